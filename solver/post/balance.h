@@ -24,8 +24,9 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
  * uz_measure_sliding. */
 uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                          const double *r, double sliding, uz_error *err);
-/* Takes one back that turned out to be without ground. */
-void uz_drop_warning(uz_evaluation *out, const char *code);
+/* Takes the warning `sliding` back, which turned out to be without ground, and warns of overlap that it had explained.
+ */
+void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene);
 
 /* Beyond the first, answers with their contacts as they are before anything moves have the second. */
 #define UZ_MOST_SLIDING 0.05

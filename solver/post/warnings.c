@@ -335,19 +335,26 @@ static void look_at_mismatch(const doubts *d, int64_t k, int64_t *row)
              contact->on, contact->with);
 }
 
-/* Facets that stand for smooth surfaces, and overlap that nothing else explains. */
-static void look_at_overlap(const doubts *d, int64_t k)
+/* Facets that stand for smooth surfaces. */
+static void look_at_facets(const doubts *d, int64_t k)
 {
-    static const char *const REASONS[] = {"facets",        "coarse_contact", "free_form",
-                                          "feature_angle", UZ_WARN_SLIDING,  "deep_overlap"};
     const uz_overlap *o = &d->out->overlap[k];
     const double approach = d->out->approach, scale = fmax(approach, o->depth);
-    bool explained = false;
     if (d->scene->contacts[k].kind == UZ_OBSTACLE_BODY && o->facets_left > MOST_FACETS * scale)
         warn(d->out, "facets", o->facets_left / scale,
              "facets of contact %lld are off their smooth surface by %.2g, with an approach of %.2g and an overlap of "
              "%.2g; smooth, or refine",
              (long long)k, o->facets_left, approach, o->depth);
+}
+
+/* Overlap that nothing else explains. */
+static void look_at_overlap(const doubts *d, int64_t k)
+{
+    static const char *const REASONS[] = {"facets",        "coarse_contact", "free_form",
+                                          "feature_angle", UZ_WARN_SLIDING,  "deep_overlap"};
+    const uz_overlap *o = &d->out->overlap[k];
+    const double approach = d->out->approach;
+    bool explained = false;
     for (int i = 0; i < d->out->n_warnings; i++)
         for (size_t j = 0; j < sizeof REASONS / sizeof REASONS[0]; j++)
             explained = explained || strcmp(d->out->warnings[i].code, REASONS[j]) == 0;
@@ -389,13 +396,17 @@ static void look_at_mesh(const doubts *d)
             (long long)mesh->n_unused);
 }
 
-void uz_drop_warning(uz_evaluation *out, const char *code)
+void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene)
 {
+    const doubts d = {.model = model, .scene = scene, .out = out};
     int kept = 0;
     for (int i = 0; i < out->n_warnings; i++)
-        if (strcmp(out->warnings[i].code, code) != 0)
+        if (strcmp(out->warnings[i].code, UZ_WARN_SLIDING) != 0)
             out->warnings[kept++] = out->warnings[i];
+    const bool dropped = kept < out->n_warnings;
     out->n_warnings = kept;
+    for (int64_t k = 0; k < scene->n_contacts && dropped; k++)
+        look_at_overlap(&d, k);
 }
 
 uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
@@ -410,6 +421,7 @@ uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const u
     const uz_status status = look_at_contact(&d, err);
     for (int64_t k = 0, row = 0; k < scene->n_contacts && status == UZ_OK; k++) {
         look_at_mismatch(&d, k, &row);
+        look_at_facets(&d, k);
         look_at_overlap(&d, k);
     }
     return status;

@@ -235,7 +235,7 @@ uz_status uz_solve_moving(uz_result **result, const uz_problem *problem, const u
         if (status != UZ_OK || keep) { /* the answer before anything moved is as good */
             if (status == UZ_OK && answered) {
                 (*result)->summary.geometry.change = next->summary.geometry.change;
-                uz_drop_warning((*result)->evaluation, UZ_WARN_SLIDING);
+                uz_drop_sliding((*result)->evaluation, &m.base->model, &problem->scene);
             }
             if (status == UZ_OK)
                 uz_timings_add(&(*result)->summary.timings, &next->summary.timings);

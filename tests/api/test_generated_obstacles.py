@@ -25,5 +25,14 @@ def test_passes_that_went_back_and_forth_or_crept(s):
         check(answer["summary"]["contact"]["geometry"]["passes"] < 30, answer["summary"]["contact"]["geometry"])
 
 
+def test_overlap_that_is_not_due_to_sliding(s):
+    """`auto` finds that the answer would not change where the body has moved to: sliding no longer explains the overlap."""
+    answer, why = generated_obstacles.contacts.Daemon(s).answer(generated_obstacles.Scene(92).request())
+    check(answer, why)
+    geometry = answer["summary"]["contact"]["geometry"]
+    check(geometry["kinematics"] == "fixed" and geometry["sliding"] > 0.05 and geometry["change"] < 0.05, geometry)
+    check([w["code"] for w in answer["summary"]["warnings"]] == ["overlap"], answer["summary"]["warnings"])
+
+
 if __name__ == "__main__":
     service.main(globals())
