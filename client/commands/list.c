@@ -8,14 +8,6 @@
 
 #define PAGE_JOBS 100L
 
-static void print_cell(FILE *to, const char *text, int width)
-{
-    client_print_safe(to, text);
-    for (int i = (int)strlen(text); i < width; i++)
-        fputc(' ', to);
-    fputs("  ", to);
-}
-
 client_exit client_list(client_session *s)
 {
     const client_options *o = s->options;
@@ -59,10 +51,10 @@ client_exit client_list(client_session *s)
         fprintf(s->out, "%-32s  %-10s  %-15s  %-24s  %s\n", "id", "status", "outcome", "created", "tags");
         for (size_t i = 0; i < json_array_size(jobs); i++) {
             const json_t *job = json_array_get(jobs, i);
-            print_cell(s->out, client_json_text(job, "id"), 32);
-            print_cell(s->out, client_json_text(job, "status"), 10);
-            print_cell(s->out, client_json_text(job, "summary.outcome"), 15);
-            print_cell(s->out, client_json_text(job, "created"), 24);
+            client_print_cell(s->out, client_json_text(job, "id"), 32);
+            client_print_cell(s->out, client_json_text(job, "status"), 10);
+            client_print_cell(s->out, client_json_text(job, "summary.outcome"), 15);
+            client_print_cell(s->out, client_json_text(job, "created"), 24);
             client_print_tags(s->out, job, ",");
             fputc('\n', s->out);
         }
@@ -90,7 +82,7 @@ client_exit client_factors(client_session *s)
             const json_t *factor = json_array_get(factors, i);
             char digest[16];
             snprintf(digest, sizeof digest, "%.12s", client_json_text(factor, "digest"));
-            print_cell(s->out, digest, 12);
+            client_print_cell(s->out, digest, 12);
             for (size_t k = 0; k < sizeof COUNTS / sizeof *COUNTS; k++)
                 fprintf(s->out, "%12.0f  ", client_json_number(factor, COUNTS[k]));
             fprintf(s->out, "%9.1f MB\n", client_json_number(factor, "bytes") / 1e6);

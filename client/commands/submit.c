@@ -131,14 +131,10 @@ static client_exit follow_all(client_session *s, const client_bodies *bodies, cl
             const char *label = bodies->item[i].label;
             double error = client_json_number(job, "summary.certificate.relative_error");
             char text[32];
-            client_print_safe(s->out, client_json_text(job, "id"));
-            fputs("  ", s->out);
             const char *outcome = client_json_text(job, "summary.outcome");
-            fprintf(s->out, "%-15s  ", *outcome ? outcome : client_json_text(job, "status"));
-            if (isfinite(error))
-                fprintf(s->out, "%-9s  ", client_format_bound(text, error));
-            else
-                fprintf(s->out, "%-9s  ", "unknown");
+            client_print_cell(s->out, client_json_text(job, "id"), 32);
+            client_print_cell(s->out, *outcome ? outcome : client_json_text(job, "status"), 15);
+            client_print_cell(s->out, isfinite(error) ? client_format_bound(text, error) : "unknown", 9);
             client_print_safe(s->out, label);
             fputc('\n', s->out);
         }

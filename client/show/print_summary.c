@@ -411,24 +411,9 @@ void client_print_cases(FILE *to, const json_t *result)
     json_array_foreach(cases, i, item)
     {
         const json_t *summary = json_object_get(item, "summary");
-        /* At most NAME_WIDTH characters of the name, and padding; UTF-8 counts characters. */
-        const char *name = client_json_text(item, "name");
-        char text[4 * NAME_WIDTH + 1];
-        size_t used = 0;
-        int width = 0;
-        for (; name[used] && used + 4 < sizeof text; used++) {
-            bool begins = ((unsigned char)name[used] & 0xc0) != 0x80;
-            if (begins && width == NAME_WIDTH)
-                break;
-            width += begins;
-            text[used] = name[used];
-        }
-        text[used] = '\0';
-        client_print_safe(to, text);
-        fprintf(to, "%*s  ", NAME_WIDTH - width, "");
-        client_print_safe(to, client_json_text(summary, "outcome"));
-        fprintf(to, "%*s  %10s  %8s  %s\n", 15 - (int)strlen(client_json_text(summary, "outcome")), "",
-                number_in_words(iterations, summary, "iterations", 9),
+        client_print_cell(to, client_json_text(item, "name"), NAME_WIDTH);
+        client_print_cell(to, client_json_text(summary, "outcome"), 15);
+        fprintf(to, "%10s  %8s  %s\n", number_in_words(iterations, summary, "iterations", 9),
                 number_in_words(touch, summary, "contact.active", 9),
                 bound_in_words(error, summary, "certificate.relative_error"));
     }

@@ -92,6 +92,23 @@ void client_print_tags(FILE *to, const json_t *job, const char *separator)
     }
 }
 
+void client_print_cell(FILE *to, const char *text, int width)
+{
+    char shown[256];
+    size_t used = 0;
+    int characters = 0;
+    for (; text[used] && used + 4 < sizeof shown; used++) {
+        const bool begins = ((unsigned char)text[used] & 0xc0) != 0x80; /* of a character in UTF-8 */
+        if (begins && characters == width)
+            break;
+        characters += begins;
+        shown[used] = text[used];
+    }
+    shown[used] = '\0';
+    client_print_safe(to, shown);
+    fprintf(to, "%*s", width - characters + 2, "");
+}
+
 void client_print_job(FILE *to, const json_t *job)
 {
     static const char *const TIMES[] = {"created", "started", "finished"};

@@ -22,6 +22,9 @@ client_exit client_job_exit(const json_t *job);
 void client_print_job(FILE *to, const json_t *job);
 /* Its tags, safe for a terminal, with the separator between them. */
 void client_print_tags(FILE *to, const json_t *job, const char *separator);
+/* A cell of a table: at most `width` characters of the text, safe for a terminal, filled up with blanks to that, and
+ * two more. */
+void client_print_cell(FILE *to, const char *text, int width);
 /* What came of an ended job, about 15 lines. Parts that the job lacks are left out. */
 void client_print_summary(FILE *to, const json_t *job);
 /* A line for each load case of a result. */

@@ -15,6 +15,14 @@
 #include <pthread.h>
 #include <semaphore.h>
 
+/* What streams over all jobs share: the texts of the latest changes, each encoded once for all of them (events.c). */
+#define TOLD_TEXTS 512
+typedef struct {
+    uint64_t number; /* of the change; 0: none */
+    const char *event;
+    char *data;
+} told_text;
+
 /* What handlers may use, the same for all requests. */
 typedef struct {
     store *store;
@@ -27,7 +35,8 @@ typedef struct {
     http_options options;
     transport *server;
     sem_t turns;                  /* so many replies may be computed at a time, the others wait: fields.c */
-    struct told_changes *told;    /* texts of the latest changes of jobs: events.c */
+    pthread_mutex_t told_lock;    /* the next; taken before the store's and the workers' own */
+    told_text told[TOLD_TEXTS];   /* of change n at n % TOLD_TEXTS */
     char run[17];                 /* a random name of this run of the daemon */
     pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
     pthread_mutex_t ready_lock;   /* the next two */
@@ -51,10 +60,6 @@ bool admission_check(api *context, http_request *rq);
 bool uploads_begin(api *context, http_request *rq);
 /* A piece of the body; ctx: the api. */
 bool uploads_take(void *ctx, http_request *rq, const char *data, size_t size);
-
-/* ---- what streams over all jobs share: the texts of the latest changes, each encoded once for all of them */
-struct told_changes *told_changes_new(void);    /* NULL: no memory */
-void told_changes_free(struct told_changes *t); /* NULL is fine */
 
 /* ---- the route table (routes.c) */
 typedef void (*route_handler)(api *context, http_request *rq, http_reply *reply);

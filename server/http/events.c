@@ -105,18 +105,6 @@ void events_get(api *context, http_request *rq, http_reply *reply)
 
 #define EVERY_S 0.1 /* a stream tells at most so often */
 #define AT_ONCE 64  /* changes that are told together */
-#define TEXTS   512 /* that are kept for other streams */
-
-typedef struct {
-    uint64_t number; /* of the change; 0: none */
-    const char *event;
-    char *data;
-} told_text;
-
-struct told_changes {
-    pthread_mutex_t lock;   /* taken before the store's and the workers' own */
-    told_text texts[TEXTS]; /* of change n at n % TEXTS */
-};
 
 typedef struct {
     event_stream base;
@@ -125,30 +113,12 @@ typedef struct {
     bool reset;    /* that it must be told first */
 } all_stream;
 
-struct told_changes *told_changes_new(void)
-{
-    struct told_changes *t = calloc(1, sizeof *t);
-    if (t)
-        pthread_mutex_init(&t->lock, NULL);
-    return t;
-}
-
-void told_changes_free(struct told_changes *t)
-{
-    if (!t)
-        return;
-    for (size_t i = 0; i < TEXTS; i++)
-        free(t->texts[i].data);
-    pthread_mutex_destroy(&t->lock);
-    free(t);
-}
-
 /* ---- texts */
 
 /* Under the lock. It may describe a later state than the change made: then there is a later change, told after it. */
 static const told_text *text_of(api *context, const feed_change *change)
 {
-    told_text *kept = &context->told->texts[change->number % TEXTS];
+    told_text *kept = &context->told[change->number % TOLD_TEXTS];
     if (kept->number == change->number)
         return kept;
     free(kept->data);
@@ -192,12 +162,12 @@ static bool look_at_all(event_stream *base)
         return say(s, "reset", s->seen, "{}");
     }
     bool ok = true;
-    pthread_mutex_lock(&context->told->lock);
+    pthread_mutex_lock(&context->told_lock);
     for (size_t i = 0; ok && i < count; i++) {
         const told_text *text = text_of(context, &changes[i]);
         ok = text && say(s, text->event, changes[i].number, text->data);
     }
-    pthread_mutex_unlock(&context->told->lock);
+    pthread_mutex_unlock(&context->told_lock);
     s->seen = seen;
     return ok;
 }

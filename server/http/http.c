@@ -68,7 +68,9 @@ static void on_account(void *ctx, const http_request *rq, bool completed, bool e
 static void free_server(http_server *server)
 {
     sem_destroy(&server->context.turns);
-    told_changes_free(server->context.told);
+    for (size_t i = 0; i < TOLD_TEXTS; i++)
+        free(server->context.told[i].data);
+    pthread_mutex_destroy(&server->context.told_lock);
     rate_free(server->context.rate);
     pthread_mutex_destroy(&server->context.predict_lock);
     pthread_mutex_destroy(&server->context.ready_lock);
@@ -94,14 +96,14 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     context->options = *options;
     pthread_mutex_init(&context->predict_lock, NULL);
     pthread_mutex_init(&context->ready_lock, NULL);
+    pthread_mutex_init(&context->told_lock, NULL);
     sem_init(&context->turns, 0, (unsigned)work_settings(parts->work)->workers);
     if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
         random = (uint64_t)(clock_seconds(CLOCK_MONOTONIC) * 1e9);
     snprintf(context->run, sizeof context->run, "%016llx", (unsigned long long)random);
     if (options->max_client_rate > 0)
         context->rate = rate_new(options->max_client_rate);
-    context->told = told_changes_new();
-    if (!context->told || (options->max_client_rate > 0 && !context->rate)) {
+    if (options->max_client_rate > 0 && !context->rate) {
         snprintf(message, size, "cannot start the HTTP server: out of memory");
         close(listen_fd);
         free_server(server);

@@ -4,7 +4,6 @@
 #include "codec/codec.h"
 #include "store/uploads.h"
 
-#include <errno.h>
 #include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -84,11 +83,9 @@ void *housekeeping_loop(void *arg)
 {
     work *w = arg;
     idle_watch idle = {.since = clock_seconds(CLOCK_MONOTONIC)};
-    struct timespec deadline;
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {
-        work_deadline(&deadline, ROUND_S);
-        if (pthread_cond_timedwait(&w->tick, &w->lock, &deadline) != ETIMEDOUT)
+        if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + ROUND_S))
             continue;
         pthread_mutex_unlock(&w->lock);
         keep_reserve(w, &idle);

@@ -64,9 +64,6 @@ struct work {
 /* Decodes, solves and stores one claimed job; takes over its texts and the body. */
 void work_run(worker *me, job *claimed, char *body, size_t body_len);
 
-/* Fills `deadline` with now + seconds on CLOCK_MONOTONIC, which every condition here uses. */
-void work_deadline(struct timespec *deadline, double seconds);
 bool work_is_stopping(work *w);
-void work_init_condition(pthread_cond_t *condition);
 
 #endif

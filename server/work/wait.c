@@ -1,35 +1,10 @@
-/* wait.c: those who wait for a job to end, and the clock that they wait by. */
+/* wait.c: those who wait for a job to end. */
 #include "work/internal.h"
 
 #include <poll.h>
-#include <time.h>
 
 /* Every change of a job is told; should a store have failed when one looked, it is asked again after this. */
 #define LOOK_AGAIN_S 15.0
-
-/* ---- time */
-
-void work_deadline(struct timespec *deadline, double seconds)
-{
-    double s = seconds > 0.0 ? seconds : 0.0; /* NaN: now */
-    clock_gettime(CLOCK_MONOTONIC, deadline);
-    s = s < 1e8 ? s : 1e8;
-    time_t whole = (time_t)s;
-    long nanoseconds = deadline->tv_nsec + (long)(1e9 * (s - (double)whole));
-    deadline->tv_sec += whole + nanoseconds / 1000000000;
-    deadline->tv_nsec = nanoseconds % 1000000000;
-}
-
-void work_init_condition(pthread_cond_t *condition)
-{
-    pthread_condattr_t attributes;
-    pthread_condattr_init(&attributes);
-    pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
-    pthread_cond_init(condition, &attributes);
-    pthread_condattr_destroy(&attributes);
-}
-
-/* ---- waiters */
 
 static bool has_ended(work *w, const char *id)
 {

@@ -214,7 +214,6 @@ static void tell(webhooks *all, const webhook_due *due)
 static void *tell_loop(void *arg)
 {
     webhooks *all = arg;
-    struct timespec deadline;
     while (!atomic_load(&all->stop)) {
         webhook_due due;
         if (store_webhook_next(all->store, &due) == STORE_OK) {
@@ -222,10 +221,9 @@ static void *tell_loop(void *arg)
             free(due.url);
             continue;
         }
-        work_deadline(&deadline, LOOK_S);
         pthread_mutex_lock(&all->lock);
         if (!atomic_load(&all->stop))
-            pthread_cond_timedwait(&all->wake, &all->lock, &deadline);
+            clock_wait(&all->wake, &all->lock, clock_seconds(CLOCK_MONOTONIC) + LOOK_S);
         pthread_mutex_unlock(&all->lock);
     }
     return NULL;
@@ -282,7 +280,7 @@ webhooks *webhooks_start(store *s, const webhook_options *options, server_log *l
     all->options = *options;
     atomic_init(&all->stop, false);
     pthread_mutex_init(&all->lock, NULL);
-    work_init_condition(&all->wake);
+    clock_condition(&all->wake);
     if (options->n_allow == 0) { /* what was to be told before is given up, so that its jobs need not stay for it */
         bool any = false;
         if (store_webhooks_open(s, &any) != STORE_OK || !any)

@@ -2,7 +2,7 @@
 #include "work/housekeeping.h"
 #include "work/internal.h"
 
-#include <errno.h>
+#include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -45,15 +45,10 @@ static store_status claim(worker *me, job *claimed, char **body, size_t *body_le
 /* Waits until something was submitted since `seen`; after a failure of the store it tries again anyway. */
 static void wait_for_work(work *w, uint64_t seen, bool store_failed)
 {
-    struct timespec deadline;
-    work_deadline(&deadline, CLAIM_RETRY_S);
+    const double until = store_failed ? clock_seconds(CLOCK_MONOTONIC) + CLAIM_RETRY_S : (double)INFINITY;
     pthread_mutex_lock(&w->lock);
-    while (!w->stopping && (store_failed || w->submitted == seen)) {
-        if (!store_failed)
-            pthread_cond_wait(&w->wake, &w->lock);
-        else if (pthread_cond_timedwait(&w->wake, &w->lock, &deadline) == ETIMEDOUT)
-            break;
-    }
+    while (!w->stopping && (store_failed || w->submitted == seen) && clock_wait(&w->wake, &w->lock, until))
+        ;
     pthread_mutex_unlock(&w->lock);
 }
 
@@ -118,11 +113,9 @@ static void renew(worker *me)
 static void *keep_loop(void *arg)
 {
     work *w = arg;
-    struct timespec deadline;
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {
-        work_deadline(&deadline, w->options.lease_s / 3.0);
-        if (pthread_cond_timedwait(&w->tick, &w->lock, &deadline) != ETIMEDOUT)
+        if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + w->options.lease_s / 3.0))
             continue;
         pthread_mutex_unlock(&w->lock);
         for (int i = 0; i < w->options.workers; i++)
@@ -202,9 +195,9 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     w->options.lease_s = options->lease_s > 0.0 ? options->lease_s : 30.0;
     pthread_mutex_init(&w->claim_lock, NULL);
     pthread_mutex_init(&w->lock, NULL);
-    work_init_condition(&w->wake);
-    work_init_condition(&w->idle);
-    work_init_condition(&w->tick);
+    clock_condition(&w->wake);
+    clock_condition(&w->idle);
+    clock_condition(&w->tick);
     w->cache = uz_cache_new(options->cache_bytes - (options->reserve ? options->cache_bytes / RESERVE_SHARE : 0));
     w->feed = feed_new();
     w->workers = calloc((size_t)w->options.workers, sizeof *w->workers);
@@ -260,7 +253,6 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
 
 void work_stop(work *w, double drain_s)
 {
-    struct timespec deadline;
     double until = clock_seconds(CLOCK_MONOTONIC) + (drain_s > 0.0 ? drain_s : 0.0);
     pthread_mutex_lock(&w->lock);
     bool first = !w->stopping;
@@ -272,10 +264,8 @@ void work_stop(work *w, double drain_s)
     feed_wake_all(w->feed);
     pthread_mutex_lock(&w->lock);
     while (first && w->alive > 0 &&
-           clock_seconds(CLOCK_MONOTONIC) < w->drain_until) { /* another call may bring that time nearer */
-        work_deadline(&deadline, w->drain_until - clock_seconds(CLOCK_MONOTONIC));
-        pthread_cond_timedwait(&w->idle, &w->lock, &deadline);
-    }
+           clock_seconds(CLOCK_MONOTONIC) < w->drain_until) /* another call may bring that time nearer */
+        clock_wait(&w->idle, &w->lock, w->drain_until);
     while (!first && !w->stopped)
         pthread_cond_wait(&w->idle, &w->lock);
     pthread_mutex_unlock(&w->lock);

@@ -46,13 +46,7 @@ static void *watch(void *argument)
             earliest = fmin(earliest, d->at);
         }
         all->wake_at = earliest;
-        if (isinf(earliest)) {
-            pthread_cond_wait(&all->changed, &all->mutex);
-            continue;
-        }
-        struct timespec t = {.tv_sec = (time_t)earliest};
-        t.tv_nsec = (long)((earliest - (double)t.tv_sec) * 1e9);
-        pthread_cond_timedwait(&all->changed, &all->mutex, &t);
+        clock_wait(&all->changed, &all->mutex, earliest);
     }
     pthread_mutex_unlock(&all->mutex);
     return NULL;
@@ -67,11 +61,7 @@ deadlines *deadlines_new(const char *last_words)
         free(words);
         return NULL;
     }
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
-    pthread_cond_init(&all->changed, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    clock_condition(&all->changed);
     pthread_mutex_init(&all->mutex, NULL);
     all->wake_at = INFINITY;
     all->last_words = words;
