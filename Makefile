@@ -194,7 +194,7 @@ $(BUILD)/theory: $(call obj,$(THEORY_SRC) tests/support/harness_measure.c) $(BUI
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
 
 # Counts back-substitutions by standing between the solver's parts (tests/figures/count.c).
-FIGURES_WRAP := uz_factor_forward uz_factor_backward uz_principal_solve uz_multigrid_apply
+FIGURES_WRAP := uz_factor_solve_one uz_factor_solve_lanes uz_principal_solve uz_multigrid_apply
 $(BUILD)/figures: $(call obj,$(FIGURES_SRC) tests/support/harness_measure.c tests/support/harness_files.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) $(patsubst %,-Wl$(comma)--wrap=%,$(FIGURES_WRAP)) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
 

@@ -99,9 +99,9 @@ static uz_status solve_coarsest(const uz_multigrid *mg, uz_multigrid_room *room,
 {
     double *t = room->t[mg->levels - 1];
     uz_factor_permute(mg->coarsest, t, b);
-    uz_status status = uz_factor_forward(mg->coarsest, room->ws, t, 1, err);
+    uz_status status = uz_factor_solve_one(mg->coarsest, room->ws, t, true, err);
     if (status == UZ_OK)
-        status = uz_factor_backward(mg->coarsest, room->ws, t, 1, err);
+        status = uz_factor_solve_one(mg->coarsest, room->ws, t, false, err);
     uz_factor_unpermute(mg->coarsest, x, t);
     return status;
 }

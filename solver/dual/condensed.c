@@ -228,7 +228,7 @@ static uz_status load_whole(uz_dual_load *load, const double *p, uz_error *err)
     if (status != UZ_OK)
         return status;
     uz_factor_permute(factor, x->base, p);
-    status = uz_factor_forward(factor, x->ws, x->base, 1, err);
+    status = uz_factor_solve_one(factor, x->ws, x->base, true, err);
     if (status != UZ_OK)
         return status;
     load->psi0 = -0.5 * uz_dot(load->dual->d, x->base, x->base);
@@ -335,7 +335,7 @@ static uz_status recover(uz_dual_load *load, double *u, const double *r, bool co
         y[k] = x->base ? x->base[k] : x->lane[k * UZ_LANES];
     uz_status status = add_reactions(load, y, 1, u, r, corrected, err); /* u is room */
     if (status == UZ_OK)
-        status = uz_factor_backward(dual->factor, x->ws, y, 1, err);
+        status = uz_factor_solve_one(dual->factor, x->ws, y, false, err);
     if (status == UZ_OK)
         uz_factor_unpermute(dual->factor, u, y);
     free(own);

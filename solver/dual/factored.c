@@ -25,9 +25,9 @@ static uz_status solve(factored_load *x, double *v, uz_error *err)
     const uz_factor *factor = x->sparse.load.dual->factor;
     double *room = x->sparse.work2;
     uz_factor_permute(factor, room, v);
-    uz_status status = uz_factor_forward(factor, x->ws, room, 1, err);
+    uz_status status = uz_factor_solve_one(factor, x->ws, room, true, err);
     if (status == UZ_OK)
-        status = uz_factor_backward(factor, x->ws, room, 1, err);
+        status = uz_factor_solve_one(factor, x->ws, room, false, err);
     uz_factor_unpermute(factor, v, room);
     return status;
 }

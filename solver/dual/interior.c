@@ -98,9 +98,9 @@ static uz_status factorize(interior *x, bool *can, uz_error *err)
 static uz_status solve(interior *x, const uz_factor *factor, uz_error *err)
 {
     uz_factor_permute(factor, x->room, x->dw);
-    uz_status status = uz_factor_forward(factor, x->ws, x->room, 1, err);
+    uz_status status = uz_factor_solve_one(factor, x->ws, x->room, true, err);
     if (status == UZ_OK)
-        status = uz_factor_backward(factor, x->ws, x->room, 1, err);
+        status = uz_factor_solve_one(factor, x->ws, x->room, false, err);
     uz_factor_unpermute(factor, x->dw, x->room);
     return status;
 }

@@ -65,9 +65,9 @@ static uz_status step(multipliers *a, double *r, const uz_factor *factor, uz_fac
         for (int64_t k = Nt->ptr[i]; a->active[i] && k < Nt->ptr[i + 1]; k++)
             a->e[Nt->idx[k]] += Nt->val[k] * a->sigma[i] * a->f[i];
     uz_factor_permute(factor, a->room, a->e);
-    uz_status status = uz_factor_forward(factor, ws, a->room, 1, err);
+    uz_status status = uz_factor_solve_one(factor, ws, a->room, true, err);
     if (status == UZ_OK)
-        status = uz_factor_backward(factor, ws, a->room, 1, err);
+        status = uz_factor_solve_one(factor, ws, a->room, false, err);
     uz_factor_unpermute(factor, a->e, a->room);
     for (int64_t i = 0; i < a->dual->m; i++) {
         double change = a->f[i];

@@ -109,11 +109,11 @@ static uz_status estimate_condition(uz_factor *factor, const uz_csc *K, uz_error
     for (int64_t k = 0; status == UZ_OK && k < n; k++)
         y[k] = sqrt(K->val[K->ptr[perm[k]]]) * (uz_uniform(&state) - 0.5);
     if (status == UZ_OK)
-        status = uz_factor_forward(factor, ws, y, 1, err);
+        status = uz_factor_solve_one(factor, ws, y, true, err);
     for (int64_t k = 0; status == UZ_OK && k < n; k++)
         square += y[k] * y[k];
     if (status == UZ_OK)
-        status = uz_factor_backward(factor, ws, y, 1, err);
+        status = uz_factor_solve_one(factor, ws, y, false, err);
     for (int64_t k = 0; status == UZ_OK && k < n; k++)
         weighted += K->val[K->ptr[perm[k]]] * y[k] * y[k];
     if (square / weighted < factor->info.rcond) /* false for NaN, as powers far out of range make it */

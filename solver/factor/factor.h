@@ -71,11 +71,8 @@ void uz_factor_workspace_free(uz_factor_workspace *ws);
 /* Vectors in the factor's own order: permuted[k] = x[perm[k]]. */
 void uz_factor_permute(const uz_factor *factor, double *permuted, const double *x);
 void uz_factor_unpermute(const uz_factor *factor, double *x, const double *permuted);
-/* In place on an n x columns array, column-major, in the factor's order: x = L^-1 x and x = L'^-1 x. */
-uz_status uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                            uz_error *err);
-uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                             uz_error *err);
+/* In place on a vector x (n) in the factor's order: x = L^-1 x (forward), or x = L'^-1 x. UZ_ERR_MEMORY. */
+uz_status uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward, uz_error *err);
 
 /* The same for blocks of UZ_LANES vectors that stand side by side: entry k of vector l at X[k * UZ_LANES + l], n rows,
  * one block after the other. An answer depends neither on what the other lanes hold nor on the lane. Permutations are

@@ -31,7 +31,7 @@ struct uz_factor {
 
 struct uz_factor_workspace {
     cholmod_common common;
-    double *panel; /* CHOLMOD's gather room, grown on demand */
+    double *panel; /* room to gather rows in, grown on demand */
     size_t panel_size;
 };
 
@@ -65,10 +65,6 @@ double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_do
 
 /* Gives ws->panel at least `need` entries. */
 uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err);
-
-/* x (n, in the factor's order) = L^-1 x, or L'^-1 x, in place; ws->panel is room. Only memory can fail. */
-uz_status uz_single_substitute(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward,
-                               uz_error *err);
 
 /* The symbolic supernodal factor of n dofs from that of their groups; NULL: no memory. */
 cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t n, cholmod_common *common);

@@ -20,7 +20,7 @@ enum { VECTORS = 4 };
 #define LEAST_SHARE 7e-4
 
 struct uz_norm_estimate {
-    double *Y; /* n x VECTORS, in the factor's order */
+    double *Y; /* a block of UZ_LANES vectors, in the factor's order; those from VECTORS on are 0 */
     int half_solves;
 };
 
@@ -28,12 +28,13 @@ uz_norm_estimate *uz_norm_estimate_new(const uz_factor *factor)
 {
     uint64_t state = 0x9E3779B97F4A7C15u;
     uz_norm_estimate *norm = uz_alloc_zero(1, sizeof *norm);
-    if (norm && !(norm->Y = uz_alloc(factor->n * VECTORS, sizeof *norm->Y))) {
+    if (norm && !(norm->Y = uz_alloc_zero(factor->n * UZ_LANES, sizeof *norm->Y))) {
         free(norm);
         norm = NULL;
     }
-    for (int64_t k = 0; norm && k < factor->n * VECTORS; k++)
-        norm->Y[k] = 2.0 * uz_uniform(&state) - 1.0;
+    for (int v = 0; norm && v < VECTORS; v++)
+        for (int64_t k = 0; k < factor->n; k++)
+            norm->Y[k * UZ_LANES + v] = 2.0 * uz_uniform(&state) - 1.0;
     return norm;
 }
 
@@ -50,7 +51,7 @@ static void scale(double *Y, const uz_factor *factor, const uz_csc *K)
     for (int64_t k = 0; k < factor->n; k++) {
         const double root = sqrt(K->val[K->ptr[perm[k]]]);
         for (int v = 0; v < VECTORS; v++)
-            Y[k + v * factor->n] *= root;
+            Y[k * UZ_LANES + v] *= root;
     }
 }
 
@@ -61,14 +62,19 @@ uz_status uz_norm_estimate_step(double *bound, bool *done, uz_norm_estimate *nor
     const bool back = norm->half_solves % 2 == 1;
     if (!back)
         scale(norm->Y, factor, K);
-    uz_status status = (back ? uz_factor_backward : uz_factor_forward)(factor, ws, norm->Y, VECTORS, err);
+    uz_status status = uz_factor_solve_lanes(factor, norm->Y, 1, !back, err);
+    if (status == UZ_OK)
+        status = uz_need_panel(ws, (size_t)factor->n, err);
     if (status != UZ_OK)
         return status;
     if (back)
         scale(norm->Y, factor, K);
     double largest = 0.0;
-    for (int v = 0; v < VECTORS; v++)
-        largest = fmax(largest, uz_norm(factor->n, norm->Y + v * factor->n));
+    for (int v = 0; v < VECTORS; v++) {
+        for (int64_t k = 0; k < factor->n; k++)
+            ws->panel[k] = norm->Y[k * UZ_LANES + v];
+        largest = fmax(largest, uz_norm(factor->n, ws->panel));
+    }
     norm->half_solves++;
     *bound = pow(largest / LEAST_SHARE, 2.0 / norm->half_solves);
     *done = norm->half_solves >= HALF_SOLVES;

@@ -270,7 +270,7 @@ UZ_AVX2_FMA static void substitute_back_fused(const panel_of *s)
     substitute_back(s);
 }
 
-uz_status uz_single_substitute(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward, uz_error *err)
+uz_status uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward, uz_error *err)
 {
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;

@@ -1,4 +1,4 @@
-/* triangular.c: substitutions with the factor, and its trailing block. */
+/* triangular.c: what substitutions with the factor need, and its trailing block. */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
@@ -54,8 +54,6 @@ cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns)
     return X;
 }
 
-typedef int (*substitution)(cholmod_factor *, cholmod_dense *, cholmod_dense *, cholmod_common *);
-
 uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err)
 {
     if (ws->panel && need <= ws->panel_size)
@@ -64,34 +62,6 @@ uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err)
     ws->panel = uz_alloc((int64_t)need, sizeof *ws->panel);
     ws->panel_size = ws->panel ? need : 0;
     return ws->panel ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution");
-}
-
-static uz_status substitute(substitution solve, const uz_factor *factor, uz_factor_workspace *ws, double *x,
-                            int64_t columns, uz_error *err)
-{
-    uz_status status = uz_need_panel(ws, factor->L.maxesize * (size_t)columns, err);
-    if (status != UZ_OK)
-        return status;
-    cholmod_dense X = uz_view_dense(x, factor->n, columns),
-                  E = uz_view_dense(ws->panel, (int64_t)factor->L.maxesize, columns);
-    if (!solve((cholmod_factor *)&factor->L, &X, &E, &ws->common) || ws->common.status != CHOLMOD_OK)
-        return uz_fail(err, UZ_ERR_INTERNAL, "", "substitution failed (CHOLMOD status %d)", ws->common.status);
-    return UZ_OK;
-}
-
-uz_status uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns, uz_error *err)
-{
-    if (columns == 1)
-        return uz_single_substitute(factor, ws, x, true, err);
-    return substitute(cholmod_l_super_lsolve, factor, ws, x, columns, err);
-}
-
-uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                             uz_error *err)
-{
-    if (columns == 1)
-        return uz_single_substitute(factor, ws, x, false, err);
-    return substitute(cholmod_l_super_ltsolve, factor, ws, x, columns, err);
 }
 
 /* The elimination tree of several unconnected bodies is a forest and its postorder may put one body's contact dofs

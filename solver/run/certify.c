@@ -52,7 +52,7 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err
         return uz_dual_load_inverse_norm(run->work.dual, value, e, err);
     double *x = run->work.scratch;
     uz_factor_permute(factor, x, e);
-    uz_status status = uz_factor_forward(factor, run->work.ws, x, 1, err);
+    uz_status status = uz_factor_solve_one(factor, run->work.ws, x, true, err);
     const double norm = uz_norm(run->d, x);
     *value = norm * norm;
     return status;
@@ -63,7 +63,7 @@ static uz_status measure_doubt(void *ctx, double *doubt, uz_error *err)
     uz_run *run = ctx;
     const uz_request *asked = run->asked;
     const uz_stop stop = {asked->hooks, asked->deadline};
-    return uz_setup_doubt(asked->setup, doubt, uz_setup_K(asked->setup, asked->problem), run->work.ws, &stop, err);
+    return uz_setup_doubt(asked->setup, doubt, uz_setup_K(asked->setup, asked->problem), &stop, err);
 }
 
 uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz_error *err)

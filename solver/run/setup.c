@@ -234,36 +234,37 @@ uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *proble
 /* What a half solve needs. */
 typedef struct {
     const uz_factor *factor;
-    const uz_csc *K;
-    uz_factor_workspace *ws;
-    double *room; /* d */
+    int64_t d;
+    double *room; /* d x UZ_LANES */
 } half_solver;
 
 /* S^-1 = L^-1 P, S^-T = P'L'^-1. */
 static uz_status half_solve(void *ctx, double *X, int64_t columns, bool transposed, uz_error *err)
 {
     const half_solver *s = ctx;
-    const int64_t d = s->K->cols;
-    uz_status status = transposed ? uz_factor_backward(s->factor, s->ws, X, columns, err) : UZ_OK;
-    for (int64_t k = 0; status == UZ_OK && k < columns; k++) {
-        (transposed ? uz_factor_unpermute : uz_factor_permute)(s->factor, s->room, X + k * d);
-        memcpy(X + k * d, s->room, (size_t)d * sizeof *X);
+    const int64_t d = s->d, *position = uz_factor_position(s->factor);
+    uz_status status = UZ_OK;
+    for (int64_t first = 0; status == UZ_OK && first < columns; first += UZ_LANES) {
+        const int64_t lanes = columns - first < UZ_LANES ? columns - first : UZ_LANES;
+        double *x = X + first * d;
+        for (int64_t l = 0; l < lanes; l++)
+            for (int64_t i = 0; i < d; i++)
+                s->room[(transposed ? i : position[i]) * UZ_LANES + l] = x[i + l * d];
+        status = uz_factor_solve_lanes(s->factor, s->room, 1, !transposed, err);
+        for (int64_t l = 0; l < lanes; l++)
+            for (int64_t i = 0; i < d; i++)
+                x[i + l * d] = s->room[(transposed ? position[i] : i) * UZ_LANES + l];
     }
-    if (status == UZ_OK && !transposed)
-        status = uz_factor_forward(s->factor, s->ws, X, columns, err);
     return status;
 }
 
 /* Under the mutex. */
-static uz_status know_doubt(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
-                            uz_error *err)
+static uz_status know_doubt(uz_setup *setup, const uz_csc *K, const uz_stop *stop, uz_error *err)
 {
-    half_solver solver = {setup->factor, K, ws, uz_alloc(K->cols, sizeof(double))};
     double norm;
-    if (!isnan(setup->doubt)) {
-        free(solver.room);
+    if (!isnan(setup->doubt))
         return UZ_OK;
-    }
+    half_solver solver = {setup->factor, K->cols, uz_alloc_zero(K->cols * UZ_LANES, sizeof(double))};
     uz_status status = solver.room
                            ? uz_distrust(&norm, K, half_solve, &solver, stop, err)
                            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)K->cols);
@@ -273,13 +274,12 @@ static uz_status know_doubt(uz_setup *setup, const uz_csc *K, uz_factor_workspac
     return status;
 }
 
-uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
-                         uz_error *err)
+uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, const uz_stop *stop, uz_error *err)
 {
     *doubt = INFINITY;
     if (!uz_lock_while(&setup->mutex, stop))
         return UZ_OK; /* who asks finds that it has to stop */
-    uz_status status = know_doubt(setup, K, ws, stop, err);
+    uz_status status = know_doubt(setup, K, stop, err);
     if (status == UZ_OK)
         *doubt = setup->doubt;
     pthread_mutex_unlock(&setup->mutex);
@@ -299,7 +299,7 @@ static uz_status improve_bound(uz_setup *setup, const uz_csc *K, uz_factor_works
         return status;
     double doubt = uz_bound_doubt(bound, K->cols); /* that of the factor; K's may be so much larger */
     if (done && !(doubt <= UZ_BOUND_HARMLESS)) {
-        status = know_doubt(setup, K, ws, stop, err);
+        status = know_doubt(setup, K, stop, err);
         doubt = status == UZ_OK ? setup->doubt : INFINITY;
     }
     if (status != UZ_ERR_CANCELLED)

@@ -74,8 +74,7 @@ double uz_setup_inverse_bound(uz_setup *setup, int steps, const uz_csc *K, uz_fa
                               const uz_stop *stop);
 /* How far its factor may be trusted: uz_distrust, made at the first call and kept with the setup. Only certificates of
  * bodies whose condition leaves doubts ask. UZ_ERR_NOT_SPD is not kept: nothing is solved on such a setup. */
-uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
-                         uz_error *err);
+uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, const uz_stop *stop, uz_error *err);
 
 /* Its matrices: the model's for a scene, the problem's otherwise. N has the rows it is solved with. */
 const uz_csc *uz_setup_K(const uz_setup *setup, const uz_problem *problem);

@@ -94,9 +94,9 @@ static uz_status solve_rows(block *s, double *x, uz_error *err)
     memset(x, 0, (size_t)s->d * sizeof *x);
     uz_csc_gaxpy(x, s->Nt, 1.0, s->row);
     uz_factor_permute(s->factor, s->dof, x);
-    uz_status status = uz_factor_forward(s->factor, s->ws, s->dof, 1, err);
+    uz_status status = uz_factor_solve_one(s->factor, s->ws, s->dof, true, err);
     if (status == UZ_OK)
-        status = uz_factor_backward(s->factor, s->ws, s->dof, 1, err);
+        status = uz_factor_solve_one(s->factor, s->ws, s->dof, false, err);
     uz_factor_unpermute(s->factor, x, s->dof);
     return status;
 }

@@ -24,26 +24,23 @@ static void count_passes(const uz_factor *factor, int64_t columns)
 }
 
 /* The names that ld gives to what is wrapped. */
-uz_status __real_uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                                   uz_error *err);
-uz_status __wrap_uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                                   uz_error *err);
-uz_status __wrap_uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                                   uz_error *err)
+uz_status __real_uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward,
+                                     uz_error *err);
+uz_status __wrap_uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward,
+                                     uz_error *err);
+uz_status __wrap_uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward,
+                                     uz_error *err)
 {
-    count_passes(factor, columns);
-    return __real_uz_factor_forward(factor, ws, x, columns, err);
+    count_passes(factor, 1);
+    return __real_uz_factor_solve_one(factor, ws, x, forward, err);
 }
 
-uz_status __real_uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                                    uz_error *err);
-uz_status __wrap_uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                                    uz_error *err);
-uz_status __wrap_uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
-                                    uz_error *err)
+uz_status __real_uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err);
+uz_status __wrap_uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err);
+uz_status __wrap_uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err)
 {
-    count_passes(factor, columns);
-    return __real_uz_factor_backward(factor, ws, x, columns, err);
+    count_passes(factor, blocks * UZ_LANES);
+    return __real_uz_factor_solve_lanes(factor, X, blocks, forward, err);
 }
 
 uz_status __real_uz_principal_solve(double *x, uz_principal *part, uz_error *err);

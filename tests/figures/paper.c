@@ -81,7 +81,8 @@ static double smallest_eigenvalue(const uz_csc *K)
     for (int step = 0; step < 500 && !(fabs(value - before) <= 1e-13 * value); step++) {
         double xx = 0, xy = 0;
         memcpy(y, x, (size_t)d * sizeof *y);
-        if (uz_factor_forward(factor, ws, y, 1, &err) != UZ_OK || uz_factor_backward(factor, ws, y, 1, &err) != UZ_OK)
+        if (uz_factor_solve_one(factor, ws, y, true, &err) != UZ_OK ||
+            uz_factor_solve_one(factor, ws, y, false, &err) != UZ_OK)
             exit(1);
         double largest = 0;
         for (int64_t j = 0; j < d; j++) {

@@ -80,8 +80,8 @@ static void solve_exactly(const pair *p, double *x)
     uz_error err = {0};
     double *y = vector(p->K.cols);
     uz_factor_permute(p->factor, y, x);
-    CHECK(uz_factor_forward(p->factor, p->ws, y, 1, &err) == UZ_OK);
-    CHECK(uz_factor_backward(p->factor, p->ws, y, 1, &err) == UZ_OK);
+    CHECK(uz_factor_solve_one(p->factor, p->ws, y, true, &err) == UZ_OK);
+    CHECK(uz_factor_solve_one(p->factor, p->ws, y, false, &err) == UZ_OK);
     uz_factor_unpermute(p->factor, x, y);
     free(y);
 }

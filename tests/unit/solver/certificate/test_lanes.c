@@ -131,7 +131,7 @@ TEST(substitutions_in_lanes)
         double worst = 0, largest = 0;
         for (int64_t lane = 0; lane < BLOCKS * UZ_LANES; lane++) {
             double *one = x + lane * d;
-            CHECK_INT((forward ? uz_factor_forward : uz_factor_backward)(f.factor, f.ws, one, 1, NULL), UZ_OK);
+            CHECK_INT(uz_factor_solve_one(f.factor, f.ws, one, forward, NULL), UZ_OK);
             for (int64_t j = 0; j < d; j++) {
                 double got = X[lane / UZ_LANES * size + j * UZ_LANES + lane % UZ_LANES];
                 worst = fmax(worst, fabs(got - one[j]));

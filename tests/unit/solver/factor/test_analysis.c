@@ -15,8 +15,8 @@ static void solve(double *x, const uz_factor *factor, const double *b, int64_t n
     uz_error err;
     double *y = vector(n);
     uz_factor_permute(factor, y, b);
-    CHECK(uz_factor_forward(factor, ws, y, 1, &err) == UZ_OK);
-    CHECK(uz_factor_backward(factor, ws, y, 1, &err) == UZ_OK);
+    CHECK(uz_factor_solve_one(factor, ws, y, true, &err) == UZ_OK);
+    CHECK(uz_factor_solve_one(factor, ws, y, false, &err) == UZ_OK);
     uz_factor_unpermute(factor, x, y);
     uz_factor_workspace_free(ws);
     free(y);

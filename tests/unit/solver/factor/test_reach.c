@@ -54,7 +54,7 @@ static void forward_row(double *x, const uz_factor *factor, uz_factor_workspace 
     e[i] = 1;
     uz_csc_gaxpy_t(b, N, 1, e);
     uz_factor_permute(factor, x, b);
-    CHECK(uz_factor_forward(factor, ws, x, 1, &err) == UZ_OK);
+    CHECK(uz_factor_solve_one(factor, ws, x, true, &err) == UZ_OK);
     free(b);
     free(e);
 }
@@ -98,13 +98,13 @@ static void check_substitutions(const uz_reach *reach, const uz_factor *factor, 
     uz_factor_permute(factor, x, b);
     memcpy(full, x, (size_t)n * sizeof *x);
     CHECK(uz_reach_forward(reach, ws, x, &err) == UZ_OK);
-    CHECK(uz_factor_forward(factor, ws, full, 1, &err) == UZ_OK);
+    CHECK(uz_factor_solve_one(factor, ws, full, true, &err) == UZ_OK);
     for (int64_t k = 0; k < n; k++)
         CHECK(fabs(x[k] - full[k]) <= 1e-13 * largest(full, n));
     for (int64_t k = 0; k < n; k++) /* any vector may be asked about at the dofs */
         x[k] = full[k] = sin((double)k);
     CHECK(uz_reach_backward(reach, ws, x, &err) == UZ_OK);
-    CHECK(uz_factor_backward(factor, ws, full, 1, &err) == UZ_OK);
+    CHECK(uz_factor_solve_one(factor, ws, full, false, &err) == UZ_OK);
     for (int64_t k = 0; k < count; k++) {
         int64_t at = uz_factor_position(factor)[dofs[k]];
         CHECK(fabs(x[at] - full[at]) <= 1e-12 * largest(full, n));

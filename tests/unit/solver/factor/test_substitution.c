@@ -13,18 +13,16 @@ static const uz_ordering orderings[] = {UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_OR
 static double single_against_several(const uz_factor *factor, uz_factor_workspace *ws, const double *b, int64_t n)
 {
     uz_error err;
-    double most = 0, size = 0, *x = vector(n), *y = vector(2 * n);
-    for (int c = 0; c < 2; c++)
-        memcpy(y + c * n, b, (size_t)n * sizeof *b);
+    double most = 0, size = 0, *x = vector(n), *y = vector(n * UZ_LANES);
+    for (int64_t i = 0; i < n * UZ_LANES; i++)
+        y[i] = b[i / UZ_LANES];
     memcpy(x, b, (size_t)n * sizeof *b);
     for (int half = 0; half < 2; half++) {
-        uz_status (*run)(const uz_factor *, uz_factor_workspace *, double *, int64_t, uz_error *) =
-            half ? uz_factor_backward : uz_factor_forward;
-        CHECK_INT(run(factor, ws, x, 1, &err), UZ_OK);
-        CHECK_INT(run(factor, ws, y, 2, &err), UZ_OK);
+        CHECK_INT(uz_factor_solve_one(factor, ws, x, half == 0, &err), UZ_OK);
+        CHECK_INT(uz_factor_solve_lanes(factor, y, 1, half == 0, &err), UZ_OK);
         for (int64_t i = 0; i < n; i++) {
-            most = fmax(most, fabs(x[i] - y[i]));
-            size = fmax(size, fabs(y[i]));
+            most = fmax(most, fabs(x[i] - y[i * UZ_LANES]));
+            size = fmax(size, fabs(y[i * UZ_LANES]));
         }
     }
     free(x);
