@@ -166,6 +166,7 @@ void uz_dual_load_free(uz_dual_load *load)
     load->dual->form->unload(load);
     free(load->h);
     free(load->g0);
+    free(load->inside);
     free(load->correction);
     free(load->kept);
     free(load);

@@ -55,6 +55,8 @@ typedef struct {
     double left;  /* the last apply's error of K^-1 N'r, a bound in the energy norm: (s'(Dr - D r))^2 <= left^2 s'D s */
     size_t bytes; /* what it holds, but for a factor of the free dofs, which comes and goes */
     uz_stop stop; /* of uz_dual_load_aim */
+    double *inside; /* m: reactions of uz_dual_load_interior, NULL: not asked. Rows that depend on each other share
+                     * theirs near these, which all press */
     double *correction, *kept; /* feasible corrections, as the form writes them: the last, and the kept one */
     bool has_kept;
     bool asked_lambda_max; /* by uz_dual_load_prepare: others on the same body may have, too */

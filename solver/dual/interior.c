@@ -110,19 +110,18 @@ static uz_status solve(interior *x, const uz_factor *factor, uz_error *err)
 static uz_status begin(interior *x, bool *can, uz_error *err)
 {
     const double *g0 = x->load->g0;
-    double along = 0.0, square = 0.0, force, least = 0.0, size = 0.0;
+    double along = 0.0, square = 0.0, alone = 0.0, least = 0.0, size = 0.0;
     for (int64_t i = 0; i < x->m; i++)
         x->z[i] = x->compliance[i] > 0.0 ? 1.0 / x->unit[i] : 0.0;
     uz_csc_gaxpy_t(x->dw, &x->dual->N, -1.0, x->z);
     uz_status status = solve(x, x->dual->factor, err);
     uz_csc_gaxpy(x->ds, &x->dual->N, -1.0, x->dw); /* D z */
     for (int64_t i = 0; i < x->m; i++) {           /* in the metric of the compliances */
-        if (x->z[i] == 0.0)
-            continue;
         along += x->z[i] * fabs(g0[i]) * x->z[i] * fabs(x->ds[i]);
         square += x->z[i] * x->ds[i] * x->z[i] * x->ds[i];
+        alone += x->z[i] * fabs(g0[i]) / (double)x->m;
     }
-    force = along / square;
+    const double force = fmin(along / square, alone); /* together rows may move nothing at all: 0 / 0 */
     *can = status == UZ_OK && force > 0.0 && isfinite(force);
     for (int64_t j = 0; j < x->d; j++)
         x->w[j] = force * x->dw[j];
@@ -252,6 +251,10 @@ uz_status uz_dual_load_interior(uz_dual_load *load, bool *can, bool *active, dou
             status = advance(&x, &on, mu, err);
         on = on && *can;
     }
+    if (status == UZ_OK && *can && !load->inside && !(load->inside = uz_alloc(x.m, sizeof *load->inside)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld reactions", (long long)x.m);
+    for (int64_t i = 0; status == UZ_OK && *can && i < x.m; i++)
+        load->inside[i] = active[i] ? -x.z[i] : 0.0;
     clear(&x);
     return status;
 }

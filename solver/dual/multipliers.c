@@ -25,6 +25,9 @@
 #define NOISE      (64.0 * DBL_EPSILON)
 #define PULL_NOISE 1e-12
 
+/* Where the terms of a gap happen to be small, the rounding of w is still that of its other entries. */
+#define LEAST_SIZE 1e-3
+
 enum { PASSES = 12 };
 
 typedef struct {
@@ -43,6 +46,7 @@ static void measure(multipliers *a, const double *r)
     memset(a->e, 0, (size_t)a->dual->d * sizeof *a->e);
     uz_csc_symv(a->e, a->x->load.K, -1.0, a->w);
     uz_csc_gaxpy_t(a->e, &a->dual->N, 1.0, r);
+    double largest = 0.0;
     a->worst = 0.0;
     for (int64_t i = 0; i < a->dual->m; i++) {
         a->f[i] = a->x->load.g0[i];
@@ -52,9 +56,11 @@ static void measure(multipliers *a, const double *r)
             a->f[i] -= term;
             a->size[i] += fabs(term);
         }
-        if (a->active[i] && a->size[i] > 0.0)
-            a->worst = fmax(a->worst, fabs(a->f[i]) / a->size[i]);
+        largest = fmax(largest, a->active[i] ? a->size[i] : 0.0);
     }
+    for (int64_t i = 0; largest > 0.0 && i < a->dual->m; i++)
+        if (a->active[i])
+            a->worst = fmax(a->worst, fabs(a->f[i]) / fmax(a->size[i], LEAST_SIZE * largest));
 }
 
 /* One pass with a factor of S. */
@@ -127,7 +133,8 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
         a.w = of_d;
         a.e = of_d + d;
         a.room = of_d + 2 * d;
-        memset(r, 0, (size_t)m * sizeof *r);
+        for (int64_t i = 0; i < m; i++)
+            r[i] = active[i] && x->load.inside ? x->load.inside[i] : 0.0;
         measure(&a, r);
         status = uz_springs_create(&S, x->load.K, dual, active, err);
     }

@@ -100,12 +100,13 @@ static bool may_exchange(const uz_iterate *it, const uz_dual_load *load)
 }
 
 /* Once, where guesses lead no further: the rows that an interior point finds, if its steps take less than to exchange
- * the rows one by one. */
+ * the rows one by one. Of rows that depend on each other it finds all that touch, where exchanges need a part that is
+ * independent and presses. */
 static uz_status look_from_inside(pivoting *p, bool *found, const uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     const double m = (double)it->m, exchanges = load->dual->can->cheap_steps ? m * m * m / 8.0 : INFINITY;
     *found = false;
-    if (p->from_inside)
+    if (p->from_inside || (load->dual->can->cheap_steps && load->dual->rows_may_depend))
         return UZ_OK;
     p->from_inside = true;
     uz_status status = uz_dual_load_interior(load, found, p->active, exchanges, err);

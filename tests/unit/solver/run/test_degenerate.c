@@ -99,42 +99,54 @@ TEST(a_long_chain_is_certified)
 }
 
 /* u_i - u_(i+1) <= h_i around a circle, with h that add up to nothing: each row holds as an equation, and u, whose mean
- * is zero, is made of halves. Of N rows at once some dozens penetrate by rounding (POWELL20 of the CUTE collection). */
-TEST(a_cycle_without_room_is_certified)
+ * is zero, is made of halves. Of n rows at once some dozens penetrate by rounding (POWELL20 of the CUTE collection). */
+static void solve_cycle(int64_t n)
 {
-    enum { N = 100 };
-    int64_t row[2 * N], column[2 * N];
-    double value[2 * N], exact[N] = {0}, mean = 0;
-    uz_qp qp = {.p = vector(N), .h = vector(N)};
-    for (int64_t i = 0; i < N; i++) {
+    int64_t *row = calloc(2 * (size_t)n, sizeof *row), *column = calloc(2 * (size_t)n, sizeof *column);
+    double *value = vector(2 * n), *exact = vector(n), mean = 0;
+    uz_qp qp = {.p = vector(n), .h = vector(n)};
+    if (!row || !column)
+        abort();
+    for (int64_t i = 0; i < n; i++) {
         row[i] = column[i] = i;
         value[i] = 1;
     }
-    CHECK_INT(uz_csc_from_triplets(&qp.K, N, N, N, row, column, value, NULL), UZ_OK);
-    for (int64_t i = 0; i < N; i++) {
+    CHECK_INT(uz_csc_from_triplets(&qp.K, n, n, n, row, column, value, NULL), UZ_OK);
+    for (int64_t i = 0; i < n; i++) {
         for (int64_t k = 0; k < 2; k++) {
             row[2 * i + k] = i;
-            column[2 * i + k] = (i + k) % N;
+            column[2 * i + k] = (i + k) % n;
             value[2 * i + k] = k ? -1 : 1;
         }
-        qp.h[i] = i + 1 == N ? 0.5 - N : 0.5 - (i % 2 ? 1.0 : -1.0) * (double)(i + 1);
-        if (i + 1 < N)
+        qp.h[i] = i + 1 == n ? 0.5 - (double)n : 0.5 - (i % 2 ? 1.0 : -1.0) * (double)(i + 1);
+        if (i + 1 < n)
             exact[i + 1] = exact[i] - qp.h[i];
-        mean += exact[i] / N;
+        mean += exact[i] / (double)n;
     }
-    CHECK_INT(uz_csc_from_triplets(&qp.N, N, N, 2 * N, row, column, value, NULL), UZ_OK);
+    CHECK_INT(uz_csc_from_triplets(&qp.N, n, n, 2 * n, row, column, value, NULL), UZ_OK);
     uz_problem problem = problem_of(qp);
     uz_settings settings = uz_settings_default();
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
         double error = 0;
-        for (int64_t i = 0; i < N; i++)
+        for (int64_t i = 0; i < n; i++)
             error = fmax(error, fabs(result->u[i] - (exact[i] - mean)));
         CHECK_INT(result->summary.outcome, UZ_CONVERGED);
-        CHECK_MSG(error <= 1e-12 * N, "off by %g", error);
+        CHECK_MSG(error <= 1e-12 * (double)n, "%d rows: off by %g", (int)n, error);
     }
     uz_result_free(result);
     uz_problem_clear(&problem);
+    free(row);
+    free(column);
+    free(value);
+    free(exact);
+}
+
+/* Dense on the contact, and with a sparse factor of all that touch. */
+TEST(a_cycle_without_room_is_certified)
+{
+    solve_cycle(100);
+    solve_cycle(1200);
 }
 
 /* Of 1,200 second differences that may not be negative nearly all are zero, and each that is let go moves all others:
