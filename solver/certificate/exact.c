@@ -186,8 +186,8 @@ static void conclude(exact *c, uz_certificate *better, const mpf_t square, doubl
     mpf_mul(error, error, term);
     mpf_mul(gap, gap, term);
     mpf_div_ui(gap, gap, 2);
-    better->gap = outward(gap, 1.0);
     better->absolute_error = outward(error, 1.0);
+    better->gap = fmax(outward(gap, 1.0), better->absolute_error > 0.0 ? DBL_TRUE_MIN : 0.0);
     /* pi(v + delta) - pi(v) = e'delta + s'N delta + 1/2 ||delta||_K^2 */
     if (settled > 0.0) {
         mpf_div_ui(term, far, 2);

@@ -118,6 +118,8 @@ void uz_run_balance_request(uz_run *run)
     if (!nodal)
         return; /* the request stays at what it was, which is stricter */
     uz_recover_nodal(nodal, model, run->answer.u, run->load.prescribed);
+    for (int64_t i = 0; run->load.exponent != 0 && i < model->mesh.n_nodes * model->mesh.dim; i++)
+        nodal[i] = ldexp(nodal[i], -run->load.exponent);
     const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
     summary->discretization_error = uz_estimate_mesh_error(model, &scene, nodal);
     free(nodal);

@@ -206,5 +206,7 @@ uz_status uz_report_run(uz_run *run, uz_error *err)
     } else {
         result->state = state;
     }
+    if (status == UZ_OK)
+        status = uz_run_unscale(run, err);
     return status == UZ_OK ? uz_report_answer(run, err) : status;
 }

@@ -77,6 +77,8 @@ uz_status uz_run_load(uz_run *run, uz_error *err)
         run->load.p = own && own->p ? own->p : problem->qp.p;
         run->load.h = run->load.h_all = own && own->h ? own->h : problem->qp.h;
     }
+    if (status == UZ_OK)
+        status = uz_run_scale_load(run, err);
     run->result->summary.timings.assemble += uz_seconds() - start;
     return status;
 }
@@ -86,14 +88,15 @@ static uz_status take_start(uz_run *run, uz_error *err)
 {
     const uz_candidates *rows = &run->asked->setup->rows;
     const uz_state *start = run->asked->start;
-    uz_state *part = NULL;
-    if (!rows->in)
-        return uz_iterate_start(&run->work.it, run->work.dual, start, err);
+    uz_state *part = NULL, *scaled = NULL;
     uz_status status = uz_state_check(start, run->all, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK && rows->in)
         status = uz_state_gather(&part, start, rows, err);
+    if (status == UZ_OK && run->load.exponent != 0)
+        status = uz_state_scaled(&scaled, part ? part : start, run->load.exponent, err);
     if (status == UZ_OK)
-        status = uz_iterate_start(&run->work.it, run->work.dual, part, err);
+        status = uz_iterate_start(&run->work.it, run->work.dual, scaled ? scaled : part ? part : start, err);
+    uz_state_free(scaled);
     uz_state_free(part);
     return status;
 }
@@ -142,15 +145,16 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
 {
     const uz_request *asked = run->asked;
     uz_work *work = &run->work;
+    uz_scaled_hooks room;
     const uz_method_options options = {
         .method = asked->settings->method,
         .stopping = asked->settings->stopping,
         .target = work->target,
-        .epsilon = asked->settings->epsilon,
+        .epsilon = ldexp(asked->settings->epsilon, run->load.exponent),
         .max_iterations = asked->settings->max_iterations,
         .deadline = asked->deadline,
         .again = work->again,
-        .hooks = asked->hooks,
+        .hooks = uz_run_hooks(&room, run),
     };
     const uz_stop stop = {asked->hooks, asked->deadline};
     uz_milestones_resume(&work->milestones, uz_run_time(run));
@@ -321,6 +325,8 @@ uz_status uz_run_finish(uz_run *run, uz_error *err)
     run->result->summary.certificate = run->answer.certificate;
     if (status == UZ_OK)
         status = uz_run_certify_all_rows(run, err);
+    if (status == UZ_OK)
+        status = uz_run_round_to_units(run, err);
     if (status != UZ_OK)
         return status;
     run->result->summary.outcome = conclude(run);

@@ -32,7 +32,8 @@ typedef struct {
     const double *h_all; /* all rows */
     double *prescribed;  /* scenes: n_fixed */
     bool moved;          /* some of them are not zero */
-    double *owned;       /* scenes: room of all of these */
+    int exponent;        /* all of these, and what is worked on and answered, are times 2^exponent (scale.c) */
+    double *owned;       /* room of all of these; matrices: NULL where they are the caller's */
 } uz_load_vectors;
 
 /* What is worked on. */
@@ -86,6 +87,27 @@ uz_status uz_run_certify(uz_run *run, uz_error *err);
 /* Further rounds while the certificate asks for them, refinement, all rows; then the report. */
 uz_status uz_run_finish(uz_run *run, uz_error *err);
 void uz_run_end(uz_run *run);
+
+/* ---- units in which squares neither over- nor underflow (scale.c) */
+
+/* Multiplies the load by a power of two where it is not of a usual size. Exact. */
+uz_status uz_run_scale_load(uz_run *run, uz_error *err);
+/* The same for an answer that was given, or the load back to its own units. */
+void uz_run_scale_given(uz_run *run);
+/* Makes the answer what doubles hold of it in the caller's units, and certifies that where it is another. */
+uz_status uz_run_round_to_units(uz_run *run, uz_error *err);
+/* Answer, certificate of the summary, history, state and radius in the caller's units; bounds stay bounds, none becomes
+ * 0. */
+uz_status uz_run_unscale(uz_run *run, uz_error *err);
+/* *out: the state in other units. */
+uz_status uz_state_scaled(uz_state **out, const uz_state *from, int exponent, uz_error *err);
+/* The caller's hooks, told in the caller's units; room lives as long as they. */
+typedef struct {
+    const uz_hooks *outer;
+    int exponent;
+    uz_hooks hooks;
+} uz_scaled_hooks;
+const uz_hooks *uz_run_hooks(uz_scaled_hooks *room, const uz_run *run);
 
 /* ---- certificates (certify.c) */
 

@@ -30,11 +30,11 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
         int64_t dof = model->dof[i], node = i / dim;
         double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
         double rounding = uz_dof_rounding(model, node, u + node * dim);
-        if (dof < 0 && !(fabs(given - run->load.prescribed[-1 - dof]) <= rounding))
+        const double held = dof < 0 ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent) : given;
+        if (!(fabs(given - held) <= rounding))
             return uz_fail(err, UZ_ERR_SCENE, "u",
                            "node %lld is supported: its displacement along %s must be %.17g, it is given as %.17g",
-                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), run->load.prescribed[-1 - dof],
-                           given);
+                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), held, given);
     }
     return UZ_OK;
 }
@@ -62,6 +62,8 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
         memcpy(answer->u, u, (size_t)run->d * sizeof *u);
     if (status == UZ_OK && size_r > 0)
         memcpy(answer->r, r, size_r);
+    if (status == UZ_OK)
+        uz_run_scale_given(run);
     double start = uz_seconds();
     if (status == UZ_OK && setup->amg) /* its certificate solves with what a load keeps */
         status = uz_dual_load_create(&run->work.dual, setup->dual, uz_setup_K(setup, asked->problem), run->load.p,
@@ -75,9 +77,11 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
         status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
     }
     summary->timings.certify = uz_seconds() - start;
+    summary->certificate = answer->certificate;
+    if (status == UZ_OK)
+        status = uz_run_unscale(run, err);
     if (status != UZ_OK)
         return status;
-    summary->certificate = answer->certificate;
     if (size_r > 0)
         memcpy(answer->r, r, size_r);
     uz_milestones_resume(&run->work.milestones, uz_run_time(run));

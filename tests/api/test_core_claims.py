@@ -99,6 +99,22 @@ def test_a_bound_is_not_zero_by_underflow(s):
             check(claimed[what] is None or claimed[what] > 0, name, what, claimed)
 
 
+def test_loads_from_the_ends_of_double(s):
+    """Times a power of two the answer is the same, bit for bit, and so is its certificate."""
+    first = None
+    for power in (0, -1000, -900, -500, -100, 100, 500, 900):
+        unit = 2.0 ** power
+        job = s.solve({"problem": {"kind": "matrices", "p": [unit, 3 * unit], "h": [-unit / 8, unit / 4, unit],
+                                   "K": "%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 3\n2 1 1\n2 2 2\n",
+                                   "N": "%%MatrixMarket matrix coordinate real general\n3 2 4\n1 1 1\n2 2 1\n3 1 1\n3 2 1\n"}})
+        told = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=displacements,reactions"), 200).json
+        summary = job["summary"]
+        answer = [x / unit for x in told["displacements"] + told["reactions"]], summary["certificate"]["relative_error"]
+        first = first or answer
+        check(summary["outcome"] == "converged" and answer == first, power, answer, first, summary)
+        check(summary["certificate"]["absolute_error"] > 0, power, summary)
+
+
 def test_a_stiffness_without_digits_is_refused(s):
     for value in ("5e-324", "3e-310", "1e-300"):
         request = {"problem": {"kind": "matrices", "p": [1], "h": [1],

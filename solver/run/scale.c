@@ -1,0 +1,251 @@
+/* scale.c: loads in units in which their squares neither over- nor underflow.
+ *
+ * u and r are homogeneous of degree 1 in (p, h), and so is every bound; energies are of degree 2. Powers of two are
+ * exact, so what is solved is the same problem bit for bit, and answers differ by the power alone. Loads of usual sizes
+ * are left as they are. */
+#include "certificate/bound.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "run/run.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Loads and gaps between 2^-USUAL and 2^USUAL are left alone. */
+enum { USUAL = 60 };
+
+/* The exponents by which x (n) can be multiplied without losing a bit, as far as [*least, *most] reaches. */
+static void keep_exact(int *least, int *most, const double *x, int64_t n)
+{
+    for (int64_t i = 0; i < n; i++) {
+        int exponent;
+        if (x[i] == 0.0)
+            continue;
+        frexp(x[i], &exponent);
+        const int down = DBL_MIN_EXP - exponent, up = DBL_MAX_EXP - exponent;
+        *least = down < 0 ? (down > *least ? down : *least) : 0;
+        *most = up < *most ? up : *most;
+    }
+}
+
+/* log2 of how large the answer may be in the energy norm, by what drives it: the load, dof by dof, and rows that u = 0
+ * penetrates. -INFINITY: nothing does. */
+static double drive(const uz_run *run, double *row_room)
+{
+    const uz_csc *K = uz_setup_K(run->asked->setup, run->asked->problem),
+                 *N = uz_setup_all_rows(run->asked->setup, run->asked->problem);
+    double most = -INFINITY;
+    memset(row_room, 0, (size_t)run->all * sizeof *row_room);
+    for (int64_t j = 0; j < run->d; j++) {
+        const double stiffness = K->ptr[j] < K->ptr[j + 1] ? K->val[K->ptr[j]] : 0.0;
+        if (!(stiffness > 0.0)) /* refused, but elsewhere */
+            continue;
+        most = fmax(most, log2(fabs(run->load.p[j])) - 0.5 * log2(stiffness));
+        for (int64_t k = N->ptr ? N->ptr[j] : 0; N->ptr && k < N->ptr[j + 1]; k++)
+            row_room[N->idx[k]] = fmax(row_room[N->idx[k]], fabs(N->val[k]) / sqrt(stiffness));
+    }
+    for (int64_t i = 0; i < run->all; i++)
+        if (run->load.h_all[i] < 0.0 && row_room[i] > 0.0)
+            most = fmax(most, log2(-run->load.h_all[i]) - log2(row_room[i]));
+    return most;
+}
+
+static bool is_usual(const uz_run *run)
+{
+    const double force = uz_bound_largest(run->load.p, run->d);
+    double depth = 0.0;
+    for (int64_t i = 0; i < run->all; i++)
+        depth = fmax(depth, -run->load.h_all[i]);
+    return (force == 0.0 || (force > ldexp(1.0, -USUAL) && force < ldexp(1.0, USUAL))) &&
+           (depth == 0.0 || (depth > ldexp(1.0, -USUAL) && depth < ldexp(1.0, USUAL)));
+}
+
+static void multiply(double *x, int64_t n, int exponent)
+{
+    for (int64_t i = 0; x && i < n; i++)
+        x[i] = ldexp(x[i], exponent);
+}
+
+uz_status uz_run_scale_load(uz_run *run, uz_error *err)
+{
+    uz_load_vectors *load = &run->load;
+    const int64_t n_fixed = run->asked->setup->is_scene ? run->asked->setup->model.n_fixed : 0,
+                  kept = load->h != load->h_all ? run->m : 0;
+    if (is_usual(run))
+        return UZ_OK;
+    /* in the order of a scene's */
+    double *own = load->owned ? load->owned : uz_alloc(run->d + run->all, sizeof *own);
+    double *row_room = uz_alloc(run->all, sizeof *row_room);
+    if (own && row_room && !load->owned) {
+        load->owned = memcpy(own, load->p, (size_t)run->d * sizeof *own);
+        if (run->all > 0)
+            memcpy(own + run->d, load->h_all, (size_t)run->all * sizeof *own);
+        load->p = own;
+        load->h = load->h_all = own + run->d;
+    }
+    if (!own || !row_room) {
+        free(own == load->owned ? NULL : own);
+        free(row_room);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
+    }
+    const double size = drive(run, row_room);
+    const int64_t n = run->d + run->all + n_fixed + kept;
+    int least = -2 * DBL_MAX_EXP, most = 2 * DBL_MAX_EXP;
+    free(row_room);
+    keep_exact(&least, &most, load->owned, n);
+    if (isfinite(size))
+        load->exponent = (int)fmax(least, fmin(most, -floor(size)));
+    multiply(load->owned, n, load->exponent);
+    return UZ_OK;
+}
+
+/* What a multiplication has lost to underflow, so that a bound stays one: towards `side`. */
+static double outward(double x, int exponent, double side)
+{
+    const double y = ldexp(x, exponent);
+    return ldexp(y, -exponent) == x || !isfinite(x) ? y : nextafter(y, copysign(INFINITY, side));
+}
+
+static void scale_residual(uz_residual *e, int exponent)
+{
+    e->e1 = ldexp(e->e1, exponent);
+    e->e2 = ldexp(e->e2, exponent);
+    e->e3 = ldexp(e->e3, exponent);
+    e->e4 = ldexp(e->e4, 2 * exponent);
+    e->total = hypot(hypot(e->e1, e->e2), hypot(e->e3, e->e4));
+}
+
+static void scale_row(uz_history_row *row, int exponent)
+{
+    row->dual_objective = ldexp(row->dual_objective, 2 * exponent);
+    row->step_norm = ldexp(row->step_norm, exponent);
+    row->error_bound = outward(row->error_bound, exponent, 1.0);
+    scale_residual(&row->residual, exponent);
+}
+
+static void scale_certificate(uz_certificate *c, int exponent)
+{
+    c->absolute_error = outward(c->absolute_error, exponent, 1.0);
+    c->gap = outward(c->gap, 2 * exponent, 1.0);
+    c->energy_primal = outward(c->energy_primal, 2 * exponent, 1.0);
+    c->energy_dual = outward(c->energy_dual, 2 * exponent, -1.0);
+    c->energy_norm = ldexp(c->energy_norm, exponent);
+    scale_residual(&c->residual, exponent);
+}
+
+uz_status uz_state_scaled(uz_state **out, const uz_state *from, int exponent, uz_error *err)
+{
+    uz_state *s = uz_alloc_zero(1, sizeof *s);
+    *out = NULL;
+    if (!s)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a state");
+    *s = *from;
+    double **to[] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
+    bool ok = true;
+    for (size_t k = 0; k < sizeof to / sizeof to[0]; k++) {
+        const double *x = *to[k];
+        *to[k] = x ? uz_alloc(s->m, sizeof *x) : NULL;
+        ok = ok && (*to[k] || !x);
+        for (int64_t i = 0; *to[k] && i < s->m; i++) {
+            const double y = ldexp(x[i], exponent);
+            (*to[k])[i] = isfinite(y) ? y : 0.0; /* of another load, and of no use to this one */
+        }
+    }
+    s->step_norm = ldexp(s->step_norm, exponent);
+    s->best_bound = outward(s->best_bound, exponent, 1.0);
+    if (ok)
+        *out = s;
+    else
+        uz_state_free(s);
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)from->m);
+}
+
+/* What was given is told as it was: a load whose units would lose some of it keeps its own. */
+void uz_run_scale_given(uz_run *run)
+{
+    uz_load_vectors *load = &run->load;
+    double *vectors[] = {run->answer.u, run->answer.r};
+    const int64_t sizes[] = {run->d, run->answer.m};
+    bool exact = true;
+    for (int k = 0; k < 2; k++)
+        for (int64_t i = 0; i < sizes[k]; i++)
+            exact = exact && ldexp(ldexp(vectors[k][i], load->exponent), -load->exponent) == vectors[k][i];
+    for (int k = 0; exact && k < 2; k++)
+        multiply(vectors[k], sizes[k], load->exponent);
+    if (exact || load->exponent == 0)
+        return;
+    const int64_t n_fixed = run->asked->setup->is_scene ? run->asked->setup->model.n_fixed : 0;
+    multiply(load->owned, run->d + run->all + n_fixed + (load->h != load->h_all ? run->m : 0), -load->exponent);
+    load->exponent = 0;
+}
+
+uz_status uz_run_round_to_units(uz_run *run, uz_error *err)
+{
+    uz_answer *answer = &run->answer;
+    double *vectors[] = {answer->u, answer->r};
+    const int64_t sizes[] = {run->d, answer->m};
+    const int exponent = run->load.exponent;
+    bool lost = false;
+    for (int k = 0; exponent > 0 && !run->result->ray && k < 2; k++)
+        for (int64_t i = 0; i < sizes[k]; i++) {
+            const double told = ldexp(ldexp(vectors[k][i], -exponent), exponent);
+            lost = lost || told != vectors[k][i];
+            vectors[k][i] = told;
+        }
+    uz_status status = lost ? uz_run_certify_answer(run, answer, err) : UZ_OK;
+    if (lost)
+        run->result->summary.certificate = answer->certificate;
+    return status;
+}
+
+uz_status uz_run_unscale(uz_run *run, uz_error *err)
+{
+    const int exponent = -run->load.exponent;
+    uz_answer *answer = &run->answer;
+    uz_result *result = run->result;
+    if (exponent == 0)
+        return UZ_OK;
+    multiply(answer->u, run->d, exponent);
+    multiply(answer->r, answer->m, exponent);
+    multiply(answer->g, answer->m, exponent);
+    multiply(run->load.prescribed, run->asked->setup->is_scene ? run->asked->setup->model.n_fixed : 0, exponent);
+    for (int64_t k = 0; k < result->history.count; k++)
+        scale_row(&result->history.rows[k], exponent);
+    scale_certificate(&result->summary.certificate, exponent);
+    result->summary.infeasible_radius = outward(result->summary.infeasible_radius, exponent, -1.0);
+    uz_state *state = result->state;
+    uz_status status = state ? uz_state_scaled(&result->state, state, exponent, err) : UZ_OK;
+    uz_state_free(state);
+    run->load.exponent = 0;
+    return status;
+}
+
+static bool asks_cancelled(void *ctx)
+{
+    const uz_scaled_hooks *own = ctx;
+    return own->outer->cancelled && own->outer->cancelled(own->outer->ctx);
+}
+
+static void tells_progress(void *ctx, const uz_history_row *row)
+{
+    const uz_scaled_hooks *own = ctx;
+    uz_history_row told = *row;
+    scale_row(&told, own->exponent);
+    if (own->outer->progress)
+        own->outer->progress(own->outer->ctx, &told);
+}
+
+const uz_hooks *uz_run_hooks(uz_scaled_hooks *room, const uz_run *run)
+{
+    const uz_hooks *outer = run->asked->hooks;
+    if (run->load.exponent == 0 || !outer)
+        return outer;
+    *room = (uz_scaled_hooks){
+        .outer = outer,
+        .exponent = -run->load.exponent,
+        .hooks = {.ctx = room, .cancelled = asks_cancelled, .progress = tells_progress},
+    };
+    return &room->hooks;
+}
