@@ -187,16 +187,20 @@ uz_status uz_run_round_to_units(uz_run *run, uz_error *err)
     double *vectors[] = {answer->u, answer->r};
     const int64_t sizes[] = {run->d, answer->m};
     const int exponent = run->load.exponent;
-    bool lost = false;
-    for (int k = 0; exponent > 0 && !run->result->ray && k < 2; k++)
+    uz_certificate *certificate = &run->result->summary.certificate;
+    bool lost = false, beyond = !isfinite(ldexp(certificate->absolute_error, -exponent));
+    for (int k = 0; exponent != 0 && !run->result->ray && k < 2; k++)
         for (int64_t i = 0; i < sizes[k]; i++) {
-            const double told = ldexp(ldexp(vectors[k][i], -exponent), exponent);
-            lost = lost || told != vectors[k][i];
-            vectors[k][i] = told;
+            const double told = ldexp(vectors[k][i], -exponent), back = ldexp(told, exponent);
+            beyond = beyond || !isfinite(told);
+            lost = lost || (back != vectors[k][i] && isfinite(told));
+            vectors[k][i] = isfinite(told) ? back : vectors[k][i];
         }
     uz_status status = lost ? uz_run_certify_answer(run, answer, err) : UZ_OK;
     if (lost)
-        run->result->summary.certificate = answer->certificate;
+        *certificate = answer->certificate;
+    if (exponent != 0 && beyond) /* no double holds the answer, or its bound */
+        certificate->absolute_error = certificate->relative_error = certificate->gap = INFINITY;
     return status;
 }
 

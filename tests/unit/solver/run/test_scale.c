@@ -172,3 +172,19 @@ TEST(what_denormals_lose_is_in_the_bound)
         uz_problem_clear(&problem);
     }
 }
+
+/* u* = 2^1100 / 3 is larger than any double: nothing is claimed of it. */
+TEST(an_answer_beyond_doubles_is_not_certified)
+{
+    const double K[] = {ldexp(3, -100)}, N[] = {1};
+    uz_settings settings = uz_settings_default();
+    uz_qp qp = {
+        .K = csc_from_dense(K, 1, 1, true), .N = csc_from_dense(N, 1, 1, false), .p = vector(1), .h = vector(1)};
+    qp.p[0] = -ldexp(1, 1000);
+    uz_problem problem = problem_of(qp);
+    uz_result *result = solve_problem(&problem, &settings);
+    CHECK(result && result->summary.outcome == UZ_PRECISION_LIMIT);
+    CHECK(result && isinf(result->summary.certificate.relative_error));
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
