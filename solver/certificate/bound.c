@@ -1,5 +1,6 @@
 #include "certificate/bound.h"
 
+#include "certificate/double_double.h"
 #include "certificate/one_sided.h"
 
 #include <float.h>
@@ -165,6 +166,34 @@ static bool has_underflown(const uz_certificate *out, const uz_bound_terms *t)
     return t->anything && fmax(out->energy_norm * out->energy_norm, 0x1p106 * t->square) < ENERGY_LEAST;
 }
 
+/* Of the sizes that entries of e and g are the differences of, double-double sums of up to some thousand terms hide no
+ * more than this (K_ij^2 <= K_ii K_jj, so that |u|'|K||u| is at most so many times the sum of K_jj u_j^2). */
+#define HIDDEN 0x1p-84
+
+void uz_bound_energy(uz_bound_terms *t, const uz_energy_sums *s, const double *r, const double *g, const double *h,
+                     int64_t d, int64_t m)
+{
+    const double n = (double)(d + m + 8), terms = n * DBL_EPSILON; /* of n rounded additions, relative */
+    double_double sum = {0.0, 0.0};
+    double of_rows = 0.0, by_rows = 0.0;
+    for (int64_t i = 0; i < m; i++) {
+        if (r[i] == 0.0) /* and h may be any size */
+            continue;
+        dd_add_product(&sum.hi, &sum.lo, r[i], h[i], 0);
+        dd_add_product(&sum.hi, &sum.lo, -r[i], g[i], 0);
+        of_rows += fabs(r[i]) * (fabs(h[i]) + fabs(g[i]));
+        by_rows += DBL_EPSILON * fabs(r[i]) * fabs(g[i]);
+    }
+    dd_add(&sum, s->work);
+    dd_add(&sum, -s->load);
+    dd_add(&sum, -s->load_low);
+    t->energy = 0.5 * (sum.hi + sum.lo);
+    /* squares that underflow hide nothing that has not been rounded up to DBL_MIN elsewhere, times n */
+    t->margin = (1.0 + 0x1p-20) * (DBL_EPSILON * fabs(t->energy) + terms * terms * (s->load_size + of_rows) + by_rows +
+                                   2.0 * terms * (s->work_size + s->change_size) + HIDDEN * (s->noise + s->pressed) +
+                                   uz_bound_rounding(s->correction, d) + n * DBL_MIN);
+}
+
 /* pi(v) = pi(u) + c'(K u - p) + 1/2 c'K c: that of the feasible v, so that it is an upper bound on the minimum. */
 void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasible, const double *r, const double *g,
                        const double *h, int64_t m)
@@ -176,16 +205,18 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
     /* (K v - p)'delta = (e + N'r)'delta with the e of v, and r'N delta = r'g(v) - r'g(v + delta) */
     const double farther = t->settled > 0.0 ? (sqrt(t->square) + 0.5 * t->settled) * t->settled : 0.0;
     const double unsure = t->settled > 0.0 ? farther + t->pressed + t->complementarity : 0.0;
-    out->energy_primal = 0.5 * t->stiffness - t->load + t->change;
+    out->energy_primal = t->energy + t->change;
+    const double margin = t->margin + DBL_EPSILON * (fabs(t->energy) + fabs(t->change));
     out->gap =
         feasible && !has_underflown(out, t) ? 0.5 * t->square + farther + t->complementarity + t->pressed : INFINITY;
-    bool number = !isnan(t->stiffness) && !isnan(t->load) && !isnan(t->change) && !isnan(t->square);
+    bool number = !isnan(t->stiffness) && !isnan(t->energy) && !isnan(t->change) && !isnan(t->square);
     if (isnan(out->gap) || !number) /* overflow on the way; fmax would make 0 of it */
         out->gap = INFINITY;
     if (t->anything) /* whatever squares and products lose by underflow */
         out->gap = fmax(out->gap, DBL_MIN);
-    out->energy_dual = out->energy_primal - unsure - out->gap;
-    out->energy_primal += unsure;
+    const double off = (1.0 + SUMS) * (unsure + margin);
+    out->energy_dual = nextafter(out->energy_primal - (off + (1.0 + SUMS) * out->gap), -INFINITY);
+    out->energy_primal = nextafter(out->energy_primal + off, INFINITY);
     out->absolute_error = sqrt(2.0 * out->gap) + correction_norm;
     if (t->anything)
         out->absolute_error = (1.0 + SUMS) * out->absolute_error + sqrt(DBL_MIN);

@@ -5,7 +5,8 @@
 #include "uzawa.h"
 
 typedef struct {
-    double stiffness, load;   /* u'Ku, u'p */
+    double stiffness;         /* u'Ku */
+    double energy, margin;    /* pi(u), and what rounding may hide of pi(v) */
     double change;            /* c'(K u - p + 1/2 K c) */
     double correction_energy; /* c'K c */
     double square;            /* bound on e'K^-1 e, with all that rounding may hide; INFINITY: none */
@@ -18,6 +19,21 @@ typedef struct {
     double whole_norm;        /* ||u||_K with the supported dofs */
     bool anything;            /* some entry of u, c or K u - p - N'r is not zero */
 } uz_bound_terms;
+
+/* Sums over the dofs of what pi(u) = 1/2 u'Ku - u'p is made of, and of magnitudes. */
+typedef struct {
+    double load, load_low, load_size; /* u'p as the pair that Dot2 gives, |u|'|p| */
+    double work, work_size;           /* u'e, |u|'|e| with e = K u - p - N'r in double-double precision */
+    double noise;                     /* u_j^2 K_jj + (|K u|_j + |p_j|)^2 / K_jj */
+    double change_size;               /* |c|'(|K u| + |p| + |K c|) */
+    double correction;                /* the sum of K_jj c_j^2 */
+    double pressed;                   /* of |r_i| times what the gap of row i is the difference of */
+} uz_energy_sums;
+
+/* t->energy and margin by u'Ku = u'e + u'p + r'(h - g): what is left of rounding is that of u'p, r'h and r'g, which are
+ * summed in double-double precision (Ogita, Rump and Oishi's bound), and of single terms. r (<= 0), g, h: m. */
+void uz_bound_energy(uz_bound_terms *t, const uz_energy_sums *s, const double *r, const double *g, const double *h,
+                     int64_t d, int64_t m);
 
 /* r (<= 0), g, h: m. Everything of *out is filled; without a feasible v the terms of c and square are not read. */
 void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasible, const double *r, const double *g,

@@ -117,47 +117,62 @@ typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
 
 typedef struct {
-    four stiffness, load, change, correction_energy, weighted, noise;
+    four stiffness, load, load_low, load_size, work, work_size, change, change_size, correction_energy, weighted, noise;
     bits anything;
 } sums;
 
 enum { VECTORS = 8 };
 
 /* From entry j on of u, p, c, K u, K c, e, e_u and the weights. */
-static inline __attribute__((always_inline)) void add_four(sums *s, const double *const x[VECTORS], int64_t j)
+static inline __attribute__((always_inline)) void add_four(sums *s, const double *const x[VECTORS], int64_t j,
+                                                           int fused)
 {
     four v[VECTORS];
     for (int k = 0; k < VECTORS; k++)
         v[k] = *(const four *)(x[k] + j);
     const four u = v[0], p = v[1], c = v[2], Ku = v[3], Kc = v[4], e = v[5], e_u = v[6], weight = v[7];
-    const four force = (four)((bits)Ku & INT64_MAX) + (four)((bits)p & INT64_MAX);
+    const four force = (four)((bits)Ku & INT64_MAX) + (four)((bits)p & INT64_MAX), load = u * p, work = u * e_u;
+    const four sum = s->load + load, back = sum - s->load;
+    four error = {0.0};
+    for (int l = 0; l < 4; l++)
+        error[l] = fused ? __builtin_fma(u[l], p[l], -load[l]) : product_error_split(u[l], p[l], load[l]);
+    s->load_low += ((s->load - (sum - back)) + (load - back)) + error;
+    s->load = sum;
+    s->load_size += (four)((bits)load & INT64_MAX);
     s->stiffness += u * Ku;
-    s->load += u * p;
+    s->work += work;
+    s->work_size += (four)((bits)work & INT64_MAX);
     s->change += c * (Ku - p + 0.5 * Kc);
+    s->change_size += (four)((bits)c & INT64_MAX) * (force + (four)((bits)Kc & INT64_MAX));
     s->correction_energy += c * Kc;
     s->weighted += e * weight * e;
     s->noise += u / weight * u + force * weight * force;
     s->anything |= ((bits)u | (bits)c | (bits)e_u) & INT64_MAX;
 }
 
-static inline __attribute__((always_inline)) void add_all(sums *s, const double *const x[VECTORS], int64_t d)
+static inline __attribute__((always_inline)) void add_all(sums *s, const double *const x[VECTORS], int64_t d, int fused)
 {
     double rest[VECTORS][4] = {{0}};
     const double *last[VECTORS];
     int64_t j = 0;
     for (; j + 4 <= d; j += 4)
-        add_four(s, x, j);
+        add_four(s, x, j, fused);
     for (int k = 0; k < VECTORS; k++) {
         last[k] = rest[k];
         for (int l = 0; l < 4; l++)
             rest[k][l] = j + l < d ? x[k][j + l] : k == VECTORS - 1;
     }
-    add_four(s, last, 0);
+    add_four(s, last, 0, fused);
 }
 
-UZ_AVX2 static void add_all_wide(sums *s, const double *const x[VECTORS], int64_t d)
+UZ_AVX2_FMA static void add_all_fused(sums *s, const double *const x[VECTORS], int64_t d)
 {
-    add_all(s, x, d);
+    add_all(s, x, d, 1);
+}
+
+static void add_all_split(sums *s, const double *const x[VECTORS], int64_t d)
+{
+    add_all(s, x, d, 0);
 }
 
 static double total(const four *x)
@@ -166,15 +181,24 @@ static double total(const four *x)
 }
 
 /* The terms that are sums over the dofs. */
-static void add_up(certifier *c, uz_bound_terms *t)
+static void add_up(certifier *c, uz_bound_terms *t, uz_energy_sums *energies)
 {
     const uz_residuals *res = &c->res;
     const double *const x[VECTORS] = {c->u, c->in->p, c->c, res->Ku, res->Kc, res->e, res->e_u, c->weight};
     sums s;
     memset(&s, 0, sizeof s);
-    (uz_cpu_has_avx2() ? add_all_wide : add_all)(&s, x, c->d);
+    (uz_cpu_has_avx2_fma() ? add_all_fused : add_all_split)(&s, x, c->d);
+    double_double load = {0.0, total(&s.load_low)};
+    for (int l = 0; l < 4; l++)
+        dd_add(&load, s.load[l]);
     t->stiffness = c->energy = total(&s.stiffness);
-    t->load = total(&s.load);
+    energies->load = load.hi;
+    energies->load_low = load.lo;
+    energies->load_size = total(&s.load_size);
+    energies->work = total(&s.work);
+    energies->work_size = total(&s.work_size);
+    energies->noise = total(&s.noise);
+    energies->change_size = total(&s.change_size);
     t->change = total(&s.change);
     t->correction_energy = total(&s.correction_energy);
     t->anything = (s.anything[0] | s.anything[1] | s.anything[2] | s.anything[3]) != 0;
@@ -183,25 +207,6 @@ static void add_up(certifier *c, uz_bound_terms *t)
     t->e1 = uz_bound_norm(res->e_u, c->d);
     t->force = uz_bound_norm(c->in->p, c->d);
     t->span = uz_bound_largest(c->Nt.val, c->Nt.ptr[c->m]) * uz_bound_largest(c->u, c->d);
-}
-
-static void add_dot(double_double *sum, double factor, const double *x, const double *y, int64_t n)
-{
-    for (int64_t i = 0; i < n; i++)
-        dd_add_product(&sum->hi, &sum->lo, factor * x[i], y[i], 0);
-}
-
-/* u'Ku = u'e_u + u'p + r'N u with e_u = K u - p - N'r, which is known in double-double precision, and N u = h - g. */
-static void sharpen_energies(const certifier *c, uz_bound_terms *t, const double *r, const double *g)
-{
-    double_double load = {0.0, 0.0};
-    add_dot(&load, 1.0, c->u, c->in->p, c->d);
-    double_double stiffness = load;
-    add_dot(&stiffness, 1.0, c->u, c->res.e_u, c->d);
-    add_dot(&stiffness, 1.0, r, c->in->h, c->m);
-    add_dot(&stiffness, -1.0, r, g, c->m);
-    t->load = load.hi + load.lo;
-    t->stiffness = stiffness.hi + stiffness.lo;
 }
 
 /* The bound that r gives, with the correction that there is. */
@@ -213,13 +218,14 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
     uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, c->u, c->c, r, err);
     if (status != UZ_OK)
         return status;
-    add_up(c, &terms);
-    double size = 0.0; /* of the correction, in the norm of W^-1 */
+    uz_energy_sums energies = {.correction = 0.0};
     for (int64_t b = 0; b < c->n_b; b++)
-        size += c->c[c->dof[b]] / c->weight_b[b] * c->c[c->dof[b]];
-    terms.correction_energy += uz_bound_rounding(size, c->d);
-    if (c->in->precise_energies && isfinite(terms.stiffness) && isfinite(terms.load))
-        sharpen_energies(c, &terms, r, g);
+        energies.correction += c->c[c->dof[b]] / c->weight_b[b] * c->c[c->dof[b]];
+    for (int64_t i = 0; i < c->m; i++)
+        energies.pressed -= r[i] * c->feasible.size[i];
+    add_up(c, &terms, &energies);
+    terms.correction_energy += uz_bound_rounding(energies.correction, c->d);
+    uz_bound_energy(&terms, &energies, r, g, c->in->h, c->d, c->m);
     if (feasible)
         status = uz_certify_distance(&terms.square, c->in, c->res.e, c->d, c->weighted, c->energy, c->noise, err);
     terms.complementarity = uz_feasible_complementarity(&c->feasible, r, true);

@@ -34,11 +34,9 @@ typedef struct {
     double rcond;      /* an estimate of the least eigenvalue of K, scaled by its diagonal */
     double inverse_bound; /* e'K^-1 e <= inverse_bound sum e_j^2 / K_jj; INFINITY: unknown. Spares inverse_norm where it
                              is sharp enough: */
-    bool precise_energies; /* u'Ku and u'p in double-double precision too: what is shown, not what is bounded, needs it
-                            */
-    bool moved;            /* supports move the body; relative errors are then beside */
-    double whole_norm;     /* ||u||_K with the supported dofs */
-    double sharp;          /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
+    bool moved;           /* supports move the body; relative errors are then beside */
+    double whole_norm;    /* ||u||_K with the supported dofs */
+    double sharp;         /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
 } uz_certify_input;
 
 /* u (d): the answer to certify. r (m): <= 0, else its positive part counts as e3 and r is cut at 0; where rows depend

@@ -21,7 +21,8 @@ enum { WIDTH = UZ_CERTIFY_LANES, HALVES = WIDTH / 4 };
 
 /* Sums over the dofs, for each lane. */
 typedef struct {
-    lanes stiffness, load, change, correction_energy, e_square, weighted, noise, force, sizes, residuals;
+    lanes stiffness, load, load_low, load_size, work, work_size, change, change_size, correction_energy;
+    lanes e_square, weighted, noise, force, sizes, residuals;
     lanes largest; /* not a sum: of |u_j| */
 } sums;
 
@@ -220,13 +221,22 @@ static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *
         for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
             add_product(hi, lo, -N->val[k], (const lanes *)c->r + N->idx[k] * HALVES + half, fused);
         s->change += moved * (Ku - *p + 0.5 * Kc);
+        s->change_size += (lanes)((lane_bits)moved & INT64_MAX) * (forces + (lanes)((lane_bits)Kc & INT64_MAX));
         s->correction_energy += moved * Kc;
         add_magnitude(&s->sizes, &moved);
     }
     const lanes e_u = *hi + *lo;
     const lanes e = e_u + Kc;
     s->stiffness += *u * Ku;
-    s->load += *u * *p;
+    const lanes load = *u * *p, work = *u * e_u, sum = s->load + load, back = sum - s->load;
+    lanes error = {0.0};
+    for (int l = 0; l < 4; l++)
+        error[l] = fused ? __builtin_fma((*u)[l], (*p)[l], -load[l]) : product_error_split((*u)[l], (*p)[l], load[l]);
+    s->load_low += ((s->load - (sum - back)) + (load - back)) + error;
+    s->load = sum;
+    add_magnitude(&s->load_size, &load);
+    s->work += work;
+    add_magnitude(&s->work_size, &work);
     s->force += *p * *p;
     s->e_square += e_u * e_u;
     s->weighted += weight * e * e;
@@ -295,7 +305,7 @@ static void couple(uz_lane_certifier *c, int lane)
 }
 
 /* What a lane's answer has to do with the contact: gaps, correction, reactions; their part of the terms. */
-static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a, const double *U,
+static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a, const double *U, double *pressed,
                          uz_bound_terms *terms)
 {
     uz_feasible *f = &c->feasible;
@@ -311,6 +321,8 @@ static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a
     for (int64_t b = 0; b < c->n_b; b++)
         c->c[b * WIDTH + lane] = f->correction[b];
     couple(c, lane);
+    for (int64_t i = 0; i < f->m; i++)
+        *pressed -= a->r[i] * f->size[i];
     terms->complementarity = uz_feasible_complementarity(f, a->r, feasible);
     terms->settled = feasible ? f->exact.length : 0.0;
     terms->pressed = terms->settled > 0.0 ? uz_feasible_complementarity(f, a->r, false) : 0.0;
@@ -324,7 +336,8 @@ static bool within_range(double sizes, double residuals, double force)
     return plain && sizes < 1e130 && residuals < 1e130 && (force == 0.0 || (force > 1e-260 && force < 1e260));
 }
 
-static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *a, bool feasible, uz_bound_terms *terms)
+static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *a, bool feasible, double pressed,
+                          uz_bound_terms *terms)
 {
     const sums *s = &c->sum[lane / 4];
     const int l = lane % 4;
@@ -336,12 +349,14 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     terms->moved = a->moved;
     terms->whole_norm = a->whole_norm;
     terms->stiffness = s->stiffness[l];
-    terms->load = s->load[l];
     terms->change = s->change[l];
-    double size = 0.0;
+    uz_energy_sums energies = {s->load[l],      s->load_low[l], s->load_size[l],   s->work[l],
+                               s->work_size[l], s->noise[l],    s->change_size[l], 0.0,
+                               pressed};
     for (int64_t b = 0; b < c->n_b; b++)
-        size += c->c[b * WIDTH + lane] / c->weight_b[b] * c->c[b * WIDTH + lane];
-    terms->correction_energy = s->correction_energy[l] + uz_bound_rounding(size, c->K->cols);
+        energies.correction += c->c[b * WIDTH + lane] / c->weight_b[b] * c->c[b * WIDTH + lane];
+    terms->correction_energy = s->correction_energy[l] + uz_bound_rounding(energies.correction, c->K->cols);
+    uz_bound_energy(terms, &energies, a->r, a->g, a->h, c->K->cols, c->feasible.m);
     terms->e1 = sqrt(s->e_square[l]);
     terms->force = sqrt(s->force[l]);
     terms->span = c->steepest * s->largest[l];
@@ -356,12 +371,13 @@ void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, 
 {
     uz_bound_terms terms[WIDTH] = {{0}};
     bool feasible[WIDTH] = {false};
+    double pressed[WIDTH] = {0.0};
     for (int l = 0; l < count; l++) {
         terms[l].positive_part = uz_cut_reactions(answers[l].r, c->feasible.m);
         answers[l].certified = false;
-        feasible[l] = prepare_lane(c, l, &answers[l], U, &terms[l]);
+        feasible[l] = prepare_lane(c, l, &answers[l], U, &pressed[l], &terms[l]);
     }
     run_pass(c, U, P);
     for (int l = 0; l < count; l++)
-        conclude_lane(c, l, &answers[l], feasible[l], &terms[l]);
+        conclude_lane(c, l, &answers[l], feasible[l], pressed[l], &terms[l]);
 }

@@ -72,10 +72,8 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
         uz_run_balance_request(run);
     if (status == UZ_OK)
         status = uz_run_certify_input(&input, run, answer, err);
-    if (status == UZ_OK) {
-        input.precise_energies = true;
+    if (status == UZ_OK)
         status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
-    }
     summary->timings.certify = uz_seconds() - start;
     summary->certificate = answer->certificate;
     if (status == UZ_OK)
