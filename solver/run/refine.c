@@ -254,13 +254,22 @@ uz_status uz_run_decide(uz_run *run, uz_error *err)
                  seconds = end == UZ_END_UNDECIDED || isinf(c->relative_error) ? 1.0 : 0.1, start = uz_seconds();
     bool solved = gave_up, tried = false;
     uz_status status = UZ_OK;
-    for (int bits = UZ_PRECISE_BITS; gave_up && bits <= UZ_PRECISE_MORE_BITS;
-         bits *= UZ_PRECISE_MORE_BITS / UZ_PRECISE_BITS)
+    /* Units of the load may be too far from those of an answer that rows hold; in many bits the caller's do as well. */
+    for (int bits = UZ_PRECISE_BITS; gave_up && bits <= UZ_PRECISE_MORE_BITS;) {
         if (status == UZ_OK && solved && !run->result->ray && c->relative_error > enough &&
             uz_precise_is_small(run->d, run->m, bits, seconds) && !uz_stop_is_due(&stop)) {
             status = solve_precisely(run, &solved, run->load.p, bits, err);
             tried = true;
         }
+        bits *= UZ_PRECISE_MORE_BITS / UZ_PRECISE_BITS;
+        if (status == UZ_OK && bits > UZ_PRECISE_MORE_BITS && run->load.exponent != 0 && tried && !run->result->ray &&
+            c->relative_error > enough) {
+            status = uz_run_round_to_units(run, err);
+            uz_run_restore_units(run);
+            bits = UZ_PRECISE_BITS;
+            solved = true;
+        }
+    }
     /* Loads may move the body so much farther than the rows are apart that no bits see these contradict each other. */
     if (status == UZ_OK && tried && solved && isinf(c->absolute_error)) {
         double *zero = uz_alloc_zero(run->d, sizeof *zero);

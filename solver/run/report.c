@@ -207,6 +207,6 @@ uz_status uz_report_run(uz_run *run, uz_error *err)
         result->state = state;
     }
     if (status == UZ_OK)
-        status = uz_run_unscale(run, err);
+        status = uz_run_unscale_history(run, err);
     return status == UZ_OK ? uz_report_answer(run, err) : status;
 }

@@ -92,8 +92,8 @@ static uz_status take_start(uz_run *run, uz_error *err)
     uz_status status = uz_state_check(start, run->all, err);
     if (status == UZ_OK && rows->in)
         status = uz_state_gather(&part, start, rows, err);
-    if (status == UZ_OK && run->load.exponent != 0)
-        status = uz_state_scaled(&scaled, part ? part : start, run->load.exponent, err);
+    if (status == UZ_OK && run->work.exponent != 0)
+        status = uz_state_scaled(&scaled, part ? part : start, run->work.exponent, err);
     if (status == UZ_OK)
         status = uz_iterate_start(&run->work.it, run->work.dual, scaled ? scaled : part ? part : start, err);
     uz_state_free(scaled);
@@ -150,7 +150,7 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
         .method = asked->settings->method,
         .stopping = asked->settings->stopping,
         .target = work->target,
-        .epsilon = ldexp(asked->settings->epsilon, run->load.exponent),
+        .epsilon = ldexp(asked->settings->epsilon, work->exponent),
         .max_iterations = asked->settings->max_iterations,
         .deadline = asked->deadline,
         .again = work->again,
@@ -327,6 +327,8 @@ uz_status uz_run_finish(uz_run *run, uz_error *err)
         status = uz_run_certify_all_rows(run, err);
     if (status == UZ_OK)
         status = uz_run_round_to_units(run, err);
+    uz_run_restore_units(run);
+    run->result->summary.certificate = run->answer.certificate;
     if (status != UZ_OK)
         return status;
     run->result->summary.outcome = conclude(run);

@@ -32,7 +32,7 @@ typedef struct {
     const double *h_all; /* all rows */
     double *prescribed;  /* scenes: n_fixed */
     bool moved;          /* some of them are not zero */
-    int exponent;        /* all of these, and what is worked on and answered, are times 2^exponent (scale.c) */
+    int exponent;        /* all of these, and the answer, are times 2^exponent (scale.c) */
     double *owned;       /* room of all of these; matrices: NULL where they are the caller's */
 } uz_load_vectors;
 
@@ -43,6 +43,7 @@ typedef struct {
     uz_milestones milestones;
     uz_factor_workspace *ws; /* this and d numbers for linear solves, made when the first is needed */
     double *scratch;
+    int exponent;     /* of iterates and history */
     double requested; /* relative error that the certificate must meet */
     double target;    /* relative error at which the method returns */
     bool again;       /* the method's target was met, the certificate was not */
@@ -96,9 +97,10 @@ uz_status uz_run_scale_load(uz_run *run, uz_error *err);
 void uz_run_scale_given(uz_run *run);
 /* Makes the answer what doubles hold of it in the caller's units, and certifies that where it is another. */
 uz_status uz_run_round_to_units(uz_run *run, uz_error *err);
-/* Answer, certificate of the summary, history, state and radius in the caller's units; bounds stay bounds, none becomes
- * 0. */
-uz_status uz_run_unscale(uz_run *run, uz_error *err);
+/* Load, answer, its certificate and the radius in the caller's units; bounds stay bounds, none becomes 0. */
+void uz_run_restore_units(uz_run *run);
+/* History and state of the result as well. */
+uz_status uz_run_unscale_history(uz_run *run, uz_error *err);
 /* *out: the state in other units. */
 uz_status uz_state_scaled(uz_state **out, const uz_state *from, int exponent, uz_error *err);
 /* The caller's hooks, told in the caller's units; room lives as long as they. */

@@ -98,6 +98,7 @@ uz_status uz_run_scale_load(uz_run *run, uz_error *err)
     if (isfinite(size))
         load->exponent = (int)fmax(least, fmin(most, -floor(size)));
     multiply(load->owned, n, load->exponent);
+    run->work.exponent = load->exponent;
     return UZ_OK;
 }
 
@@ -166,6 +167,7 @@ uz_status uz_state_scaled(uz_state **out, const uz_state *from, int exponent, uz
 void uz_run_scale_given(uz_run *run)
 {
     uz_load_vectors *load = &run->load;
+    const int64_t n_fixed = run->asked->setup->is_scene ? run->asked->setup->model.n_fixed : 0;
     double *vectors[] = {run->answer.u, run->answer.r};
     const int64_t sizes[] = {run->d, run->answer.m};
     bool exact = true;
@@ -174,21 +176,19 @@ void uz_run_scale_given(uz_run *run)
             exact = exact && ldexp(ldexp(vectors[k][i], load->exponent), -load->exponent) == vectors[k][i];
     for (int k = 0; exact && k < 2; k++)
         multiply(vectors[k], sizes[k], load->exponent);
-    if (exact || load->exponent == 0)
-        return;
-    const int64_t n_fixed = run->asked->setup->is_scene ? run->asked->setup->model.n_fixed : 0;
-    multiply(load->owned, run->d + run->all + n_fixed + (load->h != load->h_all ? run->m : 0), -load->exponent);
-    load->exponent = 0;
+    if (!exact)
+        multiply(load->owned, run->d + run->all + n_fixed + (load->h != load->h_all ? run->m : 0), -load->exponent);
+    load->exponent = exact ? load->exponent : 0;
 }
 
 uz_status uz_run_round_to_units(uz_run *run, uz_error *err)
 {
     uz_answer *answer = &run->answer;
+    uz_certificate *certificate = &answer->certificate;
     double *vectors[] = {answer->u, answer->r};
     const int64_t sizes[] = {run->d, answer->m};
     const int exponent = run->load.exponent;
-    uz_certificate *certificate = &run->result->summary.certificate;
-    bool lost = false, beyond = !isfinite(ldexp(certificate->absolute_error, -exponent));
+    bool lost = false, beyond = false;
     for (int k = 0; exponent != 0 && !run->result->ray && k < 2; k++)
         for (int64_t i = 0; i < sizes[k]; i++) {
             const double told = ldexp(vectors[k][i], -exponent), back = ldexp(told, exponent);
@@ -197,32 +197,42 @@ uz_status uz_run_round_to_units(uz_run *run, uz_error *err)
             vectors[k][i] = isfinite(told) ? back : vectors[k][i];
         }
     uz_status status = lost ? uz_run_certify_answer(run, answer, err) : UZ_OK;
-    if (lost)
-        *certificate = answer->certificate;
-    if (exponent != 0 && beyond) /* no double holds the answer, or its bound */
-        certificate->absolute_error = certificate->relative_error = certificate->gap = INFINITY;
+    if (exponent != 0 && (beyond || !isfinite(ldexp(certificate->absolute_error, -exponent))))
+        certificate->absolute_error = certificate->relative_error = certificate->gap =
+            INFINITY; /* no double holds it */
     return status;
 }
 
-uz_status uz_run_unscale(uz_run *run, uz_error *err)
+void uz_run_restore_units(uz_run *run)
 {
     const int exponent = -run->load.exponent;
+    const uz_setup *setup = run->asked->setup;
+    const int64_t n_fixed = setup->is_scene ? setup->model.n_fixed : 0;
     uz_answer *answer = &run->answer;
-    uz_result *result = run->result;
     if (exponent == 0)
-        return UZ_OK;
+        return;
+    multiply(run->load.owned, run->d + run->all + n_fixed + (run->load.h != run->load.h_all ? run->m : 0), exponent);
     multiply(answer->u, run->d, exponent);
     multiply(answer->r, answer->m, exponent);
     multiply(answer->g, answer->m, exponent);
-    multiply(run->load.prescribed, run->asked->setup->is_scene ? run->asked->setup->model.n_fixed : 0, exponent);
+    scale_certificate(&answer->certificate, exponent);
+    run->result->summary.infeasible_radius = outward(run->result->summary.infeasible_radius, exponent, -1.0);
+    run->work.reach = outward(run->work.reach, exponent, -1.0);
+    run->load.exponent = 0;
+}
+
+uz_status uz_run_unscale_history(uz_run *run, uz_error *err)
+{
+    uz_result *result = run->result;
+    uz_state *state = result->state;
+    const int exponent = -run->work.exponent;
+    if (exponent == 0)
+        return UZ_OK;
     for (int64_t k = 0; k < result->history.count; k++)
         scale_row(&result->history.rows[k], exponent);
-    scale_certificate(&result->summary.certificate, exponent);
-    result->summary.infeasible_radius = outward(result->summary.infeasible_radius, exponent, -1.0);
-    uz_state *state = result->state;
     uz_status status = state ? uz_state_scaled(&result->state, state, exponent, err) : UZ_OK;
     uz_state_free(state);
-    run->load.exponent = 0;
+    run->work.exponent = 0;
     return status;
 }
 
@@ -244,11 +254,11 @@ static void tells_progress(void *ctx, const uz_history_row *row)
 const uz_hooks *uz_run_hooks(uz_scaled_hooks *room, const uz_run *run)
 {
     const uz_hooks *outer = run->asked->hooks;
-    if (run->load.exponent == 0 || !outer)
+    if (run->work.exponent == 0 || !outer)
         return outer;
     *room = (uz_scaled_hooks){
         .outer = outer,
-        .exponent = -run->load.exponent,
+        .exponent = -run->work.exponent,
         .hooks = {.ctx = room, .cancelled = asks_cancelled, .progress = tells_progress},
     };
     return &room->hooks;

@@ -75,11 +75,10 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     if (status == UZ_OK)
         status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
     summary->timings.certify = uz_seconds() - start;
-    summary->certificate = answer->certificate;
-    if (status == UZ_OK)
-        status = uz_run_unscale(run, err);
     if (status != UZ_OK)
         return status;
+    uz_run_restore_units(run);
+    summary->certificate = answer->certificate;
     if (size_r > 0)
         memcpy(answer->r, r, size_r);
     uz_milestones_resume(&run->work.milestones, uz_run_time(run));
