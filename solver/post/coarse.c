@@ -3,18 +3,24 @@
  * A row on one node, or on one place inside a side, stands for all of the contact around it: the force depends on the
  * side's length then, and the pressure on nothing else. A side is covered where it is in contact (at a place or a
  * middle inside, or at all corners) and so is what surrounds it: each of its corners touches, or all sides there are in
- * contact and there are several. A row that no side around it is covered beside is on its own. Where the obstacle turns
- * by little along the side it is none of the mesh's doing: a corner of the body stands on flat ground. */
+ * contact and there are several. A row that no side around it is covered beside is on its own. Where neither the
+ * obstacle nor the body turns along the side it is none of the mesh's doing: a corner of the body stands on flat
+ * ground. */
 #include "post/balance.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 /* Sides along which the obstacle's normal turns by less than this (rad) see it as flat: 12 of them to its radius. */
 #define LEAST_TURN 0.08
+/* A body's own sides are curved where they turn by more than the first of these (rad), and by less than the second,
+ * from which on they meet in an edge that is meant. */
+#define CURVED 0.01
+#define CORNER 0.7
 /* Part of a contact's force that rows on their own may carry. */
 #define LONE_PART 0.1
 /* An obstacle stands in a side where it is deeper than this part of it. */
@@ -30,6 +36,7 @@ typedef struct {
     int32_t *sides, *touching;        /* n_nodes: sides around it, and those in contact */
     bool *active, *covered;           /* n_nodes: has its row a reaction? is a side around it covered? */
     unsigned char *in_contact, *turn; /* by side */
+    double *normals;                  /* n_nodes x 3: sums of the unit normals that the sides have there */
 } contact_sides;
 
 /* The nodes of a side, its corners first. */
@@ -47,7 +54,7 @@ static bool turns(const contact_sides *on, const int64_t *node, int corners)
     const uz_body_model *model = on->model;
     const uz_contact_sites *sites = &model->sites[model->info.contact_of[on->first]];
     const int dim = model->mesh.dim;
-    for (int a = 0; a < corners; a++)
+    for (int a = 0; a < corners && sites->n > 0; a++) /* a plane has none, and turns nowhere */
         for (int b = 0; b < corners; b++) {
             const int64_t i = on->row_of[node[a]] - 1, j = on->row_of[node[b]] - 1;
             double chord = 0, length = 0, along = 0;
@@ -69,12 +76,58 @@ static bool turns(const contact_sides *on, const int64_t *node, int corners)
     return false;
 }
 
+/* The unit normals of a side at its nodes, and in its middle (the last); false: it has none, as on an axis. */
+static bool normals_of(double normal[UZ_FACE_NODES + 1][3], int64_t *node, const contact_sides *on, int64_t face)
+{
+    uz_side side;
+    double xyz[3 * UZ_FACE_NODES];
+    uz_body_side(&side, xyz, node, on->model, on->group->face[face]);
+    const double middle = side.dim == 3 && side.nodes % 3 == 0 ? 1.0 / 3 : 0;
+    for (int a = 0; a <= side.nodes; a++) {
+        double area[3] = {0};
+        uz_side_area_vector(area, &side, a < side.nodes ? uz_side_local_nodes(&side)[a] : (double[2]){middle, middle});
+        if (!uz_unit_normal(normal[a < side.nodes ? a : UZ_FACE_NODES], area, side.dim) && a == side.nodes)
+            return false;
+    }
+    return true;
+}
+
+/* Is the side part of a curve? Half of what it turns by with its neighbours, or itself, is between its normal in the
+ * middle and the mean at one of its nodes. */
+static bool is_curved(const contact_sides *on, int64_t face)
+{
+    double normal[UZ_FACE_NODES + 1][3];
+    int64_t node[UZ_FACE_NODES];
+    int corners;
+    if (!normals_of(normal, node, on, face))
+        return false;
+    const int count = nodes_of(node, &corners, on, face);
+    for (int a = 0; a < count; a++) {
+        double mean[3], chord = 0;
+        if (!uz_unit_normal(mean, on->normals + 3 * node[a], 3))
+            continue;
+        for (int c = 0; c < 3; c++)
+            chord = hypot(chord, mean[c] - normal[UZ_FACE_NODES][c]);
+        const double turn = 4 * asin(fmin(1, 0.5 * chord));
+        if (turn > CURVED && turn < CORNER)
+            return true;
+    }
+    return false;
+}
+
 /* Fills what is by node and by side. */
 static void look_at_sides(contact_sides *on)
 {
     const uz_body_model *model = on->model;
     int64_t node[UZ_FACE_NODES], row = on->first;
     int corners;
+    for (int64_t f = 0; f < on->group->n_faces; f++) {
+        double normal[UZ_FACE_NODES + 1][3];
+        const int count = nodes_of(node, &corners, on, f);
+        for (int a = 0; a < count && normals_of(normal, node, on, f); a++)
+            for (int c = 0; c < 3; c++)
+                on->normals[3 * node[a] + c] += normal[a][c];
+    }
     while (row < on->last && !uz_row_inner(model, row)) {
         on->row_of[model->info.contact_node[row]] = row + 1;
         on->active[model->info.contact_node[row]] = model->law->kind->active(model->law, NULL, &on->r[row], 1) > 0;
@@ -92,7 +145,7 @@ static void look_at_sides(contact_sides *on)
             inside = model->law->kind->active(model->law, NULL, &on->r[row++], 1) > 0;
         on->in_contact[f] = all || inside;
         /* a row inside is there because the obstacle does not follow the side */
-        on->turn[f] = inside || turns(on, node, corners);
+        on->turn[f] = inside || turns(on, node, corners) || is_curved(on, f);
         for (int a = 0; a < count; a++) {
             on->sides[node[a]]++;
             on->touching[node[a]] += on->in_contact[f];
@@ -127,9 +180,12 @@ static void add_lone_rows(uz_coarse_contact *out, contact_sides *on, int64_t con
         bool covered = false;
         if (inner && inner->face.element == on->group->face[f].element && inner->face.side == on->group->face[f].side)
             here = fabs(on->r[row++]);
+        for (int a = 0; a < count; a++)
+            covered = covered || on->covered[node[a]];
         for (int a = 0; a < count; a++) {
             const int64_t own = on->row_of[node[a]] - 1;
-            covered = covered || on->covered[node[a]];
+            if (covered && a >= corners) /* beside a covered side, as the row inside is */
+                on->covered[node[a]] = true;
             most = fmax(most, own >= 0 && !on->covered[node[a]] ? fabs(on->r[own]) : 0);
         }
         here = covered ? 0 : here;
@@ -194,8 +250,7 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
             row++;
         on.last = row;
         on.group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
-        if (scene->contacts[k].kind == UZ_OBSTACLE_PLANE || scene->contacts[k].kind == UZ_OBSTACLE_BODY || !on.group ||
-            on.group->n_faces == 0)
+        if (scene->contacts[k].kind == UZ_OBSTACLE_BODY || !on.group || on.group->n_faces == 0)
             continue;
         on.row_of = uz_alloc_zero(n, sizeof *on.row_of);
         on.sides = uz_alloc_zero(n, sizeof *on.sides);
@@ -204,7 +259,9 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
         on.covered = uz_alloc_zero(n, sizeof *on.covered);
         on.in_contact = uz_alloc_zero(on.group->n_faces, 1);
         on.turn = uz_alloc_zero(on.group->n_faces, 1);
-        room = on.row_of && on.sides && on.touching && on.active && on.covered && on.in_contact && on.turn;
+        on.normals = uz_alloc_zero(n, 3 * sizeof *on.normals);
+        room =
+            on.row_of && on.sides && on.touching && on.active && on.covered && on.in_contact && on.turn && on.normals;
         if (room) {
             look_at_sides(&on);
             add_deep_sides(out, &on, k);
@@ -218,6 +275,7 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
         free(on.covered);
         free(on.in_contact);
         free(on.turn);
+        free(on.normals);
     }
     return room ? UZ_OK
                 : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of %lld contacts",
