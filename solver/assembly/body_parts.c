@@ -4,42 +4,12 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "scene/mesh_parts.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Representative of a node's part; halves the path on its way. */
-static int64_t find_root(int64_t *parent, int64_t a)
-{
-    while (parent[a] != a) {
-        parent[a] = parent[parent[a]];
-        a = parent[a];
-    }
-    return a;
-}
-
-/* part_of[node] = number of its connected part, parts numbered by their first node. Returns how many, -1: no memory. */
-static int64_t number_parts(int64_t *part_of, const uz_mesh *mesh)
-{
-    int64_t count = 0;
-    int64_t *parent = uz_alloc(mesh->n_nodes, sizeof *parent);
-    if (!parent)
-        return -1;
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        parent[a] = a;
-    for (int64_t e = 0; e < mesh->n_elements; e++)
-        for (int64_t i = mesh->first[e] + 1; i < mesh->first[e + 1]; i++) {
-            int64_t a = find_root(parent, mesh->node[i]);
-            int64_t b = find_root(parent, mesh->node[mesh->first[e]]);
-            parent[a > b ? a : b] = a > b ? b : a; /* the lesser node leads, so a root is met before its followers */
-        }
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        part_of[a] = parent[a] == a ? count++ : part_of[find_root(parent, a)];
-    free(parent);
-    return count;
-}
 
 /* v minus its projection on the rows, twice for accuracy; returns the length of what is left. */
 static double reject(double v[UZ_MOTIONS], double rows[][UZ_MOTIONS], int n)
@@ -165,7 +135,7 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
     for (int k = 0; k < parts->motions; k++)
         parts->unit[k][which[k]] = 1;
     parts->of = uz_alloc(model->mesh.n_nodes, sizeof *parts->of);
-    parts->count = parts->of ? number_parts(parts->of, &model->mesh) : -1;
+    parts->count = parts->of ? uz_mesh_number_parts(parts->of, &model->mesh) : -1;
     parts->list = parts->count >= 0 ? uz_alloc_zero(parts->count, sizeof *parts->list) : NULL;
     if (!parts->list)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of %lld nodes", (long long)model->mesh.n_nodes);

@@ -1,5 +1,6 @@
 #include "scene/mesh.h"
 
+#include "core/alloc.h"
 #include "core/error.h"
 
 #include <stdio.h>
@@ -35,6 +36,18 @@ const uz_group *uz_mesh_group(const uz_mesh *mesh, const char *name, const char 
         used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i ? ", " : "", mesh->groups[i].name);
     uz_fail(err, UZ_ERR_SCENE, where, "there is no group \"%.63s\"; this mesh has: %s", name, names);
     return NULL;
+}
+
+int uz_groups_share_face(const uz_mesh *mesh, const uz_group *one, const uz_group *other)
+{
+    unsigned char *sides = uz_alloc_zero(mesh->n_elements, 1); /* bits: an element has at most six sides */
+    int shared = sides ? 0 : -1;
+    for (int64_t i = 0; i < one->n_faces && sides; i++)
+        sides[one->face[i].element] |= (unsigned char)(1u << one->face[i].side);
+    for (int64_t i = 0; i < other->n_faces && shared == 0; i++)
+        shared = sides[other->face[i].element] >> other->face[i].side & 1;
+    free(sides);
+    return shared;
 }
 
 int64_t uz_group_node_count(const uz_mesh *mesh, const uz_group *group)

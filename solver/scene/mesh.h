@@ -73,6 +73,9 @@ int uz_mesh_face(int64_t node[UZ_FACE_NODES], const uz_mesh *mesh, uz_face face)
 /* The group of that name, or NULL with UZ_ERR_SCENE at `where`, listing the names that there are. */
 const uz_group *uz_mesh_group(const uz_mesh *mesh, const char *name, const char *where, uz_error *err);
 
+/* Have two groups of faces one in common? 0 or 1; -1: no memory. */
+int uz_groups_share_face(const uz_mesh *mesh, const uz_group *one, const uz_group *other);
+
 /* How many nodes a group has, and the i-th of them, 0 <= i < count. */
 int64_t uz_group_node_count(const uz_mesh *mesh, const uz_group *group);
 int64_t uz_group_node_at(const uz_group *group, int64_t i);

@@ -1,0 +1,186 @@
+#include "scene/mesh_parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct uz_own_body {
+    const uz_mesh *mesh;
+    int64_t *part;           /* of each node */
+    int64_t *first, *around; /* elements around each node */
+    int64_t *seen;           /* n_elements: the last question in which it was on the way */
+    int64_t *queue;          /* n_elements */
+    int64_t questions;
+};
+
+/* Representative of a node's part; halves the path on its way. */
+static int64_t find_root(int64_t *parent, int64_t a)
+{
+    while (parent[a] != a) {
+        parent[a] = parent[parent[a]];
+        a = parent[a];
+    }
+    return a;
+}
+
+int64_t uz_mesh_number_parts(int64_t *part, const uz_mesh *mesh)
+{
+    int64_t count = 0;
+    int64_t *parent = uz_alloc(mesh->n_nodes, sizeof *parent);
+    if (!parent)
+        return -1;
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        parent[a] = a;
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        for (int64_t i = mesh->first[e] + 1; i < mesh->first[e + 1]; i++) {
+            int64_t a = find_root(parent, mesh->node[i]);
+            int64_t b = find_root(parent, mesh->node[mesh->first[e]]);
+            parent[a > b ? a : b] = a > b ? b : a; /* the lesser node leads, so a root is met before its followers */
+        }
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        part[a] = parent[a] == a ? count++ : part[find_root(parent, a)];
+    free(parent);
+    return count;
+}
+
+/* Does a part have faces of both groups? *parts: how many there are. False with *parts < 0: no memory. */
+static bool shares_part(int64_t *part, int64_t *parts, const uz_mesh *mesh, const uz_group *one, const uz_group *other)
+{
+    *parts = uz_mesh_number_parts(part, mesh);
+    unsigned char *has = *parts >= 0 ? uz_alloc_zero(*parts, 1) : NULL;
+    bool shared = false;
+    if (!has) {
+        *parts = -1;
+        return false;
+    }
+    for (int64_t i = 0; i < one->n_faces; i++)
+        has[part[mesh->node[mesh->first[one->face[i].element]]]] = 1;
+    for (int64_t i = 0; i < other->n_faces && !shared; i++)
+        shared = has[part[mesh->node[mesh->first[other->face[i].element]]]];
+    free(has);
+    return shared;
+}
+
+/* Counted, summed, placed: filling from the end leaves first[i] at the beginning of its list. */
+static void list_around(uz_own_body *own)
+{
+    const uz_mesh *mesh = own->mesh;
+    const int64_t total = mesh->first[mesh->n_elements];
+    for (int64_t q = 0; q < total; q++)
+        own->first[mesh->node[q]]++;
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        own->first[a + 1] += own->first[a];
+    for (int64_t e = mesh->n_elements - 1; e >= 0; e--)
+        for (int64_t q = mesh->first[e]; q < mesh->first[e + 1]; q++)
+            own->around[--own->first[mesh->node[q]]] = e;
+}
+
+uz_status uz_own_body_new(uz_own_body **out, const uz_mesh *mesh, const uz_group *one, const uz_group *other,
+                          uz_error *err)
+{
+    int64_t parts = -1;
+    uz_own_body *own = uz_alloc_zero(1, sizeof *own);
+    *out = NULL;
+    if (own)
+        own->part = uz_alloc(mesh->n_nodes, sizeof *own->part);
+    if (own && own->part && !shares_part(own->part, &parts, mesh, one, other) && parts >= 0) {
+        uz_own_body_free(own);
+        return UZ_OK;
+    }
+    if (parts >= 0) {
+        own->mesh = mesh;
+        own->first = uz_alloc_zero(mesh->n_nodes + 1, sizeof *own->first);
+        own->around = uz_alloc(mesh->first[mesh->n_elements], sizeof *own->around);
+        own->seen = uz_alloc_zero(mesh->n_elements, sizeof *own->seen);
+        own->queue = uz_alloc(mesh->n_elements, sizeof *own->queue);
+    }
+    if (parts < 0 || !own->first || !own->around || !own->seen || !own->queue) {
+        uz_own_body_free(own);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact of a body with itself");
+    }
+    list_around(own);
+    *out = own;
+    return UZ_OK;
+}
+
+void uz_own_body_free(uz_own_body *own)
+{
+    if (!own)
+        return;
+    free(own->part);
+    free(own->first);
+    free(own->around);
+    free(own->seen);
+    free(own->queue);
+    free(own);
+}
+
+/* Does the straight way from x to y meet the box around an element? */
+static bool is_on_way(const uz_mesh *mesh, int64_t element, const double *x, const double *y)
+{
+    int count;
+    const int64_t *node = uz_mesh_element(mesh, element, &count);
+    double from = 0, to = 1;
+    for (int c = 0; c < mesh->dim; c++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int a = 0; a < count; a++) {
+            low = fmin(low, mesh->xyz[node[a] * mesh->dim + c]);
+            high = fmax(high, mesh->xyz[node[a] * mesh->dim + c]);
+        }
+        const double margin = 1e-6 * (high - low), way = y[c] - x[c];
+        low -= margin + x[c];
+        high += margin - x[c];
+        if (fabs(way) <= margin) { /* along the box */
+            if (low > fmax(way, 0) || high < fmin(way, 0))
+                return false;
+            continue;
+        }
+        from = fmax(from, fmin(low / way, high / way));
+        to = fmin(to, fmax(low / way, high / way));
+    }
+    return from <= to;
+}
+
+bool uz_own_body_same(const uz_own_body *own, int64_t from, int64_t to)
+{
+    return own &&
+           own->part[own->mesh->node[own->mesh->first[from]]] == own->part[own->mesh->node[own->mesh->first[to]]];
+}
+
+/* Goes from element to element on the way from x to y. Returns whether it meets `to`; *reached: is there an element
+ * around y? */
+static bool walk(bool *reached, uz_own_body *own, int64_t from, const double *x, int64_t to, const double *y)
+{
+    const uz_mesh *mesh = own->mesh;
+    int64_t n = 0, next = 0;
+    *reached = false;
+    own->queue[n++] = from;
+    own->seen[from] = ++own->questions;
+    for (; next < n && own->queue[next] != to; next++) {
+        *reached = *reached || is_on_way(mesh, own->queue[next], y, y);
+        for (int64_t q = mesh->first[own->queue[next]]; q < mesh->first[own->queue[next] + 1]; q++)
+            for (int64_t k = own->first[mesh->node[q]]; k < own->first[mesh->node[q] + 1]; k++) {
+                const int64_t e = own->around[k];
+                if (own->seen[e] == own->questions)
+                    continue;
+                own->seen[e] = own->questions;
+                if (is_on_way(mesh, e, x, y))
+                    own->queue[n++] = e;
+            }
+    }
+    return next < n;
+}
+
+uz_way uz_own_body_way(uz_own_body *own, int64_t from, const double *x, int64_t to, const double *y)
+{
+    bool there, back;
+    if (!uz_own_body_same(own, from, to))
+        return UZ_WAY_OVERLAP;
+    if (walk(&there, own, from, x, to, y))
+        return UZ_WAY_BACK;
+    walk(&back, own, to, y, from, x);
+    return there && back ? UZ_WAY_OVERLAP : UZ_WAY_APART;
+}
