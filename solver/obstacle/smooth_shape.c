@@ -102,9 +102,20 @@ static double step_towards(uz_smooth_shape *s, const double *xyz, int64_t n, int
     double squares = 0;
     double A[PARAMETERS][PARAMETERS] = {{0}}, b[PARAMETERS] = {0};
     double e[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, turn[2][3];
-    if (s->kind != UZ_SMOOTH_SPHERE) { /* two directions across the axis, and the axis */
+    if (s->kind != UZ_SMOOTH_SPHERE) { /* two directions across the axis, and the axis: turned as the points are */
+        double across[3] = {0}, most = 0;
+        for (int64_t i = 0; i < n; i += 1 + n / 16) {
+            const double off[3] = {xyz[3 * i] - s->point[0], xyz[3 * i + 1] - s->point[1],
+                                   xyz[3 * i + 2] - s->point[2]};
+            double arm[3];
+            uz_cross3(arm, s->axis, off);
+            if (!(uz_dot3(arm, arm) > 1.01 * most))
+                continue;
+            most = uz_dot3(arm, arm);
+            memcpy(across, off, sizeof across);
+        }
         const int least = fabs(s->axis[0]) < 0.6 ? 0 : 1;
-        uz_cross3(e[1], s->axis, e[least]);
+        uz_cross3(e[1], s->axis, most > 0 ? across : e[least]);
         uz_unit3(e[1]);
         uz_cross3(e[0], e[1], s->axis);
         memcpy(e[2], s->axis, sizeof e[2]);
