@@ -41,6 +41,9 @@ typedef struct {
     double size;                 /* the longest distance between nodes of the side, halved on quadratic ones */
 } uz_inner_place;
 
+/* A side may be of both surfaces of a contact. */
+enum { UZ_SLAVE_ON = 1, UZ_SLAVE_WITH = 2, UZ_MASTER_ON = 4 };
+
 /* Where the nodes of one contact's group stand to its obstacle, before anything moves. A plane needs none of this. */
 typedef struct {
     int64_t n;      /* nodes of the group, and places inside its sides; 0: a plane */
@@ -51,13 +54,16 @@ typedef struct {
     double *weight; /* ... and their shares in the point that it meets: each sum is 1 */
     uz_face *face;  /* n: of the group `with` */
     /* Surface to surface only: n places, which nodes they are, and the part of the surface that the reaction of each
-     * acts on; NULL: the nodes of the group. Is `with` the slave? */
+     * acts on; NULL: the nodes of the group. */
     int64_t *at;
     double *area;
     int64_t n_inner;       /* a rigid obstacle: so many of the n, the last ones, are inside sides */
     uz_inner_place *inner; /* n_inner */
     int64_t *ends; /* n x 2: of a middle of a face's edge the places of the edge's ends, as for row_ends; else -1 */
-    bool swapped;
+    /* The n_sides sides of both surfaces are of zones (mortar_pairs.c); rank: n_ranks pairs of a zone that is the slave and
+     * one that is its master. of: n, of which surface a place's slave and most of its masters are: UZ_SLAVE_ON, ... */
+    int64_t n_sides, *zone, n_zones, n_ranks, *rank;
+    unsigned char *of;
     uz_contact_surface surface[2]; /* what `on` and `with` are taken for */
 } uz_contact_sites;
 

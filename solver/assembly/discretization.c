@@ -31,11 +31,6 @@ uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, 
         return UZ_OK;
     snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
     in->with = uz_mesh_group(&model->mesh, contact->with, where, err);
-    if (in->with && model->sites && model->sites[index].swapped) {
-        const uz_group *slave = in->with;
-        in->with = in->on;
-        in->on = slave;
-    }
     return in->with ? UZ_OK : UZ_ERR_SCENE;
 }
 

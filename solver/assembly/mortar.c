@@ -22,7 +22,6 @@
 #include "core/error.h"
 #include "core/vector3.h"
 #include "linalg/linalg.h"
-#include "obstacle/candidates.h"
 #include "obstacle/projection.h"
 
 #include <math.h>
@@ -132,150 +131,6 @@ bool uz_mortar_add_point(uz_mortar_points *points, const uz_mortar_point *p)
     return true;
 }
 
-/* Between the corners of one side; box: 2 dim. */
-static double enclose(double *box, const uz_mortar_side *side, int dim)
-{
-    double size = 0;
-    for (int c = 0; c < dim; c++) {
-        box[c] = INFINITY;
-        box[dim + c] = -INFINITY;
-        for (int a = 0; a < side->nodes; a++) {
-            box[c] = fmin(box[c], side->xyz[dim * a + c]);
-            box[dim + c] = fmax(box[dim + c], side->xyz[dim * a + c]);
-        }
-        size = hypot(size, box[dim + c] - box[c]);
-    }
-    return size;
-}
-
-/* Of the sides, for a surface whose sides are looked for. */
-static uz_status plant_tree(uz_mortar_surface *surface, int dim, uz_error *err)
-{
-    double *box = uz_alloc(surface->n, 6 * sizeof *box);
-    if (!box)
-        return no_memory(err);
-    for (int64_t i = 0; i < surface->n; i++)
-        enclose(box + 2 * dim * i, &surface->side[i], dim);
-    const uz_status status = uz_box_tree_init(&surface->tree, surface->n, dim, box, err);
-    free(box);
-    return status;
-}
-
-/* Room that serves one slave side after the other. */
-typedef struct {
-    uz_mortar_points points;
-    int64_t *near, n_near;
-    double *A; /* points.room x UZ_FACE_NODES */
-    int64_t A_room;
-} side_work;
-
-static bool list_near(void *ctx, int64_t item)
-{
-    side_work *work = ctx;
-    work->near[work->n_near++] = item;
-    return false;
-}
-
-static int ascending(const void *a, const void *b)
-{
-    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* The area of all points. Where the master has several layers, as of a plate and what is behind it, only the nearest is
- * kept: what is farther than it by more than the side's size goes. */
-static double covered_area(uz_mortar_points *points, double size)
-{
-    double area = 0, nearest = INFINITY;
-    int64_t kept = 0;
-    for (int64_t g = 0; g < points->n; g++)
-        nearest = fmin(nearest, fabs(points->point[g].gap));
-    for (int64_t g = 0; g < points->n; g++)
-        if (fabs(points->point[g].gap) <= nearest + size) {
-            area += points->point[g].weight;
-            points->point[kept++] = points->point[g];
-        }
-    points->n = kept;
-    return area;
-}
-
-/* The points of slave side i. The master is looked for close by, then farther away as long as the side is not covered:
- * most sides are covered at once. False: no memory. */
-static bool find_points(side_work *work, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
-                        const uz_mortar_surface *master)
-{
-    const int dim = in->model->mesh.dim;
-    const uz_mortar_geometry *geometry = uz_mortar_geometry_of(dim);
-    double box[6], covered = 0;
-    const double size = enclose(box, &slave->side[i], dim);
-    int64_t before = -1;
-    for (double reach = size; covered < (1 - 1e-9) * slave->side[i].area; reach *= 8) {
-        double wide[6];
-        for (int c = 0; c < dim; c++) {
-            wide[c] = box[c] - reach;
-            wide[dim + c] = box[dim + c] + reach;
-        }
-        work->n_near = 0;
-        uz_box_tree_meet(&master->tree, wide, list_near, work);
-        if (work->n_near > before) {
-            before = work->n_near;
-            qsort(work->near, (size_t)work->n_near, sizeof *work->near, ascending);
-            work->points.n = 0;
-            if (!geometry->points(&work->points, in, slave, i, master, work->near, work->n_near))
-                return false;
-        }
-        covered = covered_area(&work->points, size);
-        if (before == master->n || reach > 2 * in->model->mesh.extent)
-            break;
-    }
-    if (work->points.n * UZ_FACE_NODES <= work->A_room)
-        return true;
-    double *A = uz_realloc(work->A, UZ_FACE_NODES * work->points.room, sizeof *A);
-    work->A = A ? A : work->A;
-    work->A_room = A ? UZ_FACE_NODES * work->points.room : work->A_room;
-    return A != NULL;
-}
-
-/* ---- which side is the slave */
-
-/* Distance between neighbouring nodes, whichever edge of its side a face begins with. */
-static double spacing(const uz_mortar_side *side, int dim)
-{
-    const bool triangle = side->nodes % 3 == 0;
-    const double length = dim == 2   ? hypot(side->xyz[2] - side->xyz[0], side->xyz[3] - side->xyz[1])
-                          : triangle ? sqrt(2 * side->area)
-                                     : sqrt(side->area);
-    return side->nodes > (dim == 2 ? 2 : triangle ? 3 : 4) ? length / 2 : length;
-}
-
-/* Is the master finer than the slave where they face each other? Looked at on some of the slave's sides, and only where
- * the two are hardly farther from each other than at their nearest: what is farther away touches late or never, however
- * fine it is. */
-static bool is_master_finer(bool *finer, side_work *work, const uz_contact_input *in, const uz_mortar_surface *slave,
-                            const uz_mortar_surface *master)
-{
-    enum { LOOKED_AT = 500 };
-    const int dim = in->model->mesh.dim;
-    double fine[2] = {0, 0}, least = INFINITY;
-    for (int pass = 0; pass < 2; pass++) {
-        const double most = fmax(least, 0) + UZ_CANDIDATES_REACH * in->model->mesh.extent;
-        for (int64_t i = 0; i < slave->n; i += 1 + slave->n / LOOKED_AT) {
-            if (!find_points(work, in, slave, i, master))
-                return false;
-            for (int64_t g = 0; g < work->points.n; g++) {
-                const uz_mortar_point *p = &work->points.point[g];
-                least = fmin(least, p->gap);
-                if (pass == 0 || p->gap > most)
-                    continue;
-                fine[0] += p->weight / spacing(&slave->side[i], dim);
-                fine[1] += p->weight / spacing(&master->side[p->master], dim);
-            }
-        }
-    }
-    *finer = fine[1] > (1 + 1e-6) * fine[0];
-    return true;
-}
-
 /* ---- rows */
 
 /* The integrals that rows are made of, by place; the masters' by entries. */
@@ -354,10 +209,11 @@ static void transform(double *N, int nodes, int dim)
 
 /* The share of one slave side with its points: with A = sqrt(w) N = Q R the dual functions at the points are
  * Q R^-T diag(int N) / sqrt(w). A side of which too little is covered for that is left out. */
-static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_side *side,
-                     const uz_mortar_surface *master, const uz_mortar_points *points, double *A, int dim)
+static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_pair *pair, int64_t i, double *A)
 {
-    const int n = side->nodes;
+    const uz_mortar_points *points = &pair->points;
+    const uz_mortar_side *side = &pair->surface.side[i];
+    const int n = side->nodes, dim = pair->in->model->mesh.dim;
     const int64_t count = points->n;
     double R[UZ_FACE_NODES][UZ_FACE_NODES], D[UZ_FACE_NODES] = {0}, M[UZ_FACE_NODES][UZ_FACE_NODES] = {{0}};
     for (int64_t g = 0; g < count; g++) {
@@ -375,7 +231,7 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_sid
         to->D[side->place[a]] += D[a];
     for (int64_t g = 0; g < count; g++) {
         const uz_mortar_point *p = &points->point[g];
-        const uz_mortar_side *other = &master->side[p->master];
+        const uz_mortar_side *other = &pair->surface.side[p->master];
         double psi[UZ_FACE_NODES] = {0}; /* R psi' = Q', from the last row up */
         for (int j = n - 1; j >= 0; j--) {
             psi[j] = A[j * count + g];
@@ -402,6 +258,9 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_sid
             if (fabs(sum) > to->most[place]) {
                 to->most[place] = fabs(sum);
                 sites->face[place] = other->face;
+                sites->of[place] = (unsigned char)((pair->of[i] & UZ_OF_ON ? UZ_SLAVE_ON : 0) |
+                                                   (pair->of[i] & UZ_OF_WITH ? UZ_SLAVE_WITH : 0) |
+                                                   (pair->of[p->master] & UZ_OF_ON ? UZ_MASTER_ON : 0));
             }
         }
         memset(M, 0, sizeof M);
@@ -409,14 +268,16 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_sid
     return true;
 }
 
-/* Integrals over all of the slave. False: no memory. */
-static bool integrate(integrals *of, uz_contact_sites *sites, side_work *work, const uz_contact_input *in,
-                      const uz_mortar_surface *slave, const uz_mortar_surface *master)
+/* Integrals over all sides that are slaves, as far as they are. False: no memory. */
+static bool integrate(integrals *of, uz_contact_sites *sites, uz_mortar_pair *pair)
 {
-    const int dim = in->model->mesh.dim;
-    for (int64_t i = 0; i < slave->n; i++) {
-        const uz_mortar_side *side = &slave->side[i];
-        const uz_side shape = uz_mortar_side_of(side, in->model);
+    const uz_mortar_surface *surface = &pair->surface;
+    const int dim = pair->in->model->mesh.dim;
+    double *A = NULL;
+    int64_t room = 0;
+    for (int64_t i = 0; i < surface->n; i++) {
+        const uz_mortar_side *side = &surface->side[i];
+        const uz_side shape = uz_mortar_side_of(side, pair->in->model);
         const int corners = side->nodes / 2;
         double weight[UZ_FACE_NODES];
         uz_side_weights(weight, &shape);
@@ -428,9 +289,27 @@ static bool integrate(integrals *of, uz_contact_sites *sites, side_work *work, c
             for (int k = 0; k < 2 && dim == 3 && side->nodes >= 6 && a >= corners; k++)
                 sites->ends[2 * place + k] = side->place[(a - corners + k) % corners];
         }
-        if (!find_points(work, in, slave, i, master) || !add_side(of, sites, side, master, &work->points, work->A, dim))
-            return false;
+        if (sites->n_zones == 2 && sites->n_ranks == 1 && sites->zone[i] == sites->rank[1])
+            continue; /* the master of all that it faces */
+        bool good = uz_mortar_find_points(pair, i);
+        uz_mortar_points *points = &pair->points;
+        int64_t kept = 0;
+        for (int64_t g = 0; g < points->n && good; g++)
+            if (uz_mortar_is_slave(sites, i, points->point[g].master))
+                points->point[kept++] = points->point[g];
+        points->n = good ? kept : 0;
+        if (points->n * UZ_FACE_NODES > room) {
+            double *grown = uz_realloc(A, UZ_FACE_NODES * points->room, sizeof *grown);
+            good = grown != NULL;
+            A = grown ? grown : A;
+            room = UZ_FACE_NODES * points->room;
+        }
+        if (good && add_side(of, sites, pair, i, A))
+            continue;
+        free(A);
+        return false;
     }
+    free(A);
     return true;
 }
 
@@ -503,18 +382,20 @@ static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const 
     return UZ_OK;
 }
 
-static uz_status make_rows(uz_contact_sites *sites, side_work *work, const uz_contact_input *in,
-                           const uz_mortar_surface *slave, const uz_mortar_surface *master, uz_error *err)
+static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_error *err)
 {
-    const int64_t n = slave->n_places;
+    const int64_t n = pair->surface.n_places;
+    const uz_body_model *model = pair->in->model;
     integrals of = {.D = uz_alloc_zero(5 * n, sizeof *of.D)};
     sites->gap = uz_alloc(n, sizeof *sites->gap);
-    sites->normal = uz_alloc(n * in->model->mesh.dim, sizeof *sites->normal);
+    sites->normal = uz_alloc(n * model->mesh.dim, sizeof *sites->normal);
     sites->area = uz_alloc(n, sizeof *sites->area);
     sites->at = uz_alloc(n, sizeof *sites->at);
     sites->ends = uz_alloc(2 * n, sizeof *sites->ends);
     sites->face = uz_alloc_zero(n, sizeof *sites->face);
-    bool room = of.D && sites->gap && sites->normal && sites->area && sites->at && sites->ends && sites->face;
+    sites->of = uz_alloc_zero(n, sizeof *sites->of);
+    bool room =
+        of.D && sites->gap && sites->normal && sites->area && sites->at && sites->ends && sites->face && sites->of;
     if (room) {
         sites->n = n;
         of.whole = of.D + n;
@@ -522,97 +403,57 @@ static uz_status make_rows(uz_contact_sites *sites, side_work *work, const uz_co
         of.most = of.D + 3 * n;
         of.around = of.D + 4 * n;
         memset(sites->ends, 0xff, (size_t)(2 * n) * sizeof *sites->ends);
-        room = integrate(&of, sites, work, in, slave, master);
+        room = integrate(&of, sites, pair);
     }
-    const uz_status status = room ? fill_sites(sites, &of, slave, in->model, err) : no_memory(err);
+    const uz_status status = room ? fill_sites(sites, &of, &pair->surface, model, err) : no_memory(err);
     clear_integrals(&of);
     return status;
 }
 
-/* Which of the two is the slave: the finer one, or what it was before anything moved. The surface that has the lowest
- * node is looked at first, whatever the two are called. first: what it is; false: no memory. */
-static bool choose_slave(bool *swapped, side_work *work, const uz_contact_input *in, const uz_mortar_surface *on,
-                         const uz_mortar_surface *with)
+/* What the sides of each group are taken for. False: no memory. */
+static bool describe(uz_contact_sites *sites, const uz_mortar_pair *pair)
 {
-    const bool turned = in->on->node[0] > in->with->node[0];
-    bool finer = false;
-    *swapped = in->rest && in->rest->sites[in->index].swapped;
-    if (in->rest)
-        return true;
-    if (!is_master_finer(&finer, work, in, turned ? with : on, turned ? on : with))
-        return false;
-    *swapped = turned != finer;
-    return true;
-}
-
-/* The normals that smooth shapes give a surface in space at rest differ from those of its facets: so they do where it
- * has moved. */
-static uz_status turn_with_rest(uz_mortar_surface *surface, const uz_contact_input *in, const uz_group *group,
-                                uz_error *err)
-{
-    uz_contact_input before = *in; /* at rest, by its facets alone */
-    uz_mortar_surface facets = {0};
-    before.model = in->rest;
-    uz_status status = uz_mortar_surface_make(&facets, &before, group, err);
-    const bool same = status == UZ_OK && facets.n_places == surface->n_places;
-    for (int64_t p = 0; p < surface->n_places && same; p++) {
-        for (int c = 0; c < 3; c++)
-            surface->normal[3 * p + c] += surface->rest->normal[3 * p + c] - facets.normal[3 * p + c];
-        uz_unit3(surface->normal + 3 * p);
+    const uz_contact_input *in = pair->in;
+    const uz_mortar_surface *all = pair->rest.n > 0 ? &pair->rest : &pair->surface;
+    uz_mortar_surface some = *all;
+    some.n = 0;
+    some.side = uz_alloc(all->n, sizeof *some.side);
+    bool room = some.side != NULL;
+    for (int k = 0; k < 2 && room; k++) {
+        some.n = 0;
+        for (int64_t i = 0; i < all->n; i++)
+            if (pair->of[i] & (k == 0 ? UZ_OF_ON : UZ_OF_WITH))
+                some.side[some.n++] = all->side[i];
+        room = uz_mortar_describe(&sites->surface[k], &some, in, k == 0 ? in->on : in->with);
+        sites->surface[k].contact = in->index;
+        for (int64_t p = 0; p < sites->n; p++)
+            sites->surface[k].slave =
+                sites->surface[k].slave ||
+                (isfinite(sites->gap[p]) && sites->of[p] & (k == 0 ? UZ_SLAVE_ON : UZ_SLAVE_WITH));
     }
-    uz_mortar_surface_clear(&facets);
-    return status;
+    free(some.side);
+    return room;
 }
 
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
 {
-    uz_mortar_surface surface[2] = {{0}, {0}}, rest[2] = {{0}, {0}}; /* of `on` and `with` */
-    uz_contact_input before = *in;
-    side_work work = {.near = NULL};
+    uz_mortar_pair pair = {.in = in};
     char where[96];
     uz_status status = uz_contact_pair_check(&in->model->mesh, in->on, in->with, in->index, err);
-    before.model = in->rest;
-    before.rest = NULL;
-    for (int k = 0; k < 2 && status == UZ_OK; k++) {
-        status = uz_mortar_surface_make(&surface[k], in, k == 0 ? in->on : in->with, err);
-        if (status == UZ_OK)
-            status = plant_tree(&surface[k], in->model->mesh.dim, err);
-    }
-    for (int k = 0; k < 2 && status == UZ_OK && in->rest && !in->contact->faceted; k++) {
-        status = uz_mortar_surface_make(&rest[k], &before, k == 0 ? in->on : in->with, err);
-        surface[k].rest = &rest[k];
-        if (status == UZ_OK && in->model->mesh.dim == 3)
-            status = turn_with_rest(&surface[k], in, k == 0 ? in->on : in->with, err);
-    }
-    if (status != UZ_OK)
-        goto done;
-    const int64_t most = surface[0].n > surface[1].n ? surface[0].n : surface[1].n;
-    work.near = uz_alloc(most, sizeof *work.near);
-    if (!work.near || !choose_slave(&sites->swapped, &work, in, &surface[0], &surface[1])) {
+    if (status == UZ_OK)
+        status = uz_mortar_pair_make(&pair, in, err);
+    if (status == UZ_OK)
+        status = uz_mortar_choose_slaves(sites, &pair, err);
+    if (status == UZ_OK)
+        status = make_rows(sites, &pair, err);
+    if (status == UZ_OK && !describe(sites, &pair))
         status = no_memory(err);
-        goto done;
-    }
-    status = make_rows(sites, &work, in, &surface[sites->swapped], &surface[!sites->swapped], err);
-    for (int k = 0; k < 2 && status == UZ_OK; k++) {
-        if (!uz_mortar_describe(&sites->surface[k], rest[k].n > 0 ? &rest[k] : &surface[k], in,
-                                k == 0 ? in->on : in->with))
-            status = no_memory(err);
-        sites->surface[k].contact = in->index;
-        sites->surface[k].slave = sites->swapped == (k == 1);
-    }
     if (status == UZ_OK && sites->first[sites->n] == 0 && !in->rest) {
         snprintf(where, sizeof where, "/contacts/%lld/on", (long long)in->index);
         status =
             uz_fail(err, UZ_ERR_SCENE, where, "no part of \"%.63s\" faces \"%.63s\"", in->on->name, in->with->name);
     }
-done:
-    for (int k = 0; k < 2; k++) {
-        uz_mortar_surface_clear(&surface[k]);
-        uz_mortar_surface_clear(&rest[k]);
-    }
-    free(work.points.point);
-    free(work.near);
-    free(work.A);
+    uz_mortar_pair_clear(&pair);
     return status;
 }
 

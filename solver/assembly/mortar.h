@@ -9,6 +9,7 @@
 #include "assembly/discretization.h"
 #include "obstacle/box_tree.h"
 #include "obstacle/smooth_shape.h"
+#include "scene/mesh_parts.h"
 
 /* An edge or a face of a surface. A place is a node of the slave with a normal of its own: where the surface turns by
  * more than the feature angle, a node has one for each side. */
@@ -52,15 +53,45 @@ bool uz_mortar_add_point(uz_mortar_points *points, const uz_mortar_point *p);
 /* The side as solver/element takes it, in a body of this kind. */
 uz_side uz_mortar_side_of(const uz_mortar_side *side, const uz_body_model *model);
 
+/* Which surface a side is of: bits. */
+enum { UZ_OF_ON = 1, UZ_OF_WITH = 2 };
+
+/* Both surfaces of a contact as one, and room for what is looked for on one side after the other. */
+typedef struct {
+    const uz_contact_input *in;
+    uz_group group;                  /* its sides */
+    unsigned char *of;               /* of each side: UZ_OF_... */
+    uz_mortar_surface surface, rest; /* where it is, and before anything moved; surface.rest is &rest, or NULL */
+    uz_own_body *own;                /* NULL: no part of the body may touch itself */
+    uz_mortar_points points;         /* of the side that was looked at last */
+    int64_t n_near, *near;           /* the sides that it may touch, ascending */
+    bool layered;                    /* several of them may be above each other: only the nearest counts */
+    int64_t *way;                    /* of each side: uz_way + 3 * (1 + i), to it from side i; 0: nobody asked */
+} uz_mortar_pair;
+
+/* The caller clears *pair in every case; `in` is kept. Errors: UZ_ERR_SCENE (a side without area), UZ_ERR_MEMORY. */
+uz_status uz_mortar_pair_make(uz_mortar_pair *pair, const uz_contact_input *in, uz_error *err);
+void uz_mortar_pair_clear(uz_mortar_pair *pair);
+
+/* pair->points: those of side i against whatever it faces. False: no memory. */
+bool uz_mortar_find_points(uz_mortar_pair *pair, int64_t i);
+/* What leads from x on side i to y behind it, on side j. */
+uz_way uz_mortar_way(uz_mortar_pair *pair, int64_t i, int64_t j, const double *x, const double *y);
+
+/* sites->zone, ->rank: what uz_mortar_is_slave answers from; what was chosen before anything moved stays. Errors:
+ * UZ_ERR_MEMORY. */
+uz_status uz_mortar_choose_slaves(uz_contact_sites *sites, uz_mortar_pair *pair, uz_error *err);
+/* Of two sides that face each other, is i the slave? */
+bool uz_mortar_is_slave(const uz_contact_sites *sites, int64_t i, int64_t j);
+
 /* The geometry of surfaces of one dimension. False: no memory.
  *   places  tangents, places, node and normal of a surface whose sides are there
- *   points  adds those of slave side i against some sides of the master, ascending
+ *   points  adds to pair->points those of side i against the sides pair->near
  *   offset  from the point of a side at `local`, which is x before anything moves, to the smooth surface that the side
  *           stands for; zero where it stands for none */
 typedef struct {
     bool (*places)(uz_mortar_surface *surface, const uz_contact_input *in);
-    bool (*points)(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
-                   const uz_mortar_surface *master, const int64_t *near, int64_t n_near);
+    bool (*points)(uz_mortar_pair *pair, int64_t i);
     void (*offset)(double offset[3], const uz_mortar_surface *surface, const uz_mortar_side *side, const double *local,
                    const double x[3]);
 } uz_mortar_geometry;

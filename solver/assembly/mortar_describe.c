@@ -123,7 +123,7 @@ bool uz_mortar_describe(uz_contact_surface *out, const uz_mortar_surface *surfac
     }
     out->free_form = out->free_form && out->largest_turn > NO_TURN && !in->contact->faceted;
     for (int64_t p = 0; p < n; p++)
-        out->parts += part[p] == p;
+        out->parts += area[p] > 0; /* by the place that stands for all of them */
     find_corners(out, surface, in, bent);
     const uz_mortar_side *side = &surface->side[largest];
     const uz_smooth_shape *shape = &side->shape;

@@ -271,52 +271,59 @@ static double project_on_master(double *s, const uz_mortar_side *e, const double
                                                                                                    : INFINITY;
 }
 
-/* The nearest of some master edges that the line through x along n meets from outside; -1: none. */
-static int64_t edge_across(const uz_mortar_surface *master, const int64_t *near, int64_t n_near, const double x[2],
-                           const double n[2])
+/* The nearest of some edges that the line through x on edge i along n meets from outside; -1: none. Behind x that ends
+ * at the back of what x is on. */
+static int64_t edge_across(uz_mortar_pair *pair, int64_t i, const double x[2], const double n[2])
 {
-    int64_t best = -1;
-    double least = INFINITY;
-    for (int64_t k = 0; k < n_near; k++) {
-        const uz_mortar_side *e = &master->side[near[k]];
+    int64_t front = -1, behind = -1;
+    double to_front = INFINITY, to_behind = INFINITY, to_back = INFINITY;
+    for (int64_t k = 0; k < pair->n_near; k++) {
+        const uz_mortar_side *e = &pair->surface.side[pair->near[k]];
         double chord[2], outward[2], s = 0;
         direction(chord, e->xyz, e->xyz + 2);
         turn_outward(outward, chord);
         if (dot(outward, n) >= 0)
             continue;
-        const double distance = fabs(project_on_master(&s, e, x, n));
-        if (fabs(s) <= 1 + 2e-9 && distance < least) {
-            least = distance;
-            best = near[k];
+        const double distance = project_on_master(&s, e, x, n);
+        const double y[2] = {x[0] + distance * n[0], x[1] + distance * n[1]};
+        if (!(fabs(s) <= 1 + 2e-9 && fabs(distance) < (distance < 0 ? fmin(to_behind, to_back) : to_front)))
+            continue;
+        const uz_way way = distance < 0 ? uz_mortar_way(pair, i, pair->near[k], x, y) : UZ_WAY_OVERLAP;
+        if (way == UZ_WAY_BACK) {
+            to_back = -distance;
+        } else if (way == UZ_WAY_OVERLAP) {
+            *(distance < 0 ? &to_behind : &to_front) = fabs(distance);
+            *(distance < 0 ? &behind : &front) = pair->near[k];
         }
     }
-    return best;
+    return behind >= 0 && to_behind < fmin(to_front, to_back) ? behind : front;
 }
 
-/* The Gauss points between a and b of slave edge i, which has master edge k across. */
-static bool add_segment(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave,
-                        const uz_mortar_side *e, const uz_mortar_surface *master, int64_t k, double a, double b)
+/* The Gauss points between a and b of edge i, which has edge k across. */
+static bool add_segment(uz_mortar_pair *pair, int64_t i, int64_t k, double a, double b)
 {
     static const double AT[4] = {-0.86113631159405257522, -0.33998104358485626480, 0.33998104358485626480,
                                  0.86113631159405257522};
     static const double WEIGHT[4] = {0.34785484513745385737, 0.65214515486254614263, 0.65214515486254614263,
                                      0.34785484513745385737};
-    const uz_mortar_side *f = &master->side[k];
+    const uz_contact_input *in = pair->in;
+    const uz_mortar_surface *surface = &pair->surface;
+    const uz_mortar_side *e = &surface->side[i], *f = &surface->side[k];
     bool room = true;
     for (int g = 0; g < 4 && room; g++) {
         uz_mortar_point p = {.master = k};
         double x[2], slope[2], n[2], t = 0;
         const double s = 0.5 * (a + b) + 0.5 * (b - a) * AT[g];
         edge_at(x, slope, e, s);
-        normal_at(n, slave, e, s);
+        normal_at(n, surface, e, s);
         p.gap = project_on_master(&t, f, x, n);
         p.weight = 0.5 * (b - a) * WEIGHT[g] * hypot(slope[0], slope[1]);
         p.weight *= in->model->kind == UZ_AXISYMMETRIC ? 2 * PI * x[0] : in->model->thickness;
         shape_at(p.N, e->nodes, s);
         shape_at(p.M, f->nodes, t);
         if (!in->contact->faceted)
-            p.gap += offset_along(n, uz_mortar_rest(master, f), t) - offset_along(n, uz_mortar_rest(slave, e), s);
-        room = !isfinite(p.gap) || uz_mortar_add_point(points, &p);
+            p.gap += offset_along(n, uz_mortar_rest(surface, f), t) - offset_along(n, uz_mortar_rest(surface, e), s);
+        room = !isfinite(p.gap) || uz_mortar_add_point(&pair->points, &p);
     }
     return room;
 }
@@ -328,18 +335,18 @@ static int ascending(const void *a, const void *b)
 }
 
 /* Segments between the master's nodes, projected along the slave's field of normals. */
-static bool points(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
-                   const uz_mortar_surface *master, const int64_t *near, int64_t n_near)
+static bool points(uz_mortar_pair *pair, int64_t i)
 {
-    const uz_mortar_side *e = &slave->side[i];
+    const uz_mortar_surface *surface = &pair->surface;
+    const uz_mortar_side *e = &surface->side[i];
     int64_t n_cuts = 0;
-    double *cut = uz_alloc(2 * n_near + 2, sizeof *cut), chord[2];
+    double *cut = uz_alloc(2 * pair->n_near + 2, sizeof *cut), chord[2];
     bool room = cut != NULL;
     const double length = direction(chord, e->xyz, e->xyz + 2);
-    for (int64_t k = 0; k < 2 * n_near && room; k++) {
-        const double *x = master->side[near[k / 2]].xyz + 2 * (k % 2);
+    for (int64_t k = 0; k < 2 * pair->n_near && room; k++) {
+        const double *x = surface->side[pair->near[k / 2]].xyz + 2 * (k % 2);
         const double along = ((x[0] - e->xyz[0]) * chord[0] + (x[1] - e->xyz[1]) * chord[1]) / length;
-        const double s = along > -0.9 && along < 1.9 ? project_on_slave(slave, e, x) : 2;
+        const double s = along > -0.9 && along < 1.9 ? project_on_slave(surface, e, x) : 2;
         if (fabs(s) < 1)
             cut[n_cuts++] = s;
     }
@@ -354,10 +361,10 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
         if (cut[k + 1] - cut[k] < LEAST_SEGMENT)
             continue;
         edge_at(x, NULL, e, middle);
-        normal_at(n, slave, e, middle);
-        const int64_t across = edge_across(master, near, n_near, x, n);
+        normal_at(n, surface, e, middle);
+        const int64_t across = edge_across(pair, i, x, n);
         if (across >= 0)
-            room = add_segment(points, in, slave, e, master, across, cut[k], cut[k + 1]);
+            room = add_segment(pair, i, across, cut[k], cut[k + 1]);
     }
     free(cut);
     return room;

@@ -370,13 +370,57 @@ static bool is_affine(const uz_mortar_side *side)
     return off <= 1e-9 * size;
 }
 
+/* What leads from y on face i to face j, where that is behind it; height: of the two over the plane. */
+static uz_way way_to(uz_mortar_pair *pair, int64_t i, int64_t j, const plane *on, const double y[2],
+                     const double height[2])
+{
+    double x[2][3];
+    for (int k = 0; k < 2; k++)
+        for (int c = 0; c < 3; c++)
+            x[k][c] = on->x[c] + y[0] * on->t[0][c] + y[1] * on->t[1][c] + height[k] * on->n[c];
+    return height[1] < height[0] ? uz_mortar_way(pair, i, j, x[0], x[1]) : UZ_WAY_OVERLAP;
+}
+
+/* Is there another face at y, nearer to face i than face j is? Where there are no layers that can only be the back of
+ * what i is on, beyond which nothing is looked for. */
+static bool is_covered(uz_mortar_pair *pair, int64_t i, int64_t j, const plane *on, const double y[2],
+                       const double height[2])
+{
+    const bool behind = height[1] < height[0];
+    for (int64_t k = 0; k < pair->n_near && (pair->layered || (pair->own && behind)); k++) {
+        const uz_mortar_side *other = &pair->surface.side[pair->near[k]];
+        const uz_side shape = uz_mortar_side_of(other, pair->in->model);
+        polygon piece[MOST_PIECES];
+        bool within = false;
+        const int count = pair->near[k] == j ? 0 : project(piece, other, on);
+        for (int q = 0; q < count && !within; q++) {
+            turn_over(&piece[q]);
+            within = twice_area(&piece[q]) > 0;
+            for (int a = 0; a < piece[q].n && within; a++) {
+                const double *from = piece[q].x[a], *to = piece[q].x[(a + 1) % piece[q].n];
+                within = (to[0] - from[0]) * (y[1] - from[1]) >= (to[1] - from[1]) * (y[0] - from[0]);
+            }
+        }
+        double N[UZ_FACE_NODES], area[3], local[2], there[2] = {height[0], 0};
+        memcpy(local, centre_of(other), sizeof local);
+        if (!within || !lift(N, area, &there[1], local, other, &shape, on, y) ||
+            !(fabs(there[1] - there[0]) < (1 - 1e-9) * fabs(height[1] - height[0])))
+            continue;
+        const uz_way way = way_to(pair, i, pair->near[k], on, y, there);
+        if ((way == UZ_WAY_BACK && behind) || (way == UZ_WAY_OVERLAP && pair->layered))
+            return true;
+    }
+    return false;
+}
+
 /* One convex piece that both faces cover, as a fan of triangles with n x n points each: those of a square, one side of
  * which falls together in a corner, exact to degree 2 n - 2. */
-static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_mortar_surface *slave,
-                      const uz_mortar_side *side, const uz_mortar_surface *surface, int64_t master,
-                      const uz_contact_input *in, const plane *on, int n)
+static bool add_piece(uz_mortar_pair *pair, const polygon *piece, int64_t i_side, int64_t master, const plane *on,
+                      int n)
 {
-    const uz_mortar_side *other = &surface->side[master];
+    const uz_contact_input *in = pair->in;
+    const uz_mortar_surface *surface = &pair->surface;
+    const uz_mortar_side *side = &surface->side[i_side], *other = &surface->side[master];
     const uz_side mine = uz_mortar_side_of(side, in->model), its = uz_mortar_side_of(other, in->model);
     double at[5], weight[5], local[2][2];
     bool room = true;
@@ -396,38 +440,38 @@ static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_m
             for (int c = 0; c < 2; c++)
                 y[c] = (1 - r - s) * triangle.x[0][c] + r * triangle.x[1][c] + s * triangle.x[2][c];
             if (!lift(p.N, area, &height[0], local[0], side, &mine, on, y) ||
-                !lift(p.M, ignored, &height[1], local[1], other, &its, on, y))
+                !lift(p.M, ignored, &height[1], local[1], other, &its, on, y) ||
+                way_to(pair, i_side, master, on, y, height) != UZ_WAY_OVERLAP ||
+                is_covered(pair, i_side, master, on, y, height))
                 continue;
             for (int a = 0; a < side->nodes; a++)
                 for (int c = 0; c < 3; c++)
-                    normal[c] += p.N[a] * slave->normal[3 * side->place[a] + c];
+                    normal[c] += p.N[a] * surface->normal[3 * side->place[a] + c];
             uz_unit3(normal);
             p.weight *= sqrt(uz_dot3(area, area)) / uz_dot3(area, on->n);
             p.gap = (height[1] - height[0]) * uz_dot3(normal, on->n);
             for (int k = 0; k < 2; k++) { /* from either face, as it was before anything moved, to its shape */
-                const uz_mortar_surface *of = k == 0 ? slave : surface;
-                const uz_mortar_side *rest = uz_mortar_rest(of, k == 0 ? side : other);
+                const uz_mortar_side *rest = uz_mortar_rest(surface, k == 0 ? side : other);
                 double x[3], off[3];
                 for (int c = 0; c < 3; c++) {
                     x[c] = on->x[c] + y[0] * on->t[0][c] + y[1] * on->t[1][c] + height[k] * on->n[c];
                     for (int a = 0; a < rest->nodes && in->rest; a++)
                         x[c] = (a == 0 ? 0 : x[c]) + (k == 0 ? p.N : p.M)[a] * rest->xyz[3 * a + c];
                 }
-                smooth_offset(off, of->rest ? of->rest : of, rest, k == 0 ? p.N : p.M, x);
+                smooth_offset(off, surface->rest ? surface->rest : surface, rest, k == 0 ? p.N : p.M, x);
                 p.gap += (k == 0 ? -1 : 1) * uz_dot3(off, normal);
             }
             if (isfinite(p.gap) && p.weight > 0)
-                room = uz_mortar_add_point(points, &p);
+                room = uz_mortar_add_point(&pair->points, &p);
         }
     }
     return room;
 }
 
-static bool points(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
-                   const uz_mortar_surface *master, const int64_t *near, int64_t n_near)
+static bool points(uz_mortar_pair *pair, int64_t i)
 {
-    const uz_mortar_side *side = &slave->side[i];
-    const uz_side shape = uz_mortar_side_of(side, in->model);
+    const uz_mortar_side *side = &pair->surface.side[i];
+    const uz_side shape = uz_mortar_side_of(side, pair->in->model);
     plane on = {.x = {0}};
     polygon mine[MOST_PIECES], its[MOST_PIECES];
     bool room = true;
@@ -444,8 +488,8 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
     uz_unit3(on.t[0]);
     uz_cross3(on.t[1], on.n, on.t[0]);
     const int n_mine = project(mine, side, &on);
-    for (int64_t k = 0; k < n_near && room; k++) {
-        const uz_mortar_side *other = &master->side[near[k]];
+    for (int64_t k = 0; k < pair->n_near && room; k++) {
+        const uz_mortar_side *other = &pair->surface.side[pair->near[k]];
         const bool affine = is_affine(side) && is_affine(other);
         const int n_its = project(its, other, &on), rule = !affine ? 5 : side->nodes > 4 || other->nodes > 4 ? 4 : 3;
         for (int q = 0; q < n_its && room; q++) {
@@ -456,7 +500,7 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
                 polygon piece = mine[p];
                 clip(&piece, &its[q]);
                 if (piece.n >= 3 && twice_area(&piece) > LEAST_PIECE * side->area)
-                    room = add_piece(points, &piece, slave, side, master, near[k], in, &on, rule);
+                    room = add_piece(pair, &piece, i, pair->near[k], &on, rule);
             }
         }
     }

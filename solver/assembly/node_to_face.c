@@ -1,6 +1,6 @@
 /* node_to_face.c: contact of the nodes of one part of the body with the faces of another (obstacle/projection.h): a row
  * for each node that meets a face, along the face's normal. */
-#include "assembly/discretization.h"
+#include "assembly/mortar.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
@@ -38,15 +38,94 @@ static uz_status copy_pairs(uz_contact_sites *sites, const uz_contact_input *in,
     return UZ_OK;
 }
 
+/* Where a surface may touch itself: each node of both surfaces is a slave of the sides that its own are slaves of. */
+typedef struct {
+    const uz_mortar_pair *pair;
+    const uz_contact_sites *sites;
+    int64_t *first, *side; /* n_nodes + 1: the sides of both surfaces around each node */
+    int64_t *number;       /* UZ_ELEMENT_SIDES of each element: which side of the pair it is */
+} own_sides;
+
+static int64_t number_of(const own_sides *own, uz_face face)
+{
+    return own->number[face.element * UZ_ELEMENT_SIDES + face.side];
+}
+
+static bool is_slave(const void *ctx, int64_t node, int64_t face)
+{
+    const own_sides *own = ctx;
+    const int64_t j = number_of(own, own->pair->in->with->face[face]);
+    bool both = false;
+    for (int64_t q = own->first[node]; q < own->first[node + 1]; q++) {
+        const int64_t i = own->side[q];
+        if (own->pair->of[i] != (UZ_OF_ON | UZ_OF_WITH))
+            continue;
+        both = true;
+        if (own->pair->of[j] == UZ_OF_WITH || uz_mortar_is_slave(own->sites, i, j))
+            return true;
+    }
+    return !both;
+}
+
+static bool list_sides(own_sides *own, const uz_contact_input *in)
+{
+    const uz_mortar_surface *surface = &own->pair->surface;
+    const int64_t n = in->model->mesh.n_nodes;
+    own->first = uz_alloc_zero(n + 2, sizeof *own->first);
+    own->side = uz_alloc(surface->n * UZ_FACE_NODES, sizeof *own->side);
+    own->number = uz_alloc(in->model->mesh.n_elements * UZ_ELEMENT_SIDES, sizeof *own->number);
+    const bool room = own->first && own->side && own->number;
+    for (int64_t i = 0; i < surface->n && room; i++) {
+        own->number[surface->side[i].face.element * UZ_ELEMENT_SIDES + surface->side[i].face.side] = i;
+        for (int a = 0; a < surface->side[i].nodes; a++)
+            own->first[surface->side[i].node[a] + 2]++;
+    }
+    for (int64_t a = 0; a < n && room; a++)
+        own->first[a + 2] += own->first[a + 1];
+    for (int64_t i = 0; i < surface->n && room; i++)
+        for (int a = 0; a < surface->side[i].nodes; a++)
+            own->side[own->first[surface->side[i].node[a] + 1]++] = i;
+    return room;
+}
+
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
 {
+    const uz_mesh *mesh = &in->model->mesh;
     uz_contact_pair *pair = NULL;
+    uz_mortar_pair both = {.in = in};
+    own_sides own = {.pair = &both, .sites = sites};
+    uz_own_place place = {.ctx = &own};
     int64_t count = 0;
-    uz_status status = uz_sites_of_nodes(sites, in, err);
+    const int itself = in->on->kind == UZ_GROUP_FACES ? uz_groups_share_face(mesh, in->on, in->with) : 0;
+    uz_status status = uz_contact_pair_check(mesh, in->on, in->with, in->index, err);
     if (status == UZ_OK)
-        status = uz_contact_pairs(&pair, &count, &in->model->mesh, in->on, in->with, in->index, in->rest != NULL, err);
+        status = uz_sites_of_nodes(sites, in, err);
+    if (status == UZ_OK && itself > 0) {
+        status = uz_mortar_pair_make(&both, in, err);
+        if (status == UZ_OK)
+            status = uz_mortar_choose_slaves(sites, &both, err);
+        place.may = is_slave;
+    }
+    if (status == UZ_OK && (itself < 0 || (itself > 0 && !list_sides(&own, in))))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact of a body with itself");
+    if (status == UZ_OK)
+        status = uz_own_body_new(&place.own, mesh, in->on, in->with, err);
+    if (status == UZ_OK)
+        status = uz_contact_pairs(&pair, &count, mesh, in->on, in->with, in->index, &place, in->rest != NULL, err);
     if (status == UZ_OK)
         status = copy_pairs(sites, in, pair, count, err);
+    if (status == UZ_OK && itself > 0 && !(sites->of = uz_alloc_zero(sites->n, 1)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact of a body with itself");
+    for (int64_t i = 0; i < sites->n && status == UZ_OK && itself > 0; i++)
+        if (isfinite(sites->gap[i])) {
+            const bool of_on = both.of[number_of(&own, sites->face[i])] & UZ_OF_ON;
+            sites->of[i] = UZ_SLAVE_ON | (of_on ? UZ_MASTER_ON : 0);
+        }
+    uz_mortar_pair_clear(&both);
+    uz_own_body_free(place.own);
+    free(own.first);
+    free(own.side);
+    free(own.number);
     free(pair);
     return status;
 }

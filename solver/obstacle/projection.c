@@ -83,10 +83,69 @@ static void box_of(double *box, const double *xyz, int dim, int count)
     }
 }
 
+static double face_size(const double *xyz, int dim, int corners)
+{
+    double most = 0;
+    for (int i = 0; i < corners; i++) {
+        const int j = (i + 1) % corners;
+        double sum = 0;
+        for (int c = 0; c < dim; c++)
+            sum += (xyz[j * dim + c] - xyz[i * dim + c]) * (xyz[j * dim + c] - xyz[i * dim + c]);
+        most = fmax(most, sqrt(sum));
+    }
+    return most;
+}
+
+/* A point that looks for what it meets. */
+typedef struct {
+    const master *m;
+    const uz_own_place *own;
+    double *back; /* the squared distance of the nearest side that is the back of its own body */
+} seeker;
+
+/* May the point x meet this face, whose closest point is the foot? */
+static bool may_meet(const seeker *s, int64_t face, const int64_t *node, int nodes, double size, const double *x,
+                     const uz_foot *foot)
+{
+    const uz_own_place *own = s->own;
+    const master *m = s->m;
+    const int64_t element = m->group->face[face].element;
+    const bool may = !own->may || own->may(own->ctx, own->node[0], face);
+    double from[3] = {0}, to[3] = {0}, along = 0;
+    bool seen = false;
+    if (!uz_own_body_same(own->own, own->element, element))
+        return may;
+    for (int a = 0; a < nodes; a++)
+        for (int b = 0; b < own->nodes; b++)
+            if (node[a] == own->node[b])
+                return false;
+    for (int c = 0; c < m->mesh->dim; c++) {
+        from[c] = x[c] / m->scale;
+        to[c] = (x[c] + foot->point[c]) / m->scale;
+        along -= foot->point[c] * foot->normal[c];
+    }
+    for (int k = 0; k < own->normals && !seen; k++) { /* the two look at each other, or both are behind each other */
+        double cosine = 0, ahead = 0;
+        for (int c = 0; c < 3; c++) {
+            cosine += own->normal[k][c] * foot->normal[c];
+            ahead += own->normal[k][c] * foot->point[c];
+        }
+        ahead = foot->distance2 > ON_BORDER * ON_BORDER * size * size ? (along < 0 ? -ahead : ahead) : size;
+        seen = cosine < -SAME_WAY && ahead > SAME_WAY * sqrt(foot->distance2);
+    }
+    if (!seen)
+        return false;
+    const uz_way way = along < 0 ? uz_own_body_way(own->own, own->element, from, element, to) : UZ_WAY_OVERLAP;
+    if (way == UZ_WAY_BACK)
+        *s->back = fmin(*s->back, foot->distance2);
+    return may && way == UZ_WAY_OVERLAP;
+}
+
 static double distance_to(const void *ctx, int64_t item, const double *x, double best)
 {
     static const double ORIGIN[3] = {0};
-    const master *m = ctx;
+    const seeker *s = ctx;
+    const master *m = s->m;
     const int dim = m->mesh->dim;
     double xyz[3 * UZ_FACE_NODES], box[6];
     int64_t node[UZ_FACE_NODES];
@@ -96,7 +155,9 @@ static double distance_to(const void *ctx, int64_t item, const double *x, double
     if (uz_box_distance(box, dim, ORIGIN) > best)
         return INFINITY;
     uz_face_closest(&foot, dim, count, xyz);
-    return foot.distance2;
+    return s->own && !may_meet(s, item, node, count, face_size(xyz, dim, uz_face_corners(dim, count)), x, &foot)
+               ? INFINITY
+               : foot.distance2;
 }
 
 static uz_status out_of_memory(uz_error *err)
@@ -238,19 +299,6 @@ static void meet(meeting *out, const master *m, int64_t a, int64_t b, const doub
 
 /* ------------------------------------------------------------------ rows */
 
-static double face_size(const double *xyz, int dim, int corners)
-{
-    double most = 0;
-    for (int i = 0; i < corners; i++) {
-        const int j = (i + 1) % corners;
-        double sum = 0;
-        for (int c = 0; c < dim; c++)
-            sum += (xyz[j * dim + c] - xyz[i * dim + c]) * (xyz[j * dim + c] - xyz[i * dim + c]);
-        most = fmax(most, sqrt(sum));
-    }
-    return most;
-}
-
 /* The normal where the foot is on an edge or a corner of its face. off: x_s - x_m. False: the node is beyond the border
  * of the master. */
 static bool normal_between(double normal[3], const master *m, const uz_contact_pair *row, const uz_foot *foot,
@@ -295,14 +343,18 @@ static bool looks_away(const master *slave, int64_t node, const double *x, const
 
 /* Fills all of a row but its node for a point x, scaled; *found false: it faces no part of the master. Returns false
  * where the face has no normal: *row tells which. */
-static bool place_on(bool *found, uz_contact_pair *row, const master *m, const double x[3])
+static bool place_on(bool *found, uz_contact_pair *row, const master *m, const double x[3], const uz_own_place *own)
 {
     const int dim = m->mesh->dim;
-    double off[3], normal[3], xyz[3 * UZ_FACE_NODES], along = 0;
+    double off[3], normal[3], xyz[3 * UZ_FACE_NODES], along = 0, back = INFINITY;
     uz_foot foot;
     *found = false;
     memset(row, 0, sizeof *row);
-    const int64_t nearest = uz_box_tree_nearest(&m->tree, x, distance_to, m);
+    const int64_t nearest = uz_box_tree_nearest(&m->tree, x, distance_to, &(seeker){m, own, &back});
+    if (nearest < 0 && own) {
+        row->gap = INFINITY;
+        return true;
+    }
     row->number = nearest < 0 ? 0 : nearest;
     row->face = m->group->face[row->number];
     row->count = gather(xyz, row->master, m, row->number, x);
@@ -314,6 +366,11 @@ static bool place_on(bool *found, uz_contact_pair *row, const master *m, const d
     memcpy(normal, foot.normal, sizeof normal);
     const double size = face_size(xyz, dim, uz_face_corners(dim, row->count));
     row->gap = sqrt(foot.distance2) / m->scale;
+    for (int c = 0; c < dim; c++)
+        along += off[c] * foot.normal[c];
+    if (along < 0 && foot.distance2 > back)
+        return true;
+    along = 0;
     if (foot.place != UZ_FACE_WITHIN && !normal_between(normal, m, row, &foot, size, x, off))
         return true;
     if (!uz_unit_normal(row->normal, normal, dim))
@@ -330,13 +387,24 @@ static bool place_on(bool *found, uz_contact_pair *row, const master *m, const d
 
 /* Fills the row of one node; *found false: it faces no part of the master. */
 static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, const master *slave, int64_t node,
-                          int64_t index, uz_error *err)
+                          int64_t index, const uz_own_place *own, uz_error *err)
 {
-    double x[3] = {0};
+    enum { MOST_AROUND = 48 };
+    double x[3] = {0}, normal[MOST_AROUND][3];
+    uz_own_place at = *own;
     char where[96];
     for (int c = 0; c < m->mesh->dim; c++)
         x[c] = m->mesh->xyz[node * m->mesh->dim + c] * m->scale;
-    if (!place_on(found, row, m, x)) {
+    at.node = &node;
+    at.nodes = 1;
+    at.normal = (const double(*)[3])normal;
+    for (int64_t q = slave->first[node]; own->own && q < slave->first[node + 1] && at.normals < MOST_AROUND; q++) {
+        uz_foot foot;
+        closest_on(&foot, slave, slave->around[q], x);
+        memcpy(normal[at.normals++], foot.normal, sizeof foot.normal);
+        at.element = slave->group->face[slave->around[q]].element;
+    }
+    if (!place_on(found, row, m, x, own->own ? &at : NULL)) {
         snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
         return uz_fail(err, UZ_ERR_SCENE, where, "the face at node %lld of \"%.63s\" has no area, and so no normal",
                        (long long)row->master[0], m->group->name);
@@ -357,9 +425,8 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
                        "\"%.63s\" has no faces; the other body is given by the %s that can be touched", with->name,
                        "edges or faces");
     if (on == with)
-        return uz_fail(err, UZ_ERR_SCENE, where, "\"%.63s\" is both bodies; name the faces of the other one",
-                       with->name);
-    /* No node of the master may be among the slaves: its gap to itself is zero for every motion. */
+        return UZ_OK;
+    /* Bodies that have nodes in common hang together there, unless the surface is to touch itself. */
     unsigned char *of_master = uz_alloc_zero(mesh->n_nodes, 1);
     uz_status status = of_master ? UZ_OK : out_of_memory(err);
     for (int64_t f = 0; f < with->n_faces && status == UZ_OK; f++) {
@@ -369,25 +436,32 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
             of_master[node[i]] = 1;
     }
     snprintf(where, sizeof where, "/contacts/%lld/on", (long long)index);
-    for (int64_t i = 0; i < uz_group_node_count(mesh, on) && status == UZ_OK; i++)
-        if (of_master[uz_group_node_at(on, i)])
+    int itself = -1;
+    for (int64_t i = 0; i < uz_group_node_count(mesh, on) && status == UZ_OK && itself != 1; i++) {
+        if (!of_master[uz_group_node_at(on, i)])
+            continue;
+        itself = uz_groups_share_face(mesh, on, with);
+        if (itself < 0)
+            status = out_of_memory(err);
+        else if (itself == 0)
             status = uz_fail(err, UZ_ERR_SCENE, where,
                              "node %lld is in \"%.63s\" and on the faces of \"%.63s\"; the two bodies must have nodes "
                              "of their own where they touch",
                              (long long)uz_group_node_at(on, i), on->name, with->name);
+    }
     free(of_master);
     return status;
 }
 
 static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m, const master *slave, int64_t index,
-                           bool may_miss, uz_error *err)
+                           const uz_own_place *own, bool may_miss, uz_error *err)
 {
     const uz_group *on = slave->group;
     char where[96];
     *count = 0;
     for (int64_t i = 0; i < uz_group_node_count(m->mesh, on); i++) {
         bool found;
-        const uz_status status = make_row(&found, &row[*count], m, slave, uz_group_node_at(on, i), index, err);
+        const uz_status status = make_row(&found, &row[*count], m, slave, uz_group_node_at(on, i), index, own, err);
         if (status != UZ_OK)
             return status;
         *count += found;
@@ -414,7 +488,7 @@ static uz_status prepare(master *m, const uz_mesh *mesh, const uz_group *group, 
 }
 
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
-                           const uz_group *with, int64_t index, bool may_miss, uz_error *err)
+                           const uz_group *with, int64_t index, const uz_own_place *own, bool may_miss, uz_error *err)
 {
     master m = {.mesh = NULL}, slave = {.mesh = NULL};
     uz_contact_pair *row = NULL;
@@ -428,7 +502,7 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
     if (status == UZ_OK)
         status = prepare(&slave, mesh, on, true, false, err);
     if (status == UZ_OK)
-        status = make_rows(row, count, &m, &slave, index, may_miss, err);
+        status = make_rows(row, count, &m, &slave, index, own, may_miss, err);
     if (status == UZ_OK)
         *out = row;
     else
@@ -461,11 +535,11 @@ void uz_faces_free(uz_faces *faces)
     free(faces);
 }
 
-bool uz_faces_closest(uz_contact_pair *row, const uz_faces *faces, const double *x)
+bool uz_faces_closest(uz_contact_pair *row, const uz_faces *faces, const double *x, const uz_own_place *own)
 {
     bool found;
     double at[3] = {0};
     for (int c = 0; c < faces->mesh->dim; c++)
         at[c] = x[c] * faces->scale;
-    return place_on(&found, row, faces, at) && found;
+    return place_on(&found, row, faces, at, own->own ? own : NULL) && found;
 }

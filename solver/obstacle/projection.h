@@ -16,6 +16,7 @@
 #define UZ_OBSTACLE_PROJECTION_H
 
 #include "scene/mesh.h"
+#include "scene/mesh_parts.h"
 
 /* A node beyond the border of the master has no row when it is outside by more than this part of the face's size. */
 #define UZ_OVERHANG 0.05
@@ -34,17 +35,30 @@ typedef struct {
     double size;      /* of the face: its longest edge */
 } uz_contact_pair;
 
-/* May the two touch? UZ_ERR_SCENE: `with` has no faces, is `on`, or the two have a node in common. */
+/* May the two touch? UZ_ERR_SCENE: `with` has no faces, or the two have a node in common, but no face. */
 uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const uz_group *with, int64_t index,
                                 uz_error *err);
 
+/* The place that a point of one body is at, whose other sides it may meet too: those that have none of its nodes, look
+ * at it, and are not the back of what it is on, nor beyond that (scene/mesh_parts.h). */
+typedef struct {
+    uz_own_body *own; /* of the mesh; NULL: whatever is nearest is met */
+    int64_t element;  /* which it is on */
+    int nodes, normals;
+    const int64_t *node;       /* those of its side, or itself */
+    const double (*normal)[3]; /* of the sides around it, out of the body: one is enough that looks at what is met */
+    bool (*may)(const void *ctx, int64_t node,
+                int64_t number); /* of its first node and a face of the group; NULL: all */
+    const void *ctx;
+} uz_own_place;
+
 /* The rows of all nodes of `on` that face `with` (behind it, only those that look at it), in the order of the nodes
  * (ascending). O((n + f) log f) for n nodes within a few faces' size of f faces. `index` is the contact's place in the
- * scene, for pointers. may_miss: it is no error that no node faces `with`. The caller frees *out with free(). Errors:
- * UZ_ERR_SCENE ("/contacts/i/with": not faces; "/contacts/i/on": a node of the master itself, or no node that faces
- * it), UZ_ERR_MEMORY. */
+ * scene, for pointers. own: own, may and ctx alone. may_miss: it is no error that no node faces `with`. The caller
+ * frees *out with free(). Errors: UZ_ERR_SCENE ("/contacts/i/with": not faces; "/contacts/i/on": a node of the master
+ * itself, or no node that faces it), UZ_ERR_MEMORY. */
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
-                           const uz_group *with, int64_t index, bool may_miss, uz_error *err);
+                           const uz_group *with, int64_t index, const uz_own_place *own, bool may_miss, uz_error *err);
 
 /* The faces of a group, made ready for points from anywhere. */
 typedef struct uz_faces uz_faces;
@@ -52,8 +66,8 @@ typedef struct uz_faces uz_faces;
 /* O(f log f). mesh and group are kept: they outlive it. The caller frees *out. Error: UZ_ERR_MEMORY. */
 uz_status uz_faces_new(uz_faces **out, const uz_mesh *mesh, const uz_group *group, uz_error *err);
 void uz_faces_free(uz_faces *faces);
-/* The closest place to x (dim) as the row of a node there, whose number stays 0. False: x lies beyond the faces'
- * border, or the face there has no normal. Allocates nothing. */
-bool uz_faces_closest(uz_contact_pair *row, const uz_faces *faces, const double *x);
+/* The closest place to x (dim), which is at `own`, as the row of a node there, whose number stays 0. False: x lies
+ * beyond the faces' border, or the face there has no normal. Allocates nothing. */
+bool uz_faces_closest(uz_contact_pair *row, const uz_faces *faces, const double *x, const uz_own_place *own);
 
 #endif

@@ -66,7 +66,7 @@ static void add_contacts(balance *b)
     for (int64_t row = 0; row < model->m; row++) {
         const int64_t k = info->contact_of[row], node = info->contact_node[row], place = model->row_place[row];
         const uz_contact_sites *sites = model->sites && model->sites[k].first ? &model->sites[k] : NULL;
-        const bool swapped = model->sites && model->sites[k].swapped; /* `on` is pushed back */
+        const int of = sites && sites->of ? sites->of[place] : UZ_SLAVE_ON;
         const uz_inner_place *inner = uz_row_inner(model, row);
         double f[DIM] = {0};
         for (int c = 0; c < b->dim; c++)
@@ -78,7 +78,7 @@ static void add_contacts(balance *b)
                 part[c] = (inner ? inner->share[a] : 1) * f[c];
                 b->contact[at * b->dim + c] += part[c];
             }
-            add_force(b, swapped ? NULL : &b->out->contacts[k], at, part);
+            add_force(b, of & UZ_SLAVE_ON ? &b->out->contacts[k] : NULL, at, part);
         }
         for (int64_t j = sites ? sites->first[place] : 0; sites && j < sites->first[place + 1]; j++) {
             double back[DIM] = {0};
@@ -86,7 +86,7 @@ static void add_contacts(balance *b)
                 back[c] = -sites->weight[j] * f[c];
                 b->contact[sites->node[j] * b->dim + c] += back[c];
             }
-            add_force(b, swapped ? &b->out->contacts[k] : NULL, sites->node[j], back);
+            add_force(b, of & UZ_MASTER_ON ? &b->out->contacts[k] : NULL, sites->node[j], back);
         }
     }
 }

@@ -55,7 +55,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     if (status != UZ_OK)
         return status;
     /* Force (of rings: axial), area and peak of the contact: the obstacle pushes a row's node along its normal by
-     * -push, and `on` is pushed the other way where the other side has the rows. */
+     * -push, and `on` is pushed the other way where the masters are its own. */
     double *push = uz_alloc(result->m, sizeof *push);
     if (!push)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)result->m);
@@ -65,9 +65,11 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     double pressed = 0; /* the sum of the forces of all rows */
     for (int64_t i = 0; i < result->m; i++) {
         const int64_t node = mesh->contact_node[i];
-        const bool swapped = model->sites && model->sites[mesh->contact_of[i]].swapped;
+        const uz_contact_sites *sites = model->sites ? &model->sites[mesh->contact_of[i]] : NULL;
+        const int of = sites && sites->of ? sites->of[model->row_place[i]] : UZ_SLAVE_ON;
+        const int times = (of & UZ_SLAVE_ON ? 1 : 0) - (of & UZ_MASTER_ON ? 1 : 0);
         for (int axis = model->kind == UZ_AXISYMMETRIC ? 1 : 0; axis < mesh->dim; axis++)
-            summary->force[axis] -= (swapped ? -push[i] : push[i]) * mesh->contact_normal[i * mesh->dim + axis];
+            summary->force[axis] -= times * push[i] * mesh->contact_normal[i * mesh->dim + axis];
         pressed += fabs(push[i]);
         if (model->law->kind->active(model->law, NULL, &result->r[i], 1) > 0)
             e->contact_area += mesh->contact_area[i];

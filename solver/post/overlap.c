@@ -41,6 +41,7 @@ typedef struct {
     bool smooth;           /* are offsets part of the contact? */
     bool plane;            /* is the obstacle one? Then straight sides are deepest at their nodes */
     uz_obstacle *obstacle; /* NULL: two bodies */
+    uz_own_body *own;      /* where it is now; NULL: no part of it may touch itself */
     flank flank[2];
     uz_overlap *out;
 } work;
@@ -117,7 +118,14 @@ static void look(work *w, place *p, const double *local)
     } else {
         uz_contact_pair foot;
         double d[3] = {0}, back[3] = {0};
-        const bool found = uz_faces_closest(&foot, w->flank[!p->k].faces, x);
+        const double outward[1][3] = {{out[0], out[1], out[2]}};
+        const uz_own_place own = {.own = w->own,
+                                  .element = side->face.element,
+                                  .nodes = side->nodes,
+                                  .normals = 1,
+                                  .node = side->node,
+                                  .normal = outward};
+        const bool found = uz_faces_closest(&foot, w->flank[!p->k].faces, x, &own);
         p->gap = foot.gap;
         if (!found)
             return;
@@ -311,6 +319,8 @@ static uz_status look_at_contact(uz_overlap *out, const uz_body_model *moved, co
         if (status == UZ_OK && pair)
             status = uz_faces_new(&w.flank[j].faces, &moved->mesh, group[j], NULL);
     }
+    if (status == UZ_OK && pair)
+        status = uz_own_body_new(&w.own, &moved->mesh, group[0], group[1], NULL);
     for (int j = 0; j < flanks && status == UZ_OK; j++) {
         free(seen);
         seen = uz_alloc_zero(w.flank[j].still.n_places, 1);
@@ -322,6 +332,7 @@ static uz_status look_at_contact(uz_overlap *out, const uz_body_model *moved, co
     }
     free(seen);
     uz_obstacle_free(w.obstacle);
+    uz_own_body_free(w.own);
     for (int j = 0; j < flanks; j++) {
         uz_mortar_surface_clear(&w.flank[j].still);
         uz_mortar_surface_clear(&w.flank[j].moved);

@@ -19,7 +19,8 @@ const uz_group *uz_check_sides(char where[UZ_CHECK_POINTER], const uz_mesh *mesh
 uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i, const char *key, uz_error *err);
 uz_status uz_check_number(double value, const char *list, int64_t i, const char *key, uz_error *err);
 
-/* Group, directions and values of support i; groups and directions of contact i. */
+/* Group, directions and values of support i; groups and directions of contact i, whose sides no
+ * contact before it may have named for each other. */
 uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err);
 uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err);
 uz_status uz_check_materials(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);

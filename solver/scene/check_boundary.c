@@ -1,11 +1,13 @@
 /* check_boundary.c: supports and contacts. */
 #include "scene/check.h"
 
+#include "core/alloc.h"
 #include "core/error.h"
 #include "scene/scene.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 bool uz_unit_normal(double out[3], const double normal[3], int dim)
@@ -106,6 +108,45 @@ static uz_status check_contact_side(const uz_mesh *mesh, const char *on, int64_t
     return UZ_OK;
 }
 
+/* Has the group a face among these: bits, by element? */
+static bool has_any(const unsigned char *sides, const uz_mesh *mesh, const char *name)
+{
+    const uz_group *group = uz_mesh_group(mesh, name, "", NULL);
+    for (int64_t i = 0; group && i < group->n_faces; i++)
+        if (sides[group->face[i].element] >> group->face[i].side & 1)
+            return true;
+    return false;
+}
+
+/* Two contacts of the same sides would divide their pressure between them at will. */
+static uz_status check_named_once(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    const uz_contact *mine = &scene->contacts[i];
+    const char *const name[2] = {mine->on, mine->with};
+    unsigned char *const of[2] = {uz_alloc_zero(mesh->n_elements, 1), uz_alloc_zero(mesh->n_elements, 1)};
+    const bool room = of[0] && of[1];
+    uz_status status = room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of contacts");
+    for (int k = 0; k < 2 && room; k++) {
+        const uz_group *group = uz_mesh_group(mesh, name[k], "", NULL);
+        for (int64_t f = 0; group && f < group->n_faces; f++)
+            of[k][group->face[f].element] |= (unsigned char)(1u << group->face[f].side);
+    }
+    for (int64_t k = 0; k < i && status == UZ_OK; k++) {
+        const uz_contact *its = &scene->contacts[k];
+        if (its->kind == UZ_OBSTACLE_BODY && ((has_any(of[0], mesh, its->on) && has_any(of[1], mesh, its->with)) ||
+                                              (has_any(of[1], mesh, its->on) && has_any(of[0], mesh, its->with))))
+            status =
+                uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, NULL),
+                        "sides of \"%.40s\" and \"%.40s\" that may touch here may do so by contact %lld (\"%.40s\" "
+                        "and \"%.40s\"), too; name each pair once, several in one contact as lists",
+                        mine->on, mine->with, (long long)k, its->on, its->with);
+    }
+    free(of[0]);
+    free(of[1]);
+    return status;
+}
+
 uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
@@ -119,8 +160,5 @@ uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i
     if (contact->kind != UZ_OBSTACLE_BODY)
         return UZ_OK; /* its values are checked with the obstacle */
     status = check_contact_side(mesh, contact->with, i, "with", err);
-    if (status == UZ_OK && strncmp(contact->on, contact->with, sizeof contact->on) == 0)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
-                       "\"%.63s\" would touch itself; name a side of another part", contact->with);
-    return status;
+    return status == UZ_OK && i > 0 ? check_named_once(scene, mesh, i, err) : status;
 }

@@ -282,7 +282,7 @@ def test_refusals_name_the_place(s):
         said = str(reply.json)
         check((reply.status == 422 or reply.json["status"] == "failed") and all(w in said for w in words), said)
 
-    refused(lambda p: p["contacts"][0].update({"with": "low"}), "/contacts/0/with", "touch itself")
+    refused(lambda p: p["contacts"][0].update({"with": "low"}), "/contacts/0/on", "faces")
     refused(lambda p: p["contacts"][0].update({"with": "top"}), "/contacts/0/on", "faces")
     refused(lambda p: p["contacts"][0].update({"discretization": "mortar"}), "/contacts/0/discretization", "surfaces")
     refused(lambda p: p["contacts"][0].update({"feature_angle": 0}), "/contacts/0/feature_angle")

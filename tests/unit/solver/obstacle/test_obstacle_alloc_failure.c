@@ -62,7 +62,7 @@ static void make_pairs(void)
     uz_contact_pair *row;
     int64_t count;
     uz_error err = {0};
-    const uz_status status = uz_contact_pairs(&row, &count, &mesh, &on, &with, 0, false, &err);
+    const uz_status status = uz_contact_pairs(&row, &count, &mesh, &on, &with, 0, &(uz_own_place){0}, false, &err);
     CHECK_INT(status, heap.failed ? UZ_ERR_MEMORY : UZ_OK);
     CHECK((row != NULL) == (status == UZ_OK) && count == (status == UZ_OK));
     free(row);

@@ -115,7 +115,8 @@ static uz_contact_pair *rows_of(int64_t *count, const bodies *b)
 {
     uz_contact_pair *row;
     uz_error err = {0};
-    const uz_status status = uz_contact_pairs(&row, count, &b->mesh, &b->on, &b->with, 0, false, &err);
+    const uz_status status =
+        uz_contact_pairs(&row, count, &b->mesh, &b->on, &b->with, 0, &(uz_own_place){0}, false, &err);
     CHECK_MSG(status == UZ_OK, "%s: %s", err.where, err.message);
     if (status != UZ_OK)
         exit(1);
@@ -440,7 +441,7 @@ static void check_tetrahedron(uz_element_kind kind)
             inner[c] = (xyz[c] + xyz[3 + c] + xyz[6 + c] + xyz[9 + c]) / 4;
             x[c] = middle + 0.1 * (middle - inner[c]);
         }
-        CHECK_INT(uz_contact_pairs(&row, &count, &mesh, &on, &with, 0, false, &err), UZ_OK);
+        CHECK_INT(uz_contact_pairs(&row, &count, &mesh, &on, &with, 0, &(uz_own_place){0}, false, &err), UZ_OK);
         CHECK_INT(count, 1);
         CHECK_INT(row->count, per);
         CHECK(row->gap > 0);
@@ -464,7 +465,7 @@ static void refused(const bodies *b, const uz_group *on, const uz_group *with, c
     uz_contact_pair *row;
     int64_t count;
     uz_error err = {0};
-    CHECK_INT(uz_contact_pairs(&row, &count, &b->mesh, on, with, 3, false, &err), UZ_ERR_SCENE);
+    CHECK_INT(uz_contact_pairs(&row, &count, &b->mesh, on, with, 3, &(uz_own_place){0}, false, &err), UZ_ERR_SCENE);
     CHECK(!row && count == 0);
     CHECK_STR(err.where, where);
     CHECK_MSG(strstr(err.message, fragment) != NULL, "\"%s\" lacks \"%s\"", err.message, fragment);
@@ -477,7 +478,6 @@ TEST(bad_groups_are_refused)
     memcpy(slave(&b, 1), (double[]){3, 0.2}, 16);
     refused(&b, &b.on, &b.with, "/contacts/3/on", "no node of \"shoe\" faces \"floor\"");
     refused(&b, &b.on, &b.on, "/contacts/3/with", "\"shoe\" has no faces");
-    refused(&b, &b.with, &b.with, "/contacts/3/with", "both bodies");
     b.on.node[0] = 2;
     refused(&b, &b.on, &b.with, "/contacts/3/on", "node 2 is in \"shoe\"");
     b.on.node[0] = b.mesh.n_nodes - 2;

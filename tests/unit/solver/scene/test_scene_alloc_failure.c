@@ -210,6 +210,30 @@ TEST(every_allocation_for_a_second_part_may_fail)
     uz_scene_clear(&s);
 }
 
+/* A strip bent to most of a ring: its inside faces itself. */
+static void bend(double x[3])
+{
+    const double turn = 1.7 * x[0] * acos(-1), r = 2 - x[1];
+    x[0] = r * sin(turn);
+    x[1] = -r * cos(turn);
+}
+
+TEST(every_allocation_for_contact_with_itself_may_fail)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){1, 1, 0}, (int64_t[3]){8, 1, 0});
+    body_give_mesh(&s, bend);
+    body_hold(&s, "left", 0, 0, NAN);
+    uz_contact *contact = body_plane(&s, "top", (double[3]){0}, (double[3]){0});
+    contact->kind = UZ_OBSTACLE_BODY;
+    contact->faceted = true;
+    snprintf(contact->with, sizeof contact->with, "top");
+    for (int k = 0; k < 2; k++) {
+        contact->between = k == 0 ? UZ_CONTACT_SURFACES : UZ_CONTACT_NODES;
+        CHECK(fail_each(to_qp, &s) > 70);
+    }
+    uz_scene_clear(&s);
+}
+
 TEST(error_estimate_without_memory_is_nan)
 {
     uz_scene scene = paper_scene(4, 2);

@@ -1,0 +1,607 @@
+/* mortar_pairs.c: which sides of a contact face each other, and which of the two is the slave.
+ *
+ * Both surfaces are one list of sides here, as a side may belong to either. Two sides may touch if one is of `on` and
+ * the other of `with`, unless they have a node in common or are front and back of one part of the body: what lies
+ * behind a side is its own back if the body goes on all the way between them (scene/mesh_parts.h).
+ *
+ * Sides make zones, and of each two zones that face each other the one with the finer mesh is the slave, whichever is
+ * called `on`. Sides of one surface alone are of one zone as far as they hang together; those of both, where the
+ * surface may touch itself, as far as it is smooth, and where a smooth piece faces itself it is divided in two. So each
+ * pair of places is seen from one side only. */
+#include "assembly/mortar.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/vector3.h"
+#include "obstacle/candidates.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Sides of a zone that are looked at before the slave is chosen. */
+enum { LOOKED_AT = 500 };
+
+static uz_status no_memory(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
+}
+
+/* ---- both surfaces as one */
+
+static int by_face(const void *a, const void *b)
+{
+    const uz_face *x = a, *y = b;
+    return x->element != y->element ? (x->element > y->element) - (x->element < y->element) : x->side - y->side;
+}
+
+/* The sides of both groups, each once: those of `on`, then the others of `with`; where there are common ones in an
+ * order that does not depend on which group is called `on`. */
+static bool join_groups(uz_mortar_pair *pair, const uz_contact_input *in)
+{
+    const uz_group *group[2] = {in->on, in->with};
+    const int64_t n = in->on->n_faces + in->with->n_faces;
+    unsigned char *has[2] = {uz_alloc_zero(in->model->mesh.n_elements, 1),
+                             uz_alloc_zero(in->model->mesh.n_elements, 1)};
+    uz_group *all = &pair->group;
+    bool common = false;
+    memcpy(all->name, in->on->name, sizeof all->name);
+    all->kind = UZ_GROUP_FACES;
+    all->face = uz_alloc(n, sizeof *all->face);
+    pair->of = uz_alloc(n, 1);
+    const bool room = has[0] && has[1] && all->face && pair->of;
+    for (int k = 0; k < 2 && room; k++)
+        for (int64_t i = 0; i < group[k]->n_faces; i++) {
+            const uz_face face = group[k]->face[i];
+            const unsigned char bit = (unsigned char)(1u << face.side);
+            if (k == 1 && has[0][face.element] & bit)
+                common = true;
+            else if (!(has[k][face.element] & bit))
+                all->face[all->n_faces++] = face;
+            has[k][face.element] |= bit;
+        }
+    if (common)
+        qsort(all->face, (size_t)all->n_faces, sizeof *all->face, by_face);
+    for (int64_t i = 0; i < all->n_faces && room; i++) {
+        pair->of[i] = 0;
+        for (int k = 0; k < 2; k++)
+            if (has[k][all->face[i].element] >> all->face[i].side & 1)
+                pair->of[i] |= (unsigned char)(k == 0 ? UZ_OF_ON : UZ_OF_WITH);
+    }
+    free(has[0]);
+    free(has[1]);
+    return room;
+}
+
+/* Between the corners of one side; box: 2 dim. */
+static double enclose(double *box, const uz_mortar_side *side, int dim)
+{
+    double size = 0;
+    for (int c = 0; c < dim; c++) {
+        box[c] = INFINITY;
+        box[dim + c] = -INFINITY;
+        for (int a = 0; a < side->nodes; a++) {
+            box[c] = fmin(box[c], side->xyz[dim * a + c]);
+            box[dim + c] = fmax(box[dim + c], side->xyz[dim * a + c]);
+        }
+        size = hypot(size, box[dim + c] - box[c]);
+    }
+    return size;
+}
+
+static uz_status plant_tree(uz_mortar_surface *surface, int dim, uz_error *err)
+{
+    double *box = uz_alloc(surface->n, 6 * sizeof *box);
+    if (!box)
+        return no_memory(err);
+    for (int64_t i = 0; i < surface->n; i++)
+        enclose(box + 2 * dim * i, &surface->side[i], dim);
+    const uz_status status = uz_box_tree_init(&surface->tree, surface->n, dim, box, err);
+    free(box);
+    return status;
+}
+
+/* The normals that smooth shapes give a surface in space at rest differ from those of its facets: so they do where it
+ * has moved. */
+static uz_status turn_with_rest(uz_mortar_pair *pair, const uz_contact_input *at_rest, uz_error *err)
+{
+    uz_contact_input before = *at_rest; /* by its facets alone */
+    uz_mortar_surface facets = {0}, *surface = &pair->surface;
+    uz_contact faceted = *at_rest->contact;
+    faceted.faceted = true;
+    before.contact = &faceted;
+    uz_status status = uz_mortar_surface_make(&facets, &before, &pair->group, err);
+    const bool same = status == UZ_OK && facets.n_places == surface->n_places;
+    for (int64_t p = 0; p < surface->n_places && same; p++) {
+        for (int c = 0; c < 3; c++)
+            surface->normal[3 * p + c] += pair->rest.normal[3 * p + c] - facets.normal[3 * p + c];
+        uz_unit3(surface->normal + 3 * p);
+    }
+    uz_mortar_surface_clear(&facets);
+    return status;
+}
+
+uz_status uz_mortar_pair_make(uz_mortar_pair *pair, const uz_contact_input *in, uz_error *err)
+{
+    uz_contact_input before = *in;
+    const int dim = in->model->mesh.dim;
+    *pair = (uz_mortar_pair){.in = in};
+    before.model = in->rest;
+    before.rest = NULL;
+    if (!join_groups(pair, in))
+        return no_memory(err);
+    pair->near = uz_alloc(pair->group.n_faces, sizeof *pair->near);
+    pair->way = uz_alloc_zero(pair->group.n_faces, sizeof *pair->way);
+    uz_status status = pair->near && pair->way ? UZ_OK : no_memory(err);
+    if (status == UZ_OK)
+        status = uz_mortar_surface_make(&pair->surface, in, &pair->group, err);
+    if (status == UZ_OK)
+        status = plant_tree(&pair->surface, dim, err);
+    if (status == UZ_OK)
+        status = uz_own_body_new(&pair->own, &in->model->mesh, in->on, in->with, err);
+    if (status == UZ_OK && in->rest && !in->contact->faceted) {
+        status = uz_mortar_surface_make(&pair->rest, &before, &pair->group, err);
+        pair->surface.rest = &pair->rest;
+        if (status == UZ_OK && dim == 3)
+            status = turn_with_rest(pair, &before, err);
+    }
+    return status;
+}
+
+void uz_mortar_pair_clear(uz_mortar_pair *pair)
+{
+    uz_mortar_surface_clear(&pair->surface);
+    uz_mortar_surface_clear(&pair->rest);
+    uz_own_body_free(pair->own);
+    free(pair->group.face);
+    free(pair->of);
+    free(pair->points.point);
+    free(pair->near);
+    free(pair->way);
+}
+
+/* ---- the points of a side */
+
+static bool may_touch(const uz_mortar_pair *pair, int64_t i, int64_t j)
+{
+    const unsigned char mine = pair->of[i], its = pair->of[j];
+    if (!(mine & UZ_OF_ON && its & UZ_OF_WITH) && !(mine & UZ_OF_WITH && its & UZ_OF_ON))
+        return false;
+    const uz_mortar_side *a = &pair->surface.side[i], *b = &pair->surface.side[j];
+    for (int k = 0; k < a->nodes && pair->own; k++)
+        for (int l = 0; l < b->nodes; l++)
+            if (a->node[k] == b->node[l])
+                return false;
+    return true;
+}
+
+uz_way uz_mortar_way(uz_mortar_pair *pair, int64_t i, int64_t j, const double *x, const double *y)
+{
+    const uz_face *face = pair->group.face;
+    if (!pair->own)
+        return UZ_WAY_OVERLAP;
+    if (pair->way[j] / 3 != i + 1) /* of two sides the first point tells */
+        pair->way[j] = 3 * (i + 1) + (int64_t)uz_own_body_way(pair->own, face[i].element, x, face[j].element, y);
+    return (uz_way)(pair->way[j] % 3);
+}
+
+typedef struct {
+    uz_mortar_pair *pair;
+    int64_t i, met;
+} search;
+
+static bool list_near(void *ctx, int64_t item)
+{
+    search *s = ctx;
+    s->met++;
+    if (may_touch(s->pair, s->i, item))
+        s->pair->near[s->pair->n_near++] = item;
+    return false;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* The area of all points. Where the master has several layers, as of a plate and what is behind it, only the nearest is
+ * kept: what is farther than it by more than the side's size goes. */
+static double covered_area(uz_mortar_points *points, double size)
+{
+    double area = 0, nearest = INFINITY;
+    int64_t kept = 0;
+    for (int64_t g = 0; g < points->n; g++)
+        nearest = fmin(nearest, fabs(points->point[g].gap));
+    for (int64_t g = 0; g < points->n; g++)
+        if (fabs(points->point[g].gap) <= nearest + size) {
+            area += points->point[g].weight;
+            points->point[kept++] = points->point[g];
+        }
+    points->n = kept;
+    return area;
+}
+
+/* The master is looked for close by, then farther away as long as the side is not covered: most sides are covered at
+ * once. Layers nearer to each other than the side's size are told apart point by point where they cover it more than
+ * once. */
+bool uz_mortar_find_points(uz_mortar_pair *pair, int64_t i)
+{
+    const int dim = pair->in->model->mesh.dim;
+    const uz_mortar_geometry *geometry = uz_mortar_geometry_of(dim);
+    const double area = pair->surface.side[i].area;
+    double box[6], covered = 0;
+    const double size = enclose(box, &pair->surface.side[i], dim);
+    int64_t before = -1;
+    pair->points.n = 0;
+    for (double reach = size; covered < (1 - 1e-9) * area; reach *= 8) {
+        search s = {.pair = pair, .i = i};
+        double wide[6];
+        for (int c = 0; c < dim; c++) {
+            wide[c] = box[c] - reach;
+            wide[dim + c] = box[dim + c] + reach;
+        }
+        pair->n_near = 0;
+        uz_box_tree_meet(&pair->surface.tree, wide, list_near, &s);
+        if (pair->n_near > before) {
+            before = pair->n_near;
+            qsort(pair->near, (size_t)pair->n_near, sizeof *pair->near, ascending);
+            pair->points.n = 0;
+            if (!geometry->points(pair, i))
+                return false;
+            covered = covered_area(&pair->points, size);
+            pair->layered = dim == 3 && covered > (1 + 1e-6) * area;
+            pair->points.n = pair->layered ? 0 : pair->points.n;
+            if (pair->layered && !geometry->points(pair, i))
+                return false;
+            pair->layered = false;
+        }
+        covered = covered_area(&pair->points, size);
+        if (s.met == pair->surface.n || reach > 2 * pair->in->model->mesh.extent)
+            break;
+    }
+    return true;
+}
+
+/* ---- zones */
+
+typedef struct {
+    int64_t first, side, *id; /* the lowest place and side of a zone, and where its number stands */
+} zone_mark;
+
+static int by_place(const void *a, const void *b)
+{
+    const zone_mark *x = a, *y = b;
+    return x->first != y->first ? (x->first > y->first) - (x->first < y->first)
+                                : (x->side > y->side) - (x->side < y->side);
+}
+
+static int64_t root_of(int64_t *of, int64_t p)
+{
+    while (of[p] != p)
+        p = of[p] = of[of[p]];
+    return p;
+}
+
+static void join(int64_t *of, int64_t p, int64_t q)
+{
+    p = root_of(of, p);
+    q = root_of(of, q);
+    of[p > q ? p : q] = p > q ? q : p;
+}
+
+/* zone (sides): zones numbered by their lowest nodes. Returns how many; -1: no memory. */
+static int64_t number_zones(int64_t *zone, const uz_mortar_pair *pair)
+{
+    const uz_mortar_surface *surface = &pair->surface;
+    const int64_t places = surface->n_places;
+    int64_t *of = uz_alloc(places, sizeof *of), *id = uz_alloc(3 * places, sizeof *id), count = 0;
+    unsigned char *used = uz_alloc_zero(places, 1);
+    zone_mark *mark = uz_alloc(surface->n, sizeof *mark);
+    const bool room = of && id && used && mark;
+    for (int64_t k = 0; k < 3 * places && room; k++)
+        id[k] = -1;
+    for (int group = 1; group <= 3 && room; group++) {
+        int64_t *const own = id + (group - 1) * places;
+        for (int64_t p = 0; p < places; p++)
+            of[p] = p;
+        for (int64_t i = 0; i < surface->n; i++)
+            for (int a = 0; a < surface->side[i].nodes && pair->of[i] == group; a++) {
+                join(of, surface->side[i].place[a], surface->side[i].place[0]);
+                used[surface->side[i].place[a]] |= (unsigned char)(1u << group);
+            }
+        for (int64_t p = 1, last = 0; p < places && group < 3; p++) { /* around corners, too */
+            if (!(used[p] >> group & 1))
+                continue;
+            if (surface->node[p] == surface->node[last] && used[last] >> group & 1)
+                join(of, p, last);
+            last = p;
+        }
+        for (int64_t i = 0; i < surface->n; i++) {
+            if (pair->of[i] != group)
+                continue;
+            const int64_t root = root_of(of, surface->side[i].place[0]);
+            if (own[root] < 0) {
+                own[root] = count;
+                mark[count++] = (zone_mark){root, i, NULL};
+            }
+            zone[i] = own[root];
+        }
+    }
+    for (int64_t z = 0; z < count && room; z++)
+        mark[z].id = id + z; /* from here on room for the final numbers: there are no more zones than places */
+    if (room)
+        qsort(mark, (size_t)count, sizeof *mark, by_place);
+    for (int64_t z = 0; z < count && room; z++)
+        *mark[z].id = z;
+    for (int64_t i = 0; i < surface->n && room; i++)
+        zone[i] = id[zone[i]];
+    free(of);
+    free(id);
+    free(used);
+    free(mark);
+    return room ? count : -1;
+}
+
+/* ---- which zone is the slave */
+
+/* What one point tells of its two zones, lo < hi. */
+typedef struct {
+    int64_t lo, hi, order;
+    bool from_hi;
+    double gap, fine[2]; /* fine: area over the distance of nodes, of lo and hi */
+} sample;
+
+static int by_zones(const void *a, const void *b)
+{
+    const sample *x = a, *y = b;
+    if (x->lo != y->lo)
+        return (x->lo > y->lo) - (x->lo < y->lo);
+    if (x->hi != y->hi)
+        return (x->hi > y->hi) - (x->hi < y->hi);
+    return x->from_hi != y->from_hi ? x->from_hi - y->from_hi : (x->order > y->order) - (x->order < y->order);
+}
+
+static int by_two(const void *a, const void *b)
+{
+    const int64_t *x = a, *y = b;
+    return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
+}
+
+/* Distance between neighbouring nodes, whichever edge of its side a face begins with. */
+static double spacing(const uz_mortar_side *side, int dim)
+{
+    const bool triangle = side->nodes % 3 == 0;
+    const double length = dim == 2   ? hypot(side->xyz[2] - side->xyz[0], side->xyz[3] - side->xyz[1])
+                          : triangle ? sqrt(2 * side->area)
+                                     : sqrt(side->area);
+    return side->nodes > (dim == 2 ? 2 : triangle ? 3 : 4) ? length / 2 : length;
+}
+
+/* Samples of what zones face each other: on some sides of each zone, the lowest first. Returns how many; -1: no memory.
+ */
+static int64_t take_samples(sample **out, uz_mortar_pair *pair, const int64_t *zone, int64_t n_zones)
+{
+    const uz_mortar_surface *surface = &pair->surface;
+    const int dim = pair->in->model->mesh.dim;
+    int64_t n = 0, room = 0, *start = uz_alloc_zero(n_zones + 2, sizeof *start);
+    int64_t *list = uz_alloc(surface->n, sizeof *list);
+    bool good = start && list;
+    for (int64_t i = 0; i < surface->n && good; i++)
+        start[zone[i] + 2]++;
+    for (int64_t z = 0; z < n_zones && good; z++)
+        start[z + 2] += start[z + 1];
+    for (int64_t i = 0; i < surface->n && good; i++)
+        list[start[zone[i] + 1]++] = i;
+    for (int64_t z = 0; z < n_zones && good; z++) {
+        if (n_zones == 2 && z == 1 && n > 0)
+            break; /* the other one has told */
+        for (int64_t k = start[z]; k < start[z + 1] && good; k += 1 + (start[z + 1] - start[z]) / LOOKED_AT) {
+            good = uz_mortar_find_points(pair, list[k]);
+            if (good && n + pair->points.n > room) {
+                sample *grown = uz_realloc(*out, room = 2 * room + pair->points.n, sizeof *grown);
+                good = grown != NULL;
+                *out = grown ? grown : *out;
+            }
+            for (int64_t g = 0; g < pair->points.n && good; g++) {
+                const uz_mortar_point *p = &pair->points.point[g];
+                const int64_t other = zone[p->master];
+                const bool from_hi = z > other;
+                if (z == other)
+                    continue;
+                sample *s = &(*out)[n];
+                *s = (sample){from_hi ? other : z, from_hi ? z : other, n, from_hi, p->gap, {0}};
+                s->fine[from_hi] = p->weight / spacing(&surface->side[list[k]], dim);
+                s->fine[!from_hi] = p->weight / spacing(&surface->side[p->master], dim);
+                n++;
+            }
+        }
+    }
+    free(start);
+    free(list);
+    return good ? n : -1;
+}
+
+/* The finer of two zones where they face each other is the slave. Looked at only where the two are hardly farther from
+ * each other than at their nearest: what is farther away touches late or never, however fine it is. */
+static bool rank_zones(uz_contact_sites *sites, uz_mortar_pair *pair, int64_t n_zones)
+{
+    sample *s = NULL;
+    const int64_t n = take_samples(&s, pair, sites->zone, n_zones);
+    int64_t pairs = 0;
+    if (n > 0)
+        qsort(s, (size_t)n, sizeof *s, by_zones);
+    for (int64_t k = 0; k < n; k++)
+        pairs += k == 0 || s[k].lo != s[k - 1].lo || s[k].hi != s[k - 1].hi;
+    sites->rank = n >= 0 ? uz_alloc(2 * pairs, sizeof *sites->rank) : NULL;
+    for (int64_t first = 0, end; first < n && sites->rank; first = end) {
+        double fine[2] = {0, 0}, least = INFINITY;
+        const bool from_hi = s[first].from_hi; /* those seen from the lower zone, if there are any */
+        for (end = first; end < n && s[end].lo == s[first].lo && s[end].hi == s[first].hi; end++)
+            least = s[end].from_hi == from_hi ? fmin(least, s[end].gap) : least;
+        const double most = fmax(least, 0) + UZ_CANDIDATES_REACH * pair->in->model->mesh.extent;
+        for (int64_t k = first; k < end; k++)
+            for (int j = 0; j < 2 && s[k].from_hi == from_hi && s[k].gap <= most; j++)
+                fine[j] += s[k].fine[j];
+        const bool hi = fine[1] > (1 + 1e-6) * fine[0];
+        sites->rank[2 * sites->n_ranks] = hi ? s[first].hi : s[first].lo;
+        sites->rank[2 * sites->n_ranks++ + 1] = hi ? s[first].lo : s[first].hi;
+    }
+    if (sites->rank)
+        qsort(sites->rank, (size_t)sites->n_ranks, 2 * sizeof *sites->rank, by_two);
+    free(s);
+    return sites->rank != NULL;
+}
+
+bool uz_mortar_is_slave(const uz_contact_sites *sites, int64_t i, int64_t j)
+{
+    const int64_t way[2] = {sites->zone[i], sites->zone[j]}, back[2] = {way[1], way[0]};
+    if (way[0] == way[1])
+        return i < j;
+    const size_t n = (size_t)sites->n_ranks, size = 2 * sizeof *sites->rank;
+    if (bsearch(way, sites->rank, n, size, by_two))
+        return true;
+    return way[0] < way[1] &&
+           !bsearch(back, sites->rank, n, size, by_two); /* two that did not face each other before */
+}
+
+/* ---- zones that face themselves */
+
+/* A growing list of pairs of numbers. */
+typedef struct {
+    int64_t n, room, (*pair)[2];
+} pair_list;
+
+static bool add_two(pair_list *list, int64_t a, int64_t b)
+{
+    if (list->n == list->room) {
+        int64_t(*grown)[2] = uz_realloc(list->pair, 2 * list->room + 256, sizeof *grown);
+        if (!grown)
+            return false;
+        list->pair = grown;
+        list->room = 2 * list->room + 256;
+    }
+    list->pair[list->n][0] = a;
+    list->pair[list->n++][1] = b;
+    return true;
+}
+
+/* Where the pairs that begin with a number begin. */
+static int64_t first_of(const pair_list *list, int64_t number)
+{
+    int64_t lo = 0, hi = list->n;
+    while (lo < hi) {
+        const int64_t middle = lo + (hi - lo) / 2;
+        if (list->pair[middle][0] < number)
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    return lo;
+}
+
+/* Two halves of each zone that faces itself, as the inside of a ring does: from one side and those across fronts go on
+ * along the surface, ring by ring, until they meet. half: 0 where a side does not face its own zone, else 1 or 2;
+ * across: pairs of sides; sides: pairs of place and side; queue: room for all sides. */
+static void divide(unsigned char *half, const uz_mortar_surface *surface, const pair_list *across,
+                   const pair_list *sides, int64_t *queue)
+{
+    for (int64_t k = 0; k < across->n; k++) {
+        int64_t n = 0;
+        if (half[across->pair[k][0]])
+            continue;
+        half[across->pair[k][0]] = 1;
+        queue[n++] = across->pair[k][0];
+        for (int64_t next = 0; next < n; next++) {
+            const int64_t i = queue[next];
+            for (int64_t q = first_of(across, i); q < across->n && across->pair[q][0] == i; q++) {
+                const int64_t j = across->pair[q][1];
+                if (half[j])
+                    continue;
+                half[j] = (unsigned char)(3 - half[i]);
+                queue[n++] = j;
+            }
+            for (int a = 0; a < surface->side[i].nodes; a++) {
+                const int64_t place = surface->side[i].place[a];
+                for (int64_t q = first_of(sides, place); q < sides->n && sides->pair[q][0] == place; q++) {
+                    const int64_t j = sides->pair[q][1];
+                    if (half[j])
+                        continue;
+                    half[j] = half[i];
+                    queue[n++] = j;
+                }
+            }
+        }
+    }
+}
+
+/* Divides the zones of both surfaces that face themselves; *n_zones grows. */
+static bool divide_zones(int64_t *zone, int64_t *n_zones, uz_mortar_pair *pair)
+{
+    const uz_mortar_surface *surface = &pair->surface;
+    pair_list across = {0}, sides = {0};
+    unsigned char *half = NULL;
+    int64_t *queue = NULL, *second = NULL;
+    bool good = true;
+    for (int64_t i = 0; i < surface->n && good; i++) {
+        int64_t last = -1;
+        bool itself = false;
+        if (pair->of[i] != (UZ_OF_ON | UZ_OF_WITH))
+            continue;
+        good = uz_mortar_find_points(pair, i);
+        for (int64_t g = 0; g < pair->points.n && good; g++) {
+            const int64_t j = pair->points.point[g].master;
+            if (j == last || zone[j] != zone[i])
+                continue;
+            itself = true;
+            good = add_two(&across, i, last = j) && add_two(&across, j, i);
+        }
+        for (int a = 0; a < surface->side[i].nodes && itself && good; a++)
+            good = add_two(&sides, surface->side[i].place[a], i);
+    }
+    if (good && across.n > 0) {
+        half = uz_alloc_zero(surface->n, 1);
+        queue = uz_alloc(surface->n, sizeof *queue);
+        second = uz_alloc_zero(*n_zones, sizeof *second);
+        good = half && queue && second;
+        qsort(across.pair, (size_t)across.n, sizeof *across.pair, by_two);
+        qsort(sides.pair, (size_t)sides.n, sizeof *sides.pair, by_two);
+    }
+    if (good && across.n > 0)
+        divide(half, surface, &across, &sides, queue);
+    for (int64_t i = 0; i < surface->n && good && half; i++)
+        if (half[i] == 2) {
+            second[zone[i]] = second[zone[i]] ? second[zone[i]] : (*n_zones)++;
+            zone[i] = second[zone[i]];
+        }
+    free(across.pair);
+    free(sides.pair);
+    free(half);
+    free(queue);
+    free(second);
+    return good;
+}
+
+uz_status uz_mortar_choose_slaves(uz_contact_sites *sites, uz_mortar_pair *pair, uz_error *err)
+{
+    const int64_t n = pair->surface.n;
+    const uz_contact_sites *before = pair->in->rest ? &pair->in->rest->sites[pair->in->index] : NULL;
+    sites->zone = uz_alloc(n, sizeof *sites->zone);
+    if (!sites->zone)
+        return no_memory(err);
+    sites->n_sides = n;
+    if (!before) {
+        int64_t n_zones = number_zones(sites->zone, pair);
+        const bool good = n_zones >= 0 && divide_zones(sites->zone, &n_zones, pair) && rank_zones(sites, pair, n_zones);
+        sites->n_zones = n_zones;
+        return good ? UZ_OK : no_memory(err);
+    }
+    sites->rank = uz_alloc(2 * before->n_ranks, sizeof *sites->rank);
+    if (!sites->rank)
+        return no_memory(err);
+    memcpy(sites->zone, before->zone, (size_t)n * sizeof *sites->zone);
+    memcpy(sites->rank, before->rank, (size_t)(2 * before->n_ranks) * sizeof *sites->rank);
+    sites->n_ranks = before->n_ranks;
+    sites->n_zones = before->n_zones;
+    return UZ_OK;
+}
