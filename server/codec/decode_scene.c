@@ -183,14 +183,33 @@ static const struct {
     {"height", UZ_OBSTACLE_HEIGHT, NULL, NULL, NULL, read_height},
 };
 
+/* A group, or several by which a surface is named. */
+static bool decode_groups(char name[64], uz_names *groups, decoding *d, const json_value *item, const char *key)
+{
+    const json_value *value = json_get(item, key);
+    if (!json_is(value, JSON_IS_ARRAY)) {
+        decode_name(name, 64, item, key, "");
+        return true;
+    }
+    groups->name = decode_room(d, value, sizeof *groups->name, &groups->n);
+    for (int64_t i = 0; groups->name && i < groups->n; i++) {
+        const size_t len = value->items[i].count;
+        memcpy(groups->name[i], json_text(&value->items[i]), len < 64 ? len : 63);
+    }
+    if (groups->name)
+        uz_name_together(name, groups);
+    return groups->name != NULL;
+}
+
 static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
 {
     out->contacts = decode_room(d, list, sizeof *out->contacts, &out->n_contacts);
     for (int64_t i = 0; i < out->n_contacts; i++) {
         const json_value *item = &list->items[i], *given = json_get(item, "obstacle");
         uz_contact *to = &out->contacts[i];
-        decode_name(to->on, sizeof to->on, item, "on", "");
-        decode_name(to->with, sizeof to->with, item, "with", "");
+        if (!decode_groups(to->on, &to->on_groups, d, item, "on") ||
+            !decode_groups(to->with, &to->with_groups, d, item, "with"))
+            return false;
         to->kind = UZ_OBSTACLE_BODY;
         to->between = json_text_is(json_get(item, "discretization"), "nodes") ? UZ_CONTACT_NODES : UZ_CONTACT_SURFACES;
         to->faceted = json_is(json_get(item, "smooth"), JSON_IS_BOOLEAN) && !json_truth(json_get(item, "smooth"));

@@ -60,8 +60,9 @@ typedef struct {
     int64_t n_inner;       /* a rigid obstacle: so many of the n, the last ones, are inside sides */
     uz_inner_place *inner; /* n_inner */
     int64_t *ends; /* n x 2: of a middle of a face's edge the places of the edge's ends, as for row_ends; else -1 */
-    /* The n_sides sides of both surfaces are of zones (mortar_pairs.c); rank: n_ranks pairs of a zone that is the slave and
-     * one that is its master. of: n, of which surface a place's slave and most of its masters are: UZ_SLAVE_ON, ... */
+    /* The n_sides sides of both surfaces are of zones (mortar_pairs.c); rank: n_ranks pairs of a zone that is the slave
+     * and one that is its master. of: n, of which surface a place's slave and most of its masters are: UZ_SLAVE_ON, ...
+     */
     int64_t n_sides, *zone, n_zones, n_ranks, *rank;
     unsigned char *of;
     uz_contact_surface surface[2]; /* what `on` and `with` are taken for */

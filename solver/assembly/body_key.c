@@ -33,6 +33,13 @@ static void put_name(uz_buffer *key, const char *name, size_t size)
     uz_buffer_put(key, name, len);
 }
 
+static void put_names(uz_buffer *key, const uz_names *names)
+{
+    put_int(key, names->n);
+    for (int64_t i = 0; i < names->n; i++)
+        put_name(key, names->name[i], sizeof names->name[i]);
+}
+
 static void put_doubles(uz_buffer *key, const double *x, int64_t n)
 {
     put_int(key, x ? n : -1);
@@ -142,6 +149,7 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
         const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
         uz_unit_normal(normal, contact->normal, dim);
         put_name(key, contact->on, sizeof contact->on);
+        put_names(key, &contact->on_groups);
         put_doubles(key, normal, 3);
         put_int(key, contact->kind);
         if (contact->kind == UZ_OBSTACLE_PLANE)
@@ -155,6 +163,7 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
         put_doubles(key, contact->y, n[1]);
         put_doubles(key, contact->z, n[2]);
         put_name(key, contact->with, sizeof contact->with);
+        put_names(key, &contact->with_groups);
         put_int(key, contact->between);
         put_int(key, contact->faceted);
         put_double(key, contact->feature_angle);
@@ -163,7 +172,7 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
 
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err)
 {
-    static const char format[] = "uzawa body 3";
+    static const char format[] = "uzawa body 4";
     uz_buffer key = {0};
     char *text = NULL;
     const int dim = uz_scene_dim(scene);

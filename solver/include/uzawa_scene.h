@@ -131,15 +131,25 @@ typedef enum {
     UZ_OBSTACLE_CYLINDER, /* 3D: point on the axis, normal is the axis, radius, inside */
     UZ_OBSTACLE_POLYLINE, /* 2D: n_x points (x[i], y[i]), the obstacle on the right of the line as it goes on */
     UZ_OBSTACLE_HEIGHT,   /* z over x (2D: n_y = 0, z has n_x) or over x and y (z[j * n_x + i]): the obstacle below */
-    UZ_OBSTACLE_BODY      /* the group `with` of another part of the mesh */
+    UZ_OBSTACLE_BODY      /* the group `with` of the mesh, which may be or overlap `on`: the body may touch itself */
 } uz_obstacle_kind;
-/* Between two parts of the body. */
+/* Several groups that make one surface. */
+typedef struct {
+    int64_t n;
+    char (*name)[64]; /* ascending, each once */
+} uz_names;
+/* Sorts them, drops what is there twice, and gives what they are called together: "bottom + side"; of a long list the
+ * beginning, and a number that follows from all of it. */
+void uz_name_together(char name[64], uz_names *groups);
+
+/* Between two parts of the body, or a part and itself. */
 typedef enum {
     UZ_CONTACT_SURFACES, /* the two surfaces in the mean, by dual mortar rows; on and with may be exchanged */
     UZ_CONTACT_NODES     /* nodes of `on` against faces of `with` */
 } uz_contact_between;
 typedef struct {
     char on[64];
+    uz_names on_groups, with_groups; /* n > 0: on, with are what uz_name_together calls them */
     uz_obstacle_kind kind;
     double point[3], normal[3];
     double radius;

@@ -149,7 +149,6 @@ static uz_status check_named_once(const uz_scene *scene, const uz_mesh *mesh, in
 
 uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     const uz_contact *contact = &scene->contacts[i];
     uz_status status = check_contact_side(mesh, contact->on, i, "on", err);
     if (status != UZ_OK)

@@ -112,7 +112,11 @@ uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, 
 
 uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
 {
-    if (scene->source == UZ_MESH_GIVEN)
-        return uz_mesh_from_given(out, &scene->given, uz_scene_dim(scene), err);
-    return uz_mesh_from_box(out, &scene->box, err);
+    uz_status status = scene->source == UZ_MESH_GIVEN ? uz_mesh_from_given(out, &scene->given, uz_scene_dim(scene), err)
+                                                      : uz_mesh_from_box(out, &scene->box, err);
+    if (status == UZ_OK)
+        status = uz_mesh_join_groups(out, scene, err);
+    if (status != UZ_OK)
+        uz_mesh_clear(out);
+    return status;
 }

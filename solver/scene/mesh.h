@@ -59,7 +59,11 @@ uz_status uz_mesh_from_box(uz_mesh *out, const uz_box *box, uz_error *err);
  */
 uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, uz_error *err);
 
-/* The mesh of a scene, whatever it comes from. */
+/* Adds the groups that contacts name together (uz_names). Errors: UZ_ERR_SCENE at "/contacts/i/on" or "with", _MEMORY.
+ */
+uz_status uz_mesh_join_groups(uz_mesh *mesh, const uz_scene *scene, uz_error *err);
+
+/* The mesh of a scene, whatever it comes from, with the groups that its contacts name together. */
 uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err);
 void uz_mesh_clear(uz_mesh *mesh);
 

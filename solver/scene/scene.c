@@ -31,6 +31,8 @@ void uz_scene_clear(uz_scene *scene)
         free(scene->contacts[i].x);
         free(scene->contacts[i].y);
         free(scene->contacts[i].z);
+        free(scene->contacts[i].on_groups.name);
+        free(scene->contacts[i].with_groups.name);
     }
     uz_given_mesh_clear(&scene->given);
     free(scene->materials);

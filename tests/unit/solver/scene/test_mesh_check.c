@@ -14,7 +14,7 @@ typedef struct {
     uz_material materials[2];
     uz_support supports[1];
     uz_load loads[1];
-    uz_contact contacts[1];
+    uz_contact contacts[2];
     uz_scene scene;
 } square;
 
@@ -166,13 +166,28 @@ static void contact(square *s, uz_obstacle_kind kind, const char *on, const char
     snprintf(s->contacts[0].with, 64, "%s", with);
 }
 
+static void contacts(square *s, uz_obstacle_kind kind, const char *on, const char *with)
+{
+    contact(s, UZ_OBSTACLE_BODY, on, with);
+    s->contacts[1] = s->contacts[0];
+    contact(s, kind, "boundary", "bottom");
+    s->scene.n_contacts = 2;
+}
+
+TEST(sides_touch_by_one_contact)
+{
+    REFUSED(contacts(&s, UZ_OBSTACLE_BODY, "bottom", "boundary"), "/contacts/1", "contact 0");
+    REFUSED(contacts(&s, UZ_OBSTACLE_BODY, "boundary", "bottom"), "/contacts/1", "each pair once");
+    TAKEN(contacts(&s, UZ_OBSTACLE_PLANE, "boundary", "bottom"));
+}
+
 TEST(contacts_suit_their_groups)
 {
     TAKEN(contact(&s, UZ_OBSTACLE_PLANE, "bottom", ""));
     TAKEN(contact(&s, UZ_OBSTACLE_BODY, "bottom", "boundary"));
     REFUSED(contact(&s, UZ_OBSTACLE_PLANE, "corner", ""), "/contacts/0/on", "made of nodes");
     REFUSED(contact(&s, UZ_OBSTACLE_PLANE, "cut", ""), "/contacts/0/on", "between two elements");
-    REFUSED(contact(&s, UZ_OBSTACLE_BODY, "bottom", "bottom"), "/contacts/0/with", "touch itself");
+    TAKEN(contact(&s, UZ_OBSTACLE_BODY, "bottom", "bottom"));
     REFUSED(contact(&s, UZ_OBSTACLE_BODY, "bottom", "lower"), "/contacts/0/with", "made of elements");
     REFUSED(contact(&s, UZ_OBSTACLE_BODY, "bottom", "ground"), "/contacts/0/with", "no group");
 }
