@@ -205,51 +205,39 @@ static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_c
     return status;
 }
 
-static uz_status build(uz_multigrid *mg, const uz_csc *K, const uz_modes *modes, const bool *held, size_t memory_limit,
-                       const uz_stop *stop, uz_error *err)
+uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
+                              size_t memory_limit, const uz_stop *stop, uz_error *err)
 {
-    const int64_t n = K->cols;
-    sources from = {.n_nodes = modes->n_nodes, .strong = modes->strong};
+    const int64_t n = K->cols, k = modes->count;
+    *out = NULL;
+    if (n >= INT32_MAX)
+        return uz_fail(err, UZ_ERR_UNSUPPORTED, "K", "matrix_free holds up to 2^31 - 2 dofs, these are %lld",
+                       (long long)n);
+    uz_multigrid *mg = uz_alloc_zero(1, sizeof *mg);
+    sources from = {uz_alloc(n, sizeof *from.node), modes->n_nodes, uz_alloc(n * k, sizeof *from.modes), modes->strong};
+    uz_status status = UZ_OK;
     bool done = false;
-    mg->k = modes->count;
-    mg->levels = 1;
-    uz_status status = K->cols < INT32_MAX
-                           ? UZ_OK
-                           : uz_fail(err, UZ_ERR_UNSUPPORTED, "K",
-                                     "matrix_free holds up to 2^31 - 2 dofs, these are %lld", (long long)K->cols);
-    if (status == UZ_OK)
+    if (!mg || !from.node || !from.modes) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid on %lld dofs", (long long)n);
+    } else {
+        mg->k = modes->count;
+        mg->levels = 1;
+        memcpy(from.node, modes->node, (size_t)n * sizeof *from.node);
+        memcpy(from.modes, modes->value, (size_t)(n * k) * sizeof *from.modes);
         status = invert_diagonal(&mg->level[0], K, held, err);
-    if (status == UZ_OK) {
-        from.node = uz_alloc(n, sizeof *from.node);
-        from.modes = uz_alloc(n * mg->k, sizeof *from.modes);
-        if (from.node && from.modes) {
-            memcpy(from.node, modes->node, (size_t)n * sizeof *from.node);
-            memcpy(from.modes, modes->value, (size_t)(n * mg->k) * sizeof *from.modes);
-        } else {
-            status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)n);
-        }
     }
     while (status == UZ_OK && !done)
         status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarsen(mg, &done, &from, K, memory_limit, stop, err);
     free(from.node);
     free(from.modes);
-    double *row = status == UZ_OK ? uz_alloc(K->cols, sizeof *row) : NULL;
+    double *row = status == UZ_OK ? uz_alloc(n, sizeof *row) : NULL;
     if (status == UZ_OK && !row)
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)K->cols);
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)n);
     if (status == UZ_OK)
         mg->most = bound_by_diagonal(&mg->level[0], K, row);
     free(row);
-    return status == UZ_OK ? factor_coarsest(mg, K, held, memory_limit, stop, err) : status;
-}
-
-uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
-                              size_t memory_limit, const uz_stop *stop, uz_error *err)
-{
-    *out = NULL;
-    uz_multigrid *mg = uz_alloc_zero(1, sizeof *mg);
-    if (!mg)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid");
-    uz_status status = build(mg, K, modes, held, memory_limit, stop, err);
+    if (status == UZ_OK)
+        status = factor_coarsest(mg, K, held, memory_limit, stop, err);
     if (status == UZ_OK) {
         mg->bytes = count_bytes(mg);
         *out = mg;

@@ -201,35 +201,10 @@ static uz_status try_threshold(uz_amg *amg, const uz_csc *K, double strong, size
 #define WORTH_LAMBDA  3.0
 
 /* The better of two thresholds; the first one's failure stands where the second fails too. */
-static uz_status build(uz_amg *amg, const uz_csc *K, size_t memory_limit, const uz_hooks *hooks, uz_error *err)
-{
-    uz_error ignored = {0}, *into = err ? err : &ignored;
-    uz_status status = try_threshold(amg, K, amg->modes.strong, memory_limit, hooks, into);
-    const bool may_improve = status == UZ_OK ? amg->info.levels > 1 && amg->info.lambda < BAD_LAMBDA
-                                             : status == UZ_ERR_NOT_SPD && amg->mg && amg->info.iterations > 0;
-    if (!may_improve)
-        return status;
-    uz_amg second = {.modes = amg->modes, .info = amg->info};
-    uz_error failure = {0};
-    second.info.lambda = 0.0;
-    uz_status other = try_threshold(&second, K, SECOND_STRONG, memory_limit, hooks, &failure);
-    bool better = other == UZ_OK && (status != UZ_OK || second.info.lambda > WORTH_LAMBDA * amg->info.lambda);
-    uz_multigrid_free(better ? amg->mg : second.mg);
-    if (better) {
-        *amg = second;
-        uz_error_reset(into);
-        return UZ_OK;
-    }
-    if (other == UZ_ERR_CANCELLED || (other == UZ_ERR_MEMORY && status != UZ_OK)) {
-        *into = failure;
-        return other;
-    }
-    return status;
-}
-
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
                         uz_error *err)
 {
+    uz_error ignored = {0}, failure = {0}, *into = err ? err : &ignored;
     *out = NULL;
     uz_amg *amg = uz_alloc_zero(1, sizeof *amg);
     if (!amg) {
@@ -238,7 +213,24 @@ uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t m
     }
     amg->modes = *modes;
     memset(modes, 0, sizeof *modes);
-    uz_status status = build(amg, K, memory_limit, hooks, err);
+    uz_status status = try_threshold(amg, K, amg->modes.strong, memory_limit, hooks, into);
+    const bool may_improve = status == UZ_OK ? amg->info.levels > 1 && amg->info.lambda < BAD_LAMBDA
+                                             : status == UZ_ERR_NOT_SPD && amg->mg && amg->info.iterations > 0;
+    if (may_improve) {
+        uz_amg second = {.modes = amg->modes, .info = amg->info};
+        second.info.lambda = 0.0;
+        const uz_status other = try_threshold(&second, K, SECOND_STRONG, memory_limit, hooks, &failure);
+        const bool better = other == UZ_OK && (status != UZ_OK || second.info.lambda > WORTH_LAMBDA * amg->info.lambda);
+        uz_multigrid_free(better ? amg->mg : second.mg);
+        if (better) {
+            *amg = second;
+            uz_error_reset(into);
+            status = UZ_OK;
+        } else if (other == UZ_ERR_CANCELLED || (other == UZ_ERR_MEMORY && status != UZ_OK)) {
+            *into = failure;
+            status = other;
+        }
+    }
     if (status == UZ_OK)
         *out = amg;
     else

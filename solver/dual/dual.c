@@ -199,15 +199,14 @@ static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_err
     return status;
 }
 
-static uz_status find_lambda_max(double *lambda_max, uz_dual_load *load, bool weighted, uz_error *err);
-
 /* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
 #define LAMBDA_TOLERANCE 1e-4
 
 uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weighted, uz_error *err)
 {
-    uz_dual_lazy *lazy = load->dual->lazy;
-    const uz_dual_form *form = load->dual->form;
+    const uz_dual *dual = load->dual;
+    const uz_dual_form *form = dual->form;
+    uz_dual_lazy *lazy = dual->lazy;
     uz_status status = UZ_OK;
     if (lambda_max) {
         *lambda_max = 0.0;
@@ -217,9 +216,18 @@ uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weig
         status = form->prepare(load, err);
     if (status != UZ_OK || !lambda_max || !uz_lock_while(&lazy->making, &load->stop))
         return status;
-    double *known = &lazy->lambda_max[weighted && load->dual->row_weight];
-    if (isnan(*known)) {
-        status = find_lambda_max(lambda_max, load, weighted, err);
+    lanczos_operator op = {.load = load, .weight = weighted ? dual->row_weight : NULL};
+    double *known = &lazy->lambda_max[op.weight != NULL];
+    if (!isnan(*known)) {
+        *lambda_max = *known;
+    } else if (op.weight && !(op.weighted = uz_alloc(dual->m, sizeof *op.weighted))) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a vector of %lld contacts", (long long)dual->m);
+    } else {
+        if (form->probe)
+            form->probe(load, true, 0.1 * LAMBDA_TOLERANCE);
+        status = uz_lanczos_max(lambda_max, dual->m, apply_for_lanczos, &op, LAMBDA_TOLERANCE, err);
+        if (form->probe)
+            form->probe(load, false, 0.0);
         if (status != UZ_OK || uz_stop_is_due(&load->stop)) {
             *lambda_max = 0.0; /* applications may have been cut short */
         } else {
@@ -227,27 +235,10 @@ uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weig
             *known = *lambda_max;
             pthread_mutex_unlock(&lazy->known);
         }
-    } else {
-        *lambda_max = *known;
     }
     pthread_mutex_unlock(&lazy->making);
-    return status == UZ_ERR_CANCELLED ? UZ_OK : status;
-}
-
-static uz_status find_lambda_max(double *lambda_max, uz_dual_load *load, bool weighted, uz_error *err)
-{
-    const uz_dual *dual = load->dual;
-    const uz_dual_form *form = dual->form;
-    lanczos_operator op = {.load = load, .weight = weighted ? dual->row_weight : NULL};
-    if (op.weight && !(op.weighted = uz_alloc(dual->m, sizeof *op.weighted)))
-        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a vector of %lld contacts", (long long)dual->m);
-    if (form->probe)
-        form->probe(load, true, 0.1 * LAMBDA_TOLERANCE);
-    uz_status status = uz_lanczos_max(lambda_max, dual->m, apply_for_lanczos, &op, LAMBDA_TOLERANCE, err);
-    if (form->probe)
-        form->probe(load, false, 0.0);
     free(op.weighted);
-    return status;
+    return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 
 /* psi(r) = psi0 + r'g0 - 1/2 r'Dr, and psi(r) = -1/2 ||u(r)||_K^2 + r'h. */

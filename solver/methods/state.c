@@ -158,14 +158,16 @@ uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_l
     *out = NULL;
     const uz_best *before = &it->before;
     const double *scale = load->dual->row_scale;
-    uz_state empty = {0}, *s = uz_alloc_zero(1, sizeof *s);
-    bool ok = s != NULL;
-    double **room[] = {&empty.r, &empty.rho, &empty.Dr, &empty.Drho, &empty.best_r, &empty.anchor};
-    for (size_t k = 0; ok && k < sizeof room / sizeof room[0]; k++)
-        ok = (*room[k] = uz_alloc(it->m, sizeof(double))) != NULL;
-    if (s)
-        *s = empty;
-    if (!ok) {
+    uz_state *s = uz_alloc_zero(1, sizeof *s);
+    if (!s)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a state");
+    s->r = uz_alloc(it->m, sizeof *s->r);
+    s->rho = uz_alloc(it->m, sizeof *s->rho);
+    s->Dr = uz_alloc(it->m, sizeof *s->Dr);
+    s->Drho = uz_alloc(it->m, sizeof *s->Drho);
+    s->best_r = uz_alloc(it->m, sizeof *s->best_r);
+    s->anchor = uz_alloc(it->m, sizeof *s->anchor);
+    if (!s->r || !s->rho || !s->Dr || !s->Drho || !s->best_r || !s->anchor) {
         uz_state_free(s);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)it->m);
     }
