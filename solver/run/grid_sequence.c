@@ -276,23 +276,16 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, const search *g
     return status;
 }
 
-/* ---- which answers are kept */
-
-static void drop(search *g, answers *x)
-{
-    for (int64_t i = 0; x->results && i < g->n_cases; i++)
-        uz_timings_add(&g->spent[i], &x->results[i]->summary.timings);
-    uz_results_free(x->results, x->results ? g->n_cases : 0);
-    x->results = NULL;
-}
-
 /* The coarsest grid that meets the request; until there is one, that of the smallest error. */
 static void keep_better(search *g, answers *x)
 {
     const bool meets = x->error <= g->requested, met = g->best.results && g->best.error <= g->requested;
     const bool better = !g->best.results || (met ? meets && x->n < g->best.n : meets || x->error < g->best.error);
     answers *worse = better ? &g->best : x;
-    drop(g, worse);
+    for (int64_t i = 0; worse->results && i < g->n_cases; i++)
+        uz_timings_add(&g->spent[i], &worse->results[i]->summary.timings);
+    uz_results_free(worse->results, worse->results ? g->n_cases : 0);
+    worse->results = NULL;
     if (better) {
         g->best = *x;
         memcpy(g->sequence.cells, x->box.cells, sizeof g->sequence.cells);

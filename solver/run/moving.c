@@ -189,15 +189,6 @@ static uz_status judge(bool *settled, moving *m, uz_result *result, uz_error *er
     return UZ_OK;
 }
 
-/* One problem at m->place. */
-static uz_status solve_pass(uz_result **next, moving *m, uz_error *err)
-{
-    *next = NULL;
-    m->settings.time_limit_s = fmax(0.0, m->deadline - uz_seconds());
-    m->passes++;
-    return uz_solve_rounds(next, &m->problem, &m->settings, NULL, m->cache, &m->hooks, err);
-}
-
 /* Ends without an answer at its own place. */
 static void give_up(uz_result *result, const moving *m, uz_outcome outcome)
 {
@@ -225,8 +216,10 @@ uz_status uz_solve_moving(uz_result **result, const uz_problem *problem, const u
     m.hooks.begins = NULL; /* it has begun */
     uz_status status = prepare(&m, *result, problem, settings, cache, &own);
     while (status == UZ_OK && answered && !settled && m.passes < MOST_PASSES && !uz_stop_is_due(&stop)) {
-        uz_result *next;
-        status = solve_pass(&next, &m, &own);
+        uz_result *next = NULL; /* at m.place */
+        m.settings.time_limit_s = fmax(0.0, m.deadline - uz_seconds());
+        m.passes++;
+        status = uz_solve_rounds(&next, &m.problem, &m.settings, NULL, m.cache, &m.hooks, &own);
         answered = status == UZ_OK && next->summary.outcome == UZ_CONVERGED;
         if (answered)
             status = judge(&settled, &m, next, &own);

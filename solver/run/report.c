@@ -16,21 +16,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What stands in the factor's place: no entries of L, but bytes and a condition. */
-static uz_factor_info describe_factor(const uz_setup *setup)
-{
-    if (setup->factor)
-        return uz_factor_describe(setup->factor);
-    uz_amg_info amg = uz_amg_describe(setup->amg);
-    return (uz_factor_info){.bytes = amg.bytes, .rcond = amg.rcond, .factor_s = amg.create_s + amg.spectrum_s};
-}
-
 void uz_report_setup(uz_run *run)
 {
     const uz_setup *setup = run->asked->setup;
     const uz_reuse reused = run->asked->reused;
     uz_summary *summary = &run->result->summary;
-    uz_factor_info factor = describe_factor(setup);
+    uz_factor_info factor;
+    if (setup->factor) {
+        factor = uz_factor_describe(setup->factor);
+    } else { /* what stands in its place has no entries of L, but bytes and a condition */
+        const uz_amg_info amg = uz_amg_describe(setup->amg);
+        factor = (uz_factor_info){.bytes = amg.bytes, .rcond = amg.rcond, .factor_s = amg.create_s + amg.spectrum_s};
+    }
     summary->discretization_error = NAN;
     summary->max_pressure = NAN;
     summary->row_scaling = UZ_ROW_SCALING_NONE;

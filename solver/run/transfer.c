@@ -18,24 +18,6 @@ typedef struct {
     double *pressure; /* n_nodes; of the contact that is transferred */
 } field;
 
-static void clear(field *f)
-{
-    for (int axis = 0; axis < 3; axis++)
-        free(f->line[axis]);
-    free(f->pressure);
-}
-
-static uz_status make(field *f, const uz_box *box, int64_t n_nodes, uz_error *err)
-{
-    f->box = box;
-    f->lattice = uz_box_lattice_of(box);
-    f->pressure = uz_alloc_zero(n_nodes, sizeof *f->pressure);
-    bool room = f->pressure != NULL;
-    for (int axis = 0; axis < box->dim; axis++)
-        room = (f->line[axis] = uz_box_lines(box, axis, f->lattice.order)) && room;
-    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
-}
-
 /* The lattice cell that x lies in along an axis, and where in it, 0 to 1. */
 static int64_t locate(double *share, const field *f, int axis, double x)
 {
@@ -83,47 +65,38 @@ static void spread(field *f, const uz_result *result, int64_t contact, bool put)
             f->pressure[result->mesh.contact_node[i]] = put ? result->pressure[i] : 0.0;
 }
 
-static bool has_pressure(const uz_result *result)
-{
-    for (int64_t i = 0; result->pressure && i < result->m; i++)
-        if (!isfinite(result->pressure[i]))
-            return false; /* infeasible */
-    return result->pressure && result->mesh.contact_of;
-}
-
-static void transfer(double *r, field *f, const uz_result *result, const uz_mesh_info *fine, int64_t m)
-{
-    int64_t contact = -1;
-    for (int64_t i = 0; i < m; i++) { /* rows come contact by contact */
-        if (fine->contact_of[i] != contact) {
-            spread(f, result, contact, false);
-            contact = fine->contact_of[i];
-            spread(f, result, contact, true);
-        }
-        r[i] = -pressure_at(f, fine->xyz + fine->contact_node[i] * fine->dim) * fine->contact_area[i];
-    }
-}
-
 uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_mesh_info *fine,
                             int64_t m, uz_error *err)
 {
-    field f = {.box = NULL};
     *out = NULL;
-    if (!has_pressure(result))
+    bool known = result->pressure && result->mesh.contact_of;
+    for (int64_t i = 0; known && i < result->m; i++)
+        known = isfinite(result->pressure[i]); /* else infeasible */
+    if (!known)
         return UZ_OK;
+    field f = {.box = coarse, .lattice = uz_box_lattice_of(coarse)};
     uz_state *state = uz_alloc_zero(1, sizeof *state);
-    uz_status status = make(&f, coarse, result->mesh.n_nodes, err);
-    if (state)
-        state->r = uz_alloc(m, sizeof *state->r);
-    if (status == UZ_OK && (!state || !state->r))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
-    if (status == UZ_OK) {
-        state->m = m;
-        transfer(state->r, &f, result, fine, m);
-        *out = state;
-        state = NULL;
+    f.pressure = uz_alloc_zero(result->mesh.n_nodes, sizeof *f.pressure);
+    bool room = state && f.pressure && (state->r = uz_alloc(m, sizeof *state->r));
+    for (int axis = 0; axis < coarse->dim; axis++)
+        room = (f.line[axis] = uz_box_lines(coarse, axis, f.lattice.order)) && room;
+    int64_t contact = -1;
+    for (int64_t i = 0; room && i < m; i++) { /* rows come contact by contact */
+        if (fine->contact_of[i] != contact) {
+            spread(&f, result, contact, false);
+            contact = fine->contact_of[i];
+            spread(&f, result, contact, true);
+        }
+        state->r[i] = -pressure_at(&f, fine->xyz + fine->contact_node[i] * fine->dim) * fine->contact_area[i];
     }
-    uz_state_free(state);
-    clear(&f);
-    return status;
+    for (int axis = 0; axis < coarse->dim; axis++)
+        free(f.line[axis]);
+    free(f.pressure);
+    if (!room) {
+        uz_state_free(state);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
+    }
+    state->m = m;
+    *out = state;
+    return UZ_OK;
 }
