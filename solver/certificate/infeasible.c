@@ -278,7 +278,7 @@ static double radius_of(const double *y, const uz_csc *N, const double *h)
     double radius = mpq_sgn(work) > 0 ? INFINITY : 0.0;
     if (mpq_sgn(work) > 0 && mpq_sgn(slack) > 0) {
         mpq_div(work, work, slack);
-        radius = mpq_get_d(work);
+        radius = fmin(mpq_get_d(work), DBL_MAX); /* INFINITY would say that there is no u at all */
     }
     mpq_clears(work, slack, sum, term, entry, NULL);
     return radius;
