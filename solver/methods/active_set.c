@@ -20,7 +20,16 @@
 
 /* Where steps are small they go on to the exact answer after the target is met: there the certificate of a cached body
  * is cheaper by half a linear solve, which is more than the steps cost. */
-enum { PATIENCE = 3, CIRCLES = 4, MAX_STEPS = 400, EXTRA_STEPS = 12, FEW_ROWS = 1024, GUESSES = 8, MANY_GUESSES = 32 };
+enum {
+    PATIENCE = 3,
+    CIRCLES = 4,
+    NEARLY = 2,
+    MAX_STEPS = 400,
+    EXTRA_STEPS = 12,
+    FEW_ROWS = 1024,
+    GUESSES = 8,
+    MANY_GUESSES = 32
+};
 
 /* What an exchange of all wrong rows is expected to leave of them, before it was tried. */
 #define FAIR_RATE 0.5
@@ -97,6 +106,13 @@ static bool is_stuck(const pivoting *p)
 static bool may_exchange(const uz_iterate *it, const uz_dual_load *load)
 {
     return load->dual->rows_may_depend && (load->dual->can->cheap_steps || it->m <= FEW_ROWS);
+}
+
+/* A wrong row or two among bounds are weakly active ones, whose signs rounding makes: the answer is handed over to be
+ * certified, which takes less than an interior point, and mostly ends it. */
+static bool is_nearly_right(const pivoting *p, const uz_dual_load *load, const uz_method_options *options)
+{
+    return options->yields && p->fewest <= NEARLY && !load->dual->rows_may_depend;
 }
 
 /* Once, where guesses lead no further: the rows that an interior point finds, if its steps take less than to exchange
@@ -186,7 +202,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
             goto done;
         bool found = false;
         if ((over && !uz_should_stop(end, it, options)) ||
-            (!over && is_stuck(&p) && (p.move != GUESS || p.idle >= CIRCLES)))
+            (!over && is_stuck(&p) && (p.move != GUESS || p.idle >= CIRCLES) && !is_nearly_right(&p, load, options)))
             status = look_from_inside(&p, &found, it, load, err);
         if (status != UZ_OK)
             goto done;

@@ -56,10 +56,9 @@ static const struct {
     const char *name, *element; /* NULL: the chain */
     int64_t cells, layers;
     double load, gap;
-} bodies[] = {{"beam_quad4_m400", "quad4", 400, 2, 1e-3, 0.01},
-              {"beam_quad4_m1000", "quad4", 1000, 4, 1e-3, 0.01},
-              {"beam_quad8_m400", "quad8", 200, 2, 1e-4, 0.5},
-              {"chenhark_d5000", NULL, 5000, 0, 0.0, 0.0}};
+} bodies[] = {{"beam_quad4_m400", "quad4", 400, 2, 1e-3, 0.01},   {"beam_quad4_m1000", "quad4", 1000, 4, 1e-3, 0.01},
+              {"beam_quad4_m2000", "quad4", 2000, 4, 1e-3, 0.01}, {"beam_quad8_m400", "quad8", 200, 2, 1e-4, 0.5},
+              {"beam_quad8_m2000", "quad8", 1000, 2, 1e-4, 0.5},  {"chenhark_d5000", NULL, 5000, 0, 0.0, 0.0}};
 
 const char *bench_slender_name(int which)
 {
