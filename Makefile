@@ -228,7 +228,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers peers-contact extremes theory figures numbers collect page-size
+        bench-size bench-deps peers peers-contact extremes theory roller figures numbers collect page-size
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
 	@tests/run.sh $(BUILD)
@@ -344,6 +344,9 @@ extremes: deps-test ## claims at the extremes, and 1,000 generated scenes of bod
 theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table and build/theory.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory
 	@$(call measured,theory) $(BUILD)/theory $(BUILD)/theory.json
+
+roller: $(BUILD)/uzawad ## a roller pushed into a block, graded meshes, from either side: the force that contact that moves converges to; minutes
+	@$(PYTHON) -B tests/theory/roller.py $(BUILD)
 
 page-size: $(BUILD)/gen/page.c
 	@$(call measured,page) $(PYTHON) -B tests/figures/page_size.py $(BUILD)/gen/page $(BUILD)/page.json
