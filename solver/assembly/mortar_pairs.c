@@ -188,12 +188,40 @@ uz_way uz_mortar_way(uz_mortar_pair *pair, int64_t i, int64_t j, const double *x
 typedef struct {
     uz_mortar_pair *pair;
     int64_t i, met;
+    double centre[3], radius, normal[3]; /* of side i */
 } search;
 
+/* The middle of a side, and how far its nodes are from that at most. */
+static double surround(double centre[3], const uz_mortar_side *side, int dim)
+{
+    double most = 0;
+    for (int c = 0; c < 3; c++)
+        centre[c] = 0;
+    for (int k = 0; k < side->nodes * dim; k++)
+        centre[k % dim] += side->xyz[k] / side->nodes;
+    for (int a = 0; a < side->nodes; a++) {
+        double square = 0;
+        for (int c = 0; c < dim; c++)
+            square += (side->xyz[a * dim + c] - centre[c]) * (side->xyz[a * dim + c] - centre[c]);
+        most = fmax(most, square);
+    }
+    return sqrt(most);
+}
+
+/* In space what side i meets is in the prism on it, across its plane: far away that is little of what is near. */
 static bool list_near(void *ctx, int64_t item)
 {
     search *s = ctx;
     s->met++;
+    if (s->pair->in->model->mesh.dim == 3) {
+        double off[3], across[3];
+        const double reach = 1.001 * (s->radius + surround(off, &s->pair->surface.side[item], 3));
+        for (int c = 0; c < 3; c++)
+            off[c] -= s->centre[c];
+        uz_cross3(across, off, s->normal);
+        if (uz_dot3(across, across) > reach * reach)
+            return false;
+    }
     if (may_touch(s->pair, s->i, item))
         s->pair->near[s->pair->n_near++] = item;
     return false;
@@ -233,15 +261,20 @@ bool uz_mortar_find_points(uz_mortar_pair *pair, int64_t i)
     double box[6], covered = 0;
     const double size = enclose(box, &pair->surface.side[i], dim);
     int64_t before = -1;
+    search s = {.pair = pair, .i = i};
+    const uz_side shape = uz_mortar_side_of(&pair->surface.side[i], pair->in->model);
+    static const double MIDDLE[2][2] = {{0, 0}, {1. / 3, 1. / 3}};
+    uz_side_area_vector(s.normal, &shape, MIDDLE[dim == 3 && shape.nodes % 3 == 0]);
+    uz_unit3(s.normal);
+    s.radius = surround(s.centre, &pair->surface.side[i], dim);
     pair->points.n = 0;
     for (double reach = size; covered < (1 - 1e-9) * area; reach *= 8) {
-        search s = {.pair = pair, .i = i};
         double wide[6];
         for (int c = 0; c < dim; c++) {
             wide[c] = box[c] - reach;
             wide[dim + c] = box[dim + c] + reach;
         }
-        pair->n_near = 0;
+        pair->n_near = s.met = 0;
         uz_box_tree_meet(&pair->surface.tree, wide, list_near, &s);
         if (pair->n_near > before) {
             before = pair->n_near;
