@@ -133,6 +133,8 @@ typedef struct {
     const double *xyz; /* nodes x dim, in the side's order, true coordinates */
 } uz_side;
 
+/* A face is, in its own plane, the element of as many nodes: 3, 4, 6 or 8. */
+const uz_element_type *uz_face_type(int nodes);
 void uz_side_shape(double *N, const uz_side *side, const double point[2]);
 /* With derivatives: slope[node][reference coordinate]. */
 void uz_side_gradients(double *N, double slope[][3], const uz_side *side, const double point[2]);

@@ -14,19 +14,15 @@
 #define WEIGHT_A 0.12593918054482715260
 #define WEIGHT_B 0.13239415278850618074
 
-/* A face is, in its own plane, the element of as many nodes. */
-static const uz_element_type *face_type(const uz_side *side)
+const uz_element_type *uz_face_type(int nodes)
 {
-    return uz_element_type_of(side->nodes == 3   ? UZ_TRI3
-                              : side->nodes == 4 ? UZ_QUAD4
-                              : side->nodes == 6 ? UZ_TRI6
-                                                 : UZ_QUAD8);
+    return uz_element_type_of(nodes == 3 ? UZ_TRI3 : nodes == 4 ? UZ_QUAD4 : nodes == 6 ? UZ_TRI6 : UZ_QUAD8);
 }
 
 const double (*uz_side_local_nodes(const uz_side *side))[3]
 {
     static const double EDGE[3][3] = {{-1}, {1}, {0}};
-    return side->dim == 2 ? EDGE : face_type(side)->local;
+    return side->dim == 2 ? EDGE : uz_face_type(side->nodes)->local;
 }
 
 /* ---------------------------------------------------------- shape functions */
@@ -36,7 +32,7 @@ void uz_side_gradients(double *N, double slope[][3], const uz_side *side, const 
     const double s = point[0];
     if (side->dim == 3) {
         const double at[3] = {point[0], point[1]};
-        face_type(side)->shape(N, slope, at);
+        uz_face_type(side->nodes)->shape(N, slope, at);
     } else if (side->nodes == 2) {
         N[0] = 0.5 * (1 - s);
         N[1] = 0.5 * (1 + s);
@@ -64,7 +60,7 @@ int uz_side_gauss_count(const uz_side *side)
 {
     if (side->dim == 2)
         return side->nodes;
-    return side->nodes == 3 ? 3 : side->nodes == 6 ? 7 : face_type(side)->rule.count;
+    return side->nodes == 3 ? 3 : side->nodes == 6 ? 7 : uz_face_type(side->nodes)->rule.count;
 }
 
 double uz_side_gauss(double point[2], const uz_side *side, int g)
@@ -84,7 +80,7 @@ double uz_side_gauss(double point[2], const uz_side *side, int g)
         return 0.5 * (centre ? 9. / 40 : nodes == 3 ? 1. / 3 : outer ? WEIGHT_A : WEIGHT_B);
     }
     double place[3];
-    const double weight = face_type(side)->rule.point(place, g);
+    const double weight = uz_face_type(side->nodes)->rule.point(place, g);
     memcpy(point, place, 2 * sizeof *point);
     return weight;
 }

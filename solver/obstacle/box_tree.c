@@ -69,45 +69,30 @@ static void split_at(int64_t *item, int64_t first, int64_t end, int64_t place, c
     }
 }
 
-static int widest_axis(const uz_box_tree *tree, const double *box, part of)
+/* The box of a node's items, and those below it: halves by the median along the axis in which centres are spread most.
+ */
+static void build_node(uz_box_tree *tree, const double *box, part of)
 {
-    int widest = 0;
-    double most = -1;
-    for (int axis = 0; axis < tree->dim; axis++) {
+    const int dim = tree->dim;
+    double *own = tree->box + 2 * dim * of.node, most = -1;
+    order by = {box, dim, 0};
+    for (int c = 0; c < dim; c++) {
         double low = INFINITY, high = -INFINITY;
+        own[c] = INFINITY;
+        own[dim + c] = -INFINITY;
         for (int64_t i = of.first; i < of.end; i++) {
-            const double at = centre(box, tree->dim, tree->item[i], axis);
+            const double *its = box + 2 * dim * tree->item[i], at = centre(box, dim, tree->item[i], c);
+            own[c] = fmin(own[c], its[c]);
+            own[dim + c] = fmax(own[dim + c], its[dim + c]);
             low = fmin(low, at);
             high = fmax(high, at);
         }
         if (high - low > most) {
             most = high - low;
-            widest = axis;
+            by.axis = c;
         }
     }
-    return widest;
-}
-
-static void enclose(double *into, const double *box, int dim)
-{
-    for (int c = 0; c < dim; c++) {
-        into[c] = fmin(into[c], box[c]);
-        into[dim + c] = fmax(into[dim + c], box[dim + c]);
-    }
-}
-
-static void build_node(uz_box_tree *tree, const double *box, part of)
-{
-    const int dim = tree->dim;
-    double *own = tree->box + 2 * dim * of.node;
-    for (int c = 0; c < dim; c++) {
-        own[c] = INFINITY;
-        own[dim + c] = -INFINITY;
-    }
-    for (int64_t i = of.first; i < of.end; i++)
-        enclose(own, box + 2 * dim * tree->item[i], dim);
     if (of.end - of.first > LEAF) {
-        const order by = {box, dim, widest_axis(tree, box, of)};
         split_at(tree->item, of.first, of.end, half_of(of, 0).end, &by);
         build_node(tree, box, half_of(of, 0));
         build_node(tree, box, half_of(of, 1));
@@ -149,11 +134,6 @@ double uz_box_distance(const double *box, int dim, const double *x)
     return sum;
 }
 
-static double node_distance(const uz_box_tree *tree, int64_t node, const double *x)
-{
-    return uz_box_distance(tree->box + 2 * tree->dim * node, tree->dim, x);
-}
-
 int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_distance *distance, const void *ctx)
 {
     struct {
@@ -171,7 +151,9 @@ int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_di
             continue;
         if (of.end - of.first > LEAF) {
             const part halves[2] = {half_of(of, 0), half_of(of, 1)};
-            const double far[2] = {node_distance(tree, halves[0].node, x), node_distance(tree, halves[1].node, x)};
+            const double *box = tree->box + 2 * tree->dim * halves[0].node; /* that of the other follows it */
+            const double far[2] = {uz_box_distance(box, tree->dim, x),
+                                   uz_box_distance(box + 2 * tree->dim, tree->dim, x)};
             const int later = far[1] < far[0] ? 0 : 1;
             stack[depth].of = halves[later];
             stack[depth++].distance = far[later];
@@ -190,15 +172,6 @@ int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_di
     return found;
 }
 
-static bool node_meets(const uz_box_tree *tree, int64_t node, const double *box)
-{
-    const double *low = tree->box + 2 * tree->dim * node, *high = low + tree->dim;
-    for (int c = 0; c < tree->dim; c++)
-        if (low[c] > box[tree->dim + c] || box[c] > high[c])
-            return false;
-    return true;
-}
-
 bool uz_box_tree_meet(const uz_box_tree *tree, const double *box, uz_item_visit *visit, void *ctx)
 {
     part stack[MOST_LEVELS];
@@ -207,7 +180,11 @@ bool uz_box_tree_meet(const uz_box_tree *tree, const double *box, uz_item_visit 
         stack[depth++] = (part){1, 0, tree->n};
     while (depth > 0) {
         const part of = stack[--depth];
-        if (!node_meets(tree, of.node, box))
+        const double *low = tree->box + 2 * tree->dim * of.node, *high = low + tree->dim;
+        bool meets = true;
+        for (int c = 0; c < tree->dim && meets; c++)
+            meets = !(low[c] > box[tree->dim + c] || box[c] > high[c]);
+        if (!meets)
             continue;
         if (of.end - of.first > LEAF) {
             stack[depth++] = half_of(of, 1);

@@ -31,30 +31,23 @@ void uz_candidates_clear(uz_candidates *candidates)
     memset(candidates, 0, sizeof *candidates);
 }
 
-/* The deepest penetration of the rows left out, 0 if there is none, INFINITY where a gap is no number. */
-static double deepest(const uz_candidates *c, const uz_law *law, const double *g, const double *size, double rounding)
+int64_t uz_candidates_extend(uz_candidates *candidates, const uz_law *law, const double *g, const double *size,
+                             double rounding)
 {
-    double depth = 0, own;
+    uz_candidates *c = candidates;
+    const int64_t before = c->count;
+    double deepest = 0, own; /* penetration of the rows left out: INFINITY where a gap is no number */
     for (int64_t i = 0; i < c->m; i++) {
         if (c->in[i])
             continue;
         law->kind->penetration(law, &own, &g[i], 1);
         if (isnan(g[i]))
-            depth = INFINITY;
+            deepest = INFINITY;
         else if (!(own <= rounding * size[i]))
-            depth = fmax(depth, own);
+            deepest = fmax(deepest, own);
     }
-    return depth;
-}
-
-int64_t uz_candidates_extend(uz_candidates *candidates, const uz_law *law, const double *g, const double *size,
-                             double rounding)
-{
-    uz_candidates *c = candidates;
-    const double depth = deepest(c, law, g, size, rounding);
-    const int64_t before = c->count;
-    for (int64_t i = 0; i < c->m && depth > 0; i++)
-        if (!c->in[i] && !(g[i] > depth)) {
+    for (int64_t i = 0; i < c->m && deepest > 0; i++)
+        if (!c->in[i] && !(g[i] > deepest)) {
             c->in[i] = 1;
             c->count++;
         }

@@ -1,6 +1,7 @@
 #include "obstacle/face_point.h"
 
 #include "core/vector3.h"
+#include "element/element.h"
 
 #include <float.h>
 #include <math.h>
@@ -52,25 +53,6 @@ static double curve_slope(double *second, const curve *k, double s)
     return uz_dot3(x, t);
 }
 
-/* Newton within a bracket, halved where a step leaves it. */
-static double curve_root(const curve *k, double low, double high)
-{
-    double s = 0.5 * (low + high);
-    for (int step = 0; step < 60 && high - low > DBL_EPSILON; step++) {
-        double second;
-        const double slope = curve_slope(&second, k, s);
-        if (slope < 0)
-            low = s;
-        else
-            high = s;
-        const double next = s - slope / second;
-        if (next == s || slope == 0)
-            return s;
-        s = next > low && next < high ? next : 0.5 * (low + high);
-    }
-    return s;
-}
-
 static double closest_on_curve(const curve *k)
 {
     enum { SAMPLES = 8 };
@@ -84,74 +66,74 @@ static double closest_on_curve(const curve *k)
             at = s;
         }
     }
-    const double low = fmax(at - 2.0 / SAMPLES, -1), high = fmin(at + 2.0 / SAMPLES, 1);
+    double low = fmax(at - 2.0 / SAMPLES, -1), high = fmin(at + 2.0 / SAMPLES, 1);
     if (curve_slope(&second, k, low) >= 0)
         return low;
-    return curve_slope(&second, k, high) <= 0 ? high : curve_root(k, low, high);
+    if (curve_slope(&second, k, high) <= 0)
+        return high;
+    /* Newton within a bracket, halved where a step leaves it. */
+    double s = 0.5 * (low + high);
+    for (int step = 0; step < 60 && high - low > DBL_EPSILON; step++) {
+        const double slope = curve_slope(&second, k, s);
+        if (slope < 0)
+            low = s;
+        else
+            high = s;
+        const double next = s - slope / second;
+        if (next == s || slope == 0)
+            return s;
+        s = next > low && next < high ? next : 0.5 * (low + high);
+    }
+    return s;
 }
 
 /* --------------------------------------------------------------- surfaces */
 
 typedef struct {
-    int count;
+    const uz_element_type *type;
     double x[UZ_FACE_NODES][3];
 } surface;
 
-static const double QUAD[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
-
-/* In area coordinates L: corners L (2 L - 1), middles 4 L L'. */
-static void triangle_shape(double *w, double *da, double *db, int count, double a, double b)
+/* The point at these coordinates, its shape functions and tangents; N and T may be NULL. */
+static void surface_at(double x[3], double *N, double T[2][3], const surface *f, const double at[2])
 {
-    static const double DA[3] = {-1, 1, 0}, DB[3] = {-1, 0, 1};
-    const double l[3] = {1 - a - b, a, b};
-    for (int i = 0; i < 3; i++) {
-        const int j = (i + 1) % 3;
-        const double slope = count == 3 ? 1 : 4 * l[i] - 1;
-        w[i] = count == 3 ? l[i] : l[i] * (2 * l[i] - 1);
-        da[i] = slope * DA[i];
-        db[i] = slope * DB[i];
-        if (count == 3)
-            continue;
-        w[3 + i] = 4 * l[i] * l[j];
-        da[3 + i] = 4 * (DA[i] * l[j] + l[i] * DA[j]);
-        db[3 + i] = 4 * (DB[i] * l[j] + l[i] * DB[j]);
+    double values[UZ_FACE_NODES], slope[UZ_FACE_NODES][3];
+    const double point[3] = {at[0], at[1], 0};
+    N = N ? N : values;
+    f->type->shape(N, T ? slope : NULL, point);
+    for (int c = 0; c < 3; c++) {
+        x[c] = 0;
+        for (int i = 0; i < f->type->nodes; i++)
+            x[c] += N[i] * f->x[i][c];
+        for (int k = 0; k < 2 && T; k++) {
+            T[k][c] = 0;
+            for (int i = 0; i < f->type->nodes; i++)
+                T[k][c] += slope[i][k] * f->x[i][c];
+        }
     }
 }
 
-static void shape(double *w, double *da, double *db, int count, const double at[2])
+static double distance_at(const surface *f, const double at[2])
 {
-    if (count == 8) {
-        /* The quadrilateral of eight nodes, corners first. */
-        double gradient[UZ_FACE_NODES][3];
-        const uz_element_type *type = uz_element_type_of(UZ_QUAD8);
-        const double point[3] = {at[0], at[1], 0};
-        type->shape(w, gradient, point);
-        for (int i = 0; i < 8; i++) {
-            da[i] = gradient[i][0];
-            db[i] = gradient[i][1];
-        }
-    } else if (count == 4) {
-        const double a = at[0], b = at[1];
-        for (int i = 0; i < 4; i++) {
-            w[i] = 0.25 * (1 + QUAD[i][0] * a) * (1 + QUAD[i][1] * b);
-            da[i] = 0.25 * QUAD[i][0] * (1 + QUAD[i][1] * b);
-            db[i] = 0.25 * QUAD[i][1] * (1 + QUAD[i][0] * a);
-        }
-    } else {
-        triangle_shape(w, da, db, count, at[0], at[1]);
-    }
+    double x[3];
+    surface_at(x, NULL, NULL, f, at);
+    return uz_dot3(x, x);
 }
 
-/* Of the position on a face of eight nodes, where p, q are a node's own coordinates: those of (1 + p a) (1 + q b)
- * (p a + q b - 1) / 4 at corners and of (1 - a^2) (1 + q b) / 2 or (1 - b^2) (1 + p a) / 2 between them. */
-static void serendipity_second(double aa[3], double ab[3], double bb[3], const surface *f, const double at[2])
+/* Second derivatives of the position: the same everywhere on a face of at most six nodes. Where p, q are the own
+ * coordinates of one of eight nodes, those of (1 + p a) (1 + q b) (p a + q b - 1) / 4 at corners and of
+ * (1 - a^2) (1 + q b) / 2 or (1 - b^2) (1 + p a) / 2 between them. */
+static void second_derivatives(double aa[3], double ab[3], double bb[3], const surface *f, const double at[2])
 {
-    const double(*local)[3] = uz_element_type_of(UZ_QUAD8)->local;
-    memset(aa, 0, 3 * sizeof *aa);
-    memset(ab, 0, 3 * sizeof *ab);
-    memset(bb, 0, 3 * sizeof *bb);
-    for (int i = 0; i < 8; i++) {
-        const double p = local[i][0], q = local[i][1], a = at[0], b = at[1];
+    const int nodes = f->type->nodes;
+    for (int c = 0; c < 3; c++) {
+        const double x[6] = {f->x[0][c], f->x[1][c], f->x[2][c], f->x[3][c], f->x[4][c], f->x[5][c]};
+        aa[c] = nodes == 6 ? 4 * (x[0] + x[1] - 2 * x[3]) : 0;
+        bb[c] = nodes == 6 ? 4 * (x[0] + x[2] - 2 * x[5]) : 0;
+        ab[c] = nodes == 6 ? 4 * (x[0] - x[3] + x[4] - x[5]) : nodes == 4 ? 0.25 * (x[0] - x[1] + x[2] - x[3]) : 0;
+    }
+    for (int i = 0; i < nodes && nodes == 8; i++) {
+        const double p = f->type->local[i][0], q = f->type->local[i][1], a = at[0], b = at[1];
         const double along_a = p == 0 ? -(1 + q * b) : q == 0 ? 0 : 0.5 * (1 + q * b);
         const double along_b = q == 0 ? -(1 + p * a) : p == 0 ? 0 : 0.5 * (1 + p * a);
         const double mixed = p == 0 ? -a * q : q == 0 ? -b * p : 0.25 * p * q * (1 + 2 * p * a + 2 * q * b);
@@ -163,44 +145,10 @@ static void serendipity_second(double aa[3], double ab[3], double bb[3], const s
     }
 }
 
-/* Second derivatives of the position: the same everywhere on a face of at most six nodes. */
-static void second_derivatives(double aa[3], double ab[3], double bb[3], const surface *f, const double at[2])
-{
-    if (f->count == 8) {
-        serendipity_second(aa, ab, bb, f, at);
-        return;
-    }
-    for (int c = 0; c < 3; c++) {
-        const double x[6] = {f->x[0][c], f->x[1][c], f->x[2][c], f->x[3][c], f->x[4][c], f->x[5][c]};
-        aa[c] = f->count == 6 ? 4 * (x[0] + x[1] - 2 * x[3]) : 0;
-        bb[c] = f->count == 6 ? 4 * (x[0] + x[2] - 2 * x[5]) : 0;
-        ab[c] = f->count == 6   ? 4 * (x[0] - x[3] + x[4] - x[5])
-                : f->count == 4 ? 0.25 * (x[0] - x[1] + x[2] - x[3])
-                                : 0;
-    }
-}
-
-static void combine(double out[3], const surface *f, const double *w)
-{
-    for (int c = 0; c < 3; c++) {
-        out[c] = 0;
-        for (int i = 0; i < f->count; i++)
-            out[c] += w[i] * f->x[i][c];
-    }
-}
-
-static double distance_at(const surface *f, const double at[2])
-{
-    double w[UZ_FACE_NODES], da[UZ_FACE_NODES], db[UZ_FACE_NODES], x[3];
-    shape(w, da, db, f->count, at);
-    combine(x, f, w);
-    return uz_dot3(x, x);
-}
-
 /* How far outside the face's own coordinates; < 0 within. */
-static double outside(int count, const double at[2])
+static double outside(const surface *f, const double at[2])
 {
-    if (count % 4 == 0)
+    if (f->type->corners == 4)
         return fmax(fabs(at[0]), fabs(at[1])) - 1;
     return fmax(fmax(-at[0], -at[1]), at[0] + at[1] - 1);
 }
@@ -208,11 +156,9 @@ static double outside(int count, const double at[2])
 /* The Newton step of half the squared distance; Gauss-Newton's where the former would not go down. */
 static void newton_step(double step[2], const surface *f, const double at[2])
 {
-    double w[UZ_FACE_NODES], da[UZ_FACE_NODES], db[UZ_FACE_NODES], x[3], ta[3], tb[3], aa[3], ab[3], bb[3];
-    shape(w, da, db, f->count, at);
-    combine(x, f, w);
-    combine(ta, f, da);
-    combine(tb, f, db);
+    double x[3], T[2][3], aa[3], ab[3], bb[3];
+    const double *ta = T[0], *tb = T[1];
+    surface_at(x, NULL, T, f, at);
     second_derivatives(aa, ab, bb, f, at);
     const double ga = uz_dot3(x, ta), gb = uz_dot3(x, tb);
     double haa = uz_dot3(ta, ta) + uz_dot3(x, aa), hab = uz_dot3(ta, tb) + uz_dot3(x, ab),
@@ -227,12 +173,24 @@ static void newton_step(double step[2], const surface *f, const double at[2])
     step[1] = -(haa * gb - hab * ga) / determinant;
 }
 
-/* Down to a minimum of the distance. False: the way leads out of the face. */
+/* From the best of a few samples down to a minimum of the distance. False: the way leads out of the face. */
 static bool descend(double at[2], const surface *f)
 {
     enum { STEPS = 50, HALVINGS = 30 };
     static const double SMALL = 1e-5; /* the distance is too flat there to tell whether such a step goes down */
-    double distance = distance_at(f, at);
+    static const double TRIANGLE[7][2] = {{1. / 3, 1. / 3}, {0.1, 0.1},   {0.8, 0.1}, {0.1, 0.8},
+                                          {0.45, 0.1},      {0.45, 0.45}, {0.1, 0.45}};
+    const int starts = f->type->nodes == 3 ? 1 : f->type->nodes == 6 ? 7 : 9;
+    double distance = INFINITY;
+    for (int i = 0; i < starts; i++) {
+        const int column = i % 3, line = i / 3;
+        const double grid[2] = {0.7 * (column - 1), 0.7 * (line - 1)};
+        const double *start = f->type->corners == 4 ? grid : TRIANGLE[i], there = distance_at(f, start);
+        if (there < distance) {
+            distance = there;
+            memcpy(at, start, sizeof grid);
+        }
+    }
     for (int k = 0; k < STEPS; k++) {
         double step[2], next[2], there = INFINITY, part = 1;
         newton_step(step, f, at);
@@ -249,30 +207,12 @@ static bool descend(double at[2], const surface *f)
             return false;
         memcpy(at, next, sizeof next);
         distance = there;
-        if (outside(f->count, at) > 0.5)
+        if (outside(f, at) > 0.5)
             return false;
         if (part * (fabs(step[0]) + fabs(step[1])) <= 2 * DBL_EPSILON)
             break;
     }
-    return outside(f->count, at) < 0;
-}
-
-static void best_start(double at[2], const surface *f)
-{
-    static const double TRIANGLE[7][2] = {{1. / 3, 1. / 3}, {0.1, 0.1},   {0.8, 0.1}, {0.1, 0.8},
-                                          {0.45, 0.1},      {0.45, 0.45}, {0.1, 0.45}};
-    double best = INFINITY;
-    const int starts = f->count == 3 ? 1 : f->count == 6 ? 7 : 9;
-    for (int i = 0; i < starts; i++) {
-        const int column = i % 3, line = i / 3;
-        const double grid[2] = {0.7 * (column - 1), 0.7 * (line - 1)};
-        const double *start = f->count % 4 == 0 ? grid : TRIANGLE[i];
-        const double d = distance_at(f, start);
-        if (d < best) {
-            best = d;
-            memcpy(at, start, sizeof grid);
-        }
-    }
+    return outside(f, at) < 0;
 }
 
 /* ---------------------------------------------------------------- both */
@@ -306,25 +246,14 @@ static void closest_in_plane(uz_foot *out, int count, const double *xyz)
     set_normal(out, (double[3]){tangent[1], -tangent[0], 0});
 }
 
-static const double TRI[3][2] = {{0, 0}, {1, 0}, {0, 1}};
-
-/* The face's own coordinates of a point of its edge. */
-static void edge_to_face(double at[2], int corners, int edge, double s)
-{
-    const double *from = corners == 4 ? QUAD[edge] : TRI[edge];
-    const double *to = corners == 4 ? QUAD[(edge + 1) % 4] : TRI[(edge + 1) % 3];
-    for (int c = 0; c < 2; c++)
-        at[c] = s == -1 ? from[c] : s == 1 ? to[c] : 0.5 * ((1 - s) * from[c] + (1 + s) * to[c]);
-}
-
 /* The closest point of the border; its squared distance is returned, its place in *out. */
 static double closest_on_border(uz_foot *out, const surface *f, double x[3])
 {
-    const int corners = uz_face_corners(3, f->count);
+    const int corners = f->type->corners;
     double best = INFINITY;
     for (int edge = 0; edge < corners; edge++) {
         const int next = (edge + 1) % corners;
-        const curve k = curve_of(f->x[edge], f->x[next], f->count > corners ? f->x[corners + edge] : NULL, 3);
+        const curve k = curve_of(f->x[edge], f->x[next], f->type->nodes > corners ? f->x[corners + edge] : NULL, 3);
         double s = closest_on_curve(&k);
         s = s >= 1 - SNAP ? 1 : s <= -1 + SNAP ? -1 : s;
         const double distance = curve_distance(&k, s);
@@ -332,44 +261,38 @@ static double closest_on_border(uz_foot *out, const surface *f, double x[3])
             continue;
         best = distance;
         curve_at(x, &k, s);
-        edge_to_face(out->local, corners, edge, s);
+        const double *from = f->type->local[edge], *to = f->type->local[next];
+        for (int c = 0; c < 2; c++)
+            out->local[c] = s == -1 ? from[c] : s == 1 ? to[c] : 0.5 * ((1 - s) * from[c] + (1 + s) * to[c]);
         out->place = fabs(s) == 1 ? UZ_FACE_CORNER : UZ_FACE_EDGE;
         out->which = s == 1 ? next : edge;
     }
     return best;
 }
 
-/* Is the point within the face nearer than that of the border, by more than rounding? */
-static bool truly_within(const surface *f, const double at[2], double border, const double on_border[3])
-{
-    double w[UZ_FACE_NODES], da[UZ_FACE_NODES], db[UZ_FACE_NODES], x[3], off[3], size = 0;
-    shape(w, da, db, f->count, at);
-    combine(x, f, w);
-    for (int c = 0; c < 3; c++) {
-        off[c] = x[c] - on_border[c];
-        size = fmax(size, fabs(f->x[1][c] - f->x[0][c]));
-    }
-    return uz_dot3(x, x) < border && uz_dot3(off, off) > SNAP * SNAP * size * size;
-}
-
 static void closest_in_space(uz_foot *out, int count, const double *xyz)
 {
-    surface f = {.count = count, .x = {{0}}};
-    double at[2], border[3], da[UZ_FACE_NODES], db[UZ_FACE_NODES], ta[3], tb[3];
+    surface f = {.type = uz_face_type(count), .x = {{0}}};
+    double at[2] = {0}, border[3], normal[3], T[2][3];
     memcpy(f.x, xyz, (size_t)count * sizeof f.x[0]);
     const double distance = closest_on_border(out, &f, border);
-    best_start(at, &f);
-    if (descend(at, &f) && truly_within(&f, at, distance, border)) {
-        out->place = UZ_FACE_WITHIN;
-        out->which = 0;
-        memcpy(out->local, at, sizeof at);
+    if (descend(at, &f)) {
+        double x[3], off[3], size = 0;
+        surface_at(x, NULL, NULL, &f, at);
+        for (int c = 0; c < 3; c++) {
+            off[c] = x[c] - border[c];
+            size = fmax(size, fabs(f.x[1][c] - f.x[0][c]));
+        }
+        /* nearer than the point of the border by more than rounding */
+        if (uz_dot3(x, x) < distance && uz_dot3(off, off) > SNAP * SNAP * size * size) {
+            out->place = UZ_FACE_WITHIN;
+            out->which = 0;
+            memcpy(out->local, at, sizeof at);
+        }
     }
-    shape(out->weight, da, db, count, out->local);
-    combine(out->point, &f, out->weight);
-    combine(ta, &f, da);
-    combine(tb, &f, db);
-    set_normal(
-        out, (double[3]){ta[1] * tb[2] - ta[2] * tb[1], ta[2] * tb[0] - ta[0] * tb[2], ta[0] * tb[1] - ta[1] * tb[0]});
+    surface_at(out->point, out->weight, T, &f, out->local);
+    uz_cross3(normal, T[0], T[1]);
+    set_normal(out, normal);
 }
 
 void uz_face_closest(uz_foot *out, int dim, int count, const double *xyz)

@@ -49,20 +49,13 @@ static double radial(double unit[3], const uz_obstacle *o, const double x[3])
     return length;
 }
 
-/* What rounding can leave of the vector from the centre to the point itself. */
-static bool is_centre(const uz_obstacle *o, const double x[3], double distance)
-{
-    double size = 0;
-    for (int c = 0; c < o->dim; c++)
-        size += fabs(x[c]) + fabs(o->point[c]);
-    return distance <= 4 * DBL_EPSILON * size;
-}
-
 static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
 {
-    double unit[3];
+    double unit[3], size = 0;
     const double distance = radial(unit, o, x), sign = o->inside ? -1 : 1;
-    if (is_centre(o, x, distance)) {
+    for (int c = 0; c < o->dim; c++)
+        size += fabs(x[c]) + fabs(o->point[c]);
+    if (distance <= 4 * DBL_EPSILON * size) { /* what rounding can leave of the centre itself */
         char where[96];
         const bool cylinder = o->shape == &uz_shape_cylinder;
         snprintf(where, sizeof where, "/contacts/%lld/obstacle/%s/%s", (long long)o->index, o->shape->name[o->dim - 2],

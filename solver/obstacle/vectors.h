@@ -1,15 +1,11 @@
-/* vectors.h: three numbers as a vector, and the frame of a patch. */
+/* vectors.h: vectors in space for the patches of obstacles, and the frame of a patch. */
 #ifndef UZ_OBSTACLE_VECTORS_H
 #define UZ_OBSTACLE_VECTORS_H
 
+#include "core/vector3.h"
 #include "obstacle/shape.h"
 
 #include <math.h>
-
-static inline double uz_dot3(const double x[3], const double y[3])
-{
-    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
-}
 
 static inline void uz_add3(double out[3], double times, const double x[3])
 {
@@ -23,12 +19,6 @@ static inline void uz_make_unit3(double x[3], const double otherwise[3])
     const double length = hypot(hypot(x[0], x[1]), x[2]);
     for (int c = 0; c < 3; c++)
         x[c] = length > 0 ? x[c] / length : otherwise[c];
-}
-
-static inline void uz_cross3(double out[3], const double x[3], const double y[3])
-{
-    for (int c = 0; c < 3; c++)
-        out[c] = x[(c + 1) % 3] * y[(c + 2) % 3] - x[(c + 2) % 3] * y[(c + 1) % 3];
 }
 
 /* a across n, b across both. */
