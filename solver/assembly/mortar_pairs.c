@@ -13,6 +13,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "core/vector3.h"
 #include "obstacle/candidates.h"
 
@@ -228,12 +229,6 @@ static bool list_near(void *ctx, int64_t item)
     return false;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* The area of all points. Where the master has several layers, as of a plate and what is behind it, only the nearest is
  * kept: what is farther than it by more than the side's size goes. */
 static double covered_area(uz_mortar_points *points, double size)
@@ -279,7 +274,7 @@ bool uz_mortar_find_points(uz_mortar_pair *pair, int64_t i)
         uz_box_tree_meet(&pair->surface.tree, wide, list_near, &s);
         if (pair->n_near > before) {
             before = pair->n_near;
-            qsort(pair->near, (size_t)pair->n_near, sizeof *pair->near, ascending);
+            qsort(pair->near, (size_t)pair->n_near, sizeof *pair->near, uz_ascending);
             pair->points.n = 0;
             if (!geometry->points(pair, i))
                 return false;

@@ -24,4 +24,13 @@ static inline double uz_unit3(double v[3])
     return length;
 }
 
+/* The squared distance of two points of dim coordinates. */
+static inline double uz_distance2(const double *x, const double *y, int dim)
+{
+    double sum = 0;
+    for (int c = 0; c < dim; c++)
+        sum += (x[c] - y[c]) * (x[c] - y[c]);
+    return sum;
+}
+
 #endif

@@ -55,14 +55,6 @@ typedef struct {
     double foot[3];
 } place;
 
-static double distance(const double *x, const double *y, int dim)
-{
-    double sum = 0;
-    for (int c = 0; c < dim; c++)
-        sum += (x[c] - y[c]) * (x[c] - y[c]);
-    return sqrt(sum);
-}
-
 /* The gap between smooth surfaces where facets have this foot: along the smooth normal of the point's own side, as the
  * directions of facets are off by half their turn. d: from the foot to the point. */
 static double smooth_gap(const work *w, const place *p, const uz_contact_pair *foot, const double d[3],
@@ -235,7 +227,7 @@ static void look_at_side(work *w, int k, int64_t i, unsigned char *seen)
             middle[c] += N[a] * moved[dim * a + c];
         }
     for (int a = 0; a < side->nodes; a++)
-        p.size = fmax(p.size, distance(middle, moved + dim * a, dim));
+        p.size = fmax(p.size, sqrt(uz_distance2(middle, moved + dim * a, dim)));
     const double off = sagitta(&known, w, &p);
     look(w, &p, at[0]);
     if (!(p.gap <= p.size + 2 * off)) /* gaps change by no more than places do */

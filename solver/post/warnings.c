@@ -2,6 +2,7 @@
  * normals and the places where bodies meet to be those of the undeformed body. */
 #include "post/balance.h"
 
+#include "core/vector3.h"
 #include "post/parts.h"
 #include "obstacle/obstacle.h"
 
@@ -52,12 +53,6 @@ __attribute__((format(printf, 4, 5))) static void warn(uz_evaluation *out, const
 
 /* ---- strain and rotation */
 
-static inline double squared_distance(const double *x, const double *y, int dim)
-{
-    const double a = x[0] - y[0], b = x[1] - y[1], c = dim == 3 ? x[2] - y[2] : 0;
-    return a * a + b * b + c * c;
-}
-
 /* At most how steep u is where all elements are equal boxes with nodes at their corners only: the range of u over the
  * shortest edge. INFINITY: not such a mesh. */
 static double slope_by_range(const doubts *d)
@@ -91,7 +86,7 @@ static double largest_slope(const doubts *d)
         const int64_t first = mesh->node[mesh->first[e]] * dim;
         for (int64_t k = mesh->first[e] + 1; k < mesh->first[e + 1]; k++) {
             const int64_t i = mesh->node[k] * dim;
-            const double du = squared_distance(u + i, u + first, dim), dx = squared_distance(x + i, x + first, dim);
+            const double du = uz_distance2(u + i, u + first, dim), dx = uz_distance2(x + i, x + first, dim);
             if (du > largest * dx)
                 largest = du / dx;
         }
@@ -173,8 +168,8 @@ static double size_of_face(const uz_mesh *mesh, uz_face face)
     const int count = uz_mesh_face(node, mesh, face);
     for (int a = 0; a < count; a++)
         for (int b = 0; b < a; b++)
-            largest = fmax(
-                largest, squared_distance(mesh->xyz + node[a] * mesh->dim, mesh->xyz + node[b] * mesh->dim, mesh->dim));
+            largest = fmax(largest,
+                           uz_distance2(mesh->xyz + node[a] * mesh->dim, mesh->xyz + node[b] * mesh->dim, mesh->dim));
     return sqrt(largest);
 }
 

@@ -1,6 +1,7 @@
 /* contact_groups.c: several groups of a mesh as one surface of a contact. */
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "scene/check.h"
 #include "scene/scene.h"
 
@@ -55,12 +56,6 @@ static int by_side(const void *a, const void *b)
     return x->element != y->element ? (x->element > y->element) - (x->element < y->element) : x->side - y->side;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* All sides of the groups, by element. */
 static uz_status join(uz_group *out, const uz_mesh *mesh, const uz_names *groups, const char *where, uz_error *err)
 {
@@ -89,7 +84,7 @@ static uz_status join(uz_group *out, const uz_mesh *mesh, const uz_names *groups
         out->n_inner += group->n_inner;
     }
     qsort(out->face, (size_t)out->n_faces, sizeof *out->face, by_side);
-    qsort(out->node, (size_t)out->n_nodes, sizeof *out->node, ascending);
+    qsort(out->node, (size_t)out->n_nodes, sizeof *out->node, uz_ascending);
     faces = nodes = 0;
     for (int64_t i = 0; i < out->n_faces; i++)
         if (i == 0 || by_side(&out->face[i], &out->face[faces - 1]) != 0)

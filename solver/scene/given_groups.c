@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "scene/corner_table.h"
 
 #include <stdio.h>
@@ -42,18 +43,12 @@ static bool append(number_list *list, int64_t value)
     return true;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* Sorts the list and leaves each number once. */
 static void sort_unique(number_list *list)
 {
     int64_t kept = 0;
     if (list->count > 1)
-        qsort(list->value, (size_t)list->count, sizeof *list->value, ascending);
+        qsort(list->value, (size_t)list->count, sizeof *list->value, uz_ascending);
     for (int64_t i = 0; i < list->count; i++)
         if (i == 0 || list->value[i] != list->value[kept - 1])
             list->value[kept++] = list->value[i];
@@ -162,7 +157,7 @@ static bool drop_repeated(uz_group *group, const number_list *code)
     unsigned char *seen = uz_alloc_zero(sorted.count, sizeof *seen);
     for (int64_t i = 0; seen && sorted.count < code->count && i < code->count; i++) {
         const int64_t *at =
-            bsearch(&code->value[i], sorted.value, (size_t)sorted.count, sizeof *sorted.value, ascending);
+            bsearch(&code->value[i], sorted.value, (size_t)sorted.count, sizeof *sorted.value, uz_ascending);
         if (!seen[at - sorted.value]++)
             group->face[kept++] = group->face[i];
     }
