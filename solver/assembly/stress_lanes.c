@@ -81,7 +81,7 @@ INLINE void add_linear_fit(double *rows, const uz_strain_group *g, const int64_t
 {
     const int m = dim + 1, nodes = g->rule.nodes;
     const lane_bits no_sign = (lane_bits){0} + INT64_MAX;
-    uz_lanes A[LINEAR][LINEAR] = {{{0}}}, B[LINEAR][UZ_ELEMENT_STRESSES] = {{{0}}}, y[3 * NODES], b[LINEAR];
+    uz_lanes A[LINEAR][LINEAR] = {{{0}}}, B[LINEAR][UZ_ELEMENT_STRESSES] = {{{0}}}, y[3 * NODES] = {{0}}, b[LINEAR];
     uz_lanes length = {0};
     for (int i = 0; i < nodes * dim; i++) { /* places from the first node on, over the element's size */
         y[i] = g->x[i] - g->x[i % dim];
