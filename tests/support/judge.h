@@ -69,12 +69,41 @@ static inline void measure_residuals(quad *force, quad *gap, const quad_exact *x
         }
 }
 
+/* ||motion||_K that closes the gaps of the active rows, sqrt(g' D_AA^-1 g): far more than g where rows nearly depend on
+ * each other. INFINITY where they do. */
+static inline quad closing_motion(const quad_exact *x, const quad *gap)
+{
+    quad *D = quad_zeros(x->m * x->m), *g = quad_zeros(x->m), square = 0;
+    int64_t n = 0, stop;
+    for (int64_t i = 0; i < x->m; i++)
+        n += x->active[i];
+    for (int64_t i = 0, a = 0; i < x->m; i++) {
+        if (!x->active[i])
+            continue;
+        g[a] = gap[i];
+        for (int64_t j = 0, b = 0; j <= i; j++)
+            if (x->active[j])
+                D[a * n + b++] = x->D[i * x->m + j];
+        a++;
+    }
+    const bool independent = quad_cholesky(D, n, NULL, 0, &stop);
+    if (independent)
+        quad_forward(g, D, n, NULL);
+    for (int64_t a = 0; a < n; a++)
+        square += g[a] * g[a];
+    free(D);
+    free(g);
+    return independent ? quad_sqrt(square) : (quad)INFINITY;
+}
+
 /* A bound on ||error||_K of the reference up to a small factor. The residual force, the gaps of its active rows and the
- * pulls are mended by a motion of about their own size. Lifting other rows that penetrate, by a motion of size `lift`,
- * may open the active ones by as much, and then what their reactions do there enters under a root. */
+ * pulls are mended by a motion of about their own size, or by the one that closes the gaps. Lifting other rows that
+ * penetrate, by a motion of size `lift`, may open the active ones by as much, and then what their reactions do there
+ * enters under a root. */
 static inline quad measure_noise(const quad_exact *x)
 {
     quad *force = quad_zeros(x->d), *gap = quad_zeros(x->m), square = 0, mend = 0, lift = 0, push = 0;
+    int64_t several = 0;
     measure_residuals(force, gap, x);
     quad_forward(force, x->L, x->d, x->first);
     for (int64_t j = 0; j < x->d; j++)
@@ -84,9 +113,13 @@ static inline quad measure_noise(const quad_exact *x)
         if (!(size > 0))
             continue;
         mend += (x->active[i] ? quad_abs(gap[i]) / size : 0) + (x->r[i] > 0 ? x->r[i] * size : 0);
+        several += x->active[i];
         lift += !x->active[i] && gap[i] < 0 ? -gap[i] / size : 0;
         push += quad_abs(x->r[i]) * size;
     }
+    const quad closing = several > 1 ? closing_motion(x, gap) : 0;
+    if (closing > mend && closing < (quad)INFINITY)
+        mend = closing;
     free(force);
     free(gap);
     return mend + quad_sqrt(square) + lift + quad_sqrt(2 * push * lift);
