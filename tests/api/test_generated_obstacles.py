@@ -1,4 +1,5 @@
-"""Some generated bodies on rigid obstacles, mirrored, turned and in other units; `make extremes` looks at a thousand."""
+"""Some generated bodies on rigid obstacles, mirrored, turned and in other units; the
+generator makes as many as are asked for: `tests/extremes/generated_obstacles.py BUILD OUT.json COUNT`."""
 # not under ThreadSanitizer: about answers, not about threads
 import pathlib
 import sys

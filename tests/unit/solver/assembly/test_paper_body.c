@@ -133,8 +133,8 @@ TEST(estimated_error_of_the_paper_body)
     CHECK_MSG(fine < 0.75 * coarse, "%g at 15 x 5, %g at 30 x 10", coarse, fine);
 }
 
-/* Where loads are the only work, ||u - u_h||^2 = W - W_h with W = p'u. The estimate over the true error lies between low
- * and high. Returns W by extrapolation; `exact` may be 0: that one. */
+/* Where loads are the only work, ||u - u_h||^2 = W - W_h with W = p'u. The estimate over the true error lies between
+ * low and high. Returns W by extrapolation; `exact` may be 0: that one. */
 static double check_bent_beam(const char *element, uz_formulation formulation, double exact, double low, double high)
 {
     double work[3], estimate[3];

@@ -38,7 +38,8 @@ TEST(rows_are_those_of_the_exact_answer)
     qp_random rng = {51};
     for (int k = 0; k < 60; k++) {
         const int64_t d = 5 + k % 20, m = 2 + k % (d - 2);
-        uz_qp qp = random_qp(&rng, &(qp_kind){.d = d, .m = m, .condition = k % 2 ? 1e2 : 1e6});
+        const qp_kind kind = {.d = d, .m = m, .condition = k % 2 == 1 ? 1e2 : 1e6};
+        uz_qp qp = random_qp(&rng, &kind);
         bool can = false, active[32] = {false};
         body b;
         if (begin(&b, &qp)) {
