@@ -50,7 +50,8 @@ static uz_status run_race(bool *there, race *x, uz_iterate *it, uz_dual_load *lo
     const int64_t steps = options->max_iterations - it->iteration;
     uz_status status = UZ_OK;
     *there = false;
-    for (double turn = FIRST_TURN * uz_dual_load_column_work(load); status == UZ_OK && (x->way[0] || x->way[1]);
+    /* A column of no rows is no work. */
+    for (double turn = FIRST_TURN * fmax(uz_dual_load_column_work(load), 1.0); status == UZ_OK && (x->way[0] || x->way[1]);
          x->side = !x->side) {
         uz_exchange *way = x->way[x->side];
         if (!way)

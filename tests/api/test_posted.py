@@ -20,8 +20,9 @@ def test_claims_are_true(s):
 def test_claims_that_were_once_false(s):
     """Answers beside rows that contradict each other by far less than the displacements; answers that hang on what is below
     the rounding of double-double gaps; rows of denormal entries, on which the service failed; and a radius beyond doubles."""
-    for k in [34, 236, 1985, 2289, 1102, 2741, 2834, 316, 2836, 736]:
-        tally, wrong = posted.run(s, [k], 2 if k == 736 else 1)
+    ones = [34, 236, 1985, 2289, 1102, 2741, 2834, 316, 2836]
+    for seed, k in [(1, k) for k in ones] + [(2, 736), (3, 1199)]:  # the last one never ended
+        tally, wrong = posted.run(s, [k], seed)
         check(not wrong, *wrong)
         check(not any("not judged" in end for end in tally), k, tally)
 
