@@ -119,13 +119,14 @@ static uz_status certify(uz_semi *s, uz_error *err)
     uz_result *result = s->last;
     uz_certificate *c = &result->summary.certificate;
     double gap = c->gap;
+    /* Of the answer itself, as if the residual force moved nothing: an unbounded motion would take the energy along. */
     uz_certify_input input = {.K = s->of.K,
                               .N = s->of.N,
                               .p = s->of.p,
                               .h = s->of.h,
                               .inverse_norm = no_inverse,
                               .rcond = 1.0,
-                              .inverse_bound = INFINITY};
+                              .inverse_bound = 0.0};
     uz_status status = uz_certify(c, result->r, result->g, result->u, &input, err);
     if (status != UZ_OK)
         return status;

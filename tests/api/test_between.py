@@ -58,6 +58,8 @@ def test_a_circle_between_two_nodes_is_resisted_on_every_mesh(s):
     """Rows at nodes alone give 0 on the first mesh; what is converged is 155."""
     for n, force, how in ((20, 372, "auto"), (40, 192, "auto"), (80, 176, "auto"), (200, 169, "auto"), (400, 157, "auto"),
                           (20, 372, "fixed"), (80, 176, "fixed"), (200, 169, "fixed")):
+        if n > 80 and service.INSTRUMENTED:
+            continue
         result = solve(s, {**block(n, CIRCLE), "kinematics": how})
         contact = result["summary"]["contact"]
         check(abs(contact["force"][1] - force) <= 0.05 * force, (n, how, contact))
@@ -118,6 +120,8 @@ def test_corners_between_nodes(s):
 def test_a_node_on_a_ridge(s):
     """Exactly amid its flanks it is on either by rounding: the answer is symmetric, and the mirror image's, as on finer meshes."""
     for element, slope, form in itertools.product(("quad4", "quad8", "tri6"), (0.3, 1, 3), ("polyline", "height")):
+        if service.INSTRUMENTED and (form == "height") != (slope == 1):
+            continue
         forces = []
         for turn, n in ((1, 8), (-1, 8), (1, 32)):
             x, y = [2 - 3 * turn, 2, 2 + 3.3 * turn], [0.1 - 3 * slope, 0.1, 0.1 - 3.3 * slope]
@@ -171,7 +175,7 @@ def test_a_curved_body_on_a_plane_is_narrow(s):
         r, angle = 10 * (1 - 0.6 * y), 1.4 * x - 0.7
         return r * math.sin(angle), 10 - r * math.cos(angle)
     for kind, sizes in (("quad4", (4, 16, 128)), ("quad8", (4, 16, 128)), ("tri6", (4, 16, 128)), ("hex8", (4, 16)), ("tet10", (4, 16))):
-        for n in sizes:
+        for n in sizes[:1] if service.INSTRUMENTED else sizes:
             check(("coarse_contact" in warned(pressed(kind, n, arc))) == (n < 128), kind, n)
     for kind, n in (("quad4", 4), ("quad8", 16), ("hex8", 4)):
         for place in (lambda x, y: (10 * x, 6 * y), lambda x, y: (10 * x - 0.6 * y, x + 6 * y), lambda x, y: (10 * x, 8 * abs(x - 0.5) + 6 * y)):
