@@ -1,4 +1,5 @@
 """Which sides of a contact touch each other: lists of groups, a side with itself, and never a body's own back."""
+# not under ThreadSanitizer: about answers, not about threads
 import math
 
 import service
