@@ -51,8 +51,8 @@ static uz_status run_race(bool *there, race *x, uz_iterate *it, uz_dual_load *lo
     uz_status status = UZ_OK;
     *there = false;
     /* A column of no rows is no work. */
-    for (double turn = FIRST_TURN * fmax(uz_dual_load_column_work(load), 1.0); status == UZ_OK && (x->way[0] || x->way[1]);
-         x->side = !x->side) {
+    for (double turn = FIRST_TURN * fmax(uz_dual_load_column_work(load), 1.0);
+         status == UZ_OK && (x->way[0] || x->way[1]); x->side = !x->side) {
         uz_exchange *way = x->way[x->side];
         if (!way)
             continue;
