@@ -56,21 +56,47 @@ static bool check_name(const api *context, const http_request *rq, problem_detai
                         (int)(host->value_len < 100 ? host->value_len : 100), host->value);
 }
 
-/* What the route takes: site, body, parameters, type. */
+/* A page of another origin must not submit or delete through its visitor's browser, unless its origin is one that may
+ * use the service. A browser names the page's origin with every POST and DELETE (RFC 6454; WHATWG Fetch), and another
+ * port of this machine is another origin although it is the same site; Sec-Fetch-Site comes with requests to addresses
+ * that it trusts only, but no page can write it. Programs send neither. */
+static bool check_origin(const api *context, const http_request *rq, problem_details *problem)
+{
+    static const char SCHEMES[][9] = {"https://", "http://"};
+    const bool changes = strcmp(rq->route->method, "POST") == 0 || strcmp(rq->route->method, "DELETE") == 0;
+    const header_field *site = header_find(&rq->headers, "Sec-Fetch-Site", NULL);
+    const header_field *origin = header_find(&rq->headers, "Origin", NULL);
+    const header_field *host = header_find(&rq->headers, "Host", NULL);
+    if (!changes || rq->reply.cors_origin)
+        return true;
+    bool own = !origin;
+    /* ours: the Host that was asked for, by HTTPS also where a proxy ends TLS */
+    for (size_t i = 0; i < (context->options.tls ? 1 : 2) && origin && host; i++) {
+        const size_t scheme = strlen(SCHEMES[i]);
+        own = own || (origin->value_len == scheme + host->value_len &&
+                      strncasecmp(origin->value, SCHEMES[i], scheme) == 0 &&
+                      strncasecmp(origin->value + scheme, host->value, host->value_len) == 0);
+    }
+    if (site) /* the browser's own word, right also behind a proxy that puts another Host */
+        own = token_equal(site->value, site->value_len, "same-origin") ||
+              (own && token_equal(site->value, site->value_len, "none"));
+    return own || problem_fill(problem, 403, "cross_site", "Requests from other sites are refused",
+                               "a browser sent this for a page of another origin%s%.*s: name the page's origin with "
+                               "the daemon's option --cors if it may",
+                               origin ? ", " : "", origin ? (int)(origin->value_len < 100 ? origin->value_len : 100) : 0,
+                               origin ? origin->value : "");
+}
+
+/* What the route takes: body, parameters, type. */
 static bool check_request(const api *context, http_request *rq, problem_details *problem)
 {
     const route *to = rq->route;
     const bool post = strcmp(to->method, "POST") == 0;
     const size_t limit = to->streamed ? context->options.max_upload : context->options.max_body;
     size_t codings;
-    const header_field *site = header_find(&rq->headers, "Sec-Fetch-Site", NULL);
     const header_field *coding = header_find(&rq->headers, "Content-Encoding", &codings);
-    /* A page of another site must not submit or delete through its visitor's browser, unless its origin is one that may
-     * use the service. Programs send no such header. */
-    if (site && token_equal(site->value, site->value_len, "cross-site") && strcmp(to->method, "GET") != 0 &&
-        !rq->reply.cors_origin)
-        return problem_fill(problem, 403, "cross_site", "Requests from other sites are refused",
-                            "a browser sent this for a page of another site");
+    if (!check_origin(context, rq, problem))
+        return false;
     if (!post && (rq->chunked || rq->length > 0))
         return problem_fill(problem, 400, "unexpected_body", "The request must not have a body", "%s %s takes no body",
                             to->method, to->pattern);
@@ -88,7 +114,13 @@ static bool check_request(const api *context, http_request *rq, problem_details 
         return problem_fill(problem, 415, "content_encoding", "The content coding is not supported",
                             to->streamed ? "send the body as it is, or with Content-Encoding: gzip"
                                          : "send the body without Content-Encoding");
-    if (!to->streamed && !request_is_json(rq))
+    /* a body that any page could send is none of ours; without a body nothing is read */
+    const body_type type = request_body_type(rq);
+    const bool has_body = rq->chunked || rq->length > 0 || header_find(&rq->headers, "Content-Type", NULL);
+    if (has_body && to->streamed && type == BODY_OF_ANY_PAGE)
+        return problem_fill(problem, 415, "content_type", "The body must have a type that no page can send unasked",
+                            "send the header field Content-Type: application/octet-stream");
+    if (has_body && !to->streamed && type != BODY_JSON)
         return problem_fill(problem, 415, "content_type", "The body must be JSON",
                             "send the header field Content-Type: application/json");
     if (!api_draining(context))

@@ -185,6 +185,8 @@ class Service:
         if isinstance(body, (dict, list)):
             body = json.dumps(body).encode()
             headers.setdefault("Content-Type", "application/json")
+        elif body and path == "/v1/uploads":
+            headers.setdefault("Content-Type", "application/octet-stream")
         connection = http.client.HTTPConnection(self.host, self.port, timeout=timeout)
         try:
             connection.request(method, path, body=body, headers=headers)

@@ -97,6 +97,7 @@ def test_wrong_tokens(s):
 def test_an_upload_is_refused_before_it_comes(s):
     for secret, status in (("", 401), (READ, 403)):
         field = f"Authorization: Bearer {secret}\r\n" if secret else ""
+        field += "Content-Type: application/octet-stream\r\n"
         data, _ = s.raw(f"POST /v1/uploads HTTP/1.1\r\nHost: x\r\n{field}Content-Length: 1000000\r\n\r\n".encode())
         check(service.head_of(data)[0] == status, data)
         data, _ = s.raw(f"POST /v1/uploads HTTP/1.1\r\nHost: x\r\n{field}Transfer-Encoding: chunked\r\n\r\n".encode())
@@ -247,7 +248,7 @@ def test_tls(s):
             def ask(method, path, body=None, headers=None):
                 connection = http.client.HTTPSConnection("127.0.0.1", port, context=context, timeout=20)
                 try:
-                    connection.request(method, path, body, headers or {})
+                    connection.request(method, path, body, {"Content-Type": "application/json", **(headers or {})} if body else headers or {})
                     reply = connection.getresponse()
                     return reply.status, reply.read()
                 finally:

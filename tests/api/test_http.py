@@ -247,12 +247,36 @@ def test_content_type(s):
     body = json.dumps(MATRICES).encode()
     for good in ("application/json", "Application/JSON; charset=utf-8", "application/vnd.x+json"):
         expect(s.request("POST", "/v1/jobs?validate=true", body, {"Content-Type": good}), 200)
-    expect(s.request("POST", "/v1/jobs?validate=true", body), 200)  # none at all
-    for bad in ("application/x-www-form-urlencoded", "text/plain", "application/json-seq", "+json", ""):
+    reply = expect(s.request("POST", "/v1/jobs?validate=true", body), 415, "content_type")  # none at all
+    check("Content-Type: application/json" in reply.json["detail"], reply)
+    for bad in ("application/x-www-form-urlencoded", "text/plain", "text/plain+json", "application/json-seq", "+json", ""):
         expect(s.request("POST", "/v1/jobs?validate=true", body, {"Content-Type": bad}), 415, "content_type")
     expect(s.request("POST", "/v1/jobs", body, {"Content-Type": "application/json", "Content-Encoding": "gzip"}), 415,
            "content_encoding")
-    expect(s.post(MATRICES, {"Sec-Fetch-Site": "cross-site"}), 403, "cross_site")
+    for bad in ("text/plain", "multipart/form-data; boundary=x", "Application/x-www-form-urlencoded", ""):
+        expect(s.request("POST", "/v1/uploads", b"text", {"Content-Type": bad}), 415, "content_type")
+    for good in ("application/octet-stream", "text/x-matrix-market", "application/json"):
+        check(s.request("POST", "/v1/uploads", b"text", {"Content-Type": good}).status in (200, 201), good)
+
+
+def test_pages_of_other_origins(s):
+    """Whatever a page can have its visitor's browser send. Another port is another origin, though the same site."""
+    job = s.solve(MATRICES)["id"]
+    own = {"Origin": f"http://127.0.0.1:{s.port}"}
+    foreign = [{"Origin": f"http://127.0.0.1:{s.port + 1}"}, {"Origin": "http://127.0.0.1"}, {"Origin": "null"}, {"Origin": ""},
+               {"Origin": f"ftp://127.0.0.1:{s.port}"}, {"Origin": f"http://127.0.0.1:{s.port}.x"}, {"Origin": "http://desk"},
+               {"Sec-Fetch-Site": "cross-site"}, {"Sec-Fetch-Site": "same-site"}, {**own, "Sec-Fetch-Site": "same-site"}]
+    changes = (("POST", "/v1/jobs", MATRICES), ("POST", "/v1/verify", MATRICES), ("POST", f"/v1/jobs/{job}/refine", {}),
+               ("POST", "/v1/uploads", b"text"), ("POST", "/v1/admin/check", None), ("DELETE", f"/v1/jobs/{job}", None))
+    for fields in foreign:
+        for method, path, body in changes:
+            expect(s.request(method, path, body, fields), 403, "cross_site")
+        expect(s.request("GET", "/v1/jobs", headers=fields), 200)  # which the page can't read
+    check(len(s.get("/v1/jobs").json["jobs"]) == 1)
+    for fields in ({}, own, {**own, "Sec-Fetch-Site": "same-origin"}, {"Sec-Fetch-Site": "none"},
+                   {"Origin": f"https://LOCALHOST:{s.port}", "Host": f"localhost:{s.port}"},  # behind a proxy with TLS
+                   {"Origin": "https://solver.example", "Sec-Fetch-Site": "same-origin"}):  # that puts its own Host
+        expect(s.post(MATRICES, fields), 202)
 
 
 def test_prefer_wait(s):

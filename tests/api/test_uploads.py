@@ -42,7 +42,7 @@ def test_send_read_delete(s):
     check(reply.json["id"] == digest(K) and reply.json["bytes"] == len(K) and reply.json["used_by"] == 0, reply)
     path = reply.headers["location"]
     check(path == f"/v1/uploads/{digest(K)}", reply)
-    again = expect(send(s, K, Content_Type="text/plain"), 200)
+    again = expect(send(s, K, Content_Type="text/x-matrix-market"), 200)
     check(again.json["id"] == digest(K) and again.json["created"] == reply.json["created"], again)
     check(expect(s.get(path), 200).json["bytes"] == len(K))
     raw = expect(s.get(path, Accept="application/octet-stream"), 200)
@@ -250,7 +250,8 @@ def test_what_is_unused_goes_by_age(s):
 def start_sending(s, text, count):
     """Sends the head of an upload and the first bytes of its body."""
     c = s.connect()
-    c.sendall(f"POST /v1/uploads HTTP/1.1\r\nHost: x\r\nContent-Length: {len(text)}\r\n\r\n".encode() + text[:count])
+    c.sendall(b"POST /v1/uploads HTTP/1.1\r\nHost: x\r\nContent-Type: application/octet-stream\r\n"
+              b"Content-Length: %d\r\n\r\n" % len(text) + text[:count])
     end = time.monotonic() + 20
     while not any(name.startswith("incoming-") and (folder(s) / name).stat().st_size >= count for name in files(s)):
         check(time.monotonic() < end, files(s))

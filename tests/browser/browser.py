@@ -33,7 +33,7 @@ def start(width=1200, height=900, dark=False):
     wanted = webdriver.ChromeOptions()
     for one in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader",
                 "--enable-unsafe-swiftshader", "--hide-scrollbars", "--force-device-scale-factor=1", "--no-first-run",
-                "--disable-gpu-watchdog", "--disable-gpu-process-crash-limit", "--disable-background-networking", "--disable-component-update", f"--window-size={width},{height}"):
+                "--disable-gpu-watchdog", "--disable-gpu-process-crash-limit", "--disable-background-networking", "--disable-component-update", "--host-resolver-rules=MAP *.example 127.0.0.1", f"--window-size={width},{height}"):
         wanted.add_argument(one)
     wanted.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     wanted.binary_location = shutil.which("chromium")

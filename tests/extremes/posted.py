@@ -224,7 +224,7 @@ def run(s, numbers, seed, show=False):
         name, K, N, h, p, solver = made
         request = {"problem": {"kind": "matrices", "K": text_of(K, len(K), True), "p": p, "h": h,
                                "N": text_of(N, len(K), False)}, "solver": solver}
-        posted = s.request("POST", "/v1/jobs", json.dumps(request), {"Prefer": "wait=120"})
+        posted = s.request("POST", "/v1/jobs", json.dumps(request), {"Content-Type": "application/json", "Prefer": "wait=120"})
         job = posted.json
         if posted.status >= 500:
             false, end = [f"status {posted.status}"], "failed"

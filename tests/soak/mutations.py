@@ -132,7 +132,7 @@ class Mutator:
         return "mesh", chance.choice(("/v1/jobs", "/v1/jobs?validate=true")), {"Content-Type": JSON}, json.dumps(body).encode()
 
     def upload(self, chance):
-        body, fields = damaged(chance.choice(self.texts), chance), {"Content-Type": "text/plain"}
+        body, fields = damaged(chance.choice(self.texts), chance), {"Content-Type": "application/octet-stream"}
         if chance.random() < 0.5:
             body, fields["Content-Encoding"] = damaged(gzip.compress(body, 1), chance), "gzip"
         return "upload", "/v1/uploads", fields, body

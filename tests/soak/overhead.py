@@ -64,7 +64,7 @@ class Way:
         start = time.perf_counter()
         ids = {}
         for name, text in texts.items():
-            status, got = self.ask("POST", "/v1/uploads", text, {"Content-Type": "text/plain"})
+            status, got = self.ask("POST", "/v1/uploads", text, {"Content-Type": "application/octet-stream"})
             service.check(status == 201, status, got[:500])
             ids[name] = {"upload": json.loads(got)["id"]}
         return time.perf_counter() - start, ids

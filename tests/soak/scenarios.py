@@ -144,7 +144,7 @@ def slow_clients(build, clients, seconds):
             one = socket.create_connection((s.host, s.port), timeout=20)
             one.setblocking(False)
             held.append(one)
-        message = b"POST /v1/jobs HTTP/1.1\r\nHost: slow\r\nContent-Length: 1000\r\n\r\n" + b"x" * 1000
+        message = b"POST /v1/jobs HTTP/1.1\r\nHost: slow\r\nContent-Type: application/json\r\nContent-Length: 1000\r\n\r\n" + b"x" * 1000
         begun, at = time.monotonic(), 0
         while time.monotonic() < begun + seconds:
             due = time.monotonic() + 1

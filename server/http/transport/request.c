@@ -129,17 +129,24 @@ bool request_takes_gzip(const http_request *rq)
     return quality > 0;
 }
 
-bool request_is_json(const http_request *rq)
+body_type request_body_type(const http_request *rq)
 {
+    static const char APPLICATION[] = "application/";
+    static const char *const FORMS[] = {"text/plain", "multipart/form-data", "application/x-www-form-urlencoded"};
     size_t count;
     const header_field *field = header_find(&rq->headers, "Content-Type", &count);
-    if (!field)
-        return true;
+    if (count != 1)
+        return BODY_OF_ANY_PAGE;
     const char *type = field->value, *end = member_end(type, type + field->value_len, ';');
     trim(&type, &end);
-    const size_t len = (size_t)(end - type);
-    const bool structured = len > 5 && memchr(type, '/', len) && strncasecmp(end - 5, "+json", 5) == 0;
-    return count == 1 && (structured || token_equal(type, len, "application/json"));
+    const size_t len = (size_t)(end - type), prefix = sizeof APPLICATION - 1;
+    const char *slash = memchr(type, '/', len);
+    for (size_t i = 0; i < sizeof FORMS / sizeof FORMS[0]; i++)
+        if (!slash || token_equal(type, len, FORMS[i]))
+            return BODY_OF_ANY_PAGE;
+    const bool structured =
+        len > prefix + 5 && strncasecmp(type, APPLICATION, prefix) == 0 && strncasecmp(end - 5, "+json", 5) == 0;
+    return structured || token_equal(type, len, "application/json") ? BODY_JSON : BODY_OTHER;
 }
 
 bool request_client_gone(const http_request *rq)

@@ -176,8 +176,10 @@ double request_wait(const http_request *rq, double otherwise, double max_wait_s)
 bool request_accepts(const http_request *rq, const char *type);
 /* True if Accept-Encoding names gzip, or all that it does not name, with a quality above 0. */
 bool request_takes_gzip(const http_request *rq);
-/* True if the body may be JSON: Content-Type absent, application/json or ...+json. */
-bool request_is_json(const http_request *rq);
+/* What its Content-Type says of the body: application/json or application/...+json; a type that a browser lets any page
+ * send without asking first (WHATWG Fetch, CORS-safelisted request-header), none, several or no type; or another. */
+typedef enum { BODY_JSON, BODY_OTHER, BODY_OF_ANY_PAGE } body_type;
+body_type request_body_type(const http_request *rq);
 /* The client closed its end: an answer would reach nobody. */
 bool request_client_gone(const http_request *rq);
 /* Reads a decimal integer of the query in [least, most]; absent: *out is left. False with a 400. */
