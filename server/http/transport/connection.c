@@ -1,6 +1,7 @@
 /* connection.c: a connection's requests, from the first line to the end of the reply. */
 #include "http/transport/connection.h"
 #include "http/transport/message.h"
+#include "http/transport/reading.h"
 
 #include <math.h>
 #include <poll.h>
@@ -22,7 +23,7 @@ connection *connection_new(transport *server, int fd, const struct sockaddr *add
     c->fd = fd;
     c->place = peer_begin(server->peers, address);
     c->deadline =
-        deadlines_add(server->deadlines, fd, clock_seconds(CLOCK_MONOTONIC) + server->options.request_deadline_s);
+        deadlines_add(server->deadlines, fd, clock_seconds(CLOCK_MONOTONIC) + server->options.request_deadline_s, c);
     if (!c->deadline || !c->place) {
         deadline_remove(c->deadline);
         peer_end(c->place);
@@ -140,8 +141,10 @@ static bool refuse_header(problem_details *problem, int status)
 
 void connection_refuse(connection *c, int status)
 {
-    http_request *rq = c->request;
     problem_details problem;
+    if (!c->request) /* its first line was not understood */
+        connection_begin_request(c, "");
+    http_request *rq = c->request;
     if (!rq || rq->status)
         return;
     if (!c->refusing)
@@ -184,6 +187,17 @@ static size_t header_size(struct MHD_Connection *mhd)
     return info ? info->header_size : 0;
 }
 
+/* Sees the rest of a chunked body before libmicrohttpd does. */
+static bool take_chunks(void *ctx, const char *data, size_t size)
+{
+    connection *c = ctx;
+    if (chunks_follow(&c->chunks, data, size))
+        return true;
+    reading_watch(NULL, NULL);
+    connection_refuse(c, 400);
+    return false;
+}
+
 /* False with rq->refused: the bytes can't be trusted, so nothing after them on this connection can. */
 static bool read_framing(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
@@ -208,9 +222,24 @@ static bool read_framing(connection *c, struct MHD_Connection *mhd, const char *
     c->layout.method = method;
     c->layout.version = version;
     c->layout.block_len = header_size(mhd);
-    return framing_tiles(&c->layout, &rq->headers) ||
+    if (!framing_tiles(&c->layout, &rq->headers))
+        return problem_fill(&rq->refused, 400, "bad_request_framing", "The request is malformed or ambiguous",
+                            "lines must end in CR LF, must not be folded, and must not contain NUL");
+    /* What was read last ends where libmicrohttpd's buffer does, unless all of this header block was read with the
+     * request before: then the buffer has moved, and what was left there counts. */
+    const reading_place last = reading_last();
+    const char *body = method + c->layout.block_len;
+    const bool fresh = last.total != c->read;
+    const uint64_t rest = c->ahead > c->layout.block_len ? c->ahead - c->layout.block_len : 0;
+    c->ahead = fresh ? (uint64_t)(last.end - body) : rest;
+    c->read = last.total;
+    c->chunks = (chunk_follower){.digits = 0};
+    if (!rq->chunked)
+        return true;
+    reading_watch(take_chunks, c);
+    return chunks_follow(&c->chunks, body, (size_t)c->ahead) ||
            problem_fill(&rq->refused, 400, "bad_request_framing", "The request is malformed or ambiguous",
-                        "lines must end in CR LF, must not be folded, and must not contain NUL");
+                        "the chunks of the body are malformed: each line of theirs must end in CR LF");
 }
 
 bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
@@ -375,6 +404,11 @@ void connection_end_request(connection *c, unsigned status, bool completed)
     if (c->request->unread_body && completed)
         linger(c);
     c->server->handlers.account(c->server->handlers.ctx, c->request, completed, deadline_expired(c->deadline));
+    const uint64_t total = reading_last().total, came = c->ahead + (total - c->read);
+    const uint64_t rest = c->request->chunked ? c->chunks.beyond : came - c->request->length;
+    c->ahead = rest <= came ? rest : 0;
+    c->read = total;
+    reading_watch(NULL, NULL);
     request_free(c->server, &c->request);
     deadline_set(c->deadline, clock_seconds(CLOCK_MONOTONIC) + c->server->options.request_deadline_s, false);
 }

@@ -44,6 +44,10 @@ typedef struct {
     int fd;
     bool refusing;
     framing_layout layout;
+    chunk_follower chunks;
+    /* What libmicrohttpd has read ahead: bytes behind the header block, as long as a request is under way, then behind
+     * the request; and how many it had read in all by then. */
+    uint64_t ahead, read;
 } connection;
 
 /* NULL: no memory; the connection's requests are then refused. */

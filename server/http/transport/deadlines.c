@@ -14,6 +14,7 @@ struct deadline {
     deadline *previous, *next;
     double at;
     int fd;
+    void *owner;
     bool speak, expired;
 };
 
@@ -98,12 +99,12 @@ void deadlines_hear_no_more(deadlines *all)
     pthread_mutex_unlock(&all->mutex);
 }
 
-deadline *deadlines_add(deadlines *all, int fd, double at)
+deadline *deadlines_add(deadlines *all, int fd, double at, void *owner)
 {
     deadline *d = calloc(1, sizeof *d);
     if (!d)
         return NULL;
-    *d = (deadline){.all = all, .at = at, .fd = fd};
+    *d = (deadline){.all = all, .at = at, .fd = fd, .owner = owner};
     pthread_mutex_lock(&all->mutex);
     d->next = all->first;
     if (d->next)
@@ -113,6 +114,16 @@ deadline *deadlines_add(deadlines *all, int fd, double at)
         pthread_cond_signal(&all->changed);
     pthread_mutex_unlock(&all->mutex);
     return d;
+}
+
+void *deadlines_owner(deadlines *all, int fd)
+{
+    void *found = NULL;
+    pthread_mutex_lock(&all->mutex);
+    for (const deadline *d = all->first; d && !found; d = d->next)
+        found = d->fd == fd ? d->owner : NULL;
+    pthread_mutex_unlock(&all->mutex);
+    return found;
 }
 
 void deadline_set(deadline *d, double at, bool speak)

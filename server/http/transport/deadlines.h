@@ -19,8 +19,10 @@ deadlines *deadlines_new(const char *last_words);
 /* Stops the thread; every deadline must have been removed. */
 void deadlines_free(deadlines *all);
 
-/* Watches fd until `at`. NULL: no memory. */
-deadline *deadlines_add(deadlines *all, int fd, double at);
+/* Watches fd until `at`. owner: whose it is. NULL: no memory. */
+deadline *deadlines_add(deadlines *all, int fd, double at, void *owner);
+/* The owner of the deadline of fd; NULL: none has it. */
+void *deadlines_owner(deadlines *all, int fd);
 /* INFINITY: not watched. speak: say the last words when it expires. */
 void deadline_set(deadline *d, double at, bool speak);
 /* True once it has expired. */

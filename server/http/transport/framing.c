@@ -27,7 +27,7 @@ const header_field *header_find(const header_list *headers, const char *name, si
 
 static bool check_fields(const char *version, const header_list *headers, problem_details *problem)
 {
-    size_t hosts;
+    size_t hosts, tokens;
     if (headers->overflow)
         return problem_fill(problem, 431, "too_many_headers", "Too many header fields", "at most %d header fields",
                             HEADERS_MAX);
@@ -48,6 +48,9 @@ static bool check_fields(const char *version, const header_list *headers, proble
         if (!text)
             return refuse(problem, "a header field's value has a control character");
     }
+    header_find(headers, "Authorization", &tokens);
+    if (tokens > 1) /* a proxy may have looked at the other one */
+        return refuse(problem, "Authorization may occur once");
     const header_field *host = header_find(headers, "Host", &hosts);
     if (hosts > 1 || (strcmp(version, "HTTP/1.1") == 0 && hosts == 0))
         return refuse(problem, "exactly one Host header field is needed");
@@ -129,4 +132,64 @@ bool framing_tiles(const framing_layout *layout, const header_list *headers)
         next = line_end(field->value + field->value_len + strspn(field->value + field->value_len, " \t"));
     }
     return next && next + 2 == end;
+}
+
+bool chunks_follow(chunk_follower *f, const char *data, size_t size)
+{
+    static const char DIGITS[] = "0123456789abcdef0123456789ABCDEF";
+    for (size_t i = 0; i < size; i++) {
+        const char c = data[i];
+        const char *digit = c ? strchr(DIGITS, c) : NULL;
+        const bool text = (unsigned char)c >= 0x20 ? c != 0x7f : c == '\t';
+        switch (f->state) {
+        case CHUNKS_SIZE:
+            if (digit && f->digits++ < 15)
+                f->left = f->left * 16 + (uint64_t)((digit - DIGITS) % 16);
+            else if (digit || f->digits == 0 || !(c == ';' || c == '\r'))
+                return false;
+            else
+                f->state = c == ';' ? CHUNKS_EXTENSION : CHUNKS_SIZE_LF;
+            break;
+        case CHUNKS_EXTENSION:
+        case CHUNKS_FIELD:
+            if (c == '\r')
+                f->state = f->state == CHUNKS_FIELD ? CHUNKS_FIELD_LF : CHUNKS_SIZE_LF;
+            else if (!text)
+                return false;
+            break;
+        case CHUNKS_DATA: {
+            const size_t n = f->left < size - i ? (size_t)f->left : size - i;
+            i += n - 1;
+            f->left -= n;
+            f->state = f->left > 0 ? CHUNKS_DATA : CHUNKS_DATA_CR;
+            break;
+        }
+        case CHUNKS_DATA_CR:
+            if (c != '\r')
+                return false;
+            f->state = CHUNKS_DATA_LF;
+            break;
+        case CHUNKS_TRAILER: /* a line that begins with white space would go on with the one before */
+            if (c != '\r' && (!text || c == ' ' || c == '\t'))
+                return false;
+            f->state = c == '\r' ? CHUNKS_LAST_LF : CHUNKS_FIELD;
+            break;
+        case CHUNKS_SIZE_LF:
+        case CHUNKS_DATA_LF:
+        case CHUNKS_FIELD_LF:
+        case CHUNKS_LAST_LF:
+            if (c != '\n')
+                return false;
+            f->digits = 0;
+            f->state = f->state == CHUNKS_SIZE_LF    ? f->left > 0 ? CHUNKS_DATA : CHUNKS_TRAILER
+                       : f->state == CHUNKS_DATA_LF  ? CHUNKS_SIZE
+                       : f->state == CHUNKS_FIELD_LF ? CHUNKS_TRAILER
+                                                     : CHUNKS_DONE;
+            break;
+        case CHUNKS_DONE:
+            f->beyond += size - i;
+            return true;
+        }
+    }
+    return true;
 }

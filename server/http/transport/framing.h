@@ -27,4 +27,27 @@ typedef struct {
 } framing_layout;
 bool framing_tiles(const framing_layout *layout, const header_list *headers);
 
+/* A chunked body (RFC 9112, section 7.1), followed byte by byte: sizes of at most 15 digits, extensions without control
+ * characters, CR LF and nothing else at the end of size lines, data and trailer fields. Begins zeroed. */
+typedef struct {
+    enum {
+        CHUNKS_SIZE,
+        CHUNKS_EXTENSION,
+        CHUNKS_SIZE_LF,
+        CHUNKS_DATA,
+        CHUNKS_DATA_CR,
+        CHUNKS_DATA_LF,
+        CHUNKS_TRAILER, /* at the start of a line */
+        CHUNKS_FIELD,
+        CHUNKS_FIELD_LF,
+        CHUNKS_LAST_LF,
+        CHUNKS_DONE
+    } state;
+    int digits;
+    uint64_t left;   /* of this chunk's data; of the size so far */
+    uint64_t beyond; /* bytes that came behind the body */
+} chunk_follower;
+/* False: what came is not that. */
+bool chunks_follow(chunk_follower *f, const char *data, size_t size);
+
 #endif

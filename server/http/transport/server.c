@@ -6,6 +6,7 @@
  * (held.h). */
 #include "http/transport/connection.h"
 #include "http/transport/message.h"
+#include "http/transport/reading.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -103,6 +104,8 @@ __attribute__((format(printf, 2, 0))) static void on_message(void *ctx, const ch
     log_write(server->options.log, LOG_DEBUG, "http_message", (log_field[]){LOG_S("message", text), {0}});
     connection *c = pthread_getspecific(server->current);
     const char *code = strstr(text, "HTTP response code is ");
+    if (!c && code) /* of the first request on a connection, before its first line is understood */
+        c = deadlines_owner(server->deadlines, reading_last().fd);
     if (c && code)
         connection_refuse(c, atoi(code + strlen("HTTP response code is ")));
 }

@@ -97,6 +97,7 @@ TEST(ambiguous_framing_is_refused)
         {{"Content-Length", "1234567890123456789"}, {"A", "b"}, 400},
         {{"Transfer-Encoding", "gzip, chunked"}, {"A", "b"}, 400},
         {{"Host", "y"}, {"A", "b"}, 400},
+        {{"Authorization", "Bearer x"}, {"authorization", "Bearer x"}, 400},
         {{"Content-Length ", "2"}, {"A", "b"}, 400},
         {{"", "2"}, {"A", "b"}, 400},
         {{"A", "b\rc"}, {"A", "b"}, 400},
@@ -138,6 +139,55 @@ TEST(space_behind_a_value_is_none_of_it)
     list.fields[0] = (header_field){block + 17, block + 23, 4, 1};
     framing_layout layout = {block, block + 4, block + 7, 2, sizeof block - 1};
     CHECK(framing_tiles(&layout, &list));
+}
+
+/* Whether a chunked body is taken, whole and byte by byte alike; *beyond is what came behind it. */
+static bool chunks_good(const char *text, size_t size, uint64_t *beyond)
+{
+    chunk_follower whole = {.digits = 0}, single = {.digits = 0};
+    bool good = true;
+    const bool taken = chunks_follow(&whole, text, size);
+    for (size_t i = 0; i < size && good; i++)
+        good = chunks_follow(&single, text + i, 1);
+    CHECK(good == taken);
+    CHECK(!good || (whole.state == single.state && whole.beyond == single.beyond));
+    *beyond = whole.state == CHUNKS_DONE ? whole.beyond : 1000;
+    return taken;
+}
+
+TEST(chunked_bodies_are_followed)
+{
+    static const struct {
+        const char *text;
+        uint64_t beyond; /* 1000: the body is not at its end */
+        bool good;
+    } BODIES[] = {
+        {"5\r\nhello\r\n0\r\n\r\nGET", 3, true},
+        {"A;x=\"y\"\r\n0123456789\r\n000\r\nX: y\r\nZ:\r\n\r\n", 0, true},
+        {"5\r\nhel", 1000, true},
+        {"00000000000000b\r\n\r\n\r\n\r\n\r\n\r\n\r\r\n0\r\n\r\n", 0, true},
+        {"5\nhello", 0, false},
+        {"5\r\nhello\n0", 0, false},
+        {"5\r\nhello0\r\n", 0, false},
+        {"0\n\r\n", 0, false},
+        {"0\r\n\n", 0, false},
+        {"0\r\nX: y\n\r\n", 0, false},
+        {"0\r\n X: y\r\n\r\n", 0, false},
+        {"1;a\nb", 0, false},
+        {"ffffffffffffffff\r\n", 0, false},
+        {"-1\r\n", 0, false},
+        {"\r\n", 0, false},
+        {"g", 0, false},
+    };
+    for (size_t i = 0; i < sizeof BODIES / sizeof BODIES[0]; i++) {
+        uint64_t beyond = 0;
+        const bool good = chunks_good(BODIES[i].text, strlen(BODIES[i].text), &beyond);
+        CHECK_MSG(good == BODIES[i].good && (!good || beyond == BODIES[i].beyond), "%zu: %d, %llu", i, good,
+                  (unsigned long long)beyond);
+    }
+    uint64_t beyond;
+    CHECK(chunks_good("2\r\n\0\n\r\n0\r\n\r\n", 12, &beyond) && beyond == 0);
+    CHECK(!chunks_good("2;\0\r\n", 6, &beyond));
 }
 
 /* A block as the parser leaves it: '0' stands for NUL. */
@@ -235,8 +285,8 @@ TEST(a_deadline_cuts_a_connection)
     CHECK(socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0);
     deadlines *all = deadlines_new("too late");
     double start = clock_seconds(CLOCK_MONOTONIC);
-    deadline *never = deadlines_add(all, -1, INFINITY);
-    deadline *d = deadlines_add(all, ends[0], start + 100);
+    deadline *never = deadlines_add(all, -1, INFINITY, NULL);
+    deadline *d = deadlines_add(all, ends[0], start + 100, ends);
     deadline_set(d, start + 0.05, true);
     CHECK(!deadline_expired(d));
     CHECK_INT(read(ends[1], text, sizeof text - 1), 8);
