@@ -73,18 +73,19 @@ static bool check_origin(const api *context, const http_request *rq, problem_det
     /* ours: the Host that was asked for, by HTTPS also where a proxy ends TLS */
     for (size_t i = 0; i < (context->options.tls ? 1 : 2) && origin && host; i++) {
         const size_t scheme = strlen(SCHEMES[i]);
-        own = own || (origin->value_len == scheme + host->value_len &&
-                      strncasecmp(origin->value, SCHEMES[i], scheme) == 0 &&
-                      strncasecmp(origin->value + scheme, host->value, host->value_len) == 0);
+        own = own ||
+              (origin->value_len == scheme + host->value_len && strncasecmp(origin->value, SCHEMES[i], scheme) == 0 &&
+               strncasecmp(origin->value + scheme, host->value, host->value_len) == 0);
     }
     if (site) /* the browser's own word, right also behind a proxy that puts another Host */
         own = token_equal(site->value, site->value_len, "same-origin") ||
               (own && token_equal(site->value, site->value_len, "none"));
-    return own || problem_fill(problem, 403, "cross_site", "Requests from other sites are refused",
-                               "a browser sent this for a page of another origin%s%.*s: name the page's origin with "
-                               "the daemon's option --cors if it may",
-                               origin ? ", " : "", origin ? (int)(origin->value_len < 100 ? origin->value_len : 100) : 0,
-                               origin ? origin->value : "");
+    return own ||
+           problem_fill(problem, 403, "cross_site", "Requests from other sites are refused",
+                        "a browser sent this for a page of another origin%s%.*s: name the page's origin with "
+                        "the daemon's option --cors if it may",
+                        origin ? ", " : "", origin ? (int)(origin->value_len < 100 ? origin->value_len : 100) : 0,
+                        origin ? origin->value : "");
 }
 
 /* What the route takes: body, parameters, type. */
@@ -189,11 +190,26 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
                               : "send the header field Authorization: Bearer TOKEN");
 }
 
+/* On a connection beyond the limit. */
+static bool check_room(const api *context, http_request *rq, bool has_route, problem_details *problem)
+{
+    if (!rq->spare)
+        return true;
+    rq->reply.close = true;
+    if (has_route && (strcmp(rq->route->pattern, "/healthz") == 0 || strcmp(rq->route->pattern, "/readyz") == 0))
+        return true;
+    rq->reply.retry_after_s = 5;
+    return problem_fill(problem, 503, "too_many_connections", "Too many connections are open",
+                        "%u connections are busy, as many as this server lets (its option --max-connections): try "
+                        "again later",
+                        context->options.max_connections);
+}
+
 bool admission_check(api *context, http_request *rq)
 {
     problem_details *problem = &rq->refused;
     bool found = target_parse(&rq->target, rq->raw_target, problem) &&
                  route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem);
-    return check_name(context, rq, problem) && check_client(context, rq, found, problem) && found &&
-           check_request(context, rq, problem);
+    return check_room(context, rq, found, problem) && check_name(context, rq, problem) &&
+           check_client(context, rq, found, problem) && found && check_request(context, rq, problem);
 }

@@ -134,6 +134,13 @@ static bool set_layer(server_options *o, option_source layer, const flags *f, ch
     return true;
 }
 
+/* Whether nobody else can reach an address "HOST:PORT", as far as its text says. */
+static bool is_loopback(const char *listen)
+{
+    return strncmp(listen, "127.", 4) == 0 || strncmp(listen, "[::1]:", 6) == 0 ||
+           strncmp(listen, "localhost:", 10) == 0;
+}
+
 options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size)
 {
     flags f = {.verdict = OPTIONS_RUN};
@@ -145,6 +152,7 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
     for (size_t i = 0; i < table.count; i++)
         if (table.rows[i].normal && table.rows[i].normal[0])
             uz_option_set(out, &table.rows[i], table.rows[i].normal);
+    out->max_client_connections = -1;
     out->workers = cores < 1 ? 1 : cores > 1024 ? 1024 : (int)cores;
     options_verdict verdict = read_flags(&f, argc, argv, message, size);
     if (verdict == OPTIONS_WRONG || verdict == OPTIONS_HELP || verdict == OPTIONS_VERSION)
@@ -161,6 +169,8 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
     }
     if (out->max_streams == 0) /* they hold their connections for long: the others are for everything else */
         out->max_streams = out->max_connections - out->max_connections / 4;
+    if (out->max_client_connections < 0)
+        out->max_client_connections = is_loopback(out->listen) ? 0 : 1 + out->max_connections / 4;
     if (out->memory == 0)
         out->memory = memory_share(memory_available(), out->cache, out->workers);
     if (backup)

@@ -90,8 +90,9 @@ static const uz_option ROWS[] = {
     SETTING("max-streams", INTEGER, max_streams, .value = "N", .least = 1, .most = 100000,
             .otherwise = "three quarters of max-connections", .unit = "streams",
             .about = "event streams open at once; they are connections too"),
-    SETTING("max-client-connections", INTEGER, max_client_connections, .value = "N", .most = 100000, .normal = "0",
-            .unit = "connections", .zero_is_off = true,
+    SETTING("max-client-connections", INTEGER, max_client_connections, .value = "N", .most = 100000,
+            .otherwise = "a quarter of max-connections, on a loopback address 0", .unit = "connections",
+            .zero_is_off = true,
             .about =
                 "connections of one address open at once; 0: no limit of its own. Behind a proxy all clients are one"),
     SETTING(

@@ -261,18 +261,79 @@ def test_idle_connections_close(s):
         check(read_all(silent) == (b"", True), "a silent connection")
 
 
-@options("--max-connections", "8")
-def test_connection_limit(s):
-    held = [s.connect() for _ in range(8)]
+@options("--max-connections", "40", "--max-streams", "40")
+def test_half_sent_requests_go_first(s):
+    """However many there are, whoever asks is served; streams and idle connections stay."""
+    job = s.post(SCENE, {"Prefer": "wait=20"}).json["id"]
+    with s.connect(timeout=10) as stream, s.connect(timeout=10) as idle:
+        stream.sendall(b"GET /v1/events HTTP/1.1\r\nHost: x\r\n\r\n")
+        check(stream.recv(4096).startswith(b"HTTP/1.1 200"))
+        idle.sendall(SMUGGLED)
+        check(idle.recv(4096).startswith(b"HTTP/1.1 200"))
+        half = []
+        for _ in range(100):
+            half.append(s.connect())
+            half[-1].sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n")
+        time.sleep(0.3)  # so old are half-sent ones before the idle one counts as much
+        for _ in range(30):
+            started = time.monotonic()
+            check(s.get(f"/v1/jobs/{job}").status == 200 and time.monotonic() - started < 2)
+        idle.sendall(SMUGGLED)
+        check(idle.recv(4096).startswith(b"HTTP/1.1 200"), "one that was idle for a moment went before half-sent ones")
+        s.solve(MATRICES)
+        check(b"event: " in stream.recv(65536), "the stream was cut")
+        for c in half:
+            c.close()
+    warned = s.events("too_many_connections")
+    check(len(warned) == 1 and warned[0]["level"] == "warn" and warned[0]["address"] == "127.0.0.1", warned)
+    check(warned[0]["max_connections"] == 40 and warned[0]["of_this_address"] >= 40 and warned[0]["cut"] == 1, warned)
+
+
+@options("--max-connections", "8", "--max-streams", "8")
+def test_room_for_health_checks(s):
+    """Where all connections are busy, so that none can go."""
+    busy = [s.connect() for _ in range(8)]
+    for c in busy:
+        c.sendall(b"GET /v1/events HTTP/1.1\r\nHost: x\r\n\r\n")
+        check(c.recv(4096).startswith(b"HTTP/1.1 200"))
+    for _ in range(40):
+        for path in ("/healthz", "/readyz"):
+            check(s.get(path).status == 200, path)
+    reply = expect(s.get("/v1/jobs"), 503, "too_many_connections")
+    check(reply.headers["connection"] == "close" and int(reply.headers["retry-after"]) > 0, reply)
+    half = [s.connect() for _ in range(40)]  # these must not take the room
+    check(s.get("/healthz").status == 200)
+    for c in busy + half:
+        c.close()
+    wait_until(lambda: s.get("/v1/jobs").status == 200)
+
+
+@options("--max-client-connections", "5")
+def test_connections_of_one_address(s):
+    held = [s.connect() for _ in range(5)]
     time.sleep(0.2)
     with s.connect(timeout=3) as c:
         c.sendall(SMUGGLED)
         data, _ = read_all(c)
-        check(not data.startswith(b"HTTP/1.1 200"), data)
+        check(data == b"", data)
     for c in held:
         c.close()
-    time.sleep(0.3)
-    check(s.get("/healthz").status == 200)
+    wait_until(lambda: answers(s))
+    check(s.events("too_many_connections")[0]["refused"] == 1, s.log())
+
+
+def wait_until(true, seconds=10):
+    end = time.monotonic() + seconds
+    while not true():
+        check(time.monotonic() < end, "never")
+        time.sleep(0.05)
+
+
+def answers(s):
+    try:
+        return s.get("/healthz").status == 200
+    except OSError:
+        return False
 
 
 if __name__ == "__main__":

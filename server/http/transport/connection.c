@@ -21,9 +21,10 @@ connection *connection_new(transport *server, int fd, const struct sockaddr *add
         return NULL;
     c->server = server;
     c->fd = fd;
+    c->spare = server->next_is_spare;
     c->place = peer_begin(server->peers, address);
-    c->deadline =
-        deadlines_add(server->deadlines, fd, clock_seconds(CLOCK_MONOTONIC) + server->options.request_deadline_s, c);
+    c->deadline = deadlines_add(server->deadlines, fd,
+                                clock_seconds(CLOCK_MONOTONIC) + server->options.request_deadline_s, c, c->spare);
     if (!c->deadline || !c->place) {
         deadline_remove(c->deadline);
         peer_end(c->place);
@@ -83,10 +84,11 @@ void connection_begin_request(connection *c, const char *raw_target)
     rq->server = c->server;
     rq->fd = c->fd;
     rq->address_len = peer_address(c->place, rq->address);
+    rq->spare = c->spare;
     rq->started = clock_seconds(CLOCK_MONOTONIC);
     c->request = rq;
     c->layout = (framing_layout){.target = raw_target, .target_len = strlen(raw_target)};
-    deadline_set(c->deadline, rq->started + c->server->options.request_deadline_s, !c->server->tls);
+    deadline_set(c->deadline, rq->started + c->server->options.request_deadline_s, DEADLINE_HEAD, !c->server->tls);
 }
 
 /* ------------------------------------------------------------------ reply */
@@ -111,7 +113,8 @@ static bool send_reply(connection *c, struct MHD_Connection *mhd)
     http_reply *reply = &c->request->reply;
     request_note_reply(c->request);
     double allowed = c->server->options.request_deadline_s + (double)reply->len / SLOWEST_RATE;
-    deadline_set(c->deadline, reply->source.read ? INFINITY : clock_seconds(CLOCK_MONOTONIC) + allowed, false);
+    deadline_set(c->deadline, reply->source.read ? INFINITY : clock_seconds(CLOCK_MONOTONIC) + allowed, DEADLINE_SERVED,
+                 false);
     return reply_send(mhd, reply);
 }
 
@@ -267,7 +270,7 @@ bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *m
     }
     if (framed && c->server->handlers.admit(c->server->handlers.ctx, rq)) {
         deadline_set(c->deadline, rq->started + options->request_deadline_s + (double)rq->length / SLOWEST_RATE,
-                     !c->server->tls);
+                     DEADLINE_BODY, !c->server->tls);
         return true;
     }
     if (framed && !(rq->chunked || rq->length > 0))
@@ -325,7 +328,7 @@ bool connection_body(connection *c, const char *data, size_t size)
         if (rq->chunked) /* the length is not known before: the allowance grows with what has come */
             deadline_set(c->deadline,
                          rq->started + c->server->options.request_deadline_s + (double)rq->body_len / SLOWEST_RATE,
-                         !c->server->tls);
+                         DEADLINE_BODY, !c->server->tls);
         return true;
     }
     handlers->drop(handlers->ctx, rq);
@@ -366,7 +369,7 @@ static bool hold(connection *c)
 bool connection_answer(connection *c, struct MHD_Connection *mhd)
 {
     http_request *rq = c->request;
-    deadline_set(c->deadline, INFINITY, false); /* the client has done its part */
+    deadline_set(c->deadline, INFINITY, DEADLINE_SERVED, false); /* the client has done its part */
     rq->reply.job = rq->job_id;
     if (rq->refused.status)
         reply_problem(&rq->reply, &rq->refused);
@@ -410,5 +413,6 @@ void connection_end_request(connection *c, unsigned status, bool completed)
     c->read = total;
     reading_watch(NULL, NULL);
     request_free(c->server, &c->request);
-    deadline_set(c->deadline, clock_seconds(CLOCK_MONOTONIC) + c->server->options.request_deadline_s, false);
+    deadline_set(c->deadline, clock_seconds(CLOCK_MONOTONIC) + c->server->options.request_deadline_s, DEADLINE_IDLE,
+                 false);
 }

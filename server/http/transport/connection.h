@@ -14,6 +14,8 @@
 /* Bytes of each connection's buffer, in which libmicrohttpd keeps the header block, 64 bytes for each of its fields and
  * the head of the reply, and the piece in which a body arrives. */
 #define CONNECTION_MEMORY (64 * 1024)
+/* Connections beyond the limit, where nobody can go: for health checks, everybody else is told 503 there. */
+#define SPARE_CONNECTIONS 32
 /* Slowest transfer that is waited for, bytes per second: the allowance that a body's length adds to a deadline. */
 #define SLOWEST_RATE 100e3
 
@@ -34,6 +36,10 @@ struct transport {
     atomic_uint streams;      /* open */
     atomic_size_t body_bytes; /* of all bodies in memory */
     atomic_bool draining, stopping;
+    /* The thread's that accepts. */
+    bool next_is_spare;    /* of the connection accepted last */
+    double warned;         /* when it was last said that there are too many; on CLOCK_MONOTONIC */
+    uint64_t cut, refused; /* since then: cut to make room, and not let in */
 };
 
 typedef struct {
@@ -43,6 +49,7 @@ typedef struct {
     peer *place;
     int fd;
     bool refusing;
+    bool spare; /* one more than there may be: for health checks */
     framing_layout layout;
     chunk_follower chunks;
     /* What libmicrohttpd has read ahead: bytes behind the header block, as long as a request is under way, then behind

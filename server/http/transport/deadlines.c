@@ -12,10 +12,11 @@
 struct deadline {
     deadlines *all;
     deadline *previous, *next;
-    double at;
+    double at, since; /* since: its phase, HEAD since the connection was last idle */
     int fd;
     void *owner;
-    bool speak, expired;
+    deadline_phase phase;
+    bool spare, speak, expired;
 };
 
 struct deadlines {
@@ -99,12 +100,13 @@ void deadlines_hear_no_more(deadlines *all)
     pthread_mutex_unlock(&all->mutex);
 }
 
-deadline *deadlines_add(deadlines *all, int fd, double at, void *owner)
+deadline *deadlines_add(deadlines *all, int fd, double at, void *owner, bool spare)
 {
     deadline *d = calloc(1, sizeof *d);
     if (!d)
         return NULL;
-    *d = (deadline){.all = all, .at = at, .fd = fd, .owner = owner};
+    *d = (deadline){
+        .all = all, .at = at, .since = clock_seconds(CLOCK_MONOTONIC), .fd = fd, .owner = owner, .spare = spare};
     pthread_mutex_lock(&all->mutex);
     d->next = all->first;
     if (d->next)
@@ -126,16 +128,45 @@ void *deadlines_owner(deadlines *all, int fd)
     return found;
 }
 
-void deadline_set(deadline *d, double at, bool speak)
+void deadline_set(deadline *d, double at, deadline_phase phase, bool speak)
 {
     pthread_mutex_lock(&d->all->mutex);
     if (!d->expired) {
+        if (phase != d->phase)
+            d->since = clock_seconds(CLOCK_MONOTONIC);
+        d->phase = phase;
         d->at = at;
         d->speak = speak;
         if (at < d->all->wake_at)
             pthread_cond_signal(&d->all->changed);
     }
     pthread_mutex_unlock(&d->all->mutex);
+}
+
+bool deadlines_make_room(deadlines *all, struct sockaddr_storage *from, bool *spare)
+{
+    const double now = clock_seconds(CLOCK_MONOTONIC);
+    double longest = -1.0;
+    deadline *found = NULL;
+    pthread_mutex_lock(&all->mutex);
+    for (deadline *d = all->first; d; d = d->next) {
+        const double waited = (now - d->since) * (d->phase == DEADLINE_HEAD ? 1.0 : 0.1);
+        if (!d->expired && (d->phase == DEADLINE_HEAD || d->phase == DEADLINE_IDLE) && waited > longest) {
+            longest = waited;
+            found = d;
+        }
+    }
+    if (found) {
+        socklen_t len = sizeof *from;
+        memset(from, 0, sizeof *from);
+        getpeername(found->fd, (struct sockaddr *)from, &len);
+        *spare = found->spare;
+        found->expired = true;
+        found->at = INFINITY;
+        shutdown(found->fd, SHUT_RDWR);
+    }
+    pthread_mutex_unlock(&all->mutex);
+    return found != NULL;
 }
 
 bool deadline_expired(deadline *d)

@@ -9,6 +9,8 @@
 #include "http/transport/reading.h"
 
 #include <errno.h>
+#include <netdb.h>
+#include <netinet/in.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,15 +39,57 @@ static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_c
     }
 }
 
-/* libmicrohttpd's own limits know only the connections that it still has. */
+static const double WARN_EVERY_S = 10.0;
+
+/* Says, now and then, that there are too many connections, and from where the last one was that had to go. */
+static void warn_of_crowd(transport *server, const struct sockaddr *from)
+{
+    const double now = clock_seconds(CLOCK_MONOTONIC);
+    char name[64] = "";
+    if (server->warned > 0 && now < server->warned + WARN_EVERY_S)
+        return;
+    server->warned = now;
+    const socklen_t len = from->sa_family == AF_INET6 ? sizeof(struct sockaddr_in6)
+                                                      : sizeof(struct sockaddr_in); /* else a name stays "" */
+    getnameinfo(from, len, name, sizeof name, NULL, 0, NI_NUMERICHOST);
+    log_write(server->options.log, LOG_WARN, "too_many_connections",
+              (log_field[]){LOG_S("address", name),
+                            LOG_I("of_this_address", peers_from(server->peers, from)),
+                            LOG_I("connections", peers_count(server->peers)),
+                            LOG_I("max_connections", server->options.max_connections),
+                            LOG_I("max_client_connections", server->options.max_client_connections),
+                            LOG_I("cut", server->cut),
+                            LOG_I("refused", server->refused),
+                            {0}});
+    server->cut = server->refused = 0;
+}
+
+/* Where there are as many connections as may be, one goes that waits for a request: those of which a header block has
+ * begun and not ended first, since nobody loses anything by them. libmicrohttpd's own limits know only the connections
+ * that it still has. */
 static enum MHD_Result on_accept(void *ctx, const struct sockaddr *address, socklen_t len)
 {
     transport *server = ctx;
     const transport_options *options = &server->options;
+    struct sockaddr_storage from;
     (void)len;
-    bool room =
-        peers_count(server->peers) < options->max_connections &&
-        (options->max_client_connections == 0 || peers_from(server->peers, address) < options->max_client_connections);
+    const size_t count = peers_count(server->peers);
+    server->next_is_spare = false;
+    if (options->max_client_connections > 0 && peers_from(server->peers, address) >= options->max_client_connections) {
+        server->refused++;
+        warn_of_crowd(server, address);
+        return MHD_NO;
+    }
+    if (count < options->max_connections)
+        return MHD_YES;
+    bool spare = true;
+    const bool made = deadlines_make_room(server->deadlines, &from, &spare);
+    /* one that was cut is still counted for a moment */
+    const bool room = count < options->max_connections + SPARE_CONNECTIONS;
+    server->next_is_spare = spare;
+    server->cut += made;
+    server->refused += !room;
+    warn_of_crowd(server, made ? (struct sockaddr *)&from : address);
     return room ? MHD_YES : MHD_NO;
 }
 
@@ -128,7 +172,7 @@ static struct MHD_Daemon *start_daemon(transport *server, int listen_fd, const t
     unsigned idle_s = (unsigned)(options->max_wait_s + 2 * options->request_deadline_s + 60);
     struct MHD_OptionItem items[] = {
         {MHD_OPTION_LISTEN_SOCKET, listen_fd, NULL},
-        {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)options->max_connections, NULL},
+        {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)options->max_connections + SPARE_CONNECTIONS, NULL},
         {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
         {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)idle_s, NULL},
         {MHD_OPTION_STRICT_FOR_CLIENT, 1, NULL},
@@ -136,7 +180,6 @@ static struct MHD_Daemon *start_daemon(transport *server, int listen_fd, const t
         {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)on_completed, server},
         {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, server},
         {MHD_OPTION_URI_LOG_CALLBACK, (intptr_t)on_target, server},
-        {MHD_OPTION_PER_IP_CONNECTION_LIMIT, (intptr_t)options->max_client_connections, NULL}, /* 0: no limit */
         {server->tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, server->tls ? options->tls->cert : NULL},
         {MHD_OPTION_HTTPS_MEM_KEY, 0, server->tls ? options->tls->key : NULL},
         {MHD_OPTION_END, 0, NULL},

@@ -147,6 +147,7 @@ typedef struct http_request {
     int fd;                    /* to see whether the client is still there */
     unsigned char address[16]; /* what tells its client from others (peer.h), address_len bytes; 0: unknown */
     size_t address_len;
+    bool spare; /* as many connections are open as may be: this one is for health checks */
     char method[16];
     double started; /* on CLOCK_MONOTONIC */
     /* Set by `admit`. */

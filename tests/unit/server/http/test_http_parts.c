@@ -285,9 +285,9 @@ TEST(a_deadline_cuts_a_connection)
     CHECK(socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0);
     deadlines *all = deadlines_new("too late");
     double start = clock_seconds(CLOCK_MONOTONIC);
-    deadline *never = deadlines_add(all, -1, INFINITY, NULL);
-    deadline *d = deadlines_add(all, ends[0], start + 100, ends);
-    deadline_set(d, start + 0.05, true);
+    deadline *never = deadlines_add(all, -1, INFINITY, NULL, false);
+    deadline *d = deadlines_add(all, ends[0], start + 100, ends, false);
+    deadline_set(d, start + 0.05, DEADLINE_BODY, true);
     CHECK(!deadline_expired(d));
     CHECK_INT(read(ends[1], text, sizeof text - 1), 8);
     CHECK_STR(text, "too late");
@@ -301,6 +301,33 @@ TEST(a_deadline_cuts_a_connection)
     deadlines_free(all);
     close(ends[0]);
     close(ends[1]);
+}
+
+TEST(who_waits_for_a_request_makes_room)
+{
+    int ends[3][2];
+    deadline *d[3];
+    struct sockaddr_storage from;
+    bool spare = true;
+    deadlines *all = deadlines_new("");
+    for (int i = 0; i < 3; i++) {
+        CHECK(socketpair(AF_UNIX, SOCK_STREAM, 0, ends[i]) == 0);
+        d[i] = deadlines_add(all, ends[i][0], INFINITY, ends[i], i == 2);
+    }
+    CHECK(deadlines_owner(all, ends[1][0]) == ends[1] && !deadlines_owner(all, -2));
+    deadline_set(d[0], INFINITY, DEADLINE_BODY, false);
+    CHECK(deadlines_make_room(all, &from, &spare) && !spare && deadline_expired(d[1]));
+    CHECK(deadlines_make_room(all, &from, &spare) && spare && deadline_expired(d[2]));
+    CHECK(!deadlines_make_room(all, &from, &spare) && !deadline_expired(d[0]));
+    deadline_set(d[0], INFINITY, DEADLINE_IDLE, false);
+    CHECK(deadlines_make_room(all, &from, &spare) && deadline_expired(d[0]));
+    for (int i = 0; i < 3; i++) {
+        CHECK_INT(read(ends[i][1], &(char){0}, 1), 0);
+        deadline_remove(d[i]);
+        close(ends[i][0]);
+        close(ends[i][1]);
+    }
+    deadlines_free(all);
 }
 
 /* ----------------------------------------------------------------- options */
