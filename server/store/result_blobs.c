@@ -36,17 +36,29 @@ static store_status put_blob(const result_blobs *place, void *transaction, const
     return status;
 }
 
+static bool has_history(const store_answer *answer)
+{
+    return answer->history && answer->history_columns > 0 && answer->history_columns <= PIECE_DOUBLES;
+}
+
 store_status result_blobs_put(const result_blobs *place, void *transaction, const char *id,
-                              const store_outcome *outcome, int64_t *bytes, char cause[256])
+                              const store_outcome *outcome, int64_t *bytes, char **contents, char cause[256])
 {
     store_status status = STORE_OK;
     unsigned char *piece = malloc(RESULT_PIECE);
+    size_t len = 0, n_blobs = outcome->n_cases;
     *bytes = 0;
-    if (!piece) {
-        strcpy(cause, "no memory for a result");
-        return STORE_ERROR;
+    *contents = NULL;
+    FILE *list = open_memstream(contents, &len);
+    for (size_t number = 0; number <= outcome->n_cases; number++) {
+        const store_answer *answer = number == 0 ? &outcome->whole : &outcome->cases[number - 1];
+        n_blobs += answer->n_vectors + has_history(answer);
     }
-    for (size_t number = 0; number <= outcome->n_cases && status == STORE_OK; number++) {
+    if (list)
+        fprintf(list, "%zu %zu\n", n_blobs, outcome->n_cases);
+    if (!piece || !list)
+        status = STORE_ERROR;
+    for (size_t number = 0; status == STORE_OK && number <= outcome->n_cases; number++) {
         const store_answer *answer = number == 0 ? &outcome->whole : &outcome->cases[number - 1];
         result_key key = {id, (int64_t)number, NULL};
         for (size_t i = 0; i < answer->n_vectors && status == STORE_OK; i++) {
@@ -54,15 +66,28 @@ store_status result_blobs_put(const result_blobs *place, void *transaction, cons
             key.name = v->name;
             status = put_blob(place, transaction, &key, v->data, v->count, 1, piece);
             *bytes += 8 * v->count;
+            fprintf(list, "%zu %s %lld\n", number, v->name, (long long)v->count);
         }
         const int64_t columns = answer->history_columns;
         key.name = NULL;
-        if (status == STORE_OK && answer->history && columns > 0 && columns <= PIECE_DOUBLES) {
+        if (status == STORE_OK && has_history(answer)) {
             status = put_blob(place, transaction, &key, answer->history, answer->history_rows, columns, piece);
             *bytes += 8 * answer->history_rows * columns;
+            fprintf(list, "%zu / %lld\n", number, (long long)(answer->history_rows * columns));
         }
     }
+    const bool listed = list && !ferror(list) && fflush(list) == 0;
+    if (list)
+        fclose(list);
+    if (!piece || !listed) {
+        strcpy(cause, "no memory for a result");
+        status = STORE_ERROR;
+    }
     free(piece);
+    if (status == STORE_OK)
+        return STORE_OK;
+    free(*contents);
+    *contents = NULL;
     return status;
 }
 
@@ -101,6 +126,26 @@ static bool take(void *ctx, const result_piece *piece)
     return true;
 }
 
+store_status result_blobs_missing(store *s, const result_key *key, int64_t n_cases)
+{
+    char *list = NULL, line[80], cause[128];
+    long long blobs, cases;
+    store_status status = s->engine->results->contents(s, key->job, &list);
+    bool lost = status == STORE_DAMAGED;
+    if (status == STORE_OK && list && n_cases >= 0)
+        lost = sscanf(list, "%lld %lld", &blobs, &cases) != 2 || cases != n_cases;
+    if (status == STORE_OK && list && n_cases < 0) {
+        snprintf(line, sizeof line, "\n%lld %s ", (long long)key->number, key->name ? key->name : "/");
+        lost = strstr(list, line) != NULL;
+    }
+    free(list);
+    if (!lost)
+        return STORE_OK;
+    snprintf(cause, sizeof cause, "a part of the result of job %.32s is missing or has another name", key->job);
+    store_set_message(s, cause);
+    return STORE_DAMAGED;
+}
+
 /* All of it, or nothing and a message. */
 static store_status get_blob(store *s, const result_key *key, int64_t after, taken *t)
 {
@@ -113,6 +158,8 @@ static store_status get_blob(store *s, const result_key *key, int64_t after, tak
         return STORE_OK;
     free(t->x);
     *t = (taken){.status = t->status};
+    if (status == STORE_NOT_FOUND)
+        return result_blobs_missing(s, key, -1) == STORE_DAMAGED ? STORE_DAMAGED : STORE_NOT_FOUND;
     if (status != STORE_OK)
         return status;
     if (t->status == STORE_DAMAGED)

@@ -44,11 +44,21 @@ typedef struct {
                         bool (*take)(void *ctx, const result_piece *piece), void *ctx);
     /* The sum of the headers of all vectors of that name in a job. */
     store_status (*count)(store *s, const char *id, const char *name, int64_t *total);
+    /* The list that result_blobs_put made of the blobs of a job, freed by the caller; NULL: an older format kept none.
+     * STORE_DAMAGED: it is not what was written. */
+    store_status (*contents)(store *s, const char *id, char **list);
 } result_blobs;
 
-/* For an engine's finish: puts the vectors and histories of an outcome; *bytes is how many they are. cause is set where
- * it is not the place that failed. */
+/* For an engine's finish: puts the vectors and histories of an outcome; *bytes is how many they are, *contents a list
+ * of them, freed by the caller, which the engine keeps with the end of the job, under a checksum: a blob that is lost,
+ * or has another name, would else not be missed. Its first line is how many blobs and cases there are together, and how
+ * many cases; each other one "NUMBER NAME COUNT" of a vector, "NUMBER / COUNT" of a history. cause is set where it is
+ * not the place that failed. */
 store_status result_blobs_put(const result_blobs *place, void *transaction, const char *id,
-                              const store_outcome *outcome, int64_t *bytes, char cause[256]);
+                              const store_outcome *outcome, int64_t *bytes, char **contents, char cause[256]);
+
+/* For what was read and not found: STORE_DAMAGED, and a message, where the list has the blob, or where it has another
+ * number of cases than that (-1: any); key->name NULL and n_cases not -1: nothing is looked for. Otherwise STORE_OK. */
+store_status result_blobs_missing(store *s, const result_key *key, int64_t n_cases);
 
 #endif

@@ -253,6 +253,14 @@ store_status store_get_cases(store *s, const char *id, const char *name, store_c
     *cases = NULL;
     *count = 0;
     store_status status = s->engine->get_cases(s, id, name, cases, count);
+    if (status == STORE_OK && name && *count == 0) { /* or has it another name now? */
+        store_case *all;
+        size_t n;
+        status = store_get_cases(s, id, NULL, &all, &n);
+        store_cases_free(all, n);
+    } else if (status == STORE_OK && !name) {
+        status = result_blobs_missing(s, &(result_key){.job = id}, (int64_t)*count);
+    }
     if (status == STORE_OK)
         return STORE_OK;
     store_cases_free(*cases, *count);

@@ -67,6 +67,25 @@ def test_a_vector(s):
     s.start()
 
 
+def test_the_name_of_a_vector(s):
+    """One bit of it, and the vector is another one's: the answer must not come without."""
+    job = s.solve(SCENE)["id"]
+    stop(s)
+    with contextlib.closing(sqlite3.connect(s.db)) as db, db:
+        db.execute("UPDATE vector SET name = 'reactionr' WHERE name = 'reactions'")
+    check("reactionr" in findings(s)[1], findings(s))
+    s.start()
+    check_named(s.get(f"/v1/jobs/{job}/result"), job)
+    check_named(s.get(f"/v1/jobs/{job}/result?fields=reactions"), job)
+    expect(s.get(f"/v1/jobs/{job}/result?fields=gaps"), 200)
+    stop(s)
+    with contextlib.closing(sqlite3.connect(s.db)) as db, db:
+        db.execute("DELETE FROM vector WHERE name = 'gaps'")
+    check("missing" in findings(s)[1], findings(s))
+    s.start()
+    check_named(s.get(f"/v1/jobs/{job}/result?fields=gaps"), job)
+
+
 @options("--workers", "1")
 def test_an_upload(s):
     """A matrix on disk that is another one now is no matrix of anybody's problem."""

@@ -19,10 +19,11 @@ bool checksum_register(sqlite3 *db);
 #define SUM_IS(sum, columns) "(" sum " IS NULL OR " sum " = checksum(" columns "))"
 
 /* The columns that a checksum covers, of each table that has one. */
-#define SUM_JOB     "job.id, job.status, job.summary"
-#define SUM_REQUEST "request.job, request.body"
-#define SUM_ANSWER  "answer.job, answer.number, answer.name, answer.summary"
-#define SUM_VECTOR  "vector.job, vector.answer, vector.name, vector.part, vector.version, vector.count, vector.data"
+#define SUM_JOB      "job.id, job.status, job.summary"
+#define SUM_CONTENTS "job.id, job.contents"
+#define SUM_REQUEST  "request.job, request.body"
+#define SUM_ANSWER   "answer.job, answer.number, answer.name, answer.summary"
+#define SUM_VECTOR   "vector.job, vector.answer, vector.name, vector.part, vector.version, vector.count, vector.data"
 #define SUM_HISTORY                                                                                                    \
     "history.job, history.answer, history.part, history.version, history.columns, history.last, history.data"
 

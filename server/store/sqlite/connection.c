@@ -86,7 +86,9 @@ static const char *const SQL[QUERY_COUNT] = {
                           "queue_until < ?1 LIMIT 1",
     [QUERY_EXPIRE] = "UPDATE job SET status = 3, finished = ?1, error = ?2"
                      " WHERE status = 0 AND queue_until > 0 AND queue_until < ?1 RETURNING id",
-    [QUERY_ADD_BYTES] = "UPDATE job SET bytes = bytes + ?2 WHERE id = ?1",
+    [QUERY_ADD_CONTENTS] =
+        "UPDATE job SET bytes = bytes + ?2, contents = ?3, contents_sum = " SUM_OF("?1, ?3") " WHERE id = ?1",
+    [QUERY_CONTENTS] = "SELECT contents, " SUM_IS("contents_sum", SUM_CONTENTS) " FROM job WHERE id = ?1",
     [QUERY_ENDED] = "SELECT count(*), coalesce(sum(bytes), 0) FROM job INDEXED BY job_by_end WHERE status >= 2",
     [QUERY_OLD_JOBS] = "SELECT id, finished, bytes FROM job INDEXED BY job_by_end WHERE status >= 2"
                        " AND NOT EXISTS (SELECT 1 FROM webhook WHERE job = id AND state = 1)"

@@ -29,8 +29,9 @@
  * upload_use which jobs name which uploads in their requests.
  * webhook  whom to tell of the end of a job. state 0: it has not ended, 1: to be told at `next`, 2: told, 3: given up.
  *          A trigger makes it due, whatever ends the job.
- * sum, summary_sum: checksums of what answers are made of (checksum.h); NULL in rows that an older format wrote.
- * Deleting a job deletes its rows in every other table. */
+ * contents of an ended job: which rows its result has (result_blobs.h).
+ * sum, summary_sum, contents_sum: checksums of what answers are made of (checksum.h); NULL in rows that an older format
+ * wrote. Deleting a job deletes its rows in every other table. */
 #define RESULT_TABLES                                                                                                  \
     "CREATE TABLE answer("                                                                                             \
     "  job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"                                                        \
@@ -91,6 +92,9 @@
     "ALTER TABLE answer ADD COLUMN sum INTEGER; ALTER TABLE vector ADD COLUMN sum INTEGER;"                            \
     "ALTER TABLE history ADD COLUMN sum INTEGER;"
 
+/* Version 6. */
+#define COLUMNS_6 "ALTER TABLE job ADD COLUMN contents TEXT; ALTER TABLE job ADD COLUMN contents_sum INTEGER;"
+
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"
@@ -113,7 +117,7 @@ static const char *const SCHEMA =
     "  tag TEXT NOT NULL, job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
-    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5;
+    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5 COLUMNS_6;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -131,7 +135,8 @@ const char *file_format_why_unreadable(sqlite3 *db)
 
 /* STEPS[n] turns version n into n + 1. Version 2: load cases, and jobs that refine others. The primary keys of the
  * result tables grew by a column, which SQLite can only do by copying the rows. Version 3: uploads, webhooks, the turn
- * and the size of jobs. Version 4: the tally. Version 5: checksums. */
+ * and the size of jobs. Version 4: the tally. Version 5: checksums. Version 6: what belongs
+ * to a result. */
 static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [0] = NULL,
     [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
@@ -149,6 +154,7 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
           " + coalesce((SELECT sum(length(data)) FROM history WHERE job = id), 0) WHERE status >= 2;",
     [3] = TABLES_4,
     [4] = COLUMNS_5,
+    [5] = COLUMNS_6,
 };
 
 bool file_format_integer(sqlite3 *db, const char *sql, int64_t *value)

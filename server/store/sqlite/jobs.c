@@ -288,14 +288,18 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
         status = statement_run(&st);
     }
     int64_t bytes = 0;
+    char *contents = NULL;
     if (status == STORE_OK)
-        status = result_blobs_put(&SQLITE_RESULTS, c, id, a->outcome, &bytes, c->message);
+        status = result_blobs_put(&SQLITE_RESULTS, c, id, a->outcome, &bytes, &contents, c->message);
     if (status != STORE_OK)
         return status;
-    st = statement_begin(c, QUERY_ADD_BYTES);
+    st = statement_begin(c, QUERY_ADD_CONTENTS);
     bind_text(&st, 1, id);
     bind_integer(&st, 2, bytes);
-    return statement_run(&st);
+    bind_text(&st, 3, contents);
+    status = statement_run(&st);
+    free(contents);
+    return status;
 }
 
 store_status sqlite_renew(store *base, const store_lease *lease, double lease_s, int progress)

@@ -44,6 +44,14 @@ static const struct {
      "the tally of jobs with status %s is wrong\n"},
     {5, "SELECT id FROM job WHERE summary IS NOT NULL AND NOT " SUM_IS("summary_sum", SUM_JOB),
      "the summary of job %s is not what was written\n"},
+    {6, "SELECT id FROM job WHERE NOT " SUM_IS("contents_sum", SUM_CONTENTS),
+     "the list of the result of job %s is not what was written\n"},
+    {6,
+     "SELECT id FROM job WHERE contents IS NOT NULL AND CAST(contents AS INTEGER) <>"
+     " (SELECT count(*) FROM answer WHERE answer.job = id)"
+     " + (SELECT count(*) FROM vector WHERE vector.job = id AND part = 0)"
+     " + (SELECT count(*) FROM history WHERE history.job = id AND part = 0)",
+     "a part of the result of job %s is missing\n"},
     {5, "SELECT job FROM request WHERE NOT " SUM_IS("sum", SUM_REQUEST),
      "the request of job %s is not what was written\n"},
     {5, "SELECT number || ' of job ' || job FROM answer WHERE NOT " SUM_IS("sum", SUM_ANSWER),

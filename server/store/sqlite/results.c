@@ -2,6 +2,8 @@
  * job. docs/architecture/store.md says why not as files. */
 #include "store/sqlite/internal.h"
 
+#include <stdio.h>
+
 static store_status put(void *transaction, const result_key *key, const result_piece *piece)
 {
     statement st = statement_begin(transaction, key->name ? QUERY_INSERT_VECTOR : QUERY_INSERT_HISTORY);
@@ -56,4 +58,23 @@ static store_status count(store *base, const char *id, const char *name, int64_t
     return sqlite_give_reader(s, c, statement_end(&st, STORE_OK));
 }
 
-const result_blobs SQLITE_RESULTS = {.put = put, .get = get, .count = count};
+static store_status contents(store *base, const char *id, char **list)
+{
+    sqlite_store *s = sqlite_of(base);
+    store_status status = STORE_NOT_FOUND;
+    connection *c = sqlite_take_reader(s);
+    statement st = statement_begin(c, QUERY_CONTENTS);
+    bind_text(&st, 1, id);
+    *list = NULL;
+    if (statement_row(&st)) {
+        bool ok = true;
+        const bool good = sqlite3_column_int(st.stmt, 1);
+        *list = good ? sqlite_copy_text(&st, 0, &ok) : NULL;
+        status = !good ? STORE_DAMAGED : ok ? STORE_OK : STORE_ERROR;
+        if (status != STORE_OK)
+            snprintf(c->message, sizeof c->message, "the list of the result of job %.32s can't be read", id);
+    }
+    return sqlite_give_reader(s, c, statement_end(&st, status));
+}
+
+const result_blobs SQLITE_RESULTS = {.put = put, .get = get, .count = count, .contents = contents};

@@ -241,6 +241,7 @@ TEST(a_file_that_cannot_be_taken_over_stays_as_it_was)
 
 /* What a format added is taken away again: what is left is the format before it, as it was written then. */
 static const char *const TO_FORMAT[] = {
+    [5] = "ALTER TABLE job DROP COLUMN contents; ALTER TABLE job DROP COLUMN contents_sum; PRAGMA user_version = 5;",
     [4] = "ALTER TABLE job DROP COLUMN summary_sum; ALTER TABLE request DROP COLUMN sum;"
           "ALTER TABLE answer DROP COLUMN sum; ALTER TABLE vector DROP COLUMN sum;"
           "ALTER TABLE history DROP COLUMN sum; PRAGMA user_version = 4;",
@@ -304,7 +305,7 @@ static void check_taken_over(int version)
     CHECK_INT(claim_id(p.s, "me", ended), STORE_OK);
     CHECK_INT(finish_with_answer(p.s, ended), STORE_OK);
     store_close(p.s);
-    for (int at = 4; at >= version; at--)
+    for (int at = 5; at >= version; at--)
         change_file(p.path, TO_FORMAT[at]);
     CHECK_INT(rows_in(p.path, "tally"), version < 4 ? -1 : 5);
     CHECK_INT(rows_in(p.path, "request WHERE sum > 0"), -1);
@@ -448,6 +449,61 @@ TEST(what_is_not_what_was_written_is_not_shown)
         CHECK(!body == request);
         free(body);
         job_clear(&j);
+        place_end(&p);
+    }
+}
+
+/* What is not there any more, or under another name, is missed. */
+TEST(a_lost_part_of_a_result_is_missed)
+{
+    static const char *const DAMAGES[][2] = {
+        {"UPDATE vector SET name = 'gapt'", "gapt of job "},
+        {"DELETE FROM vector", "a part of the result of job "},
+        {"DELETE FROM history", "a part of the result of job "},
+        {"DELETE FROM answer WHERE number = 2", "a part of the result of job "},
+        {"UPDATE answer SET name = 'tvo' WHERE number = 2", "2 of job "},
+        {"UPDATE job SET contents = '4 1' WHERE status = 2", "the list of the result of job "},
+        {"UPDATE job SET contents = NULL WHERE status = 2", "the list of the result of job "},
+    };
+    for (size_t i = 0; i < sizeof DAMAGES / sizeof DAMAGES[0]; i++) {
+        place p;
+        char id[33], claimed[33];
+        double *x = NULL;
+        int64_t n, columns;
+        store_case *cases;
+        size_t count;
+        store_vector gaps = {"gaps", 3, ANSWER};
+        const store_answer two[] = {{.name = "one", .summary = "{}"}, {.name = "two", .summary = "{}"}};
+        store_outcome outcome = {
+            .status = JOB_SUCCESSFUL,
+            .whole = {.vectors = &gaps, .n_vectors = 1, .history = ANSWER, .history_rows = 1, .history_columns = 3},
+            .cases = two,
+            .n_cases = 2};
+        if (!place_begin(&p))
+            return;
+        CHECK_INT(submit_text(p.s, "{}", NULL, NULL, id), STORE_OK);
+        CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
+        CHECK_INT(finish_as(p.s, claimed, "me", &outcome), STORE_OK);
+        CHECK_INT(store_get_vector(p.s, id, 0, "reactions", &x, &n), STORE_NOT_FOUND);
+        CHECK_INT(store_get_vector(p.s, id, 1, "gaps", &x, &n), STORE_NOT_FOUND);
+        CHECK_INT(store_get_cases(p.s, id, "three", &cases, &count), STORE_OK);
+        CHECK(count == 0);
+        store_close(p.s);
+        check_findings(&p, "");
+        change_file(p.path, DAMAGES[i][0]);
+        check_findings(&p, DAMAGES[i][1]);
+        if (!place_open(&p))
+            return;
+        const bool list = i >= 5, in_cases = i >= 3;
+        CHECK_INT(store_get_vector(p.s, id, 0, "gaps", &x, &n), i < 2 ? STORE_DAMAGED : STORE_OK);
+        free(x);
+        CHECK_INT(store_get_vector(p.s, id, 0, "reactions", &x, &n), list ? STORE_DAMAGED : STORE_NOT_FOUND);
+        CHECK_INT(store_get_history(p.s, id, 0, -1, &x, &n, &columns), i == 2 ? STORE_DAMAGED : STORE_OK);
+        free(x);
+        CHECK_INT(store_get_cases(p.s, id, NULL, &cases, &count), in_cases ? STORE_DAMAGED : STORE_OK);
+        store_cases_free(cases, count);
+        CHECK_INT(store_get_cases(p.s, id, "two", &cases, &count), i == 3 || i == 4 ? STORE_DAMAGED : STORE_OK);
+        store_cases_free(cases, count);
         place_end(&p);
     }
 }
