@@ -4,7 +4,8 @@
  * MB was seen to take 8 ms: a factor of 200 MB took twice as long on fresh pages, now and then. Freed blocks leave
  * their pages here, up to a number of bytes. A new block is made by moving such pages to a range of addresses of its
  * own (mremap(2) moves entries of page tables, not bytes), so that nothing is too small or lies in the way; what is
- * missing is fresh. */
+ * missing is fresh. Fresh pages are touched ahead of their owner by a thread of the reserve's own, which asks the
+ * kernel for them and writes nothing: before a block is taken, as far as it was announced, and while it is filled. */
 #include "core/reserve.h"
 
 #include <pthread.h>
@@ -15,6 +16,7 @@
 
 #define HUGE_PAGE ((size_t)2 << 20)
 #define FILL      (16 * HUGE_PAGE)
+#define LONG      (4 * HUGE_PAGE) /* less is not worth waking the helper */
 
 /* Huge pages in one mapping: mremap takes no more than one at a time. */
 typedef struct piece {
@@ -36,6 +38,11 @@ struct uz_reserve {
     piece *kept;
     size_t block_bytes, kept_bytes, most, ready;
     size_t largest; /* block since it was emptied last */
+    pthread_cond_t news;
+    pthread_t helper; /* only while has_helper */
+    bool has_helper, ends;
+    char *ahead, *ahead_end; /* fresh pages of the block that was taken last */
+    size_t expected;         /* bytes that shall be kept for a block to come */
 };
 
 uz_reserve *uz_reserve_new(size_t most, size_t ready)
@@ -46,6 +53,7 @@ uz_reserve *uz_reserve_new(size_t most, size_t ready)
     reserve->most = most;
     reserve->ready = ready < most ? ready : most;
     pthread_mutex_init(&reserve->mutex, NULL);
+    pthread_cond_init(&reserve->news, NULL);
     return reserve;
 }
 
@@ -104,38 +112,6 @@ static void unmap_pieces(piece *list)
     }
 }
 
-void *uz_reserve_take(uz_reserve *reserve, size_t bytes)
-{
-    if (bytes > PTRDIFF_MAX - 2 * HUGE_PAGE)
-        return NULL;
-    bytes = (bytes + HUGE_PAGE - 1) / HUGE_PAGE * HUGE_PAGE;
-    block *b = calloc(1, sizeof *b);
-    if (!b || !(b->at = map(bytes))) {
-        free(b);
-        return NULL;
-    }
-    b->bytes = bytes;
-    pthread_mutex_lock(&reserve->mutex);
-    const bool made = move_kept(reserve, b);
-    if (made) {
-        b->next = reserve->blocks;
-        reserve->blocks = b;
-        reserve->block_bytes += bytes;
-        reserve->largest = bytes > reserve->largest ? bytes : reserve->largest;
-    }
-    pthread_mutex_unlock(&reserve->mutex);
-    if (made)
-        return b->at;
-    munmap(b->at, bytes); /* its pieces too */
-    while (b->pieces) {
-        piece *next = b->pieces->next;
-        free(b->pieces);
-        b->pieces = next;
-    }
-    free(b);
-    return NULL;
-}
-
 size_t uz_reserve_size(uz_reserve *reserve, const void *block_at)
 {
     pthread_mutex_lock(&reserve->mutex);
@@ -171,6 +147,107 @@ static void keep(uz_reserve *reserve, piece *freed)
     unmap_pieces(out);
 }
 
+/* Keeps fresh pages, which are there. */
+static bool keep_fresh(uz_reserve *reserve, size_t bytes)
+{
+    piece *fresh = calloc(1, sizeof *fresh);
+    if (!fresh || !(fresh->at = map(bytes))) {
+        free(fresh);
+        return false;
+    }
+    fresh->bytes = bytes;
+    memset(fresh->at, 0, bytes);
+    keep(reserve, fresh);
+    return true;
+}
+
+static void *touch_ahead(void *arg)
+{
+    uz_reserve *reserve = arg;
+    bool good = true;
+    pthread_mutex_lock(&reserve->mutex);
+    while (!reserve->ends) {
+        char *const at = reserve->ahead;
+        const size_t all = reserve->block_bytes + reserve->kept_bytes;
+        if (at < reserve->ahead_end) {
+            reserve->ahead += HUGE_PAGE;
+            pthread_mutex_unlock(&reserve->mutex);
+            good = madvise(at, HUGE_PAGE, MADV_POPULATE_WRITE) == 0; /* false too where the block has gone meanwhile */
+            pthread_mutex_lock(&reserve->mutex);
+            if (!good)
+                reserve->ahead = reserve->ahead_end;
+        } else if (reserve->kept_bytes < reserve->expected && all + HUGE_PAGE <= reserve->most) {
+            pthread_mutex_unlock(&reserve->mutex);
+            good = keep_fresh(reserve, HUGE_PAGE);
+            pthread_mutex_lock(&reserve->mutex);
+            if (!good)
+                reserve->expected = 0;
+        } else {
+            pthread_cond_wait(&reserve->news, &reserve->mutex);
+        }
+    }
+    pthread_mutex_unlock(&reserve->mutex);
+    return NULL;
+}
+
+/* Under the mutex. Without a thread pages come when they are touched. */
+static void wake_helper(uz_reserve *reserve)
+{
+    if (!reserve->has_helper)
+        reserve->has_helper = pthread_create(&reserve->helper, NULL, touch_ahead, reserve) == 0;
+    pthread_cond_signal(&reserve->news);
+}
+
+void uz_reserve_expect(uz_reserve *reserve, size_t bytes)
+{
+    pthread_mutex_lock(&reserve->mutex);
+    reserve->expected = bytes < reserve->ready ? bytes : reserve->ready;
+    if (reserve->kept_bytes < reserve->expected)
+        wake_helper(reserve);
+    pthread_mutex_unlock(&reserve->mutex);
+}
+
+void *uz_reserve_take(uz_reserve *reserve, size_t bytes)
+{
+    if (bytes > PTRDIFF_MAX - 2 * HUGE_PAGE)
+        return NULL;
+    bytes = (bytes + HUGE_PAGE - 1) / HUGE_PAGE * HUGE_PAGE;
+    block *b = calloc(1, sizeof *b);
+    if (!b || !(b->at = map(bytes))) {
+        free(b);
+        return NULL;
+    }
+    b->bytes = bytes;
+    pthread_mutex_lock(&reserve->mutex);
+    size_t kept = reserve->kept_bytes;
+    const bool made = move_kept(reserve, b);
+    if (made) {
+        kept -= reserve->kept_bytes;
+        if (bytes >= reserve->expected / 2)
+            reserve->expected = 0;
+        if (bytes - kept >= LONG) {
+            reserve->ahead = b->at + kept;
+            reserve->ahead_end = b->at + bytes;
+            wake_helper(reserve);
+        }
+        b->next = reserve->blocks;
+        reserve->blocks = b;
+        reserve->block_bytes += bytes;
+        reserve->largest = bytes > reserve->largest ? bytes : reserve->largest;
+    }
+    pthread_mutex_unlock(&reserve->mutex);
+    if (made)
+        return b->at;
+    munmap(b->at, bytes); /* its pieces too */
+    while (b->pieces) {
+        piece *next = b->pieces->next;
+        free(b->pieces);
+        b->pieces = next;
+    }
+    free(b);
+    return NULL;
+}
+
 bool uz_reserve_give(uz_reserve *reserve, void *block_at)
 {
     pthread_mutex_lock(&reserve->mutex);
@@ -181,6 +258,8 @@ bool uz_reserve_give(uz_reserve *reserve, void *block_at)
     if (found) {
         *link = found->next;
         reserve->block_bytes -= found->bytes;
+        if (reserve->ahead >= found->at && reserve->ahead < found->at + found->bytes)
+            reserve->ahead = reserve->ahead_end = NULL;
     }
     pthread_mutex_unlock(&reserve->mutex);
     if (!found)
@@ -198,15 +277,7 @@ bool uz_reserve_fill(uz_reserve *reserve)
     pthread_mutex_unlock(&reserve->mutex);
     const bool more = bytes > FILL;
     bytes = (more ? FILL : bytes) / HUGE_PAGE * HUGE_PAGE;
-    piece *fresh = bytes > 0 ? calloc(1, sizeof *fresh) : NULL;
-    if (!fresh || !(fresh->at = map(bytes))) {
-        free(fresh);
-        return false;
-    }
-    fresh->bytes = bytes;
-    memset(fresh->at, 0, bytes);
-    keep(reserve, fresh);
-    return more;
+    return bytes > 0 && keep_fresh(reserve, bytes) && more;
 }
 
 void uz_reserve_empty(uz_reserve *reserve)
@@ -231,7 +302,14 @@ void uz_reserve_free(uz_reserve *reserve)
 {
     if (!reserve)
         return;
+    pthread_mutex_lock(&reserve->mutex);
+    reserve->ends = true;
+    pthread_cond_signal(&reserve->news);
+    pthread_mutex_unlock(&reserve->mutex);
+    if (reserve->has_helper)
+        pthread_join(reserve->helper, NULL);
     uz_reserve_empty(reserve);
+    pthread_cond_destroy(&reserve->news);
     pthread_mutex_destroy(&reserve->mutex);
     free(reserve);
 }

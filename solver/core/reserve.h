@@ -4,6 +4,9 @@
 
 #include "uzawa.h"
 
+/* A block of some `bytes` is going to be taken: their pages are made ready meanwhile, as far as `ready` of
+ * uz_reserve_new allows. */
+void uz_reserve_expect(uz_reserve *reserve, size_t bytes);
 /* An uninitialized block, on a huge page boundary; NULL: no memory. */
 void *uz_reserve_take(uz_reserve *reserve, size_t bytes);
 /* Of a block that was taken; 0: it was not. */

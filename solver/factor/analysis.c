@@ -57,6 +57,7 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
         free(analysis);
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     }
+    uz_expect_factor(K);
     cholmod_sparse A;
     memset(&A, 0, sizeof A);
     A.nrow = (size_t)K->rows;

@@ -38,6 +38,9 @@ struct uz_factor_workspace {
 /* Starts a CHOLMOD workspace that never prints, never aborts and gives LL' supernodal factors with 64-bit integers. */
 bool uz_cholmod_start(cholmod_common *common);
 
+/* Memory for a factor of K is made ready while K is analysed. */
+void uz_expect_factor(const uz_csc *K);
+
 /* A dense matrix over an array, column-major. */
 cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns);
 

@@ -1,5 +1,5 @@
 /* memory.c: where CHOLMOD gets its memory. */
-#include "factor/factor.h"
+#include "factor/factor_private.h"
 
 #include "core/alloc.h"
 #include "core/reserve.h"
@@ -9,6 +9,9 @@
 #include <suitesparse/SuiteSparse_config.h>
 
 static uz_reserve *reserve; /* set once, before threads start: CHOLMOD's hooks, which are as global, have no context */
+
+/* What factors of plane bodies of some 100,000 dofs have at least, in units of K's entries; solids have more. */
+#define FILL_IN 4
 
 static void *allocate(size_t bytes)
 {
@@ -45,6 +48,13 @@ static void *resize(void *block, size_t bytes)
         release(block);
     }
     return moved;
+}
+
+void uz_expect_factor(const uz_csc *K)
+{
+    const size_t bytes = 8 * FILL_IN * (size_t)K->ptr[K->cols];
+    if (reserve && bytes >= UZ_HUGE_LEAST)
+        uz_reserve_expect(reserve, bytes);
 }
 
 void uz_factor_use_huge_pages(void)

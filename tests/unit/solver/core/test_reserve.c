@@ -6,7 +6,9 @@
 #include "sanitized.h"
 
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
+#include <time.h>
 
 #define MB ((size_t)1 << 20)
 
@@ -79,6 +81,44 @@ TEST(no_more_is_kept_than_allowed)
     CHECK(uz_reserve_bytes(reserve) == 10 * MB); /* as much as the largest took */
     CHECK(uz_reserve_take(reserve, SIZE_MAX) == NULL && uz_reserve_take(reserve, PTRDIFF_MAX) == NULL);
     CHECK(uz_reserve_give(reserve, a));
+    uz_reserve_free(reserve);
+}
+
+static bool is_there(void *at, size_t bytes)
+{
+    unsigned char pages[8192];
+    bool all = bytes / 4096 <= sizeof pages && mincore(at, bytes, pages) == 0;
+    for (size_t k = 0; all && k < bytes / 4096; k++)
+        all = pages[k] & 1;
+    return all;
+}
+
+/* Within so many tenths of a second. */
+enum { PATIENCE = 100 };
+
+TEST(pages_are_there_before_they_are_touched)
+{
+    const struct timespec tenth = {.tv_nsec = 100000000};
+    uz_reserve *reserve = uz_reserve_new(64 * MB, 12 * MB);
+    uz_reserve_expect(reserve, 10 * MB);
+    for (int k = 0; k < PATIENCE && uz_reserve_bytes(reserve) < 10 * MB; k++)
+        nanosleep(&tenth, NULL);
+    CHECK(uz_reserve_bytes(reserve) == 10 * MB);
+    uz_reserve_expect(reserve, 40 * MB); /* no more than `ready` */
+    for (int k = 0; k < PATIENCE && uz_reserve_bytes(reserve) < 12 * MB; k++)
+        nanosleep(&tenth, NULL);
+    CHECK(uz_reserve_bytes(reserve) == 12 * MB);
+    unsigned char *a = uz_reserve_take(reserve, 30 * MB); /* 18 of them fresh */
+    write_all(a, MB, 1);
+    for (int k = 0; k < PATIENCE && !is_there(a, 30 * MB); k++)
+        nanosleep(&tenth, NULL);
+    CHECK(is_there(a, 30 * MB) && has_only(a, MB, 1));
+    CHECK(uz_reserve_give(reserve, a) && uz_reserve_bytes(reserve) == 30 * MB);
+    for (int k = 0; k < 20; k++) { /* gone before anybody has touched it */
+        a = uz_reserve_take(reserve, 48 * MB);
+        CHECK(uz_reserve_give(reserve, a));
+        uz_reserve_empty(reserve);
+    }
     uz_reserve_free(reserve);
 }
 
