@@ -69,7 +69,7 @@ static void keep_reserve(work *w, idle_watch *idle)
     void *block = NULL;
     if (known && heap.fordblks > HEAP_FREE + (large ? 4 * share : 0))
         malloc_trim(0);
-    else if (known && heap.fordblks < least && posix_memalign(&block, HUGE_PAGE, least) == 0) {
+    else if (known && heap.fordblks < least / 2 && posix_memalign(&block, HUGE_PAGE, least) == 0) {
         madvise(block, least, MADV_HUGEPAGE);
         for (size_t at = 0; at < least; at += SMALL_PAGE)
             ((volatile char *)block)[at] = 0;
