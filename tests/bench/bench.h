@@ -23,7 +23,7 @@ typedef struct {
 } bench_linear;
 typedef enum { BENCH_AMD, BENCH_METIS } bench_ordering;
 bench_linear bench_cholmod(const uz_csc *K, const double *p, bench_ordering ordering);
-/* The one whose solve is the faster, by the best of three runs of each. */
+/* The one whose solve takes less of the processor, by the best of three runs of each. */
 bench_ordering bench_better_ordering(const uz_csc *K, const double *p);
 
 /* Seconds that Ipopt takes to minimize *value = 1/2 u'Ku - p'u over lower <= u <= upper (d each), from the given u.
