@@ -132,7 +132,7 @@ double uz_bound_noise(double spread, double sum)
 
 double uz_bound_enlarge(double square, double doubt, double noise)
 {
-    const double norm = doubt < MOST_DOUBT ? sqrt(square) / sqrt(1.0 - doubt) + noise : INFINITY;
+    const double norm = doubt < MOST_DOUBT ? (sqrt(square) + noise) / sqrt(1.0 - doubt) : INFINITY;
     return norm * norm;
 }
 

@@ -40,7 +40,7 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
                        const double *h, int64_t m);
 
 /* e'K^-1 e, enlarged by what the rounding of the factor (relative part `doubt`) and of double-double sums (see
- * uz_bound_noise) may hide of it. */
+ * uz_bound_noise; by the factor's inverse) may hide of it. */
 double uz_bound_enlarge(double square, double doubt, double noise);
 
 /* How much the factor's rounding may falsify e'K^-1 e, relative, where the inverse of diag(K)^-1/2 K diag(K)^-1/2 has

@@ -80,29 +80,31 @@ static void release(certifier *c)
     uz_feasible_clear(&c->feasible);
 }
 
-/* How far estimates of the inverse's norm, from single vectors that rounding made, may be below it. */
+/* How far an estimate of the inverse's norm, from single vectors that rounding made, may be below it. */
 #define SURELY 1e3
 
-/* (1 - doubt) e'K^-1 e <= ||S^-1 e||^2 for any doubt below 1 (distrust.h), and the estimate of the inverse from which
- * it follows falls short, if at all, whatever its size: a doubt of this much is as safe as a small one. It is only
- * dearer, and the bound that pays for it may be as sharp as was asked for nevertheless. */
+/* (1 - doubt) e'K^-1 e <= ||S^-1 e||^2 for any doubt below 1 (distrust.h), and the bound on the inverse from which it
+ * follows holds whatever its size: a doubt of this much is as safe as a small one. It is only dearer, and the bound
+ * that pays for it may be as sharp as was asked for nevertheless. */
 #define AFFORDABLE 0.5
 
 uz_status uz_certify_distance(double *square, const uz_certify_input *in, double *e, int64_t d, double weighted,
                               double energy, double noise, uz_error *err)
 {
     const double harmless = in->sharp * in->sharp * (in->moved ? in->whole_norm * in->whole_norm : energy);
-    double inverse = in->inverse_bound, doubt = 0.0;
+    double inverse = in->inverse_bound, doubt = uz_bound_doubt(inverse, d);
     uz_status status = UZ_OK;
-    *square = inverse * weighted; /* where the norm of K^-1 is known, and good enough */
-    if (!isfinite(inverse) || !(*square <= harmless)) {
+    *square = inverse * weighted;
+    if (!in->spares || !(doubt <= UZ_BOUND_HARMLESS) || !(*square <= harmless)) {
         status = in->inverse_norm(in->ctx, square, e, err);
-        /* a residual is rounding, in all directions alike: e'K^-1 e / e'W e is the mean of d eigenvalues */
-        const double seen =
-            fmax(1.0 / fmax(in->rcond, DBL_MIN), weighted > 0.0 ? (double)d * (*square / weighted) : 0.0);
-        inverse = fmin(inverse, SURELY * seen);
-        /* Without a factor the solve is one of conjugate gradients, whose rounding is that of products with K. */
-        doubt = uz_bound_doubt(in->measure_doubt ? inverse : seen, d);
+        if (!in->measure_doubt) {
+            /* The solve is one of conjugate gradients, whose rounding is that of products with K. A residual is
+             * rounding, in all directions alike: e'K^-1 e / e'W e is the mean of d eigenvalues. */
+            const double seen =
+                fmax(1.0 / fmax(in->rcond, DBL_MIN), weighted > 0.0 ? (double)d * (*square / weighted) : 0.0);
+            inverse = SURELY * seen;
+            doubt = uz_bound_doubt(seen, d);
+        }
         const bool small = doubt <= UZ_BOUND_HARMLESS || (doubt <= AFFORDABLE && *square / (1.0 - doubt) <= harmless);
         if (status == UZ_OK && in->measure_doubt && !small)
             status = in->measure_doubt(in->ctx, &doubt, err);

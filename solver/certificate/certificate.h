@@ -24,19 +24,22 @@ typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, double *e, uz_err
 /* *doubt: how much the factorization's rounding may falsify that, relative (uz_distrust). */
 typedef uz_status (*uz_measure_doubt)(void *ctx, double *doubt, uz_error *err);
 
+/* From so many dofs on it is worth sparing. */
+enum { UZ_CERTIFY_SPARES = 20000 };
+
 typedef struct {
     const uz_csc *K, *N; /* lower triangle; m x d */
     const double *p, *h;
     uz_inverse_norm inverse_norm;
-    uz_measure_doubt
-        measure_doubt; /* asked where rcond says that it may matter to what is sharp; NULL: inverse_norm is a bound */
-    void *ctx;         /* of both */
-    double rcond;      /* an estimate of the least eigenvalue of K, scaled by its diagonal */
-    double inverse_bound; /* e'K^-1 e <= inverse_bound sum e_j^2 / K_jj; INFINITY: unknown. Spares inverse_norm where it
-                             is sharp enough: */
+    uz_measure_doubt measure_doubt; /* asked where inverse_bound says that it may matter to what is sharp; NULL: there
+                                       is no factor */
+    void *ctx;                      /* of both */
+    double rcond;         /* without a factor: an estimate of the least eigenvalue of K, scaled by its diagonal */
+    double inverse_bound; /* with one: what inverse_norm gives is at most so many times the sum of e_j^2 / K_jj */
+    bool spares;          /* that takes the place of inverse_norm where it is sharp enough: */
+    double sharp;         /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
     bool moved;           /* supports move the body; relative errors are then beside */
     double whole_norm;    /* ||u||_K with the supported dofs */
-    double sharp;         /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
 } uz_certify_input;
 
 /* u (d): the answer to certify. r (m): <= 0, else its positive part counts as e3 and r is cut at 0; where rows depend

@@ -27,8 +27,9 @@ typedef struct {
 } sums;
 
 struct uz_lane_certifier {
+    uz_certify_input in;
+    uz_inverse_norms inverse_norms;
     const uz_csc *K, *N;
-    double inverse_bound;
     double steepest;      /* the largest |N_ij| */
     double *weight;       /* d */
     int64_t n_b;          /* dofs that N touches */
@@ -43,6 +44,7 @@ struct uz_lane_certifier {
     double *Kc;           /* d x WIDTH; rows that no contact dof couples to stay 0 */
     double *r;            /* m x WIDTH */
     double *hi, *lo;      /* d x WIDTH: zero between calls */
+    double *E;            /* d x WIDTH: residuals; NULL where no solve asks for them */
     sums sum[HALVES];
 };
 
@@ -113,19 +115,22 @@ static bool allocate(uz_lane_certifier *c)
     c->Kc = uz_alloc_zero(d, WIDTH * sizeof(double));
     c->hi = uz_alloc_zero(d, WIDTH * sizeof(double));
     c->lo = uz_alloc_zero(d, WIDTH * sizeof(double));
-    return c->weight && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo;
+    c->E = c->in.spares ? NULL : uz_alloc(d, WIDTH * sizeof(double));
+    return c->weight && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo && (c->E || c->in.spares);
 }
 
-uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, const uz_csc *N, double inverse_bound,
+uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_certify_input *in, uz_inverse_norms inverse_norms,
                                    uz_error *err)
 {
+    const uz_csc *K = in->K, *N = in->N;
     *out = NULL;
     uz_lane_certifier *c = uz_alloc_zero(1, sizeof *c);
     if (!c)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify");
+    c->in = *in;
+    c->inverse_norms = inverse_norms;
     c->K = K;
     c->N = N;
-    c->inverse_bound = inverse_bound;
     bool ok = allocate(c);
     uz_status status = UZ_OK;
     if (ok) {
@@ -163,6 +168,7 @@ void uz_lane_certifier_free(uz_lane_certifier *c)
     free(c->r);
     free(c->hi);
     free(c->lo);
+    free(c->E);
     free(c);
 }
 
@@ -227,6 +233,8 @@ static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *
     }
     const lanes e_u = *hi + *lo;
     const lanes e = e_u + Kc;
+    if (c->E)
+        ((lanes *)c->E)[j * HALVES + half] = e;
     s->stiffness += *u * Ku;
     const lanes load = *u * *p, work = *u * e_u, sum = s->load + load, back = sum - s->load;
     lanes error = {0.0};
@@ -336,15 +344,41 @@ static bool within_range(double sizes, double residuals, double force)
     return plain && sizes < 1e130 && residuals < 1e130 && (force == 0.0 || (force > 1e-260 && force < 1e260));
 }
 
-static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *a, bool feasible, double pressed,
-                          uz_bound_terms *terms)
+/* What uz_certify_distance asks of a lane: squares of the lanes come from one solve. */
+typedef struct {
+    const uz_lane_certifier *c;
+    double square; /* INFINITY: unknown */
+} lane_solve;
+
+static uz_status lane_norm(void *ctx, double *value, double *e, uz_error *err)
+{
+    (void)e, (void)err;
+    *value = ((lane_solve *)ctx)->square;
+    return *value < INFINITY ? UZ_OK : UZ_ERR_CANCELLED;
+}
+
+static uz_status lane_doubt(void *ctx, double *doubt, uz_error *err)
+{
+    const uz_certify_input *in = &((lane_solve *)ctx)->c->in;
+    return in->measure_doubt(in->ctx, doubt, err);
+}
+
+static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *a, bool feasible, double solved,
+                          double pressed, uz_bound_terms *terms)
 {
     const sums *s = &c->sum[lane / 4];
     const int l = lane % 4;
-    const double square = c->inverse_bound * s->weighted[l];
-    const double energy = a->moved ? a->whole_norm * a->whole_norm : s->stiffness[l];
-    bool sharp = square <= a->sharp * a->sharp * energy;
-    if (!feasible || !sharp || !within_range(s->sizes[l], s->residuals[l], s->force[l]))
+    lane_solve solve = {c, solved};
+    uz_certify_input in = c->in;
+    in.inverse_norm = lane_norm;
+    in.measure_doubt = lane_doubt;
+    in.ctx = &solve;
+    in.sharp = a->sharp;
+    in.moved = a->moved;
+    in.whole_norm = a->whole_norm;
+    if (!feasible || !within_range(s->sizes[l], s->residuals[l], s->force[l]) ||
+        uz_certify_distance(&terms->square, &in, NULL, c->K->cols, s->weighted[l], s->stiffness[l], s->noise[l],
+                            NULL) != UZ_OK)
         return;
     terms->moved = a->moved;
     terms->whole_norm = a->whole_norm;
@@ -361,7 +395,6 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     terms->force = sqrt(s->force[l]);
     terms->span = c->steepest * s->largest[l];
     terms->anything = s->sizes[l] > 0.0;
-    terms->square = uz_bound_enlarge(square, 0.0, uz_bound_noise(c->inverse_bound, s->noise[l]));
     memset(&a->certificate, 0, sizeof a->certificate);
     uz_bound_conclude(&a->certificate, terms, feasible, a->r, a->g, a->h, c->feasible.m);
     a->certified = true;
@@ -371,13 +404,14 @@ void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, 
 {
     uz_bound_terms terms[WIDTH] = {{0}};
     bool feasible[WIDTH] = {false};
-    double pressed[WIDTH] = {0.0};
+    double pressed[WIDTH] = {0.0}, squares[WIDTH];
     for (int l = 0; l < count; l++) {
         terms[l].positive_part = uz_cut_reactions(answers[l].r, c->feasible.m);
         answers[l].certified = false;
         feasible[l] = prepare_lane(c, l, &answers[l], U, &pressed[l], &terms[l]);
     }
     run_pass(c, U, P);
+    const bool solved = c->E && c->inverse_norms(c->in.ctx, squares, c->E, NULL) == UZ_OK;
     for (int l = 0; l < count; l++)
-        conclude_lane(c, l, &answers[l], feasible[l], pressed[l], &terms[l]);
+        conclude_lane(c, l, &answers[l], feasible[l], solved ? squares[l] : INFINITY, pressed[l], &terms[l]);
 }

@@ -94,35 +94,6 @@ static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *c
  * move, rounding was seen to leave up to half of n eps. */
 #define RCOND_LEAST DBL_EPSILON
 
-/* The pivots alone may be short by any factor (Kahan's matrix). For H = diag(K)^-1/2 K diag(K)^-1/2 and a random x the
- * quotient x'H^-2 x / x'H^-1 x is below the largest eigenvalue of H^-1, and close to it where that stands out (Dixon,
- * SIAM J. Numer. Anal. 20 (1983)). One linear solve, once per factor. */
-static uz_status estimate_condition(uz_factor *factor, const uz_csc *K, uz_error *err)
-{
-    const int64_t n = factor->n;
-    const SuiteSparse_long *perm = factor->L.Perm;
-    uint64_t state = 0x9E3779B97F4A7C15u;
-    double square = 0.0, weighted = 0.0, *y = uz_alloc(n, sizeof *y);
-    uz_factor_workspace *ws = uz_factor_workspace_new();
-    uz_status status =
-        y && ws ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
-    for (int64_t k = 0; status == UZ_OK && k < n; k++)
-        y[k] = sqrt(K->val[K->ptr[perm[k]]]) * (uz_uniform(&state) - 0.5);
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(factor, ws, y, true, err);
-    for (int64_t k = 0; status == UZ_OK && k < n; k++)
-        square += y[k] * y[k];
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(factor, ws, y, false, err);
-    for (int64_t k = 0; status == UZ_OK && k < n; k++)
-        weighted += K->val[K->ptr[perm[k]]] * y[k] * y[k];
-    if (square / weighted < factor->info.rcond) /* false for NaN, as powers far out of range make it */
-        factor->info.rcond = square / weighted;
-    uz_factor_workspace_free(ws);
-    free(y);
-    return status;
-}
-
 static uz_status describe(uz_factor *factor, const uz_csc *K, uz_error *err)
 {
     uz_factor_info *info = &factor->info;
@@ -146,7 +117,8 @@ static uz_status describe(uz_factor *factor, const uz_csc *K, uz_error *err)
                        "K is singular to working precision (reciprocal condition %.2g): the body can move without "
                        "resistance, or its stiffnesses differ by more than double precision can hold",
                        info->rcond);
-    return estimate_condition(factor, K, err);
+    /* The pivots alone may be short by any factor (Kahan's matrix). */
+    return uz_bound_inverse(factor, K, err);
 }
 
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,

@@ -28,7 +28,10 @@ typedef struct {
     uz_order_choice considered[UZ_CHOICES]; /* n_considered; the used one among them */
     int n_considered;
     size_t bytes;
-    double rcond;   /* an estimate of the least eigenvalue of K after diagonal scaling, rather too large; kept with L */
+    double rcond; /* an estimate of the least eigenvalue of K after diagonal scaling, rather too large; kept with L */
+    /* At least lambda_max(D^1/2 (L L')^-1 D^1/2), D = diag(K), but for a probability below 1e-12, and seldom more than
+     * 50 times that; so ||L^-1 P e||^2 is at most so many times the sum of e_j^2 / K_jj. INFINITY: unknown. */
+    double inverse_bound;
     double order_s; /* what the analysis took, whoever waited for it */
     double factor_s;
 } uz_factor_info;
@@ -43,7 +46,7 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
                              uz_ordering ordering, const uz_hooks *hooks, uz_error *err);
 void uz_analysis_free(uz_analysis *analysis);
 size_t uz_analysis_bytes(const uz_analysis *analysis);
-/* What a factor made from it will be: everything but rcond and factor_s. */
+/* What a factor made from it will be: everything but rcond, inverse_bound and factor_s. */
 uz_factor_info uz_analysis_describe(const uz_analysis *analysis);
 
 /* Factors K (lower triangle, n x n), whose pattern must be the one that was analysed. memory_limit 0: none. `cancelled`
@@ -81,16 +84,6 @@ enum { UZ_LANES = 8 };
 void uz_factor_permute_lanes(const uz_factor *factor, double *permuted, const double *X);
 void uz_factor_unpermute_lanes(const uz_factor *factor, double *X, const double *permuted);
 uz_status uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err);
-
-/* Vectors from which the norm of K^-1 is bounded; NULL: no memory. */
-typedef struct uz_norm_estimate uz_norm_estimate;
-uz_norm_estimate *uz_norm_estimate_new(const uz_factor *factor);
-void uz_norm_estimate_free(uz_norm_estimate *norm); /* NULL is fine */
-/* *bound >= lambda_max(D_K^1/2 K^-1 D_K^1/2) with D_K = diag(K), except with a probability below 1e-12; so e'K^-1 e is
- * at most *bound times the sum of e_j^2 / K_jj. Each step takes about a linear solve and sharpens the bound, which the
- * first leaves far too large; done: there is little more to win. */
-uz_status uz_norm_estimate_step(double *bound, bool *done, uz_norm_estimate *norm, const uz_factor *factor,
-                                uz_factor_workspace *ws, const uz_csc *K, uz_error *err);
 
 /* Where dof i stands in the factor's order: position[i], n. */
 const int64_t *uz_factor_position(const uz_factor *factor);

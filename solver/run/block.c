@@ -21,6 +21,7 @@
 _Static_assert((int)UZ_LANES == (int)UZ_CERTIFY_LANES, "what comes out of the factor is certified as it lies");
 
 struct uz_block {
+    uz_setup *setup;
     const uz_csc *K;
     int64_t d, width;
     uz_dual_block *loads;
@@ -29,15 +30,34 @@ struct uz_block {
     uz_dual_load **cases; /* width: those of the runs */
     const double **r;     /* width: scaled reactions to recover from */
     bool *corrected;      /* width */
+    double *permuted;     /* d x UZ_LANES, or NULL: no certificate takes a solve */
 };
+
+static uz_status measure_doubt(void *ctx, double *doubt, uz_error *err)
+{
+    uz_block *block = ctx;
+    return uz_setup_doubt(block->setup, doubt, block->K, NULL, err);
+}
+
+static uz_status inverse_norms(void *ctx, double squares[UZ_LANES], double *E, uz_error *err)
+{
+    uz_block *block = ctx;
+    uz_factor_permute_lanes(block->setup->factor, block->permuted, E);
+    uz_status status = uz_factor_solve_lanes(block->setup->factor, block->permuted, 1, true, err);
+    for (int64_t l = 0; l < UZ_LANES; l++)
+        squares[l] = 0.0;
+    for (int64_t k = 0; k < block->d * UZ_LANES; k++)
+        squares[k % UZ_LANES] += block->permuted[k] * block->permuted[k];
+    return status;
+}
 
 uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *problem, int64_t blocks, uz_error *err)
 {
-    uz_factor_workspace *ws = NULL;
     *out = NULL;
     uz_block *block = uz_alloc_zero(1, sizeof *block);
     if (!block)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+    block->setup = setup;
     block->K = uz_setup_K(setup, problem);
     block->d = block->K->cols;
     block->width = blocks * UZ_LANES;
@@ -50,12 +70,16 @@ uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *pro
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     if (status == UZ_OK)
         status = uz_dual_block_create(&block->loads, setup->dual, blocks, err);
-    if (status == UZ_OK && !(ws = uz_factor_workspace_new()))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a linear solve");
-    if (status == UZ_OK) /* without a finite bound on K^-1 no lane can be certified; the loads then are one by one */
-        status = uz_lane_certifier_create(&block->certifier, block->K, uz_setup_N(setup, problem),
-                                          uz_setup_inverse_bound(setup, UZ_ALL_STEPS, block->K, ws, NULL), err);
-    uz_factor_workspace_free(ws);
+    const uz_certify_input in = {.K = block->K,
+                                 .N = uz_setup_N(setup, problem),
+                                 .measure_doubt = measure_doubt,
+                                 .ctx = block,
+                                 .inverse_bound = uz_factor_describe(setup->factor).inverse_bound,
+                                 .spares = block->d >= UZ_CERTIFY_SPARES};
+    if (status == UZ_OK && !in.spares && !(block->permuted = uz_alloc(block->d * UZ_LANES, sizeof(double))))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+    if (status == UZ_OK)
+        status = uz_lane_certifier_create(&block->certifier, &in, inverse_norms, err);
     if (status == UZ_OK)
         *out = block;
     else
@@ -73,6 +97,7 @@ void uz_block_free(uz_block *block)
     free(block->cases);
     free(block->r);
     free(block->corrected);
+    free(block->permuted);
     free(block);
 }
 

@@ -72,20 +72,12 @@ uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz
     return run->load.moved ? uz_whole_norm(norm, &run->asked->setup->model, u, run->load.prescribed, err) : UZ_OK;
 }
 
-/* From so many dofs on a half solve is worth sparing, and the certificate of a load depends on how many came before it.
- * On smaller bodies it is the same whatever the cache knows. */
-enum { SPARES_HALF_SOLVES = 20000 };
-
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_answer *answer, uz_error *err)
 {
     const uz_request *asked = run->asked;
     uz_setup *setup = asked->setup;
     const uz_csc *K = uz_setup_K(setup, asked->problem);
-    const uz_stop stop = {asked->hooks, asked->deadline};
-    const bool all_rows = answer->m == run->all, at_once = run->work.with_norm || asked->problem->n_cases > 1;
-    const bool with_norm = setup->factor && (at_once || run->d >= SPARES_HALF_SOLVES);
-    const int steps = at_once ? UZ_ALL_STEPS : asked->serves_many && !run->work.normed;
-    run->work.normed = true;
+    const bool all_rows = answer->m == run->all;
     double whole_norm = 0.0;
     uz_status status = need_workspace(run, err);
     if (status == UZ_OK)
@@ -101,7 +93,8 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .measure_doubt = setup->factor ? measure_doubt : NULL,
         .ctx = run,
         .rcond = run->result->summary.rcond,
-        .inverse_bound = with_norm ? uz_setup_inverse_bound(setup, steps, K, run->work.ws, &stop) : INFINITY,
+        .inverse_bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY,
+        .spares = run->d >= UZ_CERTIFY_SPARES,
         .moved = run->load.moved,
         .whole_norm = whole_norm,
         .sharp = 0.5 * run->work.requested,

@@ -175,7 +175,6 @@ static uz_request request_of(const batch *b, int64_t place, bool in_block)
         .start = b->starts ? b->starts[i] : NULL,
         .setup = b->setup,
         .reused = reused,
-        .serves_many = reused.op || b->n > 1,
         .in_block = in_block,
         .started = place == 0 ? b->round_started : uz_seconds(),
         .deadline = b->started + b->settings->time_limit_s,

@@ -311,17 +311,6 @@ uz_status uz_run_finish(uz_run *run, uz_error *err)
         run->result->summary.infeasible_radius = run->work.reach;
         run->work.far = NULL;
     }
-    /* With the norm of K^-1 certificates take less off for rounding, and loads of a body that served many others have
-     * it: what they reach, every one does, whether others came before or not. */
-    const double error = run->answer.certificate.relative_error;
-    if (status == UZ_OK && run->asked->setup->factor && run->work.end != UZ_END_TIME &&
-        run->work.end != UZ_END_CANCELLED && error > run->work.requested && isfinite(error)) {
-        const uz_certificate before_norm = run->answer.certificate;
-        run->work.with_norm = true;
-        status = uz_run_certify_answer(run, &run->answer, err);
-        if (run->answer.certificate.relative_error > before_norm.relative_error)
-            run->answer.certificate = before_norm;
-    }
     run->result->summary.certificate = run->answer.certificate;
     if (status == UZ_OK)
         status = uz_run_certify_all_rows(run, err);

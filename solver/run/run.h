@@ -21,7 +21,6 @@ typedef struct {
     const uz_state *start;    /* NULL: from r = 0 */
     uz_setup *setup;          /* borrowed; only its mutex and what that guards change */
     uz_reuse reused;          /* what of it was there before */
-    bool serves_many;         /* it serves more than this load: what makes certificates cheaper pays */
     bool in_block;            /* other loads begin before this one ends */
     double started, deadline; /* uz_seconds() */
 } uz_request;
@@ -47,8 +46,6 @@ typedef struct {
     double requested; /* relative error that the certificate must meet */
     double target;    /* relative error at which the method returns */
     bool again;       /* the method's target was met, the certificate was not */
-    bool with_norm;   /* certificates may use the norm of K^-1, as those of a body that serves many loads */
-    bool normed;      /* this run has done its part of that norm */
     double *far;      /* m, or NULL: a ray that is no proof, and how large every feasible u is by it */
     double reach;
     uz_end end;

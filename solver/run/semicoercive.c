@@ -239,9 +239,8 @@ static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
     uz_reuse reused;
     bool single = true;
     double sum = 0.0, rows = 0.0, *noise = uz_alloc_zero(s->d, sizeof *noise);
-    uz_factor_workspace *ws = uz_factor_workspace_new();
     uz_status status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
-    if (status == UZ_OK && (!noise || !ws))
+    if (status == UZ_OK && !noise)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)s->d);
     if (status == UZ_OK)
         uz_augmented_noise(noise, &augmented, &s->Nt, s->weight, s->target, s->last->u);
@@ -257,12 +256,11 @@ static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
     if (setup) {
         for (int64_t j = 0; j < s->d; j++)
             sum += noise[j] > 0.0 ? noise[j] / augmented.qp.K.val[augmented.qp.K.ptr[j]] * noise[j] : 0.0;
-        rows = sum > 0.0 ? uz_setup_inverse_bound(setup, UZ_ALL_STEPS, &augmented.qp.K, ws, NULL) * sum : 0.0;
+        rows = sum > 0.0 ? uz_setup_inverse_bound(setup, &augmented.qp.K, NULL) * sum : 0.0;
     }
     *bound = sqrt(rows);
     uz_setup_release(s->cache, setup);
     uz_augmented_clear(&augmented);
-    uz_factor_workspace_free(ws);
     free(noise);
     return status;
 }
@@ -274,11 +272,7 @@ static uz_status bound_inverse(const uz_semi *s, double *bound, uz_error *err)
     uz_problem augmented;
     uz_setup *setup = NULL;
     uz_reuse reused;
-    uz_factor_workspace *ws = uz_factor_workspace_new();
-    uz_status status = ws ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify");
-    memset(&augmented, 0, sizeof augmented);
-    if (status == UZ_OK)
-        status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
+    uz_status status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
     if (status == UZ_OK)
         status = uz_setup_acquire(&setup, &reused, s->cache, &augmented, NULL, s->settings, s->hooks, err);
     if (status == UZ_OK) {
@@ -286,11 +280,10 @@ static uz_status bound_inverse(const uz_semi *s, double *bound, uz_error *err)
         const uz_csc *K = &augmented.qp.K;
         for (int64_t j = 0; j < s->d; j++)
             most = fmax(most, 1.0 / (s->inverse[j] * K->val[K->ptr[j]]));
-        *bound = most * uz_setup_inverse_bound(setup, UZ_ALL_STEPS, K, ws, NULL);
+        *bound = most * uz_setup_inverse_bound(setup, K, NULL);
     }
     uz_setup_release(s->cache, setup);
     uz_augmented_clear(&augmented);
-    uz_factor_workspace_free(ws);
     return status;
 }
 

@@ -162,7 +162,6 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
     if (!setup)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
     pthread_mutex_init(&setup->mutex, NULL);
-    setup->inverse_bound = INFINITY;
     setup->doubt = NAN;
     setup->is_scene = problem->kind == UZ_PROBLEM_SCENE;
     if (setup->is_scene)
@@ -208,8 +207,6 @@ uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *proble
     setup->base = base;
     setup->is_scene = true;
     pthread_mutex_lock(&base->mutex); /* what is known of K */
-    setup->inverse_bound = base->inverse_bound;
-    setup->bound_known = base->bound_known;
     setup->doubt = base->doubt;
     pthread_mutex_unlock(&base->mutex);
     uz_status status = uz_body_model_move(&setup->model, &base->model, &problem->scene, err);
@@ -258,71 +255,35 @@ static uz_status half_solve(void *ctx, double *X, int64_t columns, bool transpos
     return status;
 }
 
-/* Under the mutex. */
-static uz_status know_doubt(uz_setup *setup, const uz_csc *K, const uz_stop *stop, uz_error *err)
-{
-    double norm;
-    if (!isnan(setup->doubt))
-        return UZ_OK;
-    half_solver solver = {setup->factor, K->cols, uz_alloc_zero(K->cols * UZ_LANES, sizeof(double))};
-    uz_status status = solver.room
-                           ? uz_distrust(&norm, K, half_solve, &solver, stop, err)
-                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)K->cols);
-    if (status == UZ_OK)
-        setup->doubt = norm;
-    free(solver.room);
-    return status;
-}
-
 uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, const uz_stop *stop, uz_error *err)
 {
+    uz_status status = UZ_OK;
     *doubt = INFINITY;
     if (!uz_lock_while(&setup->mutex, stop))
         return UZ_OK; /* who asks finds that it has to stop */
-    uz_status status = know_doubt(setup, K, stop, err);
+    if (isnan(setup->doubt)) {
+        half_solver solver = {setup->factor, K->cols, uz_alloc_zero(K->cols * UZ_LANES, sizeof(double))};
+        double norm = NAN;
+        status = solver.room ? uz_distrust(&norm, K, half_solve, &solver, stop, err)
+                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)K->cols);
+        if (status == UZ_OK)
+            setup->doubt = norm;
+        free(solver.room);
+    }
     if (status == UZ_OK)
         *doubt = setup->doubt;
     pthread_mutex_unlock(&setup->mutex);
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 
-/* One step nearer to the bound, under the mutex. A doubt that would have to be measured waits for the last one. */
-static uz_status improve_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
-                               uz_error *err)
+double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, const uz_stop *stop)
 {
-    double bound;
-    bool done = false;
-    if (!setup->norm && !(setup->norm = uz_norm_estimate_new(setup->factor)))
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to bound the inverse of %lld dofs", (long long)K->cols);
-    uz_status status = uz_norm_estimate_step(&bound, &done, setup->norm, setup->factor, ws, K, err);
-    if (status != UZ_OK)
-        return status;
-    double doubt = uz_bound_doubt(bound, K->cols); /* that of the factor; K's may be so much larger */
-    if (done && !(doubt <= UZ_BOUND_HARMLESS)) {
-        status = know_doubt(setup, K, stop, err);
-        doubt = status == UZ_OK ? setup->doubt : INFINITY;
-    }
-    if (status != UZ_ERR_CANCELLED)
-        setup->inverse_bound = doubt <= UZ_BOUND_HARMLESS || (done && doubt < 1.0) ? bound / (1.0 - doubt) : INFINITY;
-    if (done && status != UZ_ERR_CANCELLED) {
-        setup->bound_known = true;
-        uz_norm_estimate_free(setup->norm);
-        setup->norm = NULL;
-    }
-    return status;
-}
-
-double uz_setup_inverse_bound(uz_setup *setup, int steps, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop)
-{
+    const double bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY;
+    double doubt = uz_bound_doubt(bound, K->cols);
     uz_error ignored = {0};
-    if (!uz_lock_while(&setup->mutex, stop))
-        return INFINITY;
-    for (; steps > 0 && !setup->bound_known && !uz_stop_is_due(stop); steps--)
-        if (improve_bound(setup, K, ws, stop, &ignored) != UZ_OK)
-            break;
-    const double bound = setup->inverse_bound;
-    pthread_mutex_unlock(&setup->mutex);
-    return bound;
+    if (isfinite(bound) && doubt > UZ_BOUND_HARMLESS && uz_setup_doubt(setup, &doubt, K, stop, &ignored) != UZ_OK)
+        doubt = INFINITY;
+    return doubt < 1.0 ? bound / (1.0 - doubt) : INFINITY;
 }
 
 void uz_setup_free(uz_setup *setup)
@@ -330,7 +291,6 @@ void uz_setup_free(uz_setup *setup)
     if (!setup)
         return;
     pthread_mutex_destroy(&setup->mutex);
-    uz_norm_estimate_free(setup->norm);
     uz_dual_free(setup->dual);
     uz_shared_factor_release(&setup->shared);
     if (!setup->base)

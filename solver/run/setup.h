@@ -25,11 +25,8 @@ typedef struct uz_setup {
     const uz_factor *factor; /* shared.factor; NULL: matrix_free */
     uz_amg *amg;             /* matrix_free, else NULL */
     uz_dual *dual;
-    pthread_mutex_t mutex;  /* guards what follows, down to doubt */
-    uz_norm_estimate *norm; /* while a bound is made */
-    double inverse_bound;   /* as good as it is known; INFINITY: not at all */
-    bool bound_known;       /* as well as it will be */
-    double doubt;           /* NaN until somebody asks */
+    pthread_mutex_t mutex; /* guards doubt */
+    double doubt;          /* NaN until somebody asks */
     double assemble_s, condense_s;
     uz_cost_plan plan; /* which form of the operator, and why */
     uz_reuse reused;   /* when it was made */
@@ -65,13 +62,9 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
                                   const uz_hooks *hooks, uz_error *err);
 void uz_setup_free(uz_setup *setup);
 
-/* What certificates of a setup that serves many loads save by: the bound of uz_norm_estimate_step. `steps` of those
- * that are left are done first, each about a linear solve: one load after the other pays for one, so that none pays for
- * all and all are paid for only where so many came. INFINITY: nothing good enough is known yet; also where it had to
- * stop (stop NULL: never). */
-#define UZ_ALL_STEPS 1000
-double uz_setup_inverse_bound(uz_setup *setup, int steps, const uz_csc *K, uz_factor_workspace *ws,
-                              const uz_stop *stop);
+/* The factor's bound on its inverse as one on that of K: e'K^-1 e is at most so many times the sum of e_j^2 / K_jj.
+ * INFINITY: unknown, as the factor can't be trusted; also where it had to stop (stop NULL: never). */
+double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, const uz_stop *stop);
 /* How far its factor may be trusted: uz_distrust, made at the first call and kept with the setup. Only certificates of
  * bodies whose condition leaves doubts ask. UZ_ERR_NOT_SPD is not kept: nothing is solved on such a setup. */
 uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, const uz_stop *stop, uz_error *err);

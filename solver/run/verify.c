@@ -119,7 +119,6 @@ uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u,
     asked.started = uz_seconds();
     asked.deadline = asked.started + settings->time_limit_s;
     status = uz_setup_acquire(&asked.setup, &asked.reused, cache, problem, NULL, settings, hooks, err);
-    asked.serves_many = asked.reused.op;
     if (status == UZ_OK)
         status = uz_run_begin(&run, &asked, err);
     if (status == UZ_OK)

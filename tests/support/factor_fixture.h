@@ -18,19 +18,6 @@ static inline uz_status factor_by(uz_factor **out, const uz_csc *K, const int64_
     return status;
 }
 
-/* All steps of the bound on the norm of K^-1. */
-static inline uz_status whole_norm_estimate(double *bound, const uz_factor *factor, uz_factor_workspace *ws,
-                                            const uz_csc *K, uz_error *err)
-{
-    bool done = false;
-    uz_norm_estimate *norm = uz_norm_estimate_new(factor);
-    uz_status status = norm ? UZ_OK : UZ_ERR_MEMORY;
-    while (status == UZ_OK && !done)
-        status = uz_norm_estimate_step(bound, &done, norm, factor, ws, K, err);
-    uz_norm_estimate_free(norm);
-    return status;
-}
-
 /* The columns of N that have entries: dofs must have room for N->cols. Returns how many. */
 static inline int64_t dofs_touched(int64_t *dofs, const uz_csc *N)
 {
