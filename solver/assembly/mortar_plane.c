@@ -299,25 +299,42 @@ static int64_t edge_across(uz_mortar_pair *pair, int64_t i, const double x[2], c
     return behind >= 0 && to_behind < fmin(to_front, to_back) ? behind : front;
 }
 
-/* The Gauss points between a and b of edge i, which has edge k across. */
+/* Is an edge straight, with a node amid in the middle? Its shape functions are then polynomials of the place, and so
+ * along another edge. */
+static bool is_affine(const uz_mortar_side *e)
+{
+    double off = 0, size = 0;
+    for (int c = 0; c < 2 && e->nodes == 3; c++) {
+        off = fmax(off, fabs(e->xyz[4 + c] - 0.5 * (e->xyz[c] + e->xyz[2 + c])));
+        size = fmax(size, fabs(e->xyz[2 + c] - e->xyz[c]));
+    }
+    return off <= 1e-9 * size;
+}
+
+/* The Gauss points between a and b of edge i, which has edge k across: four for polynomials, else ten, which leave
+ * rounding unless a middle is nearly where the edge turns back. */
 static bool add_segment(uz_mortar_pair *pair, int64_t i, int64_t k, double a, double b)
 {
-    static const double AT[4] = {-0.86113631159405257522, -0.33998104358485626480, 0.33998104358485626480,
-                                 0.86113631159405257522};
-    static const double WEIGHT[4] = {0.34785484513745385737, 0.65214515486254614263, 0.65214515486254614263,
-                                     0.34785484513745385737};
+    static const double AT[2][5] = {{0.33998104358485626480, 0.86113631159405257522},
+                                    {0.14887433898163121088, 0.43339539412924719080, 0.67940956829902440623,
+                                     0.86506336668898451073, 0.97390652851717172008}};
+    static const double WEIGHT[2][5] = {{0.65214515486254614263, 0.34785484513745385737},
+                                        {0.29552422471475287017, 0.26926671930999635509, 0.21908636251598204400,
+                                         0.14945134915058059315, 0.06667134430868813759}};
     const uz_contact_input *in = pair->in;
     const uz_mortar_surface *surface = &pair->surface;
     const uz_mortar_side *e = &surface->side[i], *f = &surface->side[k];
+    const int fine = !is_affine(e) || !is_affine(f), half = fine ? 5 : 2;
     bool room = true;
-    for (int g = 0; g < 4 && room; g++) {
+    for (int g = 0; g < 2 * half && room; g++) {
         uz_mortar_point p = {.master = k};
         double x[2], slope[2], n[2], t = 0;
-        const double s = 0.5 * (a + b) + 0.5 * (b - a) * AT[g];
+        const int q = g < half ? half - 1 - g : g - half;
+        const double s = 0.5 * (a + b) + 0.5 * (b - a) * (g < half ? -AT[fine][q] : AT[fine][q]);
         edge_at(x, slope, e, s);
         normal_at(n, surface, e, s);
         p.gap = project_on_master(&t, f, x, n);
-        p.weight = 0.5 * (b - a) * WEIGHT[g] * hypot(slope[0], slope[1]);
+        p.weight = 0.5 * (b - a) * WEIGHT[fine][q] * hypot(slope[0], slope[1]);
         p.weight *= in->model->kind == UZ_AXISYMMETRIC ? 2 * PI * x[0] : in->model->thickness;
         shape_at(p.N, e->nodes, s);
         shape_at(p.M, f->nodes, t);
