@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "element/element_type.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -118,19 +119,27 @@ void uz_own_body_free(uz_own_body *own)
     free(own);
 }
 
-/* Does the straight way from x to y meet the box around an element? */
+/* Does the straight way from x to y meet the box around an element? Curved edges leave the box of the nodes by no more
+ * than middles are off their chords, faces between four such edges by no more than four times that: the hull of their
+ * Bezier points. */
 static bool is_on_way(const uz_mesh *mesh, int64_t element, const double *x, const double *y)
 {
     int count;
     const int64_t *node = uz_mesh_element(mesh, element, &count);
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[element]);
     double from = 0, to = 1;
     for (int c = 0; c < mesh->dim; c++) {
-        double low = INFINITY, high = -INFINITY;
+        const double *at = mesh->xyz + c;
+        double low = INFINITY, high = -INFINITY, bulge = 0;
         for (int a = 0; a < count; a++) {
-            low = fmin(low, mesh->xyz[node[a] * mesh->dim + c]);
-            high = fmax(high, mesh->xyz[node[a] * mesh->dim + c]);
+            const int *end = a < type->corners ? NULL : type->edge[a - type->corners];
+            const double t = at[node[a] * mesh->dim];
+            low = fmin(low, t);
+            high = fmax(high, t);
+            if (end)
+                bulge = fmax(bulge, fabs(t - 0.5 * (at[node[end[0]] * mesh->dim] + at[node[end[1]] * mesh->dim])));
         }
-        const double margin = 1e-6 * (high - low), way = y[c] - x[c];
+        const double margin = 1e-6 * (high - low) + (mesh->dim == 3 ? 4 : 1) * bulge, way = y[c] - x[c];
         low -= margin + x[c];
         high += margin - x[c];
         if (fabs(way) <= margin) { /* along the box */

@@ -44,6 +44,33 @@ TEST(the_back_of_a_body_is_where_it_ends_on_the_way_through_it)
     uz_scene_clear(&s);
 }
 
+/* The first side of the lower arm bulges to 0.835 at x = 0.7, above all of its nodes; the upper arm is at 0.825. */
+static void bulging_fold(double x[3])
+{
+    const double off = 2 * x[0] - 1.4;
+    if (x[0] <= 1)
+        x[1] *= 0.835 - 0.2 * off * off;
+    fold(x);
+}
+
+TEST(curved_sides_overlap_outside_the_box_of_their_nodes)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRESS, "quad8", (double[3]){12, 1, 0}, (int64_t[3]){12, 1, 0});
+    uz_mesh mesh;
+    uz_own_body *own;
+    uz_error err = {0};
+    body_give_mesh(&s, bulging_fold);
+    CHECK_INT(uz_mesh_from_scene(&mesh, &s, &err), UZ_OK);
+    const uz_group *inner = uz_mesh_group(&mesh, "top", "", &err);
+    CHECK_INT(uz_own_body_new(&own, &mesh, inner, inner, &err), UZ_OK);
+    CHECK_INT(uz_own_body_way(own, 0, (double[]){0.7, 0.835}, 11, (double[]){0.7, 0.825}), UZ_WAY_OVERLAP);
+    CHECK_INT(uz_own_body_way(own, 11, (double[]){0.7, 0.825}, 0, (double[]){0.7, 0.835}), UZ_WAY_OVERLAP);
+    CHECK_INT(uz_own_body_way(own, 0, (double[]){0.7, 0.835}, 0, (double[]){0.7, 0}), UZ_WAY_BACK);
+    uz_own_body_free(own);
+    uz_mesh_clear(&mesh);
+    uz_scene_clear(&s);
+}
+
 TEST(parts_without_sides_of_both_groups_have_no_back)
 {
     static double xyz[16] = {0, 0, 1, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 2, 0, 2};
