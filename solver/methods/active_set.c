@@ -180,7 +180,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
     if (status != UZ_OK)
         goto done;
     guess(&p, it, load);
-    *end = it->best_relative <= options->target ? UZ_END_TARGET : UZ_END_STALLED;
+    *end = it->best_relative <= options->target && !it->guessed ? UZ_END_TARGET : UZ_END_STALLED;
     if (*end == UZ_END_TARGET)
         goto done;
     for (int k = 0; k < MAX_STEPS && !over; k++) {

@@ -36,6 +36,7 @@ struct uz_iterate {
     uz_method made_by; /* the method that made the best answer */
     double step_norm;  /* of the last gradient step; NaN: none */
     bool warm;         /* r is a caller's */
+    bool guessed;      /* r is the answer to another problem near to this one: an exact step is worth more than it */
     uz_origin origin;  /* what was taken of the caller's start */
     bool begun;        /* there is a row 0, in this run's history or in that of the run it continues */
     bool fresh;        /* D r and rho are those of r as they stand: nothing is to be made again before the next step */

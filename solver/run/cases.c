@@ -45,7 +45,7 @@ uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz
     uz_result **results = uz_alloc_zero(n, sizeof(uz_result *));
     if (!results)
         return uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for the results of %lld cases", (long long)n);
-    const uz_status regular = uz_solve_rounds(results, problem, settings, starts, cache, hooks, err);
+    const uz_status regular = uz_solve_rounds(results, problem, settings, starts, NULL, cache, hooks, err);
     uz_status status = regular;
     for (int64_t i = 0; i < n; i++) { /* those refused or not certified, because only the obstacle holds the body */
         uz_problem one = uz_problem_of_case(problem, i);

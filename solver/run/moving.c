@@ -148,6 +148,7 @@ static void replace(uz_result **result, uz_result *next, const moving *m)
     uz_trade_shift(&next->trade, last->summary.timings.total);
     next->summary.reused = last->summary.reused; /* of the body, which the first solve made */
     next->summary.factor_cached = last->summary.factor_cached;
+    next->summary.origin = last->summary.origin == UZ_FROM_ZERO ? UZ_FROM_ZERO : UZ_FROM_REACTIONS; /* the caller's */
     next->summary.geometry.kind = UZ_KINEMATICS_MOVING;
     next->summary.geometry.passes = m->passes;
     if (last->m != next->m) { /* whoever goes on begins where nothing has moved, with other rows */
@@ -219,7 +220,7 @@ uz_status uz_solve_moving(uz_result **result, const uz_problem *problem, const u
         uz_result *next = NULL; /* at m.place */
         m.settings.time_limit_s = fmax(0.0, m.deadline - uz_seconds());
         m.passes++;
-        status = uz_solve_rounds(&next, &m.problem, &m.settings, NULL, m.cache, &m.hooks, &own);
+        status = uz_solve_rounds(&next, &m.problem, &m.settings, NULL, *result, m.cache, &m.hooks, &own);
         answered = status == UZ_OK && next->summary.outcome == UZ_CONVERGED;
         if (answered)
             status = judge(&settled, &m, next, &own);

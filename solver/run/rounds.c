@@ -17,6 +17,7 @@
 #include "run/run.h"
 #include "run/settings.h"
 #include "run/setup_cache.h"
+#include "run/transfer.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -39,6 +40,7 @@ typedef struct {
     int64_t n_todo, n_again;
     int64_t kept;         /* rows of the first round */
     uz_candidates wanted; /* rows of the next round, or in NULL */
+    uz_state *carried;    /* the start of the one case; NULL: those of `starts` */
 } batch;
 
 static uz_status check(const batch *b, uz_error *err);
@@ -51,7 +53,8 @@ static void end_before_round(const batch *b);
 static void prepare_round(batch *b);
 
 uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const uz_settings *settings,
-                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+                          const uz_state *const *starts, const uz_result *near, uz_cache *cache, const uz_hooks *hooks,
+                          uz_error *err)
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     batch b = {problem, settings, starts, cache, hooks, n, .started = uz_seconds(), .results = results, .round = 1};
@@ -67,6 +70,8 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
         status = uz_setup_acquire(&b.setup, &b.reused, cache, problem, &b.wanted, settings, hooks, &own);
         if (status == UZ_OK && b.round == 1 && b.setup->rows.in)
             status = reacquire_for_starts(&b, &own);
+        if (status == UZ_OK && b.round == 1 && near)
+            status = uz_carry_start(&b.carried, near, &b.setup->model.info, b.setup->model.m, &own);
         if (status == UZ_OK)
             status = check_memory(&b, &own);
         if (status == UZ_OK && b.round == 1)
@@ -107,6 +112,7 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
     free(b.todo);
     free(b.again);
     uz_candidates_clear(&b.wanted);
+    uz_state_free(b.carried);
     return status;
 }
 
@@ -172,7 +178,8 @@ static uz_request request_of(const batch *b, int64_t place, bool in_block)
         .settings = b->settings,
         .hooks = b->hooks,
         .index = i,
-        .start = b->starts ? b->starts[i] : NULL,
+        .start = b->starts ? b->starts[i] : b->carried,
+        .guessed = b->carried != NULL,
         .setup = b->setup,
         .reused = reused,
         .in_block = in_block,

@@ -135,6 +135,7 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     uz_milestones_resume(&work->milestones, uz_run_time(run));
     if (status == UZ_OK && asked->start)
         status = take_start(run, err);
+    work->it.guessed = asked->guessed;
     if (status == UZ_OK)
         tell_begin(asked);
     run->result->summary.timings.iterate += uz_seconds() - start;

@@ -19,6 +19,7 @@ typedef struct {
     const uz_hooks *hooks;
     int64_t index;            /* of the load case */
     const uz_state *start;    /* NULL: from r = 0 */
+    bool guessed;             /* start: of another problem, near to this one */
     uz_setup *setup;          /* borrowed; only its mutex and what that guards change */
     uz_reuse reused;          /* what of it was there before */
     bool in_block;            /* other loads begin before this one ends */

@@ -145,7 +145,7 @@ static uz_status solve_augmented(uz_semi *s, const uz_settings *settings, const 
     uz_result *result = NULL;
     uz_status status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
     if (status == UZ_OK)
-        status = uz_solve_rounds(&result, &augmented, settings, NULL, s->cache, hooks, err);
+        status = uz_solve_rounds(&result, &augmented, settings, NULL, NULL, s->cache, hooks, err);
     uz_augmented_clear(&augmented);
     if (status != UZ_OK) {
         uz_result_free(result);

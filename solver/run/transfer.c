@@ -100,3 +100,46 @@ uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_bo
     *out = state;
     return UZ_OK;
 }
+
+uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, uz_error *err)
+{
+    const uz_mesh_info *here = &result->mesh;
+    bool known = here->contact_of != NULL;
+    *out = NULL;
+    for (int64_t i = 0; known && i < result->m; i++)
+        known = isfinite(result->r[i]);
+    if (!known)
+        return UZ_OK;
+    uz_state *state = uz_alloc_zero(1, sizeof *state);
+    int64_t *row_at = uz_alloc_zero(here->n_nodes, sizeof *row_at); /* 1 + the first row at a node that is not taken */
+    int64_t *next = uz_alloc(result->m, sizeof *next);
+    const bool room = state && row_at && next && (state->r = uz_alloc(m, sizeof *state->r));
+    for (int64_t i = 0, first = 0, end; i < m && room; first = end) { /* rows come contact by contact */
+        const int64_t contact = there->contact_of[i];
+        while (first < result->m && here->contact_of[first] < contact)
+            first++;
+        for (end = first; end < result->m && here->contact_of[end] == contact; end++)
+            continue;
+        for (int64_t k = end - 1; k >= first; k--) {
+            next[k] = row_at[here->contact_node[k]];
+            row_at[here->contact_node[k]] = k + 1;
+        }
+        for (; i < m && there->contact_of[i] == contact; i++) {
+            int64_t *at = &row_at[there->contact_node[i]];
+            state->r[i] = *at > 0 ? result->r[*at - 1] : 0.0;
+            *at = *at > 0 ? next[*at - 1] : 0;
+        }
+        for (int64_t k = first; k < end; k++)
+            row_at[here->contact_node[k]] = 0;
+    }
+    free(row_at);
+    free(next);
+    if (!room) {
+        uz_state_free(state);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from an answer with %lld contacts",
+                       (long long)result->m);
+    }
+    state->m = m;
+    *out = state;
+    return UZ_OK;
+}

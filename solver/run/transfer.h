@@ -1,4 +1,4 @@
-/* transfer.h: the contact of one grid of a box as the start of the next. */
+/* transfer.h: the contact of one grid of a box, or at one place of a body, as the start of the next. */
 #ifndef UZ_ADAPTIVE_TRANSFER_H
 #define UZ_ADAPTIVE_TRANSFER_H
 
@@ -9,5 +9,9 @@
  * caller frees with uz_state_free. */
 uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_mesh_info *fine,
                             int64_t m, uz_error *err);
+
+/* Reactions for the contact rows of a body at another place: those of the result at the same nodes, in the order in
+ * which a contact has rows there. *out NULL and UZ_OK: the result has none. The caller frees with uz_state_free. */
+uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, uz_error *err);
 
 #endif

@@ -66,6 +66,8 @@ TEST(a_block_slid_along_a_bump_is_as_if_meshed_there)
         }
         CHECK_INT(s->geometry.kind, UZ_KINEMATICS_MOVING);
         CHECK_MSG(s->geometry.passes >= 4 && s->geometry.passes <= 7, "%lld", (long long)s->geometry.passes);
+        CHECK_INT(s->iterations, 1); /* the last pass goes on from the rows in contact of the one before */
+        CHECK_INT(s->origin, UZ_FROM_ZERO);
         CHECK(s->geometry.left <= 1e-8 && s->geometry.change > s->geometry.left);
         CHECK(moving->place && !fixed->place && !is_warned(moving));
         CHECK(fixed->summary.force[1] > 1.3 * s->force[1] && is_warned(fixed));
