@@ -1,0 +1,139 @@
+/* solve.c: a job's text is decoded, solved or verified, and what came of it is put into the store's form. */
+#include "work/solve.h"
+#include "base/clock.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool any_dismissed(const solution *s)
+{
+    for (int64_t i = 0; s->results && i < s->n; i++)
+        if (s->results[i]->summary.outcome == UZ_DISMISSED)
+            return true;
+    return false;
+}
+
+/* What the library can't know: who may do something about it, and how. */
+static void add_remedy(uz_error *err, const char *remedy)
+{
+    size_t used = strlen(err->message);
+    snprintf(err->message + used, sizeof err->message - used, "%s", remedy);
+}
+
+static uz_status verify(solution *s, const solve_with *with, uz_error *err)
+{
+    const codec_answer *given = &s->request.answer;
+    s->n = 1;
+    s->results = calloc(1, sizeof(uz_result *));
+    if (!s->results)
+        return err->status = UZ_ERR_MEMORY;
+    uz_status status = uz_verify(&s->results[0], &s->request.problem, given->u, given->r, &s->request.settings,
+                                 with->cache, with->hooks, err);
+    if (strcmp(err->where, "u") == 0)
+        strcpy(err->where, "/answer/displacements");
+    else if (strcmp(err->where, "r") == 0)
+        strcpy(err->where, "/answer/reactions");
+    /* A free body may have an answer, and one that this service itself found. */
+    const uz_problem *problem = &s->request.problem;
+    bool touches = problem->kind == UZ_PROBLEM_SCENE ? problem->scene.n_contacts > 0 : problem->qp.N.rows > 0;
+    if (touches && (err->status == UZ_ERR_FREE_BODY || err->status == UZ_ERR_NOT_SPD))
+        add_remedy(err, ". An answer is verified only where the supports alone hold the body; one that the obstacle "
+                        "holds can be solved here: its summary has a certificate");
+    return status;
+}
+
+static uz_status solve_cases(solution *s, const solve_with *with, uz_error *err)
+{
+    const uz_problem *problem = &s->request.problem;
+    /* A store that fails now may work when the result is kept: the run begins at zero, and says so. */
+    s->start_lost = starts_load(&s->starts, with->source, &s->request) != STORE_OK;
+    s->n = problem->n_cases > 0 ? problem->n_cases : 1;
+    uz_status status = uz_solve_cases(&s->results, problem, &s->request.settings,
+                                      (const uz_state *const *)s->starts.states, with->cache, with->hooks, err);
+    if (strstr(err->where, "start")) /* the library's name for what the request calls warm_start */
+        strcpy(err->where, "/solver/warm_start");
+    return status;
+}
+
+/* Phases and cache: of the first case, which paid for the body; iterating and certifying of all. */
+static void count(solution *s)
+{
+    solve_figures *f = &s->figures;
+    f->cases = s->n;
+    if (!s->results || !s->results[0])
+        return;
+    const uz_summary *first = &s->results[0]->summary;
+    f->has_answer = true;
+    f->outcome = first->outcome;
+    f->cached = first->reused.factor;
+    f->assemble = first->timings.assemble;
+    f->order = first->timings.order;
+    f->factor = first->timings.factor;
+    f->condense = first->timings.condense;
+    for (int64_t i = 0; i < s->n && s->results[i]; i++) {
+        f->iterations += s->results[i]->summary.iterations;
+        f->iterate += s->results[i]->summary.timings.iterate;
+        f->certify += s->results[i]->summary.timings.certify;
+    }
+}
+
+void solve_job(solution *out, const solve_with *with, const char *id, char *body, size_t body_len)
+{
+    problem_details problem = {0};
+    uz_error err = {0};
+    double start = clock_seconds(CLOCK_MONOTONIC);
+    *out = (solution){.n = 0};
+    bool good = body && codec_decode(&out->request, CODEC_STORED, body, body_len, with->source, &problem);
+    if (!body)
+        codec_problem_damaged(&problem, id);
+    free(body);
+    out->figures.parse = clock_seconds(CLOCK_MONOTONIC) - start;
+    if (!good) {
+        solution_fail(out, codec_encode_problem(&problem));
+        return;
+    }
+    if (with->read)
+        with->read(with->hooks->ctx, &out->request);
+    uz_settings *settings = &out->request.settings;
+    if (with->max_solve_s > 0.0 && settings->time_limit_s > with->max_solve_s)
+        settings->time_limit_s = with->max_solve_s;
+    settings->memory_limit = with->memory_limit;
+    uz_status status = out->request.answer.u ? verify(out, with, &err) : solve_cases(out, with, &err);
+    if (status == UZ_ERR_LIMIT)
+        add_remedy(&err, " (the limit is the daemon's option --memory)");
+    out->stopped = status == UZ_ERR_CANCELLED || (status == UZ_OK && any_dismissed(out));
+    if (status == UZ_OK) {
+        out->outcome.status = out->stopped ? JOB_DISMISSED : JOB_SUCCESSFUL;
+        if (!answers_build(&out->answers, &out->outcome, out->results, &out->request, &out->starts, with->queue_s,
+                           out->figures.parse))
+            solution_fail(out, NULL);
+    } else if (status == UZ_ERR_CANCELLED) {
+        out->outcome = (store_outcome){.status = JOB_DISMISSED};
+    } else {
+        codec_problem_from_error(&problem, &err, out->request.problem.kind);
+        solution_fail(out, codec_encode_problem(&problem));
+    }
+    count(out);
+}
+
+static const char *const NO_MEMORY_JSON = "{\"type\": \"about:blank\", \"title\": \"Out of memory\", \"status\": 500,"
+                                          " \"detail\": \"There was not enough memory for the answer.\","
+                                          " \"code\": \"out_of_memory\"}";
+
+void solution_fail(solution *s, char *encoded)
+{
+    free(s->error);
+    s->error = encoded;
+    s->outcome = (store_outcome){.status = JOB_FAILED, .error = encoded ? encoded : NO_MEMORY_JSON};
+}
+
+void solution_clear(solution *s)
+{
+    codec_request_clear(&s->request);
+    uz_results_free(s->results, s->n);
+    starts_clear(&s->starts);
+    answers_clear(&s->answers);
+    free(s->error);
+    *s = (solution){.n = 0};
+}
