@@ -120,6 +120,7 @@ typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
 
 typedef struct {
     four stiffness, load, load_low, load_size, work, work_size, change, change_size, correction_energy, weighted, noise;
+    four largest; /* not a sum: of |u|; what is not a number is passed over */
     bits anything;
 } sums;
 
@@ -149,6 +150,8 @@ static inline __attribute__((always_inline)) void add_four(sums *s, const double
     s->correction_energy += c * Kc;
     s->weighted += e * weight * e;
     s->noise += u / weight * u + force * weight * force;
+    const bits size = (bits)u & INT64_MAX, more = (four)size > s->largest;
+    s->largest = (four)((size & more) | ((bits)s->largest & ~more));
     s->anything |= ((bits)u | (bits)c | (bits)e_u) & INT64_MAX;
 }
 
@@ -208,7 +211,7 @@ static void add_up(certifier *c, uz_bound_terms *t, uz_energy_sums *energies)
     c->noise = total(&s.noise);
     t->e1 = uz_bound_norm(res->e_u, c->d);
     t->force = uz_bound_norm(c->in->p, c->d);
-    t->span = uz_bound_largest(c->Nt.val, c->Nt.ptr[c->m]) * uz_bound_largest(c->u, c->d);
+    t->span = uz_bound_largest(c->Nt.val, c->Nt.ptr[c->m]) * uz_bound_largest((const double *)&s.largest, 4);
 }
 
 /* The bound that r gives, with the correction that there is. */

@@ -94,7 +94,7 @@ static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *c
  * move, rounding was seen to leave up to half of n eps. */
 #define RCOND_LEAST DBL_EPSILON
 
-static uz_status describe(uz_factor *factor, const uz_csc *K, uz_error *err)
+static uz_status describe(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
 {
     uz_factor_info *info = &factor->info;
     *info = uz_analysis_describe(factor->analysis);
@@ -118,7 +118,7 @@ static uz_status describe(uz_factor *factor, const uz_csc *K, uz_error *err)
                        "resistance, or its stiffnesses differ by more than double precision can hold",
                        info->rcond);
     /* The pivots alone may be short by any factor (Kahan's matrix). */
-    return uz_bound_inverse(factor, K, err);
+    return uz_bound_inverse(factor, K, common, err);
 }
 
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
@@ -147,7 +147,7 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     if (status == UZ_OK)
         status = factorize(factor, K, &common, err);
     if (status == UZ_OK)
-        status = describe(factor, K, err);
+        status = describe(factor, K, &common, err);
     factor->info.factor_s = uz_seconds() - start;
     cholmod_l_finish(&common);
     if (status == UZ_OK)

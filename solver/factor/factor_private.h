@@ -67,7 +67,7 @@ uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t 
 double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_dofs, int64_t rows);
 
 /* Fills info.inverse_bound and lowers info.rcond to what the vectors that it is made with say. */
-uz_status uz_bound_inverse(uz_factor *factor, const uz_csc *K, uz_error *err);
+uz_status uz_bound_inverse(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err);
 
 /* Gives ws->panel at least `need` entries. */
 uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err);

@@ -29,12 +29,13 @@ static double add_squares(double squares[UZ_LANES], const double *X, int64_t n)
     return largest;
 }
 
-uz_status uz_bound_inverse(uz_factor *factor, const uz_csc *K, uz_error *err)
+uz_status uz_bound_inverse(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
 {
     const int64_t n = factor->n;
     const SuiteSparse_long *perm = factor->L.Perm;
     uint64_t state = 0x9E3779B97F4A7C15u;
-    double half[UZ_LANES], whole[UZ_LANES], *X = uz_alloc(n * UZ_LANES, sizeof *X), *root = uz_alloc(n, sizeof *root);
+    double half[UZ_LANES], whole[UZ_LANES], *root = uz_alloc(n, sizeof *root);
+    double *X = cholmod_l_malloc((size_t)(n * UZ_LANES), sizeof *X, common); /* where factors have their memory */
     uz_status status =
         X && root ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
     for (int64_t k = 0; status == UZ_OK && k < n; k++) {
@@ -58,7 +59,7 @@ uz_status uz_bound_inverse(uz_factor *factor, const uz_csc *K, uz_error *err)
             if (half[l] / whole[l] < factor->info.rcond)
                 factor->info.rcond = half[l] / whole[l];
     }
-    free(X);
+    cholmod_l_free((size_t)(n * UZ_LANES), sizeof *X, X, common);
     free(root);
     return status;
 }
