@@ -1,6 +1,7 @@
 /* table.c: the gap to a table of heights, bilinear in each cell of its grid. */
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/root.h"
 #include "obstacle/pieces.h"
 
 #include <float.h>
@@ -61,42 +62,18 @@ static double distance_at(const cell *s, const double q[3], double x, double y)
     return dx * dx + dy * dy + dz * dz;
 }
 
-/* Half the derivative along x of the squared distance at best_y: what y does to it is zero there, or y is held. */
-static double slope_at(const cell *s, const double q[3], double x)
-{
-    const double y = best_y(s, q, x);
-    return x - q[0] + (height(s, x, y) - q[2]) * (s->a + s->c * (y - s->y0));
-}
+typedef struct {
+    const cell *s;
+    const double *q;
+} cell_point;
 
-/* Where slope_at changes its sign from - to + between low and high: Illinois (Dowell and Jarratt, BIT 11 (1971)
- * 168-174), halving where it is slow. */
-static double minimum_between(const cell *s, const double q[3], double low, double high)
+/* Half the derivative along x of the squared distance at best_y: what y does to it is zero there, or y is held. */
+static double slope_at(const void *ctx, double x)
 {
-    double at_low = slope_at(s, q, low), at_high = slope_at(s, q, high), x = low;
-    int kept = 0; /* the end that the last step kept: -1 the low one, 1 the high one */
-    if (at_low >= 0)
-        return low;
-    if (at_high <= 0)
-        return high;
-    for (int k = 0; k < 200 && high - low > DBL_EPSILON * fmax(fabs(low), fabs(high)); k++) {
-        const bool halve = k % 4 == 3;
-        x = halve ? 0.5 * (low + high) : clamp(high - at_high * (high - low) / (at_high - at_low), low, high);
-        const double at = slope_at(s, q, x);
-        if (at == 0)
-            return x;
-        if (at < 0) {
-            low = x;
-            at_low = at;
-            at_high *= kept == 1 ? 0.5 : 1;
-            kept = 1;
-        } else {
-            high = x;
-            at_high = at;
-            at_low *= kept == -1 ? 0.5 : 1;
-            kept = -1;
-        }
-    }
-    return x;
+    const cell_point *at = ctx;
+    const cell *s = at->s;
+    const double y = best_y(s, at->q, x);
+    return x - at->q[0] + (height(s, x, y) - at->q[2]) * (s->a + s->c * (y - s->y0));
 }
 
 /* The closest (x, y) of a cell, and its squared distance. A bilinear cell may have two minima: the best of a few
@@ -114,7 +91,7 @@ static double closest(double at[2], const cell *s, const double q[3])
         const double width = s->high[0] - s->low[0];
         const double low = s->low[0] + width * k / stretches;
         const double high = k + 1 < stretches ? s->low[0] + width * (k + 1) / stretches : s->high[0];
-        const double x = minimum_between(s, q, low, high), y = best_y(s, q, x);
+        const double x = uz_root_between(slope_at, &(cell_point){s, q}, low, high, 0), y = best_y(s, q, x);
         const double distance = distance_at(s, q, x, y);
         if (distance < best) {
             best = distance;
