@@ -39,6 +39,7 @@ typedef struct {
     double curve;                /* of a hole with straight sides: how far behind them x is, too */
     double gap, normal[3];       /* ... `back` is taken off the gap; undeformed, also where there is no row */
     double size;                 /* the longest distance between nodes of the side, halved on quadratic ones */
+    double part;                 /* of what rows inside the side have of its area: one over their number */
 } uz_inner_place;
 
 /* A side may be of both surfaces of a contact. */
@@ -46,7 +47,7 @@ enum { UZ_SLAVE_ON = 1, UZ_SLAVE_WITH = 2, UZ_MASTER_ON = 4 };
 
 /* Where the nodes of one contact's group stand to its obstacle, before anything moves. A plane needs none of this. */
 typedef struct {
-    int64_t n;      /* nodes of the group, and places inside its sides; 0: a plane */
+    int64_t n;      /* nodes of the group, its flanks, and places inside its sides; 0: a plane */
     double *gap;    /* n; INFINITY: the place has no row, as a node that meets no face */
     double *normal; /* n x dim: unit normals of the obstacle, towards the body */
     int64_t *first; /* another part of the body, else NULL: n + 1, into node and weight */
@@ -57,7 +58,9 @@ typedef struct {
      * acts on; NULL: the nodes of the group. */
     int64_t *at;
     double *area;
-    int64_t n_inner;       /* a rigid obstacle: so many of the n, the last ones, are inside sides */
+    /* A rigid obstacle: of the n places so many, after those of the nodes, are of nodes that more flanks of a groove
+     * than one hold, `flank` says which; so many, the last ones, are inside sides. */
+    int64_t n_flanks, *flank, n_inner;
     uz_inner_place *inner; /* n_inner */
     int64_t *ends; /* n x 2: of a middle of a face's edge the places of the edge's ends, as for row_ends; else -1 */
     /* The n_sides sides of both surfaces are of zones (mortar_pairs.c); rank: n_ranks pairs of a zone that is the slave

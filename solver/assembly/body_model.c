@@ -42,6 +42,7 @@ static void free_sites(uz_contact_sites *sites, int64_t n)
         free(sites[k].rank);
         free(sites[k].of);
         free(sites[k].inner);
+        free(sites[k].flank);
     }
     free(sites);
 }
@@ -94,7 +95,8 @@ size_t uz_body_model_bytes(const uz_body_model *model)
         const uz_contact_sites *s = &model->sites[k];
         const size_t n = (size_t)s->n;
         bytes += n * 8 * (1 + dim) + (s->first ? 16 * n + 16 * (size_t)s->first[n] : 0) + (s->at ? 33 * n : 0) +
-                 8 * (size_t)(s->n_sides + 2 * s->n_ranks) + (size_t)s->n_inner * sizeof *s->inner;
+                 8 * (size_t)(s->n_sides + 2 * s->n_ranks) + (size_t)s->n_inner * sizeof *s->inner +
+                 8 * (size_t)s->n_flanks;
     }
     return bytes;
 }

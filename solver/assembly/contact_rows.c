@@ -160,9 +160,26 @@ static bool has_eight_nodes(const uz_mesh *mesh, uz_face face)
     return uz_element_type_of((uz_element_kind)mesh->kind[face.element])->side[face.side].nodes == 8;
 }
 
-/* Rows [first, end) are those of contact k. row_of: room for a number by node, or by place. */
-static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_of, int64_t k, int64_t first,
-                      int64_t end)
+/* Of the rows at an end of an edge, -1 or the first of them, the one whose normal is nearest to that of a row. */
+static int64_t row_along(const uz_body_model *model, const int64_t *next, int64_t at_end, int64_t row)
+{
+    const int dim = model->mesh.dim;
+    const double *normal = model->info.contact_normal;
+    double most = -2;
+    int64_t found = -1;
+    for (int64_t i = at_end; i >= 0; i = next[i]) {
+        double along = 0;
+        for (int c = 0; c < dim; c++)
+            along += normal[i * dim + c] * normal[row * dim + c];
+        found = along > most ? i : found;
+        most = fmax(most, along);
+    }
+    return found;
+}
+
+/* Rows [first, end) are those of contact k. row_of: room for a number by node, or by place; next: by row. */
+static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_of, int64_t *next, int64_t k,
+                      int64_t first, int64_t end)
 {
     const uz_contact_sites *sites = &model->sites[k];
     if (sites->ends) { /* places say what they are between */
@@ -181,21 +198,27 @@ static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_
     }
     for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++)
         row_of[uz_group_node_at(group, i)] = -1;
-    for (int64_t row = first; row < end; row++)
-        if (!uz_row_inner(model, row))
-            row_of[model->info.contact_node[row]] = row;
+    for (int64_t row = first; row < end; row++) { /* several of a node that flanks of a groove hold */
+        int64_t *head = &row_of[model->info.contact_node[row]];
+        if (uz_row_inner(model, row))
+            continue;
+        next[row] = *head;
+        *head = row;
+    }
     for (int64_t f = 0; f < group->n_faces; f++) {
         int64_t node[UZ_FACE_NODES];
         if (!has_eight_nodes(&model->mesh, group->face[f]))
             continue;
         uz_mesh_face(node, &model->mesh, group->face[f]);
-        for (int j = 0; j < 4; j++) {
-            const int64_t row = row_of[node[4 + j]], a = row_of[node[j]], b = row_of[node[(j + 1) % 4]];
-            if (row >= 0 && a >= 0 && b >= 0) {
-                model->row_ends[2 * row] = a;
-                model->row_ends[2 * row + 1] = b;
+        for (int j = 0; j < 4; j++)
+            for (int64_t row = row_of[node[4 + j]]; row >= 0; row = next[row]) {
+                const int64_t a = row_along(model, next, row_of[node[j]], row);
+                const int64_t b = row_along(model, next, row_of[node[(j + 1) % 4]], row);
+                if (a >= 0 && b >= 0) {
+                    model->row_ends[2 * row] = a;
+                    model->row_ends[2 * row + 1] = b;
+                }
             }
-        }
     }
 }
 
@@ -214,19 +237,20 @@ static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error
     }
     if (!any)
         return UZ_OK;
-    int64_t *row_of = uz_alloc(most, sizeof *row_of);
+    int64_t *row_of = uz_alloc(most, sizeof *row_of), *next = uz_alloc(model->m, sizeof *next);
     model->row_ends = uz_alloc(2 * model->m, sizeof *model->row_ends);
-    if (row_of && model->row_ends) {
+    if (row_of && next && model->row_ends) {
         memset(model->row_ends, 0xff, (size_t)(2 * model->m) * sizeof *model->row_ends);
         for (int64_t k = 0; k < scene->n_contacts; k++) {
             const int64_t first = row;
             while (row < model->m && model->info.contact_of[row] == k)
                 row++;
-            list_ends(model, group_that_touches(model, scene, k, err), row_of, k, first, row);
+            list_ends(model, group_that_touches(model, scene, k, err), row_of, next, k, first, row);
         }
     }
-    const bool room = row_of && model->row_ends;
+    const bool room = row_of && next && model->row_ends;
     free(row_of);
+    free(next);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
 }
 

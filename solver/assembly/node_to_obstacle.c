@@ -1,5 +1,6 @@
 /* node_to_obstacle.c: contact of a surface with a rigid obstacle: a row for each node, along the obstacle's normal, and
- * at most one more inside a side, where rows at its nodes would let the obstacle in.
+ * one more inside a side, where rows at its nodes would let the obstacle in (several, where that is as deep at several
+ * places), or at a node that more than one flank of a groove holds (uz_obstacle_flanks).
  *
  * Nodes alone see nothing that is smaller than a side: a circle between two of them meets no resistance. Gaps in the
  * mean, as between two bodies, would see it, but on curved obstacles they are off by as much as the facets are. So rows
@@ -15,8 +16,9 @@
  * there. The place is one of the material and stays.
  *
  * Amid a ridge the nearest way out is through a flank, whose normal says nothing of the crest that stands in the side:
- * there d is that of the side set back along its normal until it is clear of the obstacle, less the way. Rows of nodes
- * amid ridges are found alike (uz_obstacle_row_gap).
+ * where a side is not clear of an obstacle with edges, or past the middle of a round one, d is that of the side set
+ * back along its normal until it is clear of the obstacle, less the way. Rows of nodes amid ridges are found alike
+ * (uz_obstacle_row_gap). Outside of an obstacle w has no kinks but those of grooves, where it is not least.
  *
  * Straight sides of a hole stand for a curve that lies behind them, and a pin that fits would cut into each. There d is
  * that of the curve: x is set back by sum_a N_a(x) (x - x_a) . n_a / 2 with the means n_a of the normals around nodes,
@@ -26,6 +28,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/root.h"
 #include "obstacle/obstacle.h"
 #include "scene/scene.h"
 
@@ -48,14 +51,25 @@
 /* Cosine of the angle between a side and the mean around a node from which on the node is a corner. */
 #define LEAST_COSINE 0.94
 
-/* A normal that is another so far on, in the unit square of a side, jumps. */
-#define JUMP 1e-5
+/* Of places that are as deep as each other, as on an edge along the side, the one next to the side's middle is taken:
+ * at a distance of D from there in a side of length L one counts as less deep by PULL D^2 / L. So the place moves on
+ * with the obstacle, and does not leap from one end of the side to the other as the obstacle tilts. */
+#define PULL 1e-4
+/* In lengths of a side: depths that are the same but for rounding. */
+#define SAME_DEPTH 1e-9
+/* In coordinates of a side: places that are the same, and how well they are known. */
+#define SAME_PLACE   1e-4
+#define PLACE_WITHIN 1e-13
 
-/* Of a row inside a side: its part of the side's area. The nodes have the rest. */
+/* Of the rows inside a side: their part of the side's area. The nodes have the rest. */
 #define INNER_AREA 0.5
 
-/* Sides are halved so many times in search of the least w: in the plane, in space. */
-enum { HALVINGS = 5, HALVINGS_IN_SPACE = 3 };
+/* Sides are halved so many times in search of the least w: in the plane, in space. So many places of a side may be as
+ * deep as each other, as those of two teeth: each gets a row. */
+enum { HALVINGS = 5, HALVINGS_IN_SPACE = 3, MOST_PLACES = 4 };
+
+/* Rows of a node beside its own, of other flanks of the groove that it is in. */
+enum { MOST_FLANKS = 3 };
 
 /* ---- the deepest place of a side */
 
@@ -64,90 +78,190 @@ typedef struct {
     uz_side side;
     int64_t node[UZ_FACE_NODES];
     double xyz[3 * UZ_FACE_NODES];
-    double length, size;          /* the longest distance between its nodes; the same, halved on quadratic sides */
-    double normal[3];             /* of the side, unit, out of the body */
-    double around[4][3];          /* of straight sides: mean normals around the corners */
-    bool curved;                  /* do they differ from the side's? */
-    double back;                  /* by which the side is set back along its normal */
-    double pushed[UZ_FACE_NODES]; /* of the nodes: out of the obstacle */
-    double steep, enough;         /* bound on the slope of w; what is above `enough` is not looked for */
-    double least, at[2];          /* found: over the unit square, see local_point() */
+    double length, size;              /* the longest distance between its nodes; the same, halved on quadratic sides */
+    double normal[3];                 /* of the side, unit, out of the body */
+    double middle[3];                 /* the mean of its corners */
+    double around[4][3];              /* of straight sides: mean normals around the corners */
+    bool curved;                      /* do they differ from the side's? */
+    double back;                      /* by which the side is set back along its normal */
+    bool near;                        /* is some of it in the obstacle, or not clear of it? */
+    double pushed[UZ_FACE_NODES];     /* of the nodes: out of the obstacle */
+    double steep, enough;             /* bound on the slope of w; what is above `enough` is not looked for */
+    double least, at[MOST_PLACES][2]; /* found: where, in the side's own coordinates */
+    int places;
 } deepest;
 
-/* The unit square over the side, triangles with one edge of it in a corner. */
-static void local_point(double local[2], const uz_side *side, const double at[2])
+static bool is_triangle(const uz_side *side)
 {
-    const bool triangle = side->dim == 3 && side->nodes % 3 == 0;
-    local[0] = triangle ? at[0] * (1 - at[1]) : 2 * at[0] - 1;
-    local[1] = triangle ? at[1] : 2 * at[1] - 1;
+    return side->dim == 3 && side->nodes % 3 == 0;
 }
 
-/* The place with these shape functions, of a hole on the curve behind its straight sides, set back. */
-static void place_of(double x[3], const deepest *of, const double *N)
+/* The place with these shape functions, of a hole on the curve behind its straight sides, set back; along (NULL: not
+ * wanted): how it moves on with the coordinates of the side, if the shape functions do by `slope`. */
+static void place_of(double x[3], double along[2][3], const deepest *of, const double *N, double slope[][3])
 {
     const int dim = of->side.dim;
-    double back = 0;
+    double back = 0, grows[2] = {0};
     memset(x, 0, 3 * sizeof *x);
+    for (int i = 0; i < 2 && along; i++)
+        memset(along[i], 0, sizeof along[i]);
     for (int a = 0; a < of->side.nodes; a++)
-        for (int c = 0; c < dim; c++)
+        for (int c = 0; c < dim; c++) {
             x[c] += N[a] * of->xyz[dim * a + c];
+            for (int i = 0; i < dim - 1 && along; i++)
+                along[i][c] += slope[a][i] * of->xyz[dim * a + c];
+        }
     for (int a = 0; a < of->side.nodes && of->curved; a++)
-        for (int c = 0; c < dim; c++)
-            back += 0.5 * N[a] * (x[c] - of->xyz[dim * a + c]) * of->around[a][c];
-    for (int c = 0; c < dim; c++)
+        for (int c = 0; c < dim; c++) {
+            const double off = x[c] - of->xyz[dim * a + c];
+            back += 0.5 * N[a] * off * of->around[a][c];
+            for (int i = 0; i < dim - 1 && along; i++)
+                grows[i] += 0.5 * (slope[a][i] * off + N[a] * along[i][c]) * of->around[a][c];
+        }
+    for (int c = 0; c < dim; c++) {
         x[c] -= (fmax(0, back) + of->back) * of->normal[c];
+        for (int i = 0; i < dim - 1 && along && back > 0; i++)
+            along[i][c] -= grows[i] * of->normal[c];
+    }
 }
 
-/* w there, but for s; NAN where the obstacle has no normal, as the centre of a circle. */
-static double depth_at(const deepest *of, const double at[2])
+/* w there, but for s, and less what pulls it to the side's middle; slope (NULL: not wanted): its derivatives. NAN where
+ * the obstacle has no normal, as the centre of a circle. */
+static double depth_at(double slope[2], const deepest *of, const double local[2])
 {
-    double local[2], N[UZ_FACE_NODES], x[3], pushed = 0;
+    const int dim = of->side.dim;
+    double N[UZ_FACE_NODES], grows[UZ_FACE_NODES][3], x[3], along[2][3], value;
     uz_gap gap;
-    local_point(local, &of->side, at);
-    uz_side_shape(N, &of->side, local);
-    place_of(x, of, N);
+    uz_side_gradients(N, grows, &of->side, local);
+    place_of(x, along, of, N, grows);
+    if (uz_obstacle_gap(&gap, of->obstacle, x, NULL) != UZ_OK)
+        return (double)NAN;
+    value = gap.gap - of->back;
     for (int a = 0; a < of->side.nodes; a++)
-        pushed += N[a] * of->pushed[a];
-    return uz_obstacle_gap(&gap, of->obstacle, x, NULL) == UZ_OK ? gap.gap - of->back + pushed : (double)NAN;
+        value += N[a] * of->pushed[a];
+    for (int i = 0; i < dim - 1 && slope; i++) {
+        slope[i] = 0;
+        for (int a = 0; a < of->side.nodes; a++)
+            slope[i] += grows[a][i] * of->pushed[a];
+    }
+    for (int c = 0; c < dim; c++) {
+        const double off = x[c] + of->back * of->normal[c] - of->middle[c];
+        value += PULL / of->length * off * off;
+        for (int i = 0; i < dim - 1 && slope; i++)
+            slope[i] += (gap.normal[c] + 2 * PULL / of->length * off) * along[i][c];
+    }
+    return value;
 }
 
-static bool improve(deepest *of, double a, double b, double *value)
-{
-    const double at[2] = {a, b};
-    *value = depth_at(of, at);
-    if (!(*value < of->least - 1e-12 * of->length))
-        return false;
-    of->least = *value;
-    memcpy(of->at, at, sizeof at);
-    return true;
-}
-
-/* Branch and bound: a signed distance grows by no more than one is away. */
+/* Branch and bound: a signed distance grows by no more than one is away. Sides are divided alike from all of their
+ * corners: edges and quadrilaterals in halves, triangles by their middles (half < 0: upside down). */
 static void search(deepest *of, double a, double b, double half, int halvings)
 {
-    double value;
+    const double at[2] = {a, b}, value = depth_at(NULL, of, at), same = SAME_DEPTH * of->length;
     const int dim = of->side.dim;
-    improve(of, a, b, &value);
-    if (halvings == 0 || value - of->steep * 2 * half * of->length > fmin(of->least, of->enough))
+    const bool deeper = value < of->least - same;
+    of->places = deeper ? 0 : of->places;
+    if (deeper || (value <= of->least + same && of->places > 0 && of->places < MOST_PLACES)) {
+        memcpy(of->at[of->places++], at, sizeof at);
+        of->least = deeper ? value : of->least;
+    }
+    if (halvings == 0 || value - of->steep * fabs(half) * of->length > fmin(of->least, of->enough) + same)
         return;
-    for (int k = 0; k < 2 * (dim - 1); k++)
-        search(of, a + (k % 2 ? 0.5 : -0.5) * half, dim == 3 ? b + (k / 2 ? 0.5 : -0.5) * half : b, 0.5 * half,
-               halvings - 1);
+    for (int k = 0; k < (is_triangle(&of->side) ? 3 : 2 * (dim - 1)); k++)
+        if (is_triangle(&of->side))
+            search(of, a + half * ((k == 1) / 2. - 1. / 6), b + half * ((k == 2) / 2. - 1. / 6), 0.5 * half,
+                   halvings - 1);
+        else
+            search(of, a + (k % 2 ? 0.5 : -0.5) * half, dim == 3 ? b + (k / 2 ? 0.5 : -0.5) * half : b, 0.5 * half,
+                   halvings - 1);
+    if (is_triangle(&of->side))
+        search(of, a, b, -0.5 * half, halvings - 1);
 }
 
-/* Steps from the best place found, ever shorter. */
-static void refine(deepest *of, double step)
+static void search_all(deepest *of)
 {
-    double value;
-    for (; step > 1e-7; step *= 0.5)
-        for (bool moved = true; moved;) {
-            moved = false;
-            for (int k = 0; k < 2 * (of->side.dim - 1); k++) {
-                const double a = of->at[0] + (k / 2 ? 0 : k % 2 ? step : -step);
-                const double b = of->at[1] + (k / 2 ? k % 2 ? step : -step : 0);
-                moved = (a >= 0 && a <= 1 && b >= 0 && b <= 1 && improve(of, a, b, &value)) || moved;
+    of->places = 0;
+    if (is_triangle(&of->side))
+        search(of, 1. / 3, 1. / 3, 1, HALVINGS_IN_SPACE);
+    else
+        search(of, 0, 0, 1, of->side.dim == 2 ? HALVINGS : HALVINGS_IN_SPACE);
+}
+
+typedef struct {
+    const deepest *of;
+    double low[2], high[2]; /* where is looked */
+    double first;           /* the first coordinate, where the second is sought */
+} place_search;
+
+static double slope_along_second(const void *ctx, double second)
+{
+    const place_search *at = ctx;
+    double slope[2] = {0};
+    depth_at(slope, at->of, (double[2]){at->first, second});
+    return slope[1];
+}
+
+static double best_second(const place_search *at, double first)
+{
+    const place_search line = {at->of, {at->low[0], at->low[1]}, {at->high[0], at->high[1]}, first};
+    const double high = is_triangle(&at->of->side) ? fmax(0, fmin(at->high[1], 1 - first)) : at->high[1];
+    return at->of->side.dim == 2
+               ? 0
+               : uz_root_between(slope_along_second, &line, fmin(at->low[1], high), high, PLACE_WITHIN);
+}
+
+/* Of the least w on the lines of a constant first coordinate: there the second is where w is least, or held; where the
+ * long edge of a triangle holds it, it gives way as the first grows. */
+static double slope_along_first(const void *ctx, double first)
+{
+    const place_search *at = ctx;
+    double slope[2] = {0};
+    const double second = best_second(at, first);
+    depth_at(slope, at->of, (double[2]){first, second});
+    return slope[0] - (is_triangle(&at->of->side) && second >= 1 - first ? fmin(0, slope[1]) : 0);
+}
+
+/* From the places found to where w is least about each, to rounding; what is not as deep as the others goes, and what
+ * comes to the same place. */
+static void refine(deepest *of)
+{
+    const bool triangle = is_triangle(&of->side);
+    const double ends[2] = {triangle ? 0 : -1, 1};
+    const double reach = ldexp(1, 1 - (of->side.dim == 2 ? HALVINGS : HALVINGS_IN_SPACE));
+    double value[MOST_PLACES];
+    int kept = 0;
+    for (int k = 0; k < of->places; k++) {
+        const double began = depth_at(NULL, of, of->at[k]);
+        double at[2] = {of->at[k][0], of->at[k][1]};
+        bool held = true; /* by the border of where is looked, not of the side */
+        for (int steps = 0; steps < 20 && held; steps++) {
+            place_search within = {.of = of};
+            for (int i = 0; i < 2; i++) {
+                within.low[i] = fmax(ends[0], at[i] - reach);
+                within.high[i] = fmin(ends[1], at[i] + reach);
             }
+            at[0] = uz_root_between(slope_along_first, &within, within.low[0], within.high[0], PLACE_WITHIN);
+            at[1] = best_second(&within, at[0]);
+            held = false;
+            for (int i = 0; i < of->side.dim - 1; i++)
+                held =
+                    held || (at[i] <= within.low[i] && at[i] > ends[0]) || (at[i] >= within.high[i] && at[i] < ends[1]);
         }
+        value[k] = depth_at(NULL, of, at);
+        if (value[k] <= began)
+            memcpy(of->at[k], at, sizeof at);
+        else
+            value[k] = began;
+        of->least = fmin(of->least, value[k]);
+    }
+    for (int k = 0; k < of->places; k++) {
+        bool other = value[k] <= of->least + SAME_DEPTH * of->length;
+        for (int j = 0; j < kept; j++)
+            other = other && hypot(of->at[k][0] - of->at[j][0], of->at[k][1] - of->at[j][1]) > SAME_PLACE;
+        if (other)
+            memmove(of->at[kept++], of->at[k], sizeof of->at[k]);
+    }
+    of->places = kept;
 }
 
 /* Does the way out of the obstacle lead a node into the body? On the flank of a block it leads along the side: its row
@@ -157,19 +271,17 @@ static bool leads_in(const deepest *of, int a)
     double N[UZ_FACE_NODES], x[3], along = 0;
     uz_gap gap;
     uz_side_shape(N, &of->side, uz_side_local_nodes(&of->side)[a]);
-    place_of(x, of, N);
-    if (uz_obstacle_row_gap(&gap, of->obstacle, x, of->normal, EDGE * of->size, NULL) != UZ_OK)
+    place_of(x, NULL, of, N, NULL);
+    if (uz_obstacle_row_gap(&gap, NULL, of->obstacle, x, of->normal, EDGE * of->size, NULL) != UZ_OK)
         return true;
     for (int c = 0; c < of->side.dim; c++)
         along -= gap.normal[c] * of->normal[c];
     return along > LEAST_SHARE;
 }
 
-/* The place of the least w, where the nodes' gaps are `gap`. False: nothing is below the slack. */
+/* The places of the least w, roughly, where the nodes' gaps are `gap`. False: nothing is below the slack. */
 static bool find_below(deepest *of, const double *gap)
 {
-    const int halvings = of->side.dim == 2 ? HALVINGS : HALVINGS_IN_SPACE;
-    const double middle = of->side.dim == 2 ? 0 : 0.5;
     double lowest = INFINITY, highest = -INFINITY;
     for (int a = 0; a < of->side.nodes; a++) {
         lowest = fmin(lowest, gap[a]);
@@ -177,68 +289,39 @@ static bool find_below(deepest *of, const double *gap)
     }
     memset(of->pushed, 0, sizeof of->pushed);
     of->least = lowest;
-    of->at[0] = of->at[1] = NAN;
-    of->steep = 1;
+    of->steep = 1 + PULL;
     of->enough = INFINITY;
-    search(of, 0.5, middle, 0.5, halvings);
+    search_all(of);
+    of->near = of->least < CLEAR * of->size;
     const double s = fmax(0, of->least + SINK * of->size);
-    bool again = isnan(of->at[0]);
+    bool again = of->places == 0;
     for (int a = 0; a < of->side.nodes; a++) {
         again = again || s > gap[a];
         of->pushed[a] = s > gap[a] && leads_in(of, a) ? s - gap[a] : 0;
     }
     if (again) {
         of->least = of->enough = s - SLACK * of->size;
-        of->at[0] = of->at[1] = NAN;
-        of->steep = 1 + fmin(1, (highest - lowest) / of->size);
-        search(of, 0.5, middle, 0.5, halvings);
+        of->steep = 1 + PULL + fmin(1, (highest - lowest) / of->size);
+        search_all(of);
     }
-    if (isnan(of->at[0]) || of->least >= s - SLACK * of->size)
-        return false;
-    refine(of, ldexp(0.5, -halvings));
-    return true;
-}
-
-/* Does the obstacle's normal jump at the place, or not lead into the body? */
-static bool is_amid(const deepest *of)
-{
-    double normal[2][3] = {{0}}, along = 0;
-    for (int k = 0; k < 2 * (of->side.dim - 1); k++) {
-        double local[2], N[UZ_FACE_NODES], x[3], at[2] = {of->at[0], of->at[1]}, chord = 0;
-        uz_gap gap;
-        at[k / 2] = fmin(1, fmax(0, at[k / 2] + (k % 2 ? JUMP : -JUMP)));
-        local_point(local, &of->side, at);
-        uz_side_shape(N, &of->side, local);
-        place_of(x, of, N);
-        if (uz_obstacle_gap(&gap, of->obstacle, x, NULL) != UZ_OK)
-            return true;
-        memcpy(normal[k % 2], gap.normal, sizeof normal[0]);
-        for (int c = 0; c < 3; c++) {
-            chord = hypot(chord, k % 2 ? normal[1][c] - normal[0][c] : 0);
-            along -= gap.normal[c] * of->normal[c];
-        }
-        if (chord > LEAST_SHARE)
-            return true;
-    }
-    return along <= 2 * (of->side.dim - 1) * LEAST_SHARE;
+    return of->places > 0 && of->least < s - SLACK * of->size;
 }
 
 /* Sets the side back until it is clear of the obstacle; gap: of its nodes there. False: it cannot be. */
 static bool set_back(deepest *of, double *gap)
 {
     enum { STEPS = 60 };
-    const int halvings = of->side.dim == 2 ? HALVINGS : HALVINGS_IN_SPACE;
     memset(of->pushed, 0, sizeof of->pushed);
-    of->steep = 1;
+    of->steep = 1 + PULL;
     of->enough = INFINITY;
     for (int k = 0; k < STEPS && of->back <= 2 * of->length; k++) {
         of->least = INFINITY;
-        search(of, 0.5, of->side.dim == 2 ? 0 : 0.5, 0.5, halvings);
+        search_all(of);
         for (int a = 0; a < of->side.nodes; a++) {
             double N[UZ_FACE_NODES], x[3];
             uz_gap there;
             uz_side_shape(N, &of->side, uz_side_local_nodes(&of->side)[a]);
-            place_of(x, of, N);
+            place_of(x, NULL, of, N, NULL);
             if (uz_obstacle_gap(&there, of->obstacle, x, NULL) != UZ_OK)
                 return false;
             gap[a] = there.gap - of->back;
@@ -252,7 +335,7 @@ static bool set_back(deepest *of, double *gap)
     return false;
 }
 
-/* Is there a place where the rows of the nodes, whose gaps are `gap`, leave more than the slack? */
+/* Are there places where the rows of the nodes, whose gaps are `gap`, leave more than the slack? */
 static bool find_deepest(deepest *of, double *gap)
 {
     double lowest = INFINITY;
@@ -264,7 +347,22 @@ static bool find_deepest(deepest *of, double *gap)
     if (!find_below(of, gap))
         return false;
     const deepest plain = *of;
-    if (is_amid(of) && !(set_back(of, gap) && find_below(of, gap)))
+    bool amid = of->near && uz_obstacle_has_edges(of->obstacle);
+    if (!amid)
+        refine(of);
+    for (int k = 0; k < of->places && !amid; k++) { /* does the obstacle's normal lead into the body? */
+        double N[UZ_FACE_NODES], x[3], along = 0;
+        uz_gap there;
+        uz_side_shape(N, &of->side, of->at[k]);
+        place_of(x, NULL, of, N, NULL);
+        amid = uz_obstacle_gap(&there, of->obstacle, x, NULL) != UZ_OK;
+        for (int c = 0; c < of->side.dim && !amid; c++)
+            along -= there.normal[c] * of->normal[c];
+        amid = amid || along <= LEAST_SHARE;
+    }
+    if (amid && set_back(of, gap) && find_below(of, gap))
+        refine(of);
+    else if (amid) /* among edges w has kinks, where there is no refining it */
         *of = plain;
     return true;
 }
@@ -274,7 +372,7 @@ static bool find_deepest(deepest *of, double *gap)
 /* The unit normal of a side in its middle. */
 static void normal_of(double normal[3], const uz_side *side)
 {
-    const bool triangle = side->dim == 3 && side->nodes % 3 == 0;
+    const bool triangle = is_triangle(side);
     const double middle[2] = {triangle ? 1.0 / 3 : 0, triangle ? 1.0 / 3 : 0};
     double size = 0;
     normal[2] = 0;
@@ -318,22 +416,22 @@ static void set_curve(deepest *of, const double *normals, int corners)
     }
 }
 
-/* Fills the place that was found. Has it a row? Not where its nodes cannot give way, nor where the obstacle's normal
+/* Fills a place that was found. Has it a row? Not where its nodes cannot give way, nor where the obstacle's normal
  * leads out of the body: its middle is past the side then, and no row tells how to leave it. */
-static bool describe(uz_inner_place *out, const deepest *of, const uz_body_model *model, uz_face face)
+static bool describe(uz_inner_place *out, const deepest *of, const double local[2], const uz_body_model *model,
+                     uz_face face)
 {
     const int dim = of->side.dim, corners = dim == 2 ? 2 : of->side.nodes % 4 == 0 ? 4 : 3;
     uz_side straight = of->side;
-    double local[2], along = 0, most = 0;
+    double along = 0, most = 0;
     uz_gap gap;
     straight.nodes = corners;
-    local_point(local, &of->side, of->at);
     *out = (uz_inner_place){.face = face, .nodes = of->side.nodes, .corners = corners, .size = of->size};
     memcpy(out->node, of->node, sizeof out->node);
     uz_side_shape(out->share, &of->side, local);
     uz_side_shape(out->linear, &straight, local);
-    place_of(out->x, of, out->share);
-    if (uz_obstacle_row_gap(&gap, of->obstacle, out->x, of->normal, EDGE * of->size, NULL) != UZ_OK)
+    place_of(out->x, NULL, of, out->share, NULL);
+    if (uz_obstacle_row_gap(&gap, NULL, of->obstacle, out->x, of->normal, EDGE * of->size, NULL) != UZ_OK)
         return false;
     out->back = of->back;
     for (int c = 0; c < dim; c++) {
@@ -356,17 +454,23 @@ static bool describe(uz_inner_place *out, const deepest *of, const uz_body_model
     return along > LEAST_SHARE && most > LEAST_SHARE;
 }
 
-/* Room for `count` places inside sides beside those of `nodes` nodes. */
-static uz_status reserve_inner(uz_contact_sites *sites, int64_t nodes, int64_t count, int dim, uz_error *err)
+/* Room for `count` gaps and normals. */
+static uz_status reserve_places(uz_contact_sites *sites, int64_t count, int dim, uz_error *err)
+{
+    double *gap = uz_realloc(sites->gap, count, sizeof *gap);
+    sites->gap = gap ? gap : sites->gap;
+    double *normal = gap ? uz_realloc(sites->normal, count * dim, sizeof *normal) : NULL;
+    sites->normal = normal ? normal : sites->normal;
+    return normal ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact at %lld places", (long long)count);
+}
+
+/* Room for `count` places inside sides beside `others`. */
+static uz_status reserve_inner(uz_contact_sites *sites, int64_t others, int64_t count, int dim, uz_error *err)
 {
     uz_inner_place *inner = uz_realloc(sites->inner, count, sizeof *inner);
     sites->inner = inner ? inner : sites->inner;
-    double *gap = inner ? uz_realloc(sites->gap, nodes + count, sizeof *gap) : NULL;
-    sites->gap = gap ? gap : sites->gap;
-    double *normal = gap ? uz_realloc(sites->normal, (nodes + count) * dim, sizeof *normal) : NULL;
-    sites->normal = normal ? normal : sites->normal;
-    return normal ? UZ_OK
-                  : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact inside %lld sides", (long long)count);
+    return inner ? reserve_places(sites, others + count, dim, err)
+                 : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact inside %lld sides", (long long)count);
 }
 
 /* The places that were found before anything moved, where they have come to. */
@@ -384,13 +488,14 @@ static uz_status move_inner(uz_contact_sites *sites, const uz_contact_input *in,
         *place = before->inner[i];
         uz_body_side(&of.side, of.xyz, of.node, in->model, place->face);
         normal_of(of.normal, &of.side);
-        place_of(place->x, &of, place->share);
-        status = uz_obstacle_row_gap(&gap, obstacle, place->x, of.normal, EDGE * place->size, err);
+        place_of(place->x, NULL, &of, place->share, NULL);
+        status = uz_obstacle_row_gap(&gap, NULL, obstacle, place->x, of.normal, EDGE * place->size, err);
         if (status != UZ_OK)
             break;
         place->gap = gap.gap - place->back;
         uz_unit_normal(place->normal, gap.normal, dim);
-        sites->gap[nodes + i] = isfinite(before->gap[nodes + i]) ? place->gap : INFINITY;
+        const bool row = isfinite(before->gap[before->n - before->n_inner + i]);
+        sites->gap[nodes + i] = row ? place->gap : INFINITY;
         memcpy(sites->normal + dim * (nodes + i), place->normal, (size_t)dim * sizeof *place->normal);
         sites->n++;
         sites->n_inner++;
@@ -423,19 +528,26 @@ static uz_status find_inner(uz_contact_sites *sites, const uz_contact_input *in,
             }
         }
         of.size = of.length / (count > corners ? 2 : 1);
+        for (int a = 0; a < corners; a++)
+            for (int c = 0; c < dim; c++)
+                of.middle[c] += of.xyz[dim * a + c] / corners;
         set_curve(&of, normals, corners);
         if (!find_deepest(&of, gap))
             continue;
-        if (sites->n - nodes == room) {
+        if (sites->n - nodes + of.places > room) {
             room = 2 * room + 16;
             const uz_status status = reserve_inner(sites, nodes, room, dim, err);
             if (status != UZ_OK)
                 return status;
         }
-        uz_inner_place *place = &sites->inner[sites->n_inner++];
-        const bool row = describe(place, &of, in->model, in->on->face[f]) && in->contact->between != UZ_CONTACT_NODES;
-        sites->gap[sites->n] = row ? place->gap : INFINITY;
-        memcpy(sites->normal + dim * sites->n++, place->normal, (size_t)dim * sizeof *place->normal);
+        for (int k = 0; k < of.places; k++) {
+            uz_inner_place *place = &sites->inner[sites->n_inner++];
+            const bool row =
+                describe(place, &of, of.at[k], in->model, in->on->face[f]) && in->contact->between != UZ_CONTACT_NODES;
+            place->part = 1. / of.places;
+            sites->gap[sites->n] = row ? place->gap : INFINITY;
+            memcpy(sites->normal + dim * sites->n++, place->normal, (size_t)dim * sizeof *place->normal);
+        }
     }
     return UZ_OK;
 }
@@ -462,12 +574,76 @@ static void look_around(double *normals, double *near, const uz_contact_input *i
     }
 }
 
+/* The row of a node, and where it was taken. */
+typedef struct {
+    uz_gap gap;
+    double at[3];
+} node_row;
+
+/* Appends to the places of the nodes, whose rows are `first`, those that other flanks of grooves give them. clear (by
+ * node): how far a groove may be away. */
+static uz_status find_flanks(uz_contact_sites *sites, const uz_contact_input *in, const uz_obstacle *obstacle,
+                             const node_row *first, const double *clear, uz_error *err)
+{
+    const uz_mesh *mesh = &in->model->mesh;
+    const int dim = mesh->dim;
+    const int64_t nodes = sites->n;
+    if (!uz_obstacle_has_edges(obstacle))
+        return UZ_OK;
+    uz_gap *flank = uz_alloc(nodes, MOST_FLANKS * sizeof *flank);
+    int *count = uz_alloc_zero(nodes, sizeof *count);
+    int64_t *place = uz_alloc(mesh->n_nodes, sizeof *place), all = 0;
+    uz_status status = flank && count && place ? UZ_OK
+                                               : uz_fail(err, UZ_ERR_MEMORY, "",
+                                                         "no memory for the grooves at %lld nodes", (long long)nodes);
+    for (int64_t i = 0; i < nodes && status == UZ_OK; i++)
+        place[uz_group_node_at(in->on, i)] = i;
+    for (int64_t f = 0; f < in->on->n_faces && status == UZ_OK; f++) {
+        uz_side side;
+        int64_t node[UZ_FACE_NODES];
+        double xyz[3 * UZ_FACE_NODES];
+        uz_body_side(&side, xyz, node, in->model, in->on->face[f]);
+        for (int a = 0; a < side.nodes; a++)
+            for (int b = 0; b < side.nodes && first[place[node[a]]].gap.gap < clear[node[a]]; b++) {
+                const int64_t i = place[node[a]];
+                double way[3] = {0}, length = 0;
+                for (int c = 0; c < dim; c++)
+                    length = hypot(length, xyz[dim * b + c] - xyz[dim * a + c]);
+                for (int c = 0; c < dim && length > 0; c++)
+                    way[c] = clear[node[a]] / length * (xyz[dim * b + c] - xyz[dim * a + c]);
+                all -= count[i];
+                if (a != b)
+                    count[i] = uz_obstacle_flanks(flank + MOST_FLANKS * i, count[i], MOST_FLANKS, obstacle,
+                                                  xyz + dim * a, first[i].at, &first[i].gap, way);
+                all += count[i];
+            }
+    }
+    if (status == UZ_OK && all > 0) {
+        sites->flank = uz_alloc(all, sizeof *sites->flank);
+        status = sites->flank ? reserve_places(sites, nodes + all, dim, err)
+                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld flanks", (long long)all);
+    }
+    for (int64_t i = 0; i < nodes && status == UZ_OK; i++)
+        for (int k = 0; k < count[i]; k++) {
+            double *normal = sites->normal + dim * sites->n;
+            sites->flank[sites->n_flanks++] = uz_group_node_at(in->on, i);
+            memset(normal, 0, (size_t)dim * sizeof *normal);
+            sites->gap[sites->n] = flank[MOST_FLANKS * i + k].gap;
+            uz_put_normal(sites, sites->n++, flank[MOST_FLANKS * i + k].normal, dim);
+        }
+    free(flank);
+    free(count);
+    free(place);
+    return status;
+}
+
 /* A plane has no sites: where it is belongs to the load. */
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
 {
     const uz_mesh *mesh = &in->model->mesh;
     uz_obstacle *obstacle = NULL;
     double *gaps = NULL, *normals = NULL, *near = NULL; /* by node */
+    node_row *first = NULL;                             /* by node of the group */
     if (in->contact->kind == UZ_OBSTACLE_PLANE)
         return UZ_OK;
     uz_status status = uz_sites_of_nodes(sites, in, err);
@@ -477,27 +653,32 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
         gaps = uz_alloc(mesh->n_nodes, sizeof *gaps);
         normals = uz_alloc_zero(mesh->n_nodes * mesh->dim, sizeof *normals);
         near = uz_alloc_zero(mesh->n_nodes, sizeof *near);
+        first = uz_alloc(sites->n, sizeof *first);
     }
-    if (status == UZ_OK && !(gaps && normals && near))
+    if (status == UZ_OK && !(gaps && normals && near && first))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the gaps of %lld nodes", (long long)mesh->n_nodes);
     if (status == UZ_OK)
         look_around(normals, near, in);
     for (int64_t i = 0; i < sites->n && status == UZ_OK; i++) {
         const int64_t node = uz_group_node_at(in->on, i);
         double outward[3] = {0};
-        uz_gap at;
         uz_unit_normal(outward, normals + node * mesh->dim, mesh->dim);
-        status = uz_obstacle_row_gap(&at, obstacle, mesh->xyz + node * mesh->dim, outward, EDGE * near[node], err);
+        near[node] *= EDGE;
+        status = uz_obstacle_row_gap(&first[i].gap, first[i].at, obstacle, mesh->xyz + node * mesh->dim, outward,
+                                     near[node], err);
         if (status != UZ_OK)
             break;
-        sites->gap[i] = gaps[node] = at.gap;
-        uz_put_normal(sites, i, at.normal, mesh->dim);
+        sites->gap[i] = gaps[node] = first[i].gap.gap;
+        uz_put_normal(sites, i, first[i].gap.normal, mesh->dim);
     }
+    if (status == UZ_OK)
+        status = find_flanks(sites, in, obstacle, first, near, err);
     if (status == UZ_OK)
         status = find_inner(sites, in, obstacle, gaps, normals, err);
     free(gaps);
     free(normals);
     free(near);
+    free(first);
     uz_obstacle_free(obstacle);
     return status;
 }
@@ -527,7 +708,9 @@ static bool row(uz_contact_row *row, const uz_contact_input *in, const uz_contac
         memcpy(row->normal, inner->normal, sizeof row->normal);
         return isfinite(row->gap);
     }
-    *row = (uz_contact_row){.node = uz_group_node_at(in->on, place), .slaves = 1, .slave_share = &whole};
+    const int64_t flank = place - (sites->n - sites->n_inner - sites->n_flanks);
+    const int64_t node = sites->n_flanks > 0 && flank >= 0 ? sites->flank[flank] : uz_group_node_at(in->on, place);
+    *row = (uz_contact_row){.node = node, .slaves = 1, .slave_share = &whole};
     row->slave = &row->node;
     if (sites->n > 0) {
         row->gap = sites->gap[place];
@@ -541,28 +724,40 @@ static bool row(uz_contact_row *row, const uz_contact_input *in, const uz_contac
     return uz_unit_normal(row->normal, in->contact->normal, mesh->dim);
 }
 
-/* What a row inside a side has, its nodes have no more. */
+/* What a row inside a side has, its nodes have no more; the flanks that hold a node have equal parts of it. */
 static void areas(double *area, const uz_contact_input *in)
 {
     const uz_contact_sites *sites = &in->model->sites[in->index];
-    const int64_t nodes = uz_places_of_nodes(in);
+    const int64_t nodes = uz_places_of_nodes(in), others = nodes + sites->n_flanks;
     uz_areas_of_nodes(area, in);
     for (int64_t i = 0; i < sites->n_inner; i++) {
         uz_side side;
         int64_t node[UZ_FACE_NODES];
         double xyz[3 * UZ_FACE_NODES], w[UZ_FACE_NODES];
-        const bool row = isfinite(sites->gap[nodes + i]);
+        const bool row = isfinite(sites->gap[others + i]);
         uz_body_side(&side, xyz, node, in->model, sites->inner[i].face);
         uz_side_positive_weights(w, &side);
-        area[nodes + i] = row ? INNER_AREA * uz_side_area(&side) : 0;
+        const double part = INNER_AREA * sites->inner[i].part;
+        area[others + i] = row ? part * uz_side_area(&side) : 0;
         for (int a = 0; a < side.nodes && row; a++)
-            in->room[node[a]] += INNER_AREA * w[a];
+            in->room[node[a]] += part * w[a];
     }
     for (int64_t i = 0; i < nodes && sites->n_inner > 0; i++) {
         const int64_t node = uz_group_node_at(in->on, i);
         area[i] = fmax(0, area[i] - in->room[node]);
         in->room[node] = 0;
     }
+    for (int64_t i = 0; i < sites->n_flanks; i++)
+        in->room[sites->flank[i]]++;
+    for (int64_t i = 0; i < nodes && sites->n_flanks > 0; i++) {
+        double *whole = &in->room[uz_group_node_at(in->on, i)];
+        area[i] /= 1 + *whole;
+        *whole = *whole > 0 ? area[i] : 0;
+    }
+    for (int64_t i = 0; i < sites->n_flanks; i++)
+        area[nodes + i] = in->room[sites->flank[i]];
+    for (int64_t i = 0; i < sites->n_flanks; i++)
+        in->room[sites->flank[i]] = 0;
 }
 
 const uz_contact_discretization uz_node_to_obstacle = {

@@ -13,6 +13,12 @@
 /* A way out that is longer than this many depths leads along the obstacle. */
 #define MOST_BACK 4
 
+/* Grooves (rad): what is deeper than the first is no curve, below the second there is none. */
+#define DEEP_GROOVE 0.1
+#define NO_GROOVE   1e-5
+/* In lengths of the way on which flanks are looked for: as close to both. */
+#define AS_CLOSE 1e-6
+
 static const uz_obstacle_shape *const shapes[] = {[UZ_OBSTACLE_PLANE] = &uz_shape_plane,
                                                   [UZ_OBSTACLE_ROUND] = &uz_shape_round,
                                                   [UZ_OBSTACLE_CYLINDER] = &uz_shape_cylinder,
@@ -111,13 +117,15 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
     return status == UZ_OK ? unscale(out, o, &scaled, err) : status;
 }
 
-uz_status uz_obstacle_row_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, const double *outward,
-                              double clear, uz_error *err)
+uz_status uz_obstacle_row_gap(uz_gap *out, double *at, const uz_obstacle *obstacle, const double *x,
+                              const double *outward, double clear, uz_error *err)
 {
     enum { STEPS = 40 };
     const int dim = obstacle->dim;
     uz_gap there;
-    double back = 0;
+    double back = 0, taken[3] = {x[0], x[1], dim == 3 ? x[2] : 0};
+    if (at)
+        memcpy(at, x, (size_t)dim * sizeof *at);
     const uz_status status = uz_obstacle_gap(out, obstacle, x, err);
     if (status != UZ_OK || !obstacle->shape->has_edges || out->gap >= clear)
         return status;
@@ -125,11 +133,10 @@ uz_status uz_obstacle_row_gap(uz_gap *out, const uz_obstacle *obstacle, const do
     there = *out;
     /* a distance grows by no more than the way: no step leads past where it is enough */
     for (int k = 0; k < STEPS && there.gap < 0.999 * enough && back <= most; k++) {
-        double at[3] = {0};
         back += enough - there.gap;
         for (int c = 0; c < dim; c++)
-            at[c] = x[c] - back * outward[c];
-        if (uz_obstacle_gap(&there, obstacle, at, NULL) != UZ_OK)
+            taken[c] = x[c] - back * outward[c];
+        if (uz_obstacle_gap(&there, obstacle, taken, NULL) != UZ_OK)
             return UZ_OK;
     }
     if (there.gap < 0.999 * enough || back > most)
@@ -137,5 +144,61 @@ uz_status uz_obstacle_row_gap(uz_gap *out, const uz_obstacle *obstacle, const do
     *out = there;
     for (int c = 0; c < dim; c++)
         out->gap += back * outward[c] * there.normal[c];
+    if (at)
+        memcpy(at, taken, (size_t)dim * sizeof *at);
     return UZ_OK;
+}
+
+bool uz_obstacle_has_edges(const uz_obstacle *obstacle)
+{
+    return obstacle->shape->has_edges;
+}
+
+/* The plane that is closest to at + step * way, as a gap of x. False: an edge that juts out is closest, or nothing. */
+static bool plane_beside(uz_gap *out, const uz_obstacle *obstacle, const double *x, const double *at, const double *way,
+                         double step)
+{
+    double beside[3] = {0};
+    for (int c = 0; c < obstacle->dim; c++)
+        beside[c] = at[c] + step * way[c];
+    if (uz_obstacle_gap(out, obstacle, beside, NULL) != UZ_OK || !(fabs(out->curvature * out->gap) < 0.5))
+        return false;
+    for (int c = 0; c < obstacle->dim; c++)
+        out->gap += (x[c] - beside[c]) * out->normal[c];
+    return true;
+}
+
+/* Do two planes turn by more than `least` (rad), and does either rise above the other? */
+static bool is_groove(const uz_gap *a, const uz_gap *b, double least, double rounding)
+{
+    double turn = 0, rises[2] = {0};
+    for (int c = 0; c < 3; c++) {
+        turn = hypot(turn, a->normal[c] - b->normal[c]);
+        rises[0] += a->normal[c] * (b->foot[c] - a->foot[c]);
+        rises[1] += b->normal[c] * (a->foot[c] - b->foot[c]);
+    }
+    return turn > least && fmin(rises[0], rises[1]) >= -rounding && fmax(rises[0], rises[1]) > 0;
+}
+
+int uz_obstacle_flanks(uz_gap *out, int count, int most, const uz_obstacle *obstacle, const double *x, const double *at,
+                       const uz_gap *first, const double *way)
+{
+    static const double STEP[] = {1, 0.5, 0.25, AS_CLOSE};
+    uz_gap pair[2];
+    const double rounding = 1e-9 * sqrt(way[0] * way[0] + way[1] * way[1] + (obstacle->dim == 3 ? way[2] * way[2] : 0));
+    for (int k = 0; k < 4; k++) {
+        bool seen[2];
+        for (int j = 0; j < 2; j++)
+            seen[j] = plane_beside(&pair[j], obstacle, x, at, way, j ? -STEP[k] : STEP[k]);
+        /* a shallow one is told from a curve by a leap at the point */
+        const bool leaps = STEP[k] == AS_CLOSE && seen[0] && seen[1] && is_groove(&pair[0], &pair[1], NO_GROOVE, 0);
+        for (int j = 0; j < 2; j++) {
+            bool groove = seen[j] && count < most && (leaps || STEP[k] > AS_CLOSE);
+            for (int i = -1; i < count && groove; i++)
+                groove = is_groove(&pair[j], i < 0 ? first : &out[i], leaps ? NO_GROOVE : DEEP_GROOVE, rounding);
+            if (groove)
+                out[count++] = pair[j];
+        }
+    }
+    return count;
 }

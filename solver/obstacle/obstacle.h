@@ -64,8 +64,21 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
  * until it is as far out as it was in and `clear` at least, and has the tangent plane of the point that is closest
  * there: a flank's, or at the crest one between them, which turns from one to the other as the point passes over it.
  *   outward  dim; the body's unit normal at x; zero, or a way that does not lead out soon: as uz_obstacle_gap
- *   clear    a length: edges are as if rounded with this radius */
-uz_status uz_obstacle_row_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, const double *outward,
-                              double clear, uz_error *err);
+ *   clear    a length: edges are as if rounded with this radius
+ *   at       dim; out: where x was taken back to (NULL: not wanted) */
+uz_status uz_obstacle_row_gap(uz_gap *out, double *at, const uz_obstacle *obstacle, const double *x,
+                              const double *outward, double clear, uz_error *err);
+
+/* In a groove a point is held by more than the flank that is closest: what is free about it is where all of them let
+ * it, and on the bisector the closest one is either by rounding. Adds to the `count` planes at `out` (room: `most`)
+ * those of the obstacle beside x, as gaps of x from them: the ones that are closest to places on both sides of `at`, up
+ * to `way` from it, where they make a groove with `first` and with those found before: of each two planes either rises
+ * above the other. Grooves shallower than 0.1 (rad) count only where `at` is as close to both flanks.
+ *   first, at   of x, from uz_obstacle_row_gap
+ * Returns how many planes there are. Allocates nothing. */
+int uz_obstacle_flanks(uz_gap *out, int count, int most, const uz_obstacle *obstacle, const double *x, const double *at,
+                       const uz_gap *first, const double *way);
+/* Are there any, of whatever point? */
+bool uz_obstacle_has_edges(const uz_obstacle *obstacle);
 
 #endif

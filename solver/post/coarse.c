@@ -115,6 +115,14 @@ static bool is_curved(const contact_sides *on, int64_t face)
     return false;
 }
 
+/* Does this row stand inside this side? */
+static bool is_inside(const contact_sides *on, int64_t row, int64_t face)
+{
+    const uz_inner_place *inner = row < on->last ? uz_row_inner(on->model, row) : NULL;
+    const uz_face of = on->group->face[face];
+    return inner && inner->face.element == of.element && inner->face.side == of.side;
+}
+
 /* Fills what is by node and by side. */
 static void look_at_sides(contact_sides *on)
 {
@@ -129,20 +137,20 @@ static void look_at_sides(contact_sides *on)
                 on->normals[3 * node[a] + c] += normal[a][c];
     }
     while (row < on->last && !uz_row_inner(model, row)) {
-        on->row_of[model->info.contact_node[row]] = row + 1;
-        on->active[model->info.contact_node[row]] = model->law->kind->active(model->law, NULL, &on->r[row], 1) > 0;
+        const int64_t at = model->info.contact_node[row]; /* several times where flanks of a groove hold it */
+        on->row_of[at] = on->row_of[at] > 0 ? on->row_of[at] : row + 1;
+        on->active[at] = on->active[at] || model->law->kind->active(model->law, NULL, &on->r[row], 1) > 0;
         row++;
     }
     for (int64_t f = 0; f < on->group->n_faces; f++) {
         const int count = nodes_of(node, &corners, on, f);
-        const uz_inner_place *inner = row < on->last ? uz_row_inner(model, row) : NULL;
         bool all = true, inside = false;
         for (int a = 0; a < corners; a++)
             all = all && on->active[node[a]];
         for (int a = corners; a < count; a++)
             all = all || on->active[node[a]];
-        if (inner && inner->face.element == on->group->face[f].element && inner->face.side == on->group->face[f].side)
-            inside = model->law->kind->active(model->law, NULL, &on->r[row++], 1) > 0;
+        for (; is_inside(on, row, f); row++)
+            inside = inside || model->law->kind->active(model->law, NULL, &on->r[row], 1) > 0;
         on->in_contact[f] = all || inside;
         /* a row inside is there because the obstacle does not follow the side */
         on->turn[f] = inside || turns(on, node, corners) || is_curved(on, f);
@@ -175,11 +183,10 @@ static void add_lone_rows(uz_coarse_contact *out, contact_sides *on, int64_t con
     }
     for (int64_t f = 0; f < on->group->n_faces; f++) {
         const int count = nodes_of(node, &corners, on, f);
-        const uz_inner_place *inner = row < on->last ? uz_row_inner(model, row) : NULL;
         double here = 0, most = 0;
         bool covered = false;
-        if (inner && inner->face.element == on->group->face[f].element && inner->face.side == on->group->face[f].side)
-            here = fabs(on->r[row++]);
+        for (; is_inside(on, row, f); row++)
+            here += fabs(on->r[row]);
         for (int a = 0; a < count; a++)
             covered = covered || on->covered[node[a]];
         for (int a = 0; a < count; a++) {

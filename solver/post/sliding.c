@@ -14,12 +14,26 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Where the place of a row is now: nodes of a slave surface may have another number of places. -1: nowhere. */
-static int64_t place_now(const uz_contact_sites *now, const uz_contact_sites *before, int64_t place)
+/* Where the place of a row is now: nodes of a slave surface may have another number of places, and so may those in the
+ * grooves of an obstacle. -1: nowhere. */
+static int64_t place_now(const uz_contact_sites *now, const uz_contact_sites *before, int64_t place, int dim)
 {
-    int64_t low = 0, high = now->n;
-    if (!before->at)
-        return place < now->n ? place : -1;
+    int64_t low = 0, high = now->n, found = -1;
+    if (!before->at) {
+        const int64_t nodes = before->n - before->n_inner - before->n_flanks, flank = place - nodes;
+        double most = 0;
+        if (flank < 0 || flank >= before->n_flanks)
+            place += flank < 0 ? 0 : now->n_flanks - before->n_flanks;
+        for (int64_t i = 0; i < now->n_flanks && flank >= 0 && flank < before->n_flanks; i++) {
+            double along = 0;
+            for (int c = 0; c < dim && now->flank[i] == before->flank[flank]; c++)
+                along += now->normal[(nodes + i) * dim + c] * before->normal[place * dim + c];
+            found = along > most ? nodes + i : found;
+            most = fmax(most, along);
+        }
+        const bool is_flank = flank >= 0 && flank < before->n_flanks;
+        return is_flank ? found : place < now->n ? place : -1;
+    }
     if (place < now->n && now->at[place] == before->at[place])
         return place;
     while (low < high) {
@@ -91,7 +105,7 @@ static void add_rows(misfit *to, const uz_body_model *model, const uz_body_model
         to->force += force;
         if (force <= 0 || before->n == 0) /* of a plane nothing changes */
             continue;
-        const int64_t p = model->row_place[i], q = place_now(now, before, p);
+        const int64_t p = model->row_place[i], q = place_now(now, before, p, dim);
         const bool found = q >= 0 && isfinite(now->gap[q]);
         double chord = 0;
         for (int c = 0; c < dim && found; c++)

@@ -149,6 +149,38 @@ def test_a_tooth_between_flat_grounds_is_narrow(s):
     check(all(forces[at, 20, name] > 1.1 * forces[at, 40, name] for at, n, name in forces), forces)
 
 
+def test_two_teeth_in_one_side(s):
+    """As deep as each other in a side: whichever of them had the row, the other would stand in the side."""
+    x = [-50, 50.8, 51, 51.2, 53.8, 54, 54.2, 150]
+    result = solve(s, block(20, {"polyline": {"points": [[a, 0.4 if a in (51, 54) else -3] for a in x]}}))
+    told = [-r for r, n in zip(result["reactions"], result["contact_nodes"]) if r < 0]
+    check(len(told) == 2 and abs(told[0] - told[1]) < 1e-3 * told[0], told)
+    depth = max(0.4 - y for n, d in zip(result["nodes"], result["displacements"]) for y in [n[1] + d[1]] if n[1] == 0 and 50 <= n[0] <= 55)
+    check(depth < 1e-6, depth)
+
+
+def test_a_node_amid_a_groove(s):
+    """The tip of a wedge: of one flank alone, whichever rounding has, the body would be pushed aside. Both carry it."""
+    other = None
+    for element, form, n, turn in itertools.product(("quad4", "quad8"), ("polyline", "height"), (8, 16), (1, -1)):
+        x, y = [-3 * turn, 0, 3.3 * turn], [0.32, 0.02, 0.35]
+        x, y = (x, y) if turn > 0 else (x[::-1], y[::-1])
+        line = {"polyline": {"points": [list(p) for p in zip(x, y)]}} if form == "polyline" else {"height": {"x": x, "z": y}}
+        request = body([element], [[n, n // 2]], [lambda a, b: [4 * a - 2, 0.4 * abs(4 * a - 2) * (1 - b) + 2 * b]],
+                       {"on": [(0, "bottom")], "head": [(0, "top")]}, model="plane_strain", kinematics="fixed",
+                       materials=[{"on": "all", "young": 1000, "poisson": 0.3}], supports=[{"on": "head", "ux": 0.003, "uy": 0}],
+                       contacts=[{"on": "on", "obstacle": line}])
+        result = solve(s, request["problem"])
+        force = result["summary"]["contact"]["force"]
+        tip = result["nodes"].index([0, 0])
+        at = sorted(r for r, k in zip(result["reactions"], result["contact_nodes"]) if k == tip)
+        check(len(at) == 2 and at[1] < 0, (element, form, n, turn, at))
+        u = result["displacements"][tip]  # of the head 0.003 to the right
+        check(math.dist(u, [0, 0.02]) < 1e-12, (element, form, n, turn, u))
+        other = force if turn > 0 else other
+        check(force[0] < 0 and force[1] > 5 and math.dist(force, other) < 1e-9 * force[1], (element, form, n, force, other))
+
+
 def test_a_block_whose_flanks_are_at_nodes(s):
     """The nearest way out of it leads sideways there: rows at these nodes let it in, however far."""
     for element, n, deep in itertools.product(("quad4", "quad8", "tri3"), (20, 40), (0.01, 0.1)):

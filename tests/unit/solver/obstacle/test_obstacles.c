@@ -386,30 +386,85 @@ TEST(rows_on_a_ridge)
     for (int k = -1; k <= 1; k++)
         for (int deep = 0; deep < 3; deep++) { /* in it, on it, over it by less than is clear */
             const double at[2] = {1e-15 * k, 1 - 0.2 * (deep - 1)};
-            CHECK(uz_obstacle_row_gap(&gap, o, at, down, 0.3, NULL) == UZ_OK);
+            CHECK(uz_obstacle_row_gap(&gap, NULL, o, at, down, 0.3, NULL) == UZ_OK);
             near(gap.gap, -0.2 * (deep - 1), 1e-12, "gap");
             near(gap.normal[0], 0, 1e-12, "normal");
             near(gap.normal[1], 1, 1e-12, "normal");
         }
     for (int k = -1; k <= 1; k += 2) { /* beside the crest the plane turns, and further on it is the flank's */
         const double near_it[2] = {0.01 * k, 0.8}, far_off[2] = {k, -0.2};
-        CHECK(uz_obstacle_row_gap(&gap, o, near_it, down, 0.01, NULL) == UZ_OK);
+        CHECK(uz_obstacle_row_gap(&gap, NULL, o, near_it, down, 0.01, NULL) == UZ_OK);
         CHECK(k * gap.normal[0] > 0.01 && k * gap.normal[0] < 0.1 && gap.gap > -0.21 && gap.gap < -0.19);
-        CHECK(uz_obstacle_row_gap(&gap, o, far_off, down, 0.01, NULL) == UZ_OK);
+        CHECK(uz_obstacle_row_gap(&gap, NULL, o, far_off, down, 0.01, NULL) == UZ_OK);
         near(gap.normal[0], k * s, 1e-12, "normal");
         near(gap.gap, -0.2 * s, 1e-12, "gap");
     }
     const double beside[2] = {0.1, 0}, none[2] = {0, 0}, amid[2] = {0, 0.5};
-    CHECK(uz_obstacle_row_gap(&gap, b, beside, down, 0.01, NULL) == UZ_OK);
+    CHECK(uz_obstacle_row_gap(&gap, NULL, b, beside, down, 0.01, NULL) == UZ_OK);
     near(gap.normal[0], -1, 1e-12, "normal");
     near(gap.gap, -0.1, 1e-12, "gap");
-    CHECK(uz_obstacle_row_gap(&gap, o, amid, none, 0.01, NULL) == UZ_OK); /* of a node of no side */
+    CHECK(uz_obstacle_row_gap(&gap, NULL, o, amid, none, 0.01, NULL) == UZ_OK); /* of a node of no side */
     near(gap.gap, -0.5 * s, 1e-12, "gap");
     uz_obstacle_free(o);
     uz_obstacle_free(b);
 }
 
 /* A power of two changes exponents only, other units no more than roundings. */
+/* Nodes that more than one flank of a groove holds, and those that are held by one. */
+TEST(flanks_of_grooves)
+{
+    double x[] = {-3, 0, 3}, groove[] = {3, 0, 3}, ridge[] = {-3, 0, -3}, y[] = {-1, 1}, z[] = {3, 0, 3, 3, 0, 3};
+    double tooth_x[] = {-3, 0.1, 0.3, 0.5, 3}, tooth[] = {0, 0, 0.4, 0, 0}, fine_x[61], fine[61];
+    const double way[3] = {0.5, 0, 0};
+    double taken[3];
+    const double root = sqrt(0.5);
+    uz_contact c = polyline(x, groove, 3);
+    uz_gap first, out[3];
+    for (int form = 0; form < 2; form++) {
+        uz_obstacle *o = made(&c, form ? UZ_SOLID : UZ_PLANE_STRAIN);
+        const double up[3] = {0, form ? 0 : 1, form};
+        CHECK(uz_obstacle_has_edges(o));
+        /* amid, closer to one, in the obstacle, and on its bottom, where the point has the mean of both */
+        for (int k = 0; k < 5; k++) {
+            const double off = (double[]){0, 0.1, -0.1, 0, 0}[k], high = (double[]){0.2, 0.2, 0.2, -0.2, 0}[k];
+            const double at[3] = {off, form ? 0.1 : high, high}, down[3] = {0, -up[1], -up[2]};
+            CHECK_INT(uz_obstacle_row_gap(&first, taken, o, at, down, 0.25, NULL), UZ_OK);
+            const int found = uz_obstacle_flanks(out, 0, 3, o, at, taken, &first, way);
+            bool seen[2] = {false};
+            for (int j = -1; j < found; j++) {
+                const uz_gap *plane = j < 0 ? &first : &out[j];
+                const int side = plane->normal[0] < 0;
+                if (fabs(plane->normal[0]) < 0.5) /* the mean */
+                    continue;
+                seen[side] = true;
+                near(fabs(plane->normal[0]), root, 1e-12, "flank");
+                near(plane->gap, root * (high + (side ? -off : off)), 1e-12, "gap");
+            }
+            CHECK_MSG(seen[0] && seen[1] && found < 3, "form %d, point %d: %d flanks", form, k, found);
+        }
+        /* too far away, and out of sight of the other flank */
+        const double far[3] = {2, form ? 0.1 : 2.1, 2.1};
+        CHECK_INT(uz_obstacle_gap(&first, o, far, NULL), UZ_OK);
+        CHECK_INT(uz_obstacle_flanks(out, 0, 3, o, far, far, &first, way), 0);
+        uz_obstacle_free(o);
+        c = (uz_contact){.kind = UZ_OBSTACLE_HEIGHT, .n_x = 3, .n_y = 2, .x = x, .y = y, .z = z};
+    }
+    /* not over a ridge, nor on the pieces of a curve; beside a tooth the flank that it may run into */
+    for (int k = 0; k < 61; k++) {
+        fine_x[k] = 0.1 * (k - 30);
+        fine[k] = 0.02 * fine_x[k] * fine_x[k];
+    }
+    const uz_contact none[] = {polyline(x, ridge, 3), polyline(tooth_x, tooth, 5), polyline(fine_x, fine, 61)};
+    const double at[][2] = {{0, -0.1}, {0.7, 0}, {0.03, 0.05}};
+    for (int k = 0; k < 3; k++) {
+        uz_obstacle *o = made(&none[k], UZ_PLANE_STRAIN);
+        CHECK_INT(uz_obstacle_row_gap(&first, taken, o, at[k], (double[]){0, -1}, 0.25, NULL), UZ_OK);
+        const int found = uz_obstacle_flanks(out, 0, 3, o, at[k], taken, &first, way);
+        CHECK_MSG(found == (k == 1), "obstacle %d: %d flanks", k, found);
+        uz_obstacle_free(o);
+    }
+}
+
 TEST(units_do_not_matter)
 {
     uint64_t seed = 23;
