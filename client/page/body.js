@@ -338,7 +338,7 @@ class BodyView {
     const query = new URLSearchParams();
     if (this.case_name) query.set("case", this.case_name);
     if (this.surface) query.set("factor", String(this.factor));
-    query.set("colour", this.quantity === "von_mises" ? "von_mises" : "displacements");
+    query.set("colour", ["von_mises", "pressure"].includes(this.quantity) ? this.quantity : "displacements");
     return `/v1/jobs/${this.job}/deformed.svg?${query}`;
   }
 
