@@ -13,6 +13,7 @@
 #include "work/work.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <limits.h>
 #include <malloc.h>
 #include <pthread.h>
@@ -29,7 +30,8 @@ enum { EXIT_ENDED = 0, EXIT_FAILED = 1, EXIT_USAGE = 2 };
 static const double LEASE_S = 60;
 
 typedef struct {
-    server_log *log;
+    server_log *log, *audit; /* audit: who did what; NULL: not kept */
+    FILE *audit_file;
     metrics *metrics;
     store *store;
     uz_reserve *reserve; /* outlives the work */
@@ -113,6 +115,15 @@ static bool read_secrets(service *s, const server_options *options, char *messag
         return false;
     if (options->webhook_secret_file[0] && !webhook_read_secret(&s->hooks, options->webhook_secret_file, message, size))
         return false;
+    if (options->audit_log[0]) {
+        const int fd = open(options->audit_log, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0600);
+        s->audit_file = fd >= 0 ? fdopen(fd, "a") : NULL;
+        s->audit = s->audit_file ? log_open(s->audit_file, LOG_INFO) : NULL;
+        if (!s->audit) {
+            snprintf(message, size, "cannot write the audit log %s: %s", options->audit_log, strerror(errno));
+            return false;
+        }
+    }
     return !options->tls_cert[0] || http_tls_read(&s->tls, options->tls_cert, options->tls_key, message, size);
 }
 
@@ -121,6 +132,9 @@ static bool start_work(service *s, const server_options *options, char *message,
 {
     const store_settings kept = {.metrics = s->metrics,
                                  .max_queue = options->max_queue,
+                                 .quotas = {.waiting = options->client_queue,
+                                            .bytes = (int64_t)options->client_bytes,
+                                            .seconds = options->client_seconds},
                                  .uploads = {.one = (int64_t)options->max_upload,
                                              .all = (int64_t)options->uploads,
                                              .keep_s = options->upload_days * 86400}};
@@ -157,6 +171,7 @@ static bool start_http(service *s, const server_options *options, int fd, char *
                               .work = s->work,
                               .webhooks = s->webhooks,
                               .log = s->log,
+                              .audit = s->audit,
                               .metrics = s->metrics,
                               .auth = s->auth};
     options_split(&s->origins, options->cors);
@@ -216,6 +231,16 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     return start_http(s, options, fd, message, size);
 }
 
+static void forget_secrets(service *s)
+{
+    auth_free(s->auth);
+    http_tls_clear(&s->tls);
+    webhook_forget_secret(&s->hooks);
+    log_close(s->audit);
+    if (s->audit_file)
+        fclose(s->audit_file);
+}
+
 /* Legal at every stage of a start that failed. */
 static void end(service *s)
 {
@@ -228,9 +253,7 @@ static void end(service *s)
     if (s->store)
         store_close(s->store);
     uz_reserve_free(s->reserve);
-    auth_free(s->auth);
-    http_tls_clear(&s->tls);
-    webhook_forget_secret(&s->hooks);
+    forget_secrets(s);
     codec_end();
 }
 
@@ -337,9 +360,7 @@ static int check_config(const server_options *options)
                 check_listen(&s, options, message, sizeof message);
     if (!good)
         fprintf(stderr, "uzawad: %s\n", message);
-    auth_free(s.auth);
-    http_tls_clear(&s.tls);
-    webhook_forget_secret(&s.hooks);
+    forget_secrets(&s);
     log_close(s.log);
     return good ? EXIT_ENDED : EXIT_FAILED;
 }

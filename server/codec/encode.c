@@ -76,6 +76,8 @@ static void put_job(text *t, const job *j)
     put_time(t, "finished", j->finished);
     text_integer(t, "attempts", j->attempts);
     text_integer(t, "priority", j->priority);
+    if (j->client[0])
+        text_string(t, "owner", j->client);
     text_raw(t, "tags", j->tags ? j->tags : "[]");
     text_raw(t, "summary", j->summary);
     if (j->damaged) {

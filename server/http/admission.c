@@ -157,7 +157,7 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
 {
     static const char SCHEME[] = "Bearer";
     const auth_scope need = has_route ? route_scope(rq->route) : SCOPE_READ;
-    auth_scope have = SCOPE_NONE;
+    auth_identity who = {.scope = SCOPE_NONE};
     char *field = rq->reply.authenticate;
     const size_t size = sizeof rq->reply.authenticate;
     /* the token of `Authorization: Bearer TOKEN` */
@@ -169,8 +169,12 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
         const char *at = given->value + sizeof SCHEME, *end = given->value + given->value_len;
         while (at < end && *at == ' ')
             at++;
-        have = auth_check(context->auth, at, (size_t)(end - at), rq->token);
+        who = auth_check(context->auth, at, (size_t)(end - at), clock_seconds(CLOCK_REALTIME));
+        memcpy(rq->token, who.name, sizeof rq->token);
+        memcpy(rq->client, who.owner, sizeof rq->client);
     }
+    const auth_scope have = who.scope;
+    rq->sees_all = !context->auth || have >= SCOPE_ADMIN;
     if (!check_rate(context, rq, problem))
         return false;
     if (!context->auth || have >= need)
@@ -186,8 +190,9 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
     }
     snprintf(field, size, "Bearer realm=\"uzawad\"%s", given ? ", error=\"invalid_token\"" : "");
     return problem_fill(problem, 401, "unauthorized", "A token is needed", "%s",
-                        given ? "the token is not one of this server's"
-                              : "send the header field Authorization: Bearer TOKEN");
+                        who.expired ? "the token has expired: ask for a new one"
+                        : given     ? "the token is not one of this server's"
+                                    : "send the header field Authorization: Bearer TOKEN");
 }
 
 /* On a connection beyond the limit. */

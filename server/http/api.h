@@ -21,13 +21,15 @@ typedef struct {
     uint64_t number; /* of the change; 0: none */
     const char *event;
     char *data;
+    char client[STORE_CLIENT]; /* whose job it is */
+    bool nobodys;              /* it is gone, and that is told with a later change: whose it was is not known */
 } told_text;
 
 /* What handlers may use, the same for all requests. */
 typedef struct {
     store *store;
     work *work;
-    server_log *log;
+    server_log *log, *audit; /* audit may be NULL */
     metrics *metrics;
     const webhooks *webhooks; /* NULL: there are none */
     auth *auth;               /* NULL: everybody may all */
@@ -46,6 +48,11 @@ typedef struct {
 
 /* The daemon is about to end: nothing is waited for. */
 bool api_draining(const api *context);
+
+/* Whose jobs and uploads the request may see: a client, as the store takes it. */
+const char *api_sees(const http_request *rq);
+/* A job of those: STORE_NOT_FOUND also where it is another's. */
+store_status api_get_job(api *context, const http_request *rq, const char *id, job *out);
 
 /* Whoever waits for what is computed. */
 typedef struct {

@@ -4,18 +4,22 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <gnutls/crypto.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { DIGEST = 32, SECRET_LEAST = 16, SECRET_MOST = 128, MAX_TOKENS = 1000 };
 
+static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~+/=";
+
 typedef struct {
-    char name[64];
-    auth_scope scope;
+    auth_identity who;
+    double until; /* Unix seconds; INFINITY: for ever */
     unsigned char digest[DIGEST];
 } token;
 
@@ -39,38 +43,79 @@ const char *auth_scope_name(auth_scope scope)
 
 /* ------------------------------------------------------------------- file */
 
+/* "2026-12-31" or "2026-12-31T12:00:00Z", in UTC, as Unix seconds: until the end of the day, or the moment. */
+static bool read_end(const char *text, double *out)
+{
+    struct tm t = {0};
+    const char *rest = strptime(text, "%Y-%m-%d", &t);
+    const bool day = rest && !*rest;
+    rest = rest && !day ? strptime(rest, "T%H:%M:%SZ", &t) : rest;
+    *out = (double)timegm(&t) + (day ? 86400.0 : 0.0);
+    return rest && !*rest;
+}
+
+/* The SHA-256 of a secret, or the one that is given in its place: "sha256:" and 64 hexadecimal digits in lower case. */
+static const char *take_secret(token *t, const char *secret)
+{
+    static const char HASHED[] = "sha256:", DIGITS[] = "0123456789abcdef";
+    const size_t len = strlen(secret), prefix = sizeof HASHED - 1;
+    if (strncmp(secret, HASHED, prefix) == 0) {
+        const char *at = secret + prefix;
+        if (strlen(at) != 2 * DIGEST || strspn(at, DIGITS) != 2 * DIGEST)
+            return "sha256: must be followed by 64 digits 0 to 9 and a to f (printf %s SECRET | sha256sum)";
+        for (int i = 0; i < DIGEST; i++)
+            t->digest[i] =
+                (unsigned char)(16 * (strchr(DIGITS, at[2 * i]) - DIGITS) + (strchr(DIGITS, at[2 * i + 1]) - DIGITS));
+        return NULL;
+    }
+    if (len < SECRET_LEAST || len > SECRET_MOST || strspn(secret, ALLOWED) != len)
+        return "the secret must be 16 to 128 letters, digits and -._~+/= (openssl rand -hex 32 makes one), or sha256: "
+               "and its digest";
+    return gnutls_hash_fast(GNUTLS_DIG_SHA256, secret, len, t->digest) == 0 ? NULL : "no memory";
+}
+
 /* What is wrong with a line, NULL: nothing. Never quotes the secret. */
 static const char *take_line(token_list *list, char *line)
 {
-    static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~+/=";
     char *rest = NULL;
     const char *name = strtok_r(line, " \t\r\n", &rest);
     if (!name || name[0] == '#')
         return NULL;
-    const char *scope = strtok_r(NULL, " \t\r\n", &rest), *secret = strtok_r(NULL, " \t\r\n", &rest);
-    token t = {.scope = SCOPE_NONE};
-    if (!scope || !secret || strtok_r(NULL, " \t\r\n", &rest))
+    const char *scope = strtok_r(NULL, " \t\r\n", &rest), *secret = strtok_r(NULL, " \t\r\n", &rest), *word, *why;
+    token t = {.who = {.scope = SCOPE_NONE}, .until = INFINITY};
+    if (!scope || !secret)
         return "a line must be \"name scope secret\"";
     for (int i = SCOPE_READ; i <= SCOPE_ADMIN; i++)
         if (strcmp(scope, SCOPES[i]) == 0)
-            t.scope = (auth_scope)i;
-    if (t.scope == SCOPE_NONE)
+            t.who.scope = (auth_scope)i;
+    if (t.who.scope == SCOPE_NONE)
         return "the second word must be read, submit or admin";
-    if (strlen(name) >= sizeof t.name || strspn(name, ALLOWED) != strlen(name))
-        return "the name must be 1 to 63 letters, digits and -._~+/=";
-    if (strlen(secret) < SECRET_LEAST || strlen(secret) > SECRET_MOST || strspn(secret, ALLOWED) != strlen(secret))
-        return "the secret must be 16 to 128 letters, digits and -._~+/= (openssl rand -hex 32 makes one)";
-    for (size_t i = 0; i < list->count; i++)
-        if (strcmp(list->tokens[i].name, name) == 0)
-            return "this name stands in the file already";
+    const char *owner = name;
+    while ((word = strtok_r(NULL, " \t\r\n", &rest)))
+        if (strncmp(word, "owner=", 6) == 0)
+            owner = word + 6;
+        else if (strncmp(word, "until=", 6) != 0)
+            return "behind \"name scope secret\" there may be owner=NAME and until=DATE";
+        else if (!read_end(word + 6, &t.until))
+            return "until= must be followed by a date of UTC such as 2026-12-31 or 2026-12-31T12:00:00Z";
+    if (strlen(name) >= sizeof t.who.name || strspn(name, ALLOWED) != strlen(name) || !owner[0] ||
+        strlen(owner) >= sizeof t.who.owner || strspn(owner, ALLOWED) != strlen(owner))
+        return "the name must be 1 to 63 letters, digits and -._~+/=, and so must the owner";
+    if ((why = take_secret(&t, secret)))
+        return why;
+    strcpy(t.who.name, name);
+    strcpy(t.who.owner, owner);
+    for (size_t i = 0; i < list->count; i++) {
+        if (strcmp(list->tokens[i].who.name, name) == 0)
+            return "this name stands in the file already; several tokens of one owner have names of their own";
+        if (memcmp(list->tokens[i].digest, t.digest, DIGEST) == 0)
+            return "another token has this secret already";
+    }
     if (list->count == MAX_TOKENS)
         return "a file has at most 1000 tokens";
-    strcpy(t.name, name);
     token *grown = realloc(list->tokens, (list->count + 1) * sizeof *grown);
-    if (!grown || gnutls_hash_fast(GNUTLS_DIG_SHA256, secret, strlen(secret), t.digest) != 0) {
-        list->tokens = grown ? grown : list->tokens;
+    if (!grown)
         return "no memory";
-    }
     list->tokens = grown;
     list->tokens[list->count++] = t;
     return NULL;
@@ -156,19 +201,22 @@ bool auth_reload(auth *a, char *message, size_t size)
     return true;
 }
 
-auth_scope auth_check(auth *a, const char *secret, size_t len, char name[64])
+auth_identity auth_check(auth *a, const char *secret, size_t len, double now)
 {
     unsigned char digest[DIGEST];
-    auth_scope scope = SCOPE_NONE;
-    name[0] = '\0';
+    auth_identity found = {.scope = SCOPE_NONE};
     if (len > SECRET_MOST || gnutls_hash_fast(GNUTLS_DIG_SHA256, secret, len, digest) != 0)
-        return SCOPE_NONE;
+        return found;
     pthread_rwlock_rdlock(&a->lock);
-    for (size_t i = 0; i < a->list.count; i++)
-        if (gnutls_memcmp(a->list.tokens[i].digest, digest, DIGEST) == 0) {
-            scope = a->list.tokens[i].scope;
-            memcpy(name, a->list.tokens[i].name, 64);
-        }
+    for (size_t i = 0; i < a->list.count; i++) {
+        const token *t = &a->list.tokens[i];
+        if (gnutls_memcmp(t->digest, digest, DIGEST) != 0)
+            continue;
+        found = t->who;
+        found.expired = now >= t->until;
+        if (found.expired)
+            found.scope = SCOPE_NONE;
+    }
     pthread_rwlock_unlock(&a->lock);
-    return scope;
+    return found;
 }

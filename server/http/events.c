@@ -109,6 +109,8 @@ void events_get(api *context, http_request *rq, http_reply *reply)
 typedef struct {
     event_stream base;
     api *context;
+    char client[STORE_CLIENT]; /* whose jobs are told, unless all are */
+    bool all;
     uint64_t seen; /* the number up to which all is told */
     bool reset;    /* that it must be told first */
 } all_stream;
@@ -125,7 +127,7 @@ static const told_text *text_of(api *context, const feed_change *change)
     /* What has become of the job; NULL: no memory, or the store failed. */
     const char **event = &kept->event;
     job j;
-    char *data = NULL;
+    char *data = NULL, whose[STORE_CLIENT] = "";
     store_status status = store_get(context->store, change->id, &j);
     *event = status == STORE_NOT_FOUND ? "deleted" : "job";
     if (status == STORE_NOT_FOUND && asprintf(&data, "{\"id\": \"%s\"}", change->id) < 0)
@@ -133,8 +135,11 @@ static const told_text *text_of(api *context, const feed_change *change)
     if (status == STORE_OK) {
         jobs_freshen(context, &j);
         data = codec_encode_job(&j);
+        memcpy(whose, j.client, sizeof whose);
         job_clear(&j);
     }
+    kept->nobodys = status == STORE_NOT_FOUND && !change->deleted;
+    snprintf(kept->client, sizeof kept->client, "%s", status == STORE_OK ? whose : change->client);
     kept->data = data;
     kept->number = kept->data ? change->number : 0;
     return kept->data ? kept : NULL;
@@ -165,7 +170,8 @@ static bool look_at_all(event_stream *base)
     pthread_mutex_lock(&context->told_lock);
     for (size_t i = 0; ok && i < count; i++) {
         const told_text *text = text_of(context, &changes[i]);
-        ok = text && say(s, text->event, changes[i].number, text->data);
+        const bool told = text && (s->all || (!text->nobodys && strcmp(text->client, s->client) == 0));
+        ok = text && (!told || say(s, text->event, changes[i].number, text->data));
     }
     pthread_mutex_unlock(&context->told_lock);
     s->seen = seen;
@@ -183,6 +189,8 @@ void events_get_all(api *context, http_request *rq, http_reply *reply)
         s->base.look = look_at_all;
         s->context = context;
         s->base.every_s = EVERY_S;
+        s->all = rq->sees_all;
+        memcpy(s->client, rq->client, sizeof s->client);
         s->reset = strncmp(last, context->run, run) != 0 || last[run] != '.' || strlen(number) < 1 ||
                    strlen(number) > 18 || number[strspn(number, "0123456789")];
         s->seen = s->reset ? 0 : strtoull(number, NULL, 10);

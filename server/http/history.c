@@ -112,7 +112,7 @@ static bool refuse_with(http_reply *reply, int status, const char *code, const c
 }
 
 /* with=ID,ID:CASE: other jobs over this one. False with a reply. */
-static bool add_others(curve_list *list, api *context, const char *text, http_reply *reply)
+static bool add_others(curve_list *list, api *context, const http_request *rq, const char *text, http_reply *reply)
 {
     for (size_t len; text; text = text[len] ? text + len + 1 : NULL) {
         char id[33], case_name[64] = "";
@@ -128,7 +128,7 @@ static bool add_others(curve_list *list, api *context, const char *text, http_re
         if (len > 33)
             snprintf(case_name, sizeof case_name, "%.*s", (int)(len - 33), text + 33);
         const char *own = reply->job;
-        store_status status = store_get(context->store, id, &other);
+        store_status status = api_get_job(context, rq, id, &other);
         if (status == STORE_OK && other.damaged)
             status = STORE_DAMAGED;
         reply->job = id; /* a failure is about this one, and told at once */
@@ -179,7 +179,7 @@ void convergence_get(api *context, http_request *rq, http_reply *reply)
     }
     reply->tag_by_body = true;
     if (jobs_load(context, rq, &j, reply) && add_job(&list, context, &j, target_value(&rq->target, "case"), reply) &&
-        add_others(&list, context, target_value(&rq->target, "with"), reply)) {
+        add_others(&list, context, rq, target_value(&rq->target, "with"), reply)) {
         snprintf(title, sizeof title, "Convergence of job %s", j.id);
         const uz_plot how = {.title = title, .width = (int)width, .x = (uz_plot_x)x, .theme = (uz_theme)theme};
         char *svg = NULL;

@@ -2,6 +2,7 @@
 #include "http/http.h"
 #include "http/api.h"
 
+#include <arpa/inet.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,17 +37,42 @@ static void on_drop(void *ctx, http_request *rq)
     rq->upload = NULL;
 }
 
+/* What changed something, or was refused to whoever asked. */
+static void audit(const api *context, const http_request *rq, const char *path)
+{
+    char address[INET6_ADDRSTRLEN] = "";
+    unsigned char six[16] = {0};
+    const bool changes = strcmp(rq->method, "POST") == 0 || strcmp(rq->method, "DELETE") == 0;
+    if (!context->audit || !((changes && rq->status < 400) || rq->status == 401 || rq->status == 403))
+        return;
+    memcpy(six, rq->address, rq->address_len);
+    if (rq->address_len > 0)
+        inet_ntop(rq->address_len == 4 ? AF_INET : AF_INET6, six, address, sizeof address);
+    log_write(context->audit, LOG_INFO, "audit",
+              (log_field[]){LOG_S("owner", rq->client),
+                            LOG_S("token", rq->token),
+                            LOG_S("address", address),
+                            LOG_S("method", rq->method),
+                            LOG_S("path", path),
+                            LOG_I("status", rq->status),
+                            LOG_S("job", rq->job_id),
+                            LOG_S("upload", strlen(rq->name) == 64 ? rq->name : ""),
+                            LOG_S("request", rq->id),
+                            {0}});
+}
+
 static void on_account(void *ctx, const http_request *rq, bool completed, bool expired)
 {
     const api *context = ctx;
     const route *found = rq->route;
+    char path[256];
+    snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
+    for (char *at = path; *at; at++)
+        if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
+            *at = '?';
+    audit(context, rq, path);
     if (context->options.access_log || rq->status >= 500) {
         const char *end = completed ? "complete" : expired ? "deadline" : "aborted";
-        char path[256];
-        snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
-        for (char *at = path; *at; at++)
-            if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
-                *at = '?';
         log_field fields[] = {LOG_S("method", rq->method),
                               LOG_S("path", path),
                               LOG_S("request", rq->id),
@@ -91,6 +117,7 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     context->work = parts->work;
     context->webhooks = parts->webhooks;
     context->log = parts->log;
+    context->audit = parts->audit;
     context->metrics = parts->metrics;
     context->auth = parts->auth;
     context->options = *options;
@@ -137,6 +164,20 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
 bool api_draining(const api *context)
 {
     return atomic_load(transport_draining(context->server));
+}
+
+const char *api_sees(const http_request *rq)
+{
+    return rq->sees_all ? NULL : rq->client;
+}
+
+store_status api_get_job(api *context, const http_request *rq, const char *id, job *out)
+{
+    const store_status status = store_get(context->store, id, out);
+    if (status != STORE_OK || rq->sees_all || strcmp(out->client, rq->client) == 0)
+        return status;
+    job_clear(out);
+    return STORE_NOT_FOUND;
 }
 
 bool api_is_over(void *asker)

@@ -23,9 +23,9 @@ typedef struct {
     store *store;
     work *work;
     const webhooks *webhooks; /* NULL: there are none */
-    server_log *log;
-    metrics *metrics; /* may be NULL */
-    auth *auth;       /* NULL: everybody may all */
+    server_log *log, *audit;  /* audit: who did what; may be NULL */
+    metrics *metrics;         /* may be NULL */
+    auth *auth;               /* NULL: everybody may all */
 } http_parts;
 
 typedef struct {

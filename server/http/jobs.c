@@ -29,6 +29,10 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
         reply->retry_after_s = 10;
         reply_refuse(reply, 503, "queue_full", "Too many jobs wait",
                      "as many jobs wait as this server lets (its option --max-queue): try again later");
+    } else if (status == STORE_QUOTA) {
+        store_message(context->store, cause, sizeof cause);
+        reply->retry_after_s = 60;
+        reply_refuse(reply, 429, "quota_exceeded", "The owner has as much as it may", "%s", cause);
     } else if (status == STORE_CONFLICT) {
         reply_refuse(reply, 409, "conflict", "The job's state does not allow this",
                      "the job changed meanwhile: look at its status and try again");
@@ -49,7 +53,7 @@ bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply)
 {
     memset(out, 0, sizeof *out);
     snprintf(rq->job_id, sizeof rq->job_id, "%.32s", rq->name);
-    store_status status = store_get(context->store, rq->job_id, out);
+    store_status status = api_get_job(context, rq, rq->job_id, out);
     if (status == STORE_OK && out->damaged) {
         job_clear(out);
         status = STORE_DAMAGED;
@@ -217,7 +221,13 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
     job j = {0};
     job_status was;
     snprintf(rq->job_id, sizeof rq->job_id, "%.32s", rq->name);
-    store_status status = store_dismiss(context->store, rq->job_id, &was);
+    store_status status = api_get_job(context, rq, rq->job_id, &j);
+    job_clear(&j);
+    if (status != STORE_OK) {
+        reply_store_failure(context, status, reply);
+        return;
+    }
+    status = store_dismiss(context->store, rq->job_id, &was);
     if (status != STORE_OK && was != JOB_RUNNING) { /* one that runs is told, also where that can't be kept */
         reply_store_failure(context, status, reply);
         return;
@@ -341,6 +351,7 @@ void jobs_list(api *context, http_request *rq, http_reply *reply)
         reply_problem(reply, &problem);
         return;
     }
+    query.client = api_sees(rq);
     store_status status = store_list(context->store, &query, &jobs, &count, &more);
     if (status != STORE_OK) {
         reply_store_failure(context, status, reply);

@@ -31,9 +31,12 @@ static bool read_key(const http_request *rq, char **key, problem_details *proble
 }
 
 /* What the store keeps of a decoded request, and of its body and key, which must outlive it. */
-static store_request kept_request(const codec_request *request, const char *body, size_t len, const char *key)
+static store_request kept_request(const http_request *rq, const codec_request *request, const char *body, size_t len,
+                                  const char *key)
 {
-    return (store_request){.body = body,
+    return (store_request){.client = rq->client,
+                           .any_upload = rq->sees_all,
+                           .body = body,
                            .body_len = len,
                            .tags = request->tags,
                            .idempotency_key = key,
@@ -85,7 +88,8 @@ static bool store_job(api *context, http_request *rq, const store_request *reque
  * also where it would be refused now: what it names may be gone since, or a limit lower. The caller clears *out. */
 static bool find_repeat(api *context, http_request *rq, const char *key, job *out)
 {
-    store_request request = {.body = rq->body ? rq->body : "", .body_len = rq->body_len, .idempotency_key = key};
+    store_request request = {
+        .client = rq->client, .body = rq->body ? rq->body : "", .body_len = rq->body_len, .idempotency_key = key};
     memset(out, 0, sizeof *out);
     if (!key || store_find_repeat(context->store, &request, out) != STORE_OK)
         return false;
@@ -100,6 +104,19 @@ static void store_and_wait(api *context, http_request *rq, const store_request *
     if (store_job(context, rq, request, &j, reply))
         jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
     job_clear(&j);
+}
+
+/* The uploads that it names must be the client's. */
+static bool check_uploads(api *context, const http_request *rq, const codec_request *request, problem_details *problem)
+{
+    upload_info info;
+    for (size_t i = 0; i < request->n_uploads; i++)
+        if (store_upload_get(context->store, request->uploads[i], api_sees(rq), &info) == STORE_NOT_FOUND)
+            return problem_fill(
+                problem, 422, "unknown_upload", "An upload is not there",
+                "%.64s names no upload of yours on this server: send the text to POST /v1/uploads first",
+                request->uploads[i]);
+    return true;
 }
 
 /* ---- "warm_start": {"job": ...} against the store, before the request becomes a job. The other job may still be
@@ -126,10 +143,10 @@ static bool refuse_store(api *context, const codec_start *start, store_status st
 }
 
 /* The job must have ended with an answer. */
-static bool check_job(api *context, const codec_start *start, problem_details *problem)
+static bool check_job(api *context, const http_request *rq, const codec_start *start, problem_details *problem)
 {
     job other = {0};
-    store_status status = store_get(context->store, start->job, &other);
+    store_status status = api_get_job(context, rq, start->job, &other);
     bool ended = status == STORE_OK && jobs_ended(&other), good = ended && other.summary;
     status = status == STORE_OK && other.damaged ? STORE_DAMAGED : status;
     job_clear(&other);
@@ -196,7 +213,7 @@ static bool check_start(api *context, const codec_request *request, const http_r
     size_t len = 0;
     if (!start->job[0])
         return true;
-    if (!check_job(context, start, problem))
+    if (!check_job(context, rq, start, problem))
         return false;
     if (!start->continued)
         return check_reactions(context, request, problem);
@@ -236,7 +253,8 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
                      "validate must be true or false");
     good = good && read_key(rq, &key, &problem) &&
            codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
-           check_start(context, &request, rq, &problem) && check_webhook(context, request.webhook, &problem);
+           check_uploads(context, rq, &request, &problem) && check_start(context, &request, rq, &problem) &&
+           check_webhook(context, request.webhook, &problem);
     if (!good) {
         /* a problem, or the job that the request became when it came before */
         job j;
@@ -265,7 +283,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
     } else {
         codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
-        store_request stored = kept_request(&request, rq->body, rq->body_len, key);
+        store_request stored = kept_request(rq, &request, rq->body, rq->body_len, key);
         store_and_wait(context, rq, &stored, reply);
     }
     codec_request_clear(&request);
@@ -298,7 +316,8 @@ void verify_submit(api *context, http_request *rq, http_reply *reply)
     job j = {0};
     char *key = NULL;
     if (!read_key(rq, &key, &problem) ||
-        !codec_decode(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem)) {
+        !codec_decode(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
+        !check_uploads(context, rq, &request, &problem)) {
         if (!find_repeat(context, rq, key, &j))
             reply_problem(reply, &problem);
         else if (jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
@@ -306,7 +325,7 @@ void verify_submit(api *context, http_request *rq, http_reply *reply)
         goto done;
     }
     codec_request_strip(&request);
-    store_request stored = kept_request(&request, rq->body, rq->body_len, key);
+    store_request stored = kept_request(rq, &request, rq->body, rq->body_len, key);
     if (store_job(context, rq, &stored, &j, reply) && jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
         reply_end(context, &j, reply);
 done:
@@ -343,7 +362,8 @@ static void make_request(api *context, const http_request *rq, const job *old, c
     const size_t skip = sizeof SOLVER - 1;
     problem_details problem = {0};
     *body = codec_refine(old_body, old_len, old->id, rq->body ? rq->body : "", rq->body_len, len, &problem);
-    if (*body && codec_decode(request, CODEC_SOLVE, *body, *len, context->store, &problem)) {
+    if (*body && codec_decode(request, CODEC_SOLVE, *body, *len, context->store, &problem) &&
+        check_uploads(context, rq, request, &problem)) {
         codec_request_strip(request);
         return;
     }
@@ -387,7 +407,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
             make_request(context, rq, &old, old_body, old_len, &body, &len, &made, reply);
             free(old_body); /* as large as the new one: not kept while the client waits */
             old_body = NULL;
-            store_request request = kept_request(&made, body, len, key);
+            store_request request = kept_request(rq, &made, body, len, key);
             request.refines = old.id;
             if (body)
                 store_and_wait(context, rq, &request, reply);

@@ -19,6 +19,9 @@ static bool refuse(api *context, http_request *rq, upload_status status, problem
     case UPLOAD_NO_ROOM:
         return problem_fill(problem, 507, "uploads_full", "There is no room for more uploads",
                             "uploads that no job uses make room after a while: delete some, or the jobs that use them");
+    case UPLOAD_QUOTA:
+        store_message(context->store, cause, sizeof cause);
+        return problem_fill(problem, 429, "quota_exceeded", "The owner has as much as it may", "%s", cause);
     case UPLOAD_DISK_FULL:
         rq->reply.retry_after_s = 60;
         return problem_fill(problem, 507, "storage_full", "The disk is full",
@@ -40,7 +43,7 @@ bool uploads_begin(api *context, http_request *rq)
     const header_field *coding = header_find(&rq->headers, "Content-Encoding", NULL);
     bool gzip = coding && (token_equal(coding->value, coding->value_len, "gzip") ||
                            token_equal(coding->value, coding->value_len, "x-gzip"));
-    rq->upload = store_upload_begin(context->store, gzip, &status);
+    rq->upload = store_upload_begin(context->store, rq->client, gzip, &status);
     return rq->upload || refuse(context, rq, status, &rq->refused);
 }
 
@@ -67,6 +70,7 @@ void uploads_create(api *context, http_request *rq, http_reply *reply)
         return;
     }
     metrics_add(context->metrics, METRIC_UPLOADS, 1);
+    memcpy(rq->name, info.id, sizeof info.id);
     snprintf(reply->location, sizeof reply->location, "/v1/uploads/%s", info.id);
     reply_json(reply, known ? 200 : 201, codec_encode_upload(&info));
 }
@@ -95,7 +99,9 @@ void uploads_get(api *context, http_request *rq, http_reply *reply)
     if (request_accepts(rq, "application/octet-stream")) {
         int fd;
         int64_t bytes;
-        store_status status = store_upload_open(context->store, rq->name, &fd, &bytes);
+        store_status status = store_upload_get(context->store, rq->name, api_sees(rq), &info);
+        if (status == STORE_OK)
+            status = store_upload_open(context->store, rq->name, &fd, &bytes);
         if (status != STORE_OK)
             reply_failure(context, status, reply);
         else {
@@ -105,7 +111,7 @@ void uploads_get(api *context, http_request *rq, http_reply *reply)
         }
         return;
     }
-    store_status status = store_upload_get(context->store, rq->name, &info);
+    store_status status = store_upload_get(context->store, rq->name, api_sees(rq), &info);
     reply->tag_by_body = true;
     if (status != STORE_OK)
         reply_failure(context, status, reply);
@@ -115,7 +121,7 @@ void uploads_get(api *context, http_request *rq, http_reply *reply)
 
 void uploads_delete(api *context, http_request *rq, http_reply *reply)
 {
-    store_status status = store_upload_delete(context->store, rq->name);
+    store_status status = store_upload_delete(context->store, rq->name, api_sees(rq));
     if (status != STORE_OK)
         reply_failure(context, status, reply);
     else

@@ -27,13 +27,18 @@ typedef struct {
     /* where */
     char listen[OPTION_PATH], db[OPTION_PATH], config[OPTION_PATH];
     /* who may: "" where there is none */
-    char token_file[OPTION_PATH], tls_cert[OPTION_PATH], tls_key[OPTION_PATH], user[OPTION_PATH];
+    char token_file[OPTION_PATH], tls_cert[OPTION_PATH], tls_key[OPTION_PATH], user[OPTION_PATH],
+        audit_log[OPTION_PATH];
     bool insecure_public;
     /* work */
     int workers, max_attempts;
     size_t cache, memory; /* bytes; memory: of one solve */
     double max_solve_s;   /* of one job; 0: no limit */
     int max_queue;        /* jobs that wait; 0: no limit */
+    /* of one owner of tokens; 0: no limit */
+    int client_queue;
+    size_t client_bytes;
+    double client_seconds; /* of workers in a day */
     /* ended jobs that are kept; 0: no limit */
     double keep_days;
     int keep_jobs;

@@ -39,6 +39,9 @@ static const uz_option ROWS[] = {
     SETTING("token-file", TEXT, token_file, .value = "FILE", .normal = "",
             .about = "lines \"name scope secret\": who may read, submit or admin; read again at SIGHUP. Without it "
                      "everybody may all"),
+    SETTING("audit-log", TEXT, audit_log, .value = "FILE", .normal = "",
+            .about = "append to this file who did what: a JSON object a line for each request that changes something "
+                     "or was refused for its token"),
     SETTING("insecure-public", SWITCH, insecure_public, .normal = "no",
             .about = "listen on an address that others can reach although there is no token-file"),
     SETTING("tls-cert", TEXT, tls_cert, .value = "FILE", .normal = "",
@@ -59,6 +62,15 @@ static const uz_option ROWS[] = {
                      "0: no limit"),
     SETTING("max-queue", INTEGER, max_queue, .value = "N", .most = INT_MAX, .normal = "0", .unit = "jobs",
             .zero_is_off = true, .about = "jobs that may wait; one more is answered 503; 0: no limit"),
+    SETTING("client-queue", INTEGER, client_queue, .value = "N", .most = INT_MAX, .normal = "0", .unit = "jobs",
+            .zero_is_off = true,
+            .about = "jobs of one owner of tokens that may wait; one more is answered 429; 0: no limit"),
+    SETTING("client-bytes", BYTES, client_bytes, .value = "BYTES", .normal = "0", .unit = "bytes", .zero_is_off = true,
+            .about = "requests, results and uploads of one owner of tokens; more are answered 429; 0: no limit"),
+    SETTING("client-seconds", NUMBER, client_seconds, .value = "S", .most = 1e9, .normal = "0", .unit = "seconds",
+            .zero_is_off = true,
+            .about = "time of workers that jobs of one owner of tokens may take in a day (UTC), counted as they end; "
+                     "then its submissions are answered 429; 0: no limit"),
     SETTING("max-attempts", INTEGER, max_attempts, .value = "N", .least = 1, .most = 1000, .normal = "3",
             .unit = "runs", .about = "runs of a job whose run ends with the process before it is failed"),
     SETTING("keep-days", NUMBER, keep_days, .value = "D", .most = 1e6, .normal = "0", .unit = "days",

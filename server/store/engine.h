@@ -41,9 +41,12 @@ typedef struct {
     store_status (*webhook_attempted)(store *s, const webhook_due *due, webhook_end end, double delay_s,
                                       double silent_s);
     /* The rows of uploads. */
-    store_status (*upload_get)(store *s, const char *id, upload_info *out);
-    store_status (*upload_add)(store *s, const char *id, int64_t bytes, upload_info *out, bool *known);
-    store_status (*upload_forget)(store *s, const char *id); /* STORE_CONFLICT while a job refers to it */
+    store_status (*upload_get)(store *s, const char *id, const char *client, upload_info *out);
+    store_status (*upload_add)(store *s, const char *id, const char *client, int64_t bytes, upload_info *out,
+                               bool *known);
+    /* It is no more this client's; NULL: nobody's. STORE_CONFLICT while a job of theirs refers to it. *gone: the row
+     * went, since nobody has it any more and no job refers to it. */
+    store_status (*upload_forget)(store *s, const char *id, const char *client, bool *gone);
     store_status (*upload_idle)(store *s, double before, upload_info *out); /* no job's, longest unused, since before */
     store_status (*upload_total)(store *s, int64_t *bytes);
     store_status (*try_write)(store *s);
@@ -68,7 +71,8 @@ struct store {
 void store_base_begin(store *s, const store_engine *engine);
 void store_base_end(store *s);
 void store_set_message(store *s, const char *cause);
-void store_tell(const store *s, const char *id, bool waits);
+/* As a store_listener is told. */
+void store_tell(const store *s, const char *id, bool waits, const char *gone);
 
 /* The next id of a job: 12 hex digits of milliseconds, 4 of a counter within them, 16 random. Under the engine's lock.
  * last_ms and sequence are those of the newest id, so that ids ascend when the clock does not. */

@@ -78,10 +78,10 @@ void store_listen(store *s, store_listener *changed, void *ctx)
     s->changed_ctx = ctx;
 }
 
-void store_tell(const store *s, const char *id, bool waits)
+void store_tell(const store *s, const char *id, bool waits, const char *gone)
 {
     if (s->changed)
-        s->changed(s->changed_ctx, id, waits);
+        s->changed(s->changed_ctx, id, waits, gone);
 }
 
 void store_set_message(store *s, const char *cause)

@@ -20,6 +20,7 @@ typedef enum {
     STORE_NOT_FOUND, /* no such job, or nothing to claim */
     STORE_CONFLICT,  /* the job is not in a state that allows this; or the idempotency key came with another body */
     STORE_BUSY,      /* as many jobs wait as may */
+    STORE_QUOTA,     /* its client has what it may: store_message says of what */
     STORE_FULL,      /* the disk is full; nothing was changed */
     STORE_LOCKED,    /* another program holds the file; nothing was changed */
     STORE_DAMAGED,   /* what is stored of this job is not what was written: store_message names the job */
@@ -29,6 +30,10 @@ typedef enum {
 typedef enum { JOB_ACCEPTED, JOB_RUNNING, JOB_SUCCESSFUL, JOB_FAILED, JOB_DISMISSED } job_status;
 const char *job_status_name(job_status status);
 bool job_status_parse(job_status *out, const char *name);
+
+/* Whose a job, a key or an upload is: the name of an owner of tokens, "" where there are none. Where an operation takes
+ * one, NULL means that it is of no matter. */
+#define STORE_CLIENT 64
 
 typedef struct {
     char id[33]; /* 32 hex digits; ids sort in order of creation (millisecond time, counter, random) */
@@ -40,8 +45,9 @@ typedef struct {
     char *summary; /* JSON object once it ended with an answer, else NULL */
     char *error;   /* JSON object (problem details) when it failed, else NULL */
     int priority;
-    char refines[33]; /* the job whose run this one continues; "": none. It may have been deleted */
-    bool damaged;     /* its summary was there and is not what was written: it is not shown */
+    char refines[33];          /* the job whose run this one continues; "": none. It may have been deleted */
+    char client[STORE_CLIENT]; /* whose it is */
+    bool damaged;              /* its summary was there and is not what was written: it is not shown */
 } job;
 void job_clear(job *j); /* frees the texts, zeroes *j; NULL is fine */
 
@@ -52,11 +58,19 @@ typedef struct {
     double keep_s; /* one that no job uses goes so long after it was last used; 0: no limit */
 } upload_limits;
 
+/* What one client may have, if it has a name; 0: no limit. */
+typedef struct {
+    int64_t waiting; /* jobs that wait */
+    int64_t bytes;   /* requests, results and uploads */
+    double seconds;  /* of workers, in a day (UTC); counted when jobs end */
+} client_quotas;
+
 /* Kept nowhere: each start gives them. */
 typedef struct {
     metrics *metrics;  /* counts commits and changes there; may be NULL */
     int64_t max_queue; /* so many jobs may wait; a submission beyond it is STORE_BUSY; 0: no limit */
     upload_limits uploads;
+    client_quotas quotas;
 } store_settings;
 /* Before other threads use the store; until then nothing is limited or counted. */
 void store_configure(store *s, const store_settings *settings);
@@ -72,10 +86,10 @@ int64_t store_free_bytes(store *s);
 /* ---- notification: who waits learns of changes. From now on changed(ctx, id, waits) is called after every change of a
  * job was committed that anybody but its owner made (submitted, dismissed, expired, deleted), without a lock, by the
  * thread that made it or by one of the engine's. What owners do (claim, finish, release) they tell themselves; an
- * engine of several processes tells what owners in the others do. waits: the job now waits to be claimed. id NULL:
- * changes may have been missed, everybody is to look again. NULL: nobody is told. Before other threads use the store,
- * and after they did. */
-typedef void store_listener(void *ctx, const char *id, bool waits);
+ * engine of several processes tells what owners in the others do. waits: the job now waits to be claimed. gone: the job
+ * was deleted, and this client's it was; else NULL. id NULL: changes may have been missed, everybody is to look again.
+ * NULL: nobody is told. Before other threads use the store, and after they did. */
+typedef void store_listener(void *ctx, const char *id, bool waits, const char *gone);
 void store_listen(store *s, store_listener *changed, void *ctx);
 
 /* What is submitted. */
@@ -83,10 +97,12 @@ typedef struct {
     const char *body;
     size_t body_len;
     const char *tags;            /* JSON array text; NULL: [] */
-    const char *idempotency_key; /* may be NULL */
+    const char *client;          /* NULL: "" */
+    const char *idempotency_key; /* of this client; may be NULL */
     const char *refines;         /* id, or NULL */
     const char (*uploads)[65];   /* n_uploads ids of uploads that the body names */
     size_t n_uploads;
+    bool any_upload;
     int priority;         /* -10..10: larger ones run first, of the same the older one */
     const char *webhook;  /* address to tell of its end, or NULL */
     double queue_limit_s; /* it fails if it has not begun so long after it came; 0: no limit */
@@ -94,7 +110,7 @@ typedef struct {
 
 /* ---- submit: the job is on disk (fsync) before STORE_OK is returned. When the key is known and came with the same
  * body, *out is the earlier job and *repeated is true; with another body STORE_CONFLICT. STORE_NOT_FOUND: an upload is
- * not there (any more). */
+ * not there (any more), or not this client's (its request says any_upload: no matter whose). */
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated);
 
 /* ---- repeat: the job that store_submit would answer this request with, without submitting it: STORE_OK,
@@ -179,6 +195,7 @@ store_status store_get(store *s, const char *id, job *out);
 
 #define STORE_MORE_TAGS 3
 typedef struct {
+    const char *client;
     bool by_status;
     job_status status;
     const char *tag;                   /* NULL: any */

@@ -28,6 +28,7 @@ struct store_uploads {
 
 struct upload_writer {
     store *s;
+    char client[STORE_CLIENT];
     blob_writer *blob;
     int64_t bytes, reserved; /* reserved: part of pending */
     upload_status failed;
@@ -43,7 +44,7 @@ struct upload_writer {
 static bool has_row(void *ctx, const char *id)
 {
     upload_info info;
-    return store_upload_get(ctx, id, &info) != STORE_NOT_FOUND;
+    return store_upload_get(ctx, id, NULL, &info) != STORE_NOT_FOUND;
 }
 
 bool store_uploads_begin(store *s, blobs *place, char *message, size_t size)
@@ -83,30 +84,31 @@ bool blob_is_id(const char *text)
     return strlen(text) == UPLOAD_ID_LEN && strspn(text, "0123456789abcdef") == UPLOAD_ID_LEN;
 }
 
-store_status store_upload_get(store *s, const char *id, upload_info *out)
+store_status store_upload_get(store *s, const char *id, const char *client, upload_info *out)
 {
     *out = (upload_info){.bytes = 0};
-    return blob_is_id(id) ? s->engine->upload_get(s, id, out) : STORE_NOT_FOUND;
+    return blob_is_id(id) ? s->engine->upload_get(s, id, client, out) : STORE_NOT_FOUND;
 }
 
-/* Under the lock. */
-static store_status delete_both(store *s, const upload_info *info)
+/* Under the lock. The blob goes with its row. */
+static store_status forget(store *s, const upload_info *info, const char *client)
 {
-    store_status status = s->engine->upload_forget(s, info->id);
-    if (status != STORE_OK)
+    bool gone = false;
+    store_status status = s->engine->upload_forget(s, info->id, client, &gone);
+    if (status != STORE_OK || !gone)
         return status;
     s->uploads->bytes -= info->bytes;
     s->uploads->blobs->does->remove(s->uploads->blobs, info->id);
     return STORE_OK;
 }
 
-store_status store_upload_delete(store *s, const char *id)
+store_status store_upload_delete(store *s, const char *id, const char *client)
 {
     upload_info info;
     pthread_mutex_lock(&s->uploads->lock);
-    store_status status = store_upload_get(s, id, &info);
+    store_status status = store_upload_get(s, id, client, &info);
     if (status == STORE_OK)
-        status = delete_both(s, &info);
+        status = forget(s, &info, client);
     pthread_mutex_unlock(&s->uploads->lock);
     return status;
 }
@@ -118,7 +120,7 @@ store_status store_upload_delete(store *s, const char *id)
 static bool collect_one(store *s, double before)
 {
     upload_info found = {.bytes = 0};
-    return s->engine->upload_idle(s, before, &found) == STORE_OK && delete_both(s, &found) == STORE_OK;
+    return s->engine->upload_idle(s, before, &found) == STORE_OK && forget(s, &found, NULL) == STORE_OK;
 }
 
 store_status store_collect_uploads(store *s, int64_t *count)
@@ -139,7 +141,10 @@ store_status store_collect_uploads(store *s, int64_t *count)
 
 static upload_status status_of(store_status status)
 {
-    return status == STORE_OK ? UPLOAD_OK : status == STORE_FULL ? UPLOAD_DISK_FULL : UPLOAD_FAILED;
+    return status == STORE_OK      ? UPLOAD_OK
+           : status == STORE_FULL  ? UPLOAD_DISK_FULL
+           : status == STORE_QUOTA ? UPLOAD_QUOTA
+                                   : UPLOAD_FAILED;
 }
 
 void store_upload_abort(upload_writer *w)
@@ -158,13 +163,14 @@ void store_upload_abort(upload_writer *w)
     free(w);
 }
 
-upload_writer *store_upload_begin(store *s, bool gzip, upload_status *status)
+upload_writer *store_upload_begin(store *s, const char *client, bool gzip, upload_status *status)
 {
     char cause[BLOB_CAUSE] = "no memory for an upload";
     upload_writer *w = calloc(1, sizeof *w);
     *status = UPLOAD_FAILED;
     if (w) {
         w->s = s;
+        snprintf(w->client, sizeof w->client, "%s", client ? client : "");
         w->gzip = w->between = gzip;
         w->hashing = gnutls_hash_init(&w->hash, GNUTLS_DIG_SHA256) == 0;
         w->inflating = w->hashing && gzip && inflateInit2(&w->z, 15 + 16) == Z_OK; /* 16: gzip, not zlib (zlib.h) */
@@ -259,9 +265,11 @@ upload_status store_upload_end(upload_writer *w, upload_info *out, bool *known)
         pthread_mutex_lock(&w->s->uploads->lock); /* the blob first, then the row that makes it count */
         status = status_of(w->blob->blobs->does->publish(w->blob, id, cause));
         if (status == UPLOAD_OK)
-            status = status_of(w->s->engine->upload_add(w->s, id, w->bytes, out, known));
-        if (status == UPLOAD_OK && !*known)
-            w->s->uploads->bytes += w->bytes;
+            status = status_of(w->s->engine->upload_add(w->s, id, w->client, w->bytes, out, known));
+        if (status == UPLOAD_OK) /* others may have had it; where this fails the next one mends it */
+            w->s->engine->upload_total(w->s, &w->s->uploads->bytes);
+        else if (store_upload_get(w->s, id, NULL, &(upload_info){.bytes = 0}) == STORE_NOT_FOUND)
+            w->s->uploads->blobs->does->remove(w->s->uploads->blobs, id);
         pthread_mutex_unlock(&w->s->uploads->lock);
     }
     if (cause[0])
@@ -297,7 +305,7 @@ store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes
     struct stat st;
     char cause[256];
     *fd = -1;
-    store_status status = store_upload_get(s, id, &info);
+    store_status status = store_upload_get(s, id, NULL, &info);
     if (status != STORE_OK)
         return status;
     *bytes = info.bytes;

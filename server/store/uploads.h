@@ -17,7 +17,7 @@
 
 typedef struct {
     char id[UPLOAD_ID_LEN + 1];
-    int64_t bytes, jobs;  /* jobs: that refer to it */
+    int64_t bytes, jobs;  /* jobs: of the client that refer to it */
     double created, used; /* used: last sent, or put into a job */
 } upload_info;
 
@@ -25,6 +25,7 @@ typedef enum {
     UPLOAD_OK,
     UPLOAD_TOO_LARGE, /* beyond the limit of one */
     UPLOAD_NO_ROOM,   /* beyond the limit of all, and nothing can go */
+    UPLOAD_QUOTA,     /* beyond what its client may have */
     UPLOAD_DISK_FULL, /* */
     UPLOAD_BAD_GZIP,  /* the bytes are not a gzip stream, or not a whole one */
     UPLOAD_FAILED     /* anything else: store_message says what */
@@ -33,18 +34,21 @@ typedef enum {
 typedef struct upload_writer upload_writer;
 typedef struct store_uploads store_uploads; /* what a store knows of its uploads */
 
-/* NULL on failure: *status. gzip: what is written is compressed (RFC 1952) and kept decompressed. */
-upload_writer *store_upload_begin(store *s, bool gzip, upload_status *status);
+/* Each client that has sent it has it; what others have of the same bytes is not told. In what follows a client is NULL
+ * where it does not matter.
+ *
+ * NULL on failure: *status. gzip: what is written is compressed (RFC 1952) and kept decompressed. */
+upload_writer *store_upload_begin(store *s, const char *client, bool gzip, upload_status *status);
 upload_status store_upload_write(upload_writer *w, const void *data, size_t size);
-/* Ends it and frees w, whatever happens. UPLOAD_OK: it is on disk; *known says that it was there before. */
+/* Ends it and frees w, whatever happens. UPLOAD_OK: it is on disk; *known says that this client had it before. */
 upload_status store_upload_end(upload_writer *w, upload_info *out, bool *known);
 /* Leaves nothing behind. NULL is fine. */
 void store_upload_abort(upload_writer *w);
 
-/* STORE_NOT_FOUND where there is none, also for an id that is no id. */
-store_status store_upload_get(store *s, const char *id, upload_info *out);
-/* STORE_CONFLICT while a job refers to it. */
-store_status store_upload_delete(store *s, const char *id);
+/* STORE_NOT_FOUND where this client has none, also for an id that is no id. */
+store_status store_upload_get(store *s, const char *id, const char *client, upload_info *out);
+/* STORE_CONFLICT while a job of this client refers to it. */
+store_status store_upload_delete(store *s, const char *id, const char *client);
 /* A descriptor for reading that the caller closes; stays good if the upload is deleted. All of it is read first, and
  * STORE_DAMAGED where it is not what was sent any more, by its digest. */
 store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes);

@@ -78,7 +78,7 @@ static void wake_those_of(listener *first, const char *id)
             wake(l);
 }
 
-void feed_changed(feed *f, const char *id)
+static void tell(feed *f, const char *id, const char *deleted_of)
 {
     pthread_mutex_lock(&f->lock);
     uint64_t *newest = &f->newest[bucket(id)];
@@ -88,9 +88,21 @@ void feed_changed(feed *f, const char *id)
     *newest = now->change.number = f->last;
     now->is_past = false;
     snprintf(now->change.id, sizeof now->change.id, "%s", id);
+    now->change.deleted = deleted_of != NULL;
+    snprintf(now->change.client, sizeof now->change.client, "%s", deleted_of ? deleted_of : "");
     wake_those_of(f->listeners[bucket(id)], id);
     wake_those_of(f->all, "");
     pthread_mutex_unlock(&f->lock);
+}
+
+void feed_changed(feed *f, const char *id)
+{
+    tell(f, id, NULL);
+}
+
+void feed_deleted(feed *f, const char *id, const char *client)
+{
+    tell(f, id, client);
 }
 
 void feed_moved(feed *f, const char *id)

@@ -19,12 +19,16 @@ typedef struct listener listener;
 typedef struct {
     uint64_t number;
     char id[33];
+    bool deleted;
+    char client[64]; /* of one that was deleted */
 } feed_change;
 
 feed *feed_new(void);    /* NULL: no memory */
 void feed_free(feed *f); /* nobody listens any more; NULL is fine */
 
 void feed_changed(feed *f, const char *id);
+/* Of a job that is gone: whose it was is not known from the store any more. */
+void feed_deleted(feed *f, const char *id, const char *client);
 /* Something that only those who follow this job want to know: no number, and nothing that is kept. */
 void feed_moved(feed *f, const char *id);
 /* Everybody looks again. */

@@ -210,10 +210,12 @@ static work *make_work(store *s, const work_options *options, server_log *log)
 }
 
 /* What the store tells (store_listener): a job that waits is for one of the workers. */
-static void tell_change(void *ctx, const char *id, bool waits)
+static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
 {
     work *w = ctx;
-    if (id)
+    if (id && gone)
+        feed_deleted(w->feed, id, gone);
+    else if (id)
         feed_changed(w->feed, id);
     else
         feed_wake_all(w->feed);

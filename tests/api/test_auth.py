@@ -25,7 +25,7 @@ def write_tokens(text, mode=0o600, path=TOKENS):
     return path
 
 
-write_tokens(f"# who may\nreader read {READ}\n\nsender submit {SUBMIT}\nboss\tadmin {ADMIN}\n")
+write_tokens(f"# who may\nreader read {READ} owner=sender\n\nsender submit {SUBMIT}\nboss\tadmin {ADMIN}\n")
 
 
 def bearer(secret):

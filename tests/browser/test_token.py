@@ -10,7 +10,7 @@ from service import SCENE
 READ, SUBMIT = "r" * 20, "s" * 20
 FOLDER = tempfile.TemporaryDirectory(prefix="uzawad-tokens-")
 TOKENS = pathlib.Path(FOLDER.name, "tokens")
-TOKENS.write_text(f"reader read {READ}\nsender submit {SUBMIT}\n", encoding="utf-8")
+TOKENS.write_text(f"reader read {READ} owner=sender\nsender submit {SUBMIT}\n", encoding="utf-8")
 os.chmod(TOKENS, 0o600)
 
 # Wherever a page could leave something.

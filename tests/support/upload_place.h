@@ -13,7 +13,7 @@ static inline upload_status send(store *s, const void *data, size_t len, size_t 
                                  bool *known)
 {
     upload_status status;
-    upload_writer *w = store_upload_begin(s, gzip, &status);
+    upload_writer *w = store_upload_begin(s, NULL, gzip, &status);
     CHECK(w && status == UPLOAD_OK);
     for (size_t at = 0; w && at < len; at += piece)
         store_upload_write(w, (const char *)data + at, len - at < piece ? len - at : piece);

@@ -158,6 +158,8 @@ typedef struct http_request {
     struct upload_writer *upload; /* where a streamed body goes */
     char name[65];                /* what stood for {id} or {name} in the path */
     char token[64];               /* the name of the token that it came with; "": none */
+    char client[64];              /* whose it is: the owner of that token */
+    bool sees_all;                /* what others have too */
     char job_id[33];              /* the job that it is about; "": none */
     http_reply reply;
     int status; /* of the reply; 0: none was sent */

@@ -9,16 +9,24 @@
 #define BUSY_TIMEOUT_MS 5000
 #define JOB_COLUMNS                                                                                                    \
     "id, status, progress, attempts, created, started, finished, tags, summary, error, refines, priority, "            \
-    "summary IS NULL OR " SUM_IS("summary_sum", SUM_JOB)
+    "summary IS NULL OR " SUM_IS("summary_sum", SUM_JOB) ", client"
+
+/* The jobs of a client, or of any where that is NULL, that use an upload. */
+#define USES_OF(upload, of)                                                                                            \
+    "upload_use JOIN job ON job.id = upload_use.job WHERE upload_use.upload = " upload " AND (" of                     \
+    " IS NULL OR job.client = " of ")"
 
 /* Filters of every listing: time, further tags, and a bound on ids that the time implies (they begin with it). */
 #define LIST_FILTER                                                                                                    \
-    " AND job.id >= ?10 AND created >= ?5 AND created < ?6"                                                            \
+    " AND job.id >= ?10 AND created >= ?5 AND created < ?6 AND (?11 IS NULL OR client = ?11)"                          \
     " AND (?7 IS NULL OR EXISTS (SELECT 1 FROM tag AS t WHERE t.tag = ?7 AND t.job = job.id))"                         \
     " AND (?8 IS NULL OR EXISTS (SELECT 1 FROM tag AS t WHERE t.tag = ?8 AND t.job = job.id))"                         \
     " AND (?9 IS NULL OR EXISTS (SELECT 1 FROM tag AS t WHERE t.tag = ?9 AND t.job = job.id)) "
 #define LIST(status, than, order)                                                                                      \
     "SELECT " JOB_COLUMNS " FROM job WHERE id " than " ?1 " status LIST_FILTER "ORDER BY id " order " LIMIT ?2"
+#define LIST_CLIENT(than, order)                                                                                       \
+    "SELECT " JOB_COLUMNS " FROM job INDEXED BY job_by_client WHERE client = ?11 AND client <> '' AND id " than " ?1"  \
+    " AND (?3 IS NULL OR status = ?3) " LIST_FILTER "ORDER BY id " order " LIMIT ?2"
 #define LIST_TAG(status, than, order)                                                                                  \
     "SELECT " JOB_COLUMNS " FROM tag CROSS JOIN job ON job.id = tag.job WHERE tag.tag = ?4 AND tag.job " than          \
     " ?1 " status LIST_FILTER "ORDER BY tag.job " order " LIMIT ?2"
@@ -34,7 +42,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_FIND_KEY] = "SELECT " JOB_COLUMNS ", length(body) = ?2 AND body = ?3"
                        " FROM job JOIN request ON request.job = job.id WHERE idempotency_key = ?1",
     [QUERY_INSERT_JOB] = "INSERT INTO job(id, status, created, tags, idempotency_key, refines, priority, queue_until,"
-                         " bytes) VALUES(?1, 0, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                         " bytes, client) VALUES(?1, 0, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
     [QUERY_INSERT_REQUEST] = "INSERT INTO request(job, body, sum) VALUES(?1, ?2, " SUM_OF("?1, ?2") ")",
     [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
                           " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
@@ -81,6 +89,13 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_WEBHOOKS_OPEN] = "SELECT 1 FROM webhook WHERE state < 2 LIMIT 1",
     [QUERY_WEBHOOK_POSTPONE] = "UPDATE webhook SET next = max(next, ?2) WHERE state = ?3 AND url = ?1",
     [QUERY_WEBHOOK_ATTEMPTED] = "UPDATE webhook SET state = ?3, next = ?2, attempts = attempts + 1 WHERE job = ?1",
+    [QUERY_LIST_CLIENT] = LIST_CLIENT("<", "DESC"),
+    [QUERY_OLDEST_CLIENT] = LIST_CLIENT(">", "ASC"),
+    [QUERY_CLIENT] = "SELECT coalesce((SELECT waiting FROM client WHERE name = ?1), 0),"
+                     " coalesce((SELECT bytes FROM client WHERE name = ?1), 0)"
+                     " + coalesce((SELECT sum(upload.bytes) FROM upload_client JOIN upload ON id = upload"
+                     " WHERE client = ?1), 0),"
+                     " coalesce((SELECT seconds FROM client WHERE name = ?1 AND day = ?2), 0.0)",
     [QUERY_WAITING] = "SELECT jobs FROM tally WHERE status = 0",
     [QUERY_ANY_EXPIRED] = "SELECT 1 FROM job INDEXED BY job_by_queue_until WHERE status = 0 AND queue_until > 0 AND "
                           "queue_until < ?1 LIMIT 1",
@@ -90,7 +105,7 @@ static const char *const SQL[QUERY_COUNT] = {
         "UPDATE job SET bytes = bytes + ?2, contents = ?3, contents_sum = " SUM_OF("?1, ?3") " WHERE id = ?1",
     [QUERY_CONTENTS] = "SELECT contents, " SUM_IS("contents_sum", SUM_CONTENTS) " FROM job WHERE id = ?1",
     [QUERY_ENDED] = "SELECT count(*), coalesce(sum(bytes), 0) FROM job INDEXED BY job_by_end WHERE status >= 2",
-    [QUERY_OLD_JOBS] = "SELECT id, finished, bytes FROM job INDEXED BY job_by_end WHERE status >= 2"
+    [QUERY_OLD_JOBS] = "SELECT id, finished, bytes, client FROM job INDEXED BY job_by_end WHERE status >= 2"
                        " AND NOT EXISTS (SELECT 1 FROM webhook WHERE job = id AND state = 1)"
                        " ORDER BY finished, id LIMIT ?1",
     [QUERY_VECTOR] = "SELECT part, version, count, 0, data, " SUM_IS(
@@ -101,13 +116,20 @@ static const char *const SQL[QUERY_COUNT] = {
                            " ORDER BY number",
     [QUERY_HISTORY] = "SELECT part, version, columns, last, CASE WHEN last > ?2 THEN data END, " SUM_IS(
         "sum", SUM_HISTORY) " FROM history WHERE job = ?1 AND answer = ?3 ORDER BY part",
-    [QUERY_UPLOAD] = "SELECT bytes, created, used, (SELECT count(*) FROM upload_use WHERE upload = id) FROM upload"
-                     " WHERE id = ?1",
+    [QUERY_UPLOAD] = "SELECT bytes, created, used, (SELECT count(*) FROM " USES_OF(
+        "?1", "?2") ") FROM upload"
+                    " WHERE id = ?1 AND (?2 IS NULL OR EXISTS (SELECT 1 FROM upload_client WHERE upload = ?1"
+                    " AND client = ?2))",
     [QUERY_INSERT_UPLOAD] = "INSERT OR IGNORE INTO upload(id, bytes, created, used) VALUES(?1, ?2, ?3, ?3)",
-    [QUERY_TOUCH_UPLOAD] = "UPDATE upload SET used = ?2 WHERE id = ?1",
+    [QUERY_TOUCH_UPLOAD] = "UPDATE upload SET used = ?2 WHERE id = ?1 AND (?3 IS NULL OR EXISTS"
+                           " (SELECT 1 FROM upload_client WHERE upload = ?1 AND client = ?3))",
+    [QUERY_OWN_UPLOAD] = "INSERT OR IGNORE INTO upload_client(upload, client) VALUES(?1, ?2)",
+    [QUERY_DISOWN_UPLOAD] = "DELETE FROM upload_client WHERE upload = ?1 AND (?2 IS NULL OR client = ?2)"
+                            " AND NOT EXISTS (SELECT 1 FROM " USES_OF("?1", "?2") ")",
     [QUERY_USE_UPLOAD] = "INSERT OR IGNORE INTO upload_use(upload, job) VALUES(?1, ?2)",
     [QUERY_DELETE_UPLOAD] = "DELETE FROM upload WHERE id = ?1"
-                            " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = ?1)",
+                            " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = ?1)"
+                            " AND NOT EXISTS (SELECT 1 FROM upload_client WHERE upload = ?1)",
     [QUERY_IDLE_UPLOAD] = "SELECT id, bytes FROM upload WHERE used < ?1"
                           " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = id) ORDER BY used LIMIT 1",
     [QUERY_UPLOAD_BYTES] = "SELECT coalesce(sum(bytes), 0) FROM upload",

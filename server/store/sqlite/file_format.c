@@ -29,6 +29,10 @@
  * upload_use which jobs name which uploads in their requests.
  * webhook  whom to tell of the end of a job. state 0: it has not ended, 1: to be told at `next`, 2: told, 3: given up.
  *          A trigger makes it due, whatever ends the job.
+ * client   what each client with a name has: jobs that wait, bytes of its jobs, and seconds of workers on `day` (days
+ *          since 1970, UTC). Kept by triggers.
+ * upload_client who has sent which upload.
+ * job.client: whose it is, "" where there are no tokens. Idempotency keys of others begin with the name and \x1f.
  * contents of an ended job: which rows its result has (result_blobs.h).
  * sum, summary_sum, contents_sum: checksums of what answers are made of (checksum.h); NULL in rows that an older format
  * wrote. Deleting a job deletes its rows in every other table. */
@@ -95,6 +99,36 @@
 /* Version 6. */
 #define COLUMNS_6 "ALTER TABLE job ADD COLUMN contents TEXT; ALTER TABLE job ADD COLUMN contents_sum INTEGER;"
 
+/* Version 7. Without tokens all clients are "", and nothing is kept or counted beside their jobs. */
+#define TABLES_7                                                                                                       \
+    "ALTER TABLE job ADD COLUMN client TEXT NOT NULL DEFAULT '';"                                                      \
+    "CREATE INDEX job_by_client ON job(client, id) WHERE client <> '';"                                                \
+    "CREATE TABLE client("                                                                                             \
+    "  name TEXT PRIMARY KEY NOT NULL, waiting INTEGER NOT NULL DEFAULT 0, bytes INTEGER NOT NULL DEFAULT 0,"          \
+    "  day INTEGER NOT NULL DEFAULT 0, seconds REAL NOT NULL DEFAULT 0"                                                \
+    ") STRICT, WITHOUT ROWID;"                                                                                         \
+    "CREATE TRIGGER client_insert AFTER INSERT ON job WHEN NEW.client <> '' BEGIN"                                     \
+    " INSERT INTO client(name, waiting, bytes) VALUES(NEW.client, NEW.status = 0, NEW.bytes)"                          \
+    " ON CONFLICT(name) DO UPDATE SET waiting = waiting + excluded.waiting, bytes = bytes + excluded.bytes; END;"      \
+    "CREATE TRIGGER client_delete AFTER DELETE ON job WHEN OLD.client <> '' BEGIN"                                     \
+    " UPDATE client SET waiting = waiting - (OLD.status = 0), bytes = bytes - OLD.bytes WHERE name = OLD.client; END;" \
+    "CREATE TRIGGER client_update AFTER UPDATE OF status, bytes ON job WHEN NEW.client <> ''"                          \
+    " AND (OLD.status <> NEW.status OR OLD.bytes <> NEW.bytes) BEGIN"                                                  \
+    " UPDATE client SET waiting = waiting + (NEW.status = 0) - (OLD.status = 0),"                                      \
+    " bytes = bytes + NEW.bytes - OLD.bytes WHERE name = NEW.client; END;"                                             \
+    "CREATE TRIGGER client_worked AFTER UPDATE OF status ON job WHEN NEW.client <> '' AND OLD.status = 1"              \
+    " AND NEW.status >= 2 BEGIN"                                                                                       \
+    " UPDATE client SET seconds = max(0.0, NEW.finished - NEW.started)"                                                \
+    " + CASE WHEN day = CAST(NEW.finished / 86400 AS INTEGER) THEN seconds ELSE 0.0 END,"                              \
+    " day = CAST(NEW.finished / 86400 AS INTEGER) WHERE name = NEW.client; END;"                                       \
+    "CREATE TABLE upload_client("                                                                                      \
+    "  upload TEXT NOT NULL, client TEXT NOT NULL, PRIMARY KEY(upload, client)"                                        \
+    ") STRICT, WITHOUT ROWID;"                                                                                         \
+    "CREATE INDEX upload_client_by_client ON upload_client(client, upload);"                                           \
+    "INSERT INTO upload_client(upload, client) SELECT id, '' FROM upload;"                                             \
+    "CREATE TRIGGER upload_delete AFTER DELETE ON upload BEGIN"                                                        \
+    " DELETE FROM upload_client WHERE upload = OLD.id; END;"
+
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"
@@ -117,7 +151,7 @@ static const char *const SCHEMA =
     "  tag TEXT NOT NULL, job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
-    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5 COLUMNS_6;
+    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5 COLUMNS_6 TABLES_7;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -136,7 +170,7 @@ const char *file_format_why_unreadable(sqlite3 *db)
 /* STEPS[n] turns version n into n + 1. Version 2: load cases, and jobs that refine others. The primary keys of the
  * result tables grew by a column, which SQLite can only do by copying the rows. Version 3: uploads, webhooks, the turn
  * and the size of jobs. Version 4: the tally. Version 5: checksums. Version 6: what belongs
- * to a result. */
+ * to a result. Version 7: clients. */
 static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [0] = NULL,
     [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
@@ -155,6 +189,7 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [3] = TABLES_4,
     [4] = COLUMNS_5,
     [5] = COLUMNS_6,
+    [6] = TABLES_7,
 };
 
 bool file_format_integer(sqlite3 *db, const char *sql, int64_t *value)

@@ -90,6 +90,10 @@ store_status sqlite_check_place(const sqlite_store *s, connection *c);
 /* The job in the current row, whose first columns are the job's. Failure leaves *out zero. */
 store_status sqlite_read_job(statement *st, job *out);
 
+/* STORE_QUOTA, with a message, where a client has what it may of bytes or seconds, or would have with `more` bytes;
+ * also of jobs that wait, where it submits one. */
+store_status sqlite_check_quota(const sqlite_store *s, connection *c, const char *client, int64_t more, bool submits);
+
 /* A copy of a text column; NULL for SQL NULL, and *ok false when there is no memory. */
 char *sqlite_copy_text(statement *st, int at, bool *ok);
 
@@ -118,9 +122,10 @@ store_status sqlite_webhook_next(store *s, webhook_due *out);
 store_status sqlite_webhooks_open(store *s, bool *any);
 store_status sqlite_webhook_attempted(store *s, const webhook_due *due, webhook_end end, double delay_s,
                                       double silent_s);
-store_status sqlite_upload_get(store *s, const char *id, upload_info *out);
-store_status sqlite_upload_add(store *s, const char *id, int64_t bytes, upload_info *out, bool *known);
-store_status sqlite_upload_forget(store *s, const char *id);
+store_status sqlite_upload_get(store *s, const char *id, const char *client, upload_info *out);
+store_status sqlite_upload_add(store *s, const char *id, const char *client, int64_t bytes, upload_info *out,
+                               bool *known);
+store_status sqlite_upload_forget(store *s, const char *id, const char *client, bool *gone);
 store_status sqlite_upload_idle(store *s, double before, upload_info *out);
 store_status sqlite_upload_total(store *s, int64_t *bytes);
 store_status sqlite_try_write(store *s);

@@ -14,17 +14,33 @@ typedef struct {
     bool repeated;
 } submit_args;
 
+/* An idempotency key as the column has it, in which it is the only one: behind its client's name, where that has one.
+ * Keys have printable characters only. */
+typedef struct {
+    char text[STORE_CLIENT + 260];
+} kept_key;
+
+static kept_key key_of(const store_request *request)
+{
+    kept_key key;
+    const char *client = request->client ? request->client : "";
+    snprintf(key.text, sizeof key.text, "%s%s%s", client, client[0] ? "\x1f" : "",
+             request->idempotency_key ? request->idempotency_key : "");
+    return key;
+}
+
 /* The job that came with this key before: STORE_NOT_FOUND, STORE_CONFLICT if its body was another one. Bodies are
  * compared byte by byte: nothing has to be stored or computed for the many requests that are never repeated. */
 static store_status find_key(connection *c, submit_args *a)
 {
     store_status status = STORE_NOT_FOUND;
+    const kept_key key = key_of(a->request);
     statement st = statement_begin(c, QUERY_FIND_KEY);
-    bind_text(&st, 1, a->request->idempotency_key);
+    bind_text(&st, 1, key.text);
     bind_integer(&st, 2, (int64_t)a->request->body_len);
     bind_blob(&st, 3, a->request->body, a->request->body_len);
     if (statement_row(&st))
-        status = sqlite3_column_int(st.stmt, 13) ? sqlite_read_job(&st, a->out) : STORE_CONFLICT;
+        status = sqlite3_column_int(st.stmt, 14) ? sqlite_read_job(&st, a->out) : STORE_CONFLICT;
     return statement_end(&st, status);
 }
 
@@ -32,16 +48,19 @@ static store_status find_key(connection *c, submit_args *a)
 static store_status insert_job(connection *c, const store_request *r, const char *id)
 {
     const char *tags = r->tags ? r->tags : "[]";
+    const char *client = r->client ? r->client : "";
     const double now = clock_seconds(CLOCK_REALTIME);
+    const kept_key key = key_of(r);
     statement st = statement_begin(c, QUERY_INSERT_JOB);
     bind_text(&st, 1, id);
     bind_real(&st, 2, now);
     bind_text(&st, 3, tags);
-    bind_text(&st, 4, r->idempotency_key);
+    bind_text(&st, 4, r->idempotency_key ? key.text : NULL);
     bind_text(&st, 5, r->refines);
     bind_integer(&st, 6, r->priority);
     bind_real(&st, 7, r->queue_limit_s > 0 ? now + r->queue_limit_s : 0);
     bind_integer(&st, 8, (int64_t)r->body_len);
+    bind_text(&st, 9, client);
     store_status status = statement_run(&st);
     if (status != STORE_OK)
         return status;
@@ -59,6 +78,7 @@ static store_status insert_job(connection *c, const store_request *r, const char
         st = statement_begin(c, QUERY_TOUCH_UPLOAD);
         bind_text(&st, 1, r->uploads[i]);
         bind_real(&st, 2, now);
+        bind_text(&st, 3, r->any_upload ? NULL : client);
         status = statement_run(&st);
         if (status != STORE_OK)
             return status;
@@ -88,6 +108,29 @@ static store_status read_by_id(connection *c, const char *id, job *out)
     return statement_end(&st, status);
 }
 
+store_status sqlite_check_quota(const sqlite_store *s, connection *c, const char *client, int64_t more, bool submits)
+{
+    const client_quotas *most = &s->base.settings.quotas;
+    const char *what = NULL;
+    if (!client || !client[0] || (most->waiting <= 0 && most->bytes <= 0 && most->seconds <= 0.0))
+        return STORE_OK;
+    statement st = statement_begin(c, QUERY_CLIENT);
+    bind_text(&st, 1, client);
+    bind_integer(&st, 2, (int64_t)(clock_seconds(CLOCK_REALTIME) / 86400.0));
+    if (statement_row(&st)) {
+        if (submits && most->waiting > 0 && sqlite3_column_int64(st.stmt, 0) >= most->waiting)
+            what = "jobs that wait as one owner may (--client-queue): try again when one of them has begun";
+        else if (most->bytes > 0 && sqlite3_column_int64(st.stmt, 1) + more > most->bytes)
+            what = "bytes of requests, results and uploads as one owner may (--client-bytes): delete some";
+        else if (submits && most->seconds > 0.0 && sqlite3_column_double(st.stmt, 2) >= most->seconds)
+            what = "seconds of workers today as one owner may (--client-seconds): try again tomorrow, in UTC";
+    }
+    const store_status status = statement_end(&st, what ? STORE_QUOTA : STORE_OK);
+    if (status == STORE_QUOTA)
+        snprintf(c->message, sizeof c->message, "\"%s\" has as many %s", client, what);
+    return status;
+}
+
 static store_status submit(sqlite_store *s, connection *c, void *args)
 {
     submit_args *a = args;
@@ -108,6 +151,8 @@ static store_status submit(sqlite_store *s, connection *c, void *args)
             waiting = sqlite3_column_int64(st.stmt, 0);
         status = statement_end(&st, waiting < s->base.settings.max_queue ? STORE_OK : STORE_BUSY);
     }
+    if (status == STORE_OK)
+        status = sqlite_check_quota(s, c, a->request->client, (int64_t)a->request->body_len, true);
     if (status != STORE_OK)
         return status;
     store_next_id(&s->last_ms, &s->sequence, id);
@@ -121,7 +166,7 @@ store_status sqlite_submit(store *base, const store_request *request, job *out, 
     store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, submit, &a);
     *repeated = a.repeated;
     if (status == STORE_OK && !a.repeated)
-        store_tell(base, out->id, true);
+        store_tell(base, out->id, true, NULL);
     return status;
 }
 
@@ -365,6 +410,7 @@ store_status sqlite_recover(store *base, int max_attempts, const char *error_jso
 typedef struct {
     const char *id;
     job_status was;
+    char client[STORE_CLIENT];
 } dismiss_args;
 
 static store_status dismiss(sqlite_store *s, connection *c, void *args)
@@ -376,6 +422,7 @@ static store_status dismiss(sqlite_store *s, connection *c, void *args)
     if (status != STORE_OK)
         return status;
     a->was = j.status;
+    memcpy(a->client, j.client, sizeof a->client);
     job_clear(&j);
     statement st = statement_begin(c, a->was == JOB_ACCEPTED  ? QUERY_DISMISS
                                       : a->was == JOB_RUNNING ? QUERY_DISMISS_RUNNING
@@ -388,11 +435,11 @@ static store_status dismiss(sqlite_store *s, connection *c, void *args)
 
 store_status sqlite_dismiss(store *base, const char *id, job_status *was)
 {
-    dismiss_args a = {id, JOB_ACCEPTED};
+    dismiss_args a = {.id = id, .was = JOB_ACCEPTED};
     store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, dismiss, &a);
     *was = a.was;
     if (status == STORE_OK && a.was != JOB_RUNNING)
-        store_tell(base, id, false);
+        store_tell(base, id, false, a.was == JOB_ACCEPTED ? NULL : a.client);
     return status;
 }
 

@@ -52,6 +52,10 @@ static const struct {
      " + (SELECT count(*) FROM vector WHERE vector.job = id AND part = 0)"
      " + (SELECT count(*) FROM history WHERE history.job = id AND part = 0)",
      "a part of the result of job %s is missing\n"},
+    {7,
+     "SELECT name FROM client WHERE waiting <> (SELECT count(*) FROM job WHERE client = name AND status = 0)"
+     " OR bytes <> (SELECT coalesce(sum(bytes), 0) FROM job WHERE client = name)",
+     "what is counted of client %s is wrong\n"},
     {5, "SELECT job FROM request WHERE NOT " SUM_IS("sum", SUM_REQUEST),
      "the request of job %s is not what was written\n"},
     {5, "SELECT number || ' of job ' || job FROM answer WHERE NOT " SUM_IS("sum", SUM_ANSWER),

@@ -34,6 +34,10 @@ store_status sqlite_read_job(statement *st, job *out)
     out->summary = sqlite_copy_text(st, 8, &ok);
     out->error = sqlite_copy_text(st, 9, &ok);
     out->priority = sqlite3_column_int(row, 11);
+    const char *client = (const char *)sqlite3_column_text(row, 13);
+    ok = ok && client && strlen(client) < sizeof out->client;
+    if (ok)
+        strcpy(out->client, client);
     const char *refines = (const char *)sqlite3_column_text(row, 10);
     if (refines && strlen(refines) < sizeof out->refines)
         strcpy(out->refines, refines);
@@ -58,7 +62,9 @@ store_status sqlite_list(store *base, const store_query *q, job *jobs, size_t *c
     sqlite_store *s = sqlite_of(base);
     store_status status = STORE_OK;
     connection *c = sqlite_take_reader(s);
-    statement st = statement_begin(c, QUERIES[q->ascending][q->tag != NULL][q->by_status]);
+    const bool by_client = q->client && q->client[0] && !q->tag; /* a tag has fewer jobs than most clients */
+    statement st = statement_begin(c, by_client ? (q->ascending ? QUERY_OLDEST_CLIENT : QUERY_LIST_CLIENT)
+                                                : QUERIES[q->ascending][q->tag != NULL][q->by_status]);
     bind_text(&st, 1, q->before ? q->before : q->ascending ? "" : "~"); /* after every hex digit */
     bind_integer(&st, 2, q->limit + 1);
     if (q->by_status)
@@ -74,6 +80,7 @@ store_status sqlite_list(store *base, const store_query *q, job *jobs, size_t *c
     double ms = (q->since - 1.0) * 1e3;
     snprintf(least, sizeof least, "%012llx", ms > 0.0 ? (unsigned long long)fmin(ms, 281474976710655.0) : 0ULL);
     bind_text(&st, 10, least);
+    bind_text(&st, 11, q->client);
     while (status == STORE_OK && *count <= (size_t)q->limit && statement_row(&st)) {
         status = sqlite_read_job(&st, &jobs[*count]);
         *count += status == STORE_OK;

@@ -52,7 +52,7 @@ store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
     store_status status = any ? sqlite_write(s, WRITE_DURABLE, expire, &a) : STORE_OK;
     *count = status == STORE_OK ? a.count : 0;
     for (size_t i = 0; status == STORE_OK && i < a.n_ids; i++)
-        store_tell(base, a.ids[i], false);
+        store_tell(base, a.ids[i], false, NULL);
     free(a.ids);
     return status;
 }
@@ -62,7 +62,7 @@ store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
 typedef struct {
     const store_retention *limits;
     int64_t jobs, bytes; /* ended, as they stand */
-    char ids[MOST_AT_ONCE][33];
+    char ids[MOST_AT_ONCE][33], clients[MOST_AT_ONCE][STORE_CLIENT];
     int n_ids;
     int64_t count;
 } retain_args;
@@ -87,6 +87,8 @@ static store_status choose(connection *c, retain_args *a)
            ((limits->keep_s > 0 && sqlite3_column_double(st.stmt, 1) < now - limits->keep_s) ||
             (limits->keep_jobs > 0 && a->jobs > limits->keep_jobs) ||
             (limits->keep_bytes > 0 && a->bytes > limits->keep_bytes))) {
+        const char *client = (const char *)sqlite3_column_text(st.stmt, 3);
+        snprintf(a->clients[a->n_ids], sizeof a->clients[0], "%s", client ? client : "");
         snprintf(a->ids[a->n_ids++], sizeof a->ids[0], "%s", (const char *)sqlite3_column_text(st.stmt, 0));
         a->jobs--;
         a->bytes -= sqlite3_column_int64(st.stmt, 2);
@@ -120,6 +122,6 @@ store_status sqlite_retain(store *base, const store_retention *limits, int64_t *
         status = sqlite_write(s, WRITE_DURABLE, delete_chosen, &a);
     *count = status == STORE_OK ? a.count : 0;
     for (int i = 0; status == STORE_OK && i < a.n_ids; i++)
-        store_tell(base, a.ids[i], false);
+        store_tell(base, a.ids[i], false, a.clients[i]);
     return status;
 }

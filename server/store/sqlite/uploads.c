@@ -3,11 +3,12 @@
 
 #include <stdio.h>
 
-static store_status read_info(connection *c, const char *id, upload_info *out)
+static store_status read_info(connection *c, const char *id, const char *client, upload_info *out)
 {
     store_status status = STORE_NOT_FOUND;
     statement st = statement_begin(c, QUERY_UPLOAD);
     bind_text(&st, 1, id);
+    bind_text(&st, 2, client);
     *out = (upload_info){.bytes = 0};
     if (statement_row(&st)) {
         snprintf(out->id, sizeof out->id, "%s", id);
@@ -20,15 +21,15 @@ static store_status read_info(connection *c, const char *id, upload_info *out)
     return statement_end(&st, status);
 }
 
-store_status sqlite_upload_get(store *base, const char *id, upload_info *out)
+store_status sqlite_upload_get(store *base, const char *id, const char *client, upload_info *out)
 {
     sqlite_store *s = sqlite_of(base);
     connection *c = sqlite_take_reader(s);
-    return sqlite_give_reader(s, c, read_info(c, id, out));
+    return sqlite_give_reader(s, c, read_info(c, id, client, out));
 }
 
 typedef struct {
-    const char *id;
+    const char *id, *client;
     int64_t bytes;
     upload_info *out;
     bool known;
@@ -36,48 +37,74 @@ typedef struct {
 
 static store_status add_row(sqlite_store *s, connection *c, void *args)
 {
-    (void)s;
     add_args *a = args;
-    statement st = statement_begin(c, QUERY_INSERT_UPLOAD);
+    const double now = clock_seconds(CLOCK_REALTIME);
+    statement st = statement_begin(c, QUERY_OWN_UPLOAD);
     bind_text(&st, 1, a->id);
-    bind_integer(&st, 2, a->bytes);
-    bind_real(&st, 3, clock_seconds(CLOCK_REALTIME));
+    bind_text(&st, 2, a->client);
     store_status status = statement_run(&st);
     a->known = status == STORE_OK && sqlite3_changes64(c->db) == 0;
-    if (a->known) {
+    if (status == STORE_OK && !a->known)
+        status = sqlite_check_quota(s, c, a->client, a->bytes, false);
+    if (status != STORE_OK)
+        return status;
+    st = statement_begin(c, QUERY_INSERT_UPLOAD);
+    bind_text(&st, 1, a->id);
+    bind_integer(&st, 2, a->bytes);
+    bind_real(&st, 3, now);
+    status = statement_run(&st);
+    if (status == STORE_OK) {
         st = statement_begin(c, QUERY_TOUCH_UPLOAD);
         bind_text(&st, 1, a->id);
-        bind_real(&st, 2, clock_seconds(CLOCK_REALTIME));
+        bind_real(&st, 2, now);
         status = statement_run(&st);
     }
-    return status == STORE_OK ? read_info(c, a->id, a->out) : status;
+    return status == STORE_OK ? read_info(c, a->id, a->client, a->out) : status;
 }
 
-store_status sqlite_upload_add(store *base, const char *id, int64_t bytes, upload_info *out, bool *known)
+store_status sqlite_upload_add(store *base, const char *id, const char *client, int64_t bytes, upload_info *out,
+                               bool *known)
 {
-    add_args a = {id, bytes, out, false};
+    add_args a = {id, client, bytes, out, false};
     store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, add_row, &a);
     *known = a.known;
     return status;
 }
 
+typedef struct {
+    const char *id, *client;
+    bool gone;
+} forget_args;
+
 static store_status delete_row(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     upload_info found;
-    const char *id = args;
-    statement st = statement_begin(c, QUERY_DELETE_UPLOAD);
-    bind_text(&st, 1, id);
-    store_status status = statement_run(&st);
-    if (status != STORE_OK || sqlite3_changes64(c->db) > 0)
+    forget_args *a = args;
+    store_status status = read_info(c, a->id, a->client, &found);
+    if (status != STORE_OK)
         return status;
-    status = read_info(c, id, &found);
-    return status == STORE_OK ? STORE_CONFLICT : status;
+    if (found.jobs > 0)
+        return STORE_CONFLICT;
+    statement st = statement_begin(c, QUERY_DISOWN_UPLOAD);
+    bind_text(&st, 1, a->id);
+    bind_text(&st, 2, a->client);
+    status = statement_run(&st);
+    if (status != STORE_OK)
+        return status;
+    st = statement_begin(c, QUERY_DELETE_UPLOAD);
+    bind_text(&st, 1, a->id);
+    status = statement_run(&st);
+    a->gone = status == STORE_OK && sqlite3_changes64(c->db) > 0;
+    return status;
 }
 
-store_status sqlite_upload_forget(store *base, const char *id)
+store_status sqlite_upload_forget(store *base, const char *id, const char *client, bool *gone)
 {
-    return sqlite_write(sqlite_of(base), WRITE_DURABLE, delete_row, (void *)(uintptr_t)id);
+    forget_args a = {.id = id, .client = client};
+    store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, delete_row, &a);
+    *gone = status == STORE_OK && a.gone;
+    return status;
 }
 
 store_status sqlite_upload_idle(store *base, double before, upload_info *out)

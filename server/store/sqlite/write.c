@@ -60,7 +60,7 @@ static void run_alone(sqlite_store *s, pending *p)
         if (p->status != STORE_FULL)
             break;
     }
-    if (is_failure(p->status))
+    if (is_failure(p->status) || p->status == STORE_QUOTA)
         store_set_message(&s->base, c->message);
 }
 

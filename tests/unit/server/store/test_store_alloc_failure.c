@@ -54,7 +54,7 @@ static bool send(void)
     upload_status status;
     upload_info info;
     bool known;
-    upload_writer *w = store_upload_begin(here.s, false, &status);
+    upload_writer *w = store_upload_begin(here.s, NULL, false, &status);
     if (!w) {
         CHECK(status != UPLOAD_OK);
         return false;

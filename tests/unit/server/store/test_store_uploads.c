@@ -21,11 +21,11 @@ STORE_TEST(an_upload_is_named_by_its_digest)
     CHECK_INT(files_in(&p), 1);
     CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_OK);
     CHECK(text.len == 3 && memcmp(text.data, "abc", 3) == 0);
-    CHECK_INT(store_upload_delete(p.s, ABC), STORE_OK);
+    CHECK_INT(store_upload_delete(p.s, ABC, NULL), STORE_OK);
     CHECK(memcmp(text.data, "abc", 3) == 0); /* who reads it reads on */
     store_upload_text_done(&text);
     CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_NOT_FOUND);
-    CHECK_INT(store_upload_delete(p.s, ABC), STORE_NOT_FOUND);
+    CHECK_INT(store_upload_delete(p.s, ABC, NULL), STORE_NOT_FOUND);
     CHECK_INT(files_in(&p), 0);
     end_place(&p);
 }
@@ -113,7 +113,7 @@ STORE_TEST(an_upload_in_use_stays)
     request.uploads = ids;
     request.n_uploads = 1;
     CHECK_INT(store_submit(p.s, &request, &j, &repeated), STORE_OK);
-    CHECK_INT(store_upload_delete(p.s, ABC), STORE_CONFLICT);
+    CHECK_INT(store_upload_delete(p.s, ABC, NULL), STORE_CONFLICT);
     store_configure(p.s, &(store_settings){.uploads = {.keep_s = 1e-6}});
     CHECK_INT(store_collect_uploads(p.s, &count), STORE_OK);
     CHECK(count == 0 && files_in(&p) == 1);

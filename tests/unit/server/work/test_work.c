@@ -474,7 +474,7 @@ TEST(what_may_have_been_missed_is_looked_for)
     v.place.s->changed = NULL;
     submit(&v, SMALL, id);
     v.place.s->changed = told;
-    store_tell(v.place.s, NULL, false);
+    store_tell(v.place.s, NULL, false, NULL);
     CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
     service_end(&v);

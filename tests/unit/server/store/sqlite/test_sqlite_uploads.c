@@ -24,7 +24,7 @@ TEST(a_backup_has_the_uploads)
     CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
     CHECK_MSG(store_backup_file(p.path, copy.path, NULL, message, sizeof message), "%s", message);
     CHECK(!store_backup_file(p.path, copy.path, NULL, message, sizeof message) && strstr(message, "there already"));
-    CHECK_INT(store_upload_delete(p.s, ABC), STORE_OK);
+    CHECK_INT(store_upload_delete(p.s, ABC, NULL), STORE_OK);
     CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_NOT_FOUND);
     copy.s = NULL;
     if (place_open(&copy)) {
@@ -32,7 +32,7 @@ TEST(a_backup_has_the_uploads)
         CHECK_INT(store_upload_text(copy.s, ABC, &text), STORE_OK);
         CHECK(text.len == 3 && memcmp(text.data, "abc", 3) == 0);
         store_upload_text_done(&text);
-        CHECK_INT(store_upload_delete(copy.s, ABC), STORE_OK);
+        CHECK_INT(store_upload_delete(copy.s, ABC, NULL), STORE_OK);
         store_close(copy.s);
     }
     unlink(copy.path);
@@ -89,7 +89,7 @@ TEST(a_backup_while_an_upload_goes)
         CHECK_INT(unlink(file), 0);
         if (used)
             CHECK(store_dismiss(p.s, j.id, &was) == STORE_OK && store_dismiss(p.s, j.id, &was) == STORE_OK);
-        CHECK_INT(store_upload_delete(p.s, ABC), STORE_OK);
+        CHECK_INT(store_upload_delete(p.s, ABC, NULL), STORE_OK);
         CHECK_INT(second_pass(p.path, copy), !used);
         job_clear(&j);
         snprintf(file, sizeof file, "rm -r '%s'*", copy);
