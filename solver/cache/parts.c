@@ -24,24 +24,24 @@ typedef struct {
     const uz_hooks *hooks;
 } wanted;
 
-uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *K, uz_error *err)
+uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *A, uz_error *err)
 {
-    int64_t shape[2] = {K->rows, K->cols};
-    size_t nnz = (size_t)K->ptr[K->cols];
+    int64_t shape[2] = {A->rows, A->cols};
+    size_t nnz = (size_t)A->ptr[A->cols];
     uz_digest *pattern = uz_digest_new(), *values = uz_digest_new();
     bool ok = pattern && values;
     if (pattern) {
         uz_digest_add(pattern, shape, sizeof shape);
-        uz_digest_add(pattern, K->ptr, (size_t)(K->cols + 1) * sizeof *K->ptr);
-        uz_digest_add(pattern, K->idx, nnz * sizeof *K->idx);
+        uz_digest_add(pattern, A->ptr, (size_t)(A->cols + 1) * sizeof *A->ptr);
+        uz_digest_add(pattern, A->idx, nnz * sizeof *A->idx);
         ok = uz_digest_end(pattern, key->pattern) && ok;
     }
     if (values) {
         uz_digest_add(values, key->pattern, pattern ? sizeof key->pattern : 0);
-        uz_digest_add(values, K->val, nnz * sizeof *K->val);
+        uz_digest_add(values, A->val, nnz * sizeof *A->val);
         ok = uz_digest_end(values, key->values) && ok;
     }
-    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a digest of K");
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest of a matrix");
 }
 
 /* The key of an object that `first` (a digest), the ordering and the contact determine. */

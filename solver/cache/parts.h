@@ -6,11 +6,11 @@
 #include "cache/table.h"
 #include "factor/factor.h"
 
-/* SHA-256 of a symmetric matrix, hex: of its pattern, and of pattern and values. */
+/* SHA-256 of a matrix, hex: of its pattern, and of pattern and values. */
 typedef struct {
     char pattern[65], values[65];
 } uz_matrix_key;
-uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *K, uz_error *err);
+uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *A, uz_error *err);
 
 /* A factor and where it belongs. All zero: none. */
 typedef struct {

@@ -11,7 +11,7 @@ typedef struct {
     int64_t k_entries; /* of K's lower triangle */
     int64_t n_entries; /* of N */
     int modes;         /* of the near-null space */
-    bool bounds;       /* uz_cost_bounds */
+    bool bounds;       /* the active set is to solve with the free dofs only */
     int64_t cases;     /* loads on the body */
 } uz_cost_size;
 

@@ -19,30 +19,6 @@
 /* Gaps left out may be negative by this part of what they are the difference of. */
 #define ROUNDING (64.0 * DBL_EPSILON)
 
-/* x in the order of all rows, zero on those left out. *x NULL: nothing. */
-static uz_status scatter(double **x, const uz_candidates *rows, uz_error *err)
-{
-    double *all = *x ? uz_alloc(rows->m, sizeof *all) : NULL;
-    if (!*x)
-        return UZ_OK;
-    if (!all)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contacts", (long long)rows->m);
-    uz_candidates_scatter(all, *x, rows);
-    free(*x);
-    *x = all;
-    return UZ_OK;
-}
-
-/* What each gap is the difference of: |h| + |N| |u|. */
-static void add_sizes(double *size, const uz_csc *N, const double *h, const double *u)
-{
-    for (int64_t i = 0; i < N->rows; i++)
-        size[i] = fabs(h[i]);
-    for (int64_t j = 0; j < N->cols; j++)
-        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
-            size[N->idx[q]] += fabs(N->val[q] * u[j]);
-}
-
 /* Where no gap left out is negative at u, but some may be at the feasible displacement: what stays nearest. */
 static void take_nearest(uz_candidates *wants, const uz_law *law, const double *g)
 {
@@ -63,6 +39,8 @@ static void take_nearest(uz_candidates *wants, const uz_law *law, const double *
 static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
 {
     const uz_candidates *rows = &run->asked->setup->rows;
+    const uz_csc *N = uz_setup_all_rows(run->asked->setup, run->asked->problem);
+    const double *u = run->answer.u;
     uz_candidates wants = {0};
     double *size = uz_alloc(rows->m, sizeof *size);
     uz_status status =
@@ -70,7 +48,11 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
     if (status == UZ_OK)
         status = uz_candidates_add(&wants, rows, err);
     if (status == UZ_OK) {
-        add_sizes(size, uz_setup_all_rows(run->asked->setup, run->asked->problem), run->load.h_all, run->answer.u);
+        for (int64_t i = 0; i < rows->m; i++) /* what each gap is the difference of: |h| + |N| |u| */
+            size[i] = fabs(run->load.h_all[i]);
+        for (int64_t j = 0; j < N->cols; j++)
+            for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+                size[N->idx[q]] += fabs(N->val[q] * u[j]);
         int64_t added = uz_candidates_extend(&wants, run->work.it.law, run->answer.g, size, ROUNDING);
         if (added == 0 && suspect)
             take_nearest(&wants, run->work.it.law, run->answer.g);
@@ -91,13 +73,17 @@ uz_status uz_run_certify_all_rows(uz_run *run, uz_error *err)
         return UZ_OK;
     double start = uz_seconds();
     bool met = certificate->relative_error <= run->work.requested;
-    uz_status status = scatter(&run->answer.r, rows, err);
-    if (status == UZ_OK)
-        status = scatter(&run->answer.g, rows, err);
-    if (status == UZ_OK)
-        status = scatter(&run->result->ray, rows, err);
-    if (status != UZ_OK)
-        return status;
+    double **of_rows[] = {&run->answer.r, &run->answer.g, &run->result->ray}; /* zero on those left out */
+    for (int k = 0; k < 3; k++) {
+        double *all = *of_rows[k] ? uz_alloc(rows->m, sizeof *all) : NULL;
+        if (*of_rows[k] && !all)
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contacts", (long long)rows->m);
+        if (all)
+            uz_candidates_scatter(all, *of_rows[k], rows);
+        free(*of_rows[k]);
+        *of_rows[k] = all;
+    }
+    uz_status status = UZ_OK;
     run->answer.m = run->all;
     if (!run->result->ray)
         status = uz_run_certify_answer(run, &run->answer, err);

@@ -29,10 +29,12 @@ static uz_status check_start(const uz_state *start, const uz_problem *problem, u
     return status;
 }
 
-/* Other refusals are about the setup, which all cases share. */
-static bool is_about_case(const uz_error *err)
+/* A refusal that is not about the setup, which all cases share, names its case. */
+static void name_case(uz_error *err, const uz_problem *problem, int64_t i)
 {
-    return strcmp(err->where, "p") == 0 || strcmp(err->where, "start") == 0 || strncmp(err->where, "/loads", 6) == 0;
+    if (problem->n_cases > 0 && err &&
+        (strcmp(err->where, "p") == 0 || strcmp(err->where, "start") == 0 || strncmp(err->where, "/loads", 6) == 0))
+        uz_error_name_case(err, i);
 }
 
 uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
@@ -65,15 +67,14 @@ uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz
             status = uz_solve_semicoercive(&results[i], &one, settings, cache, hooks, regular, started, err);
         if (status == UZ_OK)
             continue;
-        if (problem->n_cases > 0 && err && is_about_case(err))
-            uz_error_name_case(err, i);
+        name_case(err, problem, i);
         break;
     }
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const uz_problem one = uz_problem_of_case(problem, i);
         status = uz_solve_moving(&results[i], &one, settings, cache, hooks, started, err);
-        if (status != UZ_OK && problem->n_cases > 0 && err && is_about_case(err))
-            uz_error_name_case(err, i);
+        if (status != UZ_OK)
+            name_case(err, problem, i);
     }
     if (status == UZ_OK)
         *out = results;

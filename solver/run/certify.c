@@ -30,19 +30,6 @@ uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
     return status;
 }
 
-/* Loads of a block may need no linear solve. */
-static uz_status need_workspace(uz_run *run, uz_error *err)
-{
-    uz_work *work = &run->work;
-    if (!work->ws)
-        work->ws = uz_factor_workspace_new();
-    if (!work->scratch)
-        work->scratch = uz_alloc(run->d, sizeof(double));
-    if (work->ws && work->scratch)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
-}
-
 /* e'K^-1 e = ||L^-1 P e||^2: half a linear solve. */
 static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
 {
@@ -79,9 +66,14 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
     const uz_csc *K = uz_setup_K(setup, asked->problem);
     const bool all_rows = answer->m == run->all;
     double whole_norm = 0.0;
-    uz_status status = need_workspace(run, err);
-    if (status == UZ_OK)
-        status = uz_run_whole_norm(&whole_norm, run, answer->u, err);
+    uz_work *work = &run->work;
+    if (!work->ws) /* loads of a block may need no linear solve */
+        work->ws = uz_factor_workspace_new();
+    if (!work->scratch)
+        work->scratch = uz_alloc(run->d, sizeof(double));
+    if (!work->ws || !work->scratch)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
+    uz_status status = uz_run_whole_norm(&whole_norm, run, answer->u, err);
     if (status != UZ_OK)
         return status;
     *input = (uz_certify_input){
@@ -100,24 +92,6 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .sharp = 0.5 * run->work.requested,
     };
     return UZ_OK;
-}
-
-/* A tenth of what the mesh itself loses: digits beyond that describe the mesh, not the body. */
-void uz_run_balance_request(uz_run *run)
-{
-    const uz_body_model *model = &run->asked->setup->model;
-    uz_summary *summary = &run->result->summary;
-    double *nodal = uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *nodal);
-    if (!nodal)
-        return; /* the request stays at what it was, which is stricter */
-    uz_recover_nodal(nodal, model, run->answer.u, run->load.prescribed);
-    for (int64_t i = 0; run->load.exponent != 0 && i < model->mesh.n_nodes * model->mesh.dim; i++)
-        nodal[i] = ldexp(nodal[i], -run->load.exponent);
-    const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
-    summary->discretization_error = uz_estimate_mesh_error(model, &scene, nodal);
-    free(nodal);
-    if (summary->discretization_error > 0.0)
-        run->work.requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * summary->discretization_error));
 }
 
 uz_status uz_run_check_ray(uz_run *run, uz_error *err)

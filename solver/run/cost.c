@@ -18,17 +18,6 @@ enum { DENSE = 192, SPARSE = 60000, BAND = 10, REPEATS = 4 };
 /* What is assumed where there is no memory to measure: a core of 2020. */
 static const uz_cost_rates ASSUMED = {3e-11, 1e-9};
 
-static double time_dense(double *Z, double *C)
-{
-    double best = INFINITY;
-    for (int k = 0; k < REPEATS; k++) {
-        double start = uz_thread_seconds();
-        uz_syrk_lower_t_while(DENSE, DENSE, Z, C, NULL);
-        best = fmin(best, uz_thread_seconds() - start);
-    }
-    return best / ((double)DENSE * DENSE * DENSE);
-}
-
 /* A lower triangle with BAND entries in a column, far enough apart to be read as those of a mesh are. */
 static bool make_sparse(uz_csc *A)
 {
@@ -47,30 +36,30 @@ static bool make_sparse(uz_csc *A)
     return true;
 }
 
-static double time_sparse(const uz_csc *A, const double *x, double *y)
-{
-    double best = INFINITY;
-    for (int k = 0; k < REPEATS; k++) {
-        double start = uz_thread_seconds();
-        uz_csc_symv(y, A, 1.0, x);
-        best = fmin(best, uz_thread_seconds() - start);
-    }
-    return best / (double)A->ptr[A->cols];
-}
-
 static uz_cost_rates measured; /* written once, under the guard */
 
 static void measure(void)
 {
     uz_csc A = {0};
-    double *room = uz_alloc_zero(2 * (DENSE * DENSE + SPARSE), sizeof *room);
+    double *room = uz_alloc_zero(2 * (DENSE * DENSE + SPARSE), sizeof *room), dense = INFINITY, sparse = INFINITY;
     measured = ASSUMED;
     if (room) {
         for (int64_t i = 0; i < DENSE * DENSE; i++)
             room[i] = 1.0 / (double)(1 + i % 7);
-        measured.flop_s = time_dense(room, room + DENSE * DENSE);
-        if (make_sparse(&A))
-            measured.entry_s = time_sparse(&A, room, room + 2 * DENSE * DENSE);
+        for (int k = 0; k < REPEATS; k++) {
+            double start = uz_thread_seconds();
+            uz_syrk_lower_t_while(DENSE, DENSE, room, room + DENSE * DENSE, NULL);
+            dense = fmin(dense, uz_thread_seconds() - start);
+        }
+        measured.flop_s = dense / ((double)DENSE * DENSE * DENSE);
+    }
+    if (room && make_sparse(&A)) {
+        for (int k = 0; k < REPEATS; k++) {
+            double start = uz_thread_seconds();
+            uz_csc_symv(room + 2 * DENSE * DENSE, &A, 1.0, room);
+            sparse = fmin(sparse, uz_thread_seconds() - start);
+        }
+        measured.entry_s = sparse / (double)A.ptr[SPARSE];
     }
     uz_csc_clear(&A);
     free(room);
@@ -132,10 +121,19 @@ double uz_cost_analysis_bytes(const uz_cost_size *size)
     return matrix_bytes(size) + 20.0 * (double)size->k_entries + 130.0 * (double)size->d;
 }
 
-bool uz_cost_bounds(const uz_csc *N, const uz_settings *settings)
+uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, int64_t n_b, int dim, int64_t cases,
+                             const uz_settings *settings)
 {
     const bool by_auto = settings->method == UZ_METHOD_AUTO && settings->stopping == UZ_STOP_CERTIFIED;
-    return (by_auto || settings->method == UZ_METHOD_ACTIVE_SET) && uz_dual_bounds_dofs(N);
+    const bool by_active_set = by_auto || settings->method == UZ_METHOD_ACTIVE_SET;
+    return (uz_cost_size){.d = K->cols,
+                          .m = N->rows,
+                          .n_b = n_b,
+                          .k_entries = K->ptr[K->cols],
+                          .n_entries = N->ptr[N->cols],
+                          .modes = dim == 3 ? 6 : 3,
+                          .bounds = by_active_set && uz_dual_bounds_dofs(N),
+                          .cases = cases};
 }
 
 bool uz_cost_is_one_to_one(const uz_csc *N, int64_t n_b)

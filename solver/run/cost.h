@@ -18,9 +18,11 @@ typedef struct {
 /* Measured once for the process. */
 uz_cost_rates uz_cost_measure_rates(void);
 
-/* Is the active set to solve with the free dofs only? Where each row has one entry, unless gradient steps were asked
- * for, which take hundreds of solves. */
-bool uz_cost_bounds(const uz_csc *N, const uz_settings *settings);
+/* Of K and of N, whose rows touch n_b dofs, for so many load cases. dim: of a scene's mesh, else 0. An active set
+ * solves with the free dofs only where each row has one entry, unless gradient steps were asked for, which take
+ * hundreds of solves. */
+uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, int64_t n_b, int dim, int64_t cases,
+                             const uz_settings *settings);
 
 /* Whether each of n_b contact dofs has a row of its own: the trailing block of a factor with these dofs last is then
  * all of the operator. Otherwise the contact may stand anywhere in it, whichever is cheaper. */

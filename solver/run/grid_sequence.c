@@ -201,40 +201,31 @@ static bool is_translation(const uz_result *result)
     return true;
 }
 
-static uz_status estimate_case(uz_result *result, const uz_body_model *outline, const uz_scene *scene, uz_error *err)
-{
-    uz_summary *s = &result->summary;
-    s->total_error = INFINITY;
-    if (uz_has_no_answer(s))
-        return UZ_OK;
-    const double mesh = is_translation(result) ? 0.0 : uz_estimate_mesh_error(outline, scene, result->u);
-    if (isnan(mesh))
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
-    s->discretization_error = mesh;
-    s->total_error = hypot(hypot(mesh, s->certificate.relative_error), s->geometry.left);
-    if (isnan(s->total_error))
-        s->total_error = INFINITY;
-    return UZ_OK;
-}
-
 /* Every case's error; the largest ones go to the level. */
 static uz_status estimate(answers *x, uz_grid_level *level, const uz_problem *problem, int64_t n_cases,
                           const uz_body_model *outline, uz_error *err)
 {
-    uz_status status = UZ_OK;
-    for (int64_t i = 0; status == UZ_OK && i < n_cases; i++) {
+    for (int64_t i = 0; i < n_cases; i++) {
         const uz_scene scene = uz_scene_of_case(problem, i);
-        const uz_summary *s = &x->results[i]->summary;
-        status = estimate_case(x->results[i], outline, &scene, err);
+        const uz_result *result = x->results[i];
+        uz_summary *s = &x->results[i]->summary;
         level->iterations += s->iterations;
         level->d = s->d;
-        if (status != UZ_OK || uz_has_no_answer(s))
+        s->total_error = INFINITY;
+        if (uz_has_no_answer(s))
             continue;
+        const double mesh = is_translation(result) ? 0.0 : uz_estimate_mesh_error(outline, &scene, result->u);
+        if (isnan(mesh))
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
+        s->discretization_error = mesh;
+        s->total_error = hypot(hypot(mesh, s->certificate.relative_error), s->geometry.left);
+        if (isnan(s->total_error))
+            s->total_error = INFINITY;
         x->error = fmax(x->error, s->total_error);
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
         level->certified_error = fmax(level->certified_error, s->certificate.relative_error);
     }
-    return status;
+    return UZ_OK;
 }
 
 /* Solves on grid n, from the best answers so far. On failure x has no results. */

@@ -7,29 +7,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Modes at a node whose dofs are along its normal and tangents. `axes` has them along the axes: it numbers all of a
- * rotated node's dofs, also those that are held. */
-static void turn_modes(uz_modes *modes, const uz_modes *axes, const uz_body_model *model)
+/* At a node whose dofs are along its normal and tangents the modes are turned there from the axes: numbered for this
+ * are all dofs of a rotated node, also those that are held. */
+static uz_status turn_modes(uz_modes *modes, const uz_body_model *model, uz_error *err)
 {
     const int dim = model->mesh.dim, count = modes->count;
-    for (int64_t t = 0; t < model->info.n_rotated; t++) {
-        const int64_t *dof = model->dof + model->info.rotated_node[t] * dim;
-        const double *Q = model->info.frame + t * dim * dim;
-        for (int c = 0; c < dim; c++)
-            for (int k = 0; k < count && dof[c] >= 0; k++) {
-                double turned = 0.0;
-                for (int axis = 0; axis < dim; axis++)
-                    turned += Q[c * dim + axis] * (double)axes->value[(t * dim + axis) * count + k];
-                modes->value[dof[c] * count + k] = (float)turned;
-            }
-    }
-}
-
-/* Their modes along the axes. */
-static uz_status modes_of_rotated(uz_modes *axes, const uz_body_model *model, uz_error *err)
-{
-    const int dim = model->mesh.dim;
-    const int64_t total = model->mesh.n_nodes * dim;
+    const int64_t total = model->mesh.n_nodes * dim, *rotated = model->info.rotated_node;
+    uz_modes axes;
     int64_t *number = uz_alloc(total, sizeof *number);
     if (!number)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the modes of %lld dofs", (long long)total);
@@ -37,11 +21,25 @@ static uz_status modes_of_rotated(uz_modes *axes, const uz_body_model *model, uz
         number[i] = -1;
     for (int64_t t = 0; t < model->info.n_rotated; t++)
         for (int c = 0; c < dim; c++)
-            number[model->info.rotated_node[t] * dim + c] = t * dim + c;
+            number[rotated[t] * dim + c] = t * dim + c;
     uz_status status =
-        uz_modes_of_body(axes, model->info.xyz, number, model->mesh.n_nodes, dim, model->info.n_rotated * dim, err);
+        uz_modes_of_body(&axes, model->info.xyz, number, model->mesh.n_nodes, dim, model->info.n_rotated * dim, err);
     free(number);
-    return status;
+    if (status != UZ_OK)
+        return status;
+    for (int64_t t = 0; t < model->info.n_rotated; t++) {
+        const int64_t *dof = model->dof + rotated[t] * dim;
+        const double *Q = model->info.frame + t * dim * dim;
+        for (int c = 0; c < dim; c++)
+            for (int k = 0; k < count && dof[c] >= 0; k++) {
+                double turned = 0.0;
+                for (int axis = 0; axis < dim; axis++)
+                    turned += Q[c * dim + axis] * (double)axes.value[(t * dim + axis) * count + k];
+                modes->value[dof[c] * count + k] = (float)turned;
+            }
+    }
+    uz_modes_clear(&axes);
+    return UZ_OK;
 }
 
 /* The near-null space: rigid-body modes where the mesh is known. */
@@ -54,14 +52,9 @@ static uz_status find_modes(uz_modes *modes, const uz_setup *setup, const uz_csc
         uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, model->mesh.dim, model->d, err);
     if (status != UZ_OK || model->info.n_rotated == 0)
         return status;
-    uz_modes axes;
-    status = modes_of_rotated(&axes, model, err);
-    if (status == UZ_OK) {
-        turn_modes(modes, &axes, model);
-        uz_modes_clear(&axes);
-    } else {
+    status = turn_modes(modes, model, err);
+    if (status != UZ_OK)
         uz_modes_clear(modes);
-    }
     return status;
 }
 
@@ -86,23 +79,6 @@ static uz_status make_dual(making *m, uz_operator op, uz_error *err)
     return status;
 }
 
-/* A multigrid in the factor's place. What it may take so that the whole stays within the limit: a load with bounds has
- * a second one. */
-static uz_status precondition(making *m, uz_error *err)
-{
-    uz_setup *setup = m->setup;
-    const uz_cost_plan *plan = &setup->plan;
-    double limit = (double)m->settings->memory_limit, copies = m->size.bounds ? 2.0 : 1.0, budget = 0.0;
-    uz_modes modes;
-    if (m->settings->memory_limit > 0)
-        budget = uz_amg_predict_bytes(m->size.d, m->size.k_entries, m->size.modes) +
-                 fmax(0.0, limit - plan->form[plan->chosen].bytes) / copies;
-    uz_status status = find_modes(&modes, setup, m->K, err);
-    if (status == UZ_OK)
-        status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, m->hooks, err);
-    return status == UZ_OK ? make_dual(m, setup->plan.form[setup->plan.chosen].op, err) : status;
-}
-
 static bool is_chosen(const uz_cost_plan *plan, uz_operator form)
 {
     return plan->chosen >= 0 && plan->form[plan->chosen].op == form;
@@ -121,25 +97,34 @@ static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_er
 /* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
 #define LAMBDA_LEAST 1e-3
 
-/* The plan took matrix_free for its price only, and the matrix is one of those that it is not cheap for, or that tell
- * more to a factorization. */
-static bool regrets(const making *m, uz_status status)
+/* A multigrid in the factor's place. What it may take so that the whole stays within the limit: a load with bounds has
+ * a second one. *regretted: nothing was made, as the plan took matrix_free for its price only, and the matrix is one of
+ * those that it is not cheap for, or that tell more to a factorization. */
+static uz_status precondition(making *m, bool *regretted, uz_error *err)
 {
-    const uz_cost_plan *plan = &m->setup->plan;
-    bool choice = m->asked == UZ_OPERATOR_AUTO && plan->count > 1 && plan->form[0].fits;
-    if (status != UZ_OK)
-        return choice && status == UZ_ERR_NOT_SPD;
-    return choice && uz_amg_describe(m->setup->amg).lambda < LAMBDA_LEAST;
-}
-
-static void undo_precondition(making *m, uz_error *err)
-{
-    uz_dual_free(m->setup->dual);
-    uz_amg_free(m->setup->amg);
-    m->setup->dual = NULL;
-    m->setup->amg = NULL;
-    if (err)
-        uz_error_reset(err);
+    uz_setup *setup = m->setup;
+    const uz_cost_plan *plan = &setup->plan;
+    const bool choice = m->asked == UZ_OPERATOR_AUTO && plan->count > 1 && plan->form[0].fits;
+    double limit = (double)m->settings->memory_limit, copies = m->size.bounds ? 2.0 : 1.0, budget = 0.0;
+    uz_modes modes;
+    if (m->settings->memory_limit > 0)
+        budget = uz_amg_predict_bytes(m->size.d, m->size.k_entries, m->size.modes) +
+                 fmax(0.0, limit - plan->form[plan->chosen].bytes) / copies;
+    uz_status status = find_modes(&modes, setup, m->K, err);
+    if (status == UZ_OK)
+        status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, m->hooks, err);
+    if (status == UZ_OK)
+        status = make_dual(m, plan->form[plan->chosen].op, err);
+    *regretted =
+        choice && (status == UZ_OK ? uz_amg_describe(setup->amg).lambda < LAMBDA_LEAST : status == UZ_ERR_NOT_SPD);
+    if (!*regretted)
+        return status;
+    uz_dual_free(setup->dual);
+    uz_amg_free(setup->amg);
+    setup->dual = NULL;
+    setup->amg = NULL;
+    uz_error_reset(err);
+    return UZ_OK;
 }
 
 enum { TRIES = 4 };
@@ -159,13 +144,7 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
         return status;
     if (!base->factor)
         return make_dual(&m, base->dual->can->op, err);
-    m.size = (uz_cost_size){.d = m.K->cols,
-                            .m = m.N->rows,
-                            .n_b = n_b,
-                            .k_entries = m.K->ptr[m.K->cols],
-                            .n_entries = m.N->ptr[m.N->cols],
-                            .modes = setup->model.mesh.dim == 3 ? 6 : 3,
-                            .bounds = uz_cost_bounds(m.N, settings)};
+    m.size = uz_cost_size_of(m.K, m.N, n_b, setup->model.mesh.dim, 0, settings);
     const uz_factor_info there = uz_factor_describe(base->factor);
     const uz_operator direct = uz_dual_choose(m.N, n_b, settings->op);
     uz_cost_decide(&setup->plan, &m.size, &there, direct, settings->op, settings->memory_limit);
@@ -193,14 +172,7 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, m.N, err);
     if (status != UZ_OK)
         return status;
-    m.size = (uz_cost_size){.d = m.K->cols,
-                            .m = m.N->rows,
-                            .n_b = n_b,
-                            .k_entries = m.K->ptr[m.K->cols],
-                            .n_entries = m.N->ptr[m.N->cols],
-                            .modes = setup->is_scene && setup->model.mesh.dim == 3 ? 6 : 3,
-                            .bounds = uz_cost_bounds(m.N, settings),
-                            .cases = problem->n_cases};
+    m.size = uz_cost_size_of(m.K, m.N, n_b, setup->is_scene ? setup->model.mesh.dim : 0, problem->n_cases, settings);
     const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor,
                no_factor = free_asked || (limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit);
     m.direct = uz_dual_choose(m.N, n_b, free_asked ? UZ_OPERATOR_AUTO : settings->op);
@@ -224,13 +196,10 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
         if (status != UZ_OK || done || plan->chosen < 0)
             break;
         if (!uz_dual_abilities_of(plan->form[plan->chosen].op)->needs_factor) {
-            status = precondition(&m, err);
-            done = !regrets(&m, status);
-            if (!done) {
-                undo_precondition(&m, err);
-                status = UZ_OK;
-                m.asked = m.direct;
-            }
+            bool regretted;
+            status = precondition(&m, &regretted, err);
+            done = !regretted;
+            m.asked = regretted ? m.direct : m.asked;
         } else {
             m.direct = plan->form[plan->chosen].op;
         }

@@ -10,29 +10,30 @@
 #include <stdlib.h>
 
 /* The form and what it takes, of K and N; the analysis of a factor where there is to be one. */
-static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, uz_cost_size *size,
+static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, int dim, int64_t cases,
                          const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
     const size_t limit = settings->memory_limit;
     const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor;
     uz_cost_plan plan = {.chosen = -1};
     uz_analysis *analysis = NULL;
-    int64_t *dofs = NULL;
-    uz_status status = uz_dual_contact_dofs(&dofs, &size->n_b, N, err);
+    int64_t *dofs = NULL, n_b = 0;
+    uz_status status = uz_dual_contact_dofs(&dofs, &n_b, N, err);
     if (status != UZ_OK)
         return status;
-    const bool no_factor = free_asked || (limit > 0 && uz_cost_analysis_bytes(size) > (double)limit);
-    const uz_operator form = uz_dual_choose(N, size->n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
+    const uz_cost_size size = uz_cost_size_of(K, N, n_b, dim, cases, settings);
+    const bool no_factor = free_asked || (limit > 0 && uz_cost_analysis_bytes(&size) > (double)limit);
+    const uz_operator form = uz_dual_choose(N, n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
     if (no_factor) {
-        uz_cost_decide(&plan, size, NULL, form, settings->op, limit);
+        uz_cost_decide(&plan, &size, NULL, form, settings->op, limit);
     } else {
-        int64_t last = uz_dual_abilities_of(form)->contact_last ? size->n_b : 0;
+        int64_t last = uz_dual_abilities_of(form)->contact_last ? n_b : 0;
         int64_t rows = uz_cost_is_one_to_one(N, last) ? 0 : N->rows;
         status = uz_analysis_create(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
         if (status == UZ_OK) {
             uz_factor_info info = uz_analysis_describe(analysis);
             out->factor_nnz = info.nnz;
-            uz_cost_decide(&plan, size, &info, form, settings->op, limit);
+            uz_cost_decide(&plan, &size, &info, form, settings->op, limit);
         }
         uz_analysis_free(analysis);
     }
@@ -43,7 +44,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, u
     out->fits = plan.chosen >= 0;
     out->op = e->op;
     out->bytes = e->bytes;
-    out->seconds = e->setup_s + (double)(size->cases > 0 ? size->cases : 1) * e->case_s;
+    out->seconds = e->setup_s + (double)(cases > 0 ? cases : 1) * e->case_s;
     if (!uz_dual_abilities_of(out->op)->needs_factor)
         out->factor_nnz = 0;
     return UZ_OK;
@@ -83,16 +84,10 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
         qp = &made;
     }
     if (status == UZ_OK) {
-        uz_cost_size size = {.d = qp->K.cols,
-                             .m = qp->N.rows,
-                             .k_entries = qp->K.ptr[qp->K.cols],
-                             .n_entries = qp->N.ptr[qp->N.cols],
-                             .modes = scene && problem->scene.box.dim == 3 ? 6 : 3,
-                             .bounds = uz_cost_bounds(&qp->N, settings),
-                             .cases = problem->n_cases};
-        out->d = size.d;
+        out->d = qp->K.cols;
         out->m = m;
-        status = predict(out, &qp->K, &qp->N, &size, settings, hooks, err);
+        status =
+            predict(out, &qp->K, &qp->N, scene ? problem->scene.box.dim : 0, problem->n_cases, settings, hooks, err);
     }
     uz_qp_clear(&made);
     return status;

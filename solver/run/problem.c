@@ -8,24 +8,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-static uz_status check_case(const uz_load_case *load_case, const uz_problem *problem, uz_error *err)
-{
-    bool scene = problem->kind == UZ_PROBLEM_SCENE;
-    if (scene ? load_case->p || load_case->h : load_case->loads != NULL)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "%s",
-                       scene ? "a load case of a scene has loads, not p or h"
-                             : "a load case of a problem in matrices has p and h, not loads");
-    uz_status status = uz_check_finite(load_case->p, problem->qp.K.cols, "p", err);
-    return status == UZ_OK ? uz_check_finite(load_case->h, problem->qp.N.rows, "h", err) : status;
-}
-
 uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
 {
     if (problem->n_cases < 0 || (problem->n_cases > 0 && !problem->cases))
         return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "the problem's load cases are missing");
     uz_status status = problem->kind == UZ_PROBLEM_MATRICES ? uz_qp_check(&problem->qp, err) : UZ_OK;
+    const bool scene = problem->kind == UZ_PROBLEM_SCENE;
     for (int64_t i = 0; status == UZ_OK && i < problem->n_cases; i++) {
-        status = check_case(&problem->cases[i], problem, err);
+        const uz_load_case *one = &problem->cases[i];
+        if (scene ? one->p || one->h : one->loads != NULL)
+            status = uz_fail(err, UZ_ERR_ARGUMENT, "", "%s",
+                             scene ? "a load case of a scene has loads, not p or h"
+                                   : "a load case of a problem in matrices has p and h, not loads");
+        if (status == UZ_OK)
+            status = uz_check_finite(one->p, problem->qp.K.cols, "p", err);
+        if (status == UZ_OK)
+            status = uz_check_finite(one->h, problem->qp.N.rows, "h", err);
         if (status != UZ_OK)
             uz_error_name_case(err, i);
     }

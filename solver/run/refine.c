@@ -69,24 +69,6 @@ static void end(refinement *x)
     uz_csc_clear(&x->Nt);
 }
 
-/* e and f of the answer; r and the rows that press, scaled. */
-static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
-{
-    const uz_run *run = x->run;
-    const double *scale = run->work.dual->dual->row_scale;
-    uz_status status = uz_equilibrium_residual(&x->res, uz_setup_K(run->asked->setup, run->asked->problem),
-                                               uz_setup_N(run->asked->setup, run->asked->problem), run->load.p,
-                                               answer->u, x->zero, answer->r, err);
-    for (int64_t j = 0; j < run->d; j++)
-        x->e[j] = -x->res.e_u[j];
-    for (int64_t i = 0; i < run->m; i++) {
-        x->f[i] = uz_gap_of_row(&x->Nt, i, run->load.h, answer->u, NULL);
-        x->r[i] = answer->r[i] / scale[i];
-    }
-    run->work.it.law->kind->active(run->work.it.law, x->active, answer->r, run->m);
-    return status;
-}
-
 /* c and s for e and f. */
 static uz_status correct(refinement *x, uz_error *err)
 {
@@ -128,7 +110,16 @@ static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
 {
     uz_run *run = x->run;
     const double *scale = run->work.dual->dual->row_scale;
-    uz_status status = measure(x, latest, err);
+    uz_status status = uz_equilibrium_residual(&x->res, uz_setup_K(run->asked->setup, run->asked->problem),
+                                               uz_setup_N(run->asked->setup, run->asked->problem), run->load.p,
+                                               latest->u, x->zero, latest->r, err);
+    for (int64_t j = 0; j < run->d; j++)
+        x->e[j] = -x->res.e_u[j];
+    for (int64_t i = 0; i < run->m; i++) {
+        x->f[i] = uz_gap_of_row(&x->Nt, i, run->load.h, latest->u, NULL);
+        x->r[i] = latest->r[i] / scale[i];
+    }
+    run->work.it.law->kind->active(run->work.it.law, x->active, latest->r, run->m); /* the rows that press */
     if (status == UZ_OK)
         status = correct(x, err);
     uz_stop stop = {run->asked->hooks, run->asked->deadline};

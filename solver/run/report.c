@@ -4,7 +4,6 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
-#include "post/evaluate.h"
 #include "linalg/linalg.h"
 #include "run/problem.h"
 #include "run/results.h"
@@ -90,24 +89,34 @@ static void report_cost(uz_run *run)
         fmax(made, solved);
 }
 
+/* Displacements are told along x, y and z: where a node's dofs are not, turning them rounds by delta, and the error by
+ * ||delta||_K, over supported dofs too, as theirs are told as well. The bound is on what is told. */
 static uz_status report_displacements(uz_run *run, uz_error *err)
 {
-    uz_result *result = run->result;
     const uz_body_model *model = &run->asked->setup->model;
+    uz_result *result = run->result;
+    uz_certificate *c = &result->summary.certificate;
+    double energy;
     if (!run->asked->setup->is_scene) {
         result->u = run->answer.u;
         run->answer.u = NULL;
         return UZ_OK;
     }
-    uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, run->all, err);
-    result->n_nodes = model->mesh.n_nodes;
-    result->u = uz_alloc(result->n_nodes * model->mesh.dim, sizeof(double));
-    if (!result->u)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
-                       (long long)result->n_nodes);
-    uz_recover_nodal(result->u, model, run->answer.u, run->load.prescribed);
     const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
-    return status == UZ_OK ? uz_evaluate(result, model, &scene, err) : status;
+    uz_status status = uz_describe_scene(result, model, &scene, run->answer.u, run->load.prescribed, run->all, err);
+    if (status != UZ_OK || model->info.n_rotated == 0)
+        return status;
+    status = uz_turning_energy(&energy, model, result->u, err);
+    if (status != UZ_OK)
+        return status;
+    c->absolute_error += sqrt(energy);
+    c->relative_error += c->energy_norm > 0.0 ? sqrt(energy) / c->energy_norm : 0.0;
+    uz_outcome *outcome = &result->summary.outcome;
+    if (c->relative_error > run->work.requested && *outcome == UZ_CONVERGED)
+        *outcome = UZ_PRECISION_LIMIT;
+    if (c->relative_error > run->work.requested && *outcome == UZ_VERIFIED)
+        *outcome = UZ_NOT_VERIFIED;
+    return UZ_OK;
 }
 
 double uz_run_time(const uz_run *run)
@@ -116,28 +125,6 @@ double uz_run_time(const uz_run *run)
     if (run->asked->in_block)
         return t->assemble + t->order + t->factor + t->condense + t->iterate + t->certify;
     return uz_seconds() - run->asked->started;
-}
-
-/* Displacements are told along x, y and z: where a node's dofs are not, turning them rounds by delta, and the error by
- * ||delta||_K, over supported dofs too, as theirs are told as well. The bound is on what is told. */
-static uz_status add_rotation_error(uz_run *run, uz_error *err)
-{
-    const uz_body_model *model = &run->asked->setup->model;
-    uz_summary *s = &run->result->summary;
-    uz_certificate *c = &s->certificate;
-    double energy;
-    if (!run->asked->setup->is_scene || model->info.n_rotated == 0)
-        return UZ_OK;
-    uz_status status = uz_turning_energy(&energy, model, run->result->u, err);
-    if (status != UZ_OK)
-        return status;
-    c->absolute_error += sqrt(energy);
-    c->relative_error += c->energy_norm > 0.0 ? sqrt(energy) / c->energy_norm : 0.0;
-    if (c->relative_error > run->work.requested && s->outcome == UZ_CONVERGED)
-        s->outcome = UZ_PRECISION_LIMIT;
-    if (c->relative_error > run->work.requested && s->outcome == UZ_VERIFIED)
-        s->outcome = UZ_NOT_VERIFIED;
-    return UZ_OK;
 }
 
 uz_status uz_report_answer(uz_run *run, uz_error *err)
@@ -158,8 +145,6 @@ uz_status uz_report_answer(uz_run *run, uz_error *err)
         summary->max_penetration = fmax(summary->max_penetration, depth);
     }
     uz_status status = report_displacements(run, err);
-    if (status == UZ_OK)
-        status = add_rotation_error(run, err);
     if (result->ray)
         uz_blank_answer(result);
     uz_explain_outcome(result, run->work.end);

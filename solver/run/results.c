@@ -1,6 +1,10 @@
 /* results.c: what is left of a solve: its message, sums of times, and the end of it. */
 #include "run/results.h"
 
+#include "core/alloc.h"
+#include "core/error.h"
+#include "post/evaluate.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,6 +31,22 @@ void uz_blank_answer(uz_result *result)
     s->reaction_sum = s->max_penetration = s->max_pressure = NAN;
     s->active = 0;
     memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
+}
+
+uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const uz_scene *scene, const double *u,
+                            const double *prescribed, int64_t m, uz_error *err)
+{
+    const uz_mesh *mesh = &model->mesh;
+    double *nodal = uz_alloc(mesh->n_nodes * mesh->dim, sizeof *nodal);
+    if (!nodal)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
+                       (long long)mesh->n_nodes);
+    uz_recover_nodal(nodal, model, u, prescribed);
+    free(result->u);
+    result->u = nodal;
+    result->n_nodes = mesh->n_nodes;
+    uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, m, err);
+    return status == UZ_OK ? uz_evaluate(result, model, scene, err) : status;
 }
 
 /* The rows with a share in the contradiction: exactly, or by more than a ray's rounding. */

@@ -2,6 +2,7 @@
 #ifndef UZ_RESULTS_H
 #define UZ_RESULTS_H
 
+#include "assembly/assembly.h"
 #include "methods/method.h"
 #include "uzawa.h"
 
@@ -9,6 +10,10 @@ static inline bool uz_has_no_answer(const uz_summary *s)
 {
     return s->outcome == UZ_INFEASIBLE || s->outcome == UZ_OUT_OF_REACH;
 }
+/* Of the free dofs u (d; may be result->u) of an answer with m rows: displacements by node, mesh, forces, pressures.
+ * Errors: UZ_ERR_MEMORY. */
+uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const uz_scene *scene, const double *u,
+                            const double *prescribed, int64_t m, uz_error *err);
 /* There is no answer: nothing that looks like one may be left. */
 void uz_blank_answer(uz_result *result);
 /* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */

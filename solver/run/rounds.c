@@ -30,6 +30,7 @@ typedef struct {
     uz_cache *cache;
     const uz_hooks *hooks;
     int64_t n;
+    int64_t blocks; /* of UZ_LANES that go through the factor at a time: two, where there are so many cases */
     double started;
     uz_result **results; /* n */
     uz_setup *setup;     /* of this round; borrowed from the cache */
@@ -43,13 +44,11 @@ typedef struct {
     uz_state *carried;    /* the start of the one case; NULL: those of `starts` */
 } batch;
 
-static uz_status check(const batch *b, uz_error *err);
 static uz_status reacquire_for_starts(batch *b, uz_error *err);
 static uz_status check_memory(const batch *b, uz_error *err);
 static uz_status solve_in_blocks(batch *b, uz_error *err);
 static uz_request request_of(const batch *b, int64_t place, bool in_block);
 static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *err);
-static void end_before_round(const batch *b);
 static void prepare_round(batch *b);
 
 uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const uz_settings *settings,
@@ -57,11 +56,18 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
                           uz_error *err)
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
-    batch b = {problem, settings, starts, cache, hooks, n, .started = uz_seconds(), .results = results, .round = 1};
+    batch b = {problem, settings, starts, cache, hooks, n, .blocks = n > UZ_LANES ? 2 : 1};
+    b.started = uz_seconds();
+    b.results = results;
+    b.round = 1;
     const uz_stop stop = {hooks, b.started + settings->time_limit_s};
     uz_error own = {0};
     b.round_started = b.started;
-    uz_status status = check(&b, &own);
+    uz_status status = uz_check_settings(settings, &own);
+    if (status == UZ_OK)
+        status = uz_check_problem(problem, &own);
+    if (status == UZ_OK && uz_cancelled(hooks))
+        status = uz_fail(&own, UZ_ERR_CANCELLED, "", "cancelled before it began");
     if (status == UZ_OK && !((b.todo = uz_alloc(n, sizeof *b.todo)) && (b.again = uz_alloc(n, sizeof *b.again))))
         status = uz_fail(&own, UZ_ERR_MEMORY, "", "no memory for %lld cases", (long long)n);
     for (; status == UZ_OK && b.n_todo < n; b.n_todo++)
@@ -102,9 +108,14 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
             prepare_round(&b);
         const bool next = status == UZ_OK && b.n_todo > 0;
         if (b.round > 1 && (status == UZ_ERR_CANCELLED || (next && uz_stop_is_due(&stop)))) {
-            end_before_round(&b); /* there are answers with bounds: whoever ends the solve now gets these */
-            status = UZ_OK;
-            break;
+            status = UZ_OK; /* there are answers with bounds: whoever ends the solve now gets these */
+            for (; b.n_todo > 0; b.n_todo--) {
+                uz_result *result = results[b.todo[b.n_todo - 1]];
+                if (result->summary.rounds == b.round)
+                    continue; /* it had its turn */
+                result->summary.outcome = uz_cancelled(hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
+                uz_explain_outcome(result, UZ_END_TARGET);
+            }
         }
     }
     if (status != UZ_OK && err)
@@ -113,17 +124,6 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
     free(b.again);
     uz_candidates_clear(&b.wanted);
     uz_state_free(b.carried);
-    return status;
-}
-
-/* Everything that can be refused before anything is computed. */
-static uz_status check(const batch *b, uz_error *err)
-{
-    uz_status status = uz_check_settings(b->settings, err);
-    if (status == UZ_OK)
-        status = uz_check_problem(b->problem, err);
-    if (status == UZ_OK && uz_cancelled(b->hooks))
-        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
     return status;
 }
 
@@ -142,13 +142,6 @@ static uz_status reacquire_for_starts(batch *b, uz_error *err)
     return uz_setup_acquire(&b->setup, &b->reused, b->cache, b->problem, &b->wanted, b->settings, b->hooks, err);
 }
 
-/* How many lanes go through the factor at a time: twice as many as one pass over K certifies, where there are so many
- * cases. */
-static int64_t blocks_for(const batch *b)
-{
-    return b->n > UZ_LANES ? 2 : 1;
-}
-
 /* What the results take that this call returns, and while it works the vectors of a block. */
 static uz_status check_memory(const batch *b, uz_error *err)
 {
@@ -156,7 +149,7 @@ static uz_status check_memory(const batch *b, uz_error *err)
     const uz_dual *dual = setup->dual;
     const uz_mesh *mesh = &setup->model.mesh;
     double nodal = setup->is_scene ? (double)(mesh->n_nodes * mesh->dim) : (double)dual->d;
-    double lanes = 7.0 * (double)(blocks_for(b) * UZ_LANES) * (double)dual->d;
+    double lanes = 7.0 * (double)(b->blocks * UZ_LANES) * (double)dual->d;
     double each = (setup->is_scene ? 2.0 : 1.0) * nodal + 8.0 * (double)dual->m;
     double bytes = (double)setup->bytes + 8.0 * ((double)b->n * each + lanes);
     if (b->n == 1 || b->settings->memory_limit == 0 || bytes <= (double)b->settings->memory_limit)
@@ -191,11 +184,11 @@ static uz_request request_of(const batch *b, int64_t place, bool in_block)
 static uz_status solve_in_blocks(batch *b, uz_error *err)
 {
     uz_block *block = NULL;
-    const int64_t width = blocks_for(b) * UZ_LANES;
+    const int64_t width = b->blocks * UZ_LANES;
     uz_request *asked = uz_alloc_zero(width, sizeof *asked);
     uz_status status = asked ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     if (status == UZ_OK)
-        status = uz_block_create(&block, b->setup, b->problem, blocks_for(b), err);
+        status = uz_block_create(&block, b->setup, b->problem, b->blocks, err);
     for (int64_t first = 0; status == UZ_OK && first < b->n_todo; first += width) {
         const int64_t count = b->n_todo - first < width ? b->n_todo - first : width;
         int64_t failed = 0;
@@ -239,17 +232,6 @@ static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *e
         uz_error_name_case(err, i);
     }
     return status;
-}
-
-static void end_before_round(const batch *b)
-{
-    for (int64_t k = 0; k < b->n_todo; k++) {
-        uz_result *result = b->results[b->todo[k]];
-        if (result->summary.rounds == b->round)
-            continue; /* it had its turn */
-        result->summary.outcome = uz_cancelled(b->hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
-        uz_explain_outcome(result, UZ_END_TARGET);
-    }
 }
 
 enum { MAX_ROUNDS = 8 };

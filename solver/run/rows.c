@@ -65,11 +65,14 @@ bool uz_may_omit_rows(const uz_problem *problem)
 
 /* ---------------------------------------------------------------- the choice */
 
-/* The diagonal of the box around the body. */
-static double extent_of(const uz_mesh_info *info)
+uz_status uz_choose_rows(uz_candidates *rows, const double *h, int64_t m, const uz_mesh_info *info,
+                         const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
 {
-    double square = 0;
-    for (int axis = 0; axis < info->dim; axis++) {
+    *rows = (uz_candidates){.m = m, .count = m};
+    if (m <= FEW_ROWS || scene->all_candidates)
+        return UZ_OK;
+    double square = 0, most = 0;
+    for (int axis = 0; axis < info->dim; axis++) { /* the diagonal of the box around the body */
         double low = INFINITY, high = -INFINITY;
         for (int64_t i = 0; i < info->n_nodes; i++) {
             low = fmin(low, info->xyz[i * info->dim + axis]);
@@ -77,31 +80,15 @@ static double extent_of(const uz_mesh_info *info)
         }
         square += (high - low) * (high - low);
     }
-    return sqrt(square);
-}
-
-/* The farthest that a support pushes its nodes, and with them perhaps the whole body. */
-static double pushed_by_supports(const uz_scene *scene, int dim)
-{
-    double most = 0;
-    for (int64_t i = 0; i < scene->n_supports; i++) {
+    for (int64_t i = 0; i < scene->n_supports;
+         i++) { /* the farthest that one pushes nodes, and perhaps the whole body */
         const uz_support *s = &scene->supports[i];
         double u = 0;
-        for (int c = 0; c < dim && s->kind == UZ_SUPPORT_COMPONENTS; c++)
+        for (int c = 0; c < info->dim && s->kind == UZ_SUPPORT_COMPONENTS; c++)
             u = isnan(s->u[c]) ? u : hypot(u, s->u[c]);
         most = fmax(most, s->kind == UZ_SUPPORT_NORMAL ? fabs(s->value) : u);
     }
-    return most;
-}
-
-uz_status uz_choose_rows(uz_candidates *rows, const double *h, int64_t m, const uz_mesh_info *info,
-                         const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
-{
-    *rows = (uz_candidates){.m = m, .count = m};
-    if (m <= FEW_ROWS || scene->all_candidates)
-        return UZ_OK;
-    const double reach = UZ_CANDIDATES_REACH * extent_of(info) + pushed_by_supports(scene, info->dim);
-    uz_status status = uz_candidates_first(rows, h, m, reach, err);
+    uz_status status = uz_candidates_first(rows, h, m, UZ_CANDIDATES_REACH * sqrt(square) + most, err);
     if (status == UZ_OK && wanted && wanted->in && wanted->m == m)
         status = uz_candidates_add(rows, wanted, err);
     if (status == UZ_OK && (double)rows->count <= MOST_KEPT * (double)m)
@@ -157,33 +144,24 @@ bool uz_candidates_has(const uz_candidates *a, const uz_candidates *b)
 
 /* ---------------------------------------------------------------- states */
 
-enum { STATE_VECTORS = 6 };
-
-static void list_vectors(double **list[STATE_VECTORS], uz_state *s)
-{
-    double **vectors[STATE_VECTORS] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
-    memcpy(list, vectors, sizeof vectors);
-}
-
 static uz_status copy_rows(uz_state **out, const uz_state *from, const uz_candidates *rows, bool gather, uz_error *err)
 {
-    uz_state source = *from, *s = uz_alloc_zero(1, sizeof *s);
-    double **to[STATE_VECTORS], **given[STATE_VECTORS];
+    uz_state *s = uz_alloc_zero(1, sizeof *s);
+    bool ok = true;
     *out = NULL;
     if (!s)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a state");
     *s = *from;
     s->m = gather ? rows->count : rows->m;
-    list_vectors(to, s);
-    list_vectors(given, &source);
-    bool ok = true;
-    for (int k = 0; k < STATE_VECTORS; k++) {
-        *to[k] = *given[k] ? uz_alloc(s->m, sizeof(double)) : NULL;
-        ok = ok && (*to[k] || !*given[k]);
+    double **to[] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
+    for (size_t k = 0; k < sizeof to / sizeof to[0]; k++) {
+        const double *given = *to[k];
+        *to[k] = given ? uz_alloc(s->m, sizeof *given) : NULL;
+        ok = ok && (*to[k] || !given);
         if (*to[k] && gather)
-            uz_candidates_gather(*to[k], *given[k], rows);
+            uz_candidates_gather(*to[k], given, rows);
         else if (*to[k])
-            uz_candidates_scatter(*to[k], *given[k], rows);
+            uz_candidates_scatter(*to[k], given, rows);
     }
     if (ok) {
         *out = s;

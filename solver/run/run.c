@@ -43,39 +43,34 @@ uz_status uz_run_begin(uz_run *run, const uz_request *asked, uz_error *err)
     return UZ_OK;
 }
 
-/* Of a scene: the vectors of all rows, and h of those that the setup has. */
-static uz_status assemble_load(uz_load_vectors *load, const uz_run *run, uz_error *err)
-{
-    const uz_setup *setup = run->asked->setup;
-    const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
-    int64_t kept = setup->rows.in ? run->m : 0, n_fixed = setup->model.n_fixed;
-    load->owned = uz_alloc_zero(run->d + run->all + n_fixed + kept, sizeof(double));
-    if (!load->owned)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
-    double *h = load->owned + run->d;
-    load->p = load->owned;
-    load->h = load->h_all = h;
-    load->prescribed = h + run->all;
-    uz_status status = uz_body_model_load(load->owned, h, load->prescribed, &setup->model, &scene, err);
-    load->moved = status == UZ_OK && uz_is_moved(&setup->model, load->prescribed);
-    if (status == UZ_OK && setup->rows.in) {
-        uz_candidates_gather(load->prescribed + n_fixed, h, &setup->rows);
-        load->h = load->prescribed + n_fixed;
-    }
-    return status;
-}
-
 uz_status uz_run_load(uz_run *run, uz_error *err)
 {
+    const uz_setup *setup = run->asked->setup;
     const uz_problem *problem = run->asked->problem;
+    uz_load_vectors *load = &run->load;
     double start = uz_seconds();
     uz_status status = UZ_OK;
-    if (run->asked->setup->is_scene) {
-        status = assemble_load(&run->load, run, err);
+    if (setup->is_scene) { /* the vectors of all rows, and h of those that the setup has */
+        const uz_scene scene = uz_scene_of_case(problem, run->asked->index);
+        const int64_t n_fixed = setup->model.n_fixed;
+        load->n_owned = run->d + run->all + n_fixed + (setup->rows.in ? run->m : 0);
+        load->owned = uz_alloc_zero(load->n_owned, sizeof(double));
+        if (!load->owned)
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
+        double *h = load->owned + run->d;
+        load->p = load->owned;
+        load->h = load->h_all = h;
+        load->prescribed = h + run->all;
+        status = uz_body_model_load(load->owned, h, load->prescribed, &setup->model, &scene, err);
+        load->moved = status == UZ_OK && uz_is_moved(&setup->model, load->prescribed);
+        if (status == UZ_OK && setup->rows.in) {
+            uz_candidates_gather(load->prescribed + n_fixed, h, &setup->rows);
+            load->h = load->prescribed + n_fixed;
+        }
     } else {
         const uz_load_case *own = problem->n_cases > 0 ? &problem->cases[run->asked->index] : NULL;
-        run->load.p = own && own->p ? own->p : problem->qp.p;
-        run->load.h = run->load.h_all = own && own->h ? own->h : problem->qp.h;
+        load->p = own && own->p ? own->p : problem->qp.p;
+        load->h = load->h_all = own && own->h ? own->h : problem->qp.h;
     }
     if (status == UZ_OK)
         status = uz_run_scale_load(run, err);
@@ -107,19 +102,17 @@ static void tell_begin(const uz_request *asked)
         asked->hooks->begins(asked->hooks->ctx, asked->index);
 }
 
-/* Steps that others published, an alpha and a rule that were told belong to the rows as the caller wrote them. */
-static bool takes_rows_as_given(const uz_settings *settings)
-{
-    const uz_method_kind *method = uz_method_kind_of(settings->method);
-    if (settings->row_scaling != UZ_ROW_SCALING_AUTO)
-        return settings->row_scaling == UZ_ROW_SCALING_NONE;
-    return settings->alpha > 0.0 || settings->stopping == UZ_STOP_PAPER || (method && method->as_given);
-}
-
 uz_status uz_run_start(uz_run *run, uz_error *err)
 {
     const uz_request *asked = run->asked;
+    const uz_settings *settings = asked->settings;
+    const uz_method_kind *method = uz_method_kind_of(settings->method);
     uz_work *work = &run->work;
+    /* steps that others published, an alpha and a rule that were told belong to the rows as the caller wrote them */
+    const bool as_given =
+        settings->row_scaling != UZ_ROW_SCALING_AUTO
+            ? settings->row_scaling == UZ_ROW_SCALING_NONE
+            : settings->alpha > 0.0 || settings->stopping == UZ_STOP_PAPER || (method && method->as_given);
     double start = uz_seconds();
     uz_status status = UZ_OK;
     if (!work->dual)
@@ -128,8 +121,8 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     if (status == UZ_OK)
         status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
-        status = uz_iterate_init(&work->it, uz_setup_law(asked->setup), asked->setup->dual,
-                                 takes_rows_as_given(asked->settings), asked->settings->alpha, err);
+        status =
+            uz_iterate_init(&work->it, uz_setup_law(asked->setup), asked->setup->dual, as_given, settings->alpha, err);
     /* bounds of iterations are relative to another norm where supports move the body */
     work->it.milestones = run->load.moved ? NULL : &work->milestones;
     uz_milestones_resume(&work->milestones, uz_run_time(run));
@@ -190,25 +183,6 @@ static void note_certificate(uz_run *run)
                           run->work.dual->applications);
 }
 
-/* A method keeps the answer that it could bound best. Where rows nearly depend on each other its own bounds fail
- * although its last r is right: when it ends short of the request, the last r is certified too and the better answer
- * kept. */
-static uz_status try_last_reactions(uz_run *run, uz_error *err)
-{
-    uz_answer last = {0};
-    uz_status status = uz_answer_allocate(&last, run->d, run->m, err);
-    if (status == UZ_OK)
-        status = uz_run_certify_reactions(run, &last, run->work.it.r, false, err);
-    bool exact = run->work.end == UZ_END_SOLVED && isinf(run->answer.certificate.relative_error);
-    if (status == UZ_OK && (exact || last.certificate.relative_error < run->answer.certificate.relative_error)) {
-        uz_answer swap = run->answer;
-        run->answer = last;
-        last = swap;
-    }
-    uz_answer_clear(&last);
-    return status;
-}
-
 /* Where the method can't do better, but the request is missed. A run that was told to stop has an answer with a bound:
  * another certificate would cost as much again. */
 static uz_status improve(uz_run *run, uz_error *err)
@@ -218,8 +192,21 @@ static uz_status improve(uz_run *run, uz_error *err)
          missed = run->answer.certificate.relative_error > (told ? DBL_MAX : run->work.requested);
     double start = uz_seconds();
     uz_status status = UZ_OK;
-    if (missed && end != UZ_END_TARGET && end != UZ_END_PAPER)
-        status = try_last_reactions(run, err);
+    if (missed && end != UZ_END_TARGET && end != UZ_END_PAPER) {
+        /* A method keeps the answer that it could bound best. Where rows nearly depend on each other its own bounds
+         * fail although its last r is right: that is certified too, and the better answer kept. */
+        uz_answer last = {0};
+        status = uz_answer_allocate(&last, run->d, run->m, err);
+        if (status == UZ_OK)
+            status = uz_run_certify_reactions(run, &last, run->work.it.r, false, err);
+        bool exact = end == UZ_END_SOLVED && isinf(run->answer.certificate.relative_error);
+        if (status == UZ_OK && (exact || last.certificate.relative_error < run->answer.certificate.relative_error)) {
+            const uz_answer swap = run->answer;
+            run->answer = last;
+            last = swap;
+        }
+        uz_answer_clear(&last);
+    }
     if (status == UZ_OK)
         status = uz_run_refine(run, err);
     run->result->summary.timings.certify += uz_seconds() - start;
@@ -235,7 +222,9 @@ static uz_status judge(bool *done, uz_run *run, uz_error *err)
     uz_work *work = &run->work;
     const bool next = work->end == UZ_END_NEXT;
     if (run->asked->settings->balanced && run->asked->setup->is_scene && !work->again && !next) {
-        uz_run_balance_request(run);
+        const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
+        uz_balance_request(&work->requested, &run->result->summary.discretization_error, &run->asked->setup->model,
+                           &scene, run->answer.u, run->load.prescribed, run->load.exponent);
         work->target = work->requested;
     }
     uz_status status = improve(run, err);

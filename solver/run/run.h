@@ -33,7 +33,8 @@ typedef struct {
     double *prescribed;  /* scenes: n_fixed */
     bool moved;          /* some of them are not zero */
     int exponent;        /* all of these, and the answer, are times 2^exponent (scale.c) */
-    double *owned;       /* room of all of these; matrices: NULL where they are the caller's */
+    double *owned;       /* n_owned: room of all of these; matrices: NULL where they are the caller's */
+    int64_t n_owned;
 } uz_load_vectors;
 
 /* What is worked on. */
@@ -121,8 +122,6 @@ uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err);
  */
 uz_status uz_run_certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_correction,
                                    uz_error *err);
-/* Scenes, `balanced`: the request from the estimated discretization error of answer.u. */
-void uz_run_balance_request(uz_run *run);
 /* UZ_END_RAY: the rows that seem to contradict each other along it->ray, checked on the original data. */
 uz_status uz_run_check_ray(uz_run *run, uz_error *err);
 /* What y (m, <= 0, caller's rows) proves: result->ray where no u is feasible, else work.far where it reaches further

@@ -71,14 +71,13 @@ static void multiply(double *x, int64_t n, int exponent)
 uz_status uz_run_scale_load(uz_run *run, uz_error *err)
 {
     uz_load_vectors *load = &run->load;
-    const int64_t n_fixed = run->asked->setup->is_scene ? run->asked->setup->model.n_fixed : 0,
-                  kept = load->h != load->h_all ? run->m : 0;
     if (is_usual(run))
         return UZ_OK;
     /* in the order of a scene's */
     double *own = load->owned ? load->owned : uz_alloc(run->d + run->all, sizeof *own);
     double *row_room = uz_alloc(run->all, sizeof *row_room);
     if (own && row_room && !load->owned) {
+        load->n_owned = run->d + run->all;
         load->owned = memcpy(own, load->p, (size_t)run->d * sizeof *own);
         if (run->all > 0)
             memcpy(own + run->d, load->h_all, (size_t)run->all * sizeof *own);
@@ -91,13 +90,12 @@ uz_status uz_run_scale_load(uz_run *run, uz_error *err)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
     }
     const double size = drive(run, row_room);
-    const int64_t n = run->d + run->all + n_fixed + kept;
     int least = -2 * DBL_MAX_EXP, most = 2 * DBL_MAX_EXP;
     free(row_room);
-    keep_exact(&least, &most, load->owned, n);
+    keep_exact(&least, &most, load->owned, load->n_owned);
     if (isfinite(size))
         load->exponent = (int)fmax(least, fmin(most, -floor(size)));
-    multiply(load->owned, n, load->exponent);
+    multiply(load->owned, load->n_owned, load->exponent);
     run->work.exponent = load->exponent;
     return UZ_OK;
 }
@@ -124,16 +122,6 @@ static void scale_row(uz_history_row *row, int exponent)
     row->step_norm = ldexp(row->step_norm, exponent);
     row->error_bound = outward(row->error_bound, exponent, 1.0);
     scale_residual(&row->residual, exponent);
-}
-
-static void scale_certificate(uz_certificate *c, int exponent)
-{
-    c->absolute_error = outward(c->absolute_error, exponent, 1.0);
-    c->gap = outward(c->gap, 2 * exponent, 1.0);
-    c->energy_primal = outward(c->energy_primal, 2 * exponent, 1.0);
-    c->energy_dual = outward(c->energy_dual, 2 * exponent, -1.0);
-    c->energy_norm = ldexp(c->energy_norm, exponent);
-    scale_residual(&c->residual, exponent);
 }
 
 uz_status uz_state_scaled(uz_state **out, const uz_state *from, int exponent, uz_error *err)
@@ -167,7 +155,6 @@ uz_status uz_state_scaled(uz_state **out, const uz_state *from, int exponent, uz
 void uz_run_scale_given(uz_run *run)
 {
     uz_load_vectors *load = &run->load;
-    const int64_t n_fixed = run->asked->setup->is_scene ? run->asked->setup->model.n_fixed : 0;
     double *vectors[] = {run->answer.u, run->answer.r};
     const int64_t sizes[] = {run->d, run->answer.m};
     bool exact = true;
@@ -177,7 +164,7 @@ void uz_run_scale_given(uz_run *run)
     for (int k = 0; exact && k < 2; k++)
         multiply(vectors[k], sizes[k], load->exponent);
     if (!exact)
-        multiply(load->owned, run->d + run->all + n_fixed + (load->h != load->h_all ? run->m : 0), -load->exponent);
+        multiply(load->owned, load->n_owned, -load->exponent);
     load->exponent = exact ? load->exponent : 0;
 }
 
@@ -206,16 +193,20 @@ uz_status uz_run_round_to_units(uz_run *run, uz_error *err)
 void uz_run_restore_units(uz_run *run)
 {
     const int exponent = -run->load.exponent;
-    const uz_setup *setup = run->asked->setup;
-    const int64_t n_fixed = setup->is_scene ? setup->model.n_fixed : 0;
     uz_answer *answer = &run->answer;
+    uz_certificate *c = &answer->certificate;
     if (exponent == 0)
         return;
-    multiply(run->load.owned, run->d + run->all + n_fixed + (run->load.h != run->load.h_all ? run->m : 0), exponent);
+    multiply(run->load.owned, run->load.n_owned, exponent);
     multiply(answer->u, run->d, exponent);
     multiply(answer->r, answer->m, exponent);
     multiply(answer->g, answer->m, exponent);
-    scale_certificate(&answer->certificate, exponent);
+    c->absolute_error = outward(c->absolute_error, exponent, 1.0);
+    c->gap = outward(c->gap, 2 * exponent, 1.0);
+    c->energy_primal = outward(c->energy_primal, 2 * exponent, 1.0);
+    c->energy_dual = outward(c->energy_dual, 2 * exponent, -1.0);
+    c->energy_norm = ldexp(c->energy_norm, exponent);
+    scale_residual(&c->residual, exponent);
     run->result->summary.infeasible_radius = outward(run->result->summary.infeasible_radius, exponent, -1.0);
     run->work.reach = outward(run->work.reach, exponent, -1.0);
     run->load.exponent = 0;

@@ -61,19 +61,6 @@ static uz_status build_scene(uz_semi *s, uz_error *err)
     return status;
 }
 
-/* Null spaces and the noise of augmented matrices are bounded with a factor: nothing else will do. */
-static uz_status keep_a_factor(uz_semi *s, uz_error *err)
-{
-    int64_t *dofs = NULL, n_b = 0;
-    if (s->with_factor.op != UZ_OPERATOR_AUTO && uz_dual_abilities_of(s->with_factor.op)->needs_factor)
-        return UZ_OK;
-    uz_status status = uz_dual_contact_dofs(&dofs, &n_b, s->of.N, err);
-    if (status == UZ_OK)
-        s->with_factor.op = uz_dual_choose(s->of.N, n_b, UZ_OPERATOR_AUTO);
-    free(dofs);
-    return status;
-}
-
 static uz_status prepare(uz_semi *s, uz_error *err)
 {
     const uz_qp *qp = &s->problem->qp;
@@ -85,9 +72,15 @@ static uz_status prepare(uz_semi *s, uz_error *err)
         return status;
     s->d = s->of.K->cols;
     s->m = s->of.N->rows;
-    status = keep_a_factor(s, err);
-    if (status != UZ_OK)
-        return status;
+    if (s->with_factor.op == UZ_OPERATOR_AUTO || !uz_dual_abilities_of(s->with_factor.op)->needs_factor) {
+        /* null spaces and the noise of augmented matrices are bounded with a factor: nothing else will do */
+        int64_t *dofs = NULL, n_b = 0;
+        status = uz_dual_contact_dofs(&dofs, &n_b, s->of.N, err);
+        if (status != UZ_OK)
+            return status;
+        s->with_factor.op = uz_dual_choose(s->of.N, n_b, UZ_OPERATOR_AUTO);
+        free(dofs);
+    }
     double **room[] = {&s->stiffness, &s->soft, &s->weight, &s->target};
     bool ok = (s->inverse = uz_alloc_zero(s->d, sizeof(double))) != NULL;
     for (int i = 0; i < 4; i++)
@@ -123,9 +116,12 @@ static void clear(uz_semi *s)
     uz_cache_free(s->own_cache);
 }
 
-/* The settings of an augmented solve, with the time that is left. */
-static uz_settings settings_of(const uz_semi *s, bool exact, double relative_error)
+/* Solves with the weights and targets that stand in s, in the time that is left; the result takes the place of s->last.
+ * exact: by the method that was asked for. */
+static uz_status solve_augmented(uz_semi *s, bool exact, double relative_error, const uz_hooks *hooks, uz_error *err)
 {
+    uz_problem augmented;
+    uz_result *result = NULL;
     uz_settings settings = *s->settings;
     settings.balanced = false;
     settings.relative_error = relative_error;
@@ -135,17 +131,9 @@ static uz_settings settings_of(const uz_semi *s, bool exact, double relative_err
         settings.stopping = UZ_STOP_CERTIFIED;
         settings.alpha = 0.0;
     }
-    return settings;
-}
-
-/* Solves with the weights and targets that stand in s; the result takes the place of s->last. */
-static uz_status solve_augmented(uz_semi *s, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
-{
-    uz_problem augmented;
-    uz_result *result = NULL;
     uz_status status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
     if (status == UZ_OK)
-        status = uz_solve_rounds(&result, &augmented, settings, NULL, NULL, s->cache, hooks, err);
+        status = uz_solve_rounds(&result, &augmented, &settings, NULL, NULL, s->cache, hooks, err);
     uz_augmented_clear(&augmented);
     if (status != UZ_OK) {
         uz_result_free(result);
@@ -194,14 +182,13 @@ static bool is_over(const uz_semi *s)
 static uz_status make_round(uz_semi *s, bool *settled, uz_error *err)
 {
     const uz_law *law = s->is_scene ? s->model.law : &uz_law_frictionless;
-    uz_settings settings = settings_of(s, false, ROUND_ERROR);
     uz_hooks quiet = {0};
     if (s->hooks) {
         quiet.ctx = s->hooks->ctx;
         quiet.cancelled = s->hooks->cancelled;
     }
     memcpy(s->weight, s->soft, (size_t)s->m * sizeof *s->weight);
-    uz_status status = solve_augmented(s, &settings, &quiet, err);
+    uz_status status = solve_augmented(s, false, ROUND_ERROR, &quiet, err);
     if (status != UZ_OK || is_over(s))
         return status;
     *settled = s->rounds++ > 0;
@@ -212,22 +199,6 @@ static uz_status make_round(uz_semi *s, bool *settled, uz_error *err)
         s->target[i] = s->of.h[i] - s->last->g[i];
     }
     return UZ_OK;
-}
-
-/* Weights of phase 2: the rows that press hard. Returns how many. */
-static int64_t choose_rows(uz_semi *s, const double *press, double share)
-{
-    int64_t count = 0;
-    double hardest = 0.0;
-    for (int64_t i = 0; i < s->m; i++)
-        hardest = fmax(hardest, press[i]);
-    for (int64_t i = 0; i < s->m; i++) {
-        bool chosen = press[i] > 0.0 && press[i] >= share * hardest;
-        s->weight[i] = chosen ? s->stiffness[i] : 0.0;
-        s->target[i] = s->of.h[i];
-        count += chosen;
-    }
-    return count;
 }
 
 /* A bound on what the rounding of K_R and p_R does to u, in the norm of K_R. A force N'f on rows alone is at most
@@ -287,17 +258,6 @@ static uz_status bound_inverse(const uz_semi *s, double *bound, uz_error *err)
     return status;
 }
 
-/* Rows that share dofs with others need to know which of these are surely open: only then is that bound made. */
-static uz_status prove_contact(uz_semi *s, uz_contact_verdict *verdict, uz_error *err)
-{
-    uz_contact_claim claim = {&s->of, &s->Nt, s->inverse, s->weight, s->last->u, s->last->r, s->absolute, INFINITY};
-    uz_status status = uz_prove_contact(verdict, s->provable, &claim, err);
-    if (status != UZ_OK || *verdict != UZ_CONTACT_NO_WITNESS)
-        return status;
-    status = bound_inverse(s, &claim.inverse_bound, err);
-    return status == UZ_OK ? uz_prove_contact(verdict, s->provable, &claim, err) : status;
-}
-
 /* Is the answer of the augmented problem one of the problem itself, and how far is it from the exact one? */
 static uz_status judge_exact(uz_semi *s, uz_contact_verdict *verdict, double *relative, uz_error *err)
 {
@@ -311,7 +271,14 @@ static uz_status judge_exact(uz_semi *s, uz_contact_verdict *verdict, double *re
     if (status != UZ_OK)
         return status;
     s->absolute = s->last->summary.certificate.absolute_error * (1.0 + 1e-9) + noise;
-    status = prove_contact(s, verdict, err);
+    uz_contact_claim claim = {&s->of, &s->Nt, s->inverse, s->weight, s->last->u, s->last->r, s->absolute, INFINITY};
+    status = uz_prove_contact(verdict, s->provable, &claim, err);
+    if (status == UZ_OK && *verdict == UZ_CONTACT_NO_WITNESS) {
+        /* rows that share dofs with others need to know which of these are surely open: only then is that bound made */
+        status = bound_inverse(s, &claim.inverse_bound, err);
+        if (status == UZ_OK)
+            status = uz_prove_contact(verdict, s->provable, &claim, err);
+    }
     s->proved = status == UZ_OK && *verdict == UZ_CONTACT_PROVED;
     if (status == UZ_OK)
         status = uz_semi_norms(&norm, &augmented, s, s->absolute, err);
@@ -332,8 +299,7 @@ static uz_status solve_exact(uz_semi *s, bool *done, uz_contact_verdict *verdict
     /* the norm of the augmented problem counts the springs, and motions of the supports, too */
     double request = fmin(1.0, fmax(1e-15, 0.5 * s->requested * (norm / fmax(augmented, DBL_MIN))));
     for (int attempt = 0; attempt < EXACT_TRIES; attempt++) {
-        uz_settings settings = settings_of(s, true, request);
-        uz_status status = solve_augmented(s, &settings, s->hooks, err);
+        uz_status status = solve_augmented(s, true, request, s->hooks, err);
         if (status == UZ_OK)
             status = judge_exact(s, verdict, &relative, err);
         if (status != UZ_OK)
@@ -352,6 +318,7 @@ static uz_status solve_exact(uz_semi *s, bool *done, uz_contact_verdict *verdict
 static uz_status try_exact(uz_semi *s, bool *done, uz_error *err)
 {
     int64_t before = 0;
+    double hardest = 0.0;
     bool held = false;
     double *press = uz_alloc_zero(s->m, sizeof *press);
     uz_status status = press ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)s->m);
@@ -359,10 +326,18 @@ static uz_status try_exact(uz_semi *s, bool *done, uz_error *err)
     for (int64_t i = 0; status == UZ_OK && i < s->m; i++)
         if (s->active[i] && s->provable[i] && s->stiffness[i] > 0.0)
             press[i] = -s->last->r[i] / sqrt(s->stiffness[i]);
+    for (int64_t i = 0; status == UZ_OK && i < s->m; i++)
+        hardest = fmax(hardest, press[i]);
     for (size_t level = 0; level < sizeof HARD / sizeof HARD[0] && status == UZ_OK && !*done; level++) {
         uz_contact_verdict verdict = UZ_CONTACT_DENIED;
         uz_error refusal = {0};
-        int64_t count = choose_rows(s, press, HARD[level]);
+        int64_t count = 0;
+        for (int64_t i = 0; i < s->m; i++) {
+            const bool chosen = press[i] > 0.0 && press[i] >= HARD[level] * hardest;
+            s->weight[i] = chosen ? s->stiffness[i] : 0.0;
+            s->target[i] = s->of.h[i];
+            count += chosen;
+        }
         if (count == before)
             continue;
         before = count;
@@ -381,20 +356,6 @@ static uz_status try_exact(uz_semi *s, bool *done, uz_error *err)
     return status;
 }
 
-/* A tenth of what the mesh itself loses, as in the ordinary pipeline. */
-static void balance_request(uz_semi *s)
-{
-    double *nodal = uz_alloc(s->model.mesh.n_nodes * s->model.mesh.dim, sizeof *nodal);
-    if (!nodal)
-        return; /* the request stays at what it was, which is stricter */
-    uz_recover_nodal(nodal, &s->model, s->last->u, s->prescribed);
-    double error = uz_estimate_mesh_error(&s->model, &s->problem->scene, nodal);
-    free(nodal);
-    s->discretization_error = error;
-    if (error > 0.0)
-        s->requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * error));
-}
-
 static uz_status run_rounds(uz_semi *s, uz_error *err)
 {
     bool done = false, settled = false;
@@ -406,7 +367,8 @@ static uz_status run_rounds(uz_semi *s, uz_error *err)
         if (!settled && s->rounds % IMPATIENCE != 0)
             continue;
         if (s->settings->balanced && s->is_scene)
-            balance_request(s);
+            uz_balance_request(&s->requested, &s->discretization_error, &s->model, &s->problem->scene, s->last->u,
+                               s->prescribed, 0);
         status = try_exact(s, &done, err);
         for (int64_t i = 0; status == UZ_OK && !done && i < s->m; i++)
             s->target[i] = s->of.h[i] - s->last->g[i];

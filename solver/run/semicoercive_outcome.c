@@ -4,7 +4,6 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
-#include "post/evaluate.h"
 #include "assembly/pressed.h"
 #include "run/semicoercive_private.h"
 #include "methods/milestones.h"
@@ -146,35 +145,6 @@ static uz_status certify(uz_semi *s, uz_error *err)
     return status;
 }
 
-static void name_rows(const uz_semi *s, uz_semicoercive *out)
-{
-    const int64_t most = (int64_t)(sizeof out->held_by / sizeof out->held_by[0]);
-    *out = (uz_semicoercive){.free_modes = s->k, .rounds = s->rounds};
-    for (int64_t i = 0; s->proved && i < s->m; i++)
-        if (s->weight[i] > 0.0) {
-            if (out->held < most)
-                out->held_by[out->held] = i;
-            out->held++;
-        }
-}
-
-/* Displacements by node, forces, pressures. */
-static uz_status describe_scene(uz_semi *s, uz_error *err)
-{
-    uz_result *result = s->last;
-    const uz_mesh *mesh = &s->model.mesh;
-    double *nodal = uz_alloc(mesh->n_nodes * mesh->dim, sizeof *nodal);
-    if (!nodal)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
-                       (long long)mesh->n_nodes);
-    uz_recover_nodal(nodal, &s->model, result->u, s->prescribed);
-    free(result->u);
-    result->u = nodal;
-    result->n_nodes = mesh->n_nodes;
-    uz_status status = uz_mesh_info_copy(&result->mesh, &s->model.info, s->m, err);
-    return status == UZ_OK ? uz_evaluate(result, &s->model, &s->problem->scene, err) : status;
-}
-
 /* A sum of loads that is no more than their rounding. */
 #define NO_LOAD 1e-12
 
@@ -209,9 +179,16 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
         summary->outcome = UZ_LOOSE;
     summary->requested_error = s->requested;
     summary->discretization_error = s->discretization_error;
-    name_rows(s, &summary->semicoercive);
+    uz_semicoercive *held = &summary->semicoercive;
+    *held = (uz_semicoercive){.free_modes = s->k, .rounds = s->rounds};
+    for (int64_t i = 0; s->proved && i < s->m; i++)
+        if (s->weight[i] > 0.0) { /* the first rows that hold it are named */
+            if (held->held < (int64_t)(sizeof held->held_by / sizeof held->held_by[0]))
+                held->held_by[held->held] = i;
+            held->held++;
+        }
     if (s->is_scene)
-        status = describe_scene(s, err);
+        status = uz_describe_scene(result, &s->model, &s->problem->scene, result->u, s->prescribed, s->m, err);
     if (result->ray)
         uz_blank_answer(result);
     summary->message[0] = '\0';

@@ -14,29 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void add_matrix(uz_digest *digest, const uz_csc *A)
-{
-    int64_t shape[2] = {A->rows, A->cols};
-    uz_digest_add(digest, shape, sizeof shape);
-    if (!A->ptr)
-        return;
-    size_t nnz = (size_t)A->ptr[A->cols];
-    uz_digest_add(digest, A->ptr, (size_t)(A->cols + 1) * sizeof *A->ptr);
-    uz_digest_add(digest, A->idx, nnz * sizeof *A->idx);
-    uz_digest_add(digest, A->val, nnz * sizeof *A->val);
-}
-
-static uz_status add_scene(uz_digest *digest, const uz_scene *scene, uz_error *err)
-{
-    unsigned char *key = NULL;
-    size_t len = 0;
-    uz_status status = uz_scene_body_key(&key, &len, scene, err);
-    if (status == UZ_OK)
-        uz_digest_add(digest, key, len);
-    free(key);
-    return status;
-}
-
 /* Where the choice of rows begins: initial gaps follow from the places of planes and the values of supports, which the
  * key of the model leaves out. */
 static void add_rows(uz_digest *digest, const uz_problem *problem, const uz_candidates *wanted)
@@ -66,12 +43,20 @@ uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz
     uz_digest_add(state, choices, sizeof choices);
     uz_digest_add(state, &settings->memory_limit, sizeof settings->memory_limit);
     if (problem->kind == UZ_PROBLEM_SCENE) {
-        status = add_scene(state, &problem->scene, err);
+        unsigned char *body = NULL;
+        size_t len = 0;
+        status = uz_scene_body_key(&body, &len, &problem->scene, err);
+        if (status == UZ_OK)
+            uz_digest_add(state, body, len);
+        free(body);
         add_rows(state, problem, wanted);
     } else {
+        uz_matrix_key N = {.values = ""}; /* without rows it may be a zeroed struct */
         status = uz_matrix_digest(&key->K, &problem->qp.K, err);
+        if (status == UZ_OK && problem->qp.N.ptr)
+            status = uz_matrix_digest(&N, &problem->qp.N, err);
         uz_digest_add(state, key->K.values, sizeof key->K.values);
-        add_matrix(state, &problem->qp.N);
+        uz_digest_add(state, N.values, sizeof N.values);
     }
     if (!uz_digest_end(state, key->digest) && status == UZ_OK)
         status = uz_fail(err, UZ_ERR_INTERNAL, "", "hashing failed");

@@ -84,36 +84,29 @@ typedef struct {
     size_t count, room;
 } entries;
 
-static void count_one(const void *object, const char *digest, int64_t hits, size_t bytes, void *ctx)
-{
-    (void)object, (void)digest, (void)hits, (void)bytes;
-    ((entries *)ctx)->room++;
-}
-
-/* A factor that several setups share counts for the first of them. */
-static size_t factor_bytes(entries *to, const uz_factor *factor)
-{
-    to->factors[to->count] = factor;
-    for (size_t k = 0; k < to->count; k++)
-        if (to->factors[k] == factor)
-            return 0;
-    return factor ? uz_factor_describe(factor).bytes : 0;
-}
-
+/* Without room for a list yet: counts. A factor that several setups share counts for the first of them. */
 static void describe_one(const void *object, const char *digest, int64_t hits, size_t bytes, void *ctx)
 {
     const uz_setup *setup = object;
     entries *to = ctx;
+    if (!to->list) {
+        to->room++;
+        return;
+    }
     if (to->count == to->room)
         return; /* came in since they were counted */
-    const uz_dual *dual = setup->dual;
+    const uz_factor_info factor = setup->factor ? uz_factor_describe(setup->factor) : (uz_factor_info){.nnz = 0};
+    size_t first = 0;
+    to->factors[to->count] = setup->factor;
+    while (to->factors[first] != setup->factor)
+        first++;
     uz_cache_entry *entry = &to->list[to->count];
     memcpy(entry->digest, digest, sizeof entry->digest);
-    entry->d = dual->d;
-    entry->m = dual->m;
-    entry->nnz = setup->factor ? uz_factor_describe(setup->factor).nnz : 0;
+    entry->d = setup->dual->d;
+    entry->m = setup->dual->m;
+    entry->nnz = factor.nnz;
     entry->hits = hits;
-    entry->bytes = bytes + factor_bytes(to, setup->factor);
+    entry->bytes = bytes + (first == to->count ? factor.bytes : 0);
     to->count++;
 }
 
@@ -123,7 +116,7 @@ uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **out, size_t *count, uz
     *out = NULL;
     *count = 0;
     uz_error_reset(err);
-    uz_table_visit(cache, UZ_ITEM_SETUP, count_one, &found);
+    uz_table_visit(cache, UZ_ITEM_SETUP, describe_one, &found);
     found.list = uz_alloc_zero((int64_t)found.room, sizeof *found.list);
     found.factors = uz_alloc_zero((int64_t)found.room, sizeof *found.factors);
     if (!found.list || !found.factors) {
