@@ -131,9 +131,6 @@ uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, con
 uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_body_model *model,
                              const uz_scene *scene, uz_error *err);
 
-/* The motion with these coefficients (n_modes) in words: "translation along +y". */
-void uz_name_motion(char *text, size_t size, const uz_body_model *model, const double *y);
-
 /* Does the load p (d) press a body of _build_held on its obstacles, in every mode that nothing else holds?
  * UZ_ERR_FREE_BODY at "/loads" names the motion by which the body leaves them, or could at no cost. */
 uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error *err);
@@ -193,9 +190,8 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
 
 /* Estimated ||u - u_h||_E / ||u||_E of the mesh, for nodal displacements n_nodes x dim; NaN when there is no memory or
  * nothing is strained. Zienkiewicz and Zhu, "A simple error estimator and adaptive procedure for practical engineering
- * analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared with its own nodal averages. */
-double uz_estimate_discretization_error(const uz_body_model *model, const double *nodal);
-/* The same with the temperatures of the scene's loads, whose strain has no stress. */
+ * analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared with its own nodal averages. The
+ * strain of the temperatures among the scene's loads (NULL: none) has no stress. */
 double uz_estimate_mesh_error(const uz_body_model *model, const uz_scene *scene, const double *nodal);
 
 /* *out: n_elements, expansion times rise of temperature by the scene's loads; NULL where there are no such loads. The

@@ -85,17 +85,6 @@ static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
     uz_buffer_put(key, hex, sizeof hex);
 }
 
-static int directions_held(const uz_support *support, int dim)
-{
-    int mask = 0;
-    double u[3];
-    uz_support_values(u, support, dim);
-    for (int c = 0; c < dim; c++)
-        if (!isnan(u[c]))
-            mask |= 1 << c;
-    return mask;
-}
-
 static int by_group(const void *a, const void *b)
 {
     const uz_support *const *left = a, *const *right = b;
@@ -116,8 +105,12 @@ static void put_supports(uz_buffer *key, const uz_scene *scene, int dim)
     for (int64_t i = 0; i < scene->n_supports;) {
         const uz_support *first = sorted[i];
         int mask = 0;
-        for (; i < scene->n_supports && by_group(&first, &sorted[i]) == 0; i++)
-            mask |= directions_held(sorted[i], dim);
+        for (; i < scene->n_supports && by_group(&first, &sorted[i]) == 0; i++) {
+            double u[3];
+            uz_support_values(u, sorted[i], dim);
+            for (int c = 0; c < dim; c++)
+                mask |= isnan(u[c]) ? 0 : 1 << c;
+        }
         put_name(key, first->on, sizeof first->on);
         put_int(key, mask);
     }

@@ -114,14 +114,17 @@ static uz_status displace(uz_body_model *model, const uz_body_model *rest, const
     return uz_find_sites(model, rest, scene, err);
 }
 
-/* Everything but the stiffness. held: obstacles may hold the body where supports don't. */
-static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held, uz_error *err)
+/* held: obstacles may hold the body where supports don't. */
+static uz_status build(uz_body_model *model, const uz_scene *scene, bool held, bool stiffness, uz_error *err)
 {
+    memset(model, 0, sizeof *model);
     uz_status status = uz_mesh_from_scene(&model->mesh, scene, err);
     if (status == UZ_OK)
         status = uz_scene_check_body(scene, &model->mesh, err);
-    if (status != UZ_OK)
+    if (status != UZ_OK) {
+        uz_body_model_clear(model);
         return status;
+    }
     model->info.dim = model->mesh.dim;
     model->info.n_nodes = model->mesh.n_nodes;
     model->info.n_elements = model->mesh.n_elements;
@@ -146,17 +149,10 @@ static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held,
         status = uz_build_contact_rows(model, scene, err);
     if (status == UZ_OK && held)
         status = uz_rigid_modes(&model->modes, &model->n_modes, model, err);
-    return status;
-}
-
-static uz_status build(uz_body_model *out, const uz_scene *scene, bool held, bool stiffness, uz_error *err)
-{
-    memset(out, 0, sizeof *out);
-    uz_status status = prepare(out, scene, held, err);
     if (status == UZ_OK && stiffness)
-        status = uz_build_stiffness(out, err);
+        status = uz_build_stiffness(model, err);
     if (status != UZ_OK)
-        uz_body_model_clear(out);
+        uz_body_model_clear(model);
     return status;
 }
 
@@ -200,23 +196,6 @@ static uz_status check_finite(const double *x, int64_t n, const char *where, uz_
     return UZ_OK;
 }
 
-static uz_status fill_load(double *p, double *h, double *prescribed, const uz_body_model *model, const uz_scene *scene,
-                           uz_error *err)
-{
-    uz_status status = uz_prescribed_values(prescribed, model, scene, err);
-    if (status == UZ_OK)
-        status = uz_initial_gaps(h, prescribed, model, scene, err);
-    if (status == UZ_OK)
-        status = check_finite(h, model->m, "/contacts", err);
-    if (status != UZ_OK)
-        return status;
-    status = uz_load_vector(p, model, scene, err);
-    if (status != UZ_OK)
-        return status;
-    uz_csc_gaxpy(p, &model->K_fixed, -1, prescribed);
-    return check_finite(p, model->d, "/loads", err);
-}
-
 uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_body_model *model,
                              const uz_scene *scene, uz_error *err)
 {
@@ -226,7 +205,17 @@ uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_
         return status;
     if (!prescribed && !(prescribed = own = uz_alloc(model->n_fixed, sizeof *own)))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld supported dofs", (long long)model->n_fixed);
-    status = fill_load(p, h, prescribed, model, scene, err);
+    status = uz_prescribed_values(prescribed, model, scene, err);
+    if (status == UZ_OK)
+        status = uz_initial_gaps(h, prescribed, model, scene, err);
+    if (status == UZ_OK)
+        status = check_finite(h, model->m, "/contacts", err);
+    if (status == UZ_OK)
+        status = uz_load_vector(p, model, scene, err);
+    if (status == UZ_OK) {
+        uz_csc_gaxpy(p, &model->K_fixed, -1, prescribed);
+        status = check_finite(p, model->d, "/loads", err);
+    }
     free(own);
     return status;
 }
@@ -275,13 +264,12 @@ uz_status uz_scene_check(const uz_scene *scene, uz_error *err)
     uz_body_model model;
     double *p = NULL, *h = NULL;
     uz_error_reset(err);
-    memset(&model, 0, sizeof model);
     if (scene->source == UZ_MESH_BOX && scene->box.automatic) {
         const uz_grids grids = uz_grids_of_box(&scene->box, 0.0);
         first.box = uz_grid(&grids, grids.first);
     }
     scene = &first;
-    uz_status status = prepare(&model, scene, true, err);
+    uz_status status = uz_body_model_outline(&model, scene, err);
     if (status == UZ_OK)
         status = uz_check_elements(&model, err);
     if (status == UZ_OK)
@@ -300,8 +288,7 @@ uz_status uz_scene_sizes(int *dim, int64_t *n_nodes, int64_t *m, const uz_scene 
     uz_error_reset(err);
     *dim = 0;
     *n_nodes = *m = 0;
-    memset(&model, 0, sizeof model);
-    uz_status status = prepare(&model, scene, true, err);
+    uz_status status = uz_body_model_outline(&model, scene, err);
     if (status == UZ_OK) {
         *dim = model.mesh.dim;
         *n_nodes = model.mesh.n_nodes;

@@ -11,35 +11,31 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* v minus its projection on the rows, twice for accuracy; returns the length of what is left. */
-static double reject(double v[UZ_MOTIONS], double rows[][UZ_MOTIONS], int n)
+bool uz_reject_rows(double *v, const double *basis, int64_t rank, int64_t n)
 {
     double square = 0;
     for (int twice = 0; twice < 2; twice++)
-        for (int i = 0; i < n; i++) {
+        for (int64_t i = 0; i < rank; i++) {
             double dot = 0;
-            for (int k = 0; k < UZ_MOTIONS; k++)
-                dot += v[k] * rows[i][k];
-            for (int k = 0; k < UZ_MOTIONS; k++)
-                v[k] -= dot * rows[i][k];
+            for (int64_t k = 0; k < n; k++)
+                dot += v[k] * basis[i * n + k];
+            for (int64_t k = 0; k < n; k++)
+                v[k] -= dot * basis[i * n + k];
         }
-    for (int k = 0; k < UZ_MOTIONS; k++)
+    for (int64_t k = 0; k < n; k++)
         square += v[k] * v[k];
-    return sqrt(square);
+    const double length = sqrt(square);
+    for (int64_t k = 0; k < n && length > UZ_DEPENDENT; k++)
+        v[k] /= length;
+    return length > UZ_DEPENDENT;
 }
 
 void uz_extend_rows(double rows[][UZ_MOTIONS], int *n, const double v[UZ_MOTIONS])
 {
-    double rest[UZ_MOTIONS];
     if (*n == UZ_MOTIONS)
         return;
-    memcpy(rest, v, sizeof rest);
-    double length = reject(rest, rows, *n);
-    if (length <= UZ_DEPENDENT)
-        return;
-    for (int k = 0; k < UZ_MOTIONS; k++)
-        rows[*n][k] = rest[k] / length;
-    (*n)++;
+    memcpy(rows[*n], v, sizeof rows[*n]);
+    *n += uz_reject_rows(rows[*n], rows[0], *n, UZ_MOTIONS);
 }
 
 double uz_part_size(const uz_part *p)
@@ -87,8 +83,28 @@ void uz_move_node(double u[3], const uz_parts *parts, int64_t i, const uz_mesh *
         u[c] += q[c];
 }
 
-static void measure_parts(uz_parts *parts, const uz_mesh *mesh)
+void uz_parts_clear(uz_parts *parts)
 {
+    free(parts->list);
+    free(parts->of);
+}
+
+uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *err)
+{
+    static const double axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const uz_mesh *mesh = &model->mesh;
+    *parts = (uz_parts){.dim = mesh->dim};
+    static const int plane[] = {0, 1, 5}, revolution[] = {1}, space[] = {0, 1, 2, 3, 4, 5};
+    const bool axisymmetric = model->kind == UZ_AXISYMMETRIC;
+    const int *which = parts->dim == 3 ? space : axisymmetric ? revolution : plane;
+    parts->motions = parts->dim == 3 ? 6 : axisymmetric ? 1 : 3;
+    for (int k = 0; k < parts->motions; k++)
+        parts->unit[k][which[k]] = 1;
+    parts->of = uz_alloc(mesh->n_nodes, sizeof *parts->of);
+    parts->count = parts->of ? uz_mesh_number_parts(parts->of, mesh) : -1;
+    parts->list = parts->count >= 0 ? uz_alloc_zero(parts->count, sizeof *parts->list) : NULL;
+    if (!parts->list)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of %lld nodes", (long long)mesh->n_nodes);
     for (int64_t i = 0; i < parts->count; i++)
         for (int c = 0; c < mesh->dim; c++) {
             parts->list[i].low[c] = DBL_MAX;
@@ -102,45 +118,15 @@ static void measure_parts(uz_parts *parts, const uz_mesh *mesh)
             p->high[c] = fmax(p->high[c], mesh->xyz[a * mesh->dim + c]);
         }
     }
-}
-
-/* A held dof is a direction that supports hold; a spring holds its axes as stiffness. */
-static void hold_by_supports(uz_parts *parts, const uz_body_model *model)
-{
-    static const double axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    const int dim = model->mesh.dim;
-    for (int64_t a = 0; a < model->mesh.n_nodes; a++)
-        for (int c = 0; c < dim; c++) {
-            const double *Q = uz_node_frame(model, a);
-            if (model->dof[a * dim + c] < 0)
-                uz_hold_part(parts, &model->mesh, a, Q ? Q + c * dim : axis[c]);
-            if (model->spring && model->spring[a * dim + c] > 0)
-                uz_hold_part(parts, &model->mesh, a, axis[c]);
-        }
-}
-
-void uz_parts_clear(uz_parts *parts)
-{
-    free(parts->list);
-    free(parts->of);
-}
-
-uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *err)
-{
-    *parts = (uz_parts){.dim = model->mesh.dim};
-    static const int plane[] = {0, 1, 5}, revolution[] = {1}, space[] = {0, 1, 2, 3, 4, 5};
-    const bool axisymmetric = model->kind == UZ_AXISYMMETRIC;
-    const int *which = parts->dim == 3 ? space : axisymmetric ? revolution : plane;
-    parts->motions = parts->dim == 3 ? 6 : axisymmetric ? 1 : 3;
-    for (int k = 0; k < parts->motions; k++)
-        parts->unit[k][which[k]] = 1;
-    parts->of = uz_alloc(model->mesh.n_nodes, sizeof *parts->of);
-    parts->count = parts->of ? uz_mesh_number_parts(parts->of, &model->mesh) : -1;
-    parts->list = parts->count >= 0 ? uz_alloc_zero(parts->count, sizeof *parts->list) : NULL;
-    if (!parts->list)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of %lld nodes", (long long)model->mesh.n_nodes);
-    measure_parts(parts, &model->mesh);
-    hold_by_supports(parts, model);
+    /* a held dof is a direction that supports hold; a spring holds its axes as stiffness */
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
+        const int64_t a = i / mesh->dim, c = i % mesh->dim;
+        const double *Q = uz_node_frame(model, a);
+        if (model->dof[i] < 0)
+            uz_hold_part(parts, mesh, a, Q ? Q + c * mesh->dim : axis[c]);
+        if (model->spring && model->spring[i] > 0)
+            uz_hold_part(parts, mesh, a, axis[c]);
+    }
     return UZ_OK;
 }
 

@@ -34,7 +34,10 @@ void uz_parts_clear(uz_parts *parts);
 double uz_part_size(const uz_part *p);
 double uz_part_centre(const uz_part *p, int axis);
 
-/* Appends v to the orthonormal rows unless they span it already. */
+/* v (n) becomes what the orthonormal rows of basis (rank x n) leave of it, scaled to length 1: Gram and Schmidt, twice
+ * for accuracy. False: nothing is left. */
+bool uz_reject_rows(double *v, const double *basis, int64_t rank, int64_t n);
+/* Appends v to the orthonormal rows, of which there is room for UZ_MOTIONS, unless they span it already. */
 void uz_extend_rows(double rows[][UZ_MOTIONS], int *n, const double v[UZ_MOTIONS]);
 /* The direction n (dim) at a node is held. */
 void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n);

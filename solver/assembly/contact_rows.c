@@ -92,27 +92,11 @@ static void add_entries(row_work *work, const uz_body_model *model, int64_t row,
     }
 }
 
-static void add_row(uz_body_model *model, row_work *work, int64_t row, int64_t contact, int64_t place,
-                    const uz_contact_row *r)
-{
-    const int dim = model->mesh.dim;
-    uz_mesh_info *info = &model->info;
-    info->contact_node[row] = r->node;
-    info->contact_area[row] = work->area[place];
-    info->contact_of[row] = contact;
-    model->row_place[row] = place;
-    info->contact_face[2 * row] = r->masters > 0 ? r->face.element : -1;
-    info->contact_face[2 * row + 1] = r->masters > 0 ? r->face.side : -1;
-    memcpy(info->contact_normal + row * dim, r->normal, (size_t)dim * sizeof *r->normal);
-    for (int j = 0; j < r->slaves; j++)
-        add_entries(work, model, row, r->slave[j], r->normal, -r->slave_share[j]);
-    for (int j = 0; j < r->masters; j++)
-        add_entries(work, model, row, r->master[j], r->normal, r->master_share[j]);
-}
-
 static uz_status add_contact(uz_body_model *model, row_work *work, int64_t *row, const uz_scene *scene, int64_t k,
                              uz_error *err)
 {
+    const int dim = model->mesh.dim;
+    uz_mesh_info *info = &model->info;
     uz_contact_input in;
     uz_contact_row r;
     const uz_status status = uz_contact_input_of(&in, model, scene, k, err);
@@ -121,9 +105,22 @@ static uz_status add_contact(uz_body_model *model, row_work *work, int64_t *row,
     const uz_contact_discretization *discretization = uz_discretization_of(in.contact);
     in.room = work->room;
     discretization->areas(work->area, &in);
-    for (int64_t i = 0; i < discretization->places(&in); i++)
-        if (uz_contact_row_at(&r, &in, i) && moves_something(model, &r))
-            add_row(model, work, (*row)++, k, i, &r);
+    for (int64_t i = 0; i < discretization->places(&in); i++) {
+        if (!uz_contact_row_at(&r, &in, i) || !moves_something(model, &r))
+            continue;
+        info->contact_node[*row] = r.node;
+        info->contact_area[*row] = work->area[i];
+        info->contact_of[*row] = k;
+        model->row_place[*row] = i;
+        info->contact_face[2 * *row] = r.masters > 0 ? r.face.element : -1;
+        info->contact_face[2 * *row + 1] = r.masters > 0 ? r.face.side : -1;
+        memcpy(info->contact_normal + *row * dim, r.normal, (size_t)dim * sizeof *r.normal);
+        for (int j = 0; j < r.slaves; j++)
+            add_entries(work, model, *row, r.slave[j], r.normal, -r.slave_share[j]);
+        for (int j = 0; j < r.masters; j++)
+            add_entries(work, model, *row, r.master[j], r.normal, r.master_share[j]);
+        (*row)++;
+    }
     return UZ_OK;
 }
 
@@ -148,12 +145,6 @@ static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries, in
 }
 
 /* ---- middles of eight-node faces */
-
-/* The group that can touch. The scene was checked. */
-static const uz_group *group_that_touches(const uz_body_model *model, const uz_scene *scene, int64_t k, uz_error *err)
-{
-    return uz_mesh_group(&model->mesh, scene->contacts[k].on, "/contacts", err);
-}
 
 static bool has_eight_nodes(const uz_mesh *mesh, uz_face face)
 {
@@ -227,7 +218,8 @@ static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error
     bool any = false;
     int64_t most = model->mesh.n_nodes, row = 0;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
-        const uz_group *group = group_that_touches(model, scene, k, err);
+        const uz_group *group =
+            uz_mesh_group(&model->mesh, scene->contacts[k].on, "/contacts", err); /* it was checked */
         const uz_contact_sites *sites = &model->sites[k];
         for (int64_t p = 0; sites->ends && p < sites->n && !any; p++)
             any = sites->ends[2 * p] >= 0;
@@ -245,7 +237,8 @@ static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error
             const int64_t first = row;
             while (row < model->m && model->info.contact_of[row] == k)
                 row++;
-            list_ends(model, group_that_touches(model, scene, k, err), row_of, next, k, first, row);
+            const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "/contacts", err);
+            list_ends(model, group, row_of, next, k, first, row);
         }
     }
     const bool room = row_of && next && model->row_ends;
@@ -296,15 +289,6 @@ void uz_row_forces(double *f, const uz_body_model *model, const double *r)
         }
 }
 
-static void free_work(row_work *work)
-{
-    free(work->row);
-    free(work->col);
-    free(work->val);
-    free(work->area);
-    free(work->room);
-}
-
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     row_work work;
@@ -326,7 +310,11 @@ uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_
     if (status == UZ_OK)
         status = uz_csc_from_triplets(&model->N, model->m, model->d, work.count, work.row, work.col, work.val, err);
 done:
-    free_work(&work);
+    free(work.row);
+    free(work.col);
+    free(work.val);
+    free(work.area);
+    free(work.room);
     return status;
 }
 
@@ -400,32 +388,6 @@ static uz_status other_body(uz_error *err)
     return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", "the scene's contacts are not those of this body");
 }
 
-static uz_status contact_gaps(double *h, int64_t *next, const double *prescribed, const uz_body_model *model,
-                              const uz_scene *scene, int64_t k, uz_error *err)
-{
-    uz_contact_input in;
-    uz_status status = uz_contact_input_of(&in, model, scene, k, err);
-    if (status != UZ_OK)
-        return status;
-    const int64_t places = uz_discretization_of(in.contact)->places(&in);
-    if (model->sites[k].n > 0 && model->sites[k].n != places)
-        return other_body(err);
-    for (int64_t i = 0; i < places && status == UZ_OK; i++) {
-        double scale;
-        uz_contact_row row;
-        if (!uz_contact_row_at(&row, &in, i))
-            continue;
-        const double gap = gap_at(&scale, model, &row, prescribed);
-        if (!moves_something(model, &row))
-            status = check_held(model, &row, k, gap, scale, err);
-        else if (*next == model->m)
-            return other_body(err);
-        else
-            h[(*next)++] = gap;
-    }
-    return status;
-}
-
 uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_model *model, const uz_scene *scene,
                           uz_error *err)
 {
@@ -433,8 +395,26 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
     uz_status status = UZ_OK;
     if (model->n_sites != scene->n_contacts)
         return other_body(err);
-    for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++)
-        status = contact_gaps(h, &row, prescribed, model, scene, k, err);
+    for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++) {
+        uz_contact_input in;
+        status = uz_contact_input_of(&in, model, scene, k, err);
+        const int64_t places = status == UZ_OK ? uz_discretization_of(in.contact)->places(&in) : 0;
+        if (status == UZ_OK && model->sites[k].n > 0 && model->sites[k].n != places)
+            return other_body(err);
+        for (int64_t i = 0; i < places && status == UZ_OK; i++) {
+            double scale;
+            uz_contact_row at;
+            if (!uz_contact_row_at(&at, &in, i))
+                continue;
+            const double gap = gap_at(&scale, model, &at, prescribed);
+            if (!moves_something(model, &at))
+                status = check_held(model, &at, k, gap, scale, err);
+            else if (row == model->m)
+                return other_body(err);
+            else
+                h[row++] = gap;
+        }
+    }
     if (status == UZ_OK && row != model->m)
         return other_body(err);
     for (int64_t i = 0; status == UZ_OK && i < model->m && model->row_ends; i++)

@@ -50,19 +50,6 @@ bool uz_is_on_axis(const uz_body_model *model, int64_t node)
     return model->kind == UZ_AXISYMMETRIC && fabs(mesh->xyz[node * mesh->dim]) <= 1e-12 * mesh->extent;
 }
 
-/* Marks the dofs that one support holds along axes with -1. */
-static void mark_support(uz_body_model *model, const uz_support *support, const uz_group *group)
-{
-    const int dim = model->mesh.dim;
-    const int64_t count = uz_group_node_count(&model->mesh, group);
-    double u[3];
-    uz_support_values(u, support, dim);
-    for (int64_t i = 0; i < count; i++)
-        for (int c = 0; c < dim; c++)
-            if (!isnan(u[c]))
-                model->dof[uz_group_node_at(group, i) * dim + c] = -1;
-}
-
 /* Turns the nodes of an inclined support so that what it holds is one of their dofs, unless it is held already. */
 static uz_status mark_inclined(uz_body_model *model, const uz_group *group, const double n[3], uz_error *err)
 {
@@ -77,36 +64,37 @@ static uz_status mark_inclined(uz_body_model *model, const uz_group *group, cons
     return status;
 }
 
-static uz_status mark_all(uz_body_model *model, const uz_scene *scene, uz_error *err)
-{
-    uz_status status = UZ_OK;
-    double n[3];
-    for (int64_t a = 0; a < model->mesh.n_nodes && model->kind == UZ_AXISYMMETRIC; a++)
-        if (uz_is_on_axis(model, a))
-            model->dof[a * model->mesh.dim] = -1;
-    for (int inclined = 0; inclined < 2; inclined++) /* axes first: they stay what they are */
-        for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++) {
-            const uz_group *group = uz_mesh_group(&model->mesh, scene->supports[i].on, "/supports", err);
-            if (!group)
-                return UZ_ERR_SCENE;
-            if (!inclined)
-                mark_support(model, &scene->supports[i], group);
-            else if (uz_support_is_inclined(n, &scene->supports[i], model->mesh.dim))
-                status = mark_inclined(model, group, n, err);
-        }
-    return status;
-}
-
 uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
+    uz_status status = UZ_OK;
+    double u[3], n[3];
     model->dof = uz_alloc_zero(mesh->n_nodes * mesh->dim, sizeof *model->dof);
     if (!model->dof)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the numbers of %lld nodes", (long long)mesh->n_nodes);
-    uz_status status = mark_all(model, scene, err);
+    for (int64_t a = 0; a < mesh->n_nodes && model->kind == UZ_AXISYMMETRIC; a++)
+        if (uz_is_on_axis(model, a))
+            model->dof[a * mesh->dim] = -1;
+    for (int inclined = 0; inclined < 2; inclined++) /* axes first: they stay what they are */
+        for (int64_t k = 0; k < scene->n_supports && status == UZ_OK; k++) {
+            const uz_support *support = &scene->supports[k];
+            const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
+            if (!group)
+                return UZ_ERR_SCENE;
+            if (inclined) {
+                if (uz_support_is_inclined(n, support, mesh->dim))
+                    status = mark_inclined(model, group, n, err);
+                continue;
+            }
+            uz_support_values(u, support, mesh->dim);
+            for (int64_t i = 0; i < uz_group_node_count(mesh, group); i++)
+                for (int c = 0; c < mesh->dim; c++)
+                    if (!isnan(u[c]))
+                        model->dof[uz_group_node_at(group, i) * mesh->dim + c] = -1;
+        }
     if (status != UZ_OK)
         return status;
-    const int64_t total = model->mesh.n_nodes * model->mesh.dim;
+    const int64_t total = mesh->n_nodes * mesh->dim;
     model->d = model->n_fixed = 0;
     for (int64_t i = 0; i < total; i++)
         model->dof[i] = model->dof[i] < 0 ? -1 - model->n_fixed++ : model->d++;

@@ -40,44 +40,28 @@ static void compare(void *ctx, const uz_strain_group *group)
     uz_stress_rows_compare(&x->eta2, &x->energy2, x->nodal.rows, x->nodal.size, group, place);
 }
 
-static void take_stresses(uz_nodal_strains *nodal, const uz_body_model *model)
+double uz_estimate_mesh_error(const uz_body_model *model, const uz_scene *scene, const double *nodal)
 {
-    const int n = nodal->strains;
-    for (int64_t i = 0; i < nodal->count; i++) {
-        const uz_lame lame = model->materials[nodal->material ? nodal->material[i] : 0].lame;
-        double *row = nodal->rows + i * nodal->size, thermal[UZ_ELEMENT_STRESSES] = {0};
-        if (nodal->size > n + 1)
+    double *free_strain = NULL;
+    if (scene && uz_free_strains(&free_strain, model, scene, NULL) != UZ_OK)
+        return NAN;
+    const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
+    estimate x = {.model = model};
+    const uz_strain_work work = {make_rule, compare, &x};
+    uz_status status = uz_nodal_strains_recover(&x.nodal, &from, UZ_CONTINUE_LINEAR, NULL, NULL);
+    const int n = x.nodal.strains;
+    for (int64_t i = 0; i < x.nodal.count && status == UZ_OK; i++) { /* stresses from what they are averages of */
+        const uz_lame lame = model->materials[x.nodal.material ? x.nodal.material[i] : 0].lame;
+        double *row = x.nodal.rows + i * x.nodal.size, thermal[UZ_ELEMENT_STRESSES] = {0};
+        if (x.nodal.size > n + 1)
             uz_thermal_strain(thermal, model->kind, lame, row[n + 1]);
         for (int c = 0; c < n; c++)
             row[c] -= thermal[c];
         uz_elastic_stress(row, model->kind, lame, row);
     }
-}
-
-static double estimate_from(const uz_strain_source *from)
-{
-    estimate x = {.model = from->model};
-    const uz_strain_work work = {make_rule, compare, &x};
-    uz_status status = uz_nodal_strains_recover(&x.nodal, from, UZ_CONTINUE_LINEAR, NULL, NULL);
-    if (status == UZ_OK) {
-        take_stresses(&x.nodal, from->model);
-        status = uz_strain_groups(&work, from, NULL, NULL);
-    }
+    if (status == UZ_OK)
+        status = uz_strain_groups(&work, &from, NULL, NULL);
     uz_nodal_strains_clear(&x.nodal);
-    return status == UZ_OK && x.energy2 > 0 ? sqrt(x.eta2 / (x.energy2 + x.eta2)) : NAN;
-}
-
-double uz_estimate_discretization_error(const uz_body_model *model, const double *nodal)
-{
-    return estimate_from(&(uz_strain_source){.model = model, .nodal = nodal});
-}
-
-double uz_estimate_mesh_error(const uz_body_model *model, const uz_scene *scene, const double *nodal)
-{
-    double *free_strain = NULL;
-    if (uz_free_strains(&free_strain, model, scene, NULL) != UZ_OK)
-        return NAN;
-    const double error = estimate_from(&(uz_strain_source){.model = model, .nodal = nodal, .free_strain = free_strain});
     free(free_strain);
-    return error;
+    return status == UZ_OK && x.energy2 > 0 ? sqrt(x.eta2 / (x.energy2 + x.eta2)) : NAN;
 }

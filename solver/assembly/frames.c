@@ -99,20 +99,6 @@ void uz_turn_element(double *ke, const uz_body_model *model, int64_t element)
     }
 }
 
-/* A unit vector along the free dofs of a node: zero for held ones, and where rounding has left a share of a turned
- * dof. Returns the length of what is left of n before it is scaled to 1; 0: nothing is. */
-static double free_direction(double out[3], const uz_body_model *model, int64_t node, const double n[3])
-{
-    const int dim = model->mesh.dim;
-    double length = 0;
-    uz_free_shares(out, model, node, n);
-    for (int c = 0; c < dim; c++)
-        length = hypot(length, out[c]);
-    for (int c = 0; c < dim && length > 0; c++)
-        out[c] /= length;
-    return length;
-}
-
 /* Turns the node's free dofs so that one of them is along n, a unit vector along its present ones with a share in
  * several: Q = H Q. */
 static void turn_node(uz_body_model *model, int64_t node, const double n[3], int k)
@@ -139,41 +125,24 @@ static void turn_node(uz_body_model *model, int64_t node, const double n[3], int
     memcpy(frame, Q, (size_t)(dim * dim) * sizeof *Q);
 }
 
-/* The dof with the largest share; *shares: how many have one. */
-static int largest_share(int *shares, const double n[3], int dim)
-{
-    int k = 0;
-    *shares = 0;
-    for (int c = 0; c < dim; c++) {
-        k = fabs(n[c]) > fabs(n[k]) ? c : k;
-        *shares += n[c] != 0;
-    }
-    return k;
-}
-
 int uz_hold_direction(uz_body_model *model, int64_t node, const double normal[3])
 {
-    double n[3] = {0};
-    int shares;
-    if (free_direction(n, model, node, normal) <= UZ_DEPENDENT)
+    const int dim = model->mesh.dim;
+    double n[3] = {0}, length = 0;
+    int shares = 0, k = 0; /* the dof with the largest */
+    uz_free_shares(n, model, node, normal);
+    for (int c = 0; c < dim; c++)
+        length = hypot(length, n[c]);
+    if (length <= UZ_DEPENDENT)
         return -1;
-    const int k = largest_share(&shares, n, model->mesh.dim);
+    for (int c = 0; c < dim; c++) {
+        n[c] /= length;
+        k = fabs(n[c]) > fabs(n[k]) ? c : k;
+        shares += n[c] != 0;
+    }
     if (shares > 1)
         turn_node(model, node, n, k);
     return k;
-}
-
-static void choose_frame(uz_body_model *model, bool *chosen, int64_t node, const double normal[3])
-{
-    double n[3] = {0};
-    int shares;
-    if (chosen[node] || !uz_is_contact_row(model, node, normal))
-        return;
-    chosen[node] = true;
-    free_direction(n, model, node, normal);
-    const int k = largest_share(&shares, n, model->mesh.dim);
-    if (shares > 1)
-        turn_node(model, node, n, k);
 }
 
 uz_status uz_reserve_frames(uz_body_model *model, int64_t more, uz_error *err)
@@ -230,8 +199,12 @@ uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error
         status = uz_contact_input_of(&in, model, scene, k, err);
         for (int64_t i = 0; status == UZ_OK && i < uz_discretization_of(in.contact)->places(&in); i++) {
             uz_contact_row row;
-            if (uz_contact_row_at(&row, &in, i) && row.slaves == 1) /* a row of several nodes has none of its own */
-                choose_frame(model, chosen, row.node, row.normal);
+            if (!uz_contact_row_at(&row, &in, i) || row.slaves > 1) /* a row of several nodes has none of its own */
+                continue;
+            if (chosen[row.node] || !uz_is_contact_row(model, row.node, row.normal))
+                continue;
+            chosen[row.node] = true;
+            uz_hold_direction(model, row.node, row.normal);
         }
     }
     free(chosen);

@@ -7,9 +7,23 @@
 #include <stdio.h>
 #include <string.h>
 
-static uz_status spread_materials(uz_body_model *model, const uz_scene *scene, uz_error *err)
+uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
+    model->kind = scene->model;
+    model->formulation = scene->formulation;
+    model->thickness = scene->thickness;
+    model->n_materials = scene->n_materials;
+    model->materials = uz_alloc(scene->n_materials, sizeof *model->materials);
+    if (!model->materials)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld materials", (long long)scene->n_materials);
+    for (int64_t k = 0; k < scene->n_materials; k++) {
+        const uz_material *from = &scene->materials[k];
+        model->materials[k] = (uz_body_material){uz_lame_of(scene->model, from->young, from->poisson), from->poisson,
+                                                 from->density, from->expansion};
+    }
     const int64_t n = model->mesh.n_elements;
+    if (scene->n_materials <= 1)
+        return UZ_OK;
     model->material_of = uz_alloc(n, sizeof *model->material_of);
     if (!model->material_of)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the materials of %lld elements", (long long)n);
@@ -28,36 +42,9 @@ static uz_status spread_materials(uz_body_model *model, const uz_scene *scene, u
     return UZ_OK;
 }
 
-uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_error *err)
-{
-    model->kind = scene->model;
-    model->formulation = scene->formulation;
-    model->thickness = scene->thickness;
-    model->n_materials = scene->n_materials;
-    model->materials = uz_alloc(scene->n_materials, sizeof *model->materials);
-    if (!model->materials)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld materials", (long long)scene->n_materials);
-    for (int64_t k = 0; k < scene->n_materials; k++) {
-        const uz_material *from = &scene->materials[k];
-        model->materials[k] = (uz_body_material){uz_lame_of(scene->model, from->young, from->poisson), from->poisson,
-                                                 from->density, from->expansion};
-    }
-    return scene->n_materials > 1 ? spread_materials(model, scene, err) : UZ_OK;
-}
-
 const uz_body_material *uz_element_material(const uz_body_model *model, int64_t e)
 {
     return &model->materials[model->material_of ? model->material_of[e] : 0];
-}
-
-/* Elements that are all one box share its corners, so that all have the same stiffness to the last bit. */
-static void fill_box(double *xyz, const uz_mesh *mesh, uz_element_kind kind)
-{
-    const double(*local)[3] = uz_element_local_nodes(kind);
-    const int count = uz_element_node_count(kind);
-    for (int a = 0; a < count; a++)
-        for (int c = 0; c < mesh->dim; c++)
-            xyz[a * mesh->dim + c] = local[a][c] > 0 ? mesh->cell[c] : 0;
 }
 
 uz_formulation uz_element_formulation(const uz_body_model *model, int64_t e)
@@ -73,11 +60,11 @@ void uz_body_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], cons
     const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
     int count;
     const int64_t *node = uz_mesh_element(mesh, e, &count);
-    if (mesh->uniform && model->kind != UZ_AXISYMMETRIC)
-        fill_box(xyz, mesh, kind);
-    else
-        for (int a = 0; a < count; a++)
-            memcpy(xyz + a * mesh->dim, mesh->xyz + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *xyz);
+    /* elements that are all one box share its corners, so that all have the same stiffness to the last bit */
+    const double(*local)[3] = mesh->uniform && model->kind != UZ_AXISYMMETRIC ? uz_element_local_nodes(kind) : NULL;
+    for (int a = 0; a < count; a++)
+        for (int c = 0; c < mesh->dim; c++)
+            xyz[a * mesh->dim + c] = !local ? mesh->xyz[node[a] * mesh->dim + c] : local[a][c] > 0 ? mesh->cell[c] : 0;
     *element = (uz_element){.kind = kind,
                             .model = model->kind,
                             .formulation = uz_element_formulation(model, e),

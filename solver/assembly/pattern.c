@@ -18,12 +18,19 @@ typedef struct {
     int64_t n_near;
 } neighbours;
 
-/* Returns the most neighbours, each counted once for every element that it shares. */
-static int64_t fill_incidence(neighbours *n)
+/* The most neighbours: each counted once for every element that it shares. */
+static bool neighbours_init(neighbours *n, const uz_body_model *model)
 {
-    const uz_mesh *mesh = &n->model->mesh;
+    const uz_mesh *mesh = &model->mesh;
     const int64_t corners = mesh->first[mesh->n_elements];
     int64_t most = 0;
+    memset(n, 0, sizeof *n);
+    n->model = model;
+    n->start = uz_alloc_zero(mesh->n_nodes + 1, sizeof *n->start);
+    n->around = uz_alloc(corners, sizeof *n->around);
+    n->seen = uz_alloc_zero(mesh->n_nodes, sizeof *n->seen);
+    if (!n->start || !n->around || !n->seen)
+        return false;
     for (int64_t i = 0; i < corners; i++)
         n->start[mesh->node[i] + 1]++;
     for (int64_t a = 0; a < mesh->n_nodes; a++) {
@@ -36,30 +43,8 @@ static int64_t fill_incidence(neighbours *n)
             n->around[--n->start[mesh->node[i] + 1]] = e;
     memmove(n->start, n->start + 1, (size_t)mesh->n_nodes * sizeof *n->start);
     n->start[mesh->n_nodes] = corners;
-    return most * UZ_ELEMENT_NODES;
-}
-
-static bool neighbours_init(neighbours *n, const uz_body_model *model)
-{
-    const uz_mesh *mesh = &model->mesh;
-    memset(n, 0, sizeof *n);
-    n->model = model;
-    n->start = uz_alloc_zero(mesh->n_nodes + 1, sizeof *n->start);
-    n->around = uz_alloc(mesh->first[mesh->n_elements], sizeof *n->around);
-    n->seen = uz_alloc_zero(mesh->n_nodes, sizeof *n->seen);
-    if (!n->start || !n->around || !n->seen)
-        return false;
-    n->near = uz_alloc(fill_incidence(n) + 1, sizeof *n->near);
+    n->near = uz_alloc(most * UZ_ELEMENT_NODES + 1, sizeof *n->near);
     return n->near != NULL;
-}
-
-/* Keeps the list ascending: it is short, and mostly comes in order. */
-static void insert_near(neighbours *n, int64_t node)
-{
-    int64_t i = n->n_near++;
-    for (; i > 0 && n->near[i - 1] > node; i--)
-        n->near[i] = n->near[i - 1];
-    n->near[i] = node;
 }
 
 static void gather(neighbours *n, int64_t node)
@@ -67,11 +52,16 @@ static void gather(neighbours *n, int64_t node)
     const uz_mesh *mesh = &n->model->mesh;
     n->n_near = 0;
     for (int64_t i = n->start[node]; i < n->start[node + 1]; i++)
-        for (int64_t k = mesh->first[n->around[i]]; k < mesh->first[n->around[i] + 1]; k++)
-            if (n->seen[mesh->node[k]] != node + 1) {
-                n->seen[mesh->node[k]] = node + 1;
-                insert_near(n, mesh->node[k]);
-            }
+        for (int64_t k = mesh->first[n->around[i]]; k < mesh->first[n->around[i] + 1]; k++) {
+            const int64_t other = mesh->node[k];
+            if (n->seen[other] == node + 1)
+                continue;
+            n->seen[other] = node + 1;
+            int64_t at = n->n_near++;
+            for (; at > 0 && n->near[at - 1] > other; at--) /* the list is short, and mostly comes in order */
+                n->near[at] = n->near[at - 1];
+            n->near[at] = other;
+        }
 }
 
 /* Free dofs >= first among the neighbours; written to out unless it is NULL. Returns how many. */
@@ -91,22 +81,9 @@ static int64_t free_rows(int64_t *out, const neighbours *n, int64_t first)
     return count;
 }
 
-/* One column of K (rows from the diagonal on) or of K_fixed (all free rows) per dof: first how many entries it has ...
- */
-static void count_columns(neighbours *n, int64_t *ptr, int64_t *ptr_fixed)
-{
-    const int dim = n->model->mesh.dim;
-    for (int64_t a = 0; a < n->model->mesh.n_nodes; a++) {
-        gather(n, a);
-        for (int c = 0; c < dim; c++) {
-            const int64_t column = n->model->dof[a * dim + c];
-            *(column >= 0 ? &ptr[column + 1] : &ptr_fixed[-column]) = free_rows(NULL, n, column);
-        }
-    }
-}
-
-/* ... then which. */
-static void fill_columns(uz_body_model *model, neighbours *n)
+/* One column of K (rows from the diagonal on) or of K_fixed (all free rows) per dof: how many entries it has, counted
+ * at ptr[column + 1]; where the matrices have room, which (ptr NULL). */
+static void walk_columns(uz_body_model *model, neighbours *n, int64_t *ptr, int64_t *ptr_fixed)
 {
     const uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
     const int dim = model->mesh.dim;
@@ -114,20 +91,20 @@ static void fill_columns(uz_body_model *model, neighbours *n)
     for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
         gather(n, a);
         for (int c = 0; c < dim; c++) {
-            const int64_t column = model->dof[a * dim + c];
-            free_rows(column >= 0 ? K->idx + K->ptr[column] : K_fixed->idx + K_fixed->ptr[-1 - column], n, column);
+            const int64_t column = model->dof[a * dim + c], fixed = -1 - column;
+            if (ptr)
+                *(column >= 0 ? &ptr[column + 1] : &ptr_fixed[fixed + 1]) = free_rows(NULL, n, column);
+            else
+                free_rows(column >= 0 ? K->idx + K->ptr[column] : K_fixed->idx + K_fixed->ptr[fixed], n, column);
         }
     }
 }
 
-static void accumulate(int64_t *ptr, int64_t columns)
+/* ptr: of each column one place on, how many entries it has. */
+static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, int64_t *ptr, uz_error *err)
 {
-    for (int64_t j = 0; j < columns; j++)
+    for (int64_t j = 0; j < cols; j++)
         ptr[j + 1] += ptr[j];
-}
-
-static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, const int64_t *ptr, uz_error *err)
-{
     uz_status status = uz_csc_init(A, rows, cols, ptr[cols], err);
     if (status == UZ_OK)
         memcpy(A->ptr, ptr, (size_t)(cols + 1) * sizeof *ptr);
@@ -144,14 +121,12 @@ uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
         uz_fail(err, status, "", "no memory for the pattern of %lld unknowns", (long long)model->d);
         goto done;
     }
-    count_columns(&n, ptr, ptr_fixed);
-    accumulate(ptr, model->d);
-    accumulate(ptr_fixed, model->n_fixed);
+    walk_columns(model, &n, ptr, ptr_fixed);
     status = init_matrix(&model->K, model->d, model->d, ptr, err);
     if (status == UZ_OK)
         status = init_matrix(&model->K_fixed, model->d, model->n_fixed, ptr_fixed, err);
     if (status == UZ_OK)
-        fill_columns(model, &n);
+        walk_columns(model, &n, NULL, NULL);
 done:
     free(ptr);
     free(ptr_fixed);

@@ -55,51 +55,27 @@ static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c
     return UZ_OK;
 }
 
-static uz_status prescribe_axes(prescription *p, int64_t support, const uz_group *group, uz_error *err)
+static uz_status prescribe_along(prescription *p, int64_t support, int64_t node, const double n[3], uz_error *err)
 {
-    const uz_mesh *mesh = &p->model->mesh;
-    const int64_t count = uz_group_node_count(mesh, group);
-    uz_status status = UZ_OK;
-    double u[3];
-    uz_support_values(u, &p->scene->supports[support], mesh->dim);
-    for (int c = 0; c < mesh->dim; c++)
-        for (int64_t i = 0; i < count && status == UZ_OK && !isnan(u[c]); i++)
-            status = prescribe(p, support, uz_group_node_at(group, i), c, u[c], err);
-    return status;
-}
-
-/* What the dofs given so far make of n . u at a node. Returns the held dof that n has its own share in, -1: none. */
-static int own_share(double *known, double *size, double share[3], const prescription *p, int64_t node,
-                     const double n[3])
-{
-    const int dim = p->model->mesh.dim;
-    int own = -1;
+    char where[96];
+    const double value = p->scene->supports[support].value;
+    const int64_t *dof = p->model->dof + node * p->model->mesh.dim;
+    double known = 0, size = 0, share[3]; /* what the dofs given so far make of n . u */
+    int own = -1;                         /* the held dof that n has its own share in */
     uz_to_frame(share, p->model, node, n);
-    *known = *size = 0;
-    for (int c = 0; c < dim; c++) {
-        const int64_t dof = p->model->dof[node * dim + c];
-        if (dof < 0 && (p->source[-1 - dof] || (c == 0 && uz_is_on_axis(p->model, node)))) {
-            *known += share[c] * p->value[-1 - dof];
-            *size += fabs(share[c] * p->value[-1 - dof]);
+    for (int c = 0; c < p->model->mesh.dim; c++) {
+        if (dof[c] < 0 && (p->source[-1 - dof[c]] || (c == 0 && uz_is_on_axis(p->model, node)))) {
+            known += share[c] * p->value[-1 - dof[c]];
+            size += fabs(share[c] * p->value[-1 - dof[c]]);
         } else if (fabs(share[c]) > UZ_DEPENDENT && (own < 0 || fabs(share[c]) > fabs(share[own]))) {
             own = c;
         }
     }
-    return own;
-}
-
-static uz_status prescribe_along(prescription *p, int64_t support, int64_t node, const double n[3], uz_error *err)
-{
-    char where[96];
-    double known, size, share[3];
-    const double value = p->scene->supports[support].value;
-    const int own = own_share(&known, &size, share, p, node, n);
     if (own >= 0) {
-        const int64_t dof = p->model->dof[node * p->model->mesh.dim + own];
-        if (dof >= 0)
+        if (dof[own] >= 0)
             return other_body(err);
-        p->value[-1 - dof] = (value - known) / share[own];
-        p->source[-1 - dof] = support + 1;
+        p->value[-1 - dof[own]] = (value - known) / share[own];
+        p->source[-1 - dof[own]] = support + 1;
         return UZ_OK;
     }
     if (fabs(value - known) <= AGREE * (fabs(value) + size))
@@ -114,13 +90,15 @@ static uz_status prescribe_along(prescription *p, int64_t support, int64_t node,
 static uz_status prescribe_group(prescription *p, int64_t support, bool inclined, uz_error *err)
 {
     const uz_mesh *mesh = &p->model->mesh;
-    double n[3];
+    double n[3], u[3];
     const uz_group *group = uz_mesh_group(mesh, p->scene->supports[support].on, "/supports", err);
     uz_status status = group ? UZ_OK : UZ_ERR_SCENE;
     const int64_t count = group ? uz_group_node_count(mesh, group) : 0;
-    if (group && !inclined)
-        return prescribe_axes(p, support, group, err);
-    if (!uz_support_is_inclined(n, &p->scene->supports[support], mesh->dim))
+    uz_support_values(u, &p->scene->supports[support], mesh->dim);
+    for (int c = 0; c < mesh->dim && !inclined; c++)
+        for (int64_t i = 0; i < count && status == UZ_OK && !isnan(u[c]); i++)
+            status = prescribe(p, support, uz_group_node_at(group, i), c, u[c], err);
+    if (!inclined || !uz_support_is_inclined(n, &p->scene->supports[support], mesh->dim))
         return status;
     for (int64_t i = 0; i < count && status == UZ_OK; i++)
         status = prescribe_along(p, support, uz_group_node_at(group, i), n, err);

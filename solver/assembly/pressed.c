@@ -114,20 +114,6 @@ static bool step_to_trial(nnls *s)
     return whole || stuck;
 }
 
-/* The row that y violates most, -1: none by more than `least`. */
-static int64_t entering(const nnls *s, double least)
-{
-    int64_t best = -1;
-    for (int64_t i = 0; i < s->m; i++) {
-        double w = dot(s->A + i * s->k, s->y, s->k);
-        if (!s->barred[i] && w > least) {
-            best = i;
-            least = w;
-        }
-    }
-    return best;
-}
-
 /* Fills y for the b that stands in s. */
 static void solve(nnls *s, double scale)
 {
@@ -135,7 +121,15 @@ static void solve(nnls *s, double scale)
     memset(s->barred, 0, (size_t)s->m * sizeof *s->barred);
     least_squares(s);
     for (int64_t step = 0; step < 10 * (s->m + s->k) && s->n <= s->k; step++) {
-        int64_t row = entering(s, ROUNDING * scale);
+        int64_t row = -1; /* that y violates most */
+        double most = ROUNDING * scale;
+        for (int64_t i = 0; i < s->m; i++) {
+            const double w = dot(s->A + i * s->k, s->y, s->k);
+            if (!s->barred[i] && w > most) {
+                row = i;
+                most = w;
+            }
+        }
         if (row < 0)
             break;
         if (s->n < s->k) {

@@ -12,12 +12,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-static uz_status refuse(const uz_parts *parts, const uz_part *p, const char *who, uz_error *err)
+/* The first part that is free names its motions. */
+static uz_status refuse_free(const uz_parts *parts, const char *who, uz_error *err)
 {
-    char names[300], name[160], which[96] = "";
+    char names[300] = "", name[160], which[96] = "";
     double mode[UZ_MOTIONS][UZ_MOTIONS];
+    const uz_part *p = parts->list, *end = parts->list + parts->count;
+    while (p < end && p->rank == parts->motions)
+        p++;
+    if (p == end)
+        return UZ_OK;
     const int n = uz_free_motions(mode, parts, p);
-    names[0] = '\0';
     for (int i = 0; i < n; i++) {
         const size_t used = strlen(names);
         uz_name_part_motion(name, sizeof name, parts, p, mode[i], false);
@@ -29,20 +34,12 @@ static uz_status refuse(const uz_parts *parts, const uz_part *p, const char *who
                    which);
 }
 
-static uz_status refuse_first(const uz_parts *parts, const char *who, uz_error *err)
-{
-    for (int64_t i = 0; i < parts->count; i++)
-        if (parts->list[i].rank < parts->motions)
-            return refuse(parts, &parts->list[i], who, err);
-    return UZ_OK;
-}
-
 uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)
 {
     uz_parts parts;
     uz_status status = uz_find_parts(&parts, model, err);
     if (status == UZ_OK)
-        status = refuse_first(&parts, "the supports", err);
+        status = refuse_free(&parts, "the supports", err);
     uz_parts_clear(&parts);
     return status;
 }
@@ -86,44 +83,6 @@ static uz_status fill_modes(double **out, int64_t *count, const uz_parts *parts,
 
 /* -------------------------------------------------------------- parts that lean on parts */
 
-/* rows (m x n) = N Z, each of length 1 or 0. */
-static void rows_on_modes(double *rows, const uz_body_model *model, const double *z, int64_t n)
-{
-    const uz_csc *N = &model->N;
-    for (int64_t k = 0; k < n; k++)
-        for (int64_t j = 0; j < model->d; j++)
-            for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
-                rows[N->idx[q] * n + k] += N->val[q] * z[k * model->d + j];
-    for (int64_t i = 0; i < model->m; i++) {
-        double square = 0;
-        for (int64_t k = 0; k < n; k++)
-            square += rows[i * n + k] * rows[i * n + k];
-        for (int64_t k = 0; k < n; k++)
-            rows[i * n + k] *= square > UZ_DEPENDENT * UZ_DEPENDENT ? 1 / sqrt(square) : 0;
-    }
-}
-
-/* v minus its projection on the rank orthonormal rows of basis, scaled to length 1; false: nothing is left. */
-static bool reject_rows(double *v, const double *basis, int64_t rank, int64_t n)
-{
-    double square = 0;
-    for (int twice = 0; twice < 2; twice++)
-        for (int64_t i = 0; i < rank; i++) {
-            double dot = 0;
-            for (int64_t k = 0; k < n; k++)
-                dot += v[k] * basis[i * n + k];
-            for (int64_t k = 0; k < n; k++)
-                v[k] -= dot * basis[i * n + k];
-        }
-    for (int64_t k = 0; k < n; k++)
-        square += v[k] * v[k];
-    if (square <= UZ_DEPENDENT * UZ_DEPENDENT)
-        return false;
-    for (int64_t k = 0; k < n; k++)
-        v[k] /= sqrt(square);
-    return true;
-}
-
 /* What of part i moves in the null space, rows rank .. n of basis: the rest of its motions counts as held. */
 static void keep_free(uz_parts *parts, int64_t i, const double *basis, int64_t rank, int64_t n, int64_t first)
 {
@@ -150,19 +109,30 @@ static uz_status hold_by_bodies(uz_parts *parts, const uz_body_model *model, con
     double *rows = uz_alloc_zero(model->m * n, sizeof *rows), *basis = uz_alloc(n * n, sizeof *basis);
     const bool ok = rows && basis;
     if (ok) {
-        rows_on_modes(rows, model, z, n);
+        const uz_csc *N = &model->N; /* rows (m x n) = N Z, each of length 1 or 0 */
+        for (int64_t k = 0; k < n; k++)
+            for (int64_t j = 0; j < model->d; j++)
+                for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+                    rows[N->idx[q] * n + k] += N->val[q] * z[k * model->d + j];
+        for (int64_t i = 0; i < model->m; i++) {
+            double square = 0;
+            for (int64_t k = 0; k < n; k++)
+                square += rows[i * n + k] * rows[i * n + k];
+            for (int64_t k = 0; k < n; k++)
+                rows[i * n + k] *= square > UZ_DEPENDENT * UZ_DEPENDENT ? 1 / sqrt(square) : 0;
+        }
         /* The rows of N together hold what they span of all modes; what is left goes back to the parts. Gram and
          * Schmidt, as there are few modes. basis: n x n. */
         int64_t rank = 0, all, first = 0;
         for (int64_t i = 0; i < model->m && rank < n; i++) {
             memcpy(basis + rank * n, rows + i * n, (size_t)n * sizeof *basis);
-            rank += reject_rows(basis + rank * n, basis, rank, n);
+            rank += uz_reject_rows(basis + rank * n, basis, rank, n);
         }
         all = rank;
         for (int64_t k = 0; k < n && all < n; k++) {
             memset(basis + all * n, 0, (size_t)n * sizeof *basis);
             basis[all * n + k] = 1;
-            all += reject_rows(basis + all * n, basis, all, n);
+            all += uz_reject_rows(basis + all * n, basis, all, n);
         }
         for (int64_t i = 0; i < parts->count; i++) {
             const int own = parts->motions - parts->list[i].rank;
@@ -194,7 +164,7 @@ uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *mo
                          model->info.contact_normal + i * model->mesh.dim);
     }
     if (status == UZ_OK)
-        status = refuse_first(&parts, model->m > 0 ? "the supports and obstacles" : "the supports", err);
+        status = refuse_free(&parts, model->m > 0 ? "the supports and obstacles" : "the supports", err);
     uz_parts_clear(&parts);
     if (status == UZ_OK) {
         *modes = z;
@@ -205,7 +175,8 @@ uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *mo
     return status;
 }
 
-void uz_name_motion(char *text, size_t size, const uz_body_model *model, const double *y)
+/* The motion with these coefficients (n_modes) in words, of the part that it moves most: "translation along +y". */
+static void name_motion(char *text, size_t size, const uz_body_model *model, const double *y)
 {
     uz_parts parts;
     double mode[UZ_MOTIONS][UZ_MOTIONS], largest = 0;
@@ -242,7 +213,7 @@ uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)model->n_modes);
     uz_status status = uz_load_on_modes(&how, y, model->modes, model->n_modes, &model->N, p, BALANCED, true, err);
     if (status == UZ_OK && how != UZ_PRESSED_ON) {
-        uz_name_motion(motion, sizeof motion, model, y);
+        name_motion(motion, sizeof motion, model, y);
         status = uz_fail(err, UZ_ERR_FREE_BODY, "/loads",
                          how == UZ_PUSHED_AWAY
                              ? "the loads push the body away: %s; no obstacle or support stands in its way. Hold it by "

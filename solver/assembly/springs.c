@@ -41,21 +41,6 @@ uz_status uz_spread_over_group(double *share, const uz_body_model *model, const 
     return UZ_OK;
 }
 
-static uz_status add_springs(uz_body_model *model, double *share, const uz_support *support, uz_error *err)
-{
-    const int dim = model->mesh.dim;
-    const uz_group *group = uz_mesh_group(&model->mesh, support->on, "/supports", err);
-    if (!group)
-        return UZ_ERR_SCENE;
-    memset(share, 0, (size_t)model->mesh.n_nodes * sizeof *share);
-    uz_status status = uz_spread_over_group(share, model, group, true, "/supports", err);
-    for (int64_t a = 0; a < model->mesh.n_nodes && status == UZ_OK; a++)
-        for (int c = 0; c < dim; c++)
-            if (support->spring[c] > 0) /* the corners of a tri6 face have less than nothing by rounding */
-                model->spring[a * dim + c] += fmax(0, share[a]) * support->spring[c];
-    return status;
-}
-
 uz_status uz_spread_springs(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     int64_t springs = 0;
@@ -69,9 +54,18 @@ uz_status uz_spread_springs(uz_body_model *model, const uz_scene *scene, uz_erro
     if (!share || !model->spring)
         status =
             uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the springs of %lld nodes", (long long)model->mesh.n_nodes);
-    for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++)
-        if (scene->supports[i].kind == UZ_SUPPORT_SPRING)
-            status = add_springs(model, share, &scene->supports[i], err);
+    for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++) {
+        const uz_support *support = &scene->supports[i];
+        if (support->kind != UZ_SUPPORT_SPRING)
+            continue;
+        const uz_group *group = uz_mesh_group(&model->mesh, support->on, "/supports", err);
+        memset(share, 0, (size_t)model->mesh.n_nodes * sizeof *share);
+        status = group ? uz_spread_over_group(share, model, group, true, "/supports", err) : UZ_ERR_SCENE;
+        for (int64_t a = 0; a < model->mesh.n_nodes && status == UZ_OK; a++)
+            for (int c = 0; c < model->mesh.dim; c++)
+                if (support->spring[c] > 0) /* the corners of a tri6 face have less than nothing by rounding */
+                    model->spring[a * model->mesh.dim + c] += fmax(0, share[a]) * support->spring[c];
+    }
     free(share);
     return status;
 }

@@ -135,7 +135,6 @@ static int64_t find_entry(const uz_csc *A, int64_t row, int64_t column)
 
 /* One element on its way into K. */
 typedef struct {
-    const uz_body_model *model;
     const double *ke; /* n x n */
     int n, dim;
     const int64_t *dof[UZ_ELEMENT_NODES]; /* of each of its nodes: dim of them */
@@ -165,34 +164,14 @@ static void add_block(uz_csc *K, const addition *x, int a, int b)
     }
 }
 
-/* The block of one node: its lower triangle, at the head of each column. */
-static void add_own(uz_csc *K, const addition *x, int a)
-{
-    for (int j = 0; j < x->dim; j++)
-        for (int i = j; i < x->dim; i++)
-            if (x->dof[a][j] >= 0 && x->dof[a][i] >= 0)
-                K->val[K->ptr[x->dof[a][j]] + x->dof[a][i] - x->dof[a][j]] +=
-                    x->ke[(a * x->dim + i) * x->n + a * x->dim + j];
-}
-
-/* Free rows of the column of a supported dof. */
-static void add_fixed(uz_csc *K_fixed, const addition *x, int a, int j)
-{
-    const int64_t column = -1 - x->dof[a][j];
-    for (int i = 0; i < x->n; i++) {
-        const int64_t row = x->dof[i / x->dim][i % x->dim];
-        if (row >= 0)
-            K_fixed->val[find_entry(K_fixed, row, column)] += x->ke[i * x->n + a * x->dim + j];
-    }
-}
-
 static void add_element(uz_body_model *model, const double *ke, int64_t element)
 {
     double turned[DOFS * DOFS];
     int count;
     const int64_t *node = uz_mesh_element(&model->mesh, element, &count);
     const int dim = model->mesh.dim, n = count * dim;
-    addition x = {.model = model, .ke = ke, .n = n, .dim = dim};
+    uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
+    addition x = {.ke = ke, .n = n, .dim = dim};
     if (uz_is_rotated_element(model, element)) {
         memcpy(turned, ke, (size_t)(n * n) * sizeof *ke);
         uz_turn_element(turned, model, element);
@@ -201,13 +180,22 @@ static void add_element(uz_body_model *model, const double *ke, int64_t element)
     for (int a = 0; a < count; a++)
         x.dof[a] = model->dof + node[a] * dim;
     for (int a = 0; a < count; a++) {
-        add_own(&model->K, &x, a);
+        for (int j = 0; j < dim; j++) {
+            const int64_t column = x.dof[a][j];
+            /* the block of the node itself: its lower triangle, at the head of each column */
+            for (int i = j; i < dim && column >= 0; i++)
+                if (x.dof[a][i] >= 0)
+                    K->val[K->ptr[column] + x.dof[a][i] - column] += x.ke[(a * dim + i) * n + a * dim + j];
+            /* the free rows of a supported dof */
+            for (int i = 0; i < n && column < 0; i++) {
+                const int64_t row = x.dof[i / dim][i % dim];
+                if (row >= 0)
+                    K_fixed->val[find_entry(K_fixed, row, -1 - column)] += x.ke[i * n + a * dim + j];
+            }
+        }
         for (int b = 0; b < count; b++)
             if (node[b] > node[a])
-                add_block(&model->K, &x, a, b);
-        for (int j = 0; j < dim; j++)
-            if (x.dof[a][j] < 0)
-                add_fixed(&model->K_fixed, &x, a, j);
+                add_block(K, &x, a, b);
     }
 }
 
@@ -329,11 +317,16 @@ static void take_unrotated(double *d, const uz_mesh *mesh, const int64_t *node, 
 }
 
 /* d'ke d of one element, by one triangle of the symmetric ke; the rows do not wait for each other. */
-typedef double (*energy_of)(const uz_body_model *model, const double *ke, const double *nodal, int64_t e);
-
-static double product_with(const double *ke, const double *d, int n)
+static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e, bool carried)
 {
-    double sum = 0;
+    double d[DOFS], sum = 0;
+    int count;
+    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
+    const bool rings = model->kind == UZ_AXISYMMETRIC;
+    const int n = count * model->mesh.dim;
+    take_relative(d, rings, nodal, node, count, model->mesh.dim);
+    if (carried && !rings)
+        take_unrotated(d, &model->mesh, node, count);
     for (int i = 0; i < n; i++) {
         double row = 0;
         for (int j = 0; j < i; j++)
@@ -341,27 +334,6 @@ static double product_with(const double *ke, const double *d, int n)
         sum += d[i] * (2 * row + ke[i * n + i] * d[i]);
     }
     return sum;
-}
-
-static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
-{
-    double d[DOFS];
-    int count;
-    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
-    take_relative(d, model->kind == UZ_AXISYMMETRIC, nodal, node, count, model->mesh.dim);
-    return product_with(ke, d, count * model->mesh.dim);
-}
-
-static double energy_unrotated(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
-{
-    double d[DOFS];
-    int count;
-    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
-    const bool rings = model->kind == UZ_AXISYMMETRIC;
-    take_relative(d, rings, nodal, node, count, model->mesh.dim);
-    if (!rings)
-        take_unrotated(d, &model->mesh, node, count);
-    return product_with(ke, d, count * model->mesh.dim);
 }
 
 typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
@@ -398,10 +370,8 @@ UZ_AVX2_FMA static double energy_quad4_wide(const uz_body_model *model, const do
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
-    const energy_of of_any = carried ? energy_unrotated : energy_any, of_quad4 = carried ? of_any
-                                                                                 : uz_cpu_has_avx2_fma()
-                                                                                     ? energy_quad4_wide
-                                                                                     : energy_quad4;
+    double (*const of_quad4)(const uz_body_model *, const double *, const double *, int64_t) =
+        uz_cpu_has_avx2_fma() ? energy_quad4_wide : energy_quad4;
     stiffness_source source;
     const double *ke;
     double twice = 0;
@@ -409,7 +379,8 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
     for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++) {
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
-            twice += (mesh->kind[e] == UZ_QUAD4 ? of_quad4 : of_any)(model, ke, nodal, e);
+            twice += mesh->kind[e] == UZ_QUAD4 && !carried ? of_quad4(model, ke, nodal, e)
+                                                           : energy_any(model, ke, nodal, e, carried);
     }
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && model->spring; i++)
         twice += model->spring[i] * nodal[i] * nodal[i];
@@ -419,16 +390,6 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
 }
 
 /* ------------------------------------------------------------ energy of rounding */
-
-/* |x|'|ke||x| of one element. */
-static double element_energy_bound(const double *ke, const double *x, int n)
-{
-    double sum = 0;
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++)
-            sum += fabs(ke[i * n + j]) * fabs(x[i]) * fabs(x[j]);
-    return sum;
-}
 
 uz_status uz_turning_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err)
 {
@@ -448,8 +409,11 @@ uz_status uz_turning_energy(double *energy, const uz_body_model *model, const do
         for (int a = 0; a < count; a++)
             for (int c = 0; c < dim; c++)
                 delta[a * dim + c] = uz_turning_error(model, node[a], nodal + node[a] * dim);
-        if (status == UZ_OK)
-            *energy += element_energy_bound(ke, delta, count * dim);
+        double sum = 0; /* |delta|'|ke||delta| */
+        for (int i = 0; i < count * dim && status == UZ_OK; i++)
+            for (int j = 0; j < count * dim; j++)
+                sum += fabs(ke[i * count * dim + j]) * fabs(delta[i]) * fabs(delta[j]);
+        *energy += sum;
     }
     for (int64_t t = 0; t < model->info.n_rotated && model->spring; t++) {
         const int64_t a = model->info.rotated_node[t];

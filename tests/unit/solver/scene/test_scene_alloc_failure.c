@@ -243,10 +243,10 @@ TEST(error_estimate_without_memory_is_nan)
         heap.until_failure = n;
         heap.failed = false;
         heap.watching = true;
-        CHECK(isnan(uz_estimate_discretization_error(&model, u)));
+        CHECK(isnan(uz_estimate_mesh_error(&model, NULL, u)));
         heap.watching = false;
     }
-    CHECK(uz_estimate_discretization_error(&model, u) > 0);
+    CHECK(uz_estimate_mesh_error(&model, NULL, u) > 0);
     free(u);
     uz_body_model_clear(&model);
     uz_scene_clear(&scene);
