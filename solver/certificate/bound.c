@@ -11,39 +11,31 @@
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
 
-static double sum_of_squares(const double *x, int64_t n)
+double uz_bound_norm(const double *x, int64_t n)
 {
-    four sum = {0.0}, other = {0.0};
-    double rest = 0.0;
+    four lanes = {0.0}, other = {0.0};
+    double rest = 0.0, scale = 0.0, sum;
     int64_t i = 0;
     for (; i + 8 <= n; i += 8) {
-        sum += *(const four *)(x + i) * *(const four *)(x + i);
+        lanes += *(const four *)(x + i) * *(const four *)(x + i);
         other += *(const four *)(x + i + 4) * *(const four *)(x + i + 4);
     }
     for (; i < n; i++)
         rest += x[i] * x[i];
-    sum += other;
-    return ((sum[0] + sum[1]) + (sum[2] + sum[3])) + rest;
-}
-
-/* Squares that left the range of double, or may have. */
-static double norm_by_scaling(const double *x, int64_t n)
-{
-    double scale = 0.0, sum = 0.0;
-    for (int64_t i = 0; i < n; i++) {
+    lanes += other;
+    sum = ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) + rest;
+    if (sum > 0x1p-800 && sum < 0x1p800)
+        return sqrt(sum);
+    /* squares that left the range of double, or may have */
+    for (i = 0; i < n; i++) {
         if (x[i] != x[i]) /* comparisons pass over it */
             return NAN;
         scale = fabs(x[i]) > scale ? fabs(x[i]) : scale;
     }
-    for (int64_t i = 0; scale > 0.0 && i < n; i++)
+    sum = 0.0;
+    for (i = 0; scale > 0.0 && i < n; i++)
         sum += (x[i] / scale) * (x[i] / scale);
     return scale * sqrt(sum);
-}
-
-double uz_bound_norm(const double *x, int64_t n)
-{
-    const double sum = sum_of_squares(x, n);
-    return sum > 0x1p-800 && sum < 0x1p800 ? sqrt(sum) : norm_by_scaling(x, n);
 }
 
 /* most = max(most, |x|), lane by lane; passes over what is not a number. */
@@ -69,16 +61,6 @@ double uz_bound_largest(const double *x, int64_t n)
     return largest;
 }
 
-/* Paper, section 4. */
-static void residuals(uz_residual *a, const uz_bound_terms *t, const double *r, const double *g, int64_t m)
-{
-    a->e1 = t->e1;
-    a->e2 = uz_penetration_norm(g, m);
-    a->e3 = t->positive_part;
-    a->e4 = uz_complementarity_norm(r, g, m);
-    a->total = hypot(hypot(a->e1, a->e2), hypot(a->e3, a->e4));
-}
-
 static double ratio(double value, double scale)
 {
     if (value == 0.0)
@@ -86,27 +68,25 @@ static double ratio(double value, double scale)
     return scale > 0.0 ? value / scale : INFINITY;
 }
 
-/* ||h - g|| = ||N u|| */
-static double reach(const double *g, const double *h, int64_t m)
+/* Paper, section 4; relative: force by ||p|| (by the reactions where there is no load), length by the size of h and
+ * N u = h - g, or of what u could move a row by: where all rows touch and h = 0, N u is rounding. Energy by |psi|. */
+static void conclude_residuals(uz_certificate *out, const uz_bound_terms *t, const double *r, const double *g,
+                               const double *h, int64_t m)
 {
+    const double force = t->force > 0.0 ? t->force : uz_bound_norm(r, m);
     double scale = 0.0, sum = 0.0;
+    uz_residual *a = &out->residual, *b = &out->relative_residual;
     for (int64_t i = 0; i < m; i++)
         scale = fmax(scale, fabs(h[i] - g[i]));
     for (int64_t i = 0; scale > 0.0 && i < m; i++)
         sum += ((h[i] - g[i]) / scale) * ((h[i] - g[i]) / scale);
-    return scale * sqrt(sum);
-}
-
-/* Force by ||p|| (by the reactions where there is no load), length by the size of h and N u, or of what u
- * could move a row by: where all rows touch and h = 0, N u is rounding. Energy by |psi|. */
-static void scale_residuals(uz_certificate *out, const uz_bound_terms *t, const double *r, const double *g,
-                            const double *h, int64_t m)
-{
-    double force = t->force > 0.0 ? t->force : uz_bound_norm(r, m);
-    const uz_residual *a = &out->residual;
-    uz_residual *b = &out->relative_residual;
+    a->e1 = t->e1;
+    a->e2 = uz_penetration_norm(g, m);
+    a->e3 = t->positive_part;
+    a->e4 = uz_complementarity_norm(r, g, m);
+    a->total = hypot(hypot(a->e1, a->e2), hypot(a->e3, a->e4));
     b->e1 = ratio(a->e1, force);
-    b->e2 = ratio(a->e2, fmax(t->span, fmax(uz_bound_norm(h, m), reach(g, h, m))));
+    b->e2 = ratio(a->e2, fmax(t->span, fmax(uz_bound_norm(h, m), scale * sqrt(sum))));
     b->e3 = ratio(a->e3, force);
     b->e4 = ratio(a->e4, fabs(out->energy_dual));
     b->total = hypot(hypot(b->e1, b->e2), hypot(b->e3, b->e4));
@@ -136,14 +116,6 @@ double uz_bound_enlarge(double square, double doubt, double noise)
     return norm * norm;
 }
 
-/* The error over ||u*||_K, which is at least ||v||_K minus the error. */
-static double relative_to_exact(double error, double norm)
-{
-    if (error == 0.0)
-        return 0.0;
-    return norm > error ? error / (norm - error) : INFINITY;
-}
-
 /* Of free_norm: the rounding of K alone strains a body that is only carried by so much; and an error that iterations
  * left is no rounding, so that what is small beside the motion, but not beside the strains, is not taken for it. */
 #define RIGID    1e-10
@@ -160,11 +132,6 @@ double uz_bound_reference(double whole_norm, double free_norm, double error)
 
 /* What the rounding of sums may hide of terms that do not cancel, relative. */
 #define SUMS 0x1p-40
-
-static bool has_underflown(const uz_certificate *out, const uz_bound_terms *t)
-{
-    return t->anything && fmax(out->energy_norm * out->energy_norm, 0x1p106 * t->square) < ENERGY_LEAST;
-}
 
 /* Of the sizes that entries of e and g are the differences of, double-double sums of up to some thousand terms hide no
  * more than this (K_ij^2 <= K_ii K_jj, so that |u|'|K||u| is at most so many times the sum of K_jj u_j^2). */
@@ -207,8 +174,9 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
     const double unsure = t->settled > 0.0 ? farther + t->pressed + t->complementarity : 0.0;
     out->energy_primal = t->energy + t->change;
     const double margin = t->margin + DBL_EPSILON * (fabs(t->energy) + fabs(t->change));
-    out->gap =
-        feasible && !has_underflown(out, t) ? 0.5 * t->square + farther + t->complementarity + t->pressed : INFINITY;
+    const bool underflown =
+        t->anything && fmax(out->energy_norm * out->energy_norm, 0x1p106 * t->square) < ENERGY_LEAST;
+    out->gap = feasible && !underflown ? 0.5 * t->square + farther + t->complementarity + t->pressed : INFINITY;
     bool number = !isnan(t->stiffness) && !isnan(t->energy) && !isnan(t->change) && !isnan(t->square);
     if (isnan(out->gap) || !number) /* overflow on the way; fmax would make 0 of it */
         out->gap = INFINITY;
@@ -222,7 +190,10 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
         out->absolute_error = (1.0 + SUMS) * out->absolute_error + sqrt(DBL_MIN);
     if (t->moved)
         out->energy_norm = uz_bound_reference(t->whole_norm, out->energy_norm, out->absolute_error);
-    out->relative_error = relative_to_exact(out->absolute_error, out->energy_norm);
-    residuals(&out->residual, t, r, g, m);
-    scale_residuals(out, t, r, g, h, m);
+    /* over ||u*||_K, which is at least ||v||_K minus the error */
+    const double least = out->energy_norm - out->absolute_error;
+    out->relative_error = out->absolute_error == 0.0               ? 0.0
+                          : out->energy_norm > out->absolute_error ? out->absolute_error / least
+                                                                   : INFINITY;
+    conclude_residuals(out, t, r, g, h, m);
 }

@@ -31,19 +31,6 @@ typedef struct {
     int64_t d, m, n_b;
 } certifier;
 
-static bool allocate(certifier *c)
-{
-    double **of_d[] = {&c->res.e, &c->res.e_u, &c->res.Ku, &c->res.Kc, &c->weight};
-    bool ok = true;
-    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
-        ok = (*of_d[k] = uz_alloc(c->d, sizeof(double))) && ok;
-    c->c = uz_alloc_zero(c->d, sizeof(double));
-    c->u_b = uz_alloc(c->n_b, sizeof(double));
-    c->weight_b = uz_alloc(c->n_b, sizeof(double));
-    c->res.weight = c->weight;
-    return ok && c->c && c->u_b && c->weight_b;
-}
-
 static uz_status prepare(certifier *c, const uz_certify_input *in, const double *u, uz_error *err)
 {
     memset(c, 0, sizeof *c);
@@ -55,7 +42,16 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, const double 
     if (status != UZ_OK)
         return status;
     c->n_b = c->Nt.rows;
-    if (!allocate(c) || !uz_feasible_init(&c->feasible, &c->Nt, c->weight_b))
+    double **of_d[] = {&c->res.e, &c->res.e_u, &c->res.Ku, &c->res.Kc, &c->weight};
+    bool ok = true;
+    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
+        ok = (*of_d[k] = uz_alloc(c->d, sizeof(double))) && ok;
+    c->c = uz_alloc_zero(c->d, sizeof(double));
+    c->u_b = uz_alloc(c->n_b, sizeof(double));
+    c->weight_b = uz_alloc(c->n_b, sizeof(double));
+    c->res.weight = c->weight;
+    ok = ok && c->c && c->u_b && c->weight_b;
+    if (!ok || !uz_feasible_init(&c->feasible, &c->Nt, c->weight_b))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->d);
     for (int64_t b = 0; b < c->n_b; b++) {
         c->weight_b[b] = uz_dof_weight(in->K, c->dof[b]);
@@ -240,28 +236,6 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
     return status;
 }
 
-/* Rows that depend on each other share their reactions in many ways. Some press on rows that others leave no way to
- * close: r takes the form that presses on closed rows only, where its bound is better. */
-static uz_status share_reactions(certifier *c, uz_certificate *out, double *r, const double *g, double positive_part,
-                                 uz_error *err)
-{
-    const uz_certificate before = *out;
-    double *kept = uz_alloc(c->m, sizeof *kept);
-    if (!kept)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld rows", (long long)c->m);
-    memcpy(kept, r, (size_t)c->m * sizeof *r);
-    for (int64_t i = 0; i < c->m; i++)
-        r[i] = r[i] - c->feasible.push[i];
-    uz_cut_reactions(r, c->m);
-    uz_status status = conclude(c, out, r, g, positive_part, true, err);
-    if (!(out->absolute_error < before.absolute_error)) {
-        memcpy(r, kept, (size_t)c->m * sizeof *r);
-        *out = before;
-    }
-    free(kept);
-    return status;
-}
-
 /* More of the bound than this comes from rows that r presses on and that are open. */
 #define OPEN_SHARE 0.1
 
@@ -278,7 +252,23 @@ static uz_status measure(certifier *c, uz_certificate *out, double *r, double *g
     const bool open = uz_feasible_complementarity(&c->feasible, r, feasible) > OPEN_SHARE * out->gap;
     if (status != UZ_OK || !c->feasible.pushed || !open)
         return status;
-    return share_reactions(c, out, r, g, positive_part, err);
+    /* Rows that depend on each other share their reactions in many ways. Some press on rows that others leave no way to
+     * close: r takes the form that presses on closed rows only, where its bound is better. */
+    const uz_certificate before = *out;
+    double *kept = uz_alloc(c->m, sizeof *kept);
+    if (!kept)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld rows", (long long)c->m);
+    memcpy(kept, r, (size_t)c->m * sizeof *r);
+    for (int64_t i = 0; i < c->m; i++)
+        r[i] = r[i] - c->feasible.push[i];
+    uz_cut_reactions(r, c->m);
+    status = conclude(c, out, r, g, positive_part, true, err);
+    if (!(out->absolute_error < before.absolute_error)) {
+        memcpy(r, kept, (size_t)c->m * sizeof *r);
+        *out = before;
+    }
+    free(kept);
+    return status;
 }
 
 uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u, const uz_certify_input *input,

@@ -33,29 +33,6 @@ typedef struct {
     double *X, *Y; /* d x VECTORS: M^q x, K S^-T M^(q-1) x */
 } room;
 
-static uz_status allocate(room *w, const uz_csc *K, uz_error *err)
-{
-    const int64_t d = K->cols;
-    double **of_d[] = {&w->zero, &w->res.e, &w->res.e_u, &w->res.Ku, &w->res.Kc};
-    bool ok = true;
-    w->K = K;
-    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
-        ok = (*of_d[k] = uz_alloc_zero(d, sizeof(double))) && ok;
-    w->X = uz_alloc(d * VECTORS, sizeof(double));
-    w->Y = uz_alloc(d * VECTORS, sizeof(double));
-    if (!ok || !w->X || !w->Y)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)d);
-    return uz_csc_init(&w->no_rows, 0, d, 0, err);
-}
-
-static void release(room *w)
-{
-    double *arrays[] = {w->zero, w->res.e, w->res.e_u, w->res.Ku, w->res.Kc, w->X, w->Y};
-    for (size_t k = 0; k < sizeof arrays / sizeof arrays[0]; k++)
-        free(arrays[k]);
-    uz_csc_clear(&w->no_rows);
-}
-
 /* X = M X. */
 static uz_status apply(room *w, uz_half_solve half, void *ctx, uz_error *err)
 {
@@ -91,10 +68,14 @@ uz_status uz_distrust(double *norm, const uz_csc *K, uz_half_solve half, void *c
     const int64_t d = K->cols;
     const int most = d < LARGE ? POWERS : POWERS_OF_LARGE;
     uint64_t state = 0xD1B54A32D192ED03u;
-    room w;
-    memset(&w, 0, sizeof w);
+    room w = {.K = K};
+    double **of_d[] = {&w.zero, &w.res.e, &w.res.e_u, &w.res.Ku, &w.res.Kc};
+    bool ok = (w.X = uz_alloc(d * VECTORS, sizeof(double))) && (w.Y = uz_alloc(d * VECTORS, sizeof(double)));
+    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
+        ok = ok && (*of_d[k] = uz_alloc_zero(d, sizeof(double)));
     *norm = INFINITY;
-    uz_status status = allocate(&w, K, err);
+    uz_status status = ok ? uz_csc_init(&w.no_rows, 0, d, 0, err)
+                          : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)d);
     for (int64_t k = 0; status == UZ_OK && k < d * VECTORS; k++)
         w.X[k] = uz_normal(&state);
     for (int power = 1; status == UZ_OK && *norm > ENOUGH && power <= most; power++) {
@@ -110,6 +91,10 @@ uz_status uz_distrust(double *norm, const uz_csc *K, uz_half_solve half, void *c
         if (status == UZ_OK && bound < *norm)
             *norm = bound;
     }
-    release(&w);
+    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
+        free(*of_d[k]);
+    free(w.X);
+    free(w.Y);
+    uz_csc_clear(&w.no_rows);
     return status;
 }

@@ -88,32 +88,6 @@ double uz_feasible_complementarity(const uz_feasible *c, const double *r, bool s
     return sum;
 }
 
-/* Closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g. */
-static bool worth_closing(const uz_feasible *c, const double *r, int64_t i, double gap)
-{
-    return uz_row_presses(r[i]) && gap <= -2.0 * r[i] * uz_row_compliance(c->Nt, i, c->weight);
-}
-
-/* What the rounding of a gap is relative to: the terms that it is the difference of. Row by row: a wide gap, or a row
- * of large coefficients, must not excuse the penetration of another row. */
-static void size_rows(const uz_feasible *c, const double *u)
-{
-    for (int64_t i = 0; i < c->m; i++) {
-        c->size[i] = fabs(c->h[i]);
-        for (int64_t k = c->Nt->ptr[i]; k < c->Nt->ptr[i + 1]; k++)
-            c->size[i] += fabs(c->Nt->val[k] * u[c->Nt->idx[k]]);
-    }
-}
-
-/* What the rounding of the correction, a vector of doubles, may do to the gap of row i. */
-static double gap_rounding(const uz_feasible *c, int64_t i)
-{
-    double sum = 0.0;
-    for (int64_t k = c->Nt->ptr[i]; k < c->Nt->ptr[i + 1]; k++)
-        sum += fabs(c->Nt->val[k] * c->correction[c->Nt->idx[k]]);
-    return 4.0 * DBL_EPSILON * sum;
-}
-
 /* The rows to move in this round and by how much: target_i is the gap to take away and a little more, so that the
  * correction's own rounding leaves the gap open; 0 for rows left alone. Returns the worst violation, relative to the
  * size of its row. */
@@ -121,10 +95,14 @@ static double choose_rows(const uz_feasible *c, const double *r)
 {
     double worst = 0.0;
     for (int64_t i = 0; i < c->m; i++) {
-        double gap = uz_feasible_gap(c, i);
-        bool close = worth_closing(c, r, i, fabs(gap));
+        const double gap = uz_feasible_gap(c, i);
+        /* closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g */
+        const bool close = uz_row_presses(r[i]) && fabs(gap) <= -2.0 * r[i] * uz_row_compliance(c->Nt, i, c->weight);
+        double moved = 0.0; /* what the rounding of the correction, a vector of doubles, may do is relative to this */
         c->move.in[i] = close || uz_row_penetrates(gap);
-        c->move.target[i] = c->move.in[i] ? gap - gap_rounding(c, i) : 0.0;
+        for (int64_t k = c->Nt->ptr[i]; c->move.in[i] && k < c->Nt->ptr[i + 1]; k++)
+            moved += fabs(c->Nt->val[k] * c->correction[c->Nt->idx[k]]);
+        c->move.target[i] = c->move.in[i] ? gap - 4.0 * DBL_EPSILON * moved : 0.0;
         worst = isnan(gap) ? INFINITY : uz_row_penetrates(gap) ? fmax(worst, -gap / c->size[i]) : worst;
     }
     return worst;
@@ -144,24 +122,6 @@ static bool move_rows(uz_feasible *c, const double *r)
     return choose_rows(c, r) <= NEGLIGIBLE;
 }
 
-/* Squared in the norm of W^-1: the moves that would close the chosen rows one by one, added up. */
-static double sum_of_moves(const uz_feasible *c)
-{
-    double sum = 0.0;
-    for (int64_t i = 0; i < c->m; i++)
-        if (c->move.in[i] && c->move.target[i] != 0.0)
-            sum += c->move.target[i] / uz_row_compliance(c->Nt, i, c->weight) * c->move.target[i];
-    return sum;
-}
-
-static double correction_size(const uz_feasible *c)
-{
-    double sum = 0.0;
-    for (int64_t j = 0; j < c->d; j++)
-        sum += c->correction[j] / c->weight[j] * c->correction[j];
-    return sum;
-}
-
 /* Does u + c, but for a delta that it bounds, have no penetration at all? */
 static bool settle(uz_feasible *c)
 {
@@ -175,13 +135,24 @@ static bool settle(uz_feasible *c)
 bool uz_make_feasible(uz_feasible *c, const double *r)
 {
     const uz_row_exact exact = {c->Nt, c->weight, r, c->h, c->u, c->size, NEGLIGIBLE, c->correction, c->push};
+    double expected = 0.0, size = 0.0; /* squared in the norm of W^-1 */
     c->pushed = false;
-    size_rows(c, c->u);
+    /* What the rounding of a gap is relative to: the terms that it is the difference of. Row by row: a wide gap, or a
+     * row of large coefficients, must not excuse the penetration of another row. */
+    for (int64_t i = 0; i < c->m; i++) {
+        c->size[i] = fabs(c->h[i]);
+        for (int64_t k = c->Nt->ptr[i]; k < c->Nt->ptr[i + 1]; k++)
+            c->size[i] += fabs(c->Nt->val[k] * c->u[c->Nt->idx[k]]);
+    }
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
     choose_rows(c, r);
-    double expected = STRETCH * sum_of_moves(c);
+    for (int64_t i = 0; i < c->m; i++) /* the moves that would close the chosen rows one by one, added up */
+        if (c->move.in[i] && c->move.target[i] != 0.0)
+            expected += c->move.target[i] / uz_row_compliance(c->Nt, i, c->weight) * c->move.target[i];
     bool feasible = move_rows(c, r);
-    if (feasible && correction_size(c) <= expected && settle(c))
+    for (int64_t j = 0; j < c->d; j++)
+        size += c->correction[j] / c->weight[j] * c->correction[j];
+    if (feasible && size <= STRETCH * expected && settle(c))
         return true;
     c->pushed = uz_row_exact_solve(&exact) && settle(c);
     if (c->pushed)

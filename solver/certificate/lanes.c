@@ -71,24 +71,7 @@ static int64_t list_columns(const uz_lane_certifier *c, int64_t *row, int64_t *c
     return count;
 }
 
-static uz_status extract_columns(uz_lane_certifier *c, uz_error *err)
-{
-    int64_t count = list_columns(c, NULL, NULL, NULL);
-    int64_t *row = uz_alloc(count, sizeof *row), *column = uz_alloc(count, sizeof *column);
-    double *value = uz_alloc(count, sizeof *value);
-    uz_status status = UZ_OK;
-    if (row && column && value) {
-        list_columns(c, row, column, value);
-        status = uz_csc_from_triplets(&c->K_b, c->K->cols, c->n_b, count, row, column, value, err);
-    } else {
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->K->cols);
-    }
-    free(row);
-    free(column);
-    free(value);
-    return status;
-}
-
+/* What the contact couples: its dofs, N' on them and the columns of K. */
 static uz_status compress(uz_lane_certifier *c, uz_error *err)
 {
     uz_status status = uz_touched_dofs(&c->Nt_b, &c->dof, c->N, err);
@@ -101,28 +84,26 @@ static uz_status compress(uz_lane_certifier *c, uz_error *err)
         c->place[c->dof[b]] = b;
         c->weight_b[b] = c->weight[c->dof[b]];
     }
-    return extract_columns(c, err);
-}
-
-static bool allocate(uz_lane_certifier *c)
-{
-    int64_t d = c->K->cols, m = c->N->rows;
-    c->weight = uz_alloc(d, sizeof(double));
-    c->place = uz_alloc(d, sizeof(int64_t));
-    c->weight_b = uz_alloc(d, sizeof(double));
-    c->u_b = uz_alloc(d, sizeof(double));
-    c->r = uz_alloc_zero(m, WIDTH * sizeof(double));
-    c->Kc = uz_alloc_zero(d, WIDTH * sizeof(double));
-    c->hi = uz_alloc_zero(d, WIDTH * sizeof(double));
-    c->lo = uz_alloc_zero(d, WIDTH * sizeof(double));
-    c->E = c->in.spares ? NULL : uz_alloc(d, WIDTH * sizeof(double));
-    return c->weight && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo && (c->E || c->in.spares);
+    const int64_t count = list_columns(c, NULL, NULL, NULL);
+    int64_t *row = uz_alloc(count, sizeof *row), *column = uz_alloc(count, sizeof *column);
+    double *value = uz_alloc(count, sizeof *value);
+    if (row && column && value) {
+        list_columns(c, row, column, value);
+        status = uz_csc_from_triplets(&c->K_b, c->K->cols, c->n_b, count, row, column, value, err);
+    } else {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->K->cols);
+    }
+    free(row);
+    free(column);
+    free(value);
+    return status;
 }
 
 uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_certify_input *in, uz_inverse_norms inverse_norms,
                                    uz_error *err)
 {
     const uz_csc *K = in->K, *N = in->N;
+    const int64_t d = K->cols;
     *out = NULL;
     uz_lane_certifier *c = uz_alloc_zero(1, sizeof *c);
     if (!c)
@@ -131,7 +112,16 @@ uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_certify_inp
     c->inverse_norms = inverse_norms;
     c->K = K;
     c->N = N;
-    bool ok = allocate(c);
+    c->weight = uz_alloc(d, sizeof(double));
+    c->place = uz_alloc(d, sizeof(int64_t));
+    c->weight_b = uz_alloc(d, sizeof(double));
+    c->u_b = uz_alloc(d, sizeof(double));
+    c->r = uz_alloc_zero(N->rows, WIDTH * sizeof(double));
+    c->Kc = uz_alloc_zero(d, WIDTH * sizeof(double));
+    c->hi = uz_alloc_zero(d, WIDTH * sizeof(double));
+    c->lo = uz_alloc_zero(d, WIDTH * sizeof(double));
+    c->E = in->spares ? NULL : uz_alloc(d, WIDTH * sizeof(double));
+    bool ok = c->weight && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo && (c->E || in->spares);
     uz_status status = UZ_OK;
     if (ok) {
         uz_certify_weights(c->weight, K);
@@ -143,7 +133,7 @@ uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_certify_inp
         ok = uz_feasible_init(&c->feasible, &c->Nt_b, c->weight_b) && c->c;
     }
     if (status == UZ_OK && !ok)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)K->cols);
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)d);
     if (status == UZ_OK)
         *out = c;
     else
@@ -295,28 +285,12 @@ static void pass_split(uz_lane_certifier *c, const double *U, const double *P)
     pass(c, U, P, 0);
 }
 
-static void run_pass(uz_lane_certifier *c, const double *U, const double *P)
-{
-    memset(c->sum, 0, sizeof c->sum);
-    (uz_cpu_has_avx2_fma() ? pass_fused : pass_split)(c, U, P);
-}
-
-/* Kc of a lane: zero but for the rows that contact dofs couple to. */
-static void couple(uz_lane_certifier *c, int lane)
-{
-    const uz_csc *A = &c->K_b;
-    for (int64_t k = 0; k < A->ptr[A->cols]; k++)
-        c->Kc[A->idx[k] * WIDTH + lane] = 0.0;
-    for (int64_t b = 0; b < A->cols; b++)
-        for (int64_t k = A->ptr[b]; k < A->ptr[b + 1]; k++)
-            c->Kc[A->idx[k] * WIDTH + lane] += A->val[k] * c->c[b * WIDTH + lane];
-}
-
 /* What a lane's answer has to do with the contact: gaps, correction, reactions; their part of the terms. */
 static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a, const double *U, double *pressed,
                          uz_bound_terms *terms)
 {
     uz_feasible *f = &c->feasible;
+    const uz_csc *K_b = &c->K_b;
     for (int64_t b = 0; b < c->n_b; b++)
         c->u_b[b] = U[c->dof[b] * WIDTH + lane];
     for (int64_t i = 0; i < f->m; i++) {
@@ -328,20 +302,18 @@ static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a
     bool feasible = uz_make_feasible(f, a->r) && !f->pushed; /* what pushes say of r is for uz_certify */
     for (int64_t b = 0; b < c->n_b; b++)
         c->c[b * WIDTH + lane] = f->correction[b];
-    couple(c, lane);
+    /* Kc is zero but for the rows that contact dofs couple to */
+    for (int64_t k = 0; k < K_b->ptr[K_b->cols]; k++)
+        c->Kc[K_b->idx[k] * WIDTH + lane] = 0.0;
+    for (int64_t b = 0; b < K_b->cols; b++)
+        for (int64_t k = K_b->ptr[b]; k < K_b->ptr[b + 1]; k++)
+            c->Kc[K_b->idx[k] * WIDTH + lane] += K_b->val[k] * c->c[b * WIDTH + lane];
     for (int64_t i = 0; i < f->m; i++)
         *pressed -= a->r[i] * f->size[i];
     terms->complementarity = uz_feasible_complementarity(f, a->r, feasible);
     terms->settled = feasible ? f->exact.length : 0.0;
     terms->pressed = terms->settled > 0.0 ? uz_feasible_complementarity(f, a->r, false) : 0.0;
     return feasible;
-}
-
-/* Where squares leave the range of double, uz_certify, which scales them, has the word. */
-static bool within_range(double sizes, double residuals, double force)
-{
-    bool plain = residuals == 0.0 || residuals > 1e-130;
-    return plain && sizes < 1e130 && residuals < 1e130 && (force == 0.0 || (force > 1e-260 && force < 1e260));
 }
 
 /* What uz_certify_distance asks of a lane: squares of the lanes come from one solve. */
@@ -376,7 +348,11 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     in.sharp = a->sharp;
     in.moved = a->moved;
     in.whole_norm = a->whole_norm;
-    if (!feasible || !within_range(s->sizes[l], s->residuals[l], s->force[l]) ||
+    /* where squares leave the range of double, uz_certify, which scales them, has the word */
+    const double residuals = s->residuals[l], force = s->force[l];
+    const bool plain = s->sizes[l] < 1e130 && (residuals == 0.0 || (residuals > 1e-130 && residuals < 1e130)) &&
+                       (force == 0.0 || (force > 1e-260 && force < 1e260));
+    if (!feasible || !plain ||
         uz_certify_distance(&terms->square, &in, NULL, c->K->cols, s->weighted[l], s->stiffness[l], s->noise[l],
                             NULL) != UZ_OK)
         return;
@@ -410,7 +386,8 @@ void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, 
         answers[l].certified = false;
         feasible[l] = prepare_lane(c, l, &answers[l], U, &pressed[l], &terms[l]);
     }
-    run_pass(c, U, P);
+    memset(c->sum, 0, sizeof c->sum);
+    (uz_cpu_has_avx2_fma() ? pass_fused : pass_split)(c, U, P);
     const bool solved = c->E && c->inverse_norms(c->in.ctx, squares, c->E, NULL) == UZ_OK;
     for (int l = 0; l < count; l++)
         conclude_lane(c, l, &answers[l], feasible[l], solved ? squares[l] : INFINITY, pressed[l], &terms[l]);

@@ -283,19 +283,6 @@ static inline __attribute__((always_inline)) void take_pair(const product_of *q,
     take_rest(q, j + 1, l, fused);
 }
 
-static inline __attribute__((always_inline)) void symmetric_product(const product_of *q, int fused)
-{
-    for (int64_t j = 0; j < q->A->cols; j++) {
-        prepare_column(q, j);
-        if (is_pair(q->A, j)) {
-            prepare_column(q, j + 1);
-            take_pair(q, j++, fused);
-        } else {
-            take_column(q, j, fused);
-        }
-    }
-}
-
 /* hi + lo -= p + N'r in row j */
 static inline __attribute__((always_inline)) void finish_row(const uz_residuals *out, int64_t j, const double *lo,
                                                              const uz_csc *N, const double *p, const double *r)
@@ -324,24 +311,26 @@ static inline __attribute__((always_inline)) void finish_four(const uz_residuals
     AT(four, out->Ku + j) = Ku;
 }
 
-static inline __attribute__((always_inline)) void finish(const uz_residuals *out, int64_t d, const double *lo,
-                                                         const uz_csc *N, const double *p, const double *r)
-{
-    int64_t j = 0;
-    while (j < d)
-        if (j + 4 <= d && N->ptr[j + 4] == N->ptr[j]) {
-            finish_four(out, j, lo, p);
-            j += 4;
-        } else {
-            finish_row(out, j++, lo, N, p, r);
-        }
-}
-
 static inline __attribute__((always_inline)) void run(const uz_residuals *out, const product_of *q, const uz_csc *N,
                                                       const double *p, const double *r, int fused)
 {
-    symmetric_product(q, fused);
-    finish(out, q->A->cols, q->lo, N, p, r);
+    const int64_t d = q->A->cols;
+    for (int64_t j = 0; j < d; j++) {
+        prepare_column(q, j);
+        if (is_pair(q->A, j)) {
+            prepare_column(q, j + 1);
+            take_pair(q, j++, fused);
+        } else {
+            take_column(q, j, fused);
+        }
+    }
+    for (int64_t j = 0; j < d;)
+        if (j + 4 <= d && N->ptr[j + 4] == N->ptr[j]) {
+            finish_four(out, j, q->lo, p);
+            j += 4;
+        } else {
+            finish_row(out, j++, q->lo, N, p, r);
+        }
 }
 
 UZ_AVX2_FMA static void run_fused(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p,
@@ -353,11 +342,6 @@ UZ_AVX2_FMA static void run_fused(const uz_residuals *out, const product_of *q, 
 static void run_split(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p, const double *r)
 {
     run(out, q, N, p, r, 0);
-}
-
-static void run_best(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p, const double *r)
-{
-    (uz_cpu_has_avx2_fma() ? run_fused : run_split)(out, q, N, p, r);
 }
 
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
@@ -375,7 +359,7 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
         product.first++;
     while (product.last >= 0 && c[product.last] == 0.0)
         product.last--;
-    run_best(out, &product, N, p, r);
+    (uz_cpu_has_avx2_fma() ? run_fused : run_split)(out, &product, N, p, r);
     free(lo);
     return UZ_OK;
 }

@@ -131,17 +131,6 @@ static int64_t gather(uz_row_factor *f, int64_t q)
     return top;
 }
 
-static void forward(uz_row_factor *f, double *x)
-{
-    for (int64_t k = 0; k < f->count; k++) {
-        const uz_row_column *c = &f->column[k];
-        x[k] /= c->diagonal;
-        for (int64_t e = 0; x[k] != 0.0 && e < c->count; e++)
-            x[c->below[e].row] -= c->below[e].value * x[k];
-        f->work += (double)c->count;
-    }
-}
-
 static void backward(uz_row_factor *f, double *x)
 {
     for (int64_t k = f->count - 1; k >= 0; k--) {
@@ -156,7 +145,13 @@ static void backward(uz_row_factor *f, double *x)
 
 void uz_row_factor_solve(uz_row_factor *f, double *x)
 {
-    forward(f, x);
+    for (int64_t k = 0; k < f->count; k++) {
+        const uz_row_column *c = &f->column[k];
+        x[k] /= c->diagonal;
+        for (int64_t e = 0; x[k] != 0.0 && e < c->count; e++)
+            x[c->below[e].row] -= c->below[e].value * x[k];
+        f->work += (double)c->count;
+    }
     backward(f, x);
 }
 

@@ -49,63 +49,38 @@ static void spread(uz_row_move *move, const double *x, const uz_csc *Nt, const d
             move->dofs[Nt->idx[k]] += weight[Nt->idx[k]] * Nt->val[k] * x[i];
 }
 
-static double row_value(const uz_row_move *move, int64_t i, const uz_csc *Nt)
+bool uz_row_move_solve(uz_row_move *move, double *c, const uz_csc *Nt, const double *weight)
 {
-    double sum = 0.0;
-    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
-        sum += Nt->val[k] * move->dofs[Nt->idx[k]];
-    return sum;
-}
-
-/* scale_i = 1 / (n_i'W n_i), 0 for rows out of play. Returns residual'scale residual of the start x = 0. */
-static double start(uz_row_move *move, const uz_csc *Nt, const double *weight)
-{
-    double rho = 0.0;
+    double rho = 0.0; /* residual'scale residual */
     for (int64_t i = 0; i < move->m; i++) {
-        double size = uz_row_compliance(Nt, i, weight);
-        move->scale[i] = move->in[i] && size > 0.0 ? 1.0 / size : 0.0;
+        const double size = uz_row_compliance(Nt, i, weight);
+        move->scale[i] = move->in[i] && size > 0.0 ? 1.0 / size : 0.0; /* 0 for rows out of play */
         move->x[i] = 0.0;
         move->residual[i] = move->target[i];
         move->direction[i] = move->scale[i] * move->residual[i];
         rho += move->residual[i] * move->direction[i];
     }
-    return rho;
-}
-
-/* image = N W N'direction; returns direction'image. */
-static double apply(uz_row_move *move, const uz_csc *Nt, const double *weight)
-{
-    double curvature = 0.0;
-    spread(move, move->direction, Nt, weight);
-    for (int64_t i = 0; i < move->m; i++) {
-        move->image[i] = move->in[i] ? row_value(move, i, Nt) : 0.0;
-        curvature += move->direction[i] * move->image[i];
-    }
-    return curvature;
-}
-
-/* x and residual after a step along the direction; returns the new residual'scale residual. */
-static double advance(uz_row_move *move, double step)
-{
-    double rho = 0.0;
-    for (int64_t i = 0; i < move->m; i++) {
-        move->x[i] += step * move->direction[i];
-        move->residual[i] -= step * move->image[i];
-        rho += move->residual[i] * move->scale[i] * move->residual[i];
-    }
-    return rho;
-}
-
-bool uz_row_move_solve(uz_row_move *move, double *c, const uz_csc *Nt, const double *weight)
-{
-    double rho = start(move, Nt, weight), stop = rho * DBL_EPSILON * DBL_EPSILON;
+    const double stop = rho * DBL_EPSILON * DBL_EPSILON;
     for (int step = 0; step < MAX_STEPS && rho > stop; step++) {
-        double curvature = apply(move, Nt, weight);
+        double curvature = 0.0, next = 0.0;
+        spread(move, move->direction, Nt, weight);
+        for (int64_t i = 0; i < move->m; i++) { /* image = N W N'direction */
+            double sum = 0.0;
+            for (int64_t k = Nt->ptr[i]; move->in[i] && k < Nt->ptr[i + 1]; k++)
+                sum += Nt->val[k] * move->dofs[Nt->idx[k]];
+            move->image[i] = sum;
+            curvature += move->direction[i] * sum;
+        }
         if (!(curvature > 0.0))
             break;
-        double next = advance(move, rho / curvature), beta = next / rho;
+        const double length = rho / curvature;
+        for (int64_t i = 0; i < move->m; i++) {
+            move->x[i] += length * move->direction[i];
+            move->residual[i] -= length * move->image[i];
+            next += move->residual[i] * move->scale[i] * move->residual[i];
+        }
         for (int64_t i = 0; i < move->m; i++)
-            move->direction[i] = move->scale[i] * move->residual[i] + beta * move->direction[i];
+            move->direction[i] = move->scale[i] * move->residual[i] + next / rho * move->direction[i];
         rho = next;
     }
     spread(move, move->x, Nt, weight);

@@ -287,19 +287,6 @@ static int64_t choose(settle *s)
     return q;
 }
 
-/* Moves row q, which may penetrate, and what that takes along. The rows moved before are like any other. */
-static bool move_row(settle *s, int64_t q)
-{
-    s->count = s->n_near = 0;
-    take_gap(s, q);
-    bool settled = true;
-    for (q = mpq_sgn(s->gap) < 0 ? q : -1; q >= 0 && settled; q = settled ? choose(s) : -1)
-        settled = admit(s, q);
-    for (int64_t n = 0; n < s->n_near; n++)
-        s->near[s->list[n]] = false;
-    return settled;
-}
-
 /* The rows of the list (n) penetrate. */
 static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
 {
@@ -318,8 +305,15 @@ static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
             mpq_init(s->A[k][l]);
     }
     mpq_inits(s->a, s->b, s->gap, s->step, s->part, s->own, NULL);
-    for (int64_t k = 0; settled && k < n; k++)
-        settled = move_row(s, wrong[k]);
+    /* with each row what that takes along; the rows moved before are like any other */
+    for (int64_t k = 0; settled && k < n; k++) {
+        s->count = s->n_near = 0;
+        take_gap(s, wrong[k]);
+        for (int64_t q = mpq_sgn(s->gap) < 0 ? wrong[k] : -1; q >= 0 && settled; q = settled ? choose(s) : -1)
+            settled = admit(s, q);
+        for (int64_t i = 0; i < s->n_near; i++)
+            s->near[s->list[i]] = false;
+    }
     double length = 0.0;
     for (int64_t j = 0; settled && j < s->d; j++)
         length += s->moved[j] / sqrt(s->in->weight[j]);
@@ -339,17 +333,6 @@ static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
     return settled;
 }
 
-static bool are_finite(const uz_row_settle *in, int64_t i)
-{
-    bool finite = isfinite(in->h[i]);
-    for (int64_t k = in->Nt->ptr[i]; finite && k < in->Nt->ptr[i + 1]; k++) {
-        const int64_t j = in->Nt->idx[k];
-        finite =
-            (in->at || (isfinite(in->u[j]) && isfinite(in->c[j]))) && isfinite(in->weight[j]) && in->weight[j] > 0.0;
-    }
-    return finite;
-}
-
 bool uz_row_settle_solve(uz_row_settle *problem)
 {
     settle s = {.in = problem, .d = problem->Nt->rows, .m = problem->Nt->cols, .work = MOST_WORK};
@@ -361,7 +344,12 @@ bool uz_row_settle_solve(uz_row_settle *problem)
         s.sure[i] = sure_gap(problem, i);
         if (s.sure[i] >= 0.0)
             continue;
-        settled = are_finite(problem, i);
+        settled = isfinite(problem->h[i]);
+        for (int64_t k = problem->Nt->ptr[i]; settled && k < problem->Nt->ptr[i + 1]; k++) {
+            const int64_t j = problem->Nt->idx[k];
+            settled = (problem->at || (isfinite(problem->u[j]) && isfinite(problem->c[j]))) &&
+                      isfinite(problem->weight[j]) && problem->weight[j] > 0.0;
+        }
         if (settled && !is_open(problem, i))
             wrong[n++] = i;
     }
