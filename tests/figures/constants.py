@@ -105,6 +105,7 @@ PHRASES = {
     "A scene may have 20 million unknowns": constant(20e6, r"UZ_SCENE_MAX_DOFS (\d+)"),
     "1000 items in each list": None, "4096 groups": constant(4096, r"UZ_MESH_MAX_GROUPS (\d+)"),
     "Each fails with a probability below 1e-12": None,  # of the theorems used
+    "spares bodies of 20,000 dofs and more a half": constant(20000, r"UZ_CERTIFY_SPARES = (\d+)"),
     "d times 2e-16": None,
     "\"8 digits are certain\"": None, "right to 8 digits": None,
     "at most 80 lines, files of at most 1,000": None, "functions per 1,000 lines": None,

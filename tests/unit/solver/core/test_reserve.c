@@ -112,7 +112,8 @@ TEST(pages_are_there_before_they_are_touched)
     write_all(a, MB, 1);
     for (int k = 0; k < PATIENCE && !is_there(a, 30 * MB); k++)
         nanosleep(&tenth, NULL);
-    CHECK(is_there(a, 30 * MB) && has_only(a, MB, 1));
+    const bool asks = madvise(a, 2 * MB, MADV_POPULATE_WRITE) == 0; /* Linux 5.14 */
+    CHECK((is_there(a, 30 * MB) || !asks) && has_only(a, MB, 1));
     CHECK(uz_reserve_give(reserve, a) && uz_reserve_bytes(reserve) == 30 * MB);
     for (int k = 0; k < 20; k++) { /* gone before anybody has touched it */
         a = uz_reserve_take(reserve, 48 * MB);
