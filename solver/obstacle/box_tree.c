@@ -134,14 +134,15 @@ double uz_box_distance(const double *box, int dim, const double *x)
     return sum;
 }
 
-int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_distance *distance, const void *ctx)
+int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, double farthest, uz_item_distance *distance,
+                            const void *ctx)
 {
     struct {
         part of;
         double distance;
     } stack[MOST_LEVELS];
     int64_t found = -1;
-    double best = INFINITY;
+    double best = farthest;
     int depth = 0;
     stack[depth].of = (part){1, 0, tree->n};
     stack[depth++].distance = 0;
@@ -163,7 +164,7 @@ int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_di
         }
         for (int64_t i = of.first; i < of.end; i++) {
             const double d = distance(ctx, tree->item[i], x, best);
-            if (d < best || (d == best && tree->item[i] < found)) {
+            if (d < best || (d == best && isfinite(d) && (found < 0 || tree->item[i] < found))) {
                 best = d;
                 found = tree->item[i];
             }

@@ -18,8 +18,10 @@ void uz_box_tree_clear(uz_box_tree *tree);
 
 /* The squared distance of a thing from the point in question; anything beyond `best` where it is more than that. */
 typedef double uz_item_distance(const void *ctx, int64_t item, const double *x, double best);
-/* The nearest thing, of several the one of least number; -1 where no distance is a number. Allocates nothing. */
-int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_distance *distance, const void *ctx);
+/* The nearest thing whose squared distance is at most `farthest`, of several the one of least number; -1 where there is
+ * none. Boxes beyond that are not looked into. Allocates nothing. */
+int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, double farthest, uz_item_distance *distance,
+                            const void *ctx);
 
 /* The squared distance of x from a box (2 dim). */
 double uz_box_distance(const double *box, int dim, const double *x);

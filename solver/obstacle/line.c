@@ -105,7 +105,7 @@ static void gap_to_corner(uz_gap *out, const uz_line *line, int64_t corner, cons
 
 void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
 {
-    const int64_t item = uz_box_tree_nearest(&line->tree, x, distance_to, line);
+    const int64_t item = uz_box_tree_nearest(&line->tree, x, INFINITY, distance_to, line);
     const int64_t i = piece_number(line, item);
     if (item < 0) {
         out->gap = NAN;

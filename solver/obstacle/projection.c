@@ -350,7 +350,9 @@ static bool place_on(bool *found, uz_contact_pair *row, const master *m, const d
     uz_foot foot;
     *found = false;
     memset(row, 0, sizeof *row);
-    const int64_t nearest = uz_box_tree_nearest(&m->tree, x, distance_to, &(seeker){m, own, &back});
+    const double farthest = own && own->farthest > 0 ? own->farthest * m->scale : INFINITY;
+    const int64_t nearest =
+        uz_box_tree_nearest(&m->tree, x, farthest * farthest, distance_to, &(seeker){m, own, &back});
     if (nearest < 0 && own) {
         row->gap = INFINITY;
         return true;

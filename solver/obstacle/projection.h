@@ -50,6 +50,7 @@ typedef struct {
     bool (*may)(const void *ctx, int64_t node,
                 int64_t number); /* of its first node and a face of the group; NULL: all */
     const void *ctx;
+    double farthest; /* beyond it nothing is looked for, as where all around is the own back; 0: no limit */
 } uz_own_place;
 
 /* The rows of all nodes of `on` that face `with` (behind it, only those that look at it), in the order of the nodes

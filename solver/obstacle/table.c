@@ -228,7 +228,7 @@ static void gap_on_border(uz_gap *out, const uz_table *t, int64_t item, const ce
 
 void uz_table_gap(uz_gap *out, const uz_table *table, const double x[3])
 {
-    const int64_t item = uz_box_tree_nearest(&table->tree, x, distance_to, table);
+    const int64_t item = uz_box_tree_nearest(&table->tree, x, INFINITY, distance_to, table);
     if (item < 0) {
         out->gap = NAN;
         return;

@@ -42,6 +42,7 @@ typedef struct {
     bool plane;            /* is the obstacle one? Then straight sides are deepest at their nodes */
     uz_obstacle *obstacle; /* NULL: two bodies */
     uz_own_body *own;      /* where it is now; NULL: no part of it may touch itself */
+    double reach;          /* how deep an overlap may be that means something, but for the point's own side */
     flank flank[2];
     uz_overlap *out;
 } work;
@@ -50,8 +51,9 @@ typedef struct {
 typedef struct {
     int k;
     int64_t i;
-    double size; /* of the side: from its middle to the farthest corner */
-    double gap;  /* INFINITY: faces nothing */
+    double size;  /* of the side: from its middle to the farthest corner */
+    double reach; /* how far away something is looked for */
+    double gap;   /* INFINITY: faces nothing */
     double foot[3];
 } place;
 
@@ -116,7 +118,8 @@ static void look(work *w, place *p, const double *local)
                                   .nodes = side->nodes,
                                   .normals = 1,
                                   .node = side->node,
-                                  .normal = outward};
+                                  .normal = outward,
+                                  .farthest = p->reach};
         const bool found = uz_faces_closest(&foot, w->flank[!p->k].faces, x, &own);
         p->gap = foot.gap;
         if (!found)
@@ -229,6 +232,7 @@ static void look_at_side(work *w, int k, int64_t i, unsigned char *seen)
     for (int a = 0; a < side->nodes; a++)
         p.size = fmax(p.size, sqrt(uz_distance2(middle, moved + dim * a, dim)));
     const double off = sagitta(&known, w, &p);
+    p.reach = p.size + 2 * off + w->reach;
     look(w, &p, at[0]);
     if (!(p.gap <= p.size + 2 * off)) /* gaps change by no more than places do */
         return;
@@ -277,6 +281,24 @@ static void look_at_side(work *w, int k, int64_t i, unsigned char *seen)
 
 /* ---- contacts */
 
+/* An overlap counts that is not deeper than a side, or that the motion of both surfaces made. */
+static double find_reach(const work *w, int flanks)
+{
+    const int dim = w->model->mesh.dim;
+    double longest = 0, motion = 0;
+    for (int j = 0; j < flanks; j++)
+        for (int64_t i = 0; i < w->flank[j].still.n; i++) {
+            const uz_mortar_side *side = &w->flank[j].still.side[i];
+            for (int a = 0; a < side->nodes; a++) {
+                const double *u = w->u + side->node[a] * dim;
+                motion = fmax(motion, uz_distance2(u, (double[3]){0}, dim));
+                for (int b = 0; b < a; b++)
+                    longest = fmax(longest, uz_distance2(side->xyz + dim * a, side->xyz + dim * b, dim));
+            }
+        }
+    return sqrt(longest) + 4 * sqrt(motion);
+}
+
 /* Both flanks of contact k; moved: the body where it is now. */
 static uz_status look_at_contact(uz_overlap *out, const uz_body_model *moved, const uz_body_model *model,
                                  const uz_scene *scene, int64_t k, const double *u, uz_error *err)
@@ -313,6 +335,8 @@ static uz_status look_at_contact(uz_overlap *out, const uz_body_model *moved, co
     }
     if (status == UZ_OK && pair)
         status = uz_own_body_new(&w.own, &moved->mesh, group[0], group[1], NULL);
+    if (status == UZ_OK && w.own)
+        w.reach = find_reach(&w, flanks);
     for (int j = 0; j < flanks && status == UZ_OK; j++) {
         free(seen);
         seen = uz_alloc_zero(w.flank[j].still.n_places, 1);

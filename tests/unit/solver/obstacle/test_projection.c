@@ -2,6 +2,7 @@
 #include "core/alloc.h"
 #include "core/random.h"
 #include "harness.h"
+#include "obstacle/box_tree.h"
 #include "obstacle/face_point.h"
 #include "obstacle/projection.h"
 
@@ -251,6 +252,40 @@ static void random_face(double *x, int count, uint64_t *seed)
         for (int c = 0; c < 3; c++)
             x[3 * i + c] =
                 from[c] - 0.5 + (c < 2 ? (count == 4 ? QUAD[i][c] : TRI[i][c]) : 0) + between(seed, -0.12, 0.12);
+}
+
+/* Things in a row, one at each whole number, of which `met` alone may be met. */
+typedef struct {
+    int64_t met;
+    int *asked;
+} row_of_things;
+
+static double distance_in_row(const void *ctx, int64_t item, const double *x, double best)
+{
+    const row_of_things *row = ctx;
+    (void)best;
+    (*row->asked)++;
+    return item == row->met ? (x[0] - (double)item) * (x[0] - (double)item) : (double)INFINITY;
+}
+
+/* Where nothing near may be met, as on a body's own back, all things would be looked at. */
+TEST(nothing_is_looked_for_beyond_the_farthest)
+{
+    enum { THINGS = 1000 };
+    double box[4 * THINGS];
+    uz_box_tree tree;
+    uz_error err = {0};
+    for (int i = 0; i < 4 * THINGS; i++)
+        box[i] = i % 2 == 0 ? i / 4 : 0;
+    CHECK_INT(uz_box_tree_init(&tree, THINGS, 2, box, &err), UZ_OK);
+    for (int k = 0; k < 4; k++) {
+        int asked = 0;
+        const row_of_things row = {k < 2 ? -1 : 503, &asked};
+        const double x[2] = {500, 0}, farthest = k == 0 ? (double)INFINITY : k == 3 ? 8.9 : 9;
+        CHECK_INT(uz_box_tree_nearest(&tree, x, farthest, distance_in_row, &row), k == 2 ? 503 : -1);
+        CHECK_MSG(k == 0 ? asked == THINGS : asked < 20, "%d", asked);
+    }
+    uz_box_tree_clear(&tree);
 }
 
 TEST(closest_points_against_samples)
