@@ -91,14 +91,25 @@ static double enclose(double *box, const uz_mortar_side *side, int dim)
     return size;
 }
 
-static uz_status plant_tree(uz_mortar_surface *surface, int dim, uz_error *err)
+/* The tree of the sides, and their balls. */
+static uz_status plant_tree(uz_mortar_pair *pair, int dim, uz_error *err)
 {
+    uz_mortar_surface *surface = &pair->surface;
     double *box = uz_alloc(surface->n, 6 * sizeof *box);
-    if (!box)
-        return no_memory(err);
-    for (int64_t i = 0; i < surface->n; i++)
-        enclose(box + 2 * dim * i, &surface->side[i], dim);
-    const uz_status status = uz_box_tree_init(&surface->tree, surface->n, dim, box, err);
+    pair->ball = uz_alloc_zero(surface->n, 4 * sizeof *pair->ball);
+    uz_status status = box && pair->ball ? UZ_OK : no_memory(err);
+    for (int64_t i = 0; i < surface->n && status == UZ_OK; i++) {
+        const uz_mortar_side *side = &surface->side[i];
+        double *ball = pair->ball + 4 * i, most = 0;
+        enclose(box + 2 * dim * i, side, dim);
+        for (int k = 0; k < side->nodes * dim; k++)
+            ball[k % dim] += side->xyz[k] / side->nodes;
+        for (int a = 0; a < side->nodes; a++)
+            most = fmax(most, uz_distance2(side->xyz + a * dim, ball, dim));
+        ball[3] = sqrt(most);
+    }
+    if (status == UZ_OK)
+        status = uz_box_tree_init(&surface->tree, surface->n, dim, box, err);
     free(box);
     return status;
 }
@@ -138,7 +149,7 @@ uz_status uz_mortar_pair_make(uz_mortar_pair *pair, const uz_contact_input *in, 
     if (status == UZ_OK)
         status = uz_mortar_surface_make(&pair->surface, in, &pair->group, err);
     if (status == UZ_OK)
-        status = plant_tree(&pair->surface, dim, err);
+        status = plant_tree(pair, dim, err);
     if (status == UZ_OK)
         status = uz_own_body_new(&pair->own, &in->model->mesh, in->on, in->with, err);
     if (status == UZ_OK && in->rest && !in->contact->faceted) {
@@ -159,6 +170,7 @@ void uz_mortar_pair_clear(uz_mortar_pair *pair)
     free(pair->of);
     free(pair->points.point);
     free(pair->near);
+    free(pair->ball);
     free(pair->way);
 }
 
@@ -190,36 +202,19 @@ uz_way uz_mortar_way(uz_mortar_pair *pair, int64_t i, int64_t j, const double *x
 typedef struct {
     uz_mortar_pair *pair;
     int64_t i, met;
-    double centre[3], radius, normal[3]; /* of side i */
+    double normal[3]; /* of side i */
 } search;
 
-/* The middle of a side, and how far its nodes are from that at most. */
-static double surround(double centre[3], const uz_mortar_side *side, int dim)
-{
-    double most = 0;
-    for (int c = 0; c < 3; c++)
-        centre[c] = 0;
-    for (int k = 0; k < side->nodes * dim; k++)
-        centre[k % dim] += side->xyz[k] / side->nodes;
-    for (int a = 0; a < side->nodes; a++) {
-        double square = 0;
-        for (int c = 0; c < dim; c++)
-            square += (side->xyz[a * dim + c] - centre[c]) * (side->xyz[a * dim + c] - centre[c]);
-        most = fmax(most, square);
-    }
-    return sqrt(most);
-}
-
-/* In space what side i meets is in the prism on it, across its plane: far away that is little of what is near. */
+/* In space what side i meets is in the cylinder on it, across its plane: far away that is little of what is near. */
 static bool list_near(void *ctx, int64_t item)
 {
     search *s = ctx;
     s->met++;
     if (s->pair->in->model->mesh.dim == 3) {
-        double off[3], across[3];
-        const double reach = 1.001 * (s->radius + surround(off, &s->pair->surface.side[item], 3));
-        for (int c = 0; c < 3; c++)
-            off[c] -= s->centre[c];
+        const double *mine = s->pair->ball + 4 * s->i, *its = s->pair->ball + 4 * item;
+        const double off[3] = {its[0] - mine[0], its[1] - mine[1], its[2] - mine[2]};
+        const double reach = 1.001 * (mine[3] + its[3]);
+        double across[3];
         uz_cross3(across, off, s->normal);
         if (uz_dot3(across, across) > reach * reach)
             return false;
@@ -262,13 +257,13 @@ bool uz_mortar_find_points(uz_mortar_pair *pair, int64_t i)
     static const double MIDDLE[2][2] = {{0, 0}, {1. / 3, 1. / 3}};
     uz_side_area_vector(s.normal, &shape, MIDDLE[dim == 3 && shape.nodes % 3 == 0]);
     uz_unit3(s.normal);
-    s.radius = surround(s.centre, &pair->surface.side[i], dim);
     pair->points.n = 0;
     for (double reach = size; covered < (1 - 1e-9) * area; reach *= 8) {
         double wide[6];
-        for (int c = 0; c < dim; c++) {
-            wide[c] = box[c] - reach;
-            wide[dim + c] = box[dim + c] + reach;
+        for (int c = 0; c < dim; c++) { /* in space the box of that cylinder */
+            const double *ball = pair->ball + 4 * i, aside = reach * fabs(s.normal[c]) + 1.001 * ball[3];
+            wide[c] = dim == 3 ? ball[c] - aside : box[c] - reach;
+            wide[dim + c] = dim == 3 ? ball[c] + aside : box[dim + c] + reach;
         }
         pair->n_near = s.met = 0;
         uz_box_tree_meet(&pair->surface.tree, wide, list_near, &s);
