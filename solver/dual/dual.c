@@ -269,7 +269,11 @@ uz_status uz_dual_load_column(uz_dual_load *load, double *column, int64_t i, uz_
     if (!unit)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a column of %lld contacts", (long long)dual->m);
     unit[i] = 1.0;
+    if (dual->form->probe) /* a unit is of another size than the load, which must not matter to the column */
+        dual->form->probe(load, true, 0.0);
     uz_status status = uz_dual_load_apply(load, column, unit, err);
+    if (dual->form->probe)
+        dual->form->probe(load, false, 0.0);
     free(unit);
     return status;
 }

@@ -49,7 +49,7 @@ struct uz_dual_form {
     uz_status (*aim)(uz_dual_load *load, double relative_error, uz_error *err); /* NULL: exact */
     uz_status (*prepare)(uz_dual_load *load, uz_error *err);                    /* NULL: nothing to make */
     /* Between begin true and false D is applied to vectors of about one size, which is not that of reactions, to this
-     * relative accuracy. NULL: exact. */
+     * relative accuracy; 0: to that of the answer. NULL: exact. */
     void (*probe)(uz_dual_load *load, bool begin, double accuracy);
 
     uz_status (*apply)(uz_dual_load *load, double *Dr, const double *r, uz_error *err);

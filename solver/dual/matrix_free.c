@@ -131,7 +131,7 @@ static void probe(uz_dual_load *load, bool begin, double accuracy)
 {
     free_load *x = (free_load *)load;
     x->probing = begin;
-    x->probed = accuracy;
+    x->probed = accuracy > 0.0 ? accuracy : FLOOR * x->aim;
     /* Of another size than what comes: no start for it. */
     memset(x->sparse.response, 0, (size_t)load->dual->d * sizeof *x->sparse.response);
 }

@@ -57,14 +57,14 @@ TEST(answers_scale_with_their_loads)
 {
     static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACTIVE_SET, UZ_METHOD_ACCELERATED_RESTART,
                                         UZ_METHOD_CONJUGATE, UZ_METHOD_DUAL_ACTIVE_SET};
-    static const uz_operator forms[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED};
+    static const uz_operator forms[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE};
     qp_random rng = {91};
-    for (int n = 0; n < 30; n++) {
+    for (int n = 0; n < 60; n++) {
         const qp_kind kind = {.d = random_int(&rng, 1, 12), .m = random_int(&rng, 1, 8), .condition = 100};
         uz_problem problem = problem_of(random_qp(&rng, &kind));
         uz_settings settings = uz_settings_default();
         settings.method = methods[n % 5];
-        settings.op = forms[n % 2];
+        settings.op = forms[n % 3];
         uz_result *first = solve_problem(&problem, &settings);
         for (int k = 0; first && k < EXPONENTS; k++) {
             multiply(problem.qp.p, kind.d, exponents[k]);
