@@ -11,20 +11,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Bits of roots and of what is added to them, and what more than covers their rounding. */
-enum { BITS = 256 };
+/* Bits of roots and of what is added to them, and what more than covers their rounding, which is below 2^-PLACES. */
+enum { BITS = 256, PLACES = 44 };
 #define SURELY (1.0 + 0x1p-40)
 
 typedef struct {
     const uz_certify_input *in;
     int64_t d, m;
-    uz_csc Nt;                /* d x m */
-    mpq_t *v, *Kv, *w, *Kw;   /* d: v, then u, and K times it; w = u - v */
-    mpq_t *s, *g;             /* m: reactions, gaps of v */
-    double *weight, *gap, *e; /* d, m, d */
-    mpq_t energy, load;       /* v'Kv, v'p */
-    mpq_t norm, apart, open;  /* u'Ku, ||u - v||_K^2, -s'g */
-    mpq_t a, b;               /* work */
+    uz_csc Nt;               /* d x m */
+    mpq_t *v, *Kv, *w, *Kw;  /* d: v, then u, and K times it; w = u - v */
+    mpq_t *s, *g;            /* m: reactions, gaps of v */
+    double *weight;          /* d */
+    mpq_t energy, load;      /* v'Kv, v'p */
+    mpq_t norm, apart, open; /* u'Ku, ||u - v||_K^2, -s'g */
+    mpq_t a, b;              /* work */
 } exact;
 
 static mpq_t *zeros(int64_t n)
@@ -66,33 +66,93 @@ static void multiply(exact *c, mpq_t square, mpq_t *y, const mpq_t *x)
     }
 }
 
-/* Gaps of v + delta in gap, those of v in g; false: no such delta is known. *length >= ||delta||_K. */
-static bool settle(exact *c, double *length)
+/* Moves v to where no row penetrates; g: its gaps. false: no such place is known. */
+static bool settle(exact *c)
 {
-    uz_row_settle problem = {
-        .Nt = &c->Nt, .weight = c->weight, .h = c->in->h, .at = (const mpq_t *)c->v, .gap = c->gap};
-    if (!uz_row_settle_solve(&problem) || !isfinite(problem.length))
-        return false;
-    *length = problem.length;
-    for (int64_t i = 0; i < c->m; i++) {
-        if (*length > 0.0 && !isfinite(c->gap[i]))
-            return false;
+    uz_row_settle problem = {.Nt = &c->Nt, .weight = c->weight, .h = c->in->h, .at = c->v};
+    bool open = uz_row_settle_solve(&problem);
+    for (int64_t i = 0; open && i < c->m; i++) {
         mpq_set_d(c->g[i], c->in->h[i]);
         for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++) {
             mpq_set_d(c->a, c->Nt.val[k]);
             mpq_mul(c->a, c->a, c->v[c->Nt.idx[k]]);
             mpq_sub(c->g[i], c->g[i], c->a);
         }
+        open = mpq_sgn(c->g[i]) >= 0;
     }
+    return open;
+}
+
+/* sum -= x'y */
+static void subtract_products(mpf_t sum, mpf_t term, const mpf_t *x, const mpf_t *y, int64_t n)
+{
+    for (int64_t k = 0; k < n; k++)
+        if (mpf_sgn(x[k]) != 0 && mpf_sgn(y[k]) != 0) {
+            mpf_mul(term, x[k], y[k]);
+            mpf_sub(sum, sum, term);
+        }
+}
+
+/* K ~ L L' in L's bits (L: d x d by rows, 0 before). inverse: the trace of the inverse of H = G G', G = diag(K)^-1/2 L,
+ * the sum of X_ij^2 K_jj with X = L^-1, made column by column in x (d). false: a pivot is not positive. */
+static bool factor(mpf_t *L, mpf_t inverse, const uz_csc *K, mpf_t *x, mpf_t term)
+{
+    const int64_t d = K->cols;
+    for (int64_t j = 0; j < d; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            mpf_set_d(L[K->idx[k] * d + j], K->val[k]);
+    for (int64_t j = 0; j < d; j++) {
+        mpf_t *row = L + j * d;
+        for (int64_t k = 0; k <= j; k++) {
+            subtract_products(row[k], term, row, L + k * d, k);
+            if (k < j)
+                mpf_div(row[k], row[k], L[k * d + k]);
+        }
+        if (mpf_sgn(row[j]) <= 0)
+            return false;
+        mpf_sqrt(row[j], row[j]);
+    }
+    mpf_set_ui(inverse, 0);
+    for (int64_t j = 0; j < d; j++)
+        for (int64_t i = j; i < d; i++) {
+            mpf_set_ui(x[i], i == j);
+            subtract_products(x[i], term, L + i * d + j, x + j, i - j);
+            mpf_div(x[i], x[i], L[i * d + i]);
+            mpf_set_d(term, K->val[K->ptr[j]]);
+            mpf_mul(term, term, x[i]);
+            mpf_mul(term, term, x[i]);
+            mpf_add(inverse, inverse, term);
+        }
     return true;
 }
 
-/* square = e'K^-1 e for e = K v - p - N's. It is brought to where squares of doubles neither over- nor underflow. */
-static uz_status take_distance(exact *c, mpf_t square, uz_error *err)
+/* square = e'K^-1 e for e = K v - p - N's, not below it and sharp to 2^-40; negative: nothing is known.
+ *
+ * By K ~ L L' in as many bits as v has. Rounding leaves |K - L L'|_ij <= 2 (d + 2) u (K_ii K_jj)^1/2 (Higham 2002,
+ * theorem 10.3), with a limb more than 2^-bits for u, as GMP cuts differences where their terms end. So K is L L' but
+ * for a part of 2 d (d + 2) u T, T bounding the norm of H^-1, and if that is small K is positive definite.
+ * Substitutions, that for e and those for T, leave residuals of at most (d + 2) u |G| |X|, which the root of d T
+ * bounds: no more than that again. */
+static uz_status take_distance(exact *c, mpf_t square, mp_bitcnt_t bits, uz_error *err)
 {
     const uz_csc *N = c->in->N;
-    int64_t most = INT64_MIN;
-    for (int64_t j = 0; j < c->d; j++) {
+    const int64_t d = c->d;
+    mpf_t term, inverse, *L = uz_alloc(d * (d + 1), sizeof *L), *x = L ? L + d * d : NULL;
+    mpf_set_si(square, -1);
+    if (!L)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)d);
+    mpf_init2(term, bits);
+    mpf_init2(inverse, bits);
+    for (int64_t k = 0; k < d * (d + 1); k++)
+        mpf_init2(L[k], bits);
+    bool known = bits > GMP_LIMB_BITS + PLACES && factor(L, inverse, c->in->K, x, term);
+    if (known) {
+        mpf_set_d(term, 6.0 * (double)d * (double)(d + 2));
+        mpf_mul(inverse, inverse, term);
+        mpf_div_2exp(inverse, inverse, bits - GMP_LIMB_BITS - PLACES); /* all of that is to be below 2^-PLACES */
+        known = mpf_cmp_ui(inverse, 1) < 0;
+    }
+    for (int64_t j = 0; known && j < d; j++) {
         mpq_set_d(c->b, c->in->p[j]);
         mpq_sub(c->Kv[j], c->Kv[j], c->b);
         for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++) {
@@ -100,40 +160,23 @@ static uz_status take_distance(exact *c, mpf_t square, uz_error *err)
             mpq_mul(c->a, c->a, c->s[N->idx[k]]);
             mpq_sub(c->Kv[j], c->Kv[j], c->a);
         }
-        const int64_t bits = (int64_t)mpz_sizeinbase(mpq_numref(c->Kv[j]), 2) -
-                             (int64_t)mpz_sizeinbase(mpq_denref(c->Kv[j]), 2) + ilogb(c->weight[j]) / 2;
-        most = mpq_sgn(c->Kv[j]) != 0 && bits > most ? bits : most;
-    }
-    mpf_set_ui(square, 0);
-    if (most == INT64_MIN)
-        return UZ_OK;
-    double weighted = 0.0, value;
-    for (int64_t j = 0; j < c->d; j++) {
-        if (most > 0)
-            mpq_div_2exp(c->Kv[j], c->Kv[j], (mp_bitcnt_t)most);
+        mpf_set_q(x[j], c->Kv[j]);
+        subtract_products(x[j], term, L + j * d, x, j); /* x = L^-1 e */
+        mpf_div(x[j], x[j], L[j * d + j]);
+        mpf_mul(term, x[j], x[j]);
+        if (j > 0)
+            mpf_add(square, square, term);
         else
-            mpq_mul_2exp(c->Kv[j], c->Kv[j], (mp_bitcnt_t)-most);
-        c->e[j] = mpq_get_d(c->Kv[j]);
-        weighted += c->e[j] * c->weight[j] * c->e[j];
+            mpf_set(square, term);
     }
-    mpf_set_q(square, c->energy);
-    if (most > 0)
-        mpf_div_2exp(square, square, 2 * (mp_bitcnt_t)most);
-    else
-        mpf_mul_2exp(square, square, 2 * (mp_bitcnt_t)-most);
-    const double energy = mpf_get_d(square);
-    /* the noise is what the rounding of e to doubles may hide: 2^-52 of each entry */
-    uz_status status =
-        uz_certify_distance(&value, c->in, c->e, c->d, weighted, fmin(energy, DBL_MAX), 0x1p92 * weighted, err);
-    if (status != UZ_OK || !(value <= DBL_MAX)) {
-        mpf_set_si(square, -1);
-        return status;
+    if (known) {
+        mpf_set_d(term, SURELY);
+        mpf_mul(square, square, term);
     }
-    mpf_set_d(square, value);
-    if (most > 0)
-        mpf_mul_2exp(square, square, 2 * (mp_bitcnt_t)most);
-    else
-        mpf_div_2exp(square, square, 2 * (mp_bitcnt_t)-most);
+    mpf_clears(term, inverse, NULL);
+    for (int64_t k = 0; k < d * (d + 1); k++)
+        mpf_clear(L[k]);
+    free(L);
     return UZ_OK;
 }
 
@@ -151,62 +194,35 @@ static double outward(const mpf_t x, double side)
 }
 
 /* From the terms to the bounds, in BITS: the formulas of uz_bound_conclude. */
-static void conclude(exact *c, uz_certificate *better, const mpf_t square, double settled)
+static void conclude(exact *c, uz_certificate *better, const mpf_t square)
 {
-    mpf_t root, gap, far, error, energy, term, unsure;
-    mpf_t *all[] = {&root, &gap, &far, &error, &energy, &term, &unsure};
+    mpf_t gap, error, energy, term;
+    mpf_t *all[] = {&gap, &error, &energy, &term};
     for (size_t k = 0; k < sizeof all / sizeof all[0]; k++)
         mpf_init2(*all[k], BITS);
     mpq_set_ui(c->open, 0, 1);
-    mpq_set_ui(c->b, 0, 1);
     for (int64_t i = 0; i < c->m; i++) {
         mpq_mul(c->a, c->s[i], c->g[i]);
-        mpq_abs(c->a, c->a);
-        mpq_add(c->b, c->b, c->a); /* of v */
-        if (settled > 0.0) {
-            mpq_set_d(c->a, c->gap[i]);
-            mpq_mul(c->a, c->a, c->s[i]);
-        }
-        mpq_abs(c->a, c->a);
-        mpq_add(c->open, c->open, c->a); /* of v + delta */
+        mpq_sub(c->open, c->open, c->a);
     }
-    mpf_sqrt(root, square);
-    mpf_set_d(far, settled);
-    mpf_add(gap, root, far); /* ||v + delta - u_s||_K */
-    mpf_mul(gap, gap, gap);
-    mpf_set_q(term, c->open);
-    mpf_mul_ui(term, term, 2);
-    mpf_add(gap, gap, term); /* twice the gap */
+    mpf_set_q(gap, c->open);
+    mpf_mul_ui(gap, gap, 2);
+    mpf_add(gap, gap, square); /* twice the gap */
     mpf_sqrt(error, gap);
     mpf_set_q(term, c->apart);
     mpf_sqrt(term, term);
     mpf_add(error, error, term);
-    mpf_add(error, error, far);
     mpf_set_d(term, SURELY);
     mpf_mul(error, error, term);
     mpf_mul(gap, gap, term);
     mpf_div_ui(gap, gap, 2);
     better->absolute_error = outward(error, 1.0);
     better->gap = fmax(outward(gap, 1.0), better->absolute_error > 0.0 ? DBL_TRUE_MIN : 0.0);
-    /* pi(v + delta) - pi(v) = e'delta + s'N delta + 1/2 ||delta||_K^2 */
-    if (settled > 0.0) {
-        mpf_div_ui(term, far, 2);
-        mpf_add(term, term, root);
-        mpf_mul(unsure, term, far);
-        mpf_set_q(term, c->open);
-        mpf_add(unsure, unsure, term);
-        mpf_set_q(term, c->b);
-        mpf_add(unsure, unsure, term);
-        mpf_set_d(term, SURELY);
-        mpf_mul(unsure, unsure, term);
-    }
     mpq_div_2exp(c->a, c->energy, 1);
     mpq_sub(c->a, c->a, c->load);
     mpf_set_q(energy, c->a); /* cut at BITS, and so are the sums: less than a unit in the last place of a double */
-    mpf_add(term, energy, unsure);
-    better->energy_primal = outward(term, 1.0);
-    mpf_sub(term, energy, unsure);
-    mpf_sub(term, term, gap);
+    better->energy_primal = outward(energy, 1.0);
+    mpf_sub(term, energy, gap);
     better->energy_dual = outward(term, -1.0);
     if (c->in->moved) {
         mpf_set_d(term, uz_bound_reference(c->in->whole_norm, better->energy_norm, better->absolute_error));
@@ -225,7 +241,8 @@ static void conclude(exact *c, uz_certificate *better, const mpf_t square, doubl
         mpf_clear(*all[k]);
 }
 
-/* The numbers that are certified, as rational ones. false: u is not finite, or a weight leaves the range of double. */
+/* The numbers that are certified, as rational ones. false: u is not finite, a weight leaves the range of double, or v
+ * can't be made feasible. */
 static bool take(exact *c, const double *u, const mpf_t *v, const mpf_t *s)
 {
     for (int64_t j = 0; j < c->d; j++) {
@@ -237,6 +254,8 @@ static bool take(exact *c, const double *u, const mpf_t *v, const mpf_t *s)
     for (int64_t i = 0; i < c->m; i++)
         if (mpf_sgn(s[i]) < 0)
             mpq_set_f(c->s[i], s[i]);
+    if (!settle(c))
+        return false;
     multiply(c, c->norm, c->Kw, (const mpq_t *)c->w);
     for (int64_t j = 0; j < c->d; j++)
         mpq_sub(c->w[j], c->w[j], c->v[j]);
@@ -255,13 +274,11 @@ uz_status uz_certify_exact(uz_certificate *out, const double *u, const mpf_t *v,
 {
     exact c = {.in = input, .d = input->K->cols, .m = input->N->rows};
     uz_certificate better = *out;
-    double settled = 0.0;
     mpf_t square;
     mpf_init2(square, BITS);
     mpq_inits(c.energy, c.load, c.norm, c.apart, c.open, c.a, c.b, NULL);
     mpq_t **of_d[] = {&c.v, &c.Kv, &c.w, &c.Kw}, **of_m[] = {&c.s, &c.g};
-    bool ok = (c.weight = uz_alloc(c.d, sizeof(double))) && (c.e = uz_alloc(c.d, sizeof(double))) &&
-              (c.gap = uz_alloc(c.m, sizeof(double)));
+    bool ok = (c.weight = uz_alloc(c.d, sizeof(double))) != NULL;
     for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
         ok = ok && (*of_d[k] = zeros(c.d));
     for (size_t k = 0; k < sizeof of_m / sizeof of_m[0]; k++)
@@ -271,12 +288,12 @@ uz_status uz_certify_exact(uz_certificate *out, const double *u, const mpf_t *v,
     bool feasible = false;
     if (status == UZ_OK) {
         uz_certify_weights(c.weight, input->K);
-        feasible = isfinite(input->whole_norm) && take(&c, u, v, s) && settle(&c, &settled);
+        feasible = isfinite(input->whole_norm) && take(&c, u, v, s);
     }
     if (feasible)
-        status = take_distance(&c, square, err);
+        status = take_distance(&c, square, mpf_get_prec(v[0]), err);
     if (status == UZ_OK && feasible && mpf_sgn(square) >= 0) {
-        conclude(&c, &better, square, settled);
+        conclude(&c, &better, square);
         if (better.absolute_error < out->absolute_error)
             *out = better;
     }
@@ -287,8 +304,6 @@ uz_status uz_certify_exact(uz_certificate *out, const double *u, const mpf_t *v,
     mpq_clears(c.energy, c.load, c.norm, c.apart, c.open, c.a, c.b, NULL);
     mpf_clear(square);
     free(c.weight);
-    free(c.e);
-    free(c.gap);
     uz_csc_clear(&c.Nt);
     return status;
 }

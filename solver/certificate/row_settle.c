@@ -315,9 +315,12 @@ static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
             s->near[s->list[i]] = false;
     }
     double length = 0.0;
-    for (int64_t j = 0; settled && j < s->d; j++)
+    for (int64_t j = 0; settled && j < s->d; j++) {
         length += s->moved[j] / sqrt(s->in->weight[j]);
-    for (int64_t i = 0; settled && i < s->m; i++) {
+        if (s->in->at)
+            mpq_add(s->in->at[j], s->in->at[j], s->delta[j]);
+    }
+    for (int64_t i = 0; settled && !s->in->at && i < s->m; i++) {
         take_gap(s, i);
         s->in->gap[i] = mpq_sgn(s->gap) > 0 ? SURELY * mpq_get_d(s->gap) + DBL_MIN : 0.0;
     }

@@ -17,9 +17,10 @@ typedef struct {
     const double *weight; /* d: W > 0, diagonal */
     const double *h;      /* m */
     const double *u, *c;  /* d: rows are to be open at u + c + delta */
-    const mpq_t *at;      /* d, or NULL: instead of u + c */
-    double length;        /* out: a bound on ||delta||_K for every K with the diagonal W^-1; 0: u + c needs none */
-    double *gap;          /* m: where length is not 0: at least the gaps of u + c + delta */
+    mpq_t *at;            /* d, or NULL: in place of u + c, and delta is added to it */
+    /* out, without `at`: */
+    double length; /* a bound on ||delta||_K for every K with the diagonal W^-1; 0: u + c needs none */
+    double *gap;   /* m: where length is not 0: at least the gaps of u + c + delta */
 } uz_row_settle;
 
 /* false: rows contradict each other, numbers are not finite, there is no memory, or it takes more work than a bound is

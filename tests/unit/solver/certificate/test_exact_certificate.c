@@ -94,3 +94,46 @@ TEST(no_bound_without_a_feasible_point)
     CHECK(isinf(certify(&plain, INFINITY, 0, 0).absolute_error));
     CHECK(isinf(certify(&plain, NAN, 0, 0).absolute_error));
 }
+
+/* K = (1 1; 1 1 + eps) of condition 4 / eps, and a row that never touches. v: out, u* in 512 bits. */
+static uz_certificate certify_pair(double eps, const double *u, const double *p, mpf_t *v)
+{
+    const double stiffness[] = {1, 1, 1, 1 + eps}, dense[] = {1, 0}, h = 1e30;
+    uz_csc K = csc_from_dense(stiffness, 2, 2, true), N = csc_from_dense(dense, 1, 2, false);
+    const uz_certify_input in = {.K = &K, .N = &N, .p = p, .h = &h, .rcond = 1, .inverse_bound = INFINITY};
+    uz_certificate c = {.absolute_error = INFINITY, .relative_error = INFINITY};
+    mpf_t s[1], t;
+    mpf_init2(s[0], 512);
+    mpf_init2(t, 512);
+    for (int j = 0; j < 2; j++)
+        mpf_init2(v[j], 512);
+    mpf_set_d(v[1], p[1]); /* u_2 = (p_2 - p_1) / eps, u_1 = p_1 - u_2 */
+    mpf_set_d(t, p[0]);
+    mpf_sub(v[1], v[1], t);
+    mpf_set_d(v[0], eps);
+    mpf_div(v[1], v[1], v[0]);
+    mpf_sub(v[0], t, v[1]);
+    CHECK_INT(uz_certify_exact(&c, u, (const mpf_t *)v, (const mpf_t *)s, &in, NULL), UZ_OK);
+    mpf_clears(s[0], t, NULL);
+    uz_csc_clear(&K);
+    uz_csc_clear(&N);
+    return c;
+}
+
+TEST(stiffness_that_no_double_factor_knows)
+{
+    for (int power = 8; power <= 52; power += 4) {
+        const double eps = ldexp(1, -power), p[] = {1.0 / 3, 1.0 / 3 + 3 * eps}, u[] = {-8.0 / 3, 3.0 + 1e-9};
+        mpf_t v[2];
+        const uz_certificate c = certify_pair(eps, u, p, v);
+        const long double a = (long double)u[0] - mpf_get_d(v[0]), b = (long double)u[1] - mpf_get_d(v[1]),
+                          error = sqrtl((a + b) * (a + b) + (long double)eps * b * b);
+        CHECK_MSG((long double)c.absolute_error >= error * (1 - 1e-6L) &&
+                      (long double)c.absolute_error <= error * 1.001L,
+                  "2^-%d: %g, is %g", power, c.absolute_error, (double)error);
+        mpf_clears(v[0], v[1], NULL);
+        const uz_certificate none = certify_pair(-eps, u, p, v); /* K is not positive definite */
+        CHECK_MSG(isinf(none.absolute_error), "2^-%d: %g", power, none.absolute_error);
+        mpf_clears(v[0], v[1], NULL);
+    }
+}
