@@ -116,6 +116,11 @@ double uz_bound_enlarge(double square, double doubt, double noise)
     return norm * norm;
 }
 
+bool uz_bound_blames_distance(const uz_certificate *out, double square, double requested)
+{
+    return out->relative_error > requested && out->absolute_error - sqrt(square) <= requested * out->energy_norm;
+}
+
 /* Of free_norm: the rounding of K alone strains a body that is only carried by so much; and an error that iterations
  * left is no rounding, so that what is small beside the motion, but not beside the strains, is not taken for it. */
 #define RIGID    1e-10

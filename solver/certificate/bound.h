@@ -39,6 +39,10 @@ void uz_bound_energy(uz_bound_terms *t, const uz_energy_sums *s, const double *r
 void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasible, const double *r, const double *g,
                        const double *h, int64_t m);
 
+/* Does *out miss the request, and may it be for `square` alone? A blunt bound on it must not make the difference:
+ * whether one is known depends on whom the body has served before. */
+bool uz_bound_blames_distance(const uz_certificate *out, double square, double requested);
+
 /* e'K^-1 e, enlarged by what the rounding of the factor (relative part `doubt`) and of double-double sums (see
  * uz_bound_noise; by the factor's inverse) may hide of it. */
 double uz_bound_enlarge(double square, double doubt, double noise);

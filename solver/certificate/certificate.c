@@ -84,14 +84,15 @@ static void release(certifier *c)
  * that pays for it may be as sharp as was asked for nevertheless. */
 #define AFFORDABLE 0.5
 
-uz_status uz_certify_distance(double *square, const uz_certify_input *in, double *e, int64_t d, double weighted,
-                              double energy, double noise, uz_error *err)
+uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_input *in, double *e, int64_t d,
+                              double weighted, double energy, double noise, uz_error *err)
 {
     const double harmless = in->sharp * in->sharp * (in->moved ? in->whole_norm * in->whole_norm : energy);
     double inverse = in->inverse_bound, doubt = uz_bound_doubt(inverse, d);
     uz_status status = UZ_OK;
     *square = inverse * weighted;
-    if (!in->spares || !(doubt <= UZ_BOUND_HARMLESS) || !(*square <= harmless)) {
+    *spared = in->spares && doubt <= UZ_BOUND_HARMLESS && *square <= harmless;
+    if (!*spared) {
         status = in->inverse_norm(in->ctx, square, e, err);
         if (!in->measure_doubt) {
             /* The solve is one of conjugate gradients, whose rounding is that of products with K. A residual is
@@ -227,12 +228,18 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
     add_up(c, &terms, &energies);
     terms.correction_energy += uz_bound_rounding(energies.correction, c->d);
     uz_bound_energy(&terms, &energies, r, g, c->in->h, c->d, c->m);
-    if (feasible)
-        status = uz_certify_distance(&terms.square, c->in, c->res.e, c->d, c->weighted, c->energy, c->noise, err);
     terms.complementarity = uz_feasible_complementarity(&c->feasible, r, true);
     terms.settled = feasible ? c->feasible.exact.length : 0.0;
     terms.pressed = terms.settled > 0.0 ? uz_feasible_complementarity(&c->feasible, r, false) : 0.0;
-    uz_bound_conclude(out, &terms, feasible, r, g, c->in->h, c->m);
+    uz_certify_input in = *c->in;
+    for (bool spared = true; status == UZ_OK && spared; in.spares = false) {
+        spared = false;
+        if (feasible)
+            status =
+                uz_certify_distance(&terms.square, &spared, &in, c->res.e, c->d, c->weighted, c->energy, c->noise, err);
+        uz_bound_conclude(out, &terms, feasible, r, g, in.h, c->m);
+        spared = spared && uz_bound_blames_distance(out, terms.square, 2.0 * in.sharp);
+    }
     return status;
 }
 

@@ -37,7 +37,8 @@ typedef struct {
     double rcond;         /* without a factor: an estimate of the least eigenvalue of K, scaled by its diagonal */
     double inverse_bound; /* with one: what inverse_norm gives is at most so many times the sum of e_j^2 / K_jj */
     bool spares;          /* that takes the place of inverse_norm where it is sharp enough: */
-    double sharp;         /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
+    double sharp;         /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm: half
+                             of what is asked for. Where that is too much after all, nothing is spared */
     bool moved;           /* supports move the body; relative errors are then beside */
     double whole_norm;    /* ||u||_K with the supported dofs */
 } uz_certify_input;
@@ -49,9 +50,10 @@ uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u,
                      uz_error *err);
 
 /* *square >= e'K^-1 e = ||v - u_r||_K^2, with all that the rounding of the factor and of e may hide; INFINITY: none is
- * known. e (d) is lost; weighted: e'W e; energy: u'Ku; noise: the sum of uz_bound_noise. */
-uz_status uz_certify_distance(double *square, const uz_certify_input *input, double *e, int64_t d, double weighted,
-                              double energy, double noise, uz_error *err);
+ * known. *spared: it was bounded by the inverse's norm, and e (d) stands; else that is lost. weighted: e'W e; energy:
+ * u'Ku; noise: the sum of uz_bound_noise. */
+uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_input *input, double *e, int64_t d,
+                              double weighted, double energy, double noise, uz_error *err);
 
 /* A part of it, for answers in lanes. weight (d): W = diag(K)^-1. */
 void uz_certify_weights(double *weight, const uz_csc *K);

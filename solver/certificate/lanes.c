@@ -341,6 +341,7 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     const sums *s = &c->sum[lane / 4];
     const int l = lane % 4;
     lane_solve solve = {c, solved};
+    bool spared;
     uz_certify_input in = c->in;
     in.inverse_norm = lane_norm;
     in.measure_doubt = lane_doubt;
@@ -353,8 +354,8 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     const bool plain = s->sizes[l] < 1e130 && (residuals == 0.0 || (residuals > 1e-130 && residuals < 1e130)) &&
                        (force == 0.0 || (force > 1e-260 && force < 1e260));
     if (!feasible || !plain ||
-        uz_certify_distance(&terms->square, &in, NULL, c->K->cols, s->weighted[l], s->stiffness[l], s->noise[l],
-                            NULL) != UZ_OK)
+        uz_certify_distance(&terms->square, &spared, &in, NULL, c->K->cols, s->weighted[l], s->stiffness[l],
+                            s->noise[l], NULL) != UZ_OK)
         return;
     terms->moved = a->moved;
     terms->whole_norm = a->whole_norm;
@@ -373,7 +374,7 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     terms->anything = s->sizes[l] > 0.0;
     memset(&a->certificate, 0, sizeof a->certificate);
     uz_bound_conclude(&a->certificate, terms, feasible, a->r, a->g, a->h, c->feasible.m);
-    a->certified = true;
+    a->certified = !spared || !uz_bound_blames_distance(&a->certificate, terms->square, 2.0 * a->sharp);
 }
 
 void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, const double *U, const double *P)

@@ -359,6 +359,44 @@ TEST(rounded_solution_is_certified_to_rounding)
     }
 }
 
+/* Whatever is known of the inverse, and however much of the request the rows in contact use up: with a solve the
+ * certificate meets the request, so it does. */
+TEST(a_blunt_bound_on_the_inverse_misses_no_request)
+{
+    qp_random rng = {29};
+    int64_t solved = 0;
+    for (int k = 0; k < 30; k++) {
+        qp_kind kind = {.d = 10, .m = 6, .condition = 100};
+        bench b = make_bench(random_qp(&rng, &kind));
+        if (solve_bench(&b, NULL)) {
+            uz_certify_input in = input_of(&b);
+            uz_certificate c;
+            take_exact(&b);
+            double push[6]; /* u off by what the correction takes back: all of the bound is in that */
+            for (int64_t i = 0; i < kind.m; i++)
+                push[i] = b.exact.active[i] ? 1e-9 * random_signed(&rng) : 0;
+            for (int64_t j = 0; j < kind.d; j++)
+                for (int64_t q = b.qp.N.ptr[j]; q < b.qp.N.ptr[j + 1]; q++)
+                    b.u[j] += push[b.qp.N.idx[q]] * b.qp.N.val[q] / b.qp.K.val[b.qp.K.ptr[j]];
+            CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+            const double least = c.relative_error;
+            in.spares = true;
+            /* where no row is active all of it is rounding */
+            for (double sharp = 0.5 * 1.001 * least; least > 1e-12 && sharp < 64 * least; sharp *= 1.5)
+                for (int power = 0; power < 30; power++) {
+                    in.sharp = sharp;
+                    in.inverse_bound = ldexp(1e3, power);
+                    CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+                    CHECK_MSG(c.relative_error <= 2 * sharp, "2^%d: %g of %g asked", power, c.relative_error,
+                              2 * sharp);
+                    solved += c.relative_error <= 1.01 * least;
+                }
+        }
+        free_bench(&b);
+    }
+    CHECK(solved > 0);
+}
+
 TEST(the_largest_and_the_norm_of_any_length)
 {
     double x[41] = {0};
