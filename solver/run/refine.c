@@ -205,27 +205,37 @@ static uz_status solve_precisely(uz_run *run, bool *solved, const double *p, int
     if (status == UZ_OK && ended == UZ_PRECISE_RAY)
         status = uz_run_take_ray(run, answer.r, err);
     *solved = ended == UZ_PRECISE_SOLVED;
-    if (status == UZ_OK && *solved && p == run->load.p) {
-        for (int64_t j = 0; j < run->d; j++)
-            answer.u[j] = uz_precise_round(u[j]);
+    for (int64_t j = 0; status == UZ_OK && *solved && j < run->d; j++)
+        answer.u[j] = uz_precise_round(u[j]);
+    if (status == UZ_OK && *solved && p == run->load.p)
         status = uz_run_certify_answer(run, &answer, err);
-        const double by_doubles = answer.certificate.absolute_error;
-        if (status == UZ_OK && !(answer.certificate.relative_error <= run->work.requested))
+    /* Then the answer that was there: its u may be nearer than v as doubles hold it, entry by entry. */
+    for (int k = 0; status == UZ_OK && *solved && p == run->load.p && k < 2; k++) {
+        const uz_certificate *now = &answer.certificate, *before = &run->answer.certificate;
+        const double by_doubles = now->absolute_error;
+        if (!(now->relative_error <= run->work.requested))
             status = uz_run_certify_input(&input, run, &answer, err);
-        if (status == UZ_OK && !(answer.certificate.relative_error <= run->work.requested))
+        if (status == UZ_OK && !(now->relative_error <= run->work.requested))
             status = uz_certify_exact(&answer.certificate, answer.u, (const mpf_t *)u, (const mpf_t *)r, &input, err);
-        for (int64_t i = 0; i < run->m && answer.certificate.absolute_error < by_doubles; i++)
+        bool held = true; /* in these units; it may be in the caller's */
+        for (int64_t i = 0; i < run->m && now->absolute_error < by_doubles; i++) {
             answer.r[i] = uz_precise_round(r[i]);
-    }
-    const uz_certificate *now = &answer.certificate, *before = &run->answer.certificate;
-    const bool better = now->relative_error < before->relative_error ||
-                        (isinf(before->relative_error) && now->absolute_error < before->absolute_error);
-    if (status == UZ_OK && *solved && p == run->load.p && better) {
-        const uz_answer swap = run->answer;
-        run->answer = answer;
-        answer = swap;
-        run->work.end = UZ_END_STALLED;
-        run->result->summary.refinements++;
+            held = held && isfinite(answer.r[i]);
+        }
+        if (status != UZ_OK || !held)
+            break;
+        if (now->relative_error < before->relative_error ||
+            (isinf(before->relative_error) && now->absolute_error < before->absolute_error)) {
+            const uz_answer swap = run->answer;
+            run->answer = answer;
+            answer = swap;
+            run->work.end = UZ_END_STALLED;
+            run->result->summary.refinements++;
+        } else {
+            copy_answer(&answer, &run->answer, run);
+        }
+        if (before->relative_error <= run->work.requested)
+            break;
     }
     uz_answer_clear(&answer);
     uz_precise_free(u, run->d);
@@ -243,11 +253,12 @@ uz_status uz_run_decide(uz_run *run, uz_error *err)
                          end == UZ_END_UNSOLVED || in_vain;
     const double enough = fmax(run->work.requested, ROUNDED),
                  seconds = end == UZ_END_UNDECIDED || isinf(c->relative_error) ? 1.0 : 0.1, start = uz_seconds();
-    bool solved = gave_up, tried = false;
+    bool solved = false, tried = false;
     uz_status status = UZ_OK;
-    /* Units of the load may be too far from those of an answer that rows hold; in many bits the caller's do as well. */
+    /* What contradicts itself in few bits need not in more, where entries of a row are far apart. Units of the load may
+     * be too far from those of an answer that rows hold; in many bits the caller's do as well. */
     for (int bits = UZ_PRECISE_BITS; gave_up && bits <= UZ_PRECISE_MORE_BITS;) {
-        if (status == UZ_OK && solved && !run->result->ray && c->relative_error > enough &&
+        if (status == UZ_OK && !run->result->ray && c->relative_error > enough &&
             uz_precise_is_small(run->d, run->m, bits, seconds) && !uz_stop_is_due(&stop)) {
             status = solve_precisely(run, &solved, run->load.p, bits, err);
             tried = true;
@@ -258,7 +269,6 @@ uz_status uz_run_decide(uz_run *run, uz_error *err)
             status = uz_run_round_to_units(run, err);
             uz_run_restore_units(run);
             bits = UZ_PRECISE_BITS;
-            solved = true;
         }
     }
     /* Loads may move the body so much farther than the rows are apart that no bits see these contradict each other. */

@@ -1,13 +1,15 @@
 """Random small problems posted to a daemon, judged in rational numbers by a program that shares nothing with it.
 
-usage: posted.py BUILD_DIR [COUNT [SEED [ONLY]]]
+usage: posted.py BUILD_DIR [COUNT [SEED [KIND [ONLY]]]]
 
-K, N, h and p have short entries times powers of two from all of the range of double; rows repeat, oppose or depend on
-each other, meet in a point, contradict by a hair; methods, forms, scalings and requests are mixed. The answer is found by
-trying all sets of rows in contact. Every claim is checked: an outcome, both errors, both energies, the radius. Prints each
-false one with the number of its problem (ONLY), and at the end how many were answered; fails where one was false.
+KIND `range` (default): up to 6 dofs and 10 rows; K, N, h and p have short entries times powers of two from all of the range
+of double; rows repeat, oppose or depend on each other, meet in a point, contradict by a hair. KIND `hard`: up to 12 dofs
+and 30 rows; K with conditions of 1e8 to 1e16, vertices with far more rows than dofs, rows of any size, loads that dwarf
+strain. Methods, forms, scalings and requests are mixed. Every claim is checked: an outcome, both errors, both energies, the
+radius. Prints each false one with the number of its problem (ONLY), and at the end how many were answered; fails where one
+was false. `right` in that list: the answer is as near as was asked for, and that was not certified; `possible`: it is not,
+but the exact one, rounded, would be.
 """
-import itertools
 import json
 import math
 import pathlib
@@ -18,9 +20,6 @@ from fractions import Fraction
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent.parent / "api")]
 
 import service  # noqa: E402  the path is set above
-
-MOST_SETS = 2500  # of rows in contact that are tried
-
 
 # ------------------------------------------------------------------------------------------------ the truth, exactly
 
@@ -41,34 +40,62 @@ def solve_equations(A, B):
     return [row[n:] for row in M], positive
 
 
+def find_contact(D, gap):
+    """Whether some press >= 0 has gap + D press >= 0 and no product of the two, and it; or the rows that rule that out."""
+    contact, press = [], [Fraction(0)] * len(gap)
+    while True:
+        gaps = [g + sum(D[i][b] * press[b] for b in contact) for i, g in enumerate(gap)]
+        q = min(range(len(gap)), key=gaps.__getitem__, default=0)
+        if not gap or gaps[q] >= 0:
+            return True, press
+        now = gaps[q]
+        while q not in contact:
+            y, _ = solve_equations([[D[a][b] for b in contact] for a in contact], [[D[a][q]] for a in contact])
+            eased = [x[0] for x in y]  # by so much the rows in contact press less for each unit of q
+            rate = D[q][q] - sum(D[q][b] * x for b, x in zip(contact, eased))
+            step, gone = min(((press[b] / x, b) for b, x in zip(contact, eased) if x > 0), default=(None, None))
+            if rate > 0 and (gone is None or -now / rate <= step):
+                step, gone = -now / rate, None
+            elif gone is None:
+                ray = [Fraction(0)] * len(gap)
+                for b, x in zip(contact, eased):
+                    ray[b] = -x
+                ray[q] = Fraction(1)
+                return False, ray
+            for b, x in zip(contact, eased):
+                press[b] -= step * x
+            press[q] += step
+            now += step * rate
+            if gone is None:
+                contact.append(q)
+            else:
+                contact.remove(gone)
+
+
 class Truth:
-    """definite: is K; feasible: is there a u; u: the answer, None where too many sets would have to be tried."""
+    """definite: is K; feasible: is there a u; u, press: the answer. Found by the dual method of Goldfarb and Idnani, which can't go
+    in circles without rounding; what counts is that the conditions of the answer, or of a contradiction, are met exactly."""
 
     def __init__(self, K, N, h, p):
         d, m = len(K), len(N)
-        self.K, self.p, self.feasible, self.u = K, p, None, None
+        self.K, self.p, self.feasible, self.u, self.press = K, p, None, None, None
         X, self.definite = solve_equations(K, [[p[i]] + [row[i] for row in N] for i in range(d)])
         if not self.definite:
             return
         free, W = [x[0] for x in X], [[x[1 + j] for x in X] for j in range(m)]
-        D = [[sum(a * b for a, b in zip(row, w) if a) for w in W] for row in N]
-        gap = [h[i] - sum(a * b for a, b in zip(N[i], free) if a) for i in range(m)]
-        tried = 0
-        for contact in itertools.chain.from_iterable(itertools.combinations(range(m), k) for k in range(min(d, m) + 1)):
-            tried += 1
-            if tried > MOST_SETS:
-                return
-            press = []
-            if contact:
-                y, positive = solve_equations([[D[a][b] for b in contact] for a in contact], [[-gap[a]] for a in contact])
-                press = [x[0] for x in y] if y else []
-                if not positive or any(x < 0 for x in press):
-                    continue
-            if all(gap[i] + sum(D[i][b] * x for b, x in zip(contact, press)) >= 0 for i in range(m) if i not in contact):
-                self.u = [free[j] - sum(W[b][j] * x for b, x in zip(contact, press)) for j in range(d)]
-                self.feasible = True
-                return
-        self.feasible = False
+        dot = lambda x, y: sum(a * b for a, b in zip(x, y) if a and b)
+        D = [[dot(row, w) for w in W] for row in N]
+        gap = [h[i] - dot(N[i], free) for i in range(m)]
+        self.feasible, press = find_contact(D, gap)
+        self.press = press
+        if self.feasible:
+            self.u = [free[j] - sum(w[j] * x for w, x in zip(W, press) if x) for j in range(d)]
+            gaps = [b - dot(row, self.u) for row, b in zip(N, h)]
+            balance = [dot(K[j], self.u) + sum(row[j] * x for row, x in zip(N, press) if x) - p[j] for j in range(d)]
+            assert not any(balance) and all(x >= 0 and g >= 0 and not x * g for x, g in zip(press, gaps))
+        else:
+            assert all(x >= 0 for x in press) and dot(press, h) < 0
+            assert not any(sum(row[j] * x for row, x in zip(N, press) if x) for j in range(d))
 
     def square(self, x):
         return sum(a * b * self.K[i][j] for i, a in enumerate(x) for j, b in enumerate(x) if a and b)
@@ -168,6 +195,72 @@ def make_request(chance):
     return name, K, N, h, p, solver
 
 
+def make_ill_conditioned(chance, d):
+    """Rounded to doubles, whatever that does to its smallest eigenvalues."""
+    kind = chance.choice(["spectrum", "spectrum", "hilbert", "laeuchli", "chain", "plain"])
+    if kind == "hilbert":
+        n = min(d, 11)
+        return kind, [[1 / (i + j + 1) if max(i, j) < n else float(i == j) for j in range(d)] for i in range(d)]
+    if kind == "laeuchli":
+        small = 10.0 ** chance.uniform(-15, -8)
+        return kind, [[1 + small if i == j else 1.0 for j in range(d)] for i in range(d)]
+    if kind == "chain":
+        k = [10.0 ** chance.uniform(0, 12) for _ in range(d + 1)]
+        at = lambda i, j: k[i] + k[i + 1] if i == j else -k[max(i, j)] if abs(i - j) == 1 else 0.0
+        return kind, [[at(i, j) for j in range(d)] for i in range(d)]
+    Q = []
+    while len(Q) < d:  # Gram and Schmidt
+        x = [chance.gauss(0, 1) for _ in range(d)]
+        for _ in range(2):
+            for q in Q:
+                along = sum(a * b for a, b in zip(x, q))
+                x = [a - along * b for a, b in zip(x, q)]
+        length = math.sqrt(sum(a * a for a in x))
+        Q.append([a / length for a in x])
+    digits = 2 if kind == "plain" else chance.uniform(8, 15.5)
+    value = [10.0 ** (-digits * (k / (d - 1) if d > 1 else 1)) for k in range(d)]
+    K = [[sum(value[k] * Q[k][i] * Q[k][j] for k in range(d)) for j in range(d)] for i in range(d)]
+    return kind, [[K[max(i, j)][min(i, j)] for j in range(d)] for i in range(d)]
+
+
+def make_hard_request(chance):
+    d, m = chance.randint(1, 12), chance.randint(0, 30)
+    (of_K, K), kind, N = make_ill_conditioned(chance, d), chance.choice(["vertex", "copies", "bounds", "general"]), []
+    at, touching = [short(chance) for _ in range(d)], chance.random()
+    for _ in range(m):
+        row = [short(chance) if chance.random() < 0.6 else 0.0 for _ in range(d)]
+        if kind == "bounds":
+            row = [0.0] * d
+        row[chance.randrange(d)] = chance.choice([1.0, -1.0])
+        if kind == "copies" and N and chance.random() < 0.6:
+            row = [chance.choice([1.0, -1.0, 3.0, -0.1, 0.7]) * x for x in chance.choice(N)]
+        N.append(row)
+    h = []
+    for row in N:
+        reach = float(sum(Fraction(a) * Fraction(b) for a, b in zip(row, at)))
+        h.append(reach + (0 if chance.random() < touching else abs(chance.gauss(0, 1)) * 10.0 ** chance.uniform(-12, 1)))
+    if chance.random() < 0.5:  # `at` is the answer, and some rows touch without a reaction
+        press = [chance.choice([0, 0, 1]) * abs(chance.gauss(0, 1)) for _ in N]
+        p = [sum(a * b for a, b in zip(K[j], at)) + sum(row[j] * x for row, x in zip(N, press)) for j in range(d)]
+    else:
+        p = [chance.gauss(0, 1) for _ in range(d)]
+    far = 10.0 ** chance.choice([0, 0, 0, 3, 6, 9, 12, 20])
+    p = [far * x for x in p]
+    if chance.random() < 0.5:  # rows of any size, rounded or not
+        for i, row in enumerate(N):
+            size = chance.choice([10.0 ** chance.uniform(-6, 6), 2.0 ** chance.randint(-20, 20)])
+            N[i], h[i] = [size * x for x in row], size * h[i]
+    solver = {"accuracy": {"relative_error": 10.0 ** chance.uniform(-13, -4)}, "max_iterations": 20000}
+    if chance.random() < 0.3:
+        solver["method"] = chance.choice(["active_set", "dual_active_set", "conjugate"])
+    if chance.random() < 0.4:
+        solver["operator"] = chance.choice(["condensed", "factored", "matrix_free"])
+    return f"{of_K} {kind} d{d} m{m} p{far:.0e}", K, N, h, p, solver
+
+
+KINDS = {"range": make_request, "hard": make_hard_request}
+
+
 def text_of(A, cols, symmetric):
     entries = [f"{i + 1} {j + 1} {x!r}" for i, row in enumerate(A) for j, x in enumerate(row)
                if x and not (symmetric and j > i)]
@@ -186,8 +279,6 @@ def judge(truth, requested, told, u):
     outcome, c, false = told["outcome"], told.get("certificate") or {}, []
     if not truth.definite:
         return (["K is not positive definite"] if outcome == "converged" else []), "not definite: " + outcome
-    if truth.feasible is None:
-        return [], "not judged: " + outcome
     if not truth.feasible:
         return (["contradictory, but " + outcome] if outcome == "converged" else []), "contradictory: " + outcome
     largest = max(abs(x) for x in truth.u)
@@ -198,27 +289,31 @@ def judge(truth, requested, told, u):
     bound, relative = c.get("absolute_error"), c.get("relative_error")
     if outcome == "converged" and (relative is None or relative > requested):
         false.append("converged without the certificate for it")
-    if bound is None or u is None or any(x is None for x in u):
-        return false + (["converged without an answer"] if outcome == "converged" else []), f"feasible: {outcome}, no bound"
-    error = truth.square([a - b for a, b in zip(exactly(u), truth.u)])
-    whole = truth.square(truth.u)
-    if error > Fraction(bound) ** 2:
+    whole, known = truth.square(truth.u), bound is not None and u is not None and all(x is not None for x in u)
+    error = truth.square([a - b for a, b in zip(exactly(u), truth.u)]) if known else None
+    if known and error > Fraction(bound) ** 2:
         false.append(f"absolute error {float(error) ** 0.5 if error > 1e-300 else error} above {bound}")
-    if relative is not None and error > Fraction(relative) ** 2 * whole * (1 + Fraction(1, 2 ** 30)):
+    if known and relative is not None and error > Fraction(relative) ** 2 * whole * (1 + Fraction(1, 2 ** 30)):
         false.append(f"relative error {float(error / whole) ** 0.5 if whole else 'infinite'} above {relative}")
     energy, below, above = truth.energy(), told.get("energy", {}).get("dual"), told.get("energy", {}).get("primal")
-    if (below is not None and Fraction(below) > energy) or (above is not None and Fraction(above) < energy):
+    if known and ((below is not None and Fraction(below) > energy) or (above is not None and Fraction(above) < energy)):
         false.append(f"energies {below} {above} do not enclose the least one")
-    right = whole and error <= whole / 10 ** 24
-    end = ", right to 1e-12" if outcome == "precision_limit" and right else ""
-    return false, "feasible: " + outcome + end
+    if outcome == "converged" and not known:
+        false.append("converged without an answer")
+    end = "feasible: " + outcome + ("" if known else ", no bound")
+    if outcome in ("precision_limit", "out_of_reach") and whole:
+        asked = Fraction(requested) ** 2 * whole / 4
+        held = all(abs(x) < Fraction(2) ** 1023 for x in truth.u + truth.press)  # by doubles at all
+        best = truth.square([Fraction(float(x)) - x for x in truth.u]) if held else None
+        end += ", right" if known and error <= asked else ", possible" if held and best <= asked else ""
+    return false, end
 
 
-def run(s, numbers, seed, show=False):
+def run(s, numbers, seed, kind="range", show=False):
     """Posts the problems of these numbers to service s. How often each kind of end came, and the false claims."""
     tally, wrong = {}, []
     for k in numbers:
-        made = make_request(random.Random(f"{seed} {k}"))
+        made = KINDS[kind](random.Random(f"{seed} {k}"))
         if not made:
             continue
         name, K, N, h, p, solver = made
@@ -239,6 +334,8 @@ def run(s, numbers, seed, show=False):
             false, end = judge(truth, requested, told, u)
         if show:
             print(json.dumps(request), json.dumps(job, indent=1))
+        elif end.endswith((", right", ", possible")):
+            print(f"{k}: {name} {json.dumps(solver)}: {end}", flush=True)
         tally[end] = tally.get(end, 0) + 1
         if false:
             wrong.append(f"{k}: {name} {json.dumps(solver)}: {'; '.join(false)}")
@@ -247,13 +344,13 @@ def run(s, numbers, seed, show=False):
 
 def main():
     count, seed = int(sys.argv[2]) if len(sys.argv) > 2 else 2000, int(sys.argv[3]) if len(sys.argv) > 3 else 1
-    only = int(sys.argv[4]) if len(sys.argv) > 4 else None
+    kind, only = sys.argv[4] if len(sys.argv) > 4 else "range", int(sys.argv[5]) if len(sys.argv) > 5 else None
     s = service.Service(sys.argv[1], "--workers", "1", "--keep-jobs", "100").start()
     try:
-        tally, wrong = run(s, range(count) if only is None else [only], seed, only is not None)
+        tally, wrong = run(s, range(count) if only is None else [only], seed, kind, only is not None)
     finally:
         s.stop()
-    print(*wrong, f"seed {seed}: {sum(tally.values())} problems, {len(wrong)} with a false claim", sep="\n")
+    print(*wrong, f"{kind}, seed {seed}: {sum(tally.values())} problems, {len(wrong)} with a false claim", sep="\n")
     for end in sorted(tally):
         print(f"  {tally[end]:6d}  {end}")
     return 1 if wrong else 0
