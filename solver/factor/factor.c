@@ -13,9 +13,9 @@
 #include <string.h>
 #include <suitesparse/SuiteSparse_config.h>
 
-/* P K P' (lower triangle, columns unsorted), as cholmod_factorize makes it by two transpositions with five passes over
- * the entries: of a body in two dimensions they take a tenth of the factorization. NULL: no memory. */
-static cholmod_sparse *permute(const uz_csc *K, const int64_t *position, cholmod_common *common)
+/* As cholmod_factorize makes it by two transpositions with five passes over the entries: of a body in two dimensions
+ * they take a tenth of the factorization. */
+cholmod_sparse *uz_permute(const uz_csc *K, const int64_t *position, cholmod_common *common)
 {
     size_t n = (size_t)K->cols;
     cholmod_sparse *S = cholmod_l_allocate_sparse(n, n, (size_t)K->ptr[n], 0, 1, -1, CHOLMOD_REAL, common);
@@ -60,7 +60,7 @@ void uz_factor_use_threads(int threads)
  * minor are looked at before anything resets them. */
 static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
 {
-    cholmod_sparse *S = permute(K, factor->analysis->position, common);
+    cholmod_sparse *S = uz_permute(K, factor->analysis->position, common);
     bool ok = S != NULL;
     if (S) {
         int ordering = factor->L.ordering;
@@ -193,6 +193,11 @@ void uz_factor_free(uz_factor *factor)
 uz_factor_info uz_factor_describe(const uz_factor *factor)
 {
     return factor->info;
+}
+
+uz_analysis *uz_factor_analysis(const uz_factor *factor)
+{
+    return uz_analysis_hold(factor->analysis);
 }
 
 const int64_t *uz_factor_position(const uz_factor *factor)

@@ -63,6 +63,8 @@ uz_status uz_factor_plain(uz_factor **out, const uz_csc *K, uz_ordering ordering
                           const uz_hooks *hooks, uz_error *err);
 void uz_factor_free(uz_factor *factor);
 uz_factor_info uz_factor_describe(const uz_factor *factor);
+/* What it was made from, for other matrices of its pattern; ends with uz_analysis_free. */
+uz_analysis *uz_factor_analysis(const uz_factor *factor);
 /* The dofs that come last, ascending; *count of them, 0 where none has to. */
 const int64_t *uz_factor_last_dofs(const uz_factor *factor, int64_t *count);
 /* Are the n dofs (ascending) among those that come last? Always where n = 0. */
@@ -107,11 +109,15 @@ uz_status uz_reach_backward(const uz_reach *reach, uz_factor_workspace *ws, doub
 uz_status uz_reach_gram(double *D, const uz_reach *reach, const uz_csc *N, uz_error *err);
 
 /* The factor of K_FF, F the dofs that are not fixed (n): K (lower triangle) with these dofs held. factor: of K, whose
- * order is used; ws is borrowed for the object's life. *out is NULL on success when K_FF is not positive definite to
- * working precision, or where it had to stop (stop NULL: never). */
+ * order is used; factor and ws are borrowed for the object's life. *out is NULL on success when K_FF is not positive
+ * definite to working precision, or where it had to stop (stop NULL: never). */
 typedef struct uz_principal uz_principal;
 uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *fixed, const uz_factor *factor,
                               uz_factor_workspace *ws, const uz_stop *stop, uz_error *err);
+/* The same K with other dofs fixed, at the price of what changes where that is less. *positive false, as *out NULL: to
+ * be freed, or asked again. */
+uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K, const bool *fixed, const uz_stop *stop,
+                            uz_error *err);
 void uz_principal_free(uz_principal *part);
 /* x_F = K_FF^-1 x_F in place; x (n) at fixed dofs is neither read nor written. */
 uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err);

@@ -62,6 +62,31 @@ uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_
 uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t *group, int64_t rows,
                     uz_ordering ordering, cholmod_common *common, uz_error *err);
 
+/* P K P' (lower triangle, columns unsorted); NULL: no memory. position: the factor's. */
+cholmod_sparse *uz_permute(const uz_csc *K, const int64_t *position, cholmod_common *common);
+
+/* A factor with other supernodes here and there. */
+typedef struct {
+    const double *const *block; /* nsuper; NULL: the factor's own */
+    const bool *held;           /* n: columns in whose place substitutions have 0 */
+} uz_overlay;
+/* uz_factor_solve_one, with an overlay or NULL. */
+uz_status uz_factor_substitute(const uz_factor *factor, const uz_overlay *overlay, uz_factor_workspace *ws, double *x,
+                               bool forward, uz_error *err);
+
+/* The factor of K with some dofs held, by what changes of the factor of K, both of which outlive it (paths.c). */
+typedef struct uz_paths uz_paths;
+uz_status uz_paths_create(uz_paths **out, const uz_csc *K, const uz_factor *factor, uz_factor_workspace *ws,
+                          uz_error *err);
+void uz_paths_free(uz_paths *x);
+/* Flops, about, to get from the dofs that are held to those that are `fixed` (n). */
+double uz_paths_work(uz_paths *x, const bool *fixed);
+/* Holds these dofs and no others. *positive false: K without them is not positive definite to working precision, or it
+ * had to stop (stop NULL: never); none is held then. */
+uz_status uz_paths_hold(bool *positive, uz_paths *x, const bool *fixed, const uz_stop *stop, uz_error *err);
+/* As uz_principal_solve. */
+uz_status uz_paths_solve(double *v, uz_paths *x, uz_error *err);
+
 /* Additions and multiplications of uz_reach_gram with `rows` rows on n_dofs dofs, by a symbolic factor; below 0: no
  * memory. */
 double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_dofs, int64_t rows);

@@ -1,7 +1,8 @@
 /* principal.c: factors of principal submatrices of K: the body with some dofs held.
  *
- * The reduced matrix keeps the order of the factor of K, so that its fill is part of that factor's: no ordering is
- * paid, and the more dofs are held the less is computed. */
+ * Either of the reduced matrix, which keeps the order of the factor of K, so that its fill is part of that factor's: no
+ * ordering is paid, and the more dofs are held the less is computed. Or by what changes of the factor of K (paths.c),
+ * where that is less. */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
@@ -11,11 +12,15 @@
 #include <string.h>
 
 struct uz_principal {
+    const uz_factor *factor;
     uz_factor_workspace *ws;
+    uz_paths *paths;   /* NULL: not needed yet */
+    bool by_paths;     /* else L: */
     cholmod_factor *L; /* NULL when no dof is free */
     int64_t n_free;
-    int64_t *dof;             /* n_free: which dof each row is, in the factor's order */
-    double *room;             /* n_free */
+    int64_t *dof;             /* n: which dof each row is, in the factor's order, n_free of them */
+    int64_t *place;           /* n: the row of a free dof in the reduced matrix, -1 for the others */
+    double *room;             /* n */
     cholmod_dense *X, *Y, *E; /* CHOLMOD's room, kept between solves */
 };
 
@@ -83,42 +88,70 @@ static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A
     return UZ_OK;
 }
 
+/* Entries of L, and of K in an analysis, that are passed in the time of a flop of a dense kernel; as in dual/cost.h. */
+#define FLOPS_PER_ENTRY 8.0
+#define ENTRY_PASSES    10.0
+#define ANALYSIS_PASSES 60.0
+
+/* Flops, about, to factor the reduced matrix: of K with fewer dofs. */
+static double work_anew(const uz_principal *part, const uz_csc *K)
+{
+    const uz_factor_info *info = &part->factor->info;
+    const double share = (double)part->n_free / (double)part->factor->n;
+    return share * share * info->flops + FLOPS_PER_ENTRY * (ENTRY_PASSES * share * (double)info->nnz +
+                                                            ANALYSIS_PASSES * share * (double)K->ptr[K->cols]);
+}
+
+uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K, const bool *fixed, const uz_stop *stop,
+                            uz_error *err)
+{
+    const int64_t n = part->factor->n;
+    const SuiteSparse_long *perm = part->factor->L.Perm;
+    cholmod_sparse *A = NULL;
+    uz_status status = UZ_OK;
+    *positive = true;
+    part->n_free = 0;
+    for (int64_t k = 0; k < n; k++) {
+        const int64_t i = perm[k];
+        part->place[i] = fixed[i] ? -1 : part->n_free;
+        if (!fixed[i])
+            part->dof[part->n_free++] = i;
+    }
+    if (!part->paths)
+        status = uz_paths_create(&part->paths, K, part->factor, part->ws, err);
+    part->by_paths = status == UZ_OK && uz_paths_work(part->paths, fixed) < work_anew(part, K);
+    if (status == UZ_OK && part->by_paths)
+        return uz_paths_hold(positive, part->paths, fixed, stop, err);
+    cholmod_l_free_factor(&part->L, &part->ws->common);
+    if (status == UZ_OK && part->n_free > 0 && !(A = reduce(part, K, part->place)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
+    if (uz_stop_is_due(stop))
+        *positive = false;
+    else if (status == UZ_OK && A)
+        status = factorize(part, positive, A, stop, err);
+    cholmod_l_free_sparse(&A, &part->ws->common);
+    return status;
+}
+
 uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *fixed, const uz_factor *factor,
                               uz_factor_workspace *ws, const uz_stop *stop, uz_error *err)
 {
     const int64_t n = factor->n;
-    const SuiteSparse_long *perm = factor->L.Perm;
     uz_principal *part = uz_alloc_zero(1, sizeof *part);
-    int64_t *place = uz_alloc(n, sizeof *place); /* n: the row of a free dof in the reduced matrix, -1 for the others */
-    cholmod_sparse *A = NULL;
     uz_status status = UZ_OK;
-    bool positive = true, ok = part && place;
+    bool positive = false;
     *out = NULL;
-    if (part)
+    if (part) {
+        part->factor = factor;
         part->ws = ws;
-    if (ok) {
         part->dof = uz_alloc(n, sizeof *part->dof);
+        part->place = uz_alloc(n, sizeof *part->place);
         part->room = uz_alloc(n, sizeof *part->room);
-        ok = part->dof && part->room;
     }
-    for (int64_t k = 0; ok && k < n; k++) {
-        const int64_t i = perm[k];
-        place[i] = fixed[i] ? -1 : part->n_free;
-        if (!fixed[i])
-            part->dof[part->n_free++] = i;
-    }
-    if (ok && part->n_free > 0) {
-        A = reduce(part, K, place);
-        ok = A != NULL;
-    }
-    if (!ok)
+    if (!part || !part->dof || !part->place || !part->room)
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
-    else if (uz_stop_is_due(stop))
-        positive = false;
-    else if (A)
-        status = factorize(part, &positive, A, stop, err);
-    cholmod_l_free_sparse(&A, &ws->common);
-    free(place);
+    else
+        status = uz_principal_hold(&positive, part, K, fixed, stop, err);
     if (status == UZ_OK && positive)
         *out = part;
     else
@@ -135,7 +168,9 @@ void uz_principal_free(uz_principal *part)
     cholmod_l_free_dense(&part->X, common);
     cholmod_l_free_dense(&part->Y, common);
     cholmod_l_free_dense(&part->E, common);
+    uz_paths_free(part->paths);
     free(part->dof);
+    free(part->place);
     free(part->room);
     free(part);
 }
@@ -144,6 +179,8 @@ uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err)
 {
     if (part->n_free == 0)
         return UZ_OK;
+    if (part->by_paths)
+        return uz_paths_solve(x, part->paths, err);
     cholmod_common *common = &part->ws->common;
     cholmod_dense B = uz_view_dense(part->room, part->n_free, 1);
     for (int64_t k = 0; k < part->n_free; k++)

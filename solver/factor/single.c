@@ -272,6 +272,12 @@ UZ_AVX2_FMA static void substitute_back_fused(const panel_of *s)
 
 uz_status uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward, uz_error *err)
 {
+    return uz_factor_substitute(factor, NULL, ws, x, forward, err);
+}
+
+uz_status uz_factor_substitute(const uz_factor *factor, const uz_overlay *overlay, uz_factor_workspace *ws, double *x,
+                               bool forward, uz_error *err)
+{
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
     int64_t count = (int64_t)L->nsuper;
@@ -290,10 +296,17 @@ uz_status uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, 
         /* Loads act on few dofs: what is eliminated before any of them has nothing to pass on (Gilbert and Peierls,
          * SIAM J. Sci. Stat. Comput. 9 (1988) 862: L^-1 b is nonzero on the reach of b only). */
         bool idle = forward;
-        for (int64_t i = 0; idle && i < panel.cols; i++)
+        for (int64_t i = 0; idle && !overlay && i < panel.cols; i++)
             idle = own[i] == 0.0;
+        for (int64_t i = 0; overlay && i < panel.cols; i++) {
+            const bool held = overlay->held[super[k] + i];
+            own[i] = held ? 0.0 : own[i];
+            idle = (i == 0 || idle) && (held || (forward && own[i] == 0.0));
+        }
         if (idle)
             continue;
+        if (overlay && overlay->block[k])
+            panel.L = overlay->block[k];
         memcpy(panel.b, own, (size_t)panel.cols * sizeof *own);
         for (int64_t i = panel.cols; i < panel.rows; i++)
             panel.b[i] = x[row[i]];

@@ -69,6 +69,24 @@ void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *
                     (int)ldx, 1.0, X + n, (int)ldx);
 }
 
+bool uz_block_factor(int64_t n, int64_t rows, double *A, int64_t ld)
+{
+    if (LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', (int)n, A, (int)ld) != 0)
+        return false;
+    if (rows > 0)
+        cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)rows, (int)n, 1.0, A, (int)ld,
+                    A + n, (int)ld);
+    return true;
+}
+
+void uz_block_outer(int64_t rows, int64_t n, int64_t k, const double *A, int64_t ld, double *C)
+{
+    cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, (int)n, (int)k, 1.0, A, (int)ld, 0.0, C, (int)rows);
+    if (rows > n)
+        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, (int)(rows - n), (int)n, (int)k, 1.0, A + n, (int)ld, A,
+                    (int)ld, 0.0, C + n, (int)rows);
+}
+
 void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *C)
 {
     if (n > 0)

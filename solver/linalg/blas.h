@@ -41,6 +41,11 @@ void uz_block_gemv(int64_t rows, int64_t columns, const double *A, int64_t ld, c
                    bool transposed);
 /* [X; Y] (columns, ldx) = [L^-1 X; Y - A L^-1 X] with [L; A] (n + rows by n, ld). */
 void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx);
+/* [L; B] = [chol(A); B L'^-1] in place of [A; B] (n + rows by n, ld), A symmetric, lower; false: a pivot is not
+ * positive. */
+bool uz_block_factor(int64_t n, int64_t rows, double *A, int64_t ld);
+/* C (rows x n) = A A_n' on and below its diagonal, A rows x k (ld), A_n its first n <= rows rows. */
+void uz_block_outer(int64_t rows, int64_t n, int64_t k, const double *A, int64_t ld, double *C);
 /* C (n x n) = Z'Z with Z k x n. */
 void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *C);
 /* Eigenvalues of the symmetric tridiagonal matrix (d, n; e, n - 1), ascending in d; with vectors in V (n x n). */

@@ -358,21 +358,30 @@ TEST(principal_submatrices)
     }
 }
 
-/* The factor is only asked for its order: an indefinite matrix of the same pattern shows what is reported. */
+/* The last dof of the order is on every path: with a diagonal entry that is not the factored matrix's it shows what is
+ * reported. */
 TEST(principal_submatrix_that_is_not_positive_definite)
 {
     uz_qp qp;
     uz_error err = {0};
     uz_factor *factor = NULL;
     uz_principal *part = NULL;
-    bool fixed[25] = {false};
+    bool fixed[25] = {false}, positive = false;
+    int64_t last = 0;
     CHECK(obstacle_qp(&qp, 5, &err) == UZ_OK);
     CHECK(factor_by(&factor, &qp.K, NULL, 0, UZ_ORDERING_AUTO, 0, &err) == UZ_OK);
     uz_factor_workspace *ws = uz_factor_workspace_new();
-    qp.K.val[qp.K.ptr[7]] = -1;
+    for (int64_t i = 0; i < 25; i++)
+        last = uz_factor_position(factor)[i] == 24 ? i : last;
+    qp.K.val[qp.K.ptr[last]] = -1;
+    fixed[(last + 1) % 25] = true;
     CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, NULL, &err) == UZ_OK && !part);
-    fixed[7] = true;
+    fixed[last] = true;
     CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, NULL, &err) == UZ_OK && part);
+    fixed[last] = false;
+    CHECK(part && uz_principal_hold(&positive, part, &qp.K, fixed, NULL, &err) == UZ_OK && !positive);
+    fixed[last] = true;
+    CHECK(part && uz_principal_hold(&positive, part, &qp.K, fixed, NULL, &err) == UZ_OK && positive);
     uz_principal_free(part);
     uz_factor_workspace_free(ws);
     uz_factor_free(factor);

@@ -1,4 +1,5 @@
 /* The sparse factor: what it refuses, what its last block is, and what its orderings leave behind. */
+#include "factor/factor_private.h"
 #include "factor_fixture.h"
 #include "harness.h"
 #include "qp_fixture.h"
@@ -401,25 +402,75 @@ TEST(principal_part)
     }
 }
 
-/* Held where the body would be free: the part is singular, and says so by being NULL. */
-TEST(principal_part_that_is_singular)
+/* From one set of held dofs to the next: a few that change, many, none, all, and back. */
+TEST(principal_parts_one_after_the_other)
 {
-    double dense[] = {2, -1, 0, -1, 1, 0, 0, 0, 1};
-    bool fixed[] = {false, false, false};
-    uz_csc K = csc_from_dense(dense, 3, 3, true), other = csc_from_dense(dense, 3, 3, true);
+    for (uint64_t seed = 0; seed < 12; seed++) {
+        qp_random rng = {seed};
+        int64_t w = random_int(&rng, 2, 40), n = w * w;
+        uz_csc K = grid(w, w);
+        uz_factor *factor;
+        uz_principal *part = NULL;
+        uz_factor_workspace *ws = uz_factor_workspace_new();
+        uz_error err;
+        bool *fixed = calloc((size_t)n, sizeof *fixed), positive = true;
+        double *b = vector(n), *x = vector(n);
+        CHECK(factor_of(&factor, &K, NULL, 0, orderings[seed % 3], 0, &err) == UZ_OK);
+        CHECK(uz_principal_create(&part, &K, fixed, factor, ws, NULL, &err) == UZ_OK && part);
+        for (int k = 0; k < 12; k++) {
+            const int64_t middle = random_int(&rng, 0, n);
+            for (int64_t i = 0; i < n; i++) { /* a disk comes or goes; single dofs; none and all */
+                const int64_t dx = i % w - middle % w, dy = i / w - middle / w;
+                if (k == 5 || k == 9)
+                    fixed[i] = k == 9;
+                else if (k % 3 == 2 ? random_unit(&rng) < 0.02 : 16 * (dx * dx + dy * dy) < n)
+                    fixed[i] = k % 2 == 0;
+                b[i] = x[i] = random_signed(&rng);
+            }
+            CHECK(part && uz_principal_hold(&positive, part, &K, fixed, NULL, &err) == UZ_OK && positive);
+            CHECK(part && uz_principal_solve(x, part, &err) == UZ_OK);
+            uz_csc held = hold(&K, fixed);
+            for (int64_t i = 0; i < n; i++)
+                CHECK(!fixed[i] || x[i] == b[i]);
+            CHECK_MSG(residual(&held, x, b) < 1e-15, "seed %d, set %d", (int)seed, k);
+            uz_csc_clear(&held);
+        }
+        uz_principal_free(part);
+        uz_factor_free(factor);
+        uz_factor_workspace_free(ws);
+        uz_csc_clear(&K);
+        free(fixed);
+        free(b);
+        free(x);
+    }
+}
+
+/* Another dof in the middle of a grid changes the separators around it, not what they separate. */
+TEST(another_held_dof_changes_little_of_a_factor)
+{
+    enum { W = 60 };
+    uz_csc K = grid(W, W);
     uz_factor *factor;
+    uz_paths *paths = NULL;
     uz_factor_workspace *ws = uz_factor_workspace_new();
-    uz_principal *part = (uz_principal *)&K;
     uz_error err;
+    bool fixed[W * W] = {false}, positive = false;
     CHECK_INT(factor_of(&factor, &K, NULL, 0, UZ_ORDERING_AMD, 0, &err), UZ_OK);
-    other.val[0] = 1; /* [1 -1; -1 1] */
-    CHECK_INT(uz_principal_create(&part, &other, fixed, factor, ws, NULL, &err), UZ_OK);
-    CHECK(part == NULL);
-    uz_principal_free(part);
+    CHECK(uz_paths_create(&paths, &K, factor, ws, &err) == UZ_OK && paths);
+    for (int i = 0; i < W * W; i++)
+        fixed[i] = i % 2;
+    const double most = uz_paths_work(paths, fixed);
+    for (int i = 0; i < W * W; i++)
+        fixed[i] = (i % W - 30) * (i % W - 30) + (i / W - 30) * (i / W - 30) < 25;
+    CHECK(uz_paths_hold(&positive, paths, fixed, NULL, &err) == UZ_OK && positive);
+    CHECK(uz_paths_work(paths, fixed) == 0);
+    fixed[30 * W + 35] = true;
+    const double work = uz_paths_work(paths, fixed);
+    CHECK_MSG(work > 0 && 2 * work < most, "%g of %g", work, most);
+    uz_paths_free(paths);
     uz_factor_free(factor);
     uz_factor_workspace_free(ws);
     uz_csc_clear(&K);
-    uz_csc_clear(&other);
 }
 
 /* e_j'K^-1 e_j <= bound / K_jj for all j, and for random vectors. */
