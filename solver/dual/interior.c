@@ -38,7 +38,6 @@ typedef struct {
     const uz_dual *dual;
     int64_t m, d;
     uz_springs springs;
-    uz_analysis *analysis;
     uz_factor *factor; /* of S */
     uz_factor_workspace *ws;
     double *compliance, *unit; /* m, with diag(K)^-1 for K^-1, and its root, 1 for rows of zeros: the unit of gaps */
@@ -76,7 +75,6 @@ static void clear(interior *x)
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     uz_factor_free(x->factor);
-    uz_analysis_free(x->analysis);
     uz_factor_workspace_free(x->ws);
     uz_springs_clear(&x->springs);
 }
@@ -86,7 +84,7 @@ static uz_status factorize(interior *x, bool *can, uz_error *err)
 {
     uz_springs_fill(&x->springs, x->sigma);
     uz_status status = x->factor ? uz_factor_again(x->factor, &x->springs.S, err)
-                                 : uz_factor_create(&x->factor, &x->springs.S, x->analysis, 0, NULL, err);
+                                 : uz_factor_create(&x->factor, &x->springs.S, x->springs.analysis, 0, NULL, err);
     *can = status == UZ_OK;
     if (status != UZ_ERR_NOT_SPD)
         return status;
@@ -233,11 +231,8 @@ uz_status uz_dual_load_interior(uz_dual_load *load, bool *can, bool *active, dou
     if (!dual->factor || dual->m == 0)
         return UZ_OK;
     uz_status status = uz_springs_create(&x.springs, load->K, dual, NULL, err);
-    if (status == UZ_OK && x.springs.S.ptr)
-        status = uz_analysis_create(&x.analysis, &x.springs.S, NULL, 0, 0, uz_factor_describe(dual->factor).ordering,
-                                    NULL, err);
-    if (status == UZ_OK && x.analysis) {
-        const uz_factor_info info = uz_analysis_describe(x.analysis);
+    if (status == UZ_OK && x.springs.analysis) {
+        const uz_factor_info info = uz_analysis_describe(x.springs.analysis);
         *can = EXPECTED_STEPS * (info.flops / FLOPS_PER_ENTRY + 8.0 * (double)info.nnz) <= most_work;
     }
     if (status == UZ_OK && *can)

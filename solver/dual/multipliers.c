@@ -87,13 +87,12 @@ static uz_status step(multipliers *a, double *r, const uz_factor *factor, uz_fac
 }
 
 /* Passes with one Sigma. */
-static uz_status iterate(multipliers *a, bool *slow, double *r, uz_springs *S, const uz_analysis *analysis,
-                         uz_factor_workspace *ws, uz_error *err)
+static uz_status iterate(multipliers *a, bool *slow, double *r, uz_springs *S, uz_factor_workspace *ws, uz_error *err)
 {
     uz_factor *factor = NULL;
     *slow = false;
     uz_springs_fill(S, a->sigma);
-    uz_status status = uz_factor_create(&factor, &S->S, analysis, 0, NULL, err);
+    uz_status status = uz_factor_create(&factor, &S->S, S->analysis, 0, NULL, err);
     if (status == UZ_ERR_NOT_SPD) { /* nothing is left of K in S */
         uz_error_reset(err);
         return UZ_OK;
@@ -121,7 +120,6 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
     multipliers a = {.x = x, .dual = dual, .active = active};
     double *of_m = uz_alloc_zero(3 * m, sizeof *of_m), *of_d = uz_alloc_zero(3 * d, sizeof *of_d);
     uz_springs S = {0};
-    uz_analysis *analysis = NULL;
     uz_status status = UZ_OK;
     bool slow = true;
     if (!of_m || !of_d) {
@@ -138,16 +136,15 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
         measure(&a, r);
         status = uz_springs_create(&S, x->load.K, dual, active, err);
     }
-    if (status == UZ_OK && S.S.ptr)
-        status = uz_analysis_create(&analysis, &S.S, NULL, 0, 0, UZ_ORDERING_AMD, NULL, err);
-    for (double sigma = FIRST_SIGMA; status == UZ_OK && analysis && slow && sigma <= LAST_SIGMA; sigma *= MORE_SIGMA) {
+    for (double sigma = FIRST_SIGMA; status == UZ_OK && S.analysis && slow && sigma <= LAST_SIGMA;
+         sigma *= MORE_SIGMA) {
         for (int64_t i = 0; i < m; i++) {
             double compliance = 0.0;
             for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
                 compliance += Nt->val[k] * Nt->val[k] * x->weight[Nt->idx[k]];
             a.sigma[i] = compliance > 0.0 ? sigma / compliance : 0.0;
         }
-        status = iterate(&a, &slow, r, &S, analysis, ws, err);
+        status = iterate(&a, &slow, r, &S, ws, err);
         slow = slow && a.worst > SOLVABLE;
     }
     if (status == UZ_OK && a.worst <= SOLVABLE && !uz_stop_is_due(&x->load.stop)) {
@@ -160,7 +157,6 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
         }
         *end = UZ_ACTIVE_SOLVED;
     }
-    uz_analysis_free(analysis);
     uz_springs_clear(&S);
     free(of_m);
     free(of_d);
