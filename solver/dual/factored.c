@@ -6,13 +6,16 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "law/sign.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct {
     uz_sparse_load sparse;
     uz_factor_workspace *ws;
+    uz_principal *part; /* of the last guess; NULL: none yet */
     /* made when a column of D^-1 is first wanted */
     uz_principal *held; /* K with every bounded dof held */
     uz_factor_workspace *held_ws;
@@ -49,6 +52,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
 static void unload(uz_dual_load *load)
 {
     factored_load *x = (factored_load *)load;
+    uz_principal_free(x->part);
     uz_principal_free(x->held);
     uz_factor_workspace_free(x->held_ws);
     free(x->unit);
@@ -83,33 +87,59 @@ static uz_status correct(uz_dual_load *load, double *bound2, const double *r, co
 
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
+/* Signs beyond this, relative to the terms of a sum, are wrong after one pass as after two, if K is not conditioned
+ * worse than that. */
+#define CLEARLY_WRONG 1e-7
+#define LEAST_RCOND   1e-7
+
+static bool is_clearly_wrong(const uz_bounded *box, const double *h, const double *g, const bool *active, int64_t m)
+{
+    for (int64_t i = 0; i < m; i++) {
+        const int64_t j = box->bounds->dof[i];
+        const double scale = fabs(box->bounds->scale[i]);
+        if (active[i] ? uz_reaction_pulls(box->r[i]) && scale * fabs(box->r[i]) > CLEARLY_WRONG * box->size[j]
+                      : uz_gap_penetrates(g[i]) && -g[i] > CLEARLY_WRONG * (fabs(h[i]) + scale * fabs(box->u[j])))
+            return true;
+    }
+    return false;
+}
+
+/* From the displacement of the last guess, where there was one: of a guess that is as clearly wrong as that, one pass
+ * tells. */
 static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active, uz_error *err)
 {
     factored_load *x = (factored_load *)load;
     uz_bounded *box = x->sparse.box;
-    uz_principal *part = NULL;
+    const int64_t d = load->dual->d, m = load->dual->m;
+    bool solved = true, wrong = false;
     if (!box)
         return uz_multipliers_solve(&x->sparse, x->ws, end, r, g, active, err);
-    if (!uz_bounded_hold(&x->sparse, active, false)) {
+    const bool again = box->has_exact, one_tells = again && uz_factor_describe(load->dual->factor).rcond > LEAST_RCOND;
+    if (!uz_bounded_hold(&x->sparse, active, again)) {
         *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
         return UZ_OK;
     }
     /* The displacement of the dofs that are not held. */
-    uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, x->ws, &load->stop, err);
-    bool solved = part && !uz_stop_is_due(&load->stop);
-    for (int pass = 0; status == UZ_OK && solved && pass < PASSES; pass++) {
-        uz_bounded_balance(box, load->K);
-        status = uz_principal_solve(box->force, part, err);
-        for (int64_t j = 0; status == UZ_OK && j < load->K->cols; j++)
-            box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
-        solved = !uz_stop_is_due(&load->stop);
-    }
-    uz_principal_free(part);
-    if (status != UZ_OK || !solved)
-        return status;
+    uz_status status =
+        x->part ? uz_principal_hold(&solved, x->part, load->K, box->fixed, &load->stop, err)
+                : uz_principal_create(&x->part, load->K, box->fixed, load->dual->factor, x->ws, &load->stop, err);
+    solved = solved && x->part;
     uz_bounded_balance(box, load->K);
+    for (int pass = 0; status == UZ_OK && solved && !wrong && pass < PASSES; pass++) {
+        if ((solved = !uz_stop_is_due(&load->stop)))
+            status = uz_principal_solve(box->force, x->part, err);
+        for (int64_t j = 0; status == UZ_OK && solved && j < d; j++)
+            box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
+        uz_bounded_balance(box, load->K);
+        if (one_tells && solved && pass + 1 < PASSES) {
+            uz_bounded_react(&x->sparse, g, active);
+            wrong = is_clearly_wrong(box, load->h, g, active, m);
+        }
+    }
+    if (status != UZ_OK || !solved || uz_stop_is_due(&load->stop))
+        return status;
     uz_bounded_react(&x->sparse, g, active);
-    memcpy(r, box->r, (size_t)load->dual->m * sizeof *r);
+    memcpy(r, box->r, (size_t)m * sizeof *r);
     box->has_exact = true;
     *end = UZ_ACTIVE_SOLVED;
     return UZ_OK;
