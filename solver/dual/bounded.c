@@ -188,46 +188,22 @@ static double energy(uz_bounded *box, const uz_csc *K, const double *u)
 }
 
 /* Projected successive overrelaxation lowers the energy in each sweep for any factor below 2 (Cryer, SIAM J. Control 9
- * (1971)). Sweeps cost a fraction of a factorization and move the border of the contact by many dofs, where an exact
- * step moves it by one. There are more of them while they still move it. */
+ * (1971)). Sweeps move the border of the contact by many dofs, where an exact step moves it by one, and far from the
+ * border there is little to do where the point is that of the exact step: then they go over the dofs within so many
+ * links of it. There are more of them while they still move it. */
 #define OVERRELAXATION 1.9
-enum { LEAST_SWEEPS = 6, MOST_SWEEPS = 60, HALVINGS = 6 };
-
-/* x += (K without its diagonal)_ij times u_j for i > j */
-static void add_below(double *x, const uz_csc *K, int64_t j, double u)
-{
-    for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++)
-        x[K->idx[k]] += K->val[k] * u;
-}
-
-/* Dof after dof, each by the row of K that its column of the lower triangle holds one part of; above (d) adds up the
- * other part: of the new values on the way down, of the old ones on the way up. */
-static void sweep(uz_bounded *box, const uz_csc *K, bool backwards)
-{
-    double *u = box->point, *above = box->size;
-    memset(above, 0, (size_t)K->cols * sizeof *above);
-    for (int64_t j = 0; backwards && j < K->cols; j++)
-        add_below(above, K, j, u[j]);
-    for (int64_t k = 0; k < K->cols; k++) {
-        int64_t j = backwards ? K->cols - 1 - k : k;
-        double pull = box->p[j] - above[j];
-        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
-            pull -= K->val[q] * u[K->idx[q]];
-        u[j] = clip(u[j] + OVERRELAXATION * pull / K->val[K->ptr[j]], box->bottom[j], box->top[j]);
-        if (!backwards)
-            add_below(above, K, j, u[j]);
-    }
-}
+enum { LINKS = 24, MOST_LINKS = 1000, SHARE = 6, LEAST_SWEEPS = 6, MOST_SWEEPS = 60, HALVINGS = 6 };
 
 /* The point goes towards the last exact displacement, along a path that is cut to the bounds, by the first of the
  * lengths 1, 1/2, 1/4, ... that lowers the energy (Bertsekas, SIAM J. Control Optim. 20 (1982)). From 0, where it
  * begins, by the best of them: what overshoots its bounds by far would begin with far too many held. Where K is no
- * M-matrix, as that of a plate, exact steps by themselves go round in circles. chosen (d): room. */
-static void approach(uz_bounded *box, const uz_csc *K, const double *exact, double *chosen)
+ * M-matrix, as that of a plate, exact steps by themselves go round in circles. chosen (d): room. false: it does not get
+ * there. */
+static bool approach(uz_bounded *box, const uz_csc *K, const double *exact, double *chosen)
 {
     const bool begins = isinf(box->point_energy);
     double length = 1.0, *trial = box->size;
-    bool fell = false;
+    bool fell = false, there = false;
     for (int64_t j = 0; begins && j < K->cols; j++)
         box->point[j] = clip(0.0, box->bottom[j], box->top[j]);
     if (begins)
@@ -240,41 +216,165 @@ static void approach(uz_bounded *box, const uz_csc *K, const double *exact, doub
             memcpy(chosen, trial, (size_t)K->cols * sizeof *trial);
             box->point_energy = reached;
             fell = true;
+            there = k == 0;
         }
         if (fell && !(begins && reached == box->point_energy)) /* it rises again, or any will do */
             break;
     }
     if (fell)
         memcpy(box->point, chosen, (size_t)K->cols * sizeof *chosen);
+    return there;
 }
 
-/* How many dofs the point has at their bounds. */
-static int64_t count_held(const uz_bounded *box, int64_t d)
+/* The dofs that are swept, in a row, with their part of K. */
+typedef struct {
+    int64_t n, held;       /* held: at their bounds */
+    int32_t *links, most;  /* d: to the border; those of the farthest in the region */
+    int64_t *place;        /* d: in the region, -1: elsewhere */
+    int64_t *dof;          /* n */
+    int64_t *ptr, *idx;    /* n + 1, ptr[n]: the others that each is coupled with */
+    double *val, *inverse; /* ptr[n]; n: of the diagonal */
+    double *pull, *u;      /* n: p less what dofs elsewhere take; displacements */
+} region;
+
+static bool is_held(const uz_bounded *box, int64_t j)
 {
-    int64_t count = 0;
-    for (int64_t j = 0; j < d; j++)
-        count += box->point[j] >= box->top[j] || box->point[j] <= box->bottom[j];
-    return count;
+    return box->point[j] >= box->top[j] || box->point[j] <= box->bottom[j];
+}
+
+/* Links from each dof to the next one at the border of the contact, or that pulls at its bound; force = p - K point.
+ * Passes down and up the columns: exact where dofs are numbered along a mesh, else rather too many. */
+static void count_links(region *x, const uz_bounded *box, const uz_csc *K)
+{
+    for (int64_t j = 0; j < K->cols; j++) {
+        const bool pulls = (box->point[j] >= box->top[j] && box->force[j] < 0.0) ||
+                           (box->point[j] <= box->bottom[j] && box->force[j] > 0.0);
+        x->links[j] = pulls ? 0 : MOST_LINKS + 1;
+    }
+    for (int64_t j = 0; j < K->cols; j++)
+        for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++)
+            if (is_held(box, j) != is_held(box, K->idx[k]))
+                x->links[j] = x->links[K->idx[k]] = 0;
+    for (int64_t pass = 0; pass < 4; pass++)
+        for (int64_t q = 0; q < K->cols; q++) {
+            const int64_t j = pass % 2 ? K->cols - 1 - q : q;
+            int32_t own = x->links[j];
+            for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++)
+                own = x->links[K->idx[k]] + 1 < own ? x->links[K->idx[k]] + 1 : own;
+            x->links[j] = own;
+            for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++)
+                if (own + 1 < x->links[K->idx[k]])
+                    x->links[K->idx[k]] = own + 1;
+        }
+    int64_t count[MOST_LINKS + 2] = {0}, within = 0;
+    for (int64_t j = 0; j < K->cols; j++)
+        count[x->links[j]]++;
+    for (x->most = 0; x->most < MOST_LINKS; x->most++) {
+        within += count[x->most];
+        if (x->most >= LINKS && SHARE * (within + count[x->most + 1]) > K->cols)
+            break;
+    }
+}
+
+static void leave_region(region *x)
+{
+    void *room[] = {x->links, x->place, x->dof, x->ptr, x->idx, x->val, x->inverse, x->pull, x->u};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+}
+
+/* box->force = p - K point at entry; whole: all dofs; false: no memory, and no sweeps. */
+static bool enter_region(region *x, const uz_bounded *box, const uz_csc *K, bool whole)
+{
+    *x = (region){.links = uz_alloc(K->cols, sizeof *x->links), .place = uz_alloc(K->cols, sizeof *x->place)};
+    if (!x->links || !x->place)
+        return false;
+    if (!whole)
+        count_links(x, box, K);
+    for (int64_t j = 0; j < K->cols; j++)
+        x->place[j] = whole || x->links[j] <= x->most ? x->n++ : -1;
+    x->dof = uz_alloc(x->n, sizeof *x->dof);
+    x->ptr = uz_alloc_zero(x->n + 2, sizeof *x->ptr);
+    x->inverse = uz_alloc(x->n, sizeof *x->inverse);
+    x->pull = uz_alloc(x->n, sizeof *x->pull);
+    x->u = uz_alloc(x->n, sizeof *x->u);
+    if (!x->dof || !x->ptr || !x->inverse || !x->pull || !x->u)
+        return false;
+    int64_t *next = x->ptr + 1; /* of each dof's entries: their number, then where the next one goes */
+    for (int64_t j = 0; j < K->cols; j++)
+        for (int64_t k = K->ptr[j] + 1; x->place[j] >= 0 && k < K->ptr[j + 1]; k++)
+            if (x->place[K->idx[k]] >= 0) {
+                next[x->place[j] + 1]++;
+                next[x->place[K->idx[k]] + 1]++;
+            }
+    for (int64_t a = 0; a < x->n; a++)
+        next[a + 1] += next[a];
+    x->idx = uz_alloc(next[x->n], sizeof *x->idx);
+    x->val = uz_alloc(next[x->n], sizeof *x->val);
+    if (!x->idx || !x->val)
+        return false;
+    for (int64_t j = 0; j < K->cols; j++) {
+        const int64_t a = x->place[j];
+        if (a < 0)
+            continue;
+        x->dof[a] = j;
+        x->u[a] = box->point[j];
+        x->inverse[a] = 1.0 / K->val[K->ptr[j]];
+        x->pull[a] = box->force[j] + K->val[K->ptr[j]] * box->point[j];
+        for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
+            const int64_t b = x->place[K->idx[k]];
+            if (b < 0)
+                continue;
+            x->idx[next[a]] = b;
+            x->val[next[a]++] = K->val[k];
+            x->idx[next[b]] = a;
+            x->val[next[b]++] = K->val[k];
+        }
+    }
+    for (int64_t a = 0; a < x->n; a++)
+        for (int64_t k = x->ptr[a]; k < x->ptr[a + 1]; k++)
+            x->pull[a] += x->val[k] * x->u[x->idx[k]];
+    return true;
+}
+
+/* Dof after dof, on the way down or up. */
+static void sweep(region *x, const uz_bounded *box, bool backwards)
+{
+    x->held = 0;
+    for (int64_t q = 0; q < x->n; q++) {
+        const int64_t a = backwards ? x->n - 1 - q : q, j = x->dof[a];
+        double pull = x->pull[a] - x->u[a] / x->inverse[a];
+        for (int64_t k = x->ptr[a]; k < x->ptr[a + 1]; k++)
+            pull -= x->val[k] * x->u[x->idx[k]];
+        x->u[a] = clip(x->u[a] + OVERRELAXATION * pull * x->inverse[a], box->bottom[j], box->top[j]);
+        x->held += x->u[a] >= box->top[j] || x->u[a] <= box->bottom[j];
+    }
 }
 
 bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
 {
     const uz_sparse_load *x = (const uz_sparse_load *)load;
+    const uz_csc *K = load->K;
     uz_bounded *box = x->box;
+    region near;
     if (!box || box->contradictory)
         return false;
     /* The energy only falls, so the points converge to the solution whatever the exact steps do. */
-    approach(box, load->K, box->has_exact ? box->u : x->base, x->work);
-    int64_t before = -1, held = count_held(box, load->K->cols);
-    for (int k = 0; k < MOST_SWEEPS && (k < LEAST_SWEEPS || held != before); k += 2) {
-        sweep(box, load->K, false);
-        sweep(box, load->K, true);
-        before = held;
-        held = count_held(box, load->K->cols);
+    const bool there = approach(box, K, box->has_exact ? box->u : x->base, x->work);
+    (void)energy(box, K, box->point);
+    const bool room = enter_region(&near, box, K, !there);
+    int64_t before = -1;
+    for (int k = 0; room && k < MOST_SWEEPS && (k < LEAST_SWEEPS || near.held != before); k += 2) {
+        before = near.held;
+        sweep(&near, box, false);
+        sweep(&near, box, true);
     }
-    box->point_energy = energy(box, load->K, box->point);
+    for (int64_t a = 0; room && a < near.n; a++)
+        box->point[near.dof[a]] = near.u[a];
+    leave_region(&near);
+    box->point_energy = energy(box, K, box->point);
     memset(active, 0, (size_t)load->dual->m * sizeof *active);
-    for (int64_t j = 0; j < load->K->cols; j++) {
+    for (int64_t j = 0; j < K->cols; j++) {
         if (box->point[j] >= box->top[j] && box->force[j] > 0.0)
             active[box->upper[j]] = true;
         else if (box->point[j] <= box->bottom[j] && box->force[j] < 0.0)
