@@ -153,6 +153,8 @@ static bool start_work(service *s, const server_options *options, char *message,
     if (!s->store)
         return false;
     store_configure(s->store, &kept);
+    if (store_missing(s->store))
+        log_write(s->log, LOG_ERROR, "commits_missing", (log_field[]){LOG_S("cause", store_missing(s->store)), {0}});
     s->work = work_start(s->store, &workers, s->log, message, size);
     if (!s->work)
         return false;

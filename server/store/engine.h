@@ -64,6 +64,7 @@ struct store {
     store_listener *changed; /* may be NULL */
     void *changed_ctx;
     store_uploads *uploads;
+    char *missing;                /* set at opening: store_missing */
     pthread_mutex_t message_lock; /* message; taken last */
     char message[256];
 };

@@ -63,6 +63,7 @@ void store_base_begin(store *s, const store_engine *engine)
 void store_base_end(store *s)
 {
     store_uploads_end(s);
+    free(s->missing);
     pthread_mutex_destroy(&s->message_lock);
 }
 
@@ -82,6 +83,11 @@ void store_tell(const store *s, const char *id, bool waits, const char *gone)
 {
     if (s->changed)
         s->changed(s->changed_ctx, id, waits, gone);
+}
+
+const char *store_missing(const store *s)
+{
+    return s->missing;
 }
 
 void store_set_message(store *s, const char *cause)

@@ -80,6 +80,9 @@ void store_close(store *s);
 /* The last failure's cause, for the log; copied to buffer. */
 void store_message(store *s, char *buffer, size_t size);
 
+/* What was on disk once and was not any more when the store was opened, in words; NULL: nothing that is known. */
+const char *store_missing(const store *s);
+
 /* What a program without privileges may still write to the store's disk; -1: not known. */
 int64_t store_free_bytes(store *s);
 

@@ -87,6 +87,37 @@ def test_the_name_of_a_vector(s):
 
 
 @options("--workers", "1")
+def test_a_log_that_was_cut(s):
+    """To SQLite a write-ahead log without its end is one that ends there: what was acknowledged would be gone unsaid."""
+    kept = s.solve(MATRICES)["id"]
+    wal = pathlib.Path(s.db + "-wal")
+    size = wal.stat().st_size
+    lost = [s.post(MATRICES, {"Prefer": "wait=30"}).json["id"] for _ in range(3)]
+    s.process.kill()
+    s.process.wait()
+    s.process.stdout.close()
+    s.log_file.close()
+    with open(wal, "r+b") as file:
+        file.truncate(size)
+    code, text = findings(s)
+    check(code != 0 and all(one in text for one in lost) and "write-ahead log" in text, text)
+    s.start()
+    missing = s.events("commits_missing")
+    check(len(missing) == 1 and missing[0]["level"] == "error" and all(f"submitted {one}" in missing[0]["cause"] for one in lost), missing)
+    check(kept not in missing[0]["cause"] and s.get(f"/v1/jobs/{kept}").status == 200, missing)
+    s.solve(MATRICES)  # it goes on, and says it once
+    s.process.kill()
+    s.process.wait()
+    s.process.stdout.close()
+    s.log_file.close()
+    s.start()
+    check(len(s.events("commits_missing")) == 1, s.log())
+    stop(s)
+    check(findings(s)[0] == 0, findings(s))
+    s.start()
+
+
+@options("--workers", "1")
 def test_an_upload(s):
     """A matrix on disk that is another one now is no matrix of anybody's problem."""
     text = MATRICES["problem"]["K"].encode()

@@ -68,16 +68,21 @@ static inline bool place_reopen(place *p)
     return place_open(p);
 }
 
-static inline void place_end(place *p)
+static inline void place_remove_files(const place *p)
 {
     char name[128];
-    const char *const suffixes[] = {"", "-wal", "-shm", "-journal"};
-    store_close(p->s);
-    p->s = NULL;
+    const char *const suffixes[] = {"", "-wal", "-shm", "-journal", "-trail"};
     for (size_t i = 0; i < sizeof suffixes / sizeof suffixes[0]; i++) {
         snprintf(name, sizeof name, "%s%s", p->path, suffixes[i]);
         unlink(name);
     }
+}
+
+static inline void place_end(place *p)
+{
+    store_close(p->s);
+    p->s = NULL;
+    place_remove_files(p);
     CHECK_INT(rmdir(p->folder), 0); /* nothing else is left behind */
 }
 

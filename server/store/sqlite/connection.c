@@ -134,6 +134,7 @@ static const char *const SQL[QUERY_COUNT] = {
                           " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = id) ORDER BY used LIMIT 1",
     [QUERY_UPLOAD_BYTES] = "SELECT coalesce(sum(bytes), 0) FROM upload",
     [QUERY_COUNTS] = "SELECT status, jobs FROM tally",
+    [QUERY_NUMBER] = "UPDATE tally SET jobs = ?1 WHERE status = -1",
     [QUERY_COUNT_ONE_MORE] = "UPDATE tally SET jobs = jobs + 1 WHERE status = 0",
     [QUERY_COUNT_ONE_LESS] = "UPDATE tally SET jobs = jobs - 1 WHERE status = 0",
 };

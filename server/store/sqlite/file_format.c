@@ -31,6 +31,7 @@
  *          A trigger makes it due, whatever ends the job.
  * client   what each client with a name has: jobs that wait, bytes of its jobs, and seconds of workers on `day` (days
  *          since 1970, UTC). Kept by triggers.
+ * tally    how many jobs have each status; -1: the number of commits, -2: a random name of this file (trail.h).
  * upload_client who has sent which upload.
  * job.client: whose it is, "" where there are no tokens. Idempotency keys of others begin with the name and \x1f.
  * contents of an ended job: which rows its result has (result_blobs.h).
@@ -129,6 +130,9 @@
     "CREATE TRIGGER upload_delete AFTER DELETE ON upload BEGIN"                                                        \
     " DELETE FROM upload_client WHERE upload = OLD.id; END;"
 
+/* Version 8. In a table that most commits change anyhow. */
+#define ROWS_8 "INSERT INTO tally(status, jobs) VALUES(-1, 0), (-2, random());"
+
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"
@@ -151,7 +155,8 @@ static const char *const SCHEMA =
     "  tag TEXT NOT NULL, job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
-    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5 COLUMNS_6 TABLES_7;
+    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5 COLUMNS_6 TABLES_7
+        ROWS_8;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -170,7 +175,8 @@ const char *file_format_why_unreadable(sqlite3 *db)
 /* STEPS[n] turns version n into n + 1. Version 2: load cases, and jobs that refine others. The primary keys of the
  * result tables grew by a column, which SQLite can only do by copying the rows. Version 3: uploads, webhooks, the turn
  * and the size of jobs. Version 4: the tally. Version 5: checksums. Version 6: what belongs
- * to a result. Version 7: clients. */
+ * to a result. Version 7: clients. Version 8: the
+ * number of commits. */
 static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [0] = NULL,
     [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
@@ -190,6 +196,7 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [4] = COLUMNS_5,
     [5] = COLUMNS_6,
     [6] = TABLES_7,
+    [7] = ROWS_8,
 };
 
 bool file_format_integer(sqlite3 *db, const char *sql, int64_t *value)

@@ -3,6 +3,7 @@
 #define SERVER_STORE_SQLITE_INTERNAL_H
 
 #include "store/sqlite/connection.h"
+#include "store/sqlite/trail.h"
 #include "store/engine.h"
 
 #include <pthread.h>
@@ -42,6 +43,8 @@ typedef struct {
     bool sync_stop, sync_started;
     sqlite3_file *log; /* the writer's write-ahead log, set before the thread starts */
     pthread_t syncer;
+
+    trail trail; /* `waiting` is under sync_lock, what is appended the syncer's, the rest the writer's */
 
     char *path; /* absolute, of the file */
     int file;   /* holds the lock that keeps a second daemon out; closed after every connection (see sqlite_open) */

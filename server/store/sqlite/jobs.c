@@ -157,6 +157,8 @@ static store_status submit(sqlite_store *s, connection *c, void *args)
         return status;
     store_next_id(&s->last_ms, &s->sequence, id);
     status = insert_job(c, a->request, id);
+    if (status == STORE_OK)
+        trail_note(&s->trail, "submitted", id);
     return status == STORE_OK ? read_by_id(c, id, a->out) : status;
 }
 
@@ -295,7 +297,6 @@ typedef struct {
 
 static store_status change_own(sqlite_store *s, connection *c, void *args)
 {
-    (void)s;
     const owner_args *a = args;
     const char *id = a->lease->job;
     const holder owner = holder_of(a->lease);
@@ -344,6 +345,7 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
     bind_text(&st, 3, contents);
     status = statement_run(&st);
     free(contents);
+    trail_note(&s->trail, "ended", id);
     return status;
 }
 
@@ -415,7 +417,6 @@ typedef struct {
 
 static store_status dismiss(sqlite_store *s, connection *c, void *args)
 {
-    (void)s;
     dismiss_args *a = args;
     job j = {0};
     store_status status = read_by_id(c, a->id, &j);
@@ -430,6 +431,7 @@ static store_status dismiss(sqlite_store *s, connection *c, void *args)
     bind_text(&st, 1, a->id);
     if (a->was == JOB_ACCEPTED || a->was == JOB_RUNNING)
         bind_real(&st, 2, clock_seconds(CLOCK_REALTIME));
+    trail_note(&s->trail, a->was == JOB_ACCEPTED || a->was == JOB_RUNNING ? "dismissed" : "deleted", a->id);
     return statement_run(&st);
 }
 

@@ -40,7 +40,9 @@ static const struct {
     {0, "PRAGMA foreign_key_check", "a row of %s refers to what is not there\n"},
     {0, "SELECT id FROM job WHERE NOT EXISTS (SELECT 1 FROM request WHERE request.job = job.id) LIMIT 20",
      "job %s has no request\n"},
-    {4, "SELECT status FROM tally WHERE jobs <> (SELECT count(*) FROM job WHERE job.status = tally.status)",
+    {4,
+     "SELECT status FROM tally WHERE status >= 0 AND jobs <> (SELECT count(*) FROM job WHERE job.status = "
+     "tally.status)",
      "the tally of jobs with status %s is wrong\n"},
     {5, "SELECT id FROM job WHERE summary IS NOT NULL AND NOT " SUM_IS("summary_sum", SUM_JOB),
      "the summary of job %s is not what was written\n"},
@@ -82,6 +84,11 @@ static bool check(sqlite3 *db, const char *file, store_findings *out)
     for (size_t i = 0; i < sizeof CHECKS / sizeof CHECKS[0] && rc == SQLITE_OK; i++)
         if (version >= CHECKS[i].version)
             rc = collect(db, CHECKS[i].sql, CHECKS[i].finding, text);
+    uint64_t numbered;
+    char *lost = version >= 8 ? trail_missing(db, file, &numbered) : NULL;
+    if (lost)
+        fprintf(text, "%s\n", lost);
+    free(lost);
     if (rc == SQLITE_OK && version >= 3) {
         /* Ids first, a page of them at a time: no read transaction stays open while files are read. */
         char folder[4096];

@@ -77,6 +77,12 @@ static bool open_connections(sqlite_store *s, const char *path, char *message, s
             snprintf(message, size, "cannot use a write-ahead log beside the file: %s", sqlite3_errmsg(s->writer.db));
     }
     ok = ok && file_format_upgrade(s->writer.db, version, message, size) && read_newest_id(s, message, size);
+    if (ok) {
+        uint64_t number;
+        s->base.missing = trail_missing(s->writer.db, s->path, &number);
+        trail_open(&s->trail, s->writer.db, s->path);
+        s->trail.number = number; /* past those that are lost, so that they are told once */
+    }
     for (int i = 0; ok && i < STORE_READERS; i++) {
         ok = connection_open(&s->readers[i], s->path, false, message, size);
         s->readers_free[s->n_readers_free] = &s->readers[i];
@@ -118,6 +124,7 @@ store *sqlite_open(const char *path, char *message, size_t size)
     pthread_cond_init(&s->sync_asked, NULL);
     pthread_cond_init(&s->sync_ended, NULL);
     s->queue_end = &s->queue;
+    s->trail.fd = -1;
     s->claims = (uint64_t)(clock_seconds(CLOCK_REALTIME) * 1e6);
     s->file = lock_file(path, message, size);
     bool ok = s->file >= 0 && open_connections(s, path, message, size);
@@ -147,6 +154,7 @@ void sqlite_close(store *base)
     pthread_mutex_destroy(&s->readers_lock);
     pthread_mutex_destroy(&s->queue_lock);
     pthread_mutex_destroy(&s->writer_lock);
+    trail_close(&s->trail);
     store_base_end(base);
     free(s->path);
     free(s);

@@ -37,12 +37,14 @@ static void *sync_loop(void *argument)
             continue;
         }
         uint64_t upto = s->committed;
+        trail_take(&s->trail);
         pthread_mutex_unlock(&s->sync_lock);
         double begun = clock_seconds(CLOCK_MONOTONIC);
         /* xSync touches nothing of the log, which is open as long as the writer, but its descriptor. */
         suspect = suspect || s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY) != SQLITE_OK;
         bool ok = !suspect || save_by_checkpoint(s);
         suspect = !ok; /* until a checkpoint succeeds a sync's word counts for nothing */
+        trail_append(&s->trail, ok);
         metrics_seconds(s->base.settings.metrics, METRIC_COMMIT, clock_seconds(CLOCK_MONOTONIC) - begun);
         pthread_mutex_lock(&s->sync_lock);
         if (ok) {
@@ -78,6 +80,11 @@ void sqlite_sync_end(sqlite_store *s)
 
 store_status sqlite_commit(sqlite_store *s, uint64_t *number)
 {
+    statement numbered = statement_begin(&s->writer, QUERY_NUMBER);
+    bind_integer(&numbered, 1, (int64_t)++s->trail.number);
+    const store_status noted = statement_run(&numbered);
+    if (noted != STORE_OK)
+        return noted;
     pthread_mutex_lock(&s->sync_lock);
     s->begun++;
     pthread_mutex_unlock(&s->sync_lock);
@@ -85,6 +92,8 @@ store_status sqlite_commit(sqlite_store *s, uint64_t *number)
     store_status status = statement_run(&st);
     pthread_mutex_lock(&s->sync_lock);
     *number = s->committed = s->begun;
+    if (status == STORE_OK)
+        trail_committed(&s->trail, s->trail.number);
     if (s->wanted > s->synced)
         pthread_cond_signal(&s->sync_asked);
     pthread_mutex_unlock(&s->sync_lock);

@@ -59,6 +59,7 @@ static store_status add_row(sqlite_store *s, connection *c, void *args)
         bind_real(&st, 2, now);
         status = statement_run(&st);
     }
+    trail_note(&s->trail, "upload", a->id);
     return status == STORE_OK ? read_info(c, a->id, a->client, a->out) : status;
 }
 

@@ -50,6 +50,7 @@ static void run_alone(sqlite_store *s, pending *p)
     for (int tries = 0; tries < 2; tries++) {
         if (tries > 0)
             sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
+        trail_begin(&s->trail);
         p->status = run_query(c, QUERY_BEGIN);
         if (p->status == STORE_OK) {
             p->status = p->change(s, c, p->args);
@@ -69,6 +70,7 @@ static bool run_together(sqlite_store *s, pending *list)
 {
     connection *c = &s->writer;
     uint64_t number = 0;
+    trail_begin(&s->trail);
     bool good = run_query(c, QUERY_BEGIN) == STORE_OK;
     for (pending *p = list; p && good; p = p->next) {
         good = run_query(c, QUERY_SAVEPOINT) == STORE_OK;

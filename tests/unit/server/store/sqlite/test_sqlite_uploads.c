@@ -35,7 +35,7 @@ TEST(a_backup_has_the_uploads)
         CHECK_INT(store_upload_delete(copy.s, ABC, NULL), STORE_OK);
         store_close(copy.s);
     }
-    unlink(copy.path);
+    place_remove_files(&copy);
     /* A file that is gone: no backup, and nothing is left of one. */
     CHECK(rmdir(folder) == 0);
     CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
