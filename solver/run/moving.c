@@ -23,6 +23,7 @@
 #include "run/results.h"
 #include "run/setup_cache.h"
 #include "run/solve.h"
+#include "run/transfer.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -140,7 +141,8 @@ static double next_step(moving *m)
     return square > 0.0 ? fmin(MOST_STEP, fmax(LEAST_STEP, -m->step * along / square)) : m->step;
 }
 
-/* The next answer takes the place of the last, with the time that both took. */
+/* The next answer takes the place of the last, with the time that both took. Whoever goes on from it begins where
+ * nothing has moved, with the rows that there are; without memory for their reactions nobody can. */
 static void replace(uz_result **result, uz_result *next, const moving *m)
 {
     uz_result *last = *result;
@@ -151,10 +153,9 @@ static void replace(uz_result **result, uz_result *next, const moving *m)
     next->summary.origin = last->summary.origin == UZ_FROM_ZERO ? UZ_FROM_ZERO : UZ_FROM_REACTIONS; /* the caller's */
     next->summary.geometry.kind = UZ_KINEMATICS_MOVING;
     next->summary.geometry.passes = m->passes;
-    if (last->m != next->m) { /* whoever goes on begins where nothing has moved, with other rows */
-        uz_state_free(next->state);
-        next->state = NULL;
-    }
+    uz_state_free(next->state);
+    next->state = NULL;
+    (void)uz_carry_start(&next->state, next, &m->base->model.info, m->base->model.m, true, NULL);
     uz_result_free(last);
     *result = next;
 }

@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Weights below this are rounding. */
 #define NO_WEIGHT 1e-9
@@ -101,7 +102,8 @@ uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_bo
     return UZ_OK;
 }
 
-uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, uz_error *err)
+uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, bool whole,
+                         uz_error *err)
 {
     const uz_mesh_info *here = &result->mesh;
     bool known = here->contact_of != NULL;
@@ -113,7 +115,7 @@ uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_
     uz_state *state = uz_alloc_zero(1, sizeof *state);
     int64_t *row_at = uz_alloc_zero(here->n_nodes, sizeof *row_at); /* 1 + the first row at a node that is not taken */
     int64_t *next = uz_alloc(result->m, sizeof *next);
-    const bool room = state && row_at && next && (state->r = uz_alloc(m, sizeof *state->r));
+    bool room = state && row_at && next && (state->r = uz_alloc(m, sizeof *state->r));
     for (int64_t i = 0, first = 0, end; i < m && room; first = end) { /* rows come contact by contact */
         const int64_t contact = there->contact_of[i];
         while (first < result->m && here->contact_of[first] < contact)
@@ -134,12 +136,22 @@ uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_
     }
     free(row_at);
     free(next);
+    double **others[] = {&state->rho, &state->best_r, &state->anchor, &state->Dr, &state->Drho};
+    for (int k = 0; k < 5 && room && whole; k++) { /* of D r nothing is known */
+        room = (*others[k] = uz_alloc_zero(m, sizeof(double))) != NULL;
+        if (room && k < 3)
+            memcpy(*others[k], state->r, (size_t)m * sizeof *state->r);
+    }
     if (!room) {
         uz_state_free(state);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from an answer with %lld contacts",
                        (long long)result->m);
     }
     state->m = m;
+    state->tau = 1;
+    state->step_norm = NAN;
+    state->best_bound = state->best_relative = INFINITY;
+    state->method = state->made_by = UZ_METHOD_AUTO;
     *out = state;
     return UZ_OK;
 }

@@ -11,7 +11,9 @@ uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_bo
                             int64_t m, uz_error *err);
 
 /* Reactions for the contact rows of a body at another place: those of the result at the same nodes, in the order in
- * which a contact has rows there. *out NULL and UZ_OK: the result has none. The caller frees with uz_state_free. */
-uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, uz_error *err);
+ * which a contact has rows there. whole: a state that can be stored, which says nothing but these reactions. *out NULL
+ * and UZ_OK: the result has none. The caller frees with uz_state_free. */
+uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, bool whole,
+                         uz_error *err);
 
 #endif

@@ -149,6 +149,21 @@ def test_a_side_touches_itself_as_two_groups_do(s):
                 check(max(map(abs, force)) < 1e-9, "a surface does not push itself", force)
 
 
+def test_answers_of_folds_are_refined(s):
+    """Where contact has moved there are other rows than the body has at rest, where whoever goes on begins."""
+    for way in ("fixed", "moving"):
+        request = fold("quad4", [{"on": "inner", "with": "inner"}], kinematics=way)
+        request["solver"] = {"method": "accelerated_restart", "accuracy": {"relative_error": 1e-2}}
+        first = expect(s.post(request, WAIT), 200).json
+        refined = expect(s.request("POST", f"/v1/jobs/{first['id']}/refine", {"accuracy": {"relative_error": 1e-9}}, WAIT), 200).json
+        request["solver"]["accuracy"]["relative_error"] = 1e-9
+        whole = answer_of(s, request)["summary"]
+        check(refined["status"] == "successful" and refined["summary"]["outcome"] == "converged", way, refined)
+        check(refined["summary"]["started_from"] == ("continued" if way == "fixed" else "warm"), way, refined)
+        sums = [one["contact"]["reaction_sum"] for one in (first["summary"], refined["summary"], whole)]
+        check(abs(sums[1] / sums[2] - 1) < 1e-8 < abs(sums[0] / sums[2] - 1), way, sums)
+
+
 def test_turned_and_mirrored_folds_are_the_same(s):
     for kind, contact in (("quad4", {"on": "inner", "with": "inner"}), ("tri3", {"on": "boundary", "with": "boundary"})):
         a = answer_of(s, fold(kind, [contact]))["summary"]["contact"]["reaction_sum"]
