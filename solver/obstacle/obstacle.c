@@ -13,6 +13,9 @@
 /* A way out that is longer than this many depths leads along the obstacle. */
 #define MOST_BACK 4
 
+/* An edge no farther aside, in `clear`, is before a point. */
+#define BEFORE 0.25
+
 /* Grooves (rad): what is deeper than the first is no curve, below the second there is none. */
 #define DEEP_GROOVE 0.1
 #define NO_GROOVE   1e-5
@@ -142,8 +145,27 @@ uz_status uz_obstacle_row_gap(uz_gap *out, double *at, const uz_obstacle *obstac
     if (there.gap < 0.999 * enough || back > most)
         return UZ_OK;
     *out = there;
+    /* An edge that is hardly aside, and juts out that way, is as good as before the point: along the
+     * direction from it to the point the normal would tilt as the point slides, and push it down a flank. */
+    if (fabs(there.curvature * there.gap) >= 0.5) {
+        double high = 0, aside = 0, length = 0, before[3] = {0};
+        uz_gap edge;
+        for (int c = 0; c < dim; c++)
+            high -= (taken[c] - there.foot[c]) * outward[c];
+        for (int c = 0; c < dim; c++)
+            aside = hypot(aside, taken[c] - there.foot[c] + high * outward[c]);
+        const double left = high > 0 ? fmax(0, 1 - BEFORE * clear / aside) : 1;
+        for (int c = 0; c < dim; c++) {
+            const double off = left * (taken[c] - there.foot[c]) - (1 - left) * high * outward[c];
+            before[c] = there.foot[c] + off;
+            length = hypot(length, off);
+        }
+        if (uz_obstacle_gap(&edge, obstacle, before, NULL) == UZ_OK && edge.gap >= (1 - 1e-9) * length)
+            memcpy(out->normal, edge.normal, sizeof out->normal);
+    }
+    out->gap = 0;
     for (int c = 0; c < dim; c++)
-        out->gap += back * outward[c] * there.normal[c];
+        out->gap += (x[c] - there.foot[c]) * out->normal[c];
     if (at)
         memcpy(at, taken, (size_t)dim * sizeof *at);
     return UZ_OK;

@@ -32,6 +32,23 @@ def test_passes_that_went_back_and_forth_or_crept(s):
         check(answer["summary"]["contact"]["geometry"]["passes"] < 30, answer["summary"]["contact"]["geometry"])
 
 
+def test_a_ridge_that_slides_along_a_side(s):
+    """Between nodes: where the body moves, the point that the crest presses on must not slip down a flank."""
+    def scene(element, n, slope, how):
+        line = [[2.25 + x, 0.1 - abs(x) * slope] for x in (-3, 0, 3)]
+        return {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"size": [4, 2], "cells": [n, n // 2], "element": element}},
+                            "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "top", "ux": 0, "uy": 0}],
+                            "kinematics": how, "contacts": [{"on": "bottom", "obstacle": {"polyline": {"points": line}}}]}}
+    daemon = generated_obstacles.contacts.Daemon(s)
+    for element, n, slope in (("quad4", 16, 1), ("quad4", 32, 3), ("quad8", 8, 3), ("quad8", 16, 3), ("quad8", 32, 1)):
+        forces = []
+        for how in ("fixed", "moving"):
+            answer, why = daemon.answer(scene(element, n, slope, how))
+            check(answer, element, n, slope, how, why)
+            forces.append(answer["summary"]["contact"]["force"])
+        check(max(abs(a - b) for a, b in zip(*forces)) < 0.01 * forces[0][1], element, n, slope, forces)
+
+
 def test_overlap_that_is_not_due_to_sliding(s):
     """`auto` finds that the answer would not change where the body has moved to: sliding no longer explains the overlap."""
     answer, why = generated_obstacles.contacts.Daemon(s).answer(generated_obstacles.Scene(92).request())

@@ -392,9 +392,12 @@ TEST(rows_on_a_ridge)
             near(gap.normal[1], 1, 1e-12, "normal");
         }
     for (int k = -1; k <= 1; k += 2) { /* beside the crest the plane turns, and further on it is the flank's */
-        const double near_it[2] = {0.01 * k, 0.8}, far_off[2] = {k, -0.2};
+        const double before[2] = {0.002 * k, 0.8}, near_it[2] = {0.02 * k, 0.8}, far_off[2] = {k, -0.2};
+        CHECK(uz_obstacle_row_gap(&gap, NULL, o, before, down, 0.01, NULL) == UZ_OK);
+        near(gap.normal[0], 0, 1e-12, "normal");
+        near(gap.gap, -0.2, 1e-12, "gap");
         CHECK(uz_obstacle_row_gap(&gap, NULL, o, near_it, down, 0.01, NULL) == UZ_OK);
-        CHECK(k * gap.normal[0] > 0.01 && k * gap.normal[0] < 0.1 && gap.gap > -0.21 && gap.gap < -0.19);
+        CHECK(k * gap.normal[0] > 0.01 && k * gap.normal[0] < 0.2 && gap.gap > -0.21 && gap.gap < -0.19);
         CHECK(uz_obstacle_row_gap(&gap, NULL, o, far_off, down, 0.01, NULL) == UZ_OK);
         near(gap.normal[0], k * s, 1e-12, "normal");
         near(gap.gap, -0.2 * s, 1e-12, "gap");
