@@ -57,6 +57,7 @@ typedef struct {
     double *v, *Kv; /* d: what the last pass changed, T(x) - x, and K times it */
     double *before; /* d: the v before */
     int64_t n, passes;
+    double norm;                   /* of the answer before, by its certificate */
     double step, change, ratio[2]; /* w; what the last pass changed; the last two ratios of these, 0: unknown */
 } moving;
 
@@ -83,6 +84,7 @@ static uz_status prepare(moving *m, const uz_result *first, const uz_problem *pr
     m->cache = cache;
     m->passes = 1;
     m->step = 1;
+    m->norm = first->summary.certificate.energy_norm;
     m->n = first->n_nodes * first->mesh.dim;
     if (!cache && !(m->cache = m->own_cache = uz_cache_new(SIZE_MAX)))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache");
@@ -110,7 +112,8 @@ static void clear(moving *m)
     free(m->before);
 }
 
-/* ||u - place||_K by the norm of the certificate. Both have what supports prescribe. */
+/* ||u - place||_K by the norm of the certificate, or by that of the answer before: of one that only supports carry, and
+ * nothing deforms, it is the way that they go. Both answers have what supports prescribe. */
 static double change_by(moving *m, const uz_result *result)
 {
     const uz_csc *K = &m->base->model.K;
@@ -123,8 +126,10 @@ static double change_by(moving *m, const uz_result *result)
     free(nodal);
     memset(m->Kv, 0, (size_t)K->cols * sizeof *m->Kv);
     uz_csc_symv(m->Kv, K, 1.0, m->v);
-    const double square = fmax(0.0, uz_dot(K->cols, m->v, m->Kv)), norm = result->summary.certificate.energy_norm;
-    return square > 0.0 ? sqrt(square) / norm : 0.0;
+    const double square = fmax(0.0, uz_dot(K->cols, m->v, m->Kv)), before = m->norm;
+    m->norm = result->summary.certificate.energy_norm;
+    const double least = fmin(before, m->norm);
+    return square > 0.0 ? sqrt(square) / (least > 0.0 ? least : fmax(before, m->norm)) : 0.0;
 }
 
 /* w that would have brought the last difference to zero, were all of them along one line; Kv: K times the last. */

@@ -32,6 +32,15 @@ def test_passes_that_went_back_and_forth_or_crept(s):
         check(answer["summary"]["contact"]["geometry"]["passes"] < 30, answer["summary"]["contact"]["geometry"])
 
 
+def test_a_body_that_is_carried_off_its_obstacle(s):
+    """The answer where it began is (-2.1, 7.0), that where supports carry it zero, by more than all of the deformation."""
+    daemon, scene = generated_obstacles.contacts.Daemon(s), generated_obstacles.Scene(5050)
+    for how in ("auto", "moving"):
+        answer, why = daemon.answer(scene.request(2, kinematics=how))
+        check(answer, how, why)
+        check(answer["summary"]["contact"]["force"] == [0, 0], how, answer["summary"]["contact"])
+
+
 def test_a_ridge_that_slides_along_a_side(s):
     """Between nodes: where the body moves, the point that the crest presses on must not slip down a flank."""
     def scene(element, n, slope, how):
