@@ -2,6 +2,7 @@
  * and as soft in another as the solver meets, by cold certified solves in units of CHOLMOD's linear solve of the same
  * K. */
 #include "bench/bench.h"
+#include "chen_harker.h"
 #include "core/clock.h"
 
 #include <math.h>
@@ -25,33 +26,6 @@ static uz_problem beam_problem(int64_t cells, int64_t layers, const char *elemen
     return problem;
 }
 
-/* CHENHARK of the CUTE collection, after B. Chen and P. T. Harker, SIAM J. Matrix Anal. Appl. 14 (1993): the sum of
- * squares of u_1, u_n and the second differences of u, with 0 before and behind it, under u >= 0. The solution is 1 on
- * the first half of the dofs and 0 behind it, on the first tenth of n there with r = 0. */
-static uz_status chain_qp(uz_qp *qp, int64_t n, uz_error *err)
-{
-    static const double entry[] = {6.0, -4.0, 1.0};
-    *qp = (uz_qp){.p = calloc((size_t)n, sizeof *qp->p), .h = calloc((size_t)n, sizeof *qp->h)};
-    uz_status status = qp->p && qp->h ? uz_csc_init(&qp->K, n, n, 3 * n - 3, err) : UZ_ERR_MEMORY;
-    if (status == UZ_OK)
-        status = uz_csc_init(&qp->N, n, n, n, err);
-    for (int64_t j = 0, nnz = 0; status == UZ_OK && j < n; j++) {
-        for (int64_t below = 0; below < 3 && j + below < n; below++) {
-            const double value = entry[below];
-            qp->K.idx[nnz] = j + below;
-            qp->K.val[nnz++] = value;
-            qp->p[j + below] += j < n / 2 ? value : 0.0; /* p = K u* - r* */
-            qp->p[j] += below > 0 && j + below < n / 2 ? value : 0.0;
-        }
-        qp->p[j] -= j >= n / 2 + n / 10 ? 1.0 : 0.0;
-        qp->K.ptr[j + 1] = nnz;
-        qp->N.idx[j] = j;
-        qp->N.val[j] = -1.0;
-        qp->N.ptr[j + 1] = j + 1;
-    }
-    return status;
-}
-
 static const struct {
     const char *name, *element; /* NULL: the chain */
     int64_t cells, layers;
@@ -72,12 +46,13 @@ bool bench_slender(bench_value *ratio, bench_value *milliseconds, int64_t *steps
     uz_qp qp = {0}; /* of the beam */
     uz_error err;
     double ratios[RUNS], own[RUNS];
+    const int64_t chain = bodies[which].cells;
     settings.relative_error = 1e-8;
     if (bodies[which].element)
         problem = beam_problem(bodies[which].cells, bodies[which].layers, bodies[which].element, bodies[which].load,
                                bodies[which].gap);
     bool ok = (bodies[which].element ? uz_scene_to_qp(&qp, NULL, &problem.scene, &err)
-                                     : chain_qp(&problem.qp, bodies[which].cells, &err)) == UZ_OK;
+                                     : chen_harker_qp(&problem.qp, chain, chain / 2, chain / 10, &err)) == UZ_OK;
     const uz_qp *matrices = bodies[which].element ? &qp : &problem.qp;
     const bench_ordering ordering = ok ? bench_better_ordering(&matrices->K, matrices->p) : BENCH_AMD;
     for (int k = -1; ok && k < RUNS; k++) { /* the first does not count */

@@ -551,9 +551,10 @@ def run(s, numbers, say=print, refine=True):
     return {"scenes": sum(c[0] for c in counts.values()), "solves": daemon.solves, "families": counts, "failures": failures}
 
 
-def main():
+def command(doc, run, of):
+    """BUILD OUT [COUNT [FIRST]]: runs the scenes against a daemon of its own, tells what was false and writes it down."""
     if len(sys.argv) < 3:
-        sys.exit(__doc__)
+        sys.exit(doc)
     count, first = (int(sys.argv[k]) if len(sys.argv) > k else d for k, d in ((3, 1000), (4, 0)))
     s = service.Service(sys.argv[1])
     began = time.time()
@@ -562,13 +563,13 @@ def main():
         found = run(s, range(first, first + count))
     finally:
         s.stop()
-    for name, (scenes, false) in sorted(found["families"].items()):
+    for name, (scenes, false) in sorted(found.get("families", {}).items()):
         print(f"{name:14s} {scenes:5d} scenes {false:5d} false")
-    print(f"{found['scenes']} scenes of bodies that touch, {found['solves']} solves, {len(found['failures'])} false, {time.time() - began:.0f} s")
+    print(f"{found['scenes']} {of}, {found['solves']} solves, {len(found['failures'])} false, {time.time() - began:.0f} s")
     with open(sys.argv[2], "w", encoding="utf-8") as out:
         json.dump(found, out)
     sys.exit(bool(found["failures"]))
 
 
 if __name__ == "__main__":
-    main()
+    command(__doc__, run, "scenes of bodies that touch")

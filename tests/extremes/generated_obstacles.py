@@ -4,16 +4,12 @@ usage: generated_obstacles.py BUILD_DIR OUTPUT.json [SCENES [FIRST]]
 What must hold of each: its mirror image has the mirrored answer; turning and units change rounding only; nothing pulls or stands in
 the obstacle; and the force is that of the mesh refined twice, or a warning says that it is not to be trusted. Obstacles have ridges,
 grooves and corners, half of them exactly where nodes are."""
-import json
 import math
 import random
-import sys
-import time
 
 import generated_contacts as contacts
 from generated_contacts import SOLID, distorted, in_units, kind_of, off_by, rotation, turned
 from two_bodies import EDGES, body
-import service
 
 # By how much a force may differ from that of the mesh refined twice without a warning, and how many of the scenes may.
 TOLERANCE = 0.35
@@ -228,22 +224,5 @@ def run(s, numbers, say=print, refine=True):
     return {"scenes": len(numbers), "solves": daemon.solves, "failures": failures}
 
 
-def main():
-    if len(sys.argv) < 3:
-        sys.exit(__doc__)
-    count, first = (int(sys.argv[k]) if len(sys.argv) > k else d for k, d in ((3, 1000), (4, 0)))
-    s = service.Service(sys.argv[1])
-    began = time.time()
-    try:
-        s.start()
-        found = run(s, range(first, first + count))
-    finally:
-        s.stop()
-    print(f"{found['scenes']} bodies on obstacles, {found['solves']} solves, {len(found['failures'])} false, {time.time() - began:.0f} s")
-    with open(sys.argv[2], "w", encoding="utf-8") as out:
-        json.dump(found, out)
-    sys.exit(bool(found["failures"]))
-
-
 if __name__ == "__main__":
-    main()
+    contacts.command(__doc__, run, "bodies on obstacles")

@@ -1,5 +1,6 @@
 /* Exchanges with an updated factor, by reactions and by gaps: exact answers, long beams and wide plates, on which all
  * wrong rows can't change places at once, and what `auto` does there. */
+#include "chen_harker.h"
 #include "harness.h"
 #include "judge.h"
 #include "qp_fixture.h"
@@ -156,37 +157,14 @@ TEST(steps_are_those_of_the_shorter_way)
     }
 }
 
-/* CHENHARK of the CUTE collection, after B. Chen and P. T. Harker, SIAM J. Matrix Anal. Appl. 14 (1993): sums of
- * squared second differences over u >= 0, whose solution is 1 on the first n_free dofs, then weakly active on
- * n_degenerate. */
-static uz_qp chen_harker(int64_t n, int64_t n_free, int64_t n_degenerate)
-{
-    uz_qp qp = {.p = vector(n), .h = vector(n)};
-    uz_error err;
-    CHECK_INT(uz_csc_init(&qp.K, n, n, 3 * n - 3, &err), UZ_OK);
-    CHECK_INT(uz_csc_init(&qp.N, n, n, n, &err), UZ_OK);
-    for (int64_t j = 0, at = 0; j < n; j++) {
-        static const double stencil[] = {6, -4, 1};
-        for (int64_t k = 0; k < 3 && j + k < n; k++, at++) {
-            qp.K.idx[at] = j + k;
-            qp.K.val[at] = stencil[k];
-        }
-        qp.K.ptr[j + 1] = at;
-        qp.N.ptr[j + 1] = j + 1;
-        qp.N.idx[j] = j;
-        qp.N.val[j] = -1;
-        for (int64_t k = -2; k <= 2; k++) /* p = K u* - r* */
-            qp.p[j] += j + k >= 0 && j + k < n_free ? stencil[k < 0 ? -k : k] : 0;
-        qp.p[j] -= j >= n_free + n_degenerate ? 1 : 0;
-    }
-    return qp;
-}
-
-/* Signs of weakly active rows are rounding there, so that no guess is ever without wrong rows: the last one is
+/* Signs of weakly active rows are rounding on CHENHARK, so that no guess is ever without wrong rows: the last one is
  * certified all the same, before anything else is tried. */
 TEST(a_last_guess_that_is_right_is_certified)
 {
-    uz_problem problem = problem_of(chen_harker(1000, 500, 200));
+    uz_qp qp;
+    uz_error err;
+    CHECK_INT(chen_harker_qp(&qp, 1000, 500, 200, &err), UZ_OK);
+    uz_problem problem = problem_of(qp);
     const uz_settings settings = uz_settings_default();
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
