@@ -94,18 +94,6 @@ static void ascend(double *x, const double *coarse, double *t, const uz_level *l
     }
 }
 
-static uz_status solve_coarsest(const uz_multigrid *mg, uz_multigrid_room *room, double *x, const double *b,
-                                uz_error *err)
-{
-    double *t = room->t[mg->levels - 1];
-    uz_factor_permute(mg->coarsest, t, b);
-    uz_status status = uz_factor_solve_one(mg->coarsest, room->ws, t, true, err);
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(mg->coarsest, room->ws, t, false, err);
-    uz_factor_unpermute(mg->coarsest, x, t);
-    return status;
-}
-
 uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,
                              const double *r, uz_error *err)
 {
@@ -116,8 +104,12 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
         double *x = l == 0 ? z : room->x[l];
         descend(x, room->b[l + 1], room->t[l], level, A, l == 0 ? r : room->b[l], mg->k);
     }
-    uz_status status =
-        last == 0 ? solve_coarsest(mg, room, z, r, err) : solve_coarsest(mg, room, room->x[last], room->b[last], err);
+    double *t = room->t[last];
+    uz_factor_permute(mg->coarsest, t, last == 0 ? r : room->b[last]);
+    uz_status status = uz_factor_solve_one(mg->coarsest, room->ws, t, true, err);
+    if (status == UZ_OK)
+        status = uz_factor_solve_one(mg->coarsest, room->ws, t, false, err);
+    uz_factor_unpermute(mg->coarsest, last == 0 ? z : room->x[last], t);
     if (last == 0) {
         /* Where K itself is the coarsest matrix: held dofs are rows of the unit matrix there. */
         const uz_level *level = &mg->level[0];

@@ -107,31 +107,6 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
     return status;
 }
 
-static uz_status factor_coarsest(uz_multigrid *mg, const uz_csc *K, const bool *held, size_t memory_limit,
-                                 const uz_stop *stop, uz_error *err)
-{
-    int last = mg->levels - 1;
-    uz_csc alone = {0};
-    uz_error inner = {0};
-    uz_status status = last == 0 ? uz_csc_copy(&alone, K, err) : UZ_OK;
-    /* A matrix that is small enough to be the coarsest: rows of held dofs become those of the unit matrix. */
-    for (int64_t j = 0; status == UZ_OK && last == 0 && held && j < K->cols; j++)
-        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
-            if (held[j] || held[K->idx[k]])
-                alone.val[k] = K->idx[k] == j ? 1.0 : 0.0;
-    if (status == UZ_OK)
-        status = uz_factor_plain(&mg->coarsest, last == 0 ? &alone : &mg->level[last].A, UZ_ORDERING_AMD, memory_limit,
-                                 stop ? stop->hooks : NULL, last == 0 ? err : &inner);
-    uz_csc_clear(&alone);
-    if (status == UZ_OK || last == 0)
-        return status;
-    if (status == UZ_ERR_NOT_SPD)
-        return uz_fail(err, status, "K",
-                       "K is not positive definite to working precision: on smooth displacements it resists too "
-                       "little. Support the body so that it can't move freely, or check the signs of K.");
-    return uz_fail(err, status, inner.where, "%s", inner.message);
-}
-
 /* All so far; what the limit is compared with on the way. */
 static size_t count_bytes(const uz_multigrid *mg)
 {
@@ -236,8 +211,28 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
     if (status == UZ_OK)
         mg->most = bound_by_diagonal(&mg->level[0], K, row);
     free(row);
-    if (status == UZ_OK)
-        status = factor_coarsest(mg, K, held, memory_limit, stop, err);
+    if (status == UZ_OK) { /* the factor of the coarsest level */
+        const int last = mg->levels - 1;
+        uz_csc alone = {0};
+        uz_error inner = {0};
+        if (last == 0)
+            status = uz_csc_copy(&alone, K, err);
+        /* a matrix that is small enough to be the coarsest: rows of held dofs become those of the unit matrix */
+        for (int64_t j = 0; status == UZ_OK && last == 0 && held && j < n; j++)
+            for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+                if (held[j] || held[K->idx[q]])
+                    alone.val[q] = K->idx[q] == j ? 1.0 : 0.0;
+        if (status == UZ_OK)
+            status = uz_factor_plain(&mg->coarsest, last == 0 ? &alone : &mg->level[last].A, UZ_ORDERING_AMD,
+                                     memory_limit, stop ? stop->hooks : NULL, last == 0 ? err : &inner);
+        uz_csc_clear(&alone);
+        if (last > 0 && status == UZ_ERR_NOT_SPD)
+            uz_fail(err, status, "K",
+                    "K is not positive definite to working precision: on smooth displacements it resists too little. "
+                    "Support the body so that it can't move freely, or check the signs of K.");
+        else if (last > 0 && status != UZ_OK)
+            uz_fail(err, status, inner.where, "%s", inner.message);
+    }
     if (status == UZ_OK) {
         mg->bytes = count_bytes(mg);
         *out = mg;

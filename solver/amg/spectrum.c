@@ -78,28 +78,6 @@ static void random_residual(uz_cg *cg, const uz_csc *K)
         cg->r[j] = sqrt(K->val[K->ptr[j]]) * uz_normal(&state);
 }
 
-/* One step of conjugate gradients without the solution. */
-static uz_status step(coefficients *c, double *square, uz_cg *cg, const uz_csc *K, uz_error *err)
-{
-    memset(cg->q, 0, (size_t)cg->n * sizeof *cg->q);
-    uz_csc_symv(cg->q, K, 1.0, cg->p);
-    double curvature = uz_dot(cg->n, cg->p, cg->q), before = *square;
-    if (!(curvature > 0.0))
-        return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                       "K is not positive definite: conjugate gradients met a direction that it does not resist. "
-                       "Support the body so that it can't move freely, or check the signs of K.");
-    double alpha = *square / curvature;
-    uz_axpy(cg->n, -alpha, cg->q, cg->r);
-    uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
-    *square = uz_dot(cg->n, cg->r, cg->z);
-    double beta = *square / before;
-    for (int64_t j = 0; j < cg->n; j++)
-        cg->p[j] = cg->z[j] + beta * cg->p[j];
-    c->alpha[c->count] = alpha;
-    c->beta[c->count++] = beta;
-    return status;
-}
-
 /* M is K but for rounding where there is one level only, and steps are cheap. */
 #define NEAR_ONE 0.9
 
@@ -115,7 +93,23 @@ static uz_status bound_below(double *lambda, coefficients *c, uz_cg *cg, const u
     while (status == UZ_OK && c->count < STEPS_MOST && square > 0.0) {
         if (uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
-        status = step(c, &square, cg, K, err);
+        /* a step of conjugate gradients without the solution */
+        memset(cg->q, 0, (size_t)cg->n * sizeof *cg->q);
+        uz_csc_symv(cg->q, K, 1.0, cg->p);
+        const double curvature = uz_dot(cg->n, cg->p, cg->q), last = square;
+        if (!(curvature > 0.0))
+            return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                           "K is not positive definite: conjugate gradients met a direction that it does not resist. "
+                           "Support the body so that it can't move freely, or check the signs of K.");
+        const double alpha = square / curvature;
+        uz_axpy(cg->n, -alpha, cg->q, cg->r);
+        status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
+        square = uz_dot(cg->n, cg->r, cg->z);
+        const double beta = square / last;
+        for (int64_t j = 0; j < cg->n; j++)
+            cg->p[j] = cg->z[j] + beta * cg->p[j];
+        c->alpha[c->count] = alpha;
+        c->beta[c->count++] = beta;
         if (status != UZ_OK || c->count % CHECK_EVERY != 0 || sqrt(square) >= share)
             continue;
         *lambda = excluded(c, sqrt(square) / share);

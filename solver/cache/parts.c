@@ -118,21 +118,6 @@ static bool fits_best(const void *object, void *ctx)
     return fits(object, ctx) && count <= 2 * w->n_dofs + 256 && uz_factor_ends_with(kept->factor, w->dofs, w->n_dofs);
 }
 
-/* A factor of K that is there, one that ends with the contact if possible, or a place that the caller has to fill. The
- * place's key is that of the contact: what is found there is what the caller would make. */
-static uz_status find_or_reserve(uz_item **item, bool *create, uz_cache *cache, wanted *w, uz_error *err)
-{
-    char digest[65];
-    *create = false;
-    *item = uz_table_search(cache, UZ_ITEM_FACTOR, fits_best, w);
-    if (!*item)
-        *item = uz_table_search(cache, UZ_ITEM_FACTOR, fits, w);
-    if (*item)
-        return UZ_OK;
-    uz_status status = digest_with_order(digest, w->key->values, w, err);
-    return status == UZ_OK ? uz_table_acquire(item, create, cache, UZ_ITEM_FACTOR, digest, w->hooks, err) : status;
-}
-
 /* Puts a factor into the place that was reserved for it, and owns it also on failure. */
 static uz_status keep(uz_cache *cache, uz_item *item, uz_factor *factor, const wanted *w, uz_error *err)
 {
@@ -158,7 +143,19 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
     uz_factor *factor = NULL;
     bool create = true;
     memset(out, 0, sizeof *out);
-    uz_status status = cache ? find_or_reserve(&item, &create, cache, &w, err) : UZ_OK;
+    uz_status status = UZ_OK;
+    if (cache) { /* one that is there, which ends with the contact if possible */
+        item = uz_table_search(cache, UZ_ITEM_FACTOR, fits_best, &w);
+        item = item ? item : uz_table_search(cache, UZ_ITEM_FACTOR, fits, &w);
+        create = false;
+    }
+    if (cache &&
+        !item) { /* or a place to fill, whose key is that of the contact: what is found there is what is made */
+        char digest[65];
+        status = digest_with_order(digest, key->values, &w, err);
+        if (status == UZ_OK)
+            status = uz_table_acquire(&item, &create, cache, UZ_ITEM_FACTOR, digest, hooks, err);
+    }
     if (status != UZ_OK)
         return status;
     if (create) {

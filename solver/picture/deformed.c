@@ -89,6 +89,8 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
     scenery->value = value;
     scenery->pressure = pressure;
     if (status == UZ_OK) {
+        for (int64_t i = 0; i < scenery->model->m; i++)
+            scenery->largest_push = fmax(scenery->largest_push, pressure[i]);
         scenery->contacts_only = how->colour == UZ_FIELD_PRESSURE;
         scenery->low = scenery->contacts_only ? 0 : INFINITY;
         scenery->high = scenery->contacts_only ? 0 : -INFINITY;

@@ -360,20 +360,11 @@ void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
     }
 }
 
-/* Of the pressures, NaN where a row has no area; at least 0. */
-static double largest_push(const uz_scenery *scenery)
-{
-    double largest = 0;
-    for (int64_t i = 0; i < scenery->model->m; i++)
-        largest = fmax(largest, scenery->pressure[i]);
-    return largest;
-}
-
 void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
 {
     const uz_mesh_info *info = &scenery->model->info;
     const int64_t m = scenery->model->m;
-    const double largest = largest_push(scenery);
+    const double largest = scenery->largest_push;
     int64_t pushing = 0, seen = 0;
     for (int64_t i = 0; i < m; i++)
         pushing += scenery->pressure[i] > 0;
@@ -425,8 +416,8 @@ void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char
     uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", y + 10);
     uz_buffer_put_escaped(svg, title ? title : "");
     uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g", y + 26, scenery->factor);
-    if (largest_push(scenery) > 0)
+    if (scenery->largest_push > 0)
         uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure %.3g", y + 42,
-                        largest_push(scenery));
+                        scenery->largest_push);
     uz_buffer_print(svg, "</text>\n");
 }

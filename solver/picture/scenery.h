@@ -17,6 +17,7 @@ typedef struct {
     const char *what;       /* its name */
     bool contacts_only;     /* `value` is there on sides of contacts alone, NaN elsewhere: they alone are coloured */
     const double *pressure; /* m: of each contact row, NaN where it has no area */
+    double largest_push;    /* of these; at least 0 */
     double axes[3][3];      /* rows: to the right, upwards, towards the eye */
     double scale;           /* pixels per length */
     double offset[2];       /* pixel = (offset[0] + scale * right, offset[1] - scale * up) */
