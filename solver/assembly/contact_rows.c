@@ -124,26 +124,6 @@ static uz_status add_contact(uz_body_model *model, row_work *work, int64_t *row,
     return UZ_OK;
 }
 
-static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries, int64_t most_places)
-{
-    const int dim = model->mesh.dim;
-    uz_mesh_info *info = &model->info;
-    info->contact_node = uz_alloc(model->m, sizeof *info->contact_node);
-    info->contact_area = uz_alloc(model->m, sizeof *info->contact_area);
-    info->contact_normal = uz_alloc(model->m * dim, sizeof *info->contact_normal);
-    info->contact_of = uz_alloc(model->m, sizeof *info->contact_of);
-    info->contact_face = uz_alloc(2 * model->m, sizeof *info->contact_face);
-    model->row_place = uz_alloc(model->m, sizeof *model->row_place);
-    work->count = 0;
-    work->row = uz_alloc(entries, sizeof *work->row);
-    work->col = uz_alloc(entries, sizeof *work->col);
-    work->val = uz_alloc(entries, sizeof *work->val);
-    work->area = uz_alloc(most_places, sizeof *work->area);
-    work->room = uz_alloc_zero(model->mesh.n_nodes, sizeof *work->room);
-    return info->contact_node && info->contact_area && info->contact_normal && info->contact_of && info->contact_face &&
-           model->row_place && work->row && work->col && work->val && work->area && work->room;
-}
-
 /* ---- middles of eight-node faces */
 
 static bool has_eight_nodes(const uz_mesh *mesh, uz_face face)
@@ -291,16 +271,27 @@ void uz_row_forces(double *f, const uz_body_model *model, const double *r)
 
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
-    row_work work;
+    row_work work = {.count = 0};
+    uz_mesh_info *info = &model->info;
     int64_t row = 0, entries, most_places;
     model->law = &uz_law_frictionless;
     uz_status status = count_rows(&entries, &most_places, model, scene, err);
     if (status != UZ_OK)
         return status;
-    if (!alloc_rows(model, &work, entries, most_places)) {
+    info->contact_node = uz_alloc(model->m, sizeof *info->contact_node);
+    info->contact_area = uz_alloc(model->m, sizeof *info->contact_area);
+    info->contact_normal = uz_alloc(model->m * model->mesh.dim, sizeof *info->contact_normal);
+    info->contact_of = uz_alloc(model->m, sizeof *info->contact_of);
+    info->contact_face = uz_alloc(2 * model->m, sizeof *info->contact_face);
+    model->row_place = uz_alloc(model->m, sizeof *model->row_place);
+    work.row = uz_alloc(entries, sizeof *work.row);
+    work.col = uz_alloc(entries, sizeof *work.col);
+    work.val = uz_alloc(entries, sizeof *work.val);
+    work.area = uz_alloc(most_places, sizeof *work.area);
+    work.room = uz_alloc_zero(model->mesh.n_nodes, sizeof *work.room);
+    if (!info->contact_node || !info->contact_area || !info->contact_normal || !info->contact_of ||
+        !info->contact_face || !model->row_place || !work.row || !work.col || !work.val || !work.area || !work.room)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
-        goto done;
-    }
     for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++)
         status = add_contact(model, &work, &row, scene, k, err);
     if (status == UZ_OK)
@@ -309,7 +300,6 @@ uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
     if (status == UZ_OK)
         status = uz_csc_from_triplets(&model->N, model->m, model->d, work.count, work.row, work.col, work.val, err);
-done:
     free(work.row);
     free(work.col);
     free(work.val);

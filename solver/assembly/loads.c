@@ -59,20 +59,6 @@ static void load_element(const loading *x, int64_t e)
     add_to_nodes(x, f, node, count);
 }
 
-static uz_status load_sum(const loading *x, const uz_group *group, const char *where, uz_error *err)
-{
-    const int dim = x->model->mesh.dim;
-    double *share = uz_alloc_zero(x->model->mesh.n_nodes, sizeof *share);
-    if (!share)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force on %lld nodes", (long long)group->n_nodes);
-    uz_status status = uz_spread_over_group(share, x->model, group, false, where, err);
-    for (int64_t a = 0; a < x->model->mesh.n_nodes && status == UZ_OK; a++)
-        for (int c = 0; c < dim; c++)
-            x->f[a * dim + c] += share[a] * x->load->v[c];
-    free(share);
-    return status;
-}
-
 static uz_status add_load(const loading *x, const char *where, uz_error *err)
 {
     const uz_mesh *mesh = &x->model->mesh;
@@ -92,8 +78,16 @@ static uz_status add_load(const loading *x, const char *where, uz_error *err)
     case UZ_LOAD_PRESSURE:
         load_faces(x, group);
         return UZ_OK;
-    case UZ_LOAD_FORCE:
-        return load_sum(x, group, where, err);
+    case UZ_LOAD_FORCE: {
+        double *share = uz_alloc_zero(mesh->n_nodes, sizeof *share);
+        if (!share)
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force on %lld nodes", (long long)group->n_nodes);
+        const uz_status status = uz_spread_over_group(share, x->model, group, false, where, err);
+        for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && status == UZ_OK; i++)
+            x->f[i] += share[i / mesh->dim] * x->load->v[i % mesh->dim];
+        free(share);
+        return status;
+    }
     default:
         for (int64_t i = 0; i < uz_group_element_count(mesh, group); i++)
             load_element(x, uz_group_element_at(group, i));

@@ -87,34 +87,30 @@ static uz_status prescribe_along(prescription *p, int64_t support, int64_t node,
                    (long long)node, p->scene->supports[support].on, value, known);
 }
 
-static uz_status prescribe_group(prescription *p, int64_t support, bool inclined, uz_error *err)
-{
-    const uz_mesh *mesh = &p->model->mesh;
-    double n[3], u[3];
-    const uz_group *group = uz_mesh_group(mesh, p->scene->supports[support].on, "/supports", err);
-    uz_status status = group ? UZ_OK : UZ_ERR_SCENE;
-    const int64_t count = group ? uz_group_node_count(mesh, group) : 0;
-    uz_support_values(u, &p->scene->supports[support], mesh->dim);
-    for (int c = 0; c < mesh->dim && !inclined; c++)
-        for (int64_t i = 0; i < count && status == UZ_OK && !isnan(u[c]); i++)
-            status = prescribe(p, support, uz_group_node_at(group, i), c, u[c], err);
-    if (!inclined || !uz_support_is_inclined(n, &p->scene->supports[support], mesh->dim))
-        return status;
-    for (int64_t i = 0; i < count && status == UZ_OK; i++)
-        status = prescribe_along(p, support, uz_group_node_at(group, i), n, err);
-    return status;
-}
-
 uz_status uz_prescribed_values(double *value, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
+    const uz_mesh *mesh = &model->mesh;
     uz_status status = UZ_OK;
     prescription p = {model, scene, value, uz_alloc_zero(model->n_fixed, sizeof *p.source)};
     if (!p.source)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld supported dofs", (long long)model->n_fixed);
     memset(value, 0, (size_t)model->n_fixed * sizeof *value);
-    for (int inclined = 0; inclined < 2; inclined++)
-        for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++)
-            status = prescribe_group(&p, i, inclined != 0, err);
+    for (int64_t turn = 0; turn < 2 * scene->n_supports && status == UZ_OK; turn++) { /* axes first */
+        const int64_t k = turn % scene->n_supports;
+        const bool inclined = turn >= scene->n_supports;
+        const uz_support *support = &scene->supports[k];
+        const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
+        const int64_t count = group ? uz_group_node_count(mesh, group) : 0;
+        double n[3], u[3];
+        status = group ? UZ_OK : UZ_ERR_SCENE;
+        uz_support_values(u, support, mesh->dim);
+        for (int c = 0; c < mesh->dim && !inclined; c++)
+            for (int64_t i = 0; i < count && status == UZ_OK && !isnan(u[c]); i++)
+                status = prescribe(&p, k, uz_group_node_at(group, i), c, u[c], err);
+        const bool along = inclined && uz_support_is_inclined(n, support, mesh->dim);
+        for (int64_t i = 0; along && i < count && status == UZ_OK; i++)
+            status = prescribe_along(&p, k, uz_group_node_at(group, i), n, err);
+    }
     free(p.source);
     return status;
 }

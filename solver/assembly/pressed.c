@@ -24,21 +24,6 @@ typedef struct {
 
 static const double SPANNED = 1e-11, ROUNDING = 1e-14;
 
-static bool allocate(nnls *s, int64_t m, int64_t k)
-{
-    *s = (nnls){.m = m, .k = k};
-    s->A = uz_alloc_zero(m * k, sizeof(double));
-    s->barred = uz_alloc_zero(m, sizeof(bool));
-    s->passive = uz_alloc_zero(k, sizeof(int64_t));
-    s->Q = uz_alloc_zero(k * k, sizeof(double));
-    s->R = uz_alloc_zero(k * k, sizeof(double));
-    double **room[] = {&s->b, &s->y, &s->x, &s->trial, &s->scratch};
-    bool ok = s->A && s->barred && s->passive && s->Q && s->R;
-    for (int i = 0; i < 5; i++)
-        ok = (*room[i] = uz_alloc_zero(k, sizeof(double))) && ok;
-    return ok;
-}
-
 static double dot(const double *a, const double *b, int64_t n)
 {
     double sum = 0.0;
@@ -215,12 +200,17 @@ static bool is_inside(nnls *s, const double *load, const double *size, double sc
 uz_status uz_load_on_modes(uz_pressing *how, double *y, const double *Z, int64_t k, const uz_csc *N, const double *p,
                            double tolerance, bool strict, uz_error *err)
 {
-    nnls s;
-    *how = UZ_PRESSED_ON;
+    const int64_t m = N->rows;
+    nnls s = {.m = m, .k = k};
     double *load = uz_alloc_zero(2 * k, sizeof *load);
-    uz_status status = UZ_OK;
-    if (!allocate(&s, N->rows, k) || !load)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld modes", (long long)k);
+    double **room[] = {&s.A, &s.Q, &s.R, &s.b, &s.y, &s.x, &s.trial, &s.scratch};
+    const int64_t size[] = {m * k, k * k, k * k, k, k, k, k, k};
+    bool ok =
+        load && (s.barred = uz_alloc_zero(m, sizeof *s.barred)) && (s.passive = uz_alloc_zero(k, sizeof *s.passive));
+    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
+        ok = ok && (*room[i] = uz_alloc_zero(size[i], sizeof(double)));
+    *how = UZ_PRESSED_ON;
+    uz_status status = ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld modes", (long long)k);
     if (status == UZ_OK)
         status = fill_rows(&s, Z, N, err);
     if (status == UZ_OK && k > 0) {
@@ -233,9 +223,10 @@ uz_status uz_load_on_modes(uz_pressing *how, double *y, const double *Z, int64_t
             *how = UZ_COSTS_NOTHING;
         memcpy(y, s.y, (size_t)k * sizeof *y);
     }
-    void *room[] = {s.A, s.barred, s.passive, s.Q, s.R, s.b, s.y, s.x, s.trial, s.scratch};
     for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-        free(room[i]);
+        free(*room[i]);
     free(load);
+    free(s.barred);
+    free(s.passive);
     return status;
 }

@@ -178,29 +178,6 @@ static bool is_over(const uz_semi *s)
            outcome == UZ_DISMISSED || outcome == UZ_ITERATION_LIMIT;
 }
 
-/* One step of the proximal point method. *settled: the rows that press are those of the round before. */
-static uz_status make_round(uz_semi *s, bool *settled, uz_error *err)
-{
-    const uz_law *law = s->is_scene ? s->model.law : &uz_law_frictionless;
-    uz_hooks quiet = {0};
-    if (s->hooks) {
-        quiet.ctx = s->hooks->ctx;
-        quiet.cancelled = s->hooks->cancelled;
-    }
-    memcpy(s->weight, s->soft, (size_t)s->m * sizeof *s->weight);
-    uz_status status = solve_augmented(s, false, ROUND_ERROR, &quiet, err);
-    if (status != UZ_OK || is_over(s))
-        return status;
-    *settled = s->rounds++ > 0;
-    for (int64_t i = 0; i < s->m; i++) {
-        bool active = law->kind->active(law, NULL, &s->last->r[i], 1) > 0;
-        *settled = *settled && active == s->active[i];
-        s->active[i] = active;
-        s->target[i] = s->of.h[i] - s->last->g[i];
-    }
-    return UZ_OK;
-}
-
 /* A bound on what the rounding of K_R and p_R does to u, in the norm of K_R. A force N'f on rows alone is at most
  * sqrt(sum f_i^2 / R_i), as N K_R^-1 N' <= R^-1; other forces need the norm of K_R^-1. */
 static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
@@ -356,14 +333,29 @@ static uz_status try_exact(uz_semi *s, bool *done, uz_error *err)
     return status;
 }
 
+/* Steps of the proximal point method, and phase 2 whenever the rows that press are those of the step before. */
 static uz_status run_rounds(uz_semi *s, uz_error *err)
 {
-    bool done = false, settled = false;
+    const uz_law *law = s->is_scene ? s->model.law : &uz_law_frictionless;
+    uz_hooks quiet = {0};
+    bool done = false;
     uz_status status = UZ_OK;
+    if (s->hooks) {
+        quiet.ctx = s->hooks->ctx;
+        quiet.cancelled = s->hooks->cancelled;
+    }
     while (status == UZ_OK && !done && s->rounds < ROUNDS) {
-        status = make_round(s, &settled, err);
+        memcpy(s->weight, s->soft, (size_t)s->m * sizeof *s->weight);
+        status = solve_augmented(s, false, ROUND_ERROR, &quiet, err);
         if (status != UZ_OK || is_over(s))
             return status;
+        bool settled = s->rounds++ > 0;
+        for (int64_t i = 0; i < s->m; i++) {
+            const bool active = law->kind->active(law, NULL, &s->last->r[i], 1) > 0;
+            settled = settled && active == s->active[i];
+            s->active[i] = active;
+            s->target[i] = s->of.h[i] - s->last->g[i];
+        }
         if (!settled && s->rounds % IMPATIENCE != 0)
             continue;
         if (s->settings->balanced && s->is_scene)

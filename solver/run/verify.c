@@ -92,8 +92,13 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     return uz_report_answer(run, err);
 }
 
-static uz_status check(const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
+uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u, const double *r,
+                    const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
+    uz_run run = {.asked = NULL};
+    uz_request asked = {.problem = problem, .settings = settings, .hooks = hooks};
+    *out = NULL;
+    uz_error_reset(err);
     if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_MOVING)
         return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
                        "an answer is verified with its contacts as they are before anything moves: ask for \"fixed\"");
@@ -104,17 +109,6 @@ static uz_status check(const uz_problem *problem, const uz_settings *settings, c
         status = uz_check_problem(problem, err);
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
-    return status;
-}
-
-uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u, const double *r,
-                    const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
-{
-    uz_run run = {.asked = NULL};
-    uz_request asked = {.problem = problem, .settings = settings, .hooks = hooks};
-    *out = NULL;
-    uz_error_reset(err);
-    uz_status status = check(problem, settings, hooks, err);
     if (status != UZ_OK)
         return status;
     asked.started = uz_seconds();
