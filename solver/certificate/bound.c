@@ -6,8 +6,6 @@
 #include <float.h>
 #include <math.h>
 
-#define DOUBLE_DOUBLE_ROUNDING 0x1p-98
-
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
 
@@ -97,14 +95,25 @@ double uz_bound_doubt(double inverse, int64_t d)
     return DBL_EPSILON * sqrt((double)d) * 8.0 * inverse;
 }
 
-double uz_bound_rounding(double size, int64_t d)
+/* Of the magnitudes that a double-double sum of so many terms adds up. */
+static double hidden(int64_t terms)
 {
-    return 8.0 * DBL_EPSILON * sqrt((double)d) * size;
+    const double n = (double)terms + 2.0;
+    return 0x1p-104 * n * n;
 }
 
-double uz_bound_noise(double spread, double sum)
+double uz_bound_rounding(const uz_energy_sums *s, int64_t d)
 {
-    return DOUBLE_DOUBLE_ROUNDING * sqrt((1.0 + spread) * sum);
+    const double n = (double)s->terms;
+    return DBL_EPSILON * n * (n + (double)d + 8.0) * s->correction;
+}
+
+double uz_bound_noise(double inverse, double weighted, const uz_energy_sums *s)
+{
+    const double n = (double)s->terms;
+    return (1.0 + 0x1p-20) * sqrt(1.0 + inverse) *
+           (2.0 * (n + 1.0) * hidden(s->terms) * sqrt(s->noise + s->rows + s->correction) +
+            DBL_EPSILON * (sqrt(weighted) + n * n * sqrt(s->correction)));
 }
 
 /* Beyond it too little is left of the factor to say anything. */
@@ -138,14 +147,11 @@ double uz_bound_reference(double whole_norm, double free_norm, double error)
 /* What the rounding of sums may hide of terms that do not cancel, relative. */
 #define SUMS 0x1p-40
 
-/* Of the sizes that entries of e and g are the differences of, double-double sums of up to some thousand terms hide no
- * more than this (K_ij^2 <= K_ii K_jj, so that |u|'|K||u| is at most so many times the sum of K_jj u_j^2). */
-#define HIDDEN 0x1p-84
-
 void uz_bound_energy(uz_bound_terms *t, const uz_energy_sums *s, const double *r, const double *g, const double *h,
                      int64_t d, int64_t m)
 {
-    const double n = (double)(d + m + 8), terms = n * DBL_EPSILON; /* of n rounded additions, relative */
+    const double n = (double)(d + m + 8), terms = n * DBL_EPSILON, /* of n rounded additions, relative */
+        magnitudes = ((double)s->terms + 1.0) * (s->noise + s->correction) + s->pressed;
     double_double sum = {0.0, 0.0};
     double of_rows = 0.0, by_rows = 0.0;
     for (int64_t i = 0; i < m; i++) {
@@ -162,8 +168,8 @@ void uz_bound_energy(uz_bound_terms *t, const uz_energy_sums *s, const double *r
     t->energy = 0.5 * (sum.hi + sum.lo);
     /* squares that underflow hide nothing that has not been rounded up to DBL_MIN elsewhere, times n */
     t->margin = (1.0 + 0x1p-20) * (DBL_EPSILON * fabs(t->energy) + terms * terms * (s->load_size + of_rows) + by_rows +
-                                   2.0 * terms * (s->work_size + s->change_size) + HIDDEN * (s->noise + s->pressed) +
-                                   uz_bound_rounding(s->correction, d) + n * DBL_MIN);
+                                   2.0 * terms * (s->work_size + s->change_size) + hidden(s->terms) * magnitudes +
+                                   uz_bound_rounding(s, d) + n * DBL_MIN);
 }
 
 /* pi(v) = pi(u) + c'(K u - p) + 1/2 c'K c: that of the feasible v, so that it is an upper bound on the minimum. */

@@ -28,6 +28,8 @@ typedef struct {
     double change_size;               /* |c|'(|K u| + |p| + |K c|) */
     double correction;                /* the sum of K_jj c_j^2 */
     double pressed;                   /* of |r_i| times what the gap of row i is the difference of */
+    double rows;                      /* (|N|'|r|)_j^2 / K_jj */
+    int64_t terms;                    /* uz_most_terms, or more */
 } uz_energy_sums;
 
 /* t->energy and margin by u'Ku = u'e + u'p + r'(h - g): what is left of rounding is that of u'p, r'h and r'g, which are
@@ -54,12 +56,13 @@ double uz_bound_doubt(double inverse, int64_t d);
 /* A doubt that does no harm need not be measured. */
 #define UZ_BOUND_HARMLESS 1e-2
 
-/* What the rounding of K c, summed in double precision, may hide of c'K c; size: the sum of K_jj c_j^2. */
-double uz_bound_rounding(double size, int64_t d);
+/* What the rounding of K c and of the sum, both in double precision, may hide of c'K c. Proofs of this and the next:
+ * docs/theory.md, rounding of sums. */
+double uz_bound_rounding(const uz_energy_sums *s, int64_t d);
 
-/* What the rounding of double-double sums may hide of e, in the norm of K^-1: it matters only where rounding hit u* by
- * chance. sum: of u_j^2 K_jj + (|K u|_j + |p_j|)^2 / K_jj. */
-double uz_bound_noise(double spread, double sum);
+/* What rounding may hide of e, in the norm of K^-1: that of its double-double sums, of K c and of e to doubles.
+ * inverse: e'K^-1 e <= inverse e'W e; weighted: e'W e. */
+double uz_bound_noise(double inverse, double weighted, const uz_energy_sums *s);
 
 /* What an error is relative to where supports move the body. u'Ku over the free dofs counts that motion as if it tore
  * the body off its supports: an error relative to free_norm says nothing of strain and reactions. So it is whole_norm,

@@ -27,7 +27,7 @@ typedef struct {
     uz_residuals res;     /* d each */
     double energy;        /* u'Ku */
     double weighted;      /* e'W e */
-    double noise;         /* see uz_bound_noise */
+    uz_energy_sums sums;
     int64_t d, m, n_b;
 } certifier;
 
@@ -50,7 +50,8 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, const double 
     c->u_b = uz_alloc(c->n_b, sizeof(double));
     c->weight_b = uz_alloc(c->n_b, sizeof(double));
     c->res.weight = c->weight;
-    ok = ok && c->c && c->u_b && c->weight_b;
+    c->sums.terms = in->terms > 0 ? in->terms : uz_most_terms(in->K, in->N);
+    ok = ok && c->c && c->u_b && c->weight_b && c->sums.terms > 0;
     if (!ok || !uz_feasible_init(&c->feasible, &c->Nt, c->weight_b))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->d);
     for (int64_t b = 0; b < c->n_b; b++) {
@@ -85,7 +86,7 @@ static void release(certifier *c)
 #define AFFORDABLE 0.5
 
 uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_input *in, double *e, int64_t d,
-                              double weighted, double energy, double noise, uz_error *err)
+                              double weighted, double energy, const uz_energy_sums *energies, uz_error *err)
 {
     const double harmless = in->sharp * in->sharp * (in->moved ? in->whole_norm * in->whole_norm : energy);
     double inverse = in->inverse_bound, doubt = uz_bound_doubt(inverse, d);
@@ -106,7 +107,7 @@ uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_inp
         if (status == UZ_OK && in->measure_doubt && !small)
             status = in->measure_doubt(in->ctx, &doubt, err);
     }
-    *square = uz_bound_enlarge(*square, doubt, uz_bound_noise(inverse, noise));
+    *square = uz_bound_enlarge(*square, doubt, uz_bound_noise(inverse, weighted, energies));
     return status;
 }
 
@@ -183,9 +184,10 @@ static double total(const four *x)
 }
 
 /* The terms that are sums over the dofs. */
-static void add_up(certifier *c, uz_bound_terms *t, uz_energy_sums *energies)
+static void add_up(certifier *c, uz_bound_terms *t)
 {
     const uz_residuals *res = &c->res;
+    uz_energy_sums *energies = &c->sums;
     const double *const x[VECTORS] = {c->u, c->in->p, c->c, res->Ku, res->Kc, res->e, res->e_u, c->weight};
     sums s;
     memset(&s, 0, sizeof s);
@@ -205,7 +207,6 @@ static void add_up(certifier *c, uz_bound_terms *t, uz_energy_sums *energies)
     t->correction_energy = total(&s.correction_energy);
     t->anything = (s.anything[0] | s.anything[1] | s.anything[2] | s.anything[3]) != 0;
     c->weighted = total(&s.weighted);
-    c->noise = total(&s.noise);
     t->e1 = uz_bound_norm(res->e_u, c->d);
     t->force = uz_bound_norm(c->in->p, c->d);
     t->span = uz_bound_largest(c->Nt.val, c->Nt.ptr[c->m]) * uz_bound_largest((const double *)&s.largest, 4);
@@ -220,14 +221,22 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
     uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, c->u, c->c, r, err);
     if (status != UZ_OK)
         return status;
-    uz_energy_sums energies = {.correction = 0.0};
-    for (int64_t b = 0; b < c->n_b; b++)
-        energies.correction += c->c[c->dof[b]] / c->weight_b[b] * c->c[c->dof[b]];
+    const uz_csc *N = c->in->N;
+    uz_energy_sums *energies = &c->sums;
+    energies->correction = energies->pressed = energies->rows = 0.0;
+    for (int64_t b = 0; b < c->n_b; b++) {
+        const int64_t j = c->dof[b];
+        double force = 0.0;
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
+            force += fabs(N->val[k] * r[N->idx[k]]);
+        energies->rows += force * c->weight_b[b] * force;
+        energies->correction += c->c[j] / c->weight_b[b] * c->c[j];
+    }
     for (int64_t i = 0; i < c->m; i++)
-        energies.pressed -= r[i] * c->feasible.size[i];
-    add_up(c, &terms, &energies);
-    terms.correction_energy += uz_bound_rounding(energies.correction, c->d);
-    uz_bound_energy(&terms, &energies, r, g, c->in->h, c->d, c->m);
+        energies->pressed -= r[i] * c->feasible.size[i];
+    add_up(c, &terms);
+    terms.correction_energy += uz_bound_rounding(energies, c->d);
+    uz_bound_energy(&terms, energies, r, g, c->in->h, c->d, c->m);
     terms.complementarity = uz_feasible_complementarity(&c->feasible, r, true);
     terms.settled = feasible ? c->feasible.exact.length : 0.0;
     terms.pressed = terms.settled > 0.0 ? uz_feasible_complementarity(&c->feasible, r, false) : 0.0;
@@ -236,7 +245,7 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
         spared = false;
         if (feasible)
             status =
-                uz_certify_distance(&terms.square, &spared, &in, c->res.e, c->d, c->weighted, c->energy, c->noise, err);
+                uz_certify_distance(&terms.square, &spared, &in, c->res.e, c->d, c->weighted, c->energy, energies, err);
         uz_bound_conclude(out, &terms, feasible, r, g, in.h, c->m);
         spared = spared && uz_bound_blames_distance(out, terms.square, 2.0 * in.sharp);
     }

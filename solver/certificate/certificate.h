@@ -16,6 +16,7 @@
 #ifndef UZ_CERTIFICATE_H
 #define UZ_CERTIFICATE_H
 
+#include "certificate/bound.h"
 #include "uzawa.h"
 
 /* *value = e'K^-1 e for e (d, may be overwritten), within the accuracy of a factorization of K. */
@@ -34,6 +35,7 @@ typedef struct {
     uz_measure_doubt measure_doubt; /* asked where inverse_bound says that it may matter to what is sharp; NULL: there
                                        is no factor */
     void *ctx;                      /* of both */
+    int64_t terms;                  /* uz_most_terms of K and N, or more; none positive: it is counted */
     double rcond;         /* without a factor: an estimate of the least eigenvalue of K, scaled by its diagonal */
     double inverse_bound; /* with one: what inverse_norm gives is at most so many times the sum of e_j^2 / K_jj */
     bool spares;          /* that takes the place of inverse_norm where it is sharp enough: */
@@ -51,9 +53,9 @@ uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u,
 
 /* *square >= e'K^-1 e = ||v - u_r||_K^2, with all that the rounding of the factor and of e may hide; INFINITY: none is
  * known. *spared: it was bounded by the inverse's norm, and e (d) stands; else that is lost. weighted: e'W e; energy:
- * u'Ku; noise: the sum of uz_bound_noise. */
+ * u'Ku; sums: those that uz_bound_noise reads. */
 uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_input *input, double *e, int64_t d,
-                              double weighted, double energy, double noise, uz_error *err);
+                              double weighted, double energy, const uz_energy_sums *sums, uz_error *err);
 
 /* A part of it, for answers in lanes. weight (d): W = diag(K)^-1. */
 void uz_certify_weights(double *weight, const uz_csc *K);

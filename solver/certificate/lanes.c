@@ -125,6 +125,8 @@ uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_certify_inp
     uz_status status = UZ_OK;
     if (ok) {
         uz_certify_weights(c->weight, K);
+        c->in.terms = in->terms > 0 ? in->terms : uz_most_terms(K, N);
+        ok = c->in.terms > 0;
         c->steepest = N->rows > 0 ? uz_bound_largest(N->val, N->ptr[N->cols]) : 0.0;
         status = compress(c, err);
     }
@@ -286,9 +288,10 @@ static void pass_split(uz_lane_certifier *c, const double *U, const double *P)
 }
 
 /* What a lane's answer has to do with the contact: gaps, correction, reactions; their part of the terms. */
-static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a, const double *U, double *pressed,
-                         uz_bound_terms *terms)
+static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a, const double *U,
+                         uz_energy_sums *energies, uz_bound_terms *terms)
 {
+    const uz_csc *N = c->N;
     uz_feasible *f = &c->feasible;
     const uz_csc *K_b = &c->K_b;
     for (int64_t b = 0; b < c->n_b; b++)
@@ -300,8 +303,14 @@ static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a
     f->u = c->u_b;
     f->h = a->h;
     bool feasible = uz_make_feasible(f, a->r) && !f->pushed; /* what pushes say of r is for uz_certify */
-    for (int64_t b = 0; b < c->n_b; b++)
+    for (int64_t b = 0; b < c->n_b; b++) {
+        double force = 0.0;
+        for (int64_t k = N->ptr[c->dof[b]]; k < N->ptr[c->dof[b] + 1]; k++)
+            force += fabs(N->val[k] * a->r[N->idx[k]]);
+        energies->rows += force * c->weight_b[b] * force;
+        energies->correction += f->correction[b] / c->weight_b[b] * f->correction[b];
         c->c[b * WIDTH + lane] = f->correction[b];
+    }
     /* Kc is zero but for the rows that contact dofs couple to */
     for (int64_t k = 0; k < K_b->ptr[K_b->cols]; k++)
         c->Kc[K_b->idx[k] * WIDTH + lane] = 0.0;
@@ -309,7 +318,7 @@ static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a
         for (int64_t k = K_b->ptr[b]; k < K_b->ptr[b + 1]; k++)
             c->Kc[K_b->idx[k] * WIDTH + lane] += K_b->val[k] * c->c[b * WIDTH + lane];
     for (int64_t i = 0; i < f->m; i++)
-        *pressed -= a->r[i] * f->size[i];
+        energies->pressed -= a->r[i] * f->size[i];
     terms->complementarity = uz_feasible_complementarity(f, a->r, feasible);
     terms->settled = feasible ? f->exact.length : 0.0;
     terms->pressed = terms->settled > 0.0 ? uz_feasible_complementarity(f, a->r, false) : 0.0;
@@ -336,7 +345,7 @@ static uz_status lane_doubt(void *ctx, double *doubt, uz_error *err)
 }
 
 static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *a, bool feasible, double solved,
-                          double pressed, uz_bound_terms *terms)
+                          uz_energy_sums *energies, uz_bound_terms *terms)
 {
     const sums *s = &c->sum[lane / 4];
     const int l = lane % 4;
@@ -349,25 +358,27 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     in.sharp = a->sharp;
     in.moved = a->moved;
     in.whole_norm = a->whole_norm;
+    energies->load = s->load[l];
+    energies->load_low = s->load_low[l];
+    energies->load_size = s->load_size[l];
+    energies->work = s->work[l];
+    energies->work_size = s->work_size[l];
+    energies->noise = s->noise[l];
+    energies->change_size = s->change_size[l];
     /* where squares leave the range of double, uz_certify, which scales them, has the word */
     const double residuals = s->residuals[l], force = s->force[l];
     const bool plain = s->sizes[l] < 1e130 && (residuals == 0.0 || (residuals > 1e-130 && residuals < 1e130)) &&
                        (force == 0.0 || (force > 1e-260 && force < 1e260));
     if (!feasible || !plain ||
-        uz_certify_distance(&terms->square, &spared, &in, NULL, c->K->cols, s->weighted[l], s->stiffness[l],
-                            s->noise[l], NULL) != UZ_OK)
+        uz_certify_distance(&terms->square, &spared, &in, NULL, c->K->cols, s->weighted[l], s->stiffness[l], energies,
+                            NULL) != UZ_OK)
         return;
     terms->moved = a->moved;
     terms->whole_norm = a->whole_norm;
     terms->stiffness = s->stiffness[l];
     terms->change = s->change[l];
-    uz_energy_sums energies = {s->load[l],      s->load_low[l], s->load_size[l],   s->work[l],
-                               s->work_size[l], s->noise[l],    s->change_size[l], 0.0,
-                               pressed};
-    for (int64_t b = 0; b < c->n_b; b++)
-        energies.correction += c->c[b * WIDTH + lane] / c->weight_b[b] * c->c[b * WIDTH + lane];
-    terms->correction_energy = s->correction_energy[l] + uz_bound_rounding(energies.correction, c->K->cols);
-    uz_bound_energy(terms, &energies, a->r, a->g, a->h, c->K->cols, c->feasible.m);
+    terms->correction_energy = s->correction_energy[l] + uz_bound_rounding(energies, c->K->cols);
+    uz_bound_energy(terms, energies, a->r, a->g, a->h, c->K->cols, c->feasible.m);
     terms->e1 = sqrt(s->e_square[l]);
     terms->force = sqrt(s->force[l]);
     terms->span = c->steepest * s->largest[l];
@@ -381,15 +392,17 @@ void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, 
 {
     uz_bound_terms terms[WIDTH] = {{0}};
     bool feasible[WIDTH] = {false};
-    double pressed[WIDTH] = {0.0}, squares[WIDTH];
+    uz_energy_sums energies[WIDTH] = {{0}};
+    double squares[WIDTH];
     for (int l = 0; l < count; l++) {
+        energies[l].terms = c->in.terms;
         terms[l].positive_part = uz_cut_reactions(answers[l].r, c->feasible.m);
         answers[l].certified = false;
-        feasible[l] = prepare_lane(c, l, &answers[l], U, &pressed[l], &terms[l]);
+        feasible[l] = prepare_lane(c, l, &answers[l], U, &energies[l], &terms[l]);
     }
     memset(c->sum, 0, sizeof c->sum);
     (uz_cpu_has_avx2_fma() ? pass_fused : pass_split)(c, U, P);
     const bool solved = c->E && c->inverse_norms(c->in.ctx, squares, c->E, NULL) == UZ_OK;
     for (int l = 0; l < count; l++)
-        conclude_lane(c, l, &answers[l], feasible[l], solved ? squares[l] : INFINITY, pressed[l], &terms[l]);
+        conclude_lane(c, l, &answers[l], feasible[l], solved ? squares[l] : INFINITY, &energies[l], &terms[l]);
 }

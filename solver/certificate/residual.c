@@ -374,3 +374,23 @@ double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double 
     }
     return sum.hi + sum.lo;
 }
+
+int64_t uz_most_terms(const uz_csc *K, const uz_csc *N)
+{
+    const int64_t room = K->rows > N->rows ? K->rows : N->rows;
+    int64_t most = 1, *count = uz_alloc_zero(room, sizeof *count);
+    if (!count)
+        return -1;
+    for (int64_t j = 0; j < K->cols; j++) {
+        count[j] += K->ptr[j + 1] - K->ptr[j] + (N->ptr ? N->ptr[j + 1] - N->ptr[j] : 0);
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            count[K->idx[k]] += K->idx[k] != j;
+    }
+    for (int64_t j = 0; j < K->cols; j++)
+        most = count[j] + 2 > most ? count[j] + 2 : most; /* p and K c */
+    memset(count, 0, (size_t)room * sizeof *count);
+    for (int64_t k = 0; N->ptr && k < N->ptr[N->cols]; k++)
+        most = 2 * ++count[N->idx[k]] + 1 > most ? 2 * count[N->idx[k]] + 1 : most;
+    free(count);
+    return most;
+}

@@ -13,6 +13,9 @@ typedef struct {
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
                                   const double *c, const double *r, uz_error *err);
 
+/* The most terms that an entry of e, or a gap of u + c, is the sum of; -1: no memory. K: lower triangle. */
+int64_t uz_most_terms(const uz_csc *K, const uz_csc *N);
+
 /* 1 / K_jj; 1 where that is not positive. */
 static inline double uz_dof_weight(const uz_csc *K, int64_t j)
 {

@@ -74,6 +74,7 @@ uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *pro
                                  .N = uz_setup_N(setup, problem),
                                  .measure_doubt = measure_doubt,
                                  .ctx = block,
+                                 .terms = setup->terms,
                                  .inverse_bound = uz_factor_describe(setup->factor).inverse_bound,
                                  .spares = block->d >= UZ_CERTIFY_SPARES};
     if (status == UZ_OK && !in.spares && !(block->permuted = uz_alloc(block->d * UZ_LANES, sizeof(double))))

@@ -84,6 +84,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .inverse_norm = inverse_norm,
         .measure_doubt = setup->factor ? measure_doubt : NULL,
         .ctx = run,
+        .terms = setup->terms,
         .rcond = run->result->summary.rcond,
         .inverse_bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY,
         .spares = run->d >= UZ_CERTIFY_SPARES,

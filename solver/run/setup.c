@@ -2,6 +2,7 @@
 
 #include "certificate/bound.h"
 #include "certificate/distrust.h"
+#include "certificate/residual.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/digest.h"
@@ -155,6 +156,8 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
         status = uz_body_model_build(&setup->model, &problem->scene, err);
     else if (status == UZ_OK && problem->qp.N.rows == 0) /* N may come as a zeroed struct */
         status = uz_csc_init(&setup->no_rows, 0, problem->qp.K.cols, 0, err);
+    if (status == UZ_OK)
+        setup->terms = uz_most_terms(uz_setup_K(setup, problem), uz_setup_all_rows(setup, problem));
     setup->assemble_s = uz_seconds() - start;
     if (status == UZ_OK && setup->is_scene && uz_may_omit_rows(problem))
         status = choose_rows(setup, &problem->scene, wanted, err);
@@ -195,6 +198,8 @@ uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *proble
     setup->doubt = base->doubt;
     pthread_mutex_unlock(&base->mutex);
     uz_status status = uz_body_model_move(&setup->model, &base->model, &problem->scene, err);
+    if (status == UZ_OK)
+        setup->terms = uz_most_terms(uz_setup_K(setup, problem), uz_setup_all_rows(setup, problem));
     setup->assemble_s = uz_seconds() - start;
     if (status == UZ_OK && uz_may_omit_rows(problem))
         status = choose_rows(setup, &problem->scene, wanted, err);

@@ -27,6 +27,7 @@ typedef struct uz_setup {
     uz_dual *dual;
     pthread_mutex_t mutex; /* guards doubt */
     double doubt;          /* NaN until somebody asks */
+    int64_t terms;         /* uz_most_terms of K and all rows; none positive: there was no memory */
     double assemble_s, condense_s;
     uz_cost_plan plan; /* which form of the operator, and why */
     uz_reuse reused;   /* when it was made */
