@@ -29,8 +29,9 @@ typedef struct {
     int n_considered;
     size_t bytes;
     double rcond; /* an estimate of the least eigenvalue of K after diagonal scaling, rather too large; kept with L */
-    /* At least lambda_max(D^1/2 (L L')^-1 D^1/2), D = diag(K), but for a probability below 1e-12, and seldom more than
-     * 50 times that; so ||L^-1 P e||^2 is at most so many times the sum of e_j^2 / K_jj. INFINITY: unknown. */
+    /* At least lambda_max(D^1/2 (L L')^-1 D^1/2), D = diag(K), but for a probability below 1e-12: some 50 times that
+     * where few directions are soft, more where all are alike, and then small. So ||L^-1 P e||^2 is at most so many
+     * times the sum of e_j^2 / K_jj. INFINITY: unknown. */
     double inverse_bound;
     double order_s; /* what the analysis took, whoever waited for it */
     double factor_s;
