@@ -296,16 +296,32 @@ static void drain_until_stopped(service *s, double seconds)
     pthread_join(thread, NULL);
 }
 
-/* SIGHUP reads the tokens again where there are any; else it ends the daemon, as for every program of a terminal. */
-static int wait_for_signal(const service *s)
+/* What SIGHUP asks for: the tokens and the certificate anew, each as it was where its files are wrong. */
+static void read_again(const service *s, const server_options *options)
 {
-    char message[OPTION_PATH + 256] = "";
+    char message[2 * OPTION_PATH + 256] = "";
+    http_tls fresh = {NULL, NULL};
+    if (s->auth && auth_reload(s->auth, message, sizeof message))
+        log_write(s->log, LOG_INFO, "tokens_reloaded", (log_field[]){{0}});
+    else if (s->auth)
+        log_write(s->log, LOG_ERROR, "tokens_kept", (log_field[]){LOG_S("cause", message), {0}});
+    if (!s->tls.cert)
+        return;
+    if (http_tls_read(&fresh, options->tls_cert, options->tls_key, message, sizeof message) &&
+        http_use_tls(s->http, &fresh, message, sizeof message))
+        log_write(s->log, LOG_INFO, "certificate_reloaded", (log_field[]){{0}});
+    else
+        log_write(s->log, LOG_ERROR, "certificate_kept", (log_field[]){LOG_S("cause", message), {0}});
+    http_tls_clear(&fresh);
+}
+
+/* SIGHUP reads again what it can; where there is nothing it ends the daemon, as for every program of a terminal. */
+static int wait_for_signal(const service *s, const server_options *options)
+{
     int taken = 0;
-    while (sigwait(&s->signals, &taken) != 0 || (taken == SIGHUP && s->auth)) {
-        if (taken == SIGHUP && auth_reload(s->auth, message, sizeof message))
-            log_write(s->log, LOG_INFO, "tokens_reloaded", (log_field[]){{0}});
-        else if (taken == SIGHUP)
-            log_write(s->log, LOG_ERROR, "tokens_kept", (log_field[]){LOG_S("cause", message), {0}});
+    while (sigwait(&s->signals, &taken) != 0 || (taken == SIGHUP && (s->auth || s->tls.cert))) {
+        if (taken == SIGHUP)
+            read_again(s, options);
         taken = 0;
     }
     if (taken == SIGABRT) /* somebody wants a core file */
@@ -329,7 +345,7 @@ static int run(service *s, const server_options *options)
                             LOG_I("workers", options->workers),
                             LOG_S("version", UZAWAD_VERSION),
                             {0}});
-    int taken = wait_for_signal(s);
+    int taken = wait_for_signal(s, options);
     log_write(s->log, LOG_INFO, "stopping", (log_field[]){LOG_S("signal", strsignal(taken)), {0}});
     drain_until_stopped(s, options->drain_s);
     end(s);

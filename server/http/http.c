@@ -186,6 +186,11 @@ bool api_is_over(void *asker)
     return api_draining(a->context) || request_client_gone(a->rq);
 }
 
+bool http_use_tls(http_server *server, const http_tls *tls, char *message, size_t size)
+{
+    return transport_use_tls(server->context.server, tls, message, size);
+}
+
 void http_drain(http_server *server)
 {
     transport_drain(server->context.server);

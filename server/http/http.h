@@ -49,6 +49,9 @@ typedef struct {
 http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message,
                         size_t size);
 
+/* For connections that begin from now on: transport_use_tls. */
+bool http_use_tls(http_server *server, const http_tls *tls, char *message, size_t size);
+
 /* From now on submissions are answered 503, /readyz too, and long polls end early; everything else goes on. */
 void http_drain(http_server *server);
 

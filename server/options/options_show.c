@@ -27,8 +27,8 @@ void options_usage(FILE *to)
         "Precedence: flag, environment, file, default.\n"
         "BYTES takes the suffixes K, M and G. When it is ready it prints one line, \"listening on URL\"; the log goes\n"
         "to standard error, one JSON object a line. SIGTERM and SIGINT end it after a drain, a second one at once:\n"
-        "jobs that were running are run again at the next start. SIGHUP reads the token-file again, if there is one;\n"
-        "else it ends the daemon too.\n"
+        "jobs that were running are run again at the next start. SIGHUP reads token-file, tls-cert and tls-key again;\n"
+        "without any of them it ends the daemon too.\n"
         "\n"
         "exit status: 0 ended by a signal, or the check found nothing; 1 could not start or failed; 2 wrong usage\n",
         to);

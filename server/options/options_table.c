@@ -46,7 +46,9 @@ static const uz_option ROWS[] = {
             .about = "listen on an address that others can reach although there is no token-file"),
     SETTING("tls-cert", TEXT, tls_cert, .value = "FILE", .normal = "",
             .about = "certificate chain (PEM): answer by HTTPS; needs tls-key"),
-    SETTING("tls-key", TEXT, tls_key, .value = "FILE", .normal = "", .about = "private key (PEM) of tls-cert"),
+    SETTING("tls-key", TEXT, tls_key, .value = "FILE", .normal = "",
+            .about =
+                "private key (PEM) of tls-cert, which others must not be able to read; both are read again at SIGHUP"),
     SETTING("user", TEXT, user, .value = "TEXT", .normal = "",
             .about = "become this user once the port is taken, when started as root"),
     SETTING("workers", INTEGER, workers, .value = "N", .least = 1, .most = 1024,

@@ -223,11 +223,12 @@ def test_connections_of_one_client(s):
     raise AssertionError("it never takes another")
 
 
-def make_certificate(folder):
+def make_certificate(folder, kind=("ec", "-pkeyopt", "ec_paramgen_curve:P-256")):
     if not shutil.which("openssl"):
         raise Skip("openssl is not installed")
+    os.makedirs(folder, exist_ok=True)
     cert, key = os.path.join(folder, "cert.pem"), os.path.join(folder, "key.pem")
-    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+    subprocess.run(["openssl", "req", "-x509", "-newkey", *kind, "-nodes",
                     "-keyout", key, "-out", cert, "-days", "2", "-subj", "/CN=localhost", "-addext",
                     "subjectAltName=IP:127.0.0.1"], check=True, capture_output=True)
     return cert, key
@@ -237,7 +238,7 @@ def make_certificate(folder):
 def test_tls(s):
     cert, key = make_certificate(s.folder)
     with subprocess.Popen(s.command("--listen", "127.0.0.1:0", "--db", s.db, "--tls-cert", cert, "--tls-key", key,
-                                    "--max-body", "10K", "--request-deadline-s", "5"),
+                                    "--max-body", "10K", "--request-deadline-s", "30"),
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         line = process.stdout.readline().decode()
         try:
@@ -250,12 +251,15 @@ def test_tls(s):
                 try:
                     connection.request(method, path, body, {"Content-Type": "application/json", **(headers or {})} if body else headers or {})
                     reply = connection.getresponse()
+                    kept.update({name.lower(): value for name, value in reply.getheaders()})
                     return reply.status, reply.read()
                 finally:
                     connection.close()
+            kept = {}
             status, body = ask("POST", "/v1/jobs", json.dumps(MATRICES), {"Prefer": "wait=30"})
             check(status == 200 and json.loads(body)["summary"]["outcome"] == "converged", status, body)
             check(ask("GET", "/v1/jobs")[0] == 200 and ask("GET", "/nothing")[0] == 404)
+            check(kept["strict-transport-security"].startswith("max-age="), kept)
             check(ask("POST", "/v1/jobs", "x" * 20000)[0] == 413)
             # What waits keeps its thread, as nobody else can write to its connection.
             told = ask("GET", f"/v1/jobs/{json.loads(body)['id']}/events")
@@ -267,7 +271,8 @@ def test_tls(s):
             got = uzawa(s, "--server", line.split()[-1], "list", UZAWA_CA=cert)
             check(got.returncode == 0, got)
             check(uzawa(s, "--server", line.split()[-1], "--retry", "0", "list").returncode == 12, "it trusts anybody")
-            # A slow client is cut off, without plain text in the encrypted stream.
+            # A slow client is cut off, long before a request's deadline, without plain text in the encrypted stream.
+            started = time.monotonic()
             with socket_to(port) as raw, context.wrap_socket(raw, server_hostname="127.0.0.1") as slow:
                 slow.sendall(b"GET /healthz HT")
                 slow.settimeout(20)
@@ -275,19 +280,53 @@ def test_tls(s):
                     check(slow.recv(100) == b"", "something was said")
                 except (ssl.SSLEOFError, ConnectionResetError):
                     pass
+            check(3 < time.monotonic() - started < 15)
             with socket_to(port) as plain:
                 plain.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
                 check(b"200" not in plain.recv(1000))
             check(ask("GET", "/healthz")[0] == 200)
+            # Another certificate, without a moment in which there is none; one that is no good changes nothing.
+            check(handshake(port, "-tls1_2", "-cipher", "ECDHE-ECDSA-AES128-GCM-SHA256"))
+            renew(process, port, cert, key, make_certificate(os.path.join(s.folder, "new"), ("rsa:2048",)))
+            context = ssl.create_default_context(cafile=cert)
+            check(ask("GET", "/healthz")[0] == 200)
+            os.chmod(key, 0o644)
+            process.send_signal(signal.SIGHUP)
+            time.sleep(0.3)
+            check(ask("GET", "/healthz")[0] == 200)
+            # Forward secrecy, and nothing old: RSA key exchange, CBC, TLS 1.1.
+            check(handshake(port, "-tls1_3") and handshake(port, "-tls1_2", "-cipher", "ECDHE-RSA-AES256-GCM-SHA384"))
+            for old in (("-tls1_2", "-cipher", "AES128-GCM-SHA256"), ("-tls1_2", "-cipher", "ECDHE-RSA-AES128-SHA"),
+                        ("-tls1_2", "-cipher", "DHE-RSA-AES128-SHA"), ("-tls1_1", "-cipher", "ALL:@SECLEVEL=0")):
+                check(not handshake(port, *old), old)
         finally:
             process.send_signal(signal.SIGTERM)
             _, log = process.communicate(timeout=30)
         check(process.returncode == 0, log)
+        check(b"certificate_reloaded" in log and b"certificate_kept" in log and b"open to every user" in log, log)
+    got = run(s, "--listen", "127.0.0.1:0", "--tls-cert", cert, "--tls-key", key)
+    check(got.returncode == 1 and "open to every user" in got.stderr and "chmod" in got.stderr, got)
     other = os.path.join(s.folder, "other")
-    os.mkdir(other)
     for wrong in ((key, cert), (cert, make_certificate(other)[1]), (cert, "/nonexistent/key"), (cert, os.devnull)):
         got = run(s, "--listen", "127.0.0.1:0", "--tls-cert", wrong[0], "--tls-key", wrong[1])
         check(got.returncode == 1 and "key" in got.stderr or "null" in got.stderr, wrong, got)
+
+
+def handshake(port, *options):
+    done = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{port}", "-brief", *options], input=b"", capture_output=True,
+                          timeout=20, check=False)
+    return done.returncode == 0 and b"CONNECTION ESTABLISHED" in done.stdout + done.stderr
+
+
+def renew(process, port, cert, key, fresh):
+    before = ssl.get_server_certificate(("127.0.0.1", port))
+    os.replace(fresh[0], cert)
+    os.replace(fresh[1], key)
+    process.send_signal(signal.SIGHUP)
+    end = time.monotonic() + 20
+    while ssl.get_server_certificate(("127.0.0.1", port)) == before:
+        check(time.monotonic() < end, "the certificate is never the new one")
+        time.sleep(0.02)
 
 
 def socket_to(port):

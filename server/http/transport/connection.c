@@ -12,6 +12,8 @@
 
 /* Lingering after an early reply: long enough for the reply to cross the network. */
 static const double LINGER_S = 2.0;
+/* Time for a TLS handshake and the first line of a request. */
+static const double HANDSHAKE_S = 5.0;
 #define LOOK_MS 50 /* so soon it sees that the service ends */
 
 connection *connection_new(transport *server, int fd, const struct sockaddr *address)
@@ -23,8 +25,9 @@ connection *connection_new(transport *server, int fd, const struct sockaddr *add
     c->fd = fd;
     c->spare = server->next_is_spare;
     c->place = peer_begin(server->peers, address);
-    c->deadline = deadlines_add(server->deadlines, fd,
-                                clock_seconds(CLOCK_MONOTONIC) + server->options.request_deadline_s, c, c->spare);
+    const double most_s = server->options.request_deadline_s,
+                 patience_s = server->tls ? fmin(HANDSHAKE_S, most_s) : most_s;
+    c->deadline = deadlines_add(server->deadlines, fd, clock_seconds(CLOCK_MONOTONIC) + patience_s, c, c->spare);
     if (!c->deadline || !c->place) {
         deadline_remove(c->deadline);
         peer_end(c->place);
@@ -85,6 +88,7 @@ void connection_begin_request(connection *c, const char *raw_target)
     rq->fd = c->fd;
     rq->address_len = peer_address(c->place, rq->address);
     rq->spare = c->spare;
+    rq->reply.secure = c->server->tls;
     rq->started = clock_seconds(CLOCK_MONOTONIC);
     c->request = rq;
     c->layout = (framing_layout){.target = raw_target, .target_len = strlen(raw_target)};

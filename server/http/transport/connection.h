@@ -8,6 +8,7 @@
 #include "http/transport/peer.h"
 #include "http/transport/transport.h"
 
+#include <gnutls/gnutls.h>
 #include <microhttpd.h>
 #include <pthread.h>
 
@@ -26,6 +27,10 @@ struct transport {
     deadlines *deadlines;
     holder *holder; /* NULL: every connection keeps its thread */
     peers *peers;
+    /* Certificates, the one in use last; those before it may be in use by connections. */
+    pthread_mutex_t tls_lock;
+    gnutls_certificate_credentials_t *credentials;
+    size_t n_credentials;
     bool tls;              /* nothing can be written past libmicrohttpd */
     pthread_key_t current; /* the connection that this thread serves, once it has a request */
     bool check_layout;
@@ -56,6 +61,9 @@ typedef struct {
      * the request; and how many it had read in all by then. */
     uint64_t ahead, read;
 } connection;
+
+/* Certificate and key as GnuTLS takes them, freed by the caller; false with the reason. */
+bool http_tls_load(gnutls_certificate_credentials_t *out, const http_tls *tls, char *message, size_t size);
 
 /* NULL: no memory; the connection's requests are then refused. */
 connection *connection_new(transport *server, int fd, const struct sockaddr *address);

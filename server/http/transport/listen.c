@@ -1,5 +1,5 @@
 /* listen.c: before the server starts: from "HOST:PORT" to a listening socket, and the certificate. */
-#include "http/transport/transport.h"
+#include "http/transport/connection.h"
 
 #include <errno.h>
 #include <gnutls/gnutls.h>
@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* Splits at the last colon; brackets around an IPv6 address are required and dropped. */
@@ -97,12 +98,16 @@ bool http_is_public(int listen_fd)
 
 enum { PEM_MOST = 1 << 20 };
 
-/* malloc'ed text; NULL with the reason. */
-static char *read_text(const char *path, char *message, size_t size)
+/* malloc'ed text; NULL with the reason. secret: other users of this machine must not be able to read it. */
+static char *read_text(const char *path, bool secret, char *message, size_t size)
 {
+    struct stat st;
     FILE *file = fopen(path, "re");
-    char *text = file ? malloc(PEM_MOST + 1) : NULL;
-    if (!text) {
+    const bool open_to_all = file && secret && (fstat(fileno(file), &st) != 0 || (st.st_mode & S_IRWXO));
+    char *text = file && !open_to_all ? malloc(PEM_MOST + 1) : NULL;
+    if (open_to_all) {
+        snprintf(message, size, "the key %s is open to every user of this machine: chmod o= %s", path, path);
+    } else if (!text) {
         snprintf(message, size, "cannot read %s: %s", path, strerror(file ? ENOMEM : errno));
     } else {
         size_t n = fread(text, 1, PEM_MOST, file);
@@ -118,6 +123,18 @@ static char *read_text(const char *path, char *message, size_t size)
     return text;
 }
 
+bool http_tls_load(gnutls_certificate_credentials_t *out, const http_tls *tls, char *message, size_t size)
+{
+    const gnutls_datum_t cert = {(unsigned char *)tls->cert, (unsigned)strlen(tls->cert)};
+    const gnutls_datum_t key = {(unsigned char *)tls->key, (unsigned)strlen(tls->key)};
+    int rc = gnutls_certificate_allocate_credentials(out);
+    if (rc >= 0 && (rc = gnutls_certificate_set_x509_key_mem(*out, &cert, &key, GNUTLS_X509_FMT_PEM)) < 0)
+        gnutls_certificate_free_credentials(*out);
+    if (rc < 0)
+        snprintf(message, size, "%s", gnutls_strerror(rc));
+    return rc >= 0;
+}
+
 bool http_tls_read(http_tls *out, const char *cert_path, const char *key_path, char *message, size_t size)
 {
     *out = (http_tls){NULL, NULL};
@@ -125,27 +142,21 @@ bool http_tls_read(http_tls *out, const char *cert_path, const char *key_path, c
         snprintf(message, size, "the installed libmicrohttpd has no TLS: put a proxy in front");
         return false;
     }
-    http_tls pair = {.cert = read_text(cert_path, message, size)};
+    http_tls pair = {.cert = read_text(cert_path, false, message, size)};
     if (pair.cert)
-        pair.key = read_text(key_path, message, size);
+        pair.key = read_text(key_path, true, message, size);
     if (!pair.key) {
         http_tls_clear(&pair);
         return false;
     }
     gnutls_certificate_credentials_t credentials;
-    const gnutls_datum_t c = {(unsigned char *)pair.cert, (unsigned)strlen(pair.cert)};
-    const gnutls_datum_t k = {(unsigned char *)pair.key, (unsigned)strlen(pair.key)};
-    int rc = gnutls_certificate_allocate_credentials(&credentials);
-    if (rc >= 0) {
-        rc = gnutls_certificate_set_x509_key_mem(credentials, &c, &k, GNUTLS_X509_FMT_PEM);
+    char why[160];
+    if (http_tls_load(&credentials, &pair, why, sizeof why)) {
         gnutls_certificate_free_credentials(credentials);
-    }
-    if (rc >= 0) {
         *out = pair;
         return true;
     }
-    snprintf(message, size, "%s and %s are no certificate and its key in PEM: %s", cert_path, key_path,
-             gnutls_strerror(rc));
+    snprintf(message, size, "%s and %s are no certificate and its key in PEM: %s", cert_path, key_path, why);
     http_tls_clear(&pair);
     return false;
 }

@@ -147,6 +147,8 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, field_
     out[n++] = (field){"X-Content-Type-Options", "nosniff"};
     out[n++] = (field){"Content-Security-Policy", policy};
     out[n++] = (field){"Referrer-Policy", "no-referrer"};
+    if (reply->secure) /* RFC 6797 */
+        out[n++] = (field){"Strict-Transport-Security", "max-age=31536000"};
     out[n++] = (field){"Cache-Control", reply->immutable   ? "public, max-age=31536000, immutable"
                                         : reply->cacheable ? "no-cache"
                                         : reply->tag[0]    ? "private, no-cache"

@@ -33,6 +33,13 @@ static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_c
         const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CONNECTION_FD);
         const union MHD_ConnectionInfo *from = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
         *socket_context = info ? connection_new(server, info->connect_fd, from ? from->client_addr : NULL) : NULL;
+        const union MHD_ConnectionInfo *session = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_GNUTLS_SESSION);
+        if (server->tls && session) { /* instead of those that libmicrohttpd keeps for all its life */
+            pthread_mutex_lock(&server->tls_lock);
+            gnutls_credentials_set(session->tls_session, GNUTLS_CRD_CERTIFICATE,
+                                   server->credentials[server->n_credentials - 1]);
+            pthread_mutex_unlock(&server->tls_lock);
+        }
     } else {
         connection_free(*socket_context);
         *socket_context = NULL;
@@ -166,6 +173,11 @@ static char *make_last_words(double deadline_s)
     return text;
 }
 
+/* TLS 1.3 and 1.2 with forward secrecy and authenticated encryption only (RFC 9325, section 4). */
+static const char TLS_PRIORITIES[] =
+    "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2:-KX-ALL:+ECDHE-ECDSA:+ECDHE-RSA:-CIPHER-ALL:+AES-256-GCM:"
+    "+CHACHA20-POLY1305:+AES-128-GCM:-MAC-ALL:+AEAD:-SIGN-RSA-SHA1:-SIGN-ECDSA-SHA1:%SERVER_PRECEDENCE";
+
 static struct MHD_Daemon *start_daemon(transport *server, int listen_fd, const transport_options *options)
 {
     /* The watch over deadlines is exact; this one only backs it up, and must not end a long poll. */
@@ -182,6 +194,7 @@ static struct MHD_Daemon *start_daemon(transport *server, int listen_fd, const t
         {MHD_OPTION_URI_LOG_CALLBACK, (intptr_t)on_target, server},
         {server->tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, server->tls ? options->tls->cert : NULL},
         {MHD_OPTION_HTTPS_MEM_KEY, 0, server->tls ? options->tls->key : NULL},
+        {MHD_OPTION_HTTPS_PRIORITIES, 0, server->tls ? (void *)(uintptr_t)TLS_PRIORITIES : NULL},
         {MHD_OPTION_END, 0, NULL},
     };
     unsigned tls = server->tls ? MHD_USE_TLS : 0;
@@ -189,6 +202,33 @@ static struct MHD_Daemon *start_daemon(transport *server, int listen_fd, const t
                                 MHD_USE_ITC | MHD_USE_ERROR_LOG | tls,
                             0, on_accept, server, on_request, server, MHD_OPTION_EXTERNAL_LOGGER, on_message, server,
                             MHD_OPTION_ARRAY, items, MHD_OPTION_END);
+}
+
+bool transport_use_tls(transport *server, const http_tls *tls, char *message, size_t size)
+{
+    gnutls_certificate_credentials_t fresh;
+    if (!http_tls_load(&fresh, tls, message, size))
+        return false;
+    pthread_mutex_lock(&server->tls_lock);
+    gnutls_certificate_credentials_t *grown = realloc(server->credentials, (server->n_credentials + 1) * sizeof *grown);
+    if (grown) {
+        server->credentials = grown;
+        grown[server->n_credentials++] = fresh;
+    }
+    pthread_mutex_unlock(&server->tls_lock);
+    if (grown)
+        return true;
+    gnutls_certificate_free_credentials(fresh);
+    snprintf(message, size, "no memory for a certificate");
+    return false;
+}
+
+static void free_tls(transport *server)
+{
+    for (size_t i = 0; i < server->n_credentials; i++)
+        gnutls_certificate_free_credentials(server->credentials[i]);
+    free(server->credentials);
+    pthread_mutex_destroy(&server->tls_lock);
 }
 
 bool transport_start(transport **out, int listen_fd, const transport_handlers *handlers,
@@ -202,6 +242,7 @@ bool transport_start(transport **out, int listen_fd, const transport_handlers *h
     server->handlers = *handlers;
     server->options = *options;
     server->tls = options->tls != NULL;
+    pthread_mutex_init(&server->tls_lock, NULL);
     atomic_init(&server->id, 0);
     atomic_init(&server->connections, 0);
     atomic_init(&server->refusing, 0);
@@ -222,6 +263,8 @@ bool transport_start(transport **out, int listen_fd, const transport_handlers *h
     server->peers = peers_new();
     if (!server->deadlines || !server->peers)
         goto fail;
+    if (server->tls && !transport_use_tls(server, options->tls, message, size))
+        goto fail;
     if (!server->tls && !(server->holder = holder_new(options->request_deadline_s, connection_end_held, server)))
         goto fail;
     *out = server;
@@ -237,6 +280,7 @@ fail:
         holder_free(server->holder);
         peers_free(server->peers);
         deadlines_free(server->deadlines);
+        free_tls(server);
     }
     if (has_key)
         pthread_key_delete(server->current);
@@ -290,5 +334,6 @@ void transport_stop(transport *server)
     peers_free(server->peers);
     deadlines_free(server->deadlines);
     pthread_key_delete(server->current);
+    free_tls(server);
     free(server);
 }

@@ -108,6 +108,7 @@ typedef struct {
     bool immutable;     /* what has this address never changes */
     char content_range[80];
     const char *cors_origin; /* a page of this origin may read the reply; NULL: none; lives as long as the server */
+    bool secure;             /* comes by TLS: the browser is to come by no other way again */
     bool cors, preflight;    /* replies depend on the origin; this one says what may be asked */
     bool has_file;           /* the body is the file fd, len bytes of it from offset on; body is NULL */
     int fd;
@@ -295,6 +296,9 @@ bool http_is_public(int fd);
  * that handlers may use it. False with the reason in message, and *out is NULL. */
 bool transport_start(transport **out, int listen_fd, const transport_handlers *handlers,
                      const transport_options *options, char *message, size_t size);
+/* Connections that begin from now on get this certificate; those that are open, and copies of the session, keep theirs.
+ * False with the reason in message, and all stays as it was. */
+bool transport_use_tls(transport *server, const http_tls *tls, char *message, size_t size);
 /* Waits end early from now on; everything else goes on. */
 void transport_drain(transport *server);
 const atomic_bool *transport_draining(const transport *server);
