@@ -217,10 +217,10 @@ static uz_status solve_precisely(uz_run *run, bool *solved, const double *p, int
             status = uz_run_certify_input(&input, run, &answer, err);
         if (status == UZ_OK && !(now->relative_error <= run->work.requested))
             status = uz_certify_exact(&answer.certificate, answer.u, (const mpf_t *)u, (const mpf_t *)r, &input, err);
-        bool held = true; /* in these units; it may be in the caller's */
+        bool held = true; /* reactions, in these units; they may be in the caller's */
         for (int64_t i = 0; i < run->m && now->absolute_error < by_doubles; i++) {
             answer.r[i] = uz_precise_round(r[i]);
-            held = held && isfinite(answer.r[i]);
+            held = held && (isfinite(answer.r[i]) || run->load.exponent == 0);
         }
         if (status != UZ_OK || !held)
             break;
