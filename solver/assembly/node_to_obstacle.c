@@ -120,7 +120,7 @@ static void place_of(double x[3], double along[2][3], const deepest *of, const d
         }
     for (int c = 0; c < dim; c++) {
         x[c] -= (fmax(0, back) + of->back) * of->normal[c];
-        for (int i = 0; i < dim - 1 && along && back > 0; i++)
+        for (int i = 0; i < dim - 1 && along && back > 1e-12 * of->length; i++) /* on edges rounding is all of it */
             along[i][c] -= grows[i] * of->normal[c];
     }
 }
