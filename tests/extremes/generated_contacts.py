@@ -551,11 +551,11 @@ def run(s, numbers, say=print, refine=True):
     return {"scenes": sum(c[0] for c in counts.values()), "solves": daemon.solves, "families": counts, "failures": failures}
 
 
-def command(doc, run, of):
+def command(doc, run, of, most=1000):
     """BUILD OUT [COUNT [FIRST]]: runs the scenes against a daemon of its own, tells what was false and writes it down."""
     if len(sys.argv) < 3:
         sys.exit(doc)
-    count, first = (int(sys.argv[k]) if len(sys.argv) > k else d for k, d in ((3, 1000), (4, 0)))
+    count, first = (int(sys.argv[k]) if len(sys.argv) > k else d for k, d in ((3, most), (4, 0)))
     s = service.Service(sys.argv[1])
     began = time.time()
     try:

@@ -1,14 +1,15 @@
 """Generated bodies on rigid obstacles, each posted to a daemon at its defaults, and again mirrored, turned, in other units and refined.
-usage: generated_obstacles.py BUILD_DIR OUTPUT.json [SCENES [FIRST]]
+usage: generated_obstacles.py BUILD_DIR OUTPUT.json [SCENES [FIRST [KINEMATICS]]]
 
 What must hold of each: its mirror image has the mirrored answer; turning and units change rounding only; nothing pulls or stands in
 the obstacle; and the force is that of the mesh refined twice, or a warning says that it is not to be trusted. Obstacles have ridges,
 grooves and corners, half of them exactly where nodes are."""
 import math
 import random
+import sys
 
 import generated_contacts as contacts
-from generated_contacts import SOLID, distorted, in_units, kind_of, off_by, rotation, turned
+from generated_contacts import distorted, in_units, kind_of, off_by, rotation, turned
 from two_bodies import EDGES, body
 
 # By how much a force may differ from that of the mesh refined twice without a warning, and how many of the scenes may.
@@ -109,7 +110,7 @@ def profile(rng, width, size, places):
 
 
 class Scene:
-    def __init__(self, number):
+    def __init__(self, number, kinematics="auto"):
         rng = random.Random(f"obstacles {number}")
         self.dim = dim = 3 if number % 3 == 2 else 2
         self.kind, self.symmetric = kind_of(rng, dim), False
@@ -136,7 +137,7 @@ class Scene:
         aside = rng.choice((0, 0, rng.uniform(-3, 3) * size))
         motion = {"ux": aside, vertical: 0, **({"uy": 0} if dim == 3 else {})}
         self.family = f"{dim}D {self.kind:7s} {under:6s} {shape}"
-        self.scene = {"model": "solid" if dim == 3 else rng.choice(["plane_strain", "plane_stress"]),
+        self.scene = {"kinematics": kinematics, "model": "solid" if dim == 3 else rng.choice(["plane_strain", "plane_stress"]),
                       "materials": [{"on": "all", "young": 1000, "poisson": rng.uniform(0, 0.4)}],
                       "supports": [{"on": "head", **motion}], "loads": [], "contacts": [{"on": "on", "obstacle": obstacle}]}
 
@@ -212,11 +213,11 @@ def look(scene, daemon, rng, refine=True):
     return false
 
 
-def run(s, numbers, say=print, refine=True):
+def run(s, numbers, say=print, refine=True, kinematics="auto"):
     """Looks at scenes by number; returns what was counted, and what was false of which."""
     daemon, failures = contacts.Daemon(s), []
     for k in numbers:
-        scene = Scene(k)
+        scene = Scene(k, kinematics)
         false = look(scene, daemon, random.Random(f"variations {k}"), refine)
         if false:
             failures.append((k, scene.family, false))
@@ -225,4 +226,4 @@ def run(s, numbers, say=print, refine=True):
 
 
 if __name__ == "__main__":
-    contacts.command(__doc__, run, "bodies on obstacles")
+    contacts.command(__doc__, lambda s, numbers: run(s, numbers, kinematics=(sys.argv[5:] or ["auto"])[0]), "bodies on obstacles", 300)

@@ -85,7 +85,8 @@ PHRASES = {
     "the answer by more than 5 % in the energy norm": None, "`sliding` from 5 % on.": None,  # the same
     "one of them is more than 2 % it tries another": constant(0.02, r"#define TRIED +([\d.]+)"),
     "a tolerance of 1e-24 of the terms": None, "off by up to 0.2 %.": None,  # what was
-    "1,000 generated scenes of bodies": lambda program: ", 1000), (4, 0))" in (program.root / "tests/extremes/generated_contacts.py").read_text(),
+    "and 300 of bodies on obstacles": lambda program: "on obstacles\", 300)" in (program.root / "tests/extremes/generated_obstacles.py").read_text(),
+    "1,000 generated scenes of bodies": lambda program: "most=1000)" in (program.root / "tests/extremes/generated_contacts.py").read_text(),
     "to be 2 % of its length deep": constant(0.02, r"#define SINK +([\d.]+)"),
     "from Poisson's ratio 0.4 on, except in plane stress": constant(0.4, r"#define NEARLY_INCOMPRESSIBLE ([\d.]+)"),
     "the default there, is 5 %": constant(5e-2, r"UZ_BALANCED_TOTAL_ERROR ([\de.-]+)"), "the paper's body 5 % takes": None, "cells, and 2 % takes": None,  # asked for
