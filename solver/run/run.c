@@ -199,7 +199,8 @@ static uz_status improve(uz_run *run, uz_error *err)
         status = uz_answer_allocate(&last, run->d, run->m, err);
         if (status == UZ_OK)
             status = uz_run_certify_reactions(run, &last, run->work.it.r, false, err);
-        bool exact = end == UZ_END_SOLVED && isinf(run->answer.certificate.relative_error);
+        const bool exact =
+            (end == UZ_END_SOLVED || end == UZ_END_UNDECIDED) && isinf(run->answer.certificate.relative_error);
         if (status == UZ_OK && (exact || last.certificate.relative_error < run->answer.certificate.relative_error)) {
             const uz_answer swap = run->answer;
             run->answer = last;
