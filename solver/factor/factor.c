@@ -15,7 +15,7 @@
 
 /* As cholmod_factorize makes it by two transpositions with five passes over the entries: of a body in two dimensions
  * they take a tenth of the factorization. */
-cholmod_sparse *uz_permute(const uz_csc *K, const int64_t *position, cholmod_common *common)
+cholmod_sparse *uz_permute(const uz_csc *K, const int64_t *position, int64_t *place, cholmod_common *common)
 {
     size_t n = (size_t)K->cols;
     cholmod_sparse *S = cholmod_l_allocate_sparse(n, n, (size_t)K->ptr[n], 0, 1, -1, CHOLMOD_REAL, common);
@@ -37,6 +37,8 @@ cholmod_sparse *uz_permute(const uz_csc *K, const int64_t *position, cholmod_com
             int64_t a = position[j], b = position[K->idx[k]], at = next[a < b ? a : b]++;
             row[at] = a < b ? b : a;
             value[at] = K->val[k];
+            if (place)
+                place[k] = at;
         }
     memmove(next + 1, next, n * sizeof *next); /* each column was filled up to where the next begins */
     next[0] = 0;
@@ -58,9 +60,8 @@ void uz_factor_use_threads(int threads)
 
 /* cholmod_factorize, told that the matrix is in the factor's order already. A TRUE from it is no proof: status and
  * minor are looked at before anything resets them. */
-static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
+static uz_status factorize(uz_factor *factor, cholmod_sparse *S, cholmod_common *common, uz_error *err)
 {
-    cholmod_sparse *S = uz_permute(K, factor->analysis->position, common);
     bool ok = S != NULL;
     if (S) {
         int ordering = factor->L.ordering;
@@ -74,9 +75,8 @@ static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *c
         factor->L.ordering = ordering;
     }
     int status = common->status;
-    cholmod_l_free_sparse(&S, common);
     int64_t minor = (int64_t)factor->L.minor;
-    if (status == CHOLMOD_OUT_OF_MEMORY || status == CHOLMOD_TOO_LARGE)
+    if (!S || status == CHOLMOD_OUT_OF_MEMORY || status == CHOLMOD_TOO_LARGE)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %.3g bytes", 8.0 * (double)factor->L.xsize);
     if (status == CHOLMOD_NOT_POSDEF || minor < factor->n) {
         int64_t dof = minor < factor->n ? ((SuiteSparse_long *)factor->L.Perm)[minor] : -1;
@@ -144,8 +144,10 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
                          "the factor would take %.0f bytes and the limit is %zu: raise the limit", bytes, memory_limit);
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
+    cholmod_sparse *S = status == UZ_OK ? uz_permute(K, factor->analysis->position, NULL, &common) : NULL;
     if (status == UZ_OK)
-        status = factorize(factor, K, &common, err);
+        status = factorize(factor, S, &common, err);
+    cholmod_l_free_sparse(&S, &common);
     if (status == UZ_OK)
         status = describe(factor, K, &common, err);
     factor->info.factor_s = uz_seconds() - start;
@@ -164,7 +166,15 @@ uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
         return uz_fail(err, UZ_ERR_ARGUMENT, "K", "K is not of the pattern that was analysed");
     if (!uz_cholmod_start(&common))
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
-    uz_status status = factorize(factor, K, &common, err);
+    const int64_t count = K->ptr[K->cols];
+    double *value = factor->again ? factor->again->x : NULL;
+    for (int64_t k = 0; value && k < count; k++)
+        value[factor->place[k]] = K->val[k];
+    if (!factor->place)
+        factor->place = uz_alloc(count, sizeof *factor->place);
+    if (factor->place && !factor->again)
+        factor->again = uz_permute(K, factor->analysis->position, factor->place, &common);
+    uz_status status = factorize(factor, factor->again, &common, err);
     cholmod_l_finish(&common);
     return status;
 }
@@ -185,6 +195,12 @@ void uz_factor_free(uz_factor *factor)
 {
     if (!factor)
         return;
+    cholmod_common common;
+    if (factor->again && uz_cholmod_start(&common)) {
+        cholmod_l_free_sparse(&factor->again, &common);
+        cholmod_l_finish(&common);
+    }
+    free(factor->place);
     SuiteSparse_free(factor->L.x); /* all else of L is the analysis's */
     uz_analysis_free(factor->analysis);
     free(factor);

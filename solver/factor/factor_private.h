@@ -27,6 +27,8 @@ struct uz_factor {
     cholmod_factor L; /* the analysis's with numbers: only x and what says so are this factor's own */
     int64_t n;
     uz_factor_info info;
+    cholmod_sparse *again; /* the last K of uz_factor_again in the factor's order; NULL: not asked */
+    int64_t *place;        /* of its entries there */
 };
 
 struct uz_factor_workspace {
@@ -62,8 +64,9 @@ uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_
 uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t *group, int64_t rows,
                     uz_ordering ordering, cholmod_common *common, uz_error *err);
 
-/* P K P' (lower triangle, columns unsorted); NULL: no memory. position: the factor's. */
-cholmod_sparse *uz_permute(const uz_csc *K, const int64_t *position, cholmod_common *common);
+/* P K P' (lower triangle, columns unsorted); NULL: no memory. position: the factor's. place: where each entry of K
+ * stands in it, or NULL. */
+cholmod_sparse *uz_permute(const uz_csc *K, const int64_t *position, int64_t *place, cholmod_common *common);
 
 /* A factor with other supernodes here and there. */
 typedef struct {

@@ -78,7 +78,7 @@ uz_status uz_paths_create(uz_paths **out, const uz_csc *K, const uz_factor *fact
     if (x)
         *x = (uz_paths){.factor = factor,
                         .ws = ws,
-                        .K = uz_permute(K, factor->analysis->position, &ws->common),
+                        .K = uz_permute(K, factor->analysis->position, NULL, &ws->common),
                         .parent = uz_alloc(count, sizeof *x->parent),
                         .first = uz_alloc_zero(count + 1, sizeof *x->first),
                         .work = uz_alloc_zero(count, sizeof *x->work),
