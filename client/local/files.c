@@ -1,4 +1,5 @@
 #include "local/files.h"
+#include "text/utf8.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -123,11 +124,9 @@ bool client_file_write(const char *path, const char *bytes, size_t count, char *
 
 void client_print_safe(FILE *to, const char *text)
 {
-    while (*text) {
-        /* A control character: C0 and DEL are one byte, C1 (U+0080..U+009F) two in UTF-8. */
-        const unsigned char first = (unsigned char)text[0], second = (unsigned char)text[1];
-        const bool one = first < 0x20 || first == 0x7f, two = first == 0xc2 && second >= 0x80 && second <= 0x9f;
-        fputc(one || two ? '?' : *text, to);
-        text += two ? 2 : 1;
+    for (const char *end = text + strlen(text); text < end;) {
+        const size_t unsafe = uz_utf8_unsafe(text, (size_t)(end - text));
+        fputc(unsafe ? '?' : *text, to);
+        text += unsafe ? unsafe : 1;
     }
 }

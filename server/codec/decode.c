@@ -203,11 +203,11 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
     text_open(&t, NULL, '[');
     for (size_t i = 0; i < json_size(tags); i++) {
         const json_value *tag = &tags->items[i];
-        for (size_t k = 0; k < tag->count; k++)
-            if ((unsigned char)tag->text[k] < 0x20 || tag->text[k] == 0x7f) {
-                free(t.data);
-                return decode_refuse(d, "not_allowed", tag, "has a control character; tags are words.");
-            }
+        if (decode_unsafe(tag->text, tag->count)) {
+            free(t.data);
+            return decode_refuse(d, "not_allowed", tag,
+                                 "has a character that controls a terminal or the order of others; tags are words.");
+        }
         text_string(&t, NULL, tag->text);
     }
     text_close(&t, ']');

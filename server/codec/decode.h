@@ -44,7 +44,9 @@ bool decode_refuse(decoding *d, const char *code, const json_value *at, const ch
 void *decode_room(decoding *d, const json_value *list, size_t size, int64_t *count);
 /* A group's name; one that no mesh has (too long, or with a NUL in it) becomes "". */
 void decode_name(char *out, size_t size, const json_value *object, const char *key, const char *otherwise);
-/* A short text of the user's, label[0..len): 1 to 63 bytes without control characters, since it is compared as a C
+/* Whether a text has a character that a terminal would obey, or that changes the order of others (text/utf8.h). */
+bool decode_unsafe(const char *text, size_t len);
+/* A short text of the user's, label[0..len): 1 to 63 bytes without such characters, since it is compared as a C
  * string by the store and shown in terminals. at: where the refusal points; what: "A name of a case". */
 bool decode_label(char out[64], decoding *d, const json_value *at, const char *label, size_t len, const char *what);
 /* A number of an object that may be absent. */

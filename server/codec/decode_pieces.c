@@ -2,6 +2,7 @@
 #include "codec/decode.h"
 #include "codec/problem.h"
 #include "codec/room.h"
+#include "text/utf8.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -40,19 +41,26 @@ void decode_name(char *out, size_t size, const json_value *object, const char *k
     memcpy(out, whole ? text : "", whole ? len + 1 : 1);
 }
 
+bool decode_unsafe(const char *text, size_t len)
+{
+    for (size_t i = 0; i < len; i++)
+        if (uz_utf8_unsafe(text + i, len - i) > 0)
+            return true;
+    return false;
+}
+
 bool decode_label(char out[64], decoding *d, const json_value *at, const char *label, size_t len, const char *what)
 {
-    bool fits = len > 0 && len < 64;
-    for (size_t i = 0; fits && i < len; i++)
-        fits = (unsigned char)label[i] >= 0x20 && label[i] != 0x7f;
+    const bool fits = len > 0 && len < 64 && !decode_unsafe(label, len);
     if (fits)
         memcpy(out, label, len + 1);
     else
-        problem_set(d->problem, 422, "out_of_range", at, "%s has 1 to 63 bytes and no control characters; this one %s.",
-                    what,
-                    len == 0   ? "is empty"
-                    : len < 64 ? "has one"
-                               : "is longer");
+        problem_set(
+            d->problem, 422, "out_of_range", at,
+            "%s has 1 to 63 bytes and no characters that control a terminal or the order of others; this one %s.", what,
+            len == 0   ? "is empty"
+            : len < 64 ? "has one"
+                       : "is longer");
     return fits;
 }
 

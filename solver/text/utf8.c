@@ -16,3 +16,20 @@ size_t uz_utf8_length(const char *text, size_t len)
             return 0;
     return bytes;
 }
+
+size_t uz_utf8_unsafe(const char *text, size_t len)
+{
+    static const struct {
+        unsigned first, last;
+    } UNSAFE[] = {{0x00, 0x1f}, {0x7f, 0x9f}, {0x61c, 0x61c}, {0x200e, 0x200f}, {0x2028, 0x202e}, {0x2066, 0x2069}};
+    const size_t n = uz_utf8_length(text, len);
+    const unsigned char *byte = (const unsigned char *)text;
+    const unsigned code = n == 1   ? byte[0]
+                          : n == 2 ? (byte[0] & 0x1fu) << 6 | (byte[1] & 0x3fu)
+                          : n == 3 ? (byte[0] & 0x0fu) << 12 | (byte[1] & 0x3fu) << 6 | (byte[2] & 0x3fu)
+                                   : 0xffffffu;
+    for (size_t i = 0; i < sizeof UNSAFE / sizeof UNSAFE[0]; i++)
+        if (code >= UNSAFE[i].first && code <= UNSAFE[i].last)
+            return n;
+    return 0;
+}

@@ -340,6 +340,10 @@ TEST(text_from_elsewhere_cannot_steer_the_terminal)
     char *got = safe("a\033[31m\x07\x7f\n\xc2\x9bZ \xc3\xa4");
     CHECK_STR(got, "a?[31m????Z \xc3\xa4");
     free(got);
+    got = safe("\xe2\x80\xae"
+               "gpj\xe2\x81\xa9\xd8\x9c\xe2\x80\xa8\xe2\x80\x94"); /* U+202E, U+2069, U+061C, U+2028, a dash */
+    CHECK_STR(got, "?gpj???\xe2\x80\x94");
+    free(got);
 }
 
 TEST(url_parts_are_escaped)

@@ -81,6 +81,9 @@ TEST(beyond_the_schema)
            422, "out_of_range", "/problem/mesh/box/cells");
     refuse(SCENE_HEAD "},\"tags\":[\"a\",\"b\\n\"]}", 422, "not_allowed", "/tags/1");
     refuse(SCENE_HEAD "},\"tags\":[\"a\\u0000b\"]}", 422, "not_allowed", "/tags/0");
+    refuse(SCENE_HEAD "},\"tags\":[\"a\\u009bb\"]}", 422, "not_allowed", "/tags/0");
+    refuse(SCENE_HEAD "},\"tags\":[\"\\u202egpj.exe\"]}", 422, "not_allowed", "/tags/0");
+    refuse(SCENE_HEAD "},\"tags\":[\"a\", \"x\xe2\x81\xa6y\"]}", 422, "not_allowed", "/tags/1");
 }
 
 /* The settings of a scene with this "solver". */
