@@ -221,10 +221,22 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
     job j = {0};
     job_status was;
     snprintf(rq->job_id, sizeof rq->job_id, "%.32s", rq->name);
+    problem_details problem = {0};
     store_status status = api_get_job(context, rq, rq->job_id, &j);
-    job_clear(&j);
     if (status != STORE_OK) {
         reply_store_failure(context, status, reply);
+        return;
+    }
+    jobs_freshen(context, &j);
+    char *text = codec_encode_job(&j);
+    const bool meant = text && request_still_means(rq, text, fmax(fmax(j.created, j.started), j.finished), &problem);
+    free(text);
+    job_clear(&j);
+    if (!meant) {
+        if (problem.status)
+            reply_problem(reply, &problem);
+        else
+            reply_no_memory(reply);
         return;
     }
     status = store_dismiss(context->store, rq->job_id, &was);

@@ -121,7 +121,20 @@ void uploads_get(api *context, http_request *rq, http_reply *reply)
 
 void uploads_delete(api *context, http_request *rq, http_reply *reply)
 {
-    store_status status = store_upload_delete(context->store, rq->name, api_sees(rq));
+    upload_info info;
+    problem_details problem = {0};
+    store_status status = store_upload_get(context->store, rq->name, api_sees(rq), &info);
+    char *text = status == STORE_OK ? codec_encode_upload(&info) : NULL;
+    const bool meant = text && request_still_means(rq, text, info.used, &problem);
+    free(text);
+    if (status == STORE_OK && !meant) {
+        if (problem.status)
+            reply_problem(reply, &problem);
+        else
+            reply_no_memory(reply);
+        return;
+    }
+    status = status != STORE_OK ? status : store_upload_delete(context->store, rq->name, api_sees(rq));
     if (status != STORE_OK)
         reply_failure(context, status, reply);
     else

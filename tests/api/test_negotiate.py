@@ -119,6 +119,29 @@ def test_part_of_a_result(s):
     check([one["displacements"] for one in part["cases"]] == [one["displacements"][1:] for one in full["cases"]], part)
 
 
+def test_only_what_was_read_is_deleted(s):
+    """A job that has gone on since, and one that has not."""
+    waits = s.post(ENDLESS)
+    tag = s.get(f"/v1/jobs/{waits.json['id']}").headers["etag"]
+    path = f"/v1/jobs/{waits.json['id']}"
+    s.wait_status(waits.json["id"], "running")
+    for fields in ({"If-Match": '"0"'}, {"If-Match": f"W/{s.get(path).headers['etag']}"}, {"If-Match": ""},
+                   {"If-Unmodified-Since": "Sat, 01 Jan 2022 00:00:00 GMT"}):
+        expect(s.request("DELETE", path, headers=fields), 412, "precondition_failed")
+    check(s.get(path).json["status"] == "running", tag)
+    expect(s.request("DELETE", path), 200)
+    s.wait_status(waits.json["id"], "dismissed")
+    expect(s.request("DELETE", path, headers={"If-Match": tag}), 412, "precondition_failed")
+    now = s.get(path).headers["etag"]
+    expect(s.request("DELETE", path, headers={"If-Match": f'"x", {now}', "If-Unmodified-Since": "Sat, 01 Jan 2022 00:00:00 GMT"}), 204)
+    expect(s.request("DELETE", path, headers={"If-Match": now}), 404)
+    job = s.solve(MATRICES)["id"]
+    expect(s.request("DELETE", f"/v1/jobs/{job}", headers={"If-Unmodified-Since": "Sat, 01 Jan 2050 00:00:00 GMT"}), 204)
+    upload = s.request("POST", "/v1/uploads", b"text").headers["location"]
+    expect(s.request("DELETE", upload, headers={"If-Match": '"1"'}), 412, "precondition_failed")
+    expect(s.request("DELETE", upload, headers={"If-Match": s.get(upload).headers["etag"]}), 204)
+
+
 ORIGIN = "https://app.example.org:8443"
 
 

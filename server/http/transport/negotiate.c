@@ -2,9 +2,11 @@
 #include "http/transport/message.h"
 
 #include <gnutls/crypto.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <zlib.h>
 
 /* Smaller bodies gain nothing: header fields and frames are of that size. */
@@ -30,8 +32,8 @@ void tag_make(char tag[REPLY_TAG], const char *const *parts, const size_t *lens,
 
 /* ---- If-None-Match */
 
-/* True if a member of an entity-tag list, `"x"` or `W/"x"`, is this tag in any coding, or "*". */
-static bool field_has_tag(const header_field *field, const char *tag)
+/* True if a member of an entity-tag list, `"x"`, or if not strong `W/"x"`, is this tag in any coding, or "*". */
+static bool field_has_tag(const header_field *field, const char *tag, bool strong)
 {
     const char *at = field->value, *end = at + field->value_len;
     const size_t want = strlen(tag), mark = sizeof GZIP_MARK - 1;
@@ -44,7 +46,7 @@ static bool field_has_tag(const header_field *field, const char *tag)
             to--;
         if (to - from == 1 && *from == '*')
             return true;
-        if (to - from >= 2 && strncmp(from, "W/", 2) == 0)
+        if (to - from >= 2 && !strong && strncmp(from, "W/", 2) == 0)
             from += 2;
         if (to - from >= 2 && *from == '"' && to[-1] == '"') {
             size_t len = (size_t)(to - from) - 2;
@@ -64,13 +66,38 @@ bool reply_unchanged(const http_request *rq, http_reply *reply)
         return false;
     for (size_t i = 0; i < rq->headers.count; i++) {
         const header_field *field = &rq->headers.fields[i];
-        if (token_equal(field->name, field->name_len, "If-None-Match") && field_has_tag(field, reply->tag)) {
+        if (token_equal(field->name, field->name_len, "If-None-Match") && field_has_tag(field, reply->tag, false)) {
             reply_drop_body(reply);
             reply->status = 304;
             return true;
         }
     }
     return false;
+}
+
+bool request_still_means(const http_request *rq, const char *body, double changed, problem_details *problem)
+{
+    char tag[REPLY_TAG], date[40];
+    struct tm t = {0};
+    bool asked = false, good = false;
+    const header_field *since = header_find(&rq->headers, "If-Unmodified-Since", NULL);
+    tag_make(tag, &body, (const size_t[]){strlen(body)}, 1);
+    for (size_t i = 0; i < rq->headers.count; i++) {
+        const header_field *field = &rq->headers.fields[i];
+        if (!token_equal(field->name, field->name_len, "If-Match"))
+            continue;
+        asked = true;
+        good = good || field_has_tag(field, tag, true);
+    }
+    if (!asked && since) { /* a date that is none counts for nothing (RFC 9110, section 13.1.4) */
+        snprintf(date, sizeof date, "%.*s", (int)(since->value_len < sizeof date ? since->value_len : 0), since->value);
+        const char *rest = strptime(date, "%a, %d %b %Y %H:%M:%S GMT", &t);
+        asked = rest && !*rest;
+        good = asked && floor(changed) <= (double)timegm(&t);
+    }
+    return !asked || good ||
+           problem_fill(problem, 412, "precondition_failed", "It is not what it was",
+                        "it has changed since it was read: look at it again, then ask with its new ETag");
 }
 
 /* ---- Range */

@@ -119,9 +119,10 @@ static size_t list_cors(field *out, const http_reply *reply)
         return n;
     }
     out[n++] = (field){"Access-Control-Allow-Methods", reply->allow};
-    out[n++] = (field){"Access-Control-Allow-Headers",
-                       "Authorization, Content-Encoding, Content-Type, Idempotency-Key, If-None-Match, If-Range, "
-                       "Last-Event-ID, Prefer, Range, X-Request-Id"};
+    out[n++] =
+        (field){"Access-Control-Allow-Headers",
+                "Authorization, Content-Encoding, Content-Type, Idempotency-Key, If-Match, If-None-Match, If-Range, "
+                "Last-Event-ID, Prefer, Range, X-Request-Id"};
     out[n++] = (field){"Access-Control-Max-Age", "600"};
     return n;
 }

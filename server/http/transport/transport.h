@@ -192,6 +192,10 @@ bool request_integer(const http_request *rq, const char *key, int64_t least, int
 /* True, and the reply is a 304, if the client has what reply->tag names: then a handler need not make the body. */
 bool reply_unchanged(const http_request *rq, http_reply *reply);
 
+/* For what changes something: whether it is still what the client saw, of which `body` is the JSON now, last changed at
+ * that Unix time; by If-Match, or where there is none If-Unmodified-Since. False with a 412. */
+bool request_still_means(const http_request *rq, const char *body, double changed, problem_details *problem);
+
 /* ---- replies of Server-Sent Events (HTML Living Standard, section 9.2), whatever they are about
  *
  * Nothing looks until the feed (work/feed.h) says that there is something to tell, the client leaves, the service ends
