@@ -28,7 +28,8 @@ typedef struct {
     store_status (*release)(store *s, const store_lease *lease);
     store_status (*recover)(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
     store_status (*expire)(store *s, const char *error_json, int64_t *count);
-    store_status (*retain)(store *s, const store_retention *limits, int64_t *count); /* at least one limit */
+    /* At least one limit; now: for ages. */
+    store_status (*retain)(store *s, const store_retention *limits, double now, int64_t *count);
     store_status (*dismiss)(store *s, const char *id, job_status *was);
     store_status (*get)(store *s, const char *id, job *out);
     store_status (*list)(store *s, const store_query *query, job *jobs, size_t *count); /* limit + 1 of them at most */
@@ -64,6 +65,7 @@ struct store {
     store_listener *changed; /* may be NULL */
     void *changed_ctx;
     store_uploads *uploads;
+    age_clock ages;               /* of who retains and collects */
     char *missing;                /* set at opening: store_missing */
     pthread_mutex_t message_lock; /* message; taken last */
     char message[256];

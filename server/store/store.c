@@ -2,6 +2,7 @@
 #include "store/blobs.h"
 #include "store/engine.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -200,12 +201,30 @@ store_status store_expire(store *s, const char *error_json, int64_t *count)
     return s->engine->expire(s, error_json, count);
 }
 
+double store_age_time(store *s, bool *held)
+{
+    const double wall = clock_seconds(CLOCK_REALTIME);
+    double newest = 0.0;
+    job *jobs = NULL;
+    size_t count = 0;
+    bool more;
+    if (!s->ages.begun && store_list(s, &(store_query){.limit = 1}, &jobs, &count, &more) == STORE_OK && count > 0) {
+        newest = fmax(jobs[0].created, jobs[0].finished);
+        job_clear(jobs);
+    }
+    free(jobs);
+    const double now = age_clock_now(&s->ages, newest, wall, clock_seconds(CLOCK_MONOTONIC));
+    *held = now < wall;
+    return now;
+}
+
 store_status store_retain(store *s, const store_retention *limits, int64_t *count)
 {
     *count = 0;
     if (limits->keep_s <= 0 && limits->keep_jobs <= 0 && limits->keep_bytes <= 0)
         return STORE_OK;
-    return s->engine->retain(s, limits, count);
+    bool held;
+    return s->engine->retain(s, limits, store_age_time(s, &held), count);
 }
 
 store_status store_dismiss(store *s, const char *id, job_status *was)

@@ -188,6 +188,10 @@ typedef struct {
 } store_retention;
 store_status store_retain(store *s, const store_retention *limits, int64_t *count);
 
+/* The time by which ages are counted, in Unix seconds (age_clock); *held: it does not follow the clock on the wall now.
+ * One thread asks, and retains and collects. */
+double store_age_time(store *s, bool *held);
+
 /* ---- dismiss: an accepted job becomes dismissed and *was is JOB_ACCEPTED; of a running one it is kept that it is not
  * to run again (*was is JOB_RUNNING, also where that could not be kept: the caller tells the worker); an ended one is
  * deleted with its result and *was is its status. */

@@ -127,9 +127,11 @@ store_status store_collect_uploads(store *s, int64_t *count)
 {
     const double keep_s = s->settings.uploads.keep_s;
     int64_t n = 0;
+    bool held;
+    const double now = store_age_time(s, &held);
     for (bool more = true; more; n += more) { /* the lock is let go between two, for those who send */
         pthread_mutex_lock(&s->uploads->lock);
-        more = keep_s > 0 && s->uploads->bytes > 0 && collect_one(s, clock_seconds(CLOCK_REALTIME) - keep_s);
+        more = keep_s > 0 && s->uploads->bytes > 0 && collect_one(s, now - keep_s);
         pthread_mutex_unlock(&s->uploads->lock);
     }
     if (count)

@@ -35,8 +35,17 @@ static void expire(work *w)
     free(error);
 }
 
-static void retain(work *w)
+static void retain(work *w, bool *told)
 {
+    bool held;
+    store_age_time(w->store, &held);
+    if (held && !*told)
+        log_write(
+            w->log, LOG_WARN, "clock_jumped",
+            (log_field[]){LOG_S("cause", "the clock is more than a day past what was stored last, or was set forward: "
+                                         "nothing is deleted for its age by it before the daemon has run for a day"),
+                          {0}});
+    *told = held;
     int64_t total = 0, count = 1;
     while (count > 0 && !work_is_stopping(w) && store_retain(w->store, &w->options.retention, &count) == STORE_OK)
         total += count;
@@ -82,6 +91,7 @@ static void keep_reserve(work *w, idle_watch *idle)
 void *housekeeping_loop(void *arg)
 {
     work *w = arg;
+    bool told = false;
     idle_watch idle = {.since = clock_seconds(CLOCK_MONOTONIC)};
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {
@@ -90,7 +100,7 @@ void *housekeeping_loop(void *arg)
         pthread_mutex_unlock(&w->lock);
         keep_reserve(w, &idle);
         expire(w);
-        retain(w);
+        retain(w, &told);
         store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
         pthread_mutex_lock(&w->lock);
     }

@@ -114,7 +114,7 @@ store_status sqlite_finish(store *s, const store_lease *lease, const store_outco
 store_status sqlite_release(store *s, const store_lease *lease);
 store_status sqlite_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 store_status sqlite_expire(store *s, const char *error_json, int64_t *count);
-store_status sqlite_retain(store *s, const store_retention *limits, int64_t *count);
+store_status sqlite_retain(store *s, const store_retention *limits, double now, int64_t *count);
 store_status sqlite_dismiss(store *s, const char *id, job_status *was);
 store_status sqlite_get(store *s, const char *id, job *out);
 store_status sqlite_list(store *s, const store_query *query, job *jobs, size_t *count);

@@ -61,6 +61,7 @@ store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
 
 typedef struct {
     const store_retention *limits;
+    double now;
     int64_t jobs, bytes; /* ended, as they stand */
     char ids[MOST_AT_ONCE][33], clients[MOST_AT_ONCE][STORE_CLIENT];
     int n_ids;
@@ -71,7 +72,7 @@ typedef struct {
 static store_status choose(connection *c, retain_args *a)
 {
     const store_retention *limits = a->limits;
-    double now = clock_seconds(CLOCK_REALTIME);
+    const double now = a->now;
     int64_t chosen_bytes = 0;
     statement st = statement_begin(c, QUERY_ENDED);
     if (statement_row(&st)) {
@@ -112,10 +113,10 @@ static store_status delete_chosen(sqlite_store *s, connection *c, void *args)
     return status;
 }
 
-store_status sqlite_retain(store *base, const store_retention *limits, int64_t *count)
+store_status sqlite_retain(store *base, const store_retention *limits, double now, int64_t *count)
 {
     sqlite_store *s = sqlite_of(base);
-    retain_args a = {.limits = limits};
+    retain_args a = {.limits = limits, .now = now};
     connection *c = sqlite_take_reader(s);
     store_status status = sqlite_give_reader(s, c, choose(c, &a));
     if (status == STORE_OK && a.n_ids > 0) /* an ended job does not change any more: it may only be gone already */

@@ -330,6 +330,26 @@ TEST(who_waits_for_a_request_makes_room)
     deadlines_free(all);
 }
 
+/* -------------------------------------------------------------------- ages */
+
+TEST(ages_do_not_jump_with_the_clock)
+{
+    const double day = 86400.0, start = 1e9;
+    age_clock c = {0};
+    CHECK(age_clock_now(&c, start - 10.0, start, 0.0) == start);
+    CHECK(age_clock_now(&c, 0.0, start + 100.0, 100.0) == start + 100.0);
+    CHECK(age_clock_now(&c, 0.0, start + 250.0, 200.0) == start + 250.0); /* set by a minute: it follows */
+    CHECK(age_clock_now(&c, 0.0, start + 1e8, 300.0) == start + 350.0);   /* by years: it goes on */
+    CHECK(age_clock_now(&c, 0.0, start + 1e8 + day, 200.0 + day) == start + 250.0 + day);
+    CHECK(age_clock_now(&c, 0.0, start + 1e8 + day, 301.0 + day) == start + 1e8 + day); /* for so long: it was right */
+    CHECK(age_clock_now(&c, 0.0, start, 303.0 + day) == start); /* back: nothing is older than it is */
+    c = (age_clock){0};
+    CHECK(age_clock_now(&c, start - 100.0 * day, start, 5.0) == start - 99.0 * day); /* while it did not run */
+    CHECK(age_clock_now(&c, 0.0, start + 60.0, 65.0) == start - 99.0 * day + 60.0);
+    c = (age_clock){0};
+    CHECK(age_clock_now(&c, 0.0, start, 5.0) == start); /* an empty store */
+}
+
 /* ----------------------------------------------------------------- options */
 
 static options_verdict parse(server_options *out, char *first, char *second)
