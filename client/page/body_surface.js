@@ -51,6 +51,7 @@ export function parse_surface(buffer) {
     position: array(extras.position),
     displacement: array(extras.displacement),
     node: array(triangles.attributes._NODE),
+    pressure: extras.pressure && { ...extras.pressure, x: array(extras.pressure.accessor) },
     von_mises: extras.von_mises && { ...extras.von_mises, x: array(extras.von_mises.accessor) },
     triangle: indices(0, 4),
     line: indices(0, 1),
@@ -151,8 +152,9 @@ export function quantities(surface) {
 export function values_of(surface, id) {
   const u = surface.displacement, count = surface.position.length / 3;
   if (id === "pressure") {
-    const rows = rows_by_vertex(surface), { values, low, high } = surface.rows.pressure;
-    return { at: (v) => { const row = rows.get(v); return row === undefined || values[row] < 0 ? NaN : values[row]; }, low, high };
+    const rows = rows_by_vertex(surface), { values, low, high } = surface.rows.pressure, both = surface.pressure;
+    const of_row = (row) => (row === undefined ? -1 : values[row]), at = both ? (v) => both.x[v] * both.unit : (v) => of_row(rows.get(v));
+    return { at: (v) => (at(v) < 0 ? NaN : at(v)), low, high };
   }
   if (id === "von_mises") {
     const { x, unit, low, high } = surface.von_mises;

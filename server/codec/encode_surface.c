@@ -14,7 +14,7 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "glTF is little-endian");
 _Static_assert(sizeof(unsigned) == 4 && sizeof(float) == 4, "numbers are written as they are in memory");
 
-enum { FLOAT = 5126, UNSIGNED = 5125, ARRAYS = 20, NONE = -1 };
+enum { FLOAT = 5126, UNSIGNED = 5125, ARRAYS = 21, NONE = -1 };
 enum { POINTS = 0, LINES = 1, TRIANGLES = 4 };    /* modes of a primitive */
 enum { VERTEX_DATA = 34962, INDEX_DATA = 34963 }; /* targets of a buffer view */
 enum { HEAD = 12, CHUNK_HEAD = 8, JSON_CHUNK = 0x4E4F534A, BINARY_CHUNK = 0x004E4942, MAGIC = 0x46546C67 };
@@ -243,6 +243,7 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
     text_integer(t, "position", v->position);
     text_integer(t, "displacement", v->displacement);
     put_drawn(t, "von_mises", &s->von_mises, v->von_mises);
+    put_drawn(t, "pressure", &s->touch, add_array(w, FLOAT, 0, s->touch.x, s->n_vertices, 1));
     text_open(t, "contact", '{');
     text_integer(t, "rows", n);
     put_accessor(t, "vertex", row_vertex);

@@ -115,6 +115,7 @@ typedef struct {
     double factor;           /* of displacements: one that lets them show */
     float *node;             /* n_vertices: number of the node, exact below 2^24. NULL: that of the vertex */
     uz_drawn von_mises;      /* n_vertices */
+    uz_drawn touch;          /* n_vertices: contact pressure, on both bodies; -1 * unit where none is */
     unsigned *triangle;      /* n_triangles x 3, counter-clockwise from outside */
     unsigned *line;          /* n_lines x 2: edges of elements, each once */
     unsigned *outline;       /* n_outline x 2: the border of a plane, the sharp edges of a solid */

@@ -5,6 +5,7 @@
 #include "picture/arc.h"
 #include "picture/scenery.h"
 #include "picture/skin.h"
+#include "post/parts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -174,7 +175,7 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
 static uz_status check_size(const uz_surface *s, const surface_work *w, size_t most_bytes, uz_error *err)
 {
     const double vertices = (double)s->n_vertices, triangles = (double)s->n_triangles;
-    const double bytes = 4 * (8 * vertices + 3 * triangles + 2 * (double)(w->edges.n_lines + w->edges.n_outline) +
+    const double bytes = 4 * (9 * vertices + 3 * triangles + 2 * (double)(w->edges.n_lines + w->edges.n_outline) +
                               10 * (double)w->model->m);
     if (s->n_vertices >= INT32_MAX || s->n_triangles >= INT32_MAX || (most_bytes > 0 && bytes > (double)most_bytes))
         return uz_fail(err, UZ_ERR_LIMIT, "",
@@ -235,6 +236,19 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
             stress[w->vertex_of[a]] = stress[a];
     if (status == UZ_OK && stress)
         status = draw_values(&s->von_mises, s, stress, NULL, s->n_vertices, err);
+    bool pair = false; /* else rows say it all */
+    for (int64_t k = 0; k < w->scene->n_contacts; k++)
+        pair = pair || w->scene->contacts[k].kind == UZ_OBSTACLE_BODY;
+    if (status == UZ_OK && w->fields.pressure && pair) {
+        double *touch = uz_alloc(s->n_nodes, sizeof *touch);
+        status = touch ? uz_nodal_pressure(touch, w->model, w->scene, w->fields.pressure, err) : fail_memory(err, s);
+        for (int64_t a = 0; status == UZ_OK && a < s->n_nodes; a++)
+            if (w->vertex_of[a] >= 0)
+                touch[w->vertex_of[a]] = touch[a];
+        if (status == UZ_OK)
+            status = draw_values(&s->touch, s, touch, NULL, s->n_vertices, err);
+        free(touch);
+    }
     return status == UZ_OK ? fill_rows(s, w, err) : status;
 }
 
@@ -271,9 +285,9 @@ void uz_surface_clear(uz_surface *s)
 {
     if (!s)
         return;
-    void *const blocks[] = {s->position,   s->displacement, s->node,       s->von_mises.x, s->triangle,
-                            s->line,       s->outline,      s->row_vertex, s->row_contact, s->row_normal,
-                            s->reaction.x, s->gap.x,        s->pressure.x, s->arc.x,       s->row_part};
+    void *const blocks[] = {s->position,   s->displacement, s->node,        s->von_mises.x, s->triangle,   s->line,
+                            s->outline,    s->row_vertex,   s->row_contact, s->row_normal,  s->reaction.x, s->gap.x,
+                            s->pressure.x, s->arc.x,        s->row_part,    s->touch.x};
     for (size_t i = 0; i < sizeof blocks / sizeof blocks[0]; i++)
         free(blocks[i]);
     memset(s, 0, sizeof *s);

@@ -9,6 +9,7 @@ import struct
 
 import service
 from service import MATRICES, SCENE, check, expect
+from two_bodies import body
 
 TRIANGLES, LINES, POINTS = 4, 1, 0
 
@@ -125,6 +126,22 @@ def test_the_paper_s_body_is_what_the_result_says(s):
     check(all(near(a, answer["nodes"][n][0], 60) for a, n in zip(glb.values(contact["arc"]), answer["contact_nodes"])),
           glb.values(contact["arc"]))
     check(glb.extras["contacts"] == SCENE["problem"]["contacts"], glb.extras["contacts"])
+
+
+def test_pressure_is_on_both_surfaces_of_a_contact(s):
+    """And nowhere else; on the slave it is that of the rows."""
+    request = body(["quad4", "quad4"], [[4, 2], [5, 2]], [lambda a, b: [4 * a, b], lambda a, b: [4 * a, 1 + b]],
+                   {"low": [(0, "top")], "high": [(1, "bottom")], "head": [(1, "top")], "foot": [(0, "bottom")]}, model="plane_strain",
+                   materials=[{"on": "all", "young": 1000, "poisson": 0.3}], loads=[{"on": "head", "pressure": 2}],
+                   supports=[{"on": "foot", "uy": 0}, {"on": "head", "ux": 0}, {"on": "foot", "ux": 0}], contacts=[{"on": "low", "with": "high"}])
+    job = solved(s, request)
+    glb, nodes = surface(s, job), request["problem"]["mesh"]["nodes"]
+    pressure = glb.values(glb.extras["pressure"])
+    touching = {k for k, x in enumerate(nodes) if x[1] == 1}
+    check({k for k, p in enumerate(pressure) if p >= 0} == touching and len(touching) == 11, pressure)
+    check(all(0.5 < pressure[k] < 4 for k in touching), pressure)
+    rows = dict(zip(glb.array(glb.contact["vertex"]), glb.values(glb.contact["pressure"])))
+    check(rows and all(near(pressure[k], p, 2) for k, p in rows.items()), rows)
 
 
 def test_triangles_and_lines_of_a_plane(s):
