@@ -53,7 +53,8 @@ typedef struct {
     double psi0;
     int64_t applications; /* of D by uz_dual_load_apply, those for lambda_max included */
     double left;  /* the last apply's error of K^-1 N'r, a bound in the energy norm: (s'(Dr - D r))^2 <= left^2 s'D s */
-    size_t bytes; /* what it holds, but for a factor of the free dofs, which comes and goes */
+    size_t bytes; /* what it holds, */
+    size_t most;  /* and the most that solves with given rows as equations have taken beside it */
     uz_stop stop; /* of uz_dual_load_aim */
     double *inside; /* m: reactions of uz_dual_load_interior, NULL: not asked. Rows that depend on each other share
                      * theirs near these, which all press */

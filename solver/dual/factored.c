@@ -124,6 +124,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
         x->part ? uz_principal_hold(&solved, x->part, load->K, box->fixed, &load->stop, err)
                 : uz_principal_create(&x->part, load->K, box->fixed, load->dual->factor, x->ws, &load->stop, err);
     solved = solved && x->part;
+    load->most = uz_principal_bytes(x->part) + uz_principal_bytes(x->held);
     uz_bounded_balance(box, load->K);
     for (int pass = 0; status == UZ_OK && solved && !wrong && pass < PASSES; pass++) {
         if ((solved = !uz_stop_is_due(&load->stop)))

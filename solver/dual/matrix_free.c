@@ -253,6 +253,10 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     uz_status status = uz_multigrid_create(&mg, load->K, uz_amg_modes(amg), box->fixed, 0, &x->stop, err);
     if (status == UZ_OK)
         status = uz_cg_init(&cg, mg, box->fixed, load->dual->d, err);
+    if (status == UZ_OK) {
+        const size_t bytes = uz_multigrid_describe(mg).bytes + 56 * (size_t)load->dual->d;
+        load->most = bytes > load->most ? bytes : load->most;
+    }
     if (status == UZ_OK)
         status = solve_stepwise(x, &cg, r, g, active, err);
     uz_cg_clear(&cg);
@@ -275,7 +279,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
 #define STEP_CYCLES     30.0
 #define CHANGE_CYCLES   6.0
 /* As UZ_COST_VECTORS, with conjugate gradients. */
-#define VECTORS 52.0
+#define VECTORS 62.0
 
 static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
                      const uz_cost_rates *rates)

@@ -3,6 +3,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "dual/springs.h"
+#include "linalg/linalg.h"
 
 #include <float.h>
 #include <math.h>
@@ -96,6 +97,11 @@ static uz_status iterate(multipliers *a, bool *slow, double *r, uz_springs *S, u
     if (status == UZ_ERR_NOT_SPD) { /* nothing is left of K in S */
         uz_error_reset(err);
         return UZ_OK;
+    }
+    if (status == UZ_OK) {
+        const size_t bytes =
+            uz_csc_bytes(&S->S) * 3 + uz_analysis_bytes(S->analysis) + uz_factor_describe(factor).bytes;
+        a->x->load.most = bytes > a->x->load.most ? bytes : a->x->load.most;
     }
     for (int pass = 0; status == UZ_OK && factor && pass < PASSES && !uz_stop_is_due(&a->x->load.stop); pass++) {
         const double before = a->worst;

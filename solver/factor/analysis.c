@@ -128,6 +128,7 @@ uz_factor_info uz_analysis_describe(const uz_analysis *analysis)
         .flops = analysis->chosen.flops,
         .n_considered = analysis->n_considered,
         .bytes = 8 * L->xsize + 8 * L->ssize + 32 * (size_t)analysis->n,
+        .room = 8 * (L->maxcsize + 3 * (size_t)analysis->n),
         .order_s = analysis->seconds,
     };
     memcpy(info.considered, analysis->considered, sizeof info.considered);

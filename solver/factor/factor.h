@@ -28,6 +28,7 @@ typedef struct {
     uz_order_choice considered[UZ_CHOICES]; /* n_considered; the used one among them */
     int n_considered;
     size_t bytes;
+    size_t room;  /* bytes beside these and a copy of K while it is made */
     double rcond; /* an estimate of the least eigenvalue of K after diagonal scaling, rather too large; kept with L */
     /* At least lambda_max(D^1/2 (L L')^-1 D^1/2), D = diag(K), but for a probability below 1e-12: some 50 times that
      * where few directions are soft, more where all are alike, and then small. So ||L^-1 P e||^2 is at most so many
@@ -120,6 +121,8 @@ uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *f
 uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K, const bool *fixed, const uz_stop *stop,
                             uz_error *err);
 void uz_principal_free(uz_principal *part);
+/* The most that it has taken so far. */
+size_t uz_principal_bytes(const uz_principal *part);
 /* x_F = K_FF^-1 x_F in place; x (n) at fixed dofs is neither read nor written. */
 uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err);
 

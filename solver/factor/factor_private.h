@@ -82,6 +82,7 @@ typedef struct uz_paths uz_paths;
 uz_status uz_paths_create(uz_paths **out, const uz_csc *K, const uz_factor *factor, uz_factor_workspace *ws,
                           uz_error *err);
 void uz_paths_free(uz_paths *x);
+size_t uz_paths_bytes(const uz_paths *x); /* x NULL is legal */
 /* Flops, about, to get from the dofs that are held to those that are `fixed` (n). */
 double uz_paths_work(uz_paths *x, const bool *fixed);
 /* Holds these dofs and no others. *positive false: K without them is not positive definite to working precision, or it

@@ -33,8 +33,9 @@ struct uz_paths {
     double **block; /* nsuper: those made anew; NULL: the factor's, or all its columns are held */
     bool *idle;     /* nsuper: all its columns are held */
     int64_t *local; /* n: a row's place in the current supernode */
-    double *room;   /* the largest product of a link */
-    double *x;      /* n */
+    double *room;   /* n_room: the largest product of a link */
+    size_t n_room;
+    double *x; /* n */
 };
 
 /* An entry that is cleared, gathered and passed, in flops; of memory that has been used before. */
@@ -62,6 +63,19 @@ static void list_links(uz_paths *x, int64_t *next, const int64_t *owner, size_t 
             x->links[next[s]++] = (link){d, begin, end};
         }
     }
+}
+
+size_t uz_paths_bytes(const uz_paths *x)
+{
+    if (!x)
+        return 0;
+    const cholmod_factor *L = &x->factor->L;
+    const SuiteSparse_long *super = L->super, *pi = L->pi;
+    size_t bytes = 16 * x->K->nzmax + 25 * L->n + 34 * L->nsuper;
+    bytes += (size_t)x->first[L->nsuper] * sizeof *x->links + x->n_room * sizeof *x->room;
+    for (size_t s = 0; s < L->nsuper; s++)
+        bytes += x->block[s] ? 8 * (size_t)((super[s + 1] - super[s]) * (pi[s + 1] - pi[s])) : 0;
+    return bytes;
 }
 
 uz_status uz_paths_create(uz_paths **out, const uz_csc *K, const uz_factor *factor, uz_factor_workspace *ws,
@@ -105,6 +119,7 @@ uz_status uz_paths_create(uz_paths **out, const uz_csc *K, const uz_factor *fact
         memcpy(next, x->first, (size_t)(count + 1) * sizeof *next);
         x->links = uz_alloc(x->first[count], sizeof *x->links);
         x->room = uz_alloc((int64_t)most, sizeof *x->room);
+        x->n_room = most;
         ok = x->links && x->room;
     }
     if (ok)

@@ -22,7 +22,24 @@ struct uz_principal {
     int64_t *place;           /* n: the row of a free dof in the reduced matrix, -1 for the others */
     double *room;             /* n */
     cholmod_dense *X, *Y, *E; /* CHOLMOD's room, kept between solves */
+    size_t most;              /* bytes that it has taken so far */
 };
+
+size_t uz_principal_bytes(const uz_principal *part)
+{
+    return part ? part->most : 0;
+}
+
+/* A: the reduced matrix, while it is there, or NULL. */
+static void count_bytes(uz_principal *part, const cholmod_sparse *A)
+{
+    const cholmod_factor *L = part->L;
+    size_t bytes = 24 * (size_t)part->factor->n + uz_paths_bytes(part->paths);
+    bytes += A ? 16 * A->nzmax + 8 * A->ncol : 0;
+    if (L)
+        bytes += 16 * L->n + (L->is_super ? 8 * (L->xsize + L->ssize + 3 * L->nsuper) : 16 * L->nzmax + 32 * L->n);
+    part->most = bytes > part->most ? bytes : part->most;
+}
 
 /* Counts (values false) or places (values true) the entries of the reduced matrix's upper triangle; next (n_free + 1)
  * is where each column's next entry goes, or one past its count. */
@@ -120,8 +137,11 @@ uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K,
     if (!part->paths)
         status = uz_paths_create(&part->paths, K, part->factor, part->ws, err);
     part->by_paths = status == UZ_OK && uz_paths_work(part->paths, fixed) < work_anew(part, K);
-    if (status == UZ_OK && part->by_paths)
-        return uz_paths_hold(positive, part->paths, fixed, stop, err);
+    if (status == UZ_OK && part->by_paths) {
+        status = uz_paths_hold(positive, part->paths, fixed, stop, err);
+        count_bytes(part, NULL);
+        return status;
+    }
     cholmod_l_free_factor(&part->L, &part->ws->common);
     if (status == UZ_OK && part->n_free > 0 && !(A = reduce(part, K, part->place)))
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
@@ -129,6 +149,7 @@ uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K,
         *positive = false;
     else if (status == UZ_OK && A)
         status = factorize(part, positive, A, stop, err);
+    count_bytes(part, A);
     cholmod_l_free_sparse(&A, &part->ws->common);
     return status;
 }

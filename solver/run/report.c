@@ -54,9 +54,6 @@ void uz_report_setup(uz_run *run)
 /* Of length d: p, u, the room of the run and of the certificate, which also transposes N. */
 #define RUN_VECTORS 10.0
 
-/* In units of K: the analysis, which is kept, and the permuted copy of K while a factor is made. */
-#define FACTOR_PASSES 2.0
-
 /* A cached setup is spared, of prediction and of what is measured alike. */
 static void report_cost(uz_run *run)
 {
@@ -78,11 +75,13 @@ static void report_cost(uz_run *run)
     const uz_setup *setup = run->asked->setup;
     const bool shared = setup->factor && setup->shared.item; /* setup->bytes has no factor then */
     const uz_csc *K = uz_setup_K(setup, run->asked->problem);
-    const double made = setup->factor && !run->asked->reused.factor ? FACTOR_PASSES * (double)uz_csc_bytes(K) : 0.0;
-    const double solved = 8.0 * RUN_VECTORS * (double)run->d;
+    const uz_factor_info factor = setup->factor ? uz_factor_describe(setup->factor) : (uz_factor_info){.bytes = 0};
+    const uz_dual_load *load = run->work.dual;
+    const double made =
+        setup->factor && !run->asked->reused.factor ? (double)uz_csc_bytes(K) + (double)factor.room : 0.0;
+    const double solved = 8.0 * RUN_VECTORS * (double)run->d + (load ? (double)load->bytes + (double)load->most : 0.0);
     cost->actual_bytes =
-        (double)setup->bytes + (shared ? (double)uz_factor_describe(setup->factor).bytes : 0.0) +
-        (run->work.dual ? (double)run->work.dual->bytes : 0.0) +
+        (double)setup->bytes + (shared ? (double)factor.bytes : 0.0) +
         (run->asked->setup->is_scene
              ? 0.0
              : (double)(uz_csc_bytes(&run->asked->problem->qp.K) + uz_csc_bytes(&run->asked->problem->qp.N))) +
