@@ -22,27 +22,17 @@ typedef struct {
 static bool neighbours_init(neighbours *n, const uz_body_model *model)
 {
     const uz_mesh *mesh = &model->mesh;
-    const int64_t corners = mesh->first[mesh->n_elements];
     int64_t most = 0;
     memset(n, 0, sizeof *n);
     n->model = model;
-    n->start = uz_alloc_zero(mesh->n_nodes + 1, sizeof *n->start);
-    n->around = uz_alloc(corners, sizeof *n->around);
+    n->start = uz_alloc(mesh->n_nodes + 1, sizeof *n->start);
+    n->around = uz_alloc(mesh->first[mesh->n_elements], sizeof *n->around);
     n->seen = uz_alloc_zero(mesh->n_nodes, sizeof *n->seen);
     if (!n->start || !n->around || !n->seen)
         return false;
-    for (int64_t i = 0; i < corners; i++)
-        n->start[mesh->node[i] + 1]++;
-    for (int64_t a = 0; a < mesh->n_nodes; a++) {
-        most = n->start[a + 1] > most ? n->start[a + 1] : most;
-        n->start[a + 1] += n->start[a];
-    }
-    /* Filling from the back leaves start[a + 1] at the beginning of node a, one place too far: shifted back below. */
-    for (int64_t e = mesh->n_elements - 1; e >= 0; e--)
-        for (int64_t i = mesh->first[e + 1] - 1; i >= mesh->first[e]; i--)
-            n->around[--n->start[mesh->node[i] + 1]] = e;
-    memmove(n->start, n->start + 1, (size_t)mesh->n_nodes * sizeof *n->start);
-    n->start[mesh->n_nodes] = corners;
+    uz_mesh_list_around(n->start, n->around, mesh);
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        most = n->start[a + 1] - n->start[a] > most ? n->start[a + 1] - n->start[a] : most;
     n->near = uz_alloc(most * UZ_ELEMENT_NODES + 1, sizeof *n->near);
     return n->near != NULL;
 }

@@ -35,25 +35,6 @@ typedef struct {
     int64_t count, capacity;
 } patches;
 
-static bool list_around(patches *p)
-{
-    const uz_mesh *mesh = &p->body->model->mesh;
-    const int64_t total = mesh->first[mesh->n_elements];
-    p->first = uz_alloc_zero(mesh->n_nodes + 2, sizeof *p->first);
-    p->around = uz_alloc(total, sizeof *p->around);
-    p->seen = uz_alloc_zero(mesh->n_elements, sizeof *p->seen);
-    if (!p->first || !p->around || !p->seen)
-        return false;
-    for (int64_t i = 0; i < total; i++)
-        p->first[mesh->node[i] + 2]++;
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        p->first[a + 2] += p->first[a + 1];
-    for (int64_t e = 0; e < mesh->n_elements; e++)
-        for (int64_t i = mesh->first[e]; i < mesh->first[e + 1]; i++)
-            p->around[p->first[mesh->node[i] + 1]++] = e;
-    return true;
-}
-
 static int32_t material_of(const patches *p, int64_t e)
 {
     return p->body->model->material_of ? p->body->model->material_of[e] : 0;
@@ -275,7 +256,13 @@ uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *do
     if (any) {
         p.of = uz_alloc(mesh->n_elements, sizeof *p.of);
         middle = uz_alloc(UZ_ELEMENT_KINDS, sizeof *middle);
-        status = p.of && middle && list_around(&p) ? take_samples(&p, middle, u, hooks, err) : no_memory(err);
+        p.first = uz_alloc(mesh->n_nodes + 1, sizeof *p.first);
+        p.around = uz_alloc(mesh->first[mesh->n_elements], sizeof *p.around);
+        p.seen = uz_alloc_zero(mesh->n_elements, sizeof *p.seen);
+        if (p.first && p.around)
+            uz_mesh_list_around(p.first, p.around, mesh);
+        status =
+            p.of && middle && p.first && p.around && p.seen ? take_samples(&p, middle, u, hooks, err) : no_memory(err);
     }
     for (int64_t a = 0; any && status == UZ_OK && a < mesh->n_nodes; a++) {
         if (a % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))

@@ -76,6 +76,19 @@ const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count)
     return mesh->node + mesh->first[element];
 }
 
+void uz_mesh_list_around(int64_t *first, int64_t *around, const uz_mesh *mesh)
+{
+    const int64_t total = mesh->first[mesh->n_elements];
+    memset(first, 0, (size_t)(mesh->n_nodes + 1) * sizeof *first);
+    for (int64_t q = 0; q < total; q++)
+        first[mesh->node[q]]++;
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        first[a + 1] += first[a];
+    for (int64_t e = mesh->n_elements - 1; e >= 0; e--) /* from the end: first[a] then is where its list begins */
+        for (int64_t q = mesh->first[e]; q < mesh->first[e + 1]; q++)
+            around[--first[mesh->node[q]]] = e;
+}
+
 int uz_mesh_face(int64_t node[UZ_FACE_NODES], const uz_mesh *mesh, uz_face face)
 {
     const int64_t *of = mesh->node + mesh->first[face.element];

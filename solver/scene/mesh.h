@@ -69,6 +69,9 @@ void uz_mesh_clear(uz_mesh *mesh);
 
 /* The nodes of an element; *count of them. */
 const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count);
+/* The elements around each node, ascending: around[first[node]] up to before first[node + 1]. first: n_nodes + 1;
+ * around: as many as all elements have nodes. */
+void uz_mesh_list_around(int64_t *first, int64_t *around, const uz_mesh *mesh);
 /* The nodes of a face in its order, corners first, then middles of its edges: at most UZ_FACE_NODES. Returns how many.
  */
 enum { UZ_FACE_NODES = UZ_SIDE_NODES };

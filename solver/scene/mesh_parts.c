@@ -65,20 +65,6 @@ static bool shares_part(int64_t *part, int64_t *parts, const uz_mesh *mesh, cons
     return shared;
 }
 
-/* Counted, summed, placed: filling from the end leaves first[i] at the beginning of its list. */
-static void list_around(uz_own_body *own)
-{
-    const uz_mesh *mesh = own->mesh;
-    const int64_t total = mesh->first[mesh->n_elements];
-    for (int64_t q = 0; q < total; q++)
-        own->first[mesh->node[q]]++;
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        own->first[a + 1] += own->first[a];
-    for (int64_t e = mesh->n_elements - 1; e >= 0; e--)
-        for (int64_t q = mesh->first[e]; q < mesh->first[e + 1]; q++)
-            own->around[--own->first[mesh->node[q]]] = e;
-}
-
 uz_status uz_own_body_new(uz_own_body **out, const uz_mesh *mesh, const uz_group *one, const uz_group *other,
                           uz_error *err)
 {
@@ -93,7 +79,7 @@ uz_status uz_own_body_new(uz_own_body **out, const uz_mesh *mesh, const uz_group
     }
     if (parts >= 0) {
         own->mesh = mesh;
-        own->first = uz_alloc_zero(mesh->n_nodes + 1, sizeof *own->first);
+        own->first = uz_alloc(mesh->n_nodes + 1, sizeof *own->first);
         own->around = uz_alloc(mesh->first[mesh->n_elements], sizeof *own->around);
         own->seen = uz_alloc_zero(mesh->n_elements, sizeof *own->seen);
         own->queue = uz_alloc(mesh->n_elements, sizeof *own->queue);
@@ -102,7 +88,7 @@ uz_status uz_own_body_new(uz_own_body **out, const uz_mesh *mesh, const uz_group
         uz_own_body_free(own);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact of a body with itself");
     }
-    list_around(own);
+    uz_mesh_list_around(own->first, own->around, mesh);
     *out = own;
     return UZ_OK;
 }
