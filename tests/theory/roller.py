@@ -1,6 +1,8 @@
 """A roller of radius 10 pushed by 0.1 into a block, on meshes graded towards the contact, from either side: the force with
-`moving` on ever finer ones. On quad8 with 256 cells it is 1738.91, on quad4 1739.58, and 1740 within 0.1 % on all that
-have 64 quad8 or 128 quad4. Minutes; not part of `make ci`. usage: roller.py BUILD_DIR"""
+`moving` on ever finer ones. quad8 with 128, 192 and 256 cells have 1738.93, 1738.96 and 1738.91, with gradings 0.9 and
+0.8 times as steep and 128 cells 1738.87 and 1738.93: 1738.9 it is. quad4 comes down to that as the square of the cells'
+size: 1751.09, 1741.53, 1739.58 with 64, 128, 256, on to 1738.9. CalculiX has 1743.2 on the mesh of 32 quad8, where this is
+1742.0. Minutes; not part of `make ci`. usage: roller.py BUILD_DIR"""
 import itertools
 import math
 import pathlib
@@ -9,6 +11,8 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "api"))
 import service  # noqa: after its place is known
 from two_bodies import body
+
+TRUE = 1738.9
 
 
 def towards(middle, end, steep):
@@ -69,9 +73,9 @@ def main():
     for (element, n, exchanged), force in forces.items():
         if abs(force / forces[element, n, False] - 1) > 1e-3:
             false.append(f"{element} {n}: {force} exchanged")
-        if n >= (128 if element == "quad4" else 64) and abs(force / 1740 - 1) > 1e-3:
-            false.append(f"{element} {n}: {force} for 1740")
-    print(f"false: {false}" if false else "from either side the same, and 1740 within 0.1 %")
+        if n >= (256 if element == "quad4" else 64) and abs(force / TRUE - 1) > 5e-4:
+            false.append(f"{element} {n}: {force} for {TRUE}")
+    print(f"false: {false}" if false else f"from either side the same, and {TRUE} within 0.05 %")
     sys.exit(bool(false))
 
 
