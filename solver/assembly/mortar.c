@@ -137,6 +137,7 @@ bool uz_mortar_add_point(uz_mortar_points *points, const uz_mortar_point *p)
 typedef struct {
     double *D, *whole, *gap; /* whole: of the shape function over all of its sides ... */
     double *around;          /* ... and their areas */
+    double *least;           /* gaps below it are none that points of the place's sides have */
     double *most;            /* the largest share that a master side has, by which the row is told */
     int64_t entries, room, *place, *node;
     double *value;
@@ -227,8 +228,16 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_pai
     }
     if (count < n || !orthonormalize(A, R, count, n))
         return true;
-    for (int a = 0; a < n; a++)
+    double least = INFINITY, shortest = INFINITY;
+    const int corners = dim == 2 ? 2 : n % 3 == 0 ? 3 : 4;
+    for (int64_t g = 0; g < count; g++)
+        least = fmin(least, points->point[g].gap);
+    for (int a = 0; a < corners; a++)
+        shortest = fmin(shortest, uz_distance2(side->xyz + a * dim, side->xyz + (a + 1) % corners * dim, dim));
+    for (int a = 0; a < n; a++) {
         to->D[side->place[a]] += D[a];
+        to->least[side->place[a]] = fmin(to->least[side->place[a]], least - sqrt(shortest));
+    }
     for (int64_t g = 0; g < count; g++) {
         const uz_mortar_point *p = &points->point[g];
         const uz_mortar_side *other = &pair->surface.side[p->master];
@@ -334,8 +343,12 @@ static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const 
         uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, of->entries, of->node, of->place, of->value, err);
     if (status != UZ_OK)
         return status;
+    /* Where what covers a part of a side is far and steep, as the arm of a fold over its bend, the gap at the other end
+     * is that of a line through the gaps there, extended to nowhere: below all of them by more than the side's length.
+     */
     for (int64_t p = 0; p < sites->n; p++) {
-        const bool row = of->D[p] > LEAST_COVER * of->whole[p] && of->D[p] > LEAST_AREA * of->around[p];
+        const bool row = of->D[p] > LEAST_COVER * of->whole[p] && of->D[p] > LEAST_AREA * of->around[p] &&
+                         of->gap[p] >= of->least[p] * of->D[p];
         sites->gap[p] = row ? of->gap[p] / of->D[p] : INFINITY;
         sites->area[p] = row ? of->D[p] : 0;
         sites->at[p] = slave->node[p];
@@ -386,7 +399,7 @@ static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_err
 {
     const int64_t n = pair->surface.n_places;
     const uz_body_model *model = pair->in->model;
-    integrals of = {.D = uz_alloc_zero(5 * n, sizeof *of.D)};
+    integrals of = {.D = uz_alloc_zero(6 * n, sizeof *of.D)};
     sites->gap = uz_alloc(n, sizeof *sites->gap);
     sites->normal = uz_alloc(n * model->mesh.dim, sizeof *sites->normal);
     sites->area = uz_alloc(n, sizeof *sites->area);
@@ -402,6 +415,9 @@ static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_err
         of.gap = of.D + 2 * n;
         of.most = of.D + 3 * n;
         of.around = of.D + 4 * n;
+        of.least = of.D + 5 * n;
+        for (int64_t p = 0; p < n; p++)
+            of.least[p] = INFINITY;
         memset(sites->ends, 0xff, (size_t)(2 * n) * sizeof *sites->ends);
         room = integrate(&of, sites, pair);
     }
