@@ -335,8 +335,8 @@ peers: deps bench-deps ## the same problems by what Debian has, one certificate 
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 	@$(if $(SIZES)$(ONLY)$(PROBLEMS),,$(MAKE) --no-print-directory -s peers-contact)
 
-peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json
-	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json
+peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json; DECKS=folder: CalculiX's own decks, too
+	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json $(DECKS)
 
 extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles: tables, build/extremes.json, build/contacts.json, build/obstacles.json; FILTER=name: some, FILTER=contacts or obstacles: these scenes alone, SCENES=100: the first of them
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/uzawad
