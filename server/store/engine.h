@@ -25,7 +25,7 @@ typedef struct {
     store_status (*claim)(store *s, store_lease *lease, double lease_s, job *out, char **body, size_t *len);
     store_status (*renew)(store *s, const store_lease *lease, double lease_s, int progress);
     store_status (*finish)(store *s, const store_lease *lease, const store_outcome *outcome);
-    store_status (*release)(store *s, const store_lease *lease);
+    store_status (*release)(store *s, const store_lease *lease, bool counted);
     store_status (*recover)(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
     store_status (*expire)(store *s, const char *error_json, int64_t *count);
     /* At least one limit; now: for ages. */

@@ -170,6 +170,12 @@ static store_status get_blob(store *s, const result_key *key, int64_t after, tak
     return t->status;
 }
 
+store_status result_blobs_pieces(store *s, const result_key *key, int64_t after,
+                                 bool (*take_piece)(void *ctx, const result_piece *piece), void *ctx)
+{
+    return s->engine->results->get(s, key, after, take_piece, ctx);
+}
+
 store_status store_get_vector(store *s, const char *id, int64_t number, const char *name, double **data, int64_t *count)
 {
     taken t;

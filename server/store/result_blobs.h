@@ -61,4 +61,8 @@ store_status result_blobs_put(const result_blobs *place, void *transaction, cons
  * number of cases than that (-1: any); key->name NULL and n_cases not -1: nothing is looked for. Otherwise STORE_OK. */
 store_status result_blobs_missing(store *s, const result_key *key, int64_t n_cases);
 
+/* For who passes them on: the pieces of a blob, as the engine has them. */
+store_status result_blobs_pieces(store *s, const result_key *key, int64_t after,
+                                 bool (*take)(void *ctx, const result_piece *piece), void *ctx);
+
 #endif

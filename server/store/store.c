@@ -179,9 +179,9 @@ store_status store_finish(store *s, const store_lease *lease, const store_outcom
     return STORE_ERROR;
 }
 
-store_status store_release(store *s, const store_lease *lease)
+store_status store_release(store *s, const store_lease *lease, bool counted)
 {
-    return s->engine->release(s, lease);
+    return s->engine->release(s, lease, counted);
 }
 
 store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed)

@@ -168,11 +168,12 @@ typedef struct {
  * otherwise STORE_CONFLICT and nothing is written: each job gets one result. */
 store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome);
 
-/* ---- requeue. store_release: one running job of ours goes back to accepted (shutdown), the attempt is not counted.
+/* ---- requeue. store_release: one running job of ours goes back to accepted; counted: the attempt was one, since its
+ * run failed (else the service stops).
  * store_recover, once at start before any claim: jobs left running by owners that are gone become accepted again, or
  * failed with the given error JSON when attempts >= max_attempts. Counts may be NULL. Both: a job that was told to end
  * becomes dismissed instead. */
-store_status store_release(store *s, const store_lease *lease);
+store_status store_release(store *s, const store_lease *lease, bool counted);
 store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 
 /* ---- expire: jobs that have waited longer than they may fail with the given error JSON; *count is how many. They are

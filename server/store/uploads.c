@@ -301,10 +301,9 @@ store_status blob_check(int fd, const char *id)
     return n < 0 ? STORE_ERROR : strcmp(found, id) == 0 ? STORE_OK : STORE_DAMAGED;
 }
 
-store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes)
+store_status store_upload_descriptor(store *s, const char *id, int *fd, int64_t *bytes)
 {
     upload_info info;
-    struct stat st;
     char cause[256];
     *fd = -1;
     store_status status = store_upload_get(s, id, NULL, &info);
@@ -312,17 +311,27 @@ store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes
         return status;
     *bytes = info.bytes;
     *fd = s->uploads->blobs->does->open(s->uploads->blobs, id);
-    if (*fd < 0)
-        status = errno == ENOENT ? STORE_DAMAGED : STORE_ERROR;
-    else if (fstat(*fd, &st) != 0)
-        status = STORE_ERROR;
-    else /* what it has must be what was sent, or a matrix would silently be another one */
-        status = st.st_size == info.bytes ? blob_check(*fd, id) : STORE_DAMAGED;
+    if (*fd >= 0)
+        return STORE_OK;
+    status = errno == ENOENT ? STORE_DAMAGED : STORE_ERROR;
+    snprintf(cause, sizeof cause, "cannot read the file of upload %s: %s", id, strerror(errno));
+    store_set_message(s, cause);
+    return status;
+}
+
+store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes)
+{
+    char cause[256];
+    store_status status = store_upload_descriptor(s, id, fd, bytes);
+    if (status != STORE_OK)
+        return status;
+    /* What it has must be what was sent, or a matrix would silently be another one. */
+    const off_t size = lseek(*fd, 0, SEEK_END);
+    status = size < 0 ? STORE_ERROR : size == *bytes ? blob_check(*fd, id) : STORE_DAMAGED;
     if (status == STORE_OK)
         return STORE_OK;
-    int reason = errno;
-    if (*fd >= 0)
-        close(*fd);
+    const int reason = errno;
+    close(*fd);
     *fd = -1;
     if (status == STORE_DAMAGED)
         snprintf(cause, sizeof cause, "the file of upload %s is missing or not what was sent", id);

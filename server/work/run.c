@@ -198,7 +198,7 @@ static void count_job(const run *r)
 static void store_end(run *r, run_end end)
 {
     work *w = r->me->w;
-    if (end == END_RELEASE && store_release(w->store, &r->me->lease) != STORE_OK)
+    if (end == END_RELEASE && store_release(w->store, &r->me->lease, false) != STORE_OK)
         log_store_failure(r, LOG_ERROR, "release_failed");
     if (end != END_FINISH) {
         metrics_add(w->options.metrics, METRIC_REQUEUED, end == END_RELEASE);

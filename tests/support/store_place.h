@@ -142,7 +142,7 @@ static inline store_status renew_as(store *s, const char *id, const char *owner,
 static inline store_status release_as(store *s, const char *id, const char *owner)
 {
     const store_lease lease = lease_of(id, owner);
-    return store_release(s, &lease);
+    return store_release(s, &lease, false);
 }
 
 static inline job_status status_of(store *s, const char *id)

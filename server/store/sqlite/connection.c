@@ -63,7 +63,7 @@ static const char *const SQL[QUERY_COUNT] = {
                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?2, ?3, ?4, ?5, ?6") ")",
     [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, last, part, version, columns, data, answer, sum)"
                              " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?3, ?4, ?5, ?2, ?6") ")",
-    [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - 1, progress = 0, started = 0, owner = NULL,"
+    [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - ?3, progress = 0, started = 0, owner = NULL,"
                       " lease = 0, queue_until = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_RECOVER_FAIL] = "UPDATE job SET status = 3, finished = ?2, error = ?3, owner = NULL, lease = 0"
                            " WHERE status = 1 AND attempts >= ?1",

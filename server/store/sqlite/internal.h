@@ -111,7 +111,7 @@ store_status sqlite_find_repeat(store *s, const store_request *request, job *out
 store_status sqlite_claim(store *s, store_lease *lease, double lease_s, job *out, char **body, size_t *len);
 store_status sqlite_renew(store *s, const store_lease *lease, double lease_s, int progress);
 store_status sqlite_finish(store *s, const store_lease *lease, const store_outcome *outcome);
-store_status sqlite_release(store *s, const store_lease *lease);
+store_status sqlite_release(store *s, const store_lease *lease, bool counted);
 store_status sqlite_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 store_status sqlite_expire(store *s, const char *error_json, int64_t *count);
 store_status sqlite_retain(store *s, const store_retention *limits, double now, int64_t *count);

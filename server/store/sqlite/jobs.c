@@ -293,6 +293,7 @@ typedef struct {
     double lease_s;
     int progress;
     const store_outcome *outcome;
+    bool counted; /* release: the attempt */
 } owner_args;
 
 static store_status change_own(sqlite_store *s, connection *c, void *args)
@@ -310,6 +311,8 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
     if (a->query == QUERY_RENEW) {
         bind_real(&st, 3, clock_seconds(CLOCK_REALTIME) + a->lease_s);
         bind_integer(&st, 4, a->progress);
+    } else if (a->query == QUERY_RELEASE) {
+        bind_integer(&st, 3, a->counted ? 0 : 1);
     } else if (a->query == QUERY_FINISH) {
         bind_integer(&st, 3, a->outcome->status);
         bind_real(&st, 4, clock_seconds(CLOCK_REALTIME));
@@ -351,7 +354,7 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
 
 store_status sqlite_renew(store *base, const store_lease *lease, double lease_s, int progress)
 {
-    owner_args a = {QUERY_RENEW, lease, lease_s, progress, NULL};
+    owner_args a = {.query = QUERY_RENEW, .lease = lease, .lease_s = lease_s, .progress = progress};
     return sqlite_write(sqlite_of(base), WRITE_LAZY, change_own, &a);
 }
 
@@ -361,9 +364,9 @@ store_status sqlite_finish(store *base, const store_lease *lease, const store_ou
     return sqlite_write(sqlite_of(base), WRITE_SOON, change_own, &a);
 }
 
-store_status sqlite_release(store *base, const store_lease *lease)
+store_status sqlite_release(store *base, const store_lease *lease, bool counted)
 {
-    owner_args a = {.query = QUERY_RELEASE, .lease = lease};
+    owner_args a = {.query = QUERY_RELEASE, .lease = lease, .counted = counted};
     return sqlite_write(sqlite_of(base), WRITE_SOON, change_own, &a);
 }
 

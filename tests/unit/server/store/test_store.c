@@ -98,7 +98,7 @@ STORE_TEST(an_earlier_lease_is_fenced_off)
     job_clear(&j);
     free(body);
     CHECK_INT(store_renew(p.s, &first, 0.0, 10), STORE_OK); /* it has run out, but nobody else has the job */
-    CHECK_INT(store_release(p.s, &first), STORE_OK);
+    CHECK_INT(store_release(p.s, &first, false), STORE_OK);
     CHECK_INT(store_renew(p.s, &first, 30.0, 20), STORE_CONFLICT);
     CHECK_INT(store_claim(p.s, "a", 30.0, &second, &j, &body, &len), STORE_OK);
     job_clear(&j);
@@ -107,7 +107,7 @@ STORE_TEST(an_earlier_lease_is_fenced_off)
     CHECK(second.token != first.token);
     CHECK_INT(store_renew(p.s, &first, 30.0, 30), STORE_CONFLICT);
     CHECK_INT(store_finish(p.s, &first, &PLAIN_SUCCESS), STORE_CONFLICT);
-    CHECK_INT(store_release(p.s, &first), STORE_CONFLICT);
+    CHECK_INT(store_release(p.s, &first, false), STORE_CONFLICT);
     CHECK_INT(store_get(p.s, id, &j), STORE_OK);
     CHECK(j.status == JOB_RUNNING && j.progress == 0);
     job_clear(&j);
