@@ -128,6 +128,11 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
 /* Process-wide settings that a library must not choose alone: BLAS threads. Call once from main before threads start;
  * `workers` is how many threads will call uz_solve at once. */
 void uz_process_init(int workers);
+/* After it: so many threads may be used in a large factorization from now on, while no solve runs. */
+void uz_process_threads(int threads);
+/* Lets BLAS allocate now what it works in, for each of its threads: later, where memory has ended, it would try for
+ * ever. */
+void uz_process_warm(void);
 /* After it, at most once: factors are made in the reserve, which has to outlive them. */
 void uz_process_reserve(uz_reserve *reserve);
 /* Per-thread cure for CHOLMOD's compiled-in OpenMP team (4 threads whatever the machine has). */

@@ -1,12 +1,16 @@
 /* process.c: what BLAS and OpenMP must be told once. */
 #include "uzawa.h"
 
+#include "core/alloc.h"
 #include "factor/factor.h"
+#include "linalg/blas.h"
 
 #include <signal.h>
+#include <stdlib.h>
 
 /* Declared here rather than by the vendors' headers, which differ between compilers and packages. */
 extern int openblas_get_num_threads(void);
+extern int openblas_get_num_procs(void);
 extern void openblas_set_num_threads(int threads);
 extern void omp_set_max_active_levels(int levels);
 
@@ -18,6 +22,23 @@ void uz_process_init(int workers)
     if (workers == 1)
         uz_factor_use_threads(openblas_get_num_threads());
     openblas_set_num_threads(1);
+}
+
+void uz_process_threads(int threads)
+{
+    uz_factor_use_threads(threads);
+}
+
+void uz_process_warm(void)
+{
+    enum { N = 512, K = 128 };
+    double *Z = uz_alloc_zero(N * K, sizeof *Z), *C = uz_alloc_zero(N * N, sizeof *C);
+    openblas_set_num_threads(openblas_get_num_procs());
+    if (Z && C)
+        uz_block_syrk_t(N, K, Z, K, C);
+    openblas_set_num_threads(1);
+    free(Z);
+    free(C);
 }
 
 void uz_process_reserve(uz_reserve *reserve)
