@@ -4,18 +4,18 @@
 #include "codec/codec.h"
 #include "http/http.h"
 #include "base/log.h"
+#include "base/memory.h"
 #include "base/metrics.h"
 #include "options/options.h"
 #include "privileges.h"
 #include "store/engines/engines.h"
 #include "uzawa.h"
+#include "work/solver_process.h"
 #include "work/webhook.h"
 #include "work/work.h"
 
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
-#include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -34,7 +34,6 @@ typedef struct {
     FILE *audit_file;
     metrics *metrics;
     store *store;
-    uz_reserve *reserve; /* outlives the work */
     work *work;
     webhooks *webhooks;
     http_server *http;
@@ -75,15 +74,12 @@ static void own_signals(char **argv, sigset_t *signals)
     }
 }
 
-/* What the process takes of the machine: memory, and as many descriptors as it may. What is freed stays in one heap,
- * touched: a page given back to the system is dear to get again, and each of glibc's eight arenas for each processor
- * would keep pages of its own. How much lies free is the housekeeper's business (work/reserve.h). */
+/* What the process takes of the machine: memory, and as many descriptors as it may. How much lies free is the
+ * housekeeper's business. */
 static void set_process_limits(void)
 {
     struct rlimit limit;
-    mallopt(M_ARENA_MAX, 1);
-    mallopt(M_MMAP_MAX, 0);
-    mallopt(M_TRIM_THRESHOLD, INT_MAX);
+    memory_keep_heap();
     if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
         limit.rlim_cur = limit.rlim_max;
         setrlimit(RLIMIT_NOFILE, &limit);
@@ -141,7 +137,6 @@ static bool start_work(service *s, const server_options *options, char *message,
     const work_options workers = {.workers = options->workers,
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
-                                  .reserve = s->reserve,
                                   .solve_bytes = options->memory,
                                   .max_solve_s = options->max_solve_s,
                                   .metrics = s->metrics,
@@ -207,10 +202,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
                                  .nonzeros = (int64_t)options->max_nonzeros};
     if (!codec_init(&limits, message, size))
         return false;
-    uz_process_init(options->workers);
-    s->reserve = uz_reserve_new(options->cache - options->cache / RESERVE_SHARE, options->cache / RESERVE_SHARE);
-    if (s->reserve)
-        uz_process_reserve(s->reserve);
+    uz_process_init(options->workers + 1); /* what is solved or predicted here is small */
     if (!read_secrets(s, options, message, size))
         return false;
     /* The port is taken before any job runs, so that a second daemon fails without a trace; and before the privileges
@@ -254,7 +246,6 @@ static void end(service *s)
     }
     if (s->store)
         store_close(s->store);
-    uz_reserve_free(s->reserve);
     forget_secrets(s);
     codec_end();
 }
@@ -422,6 +413,8 @@ int main(int argc, char **argv)
 {
     server_options options;
     char message[OPTION_PATH + 512], backup[OPTION_PATH];
+    if (argc > 1 && strcmp(argv[1], SOLVER_ROLE) == 0)
+        return solver_process(argc, argv);
     switch (options_read(&options, argc, argv, backup, message, sizeof message)) {
     case OPTIONS_HELP:
         options_usage(stdout);

@@ -1,6 +1,8 @@
 /* memory.c: limits of the machine and of the control group. */
 #include "base/memory.h"
 
+#include <limits.h>
+#include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,6 +50,13 @@ size_t memory_available(void)
     if (file)
         fclose(file);
     return least;
+}
+
+void memory_keep_heap(void)
+{
+    mallopt(M_ARENA_MAX, 1);
+    mallopt(M_MMAP_MAX, 0);
+    mallopt(M_TRIM_THRESHOLD, INT_MAX);
 }
 
 size_t memory_share(size_t available, size_t cache, int workers)

@@ -7,6 +7,11 @@
 /* Bytes of the machine, or of the control group (version 2 or 1) where that allows less. */
 size_t memory_available(void);
 
+/* What is freed stays in one heap, touched: a page given back to the system is dear to get again, and each of glibc's
+ * eight arenas for each processor would keep pages of its own. Who calls this sees to it that not too much lies free.
+ */
+void memory_keep_heap(void);
+
 /* What one of `workers` solves may take: 80 % of all, less the cache, divided; at least 64 MB. */
 size_t memory_share(size_t available, size_t cache, int workers);
 

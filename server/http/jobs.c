@@ -214,7 +214,7 @@ void jobs_get(api *context, http_request *rq, http_reply *reply)
 /* ----------------------------------------------------------------- dismiss */
 
 /* A running job ends soon after it is told to; this much is worth waiting for, so that the answer says "dismissed". */
-static const double DISMISS_WAIT_S = 0.25;
+static const double DISMISS_WAIT_S = 0.4;
 
 void jobs_delete(api *context, http_request *rq, http_reply *reply)
 {

@@ -16,7 +16,7 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
     size_t count = 0;
     (void)rq;
     reply->tag_by_body = true;
-    if (uz_cache_list(work_cache(context->work), &entries, &count, NULL) != UZ_OK)
+    if (!work_factors(context->work, &entries, &count))
         reply_no_memory(reply);
     else
         reply_json(reply, 200, codec_encode_factors(entries, count, work_settings(context->work)->cache_bytes));
@@ -67,14 +67,8 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
         now.jobs[0] = -1;
     for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++)
         now.job_names[i] = job_status_name((job_status)i);
-    uz_cache_entry *entries = NULL;
-    size_t count = 0;
-    if (uz_cache_list(work_cache(context->work), &entries, &count, NULL) == UZ_OK)
-        for (size_t i = 0; i < count; i++)
-            now.cache_bytes += entries[i].bytes;
-    now.cache_entries = count;
+    work_cached(context->work, &now.cache_entries, &now.cache_bytes);
     now.cache_max_bytes = work_settings(context->work)->cache_bytes;
-    free(entries);
     char *text = metrics_text(context->metrics, &now, &len);
     reply_text(reply, 200, "text/plain; version=0.0.4; charset=utf-8", text, len);
 }

@@ -7,19 +7,9 @@
 #include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/mman.h>
 
-#define ROUND_S 0.5
-#define IDLE_S  300.0 /* then the reserve goes back to the system */
-
-#define HEAP_FREE  ((size_t)16 << 20) /* may lie free where no large body was solved */
-#define HUGE_PAGE  ((size_t)2 << 20)
-#define SMALL_PAGE 4096
-
-typedef struct {
-    long long jobs; /* ended, when memory was made ready last */
-    double since;   /* on CLOCK_MONOTONIC */
-} idle_watch;
+#define ROUND_S   0.5
+#define HEAP_FREE ((size_t)16 << 20) /* may lie free */
 
 static void expire(work *w)
 {
@@ -54,51 +44,24 @@ static void retain(work *w, bool *told)
         log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
 }
 
-/* Memory for the next body is touched while nobody waits for it, and given back when no job has run for long. What is
- * freed stays in the heap (main): where much lies free there, all of it goes back to the system; where little and a
- * body may come, so much is touched now, in huge pages. */
-static void keep_reserve(work *w, idle_watch *idle)
+/* What is freed stays in the heap (memory_keep_heap): where much lies free there, it goes back to the system. */
+static void trim_heap(void)
 {
-    const long long jobs = atomic_load(&w->ended);
-    const double now = clock_seconds(CLOCK_MONOTONIC);
-    uz_reserve *reserve = w->options.reserve;
-    if (!reserve)
-        return;
-    const bool busy = work_busy(w) > 0, news = jobs != idle->jobs && !busy;
-    if (busy || news)
-        idle->since = now;
-    else if (now - idle->since > IDLE_S)
-        uz_reserve_empty(reserve);
-    while (news && work_busy(w) == 0 && !work_is_stopping(w) && uz_reserve_fill(reserve))
-        ;
-    const bool large = uz_reserve_bytes(reserve) > 0; /* bodies are solved here */
-    const size_t share = w->options.cache_bytes / 8, least = large && news ? share : 0;
-    const struct mallinfo2 heap = mallinfo2();
-    const bool known = heap.uordblks > 0; /* else it is another allocator, which tells nothing */
-    void *block = NULL;
-    if (known && heap.fordblks > HEAP_FREE + (large ? 4 * share : 0))
+    const struct mallinfo2 heap = mallinfo2(); /* of another allocator all zero */
+    if (heap.fordblks > HEAP_FREE)
         malloc_trim(0);
-    else if (known && heap.fordblks < least / 2 && posix_memalign(&block, HUGE_PAGE, least) == 0) {
-        madvise(block, least, MADV_HUGEPAGE);
-        for (size_t at = 0; at < least; at += SMALL_PAGE)
-            ((volatile char *)block)[at] = 0;
-        free(block);
-    }
-    if (news)
-        idle->jobs = jobs;
 }
 
 void *housekeeping_loop(void *arg)
 {
     work *w = arg;
     bool told = false;
-    idle_watch idle = {.since = clock_seconds(CLOCK_MONOTONIC)};
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {
         if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + ROUND_S))
             continue;
         pthread_mutex_unlock(&w->lock);
-        keep_reserve(w, &idle);
+        trim_heap();
         expire(w);
         retain(w, &told);
         store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */

@@ -4,7 +4,7 @@
 
 #include "base/clock.h"
 #include "work/feed.h"
-#include "work/live.h"
+#include "work/process.h"
 #include "work/work.h"
 
 #include <pthread.h>
@@ -16,16 +16,16 @@ typedef struct {
     pthread_t thread;
     char owner[128]; /* who it is to the store: host, process, a random number, worker */
 
-    pthread_mutex_t lock; /* id, lease, live */
+    pthread_mutex_t lock; /* down to progress; only this thread changes these */
     char id[33];          /* the job that runs now, "" when none */
-    store_lease lease;    /* of that job; only this thread changes it */
-    live live;
+    store_lease lease;    /* of that job */
+    process *process;     /* that it runs in; NULL: none yet */
+    int64_t n_cases;      /* of the job, once its process has read it */
+    int progress;         /* the largest told yet */
 
     atomic_bool cancel; /* somebody wants this job to end with its best answer */
     atomic_bool lost;   /* the store says the job is not ours any more */
-
-    double told_at; /* CLOCK_MONOTONIC: when its progress was told last; of this thread alone, as the next */
-    int told;       /* what was told */
+    int wake;           /* eventfd: written after one of these, or work.interrupt, was set */
 } worker;
 
 /* Lock order: claim_lock, then a worker's lock. claim_lock, then the store's. No other two are held together, but that
@@ -33,13 +33,17 @@ typedef struct {
 struct work {
     store *store;
     server_log *log;
-    uz_cache *cache;
     work_options options;
+    int processors; /* that this process may use */
 
     /* A claim and the publishing of its id are one step, so that whoever saw the job running finds its worker. */
     pthread_mutex_t claim_lock;
 
     feed *feed; /* told of every change of a job after it was committed */
+
+    pthread_mutex_t pool_lock; /* of each process what its header says; taken alone */
+    pthread_cond_t pool_idle;  /* one was given back */
+    process *processes;        /* options.workers of them */
 
     pthread_mutex_t lock; /* everything down to drain_until */
     pthread_cond_t wake;  /* submitted or stopping */
@@ -53,7 +57,6 @@ struct work {
     bool stopped;  /* every thread was joined */
     double drain_until; /* on CLOCK_MONOTONIC */
 
-    atomic_llong ended;    /* jobs that have run, whatever became of them */
     atomic_bool interrupt; /* the time to drain is over */
     int n_started;         /* workers to join; set before any other thread may call */
     bool keeper_started, housekeeper_started;
@@ -61,9 +64,16 @@ struct work {
     worker *workers; /* options.workers of them */
 };
 
-/* Decodes, solves and stores one claimed job; takes over its texts and the body. */
+/* Has one claimed job solved and stores what came of it; takes over its texts and the body. */
 void work_run(worker *me, job *claimed, char *body, size_t body_len);
 
 bool work_is_stopping(work *w);
+
+/* A process for a job with this text, that is: one that has its body, else the first one. There are as many as workers;
+ * still there may be a moment in which one more is asked what it has. */
+process *work_take_process(work *w, const char *text, size_t len, uint64_t *body);
+/* body: of the text that it has solved, as taking said; 0: nothing. done: what it said at the end; NULL: it has ended.
+ */
+void work_give_process(work *w, process *p, uint64_t body, const packet *done);
 
 #endif

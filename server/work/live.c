@@ -10,115 +10,182 @@ enum { PROGRESS_CLAIMED = 1, PROGRESS_READ = 5, PROGRESS_FIRST_ROW = 10, PROGRES
 #define TARGET_ROUNDING 1e-14
 #define TARGET_BALANCED 1e-3
 
+#define TRIES 1000 /* of a reader; a change takes nanoseconds, thinning out the rows some ten microseconds */
+
+_Static_assert(sizeof(live_state) == 8 * LIVE_WORDS && sizeof(double) == 8, "a state is words");
+
+/* ---- the writer */
+
+/* Each store is a release, so that none is seen before those that precede it. */
+static void publish(live *l, const live_state *state)
+{
+    uint64_t words[LIVE_WORDS];
+    const uint64_t turn = atomic_load_explicit(&l->turn, memory_order_relaxed) | 1; /* who wrote may have been killed */
+    memcpy(words, state, sizeof words);
+    atomic_store_explicit(&l->turn, turn, memory_order_relaxed);
+    for (int i = 0; i < LIVE_WORDS; i++)
+        atomic_store_explicit(&l->words[i], words[i], memory_order_release);
+    atomic_store_explicit(&l->turn, turn + 1, memory_order_release);
+}
+
+static void put_row(live *l, int64_t at, const double row[CODEC_HISTORY_COLUMNS])
+{
+    for (int k = 0; k < CODEC_HISTORY_COLUMNS; k++) {
+        uint64_t bits;
+        memcpy(&bits, &row[k], 8);
+        atomic_store_explicit(&l->rows[at][k], bits, memory_order_release);
+    }
+}
+
+void live_begin(live_writer *w, live *shared, const uz_settings *settings, const uz_problem *problem)
+{
+    *w = (live_writer){.shared = shared, .paper = settings->stopping == UZ_STOP_PAPER};
+    w->state = (live_state){.read = 1, .stride = 1, .max_iterations = settings->max_iterations};
+    w->state.n_cases = problem ? problem->n_cases : 0;
+    if (w->paper)
+        w->state.target = settings->epsilon;
+    else if (settings->balanced)
+        w->state.target = TARGET_BALANCED;
+    else
+        w->state.target = settings->relative_error > TARGET_ROUNDING ? settings->relative_error : TARGET_ROUNDING;
+    publish(shared, &w->state);
+}
+
+static void restart(live_state *s, int64_t current)
+{
+    s->thinned += 2; /* rows that a reader has copied are of something else now */
+    s->count = 0;
+    s->stride = 1;
+    s->any = 0;
+    s->first = 0.0;
+    s->current = current;
+}
+
+void live_case(live_writer *w, int64_t i)
+{
+    restart(&w->state, i);
+    publish(w->shared, &w->state);
+}
+
+void live_part(live_writer *w, double from, double to)
+{
+    restart(&w->state, 0);
+    w->state.from = from;
+    w->state.to = to;
+    publish(w->shared, &w->state);
+}
+
+/* Every other row goes. */
+static void thin_out(live_writer *w)
+{
+    live *l = w->shared;
+    live_state *s = &w->state;
+    s->thinned++;
+    publish(l, s);
+    s->count = 0;
+    s->stride *= 2;
+    for (int64_t i = 0; i < LIVE_ROWS; i += 2, s->count++)
+        for (int k = 0; k < CODEC_HISTORY_COLUMNS; k++)
+            atomic_store_explicit(&l->rows[s->count][k], atomic_load_explicit(&l->rows[i][k], memory_order_relaxed),
+                                  memory_order_release);
+    s->thinned++;
+}
+
+void live_add(live_writer *w, const uz_history_row *row)
+{
+    live_state *s = &w->state;
+    /* ||u||_K is near sqrt(2 |psi|): equal where every gap that closes was 0. */
+    const double scale = sqrt(2.0 * fabs(row->dual_objective));
+    s->value = w->paper ? row->step_norm : scale > 0.0 ? row->error_bound / scale : INFINITY;
+    if (s->first == 0.0)
+        s->first = isfinite(s->value) && s->value > 0.0 ? s->value : 0.0;
+    codec_history_row(s->latest, row);
+    s->any = 1;
+    if (row->iteration % s->stride == 0) {
+        if (s->count == LIVE_ROWS)
+            thin_out(w);
+        put_row(w->shared, s->count++, s->latest);
+    }
+    publish(w->shared, s);
+}
+
+/* ---- readers */
+
 void live_reset(live *l)
 {
-    double(*rows)[CODEC_HISTORY_COLUMNS] = l->rows;
-    *l = (live){.rows = rows, .stride = 1, .progress = PROGRESS_CLAIMED};
+    publish(l, &(live_state){.stride = 1});
 }
 
-void live_clear(live *l)
+live_state live_read(const live *l)
 {
-    free(l->rows);
-    *l = (live){0};
-}
-
-void live_begin(live *l, const uz_settings *settings, const uz_problem *problem)
-{
-    l->problem = problem;
-    l->paper = settings->stopping == UZ_STOP_PAPER;
-    l->max_iterations = settings->max_iterations;
-    if (l->paper)
-        l->target = settings->epsilon;
-    else if (settings->balanced)
-        l->target = TARGET_BALANCED;
-    else
-        l->target = settings->relative_error > TARGET_ROUNDING ? settings->relative_error : TARGET_ROUNDING;
-    l->progress = PROGRESS_READ;
-}
-
-void live_case(live *l, int64_t i)
-{
-    l->count = 0;
-    l->stride = 1;
-    l->any = false;
-    l->first = 0.0;
-    l->current = i;
-}
-
-void live_part(live *l, double from, double to)
-{
-    live_case(l, 0);
-    l->from = from;
-    l->to = to;
-}
-
-/* ||u||_K is near sqrt(2 |psi|): equal where every gap that closes was 0. */
-static double measure(const live *l, const uz_history_row *row)
-{
-    double scale = sqrt(2.0 * fabs(row->dual_objective));
-    return l->paper ? row->step_norm : scale > 0.0 ? row->error_bound / scale : INFINITY;
-}
-
-void live_add(live *l, const uz_history_row *row)
-{
-    l->latest = *row;
-    l->any = true;
-    if (l->first == 0.0) {
-        double value = measure(l, row);
-        l->first = isfinite(value) && value > 0.0 ? value : 0.0;
+    uint64_t words[LIVE_WORDS];
+    live_state state;
+    for (int tries = 0; tries < TRIES; tries++) {
+        const uint64_t before = atomic_load_explicit(&l->turn, memory_order_acquire);
+        for (int i = 0; i < LIVE_WORDS; i++)
+            words[i] = atomic_load_explicit(&l->words[i], memory_order_acquire);
+        if (before % 2 == 0 && atomic_load_explicit(&l->turn, memory_order_relaxed) == before)
+            break;
     }
-    if (!l->rows)
-        l->rows = malloc(LIVE_ROWS * sizeof l->rows[0]);
-    if (!l->rows || row->iteration % l->stride != 0) /* without room only the latest row is shown */
-        return;
-    if (l->count == LIVE_ROWS) { /* every other row goes */
-        l->count = 0;
-        l->stride *= 2;
-        for (int64_t i = 0; i < LIVE_ROWS; i += 2)
-            memmove(l->rows[l->count++], l->rows[i], sizeof l->rows[i]);
-    }
-    codec_history_row(l->rows[l->count++], row);
+    memcpy(&state, words, sizeof state);
+    if (state.count < 0 || state.count > LIVE_ROWS) /* nothing that comes from there is trusted to be an index */
+        state.count = 0;
+    return state;
 }
 
-int live_progress(live *l)
+int live_progress(const live *l, int before)
 {
-    const bool whole = !(l->to > 0.0);
-    if (l->any || l->current > 0 || !whole) {
+    const live_state s = live_read(l);
+    const bool whole = !(s.to > 0.0);
+    int now = s.read ? PROGRESS_READ : PROGRESS_CLAIMED;
+    if (s.any || s.current > 0 || !whole) {
         double done = 0.0; /* share of this case's iterations, by their number and by the error, whichever is more */
-        if (l->any) {
-            const double by_count = l->max_iterations > 0 ? (double)l->latest.iteration / (double)l->max_iterations : 0;
-            const double value = measure(l, &l->latest);
+        if (s.any) {
+            const double by_count = s.max_iterations > 0 ? s.latest[0] / (double)s.max_iterations : 0;
             double by_error = 0.0;
-            if (l->first > 0.0 && value > 0.0 && isfinite(value) && l->target > 0.0 && l->first > l->target)
-                by_error = log(l->first / value) / log(l->first / l->target);
+            if (s.first > 0.0 && s.value > 0.0 && isfinite(s.value) && s.target > 0.0 && s.first > s.target)
+                by_error = log(s.first / s.value) / log(s.first / s.target);
             done = fmin(1.0, fmax(0.0, fmax(by_count, by_error)));
         }
-        const double n = l->problem && l->problem->n_cases > 0 ? (double)l->problem->n_cases : 1.0;
-        double share = fmin(1.0, ((double)l->current + done) / n);
+        double share = ((double)s.current + done) / (s.n_cases > 0 ? (double)s.n_cases : 1.0);
+        share = fmin(1.0, fmax(0.0, share));
         if (!whole)
-            share = l->from + (l->to - l->from) * share;
-        int now = PROGRESS_FIRST_ROW + (int)((PROGRESS_LAST_ROW - PROGRESS_FIRST_ROW) * share);
-        l->progress = now > l->progress ? now : l->progress;
+            share = fmin(1.0, fmax(0.0, s.from + (s.to - s.from) * share));
+        now = PROGRESS_FIRST_ROW + (int)((PROGRESS_LAST_ROW - PROGRESS_FIRST_ROW) * share);
     }
-    return l->progress;
+    return now > before ? now : before;
 }
 
 bool live_rows(const live *l, int64_t after, double **rows, int64_t *count)
 {
-    int64_t first = 0;
+    double(*out)[CODEC_HISTORY_COLUMNS] = malloc((LIVE_ROWS + 1) * sizeof *out);
+    live_state s = live_read(l);
+    int64_t n = 0, first = 0;
     *rows = NULL;
     *count = 0;
-    while (first < l->count && !(l->rows[first][0] > (double)after))
-        first++;
-    double(*out)[CODEC_HISTORY_COLUMNS] = malloc((size_t)(l->count - first + 1) * sizeof *out);
     if (!out)
         return false;
-    int64_t n = l->count - first;
-    if (n > 0)
-        memcpy(out, l->rows[first], (size_t)n * sizeof *out);
-    bool is_kept = l->count > 0 && l->rows[l->count - 1][0] >= (double)l->latest.iteration;
-    if (l->any && !is_kept && l->latest.iteration > after)
-        codec_history_row(out[n++], &l->latest);
+    for (int tries = 0; tries < TRIES; tries++) {
+        const live_state now = s;
+        for (int64_t i = 0; i < now.count; i++)
+            for (int k = 0; k < CODEC_HISTORY_COLUMNS; k++) {
+                const uint64_t bits = atomic_load_explicit(&l->rows[i][k], memory_order_acquire);
+                memcpy(&out[i][k], &bits, 8);
+            }
+        n = now.count;
+        s = live_read(l); /* rows that came in meanwhile do not matter, that others moved does */
+        if (now.thinned % 2 == 0 && s.thinned == now.thinned) {
+            s = now;
+            break;
+        }
+    }
+    while (first < n && !(out[first][0] > (double)after))
+        first++;
+    n -= first;
+    memmove(out, out[first], (size_t)n * sizeof *out);
+    const bool is_kept = n > 0 && out[n - 1][0] >= s.latest[0];
+    if (s.any && !is_kept && s.latest[0] > (double)after)
+        memcpy(out[n++], s.latest, sizeof *out);
     *rows = &out[0][0];
     *count = n;
     return true;

@@ -1,11 +1,13 @@
 /* run.c: one job from its claim to its stored result. */
 #include "work/internal.h"
-#include "work/solve.h"
+#include "work/parcel.h"
+#include "work/watch.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <time.h>
 
 #define FINISH_ATTEMPTS 5
@@ -14,6 +16,7 @@
 typedef enum {
     END_FINISH,  /* outcome is stored */
     END_RELEASE, /* the service stops: somebody runs it later, from the start */
+    END_RETRY,   /* its process died: somebody runs it later, and the attempt counts */
     END_DROP     /* another owner has it */
 } run_end;
 
@@ -21,77 +24,11 @@ typedef struct {
     worker *me;
     job *job;
     double began, queue_s; /* began on CLOCK_MONOTONIC */
-    solution solution;
+    store_outcome outcome; /* points into what follows */
+    parcel parcel;
+    char *error;
+    solve_figures figures;
 } run;
-
-/* ---- what the solver asks and tells */
-
-static bool is_cancelled(void *ctx)
-{
-    worker *me = ctx;
-    return atomic_load_explicit(&me->cancel, memory_order_relaxed) ||
-           atomic_load_explicit(&me->lost, memory_order_relaxed) ||
-           atomic_load_explicit(&me->w->interrupt, memory_order_relaxed);
-}
-
-/* Progress is told so often; what ends a job is told at once. */
-#define TELL_S 0.25
-
-/* To all who follow this job; to those who follow all jobs only where the percentage is another one. By a clock that
- * costs nothing: there may be a million iterations a second. */
-static void tell_progress(worker *me)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC_COARSE, &t);
-    double now = (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-    if (now - me->told_at < TELL_S)
-        return;
-    me->told_at = now;
-    pthread_mutex_lock(&me->lock);
-    int progress = live_progress(&me->live);
-    pthread_mutex_unlock(&me->lock);
-    if (progress != me->told)
-        feed_changed(me->w->feed, me->id); /* only this thread changes its id */
-    else
-        feed_moved(me->w->feed, me->id);
-    me->told = progress;
-}
-
-static void note_progress(void *ctx, const uz_history_row *row)
-{
-    worker *me = ctx;
-    pthread_mutex_lock(&me->lock);
-    live_add(&me->live, row);
-    pthread_mutex_unlock(&me->lock);
-    tell_progress(me);
-}
-
-static void note_case(void *ctx, int64_t load_case)
-{
-    worker *me = ctx;
-    pthread_mutex_lock(&me->lock);
-    live_case(&me->live, load_case);
-    pthread_mutex_unlock(&me->lock);
-    tell_progress(me);
-}
-
-static void note_grid(void *ctx, double from, double to)
-{
-    worker *me = ctx;
-    pthread_mutex_lock(&me->lock);
-    live_part(&me->live, from, to);
-    pthread_mutex_unlock(&me->lock);
-    tell_progress(me);
-}
-
-/* The text was read. */
-static void note_request(void *ctx, const codec_request *request)
-{
-    worker *me = ctx;
-    pthread_mutex_lock(&me->lock);
-    live_begin(&me->live, &request->settings, &request->problem);
-    pthread_mutex_unlock(&me->lock);
-}
 
 /* ---- store */
 
@@ -100,6 +37,14 @@ static void log_store_failure(const run *r, log_level level, const char *event)
     char cause[256];
     store_message(r->me->w->store, cause, sizeof cause);
     log_write(r->me->w->log, level, event, (log_field[]){LOG_S("job", r->job->id), LOG_S("cause", cause), {0}});
+}
+
+/* Without memory for the error the job fails without one. */
+static void fail(run *r, const problem_details *problem)
+{
+    free(r->error);
+    r->error = codec_encode_problem(problem);
+    r->outcome = (store_outcome){.status = JOB_FAILED, .error = r->error};
 }
 
 static bool is_settled(store_status status)
@@ -114,7 +59,7 @@ static store_status try_to_store(const run *r, bool for_ever)
     work *w = r->me->w;
     double begun = clock_seconds(CLOCK_MONOTONIC);
     for (int attempt = 0;; attempt++) {
-        store_status status = store_finish(w->store, &r->me->lease, &r->solution.outcome);
+        store_status status = store_finish(w->store, &r->me->lease, &r->outcome);
         if (is_settled(status))
             return status;
         if (attempt < FINISH_ATTEMPTS)
@@ -148,9 +93,9 @@ static bool store_outcome_of(run *r)
             problem_fill(&problem, 500, "result_not_stored", TITLE, "%s",
                          "The store failed, and the service's log has the cause: submit the job again.");
         log_store_failure(r, LOG_ERROR, "result_given_up");
-        solution_fail(&r->solution, codec_encode_problem(&problem));
+        fail(r, &problem);
         if (atomic_load(&r->me->cancel))
-            r->solution.outcome = (store_outcome){.status = JOB_DISMISSED};
+            r->outcome = (store_outcome){.status = JOB_DISMISSED};
         status = try_to_store(r, true);
     }
     if (status == STORE_OK)
@@ -165,11 +110,11 @@ static bool store_outcome_of(run *r)
 static void count_job(const run *r)
 {
     metrics *m = r->me->w->options.metrics;
-    const solve_figures *f = &r->solution.figures;
-    const bool kept = f->has_answer && r->solution.outcome.status != JOB_FAILED;
+    const solve_figures *f = &r->figures;
+    const bool kept = f->has_answer && r->outcome.status != JOB_FAILED;
     const char *outcome = kept ? uz_outcome_name(f->outcome) : NULL;
     const double total = clock_seconds(CLOCK_MONOTONIC) - r->began + r->queue_s;
-    metrics_job(m, job_status_name(r->solution.outcome.status), outcome, 1);
+    metrics_job(m, job_status_name(r->outcome.status), outcome, 1);
     metrics_seconds(m, METRIC_QUEUE, r->queue_s);
     metrics_seconds(m, METRIC_PARSE, f->parse);
     metrics_seconds(m, METRIC_TOTAL, total);
@@ -185,7 +130,7 @@ static void count_job(const run *r)
     }
     log_write(r->me->w->log, LOG_INFO, "job_ended",
               (log_field[]){LOG_S("job", r->job->id),
-                            LOG_S("status", job_status_name(r->solution.outcome.status)),
+                            LOG_S("status", job_status_name(r->outcome.status)),
                             LOG_I("cases", f->cases),
                             LOG_S("outcome", outcome),
                             LOG_I("iterations", f->iterations),
@@ -198,45 +143,118 @@ static void count_job(const run *r)
 static void store_end(run *r, run_end end)
 {
     work *w = r->me->w;
-    if (end == END_RELEASE && store_release(w->store, &r->me->lease, false) != STORE_OK)
+    static const char *const EVENTS[] = {
+        [END_RELEASE] = "job_released", [END_RETRY] = "job_retried", [END_DROP] = "job_taken_over"};
+    if ((end == END_RELEASE || end == END_RETRY) &&
+        store_release(w->store, &r->me->lease, end == END_RETRY) != STORE_OK)
         log_store_failure(r, LOG_ERROR, "release_failed");
     if (end != END_FINISH) {
-        metrics_add(w->options.metrics, METRIC_REQUEUED, end == END_RELEASE);
-        const char *event = end == END_RELEASE ? "job_released" : "job_taken_over";
-        log_write(w->log, LOG_INFO, event, (log_field[]){LOG_S("job", r->job->id), {0}});
+        metrics_add(w->options.metrics, METRIC_REQUEUED, end != END_DROP);
+        log_write(w->log, LOG_INFO, EVENTS[end], (log_field[]){LOG_S("job", r->job->id), {0}});
     } else if (store_outcome_of(r)) {
         count_job(r);
     }
 }
 
+/* ---- what came of it */
+
+/* The process has died, of itself or because the system ended it. */
+static run_end judge_death(run *r, const watch_report *seen)
+{
+    problem_details problem;
+    char how[64];
+    if (WIFSIGNALED(seen->status))
+        snprintf(how, sizeof how, "signal %d", WTERMSIG(seen->status));
+    else
+        snprintf(how, sizeof how, "status %d", WEXITSTATUS(seen->status));
+    log_write(r->me->w->log, LOG_WARN, "process_died",
+              (log_field[]){LOG_S("job", r->job->id),
+                            LOG_I("attempt", r->job->attempts),
+                            LOG_S("cause", seen->out_of_memory ? "out of memory" : how),
+                            {0}});
+    if (seen->out_of_memory)
+        problem_fill(&problem, 503, "memory_limit", "Out of memory", "%s",
+                     "The system ended the process that solved this job, for want of memory: take a coarser mesh, or "
+                     "a service with more.");
+    else if (r->job->attempts >= r->me->w->options.max_attempts)
+        problem_fill(&problem, 500, "process_died", "The process that solved this job died",
+                     "It was run %d times, and each time the process ended before it had an answer, the last time "
+                     "with %s. Please report the request.",
+                     r->job->attempts, how);
+    else
+        return END_RETRY;
+    fail(r, &problem);
+    return END_FINISH;
+}
+
+static run_end judge_end(run *r, watch_end end, const watch_report *seen)
+{
+    worker *me = r->me;
+    problem_details problem;
+    const bool cancelled = atomic_load(&me->cancel), lost = atomic_load(&me->lost);
+    if (end == WATCH_DONE) {
+        segment *outbox = &me->process->outbox;
+        const uint64_t at = seen->done.u.done.at, size = seen->done.u.done.size;
+        r->figures = seen->done.u.done.figures;
+        if (seen->done.u.done.stopped && (lost || !cancelled))
+            return lost ? END_DROP : END_RELEASE;
+        if (at % 8 == 0 && at < PTRDIFF_MAX && size < PTRDIFF_MAX && segment_reach(outbox, at + size, false) &&
+            parcel_read(&r->parcel, outbox->at + at, (size_t)size)) {
+            r->outcome = r->parcel.outcome;
+            return END_FINISH;
+        }
+        end = WATCH_NO_ROOM;
+    }
+    if (lost)
+        return END_DROP;
+    r->outcome = (store_outcome){.status = JOB_DISMISSED};
+    if (cancelled)
+        return END_FINISH;
+    if (end == WATCH_STOPPED || atomic_load(&me->w->interrupt))
+        return END_RELEASE;
+    if (end == WATCH_DIED)
+        return judge_death(r, seen);
+    if (end == WATCH_OVERDUE)
+        problem_fill(
+            &problem, 422, "time_limit", "The time was over before there was an answer",
+            "After %g s, which time_limit_s or the service's --max-solve-s allow, %s. Allow more time, or take "
+            "a coarser mesh.",
+            seen->time_limit_s,
+            seen->began ? "the best answer so far could not be certified in time"
+                        : "the body was still being factored: there is no answer and no bound yet");
+    else if (end == WATCH_NOT_STARTED)
+        problem_fill(&problem, 503, "process_not_started", "No process could be started for the job", "%s",
+                     "The service's log has the cause. Submit the job again later.");
+    else
+        problem_fill(&problem, 503, "memory_limit", "Out of memory", "%s",
+                     "There was not enough memory for the request or its answer. Submit the job again later.");
+    fail(r, &problem);
+    return END_FINISH;
+}
+
 void work_run(worker *me, job *claimed, char *body, size_t body_len)
 {
+    work *w = me->w;
     run r = {.me = me, .job = claimed, .began = clock_seconds(CLOCK_MONOTONIC)};
-    const uz_hooks hooks = {
-        .ctx = me, .cancelled = is_cancelled, .progress = note_progress, .begins = note_case, .grid = note_grid};
-    me->told = -1;                                       /* of the job before */
+    watch_report seen;
     double waited = claimed->started - claimed->created; /* by the clock on the wall, which may be set back */
     r.queue_s = waited > 0.0 ? waited : 0.0;
-    log_write(me->w->log, LOG_INFO, "job_started",
+    log_write(w->log, LOG_INFO, "job_started",
               (log_field[]){LOG_S("job", claimed->id), LOG_I("attempt", claimed->attempts), {0}});
-    const solve_with with = {.source = me->w->store,
-                             .cache = me->w->cache,
-                             .hooks = &hooks,
-                             .memory_limit = me->w->options.solve_bytes,
-                             .max_solve_s = me->w->options.max_solve_s,
-                             .queue_s = r.queue_s,
-                             .read = note_request};
-    solve_job(&r.solution, &with, claimed->id, body, body_len);
-    if (r.solution.start_lost)
-        log_store_failure(&r, LOG_WARN, "start_not_read");
-    /* Who stopped it decides what becomes of the job. */
-    const bool stopped = r.solution.stopped;
-    store_end(&r, stopped && atomic_load(&me->lost)      ? END_DROP
-                  : stopped && !atomic_load(&me->cancel) ? END_RELEASE
-                                                         : END_FINISH);
+    uint64_t key = 0;
+    process *p = work_take_process(w, body, body_len, &key);
     pthread_mutex_lock(&me->lock);
-    me->live.problem = NULL; /* it goes now */
+    me->process = p;
     pthread_mutex_unlock(&me->lock);
-    solution_clear(&r.solution);
+    const watch_end end = watch_job(me, claimed, body, body_len, r.queue_s, &seen);
+    if (end == WATCH_DONE && seen.done.u.done.start_lost)
+        log_store_failure(&r, LOG_WARN, "start_not_read");
+    store_end(&r, judge_end(&r, end, &seen));
+    pthread_mutex_lock(&me->lock);
+    me->process = NULL;
+    pthread_mutex_unlock(&me->lock);
+    parcel_clear(&r.parcel);
+    free(r.error);
     job_clear(claimed);
+    work_give_process(w, p, end == WATCH_DONE ? key : 0, end == WATCH_DONE ? &seen.done : NULL);
 }

@@ -100,6 +100,10 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
         settings->time_limit_s = with->max_solve_s;
     settings->memory_limit = with->memory_limit;
     uz_status status = out->request.answer.u ? verify(out, with, &err) : solve_cases(out, with, &err);
+    if (status == UZ_ERR_MEMORY) {
+        err.status = UZ_ERR_LIMIT;
+        add_remedy(&err, ": the process that solves may take no more than it has");
+    }
     if (status == UZ_ERR_LIMIT)
         add_remedy(&err, " (the limit is the daemon's option --memory)");
     out->stopped = status == UZ_ERR_CANCELLED || (status == UZ_OK && any_dismissed(out));
@@ -119,7 +123,7 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
 
 static const char *const NO_MEMORY_JSON = "{\"type\": \"about:blank\", \"title\": \"Out of memory\", \"status\": 500,"
                                           " \"detail\": \"There was not enough memory for the answer.\","
-                                          " \"code\": \"out_of_memory\"}";
+                                          " \"code\": \"memory_limit\"}";
 
 void solution_fail(solution *s, char *encoded)
 {

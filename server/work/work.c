@@ -3,15 +3,21 @@
 #include "work/internal.h"
 
 #include <math.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/eventfd.h>
 #include <sys/random.h>
 #include <time.h>
 #include <unistd.h>
 
 #define CLAIM_RETRY_S 1.0 /* after the store failed */
+
+/* The daemon's own end, a kill or a power loss, is no fault of the jobs that ran then. One that brings the daemon down
+ * each time it runs is given up all the same, after so many times the attempts that it has. */
+#define DAEMON_ATTEMPTS 10
 
 /* ---- workers */
 
@@ -19,7 +25,9 @@
 static void publish(worker *me, const store_lease *lease)
 {
     pthread_mutex_lock(&me->lock);
-    live_reset(&me->live);
+    me->process = NULL;
+    me->n_cases = 0;
+    me->progress = 1;
     me->lease = *lease;
     strcpy(me->id, lease->job);
     pthread_mutex_unlock(&me->lock);
@@ -56,7 +64,6 @@ static void *work_loop(void *arg)
 {
     worker *me = arg;
     work *w = me->w;
-    uz_thread_init();
     for (;;) {
         job claimed;
         char *body, cause[256];
@@ -74,7 +81,6 @@ static void *work_loop(void *arg)
             work_run(me, &claimed, body, body_len);
             publish(me, &(store_lease){.token = 0});
             feed_changed(w->feed, id); /* ended, or put back */
-            atomic_fetch_add(&w->ended, 1);
             continue;
         }
         if (status != STORE_NOT_FOUND) {
@@ -90,6 +96,14 @@ static void *work_loop(void *arg)
     return NULL;
 }
 
+/* Sets one of the reasons for a job to stop, and wakes who watches it. */
+static void stop_job(worker *me, atomic_bool *why)
+{
+    const uint64_t one = 1;
+    atomic_store(why, true);
+    (void)!write(me->wake, &one, sizeof one);
+}
+
 /* ---- the keeper: a factorization may take longer than a lease and asks nothing meanwhile, so leases are renewed from
  * a thread of their own */
 
@@ -97,7 +111,9 @@ static void renew(worker *me)
 {
     pthread_mutex_lock(&me->lock);
     const store_lease lease = me->lease;
-    int progress = live_progress(&me->live);
+    if (me->process)
+        me->progress = live_progress(&me->process->board->live, me->progress);
+    const int progress = me->progress;
     pthread_mutex_unlock(&me->lock);
     if (!lease.job[0])
         return;
@@ -106,7 +122,7 @@ static void renew(worker *me)
         return; /* a store that fails now may work before the lease ends */
     pthread_mutex_lock(&me->lock);
     if (me->lease.token == lease.token && strcmp(me->id, lease.job) == 0) /* else it ended meanwhile */
-        atomic_store(&me->lost, true);
+        stop_job(me, &me->lost);
     pthread_mutex_unlock(&me->lock);
 }
 
@@ -134,11 +150,12 @@ static bool recover(work *w, char *message, size_t size)
     char cause[256];
     problem_details problem = {.status = 500, .code = "attempts_exhausted", .title = "Every attempt was cut short"};
     snprintf(problem.detail, sizeof problem.detail,
-             "The service ended while this job ran, as often as is allowed. Most likely the job needs more memory than "
-             "there is; make it smaller or submit it again.");
+             "The service ended while this job ran, as often as is allowed: maybe for want of memory. Make it smaller "
+             "or submit it again.");
     char *error = codec_encode_problem(&problem);
     store_status status =
-        error ? store_recover(w->store, w->options.max_attempts, error, &requeued, &failed) : STORE_ERROR;
+        error ? store_recover(w->store, DAEMON_ATTEMPTS * w->options.max_attempts, error, &requeued, &failed)
+              : STORE_ERROR;
     free(error);
     if (status != STORE_OK) {
         store_message(w->store, cause, sizeof cause);
@@ -194,17 +211,22 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     w->options.room_wait_s = options->room_wait_s > 0.0 ? options->room_wait_s : 60.0;
     w->options.lease_s = options->lease_s > 0.0 ? options->lease_s : 30.0;
     pthread_mutex_init(&w->claim_lock, NULL);
+    pthread_mutex_init(&w->pool_lock, NULL);
     pthread_mutex_init(&w->lock, NULL);
+    clock_condition(&w->pool_idle);
     clock_condition(&w->wake);
     clock_condition(&w->idle);
     clock_condition(&w->tick);
-    w->cache = uz_cache_new(options->cache_bytes - (options->reserve ? options->cache_bytes / RESERVE_SHARE : 0));
+    cpu_set_t may_use;
+    w->processors = sched_getaffinity(0, sizeof may_use, &may_use) == 0 ? CPU_COUNT(&may_use) : 1;
     w->feed = feed_new();
     w->workers = calloc((size_t)w->options.workers, sizeof *w->workers);
+    w->processes = calloc((size_t)w->options.workers, sizeof *w->processes);
     for (int i = 0; w->workers && i < w->options.workers; i++) {
         w->workers[i].w = w;
         snprintf(w->workers[i].owner, sizeof w->workers[i].owner, "%s:%ld:%08x:%d", host, (long)getpid(), random, i);
         pthread_mutex_init(&w->workers[i].lock, NULL);
+        w->workers[i].wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     }
     return w;
 }
@@ -230,11 +252,29 @@ static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
     pthread_mutex_unlock(&w->lock);
 }
 
+/* Half of the cache goes to all processes alike, of the other half each has as much as all after it together: the first
+ * ones are those that work where there is little to do. */
+static size_t cache_share(size_t left, size_t all, int workers, int i)
+{
+    if (i == workers - 1)
+        return left > 0 ? left : 1;
+    const size_t alike = all / 2 / (size_t)workers;
+    return alike + (i < 60 ? (all / 2) >> (i + 1) : 0);
+}
+
 work *work_start(store *s, const work_options *options, server_log *log, char *message, size_t size)
 {
     work *w = make_work(s, options, log);
-    if (!w || !w->cache || !w->workers || !w->feed) {
-        snprintf(message, size, "no memory for the workers");
+    bool made = w && w->workers && w->processes && w->feed;
+    size_t left = made ? w->options.cache_bytes : 0;
+    for (int i = 0; made && i < w->options.workers; i++) {
+        const size_t share = cache_share(left, w->options.cache_bytes, w->options.workers, i);
+        left -= share;
+        made = process_make(&w->processes[i], options->program, share, w->options.solve_bytes, log) &&
+               w->workers[i].wake >= 0;
+    }
+    if (!made) {
+        snprintf(message, size, "no memory or no descriptors for the workers");
         work_free(w);
         return NULL;
     }
@@ -273,7 +313,8 @@ void work_stop(work *w, double drain_s)
     pthread_mutex_unlock(&w->lock);
     if (!first)
         return;
-    atomic_store(&w->interrupt, true);
+    for (int i = 0; i < w->options.workers; i++)
+        stop_job(&w->workers[i], &w->interrupt);
     for (int i = 0; i < w->n_started; i++)
         pthread_join(w->workers[i].thread, NULL);
     pthread_mutex_lock(&w->lock);
@@ -298,12 +339,17 @@ void work_free(work *w)
         work_stop(w, 0.0);
     store_listen(w->store, NULL, NULL);
     for (int i = 0; w->workers && i < w->options.workers; i++) {
-        live_clear(&w->workers[i].live);
+        if (w->workers[i].wake >= 0)
+            close(w->workers[i].wake);
         pthread_mutex_destroy(&w->workers[i].lock);
     }
+    for (int i = 0; w->processes && i < w->options.workers; i++)
+        process_free(&w->processes[i]);
     free(w->workers);
-    uz_cache_free(w->cache);
+    free(w->processes);
     feed_free(w->feed);
+    pthread_cond_destroy(&w->pool_idle);
+    pthread_mutex_destroy(&w->pool_lock);
     pthread_cond_destroy(&w->tick);
     pthread_cond_destroy(&w->idle);
     pthread_cond_destroy(&w->wake);
@@ -331,11 +377,18 @@ bool work_cancel(work *w, const char *id)
     pthread_mutex_lock(&w->claim_lock);
     worker *found = find_worker(w, id);
     if (found) {
-        atomic_store(&found->cancel, true);
+        stop_job(found, &found->cancel);
         pthread_mutex_unlock(&found->lock);
     }
     pthread_mutex_unlock(&w->claim_lock);
     return found != NULL;
+}
+
+/* Names of the cases stand at the begin of the outbox while the job runs; the daemon has not read its text. */
+static void read_case_name(const process *p, int64_t i, char name[CASE_NAME])
+{
+    const ssize_t got = pread(p->outbox.fd, name, CASE_NAME, i * CASE_NAME);
+    name[got == CASE_NAME ? CASE_NAME - 1 : 0] = '\0';
 }
 
 bool work_live(work *w, const char *id, int *progress, const char *case_name, int64_t after, work_history *out)
@@ -346,17 +399,23 @@ bool work_live(work *w, const char *id, int *progress, const char *case_name, in
         *out = (work_history){.rows = NULL};
     if (!found)
         return false;
+    const process *p = found->process;
+    if (p)
+        found->progress = live_progress(&p->board->live, found->progress);
     if (progress)
-        *progress = live_progress(&found->live);
+        *progress = found->progress;
     if (out) {
-        const live *l = &found->live;
-        if (l->problem && l->current < l->problem->n_cases)
-            snprintf(out->case_name, sizeof out->case_name, "%s", l->problem->cases[l->current].name);
-        out->is_case = case_name && !l->problem; /* not read yet */
-        for (int64_t i = 0; case_name && l->problem && i < l->problem->n_cases; i++)
-            out->is_case = out->is_case || strcmp(l->problem->cases[i].name, case_name) == 0;
-        if (!case_name || strcmp(case_name, out->case_name) == 0)
-            ok = live_rows(l, after, &out->rows, &out->count);
+        const live_state now = p ? live_read(&p->board->live) : (live_state){.read = 0};
+        if (now.current >= 0 && now.current < found->n_cases)
+            read_case_name(p, now.current, out->case_name);
+        out->is_case = case_name && !now.read;
+        char name[CASE_NAME];
+        for (int64_t i = 0; case_name && i < found->n_cases && !out->is_case; i++) {
+            read_case_name(p, i, name);
+            out->is_case = strcmp(name, case_name) == 0;
+        }
+        if (p && (!case_name || strcmp(case_name, out->case_name) == 0))
+            ok = live_rows(&p->board->live, after, &out->rows, &out->count);
     }
     pthread_mutex_unlock(&found->lock);
     return ok;
@@ -365,11 +424,6 @@ bool work_live(work *w, const char *id, int *progress, const char *case_name, in
 feed *work_feed(work *w)
 {
     return w->feed;
-}
-
-uz_cache *work_cache(work *w)
-{
-    return w->cache;
 }
 
 const work_options *work_settings(const work *w)

@@ -1,8 +1,8 @@
-/* work.h: the worker threads between the store and the solver.
+/* work.h: the worker threads between the store and the processes that solve.
  *
- * One chain per job: claim -> decode -> uz_solve -> finish (commit) -> tell the waiters. A worker owns the job it runs;
- * the store decides who owns what, and a job's lease is renewed until it ends. Lock order: work's own, then the
- * store's; never the other way round (work/internal.h).
+ * One chain per job: claim -> in a process: decode, uz_solve -> finish (commit) -> tell the waiters. A worker owns the
+ * job it runs; the store decides who owns what, and a job's lease is renewed until it ends. Whatever becomes of a
+ * process is its job's alone. Lock order: work's own, then the store's; never the other way round (work/internal.h).
  *
  * What a finished job leaves in the store (store_get_vector):
  *   "dim"            1  0 for matrices; 2 or 3 for a scene: how displacements and nodes are grouped
@@ -32,14 +32,11 @@
 
 typedef struct work work;
 
-/* Of the cache's bytes one part in so many is the reserve's: memory that lies ready for the next factor. */
-enum { RESERVE_SHARE = 4 };
-
 typedef struct {
     int workers;
-    int max_attempts;    /* runs begun before a job that keeps killing the process is failed */
-    size_t cache_bytes;  /* factor cache, with the reserve */
-    uz_reserve *reserve; /* that factors are made in, or NULL */
+    const char *program; /* of the processes that solve; NULL: this one. It must call solver_process */
+    int max_attempts;    /* runs begun before a job that keeps killing its process is failed */
+    size_t cache_bytes;  /* factor caches of all processes, with their reserves */
     size_t solve_bytes;  /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
     double max_solve_s;  /* of one job, whatever it asks for; 0: no limit */
     double lease_s;
@@ -74,13 +71,17 @@ typedef struct {
  * the case that is named (NULL: whichever runs). Both may be NULL. */
 bool work_live(work *w, const char *id, int *progress, const char *case_name, int64_t after, work_history *out);
 
-uz_cache *work_cache(work *w);
+/* What the caches of all processes have, most recently used first in each; a factor that several have is one entry.
+ * Of one that runs a job: as it was before. The caller frees *entries. False: no memory. */
+bool work_factors(work *w, uz_cache_entry **entries, size_t *count);
+/* The same in numbers, as the last job of each process left it. */
+void work_cached(work *w, size_t *entries, size_t *bytes);
 const work_options *work_settings(const work *w); /* as they are in force */
 int work_busy(work *w);                           /* workers that run a job */
 
 /* Stops: no more claims; running jobs get drain_s seconds to end, then they are interrupted and released back to
- * accepted. Waiters wake at once. Returns when every worker has ended; a factorization cannot be interrupted and is
- * waited for. May be called again, also from another thread while the first call waits: the earliest end of the drain
+ * accepted. Waiters wake at once. Returns when every worker has ended, half a second later: what does not stop is
+ * killed. May be called again, also from another thread while the first call waits: the earliest end of the drain
  * counts. */
 void work_stop(work *w, double drain_s);
 /* Stops what still runs. No other call may be in progress. NULL is fine. */

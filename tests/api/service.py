@@ -177,6 +177,17 @@ class Service:
             self.log_file.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
+    def solvers(self):
+        """Process ids of those that solve, and live."""
+        found = []
+        for task in os.listdir(f"/proc/{self.process.pid}/task"):
+            try:
+                with open(f"/proc/{self.process.pid}/task/{task}/children", encoding="ascii") as file:
+                    found += [int(word) for word in file.read().split()]
+            except OSError:  # the thread has ended
+                pass
+        return [pid for pid in found if pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"]
+
     # ---- requests
 
     def request(self, method, path, body=None, headers=None, timeout=60):

@@ -216,19 +216,41 @@ def test_killed_during_submission(s):
     check_file(s)
 
 
+def iterates(s, job_id):
+    return s.get(f"/v1/jobs/{job_id}").json["progress"] > 5 and len(s.get(f"/v1/jobs/{job_id}/history").json["rows"]) > 0
+
+
+def wait_until(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not condition():
+        check(time.monotonic() < end, "it does not become true")
+        time.sleep(0.02)
+
+
+@options("--workers", "1", "--max-attempts", "1")
+def test_the_end_of_the_daemon_fails_no_job(s):
+    job_id = s.post(ENDLESS).json["id"]
+    for attempt in (1, 2, 3):
+        wait_until(lambda: s.get(f"/v1/jobs/{job_id}").json["attempts"] == attempt)
+        s.restart()
+    check(s.get(f"/v1/jobs/{job_id}").json["status"] in ("accepted", "running"))
+
+
 @options("--workers", "2", "--max-attempts", "2")
 def test_job_that_kills_is_given_up(s):
+    """A job whose process dies is tried again, so often and no more; the daemon's own end counts ten times less."""
     deadly = [s.post(ENDLESS).json["id"] for _ in range(2)]
     waiting = s.post(MATRICES).json["id"]
     for attempt in (1, 2):
         for job_id in deadly:
-            check(s.wait_status(job_id, "running")["attempts"] == attempt, attempt)
+            wait_until(lambda: s.get(f"/v1/jobs/{job_id}").json["attempts"] == attempt and iterates(s, job_id))
         check(s.get(f"/v1/jobs/{waiting}").json["status"] == "accepted")
-        s.restart()
+        for pid in s.solvers():
+            os.kill(pid, signal.SIGKILL)
     for job_id in deadly:
-        job = s.get(f"/v1/jobs/{job_id}").json
-        check(job["status"] == "failed" and job["attempts"] == 2 and job["error"]["code"] == "attempts_exhausted", job)
-        check("submit it again" in job["error"]["detail"] and job["finished"], job)
+        job = s.wait_status(job_id, "failed")
+        check(job["attempts"] == 2 and job["error"]["code"] == "process_died", job)
+        check("signal 9" in job["error"]["detail"] and job["finished"], job)
         expect(s.get(f"/v1/jobs/{job_id}/result"), 409, "job_failed")
     job = s.wait_status(waiting, "successful")  # nobody else suffers
     check(job["attempts"] == 1, job)

@@ -178,27 +178,27 @@ TEST(the_relative_error_is_the_largest_of_all)
 
 TEST(progress_of_cases)
 {
-    live l = {0};
+    static live shared;
+    live_writer l;
     uz_settings settings = uz_settings_default();
     uz_problem problem = {.n_cases = 4};
     int64_t count;
     double *rows;
     settings.max_iterations = 100;
-    live_reset(&l);
-    live_begin(&l, &settings, &problem);
-    int before = live_progress(&l);
+    live_reset(&shared);
+    live_begin(&l, &shared, &settings, &problem);
+    int before = live_progress(&shared, 0);
     for (int64_t i = 0; i < 4; i++) {
         live_case(&l, i);
-        CHECK(live_rows(&l, -1, &rows, &count) && count == 0);
+        CHECK(live_rows(&shared, -1, &rows, &count) && count == 0);
         free(rows);
         for (int64_t k = 0; k <= 50; k++)
             live_add(&l, &(uz_history_row){.iteration = k, .dual_objective = -0.5, .error_bound = INFINITY});
-        int now = live_progress(&l);
+        int now = live_progress(&shared, before);
         CHECK_MSG(now > before && now >= 10 + (int)(85 * ((double)i + 0.5) / 4) - 1 && now <= 95, "%d after %d", now,
                   before);
         before = now;
-        CHECK(live_rows(&l, 40, &rows, &count) && count == 10);
+        CHECK(live_rows(&shared, 40, &rows, &count) && count == 10);
         free(rows);
     }
-    live_clear(&l);
 }

@@ -1,0 +1,88 @@
+/* message.h: what the daemon and a process that solves say to each other.
+ *
+ * One message at a time goes over a socket of packets. What is large lies in segments: requests and pieces of stored
+ * results in the inbox, which the daemon writes, answers in the outbox, which the process writes. The board has what
+ * changes while a job runs. A conversation:
+ *
+ *     <- READY                      once, when it has started
+ *     -> JOB                        its text is in the inbox
+ *     <- ASK     -> ANSWER          an upload, or a part of an earlier job; as often as it likes
+ *     <- READ                       the text was read; names of the cases are in the outbox
+ *     <- DONE                       the outcome is in the outbox
+ *     -> LIST    <- LISTED          between jobs: what its cache has, in the outbox */
+#ifndef SERVER_WORK_MESSAGE_H
+#define SERVER_WORK_MESSAGE_H
+
+#include "store/store.h"
+#include "work/live.h"
+#include "work/solve.h"
+
+/* In shared memory, written while a job runs. */
+typedef struct {
+    atomic_bool stop; /* by the daemon: the job is to end with its best answer so far */
+    live live;        /* by the process */
+} board;
+
+typedef enum {
+    MESSAGE_READY,
+    MESSAGE_JOB,
+    MESSAGE_ASK,
+    MESSAGE_ANSWER,
+    MESSAGE_READ,
+    MESSAGE_DONE,
+    MESSAGE_LIST,
+    MESSAGE_LISTED
+} message_kind;
+typedef enum { ASK_UPLOAD, ASK_BLOB, ASK_CASE } ask_kind;
+
+enum { CASE_NAME = 64 }; /* bytes of a name in the list of cases */
+
+typedef struct {
+    int32_t kind, status; /* message_kind; of ANSWER a store_status */
+    union {
+        struct {
+            bool confined; /* it can do nothing but solve (work/confine.h) */
+        } ready;
+        struct {
+            char id[33];
+            bool damaged;  /* there is no text: what was stored is damaged */
+            uint64_t size; /* of the text */
+            double queue_s, max_solve_s;
+            uint64_t memory;
+            int32_t threads; /* that a large factorization may take */
+        } job;
+        struct {
+            ask_kind what;
+            char id[65]; /* of the upload, or of the job */
+            bool named;  /* ASK_BLOB: a vector of this name; else the history with iterations > after */
+            char name[CASE_NAME];
+            int64_t number, after;
+        } ask;
+        struct {
+            uint64_t at, size; /* in the inbox */
+            int64_t value;     /* bytes of the upload, or number of the case */
+        } answer;
+        struct {
+            int64_t n_cases;     /* names from the begin of the outbox on, CASE_NAME bytes each */
+            double time_limit_s; /* from now on; 0 or infinity: none */
+        } read;
+        struct {
+            bool stopped, start_lost; /* as a solution has them */
+            solve_figures figures;
+            uint64_t at, size;     /* of the parcel in the outbox */
+            bool listed;           /* what follows is set: the cache has changed */
+            uint64_t cached, held; /* entries and bytes of the cache */
+        } done;
+        struct {
+            uint64_t at, count, bytes; /* entries in the outbox; bytes: of all, count may be fewer */
+        } listed;
+    } u;
+} packet;
+
+/* fd: a descriptor that goes with it, -1: none. False: the other side is gone. */
+bool message_send(int socket, const packet *m, int fd);
+/* Waits for one. *fd (may be NULL): the descriptor that came with it, which the caller closes; -1: none. False: the
+ * other side is gone, or says what is no message. */
+bool message_receive(int socket, packet *m, int *fd);
+
+#endif

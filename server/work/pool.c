@@ -1,0 +1,136 @@
+/* pool.c: which process a job goes to, and what the caches of all of them have. */
+#include "work/internal.h"
+
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LIST_MS 500 /* a process that is idle gets so long to say what it has */
+
+#define TEXT_MOST ((size_t)8 << 20) /* a longer text is not read for this: its body takes seconds anyway */
+
+static bool has_body(const process *p, uint64_t body)
+{
+    for (int i = 0; i < PROCESS_BODIES; i++)
+        if (p->bodies[i] == body)
+            return true;
+    return false;
+}
+
+process *work_take_process(work *w, const char *text, size_t len, uint64_t *body)
+{
+    process *found = NULL;
+    *body = text && w->options.workers > 1 && len <= TEXT_MOST ? process_body(text, len) : 0;
+    pthread_mutex_lock(&w->pool_lock);
+    while (!found) {
+        for (int i = 0; i < w->options.workers; i++) {
+            process *p = &w->processes[i];
+            if (!p->taken && (!found || (*body && !has_body(found, *body) && has_body(p, *body))))
+                found = p;
+        }
+        if (!found)
+            pthread_cond_wait(&w->pool_idle, &w->pool_lock);
+    }
+    found->taken = true;
+    pthread_mutex_unlock(&w->pool_lock);
+    atomic_store(&found->board->stop, false);
+    live_reset(&found->board->live);
+    return found;
+}
+
+void work_give_process(work *w, process *p, uint64_t body, const packet *done)
+{
+    if (p->inbox.mapped > SEGMENT_KEPT || p->outbox.mapped > SEGMENT_KEPT) {
+        segment_rest(&p->inbox, true);
+        segment_rest(&p->outbox, true);
+    }
+    pthread_mutex_lock(&w->pool_lock);
+    if (!done) {
+        memset(p->bodies, 0, sizeof p->bodies);
+        p->held_entries = p->held_bytes = p->n_entries = 0;
+    } else if (done->u.done.listed) {
+        p->held_entries = done->u.done.cached;
+        p->held_bytes = done->u.done.held;
+    }
+    if (body && !has_body(p, body))
+        p->bodies[p->next_body++ % PROCESS_BODIES] = body;
+    p->taken = false;
+    pthread_cond_signal(&w->pool_idle);
+    pthread_mutex_unlock(&w->pool_lock);
+}
+
+/* Asks a process that nobody else has; what it says replaces what it said before. */
+static void list_process(process *p)
+{
+    packet m = {.kind = MESSAGE_LIST};
+    struct pollfd socket = {.fd = p->socket, .events = POLLIN};
+    if (p->pid == 0 || p->socket < 0 || !p->ready || !message_send(p->socket, &m, -1))
+        return;
+    if (poll(&socket, 1, LIST_MS) <= 0) { /* an answer that came later would be taken for another one */
+        process_kill(p);
+        return;
+    }
+    if (!message_receive(p->socket, &m, NULL) || m.kind != MESSAGE_LISTED ||
+        m.u.listed.count > PTRDIFF_MAX / sizeof *p->entries ||
+        !segment_reach(&p->outbox, m.u.listed.count * sizeof *p->entries, false))
+        return;
+    uz_cache_entry *copy = malloc((m.u.listed.count + 1) * sizeof *copy);
+    if (!copy)
+        return;
+    memcpy(copy, p->outbox.at, m.u.listed.count * sizeof *copy);
+    free(p->entries);
+    p->entries = copy;
+    p->n_entries = m.u.listed.count;
+    for (size_t i = 0; i < p->n_entries; i++)
+        copy[i].digest[sizeof copy[i].digest - 1] = '\0';
+}
+
+bool work_factors(work *w, uz_cache_entry **entries, size_t *count)
+{
+    *entries = NULL;
+    *count = 0;
+    for (int i = 0; i < w->options.workers; i++) {
+        process *p = &w->processes[i];
+        pthread_mutex_lock(&w->pool_lock);
+        const bool ours = !p->taken;
+        p->taken = true;
+        pthread_mutex_unlock(&w->pool_lock);
+        if (ours)
+            list_process(p);
+        pthread_mutex_lock(&w->pool_lock);
+        uz_cache_entry *grown = realloc(*entries, (*count + p->n_entries + 1) * sizeof *grown);
+        *entries = grown ? grown : *entries;
+        for (size_t k = 0; grown && k < p->n_entries; k++) {
+            size_t at = 0;
+            while (at < *count && strcmp(grown[at].digest, p->entries[k].digest) != 0)
+                at++;
+            if (at == *count) {
+                grown[(*count)++] = p->entries[k];
+            } else {
+                grown[at].hits += p->entries[k].hits;
+                grown[at].bytes += p->entries[k].bytes;
+            }
+        }
+        if (ours)
+            p->taken = false;
+        pthread_cond_signal(&w->pool_idle);
+        pthread_mutex_unlock(&w->pool_lock);
+        if (!grown) {
+            free(*entries);
+            *entries = NULL;
+            return false;
+        }
+    }
+    return true;
+}
+
+void work_cached(work *w, size_t *entries, size_t *bytes)
+{
+    *entries = *bytes = 0;
+    pthread_mutex_lock(&w->pool_lock);
+    for (int i = 0; i < w->options.workers; i++) {
+        *entries += w->processes[i].held_entries;
+        *bytes += w->processes[i].held_bytes;
+    }
+    pthread_mutex_unlock(&w->pool_lock);
+}

@@ -1,0 +1,18 @@
+/* relay.h: what a process that solves sees of the store: uploads and parts of earlier jobs, for which it asks the
+ * daemon. Both sides of the conversation. */
+#ifndef SERVER_WORK_RELAY_H
+#define SERVER_WORK_RELAY_H
+
+#include "store/store.h"
+#include "work/message.h"
+#include "work/segment.h"
+
+/* The process's side: a store for one thread with uploads, vectors, histories and cases to be read, and no other
+ * operation. Socket and inbox must outlive it; closed with store_close. NULL: no memory. */
+store *relay_open(int socket, segment *inbox);
+
+/* The daemon's side: fills the ANSWER to an ASK; what is large goes into the inbox from `at` on. *fd: a descriptor that
+ * goes with it, which the caller closes; -1: none. */
+void relay_answer(packet *answer, int *fd, store *s, const packet *ask, segment *inbox, size_t at);
+
+#endif

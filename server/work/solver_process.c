@@ -1,0 +1,286 @@
+/* solver_process.c: the life of a process that solves: its limits, then one job after another, with a cache that stays.
+ *
+ * One thread, besides those of BLAS. It may be killed at any instruction: nothing outlives it but what it has put into
+ * shared memory. */
+#include "work/solver_process.h"
+#include "base/clock.h"
+#include "base/memory.h"
+#include "work/confine.h"
+#include "work/message.h"
+#include "work/parcel.h"
+#include "work/relay.h"
+
+#include <fcntl.h>
+#include <malloc.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#define SETTLE_MS 300          /* without a job: then memory is made ready for the next one */
+#define IDLE_MS   (300 * 1000) /* then it goes back to the system */
+
+#define HEAP_FREE  ((size_t)16 << 20) /* may lie free where no large body was solved */
+#define HUGE_PAGE  ((size_t)2 << 20)
+#define SMALL_PAGE 4096
+
+#define LIMIT_ROOM ((size_t)512 << 20) /* beyond cache and twice what a solve may take: texts, answers, libraries */
+
+typedef struct {
+    int socket;
+    segment board_memory, inbox, outbox;
+    board *board;
+    store *source;
+    uz_cache *cache;
+    uz_reserve *reserve;
+    size_t cache_bytes;
+    live_writer live;
+    size_t names; /* bytes at the begin of the outbox */
+    bool fresh;   /* a job has ended since memory was made ready last */
+    double max_solve_s;
+} solver;
+
+/* ---- what the solver asks and tells */
+
+static bool is_stopped(void *ctx)
+{
+    const solver *s = ctx;
+    return atomic_load_explicit(&s->board->stop, memory_order_relaxed);
+}
+
+static void note_progress(void *ctx, const uz_history_row *row)
+{
+    live_add(&((solver *)ctx)->live, row);
+}
+
+static void note_case(void *ctx, int64_t load_case)
+{
+    live_case(&((solver *)ctx)->live, load_case);
+}
+
+static void note_grid(void *ctx, double from, double to)
+{
+    live_part(&((solver *)ctx)->live, from, to);
+}
+
+/* The names come before the news, and the news before the solve. */
+static void note_request(void *ctx, const codec_request *request)
+{
+    solver *s = ctx;
+    const uz_problem *problem = &request->problem;
+    const double asked = request->settings.time_limit_s;
+    packet m = {.kind = MESSAGE_READ, .u.read = {.time_limit_s = asked}};
+    if (s->max_solve_s > 0.0 && !(asked > 0.0 && asked < s->max_solve_s))
+        m.u.read.time_limit_s = s->max_solve_s;
+    if (segment_reach(&s->outbox, (size_t)problem->n_cases * CASE_NAME, true)) {
+        s->names = (size_t)problem->n_cases * CASE_NAME;
+        m.u.read.n_cases = problem->n_cases;
+        for (int64_t i = 0; i < problem->n_cases; i++)
+            snprintf(s->outbox.at + i * CASE_NAME, CASE_NAME, "%s", problem->cases[i].name);
+    }
+    live_begin(&s->live, &s->board->live, &request->settings, problem);
+    message_send(s->socket, &m, -1);
+}
+
+/* ---- messages */
+
+/* Where there is no room for the answer, that takes its place. */
+static void put_outcome(solver *s, solution *solved, packet *done)
+{
+    done->u.done.at = s->names;
+    done->u.done.size = parcel_size(&solved->outcome);
+    if (!segment_reach(&s->outbox, s->names + done->u.done.size, true)) {
+        solution_fail(solved, NULL);
+        done->u.done.at = s->names = 0;
+        done->u.done.size = parcel_size(&solved->outcome); /* that fits in any */
+    }
+    parcel_write(s->outbox.at + done->u.done.at, &solved->outcome);
+}
+
+static void run_job(solver *s, const packet *m)
+{
+    const uz_hooks hooks = {
+        .ctx = s, .cancelled = is_stopped, .progress = note_progress, .begins = note_case, .grid = note_grid};
+    const solve_with with = {.source = s->source,
+                             .cache = s->cache,
+                             .hooks = &hooks,
+                             .memory_limit = (size_t)m->u.job.memory,
+                             .max_solve_s = m->u.job.max_solve_s,
+                             .queue_s = m->u.job.queue_s,
+                             .read = note_request};
+    const size_t size = (size_t)m->u.job.size;
+    packet done = {.kind = MESSAGE_DONE};
+    solution solved;
+    char *body = NULL;
+    s->names = 0;
+    s->max_solve_s = with.max_solve_s;
+    uz_process_threads(m->u.job.threads);
+    if (!m->u.job.damaged && segment_reach(&s->inbox, size, false) && (body = malloc(size + 1))) {
+        memcpy(body, s->inbox.at, size);
+        body[size] = '\0';
+    }
+    if (body || m->u.job.damaged) {
+        solve_job(&solved, &with, m->u.job.id, body, size);
+    } else {
+        solved = (solution){.n = 0};
+        solution_fail(&solved, NULL);
+    }
+    put_outcome(s, &solved, &done);
+    done.u.done.stopped = solved.stopped;
+    done.u.done.start_lost = solved.start_lost;
+    done.u.done.figures = solved.figures;
+    if (!solved.figures.cached) {
+        uz_cache_entry *entries = NULL;
+        size_t count = 0;
+        done.u.done.listed = uz_cache_list(s->cache, &entries, &count, NULL) == UZ_OK;
+        done.u.done.cached = count;
+        for (size_t i = 0; i < count; i++)
+            done.u.done.held += entries[i].bytes;
+        free(entries);
+    }
+    message_send(s->socket, &done, -1);
+    solution_clear(&solved); /* while the daemon stores the answer */
+    segment_rest(&s->inbox, false);
+    segment_rest(&s->outbox, false);
+    s->fresh = true;
+}
+
+static void list_cache(solver *s)
+{
+    uz_cache_entry *entries = NULL;
+    size_t count = 0;
+    packet m = {.kind = MESSAGE_LISTED};
+    if (uz_cache_list(s->cache, &entries, &count, NULL) == UZ_OK) {
+        for (size_t i = 0; i < count; i++)
+            m.u.listed.bytes += entries[i].bytes;
+        if (segment_reach(&s->outbox, count * sizeof *entries, true)) {
+            m.u.listed.count = count;
+            if (count > 0)
+                memcpy(s->outbox.at, entries, count * sizeof *entries);
+        }
+        free(entries);
+    }
+    message_send(s->socket, &m, -1);
+}
+
+/* ---- between jobs */
+
+/* Memory for the next body is touched while nobody waits for it, and given back when no job has run for long. What is
+ * freed stays in the heap (memory_keep_heap): where much lies free there, all of it goes back to the system; where
+ * little and a body may come, so much is touched now, in huge pages. Returns the milliseconds until it is to be done
+ * again, -1: never. */
+static int make_ready(solver *s)
+{
+    struct pollfd socket = {.fd = s->socket, .events = POLLIN};
+    if (!s->fresh) {
+        uz_reserve_empty(s->reserve);
+        malloc_trim(0);
+        return -1;
+    }
+    while (poll(&socket, 1, 0) == 0 && uz_reserve_fill(s->reserve))
+        ;
+    const bool large = uz_reserve_bytes(s->reserve) > 0; /* bodies are solved here */
+    const size_t share = s->cache_bytes / 8, least = large ? share : 0;
+    const struct mallinfo2 heap = mallinfo2();
+    const bool known = heap.uordblks > 0; /* else it is another allocator, which tells nothing */
+    void *block = NULL;
+    if (known && heap.fordblks > HEAP_FREE + (large ? 4 * share : 0))
+        malloc_trim(0);
+    else if (known && heap.fordblks < least / 2 && posix_memalign(&block, HUGE_PAGE, least) == 0) {
+        madvise(block, least, MADV_HUGEPAGE);
+        for (size_t at = 0; at < least; at += SMALL_PAGE)
+            ((volatile char *)block)[at] = 0;
+        free(block);
+    }
+    s->fresh = false;
+    return IDLE_MS;
+}
+
+static void serve(solver *s)
+{
+    struct pollfd socket = {.fd = s->socket, .events = POLLIN};
+    packet m;
+    for (int wait = -1;;) {
+        if (poll(&socket, 1, wait) == 0) {
+            wait = make_ready(s);
+            continue;
+        }
+        if (!message_receive(s->socket, &m, NULL))
+            return;
+        if (m.kind == MESSAGE_JOB)
+            run_job(s, &m);
+        else if (m.kind == MESSAGE_LIST)
+            list_cache(s);
+        wait = s->fresh ? SETTLE_MS : IDLE_MS;
+    }
+}
+
+/* ---- beginning and end */
+
+/* Nobody is to outlive the daemon; and where memory ends, this process goes, not the daemon. */
+static bool settle(pid_t daemon)
+{
+    struct rlimit limit;
+    FILE *file = fopen("/proc/self/oom_score_adj", "w");
+    if (file) {
+        fputs("900\n", file);
+        fclose(file);
+    }
+    if (getrlimit(RLIMIT_FSIZE, &limit) == 0) { /* what it writes is memory */
+        limit.rlim_cur = limit.rlim_max;
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    prctl(PR_SET_NAME, "uzawad-solver", 0, 0, 0);
+    return prctl(PR_SET_PDEATHSIG, SIGKILL, 0, 0, 0) == 0 && getppid() == daemon;
+}
+
+int solver_process(int argc, char **argv)
+{
+    char why[128];
+    solver s = {.socket = SOLVER_SOCKET};
+    int kind = 0;
+    socklen_t len = sizeof kind;
+    if (argc != SOLVER_ARGUMENTS || getsockopt(SOLVER_SOCKET, SOL_SOCKET, SO_TYPE, &kind, &len) != 0 ||
+        kind != SOCK_SEQPACKET || !settle((pid_t)atol(argv[2]))) {
+        fputs("uzawad: " SOLVER_ROLE " is how uzawad starts itself\n", stderr);
+        return 2;
+    }
+    s.cache_bytes = (size_t)strtoull(argv[3], NULL, 10);
+    const size_t solve_bytes = (size_t)strtoull(argv[4], NULL, 10), reserved = s.cache_bytes / RESERVE_SHARE;
+    memory_keep_heap();
+    uz_process_init(1);
+    uz_thread_init();
+    uz_process_warm();
+    s.reserve = uz_reserve_new(s.cache_bytes - reserved, reserved);
+    s.cache = uz_cache_new(s.cache_bytes - reserved);
+    s.source = relay_open(s.socket, &s.inbox);
+    const bool made = s.reserve && s.cache && s.source && codec_init(NULL, why, sizeof why) &&
+                      segment_attach(&s.board_memory, SOLVER_BOARD) && s.board_memory.mapped >= sizeof *s.board &&
+                      segment_attach(&s.inbox, SOLVER_INBOX) && segment_attach(&s.outbox, SOLVER_OUTBOX);
+    if (made) {
+        uz_process_reserve(s.reserve);
+        s.board = (board *)(void *)s.board_memory.at;
+        segment_rest(&s.inbox, false);
+        segment_rest(&s.outbox, false);
+        if (solve_bytes > 0 && solve_bytes < (SIZE_MAX - LIMIT_ROOM - s.cache_bytes) / 2)
+            confine_memory(2 * solve_bytes + s.cache_bytes + LIMIT_ROOM);
+        const packet ready = {.kind = MESSAGE_READY, .u.ready = {.confined = confine_process()}};
+        if (message_send(s.socket, &ready, -1))
+            serve(&s);
+    }
+    if (s.source)
+        store_close(s.source);
+    uz_cache_free(s.cache);
+    uz_reserve_free(s.reserve);
+    segment_close(&s.board_memory);
+    segment_close(&s.inbox);
+    segment_close(&s.outbox);
+    codec_end();
+    return made ? 0 : 1;
+}

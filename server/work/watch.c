@@ -1,0 +1,195 @@
+/* watch.c: while a job runs in a process. A process that is told to stop has a moment to do so, in which it gives its
+ * best answer; then it is killed, whatever it does. */
+#include "work/watch.h"
+#include "work/relay.h"
+
+#include <math.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* A build with a sanitizer is that much slower. */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+enum { PATIENCE = 10 };
+#else
+enum { PATIENCE = 1 };
+#endif
+
+#define TELL_S    0.25             /* progress is told so often */
+#define CANCEL_S  (0.2 * PATIENCE) /* from the word to the kill: somebody waits for that */
+#define RELEASE_S (0.5 * PATIENCE) /* the service stops, or another owner has the job */
+#define START_S   (20.0 * PATIENCE)
+
+/* Beyond its time limit. Once it iterates there is an answer, whose certificate may take a while. */
+#define LIMIT_S     (0.7 * PATIENCE)
+#define LIMIT_SHARE 0.1
+
+typedef struct {
+    worker *me;
+    process *p;
+    const job *job;
+    size_t body_len;
+    double told_at, stop_at, due_at; /* on CLOCK_MONOTONIC */
+    double limit_s;
+    int told; /* percent */
+    bool stopping;
+    bool read;  /* the process has read the text */
+    bool again; /* it is not the first process that has it */
+} watch;
+
+/* To all who follow this job; to those who follow all jobs only where the percentage is another one. */
+static void tell_progress(watch *w, double now)
+{
+    worker *me = w->me;
+    if (now - w->told_at < TELL_S || !live_read(&w->p->board->live).any)
+        return;
+    w->told_at = now;
+    pthread_mutex_lock(&me->lock);
+    const int progress = me->progress = live_progress(&w->p->board->live, me->progress);
+    pthread_mutex_unlock(&me->lock);
+    if (progress != w->told)
+        feed_changed(me->w->feed, me->id); /* only this thread changes its id */
+    else
+        feed_moved(me->w->feed, me->id);
+    w->told = progress;
+}
+
+/* Passes on the word to stop, once. */
+static void pass_on(watch *w, double now)
+{
+    worker *me = w->me;
+    const bool cancelled = atomic_load(&me->cancel);
+    if (w->stopping || !(cancelled || atomic_load(&me->lost) || atomic_load(&me->w->interrupt)))
+        return;
+    atomic_store(&w->p->board->stop, true);
+    w->stopping = true;
+    w->stop_at = now + (cancelled ? CANCEL_S : RELEASE_S);
+}
+
+static bool is_overdue(const watch *w, double now)
+{
+    if (now < w->due_at)
+        return false;
+    return now >= w->due_at + LIMIT_SHARE * w->limit_s || !live_read(&w->p->board->live).any;
+}
+
+static bool answer(watch *w, const packet *question)
+{
+    packet reply;
+    int fd;
+    relay_answer(&reply, &fd, w->me->w->store, question, &w->p->inbox, (w->body_len + 7) / 8 * 8);
+    const bool sent = message_send(w->p->socket, &reply, fd);
+    if (fd >= 0)
+        close(fd);
+    return sent;
+}
+
+/* False: it is no message that may come now, and who says such things is not trusted with a job. */
+static bool hear(watch *w, const packet *m, double now)
+{
+    worker *me = w->me;
+    if (m->kind == MESSAGE_READY) {
+        w->p->ready = true;
+        w->due_at = w->limit_s > 0.0 ? now + w->limit_s + LIMIT_S : (double)INFINITY;
+        if (!m->u.ready.confined && PATIENCE == 1)
+            log_write(me->w->log, LOG_WARN, "process_not_confined", (log_field[]){{0}});
+        return true;
+    }
+    if (m->kind == MESSAGE_ASK)
+        return answer(w, m);
+    if (m->kind != MESSAGE_READ)
+        return false;
+    w->read = true;
+    w->limit_s = m->u.read.time_limit_s;
+    w->due_at = w->limit_s > 0.0 ? now + w->limit_s + LIMIT_S : (double)INFINITY;
+    pthread_mutex_lock(&me->lock);
+    me->n_cases = m->u.read.n_cases;
+    pthread_mutex_unlock(&me->lock);
+    return true;
+}
+
+/* Until it is done, dead or killed. */
+static watch_end follow(watch *w, watch_report *out)
+{
+    struct pollfd fds[] = {{.fd = w->p->socket, .events = POLLIN}, {.fd = w->me->wake, .events = POLLIN}};
+    for (;;) {
+        double now = clock_seconds(CLOCK_MONOTONIC);
+        pass_on(w, now);
+        if (w->stopping && now >= w->stop_at)
+            return WATCH_STOPPED;
+        if (is_overdue(w, now))
+            return w->p->ready ? WATCH_OVERDUE : WATCH_NOT_STARTED;
+        tell_progress(w, now);
+        double wait = TELL_S;
+        wait = w->stopping ? fmin(wait, w->stop_at - now) : wait;
+        wait = w->due_at > now ? fmin(wait, w->due_at - now) : wait;
+        if (poll(fds, 2, (int)(1e3 * wait) + 1) <= 0)
+            continue;
+        if (fds[1].revents) {
+            uint64_t count;
+            (void)!read(w->me->wake, &count, sizeof count);
+        }
+        if (!fds[0].revents)
+            continue;
+        if (!message_receive(w->p->socket, &out->done, NULL))
+            /* One that was about to go when it was given the job is no fault of the job's. */
+            return w->p->ready && (w->read || w->again) ? WATCH_DIED : WATCH_NOT_STARTED;
+        if (out->done.kind == MESSAGE_DONE)
+            return WATCH_DONE;
+        if (!hear(w, &out->done, clock_seconds(CLOCK_MONOTONIC)))
+            return WATCH_DIED;
+    }
+}
+
+/* A job that waits for nobody gets the processors that nobody uses; where all workers are busy each has its share. */
+static int threads_for(work *w)
+{
+    const int busy = work_busy(w), workers = w->options.workers, processors = w->processors;
+    const int threads = busy < workers ? processors - (busy - 1) : processors / workers;
+    return threads > 1 ? threads : 1;
+}
+
+watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len, double queue_s, watch_report *out)
+{
+    work *all = me->w;
+    process *p = me->process;
+    const work_options *o = &all->options;
+    watch w = {.me = me, .p = p, .job = claimed, .body_len = body_len, .told = -1, .limit_s = o->max_solve_s};
+    *out = (watch_report){.status = 0};
+    packet m = {.kind = MESSAGE_JOB,
+                .u.job = {.damaged = !body,
+                          .size = body_len,
+                          .queue_s = queue_s,
+                          .max_solve_s = o->max_solve_s,
+                          .memory = o->solve_bytes,
+                          .threads = threads_for(all)}};
+    memcpy(m.u.job.id, claimed->id, sizeof m.u.job.id);
+    const bool room = segment_reach(&p->inbox, body_len, true);
+    if (room && body_len > 0 && body)
+        memcpy(p->inbox.at, body, body_len);
+    free(body);
+    if (!room)
+        return WATCH_NO_ROOM;
+    watch_end end = WATCH_NOT_STARTED;
+    for (int tries = 0; tries < 2 && end == WATCH_NOT_STARTED && !atomic_load(&all->interrupt); tries++) {
+        const double now = clock_seconds(CLOCK_MONOTONIC);
+        if (!process_begin(p))
+            continue;
+        w.due_at = !p->ready ? now + START_S : w.limit_s > 0.0 ? now + w.limit_s + LIMIT_S : (double)INFINITY;
+        w.again = tries > 0;
+        end = message_send(p->socket, &m, -1) ? follow(&w, out) : WATCH_NOT_STARTED;
+        if (end == WATCH_DONE)
+            break;
+        out->began = live_read(&p->board->live).any;
+        out->time_limit_s = w.limit_s;
+        if (end != WATCH_DIED)
+            process_kill(p);
+        /* One that was killed may take a while to give back its memory: the job does not wait for that. */
+        if (end == WATCH_DIED || end == WATCH_NOT_STARTED) {
+            process_kill(p); /* also where it only spoke nonsense */
+            out->status = process_reap(p, &out->out_of_memory);
+        }
+    }
+    return end;
+}

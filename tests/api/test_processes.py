@@ -1,0 +1,135 @@
+"""Solves in processes of their own: they obey in any phase, a death is one job's alone, and they can do nothing but solve.
+usage: test_processes.py BUILD_DIR [FILTER]"""
+# not under sanitizers: about times, and about a filter that a sanitizer does not get through
+import copy
+import os
+import pathlib
+import signal
+import time
+
+import service
+from service import ENDLESS, MATRICES, SCENE, check, expect, options
+
+
+def cube(n, **solver):
+    """Some ten seconds of one factorization for n = 38."""
+    return {"problem": {"kind": "scene", "model": "solid",
+                        "mesh": {"box": {"origin": [0, 0, -1], "size": [1, 1, 1], "cells": [n, n, n], "element": "hex8"}},
+                        "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                        "supports": [{"on": "back", "ux": 0, "uy": 0, "uz": 0}],
+                        "contacts": [{"on": "front", "obstacle": {"sphere": {"center": [0.5, 0.5, 1.98], "radius": 2}}}]},
+            "solver": {"operator": "condensed", **solver}}
+
+
+LONG = cube(38)
+
+
+def busy(s, request):
+    """The id of a job that factors by now."""
+    job = s.post(request).json["id"]
+    s.wait_status(job, "running")
+    time.sleep(2)
+    return job
+
+
+@options("--workers", "1")
+def test_dismissed_while_it_factors(s):
+    job = busy(s, LONG)
+    began = time.monotonic()
+    reply = expect(s.request("DELETE", f"/v1/jobs/{job}"), 200)
+    s.wait_status(job, "dismissed")
+    took = time.monotonic() - began
+    check(took < 1.5, took, reply)  # 0.2 s and what a machine that is busy adds
+    check(s.solve(MATRICES)["status"] == "successful")
+
+
+@options("--workers", "1")
+def test_time_is_over_while_it_factors(s):
+    job = s.solve(copy.deepcopy({**LONG, "solver": {**LONG["solver"], "time_limit_s": 1}}))
+    check(job["status"] == "failed" and job["error"]["code"] == "time_limit" and "factored" in job["error"]["detail"], job)
+    total = next(event["total_s"] for event in s.events("job_ended") if event["job"] == job["id"])
+    check(total < 4, total)  # the limit, 0.8 s, reading the request, starting the process
+    check(s.solve(MATRICES)["status"] == "successful")
+
+
+@options("--workers", "1", "--drain-s", "0.2")
+def test_the_service_ends_while_it_factors(s):
+    job = busy(s, LONG)
+    began = time.monotonic()
+    s.process.send_signal(signal.SIGTERM)
+    check(s.process.wait(timeout=30) == 0)
+    took = time.monotonic() - began
+    check(took < 3.2, took)
+    s.process.stdout.close()
+    s.log_file.close()
+    s.start()
+    check(s.get(f"/v1/jobs/{job}").json["status"] in ("accepted", "running"))
+    check(s.events("job_released"), s.log()[-2000:])
+    s.request("DELETE", f"/v1/jobs/{job}")
+
+
+@options("--workers", "2")
+def test_a_death_is_one_jobs_alone(s):
+    """The other job goes on, with its attempt; the one whose process died runs again, and ends right."""
+    other = s.post(ENDLESS).json["id"]
+    while s.get(f"/v1/jobs/{other}").json["progress"] < 10:
+        time.sleep(0.02)
+    others = s.solvers()
+    slow = copy.deepcopy(SCENE)
+    slow["problem"]["mesh"]["box"]["cells"] = [400, 130]
+    job = s.post(slow).json["id"]
+    while s.get(f"/v1/jobs/{job}").json["progress"] < 5:  # read: a process that dies before is no fault of its job
+        time.sleep(0.01)
+    os.kill((set(s.solvers()) - set(others)).pop(), signal.SIGSEGV)
+    ended = s.wait_status(job, "successful", seconds=60)
+    check(ended["attempts"] == 2, ended)
+    check(s.get(f"/v1/jobs/{other}").json["attempts"] == 1)
+    check([event["cause"] for event in s.events("process_died")] == ["signal 11"], s.events("process_died"))
+    s.request("DELETE", f"/v1/jobs/{other}")
+    s.wait_status(other, "dismissed")
+
+
+@options("--workers", "1")
+def test_an_idle_process_may_go(s):
+    for _ in range(3):
+        check(s.solve(MATRICES)["attempts"] == 1)
+        os.kill(s.solvers()[0], signal.SIGKILL)
+    check(s.solve(MATRICES)["attempts"] == 1)
+    check(s.events("process_died") == [])
+
+
+@options("--workers", "1")
+def test_processes_go_with_the_daemon(s):
+    s.solve(MATRICES)
+    pid = s.solvers()[0]
+    s.process.kill()
+    s.process.wait()
+    end = time.monotonic() + 10
+    while os.path.exists(f"/proc/{pid}") and "Z" not in pathlib.Path(f"/proc/{pid}/stat").read_text().split()[2]:
+        check(time.monotonic() < end, "it lives on")
+        time.sleep(0.02)
+    s.restart()
+
+
+@options("--workers", "1")
+def test_a_process_is_confined(s):
+    """In all its threads; what the filter refuses is tried in tests/unit/server/work/test_confine.c."""
+    s.solve(MATRICES)
+    pid = s.solvers()[0]
+    for task in os.listdir(f"/proc/{pid}/task"):
+        status = dict(line.split(":\t", 1) for line in pathlib.Path(f"/proc/{pid}/task/{task}/status").read_text().splitlines())
+        check(status["Seccomp"] == "2" and status["NoNewPrivs"] == "1", status)
+    names = sorted(os.readlink(f"/proc/{pid}/fd/{fd}").split(":")[0] for fd in os.listdir(f"/proc/{pid}/fd"))
+    check(names[:2] == ["/dev/null"] * 2 and names.count("/memfd") == 3 and names.count("socket") == 1 and len(names) == 7, names)
+    check(s.events("process_not_confined") == [])
+
+
+@options(None)
+def test_nobody_starts_one_by_hand(s):
+    import subprocess
+    done = subprocess.run(s.command("--solver-process", "1", "1000", "0"), capture_output=True, text=True, timeout=20)
+    check(done.returncode == 2 and "how uzawad starts itself" in done.stderr, done)
+
+
+if __name__ == "__main__":
+    service.main(globals())
