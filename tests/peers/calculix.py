@@ -5,7 +5,7 @@ Blocks on others whose meshes do not match, and press fits, with CalculiX's cont
 with surfaces; and of CalculiX's own decks, where DECKS is a folder of them (they do not come with Debian's package), those
 that a scene can say (decks.py). Compared are the force through the contact, where it is known, displacements, and seconds of
 processor of the whole: of CalculiX from deck to answer, of the daemon from request to answer. CalculiX's contact is a
-penalty, in what is made here of 200 E for each length of a side."""
+penalty, in what is made here of 100 E for each length of a side."""
 import json
 import math
 import pathlib
@@ -90,7 +90,7 @@ def deck(scene, discretization):
         members = mesh["groups"].get(material["on"], {"elements": range(len(cells))})["elements"]
         lines += [f"*ELSET, ELSET=M{k}"] + [str(e + 1) for e in members] + [
             f"*MATERIAL, NAME=M{k}", "*ELASTIC", f"{material['young']}, {material['poisson']}", f"*SOLID SECTION, ELSET=M{k}, MATERIAL=M{k}"]
-    lines += ["*SURFACE INTERACTION, NAME=I", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{200 * stiff / side}, {1e-8 * stiff}",
+    lines += ["*SURFACE INTERACTION, NAME=I", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{100 * stiff / side:.6g}, {1e-8 * stiff:.6g}",
               f"*CONTACT PAIR, INTERACTION=I, TYPE={KINDS[discretization]}", f"{contact['on'].upper()}, {contact['with'].upper()}",
               "*STEP", "*STATIC", "1., 1.", "*BOUNDARY"]
     # a face is told by its corners; what is held on it are all nodes of its elements there
