@@ -139,8 +139,11 @@ def by_daemon(build, request, discretization):
     """The answer of a new daemon, and its seconds of processor."""
     s = service.Service(build)
 
-    def spent():
-        return sum(map(int, pathlib.Path(f"/proc/{s.process.pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[11:13])) / 100
+    def spent(process=None):
+        """Of the daemon and of the processes that it solves in."""
+        folder = pathlib.Path(f"/proc/{process or s.process.pid}")
+        own = sum(map(int, (folder / "stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[11:15])) / 100
+        return own + sum(map(spent, " ".join(one.read_text(encoding="utf-8") for one in folder.glob("task/*/children")).split()))
     try:
         s.start()
         problem = {**request["problem"], "contacts": [{**request["problem"]["contacts"][0], "discretization": discretization}]}
