@@ -119,7 +119,7 @@ static client_exit follow_all(client_session *s, const client_bodies *bodies, cl
 {
     client_exit worst = CLIENT_OK;
     if (!s->options->json && !s->options->quiet)
-        fprintf(s->out, "%-32s  %-15s  %-9s  %s\n", "id", "outcome", "error", "values");
+        fprintf(s->out, "%-32s  %-15s  %-13s  %s\n", "id", "outcome", "whole error", "values");
     for (size_t i = 0; i < json_array_size(jobs); i++) {
         json_t *job = json_incref(json_array_get(jobs, i));
         client_exit code = client_follow(s, client_json_text(job, "id"), &job, watch);
@@ -129,12 +129,11 @@ static client_exit follow_all(client_session *s, const client_bodies *bodies, cl
             code = client_job_exit(job);
         if (ended && !s->options->json && !s->options->quiet) {
             const char *label = bodies->item[i].label;
-            double error = client_json_number(job, "summary.certificate.relative_error");
             char text[32];
             const char *outcome = client_json_text(job, "summary.outcome");
             client_print_cell(s->out, client_json_text(job, "id"), 32);
             client_print_cell(s->out, *outcome ? outcome : client_json_text(job, "status"), 15);
-            client_print_cell(s->out, isfinite(error) ? client_format_bound(text, error) : "unknown", 9);
+            client_print_cell(s->out, client_format_error(text, client_json_at(job, "summary")), 13);
             client_print_safe(s->out, label);
             fputc('\n', s->out);
         }

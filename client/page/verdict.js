@@ -3,7 +3,7 @@
 import { h } from "./dom.js";
 import { draft } from "./examples.js";
 import { count, counted, number, number_towards, percent_up, seconds } from "./format.js";
-import { certificate_words, mesh_words, method_words, outcome_words, problem_words } from "./words.js";
+import { certificate_words, method_words, outcome_words, problem_words, whole_words } from "./words.js";
 
 function vector(values) {
   return values ? `(${values.map((value) => number(value)).join(", ")})` : null;
@@ -63,11 +63,11 @@ function assertions_of(summary) {
 
 /** The card of a summary. */
 export function verdict_card(summary) {
-  const outcome = outcome_words(summary), mesh = mesh_words(summary);
+  const outcome = outcome_words(summary), whole = whole_words(summary);
   return h("div", { class: `verdict tone-${outcome.tone}` },
     h("h2", null, h("span", { class: outcome.tone }, outcome.title)),
-    h("p", { class: "certificate", id: "certificate" }, certificate_words(summary)),
-    mesh ? h("p", null, mesh) : null,
+    whole ? h("p", { class: "certificate", id: "whole-error" }, whole) : null,
+    h("p", { class: whole ? "" : "certificate", id: "certificate" }, certificate_words(summary)),
     h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
     hint_of(summary), warnings_of(summary), assertions_of(summary),
     h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));

@@ -52,16 +52,15 @@ export function certificate_words(summary) {
       : `It is proved that no displacement whose components are all smaller than ${number(radius)} satisfies the contact conditions.`;
   }
   if (bound === null) return "No bound on the error could be proved: this answer must not be relied on.";
-  return `The exact answer of this discrete problem differs by at most ${percent_up(bound)}, in the energy norm.`;
+  return `The exact answer of ${summary.error?.kind === "estimated" ? "its equations" : "this problem"} differs by at most ${percent_up(bound)}, in the energy norm.`;
 }
 
-/** What the mesh adds, where it was estimated; null otherwise. */
-export function mesh_words(summary) {
-  const mesh = summary.discretization_error, bound = bound_of(summary);
-  if (!Number.isFinite(mesh)) return null;
-  const text = `The mesh itself is estimated to be off by about ${percent_up(mesh)}`;
-  if (bound === null || bound <= 0) return `${text}.`;
-  return mesh > bound ? `${text}: ${number(mesh / bound, 2)} times the bound on the solver's error.` : `${text}, less than the solver's bound.`;
+/** The whole error, of which the mesh has its part; null where the certificate says it all. */
+export function whole_words(summary) {
+  const { mesh, total, kind } = summary.error || {};
+  if (kind !== "estimated" || has_no_answer(summary)) return null;
+  if (!Number.isFinite(total)) return `How far the answer is off in all is not known: ${Number.isFinite(mesh) ? "nothing could be certified" : "what the mesh loses could not be estimated"}.`;
+  return `The answer is off by about ${percent_up(total)} in the energy norm, ${mesh > 0.99 * total ? "nearly all of it" : percent_up(mesh)} by its mesh (estimated).`;
 }
 
 /** One line about what was solved. */
@@ -85,6 +84,7 @@ export function result_words(job) {
   if (!summary) return "";
   const bound = bound_of(summary);
   if (has_no_answer(summary)) return OUTCOMES[summary.outcome][1].toLowerCase();
-  const error = bound === null ? "no bound" : `≤ ${percent_up(bound)}`;
+  const total = summary.error?.kind === "estimated" ? summary.error.total : null;
+  const error = bound === null ? "no bound" : Number.isFinite(total) ? `≈ ${percent_up(total)}` : `≤ ${percent_up(bound)}`;
   return summary.outcome === "converged" || summary.outcome === "verified" ? error : `${OUTCOMES[summary.outcome]?.[1].toLowerCase() || summary.outcome}, ${error}`;
 }

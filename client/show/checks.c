@@ -67,7 +67,7 @@ void client_checks_outcome(client_checks *to, const json_t *job)
     const char *outcome = client_json_text(job, "summary.outcome"), *message = client_json_text(job, "summary.message");
     const char *detail = client_json_text(job, "error.detail"), *title = client_json_text(job, "error.title");
     char bound[32];
-    client_format_bound(bound, client_json_number(job, "summary.certificate.relative_error"));
+    client_format_error(bound, client_json_at(job, "summary"));
     if (!client_job_ended(job))
         client_checks_add(to, CLIENT_NO_ANSWER, "", NAME, "the job has not ended");
     else if (!*outcome)
@@ -76,7 +76,7 @@ void client_checks_outcome(client_checks *to, const json_t *job)
                           : *title ? title
                                    : "the job left no answer and no reason");
     else if (strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0)
-        client_checks_add(to, CLIENT_PASS, "", NAME, "%s: certified relative error %s", outcome, bound);
+        client_checks_add(to, CLIENT_PASS, "", NAME, "%s: whole relative error %s", outcome, bound);
     else
         client_checks_add(to, CLIENT_FAIL, "", NAME, "%s%s%s", outcome, *message ? ": " : "", message);
 }

@@ -89,6 +89,17 @@ static void print_outcome(FILE *to, const json_t *summary)
         client_print_safe(to, message);
         fputc('\n', to);
     }
+    const json_t *error = json_object_get(summary, "error");
+    if (strcmp(client_json_text(error, "kind"), "estimated") == 0) {
+        const double mesh = client_json_number(error, "mesh"), total = client_json_number(error, "total");
+        label(to, "whole error");
+        if (isfinite(total))
+            fprintf(to, "about %.2g %% in the energy norm: %.2g %% of it the mesh's, by estimate\n", 100 * total,
+                    100 * mesh);
+        else
+            fprintf(to, "not known: what the %s could not be told\n",
+                    isfinite(mesh) ? "equations leave" : "mesh loses");
+    }
     if (json_is_object(json_object_get(summary, "cases"))) {
         label(to, "cases");
         fprintf(to, "%s; what follows is of the worst: ", number_in_words(count, summary, "cases.count", 9));
@@ -235,13 +246,12 @@ static void print_resultants(FILE *to, const json_t *summary)
     fprintf(to, "imbalance %s of their sizes\n", number_in_words(text, acts, "imbalance", 2));
 }
 
-/* The bound, whether it is what was asked for, what it is made of, and the error of the mesh, which it does not hold.
- */
+/* The bound, whether it is what was asked for, and what it is made of. */
 static void print_certificate(FILE *to, const json_t *summary)
 {
     const json_t *certificate = client_json_at(summary, "certificate");
     const double relative = client_json_number(certificate, "relative_error");
-    const double mesh = client_json_number(summary, "discretization_error");
+    const bool guaranteed = strcmp(client_json_text(summary, "error.kind"), "guaranteed") == 0;
     const double asked = client_json_number(summary, "requested_error"),
                  total = client_json_number(summary, "total_error");
     const char *outcome = client_json_text(summary, "outcome");
@@ -256,9 +266,11 @@ static void print_certificate(FILE *to, const json_t *summary)
     if (!isfinite(relative))
         fputs("nothing could be certified", to);
     else
-        fprintf(to, "the exact displacement is within %s of this one, relative, in the energy norm",
-                client_format_bound(absolute, relative));
-    if (relative > 0 && relative < 1 && digits >= 1)
+        fprintf(to, "the exact %s is within %s of this one, relative, in the energy norm",
+                guaranteed ? "displacement" : "solution of these equations", client_format_bound(absolute, relative));
+    if (!guaranteed && isfinite(relative))
+        fprintf(to, "\n%11s", ""); /* what was asked for has a line of its own */
+    else if (relative > 0 && relative < 1 && digits >= 1)
         fprintf(to, ":\n%12s%.0f digit%s %s certain", "", fmin(digits, 15), digits > 1 ? "s" : "",
                 digits > 1 ? "are" : "is");
     if (!isfinite(asked))
@@ -277,10 +289,6 @@ static void print_certificate(FILE *to, const json_t *summary)
         label(to, "");
         fprintf(to, "contact where the answer moves it, in %.0f passes; others would change it by about %.2g\n",
                 client_json_number(summary, "contact.geometry.passes"), left);
-    }
-    if (isfinite(mesh)) {
-        label(to, "");
-        fprintf(to, "the mesh itself is off by about %.2g\n", mesh);
     }
 }
 
@@ -407,14 +415,13 @@ void client_print_cases(FILE *to, const json_t *result)
     size_t i;
     json_t *item;
     fprintf(to, "\n%-*s  %-15s  %10s  %8s  %s\n", NAME_WIDTH, "case", "outcome", "iterations", "contacts",
-            "relative error");
+            "whole error");
     json_array_foreach(cases, i, item)
     {
         const json_t *summary = json_object_get(item, "summary");
         client_print_cell(to, client_json_text(item, "name"), NAME_WIDTH);
         client_print_cell(to, client_json_text(summary, "outcome"), 15);
         fprintf(to, "%10s  %8s  %s\n", number_in_words(iterations, summary, "iterations", 9),
-                number_in_words(touch, summary, "contact.active", 9),
-                bound_in_words(error, summary, "certificate.relative_error"));
+                number_in_words(touch, summary, "contact.active", 9), client_format_error(error, summary));
     }
 }

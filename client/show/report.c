@@ -82,6 +82,19 @@ const char *client_format_bound(char buffer[32], double bound)
     return buffer;
 }
 
+const char *client_format_error(char buffer[32], const json_t *summary)
+{
+    const double total = client_json_number(summary, "error.total");
+    const bool estimated = strcmp(client_json_text(summary, "error.kind"), "estimated") == 0;
+    if (!isfinite(total))
+        strcpy(buffer, "unknown");
+    else if (estimated)
+        snprintf(buffer, 32, "about %.2g", total);
+    else
+        client_format_bound(buffer, total);
+    return buffer;
+}
+
 void client_print_tags(FILE *to, const json_t *job, const char *separator)
 {
     const json_t *tags = json_object_get(job, "tags");

@@ -36,5 +36,7 @@ void client_print_problem(FILE *to, long http_status, const json_t *problem);
 const char *client_format_seconds(char *buffer, size_t size, double seconds);
 /* An upper bound with two digits, never shown smaller than it is; "inf" and "nan" as they are. */
 const char *client_format_bound(char buffer[32], double bound);
+/* A summary's whole error: a bound, "about 0.022" of an estimate, "unknown". */
+const char *client_format_error(char buffer[32], const json_t *summary);
 
 #endif

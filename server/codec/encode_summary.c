@@ -149,7 +149,7 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
 }
 
 /* The energies, and how far the answer may be off. */
-static void put_certificate(text *t, const uz_summary *s)
+static void put_certificate(text *t, const uz_summary *s, bool scene)
 {
     const uz_certificate *c = &s->certificate;
     const uz_residual *const residuals[] = {&c->residual, &c->relative_residual};
@@ -168,6 +168,12 @@ static void put_certificate(text *t, const uz_summary *s)
         put_object(t, i == 0 ? "residual" : "relative_residual",
                    (named[]){{"total", e->total}, {"e1", e->e1}, {"e2", e->e2}, {"e3", e->e3}, {"e4", e->e4}}, 5);
     }
+    text_close(t, '}');
+    double equations;
+    const double total = uz_total_error(&equations, s);
+    text_open(t, "error", '{');
+    put_named(t, (named[]){{"equations", equations}, {"mesh", s->discretization_error}, {"total", total}}, 3);
+    text_string(t, "kind", scene ? "estimated" : "guaranteed");
     text_close(t, '}');
 }
 
@@ -280,7 +286,7 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     text_integer(&t, "m", summary->m);
     text_close(&t, '}');
     put_contact(&t, summary, scene);
-    put_certificate(&t, summary);
+    put_certificate(&t, summary, scene);
     if (summary->evaluation)
         put_evaluation(&t, summary->evaluation, summary->dim);
     put_named(&t,
@@ -290,7 +296,7 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
                         {"lambda_max", summary->lambda_max}},
               4);
     if (summary->grids) {
-        text_number(&t, "total_error", summary->total_error);
+        text_number(&t, "total_error", uz_total_error(NULL, summary));
         put_grids(&t, summary->grids);
     }
     if (summary->outcome == UZ_INFEASIBLE || summary->outcome == UZ_OUT_OF_REACH)

@@ -199,13 +199,6 @@ void convergence_get(api *context, http_request *rq, http_reply *reply)
 
 /* ---- what accuracy took */
 
-static uz_status compute_mesh_error(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
-                                    const uz_hooks *hooks, uz_error *err)
-{
-    (void)which;
-    return uz_mesh_error(out, scene, answer, hooks, err);
-}
-
 void trade_get(api *context, http_request *rq, http_reply *reply)
 {
     job j = {0};
@@ -229,21 +222,9 @@ void trade_get(api *context, http_request *rq, http_reply *reply)
     } else {
         codec_summary_number(&of.mesh_error, summary, "discretization_error");
         codec_summary_number(&of.solver_error, summary, "certificate.relative_error");
-        /* where the summary does not know the error of the mesh, from the answer */
-        const char *outcome = codec_summary_text(summary, "outcome");
-        const bool known = isfinite(of.mesh_error) ||
-                           strcmp(codec_summary_text(summary, "problem.kind"), "scene") != 0 ||
-                           strcmp(outcome, "infeasible") == 0 || strcmp(outcome, "out_of_reach") == 0;
-        field_reader reader;
         size_t len = 0;
-        const bool good = known || (fields_open(&reader, context, rq, &j, reply) &&
-                                    fields_compute(&of.mesh_error, compute_mesh_error, &reader, at.number, 0, reply));
-        if (!known)
-            fields_close(&reader);
-        if (good) {
-            char *text = codec_encode_trade(&of, &len);
-            reply_text(reply, 200, "application/json", text, len);
-        }
+        char *text = codec_encode_trade(&of, &len);
+        reply_text(reply, 200, "application/json", text, len);
     }
 done:
     free(x);

@@ -17,12 +17,13 @@ void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *res
 {
     int64_t worst = 0;
     uz_timings times = {0};
-    double bound = 0.0, worst_error = 0.0;
+    double bound = 0.0, worst_error = 0.0, mesh = 0.0;
     *counts = (codec_cases){.count = problem->n_cases};
     for (int64_t i = 0; i < problem->n_cases; i++) {
         const uz_summary *one = &results[i]->summary;
         const double relative = one->certificate.relative_error, known = isnan(relative) ? (double)INFINITY : relative;
-        const double error = one->grids ? one->total_error : known; /* where the cells were chosen it was asked for */
+        const double error =
+            one->grids ? uz_total_error(NULL, one) : known; /* where the cells were chosen it was asked for */
         const int badness = BADNESS[one->outcome], so_far = BADNESS[results[worst]->summary.outcome];
         if (i == 0 || badness > so_far || (badness == so_far && error > worst_error)) {
             worst = i;
@@ -30,11 +31,13 @@ void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *res
         }
         counts->outcomes[one->outcome]++;
         bound = fmax(bound, known); /* one that is not known counts as the largest */
+        mesh = isnan(mesh) || isnan(one->discretization_error) ? (double)NAN : fmax(mesh, one->discretization_error);
         uz_timings_add(&times, &one->timings);
     }
     *out = results[worst]->summary;
     counts->worst = problem->cases[worst].name;
     out->certificate.relative_error = bound;
+    out->discretization_error = mesh;
     out->timings = times;
     out->iterations = out->restarts = out->refinements = 0;
     for (int64_t i = 0; i < problem->n_cases; i++) {

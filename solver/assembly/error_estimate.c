@@ -16,7 +16,7 @@
 typedef struct {
     const uz_body_model *model;
     uz_nodal_strains nodal; /* rows: stresses, once they are recovered */
-    double eta2, energy2;
+    uz_stress_sums sums;
 } estimate;
 
 static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
@@ -37,14 +37,26 @@ static void compare(void *ctx, const uz_strain_group *group)
     estimate *x = ctx;
     const int64_t *place[UZ_STRAIN_LANES];
     uz_nodal_places(place, &x->nodal, group, &x->model->mesh);
-    uz_stress_rows_compare(&x->eta2, &x->energy2, x->nodal.rows, x->nodal.size, group, place);
+    uz_stress_rows_compare(&x->sums, x->nodal.rows, x->nodal.size, group, place);
 }
 
-double uz_estimate_mesh_error(const uz_body_model *model, const uz_scene *scene, const double *nodal)
+/* Strain that makes stress, in parts of the whole, that is not told from rounding and what the equations left. */
+#define FREE 1e-7
+
+double uz_estimate_mesh_error(double *share, const uz_body_model *model, const uz_scene *scene, const double *nodal)
 {
     double *free_strain = NULL;
+    if (share)
+        *share = 1;
     if (scene && uz_free_strains(&free_strain, model, scene, NULL) != UZ_OK)
         return NAN;
+    /* A translation strains nothing, unless along the radius of rings: what its strains come to is rounding. */
+    const int dim = model->mesh.dim;
+    bool is_translation = !free_strain && (model->kind != UZ_AXISYMMETRIC || fabs(nodal[0]) <= 0);
+    for (int64_t i = dim; i < model->mesh.n_nodes * dim && is_translation; i++)
+        is_translation = nodal[i] >= nodal[i % dim] && nodal[i] <= nodal[i % dim];
+    if (is_translation)
+        return 0;
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
     estimate x = {.model = model};
     const uz_strain_work work = {make_rule, compare, &x};
@@ -63,5 +75,12 @@ double uz_estimate_mesh_error(const uz_body_model *model, const uz_scene *scene,
         status = uz_strain_groups(&work, &from, NULL, NULL);
     uz_nodal_strains_clear(&x.nodal);
     free(free_strain);
-    return status == UZ_OK && x.energy2 > 0 ? sqrt(x.eta2 / (x.energy2 + x.eta2)) : NAN;
+    if (status != UZ_OK || !(x.sums.whole > 0))
+        return NAN;
+    const double stressed = sqrt(x.sums.stress / x.sums.whole);
+    if (stressed < FREE)
+        return 0;
+    if (share)
+        *share = stressed;
+    return sqrt(x.sums.eta2 / (x.sums.stress + x.sums.eta2));
 }

@@ -157,27 +157,24 @@ INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, con
 }
 
 /* Deviator and trace apart, as in uz_complementary. */
-INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
+INLINE void compare(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
                     const int64_t *const place[LANES], int n, int direct, int size)
 {
-    uz_lanes nodal[NODES][MOST_ROW], eta = {0}, energy = {0};
+    uz_lanes nodal[NODES][MOST_ROW], eta = {0}, energy[2] = {{0}};
     const uz_lanes twice_mu = 2 * g->material.mu, per_twice_mu = 1 / twice_mu,
                    per_bulk = 1 / (direct * (direct * g->material.lambda + twice_mu));
     gather_rows(nodal, rows, g, place, size);
     for (int p = 0; p < g->rule.asked; p++) {
         const uz_lanes *strain = g->strain[p];
-        uz_lanes jump[UZ_ELEMENT_STRESSES], trace = {0}, sum = {0}, deviator = {0}, direct_work = {0}, shear_work = {0};
+        uz_lanes jump[UZ_ELEMENT_STRESSES], sum = {0}, deviator = {0}, shear_work = {0};
         stress_of(jump, g, strain, n, direct);
         for (int c = 0; c < n; c++) {
             jump[c] = -jump[c];
             for (int a = 0; a < g->rule.nodes; a++)
                 jump[c] += g->rule.N[p][a] * nodal[a][c];
         }
-        for (int c = 0; c < direct; c++) {
+        for (int c = 0; c < direct; c++)
             sum += jump[c];
-            trace += strain[c];
-            direct_work += strain[c] * strain[c];
-        }
         for (int c = 0; c < direct; c++)
             deviator += (jump[c] - sum / direct) * (jump[c] - sum / direct);
         for (int c = direct; c < n; c++) {
@@ -185,13 +182,22 @@ INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_
             shear_work += strain[c] * strain[c];
         }
         eta += g->shape.volume[p] * (sum * sum * per_bulk + deviator * per_twice_mu);
-        /* of the whole strain: ||u_h|| knows no temperature */
-        energy += g->shape.volume[p] *
-                  (g->material.lambda * trace * trace + twice_mu * direct_work + g->material.mu * shear_work);
+        /* of the strain that makes stress, and of the whole: without a free strain they are the same */
+        for (int whole = 0; whole < (size > n + 1 ? 2 : 1); whole++) {
+            uz_lanes trace = {0}, work = {0};
+            for (int c = 0; c < direct; c++) {
+                const uz_lanes here = whole ? strain[c] : strain[c] - g->thermal;
+                trace += here;
+                work += here * here;
+            }
+            energy[whole] += g->shape.volume[p] *
+                             (g->material.lambda * trace * trace + twice_mu * work + g->material.mu * shear_work);
+        }
     }
     for (int l = 0; l < g->count; l++) {
-        *eta2 += eta[l];
-        *energy2 += energy[l];
+        sums->eta2 += eta[l];
+        sums->stress += energy[0][l];
+        sums->whole += energy[size > n + 1][l];
     }
 }
 
@@ -210,17 +216,17 @@ INLINE void add_of_model(double *rows, const uz_strain_group *g, const int64_t *
         add(rows, g, place, share, 6, 3, MOST_ROW);
 }
 
-INLINE void compare_of_model(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
+INLINE void compare_of_model(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
                              const int64_t *const place[LANES], int size)
 {
     if (size == LANES)
-        compare(eta2, energy2, rows, g, place, 3, 2, LANES);
+        compare(sums, rows, g, place, 3, 2, LANES);
     else if (g->rule.stresses == 3)
-        compare(eta2, energy2, rows, g, place, 3, 2, MOST_ROW);
+        compare(sums, rows, g, place, 3, 2, MOST_ROW);
     else if (g->rule.stresses == 4)
-        compare(eta2, energy2, rows, g, place, 4, 3, MOST_ROW);
+        compare(sums, rows, g, place, 4, 3, MOST_ROW);
     else
-        compare(eta2, energy2, rows, g, place, 6, 3, MOST_ROW);
+        compare(sums, rows, g, place, 6, 3, MOST_ROW);
 }
 
 UZ_AVX2_FMA static void add_fused(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
@@ -229,10 +235,10 @@ UZ_AVX2_FMA static void add_fused(double *rows, const uz_strain_group *g, const 
     add_of_model(rows, g, place, share, size);
 }
 
-UZ_AVX2_FMA static void compare_fused(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
+UZ_AVX2_FMA static void compare_fused(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
                                       const int64_t *const place[LANES], int size)
 {
-    compare_of_model(eta2, energy2, rows, g, place, size);
+    compare_of_model(sums, rows, g, place, size);
 }
 
 void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
@@ -241,8 +247,8 @@ void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
     (uz_cpu_has_avx2_fma() ? add_fused : add_of_model)(rows, group, place, share, size);
 }
 
-void uz_stress_rows_compare(double *eta2, double *energy2, const double *rows, int size, const uz_strain_group *group,
+void uz_stress_rows_compare(uz_stress_sums *sums, const double *rows, int size, const uz_strain_group *group,
                             const int64_t *const place[UZ_STRAIN_LANES])
 {
-    (uz_cpu_has_avx2_fma() ? compare_fused : compare_of_model)(eta2, energy2, rows, group, place, size);
+    (uz_cpu_has_avx2_fma() ? compare_fused : compare_of_model)(sums, rows, group, place, size);
 }

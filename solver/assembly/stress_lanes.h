@@ -10,8 +10,14 @@
  * NULL: the linear function of the place that fits them best, which they must determine. */
 void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
                         const int64_t *const place[UZ_STRAIN_LANES], const double share[][UZ_ELEMENT_SAMPLES]);
-/* rows: stresses s*. Adds the integral of (s* - s)' C^-1 (s* - s) and of strain' C strain. */
-void uz_stress_rows_compare(double *eta2, double *energy2, const double *rows, int size, const uz_strain_group *group,
+/* Integrals over elements. */
+typedef struct {
+    double eta2;   /* of (s* - s)' C^-1 (s* - s) */
+    double stress; /* of strain' C strain, of the strain that makes stress */
+    double whole;  /* the same of all of the strain */
+} uz_stress_sums;
+/* rows: stresses s*. */
+void uz_stress_rows_compare(uz_stress_sums *sums, const double *rows, int size, const uz_strain_group *group,
                             const int64_t *const place[UZ_STRAIN_LANES]);
 
 #endif

@@ -65,11 +65,6 @@ void uz_fields_clear(uz_fields *fields);
 uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                        const uz_hooks *hooks, uz_error *err);
 
-/* *error: the estimated relative energy-norm error of the mesh (Zienkiewicz and Zhu 1987), as in a summary; NaN where
- * nothing is strained. Errors as above. */
-uz_status uz_mesh_error(double *error, const uz_scene *scene, const uz_field_source *answer, const uz_hooks *hooks,
-                        uz_error *err);
-
 /* ---------------------------------------------------------------- pictures */
 
 /* How a deformed body is drawn. */

@@ -214,8 +214,9 @@ typedef struct {
     uz_row_scaling row_scaling; /* NONE, also where scaling all rows alike changed nothing, or UNIT */
     double alpha;               /* step size, of the rows that row_scaling says; NaN where no gradient step was taken */
     double lambda_max;          /* of N K^-1 N' with the caller's rows; NaN where no gradient step needed it */
-    double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
-    double total_error;       /* cells chosen here: sqrt(discretization_error^2 + the certificate's relative_error^2) */
+    /* Scene: estimated energy-norm error of the mesh, relative to the strain that makes stress; NaN: no estimate. */
+    double discretization_error;
+    double stress_share;      /* scene: the energy norm of that strain over ||u||_K, 1 without temperature; else 0 */
     double infeasible_radius; /* out of reach: every feasible u has an entry of at least this; INFINITY: infeasible */
     double requested_error;   /* the relative error that `converged` had to meet */
     uz_certificate certificate;
@@ -234,6 +235,11 @@ typedef struct {
     const uz_evaluation *evaluation; /* scenes with an answer: the result's own; else NULL */
     const uz_grid_sequence *grids;   /* cells chosen here: the result's own; else NULL */
 } uz_summary;
+
+/* The whole relative error in the energy norm: the root of the sum of the squares of *equations, what moving contacts
+ * left (uz_geometry.left), and, of a scene, the estimate of what its mesh loses. INFINITY: not known. *equations: the
+ * certificate's, of a scene relative to the strain that makes stress. May be NULL. */
+double uz_total_error(double *equations, const uz_summary *summary);
 
 /* Where a run stood when it ended: enough to go on as if it had not. Rows are the caller's.
  * A start that knows no more than reactions has rho NULL: a warm start. */

@@ -20,10 +20,9 @@ typedef struct {
 uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *model, const uz_scene *scene,
                                  const double *u, const double *r, uz_error *err);
 
-/* Adds to out->warnings what makes the answer doubtful. Reads out->overlap and ->approach; sliding: of
- * uz_measure_sliding. */
-uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                         const double *r, double sliding, uz_error *err);
+/* Adds to the warnings of result->evaluation what makes the answer doubtful. Reads its overlap and approach, and the
+ * summary's geometry.sliding and discretization_error. */
+uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* Takes the warning `sliding` back, which turned out to be without ground, and warns of overlap that it had explained.
  */
 void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene);

@@ -86,32 +86,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
         status = uz_measure_overlap(e->overlap, model, scene, result->u, err);
     if (status != UZ_OK)
         return status;
+    summary->discretization_error = uz_estimate_mesh_error(&summary->stress_share, model, scene, result->u);
     e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);
     status = uz_measure_sliding(&summary->geometry.sliding, model, scene, result->u, result->r, e->approach, err);
-    return status == UZ_OK ? uz_find_doubts(e, model, scene, result->u, result->r, summary->geometry.sliding, err)
-                           : status;
-}
-
-/* ---- what the mesh loses, of an answer that is there */
-
-uz_status uz_mesh_error(double *error, const uz_scene *scene, const uz_field_source *answer, const uz_hooks *hooks,
-                        uz_error *err)
-{
-    uz_body_model model;
-    *error = NAN;
-    uz_error_reset(err);
-    uz_status status = uz_body_model_outline(&model, scene, err);
-    const int64_t n_u = status == UZ_OK ? model.mesh.n_nodes * model.mesh.dim : 0;
-    if (status == UZ_OK && (!answer->u || answer->n_u != n_u))
-        status = uz_fail(err, UZ_ERR_SIZE, "u", "an estimate needs %lld displacements", (long long)n_u);
-    for (int64_t i = 0; status == UZ_OK && i < n_u; i++)
-        if (!isfinite(answer->u[i]))
-            status = uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacement %lld is not finite: there is no answer",
-                             (long long)i);
-    if (status == UZ_OK && uz_cancelled(hooks))
-        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the estimate");
-    if (status == UZ_OK)
-        *error = uz_estimate_mesh_error(&model, scene, answer->u);
-    uz_body_model_clear(&model);
-    return status;
+    return status == UZ_OK ? uz_find_doubts(result, model, scene, err) : status;
 }

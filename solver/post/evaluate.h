@@ -5,9 +5,9 @@
 #include "assembly/assembly.h"
 #include "uzawa.h"
 
-/* Fills result->pressure, result->evaluation and the summary's force, max_pressure and evaluation from result->u, r and
- * mesh. scene: with the loads of the case; model: its body. Takes time in proportion to the contact, the supports and
- * loads, and one look at each edge of the mesh. UZ_ERR_MEMORY. */
+/* Fills result->pressure, result->evaluation and the summary's force, max_pressure, discretization_error and
+ * evaluation from result->u, r and mesh. scene: with the loads of the case; model: its body. Takes time in proportion
+ * to the contact, the supports and loads, and two looks at each element. UZ_ERR_MEMORY. */
 uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
 #endif

@@ -26,13 +26,16 @@ static const double MOST_MISMATCH = 0.05;
  * 17 % too little energy there (element/stiffness.c). */
 static const double LOCKS = 0.45;
 
+/* Error of the mesh, relative in the energy norm, from which on the answer describes another body. */
+static const double COARSE_MESH = 0.1;
+
 #define DEGREES (180 / 3.14159265358979323846)
 
 typedef struct {
     const uz_body_model *model;
     const uz_scene *scene;
     const double *u, *r;
-    double sliding;
+    double sliding, mesh_error;
     uz_evaluation *out;
 } doubts;
 
@@ -366,6 +369,11 @@ static void look_at_overlap(const doubts *d, int64_t k)
 static void look_at_mesh(const doubts *d)
 {
     const uz_mesh *mesh = &d->model->mesh;
+    if (d->mesh_error >= COARSE_MESH)
+        warn(d->out, "coarse_mesh", d->mesh_error,
+             "the mesh itself is off by about %.2g %% in the energy norm: refine it, above all near contacts and "
+             "corners",
+             100 * d->mesh_error);
     double poisson = 0;
     int64_t stiff = 0;
     for (int64_t e = 0; e < mesh->n_elements && d->model->kind != UZ_PLANE_STRESS; e++) {
@@ -404,10 +412,11 @@ void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_sc
         look_at_overlap(&d, k);
 }
 
-uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                         const double *r, double sliding, uz_error *err)
+uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
-    const doubts d = {model, scene, u, r, sliding, out};
+    const uz_summary *s = &result->summary;
+    const doubts d = {
+        model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
     const double noticed = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
     if (!(slope_by_range(&d) < 0.99 * noticed) && largest_slope(&d) > noticed)
         look_at_elements(&d);

@@ -189,44 +189,7 @@ static int64_t choose_between(const search *g)
     return n == 0 || uz_cancelled(g->hooks) || !has_time(g, n) ? 0 : n;
 }
 
-/* ---- one grid: the error of its answers */
-
-/* Has the body only been pushed aside? Then no element is strained, and there is nothing to estimate. */
-static bool is_translation(const uz_result *result)
-{
-    const int dim = result->mesh.dim;
-    for (int64_t i = dim; i < result->n_nodes * dim; i++)
-        if (result->u[i] < result->u[i % dim] || result->u[i] > result->u[i % dim])
-            return false;
-    return true;
-}
-
-/* Every case's error; the largest ones go to the level. */
-static uz_status estimate(answers *x, uz_grid_level *level, const uz_problem *problem, int64_t n_cases,
-                          const uz_body_model *outline, uz_error *err)
-{
-    for (int64_t i = 0; i < n_cases; i++) {
-        const uz_scene scene = uz_scene_of_case(problem, i);
-        const uz_result *result = x->results[i];
-        uz_summary *s = &x->results[i]->summary;
-        level->iterations += s->iterations;
-        level->d = s->d;
-        s->total_error = INFINITY;
-        if (uz_has_no_answer(s))
-            continue;
-        const double mesh = is_translation(result) ? 0.0 : uz_estimate_mesh_error(outline, &scene, result->u);
-        if (isnan(mesh))
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
-        s->discretization_error = mesh;
-        s->total_error = hypot(hypot(mesh, s->certificate.relative_error), s->geometry.left);
-        if (isnan(s->total_error))
-            s->total_error = INFINITY;
-        x->error = fmax(x->error, s->total_error);
-        level->discretization_error = fmax(level->discretization_error, s->discretization_error);
-        level->certified_error = fmax(level->certified_error, s->certificate.relative_error);
-    }
-    return UZ_OK;
-}
+/* ---- one grid */
 
 /* Solves on grid n, from the best answers so far. On failure x has no results. */
 static uz_status solve_on_grid(answers *x, uz_grid_level *level, const search *g, int64_t n, uz_error *err)
@@ -256,9 +219,17 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, const search *g
     for (int64_t i = 0; starts && i < g->n_cases; i++)
         uz_state_free(starts[i]);
     free(starts);
-    if (status == UZ_OK)
-        status = estimate(x, level, &problem, g->n_cases, &outline, err);
     uz_body_model_clear(&outline);
+    for (int64_t i = 0; status == UZ_OK && i < g->n_cases; i++) {
+        const uz_summary *s = &x->results[i]->summary;
+        level->iterations += s->iterations;
+        level->d = s->d;
+        if (uz_has_no_answer(s))
+            continue;
+        x->error = fmax(x->error, uz_total_error(NULL, s));
+        level->discretization_error = fmax(level->discretization_error, s->discretization_error);
+        level->certified_error = fmax(level->certified_error, s->certificate.relative_error);
+    }
     level->seconds = uz_seconds() - start;
     if (status != UZ_OK) {
         uz_results_free(x->results, x->results ? g->n_cases : 0);
@@ -330,7 +301,8 @@ static void conclude(const search *g, uz_summary *s)
     s->requested_error = g->requested;
     if (uz_has_no_answer(s) || s->outcome == UZ_LOOSE || s->outcome == UZ_MOVING_GEOMETRY)
         return;
-    if (s->total_error <= g->requested) {
+    const double total = uz_total_error(NULL, s);
+    if (total <= g->requested) {
         s->outcome = UZ_CONVERGED;
         s->message[0] = '\0';
         return;
@@ -346,7 +318,7 @@ static void conclude(const search *g, uz_summary *s)
                       : s->outcome == UZ_DISMISSED  ? "stopped by request"
                                                     : "the equations of this grid could not be solved better";
     snprintf(s->message, sizeof s->message, "%s. Total error about %.3g (mesh %.3g, certified %.3g), asked for %.3g.",
-             why, s->total_error, s->discretization_error, s->certificate.relative_error, g->requested);
+             why, total, s->discretization_error, s->certificate.relative_error, g->requested);
 }
 
 static uz_status publish(search *g, uz_error *err)

@@ -30,6 +30,7 @@ void uz_blank_answer(uz_result *result)
     blank(s->force, 3);
     s->reaction_sum = s->max_penetration = s->max_pressure = NAN;
     s->active = 0;
+    s->discretization_error = NAN;
     memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
 }
 
@@ -47,6 +48,17 @@ uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const
     result->n_nodes = mesh->n_nodes;
     uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, m, err);
     return status == UZ_OK ? uz_evaluate(result, model, scene, err) : status;
+}
+
+double uz_total_error(double *equations, const uz_summary *s)
+{
+    const bool scene = s->stress_share > 0.0;
+    const double certified = s->certificate.relative_error / (scene ? s->stress_share : 1.0);
+    const double left = isnan(s->geometry.left) ? 0.0 : s->geometry.left;
+    const double total = hypot(hypot(certified, left), scene ? s->discretization_error : 0.0);
+    if (equations)
+        *equations = certified;
+    return isnan(total) ? (double)INFINITY : total;
 }
 
 /* The rows with a share in the contradiction: exactly, or by more than a ray's rounding. */

@@ -224,8 +224,8 @@ static uz_status judge(bool *done, uz_run *run, uz_error *err)
     const bool next = work->end == UZ_END_NEXT;
     if (run->asked->settings->balanced && run->asked->setup->is_scene && !work->again && !next) {
         const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
-        uz_balance_request(&work->requested, &run->result->summary.discretization_error, &run->asked->setup->model,
-                           &scene, run->answer.u, run->load.prescribed, run->load.exponent);
+        uz_balance_request(&work->requested, &run->asked->setup->model, &scene, run->answer.u, run->load.prescribed,
+                           run->load.exponent);
         work->target = work->requested;
     }
     uz_status status = improve(run, err);

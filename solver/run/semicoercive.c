@@ -359,8 +359,7 @@ static uz_status run_rounds(uz_semi *s, uz_error *err)
         if (!settled && s->rounds % IMPATIENCE != 0)
             continue;
         if (s->settings->balanced && s->is_scene)
-            uz_balance_request(&s->requested, &s->discretization_error, &s->model, &s->problem->scene, s->last->u,
-                               s->prescribed, 0);
+            uz_balance_request(&s->requested, &s->model, &s->problem->scene, s->last->u, s->prescribed, 0);
         status = try_exact(s, &done, err);
         for (int64_t i = 0; status == UZ_OK && !done && i < s->m; i++)
             s->target[i] = s->of.h[i] - s->last->g[i];
@@ -377,7 +376,6 @@ uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, cons
     uz_error own = {0};
     s.is_scene = problem->kind == UZ_PROBLEM_SCENE;
     s.started = started;
-    s.discretization_error = NAN;
     s.deadline = s.started + settings->time_limit_s;
     s.requested = uz_requested_error(settings);
     double start = uz_seconds();

@@ -178,7 +178,6 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
     if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT && is_loose(s))
         summary->outcome = UZ_LOOSE;
     summary->requested_error = s->requested;
-    summary->discretization_error = s->discretization_error;
     uz_semicoercive *held = &summary->semicoercive;
     *held = (uz_semicoercive){.free_modes = s->k, .rounds = s->rounds};
     for (int64_t i = 0; s->proved && i < s->m; i++)

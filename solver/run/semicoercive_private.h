@@ -35,7 +35,6 @@ typedef struct {
     double started, deadline; /* uz_seconds() */
     double assemble_s;
     double requested;
-    double discretization_error; /* NaN: not estimated */
 } uz_semi;
 
 /* Of the last answer: what an error of it is relative to, and its norm in the last augmented problem. */

@@ -168,8 +168,8 @@ double uz_requested_error(const uz_settings *settings)
     return settings->relative_error > 0.0 ? settings->relative_error : UZ_EXACT_RELATIVE_ERROR;
 }
 
-void uz_balance_request(double *requested, double *discretization_error, const uz_body_model *model,
-                        const uz_scene *scene, const double *u, const double *prescribed, int exponent)
+void uz_balance_request(double *requested, const uz_body_model *model, const uz_scene *scene, const double *u,
+                        const double *prescribed, int exponent)
 {
     const int64_t count = model->mesh.n_nodes * model->mesh.dim;
     double *nodal = uz_alloc(count, sizeof *nodal);
@@ -178,8 +178,9 @@ void uz_balance_request(double *requested, double *discretization_error, const u
     uz_recover_nodal(nodal, model, u, prescribed);
     for (int64_t i = 0; exponent != 0 && i < count; i++)
         nodal[i] = ldexp(nodal[i], -exponent);
-    *discretization_error = uz_estimate_mesh_error(model, scene, nodal);
+    double share;
+    const double mesh = uz_estimate_mesh_error(&share, model, scene, nodal);
     free(nodal);
-    if (*discretization_error > 0.0)
-        *requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * *discretization_error));
+    if (mesh > 0.0)
+        *requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * mesh * share));
 }

@@ -39,7 +39,7 @@ def submit(server, body, *words, code=0):
 def test_submit_and_wait_prints_the_summary(server):
     done = run(server, "submit", PAPER, "--wait", code=0)
     for part in ("outcome     converged", "22 of 30 candidates touch", "sum -10.51371", "accelerated_restart",
-                 "digits are certain", "asked for 1e-08: met", "-0.0039608186"):
+                 "whole error about 2", "by estimate", "exact solution of these equations", "asked for 1e-08: met", "-0.0039608186"):
         check(part in done.stdout, part, "is missing in\n" + done.stdout)
     check(done.stderr == "", done.stderr)
 

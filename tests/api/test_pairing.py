@@ -87,7 +87,8 @@ def test_plates_do_not_touch_their_own_backs(s):
             a = answer_of(s, plates(kind, [{"on": on, "with": other}], ((3, 1), (4, 1), (2, 1))[:n]))
             check(all(abs(p - 1) < 1e-10 for p in a["pressure"]) and not codes(a), kind, n, on, codes(a))
     a = answer_of(s, plates("quad4", [{"on": "bottoms", "with": "tops", "discretization": "nodes"}]))
-    check(abs(a["summary"]["contact"]["reaction_sum"] + 20) < 1e-9 and codes(a) <= {"nodes_against_faces", "overlap"}, codes(a))
+    allowed = {"nodes_against_faces", "overlap", "coarse_mesh"}
+    check(abs(a["summary"]["contact"]["reaction_sum"] + 20) < 1e-9 and codes(a) <= allowed, codes(a))
 
 
 def test_plates_thinner_than_their_sides(s):

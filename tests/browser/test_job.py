@@ -117,7 +117,7 @@ def test_other_jobs_are_laid_over(s, b):
 def test_says_in_words_how_good_the_answer_is(s, b):
     job = s.solve({**SCENE, "solver": {"accuracy": "precise"}})
     b.open(s, f"jobs/{job['id']}")
-    b.says("#certificate", "The exact answer of this discrete problem differs by at most")
+    b.says("#certificate", "The exact answer of its equations differs by at most")
     said = b.text("#certificate").split("at most ")[1].split(" %")[0]
     plain = said.replace("×10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
     error = job["summary"]["certificate"]["relative_error"]

@@ -108,7 +108,13 @@ PHRASES = {
     "Each fails with a probability below 1e-12": None,  # of the theorems used
     "spares bodies of 20,000 dofs and more a half": constant(20000, r"UZ_CERTIFY_SPARES = (\d+)"),
     "d times 2e-16": None,
-    "\"8 digits are certain\"": None, "right to 8 digits": None,
+    "The certificate says 1e-9": None, "From 10 % on": None, "the mesh alone is off by 10 % and": None,
+    "`error.mesh` is 0.1 or more": None, "TLS** is 1.3 or 1.2": None, "with TLS 1.3 or 1.2 and forward": None,
+    "killed where it does not: after 0.2 s": constant(0.2, r"#define CANCEL_S  \(([0-9.]+)"),
+    "0.7 s (a tenth of the limit more": constant(0.7, r"#define LIMIT_S +\(([0-9.]+)"),
+    "an answer to be certified), 0.5 s": constant(0.5, r"#define RELEASE_S \(([0-9.]+)"),
+    "its cache and 512 MiB": constant(512, r"#define LIMIT_ROOM \(\(size_t\)(\d+) << 20\)"),
+    "each of 30 times": None, "a handshake has 5 s": None, "Grooves of less\nthan 0.1 rad": None,
     "at most 80 lines, files of at most 1,000": None, "functions per 1,000 lines": None,
     # limits
     "A request body may have 64 MiB": limit("max_body", 64 << 20), "an upload 1 GiB": limit("max_upload", 1 << 30),

@@ -340,21 +340,3 @@ TEST(a_continued_run_keeps_what_was_reached)
     CHECK(later.step[20].applications == before.step[20].applications + earlier.step[19].applications);
     CHECK(!is_reached(&later.step[40]));
 }
-
-TEST(the_mesh_error_is_found_from_the_answer_again)
-{
-    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(30, 10)};
-    uz_settings settings = uz_settings_default();
-    uz_error err = {0};
-    double error;
-    settings.balanced = true;
-    uz_result *result = solve(&problem, &settings);
-    uz_field_source answer = {.u = result->u, .n_u = result->n_nodes * 2};
-    CHECK_INT(uz_mesh_error(&error, &problem.scene, &answer, NULL, &err), UZ_OK);
-    CHECK_REL(error, result->summary.discretization_error, 1e-9);
-    answer.n_u--;
-    CHECK_INT(uz_mesh_error(&error, &problem.scene, &answer, NULL, &err), UZ_ERR_SIZE);
-    CHECK(isnan(error));
-    uz_result_free(result);
-    uz_problem_clear(&problem);
-}
