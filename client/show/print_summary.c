@@ -26,6 +26,12 @@ static const char *bound_in_words(char text[32], const json_t *object, const cha
     return isfinite(value) ? client_format_bound(text, value) : number_in_words(text, object, path, 2);
 }
 
+/* Places behind the point that leave two digits, up to six. */
+static int places(double value)
+{
+    return value > 0 ? (int)fmin(6, fmax(0, 1 - floor(log10(value)))) : 0;
+}
+
 static void label(FILE *to, const char *text)
 {
     fprintf(to, "%-12s", text);
@@ -94,8 +100,8 @@ static void print_outcome(FILE *to, const json_t *summary)
         const double mesh = client_json_number(error, "mesh"), total = client_json_number(error, "total");
         label(to, "whole error");
         if (isfinite(total))
-            fprintf(to, "about %.2g %% in the energy norm: %.2g %% of it the mesh's, by estimate\n", 100 * total,
-                    100 * mesh);
+            fprintf(to, "about %.*f %% in the energy norm: %.*f %% of it the mesh's, by estimate\n",
+                    places(100 * total), 100 * total, places(100 * mesh), 100 * mesh);
         else
             fprintf(to, "not known: what the %s could not be told\n",
                     isfinite(mesh) ? "equations leave" : "mesh loses");

@@ -188,12 +188,12 @@ uz_status uz_turning_energy(double *energy, const uz_body_model *model, const do
 /* Copies what a result shows of the mesh: not the frames, as a result speaks of x and y only. */
 uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t m, uz_error *err);
 
-/* Estimated ||u - u_h||_E / ||u||_E of the mesh, for nodal displacements n_nodes x dim; NaN when there is no memory or
- * nothing is strained. Zienkiewicz and Zhu, "A simple error estimator and adaptive procedure for practical engineering
- * analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared with its own nodal averages. The
- * strain of the temperatures among the scene's loads (scene NULL: none) has no stress, and the error is relative to the
- * norm of the strain that has: free expansion would hide it. *share (may be NULL): that norm over ||u_h||_E, 1 without
- * temperature. A body that is carried along or expands freely has no error. */
+/* Estimated ||u - u_h||_E / ||u||_E of the mesh, for nodal displacements n_nodes x dim; NaN when there is no memory,
+ * INFINITY where energies are beyond the range of double. Zienkiewicz and Zhu, "A simple error estimator and adaptive
+ * procedure for practical engineering analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared
+ * with its own nodal averages. The strain of the temperatures among the scene's loads (scene NULL: none) has no stress,
+ * and the error is relative to the norm of the strain that has: free expansion would hide it. *share (may be NULL):
+ * that norm over ||u_h||_E, 1 without temperature. A body that is carried along or expands freely has no error. */
 double uz_estimate_mesh_error(double *share, const uz_body_model *model, const uz_scene *scene, const double *nodal);
 
 /* *out: n_elements, expansion times rise of temperature by the scene's loads; NULL where there are no such loads. The

@@ -75,8 +75,10 @@ double uz_estimate_mesh_error(double *share, const uz_body_model *model, const u
         status = uz_strain_groups(&work, &from, NULL, NULL);
     uz_nodal_strains_clear(&x.nodal);
     free(free_strain);
-    if (status != UZ_OK || !(x.sums.whole > 0))
+    if (status != UZ_OK)
         return NAN;
+    if (!(x.sums.whole > 0 && isfinite(x.sums.whole)))
+        return INFINITY;
     const double stressed = sqrt(x.sums.stress / x.sums.whole);
     if (stressed < FREE)
         return 0;

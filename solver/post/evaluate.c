@@ -87,6 +87,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     if (status != UZ_OK)
         return status;
     summary->discretization_error = uz_estimate_mesh_error(&summary->stress_share, model, scene, result->u);
+    if (isnan(summary->discretization_error) && !result->ray)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
     e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);
     status = uz_measure_sliding(&summary->geometry.sliding, model, scene, result->u, result->r, e->approach, err);
     return status == UZ_OK ? uz_find_doubts(result, model, scene, err) : status;

@@ -369,7 +369,7 @@ static void look_at_overlap(const doubts *d, int64_t k)
 static void look_at_mesh(const doubts *d)
 {
     const uz_mesh *mesh = &d->model->mesh;
-    if (d->mesh_error >= COARSE_MESH)
+    if (d->mesh_error >= COARSE_MESH && isfinite(d->mesh_error))
         warn(d->out, "coarse_mesh", d->mesh_error,
              "the mesh itself is off by about %.2g %% in the energy norm: refine it, above all near contacts and "
              "corners",

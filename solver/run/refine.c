@@ -220,7 +220,7 @@ static uz_status solve_precisely(uz_run *run, bool *solved, const double *p, int
         bool held = true; /* reactions, in these units; they may be in the caller's */
         for (int64_t i = 0; i < run->m && now->absolute_error < by_doubles; i++) {
             answer.r[i] = uz_precise_round(r[i]);
-            held = held && (isfinite(answer.r[i]) || run->load.exponent == 0);
+            held = held && isfinite(answer.r[i]);
         }
         if (status != UZ_OK || !held)
             break;

@@ -125,7 +125,8 @@ static uz_status certify(uz_semi *s, uz_error *err)
                               .h = s->of.h,
                               .inverse_norm = no_inverse,
                               .rcond = 1.0,
-                              .inverse_bound = 0.0};
+                              .inverse_bound = 0.0,
+                              .spares = true};
     uz_status status = uz_certify(c, result->r, result->g, result->u, &input, err);
     if (status != UZ_OK)
         return status;

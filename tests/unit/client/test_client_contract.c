@@ -85,8 +85,8 @@ TEST(outcomes_in_words)
                 {"{\"status\": \"dismissed\"}", "no answer", CLIENT_NO_ANSWER},
                 {"{\"status\": \"successful\", \"summary\": {\"outcome\": \"time_limit\", \"message\": \"late\"}}",
                  "time_limit: late", CLIENT_FAIL},
-                {"{\"status\": \"successful\", \"summary\": {\"outcome\": \"converged\", \"certificate\": "
-                 "{\"relative_error\": 1e-9}}}",
+                {"{\"status\": \"successful\", \"summary\": {\"outcome\": \"converged\", \"error\": "
+                 "{\"total\": 1e-9, \"kind\": \"guaranteed\"}}}",
                  "1e-09", CLIENT_PASS}};
     for (size_t i = 0; i < sizeof LIST / sizeof LIST[0]; i++) {
         client_checks checks = {.item = NULL};

@@ -372,7 +372,7 @@ TEST(a_blunt_bound_on_the_inverse_misses_no_request)
             uz_certify_input in = input_of(&b);
             uz_certificate c;
             take_exact(&b);
-            double push[6]; /* u off by what the correction takes back: all of the bound is in that */
+            double push[6] = {0}; /* u off by what the correction takes back: all of the bound is in that */
             for (int64_t i = 0; i < kind.m; i++)
                 push[i] = b.exact.active[i] ? 1e-9 * random_signed(&rng) : 0;
             for (int64_t j = 0; j < kind.d; j++)
