@@ -34,6 +34,7 @@ process *work_take_process(work *w, const char *text, size_t len, uint64_t *body
     found->taken = true;
     pthread_mutex_unlock(&w->pool_lock);
     atomic_store(&found->board->stop, false);
+    atomic_store(&found->board->heard, false);
     live_reset(&found->board->live);
     return found;
 }

@@ -51,7 +51,10 @@ typedef struct {
 static bool is_stopped(void *ctx)
 {
     const solver *s = ctx;
-    return atomic_load_explicit(&s->board->stop, memory_order_relaxed);
+    const bool stop = atomic_load_explicit(&s->board->stop, memory_order_relaxed);
+    if (stop)
+        atomic_store_explicit(&s->board->heard, true, memory_order_relaxed);
+    return stop;
 }
 
 static void note_progress(void *ctx, const uz_history_row *row)

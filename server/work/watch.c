@@ -19,6 +19,7 @@ enum { PATIENCE = 1 };
 #define TELL_S    0.25             /* progress is told so often */
 #define CANCEL_S  (0.2 * PATIENCE) /* from the word to the kill: somebody waits for that */
 #define RELEASE_S (0.5 * PATIENCE) /* the service stops, or another owner has the job */
+#define HEARD_S   (1.0 * PATIENCE) /* more, where the process has seen it and certifies its answer */
 #define START_S   (20.0 * PATIENCE)
 
 /* Beyond its time limit. Once it iterates there is an answer, whose certificate may take a while. */
@@ -116,13 +117,15 @@ static watch_end follow(watch *w, watch_report *out)
     for (;;) {
         double now = clock_seconds(CLOCK_MONOTONIC);
         pass_on(w, now);
-        if (w->stopping && now >= w->stop_at)
+        const bool heard = w->stopping && atomic_load(&w->p->board->heard);
+        if (w->stopping && now >= w->stop_at + (heard ? HEARD_S : 0.0))
             return WATCH_STOPPED;
         if (is_overdue(w, now))
             return w->p->ready ? WATCH_OVERDUE : WATCH_NOT_STARTED;
         tell_progress(w, now);
         double wait = TELL_S;
-        wait = w->stopping ? fmin(wait, w->stop_at - now) : wait;
+        wait = w->stopping ? fmin(wait, fmax(0.0, w->stop_at - now)) : wait;
+        wait = heard && now >= w->stop_at ? fmin(TELL_S, w->stop_at + HEARD_S - now) : wait;
         wait = w->due_at > now ? fmin(wait, w->due_at - now) : wait;
         if (poll(fds, 2, (int)(1e3 * wait) + 1) <= 0)
             continue;
