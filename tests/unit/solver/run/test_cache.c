@@ -1,7 +1,6 @@
 /* The cache of bodies: one creator per key, a bound in bytes, and keys that tell bodies apart. */
 #include "run/setup_cache.h"
 #include "cache/table.h"
-#include "certificate/certificate.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -488,31 +487,6 @@ TEST(digest_of_scenes)
         CHECK_MSG(!differs(other, NULL, &original), "change %zu of a load makes another body", k);
     }
     uz_problem_clear(&original);
-}
-
-/* Above UZ_CERTIFY_SPARES dofs: the rounding of the factor is so far from doubtful that nobody measures it, and the
- * certificate is the same from the first answer on. */
-TEST(certificates_of_a_large_body)
-{
-    uz_cache *cache = uz_cache_new(1 << 30);
-    uz_settings settings = uz_settings_default();
-    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(180, 60)};
-    double first = 0;
-    for (int k = 0; k < 4; k++) {
-        uz_result *result = NULL;
-        CHECK_INT(uz_solve(&result, &problem, &settings, cache, NULL, NULL), UZ_OK);
-        const double error = result->summary.certificate.relative_error;
-        first = k == 0 ? error : first;
-        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
-        CHECK_MSG(error == first && result->d >= UZ_CERTIFY_SPARES, "%g, at first %g", error, first);
-        uz_result_free(result);
-    }
-    bool hit;
-    uz_setup *setup = acquire(cache, &problem, &hit);
-    CHECK(hit && isnan(setup->doubt));
-    uz_setup_release(cache, setup);
-    uz_problem_clear(&problem);
-    uz_cache_free(cache);
 }
 
 /* The second answer uses the first one's factor, and is the answer of its own load. */

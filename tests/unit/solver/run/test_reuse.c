@@ -1,4 +1,6 @@
 /* What a solve takes over from earlier ones with a body that is like its own but not the same. */
+#include "run/setup_cache.h"
+#include "certificate/certificate.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -236,5 +238,31 @@ TEST(spared_solves_are_done_for_those_who_ask_for_more)
                   "%g asked, %g reached", asked, reached);
         uz_result_free(result);
     }
+    uz_cache_free(cache);
+}
+
+/* Above UZ_CERTIFY_SPARES dofs: the rounding of the factor is so far from doubtful that nobody measures it, and the
+ * certificate is the same from the first answer on. */
+TEST(certificates_of_a_large_body)
+{
+    uz_cache *cache = uz_cache_new(1 << 30);
+    uz_settings settings = uz_settings_default();
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(180, 60)};
+    double first = 0;
+    for (int k = 0; k < 4; k++) {
+        uz_result *result = NULL;
+        CHECK_INT(uz_solve(&result, &problem, &settings, cache, NULL, NULL), UZ_OK);
+        const double error = result->summary.certificate.relative_error;
+        first = k == 0 ? error : first;
+        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+        CHECK_MSG(error == first && result->d >= UZ_CERTIFY_SPARES, "%g, at first %g", error, first);
+        uz_result_free(result);
+    }
+    uz_setup *setup = NULL;
+    uz_reuse reused;
+    CHECK_INT(uz_setup_acquire(&setup, &reused, cache, &problem, NULL, &settings, NULL, NULL), UZ_OK);
+    CHECK(reused.op && isnan(setup->doubt));
+    uz_setup_release(cache, setup);
+    uz_problem_clear(&problem);
     uz_cache_free(cache);
 }
