@@ -4,6 +4,7 @@ A test program is a module with functions test_*; it ends in `service.main(globa
 BUILD_DIR [FILTER]. Each test gets a running Service that it may use up: stop() is always called after it. A test that
 needs other options is decorated with @options("--workers", "1"). Raise Skip("why") to skip.
 """
+import contextlib
 import functools
 import gzip
 import http.client
@@ -13,6 +14,7 @@ import pathlib
 import shutil
 import signal
 import socket
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -119,6 +121,7 @@ class Service:
         return [str(self.build / "uzawad"), *options]
 
     def start(self):
+        self.close()
         self.log_file = open(os.path.join(self.folder, "log"), "ab")
         suppressions = f"suppressions={ROOT / 'tests' / 'tsan.supp'} {os.environ.get('TSAN_OPTIONS', '')}"
         self.process = subprocess.Popen(self.command("--listen", "127.0.0.1:0", "--db", self.db, *self.options),
@@ -132,6 +135,12 @@ class Service:
         self.host, port = self.url[len("http://"):].rsplit(":", 1)
         self.port = int(port)
         return self
+
+    def close(self):
+        """The pipes of the daemon that ran before, if any."""
+        if self.process:
+            self.process.stdout.close()
+            self.log_file.close()
 
     def log(self):
         """The log so far, as text."""
@@ -162,8 +171,6 @@ class Service:
     def restart(self, number=signal.SIGKILL, timeout=60):
         """Ends it by a signal and starts it again on the same database; returns the exit status."""
         status = self.terminate(timeout, number)
-        self.process.stdout.close()
-        self.log_file.close()
         self.start()
         return status
 
@@ -172,10 +179,13 @@ class Service:
         if self.process and self.process.poll() is None:
             self.process.kill()
             self.process.wait()
-        if self.process:
-            self.process.stdout.close()
-            self.log_file.close()
+        self.close()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    def sql(self, statement, values=()):
+        """What SQLite answers past the daemon, on its database; changes are kept."""
+        with contextlib.closing(sqlite3.connect(self.db)) as db, db:
+            return db.execute(statement, values).fetchall()
 
     def solvers(self):
         """Process ids of those that solve, and live."""
@@ -260,6 +270,13 @@ def check(condition, *what):
     """assert that stays with python -O, and says what it saw."""
     if not condition:
         raise AssertionError(" ".join(str(one) for one in what))
+
+
+def wait_until(holds, seconds=60):
+    end = time.monotonic() + seconds
+    while not holds():
+        check(time.monotonic() < end, "not true after", seconds, "s")
+        time.sleep(0.02)
 
 
 def expect(reply, status, code=None):

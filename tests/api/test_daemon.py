@@ -14,8 +14,6 @@ from service import ENDLESS, MATRICES, SCENE, Skip, check, expect, options
 def test_terminates(s):
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         if s.process.poll() is not None:
-            s.process.stdout.close()
-            s.log_file.close()
             s.start()
         s.get("/healthz")
         started = time.monotonic()
@@ -44,8 +42,6 @@ def test_drain(s):
     thread.join(timeout=10)
     check(poll["reply"].status == 200 and time.monotonic() - started < 2, poll)
     check(s.process.wait(timeout=30) == 0 and 1.5 < time.monotonic() - started < 10, time.monotonic() - started)
-    s.process.stdout.close()
-    s.log_file.close()
     s.start()  # the job was put back and runs again
     again = s.wait_status(job["id"], "running")
     check(again["attempts"] == 1, again)
@@ -66,11 +62,7 @@ def test_killed_daemon_keeps_jobs(s):
     done = s.solve(MATRICES)
     running = s.post(ENDLESS).json
     s.wait_status(running["id"], "running")
-    s.process.kill()
-    s.process.wait()
-    s.process.stdout.close()
-    s.log_file.close()
-    s.start()
+    s.restart()
     check(s.get(f"/v1/jobs/{done['id']}").json["summary"] == done["summary"])
     check(s.wait_status(running["id"], "running")["attempts"] == 2)
 

@@ -1,9 +1,8 @@
 """A bit that changes in the database file is found by its row's checksum: what is not what was written is never told as an
 answer, and everything else goes on. usage: test_damaged.py BUILD_DIR [FILTER]
 """
-import contextlib
 import pathlib
-import sqlite3
+import signal
 import struct
 import subprocess
 
@@ -21,8 +20,6 @@ def change(s, old, new):
 
 def stop(s):
     check(s.terminate() == 0, s.log())
-    s.process.stdout.close()
-    s.log_file.close()
 
 
 def flipped(data, at, bit=0):
@@ -71,16 +68,14 @@ def test_the_name_of_a_vector(s):
     """One bit of it, and the vector is another one's: the answer must not come without."""
     job = s.solve(SCENE)["id"]
     stop(s)
-    with contextlib.closing(sqlite3.connect(s.db)) as db, db:
-        db.execute("UPDATE vector SET name = 'reactionr' WHERE name = 'reactions'")
+    s.sql("UPDATE vector SET name = 'reactionr' WHERE name = 'reactions'")
     check("reactionr" in findings(s)[1], findings(s))
     s.start()
     check_named(s.get(f"/v1/jobs/{job}/result"), job)
     check_named(s.get(f"/v1/jobs/{job}/result?fields=reactions"), job)
     expect(s.get(f"/v1/jobs/{job}/result?fields=gaps"), 200)
     stop(s)
-    with contextlib.closing(sqlite3.connect(s.db)) as db, db:
-        db.execute("DELETE FROM vector WHERE name = 'gaps'")
+    s.sql("DELETE FROM vector WHERE name = 'gaps'")
     check("missing" in findings(s)[1], findings(s))
     s.start()
     check_named(s.get(f"/v1/jobs/{job}/result?fields=gaps"), job)
@@ -93,10 +88,7 @@ def test_a_log_that_was_cut(s):
     wal = pathlib.Path(s.db + "-wal")
     size = wal.stat().st_size
     lost = [s.post(MATRICES, {"Prefer": "wait=30"}).json["id"] for _ in range(3)]
-    s.process.kill()
-    s.process.wait()
-    s.process.stdout.close()
-    s.log_file.close()
+    s.terminate(number=signal.SIGKILL)
     with open(wal, "r+b") as file:
         file.truncate(size)
     code, text = findings(s)
@@ -106,11 +98,7 @@ def test_a_log_that_was_cut(s):
     check(len(missing) == 1 and missing[0]["level"] == "error" and all(f"submitted {one}" in missing[0]["cause"] for one in lost), missing)
     check(kept not in missing[0]["cause"] and s.get(f"/v1/jobs/{kept}").status == 200, missing)
     s.solve(MATRICES)  # it goes on, and says it once
-    s.process.kill()
-    s.process.wait()
-    s.process.stdout.close()
-    s.log_file.close()
-    s.start()
+    s.restart()
     check(len(s.events("commits_missing")) == 1, s.log())
     stop(s)
     check(findings(s)[0] == 0, findings(s))
@@ -215,17 +203,11 @@ def test_a_request(s):
     s.wait_status(first, "running")
     damaged = s.post({**MATRICES, "tags": ["damaged-one"]}).json["id"]
     behind = s.post(MATRICES).json["id"]
-    s.process.kill()
-    s.process.wait()
-    s.process.stdout.close()
-    s.log_file.close()
-    with contextlib.closing(sqlite3.connect(s.db)) as connection:  # past the daemon: also what stands in the journal
-        body = connection.execute("SELECT body FROM request WHERE job = ?", (damaged,)).fetchone()[0]
-        connection.execute("UPDATE request SET body = ? WHERE job = ?",
-                           (body.replace(b"[2, 2]", b"[2, 3]"), damaged))
-        connection.execute("UPDATE job SET status = 4 WHERE id = ?", (first,))
-        connection.commit()
-        check(b"[2, 2]" in body)
+    s.terminate(number=signal.SIGKILL)
+    body, = s.sql("SELECT body FROM request WHERE job = ?", (damaged,))[0]  # also what stands in the journal
+    check(b"[2, 2]" in body)
+    s.sql("UPDATE request SET body = ? WHERE job = ?", (body.replace(b"[2, 2]", b"[2, 3]"), damaged))
+    s.sql("UPDATE job SET status = 4 WHERE id = ?", (first,))
     s.start()
     failed = s.wait_status(damaged, "failed")
     check(failed["error"]["code"] == "stored_data_damaged" and failed["summary"] is None, failed)

@@ -8,7 +8,7 @@ import threading
 import time
 
 import service
-from service import ENDLESS, MATRICES, check, expect, head_of, options, read_all
+from service import ENDLESS, MATRICES, check, expect, head_of, options, read_all, wait_until
 
 LONG = 1.5  # seconds after which a long poll has given up its thread
 
@@ -23,13 +23,6 @@ def ask(s, path, fields="", method="GET", body=b""):
     length = f"Content-Length: {len(body)}\r\nContent-Type: application/json\r\n" if body else ""
     c.sendall(f"{method} {path} HTTP/1.1\r\nHost: x\r\n{length}{fields}\r\n".encode() + body)
     return c
-
-
-def until(holds, seconds=20):
-    end = time.monotonic() + seconds
-    while not holds():
-        check(time.monotonic() < end, "it does not become true")
-        time.sleep(0.05)
 
 
 def stream_start(c):
@@ -62,7 +55,7 @@ def test_no_threads(s):
         stream_start(c)
     # The last of them may come after the end, and is answered at once then.
     polls = [ask(s, f"/v1/jobs/{job}", "Prefer: wait=60\r\nConnection: close\r\n") for _ in range(50)]
-    until(lambda: threads(s) <= before + 2)
+    wait_until(lambda: threads(s) <= before + 2)
     metrics = s.get("/metrics").body.decode()
     check("uzawad_http_connections 151" in metrics and "uzawad_http_event_streams 100" in metrics,
           [line for line in metrics.splitlines() if "connections" in line or "streams" in line])
@@ -75,7 +68,7 @@ def test_no_threads(s):
         check(closed and b'"status":"dismissed"' in data and data.endswith(b"0\r\n\r\n"), data[-300:])
     for c in held + polls:
         c.close()
-    until(lambda: "uzawad_http_connections 1\n" in s.get("/metrics").body.decode())
+    wait_until(lambda: "uzawad_http_connections 1\n" in s.get("/metrics").body.decode())
     ended = [event for event in s.events("request") if event["path"].startswith("/v1/") and event["method"] == "GET"]
     check(len([event for event in ended if event["end"] == "complete" and event["status"] == 200]) >= 100, ended)
     check(len([event for event in ended if event["path"] == "/v1/events" and event["end"] == "aborted"]) == 50, ended)
@@ -173,7 +166,7 @@ def test_clients_leave(s):
     asked[2].shutdown(socket.SHUT_WR)
     asked[3].setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
     asked[3].close()  # by a reset
-    until(lambda: len([e for e in s.events("request") if e["method"] == "GET" and e["end"] == "aborted"]) == 4)
+    wait_until(lambda: len([e for e in s.events("request") if e["method"] == "GET" and e["end"] == "aborted"]) == 4)
     check(read_all(asked[2])[1])
     asked[2].close()
     check(s.get("/healthz").json["status"] == "ok")
@@ -201,7 +194,7 @@ def test_they_count_as_connections(s):
     _, closed = s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=5)
     check(closed, "a ninth connection was served")
     held.pop().close()
-    until(lambda: s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=1)[0].startswith(b"HTTP/1.1 200"))
+    wait_until(lambda: s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=1)[0].startswith(b"HTTP/1.1 200"))
     for c in held:
         c.close()
 
@@ -215,7 +208,7 @@ def test_they_count_for_their_client(s):
     check(closed and not data, "a fourth connection was served", data)
     for c in held:
         c.close()
-    until(lambda: s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=1)[0].startswith(b"HTTP/1.1 200"))
+    wait_until(lambda: s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=1)[0].startswith(b"HTTP/1.1 200"))
 
 
 def test_many_come_and_go(s):
@@ -234,7 +227,7 @@ def test_many_come_and_go(s):
         one.start()
     for one in everyone:
         one.join()
-    until(lambda: "uzawad_http_connections 1\n" in s.get("/metrics").body.decode())
+    wait_until(lambda: "uzawad_http_connections 1\n" in s.get("/metrics").body.decode())
     check("uzawad_http_event_streams 0\n" in s.get("/metrics").body.decode())
 
 

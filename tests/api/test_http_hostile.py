@@ -4,7 +4,7 @@ import socket
 import time
 
 import service
-from service import MATRICES, SCENE, check, expect, head_of, options, read_all
+from service import MATRICES, SCENE, check, expect, head_of, options, read_all, wait_until
 
 # ----------------------------------------------------------------- framing
 
@@ -320,13 +320,6 @@ def test_connections_of_one_address(s):
         c.close()
     wait_until(lambda: answers(s))
     check(s.events("too_many_connections")[0]["refused"] == 1, s.log())
-
-
-def wait_until(true, seconds=10):
-    end = time.monotonic() + seconds
-    while not true():
-        check(time.monotonic() < end, "never")
-        time.sleep(0.05)
 
 
 def answers(s):

@@ -1,12 +1,10 @@
 """Clients kept apart: jobs, uploads, keys, lists and events belong to the owner of the token that they came with.
 usage: test_owners.py BUILD_DIR [FILTER]
 """
-import contextlib
 import hashlib
 import json
 import os
 import pathlib
-import sqlite3
 import tempfile
 import time
 
@@ -207,8 +205,7 @@ def test_quotas(s):
     check("--client-seconds" in reply.json["detail"], reply)
     expect(ask(s, NEW, "GET", f"/v1/jobs/{waiting[1]}", Prefer="wait=30"), 200)
     check(s.end() == 0)
-    with contextlib.closing(sqlite3.connect(s.db)) as db, db:
-        db.execute("UPDATE client SET day = day - 1")
+    s.sql("UPDATE client SET day = day - 1")
     s.start()
     expect(ask(s, BOSS, "POST", "/v1/jobs", MATRICES), 202)
     check(expect(ask(s, BOSS, "POST", "/v1/admin/check"), 200).json["whole"])
@@ -254,8 +251,7 @@ def test_audit(s):
 def test_without_tokens_all_belongs_to_one(s):
     job = s.solve(SCENE)
     check("owner" not in job and [one["id"] for one in s.get("/v1/jobs").json["jobs"]] == [job["id"]], job)
-    with contextlib.closing(sqlite3.connect(s.db)) as db:
-        check(db.execute("SELECT count(*) FROM client").fetchone() == (0,))
+    check(s.sql("SELECT count(*) FROM client") == [(0,)])
 
 
 if __name__ == "__main__":

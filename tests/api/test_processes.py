@@ -60,8 +60,6 @@ def test_the_service_ends_while_it_factors(s):
     check(s.process.wait(timeout=30) == 0)
     took = time.monotonic() - began
     check(took < 3.2, took)
-    s.process.stdout.close()
-    s.log_file.close()
     s.start()
     check(s.get(f"/v1/jobs/{job}").json["status"] in ("accepted", "running"))
     check(s.events("job_released"), s.log()[-2000:])
@@ -102,8 +100,7 @@ def test_an_idle_process_may_go(s):
 def test_processes_go_with_the_daemon(s):
     s.solve(MATRICES)
     pid = s.solvers()[0]
-    s.process.kill()
-    s.process.wait()
+    s.terminate(number=signal.SIGKILL)
     end = time.monotonic() + 10
     while os.path.exists(f"/proc/{pid}") and "Z" not in pathlib.Path(f"/proc/{pid}/stat").read_text().split()[2]:
         check(time.monotonic() < end, "it lives on")

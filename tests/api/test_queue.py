@@ -1,12 +1,11 @@
 """Which jobs run first, which wait too long, which are listed, and which are kept."""
 import datetime
-import sqlite3
 import threading
 import time
 import urllib.parse
 
 import service
-from service import ENDLESS, MATRICES, check, expect, options
+from service import ENDLESS, MATRICES, check, expect, options, wait_until
 
 
 def ids(reply):
@@ -15,13 +14,6 @@ def ids(reply):
 
 def listed(s, **query):
     return ids(s.get("/v1/jobs?" + urllib.parse.urlencode(query, doseq=True)))
-
-
-def wait_until(condition, seconds=20):
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.05)
-    check(condition(), "did not happen in", seconds, "s")
 
 
 # -------------------------------------------------------------------- list
@@ -170,9 +162,7 @@ def test_keep_days(s):
     s.start()
     jobs = [s.solve(MATRICES)["id"] for _ in range(2)]
     s.terminate()
-    with sqlite3.connect(s.db) as db:
-        db.execute("UPDATE job SET finished = finished - 86400 WHERE id = ?", (jobs[0],))
-    db.close()
+    s.sql("UPDATE job SET finished = finished - 86400 WHERE id = ?", (jobs[0],))
     s.options = ("--keep-days", "0.5")
     s.start()
     wait_until(lambda: listed(s) == [jobs[1]])
@@ -183,12 +173,9 @@ def test_keep_bytes(s):
     s.start()
     jobs = [s.solve(MATRICES)["id"] for _ in range(4)]
     s.terminate()
-    with sqlite3.connect(s.db) as db:
-        sizes = [db.execute("SELECT bytes FROM job WHERE id = ?", (one,)).fetchone()[0] for one in jobs]
-        body = db.execute("SELECT length(body) FROM request WHERE job = ?", (jobs[0],)).fetchone()[0]
-        data = db.execute("SELECT (SELECT sum(length(data)) FROM vector WHERE job = ?1)"
-                          " + (SELECT sum(length(data)) FROM history WHERE job = ?1)", (jobs[0],)).fetchone()[0]
-    db.close()
+    sizes = [s.sql("SELECT bytes FROM job WHERE id = ?", (one,))[0][0] for one in jobs]
+    (body, data), = s.sql("SELECT length(body), (SELECT sum(length(data)) FROM vector WHERE job = ?1)"
+                          " + (SELECT sum(length(data)) FROM history WHERE job = ?1) FROM request WHERE job = ?1", (jobs[0],))
     check(sizes[0] == body + data and body > 0 and data > 0, sizes, body, data)
     s.options = ("--keep-bytes", str(sum(sizes[2:]) + 1))
     s.start()

@@ -9,12 +9,11 @@ import os
 import random
 import resource
 import signal
-import sqlite3
 import threading
 import time
 
 import service
-from service import ENDLESS, INSTRUMENTED, MATRICES, SCENE, check, expect, options
+from service import ENDLESS, INSTRUMENTED, MATRICES, SCENE, check, expect, options, wait_until
 
 ALL_FIELDS = "?fields=summary,reactions,gaps,displacements"
 
@@ -113,11 +112,9 @@ def check_all_successful(s, acknowledged):
 def check_file(s):
     """The database after the daemon has ended: sound, and without rows of nobody's."""
     s.end()
-    with sqlite3.connect(s.db) as db:
-        check(db.execute("PRAGMA integrity_check").fetchone() == ("ok",), "the file is damaged")
-        check(db.execute("PRAGMA foreign_key_check").fetchall() == [], "rows that belong to no job")
-        check(db.execute("SELECT count(*) FROM job WHERE owner IS NOT NULL AND status = 1").fetchone() == (0,))
-    db.close()
+    check(s.sql("PRAGMA integrity_check") == [("ok",)], "the file is damaged")
+    check(s.sql("PRAGMA foreign_key_check") == [], "rows that belong to no job")
+    check(s.sql("SELECT count(*) FROM job WHERE owner IS NOT NULL AND status = 1") == [(0,)])
 
 
 # ---------------------------------------------------------------- kill -9
@@ -208,9 +205,7 @@ def test_killed_during_submission(s):
             job_id = s.post(request, {"Idempotency-Key": key}).json["id"]
             energies[job_id] = energy
         wait_idle(s)
-        with sqlite3.connect(s.db) as db:  # so that the next round's keys are new ones
-            db.execute("UPDATE job SET idempotency_key = NULL")
-        db.close()
+        s.sql("UPDATE job SET idempotency_key = NULL")  # so that the next round's keys are new ones
     check(len(promised) > 20, "hardly anything was submitted:", len(promised))
     check_all_successful(s, {**promised, **energies})
     check_file(s)
@@ -218,13 +213,6 @@ def test_killed_during_submission(s):
 
 def iterates(s, job_id):
     return s.get(f"/v1/jobs/{job_id}").json["progress"] > 5 and len(s.get(f"/v1/jobs/{job_id}/history").json["rows"]) > 0
-
-
-def wait_until(condition, seconds=60):
-    end = time.monotonic() + seconds
-    while not condition():
-        check(time.monotonic() < end, "it does not become true")
-        time.sleep(0.02)
 
 
 @options("--workers", "1", "--max-attempts", "1")

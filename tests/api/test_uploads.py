@@ -5,7 +5,6 @@ import os
 import pathlib
 import random
 import resource
-import sqlite3
 import threading
 import time
 
@@ -93,9 +92,7 @@ def test_limit_of_all(s):
     expect(send(s, bytes(60000)), 201)
     expect(send(s, bytes(50000)), 507, "uploads_full")  # the first was used too lately to make room
     s.terminate()
-    with sqlite3.connect(s.db) as db:
-        db.execute("UPDATE upload SET used = used - 3600")
-    db.close()
+    s.sql("UPDATE upload SET used = used - 3600")
     s.start()
     expect(send(s, bytes(50000)), 201)
     check(files(s) == [digest(bytes(50000))], files(s))

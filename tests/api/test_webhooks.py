@@ -4,7 +4,6 @@ import hmac
 import http.server
 import json
 import os
-import sqlite3
 import threading
 import time
 
@@ -60,9 +59,7 @@ def told_in_store(s, job_id, least=1):
     """(state, attempts, next) once there were so many attempts."""
     end = time.monotonic() + 20
     while time.monotonic() < end:
-        with sqlite3.connect(f"file:{s.db}?mode=ro", uri=True) as db:
-            row = db.execute("SELECT state, attempts, next FROM webhook WHERE job = ?", (job_id,)).fetchone()
-        db.close()
+        row, = s.sql("SELECT state, attempts, next FROM webhook WHERE job = ?", (job_id,))
         if row[1] >= least:
             return row
         time.sleep(0.05)
@@ -120,9 +117,7 @@ def test_a_restart_forgets_none(s):
     s.terminate(number=9)
     receiver.close()
     for again in range(2):  # later each time; nobody listens now
-        with sqlite3.connect(s.db) as db:
-            db.execute("UPDATE webhook SET next = 0, attempts = ?", (1 + again * 3,))
-        db.close()
+        s.sql("UPDATE webhook SET next = 0, attempts = ?", (1 + again * 3,))
         if again:
             receiver = Receiver(port=receiver.port)
         s.start()
@@ -147,16 +142,12 @@ def test_what_ends_the_telling(s):
     receiver.wait(2)
     s.options = ("--webhook-allow", "example.org")
     s.terminate()
-    with sqlite3.connect(s.db) as db:
-        db.execute("UPDATE webhook SET next = 0")
-    db.close()
+    s.sql("UPDATE webhook SET next = 0")
     s.start()
     check(told_in_store(s, moved["id"], 2)[0] == 3)
     receiver.wait(2)  # it was not called any more
     s.terminate()
-    with sqlite3.connect(s.db) as db:
-        db.execute("UPDATE webhook SET state = 1, next = 0, attempts = 1 WHERE job = ?", (gone["id"],))
-    db.close()
+    s.sql("UPDATE webhook SET state = 1, next = 0, attempts = 1 WHERE job = ?", (gone["id"],))
     s.options = ("--keep-jobs", "1")
     s.start()
     end = time.monotonic() + 20

@@ -64,8 +64,6 @@ def test_mistakes_of_json_need_no_service(s, b):
         wrong(b, text, says, line_of(text, new) + after, marked)
     b.write("#job-text", TEXT[:-1])
     b.says("#verdict", f"Line {TEXT.count(chr(10)) + 1},")
-    s.process.stdout.close()
-    s.log_file.close()
     s.start()
     b.console()
 

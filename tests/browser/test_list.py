@@ -89,8 +89,6 @@ def test_comes_back_when_the_daemon_does(s, b):
     port = s.port
     s.terminate()
     b.says("#list-state", "connection lost")
-    s.process.stdout.close()
-    s.log_file.close()
     start = s.command
     s.command = lambda *given: start(*[f"127.0.0.1:{port}" if one == "127.0.0.1:0" else one for one in given])
     s.start()
@@ -140,8 +138,6 @@ def test_ten_thousand_jobs_are_smooth(s, b):
     s.start()
     summary = json.dumps(s.solve(SCENE)["summary"])
     check(s.end() == 0, s.log())
-    s.process.stdout.close()
-    s.log_file.close()
     fill(s.db, summary)
     s.start()
     b.open(s)

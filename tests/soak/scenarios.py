@@ -104,8 +104,6 @@ def endings(build, cycles, number, clients=16, seed=1):
                 figures["refused"] += one.refusals
             if number == signal.SIGTERM:  # nothing is left running
                 figures["put_back_missing"] += rows(s.db, "SELECT count(*) FROM job WHERE status = 1")[0][0]
-            s.process.stdout.close()
-            s.log_file.close()
             s.start()
         figures["lost"], figures["stuck"], figures["twice"] = settle(s, acknowledged)
         check = subprocess.run(s.command("--check-db", "--db", s.db), capture_output=True, text=True, check=False)
@@ -257,8 +255,6 @@ def full_database(build, jobs, count=100):
                 s.post(service.MATRICES)
             if size:
                 s.terminate()
-                s.process.stdout.close()
-                s.log_file.close()
                 fill(s.db, size)
                 s.start()
             held = http.client.HTTPConnection(s.host, s.port, timeout=60)
