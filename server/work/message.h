@@ -65,7 +65,7 @@ typedef struct {
         } answer;
         struct {
             int64_t n_cases;     /* names from the begin of the outbox on, CASE_NAME bytes each */
-            double time_limit_s; /* from now on; 0 or infinity: none */
+            double time_limit_s; /* from now on; infinity: none */
         } read;
         struct {
             bool stopped, start_lost; /* as a solution has them */

@@ -93,12 +93,12 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
         solution_fail(out, codec_encode_problem(&problem));
         return;
     }
-    if (with->read)
-        with->read(with->hooks->ctx, &out->request);
     uz_settings *settings = &out->request.settings;
     if (with->max_solve_s > 0.0 && settings->time_limit_s > with->max_solve_s)
         settings->time_limit_s = with->max_solve_s;
     settings->memory_limit = with->memory_limit;
+    if (with->read)
+        with->read(with->hooks->ctx, &out->request);
     uz_status status = out->request.answer.u ? verify(out, with, &err) : solve_cases(out, with, &err);
     if (status == UZ_ERR_MEMORY) {
         err.status = UZ_ERR_LIMIT;

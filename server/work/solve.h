@@ -16,7 +16,7 @@ typedef struct {
     size_t memory_limit;   /* bytes; 0: no limit */
     double max_solve_s;    /* whatever the text asks for; 0: no limit */
     double queue_s;        /* it has waited; part of its times */
-    /* may be NULL; hooks->ctx: the text was read. The request is good until solution_clear. */
+    /* may be NULL; hooks->ctx: the text was read. The request, with the limits above, is good until solution_clear. */
     void (*read)(void *ctx, const codec_request *request);
 } solve_with;
 

@@ -43,7 +43,6 @@ typedef struct {
     live_writer live;
     size_t names; /* bytes at the begin of the outbox */
     bool fresh;   /* a job has ended since memory was made ready last */
-    double max_solve_s;
 } solver;
 
 /* ---- what the solver asks and tells */
@@ -77,10 +76,7 @@ static void note_request(void *ctx, const codec_request *request)
 {
     solver *s = ctx;
     const uz_problem *problem = &request->problem;
-    const double asked = request->settings.time_limit_s;
-    packet m = {.kind = MESSAGE_READ, .u.read = {.time_limit_s = asked}};
-    if (s->max_solve_s > 0.0 && !(asked > 0.0 && asked < s->max_solve_s))
-        m.u.read.time_limit_s = s->max_solve_s;
+    packet m = {.kind = MESSAGE_READ, .u.read = {.time_limit_s = request->settings.time_limit_s}};
     if (segment_reach(&s->outbox, (size_t)problem->n_cases * CASE_NAME, true)) {
         s->names = (size_t)problem->n_cases * CASE_NAME;
         m.u.read.n_cases = problem->n_cases;
@@ -122,7 +118,6 @@ static void run_job(solver *s, const packet *m)
     solution solved;
     char *body = NULL;
     s->names = 0;
-    s->max_solve_s = with.max_solve_s;
     uz_process_threads(m->u.job.threads);
     if (!m->u.job.damaged && segment_reach(&s->inbox, size, false) && (body = malloc(size + 1))) {
         memcpy(body, s->inbox.at, size);
