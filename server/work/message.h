@@ -75,7 +75,7 @@ typedef struct {
             uint64_t cached, held; /* entries and bytes of the cache */
         } done;
         struct {
-            uint64_t at, count, bytes; /* entries in the outbox; bytes: of all, count may be fewer */
+            uint64_t count; /* entries from the begin of the outbox on */
         } listed;
     } u;
 } packet;

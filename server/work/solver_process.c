@@ -154,16 +154,12 @@ static void list_cache(solver *s)
     uz_cache_entry *entries = NULL;
     size_t count = 0;
     packet m = {.kind = MESSAGE_LISTED};
-    if (uz_cache_list(s->cache, &entries, &count, NULL) == UZ_OK) {
-        for (size_t i = 0; i < count; i++)
-            m.u.listed.bytes += entries[i].bytes;
-        if (segment_reach(&s->outbox, count * sizeof *entries, true)) {
-            m.u.listed.count = count;
-            if (count > 0)
-                memcpy(s->outbox.at, entries, count * sizeof *entries);
-        }
-        free(entries);
+    if (uz_cache_list(s->cache, &entries, &count, NULL) == UZ_OK && count > 0 &&
+        segment_reach(&s->outbox, count * sizeof *entries, true)) {
+        memcpy(s->outbox.at, entries, count * sizeof *entries);
+        m.u.listed.count = count;
     }
+    free(entries);
     message_send(s->socket, &m, -1);
 }
 
