@@ -1,6 +1,7 @@
 /* watch.c: while a job runs in a process. A process that is told to stop has a moment to do so, in which it gives its
  * best answer; then it is killed, whatever it does. */
 #include "work/watch.h"
+#include "base/sanitized.h"
 #include "work/relay.h"
 
 #include <math.h>
@@ -9,12 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* A build with a sanitizer is that much slower. */
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-enum { PATIENCE = 10 };
-#else
-enum { PATIENCE = 1 };
-#endif
+enum { PATIENCE = SANITIZED ? 10 : 1 };
 
 #define TELL_S    0.25             /* progress is told so often */
 #define CANCEL_S  (0.2 * PATIENCE) /* from the word to the kill: somebody waits for that */
@@ -93,7 +89,7 @@ static bool hear(watch *w, const packet *m, double now)
     if (m->kind == MESSAGE_READY) {
         w->p->ready = true;
         w->due_at = w->limit_s > 0.0 ? now + w->limit_s + LIMIT_S : (double)INFINITY;
-        if (!m->u.ready.confined && PATIENCE == 1)
+        if (!m->u.ready.confined && !SANITIZED)
             log_write(me->w->log, LOG_WARN, "process_not_confined", (log_field[]){{0}});
         return true;
     }
