@@ -111,7 +111,9 @@ void service_ready(api *context, http_request *rq, http_reply *reply);
 void service_schema(api *context, http_request *rq, http_reply *reply);
 void page_get(api *context, http_request *rq, http_reply *reply);
 
-/* Fills a reply for a store call that failed, and logs a STORE_ERROR. */
+/* Logs why a store call failed with STORE_ERROR; *problem is a 500. Returns false. */
+bool api_store_failed(api *context, problem_details *problem);
+/* Fills a reply for a store call that failed, and logs what whoever runs the service must know. */
 void reply_store_failure(api *context, store_status status, http_reply *reply);
 
 #endif

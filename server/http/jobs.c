@@ -9,44 +9,52 @@
 #include <string.h>
 #include <time.h>
 
+bool api_store_failed(api *context, problem_details *problem)
+{
+    char cause[512];
+    store_message(context->store, cause, sizeof cause);
+    log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
+    return problem_fill(problem, 500, "store_error", "The store failed", "the server's log has the cause");
+}
+
 void reply_store_failure(api *context, store_status status, http_reply *reply)
 {
-    char cause[512] = "";
+    static const struct {
+        store_status status;
+        int http, retry_after_s;
+        const char *code, *title, *detail; /* detail NULL: what the store says */
+    } FAILURES[] = {
+        {STORE_NOT_FOUND, 404, 0, "not_found", "Not found", "there is no job with this id"},
+        {STORE_FULL, 507, 60, "storage_full", "The disk is full",
+         "nothing was stored: delete ended jobs or free disk space, then try again"},
+        {STORE_LOCKED, 503, 5, "store_locked", "The store is in use",
+         "another program holds the database file: nothing was changed; try again later"},
+        {STORE_BUSY, 503, 10, "queue_full", "Too many jobs wait",
+         "as many jobs wait as this server lets (its option --max-queue): try again later"},
+        {STORE_QUOTA, 429, 60, "quota_exceeded", "The owner has as much as it may", NULL},
+        {STORE_CONFLICT, 409, 0, "conflict", "The job's state does not allow this",
+         "the job changed meanwhile: look at its status and try again"},
+    };
+    char cause[512];
     problem_details problem;
-    if (status == STORE_NOT_FOUND) {
-        reply_refuse(reply, 404, "not_found", "Not found", "there is no job with this id");
-    } else if (status == STORE_FULL) {
-        reply->retry_after_s = 60;
-        reply_refuse(reply, 507, "storage_full", "The disk is full",
-                     "nothing was stored: delete ended jobs or free disk space, then try again");
-    } else if (status == STORE_LOCKED) {
-        reply->retry_after_s = 5;
-        store_message(context->store, cause, sizeof cause);
+    store_message(context->store, cause, sizeof cause);
+    if (status == STORE_LOCKED)
         log_write(context->log, LOG_ERROR, "store_locked", (log_field[]){LOG_S("cause", cause), {0}});
-        reply_refuse(reply, 503, "store_locked", "The store is in use",
-                     "another program holds the database file: nothing was changed; try again later");
-    } else if (status == STORE_BUSY) {
-        reply->retry_after_s = 10;
-        reply_refuse(reply, 503, "queue_full", "Too many jobs wait",
-                     "as many jobs wait as this server lets (its option --max-queue): try again later");
-    } else if (status == STORE_QUOTA) {
-        store_message(context->store, cause, sizeof cause);
-        reply->retry_after_s = 60;
-        reply_refuse(reply, 429, "quota_exceeded", "The owner has as much as it may", "%s", cause);
-    } else if (status == STORE_CONFLICT) {
-        reply_refuse(reply, 409, "conflict", "The job's state does not allow this",
-                     "the job changed meanwhile: look at its status and try again");
-    } else if (status == STORE_DAMAGED) {
-        store_message(context->store, cause, sizeof cause);
+    for (size_t i = 0; i < sizeof FAILURES / sizeof FAILURES[0]; i++)
+        if (FAILURES[i].status == status) {
+            reply->retry_after_s = FAILURES[i].retry_after_s ? FAILURES[i].retry_after_s : reply->retry_after_s;
+            reply_refuse(reply, FAILURES[i].http, FAILURES[i].code, FAILURES[i].title, "%s",
+                         FAILURES[i].detail ? FAILURES[i].detail : cause);
+            return;
+        }
+    if (status == STORE_DAMAGED) {
         log_write(context->log, LOG_ERROR, "stored_data_damaged",
                   (log_field[]){LOG_S("job", reply->job), LOG_S("cause", cause), {0}});
         codec_problem_damaged(&problem, reply->job ? reply->job : "");
-        reply_problem(reply, &problem);
     } else {
-        store_message(context->store, cause, sizeof cause);
-        log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
-        reply_refuse(reply, 500, "store_error", "The store failed", "the server's log has the cause");
+        api_store_failed(context, &problem);
     }
+    reply_problem(reply, &problem);
 }
 
 bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply)
@@ -141,26 +149,6 @@ static void waiting_free(delayed_reply *d)
     free(w);
 }
 
-/* Puts a source into rq->reply that answers by `then` when the job has ended, or after so many seconds; its failures
- * are answered too. False: no memory. */
-static bool delay(api *context, http_request *rq, const char *id, double seconds, jobs_then then)
-{
-    waiting *w = calloc(1, sizeof *w);
-    if (!w)
-        return false;
-    w->base = (delayed_reply){.ready = waiting_ready,
-                              .make = waiting_make,
-                              .free = waiting_free,
-                              .until = clock_seconds(CLOCK_MONOTONIC) + seconds};
-    w->context = context;
-    w->then = then;
-    memcpy(w->id, id, sizeof w->id);
-    if (reply_delay(rq, &w->base, id))
-        return true;
-    free(w);
-    return false;
-}
-
 /* So long a wait keeps its thread: a connection that has given it up ends with the reply (held.h). */
 static const double SHORT_WAIT_S = 1.0;
 
@@ -172,11 +160,23 @@ void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http
         return;
     }
     note_preference(context, rq, seconds, reply);
-    if (work_wait(context->work, j->id, seconds - rest, rq->fd, transport_draining(context->server)) || rest == 0.0 ||
-        !delay(context, rq, j->id, rest, then)) {
-        if (load_again(context, j, reply))
-            then(context, j, reply);
+    const bool ended = work_wait(context->work, j->id, seconds - rest, rq->fd, transport_draining(context->server));
+    waiting *w = ended || rest == 0.0 ? NULL : calloc(1, sizeof *w);
+    if (w) {
+        /* the reply comes from a source: when the job has ended, or the rest of the time is over */
+        w->base = (delayed_reply){.ready = waiting_ready,
+                                  .make = waiting_make,
+                                  .free = waiting_free,
+                                  .until = clock_seconds(CLOCK_MONOTONIC) + rest};
+        w->context = context;
+        w->then = then;
+        memcpy(w->id, j->id, sizeof w->id);
+        if (reply_delay(rq, &w->base, j->id))
+            return;
+        free(w);
     }
+    if (load_again(context, j, reply))
+        then(context, j, reply);
 }
 
 void jobs_freshen(api *context, job *j)
@@ -221,24 +221,17 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
     job j = {0};
     job_status was;
     snprintf(rq->job_id, sizeof rq->job_id, "%.32s", rq->name);
-    problem_details problem = {0};
     store_status status = api_get_job(context, rq, rq->job_id, &j);
     if (status != STORE_OK) {
         reply_store_failure(context, status, reply);
         return;
     }
     jobs_freshen(context, &j);
-    char *text = codec_encode_job(&j);
-    const bool meant = text && request_still_means(rq, text, fmax(fmax(j.created, j.started), j.finished), &problem);
-    free(text);
+    const bool meant =
+        request_still_means(rq, codec_encode_job(&j), fmax(fmax(j.created, j.started), j.finished), reply);
     job_clear(&j);
-    if (!meant) {
-        if (problem.status)
-            reply_problem(reply, &problem);
-        else
-            reply_no_memory(reply);
+    if (!meant)
         return;
-    }
     status = store_dismiss(context->store, rq->job_id, &was);
     if (status != STORE_OK && was != JOB_RUNNING) { /* one that runs is told, also where that can't be kept */
         reply_store_failure(context, status, reply);

@@ -95,15 +95,13 @@ static const char PROBE[] =
 
 static const char *why_not_ready(api *context)
 {
-    char cause[256];
     codec_request request;
     problem_details problem;
     uz_result *result = NULL;
     uz_error err = {0};
     store_status status = store_try_write(context->store);
     if (status != STORE_OK) {
-        store_message(context->store, cause, sizeof cause);
-        log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
+        api_store_failed(context, &problem);
         return status == STORE_FULL ? "storage_full" : "store_unavailable";
     }
     uz_thread_init();

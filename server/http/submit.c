@@ -132,14 +132,10 @@ static bool refuse(problem_details *problem, const char *member, const char *cod
 
 static bool refuse_store(api *context, const codec_start *start, store_status status, problem_details *problem)
 {
-    char cause[256];
-    if (status == STORE_DAMAGED) {
-        codec_problem_damaged(problem, start->job);
-        return false;
-    }
-    store_message(context->store, cause, sizeof cause);
-    log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
-    return problem_fill(problem, 500, "store_error", "The store failed", "the server's log has the cause");
+    if (status != STORE_DAMAGED)
+        return api_store_failed(context, problem);
+    codec_problem_damaged(problem, start->job);
+    return false;
 }
 
 /* The job must have ended with an answer. */

@@ -32,9 +32,7 @@ static bool refuse(api *context, http_request *rq, upload_status status, problem
     case UPLOAD_FAILED:
         break;
     }
-    store_message(context->store, cause, sizeof cause);
-    log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
-    return problem_fill(problem, 500, "store_error", "The store failed", "the server's log has the cause");
+    return api_store_failed(context, problem);
 }
 
 bool uploads_begin(api *context, http_request *rq)
@@ -95,45 +93,31 @@ static void reply_failure(api *context, store_status status, http_reply *reply)
 void uploads_get(api *context, http_request *rq, http_reply *reply)
 {
     upload_info info;
-    reply->varies_by_type = true;
-    if (request_accepts(rq, "application/octet-stream")) {
-        int fd;
-        int64_t bytes;
-        store_status status = store_upload_get(context->store, rq->name, api_sees(rq), &info);
-        if (status == STORE_OK)
-            status = store_upload_open(context->store, rq->name, &fd, &bytes);
-        if (status != STORE_OK)
-            reply_failure(context, status, reply);
-        else {
-            reply_file(reply, 200, "application/octet-stream", fd, (size_t)bytes);
-            snprintf(reply->tag, sizeof reply->tag, "%.32s", rq->name); /* half of a digest is name enough */
-            reply->takes_ranges = true;
-        }
-        return;
-    }
+    int fd = -1;
+    int64_t bytes = 0;
+    const bool whole = request_accepts(rq, "application/octet-stream");
     store_status status = store_upload_get(context->store, rq->name, api_sees(rq), &info);
-    reply->tag_by_body = true;
-    if (status != STORE_OK)
+    if (status == STORE_OK && whole)
+        status = store_upload_open(context->store, rq->name, &fd, &bytes);
+    reply->varies_by_type = true;
+    reply->tag_by_body = !whole;
+    if (status != STORE_OK) {
         reply_failure(context, status, reply);
-    else
+    } else if (whole) {
+        reply_file(reply, 200, "application/octet-stream", fd, (size_t)bytes);
+        snprintf(reply->tag, sizeof reply->tag, "%.32s", rq->name); /* half of a digest is name enough */
+        reply->takes_ranges = true;
+    } else {
         reply_json(reply, 200, codec_encode_upload(&info));
+    }
 }
 
 void uploads_delete(api *context, http_request *rq, http_reply *reply)
 {
     upload_info info;
-    problem_details problem = {0};
     store_status status = store_upload_get(context->store, rq->name, api_sees(rq), &info);
-    char *text = status == STORE_OK ? codec_encode_upload(&info) : NULL;
-    const bool meant = text && request_still_means(rq, text, info.used, &problem);
-    free(text);
-    if (status == STORE_OK && !meant) {
-        if (problem.status)
-            reply_problem(reply, &problem);
-        else
-            reply_no_memory(reply);
+    if (status == STORE_OK && !request_still_means(rq, codec_encode_upload(&info), info.used, reply))
         return;
-    }
     status = status != STORE_OK ? status : store_upload_delete(context->store, rq->name, api_sees(rq));
     if (status != STORE_OK)
         reply_failure(context, status, reply);

@@ -75,13 +75,18 @@ bool reply_unchanged(const http_request *rq, http_reply *reply)
     return false;
 }
 
-bool request_still_means(const http_request *rq, const char *body, double changed, problem_details *problem)
+bool request_still_means(const http_request *rq, char *body, double changed, http_reply *reply)
 {
     char tag[REPLY_TAG], date[40];
     struct tm t = {0};
     bool asked = false, good = false;
     const header_field *since = header_find(&rq->headers, "If-Unmodified-Since", NULL);
-    tag_make(tag, &body, (const size_t[]){strlen(body)}, 1);
+    if (!body) {
+        reply_no_memory(reply);
+        return false;
+    }
+    tag_make(tag, (const char *const[]){body}, (const size_t[]){strlen(body)}, 1);
+    free(body);
     for (size_t i = 0; i < rq->headers.count; i++) {
         const header_field *field = &rq->headers.fields[i];
         if (!token_equal(field->name, field->name_len, "If-Match"))
@@ -95,9 +100,10 @@ bool request_still_means(const http_request *rq, const char *body, double change
         asked = rest && !*rest;
         good = asked && floor(changed) <= (double)timegm(&t);
     }
-    return !asked || good ||
-           problem_fill(problem, 412, "precondition_failed", "It is not what it was",
-                        "it has changed since it was read: look at it again, then ask with its new ETag");
+    if (asked && !good)
+        reply_refuse(reply, 412, "precondition_failed", "It is not what it was",
+                     "it has changed since it was read: look at it again, then ask with its new ETag");
+    return !asked || good;
 }
 
 /* ---- Range */

@@ -193,8 +193,9 @@ bool request_integer(const http_request *rq, const char *key, int64_t least, int
 bool reply_unchanged(const http_request *rq, http_reply *reply);
 
 /* For what changes something: whether it is still what the client saw, of which `body` is the JSON now, last changed at
- * that Unix time; by If-Match, or where there is none If-Unmodified-Since. False with a 412. */
-bool request_still_means(const http_request *rq, const char *body, double changed, problem_details *problem);
+ * that Unix time; by If-Match, or where there is none If-Unmodified-Since. body: freed; NULL: no memory. False with a
+ * 412 or 503 in reply. */
+bool request_still_means(const http_request *rq, char *body, double changed, http_reply *reply);
 
 /* ---- replies of Server-Sent Events (HTML Living Standard, section 9.2), whatever they are about
  *
