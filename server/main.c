@@ -74,18 +74,6 @@ static void own_signals(char **argv, sigset_t *signals)
     }
 }
 
-/* What the process takes of the machine: memory, and as many descriptors as it may. How much lies free is the
- * housekeeper's business. */
-static void set_process_limits(void)
-{
-    struct rlimit limit;
-    memory_keep_heap();
-    if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
-        limit.rlim_cur = limit.rlim_max;
-        setrlimit(RLIMIT_NOFILE, &limit);
-    }
-}
-
 /* An address that others can reach needs tokens, or a word that says it is meant. */
 static bool check_exposure(const service *s, const server_options *options, int fd, char *message, size_t size)
 {
@@ -195,7 +183,12 @@ static bool start_http(service *s, const server_options *options, int fd, char *
 
 static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
 {
-    set_process_limits();
+    struct rlimit descriptors;
+    memory_keep_heap(); /* how much of it lies free is the housekeeper's business */
+    if (getrlimit(RLIMIT_NOFILE, &descriptors) == 0) {
+        descriptors.rlim_cur = descriptors.rlim_max;
+        setrlimit(RLIMIT_NOFILE, &descriptors);
+    }
     const codec_limits limits = {.json_depth = options->max_json_depth,
                                  .dofs = (int64_t)options->max_dofs,
                                  .rows = (int64_t)options->max_rows,
@@ -306,20 +299,6 @@ static void read_again(const service *s, const server_options *options)
     http_tls_clear(&fresh);
 }
 
-/* SIGHUP reads again what it can; where there is nothing it ends the daemon, as for every program of a terminal. */
-static int wait_for_signal(const service *s, const server_options *options)
-{
-    int taken = 0;
-    while (sigwait(&s->signals, &taken) != 0 || (taken == SIGHUP && (s->auth || s->tls.cert))) {
-        if (taken == SIGHUP)
-            read_again(s, options);
-        taken = 0;
-    }
-    if (taken == SIGABRT) /* somebody wants a core file */
-        abort();
-    return taken;
-}
-
 static int run(service *s, const server_options *options)
 {
     char url[160], message[OPTION_PATH + 512] = "";
@@ -336,7 +315,15 @@ static int run(service *s, const server_options *options)
                             LOG_I("workers", options->workers),
                             LOG_S("version", UZAWAD_VERSION),
                             {0}});
-    int taken = wait_for_signal(s, options);
+    /* SIGHUP reads again what it can; where there is nothing it ends the daemon, as for every program of a terminal */
+    int taken = 0;
+    while (sigwait(&s->signals, &taken) != 0 || (taken == SIGHUP && (s->auth || s->tls.cert))) {
+        if (taken == SIGHUP)
+            read_again(s, options);
+        taken = 0;
+    }
+    if (taken == SIGABRT) /* somebody wants a core file */
+        abort();
     log_write(s->log, LOG_INFO, "stopping", (log_field[]){LOG_S("signal", strsignal(taken)), {0}});
     drain_until_stopped(s, options->drain_s);
     end(s);
@@ -344,29 +331,22 @@ static int run(service *s, const server_options *options)
     return EXIT_ENDED;
 }
 
-/* Tries the address with a free port: the daemon that it is meant for may be running. */
-static bool check_listen(const service *s, const server_options *options, char *message, size_t size)
+/* --check-config: the values, and whether a daemon could start with them: the files that it reads, and its address. */
+static int check_config(const server_options *options)
 {
-    char address[OPTION_PATH], url[160];
+    char message[OPTION_PATH + 512] = "", address[OPTION_PATH], url[160];
+    service s = {.log = log_open(stderr, LOG_ERROR)};
+    options_show(options, stdout);
+    /* the address with a free port: the daemon that it is meant for may be running */
     snprintf(address, sizeof address, "%s", options->listen);
     char *port = strrchr(address, ':');
     if (port && port[1] && !port[1 + strspn(port + 1, "0123456789")] && atol(port + 1) <= 65535)
         strcpy(port + 1, "0");
-    int fd = http_listen(address, "http", url, sizeof url, message, size);
-    bool ok = fd >= 0 && check_exposure(s, options, fd, message, size);
+    const bool secrets = s.log && read_secrets(&s, options, message, sizeof message);
+    const int fd = secrets ? http_listen(address, "http", url, sizeof url, message, sizeof message) : -1;
+    const bool good = fd >= 0 && check_exposure(&s, options, fd, message, sizeof message);
     if (fd >= 0)
         close(fd);
-    return ok;
-}
-
-/* --check-config: the values, and whether a daemon could start with them: the files that it reads, and its address. */
-static int check_config(const server_options *options)
-{
-    char message[OPTION_PATH + 512] = "";
-    service s = {.log = log_open(stderr, LOG_ERROR)};
-    options_show(options, stdout);
-    bool good = s.log && read_secrets(&s, options, message, sizeof message) &&
-                check_listen(&s, options, message, sizeof message);
     if (!good)
         fprintf(stderr, "uzawad: %s\n", message);
     forget_secrets(&s);
