@@ -198,14 +198,10 @@ static client_exit fetch_result(client_session *s, json_t **out, const char *id,
     bool ok = client_buffer_append(&suffix, query, strlen(query));
     if (ok && name)
         ok = client_buffer_append(&suffix, "&case=", 6) && client_http_append_escaped(&suffix, name);
-    char *path = ok ? client_job_path(s, id, suffix.data) : NULL;
-    if (path) {
-        client_request request = client_request_new(s, "GET", path);
-        code = client_ask_json(s, out, &request);
-    } else if (!ok) {
+    if (ok)
+        code = client_get_json(s, out, client_job_path(s, id, suffix.data));
+    else
         client_complain(s, code, "no memory");
-    }
-    free(path);
     free(suffix.data);
     return code;
 }
@@ -247,12 +243,7 @@ static client_exit add_cases(client_session *s, client_checks *to, const json_t 
 {
     json_t *result = NULL, *of;
     size_t i;
-    char *path = client_job_path(s, client_json_text(job, "id"), "/result?fields=summary");
-    client_exit code = CLIENT_LOCAL;
-    if (path) {
-        client_request request = client_request_new(s, "GET", path);
-        code = client_ask_json(s, &result, &request);
-    }
+    const client_exit code = fetch_result(s, &result, client_json_text(job, "id"), "/result?fields=summary", NULL);
     json_array_foreach(json_object_get(result, "cases"), i, of)
     {
         const json_t *summary = json_object_get(of, "summary");
@@ -262,7 +253,6 @@ static client_exit add_cases(client_session *s, client_checks *to, const json_t 
         client_checks_assertions(to, summary, name);
     }
     json_decref(result);
-    free(path);
     return code;
 }
 

@@ -7,12 +7,8 @@
 
 client_exit client_status(client_session *s)
 {
-    json_t *job = NULL;
-    char *path = client_job_path(s, s->options->operand, "");
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask_json(s, &job, &request);
+    json_t *job;
+    client_exit code = client_get_json(s, &job, client_job_path(s, s->options->operand, ""));
     if (job && s->options->json)
         code = client_print_json(s, job);
     else if (job)
@@ -22,24 +18,19 @@ client_exit client_status(client_session *s)
     if (job && !s->options->json && json_is_object(json_object_get(job, "error")))
         client_print_problem(s->out, 0, json_object_get(job, "error"));
     json_decref(job);
-    free(path);
     return code;
 }
 
 client_exit client_show_cases(client_session *s, const json_t *job)
 {
-    json_t *result = NULL;
+    json_t *result;
     if (!json_is_object(client_json_at(job, "summary.cases")))
         return CLIENT_OK;
-    char *path = client_job_path(s, client_json_text(job, "id"), "/result?fields=summary");
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask_json(s, &result, &request);
+    const client_exit code =
+        client_get_json(s, &result, client_job_path(s, client_json_text(job, "id"), "/result?fields=summary"));
     if (result)
         client_print_cases(s->out, result);
     json_decref(result);
-    free(path);
     return code;
 }
 
@@ -60,64 +51,52 @@ static client_exit say_gone(client_session *s, const char *what, const client_re
     return code;
 }
 
-/* Asks how the job is, and goes on only where its having ended is as wanted; else says what the other command is. */
-static client_exit check_ended(client_session *s, const char *path, bool wanted)
+/* Sends the service's one DELETE, which dismisses a job or deletes an ended one: only where the job has ended, or has
+ * not, as the command means; else says what the other command is. */
+static client_exit send_delete(client_session *s, bool of_ended)
 {
-    json_t *job = NULL;
-    char message[240];
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask_json(s, &job, &request);
+    json_t *job;
+    char message[240], *path = NULL;
+    client_exit code = client_get_json(s, &job, client_job_path(s, s->options->operand, ""));
     snprintf(message, sizeof message,
-             wanted ? "the job is %.20s: delete is for ended ones; to stop it: uzawa cancel %.40s"
-                    : "the job has ended already: %.20s; cancel stops waiting and running ones. To delete it with its "
-                      "answer: uzawa delete %.40s",
+             of_ended ? "the job is %.20s: delete is for ended ones; to stop it: uzawa cancel %.40s"
+                      : "the job has ended already: %.20s; cancel stops waiting and running ones. To delete it with "
+                        "its answer: uzawa delete %.40s",
              client_json_text(job, "status"), client_json_text(job, "id"));
-    if (code == CLIENT_OK && client_job_ended(job) != wanted)
+    if (code == CLIENT_OK && client_job_ended(job) != of_ended)
         code = client_complain(s, CLIENT_REFUSED, message);
     json_decref(job);
+    if (code == CLIENT_OK && !(path = client_job_path(s, s->options->operand, "")))
+        code = CLIENT_LOCAL;
+    if (path) {
+        client_reply reply;
+        const client_reply nothing = {0};
+        client_request request = client_request_new(s, "DELETE", path);
+        /* One that arrived must not be sent again where the second would delete what the first dismissed. A job that
+         * has ended stays so: one that is not there the second time is gone by the first. */
+        request.repeatable = of_ended;
+        const client_http_end end = client_http_send(s->http, &reply, &request);
+        const bool answered = end == CLIENT_HTTP_ANSWERED, again = of_ended && reply.attempts > 1;
+        if (answered && (reply.status == 204 || (reply.status == 404 && again)))
+            code = say_gone(s, "deleted", &nothing);
+        else if (answered && !of_ended && reply.status >= 200 && reply.status < 300)
+            code = say_gone(s, "dismissed", &reply);
+        else
+            code = client_explain(s, end, &reply);
+        client_reply_clear(&reply);
+    }
+    free(path);
     return code;
 }
 
 client_exit client_cancel(client_session *s)
 {
-    char *path = client_job_path(s, s->options->operand, "");
-    if (!path)
-        return CLIENT_LOCAL;
-    client_exit code = check_ended(s, path, false);
-    if (code == CLIENT_OK) {
-        /* The service knows one DELETE, which dismisses a job or deletes an ended one. One that arrived must not be
-         * sent again: the second would delete what the first dismissed. */
-        client_reply reply;
-        client_request request = client_request_new(s, "DELETE", path);
-        request.repeatable = false;
-        code = client_ask(s, &reply, &request);
-        if (code == CLIENT_OK)
-            code = say_gone(s, reply.status == 204 ? "deleted" : "dismissed", &reply);
-        client_reply_clear(&reply);
-    }
-    free(path);
-    return code;
+    return send_delete(s, false);
 }
 
 client_exit client_delete(client_session *s)
 {
-    char *path = client_job_path(s, s->options->operand, "");
-    if (!path)
-        return CLIENT_LOCAL;
-    client_exit code = check_ended(s, path, true);
-    if (code == CLIENT_OK) {
-        /* Of a job that has ended, which it stays, so that it may be sent again: one that is not there then is gone by
-         * it. */
-        client_reply reply;
-        client_request request = client_request_new(s, "DELETE", path);
-        client_http_end end = client_http_send(s->http, &reply, &request);
-        bool gone = end == CLIENT_HTTP_ANSWERED && (reply.status == 204 || (reply.status == 404 && reply.attempts > 1));
-        client_reply nothing = {0};
-        code = gone ? say_gone(s, "deleted", &nothing) : client_explain(s, end, &reply);
-        client_reply_clear(&reply);
-    }
-    free(path);
-    return code;
+    return send_delete(s, true);
 }
 
 /* ----------------------------------------------- result, picture, history */
@@ -142,6 +121,14 @@ client_exit client_deliver(client_session *s, const char *text, size_t len)
     client_exit code = written ? client_print_json(s, written) : CLIENT_LOCAL;
     json_decref(written);
     return code;
+}
+
+bool client_append_words(client_buffer *out, const uz_words *words)
+{
+    bool ok = client_buffer_append(out, "", 0);
+    for (int i = 0; ok && i < words->count; i++)
+        ok = client_buffer_append(out, ",", i > 0) && client_buffer_append(out, words->item[i], strlen(words->item[i]));
+    return ok;
 }
 
 /* "/v1/jobs/ID/result?a=1&b=2"; a part without a name ends the list. The caller frees. NULL: no memory, said. */
@@ -183,19 +170,12 @@ client_exit client_result(client_session *s)
 {
     const client_options *o = s->options;
     const char *format = o->format ? o->format : "json";
-    /* "a,b" of the words, "" of none. The caller frees; NULL: no memory, said. */
     client_buffer text = {0};
-    bool ok = client_buffer_append(&text, "", 0);
-    for (int i = 0; ok && i < o->fields.count; i++)
-        ok = client_buffer_append(&text, ",", i > 0) &&
-             client_buffer_append(&text, o->fields.item[i], strlen(o->fields.item[i]));
-    if (!ok) {
+    if (!client_append_words(&text, &o->fields)) {
         free(text.data);
-        client_complain(s, CLIENT_LOCAL, "no memory");
+        return client_complain(s, CLIENT_LOCAL, "no memory");
     }
-    char *fields = ok ? text.data : NULL;
-    if (!fields)
-        return CLIENT_LOCAL;
+    const char *fields = text.data;
     const client_query query[] = {{"fields", *fields ? fields : NULL}, {"case", o->case_name}, {NULL, NULL}};
     client_exit code;
     if (strcmp(format, "csv") == 0)
@@ -203,7 +183,7 @@ client_exit client_result(client_session *s)
     else
         code = fetch_and_deliver(
             s, client_path_with_query(s, strcmp(format, "vtu") == 0 ? "/result.vtu" : "/result", query));
-    free(fields);
+    free(text.data);
     return code;
 }
 

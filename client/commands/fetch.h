@@ -8,6 +8,8 @@ typedef struct {
     const char *name, *value; /* value NULL: left out */
 } client_query;
 
+/* Appends "a,b" of the words, "" of none. False: no memory. */
+bool client_append_words(client_buffer *out, const uz_words *words);
 /* Appends "&name=value", escaped; nothing where value is NULL. False: no memory. */
 bool client_append_query(client_buffer *path, const char *name, const char *value);
 /* "/v1/jobs/ID/result?a=1&b=2"; a part without a name ends the list. The caller frees. NULL: no memory, said. */

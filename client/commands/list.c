@@ -26,11 +26,11 @@ client_exit client_list(client_session *s)
         if (client_buffer_append(&path, start, strlen(start)) && client_append_query(&path, "status", o->status) &&
             client_append_query(&path, "tag", o->tags.count ? o->tags.item[0] : NULL) &&
             client_append_query(&path, "cursor", *cursor ? cursor : NULL)) {
-            client_request request = client_request_new(s, "GET", path.data);
-            code = client_ask_json(s, &page, &request);
-        } else
+            code = client_get_json(s, &page, path.data);
+        } else {
             code = client_complain(s, CLIENT_LOCAL, "no memory");
-        free(path.data);
+            free(path.data);
+        }
         json_t *more = json_object_get(page, "jobs");
         if (code == CLIENT_OK && (!json_is_array(more) || json_array_extend(jobs, more) != 0))
             code = client_complain(s, CLIENT_SERVER_ERROR, "the reply is no list of jobs");

@@ -102,10 +102,7 @@ static char *picture_path(client_session *s)
         return client_path_with_query(s, "/deformed.svg", query);
     }
     client_buffer with = {0};
-    bool ok = client_buffer_append(&with, "", 0);
-    for (int i = 0; ok && i < o->with.count; i++)
-        ok = client_buffer_append(&with, ",", i > 0) &&
-             client_buffer_append(&with, o->with.item[i], strlen(o->with.item[i]));
+    const bool ok = client_append_words(&with, &o->with);
     query[n++] = (client_query){"x", o->axis};
     query[n++] = (client_query){"with", ok && with.len ? with.data : NULL};
     char *path = ok ? client_path_with_query(s, "/convergence.svg", query) : NULL;
@@ -117,13 +114,9 @@ static char *picture_path(client_session *s)
 
 static client_exit fetch_trade(client_session *s)
 {
-    json_t *trade = NULL;
+    json_t *trade;
     const client_query query[] = {{"case", s->options->case_name}, {NULL, NULL}};
-    char *path = client_path_with_query(s, "/work-precision", query);
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask_json(s, &trade, &request);
+    client_exit code = client_get_json(s, &trade, client_path_with_query(s, "/work-precision", query));
     if (code == CLIENT_OK && !json_is_array(json_object_get(trade, "decades")))
         code = client_complain(s, CLIENT_SERVER_ERROR, "the reply has no decades; is this the right server?");
     else if (code == CLIENT_OK && s->options->json)
@@ -131,7 +124,6 @@ static client_exit fetch_trade(client_session *s)
     else if (code == CLIENT_OK)
         client_draw_trade(s, trade);
     json_decref(trade);
-    free(path);
     return code;
 }
 

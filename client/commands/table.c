@@ -185,7 +185,7 @@ client_exit client_table(client_session *s, const char *fields)
 {
     char *text = NULL;
     size_t len = 0;
-    json_t *result = NULL;
+    json_t *result;
     table t = {0};
     client_exit code = read_fields(s, &t, fields);
     if (code != CLIENT_OK)
@@ -196,12 +196,7 @@ client_exit client_table(client_session *s, const char *fields)
         snprintf(wanted + used, sizeof wanted - used, ",%s", t.name[i]);
     }
     const client_query query[] = {{"fields", wanted}, {"case", s->options->case_name}, {NULL, NULL}};
-    char *path = client_path_with_query(s, "/result", query);
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    code = client_ask_json(s, &result, &request);
-    free(path);
+    code = client_get_json(s, &result, client_path_with_query(s, "/result", query));
     t.to = code == CLIENT_OK ? open_memstream(&text, &len) : NULL;
     if (t.to) {
         const json_t *cases = json_object_get(result, "cases");

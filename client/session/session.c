@@ -88,6 +88,15 @@ client_exit client_ask_json(client_session *s, json_t **out, const client_reques
     return code;
 }
 
+client_exit client_get_json(client_session *s, json_t **out, char *path)
+{
+    const client_request request = client_request_new(s, "GET", path);
+    *out = NULL;
+    const client_exit code = path ? client_ask_json(s, out, &request) : CLIENT_LOCAL;
+    free(path);
+    return code;
+}
+
 char *client_job_path(client_session *s, const char *id, const char *suffix)
 {
     static const char JOBS[] = "/v1/jobs/";

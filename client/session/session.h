@@ -31,6 +31,9 @@ client_exit client_explain(client_session *s, client_http_end end, const client_
  */
 client_exit client_ask_json(client_session *s, json_t **out, const client_request *request);
 
+/* What is at this path, which is freed, as client_ask_json gives it. path NULL: no memory, said already. */
+client_exit client_get_json(client_session *s, json_t **out, char *path);
+
 /* "/v1/jobs/ID" and what follows; the caller frees. NULL: no memory, said on s->err. */
 char *client_job_path(client_session *s, const char *id, const char *suffix);
 
