@@ -64,6 +64,8 @@ typedef struct {
     uz_stopping stopping;
     double relative_error; /* certified: ||u - u*||_K / ||u||_K (uz_certificate) asked for, in (0, 1]; 0: rounding */
     bool balanced;         /* scenes: relative_error is a tenth of the estimated discretization error instead */
+    bool guaranteed;       /* scenes: bound the whole error, where that can be proved (uz_guarantee) */
+    double total_error;    /* scenes on a given mesh: whole relative error that `converged` has to meet, too; 0: any */
     double epsilon;        /* UZ_STOP_PAPER: stop when ||rho - r|| <= epsilon, a force */
     uz_row_scaling row_scaling;
     double alpha;           /* step size, of the rows that row_scaling leaves; 0: 1 / lambda_max(D) */

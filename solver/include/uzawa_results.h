@@ -178,6 +178,18 @@ typedef struct {
 } uz_evaluation;
 void uz_evaluation_free(uz_evaluation *evaluation);
 
+/* Scenes: a guaranteed bound on the whole error, of mesh and equations together (bound/bound.h). */
+typedef struct {
+    bool asked, proved;
+    double bound; /* on the energy norm of u - u_h, u of the continuum; INFINITY: none */
+    double
+        relative; /* the same over a lower bound of the norm of the stress of u; INFINITY where that is not positive */
+    double primal, dual; /* energies that enclose the continuum's minimum, of a u_h that does not enter the obstacle */
+    int64_t unknowns;    /* of the dual problem */
+    double seconds;
+    char why[160]; /* asked for and not proved: a clause; else "" */
+} uz_guarantee;
+
 /* One grid that was tried for a box whose cells are chosen here. Of several load cases: the worst errors. */
 typedef struct {
     int64_t cells[3], d, iterations;
@@ -218,7 +230,8 @@ typedef struct {
     double discretization_error;
     double stress_share;      /* scene: the energy norm of that strain over ||u||_K, 1 without temperature; else 0 */
     double infeasible_radius; /* out of reach: every feasible u has an entry of at least this; INFINITY: infeasible */
-    double requested_error;   /* the relative error that `converged` had to meet */
+    uz_guarantee guarantee;
+    double requested_error; /* the relative error that `converged` had to meet */
     uz_certificate certificate;
     uz_semicoercive semicoercive;
     uz_geometry geometry;
@@ -236,8 +249,9 @@ typedef struct {
     const uz_grid_sequence *grids;   /* cells chosen here: the result's own; else NULL */
 } uz_summary;
 
-/* The whole relative error in the energy norm: the root of the sum of the squares of *equations, what moving contacts
- * left (uz_geometry.left), and, of a scene, the estimate of what its mesh loses. INFINITY: not known. *equations: the
+/* The whole relative error in the energy norm: where one is proved, its bound; else the root of the sum of the squares
+ * of *equations, what moving contacts left (uz_geometry.left), and, of a scene, the estimate of what its mesh loses.
+ * INFINITY: not known. *equations: the
  * certificate's, of a scene relative to the strain that makes stress. May be NULL. */
 double uz_total_error(double *equations, const uz_summary *summary);
 

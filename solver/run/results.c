@@ -55,7 +55,8 @@ double uz_total_error(double *equations, const uz_summary *s)
     const bool scene = s->stress_share > 0.0;
     const double certified = s->certificate.relative_error / (scene ? s->stress_share : 1.0);
     const double left = isnan(s->geometry.left) ? 0.0 : s->geometry.left;
-    const double total = hypot(hypot(certified, left), scene ? s->discretization_error : 0.0);
+    const double total = s->guarantee.proved ? s->guarantee.relative
+                                             : hypot(hypot(certified, left), scene ? s->discretization_error : 0.0);
     if (equations)
         *equations = certified;
     return isnan(total) ? (double)INFINITY : total;

@@ -3,6 +3,7 @@
  *     uz_solve, uz_solve_cases    solve.c          which of the two that follow
  *     uz_solve_grid_sequence      grid_sequence.c  grid after grid, where the cells are chosen
  *     uz_solve_on_mesh            cases.c          all load cases; those that only the obstacle holds by themselves
+ *     uz_judge_whole_error        guarantee.c      a bound on one answer, by problems that the layers below solve
  *     uz_solve_semicoercive       semicoercive.c   one of these, by problems that the next layer solves
  *     uz_solve_rounds             rounds.c         all load cases on one setup, in rounds of contact rows
  *     uz_block_solve              block.c          several loads at once
@@ -17,6 +18,11 @@ typedef uz_status uz_solver(uz_result ***out, const uz_problem *problem, const u
                             const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 uz_solver uz_solve_grid_sequence; /* for a box whose cells are chosen so that the total error is what was asked for */
 uz_solver uz_solve_on_mesh;
+
+/* Where settings ask for it, a guaranteed bound on the whole error of an answer, or why there is none (uz_guarantee);
+ * and an answer that converged becomes UZ_MESH_LIMIT where the whole error is not settings->total_error. */
+void uz_judge_whole_error(uz_result *result, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                          const uz_hooks *hooks, double started);
 
 /* Solves all load cases on setups from the cache. K that is not positive definite is refused.
  *   results  n = max(1, n_cases), NULL at entry; those that are there stay on failure, and the caller frees them

@@ -164,6 +164,15 @@ TEST(moving_contact)
     check_scenario("moving contact", moving_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
 }
 
+/* The answer stays, whatever the bound on its whole error lacks. */
+TEST(guaranteed_bound)
+{
+    scenario s = {"guaranteed", scene_problem(), uz_settings_default(), false, 1};
+    s.settings.guaranteed = true;
+    CHECK(fail_each(&s) > 200);
+    uz_problem_clear(&s.problem);
+}
+
 TEST(rows_left_out)
 {
     uz_problem slender = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(60, 2, 260, 1)};

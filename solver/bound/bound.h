@@ -1,0 +1,93 @@
+/* bound.h: a guaranteed bound on the whole error of a plane body's answer, from a stress in equilibrium.
+ *
+ * For a displacement u_h that supports and obstacle admit, and a stress sigma_h in equilibrium with the loads whose
+ * pressure r_h on the obstacle is not negative, with the gap s_h that u_h leaves (Prager and Synge, "Approximations in
+ * elasticity based on the concept of function space", Quart. Appl. Math. 5 (1947); with contact: Coorevits, Hild,
+ * Hjiaj, SIAM J. Sci. Comput. 23 (2001))
+ *
+ *     1/2 |u - u_h|^2 + 1/2 |sigma - sigma_h|^2 + int r s_h + int r_h s  =  J(u_h) - D(sigma_h)  =:  G
+ *
+ * where all terms on the left are >= 0 and none is known, and all on the right is. D is maximized over polynomials on
+ * macro elements: a quadratic problem with one unknown for each moment of an edge's displacement, of the kind that this
+ * library solves (dual_problem.c). What comes back is taken for nothing but a stress, and looked at by code that has no
+ * part in how it was made (check.c). */
+#ifndef UZ_BOUND_BOUND_H
+#define UZ_BOUND_BOUND_H
+
+#include "assembly/assembly.h"
+#include "core/hooks.h"
+#include "uzawa.h"
+
+enum { UZ_BOUND_PARTS = 4, UZ_BOUND_POINTS = 6, UZ_BOUND_MOMENTS = 3 };
+
+/* A straight side of one or two elements, and what happens there. */
+typedef struct {
+    int64_t node[3];    /* its ends, the first element on the left; its middle, -1: none */
+    int64_t element[2]; /* the second -1: on the border */
+    int side[2];        /* number in the element */
+    double axis[2][2];  /* directions of its unknowns, orthonormal */
+    bool held[2];       /* along these: */
+    double value[2];    /* given displacement; 0 where free */
+    int64_t contact;    /* of the scene; -1: none */
+    double normal[2];   /* unit, into the obstacle */
+    double gap[2];      /* at the ends: normal . u <= gap, which is linear between them */
+    double traction[2]; /* of the loads, force per area, along x and y */
+} uz_bound_edge;
+
+/* A body as the continuum has it: what is between nodes, too. */
+typedef struct {
+    const uz_body_model *model; /* borrowed */
+    int degree;                 /* of the stresses: 1, with quadratic elements 2 */
+    int64_t n_edges;
+    uz_bound_edge *edge;
+    int64_t *edge_of;    /* n_elements x 4: by the element's sides */
+    double *force;       /* n_elements x 2: force per volume */
+    double *free_strain; /* n_elements; NULL: no temperature */
+    char why[160];       /* what of the scene is outside of what is proved, a clause; "": nothing */
+} uz_bound_body;
+
+/* model: of `scene`, at least its outline; borrowed. A scene that no bound is proved for is no failure: out->why says
+ * what it is, and nothing else of *out means anything. UZ_ERR_MEMORY. */
+uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+void uz_bound_body_clear(uz_bound_body *body);
+
+/* The dual problem as min 1/2 v'Kv - p'v, h - Nv >= 0. An unknown is a mean of the displacement over an edge with one
+ * of degree + 1 Bernstein polynomials as weight, along one of the edge's axes; -N'r are the resultants of the pressure.
+ *   dof   out: n_edges x (degree + 1) x 2: number of each unknown, -1: held. The caller frees it
+ * Errors: UZ_ERR_SCENE (an element too distorted), _CANCELLED, _MEMORY. */
+uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop,
+                                uz_error *err);
+
+/* The stress that belongs to the unknowns v: xx, yy, xy at the corners, of degree 2 also in the middles of the edges
+ * 01, 12, 20, of each part of an element: n_elements x UZ_BOUND_PARTS x UZ_BOUND_POINTS x 3. Part k has the corners
+ * k, k + 1 of the element and its centre (uz_bound_centre). */
+uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64_t *dof, const double *v,
+                          const uz_stop *stop, uz_error *err);
+/* The point that parts an element: of a triangle the mean of its corners, of a quadrilateral the intersection of its
+ * diagonals, where the conditions between the parts depend on each other; elsewhere there would be stresses of degree 1
+ * in equilibrium too few, and an edge unknown without stiffness. */
+void uz_bound_centre(double centre[2], const uz_bound_body *body, int64_t element);
+
+/* What check.c found, in energies: force times length. */
+typedef struct {
+    double gap;       /* int 1/2 |sigma_h - C eps(u_h)|^2 + int r_h s_h, with the terms of the violations and a
+                       * margin for rounding: >= 0 */
+    double lift;      /* norm of the displacement that takes u_h out of the obstacle */
+    double norm;      /* of the strain of u_h that makes stress */
+    double primal;    /* J(u_h), of the displacement between nodes and fully integrated */
+    double dual;      /* D(sigma_h), from the stress */
+    double defect;    /* what the residual works on u_h: J - D + defect is the gap but for the last two terms */
+    double inside;    /* bound on the norm of what equilibrium within elements lacks: rounding */
+    double *residual; /* as many as unknowns: what edges lack of equilibrium; the caller frees it */
+    char fault[160];  /* what is wrong, a clause: nothing is proved; "" */
+} uz_bound_check_result;
+
+/* u: n_nodes x 2. scene: with the loads of the case. UZ_ERR_MEMORY. */
+uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
+                         const int64_t *dof, int64_t n_dofs, const double *u, const double *stress, uz_error *err);
+
+/* The bound on |u - u_h| with the norm of the residual in that of K^-1 (K of the dual problem). As the moments q of a
+ * displacement have q'Kq <= |u|^2, this is a norm of the residual over all displacements of the continuum. */
+double uz_bound_error(const uz_bound_check_result *checked, double residual_norm);
+
+#endif

@@ -1,0 +1,525 @@
+/* check.c: what an answer and a stress prove, whatever they were made by.
+ *
+ * The stress is looked at as nodal values of polynomials on triangles. Where it lacks equilibrium, its virtual work
+ * misses that of the loads by R(w) = sum over the edges of (what is missing) . w, and the gap between displacement and
+ * stress,
+ *
+ *     G = int 1/2 |sigma_h - C eps(u_h)|^2 + int r_h s_h,   |tau|^2 = tau : C^-1 : tau,
+ *
+ * is J(u_h) - D(sigma_h) + R(u_h): both are evaluated, by different sums, and have to agree. The stress's work on
+ * eps(u_h) is that of its tractions on the sides of each element and of the force within.
+ *
+ * Where u_h enters the obstacle by s_h^- (quadratic elements do between nodes), let a displacement w, zero at supports,
+ * take it out: w_n >= s_h^-. The pressure r of the solution does at most the work int r w_n = int r_h w_n +
+ * int (sigma_h - sigma) : eps(w) - R(w), and with 1/2 |e_u|^2 + 1/2 |e_sigma|^2 = G - int r s_h - int r_h s + R(e_u)
+ *
+ *     1/2 |e_u|^2 <= G + int r_h w_n + |e_sigma| |w| - 1/2 |e_sigma|^2 + rho (|e_u| + |w|)
+ *      |e_u|      <= rho + sqrt(2 (G + int r_h w_n) + (|w| + rho)^2),        rho = sup R(w) / |w|.
+ *
+ * Nothing of it is taken from the dual problem: a wrong K makes a larger bound, or one whose sums do not agree. */
+#include "bound/bound.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Relative to the energies and works of the elements: rounding of their sums, taken into the bound; how far the two
+ * evaluations of G may differ; and residuals within elements, relative to the stress. */
+#define SUM_ROUNDING 1e-14
+#define AGREE        1e-9
+#define INSIDE       1e-9
+
+enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, MOMENTS = UZ_BOUND_MOMENTS };
+
+typedef struct {
+    uz_bound_check_result *out;
+    const uz_bound_body *body;
+    const uz_mesh *mesh;
+    int moments;
+    double *resultant; /* n_edges x moments x 2: of the stress's tractions on the elements beside the edge */
+    double *pressure;  /* n_edges x moments: r_h, as resultants */
+    double *lift;      /* n_nodes x 2: w */
+    double sum, scale; /* of elements: int 1/2 |sigma_h - C eps(u_h)|^2; of the sizes of what it is made of */
+    double strain, complementary, inside;
+} examination;
+
+static void examine_element(examination *x, const double *u, const double *stress, int64_t e);
+static double energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e);
+static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i);
+static void look_at_lift(examination *x, const double *u, int64_t i);
+static double work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status,
+                            uz_error *err);
+
+uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
+                         const int64_t *dof, int64_t n_dofs, const double *u, const double *stress, uz_error *err)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    examination x = {.out = out, .body = body, .mesh = mesh, .moments = body->degree + 1};
+    uz_status status = UZ_OK;
+    *out = (uz_bound_check_result){.gap = 0};
+    out->residual = uz_alloc_zero(n_dofs, sizeof *out->residual);
+    x.resultant = uz_alloc_zero(body->n_edges * x.moments * 2, sizeof *x.resultant);
+    x.pressure = uz_alloc_zero(body->n_edges * x.moments, sizeof *x.pressure);
+    x.lift = uz_alloc_zero(2 * mesh->n_nodes, sizeof *x.lift);
+    if (!out->residual || !x.resultant || !x.pressure || !x.lift)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check the stress of %lld elements",
+                         (long long)mesh->n_elements);
+    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++)
+        examine_element(&x, u, stress + e * STRESSES, e);
+    const double load = status == UZ_OK ? work_of_loads(&x, scene, u, &status, err) : 0;
+    if (status == UZ_OK) {
+        out->primal = x.strain - load;
+        out->dual = -x.complementary;
+        for (int64_t i = 0; i < body->n_edges; i++)
+            examine_edge(&x, u, dof, i);
+        const double scale = x.scale + fabs(load), apart = out->primal - out->dual + out->defect - out->gap - x.sum;
+        out->gap += x.sum;
+        for (int64_t i = 0; i < body->n_edges; i++)
+            look_at_lift(&x, u, i);
+        double lifted = 0, margin = 0;
+        for (int64_t e = 0; e < mesh->n_elements; e++)
+            lifted += 2 * energy_of(&margin, &x, x.lift, false, e);
+        out->lift = sqrt(lifted + 2 * margin);
+        out->norm = sqrt(2 * x.strain);
+        if (lifted > 0) { /* of u_h + w: an admissible one has the larger energy than the minimum */
+            double strain = 0;
+            for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
+                x.lift[i] += u[i];
+            for (int64_t e = 0; e < mesh->n_elements; e++)
+                strain += energy_of(&margin, &x, x.lift, true, e);
+            out->primal = strain - work_of_loads(&x, scene, x.lift, &status, err);
+        }
+        out->inside = 100 * x.inside * sqrt(2 * fabs(x.complementary));
+        if (!*out->fault && !(x.inside <= INSIDE))
+            snprintf(out->fault, sizeof out->fault, "the stress is not in equilibrium within elements, by %.1e of it",
+                     x.inside);
+        if (!*out->fault && !(out->gap >= -AGREE * scale && fabs(apart) <= AGREE * scale))
+            snprintf(out->fault, sizeof out->fault, "two ways to evaluate the gap, %.9e, differ by %.1e", out->gap,
+                     apart);
+    }
+    free(x.resultant);
+    free(x.pressure);
+    free(x.lift);
+    if (status != UZ_OK) {
+        free(out->residual);
+        out->residual = NULL;
+    }
+    return status;
+}
+
+double uz_bound_error(const uz_bound_check_result *c, double residual_norm)
+{
+    const double rho = residual_norm + c->inside, square = 2 * c->gap + (c->lift + rho) * (c->lift + rho);
+    return *c->fault || !(square >= 0) ? (double)INFINITY : rho + sqrt(square);
+}
+
+/* ---- along an edge */
+
+/* Quadratic polynomial by its Bernstein coefficients, from its values at the ends and, where there is one, the middle.
+ */
+static void bernstein(double b[3], double start, double end, const double *middle)
+{
+    b[0] = start;
+    b[2] = end;
+    b[1] = middle ? 2 * *middle - (start + end) / 2 : (start + end) / 2;
+}
+
+/* Means of a quadratic polynomial over an edge with the Bernstein polynomials of `moments` - 1 as weights. */
+static void means(double m[MOMENTS], const double b[3], int moments)
+{
+    static const double LINEAR[2][3] = {{3, 2, 1}, {1, 2, 3}};               /* sixths */
+    static const double QUADRATIC[3][3] = {{6, 3, 1}, {3, 4, 3}, {1, 3, 6}}; /* tenths */
+    for (int a = 0; a < moments; a++)
+        m[a] = moments == 2 ? (LINEAR[a][0] * b[0] + LINEAR[a][1] * b[1] + LINEAR[a][2] * b[2]) / 6
+                            : (QUADRATIC[a][0] * b[0] + QUADRATIC[a][1] * b[1] + QUADRATIC[a][2] * b[2]) / 10;
+}
+
+/* A displacement along n on an edge, as `bernstein`. */
+static void along_edge(double b[3], const double *u, const int64_t node[3], const double n[2])
+{
+    double at[3] = {0};
+    for (int a = 0; a < 3; a++)
+        at[a] = node[a] < 0 ? 0 : n[0] * u[2 * node[a]] + n[1] * u[2 * node[a] + 1];
+    bernstein(b, at[0], at[1], node[2] < 0 ? NULL : &at[2]);
+}
+
+/* s: the gap that u_h leaves, as `bernstein`; lift: by how much w widens it. */
+static void gap_along(double s[3], double lift[3], const examination *x, const double *u, const uz_bound_edge *edge)
+{
+    along_edge(s, u, edge->node, edge->normal);
+    along_edge(lift, x->lift, edge->node, edge->normal);
+    for (int a = 0; a < 3; a++) {
+        s[a] = (a == 0 ? edge->gap[0] : a == 2 ? edge->gap[1] : (edge->gap[0] + edge->gap[1]) / 2) - s[a];
+        lift[a] = -lift[a];
+    }
+}
+
+/* The work of the gap that u_h leaves, and w where it is not >= 0 all along: its nodes are taken out, and the middle
+ * one as far as makes the middle coefficient -sqrt(s_0 s_2), from where on the polynomial has no negative value. */
+static void examine_contact(examination *x, const double *u, const uz_bound_edge *edge, const double *pressure)
+{
+    uz_bound_check_result *out = x->out;
+    double s[3], m[MOMENTS], up[3], none[3];
+    gap_along(s, none, x, u, edge);
+    means(m, s, x->moments);
+    for (int a = 0; a < x->moments; a++)
+        out->gap += pressure[a] * m[a];
+    for (int a = 0; a < 3; a++)
+        up[a] = fmax(0, -s[a] - (a == 1 ? sqrt(fmax(0, s[0]) * fmax(0, s[2])) : 0));
+    const double nodal[3] = {up[0], up[2], (up[0] + 2 * fmax(up[1], (up[0] + up[2]) / 2) + up[2]) / 4};
+    for (int a = 0; a < 3; a++) {
+        const int64_t node = edge->node[a];
+        for (int c = 0; c < 2 && node >= 0 && nodal[a] > 0; c++) {
+            const double way = -nodal[a] * edge->normal[c];
+            if (x->body->model->dof[2 * node + c] >= 0 && fabs(way) > fabs(x->lift[2 * node + c]))
+                x->lift[2 * node + c] = way;
+        }
+    }
+}
+
+/* w has to be what it is meant to be, but for rounding of places. */
+static void look_at_lift(examination *x, const double *u, int64_t i)
+{
+    const uz_bound_edge *edge = &x->body->edge[i];
+    const double tolerance = 1e-12 * x->mesh->extent;
+    double s[3], lift[3], m[MOMENTS];
+    if (edge->contact < 0)
+        return;
+    gap_along(s, lift, x, u, edge);
+    means(m, lift, x->moments);
+    for (int a = 0; a < x->moments; a++)
+        x->out->gap += x->pressure[i * x->moments + a] * m[a];
+    for (int a = 0; a < 3; a++)
+        s[a] += lift[a] + tolerance;
+    const bool out_of_it = s[0] >= 0 && s[2] >= 0 && s[1] >= -sqrt(s[0] * s[2]) - tolerance;
+    const bool outward = lift[0] >= -tolerance && lift[1] >= -tolerance && lift[2] >= -tolerance;
+    if (!*x->out->fault && !(out_of_it && outward))
+        snprintf(x->out->fault, sizeof x->out->fault, "the answer is in the obstacle where supports keep it there");
+}
+
+/* What the edge lacks of equilibrium, and what supports and obstacle do there. A pressure below zero is none: it is
+ * what is missing. */
+static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i)
+{
+    uz_bound_check_result *out = x->out;
+    const uz_bound_edge *edge = &x->body->edge[i];
+    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+    const double each = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness / x->moments;
+    double *pressure = x->pressure + i * x->moments, share[2], b[3], m[MOMENTS];
+    for (int k = 0; k < 2; k++)
+        share[k] = edge->normal[0] * edge->axis[k][0] + edge->normal[1] * edge->axis[k][1];
+    for (int a = 0; a < x->moments; a++) {
+        double acts[2]; /* of the stress, less the load: along the edge's axes */
+        for (int k = 0; k < 2; k++)
+            acts[k] = edge->axis[k][0] * (x->resultant[(i * x->moments + a) * 2] - each * edge->traction[0]) +
+                      edge->axis[k][1] * (x->resultant[(i * x->moments + a) * 2 + 1] - each * edge->traction[1]);
+        const bool free0 = !edge->held[0];
+        if (edge->contact >= 0 && free0) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
+            pressure[a] = fmax(0, -(acts[0] * share[0] + acts[1] * share[1]));
+        else if (edge->contact >= 0 && !edge->held[1] && fabs(share[1]) > 1e-9)
+            pressure[a] = fmax(0, -acts[1] / share[1]);
+        for (int k = 0; k < 2; k++) {
+            const double missing = -pressure[a] * share[k] - acts[k];
+            if (edge->held[k]) {
+                out->dual -= missing * edge->value[k];
+                x->scale += fabs(missing * edge->value[k]);
+            } else {
+                along_edge(b, u, edge->node, edge->axis[k]);
+                means(m, b, x->moments);
+                out->defect += missing * m[a];
+                out->residual[dof[(i * x->moments + a) * 2 + k]] = missing;
+            }
+        }
+        if (edge->contact >= 0)
+            out->dual -= pressure[a] * (edge->gap[0] + (edge->gap[1] - edge->gap[0]) * (a + 1) / (x->moments + 1));
+    }
+    double size = 0;
+    for (int a = 0; a < 6; a++)
+        size = edge->node[a / 2] < 0 ? size : fmax(size, fabs(u[2 * edge->node[a / 2] + a % 2]));
+    for (int k = 0; k < 2; k++) { /* the bound is about displacements that keep to the supports */
+        along_edge(b, u, edge->node, edge->axis[k]);
+        for (int a = 0; a < 3 && edge->held[k] && !*out->fault; a++)
+            if (!(fabs(b[a] - edge->value[k]) <= 1e-12 * size))
+                snprintf(out->fault, sizeof out->fault, "at a support the displacement is %.9e in place of %.9e", b[a],
+                         edge->value[k]);
+    }
+    if (edge->contact >= 0)
+        examine_contact(x, u, edge, pressure);
+}
+
+/* ---- in an element */
+
+/* With its own coordinates: those of equal boxes are one box's. */
+static void take_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], const examination *x, int64_t e)
+{
+    int count;
+    const int64_t *node = uz_mesh_element(x->mesh, e, &count);
+    uz_body_element(element, xyz, x->body->model, e);
+    for (int i = 0; i < 2 * count; i++)
+        xyz[i] = x->mesh->xyz[2 * node[i / 2] + i % 2];
+}
+
+/* u less the rigid motion of the element's first node and of its middle, which no stress in equilibrium works on. */
+static void without_motion(double v[2 * UZ_ELEMENT_NODES], const uz_element *element, int nodes)
+{
+    const double *xyz = element->xyz;
+    double first[2] = {v[0], v[1]}, turn = 0, size = 0;
+    for (int i = 0; i < 2 * nodes; i++)
+        v[i] -= first[i % 2];
+    for (int a = 1; a < nodes; a++) {
+        const double dx = xyz[2 * a] - xyz[0], dy = xyz[2 * a + 1] - xyz[1];
+        turn += dx * v[2 * a + 1] - dy * v[2 * a];
+        size += dx * dx + dy * dy;
+    }
+    for (int a = 1; a < nodes; a++) {
+        v[2 * a] += turn / size * (xyz[2 * a + 1] - xyz[1]);
+        v[2 * a + 1] -= turn / size * (xyz[2 * a] - xyz[0]);
+    }
+}
+
+/* sigma : C^-1 : tau. */
+static double comply(uz_lame lame, const double s[3], const double t[3])
+{
+    return ((s[0] - s[1]) * (t[0] - t[1]) / 2 + 2 * s[2] * t[2]) / (2 * lame.mu) +
+           (s[0] + s[1]) * (t[0] + t[1]) / (4 * (lame.lambda + lame.mu));
+}
+
+/* int sigma : C^-1 : sigma / 2 + sigma : expansion over a part, and what its equilibrium lacks: div sigma + force. */
+static double examine_part(examination *x, const double corner[3][2], const double *s, const double expansion[3],
+                           double largest, int64_t e)
+{
+    static const double SIXTH[6][6] = {{6, -1, -1, 0, -4, 0},  {-1, 6, -1, 0, 0, -4},  {-1, -1, 6, -4, 0, 0},
+                                       {0, 0, -4, 32, 16, 16}, {-4, 0, 0, 16, 32, 16}, {0, -4, 0, 16, 16, 32}};
+    const uz_lame lame = uz_element_material(x->body->model, e)->lame;
+    const int points = x->moments == 2 ? 3 : 6;
+    const double area2 = (corner[1][0] - corner[0][0]) * (corner[2][1] - corner[0][1]) -
+                         (corner[1][1] - corner[0][1]) * (corner[2][0] - corner[0][0]);
+    const double volume = area2 / 2 * x->body->model->thickness;
+    double sum = 0, slope[3][2];
+    for (int i = 0; i < points; i++)
+        for (int j = 0; j < points; j++)
+            sum += volume / 2 * (points == 3 ? (i == j ? 2. : 1.) / 12 : SIXTH[i][j] / 180) *
+                   comply(lame, s + 3 * i, s + 3 * j);
+    for (int i = points == 3 ? 0 : 3; i < points; i++)
+        sum += volume / 3 * (s[3 * i] * expansion[0] + s[3 * i + 1] * expansion[1]);
+    for (int i = 0; i < 3; i++) { /* gradients of the coordinates of the triangle */
+        const double *p = corner[(i + 1) % 3], *q = corner[(i + 2) % 3];
+        slope[i][0] = (p[1] - q[1]) / area2;
+        slope[i][1] = (q[0] - p[0]) / area2;
+    }
+    for (int at = 0; at < 3; at++) { /* at each corner: the divergence is linear at most */
+        double lacks[2] = {x->body->force[2 * e], x->body->force[2 * e + 1]};
+        for (int i = 0; i < points; i++) {
+            double grad[2] = {0};
+            for (int c = 0; c < 2; c++)
+                grad[c] =
+                    points == 3 ? slope[i][c]
+                    : i < 3
+                        ? (i == at ? 3 : -1) * slope[i][c]
+                        : 4 * ((at == i - 3 ? slope[(i + 1) % 3][c] : 0) + (at == (i + 1) % 3 ? slope[i - 3][c] : 0));
+            lacks[0] += grad[0] * s[3 * i] + grad[1] * s[3 * i + 2];
+            lacks[1] += grad[0] * s[3 * i + 2] + grad[1] * s[3 * i + 1];
+        }
+        const double size = sqrt(area2) * hypot(lacks[0], lacks[1]);
+        x->inside = size > 0 ? fmax(x->inside, size / fmax(largest, DBL_MIN)) : x->inside;
+    }
+    return sum;
+}
+
+/* Bernstein coefficients of the traction along a straight side of a part, times the side's length over the number of
+ * moments: from its corner `from` to the next. */
+static void tractions(double t[MOMENTS][2], const examination *x, const double corner[3][2], const double *s, int from)
+{
+    const int to = (from + 1) % 3;
+    const double way[2] = {corner[to][0] - corner[from][0], corner[to][1] - corner[from][1]};
+    const double times = x->body->model->thickness / x->moments;
+    for (int c = 0; c < 2; c++) {
+        double at[3];
+        for (int a = 0; a < 3; a++) {
+            const double *here = s + 3 * (a == 0 ? from : a == 1 ? to : 3 + from);
+            at[a] = times * (c == 0 ? here[0] * way[1] - here[2] * way[0] : here[2] * way[1] - here[1] * way[0]);
+        }
+        t[0][c] = at[0];
+        t[x->moments - 1][c] = at[1];
+        if (x->moments == 3)
+            t[1][c] = 2 * at[2] - (at[0] + at[1]) / 2;
+    }
+}
+
+static void examine_element(examination *x, const double *u, const double *stress, int64_t e)
+{
+    const uz_body_model *model = x->body->model;
+    uz_element element;
+    int count;
+    const int64_t *node = uz_mesh_element(x->mesh, e, &count);
+    double xyz[3 * UZ_ELEMENT_NODES], v[2 * UZ_ELEMENT_NODES] = {0}, centre[2], expansion[3] = {0};
+    double work = 0, complementary = 0, margin = 0, inner[UZ_BOUND_PARTS][2][MOMENTS][2];
+    take_element(&element, xyz, x, e);
+    const int parts = uz_element_type_of(element.kind)->corners;
+    for (int i = 0; i < 2 * count; i++)
+        v[i] = u[2 * node[i / 2] + i % 2];
+    without_motion(v, &element, count);
+    const double size = sqrt(uz_element_volume(&element) / model->thickness);
+    double largest = size * hypot(x->body->force[2 * e], x->body->force[2 * e + 1]);
+    for (int i = 0; i < STRESSES; i++)
+        largest = fmax(largest, fabs(stress[i]));
+    uz_bound_centre(centre, x->body, e);
+    if (x->body->free_strain)
+        uz_thermal_strain(expansion, model->kind, element.lame, x->body->free_strain[e]);
+    for (int k = 0; k < parts; k++) {
+        const int next = (k + 1) % parts;
+        const double corner[3][2] = {
+            {xyz[2 * k], xyz[2 * k + 1]}, {xyz[2 * next], xyz[2 * next + 1]}, {centre[0], centre[1]}};
+        const double *s = stress + k * UZ_BOUND_POINTS * 3;
+        const int64_t local[3] = {k, next, count > parts ? parts + k : -1}, at = x->body->edge_of[4 * e + k];
+        const bool reversed = x->body->edge[at].node[0] != node[k];
+        double t[MOMENTS][2], b[3], m[MOMENTS];
+        complementary += examine_part(x, corner, s, expansion, largest, e);
+        tractions(t, x, corner, s, 0);
+        tractions(inner[next][0], x, corner, s, 1);
+        tractions(inner[k][1], x, corner, s, 2);
+        for (int c = 0; c < 2; c++) {
+            along_edge(b, v, local, (const double[2]){c == 0, c == 1});
+            means(m, b, x->moments);
+            for (int a = 0; a < x->moments; a++) {
+                work += t[a][c] * m[a];
+                x->resultant[(at * x->moments + (reversed ? x->moments - 1 - a : a)) * 2 + c] += t[a][c];
+            }
+        }
+    }
+    for (int k = 0; k < parts; k++) /* across the edges between the parts, in both directions */
+        for (int a = 0; a < x->moments; a++)
+            for (int c = 0; c < 2; c++) {
+                const double jump = fabs(inner[k][0][a][c] + inner[k][1][x->moments - 1 - a][c]);
+                x->inside =
+                    jump > 0 ? fmax(x->inside, jump / fmax(largest * size * model->thickness, DBL_MIN)) : x->inside;
+            }
+    const uz_gauss_rule rule = uz_element_type_of(element.kind)->rule;
+    for (int g = 0; g < rule.count; g++) { /* the force's work: polynomials that all rules integrate */
+        double point[3], grad[UZ_ELEMENT_NODES][3], N[UZ_ELEMENT_NODES];
+        const double weight = rule.point(point, g);
+        const double volume = weight * uz_element_gradients(grad, &element, point) * model->thickness;
+        uz_element_shape(N, element.kind, point);
+        for (int i = 0; i < 2 * count; i++)
+            work += volume * N[i / 2] * v[i] * x->body->force[2 * e + i % 2];
+    }
+    const double strain = energy_of(&margin, x, u, true, e);
+    x->sum += strain + complementary - work + margin + SUM_ROUNDING * (strain + fabs(complementary) + fabs(work));
+    x->scale += strain + fabs(complementary) + fabs(work);
+    x->strain += strain;
+    x->complementary += complementary;
+}
+
+/* Gauss's rule of n points on [-1, 1], by Newton's method on Legendre's polynomial. */
+static void gauss(double *at, double *weight, int n)
+{
+    for (int i = 0; i < n; i++) {
+        double z = cos(3.14159265358979323846 * (i + 0.75) / (n + 0.5)), slope = 1;
+        for (int step = 0; step < 20; step++) {
+            double p = 1, before = 0;
+            for (int k = 1; k <= n; k++) {
+                const double next = ((2 * k - 1) * z * p - (k - 1) * before) / k;
+                before = p;
+                p = next;
+            }
+            slope = n * (z * p - before) / (z * z - 1);
+            const double change = p / slope;
+            z -= change;
+            if (fabs(change) < DBL_EPSILON)
+                break;
+        }
+        at[i] = z;
+        weight[i] = 2 / ((1 - z * z) * slope * slope);
+    }
+}
+
+/* Strain energy of the displacement between its nodes, whatever the formulation of the answer. On quadrilaterals that
+ * are no parallelograms the integrand has det J below the line: analytic in each coordinate but for a pole at z > 1, so
+ * that n points are off by some q^2n, q = 1 / (z + sqrt(z^2 - 1)), a bound on which is the margin. */
+static double energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e)
+{
+    enum { MOST_POINTS = 24 };
+    const uz_body_model *model = x->body->model;
+    uz_element element;
+    int count;
+    const int64_t *node = uz_mesh_element(x->mesh, e, &count);
+    double xyz[3 * UZ_ELEMENT_NODES], expansion[3] = {0}, at[MOST_POINTS], weight[MOST_POINTS], sum = 0, off = 0;
+    bool zero = !with_expansion;
+    for (int i = 0; i < 2 * count && zero; i++)
+        zero = !(fabs(u[2 * node[i / 2] + i % 2]) > 0);
+    if (zero)
+        return 0;
+    take_element(&element, xyz, x, e);
+    if (x->body->free_strain && with_expansion)
+        uz_thermal_strain(expansion, model->kind, element.lame, x->body->free_strain[e]);
+    const uz_gauss_rule own = uz_element_type_of(UZ_TRI6)->rule;
+    const bool triangle = uz_element_type_of(element.kind)->corners == 3;
+    int n = count > 4 ? 3 : 2;
+    if (!triangle) { /* det J = a + b xi + c eta: its pole in one coordinate, at worst in the other */
+        const double *p = xyz, a[2] = {p[2] + p[4] - p[0] - p[6], p[3] + p[5] - p[1] - p[7]};
+        const double b[2] = {p[4] + p[6] - p[0] - p[2], p[5] + p[7] - p[1] - p[3]};
+        const double c[2] = {p[0] + p[4] - p[2] - p[6], p[1] + p[5] - p[3] - p[7]};
+        const double middle = a[0] * b[1] - a[1] * b[0], by_xi = fabs(a[0] * c[1] - a[1] * c[0]),
+                     by_eta = fabs(c[0] * b[1] - c[1] * b[0]), steepest = fmax(by_xi, by_eta);
+        if (steepest > 1e-14 * middle) {
+            const double z = (middle - fmin(by_xi, by_eta)) / steepest, q = 1 / (z + sqrt(fmax(0, z * z - 1)));
+            while (n < MOST_POINTS && pow(q, 2 * n - 6) > 1e-15)
+                n++;
+            off = 16 * pow(q, 2 * n - 6);
+        }
+        gauss(at, weight, n);
+    }
+    for (int g = 0; g < (triangle ? own.count : n * n); g++) {
+        double point[3] = {0}, grad[UZ_ELEMENT_NODES][3], strain[3] = {-expansion[0], -expansion[1], 0}, w;
+        if (triangle)
+            w = own.point(point, g);
+        else {
+            point[0] = at[g % n];
+            point[1] = at[g / n];
+            w = weight[g % n] * weight[g / n];
+        }
+        w *= uz_element_gradients(grad, &element, point) * model->thickness;
+        for (int a = 0; a < count; a++) {
+            const double ux = u[2 * node[a]] - u[2 * node[0]], uy = u[2 * node[a] + 1] - u[2 * node[0] + 1];
+            strain[0] += grad[a][0] * ux;
+            strain[1] += grad[a][1] * uy;
+            strain[2] += grad[a][1] * ux + grad[a][0] * uy;
+        }
+        const double trace = strain[0] + strain[1], half = strain[0] - strain[1];
+        sum += w *
+               ((element.lame.lambda + element.lame.mu) * trace * trace +
+                element.lame.mu * (half * half + strain[2] * strain[2])) /
+               2;
+    }
+    *margin += off * sum;
+    return sum;
+}
+
+/* Of the loads but temperature, as the discrete problem has them: the edges have to agree with that. */
+static double work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status,
+                            uz_error *err)
+{
+    uz_scene loaded = *scene;
+    double work = 0;
+    double *f = uz_alloc(2 * x->mesh->n_nodes, sizeof *f);
+    loaded.loads = uz_alloc(scene->n_loads, sizeof *loaded.loads);
+    loaded.n_loads = 0;
+    if (!f || !loaded.loads) {
+        *status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)x->mesh->n_nodes);
+    } else {
+        for (int64_t i = 0; i < scene->n_loads; i++)
+            if (scene->loads[i].kind != UZ_LOAD_TEMPERATURE)
+                loaded.loads[loaded.n_loads++] = scene->loads[i];
+        *status = uz_nodal_loads(f, x->body->model, &loaded, err);
+        for (int64_t i = 0; i < 2 * x->mesh->n_nodes && *status == UZ_OK; i++)
+            work += f[i] * u[i];
+    }
+    free(loaded.loads);
+    free(f);
+    return work;
+}

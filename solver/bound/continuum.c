@@ -1,0 +1,321 @@
+/* continuum.c: a scene without its discretization: edges, and what supports, loads and obstacles do along them. */
+#include "bound/bound.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "scene/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Relative to the body's extent: how far a middle may be off the middle of its side, and a point from an obstacle that
+ * it touches. */
+#define ROUNDING 1e-13
+
+typedef struct {
+    uz_bound_body *body;
+    const uz_mesh *mesh;
+    const uz_scene *scene;
+    bool *marked;   /* n_nodes: of the group at hand; afterwards those that are on none of its edges */
+    int64_t *found; /* n_edges: those of the group */
+    int64_t n_found;
+} survey;
+
+static uz_status find_edges(survey *x, uz_error *err);
+static bool has_straight_sides(const survey *x);
+static void take_supports(survey *x);
+static void take_contacts(survey *x);
+static void take_loads(survey *x);
+
+/* The first reason stays. */
+static void refuse(uz_bound_body *body, const char *why, const char *name)
+{
+    if (!*body->why)
+        snprintf(body->why, sizeof body->why, why, name);
+}
+
+uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    const uz_mesh *mesh = &model->mesh;
+    survey x = {.body = out, .mesh = mesh, .scene = scene};
+    *out = (uz_bound_body){.model = model, .degree = 1};
+    if (model->kind == UZ_SOLID)
+        refuse(out, "in three dimensions there are no equilibrium elements here", "");
+    if (model->kind == UZ_AXISYMMETRIC)
+        refuse(out, "for bodies of revolution there are no equilibrium elements here", "");
+    if (model->n_modes > 0)
+        refuse(out, "only the obstacle holds the body, and its dual problem wants supports", "");
+    if (model->spring)
+        refuse(out, "springs hold the body", "");
+    for (int64_t e = 0; e < mesh->n_elements && !*out->why; e++)
+        if (uz_element_type_of((uz_element_kind)mesh->kind[e])->nodes >
+            uz_element_type_of((uz_element_kind)mesh->kind[e])->corners)
+            out->degree = 2;
+    if (*out->why)
+        return UZ_OK;
+    x.marked = uz_alloc_zero(mesh->n_nodes, sizeof *x.marked);
+    out->force = uz_alloc_zero(2 * mesh->n_elements, sizeof *out->force);
+    uz_status status = x.marked && out->force ? find_edges(&x, err)
+                                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the marks of %lld nodes",
+                                                        (long long)mesh->n_nodes);
+    if (status == UZ_OK && has_straight_sides(&x)) {
+        take_supports(&x);
+        take_contacts(&x);
+        take_loads(&x);
+        status = uz_free_strains(&out->free_strain, model, scene, err);
+    }
+    free(x.marked);
+    free(x.found);
+    if (status != UZ_OK)
+        uz_bound_body_clear(out);
+    return status;
+}
+
+void uz_bound_body_clear(uz_bound_body *body)
+{
+    free(body->edge);
+    free(body->edge_of);
+    free(body->force);
+    free(body->free_strain);
+    *body = (uz_bound_body){.model = NULL};
+}
+
+/* ---- edges */
+
+typedef struct {
+    int64_t low, high, element;
+    int side;
+} half_edge;
+
+static int compare_halves(const void *one, const void *other)
+{
+    const half_edge *a = one, *b = other;
+    if (a->low != b->low)
+        return a->low < b->low ? -1 : 1;
+    if (a->high != b->high)
+        return a->high < b->high ? -1 : 1;
+    return a->element < b->element ? -1 : a->element > b->element;
+}
+
+static uz_status find_edges(survey *x, uz_error *err)
+{
+    const uz_mesh *mesh = x->mesh;
+    uz_bound_body *body = x->body;
+    int64_t count = 0, node[UZ_FACE_NODES];
+    half_edge *half = uz_alloc(4 * mesh->n_elements, sizeof *half);
+    body->edge = uz_alloc_zero(4 * mesh->n_elements, sizeof *body->edge);
+    body->edge_of = uz_alloc_zero(4 * mesh->n_elements, sizeof *body->edge_of);
+    x->found = uz_alloc(4 * mesh->n_elements, sizeof *x->found);
+    if (!half || !body->edge || !body->edge_of || !x->found) {
+        free(half);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the edges of %lld elements", (long long)mesh->n_elements);
+    }
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        for (int s = 0; s < uz_element_type_of((uz_element_kind)mesh->kind[e])->sides; s++) {
+            uz_mesh_face(node, mesh, (uz_face){e, s});
+            half[count++] =
+                (half_edge){node[0] < node[1] ? node[0] : node[1], node[0] < node[1] ? node[1] : node[0], e, s};
+        }
+    qsort(half, (size_t)count, sizeof *half, compare_halves);
+    for (int64_t i = 0; i < count; i++) {
+        const bool second = i > 0 && half[i].low == half[i - 1].low && half[i].high == half[i - 1].high;
+        uz_bound_edge *edge = &body->edge[body->n_edges - (second ? 1 : 0)];
+        if (second && edge->element[1] >= 0)
+            refuse(body, "more than two elements have a side in common", "");
+        edge->element[second] = half[i].element;
+        edge->side[second] = half[i].side;
+        body->edge_of[4 * half[i].element + half[i].side] = edge - body->edge;
+        if (second)
+            continue;
+        const int nodes = uz_mesh_face(node, mesh, (uz_face){half[i].element, half[i].side});
+        *edge = (uz_bound_edge){.node = {node[0], node[1], nodes > 2 ? node[2] : -1},
+                                .element = {half[i].element, -1},
+                                .side = {half[i].side, -1},
+                                .axis = {{1, 0}, {0, 1}},
+                                .contact = -1};
+        body->n_edges++;
+    }
+    free(half);
+    return UZ_OK;
+}
+
+static bool has_straight_sides(const survey *x)
+{
+    for (int64_t i = 0; i < x->body->n_edges && !*x->body->why; i++) {
+        const int64_t *node = x->body->edge[i].node;
+        for (int c = 0; c < 2 && node[2] >= 0; c++) {
+            const double *xyz = x->mesh->xyz + c;
+            if (fabs(xyz[2 * node[2]] - (xyz[2 * node[0]] + xyz[2 * node[1]]) / 2) > ROUNDING * x->mesh->extent)
+                refuse(x->body, "quadratic elements have curved sides, or nodes off the middles of sides", "");
+        }
+    }
+    return !*x->body->why;
+}
+
+/* The edges of a group -> found: of a group of edges those that it names, else all whose nodes are in it, as these are
+ * what its nodes determine. Are they all of it? A node alone is nothing to the continuum. */
+static bool find_group(survey *x, const char *name)
+{
+    const uz_bound_body *body = x->body;
+    const uz_group *group = uz_mesh_group(x->mesh, name, "", NULL);
+    bool all = true;
+    x->n_found = 0;
+    if (!group)
+        return false;
+    const int64_t count = uz_group_node_count(x->mesh, group);
+    for (int64_t i = 0; i < count; i++)
+        x->marked[uz_group_node_at(group, i)] = true;
+    for (int64_t i = 0; i < group->n_faces && group->kind == UZ_GROUP_FACES; i++)
+        x->found[x->n_found++] = body->edge_of[4 * group->face[i].element + group->face[i].side];
+    for (int64_t i = 0; i < body->n_edges && group->kind != UZ_GROUP_FACES; i++) {
+        const int64_t *node = body->edge[i].node;
+        if (x->marked[node[0]] && x->marked[node[1]] && (node[2] < 0 || x->marked[node[2]]))
+            x->found[x->n_found++] = i;
+    }
+    for (int64_t i = 0; i < x->n_found; i++)
+        for (int a = 0; a < 3; a++)
+            if (body->edge[x->found[i]].node[a] >= 0)
+                x->marked[body->edge[x->found[i]].node[a]] = false;
+    for (int64_t i = 0; i < count; i++) {
+        all = all && !x->marked[uz_group_node_at(group, i)];
+        x->marked[uz_group_node_at(group, i)] = false;
+    }
+    return all && x->n_found > 0;
+}
+
+/* ---- what is there */
+
+/* u . n = value along the edge. Of several supports what the first two independent ones say is all there is. */
+static void hold(uz_bound_edge *edge, const double n[2], double value)
+{
+    const double along[2] = {n[0] * edge->axis[0][0] + n[1] * edge->axis[0][1],
+                             n[0] * edge->axis[1][0] + n[1] * edge->axis[1][1]};
+    if (!edge->held[0]) {
+        edge->axis[0][0] = n[0];
+        edge->axis[0][1] = n[1];
+        edge->axis[1][0] = -n[1];
+        edge->axis[1][1] = n[0];
+        edge->held[0] = true;
+        edge->value[0] = value;
+    } else if (!edge->held[1] && fabs(along[1]) > 1e-9) {
+        edge->held[1] = true;
+        edge->value[1] = (value - along[0] * edge->value[0]) / along[1];
+    }
+}
+
+static void take_supports(survey *x)
+{
+    static const double AXIS[2][3] = {{1, 0, 0}, {0, 1, 0}};
+    for (int64_t k = 0; k < x->scene->n_supports; k++) {
+        const uz_support *support = &x->scene->supports[k];
+        if (!find_group(x, support->on))
+            refuse(x->body, "the support on \"%s\" holds single nodes, which the continuum does not feel", support->on);
+        for (int64_t i = 0; i < x->n_found; i++) {
+            double n[3];
+            uz_bound_edge *edge = &x->body->edge[x->found[i]];
+            for (int c = 0; c < 2 && support->kind == UZ_SUPPORT_COMPONENTS; c++)
+                if (!isnan(support->u[c]))
+                    hold(edge, AXIS[c], support->u[c]);
+            if (support->kind == UZ_SUPPORT_NORMAL && uz_unit_normal(n, support->normal, 2))
+                hold(edge, n, support->value);
+        }
+    }
+}
+
+static void take_contacts(survey *x)
+{
+    const uz_bound_body *body = x->body;
+    for (int64_t k = 0; k < x->scene->n_contacts; k++) {
+        const uz_contact *contact = &x->scene->contacts[k];
+        const uz_group *group = uz_mesh_group(x->mesh, contact->on, "", NULL);
+        double n[3];
+        if (contact->kind != UZ_OBSTACLE_PLANE)
+            refuse(x->body,
+                   contact->kind == UZ_OBSTACLE_BODY
+                       ? "the contact of \"%s\" is with another part of the body, not with a straight obstacle"
+                       : "the obstacle of \"%s\" is not straight",
+                   contact->on);
+        else if (!group || group->kind != UZ_GROUP_FACES || group->n_inner > 0 ||
+                 !uz_unit_normal(n, contact->normal, 2) || !find_group(x, contact->on))
+            refuse(x->body, "the contact's group \"%s\" is not made of edges of the border", contact->on);
+        if (*x->body->why)
+            return;
+        for (int64_t i = 0; i < x->n_found; i++) {
+            uz_bound_edge *edge = &body->edge[x->found[i]];
+            if (edge->contact >= 0)
+                refuse(x->body, "an edge of \"%s\" has two obstacles before it", contact->on);
+            edge->contact = k;
+            for (int a = 0; a < 2; a++) {
+                const double *at = x->mesh->xyz + 2 * edge->node[a];
+                const double gap = (at[0] - contact->point[0]) * n[0] + (at[1] - contact->point[1]) * n[1];
+                edge->normal[a] = -n[a];
+                edge->gap[a] = fabs(gap) < ROUNDING * x->mesh->extent ? 0 : gap;
+            }
+            if (!edge->held[0]) { /* one unknown along the normal makes a row of one entry */
+                edge->axis[0][0] = edge->axis[1][1] = -n[0];
+                edge->axis[0][1] = -n[1];
+                edge->axis[1][0] = n[1];
+            }
+        }
+    }
+}
+
+static void take_loads(survey *x)
+{
+    uz_bound_body *body = x->body;
+    for (int64_t k = 0; k < x->scene->n_loads; k++) {
+        const uz_load *load = &x->scene->loads[k];
+        const bool on_edges =
+            load->kind == UZ_LOAD_TRACTION || load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_FORCE;
+        const uz_group *group = load->kind == UZ_LOAD_NODE_FORCE ? NULL : uz_mesh_group(x->mesh, load->on, "", NULL);
+        double area = 0;
+        if (load->kind == UZ_LOAD_NODE_FORCE || (on_edges && (!group || group->kind != UZ_GROUP_FACES))) {
+            refuse(body, "a force on single nodes does infinite work in the continuum", "");
+            return;
+        }
+        if (on_edges)
+            find_group(x, load->on);
+        for (int pass = load->kind == UZ_LOAD_FORCE ? 0 : 1; pass < 2; pass++) /* the area first */
+            for (int64_t i = 0; i < (on_edges ? x->n_found : 0); i++) {
+                uz_bound_edge *edge = &body->edge[x->found[i]];
+                const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+                const double length = hypot(to[0] - from[0], to[1] - from[1]);
+                const double n[2] = {(to[1] - from[1]) / length, (from[0] - to[0]) / length};
+                if (pass == 0)
+                    area += length * body->model->thickness;
+                for (int c = 0; c < 2 && pass == 1; c++)
+                    edge->traction[c] += load->kind == UZ_LOAD_TRACTION   ? load->v[c]
+                                         : load->kind == UZ_LOAD_PRESSURE ? -load->value * n[c]
+                                                                          : load->v[c] / area;
+            }
+        for (int64_t i = 0;
+             !on_edges && load->kind != UZ_LOAD_TEMPERATURE && i < uz_group_element_count(x->mesh, group); i++) {
+            const int64_t e = uz_group_element_at(group, i);
+            const double times = load->kind == UZ_LOAD_GRAVITY ? uz_element_material(body->model, e)->density : 1;
+            for (int c = 0; c < 2; c++)
+                body->force[2 * e + c] += times * load->v[c];
+        }
+    }
+}
+
+void uz_bound_centre(double centre[2], const uz_bound_body *body, int64_t element)
+{
+    int count;
+    const uz_mesh *mesh = &body->model->mesh;
+    const int64_t *node = uz_mesh_element(mesh, element, &count);
+    const int corners = uz_element_type_of((uz_element_kind)mesh->kind[element])->corners;
+    const double *first = mesh->xyz + 2 * node[0];
+    const double *p[4] = {first, mesh->xyz + 2 * node[1], mesh->xyz + 2 * node[2], mesh->xyz + 2 * node[corners - 1]};
+    if (corners == 3) {
+        for (int c = 0; c < 2; c++)
+            centre[c] = first[c] + ((p[1][c] - first[c]) + (p[2][c] - first[c])) / 3;
+        return;
+    }
+    const double a[2] = {p[2][0] - first[0], p[2][1] - first[1]}, b[2] = {p[3][0] - p[1][0], p[3][1] - p[1][1]};
+    const double from[2] = {p[1][0] - first[0], p[1][1] - first[1]};
+    const double part = (from[0] * b[1] - from[1] * b[0]) / (a[0] * b[1] - a[1] * b[0]);
+    for (int c = 0; c < 2; c++)
+        centre[c] = first[c] + part * a[c];
+}

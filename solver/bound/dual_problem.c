@@ -1,0 +1,477 @@
+/* dual_problem.c: the dual problem on macro elements of hybrid type, condensed to unknowns of edges.
+ *
+ * An element is parted at a point (uz_bound_centre). In each part the stress is that of Airy's functions, all
+ * polynomials of degree 2 to degree + 2, plus one that balances a constant force, so that equilibrium holds at every
+ * point. Z spans what is in equilibrium across the edges between the parts as well. With the compliance F, the
+ * resultants D s of the tractions on the element's sides (D_0 those of the force) and the displacements v there, the
+ * stress s = Zz of least complementary energy 1/2 s'Fs + f's - v'(Ds + D_0) leaves of it -1/2 v'Kv + p'v with
+ *
+ *     LL' = Z'FZ,  B = DZ L'^-1,  y = L^-1 Z'f:     K = BB',  p = By - D_0,  z = L'^-1 (B'v - y)
+ *
+ * K has the rank of all moments less three. Almeida and Maunder, "Equilibrium Finite Element Formulations", 2017, ch. 5
+ * (hybrid elements) and 6 (macro elements without spurious modes). */
+#include "bound/bound.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "linalg/blas.h"
+#include "linalg/linalg.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    AIRY = 12,                                    /* most functions of a part: of degree 2 */
+    MOST = UZ_BOUND_PARTS * AIRY,                 /* of an element */
+    OUTER = UZ_BOUND_PARTS * UZ_BOUND_MOMENTS * 2 /* moments of its sides */
+};
+static const double STATIONS[2][UZ_BOUND_MOMENTS] = {{0, 1}, {0, 0.5, 1}}; /* along an edge, by degree */
+
+typedef struct {
+    const uz_bound_body *body;
+    int64_t element;
+    int parts, degree, airy, all, outer, kept; /* functions of a part, of all; moments; columns of Z */
+    double corner[UZ_BOUND_PARTS][2], centre[2];
+    double local[2][2], times[AIRY]; /* derivatives of local coordinates; scales the functions to stresses of about 1 */
+    double Z[MOST * MOST];           /* all x kept */
+    double A[(MOST + OUTER) * MOST]; /* kept + outer rows: [L; B] */
+    double y[MOST], rest[OUTER];     /* L^-1 Z'f; D_0 */
+} macro;
+
+static bool make(macro *m, const uz_bound_body *body, int64_t element);
+static void spread(macro *m, double *stress, const double *v);
+
+/* ---- the problem */
+
+/* Free dofs of the element's moments, -1 where held; value: what these are given. */
+static void number(int64_t dof_of[OUTER], double value[OUTER], const macro *m, const int64_t *dof)
+{
+    const int moments = m->degree + 1;
+    for (int i = 0; i < m->outer; i++) {
+        const int64_t edge = m->body->edge_of[4 * m->element + i / (2 * moments)];
+        dof_of[i] = dof[edge * 2 * moments + i % (2 * moments)];
+        value[i] = m->body->edge[edge].value[i % 2];
+    }
+}
+
+static uz_status fail_at(const uz_stop *stop, int64_t element, uz_error *err)
+{
+    return uz_stop_is_due(stop)
+               ? uz_fail(err, UZ_ERR_CANCELLED, "", "the bound was cancelled")
+               : uz_fail(err, UZ_ERR_SCENE, "/mesh", "element %lld is too distorted for a stress in equilibrium",
+                         (long long)element);
+}
+
+static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const int64_t *dof, const uz_stop *stop,
+                          uz_error *err)
+{
+    const int64_t n = body->model->mesh.n_elements;
+    const int most = OUTER * (OUTER + 1) / 2;
+    int64_t count = 0, room = 0, *row = NULL, *col = NULL;
+    double *val = NULL;
+    macro *m = uz_alloc(1, sizeof *m);
+    uz_status status = m ? UZ_OK : UZ_ERR_MEMORY;
+    for (int64_t e = 0; e < n && status == UZ_OK; e++) {
+        int64_t dof_of[OUTER];
+        double value[OUTER], K[OUTER * OUTER];
+        if (count + most > room) {
+            room = e == 0 ? 16 * most : count * n / e + count / 8 + 16 * most;
+            if (!uz_triplets_grow(&row, &col, &val, room)) {
+                status = UZ_ERR_MEMORY;
+                break;
+            }
+        }
+        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !make(m, body, e)) {
+            status = fail_at(stop, e, err);
+            break;
+        }
+        uz_block_outer(m->outer, m->outer, m->kept, m->A + m->kept, m->kept + m->outer, K);
+        number(dof_of, value, m, dof);
+        for (int i = 0; i < m->outer; i++) {
+            double p = -m->rest[i];
+            for (int k = 0; k < m->kept; k++)
+                p += m->A[m->kept + i + (m->kept + m->outer) * k] * m->y[k];
+            for (int j = 0; j < m->outer; j++) {
+                const double entry = i >= j ? K[i + m->outer * j] : K[j + m->outer * i];
+                if (dof_of[j] < 0)
+                    p -= entry * value[j];
+                else if (dof_of[i] >= dof_of[j]) {
+                    row[count] = dof_of[i];
+                    col[count] = dof_of[j];
+                    val[count++] = entry;
+                }
+            }
+            if (dof_of[i] >= 0)
+                qp->p[dof_of[i]] += p;
+        }
+    }
+    if (status == UZ_OK)
+        status = uz_csc_from_triplets(&qp->K, d, d, count, row, col, val, err);
+    else if (status == UZ_ERR_MEMORY)
+        uz_fail(err, status, "", "no memory for the dual problem of %lld elements", (long long)n);
+    free(row);
+    free(col);
+    free(val);
+    free(m);
+    return status;
+}
+
+/* Rows of the edges before obstacles: the mean of the gap with the a-th weight is that of a line at (a + 1) / (degree +
+ * 2) of its length. */
+static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const int64_t *dof, uz_error *err)
+{
+    const int moments = body->degree + 1;
+    int64_t count = 0, m = 0, edges = 0;
+    for (int64_t i = 0; i < body->n_edges; i++)
+        edges += body->edge[i].contact >= 0;
+    int64_t *row = uz_alloc(2 * moments * edges, sizeof *row), *col = uz_alloc(2 * moments * edges, sizeof *col);
+    double *val = uz_alloc(2 * moments * edges, sizeof *val);
+    qp->h = uz_alloc(moments * edges, sizeof *qp->h);
+    uz_status status = row && col && val && qp->h ? UZ_OK
+                                                  : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows",
+                                                            (long long)(moments * edges));
+    for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) {
+        const uz_bound_edge *edge = &body->edge[i];
+        for (int a = 0; a < moments && edge->contact >= 0; a++) {
+            double gap = edge->gap[0] + (edge->gap[1] - edge->gap[0]) * (a + 1) / (moments + 1);
+            const int64_t before = count;
+            for (int k = 0; k < 2; k++) {
+                const double share = edge->normal[0] * edge->axis[k][0] + edge->normal[1] * edge->axis[k][1];
+                const int64_t at = dof[(i * moments + a) * 2 + k];
+                if (at < 0)
+                    gap -= share * edge->value[k];
+                else if (fabs(share) > 1e-9) {
+                    row[count] = m;
+                    col[count] = at;
+                    val[count++] = share;
+                }
+            }
+            if (count > before)
+                qp->h[m++] = gap;
+        }
+    }
+    if (status == UZ_OK)
+        status = uz_csc_from_triplets(&qp->N, m, d, count, row, col, val, err);
+    free(row);
+    free(col);
+    free(val);
+    return status;
+}
+
+uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop, uz_error *err)
+{
+    const int moments = body->degree + 1;
+    int64_t d = 0;
+    *qp = (uz_qp){.p = NULL};
+    *dof = uz_alloc(body->n_edges * 2 * moments, sizeof **dof);
+    if (!*dof)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual problem of %lld edges",
+                       (long long)body->n_edges);
+    for (int64_t i = 0; i < body->n_edges * 2 * moments; i++)
+        (*dof)[i] = body->edge[i / (2 * moments)].held[i % 2] ? -1 : d++;
+    qp->p = uz_alloc_zero(d, sizeof *qp->p);
+    uz_status status = qp->p ? assemble(qp, d, body, *dof, stop, err)
+                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld unknowns", (long long)d);
+    for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) { /* a constant traction is shared equally */
+        const uz_bound_edge *edge = &body->edge[i];
+        const double *from = body->model->mesh.xyz + 2 * edge->node[0], *to = body->model->mesh.xyz + 2 * edge->node[1];
+        const double each = hypot(to[0] - from[0], to[1] - from[1]) * body->model->thickness / moments;
+        for (int a = 0; a < 2 * moments; a++) {
+            const int64_t at = (*dof)[i * 2 * moments + a];
+            if (at >= 0)
+                qp->p[at] +=
+                    each * (edge->traction[0] * edge->axis[a % 2][0] + edge->traction[1] * edge->axis[a % 2][1]);
+        }
+    }
+    if (status == UZ_OK)
+        status = add_rows(qp, d, body, *dof, err);
+    if (status != UZ_OK) {
+        uz_qp_clear(qp);
+        free(*dof);
+        *dof = NULL;
+    }
+    return status;
+}
+
+uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64_t *dof, const double *v,
+                          const uz_stop *stop, uz_error *err)
+{
+    const int64_t n = body->model->mesh.n_elements;
+    uz_status status = UZ_OK;
+    macro *m = uz_alloc(1, sizeof *m);
+    if (!m)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of an element");
+    memset(stress, 0, (size_t)n * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 * sizeof *stress);
+    for (int64_t e = 0; e < n && status == UZ_OK; e++) {
+        int64_t dof_of[OUTER];
+        double value[OUTER];
+        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !make(m, body, e)) {
+            status = fail_at(stop, e, err);
+            break;
+        }
+        number(dof_of, value, m, dof);
+        for (int i = 0; i < m->outer; i++)
+            if (dof_of[i] >= 0)
+                value[i] = v[dof_of[i]];
+        spread(m, stress + e * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, value);
+    }
+    free(m);
+    return status;
+}
+
+/* ---- one element */
+
+/* The stresses of the Airy functions at a point: S[component][function]. They are polynomials in coordinates that the
+ * element's shape is about a square in, however thin it is. */
+static void airy(double S[3][AIRY], const macro *m, const double at[2])
+{
+    const double(*g)[2] = m->local;
+    double x[5] = {1}, y[5] = {1};
+    int b = 0;
+    for (int k = 1; k < 5; k++) {
+        x[k] = x[k - 1] * (g[0][0] * (at[0] - m->centre[0]) + g[0][1] * (at[1] - m->centre[1]));
+        y[k] = y[k - 1] * (g[1][0] * (at[0] - m->centre[0]) + g[1][1] * (at[1] - m->centre[1]));
+    }
+    for (int k = 2; k <= m->degree + 2; k++)
+        for (int i = 0; i <= k; i++, b++) {
+            const int j = k - i;
+            const double xx = i >= 2 ? i * (i - 1) * x[i - 2] * y[j] : 0,
+                         yy = j >= 2 ? j * (j - 1) * x[i] * y[j - 2] : 0;
+            const double xy = i >= 1 && j >= 1 ? i * j * x[i - 1] * y[j - 1] : 0, t = m->times[b];
+            S[0][b] = t * (g[0][1] * g[0][1] * xx + 2 * g[0][1] * g[1][1] * xy + g[1][1] * g[1][1] * yy);
+            S[1][b] = t * (g[0][0] * g[0][0] * xx + 2 * g[0][0] * g[1][0] * xy + g[1][0] * g[1][0] * yy);
+            S[2][b] =
+                -t * (g[0][0] * g[0][1] * xx + (g[0][0] * g[1][1] + g[0][1] * g[1][0]) * xy + g[1][0] * g[1][1] * yy);
+        }
+}
+
+/* The stress that balances the element's force. */
+static void balance(double s[3], const macro *m, const double at[2])
+{
+    for (int c = 0; c < 2; c++)
+        s[c] = -m->body->force[2 * m->element + c] * (at[c] - m->centre[c]);
+    s[2] = 0;
+}
+
+/* Resultants of the tractions of a part on the edge from `from` to `to`, which has the part on its left, along the two
+ * axes: rows (2 per moment) of `all` columns, and those of the balancing stress (NULL: not wanted). Coefficients of
+ * Bernstein polynomials, from values at the edge's stations. */
+static void add_tractions(double *rows, double *rest, const macro *m, int part, const double *from, const double *to,
+                          const double axis[2][2], bool reversed)
+{
+    const double t[2] = {to[0] - from[0], to[1] - from[1]};
+    const int moments = m->degree + 1;
+    for (int a = 0; a < moments; a++) {
+        const double s = STATIONS[m->degree - 1][a];
+        const double at[2] = {from[0] + s * t[0], from[1] + s * t[1]};
+        const int place = reversed ? moments - 1 - a : a;
+        double S[3][AIRY], own[3];
+        airy(S, m, at);
+        balance(own, m, at);
+        for (int k = 0; k < 2; k++) {
+            /* normal times length: (t_y, -t_x); a middle station's value is (b_0 + 2 b_1 + b_2) / 4 */
+            const double xx = axis[k][0] * t[1], yy = -axis[k][1] * t[0], xy = axis[k][1] * t[1] - axis[k][0] * t[0];
+            for (int b = 0; b <= m->airy; b++) {
+                const bool last = b == m->airy;
+                const double value =
+                    (last ? xx * own[0] + yy * own[1] + xy * own[2] : xx * S[0][b] + yy * S[1][b] + xy * S[2][b]) *
+                    m->body->model->thickness / moments;
+                double *to_row = last ? rest + k : rows + k * m->all + part * m->airy + b;
+                const int step = last ? 2 : 2 * m->all;
+                if (last && !rest)
+                    continue;
+                if (moments == 3 && a != 1)
+                    to_row[step] -= value / 2;
+                to_row[step * place] += moments == 3 && a == 1 ? 2 * value : value;
+            }
+        }
+    }
+}
+
+/* Z (n x (n - rank)), orthonormal: what all columns of M (n x columns, overwritten) are orthogonal to, by Householder's
+ * reflections with pivoting. False: the rank is another one. */
+static bool span_null_space(double *Z, double *M, int n, int columns, int rank)
+{
+    double first = 0, largest = 0, v[MOST];
+    for (int j = 0; j <= rank && j < columns; j++) {
+        int best = j;
+        largest = -1;
+        for (int c = j; c < columns; c++) {
+            const double size = uz_norm(n - j, M + j + n * c);
+            best = size > largest ? c : best;
+            largest = fmax(largest, size);
+        }
+        first = j == 0 ? largest : first;
+        if (j == rank)
+            break;
+        if (!(largest > 1e-8 * first))
+            return false;
+        for (int i = 0; i < n; i++) {
+            const double held = M[i + n * best];
+            M[i + n * best] = M[i + n * j];
+            M[i + n * j] = held;
+        }
+        double *h = M + n * j; /* becomes the unit vector of the reflection, from row j on */
+        h[j] += h[j] < 0 ? -largest : largest;
+        const double size = uz_norm(n - j, h + j);
+        for (int i = j; i < n; i++)
+            h[i] /= size;
+        for (int c = j + 1; c < columns; c++)
+            uz_axpy(n - j, -2 * uz_dot(n - j, h + j, M + j + n * c), h + j, M + j + n * c);
+        if (j + 1 == rank && rank == columns)
+            largest = 0;
+    }
+    if (largest > 1e-11 * first)
+        return false;
+    for (int c = rank; c < n; c++) {
+        memset(v, 0, sizeof v);
+        v[c] = 1;
+        for (int j = rank - 1; j >= 0; j--)
+            uz_axpy(n - j, -2 * uz_dot(n - j, M + j + n * j, v + j), M + j + n * j, v + j);
+        memcpy(Z + n * (c - rank), v, (size_t)n * sizeof *v);
+    }
+    return true;
+}
+
+/* The compliance of a part, airy x airy, and what the balancing stress and free expansion make of it. */
+static void comply(double F[AIRY * AIRY], double f[AIRY], const macro *m, int part)
+{
+    const uz_body_model *model = m->body->model;
+    const uz_lame lame = uz_element_material(model, m->element)->lame;
+    const uz_element_type *triangle = uz_element_type_of(UZ_TRI6);
+    const uz_gauss_rule rule = m->degree == 1 ? triangle->rule : triangle->energy; /* of degree 2 and 4 */
+    const double *p = m->corner[part], *q = m->corner[(part + 1) % m->parts], *c = m->centre;
+    const double area2 = (q[0] - p[0]) * (c[1] - p[1]) - (q[1] - p[1]) * (c[0] - p[0]);
+    double expansion[3] = {0};
+    if (m->body->free_strain)
+        uz_thermal_strain(expansion, model->kind, lame, m->body->free_strain[m->element]);
+    memset(F, 0, AIRY * AIRY * sizeof *F);
+    memset(f, 0, AIRY * sizeof *f);
+    for (int g = 0; g < rule.count; g++) {
+        double point[3], at[2], S[3][AIRY], own[3], strain[3][AIRY + 1];
+        const double weight = rule.point(point, g) * area2 * model->thickness;
+        for (int i = 0; i < 2; i++)
+            at[i] = p[i] + point[0] * (q[i] - p[i]) + point[1] * (c[i] - p[i]);
+        airy(S, m, at);
+        balance(own, m, at);
+        for (int b = 0; b <= m->airy; b++) { /* Hooke's law, its deviator and trace apart */
+            const double s[3] = {b < m->airy ? S[0][b] : own[0], b < m->airy ? S[1][b] : own[1],
+                                 b < m->airy ? S[2][b] : own[2]};
+            const double mean = (s[0] + s[1]) / (4 * (lame.lambda + lame.mu)), half = (s[0] - s[1]) / (4 * lame.mu);
+            strain[0][b] = mean + half + (b == m->airy ? expansion[0] : 0);
+            strain[1][b] = mean - half + (b == m->airy ? expansion[1] : 0);
+            strain[2][b] = s[2] / lame.mu;
+        }
+        for (int b = 0; b < m->airy; b++)
+            for (int i = 0; i < 3; i++) {
+                f[b] += weight * S[i][b] * strain[i][m->airy];
+                for (int a = 0; a < m->airy; a++)
+                    F[a + m->airy * b] += weight * S[i][a] * strain[i][b];
+            }
+    }
+}
+
+/* Local coordinates along two edges of a triangle, between the middles of opposite edges of a quadrilateral. */
+static void scale(macro *m)
+{
+    const double(*p)[2] = m->corner;
+    double a[2], b[2], S[3][AIRY], largest[AIRY] = {0};
+    for (int c = 0; c < 2; c++) {
+        a[c] = m->parts == 3 ? p[1][c] - p[0][c] : (p[1][c] + p[2][c] - p[0][c] - p[3][c]) / 4;
+        b[c] = m->parts == 3 ? p[2][c] - p[0][c] : (p[2][c] + p[3][c] - p[0][c] - p[1][c]) / 4;
+    }
+    const double det = a[0] * b[1] - a[1] * b[0];
+    m->local[0][0] = b[1] / det;
+    m->local[0][1] = -b[0] / det;
+    m->local[1][0] = -a[1] / det;
+    m->local[1][1] = a[0] / det;
+    for (int i = 0; i < m->airy; i++)
+        m->times[i] = 1;
+    for (int k = 0; k < m->parts; k++) {
+        airy(S, m, p[k]);
+        for (int i = 0; i < m->airy; i++)
+            largest[i] = fmax(largest[i], fmax(fabs(S[2][i]), fmax(fabs(S[0][i]), fabs(S[1][i]))));
+    }
+    for (int i = 0; i < m->airy; i++)
+        m->times[i] = 1 / largest[i];
+}
+
+static bool make(macro *m, const uz_bound_body *body, int64_t element)
+{
+    static const double AXES[2][2] = {{1, 0}, {0, 1}};
+    const uz_mesh *mesh = &body->model->mesh;
+    int count;
+    const int64_t *node = uz_mesh_element(mesh, element, &count);
+    double inner[OUTER * MOST] = {0}, outer[OUTER * MOST] = {0}, F[AIRY * AIRY], f[AIRY];
+    m->body = body;
+    m->element = element;
+    m->degree = body->degree;
+    m->parts = uz_element_type_of((uz_element_kind)mesh->kind[element])->corners;
+    m->airy = m->degree == 1 ? 7 : 12;
+    m->all = m->parts * m->airy;
+    m->outer = m->parts * 2 * (m->degree + 1);
+    uz_bound_centre(m->centre, body, element);
+    for (int k = 0; k < m->parts; k++)
+        memcpy(m->corner[k], mesh->xyz + 2 * node[k], sizeof m->corner[k]);
+    scale(m);
+    memset(m->rest, 0, sizeof m->rest);
+    for (int k = 0; k < m->parts; k++) {
+        const int next = (k + 1) % m->parts, rows = 2 * (m->degree + 1);
+        const uz_bound_edge *edge = &body->edge[body->edge_of[4 * element + k]];
+        add_tractions(outer + k * rows * m->all, m->rest + k * rows, m, k, m->corner[k], m->corner[next], edge->axis,
+                      edge->node[0] != node[k]);
+        /* from the centre: part k is on the left of the edge to its first corner reversed */
+        add_tractions(inner + next * rows * m->all, NULL, m, k, m->corner[next], m->centre, AXES, false);
+        add_tractions(inner + k * rows * m->all, NULL, m, k, m->centre, m->corner[k], AXES, true);
+    }
+    const int rank = m->outer - (m->parts == 4 ? 1 : 0);
+    m->kept = m->all - rank;
+    if (!span_null_space(m->Z, inner, m->all, m->outer, rank))
+        return false;
+    const int ld = m->kept + m->outer;
+    memset(m->A, 0, sizeof m->A);
+    memset(m->y, 0, sizeof m->y);
+    for (int part = 0; part < m->parts; part++) {
+        comply(F, f, m, part);
+        for (int j = 0; j < m->kept; j++) {
+            const double *z = m->Z + m->all * j + part * m->airy;
+            double Fz[AIRY] = {0};
+            for (int b = 0; b < m->airy; b++)
+                uz_axpy(m->airy, z[b], F + m->airy * b, Fz);
+            for (int i = j; i < m->kept; i++)
+                m->A[i + ld * j] += uz_dot(m->airy, m->Z + m->all * i + part * m->airy, Fz);
+            m->y[j] += uz_dot(m->airy, z, f);
+        }
+    }
+    for (int j = 0; j < m->kept; j++)
+        for (int r = 0; r < m->outer; r++)
+            m->A[m->kept + r + ld * j] = uz_dot(m->all, outer + r * m->all, m->Z + m->all * j);
+    if (!uz_block_factor(m->kept, m->outer, m->A, ld))
+        return false;
+    uz_trsv_lower(m->kept, m->A, ld, m->y, false);
+    return true;
+}
+
+static void spread(macro *m, double *stress, const double *v)
+{
+    const int ld = m->kept + m->outer, points = m->degree == 1 ? 3 : 6;
+    double z[MOST], s[MOST] = {0};
+    for (int k = 0; k < m->kept; k++)
+        z[k] = uz_dot(m->outer, m->A + m->kept + ld * k, v) - m->y[k];
+    uz_trsv_lower(m->kept, m->A, ld, z, true);
+    for (int k = 0; k < m->kept; k++)
+        uz_axpy(m->all, z[k], m->Z + m->all * k, s);
+    for (int part = 0; part < m->parts; part++) {
+        const double *corner[3] = {m->corner[part], m->corner[(part + 1) % m->parts], m->centre};
+        for (int i = 0; i < points; i++) {
+            const double *a = corner[i % 3], *b = corner[i < 3 ? i : (i + 1) % 3];
+            const double at[2] = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
+            double S[3][AIRY], *to = stress + (part * UZ_BOUND_POINTS + i) * 3;
+            airy(S, m, at);
+            balance(to, m, at);
+            for (int c = 0; c < 3; c++)
+                to[c] += uz_dot(m->airy, S[c], s + part * m->airy);
+        }
+    }
+}

@@ -1,0 +1,168 @@
+/* guarantee.c: a guaranteed bound on the whole error of answers on a mesh, where it is asked for: the dual problem is
+ * one in matrices, which is solved as any other, and so is the norm of what its stress lacks of equilibrium. */
+#include "run/solve.h"
+
+#include "bound/bound.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "run/problem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    const uz_settings *settings;
+    uz_cache *cache;
+    uz_hooks hooks; /* whether to go on, and nothing else: rows are of the answer */
+    uz_stop stop;
+    uz_bound_body body;
+    uz_qp qp;
+    int64_t *dof;
+    double *stress;
+    uz_bound_check_result checked;
+} guarantee;
+
+/* The dual problem, or the residual's: the library's own solve, with what is left of the time. */
+static uz_status solve(uz_result **out, const guarantee *g, const uz_qp *qp, uz_error *err)
+{
+    const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = *qp};
+    uz_settings settings = uz_settings_default();
+    uz_result **results = NULL;
+    settings.memory_limit = g->settings->memory_limit;
+    settings.time_limit_s = fmax(0.0, g->stop.deadline - uz_seconds());
+    *out = NULL;
+    const uz_status status = uz_solve_on_mesh(&results, &problem, &settings, NULL, g->cache, &g->hooks, err);
+    if (status == UZ_OK)
+        *out = results[0];
+    free(results);
+    return status;
+}
+
+/* |residual| in the norm of K^-1, from above; INFINITY where that was not found. */
+static uz_status measure_residual(double *norm, const guarantee *g, uz_error *err)
+{
+    uz_qp qp = {.K = g->qp.K, .p = g->checked.residual};
+    uz_result *result = NULL;
+    double largest = 0, no_gaps = 0;
+    *norm = 0;
+    for (int64_t i = 0; i < qp.K.cols; i++)
+        largest = fmax(largest, fabs(qp.p[i]));
+    if (!(largest > 0))
+        return UZ_OK;
+    *norm = INFINITY;
+    qp.h = &no_gaps;
+    uz_status status = uz_csc_init(&qp.N, 0, qp.K.cols, 0, err);
+    if (status == UZ_OK)
+        status = solve(&result, g, &qp, err);
+    if (status == UZ_OK && isfinite(result->summary.certificate.absolute_error))
+        *norm = result->summary.certificate.energy_norm + result->summary.certificate.absolute_error;
+    uz_result_free(result);
+    uz_csc_clear(&qp.N);
+    return status;
+}
+
+/* -> summary.guarantee, but for its time and reasons that are errors. */
+static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *model, const uz_scene *scene,
+                       uz_error *err)
+{
+    uz_guarantee *out = &result->summary.guarantee;
+    uz_result *dual = NULL;
+    double rho = INFINITY;
+    uz_status status = uz_bound_body_make(&g->body, model, scene, err);
+    if (status != UZ_OK || *g->body.why) {
+        snprintf(out->why, sizeof out->why, "%s", g->body.why);
+        return status;
+    }
+    status = uz_bound_dual_problem(&g->qp, &g->dof, &g->body, &g->stop, err);
+    if (status == UZ_OK)
+        status = solve(&dual, g, &g->qp, err);
+    if (status == UZ_OK && !isfinite(dual->summary.certificate.absolute_error)) {
+        snprintf(out->why, sizeof out->why, "the dual problem could not be solved: %.100s", dual->summary.message);
+        uz_result_free(dual);
+        return UZ_OK;
+    }
+    if (status == UZ_OK) {
+        out->unknowns = g->qp.K.cols;
+        g->stress = uz_alloc(model->mesh.n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, sizeof *g->stress);
+        status = g->stress ? uz_bound_stress(g->stress, &g->body, g->dof, dual->u, &g->stop, err)
+                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of %lld elements",
+                                     (long long)model->mesh.n_elements);
+    }
+    uz_result_free(dual);
+    if (status == UZ_OK)
+        status = uz_bound_check(&g->checked, &g->body, scene, g->dof, g->qp.K.cols, result->u, g->stress, err);
+    if (status == UZ_OK)
+        status = measure_residual(&rho, g, err);
+    if (status != UZ_OK)
+        return status;
+    const uz_bound_check_result *c = &g->checked;
+    const double bound = uz_bound_error(c, rho);
+    if (!isfinite(bound)) {
+        snprintf(out->why, sizeof out->why, "%s",
+                 *c->fault ? c->fault : "what the stress lacks of equilibrium could not be bounded");
+        return UZ_OK;
+    }
+    out->proved = true;
+    out->bound = bound;
+    out->relative = c->norm > bound ? bound / (c->norm - bound) : (double)INFINITY;
+    out->primal = c->primal;
+    out->dual = c->dual - fabs(c->defect) - rho * bound;
+    return UZ_OK;
+}
+
+static void guarantee_answer(uz_result *result, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                             const uz_hooks *hooks, double started)
+{
+    const double began = uz_seconds();
+    uz_summary *s = &result->summary;
+    uz_guarantee *out = &s->guarantee;
+    uz_body_model model = {.d = 0};
+    uz_error err = {0};
+    guarantee g = {.settings = settings, .cache = cache};
+    g.hooks.ctx = hooks ? hooks->ctx : NULL;
+    g.hooks.cancelled = hooks ? hooks->cancelled : NULL;
+    g.stop = (uz_stop){&g.hooks, started + settings->time_limit_s};
+    *out = (uz_guarantee){.asked = true, .bound = INFINITY, .relative = INFINITY, .primal = NAN, .dual = NAN};
+    if (!result->evaluation || s->semicoercive.free_modes > 0) {
+        snprintf(out->why, sizeof out->why, "%s",
+                 result->evaluation ? "only the obstacle holds the body, and its dual problem wants supports"
+                                    : "there is no answer to bound the error of");
+        return;
+    }
+    uz_status status = uz_body_model_outline(&model, &problem->scene, &err);
+    if (status == UZ_OK)
+        status = prove(result, &g, &model, &problem->scene, &err);
+    uz_bound_body_clear(&g.body);
+    uz_body_model_clear(&model);
+    uz_qp_clear(&g.qp);
+    free(g.dof);
+    free(g.stress);
+    free(g.checked.residual);
+    if (status != UZ_OK) /* the answer is there, and stays */
+        snprintf(out->why, sizeof out->why, "%.150s",
+                 uz_stop_is_due(&g.stop) ? "it was stopped before the bound was made" : err.message);
+    out->seconds = uz_seconds() - began;
+    s->timings.total += out->seconds;
+    s->timings.certify += out->seconds;
+}
+
+void uz_judge_whole_error(uz_result *result, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                          const uz_hooks *hooks, double started)
+{
+    uz_summary *s = &result->summary;
+    if (problem->kind != UZ_PROBLEM_SCENE)
+        return;
+    if (settings->guaranteed)
+        guarantee_answer(result, problem, settings, cache, hooks, started);
+    const double total = uz_total_error(NULL, s);
+    if (!(settings->total_error > 0) || s->outcome != UZ_CONVERGED || total <= settings->total_error)
+        return;
+    s->outcome = UZ_MESH_LIMIT;
+    s->requested_error = settings->total_error;
+    snprintf(s->message, sizeof s->message,
+             "on this mesh the whole error is %s %.3g, asked for %.3g: refine it, or let the cells be chosen",
+             s->guarantee.proved ? "at most" : "about", total, settings->total_error);
+}

@@ -1,0 +1,329 @@
+/* The guaranteed bound on the whole error: its elements, what it proves, and what it refuses. */
+#include "body_fixture.h"
+#include "bound/bound.h"
+#include "generated.h"
+#include "linalg/blas.h"
+#include "scene_fixture.h"
+
+static const char *const ELEMENTS[] = {"tri3", "quad4", "tri6", "quad8"};
+
+static qp_random shuffled = {1};
+
+/* Moves the corners within a 60 x 20 body at random, by up to a fifth of a cell of 5 x 5. */
+static void shuffle(double *x)
+{
+    const bool inside = x[0] > 0.01 && x[0] < 59.99 && x[1] > 0.01 && x[1] < 19.99;
+    for (int c = 0; c < 2 && inside; c++)
+        x[c] += 2 * (random_unit(&shuffled) - 0.5);
+}
+
+static uz_result *answer(const uz_scene *scene, bool guaranteed)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *scene};
+    uz_settings settings = uz_settings_default();
+    uz_result *result = NULL;
+    uz_error err = {0};
+    settings.guaranteed = guaranteed;
+    const uz_status status = uz_solve(&result, &problem, &settings, NULL, NULL, &err);
+    CHECK_MSG(status == UZ_OK, "%s: %s", err.where, err.message);
+    if (status != UZ_OK)
+        exit(1);
+    return result;
+}
+
+static uz_guarantee bound_of(const uz_scene *scene)
+{
+    uz_result *result = answer(scene, true);
+    const uz_guarantee g = result->summary.guarantee;
+    uz_result_free(result);
+    return g;
+}
+
+TEST(elements_leave_no_moment_without_stiffness)
+{
+    static const double CORNERS[][8] = {{0, 0, 4, 1, 3, 5, 0, 0},    {0, 0, 1, 0, 0, 1e-2, 0, 0},
+                                        {0, 0, 1, 0, 1, 1, 0, 1},    {0, 0, 5, 0.5, 4, 3, 1, 2},
+                                        {0, 0, 9, 0.1, 7, 1, 0, 2.}, {0, 0, 1, 0, 1, 1e-2, 0, 1e-2}};
+    for (int shape = 0; shape < 6; shape++)
+        for (int degree = 1; degree <= 2; degree++) {
+            const int corners = shape < 2 ? 3 : 4;
+            const uz_element_kind kind =
+                degree == 1 ? (corners == 3 ? UZ_TRI3 : UZ_QUAD4) : (corners == 3 ? UZ_TRI6 : UZ_QUAD8);
+            double xyz[16], A[24 * 24] = {0};
+            int64_t first[] = {0, degree * corners}, node[] = {0, 1, 2, 3, 4, 5, 6, 7}, pivot[24], *dof;
+            unsigned char kinds[] = {(unsigned char)kind};
+            uz_material material = {.on = "all", .young = 1, .poisson = 0.3};
+            uz_scene scene = {.model = UZ_PLANE_STRESS, .thickness = 1, .source = UZ_MESH_GIVEN, .n_materials = 1};
+            uz_body_model model = {.kind = UZ_PLANE_STRESS, .thickness = 1};
+            uz_body_material own = {.lame = uz_lame_of(UZ_PLANE_STRESS, 1, 0.3)};
+            uz_bound_body body;
+            uz_qp qp;
+            uz_error err = {0};
+            memcpy(xyz, CORNERS[shape], sizeof(double) * 8);
+            for (int k = 0; k < corners; k++)
+                for (int c = 0; c < 2; c++)
+                    xyz[2 * (corners + k) + c] =
+                        (CORNERS[shape][2 * k + c] + CORNERS[shape][2 * ((k + 1) % corners) + c]) / 2;
+            scene.materials = &material;
+            model.mesh = (uz_mesh){.dim = 2,
+                                   .n_nodes = degree * corners,
+                                   .n_elements = 1,
+                                   .xyz = xyz,
+                                   .kind = kinds,
+                                   .first = first,
+                                   .node = node,
+                                   .extent = 10};
+            model.materials = &own;
+            CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
+            CHECK_STR(body.why, "");
+            CHECK(uz_bound_dual_problem(&qp, &dof, &body, NULL, &err) == UZ_OK);
+            const int64_t n = qp.K.cols;
+            CHECK_INT(n, corners * 2 * (degree + 1));
+            for (int64_t j = 0; j < n; j++)
+                for (int64_t k = qp.K.ptr[j]; k < qp.K.ptr[j + 1]; k++)
+                    A[qp.K.idx[k] + n * j] = qp.K.val[k];
+            CHECK_INT(uz_pstrf_lower_while(n, A, pivot, 1e-11, NULL), n - 3);
+            uz_qp_clear(&qp);
+            free(dof);
+            uz_bound_body_clear(&body);
+        }
+}
+
+/* A constant stress, and with quadratic elements a linear one, is in both spaces. */
+TEST(nothing_is_lost_where_the_answer_is_exact)
+{
+    for (int k = 0; k < 8; k++) {
+        const bool weight = k >= 4;
+        uz_scene scene = box_scene(60, 20, 12, 4);
+        snprintf(scene.box.element, sizeof scene.box.element, "%s", ELEMENTS[weight ? 2 + k % 2 : k]);
+        body_give_mesh(&scene,
+                       k == 5 || k == 7 ? NULL : shuffle); /* a distorted quad8 has no polynomials of degree 2 */
+        body_straighten(&scene);
+        add_support(&scene, "bottom", NAN, 0);
+        add_support(&scene, "left", weight ? 0 : 0.01, NAN);
+        if (weight) {
+            add_support(&scene, "right", 0, NAN);
+            scene.model = UZ_PLANE_STRAIN;
+            add_load(&scene, "all", 0, -1);
+            scene.loads[0].kind = UZ_LOAD_BODY_FORCE;
+        } else {
+            add_load(&scene, "right", 3, 0);
+            add_load(&scene, "top", 0, -0.5);
+        }
+        const uz_guarantee g = bound_of(&scene);
+        CHECK_MSG(g.proved && g.relative < 3e-6, "%s, %s: %g %s", scene.box.element, weight ? "weight" : "tension",
+                  g.relative, g.why);
+        uz_scene_clear(&scene);
+    }
+}
+
+TEST(paper_body)
+{
+    static const struct {
+        int64_t n;
+        double percent, primal, dual;
+    } TABLE[] = {{30, 2.54, -3.9608186e-3, -3.9632432e-3}, {60, 1.54, -3.9620174e-3, -3.9629288e-3}};
+    for (int k = 0; k < 2; k++) {
+        uz_scene scene = paper_scene(TABLE[k].n, TABLE[k].n / 3);
+        const uz_guarantee g = bound_of(&scene);
+        CHECK_MSG(g.proved && fabs(100 * g.relative - TABLE[k].percent) < 0.006, "%g %s", g.relative, g.why);
+        CHECK_REL(g.primal, TABLE[k].primal, 2e-8);
+        CHECK_REL(g.dual, TABLE[k].dual, 2e-8);
+        CHECK(g.dual <= -3.9627564e-3 && g.primal >= -3.96275666e-3);
+        uz_scene_clear(&scene);
+    }
+}
+
+/* ---- generated scenes: whatever is below the minimum is below whatever is above it */
+
+static uz_scene generated_scene(qp_random *rng, const char *element, int64_t n)
+{
+    const double width = 60, height = 20;
+    uz_scene scene = box_scene(width, height, 3 * n, n);
+    snprintf(scene.box.element, sizeof scene.box.element, "%s", element);
+    scene.model = random_chance(rng, 0.5) ? UZ_PLANE_STRESS : UZ_PLANE_STRAIN;
+    scene.materials[0].poisson = random_chance(rng, 0.2) ? 0.49 : 0.45 * random_unit(rng);
+    scene.materials[0].expansion = 1e-5;
+    scene.box.grading[0] = random_power(rng, -0.5, 0.5);
+    if (random_chance(rng, 0.3)) {
+        add_support(&scene, "left", 0.02 * random_unit(rng), 0.0);
+    } else {
+        add_support(&scene, "left", 0, NAN);
+        if (random_chance(rng, 0.5))
+            add_support(&scene, "top", NAN, -0.005 * random_unit(rng));
+        else
+            add_support(&scene, "right", NAN, 0.005 * random_unit(rng));
+    }
+    add_load(&scene, "right", random_unit(rng) - 0.5, random_unit(rng) - 0.5);
+    if (random_chance(rng, 0.5)) {
+        add_load(&scene, "top", 0, 0);
+        scene.loads[1].kind = UZ_LOAD_PRESSURE;
+        scene.loads[1].value = 0.2 * random_unit(rng);
+    } else {
+        add_load(&scene, "all", 0.01 * random_unit(rng), -0.01 * random_unit(rng));
+        scene.loads[1].kind = UZ_LOAD_BODY_FORCE;
+    }
+    if (random_chance(rng, 0.3)) {
+        add_load(&scene, "all", 0, 0);
+        scene.loads[2].kind = UZ_LOAD_TEMPERATURE;
+        scene.loads[2].value = random_unit(rng);
+    }
+    add_plane(&scene, "bottom", 0, -0.002 * random_unit(rng) * (random_chance(rng, 0.5) ? 1 : 0),
+              random_chance(rng, 0.3) ? 1e-4 * (random_unit(rng) - 0.2) : 0, 1);
+    scene.contacts[0].point[1] -= 60 * fmax(0, scene.contacts[0].normal[0]);
+    return scene;
+}
+
+TEST(never_below_the_truth)
+{
+    double least = INFINITY, sum = 0;
+    int count = 0;
+    for (uint64_t seed = 1; seed <= 4; seed++) {
+        double lowest = INFINITY, highest = -INFINITY, primal[8], bound[8], size = 0;
+        int n = 0;
+        for (int k = 0; k < 9; k++) {
+            qp_random rng = {seed};
+            uz_scene scene = generated_scene(&rng, k == 8 ? "quad8" : ELEMENTS[k % 4], k == 8 ? 12 : k < 4 ? 3 : 6);
+            shuffled = (qp_random){seed};
+            if (seed % 2 == 0 && k < 4) {
+                body_give_mesh(&scene, shuffle);
+                body_straighten(&scene);
+            }
+            const uz_guarantee g = bound_of(&scene);
+            CHECK_MSG(g.proved, "seed %d, %s: %s", (int)seed, scene.box.element, g.why);
+            lowest = fmin(lowest, g.primal);
+            highest = fmax(highest, g.dual);
+            size = fmax(size, fabs(g.primal));
+            if (k < 8) {
+                primal[n] = g.primal;
+                bound[n++] = g.bound;
+            }
+            uz_scene_clear(&scene);
+        }
+        CHECK_MSG(highest <= lowest + 1e-12 * size, "seed %d: %.10e above %.10e", (int)seed, highest, lowest);
+        for (int k = 0; k < n; k++) { /* J - J* is at least half the square of the error, and J* at most `lowest` */
+            const double effect = bound[k] / sqrt(2 * fmax(0, primal[k] - lowest));
+            least = fmin(least, effect);
+            sum += log(effect);
+            count++;
+        }
+    }
+    printf("# bound over error: least %.3f, geometric mean %.3f of %d\n", least, exp(sum / count), count);
+    CHECK_MSG(least >= 1, "%g", least);
+    CHECK_MSG(exp(sum / count) < 1.5, "%g", exp(sum / count));
+}
+
+/* ---- the check finds what is wrong with a stress, a displacement, a contact */
+
+TEST(check_trusts_nobody)
+{
+    uz_scene scene = paper_scene(12, 4);
+    uz_result *result = answer(&scene, false);
+    uz_body_model model;
+    uz_bound_body body;
+    uz_bound_check_result good, bad;
+    uz_qp qp;
+    uz_error err = {0};
+    int64_t *dof;
+    CHECK(uz_body_model_outline(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
+    CHECK(uz_bound_dual_problem(&qp, &dof, &body, NULL, &err) == UZ_OK);
+    const int64_t n = qp.K.cols, entries = model.mesh.n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3;
+    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = qp};
+    uz_settings settings = uz_settings_default();
+    uz_result *dual;
+    double *stress = zeros(entries);
+    CHECK(uz_solve(&dual, &problem, &settings, NULL, NULL, &err) == UZ_OK);
+    CHECK(uz_bound_stress(stress, &body, dof, dual->u, NULL, &err) == UZ_OK);
+    CHECK(uz_bound_check(&good, &body, &scene, dof, n, result->u, stress, &err) == UZ_OK);
+    CHECK_STR(good.fault, "");
+    CHECK(uz_bound_error(&good, 0) > 0 && isfinite(uz_bound_error(&good, 0)));
+    CHECK(uz_norm(n, good.residual) < 1e-9 * uz_norm(n, qp.p));
+    for (int wrong = 0; wrong < 5; wrong++) {
+        double *u = zeros(2 * model.mesh.n_nodes), *s = zeros(entries);
+        memcpy(u, result->u, (size_t)(2 * model.mesh.n_nodes) * sizeof *u);
+        memcpy(s, stress, (size_t)entries * sizeof *s);
+        if (wrong == 0) /* a part on its own */
+            s[0] *= 1.001;
+        if (wrong == 1) /* in equilibrium with other loads: what is missing is told */
+            for (int64_t i = 0; i < entries; i++)
+                s[i] *= 1.01;
+        if (wrong == 2) /* in the obstacle: at a price */
+            for (int64_t a = 0; a < model.mesh.n_nodes; a++)
+                u[2 * a + 1] -= model.mesh.xyz[2 * a] > 30 ? 1e-5 : 0;
+        if (wrong == 3) /* off its support */
+            u[0] += 1e-6;
+        if (wrong == 4) /* another answer */
+            for (int64_t i = 0; i < 2 * model.mesh.n_nodes; i++)
+                u[i] *= 0.9;
+        CHECK(uz_bound_check(&bad, &body, &scene, dof, n, u, s, &err) == UZ_OK);
+        if (wrong == 0 || wrong == 3)
+            CHECK_MSG(*bad.fault && isinf(uz_bound_error(&bad, 0)), "%d", wrong);
+        if (wrong == 1)
+            CHECK(!*bad.fault && uz_norm(n, bad.residual) > 1e-3 * uz_norm(n, qp.p));
+        if (wrong == 2)
+            CHECK(!*bad.fault && bad.lift > 0);
+        if (wrong == 2 || wrong == 4)
+            CHECK(uz_bound_error(&bad, 0) > 1.01 * uz_bound_error(&good, 0));
+        free(bad.residual);
+        free(u);
+        free(s);
+    }
+    free(good.residual);
+    free(stress);
+    free(dof);
+    uz_result_free(dual);
+    uz_result_free(result);
+    uz_qp_clear(&qp);
+    uz_bound_body_clear(&body);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&scene);
+}
+
+TEST(what_is_not_proved_is_named)
+{
+    static const char *const WHY[] = {"springs", "node", "not straight", "single nodes", "revolution"};
+    for (int k = 0; k < 5; k++) {
+        uz_scene scene = paper_scene(6, 2);
+        if (k == 0)
+            scene.supports[scene.n_supports++] = (uz_support){.kind = UZ_SUPPORT_SPRING, .on = "top", .spring = {1, 1}};
+        if (k == 1)
+            scene.loads[scene.n_loads++] = (uz_load){.kind = UZ_LOAD_NODE_FORCE, .node = 20, .v = {1, 0}};
+        if (k == 2) {
+            scene.contacts[0].kind = UZ_OBSTACLE_ROUND;
+            scene.contacts[0].point[1] = -1000;
+            scene.contacts[0].radius = 1000;
+        }
+        if (k == 3) {
+            int64_t *node = calloc(1, sizeof *node);
+            body_give_mesh(&scene, NULL);
+            *node = 6;
+            scene.given.groups[scene.given.n_groups] = (uz_given_group){.name = "corner", .n_nodes = 1, .node = node};
+            scene.given.n_groups++;
+            add_support(&scene, "corner", 0, NAN);
+        }
+        if (k == 4)
+            scene.model = UZ_AXISYMMETRIC;
+        const uz_guarantee g = bound_of(&scene);
+        CHECK_MSG(!g.proved && isinf(g.bound) && strstr(g.why, WHY[k]), "%d: \"%s\"", k, g.why);
+        uz_scene_clear(&scene);
+    }
+}
+
+TEST(a_whole_error_that_is_asked_for)
+{
+    for (int k = 0; k < 4; k++) {
+        uz_scene scene = paper_scene(30, 10);
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene};
+        uz_settings settings = uz_settings_default();
+        uz_result *result;
+        uz_error err = {0};
+        settings.guaranteed = k % 2 == 0;
+        settings.total_error = k < 2 ? 0.03 : 0.01;
+        CHECK(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK);
+        CHECK_INT(result->summary.outcome, k < 2 ? UZ_CONVERGED : UZ_MESH_LIMIT);
+        CHECK_INT(result->summary.guarantee.proved, k % 2 == 0);
+        uz_result_free(result);
+        uz_scene_clear(&scene);
+    }
+}
