@@ -52,13 +52,22 @@ export function certificate_words(summary) {
       : `It is proved that no displacement whose components are all smaller than ${number(radius)} satisfies the contact conditions.`;
   }
   if (bound === null) return "No bound on the error could be proved: this answer must not be relied on.";
-  return `The exact answer of ${summary.error?.kind === "estimated" ? "its equations" : "this problem"} differs by at most ${percent_up(bound)}, in the energy norm.`;
+  return `The exact answer of ${has_mesh(summary) ? "its equations" : "this problem"} differs by at most ${percent_up(bound)}, in the energy norm.`;
+}
+
+/** Is the error of the answer more than that of its equations? Of bodies; matrices have no mesh. */
+function has_mesh(summary) {
+  return summary.error?.kind === "estimated" || is_bounded(summary);
+}
+function is_bounded(summary) {
+  return Number.isFinite(summary.error?.dual_unknowns);
 }
 
 /** The whole error, of which the mesh has its part; null where the certificate says it all. */
 export function whole_words(summary) {
-  const { mesh, total, kind } = summary.error || {};
-  if (kind !== "estimated" || has_no_answer(summary)) return null;
+  const { mesh, total, bound } = summary.error || {};
+  if (!has_mesh(summary) || has_no_answer(summary)) return null;
+  if (is_bounded(summary)) return `The answer is off by at most ${Number.isFinite(total) ? percent_up(total) : number(bound)} in the energy norm, mesh and equations together (guaranteed).`;
   if (!Number.isFinite(total)) return `How far the answer is off in all is not known: ${Number.isFinite(mesh) ? "nothing could be certified" : "what the mesh loses could not be estimated"}.`;
   return `The answer is off by about ${percent_up(total)} in the energy norm, ${mesh > 0.99 * total ? "nearly all of it" : percent_up(mesh)} by its mesh (estimated).`;
 }
@@ -84,7 +93,7 @@ export function result_words(job) {
   if (!summary) return "";
   const bound = bound_of(summary);
   if (has_no_answer(summary)) return OUTCOMES[summary.outcome][1].toLowerCase();
-  const total = summary.error?.kind === "estimated" ? summary.error.total : null;
-  const error = bound === null ? "no bound" : Number.isFinite(total) ? `≈ ${percent_up(total)}` : `≤ ${percent_up(bound)}`;
+  const total = has_mesh(summary) ? summary.error.total : null;
+  const error = bound === null ? "no bound" : Number.isFinite(total) ? `${is_bounded(summary) ? "≤" : "≈"} ${percent_up(total)}` : `≤ ${percent_up(bound)}`;
   return summary.outcome === "converged" || summary.outcome === "verified" ? error : `${OUTCOMES[summary.outcome]?.[1].toLowerCase() || summary.outcome}, ${error}`;
 }

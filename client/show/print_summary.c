@@ -84,7 +84,7 @@ static void print_outcome(FILE *to, const json_t *summary)
     const char *outcome = client_json_text(summary, "outcome"), *words = "";
     const char *message = client_json_text(summary, "message");
     const double d = client_json_number(summary, "problem.d"), m = client_json_number(summary, "problem.m");
-    char count[32];
+    char count[32], percent[32];
     for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
         words = strcmp(WORDS[i][0], outcome) == 0 ? WORDS[i][1] : words;
     label(to, "outcome");
@@ -96,15 +96,28 @@ static void print_outcome(FILE *to, const json_t *summary)
         fputc('\n', to);
     }
     const json_t *error = json_object_get(summary, "error");
-    if (strcmp(client_json_text(error, "kind"), "estimated") == 0) {
+    const bool bounded = json_is_number(json_object_get(error, "dual_unknowns"));
+    if (bounded || strcmp(client_json_text(error, "kind"), "estimated") == 0) {
         const double mesh = client_json_number(error, "mesh"), total = client_json_number(error, "total");
         label(to, "whole error");
-        if (isfinite(total))
+        if (bounded && isfinite(total))
+            fprintf(to, "at most %s %% in the energy norm, mesh and equations together, guaranteed\n",
+                    client_format_bound(percent, 100 * total));
+        else if (bounded)
+            fprintf(to, "at most %s in the energy norm, which may be all of it: guaranteed\n",
+                    client_format_bound(percent, client_json_number(error, "bound")));
+        else if (isfinite(total))
             fprintf(to, "about %.*f %% in the energy norm: %.*f %% of it the mesh's, by estimate\n",
                     places(100 * total), 100 * total, places(100 * mesh), 100 * mesh);
         else
             fprintf(to, "not known: what the %s could not be told\n",
                     isfinite(mesh) ? "equations leave" : "mesh loses");
+        if (*client_json_text(error, "why")) {
+            label(to, "");
+            fputs("no guarantee: ", to);
+            client_print_safe(to, client_json_text(error, "why"));
+            fputc('\n', to);
+        }
     }
     if (json_is_object(json_object_get(summary, "cases"))) {
         label(to, "cases");
@@ -257,7 +270,8 @@ static void print_certificate(FILE *to, const json_t *summary)
 {
     const json_t *certificate = client_json_at(summary, "certificate");
     const double relative = client_json_number(certificate, "relative_error");
-    const bool guaranteed = strcmp(client_json_text(summary, "error.kind"), "guaranteed") == 0;
+    const bool bounded = json_is_number(client_json_at(summary, "error.dual_unknowns"));
+    const bool guaranteed = !bounded && strcmp(client_json_text(summary, "error.kind"), "guaranteed") == 0;
     const double asked = client_json_number(summary, "requested_error"),
                  total = client_json_number(summary, "total_error");
     const char *outcome = client_json_text(summary, "outcome");
@@ -282,7 +296,8 @@ static void print_certificate(FILE *to, const json_t *summary)
     if (!isfinite(asked))
         fputs("\n", to);
     else if (isfinite(total))
-        fprintf(to, "\n%12stotal error about %.2g (asked for %.3g: %s)\n", "", total, asked, met);
+        fprintf(to, "\n%12stotal error %s %.2g (asked for %.3g: %s)\n", "", bounded ? "at most" : "about", total, asked,
+                met);
     else if (asked > 0)
         fprintf(to, " (asked for %.3g: %s)\n", asked, met);
     else

@@ -164,8 +164,13 @@ static bool decode_automatic(codec_request *out, decoding *d, const json_value *
     const uz_problem *p = &out->problem;
     if (p->kind != UZ_PROBLEM_SCENE || !p->scene.box.automatic)
         return true;
-    if (!json_get(solver, "accuracy"))
+    const json_value *accuracy = json_get(solver, "accuracy");
+    const double total = out->settings.total_error;
+    if (!accuracy || (json_get(accuracy, "guaranteed") && !(total > 0) && !json_get(accuracy, "relative_error")))
         out->settings.balanced = true;
+    if (total > 0) /* what the cells are chosen by */
+        out->settings.relative_error = total;
+    out->settings.total_error = 0;
     if (json_get(root, "answer"))
         problem_set(d->problem, 422, "not_allowed", json_get(box, "cells"),
                     "An answer belongs to a mesh: give the numbers of its cells in place of \"auto\".");

@@ -105,6 +105,10 @@ void decode_settings(uz_settings *out, const json_value *object)
             s.relative_error = LEVELS[i].relative_error;
             s.balanced = LEVELS[i].balanced;
         }
+    s.guaranteed = json_truth(json_get(accuracy, "guaranteed"));
+    s.total_error = decode_number(accuracy, "total", 0);
+    if (s.total_error > 0) /* the equations may have a tenth of it */
+        s.relative_error = 0.1 * s.total_error;
     s.relative_error = decode_number(accuracy, "relative_error", s.relative_error);
     s.epsilon = decode_number(object, "epsilon", 1e-6);
     s.alpha = decode_number(object, "alpha", s.alpha);

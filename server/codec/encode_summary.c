@@ -172,8 +172,26 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
     double equations;
     const double total = uz_total_error(&equations, s);
     text_open(t, "error", '{');
-    put_named(t, (named[]){{"equations", equations}, {"mesh", s->discretization_error}, {"total", total}}, 3);
-    text_string(t, "kind", scene ? "estimated" : "guaranteed");
+    const uz_guarantee *g = &s->guarantee;
+    /* what is proved of the answer holds of the mesh's own one but for what the equations left */
+    put_named(t,
+              (named[]){{"equations", equations},
+                        {"mesh", g->proved ? g->relative + equations : s->discretization_error},
+                        {"total", total}},
+              3);
+    text_string(t, "kind", scene && !g->proved ? "estimated" : "guaranteed");
+    if (g->asked && !g->proved)
+        text_string(t, "why", g->why);
+    if (g->proved) {
+        put_named(t,
+                  (named[]){{"estimated_mesh", s->discretization_error},
+                            {"bound", g->bound},
+                            {"energy_low", g->dual},
+                            {"energy_high", g->primal},
+                            {"seconds", g->seconds}},
+                  5);
+        text_integer(t, "dual_unknowns", g->unknowns);
+    }
     text_close(t, '}');
 }
 

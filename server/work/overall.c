@@ -15,7 +15,8 @@ _Static_assert(sizeof BADNESS / sizeof BADNESS[0] == CODEC_OUTCOMES, "each outco
 
 void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *results, const uz_problem *problem)
 {
-    int64_t worst = 0;
+    int64_t worst = 0, unproved = 0, widest = 0;
+    bool proved = true;
     uz_timings times = {0};
     double bound = 0.0, worst_error = 0.0, mesh = 0.0;
     *counts = (codec_cases){.count = problem->n_cases};
@@ -30,6 +31,11 @@ void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *res
             worst_error = error;
         }
         counts->outcomes[one->outcome]++;
+        if (one->guarantee.asked && !one->guarantee.proved && proved)
+            unproved = i;
+        proved = proved && (one->guarantee.proved || !one->guarantee.asked);
+        if (one->guarantee.relative > results[widest]->summary.guarantee.relative)
+            widest = i;
         bound = fmax(bound, known); /* one that is not known counts as the largest */
         mesh = isnan(mesh) || isnan(one->discretization_error) ? (double)NAN : fmax(mesh, one->discretization_error);
         uz_timings_add(&times, &one->timings);
@@ -38,6 +44,7 @@ void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *res
     counts->worst = problem->cases[worst].name;
     out->certificate.relative_error = bound;
     out->discretization_error = mesh;
+    out->guarantee = results[proved ? widest : unproved]->summary.guarantee; /* of all, as far as there is one */
     out->timings = times;
     out->iterations = out->restarts = out->refinements = 0;
     for (int64_t i = 0; i < problem->n_cases; i++) {
