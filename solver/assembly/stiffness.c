@@ -5,6 +5,7 @@
 #include "core/alloc.h"
 #include "core/cpu.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <float.h>
 #include <math.h>
@@ -119,20 +120,6 @@ uz_status uz_check_elements(const uz_body_model *model, uz_error *err)
 
 /* ---------------------------------------------------------------- adding up */
 
-/* Place of a row in its column; the pattern has it. */
-static int64_t find_entry(const uz_csc *A, int64_t row, int64_t column)
-{
-    int64_t low = A->ptr[column], high = A->ptr[column + 1] - 1;
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (A->idx[middle] < row)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 /* One element on its way into K. */
 typedef struct {
     const double *ke; /* n x n */
@@ -155,7 +142,7 @@ static void add_block(uz_csc *K, const addition *x, int a, int b)
             if (x->dof[b][i] < 0)
                 continue;
             if (place < 0) {
-                place = find_entry(K, x->dof[b][i], column) - K->ptr[column];
+                place = uz_csc_find(K, x->dof[b][i], column) - K->ptr[column];
                 first_column = column;
             }
             rank = column - first_column;
@@ -190,7 +177,7 @@ static void add_element(uz_body_model *model, const double *ke, int64_t element)
             for (int i = 0; i < n && column < 0; i++) {
                 const int64_t row = x.dof[i / dim][i % dim];
                 if (row >= 0)
-                    K_fixed->val[find_entry(K_fixed, row, -1 - column)] += x.ke[i * n + a * dim + j];
+                    K_fixed->val[uz_csc_find(K_fixed, row, -1 - column)] += x.ke[i * n + a * dim + j];
             }
         }
         for (int b = 0; b < count; b++)
@@ -213,9 +200,9 @@ static void add_spring(uz_body_model *model, int64_t node)
             if (value == 0 || dof[i] < 0 || (dof[j] >= 0 && dof[i] < dof[j]))
                 continue;
             if (dof[j] >= 0)
-                model->K.val[find_entry(&model->K, dof[i], dof[j])] += value;
+                model->K.val[uz_csc_find(&model->K, dof[i], dof[j])] += value;
             else
-                model->K_fixed.val[find_entry(&model->K_fixed, dof[i], -1 - dof[j])] += value;
+                model->K_fixed.val[uz_csc_find(&model->K_fixed, dof[i], -1 - dof[j])] += value;
         }
 }
 

@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -17,18 +18,9 @@ static bool place_rows(uz_springs *a, const uz_csc *S)
     for (int64_t i = 0; i < a->dual->m; i++)
         for (int64_t k = Nt->ptr[i]; (!a->rows || a->rows[i]) && k < Nt->ptr[i + 1]; k++)
             for (int64_t l = Nt->ptr[i]; l <= k; l++) { /* dofs of a row ascend */
-                const int64_t row = Nt->idx[k], column = Nt->idx[l];
-                int64_t low = S->ptr[column], high = S->ptr[column + 1] - 1;
-                while (low < high) {
-                    const int64_t middle = low + (high - low) / 2;
-                    if (S->idx[middle] < row)
-                        low = middle + 1;
-                    else
-                        high = middle;
-                }
-                if (S->idx[low] != row)
+                *at = uz_csc_find(S, Nt->idx[k], Nt->idx[l]);
+                if (*at++ < 0)
                     return false;
-                *at++ = low;
             }
     return true;
 }

@@ -197,6 +197,19 @@ void uz_csc_symv(double *y, const uz_csc *A, double alpha, const double *x)
     }
 }
 
+int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column)
+{
+    int64_t low = A->ptr[column], high = A->ptr[column + 1];
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (A->idx[middle] < row)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < A->ptr[column + 1] && A->idx[low] == row ? low : -1;
+}
+
 bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room)
 {
     int64_t *rows = uz_realloc(*row, room, sizeof *rows);

@@ -3,6 +3,7 @@
 #include "certificate/row_move.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <float.h>
 #include <math.h>
@@ -101,20 +102,6 @@ void uz_augmented_clear(uz_problem *augmented)
     memset(augmented, 0, sizeof *augmented);
 }
 
-/* |A_ab| of a lower triangle, by bisection of its column. */
-static double entry(const uz_csc *A, int64_t a, int64_t b)
-{
-    int64_t row = a > b ? a : b, col = a > b ? b : a, low = A->ptr[col], high = A->ptr[col + 1];
-    while (low < high) {
-        int64_t middle = low + (high - low) / 2;
-        if (A->idx[middle] < row)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < A->ptr[col + 1] && A->idx[low] == row ? fabs(A->val[low]) : 0.0;
-}
-
 void uz_augmented_noise(double *noise, const uz_problem *augmented, const uz_csc *Nt, const double *weight,
                         const double *target, const double *u)
 {
@@ -127,8 +114,9 @@ void uz_augmented_noise(double *noise, const uz_problem *augmented, const uz_csc
             const int64_t j = Nt->idx[a];
             double force = fabs(qp->p[j]) + weight[i] * fabs(target[i] * Nt->val[a]);
             for (int64_t b = Nt->ptr[i]; b < Nt->ptr[i + 1]; b++) {
-                const int64_t k = Nt->idx[b];
-                force += (entry(&qp->K, j, k) + weight[i] * fabs(Nt->val[a] * Nt->val[b])) * fabs(u[k]);
+                const int64_t k = Nt->idx[b], at = uz_csc_find(&qp->K, j > k ? j : k, j > k ? k : j);
+                const double entry = at < 0 ? 0.0 : fabs(qp->K.val[at]);
+                force += (entry + weight[i] * fabs(Nt->val[a] * Nt->val[b])) * fabs(u[k]);
             }
             noise[j] += 4.0 * DBL_EPSILON * force;
         }
