@@ -104,12 +104,8 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
         double *x = l == 0 ? z : room->x[l];
         descend(x, room->b[l + 1], room->t[l], level, A, l == 0 ? r : room->b[l], mg->k);
     }
-    double *t = room->t[last];
-    uz_factor_permute(mg->coarsest, t, last == 0 ? r : room->b[last]);
-    uz_status status = uz_factor_solve_one(mg->coarsest, room->ws, t, true, err);
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(mg->coarsest, room->ws, t, false, err);
-    uz_factor_unpermute(mg->coarsest, last == 0 ? z : room->x[last], t);
+    uz_status status = uz_factor_solve(mg->coarsest, room->ws, last == 0 ? z : room->x[last],
+                                       last == 0 ? r : room->b[last], room->t[last], err);
     if (last == 0) {
         /* Where K itself is the coarsest matrix: held dofs are rows of the unit matrix there. */
         const uz_level *level = &mg->level[0];

@@ -22,19 +22,6 @@ typedef struct {
     double *unit, *force; /* d */
 } factored_load;
 
-/* v = K^-1 v, through work2. */
-static uz_status solve(factored_load *x, double *v, uz_error *err)
-{
-    const uz_factor *factor = x->sparse.load.dual->factor;
-    double *room = x->sparse.work2;
-    uz_factor_permute(factor, room, v);
-    uz_status status = uz_factor_solve_one(factor, x->ws, room, true, err);
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(factor, x->ws, room, false, err);
-    uz_factor_unpermute(factor, v, room);
-    return status;
-}
-
 static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
 {
     factored_load *x = (factored_load *)load;
@@ -44,8 +31,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)load->dual->d);
     if (status != UZ_OK)
         return status;
-    memcpy(x->sparse.base, p, (size_t)load->dual->d * sizeof *p);
-    status = solve(x, x->sparse.base, err);
+    status = uz_factor_solve(load->dual->factor, x->ws, x->sparse.base, p, x->sparse.work2, err);
     return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, err) : status;
 }
 
@@ -74,7 +60,7 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     if (first == dual->m) /* r = 0 */
         return UZ_OK;
     uz_csc_gaxpy_t(response, &dual->N, 1.0, r);
-    uz_status status = solve(x, response, err);
+    uz_status status = uz_factor_solve(dual->factor, x->ws, response, response, x->sparse.work2, err);
     if (status == UZ_OK)
         uz_csc_gaxpy(Dr, &dual->N, 1.0, response);
     return status;

@@ -68,41 +68,6 @@ static uz_status allocate(interior *x, uz_error *err)
     return UZ_OK;
 }
 
-static void clear(interior *x)
-{
-    double *room[] = {x->compliance, x->unit, x->sigma, x->s,  x->z,     x->ds,  x->dz,
-                      x->aim,        x->gap,  x->w,     x->dw, x->force, x->room};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
-    uz_factor_free(x->factor);
-    uz_factor_workspace_free(x->ws);
-    uz_springs_clear(&x->springs);
-}
-
-/* S for sigma, factored; *can false: it is not definite to working precision. */
-static uz_status factorize(interior *x, bool *can, uz_error *err)
-{
-    uz_springs_fill(&x->springs, x->sigma);
-    uz_status status = x->factor ? uz_factor_again(x->factor, &x->springs.S, err)
-                                 : uz_factor_create(&x->factor, &x->springs.S, x->springs.analysis, 0, NULL, err);
-    *can = status == UZ_OK;
-    if (status != UZ_ERR_NOT_SPD)
-        return status;
-    uz_error_reset(err);
-    return UZ_OK;
-}
-
-/* dw = K^-1 dw, or S^-1 dw */
-static uz_status solve(interior *x, const uz_factor *factor, uz_error *err)
-{
-    uz_factor_permute(factor, x->room, x->dw);
-    uz_status status = uz_factor_solve_one(factor, x->ws, x->room, true, err);
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(factor, x->ws, x->room, false, err);
-    uz_factor_unpermute(factor, x->dw, x->room);
-    return status;
-}
-
 /* In equilibrium: all rows pressed alike, in units of how stiff the body is at each alone, as hard as fits the gaps
  * best. Gaps are those that this leaves, widened alike until none is closed. */
 static uz_status begin(interior *x, bool *can, uz_error *err)
@@ -112,7 +77,7 @@ static uz_status begin(interior *x, bool *can, uz_error *err)
     for (int64_t i = 0; i < x->m; i++)
         x->z[i] = x->compliance[i] > 0.0 ? 1.0 / x->unit[i] : 0.0;
     uz_csc_gaxpy_t(x->dw, &x->dual->N, -1.0, x->z);
-    uz_status status = solve(x, x->dual->factor, err);
+    uz_status status = uz_factor_solve(x->dual->factor, x->ws, x->dw, x->dw, x->room, err);
     uz_csc_gaxpy(x->ds, &x->dual->N, -1.0, x->dw); /* D z */
     for (int64_t i = 0; i < x->m; i++) {           /* in the metric of the compliances */
         along += x->z[i] * fabs(g0[i]) * x->z[i] * fabs(x->ds[i]);
@@ -178,7 +143,7 @@ static uz_status step(interior *x, double *length, uz_error *err)
     }
     memcpy(x->dw, x->force, (size_t)x->d * sizeof *x->dw);
     uz_csc_gaxpy_t(x->dw, &x->dual->N, -1.0, x->dz);
-    uz_status status = solve(x, x->factor, err);
+    uz_status status = uz_factor_solve(x->factor, x->ws, x->dw, x->dw, x->room, err);
     memset(x->ds, 0, (size_t)x->m * sizeof *x->ds);
     uz_csc_gaxpy(x->ds, &x->dual->N, 1.0, x->dw);
     double most = 1.0 / SHARE;
@@ -202,8 +167,15 @@ static uz_status advance(interior *x, bool *on, double mu, uz_error *err)
         x->sigma[i] = x->z[i] / (x->s[i] + PROXIMAL * x->compliance[i] * x->z[i]);
         x->aim[i] = -x->s[i] * x->z[i];
     }
-    uz_status status = factorize(x, on, err);
-    if (status == UZ_OK && *on)
+    uz_springs_fill(&x->springs, x->sigma);
+    uz_status status = x->factor ? uz_factor_again(x->factor, &x->springs.S, err)
+                                 : uz_factor_create(&x->factor, &x->springs.S, x->springs.analysis, 0, NULL, err);
+    *on = status == UZ_OK;
+    if (status == UZ_ERR_NOT_SPD) { /* to working precision */
+        uz_error_reset(err);
+        return UZ_OK;
+    }
+    if (status == UZ_OK)
         status = step(x, &length, err);
     if (status != UZ_OK || !*on)
         return status;
@@ -250,6 +222,11 @@ uz_status uz_dual_load_interior(uz_dual_load *load, bool *can, bool *active, dou
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld reactions", (long long)x.m);
     for (int64_t i = 0; status == UZ_OK && *can && i < x.m; i++)
         load->inside[i] = active[i] ? -x.z[i] : 0.0;
-    clear(&x);
+    double *room[] = {x.compliance, x.unit, x.sigma, x.s, x.z, x.ds, x.dz, x.aim, x.gap, x.w, x.dw, x.force, x.room};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    uz_factor_free(x.factor);
+    uz_factor_workspace_free(x.ws);
+    uz_springs_clear(&x.springs);
     return status;
 }

@@ -64,32 +64,10 @@ static void measure(multipliers *a, const double *r)
             a->worst = fmax(a->worst, fabs(a->f[i]) / fmax(a->size[i], LEAST_SIZE * largest));
 }
 
-/* One pass with a factor of S. */
-static uz_status step(multipliers *a, double *r, const uz_factor *factor, uz_factor_workspace *ws, uz_error *err)
-{
-    const uz_csc *Nt = &a->dual->Nt;
-    for (int64_t i = 0; i < a->dual->m; i++)
-        for (int64_t k = Nt->ptr[i]; a->active[i] && k < Nt->ptr[i + 1]; k++)
-            a->e[Nt->idx[k]] += Nt->val[k] * a->sigma[i] * a->f[i];
-    uz_factor_permute(factor, a->room, a->e);
-    uz_status status = uz_factor_solve_one(factor, ws, a->room, true, err);
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(factor, ws, a->room, false, err);
-    uz_factor_unpermute(factor, a->e, a->room);
-    for (int64_t i = 0; i < a->dual->m; i++) {
-        double change = a->f[i];
-        for (int64_t k = Nt->ptr[i]; a->active[i] && k < Nt->ptr[i + 1]; k++)
-            change -= Nt->val[k] * a->e[Nt->idx[k]];
-        r[i] += a->active[i] ? a->sigma[i] * change : 0.0;
-    }
-    for (int64_t j = 0; j < a->dual->d; j++)
-        a->w[j] += a->e[j];
-    return status;
-}
-
 /* Passes with one Sigma. */
 static uz_status iterate(multipliers *a, bool *slow, double *r, uz_springs *S, uz_factor_workspace *ws, uz_error *err)
 {
+    const uz_csc *Nt = &a->dual->Nt;
     uz_factor *factor = NULL;
     *slow = false;
     uz_springs_fill(S, a->sigma);
@@ -105,7 +83,18 @@ static uz_status iterate(multipliers *a, bool *slow, double *r, uz_springs *S, u
     }
     for (int pass = 0; status == UZ_OK && factor && pass < PASSES && !uz_stop_is_due(&a->x->load.stop); pass++) {
         const double before = a->worst;
-        status = step(a, r, factor, ws, err);
+        for (int64_t i = 0; i < a->dual->m; i++)
+            for (int64_t k = Nt->ptr[i]; a->active[i] && k < Nt->ptr[i + 1]; k++)
+                a->e[Nt->idx[k]] += Nt->val[k] * a->sigma[i] * a->f[i];
+        status = uz_factor_solve(factor, ws, a->e, a->e, a->room, err);
+        for (int64_t i = 0; i < a->dual->m; i++) {
+            double change = a->f[i];
+            for (int64_t k = Nt->ptr[i]; a->active[i] && k < Nt->ptr[i + 1]; k++)
+                change -= Nt->val[k] * a->e[Nt->idx[k]];
+            r[i] += a->active[i] ? a->sigma[i] * change : 0.0;
+        }
+        for (int64_t j = 0; j < a->dual->d; j++)
+            a->w[j] += a->e[j];
         measure(a, r);
         if (a->worst <= CLOSED && pass > 0)
             break;

@@ -80,25 +80,6 @@ static void collect_edges(SuiteSparse_long *next, SuiteSparse_long *rows, int64_
     }
 }
 
-/* Leaves each edge once. graph's columns end where the next begins; mark: a place for each group. */
-static void drop_repeated(cholmod_sparse *graph, int64_t *mark)
-{
-    SuiteSparse_long *ptr = graph->p, *rows = graph->i, at = 0, begin = 0;
-    for (int64_t g = 0; g < (int64_t)graph->ncol; g++)
-        mark[g] = -1;
-    for (int64_t g = 0; g < (int64_t)graph->ncol; g++) {
-        int64_t end = ptr[g + 1];
-        for (int64_t k = begin; k < end; k++) {
-            if (mark[rows[k]] == g)
-                continue;
-            mark[rows[k]] = g;
-            rows[at++] = rows[k];
-        }
-        begin = end;
-        ptr[g + 1] = at;
-    }
-}
-
 cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64_t *last, int64_t n_last,
                             cholmod_common *common)
 {
@@ -121,12 +102,22 @@ cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64
             cholmod_l_allocate_sparse((size_t)groups, (size_t)groups, (size_t)edges, 0, 1, -1, CHOLMOD_PATTERN, common);
     }
     if (graph) {
-        SuiteSparse_long *ptr = graph->p;
-        collect_edges(next, graph->i, mark, A, group, groups);
+        SuiteSparse_long *ptr = graph->p, *rows = graph->i, at = 0;
+        collect_edges(next, rows, mark, A, group, groups);
+        for (int64_t g = 0; g < groups; g++)
+            mark[g] = -1;
         ptr[0] = 0;
-        for (int64_t g = 0; g < groups; g++) /* each column was filled up to where it ends */
-            ptr[g + 1] = next[g];
-        drop_repeated(graph, mark);
+        for (int64_t g = 0, begin = 0; g < groups; g++) { /* each edge once */
+            const int64_t end = next[g];                  /* each column was filled up to here */
+            for (int64_t k = begin; k < end; k++) {
+                if (mark[rows[k]] == g)
+                    continue;
+                mark[rows[k]] = g;
+                rows[at++] = rows[k];
+            }
+            begin = end;
+            ptr[g + 1] = at;
+        }
     }
     free(next);
     free(mark);

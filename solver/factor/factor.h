@@ -80,6 +80,9 @@ void uz_factor_permute(const uz_factor *factor, double *permuted, const double *
 void uz_factor_unpermute(const uz_factor *factor, double *x, const double *permuted);
 /* In place on a vector x (n) in the factor's order: x = L^-1 x (forward), or x = L'^-1 x. UZ_ERR_MEMORY. */
 uz_status uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward, uz_error *err);
+/* x = K^-1 b (n each, x may be b), by way of room (n). */
+uz_status uz_factor_solve(const uz_factor *factor, uz_factor_workspace *ws, double *x, const double *b, double *room,
+                          uz_error *err);
 
 /* The same for blocks of UZ_LANES vectors that stand side by side: entry k of vector l at X[k * UZ_LANES + l], n rows,
  * one block after the other. An answer depends neither on what the other lanes hold nor on the lane. Permutations are

@@ -31,9 +31,16 @@ struct uz_factor {
     int64_t *place;        /* of its entries there */
 };
 
+/* A factor with other supernodes here and there. */
+typedef struct {
+    const double *const *block; /* nsuper; NULL: the factor's own */
+    const bool *held;           /* n: columns in whose place substitutions have 0 */
+} uz_overlay;
+
 struct uz_factor_workspace {
     cholmod_common common;
-    double *panel; /* room to gather rows in, grown on demand */
+    const uz_overlay *overlay; /* of what uz_factor_solve_one solves with; NULL: none */
+    double *panel;             /* room to gather rows in, grown on demand */
     size_t panel_size;
 };
 
@@ -67,15 +74,6 @@ uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t 
 /* P K P' (lower triangle, columns unsorted); NULL: no memory. position: the factor's. place: where each entry of K
  * stands in it, or NULL. */
 cholmod_sparse *uz_permute(const uz_csc *K, const int64_t *position, int64_t *place, cholmod_common *common);
-
-/* A factor with other supernodes here and there. */
-typedef struct {
-    const double *const *block; /* nsuper; NULL: the factor's own */
-    const bool *held;           /* n: columns in whose place substitutions have 0 */
-} uz_overlay;
-/* uz_factor_solve_one, with an overlay or NULL. */
-uz_status uz_factor_substitute(const uz_factor *factor, const uz_overlay *overlay, uz_factor_workspace *ws, double *x,
-                               bool forward, uz_error *err);
 
 /* The factor of K with some dofs held, by what changes of the factor of K, both of which outlive it (paths.c). */
 typedef struct uz_paths uz_paths;

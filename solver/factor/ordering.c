@@ -1,4 +1,5 @@
-/* ordering.c: fill-reducing orderings of the graph of nodes with those of the contact last. */
+/* ordering.c: fill-reducing orderings of the graph of nodes with those of the contact last (Amestoy, Davis, Duff, SIAM
+ * J. Matrix Anal. Appl. 17 (1996)). */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
@@ -9,19 +10,6 @@
 #include <stdlib.h>
 
 enum { TINY = 4 };
-
-/* Amestoy, Davis, Duff, SIAM J. Matrix Anal. Appl. 17 (1996), with the constraint sets of CAMD. */
-static bool order_camd(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, cholmod_common *common)
-{
-    SuiteSparse_long *member = uz_alloc_zero((int64_t)A->nrow, sizeof *member);
-    if (!member)
-        return false;
-    for (int64_t k = 0; k < n_last; k++)
-        member[last[k]] = 1;
-    bool ok = cholmod_l_camd(A, NULL, 0, member, (SuiteSparse_long *)perm, common);
-    free(member);
-    return ok;
-}
 
 /* METIS installs its own handlers for SIGTERM and SIGABRT while it runs and uses the process's rand(): calls are
  * serialised for the whole process and the dispositions put back. The mutex guards METIS's process-wide state, it holds
@@ -70,8 +58,12 @@ uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *last, in
     if (n < TINY) { /* nothing to reduce, and CAMD reads past the end at n = 1 */
         for (int64_t k = 0; k < n; k++)
             perm[k] = k;
-    } else if (ordering == UZ_ORDERING_CAMD) {
-        ok = order_camd(perm, graph, last, n_last, common);
+    } else if (ordering == UZ_ORDERING_CAMD) { /* with the contact as a constraint set */
+        SuiteSparse_long *member = uz_alloc_zero(n, sizeof *member);
+        for (int64_t k = 0; member && k < n_last; k++)
+            member[last[k]] = 1;
+        ok = member && cholmod_l_camd(graph, NULL, 0, member, (SuiteSparse_long *)perm, common);
+        free(member);
     } else if (ordering == UZ_ORDERING_AMD) {
         ok = cholmod_l_amd(graph, NULL, 0, (SuiteSparse_long *)perm, common);
     } else {

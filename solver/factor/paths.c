@@ -281,9 +281,11 @@ uz_status uz_paths_solve(double *v, uz_paths *x, uz_error *err)
     const uz_overlay overlay = {(const double *const *)x->block, x->held};
     for (int64_t k = 0; k < x->factor->n; k++)
         x->x[k] = x->held[k] ? 0.0 : v[perm[k]];
-    uz_status status = uz_factor_substitute(x->factor, &overlay, x->ws, x->x, true, err);
+    x->ws->overlay = &overlay;
+    uz_status status = uz_factor_solve_one(x->factor, x->ws, x->x, true, err);
     if (status == UZ_OK)
-        status = uz_factor_substitute(x->factor, &overlay, x->ws, x->x, false, err);
+        status = uz_factor_solve_one(x->factor, x->ws, x->x, false, err);
+    x->ws->overlay = NULL;
     for (int64_t k = 0; status == UZ_OK && k < x->factor->n; k++)
         if (!x->held[k])
             v[perm[k]] = x->x[k];

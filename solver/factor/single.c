@@ -272,13 +272,8 @@ UZ_AVX2_FMA static void substitute_back_fused(const panel_of *s)
 
 uz_status uz_factor_solve_one(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward, uz_error *err)
 {
-    return uz_factor_substitute(factor, NULL, ws, x, forward, err);
-}
-
-uz_status uz_factor_substitute(const uz_factor *factor, const uz_overlay *overlay, uz_factor_workspace *ws, double *x,
-                               bool forward, uz_error *err)
-{
     const cholmod_factor *L = &factor->L;
+    const uz_overlay *overlay = ws->overlay;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
     int64_t count = (int64_t)L->nsuper;
     const bool fused = uz_cpu_has_avx2_fma();

@@ -40,6 +40,17 @@ void uz_factor_unpermute(const uz_factor *factor, double *x, const double *permu
         x[perm[k]] = permuted[k];
 }
 
+uz_status uz_factor_solve(const uz_factor *factor, uz_factor_workspace *ws, double *x, const double *b, double *room,
+                          uz_error *err)
+{
+    uz_factor_permute(factor, room, b);
+    uz_status status = uz_factor_solve_one(factor, ws, room, true, err);
+    if (status == UZ_OK)
+        status = uz_factor_solve_one(factor, ws, room, false, err);
+    uz_factor_unpermute(factor, x, room);
+    return status;
+}
+
 cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns)
 {
     cholmod_dense X;

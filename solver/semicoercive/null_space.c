@@ -86,21 +86,6 @@ typedef struct {
     double *row, *dof; /* m, d */
 } block;
 
-/* x (d) = K_R^-1 N'row. */
-static uz_status solve_rows(block *s, double *x, uz_error *err)
-{
-    if (uz_cancelled(s->hooks))
-        return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
-    memset(x, 0, (size_t)s->d * sizeof *x);
-    uz_csc_gaxpy(x, s->Nt, 1.0, s->row);
-    uz_factor_permute(s->factor, s->dof, x);
-    uz_status status = uz_factor_solve_one(s->factor, s->ws, s->dof, true, err);
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(s->factor, s->ws, s->dof, false, err);
-    uz_factor_unpermute(s->factor, x, s->dof);
-    return status;
-}
-
 /* X = K_R^-1 N'R N X, or K_R^-1 N'R^1/2 times random numbers to begin with. */
 static uz_status iterate(block *s, bool first, uz_error *err)
 {
@@ -117,7 +102,11 @@ static uz_status iterate(block *s, bool first, uz_error *err)
                 s->row[i] = ((double)(random >> 11) * 0x1p-53 - 0.5) * sqrt(s->weight[i]);
             }
         }
-        status = solve_rows(s, s->X + c * s->d, err);
+        double *x = s->X + c * s->d;
+        memset(x, 0, (size_t)s->d * sizeof *x);
+        uz_csc_gaxpy(x, s->Nt, 1.0, s->row);
+        status = uz_cancelled(s->hooks) ? uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration")
+                                        : uz_factor_solve(s->factor, s->ws, x, x, s->dof, err);
     }
     return status;
 }
