@@ -120,31 +120,6 @@ static double distance_at(const surface *f, const double at[2])
     return uz_dot3(x, x);
 }
 
-/* Second derivatives of the position: the same everywhere on a face of at most six nodes. Where p, q are the own
- * coordinates of one of eight nodes, those of (1 + p a) (1 + q b) (p a + q b - 1) / 4 at corners and of
- * (1 - a^2) (1 + q b) / 2 or (1 - b^2) (1 + p a) / 2 between them. */
-static void second_derivatives(double aa[3], double ab[3], double bb[3], const surface *f, const double at[2])
-{
-    const int nodes = f->type->nodes;
-    for (int c = 0; c < 3; c++) {
-        const double x[6] = {f->x[0][c], f->x[1][c], f->x[2][c], f->x[3][c], f->x[4][c], f->x[5][c]};
-        aa[c] = nodes == 6 ? 4 * (x[0] + x[1] - 2 * x[3]) : 0;
-        bb[c] = nodes == 6 ? 4 * (x[0] + x[2] - 2 * x[5]) : 0;
-        ab[c] = nodes == 6 ? 4 * (x[0] - x[3] + x[4] - x[5]) : nodes == 4 ? 0.25 * (x[0] - x[1] + x[2] - x[3]) : 0;
-    }
-    for (int i = 0; i < nodes && nodes == 8; i++) {
-        const double p = f->type->local[i][0], q = f->type->local[i][1], a = at[0], b = at[1];
-        const double along_a = p == 0 ? -(1 + q * b) : q == 0 ? 0 : 0.5 * (1 + q * b);
-        const double along_b = q == 0 ? -(1 + p * a) : p == 0 ? 0 : 0.5 * (1 + p * a);
-        const double mixed = p == 0 ? -a * q : q == 0 ? -b * p : 0.25 * p * q * (1 + 2 * p * a + 2 * q * b);
-        for (int c = 0; c < 3; c++) {
-            aa[c] += along_a * f->x[i][c];
-            ab[c] += mixed * f->x[i][c];
-            bb[c] += along_b * f->x[i][c];
-        }
-    }
-}
-
 /* How far outside the face's own coordinates; < 0 within. */
 static double outside(const surface *f, const double at[2])
 {
@@ -159,7 +134,27 @@ static void newton_step(double step[2], const surface *f, const double at[2])
     double x[3], T[2][3], aa[3], ab[3], bb[3];
     const double *ta = T[0], *tb = T[1];
     surface_at(x, NULL, T, f, at);
-    second_derivatives(aa, ab, bb, f, at);
+    /* second derivatives of the position: the same everywhere on a face of at most six nodes. Where p, q are the own
+     * coordinates of one of eight nodes, those of (1 + p a) (1 + q b) (p a + q b - 1) / 4 at corners and of
+     * (1 - a^2) (1 + q b) / 2 or (1 - b^2) (1 + p a) / 2 between them */
+    const int nodes = f->type->nodes;
+    for (int c = 0; c < 3; c++) {
+        const double y[6] = {f->x[0][c], f->x[1][c], f->x[2][c], f->x[3][c], f->x[4][c], f->x[5][c]};
+        aa[c] = nodes == 6 ? 4 * (y[0] + y[1] - 2 * y[3]) : 0;
+        bb[c] = nodes == 6 ? 4 * (y[0] + y[2] - 2 * y[5]) : 0;
+        ab[c] = nodes == 6 ? 4 * (y[0] - y[3] + y[4] - y[5]) : nodes == 4 ? 0.25 * (y[0] - y[1] + y[2] - y[3]) : 0;
+    }
+    for (int i = 0; i < nodes && nodes == 8; i++) {
+        const double p = f->type->local[i][0], q = f->type->local[i][1], a = at[0], b = at[1];
+        const double along_a = p == 0 ? -(1 + q * b) : q == 0 ? 0 : 0.5 * (1 + q * b);
+        const double along_b = q == 0 ? -(1 + p * a) : p == 0 ? 0 : 0.5 * (1 + p * a);
+        const double mixed = p == 0 ? -a * q : q == 0 ? -b * p : 0.25 * p * q * (1 + 2 * p * a + 2 * q * b);
+        for (int c = 0; c < 3; c++) {
+            aa[c] += along_a * f->x[i][c];
+            ab[c] += mixed * f->x[i][c];
+            bb[c] += along_b * f->x[i][c];
+        }
+    }
     const double ga = uz_dot3(x, ta), gb = uz_dot3(x, tb);
     double haa = uz_dot3(ta, ta) + uz_dot3(x, aa), hab = uz_dot3(ta, tb) + uz_dot3(x, ab),
            hbb = uz_dot3(tb, tb) + uz_dot3(x, bb);
@@ -229,23 +224,6 @@ static void set_normal(uz_foot *out, const double normal[3])
         out->normal[c] = normal[c] / length;
 }
 
-static void closest_in_plane(uz_foot *out, int count, const double *xyz)
-{
-    const curve k = curve_of(xyz, xyz + 2, count == 3 ? xyz + 4 : NULL, 2);
-    double s = closest_on_curve(&k);
-    s = s >= 1 - SNAP ? 1 : s <= -1 + SNAP ? -1 : s;
-    out->local[0] = s;
-    out->place = fabs(s) == 1 ? UZ_FACE_CORNER : UZ_FACE_WITHIN;
-    out->which = s == 1;
-    const double bubble = count == 3 ? 1 - s * s : 0;
-    out->weight[0] = 0.5 * (1 - s) - 0.5 * bubble;
-    out->weight[1] = 0.5 * (1 + s) - 0.5 * bubble;
-    out->weight[2] = bubble;
-    curve_at(out->point, &k, s);
-    const double tangent[2] = {k.b[0] + 2 * s * k.c[0], k.b[1] + 2 * s * k.c[1]};
-    set_normal(out, (double[3]){tangent[1], -tangent[0], 0});
-}
-
 /* The closest point of the border; its squared distance is returned, its place in *out. */
 static double closest_on_border(uz_foot *out, const surface *f, double x[3])
 {
@@ -270,37 +248,45 @@ static double closest_on_border(uz_foot *out, const surface *f, double x[3])
     return best;
 }
 
-static void closest_in_space(uz_foot *out, int count, const double *xyz)
-{
-    surface f = {.type = uz_face_type(count), .x = {{0}}};
-    double at[2] = {0}, border[3], normal[3], T[2][3];
-    memcpy(f.x, xyz, (size_t)count * sizeof f.x[0]);
-    const double distance = closest_on_border(out, &f, border);
-    if (descend(at, &f)) {
-        double x[3], off[3], size = 0;
-        surface_at(x, NULL, NULL, &f, at);
-        for (int c = 0; c < 3; c++) {
-            off[c] = x[c] - border[c];
-            size = fmax(size, fabs(f.x[1][c] - f.x[0][c]));
-        }
-        /* nearer than the point of the border by more than rounding */
-        if (uz_dot3(x, x) < distance && uz_dot3(off, off) > SNAP * SNAP * size * size) {
-            out->place = UZ_FACE_WITHIN;
-            out->which = 0;
-            memcpy(out->local, at, sizeof at);
-        }
-    }
-    surface_at(out->point, out->weight, T, &f, out->local);
-    uz_cross3(normal, T[0], T[1]);
-    set_normal(out, normal);
-}
-
 void uz_face_closest(uz_foot *out, int dim, int count, const double *xyz)
 {
     memset(out, 0, sizeof *out);
-    if (dim == 2)
-        closest_in_plane(out, count, xyz);
-    else
-        closest_in_space(out, count, xyz);
+    if (dim == 2) {
+        const curve k = curve_of(xyz, xyz + 2, count == 3 ? xyz + 4 : NULL, 2);
+        double s = closest_on_curve(&k);
+        s = s >= 1 - SNAP ? 1 : s <= -1 + SNAP ? -1 : s;
+        out->local[0] = s;
+        out->place = fabs(s) == 1 ? UZ_FACE_CORNER : UZ_FACE_WITHIN;
+        out->which = s == 1;
+        const double bubble = count == 3 ? 1 - s * s : 0;
+        out->weight[0] = 0.5 * (1 - s) - 0.5 * bubble;
+        out->weight[1] = 0.5 * (1 + s) - 0.5 * bubble;
+        out->weight[2] = bubble;
+        curve_at(out->point, &k, s);
+        const double tangent[2] = {k.b[0] + 2 * s * k.c[0], k.b[1] + 2 * s * k.c[1]};
+        set_normal(out, (double[3]){tangent[1], -tangent[0], 0});
+    } else {
+        surface f = {.type = uz_face_type(count), .x = {{0}}};
+        double at[2] = {0}, border[3], normal[3], T[2][3];
+        memcpy(f.x, xyz, (size_t)count * sizeof f.x[0]);
+        const double distance = closest_on_border(out, &f, border);
+        if (descend(at, &f)) {
+            double x[3], off[3], size = 0;
+            surface_at(x, NULL, NULL, &f, at);
+            for (int c = 0; c < 3; c++) {
+                off[c] = x[c] - border[c];
+                size = fmax(size, fabs(f.x[1][c] - f.x[0][c]));
+            }
+            /* nearer than the point of the border by more than rounding */
+            if (uz_dot3(x, x) < distance && uz_dot3(off, off) > SNAP * SNAP * size * size) {
+                out->place = UZ_FACE_WITHIN;
+                out->which = 0;
+                memcpy(out->local, at, sizeof at);
+            }
+        }
+        surface_at(out->point, out->weight, T, &f, out->local);
+        uz_cross3(normal, T[0], T[1]);
+        set_normal(out, normal);
+    }
     out->distance2 = uz_dot3(out->point, out->point);
 }

@@ -40,17 +40,6 @@ static uz_status check_slopes(const uz_obstacle_subject *s, const double *v, int
     return UZ_OK;
 }
 
-static uz_status check_steepness(const uz_obstacle_subject *s)
-{
-    const uz_contact *c = s->contact;
-    uz_status status = UZ_OK;
-    for (int64_t j = 0; j < (s->dim == 3 ? c->n_y : 1) && status == UZ_OK; j++)
-        status = check_slopes(s, c->x, c->n_x, j * c->n_x, 1);
-    for (int64_t i = 0; i < c->n_x && s->dim == 3 && status == UZ_OK; i++)
-        status = check_slopes(s, c->y, c->n_y, i, c->n_x);
-    return status;
-}
-
 static uz_status check(const uz_obstacle_subject *s)
 {
     char where[UZ_OBSTACLE_POINTER], row[32];
@@ -71,7 +60,11 @@ static uz_status check(const uz_obstacle_subject *s)
         snprintf(row, sizeof row, s->dim == 3 ? "z/%lld" : "z", (long long)j);
         status = uz_obstacle_check_finite(s, row, c->z + j * c->n_x, c->n_x);
     }
-    return status == UZ_OK ? check_steepness(s) : status;
+    for (int64_t j = 0; j < (s->dim == 3 ? c->n_y : 1) && status == UZ_OK; j++)
+        status = check_slopes(s, c->x, c->n_x, j * c->n_x, 1);
+    for (int64_t i = 0; i < c->n_x && s->dim == 3 && status == UZ_OK; i++)
+        status = check_slopes(s, c->y, c->n_y, i, c->n_x);
+    return status;
 }
 
 static double largest(const uz_contact *contact, int dim)
@@ -145,25 +138,15 @@ static int64_t find_place(double *t, const double *list, int64_t n, double value
     return low;
 }
 
-static double height_at(const uz_contact *c, double x, double y)
-{
-    double s, t;
-    const int64_t i = find_place(&s, c->x, c->n_x, x), j = find_place(&t, c->y, c->n_y, y);
-    const double *z = c->z + j * c->n_x + i;
-    return (1 - t) * ((1 - s) * z[0] + s * z[1]) + t * ((1 - s) * z[c->n_x] + s * z[c->n_x + 1]);
-}
-
-static void place(uz_obstacle_patch *p)
-{
-    (void)p;
-}
-
 static void surface(double x[3], const uz_obstacle_patch *p, double s, double t)
 {
     const double reach = UZ_PATCH_REACH * p->size;
     x[0] = p->middle[0] + s * reach;
     x[1] = p->middle[1] + t * reach;
-    x[2] = height_at(p->contact, x[0], x[1]);
+    const uz_contact *c = p->contact;
+    const int64_t i = find_place(&s, c->x, c->n_x, x[0]), j = find_place(&t, c->y, c->n_y, x[1]);
+    const double *z = c->z + j * c->n_x + i;
+    x[2] = (1 - t) * ((1 - s) * z[0] + s * z[1]) + t * ((1 - s) * z[c->n_x] + s * z[c->n_x + 1]);
 }
 
 const uz_obstacle_shape uz_shape_height = {.name = {"height", "height"},
@@ -175,5 +158,4 @@ const uz_obstacle_shape uz_shape_height = {.name = {"height", "height"},
                                            .gap = gap,
                                            .lists = lists,
                                            .outline = outline,
-                                           .place = place,
                                            .surface = surface};

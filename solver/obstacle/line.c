@@ -80,29 +80,6 @@ static void gap_to_piece(uz_gap *out, const uz_line *line, int64_t i, const doub
     out->curvature = 0;
 }
 
-/* From a corner: inside or outside by the sum of both normals, which is on the outer side of any corner. */
-static void gap_to_corner(uz_gap *out, const uz_line *line, int64_t corner, const double x[2])
-{
-    int64_t pair[2];
-    /* The pieces that meet at a point. */
-    pair[0] = line->closed && corner == 0 ? line->n - 1 : corner;
-    pair[1] = line->closed && corner == line->n - 1 ? 1 : corner + 1;
-    const double *a = line->tangent + 2 * pair[0], *b = line->tangent + 2 * pair[1];
-    const double turn = cross(a, b), *at = line->point + 2 * corner;
-    if (fabs(turn) <= UZ_SAME_DIRECTION) {
-        gap_to_piece(out, line, pair[0], x);
-        return;
-    }
-    const double off[2] = {x[0] - at[0], x[1] - at[1]}, mean[2] = {-a[1] - b[1], a[0] + b[0]};
-    const double distance = hypot(off[0], off[1]), length = hypot(mean[0], mean[1]);
-    const double size = fabs(x[0]) + fabs(x[1]), sign = dot(off, mean) < 0 ? -1 : 1;
-    const bool on = distance <= 4 * DBL_EPSILON * size;
-    for (int c = 0; c < 2; c++)
-        out->normal[c] = on ? mean[c] / length : sign * off[c] / distance;
-    out->gap = on ? dot(off, out->normal) : sign * distance;
-    out->curvature = on ? (turn < 0 ? INFINITY : -INFINITY) : sign / distance;
-}
-
 void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
 {
     const int64_t item = uz_box_tree_nearest(&line->tree, x, INFINITY, distance_to, line);
@@ -113,10 +90,28 @@ void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
     }
     const int64_t corner = closest(out->foot, line, i, x);
     out->foot[2] = out->normal[2] = 0;
-    if (corner < 0)
+    if (corner < 0) {
         gap_to_piece(out, line, i, x);
-    else
-        gap_to_corner(out, line, corner, x);
+        return;
+    }
+    /* the pieces that meet at the corner */
+    const int64_t before = line->closed && corner == 0 ? line->n - 1 : corner;
+    const int64_t after = line->closed && corner == line->n - 1 ? 1 : corner + 1;
+    const double *a = line->tangent + 2 * before, *b = line->tangent + 2 * after, turn = cross(a, b);
+    if (fabs(turn) <= UZ_SAME_DIRECTION) {
+        gap_to_piece(out, line, before, x);
+        return;
+    }
+    /* inside or outside by the sum of both normals, which is on the outer side of any corner */
+    const double *at = line->point + 2 * corner;
+    const double off[2] = {x[0] - at[0], x[1] - at[1]}, mean[2] = {-a[1] - b[1], a[0] + b[0]};
+    const double distance = hypot(off[0], off[1]), length = hypot(mean[0], mean[1]);
+    const double size = fabs(x[0]) + fabs(x[1]), sign = dot(off, mean) < 0 ? -1 : 1;
+    const bool on = distance <= 4 * DBL_EPSILON * size;
+    for (int c = 0; c < 2; c++)
+        out->normal[c] = on ? mean[c] / length : sign * off[c] / distance;
+    out->gap = on ? dot(off, out->normal) : sign * distance;
+    out->curvature = on ? (turn < 0 ? INFINITY : -INFINITY) : sign / distance;
 }
 
 static void box_of(double box[4], const uz_line *line, int64_t i)
@@ -131,38 +126,16 @@ static void box_of(double box[4], const uz_line *line, int64_t i)
     }
 }
 
-static void set_tangents(uz_line *line, const double *ends)
-{
-    const int64_t n = line->n;
-    for (int64_t i = 1; i < n; i++) {
-        const double *a = line->point + 2 * i - 2, *b = a + 2, length = hypot(b[0] - a[0], b[1] - a[1]);
-        for (int c = 0; c < 2; c++)
-            line->tangent[2 * i + c] = (b[c] - a[c]) / length;
-    }
-    memcpy(line->tangent, ends ? ends : line->tangent + 2, 2 * sizeof *ends);
-    memcpy(line->tangent + 2 * n, ends ? ends + 2 : line->tangent + 2 * n - 2, 2 * sizeof *ends);
-}
-
-static uz_status build_tree(uz_line *line, uz_error *err)
-{
-    const int64_t items = line->n + 1 - (line->closed ? 2 : 0);
-    double *box = uz_alloc(items, 4 * sizeof *box);
-    if (!box)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a polyline of %lld points", (long long)line->n);
-    for (int64_t i = 0; i < items; i++)
-        box_of(box + 4 * i, line, piece_number(line, i));
-    const uz_status status = uz_box_tree_init(&line->tree, items, 2, box, err);
-    free(box);
-    return status;
-}
-
 uz_status uz_line_init(uz_line *out, int64_t n, const double *x, const double *y, const double *ends, double scale,
                        uz_error *err)
 {
     *out = (uz_line){.n = n, .closed = !ends && x[0] == x[n - 1] && y[0] == y[n - 1]};
+    const int64_t items = n < INT64_MAX ? n + 1 - (out->closed ? 2 : 0) : -1;
+    double *box = uz_alloc(items, 4 * sizeof *box);
     out->point = uz_alloc(n, 2 * sizeof *out->point);
     out->tangent = uz_alloc(n < INT64_MAX ? n + 1 : -1, 2 * sizeof *out->tangent);
-    if (!out->point || !out->tangent) {
+    if (!box || !out->point || !out->tangent) {
+        free(box);
         uz_line_clear(out);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a polyline of %lld points", (long long)n);
     }
@@ -170,8 +143,17 @@ uz_status uz_line_init(uz_line *out, int64_t n, const double *x, const double *y
         out->point[2 * i] = x[i] * scale;
         out->point[2 * i + 1] = y[i] * scale;
     }
-    set_tangents(out, ends);
-    const uz_status status = build_tree(out, err);
+    for (int64_t i = 1; i < n; i++) {
+        const double *a = out->point + 2 * i - 2, *b = a + 2, length = hypot(b[0] - a[0], b[1] - a[1]);
+        for (int c = 0; c < 2; c++)
+            out->tangent[2 * i + c] = (b[c] - a[c]) / length;
+    }
+    memcpy(out->tangent, ends ? ends : out->tangent + 2, 2 * sizeof *ends);
+    memcpy(out->tangent + 2 * n, ends ? ends + 2 : out->tangent + 2 * n - 2, 2 * sizeof *ends);
+    for (int64_t i = 0; i < items; i++)
+        box_of(box + 4 * i, out, piece_number(out, i));
+    const uz_status status = uz_box_tree_init(&out->tree, items, 2, box, err);
+    free(box);
     if (status != UZ_OK)
         uz_line_clear(out);
     return status;
@@ -185,32 +167,19 @@ void uz_line_clear(uz_line *line)
     memset(line, 0, sizeof *line);
 }
 
-/* ------------------------------------------------------- lines that cross themselves */
-
-/* Neighbours share a point, where they may only fold back; parallel pieces meet where they lie on one another. */
-static bool fold_back(const piece *a, const piece *b)
-{
-    return dot(a->tangent, b->tangent) < 0 && fabs(cross(a->tangent, b->tangent)) <= UZ_SAME_DIRECTION;
-}
-
-static bool overlap(const piece *a, const piece *b, const double between[2])
-{
-    if (fabs(cross(between, a->tangent)) > UZ_SAME_DIRECTION * hypot(between[0], between[1]))
-        return false;
-    const double sign = dot(a->tangent, b->tangent) < 0 ? -1 : 1, from = dot(between, a->tangent);
-    const double low = from + (sign > 0 ? b->first : -b->last), high = from + (sign > 0 ? b->last : -b->first);
-    return low <= a->last && high >= a->first;
-}
-
 static bool meet(const uz_line *line, int64_t i, int64_t j)
 {
     const piece a = piece_of(line, i), b = piece_of(line, j);
     const double between[2] = {b.origin[0] - a.origin[0], b.origin[1] - a.origin[1]};
     const double turn = cross(a.tangent, b.tangent);
-    if (j == i + 1 || (line->closed && i == 1 && j == line->n - 1))
-        return fold_back(&a, &b);
-    if (fabs(turn) <= UZ_SAME_DIRECTION)
-        return overlap(&a, &b, between);
+    if (j == i + 1 || (line->closed && i == 1 && j == line->n - 1)) /* they share a point, and may only fold back */
+        return dot(a.tangent, b.tangent) < 0 && fabs(turn) <= UZ_SAME_DIRECTION;
+    if (fabs(turn) <= UZ_SAME_DIRECTION) { /* parallel pieces: where they lie on one another */
+        const double sign = dot(a.tangent, b.tangent) < 0 ? -1 : 1, from = dot(between, a.tangent);
+        const double low = from + (sign > 0 ? b.first : -b.last), high = from + (sign > 0 ? b.last : -b.first);
+        return fabs(cross(between, a.tangent)) <= UZ_SAME_DIRECTION * hypot(between[0], between[1]) && low <= a.last &&
+               high >= a.first;
+    }
     const double s = cross(between, b.tangent) / turn, t = cross(between, a.tangent) / turn;
     return s >= a.first && s <= a.last && t >= b.first && t <= b.last;
 }

@@ -90,21 +90,6 @@ static uz_status refuse_overflow(const uz_obstacle *o, uz_error *err)
     return uz_fail(err, UZ_ERR_NOT_FINITE, where, "the gap to this obstacle overflows");
 }
 
-/* Back to the caller's units. */
-static uz_status unscale(uz_gap *out, const uz_obstacle *o, const uz_gap *scaled, uz_error *err)
-{
-    uz_gap gap = *scaled;
-    gap.gap /= o->scale;
-    gap.curvature *= o->scale;
-    for (int c = 0; c < 3; c++)
-        gap.foot[c] /= o->scale;
-    const double sum = gap.gap + gap.normal[0] + gap.normal[1] + gap.normal[2];
-    if (!isfinite(sum) || isnan(gap.curvature))
-        return refuse_overflow(o, err);
-    *out = gap;
-    return UZ_OK;
-}
-
 uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, uz_error *err)
 {
     const uz_obstacle *o = obstacle;
@@ -117,7 +102,17 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
             return refuse_overflow(o, err);
     }
     const uz_status status = o->shape->gap(&scaled, o, at, err);
-    return status == UZ_OK ? unscale(out, o, &scaled, err) : status;
+    if (status != UZ_OK)
+        return status;
+    scaled.gap /= o->scale; /* back to the caller's units */
+    scaled.curvature *= o->scale;
+    for (int c = 0; c < 3; c++)
+        scaled.foot[c] /= o->scale;
+    const double sum = scaled.gap + scaled.normal[0] + scaled.normal[1] + scaled.normal[2];
+    if (!isfinite(sum) || isnan(scaled.curvature))
+        return refuse_overflow(o, err);
+    *out = scaled;
+    return UZ_OK;
 }
 
 uz_status uz_obstacle_row_gap(uz_gap *out, double *at, const uz_obstacle *obstacle, const double *x,

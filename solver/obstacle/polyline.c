@@ -38,10 +38,16 @@ static double largest(const uz_contact *contact, int dim)
     return uz_obstacle_largest(uz_obstacle_largest(0, contact->x, contact->n_x), contact->y, contact->n_x);
 }
 
-static uz_status refuse_crossing(const uz_obstacle *o, const int64_t pair[2], uz_error *err)
+static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
 {
-    const uz_line *line = o->own;
     char where[96], of[2][64];
+    int64_t pair[2];
+    uz_line *line = o->own = uz_alloc_zero(1, sizeof *line);
+    if (!line)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an obstacle");
+    const uz_status status = uz_line_init(line, c->n_x, c->x, c->y, NULL, o->scale, err);
+    if (status != UZ_OK || !uz_line_crosses(pair, line))
+        return status;
     for (int k = 0; k < 2; k++)
         if (pair[k] == 0 || pair[k] == line->n)
             snprintf(of[k], sizeof of[k], "the half line beyond point %lld",
@@ -54,16 +60,6 @@ static uz_status refuse_crossing(const uz_obstacle *o, const int64_t pair[2], uz
         "the line meets itself: %s and %s; it must have the obstacle on its right everywhere. Move its points, "
         "or end it where it began to close it",
         of[0], of[1]);
-}
-
-static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
-{
-    int64_t pair[2];
-    uz_line *line = o->own = uz_alloc_zero(1, sizeof *line);
-    if (!line)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an obstacle");
-    const uz_status status = uz_line_init(line, c->n_x, c->x, c->y, NULL, o->scale, err);
-    return status == UZ_OK && uz_line_crosses(pair, line) ? refuse_crossing(o, pair, err) : status;
 }
 
 static void clear(uz_obstacle *o)

@@ -165,22 +165,6 @@ static uz_status out_of_memory(uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two bodies");
 }
 
-static uz_status build_tree(master *m, uz_error *err)
-{
-    static const double ORIGIN[3] = {0};
-    const int64_t n = m->group->n_faces;
-    double xyz[3 * UZ_FACE_NODES];
-    int64_t node[UZ_FACE_NODES];
-    double *box = uz_alloc(n, 6 * sizeof *box);
-    if (!box)
-        return out_of_memory(err);
-    for (int64_t i = 0; i < n; i++)
-        box_of(box + 2 * m->mesh->dim * i, xyz, m->mesh->dim, gather(xyz, node, m, i, ORIGIN));
-    const uz_status status = uz_box_tree_init(&m->tree, n, m->mesh->dim, box, err);
-    free(box);
-    return status;
-}
-
 /* middles: also the faces that a node is a middle of. Counted, summed, placed: filling from the end leaves first[i] at
  * the beginning of its list. */
 static uz_status list_around(master *m, bool middles, uz_error *err)
@@ -267,36 +251,6 @@ static double angle_at(const master *m, int64_t face, int64_t node)
     return acos(fmin(fmax(ab / sqrt(aa * bb), -1), 1));
 }
 
-/* A place between faces of the master. */
-typedef struct {
-    double mean[3]; /* of their normals, unit */
-    bool smooth;    /* they are one to rounding */
-    bool border;    /* the master ends there */
-} meeting;
-
-/* The faces around corner a, or those that have the edge a, b (b >= 0); x: the place itself, scaled. */
-static void meet(meeting *out, const master *m, int64_t a, int64_t b, const double *x)
-{
-    double sum[3] = {0}, one[3] = {0}, apart = 0;
-    for (int64_t q = m->first[a]; q < m->first[a + 1]; q++) {
-        uz_foot foot;
-        const int64_t face = m->around[q];
-        if (b >= 0 && corner_of(m, face, b) < 0)
-            continue;
-        closest_on(&foot, m, face, x);
-        const double weight = b >= 0 ? 1 : angle_at(m, face, a);
-        if (one[0] == 0 && one[1] == 0 && one[2] == 0)
-            memcpy(one, foot.normal, sizeof one);
-        for (int c = 0; c < 3; c++) {
-            sum[c] += weight * foot.normal[c];
-            apart = fmax(apart, fabs(foot.normal[c] - one[c]));
-        }
-    }
-    out->border = b >= 0 ? faces_with_edge(m, a, b) < 2 : ends_at(m, a);
-    out->smooth = apart <= 1e-12;
-    uz_unit_normal(out->mean, sum, 3);
-}
-
 /* ------------------------------------------------------------------ rows */
 
 /* The normal where the foot is on an edge or a corner of its face. off: x_s - x_m. False: the node is beyond the border
@@ -307,19 +261,32 @@ static bool normal_between(double normal[3], const master *m, const uz_contact_p
     const int dim = m->mesh->dim, corners = uz_face_corners(dim, row->count);
     const int64_t a = row->master[foot->which];
     const int64_t b = foot->place == UZ_FACE_EDGE ? row->master[(foot->which + 1) % corners] : -1;
-    double place[3] = {0}, along = 0;
-    meeting at;
+    double place[3] = {0}, sum[3] = {0}, one[3] = {0}, apart = 0, along = 0;
     for (int c = 0; c < dim; c++)
         place[c] = x[c] + foot->point[c];
-    meet(&at, m, a, b, place);
+    /* the mean of the faces around corner a, or of those that have the edge a, b (b >= 0) */
+    for (int64_t q = m->first[a]; q < m->first[a + 1]; q++) {
+        uz_foot there;
+        const int64_t face = m->around[q];
+        if (b >= 0 && corner_of(m, face, b) < 0)
+            continue;
+        closest_on(&there, m, face, place);
+        const double weight = b >= 0 ? 1 : angle_at(m, face, a);
+        if (one[0] == 0 && one[1] == 0 && one[2] == 0)
+            memcpy(one, there.normal, sizeof one);
+        for (int c = 0; c < 3; c++) {
+            sum[c] += weight * there.normal[c];
+            apart = fmax(apart, fabs(there.normal[c] - one[c]));
+        }
+    }
+    uz_unit_normal(normal, sum, 3);
     for (int c = 0; c < 3; c++)
-        along += off[c] * at.mean[c];
-    memcpy(normal, at.mean, sizeof at.mean);
-    if (at.border) {
+        along += off[c] * normal[c];
+    if (b >= 0 ? faces_with_edge(m, a, b) < 2 : ends_at(m, a)) { /* the master ends there */
         const double beyond = sqrt(fmax(foot->distance2 - along * along, 0));
         return beyond <= UZ_OVERHANG * size;
     }
-    if (!at.smooth && foot->distance2 > ON_BORDER * ON_BORDER * size * size)
+    if (apart > 1e-12 && foot->distance2 > ON_BORDER * ON_BORDER * size * size)
         for (int c = 0; c < 3; c++)
             normal[c] = along < 0 ? -off[c] : off[c];
     return true;
@@ -485,7 +452,15 @@ static uz_status prepare(master *m, const uz_mesh *mesh, const uz_group *group, 
                   .scale = ldexp(1, exponent < -1000  ? 1000
                                     : exponent > 1000 ? -1000
                                                       : -exponent)};
-    const uz_status status = tree ? build_tree(m, err) : UZ_OK;
+    uz_status status = UZ_OK;
+    if (tree) {
+        double xyz[3 * UZ_FACE_NODES], *box = uz_alloc(group->n_faces, 6 * sizeof *box);
+        int64_t node[UZ_FACE_NODES];
+        for (int64_t i = 0; box && i < group->n_faces; i++)
+            box_of(box + 2 * mesh->dim * i, xyz, mesh->dim, gather(xyz, node, m, i, (const double[3]){0}));
+        status = box ? uz_box_tree_init(&m->tree, group->n_faces, mesh->dim, box, err) : out_of_memory(err);
+        free(box);
+    }
     return status == UZ_OK ? list_around(m, middles, err) : status;
 }
 

@@ -10,6 +10,9 @@
 
 static const double PI = 3.14159265358979;
 
+/* Of the length of a patch: half an arc that is as long. */
+#define ARC (1.5 * UZ_PATCH_REACH)
+
 static uz_status check_round(const uz_obstacle_subject *s)
 {
     const uz_status status = uz_obstacle_check_radius(s);
@@ -29,32 +32,24 @@ static double largest(const uz_contact *contact, int dim)
     return fmax(uz_obstacle_largest(0, contact->point, dim), contact->radius);
 }
 
-/* The vector from the centre, or from the axis at right angles to it, as a length and a unit vector. */
-static double radial(double unit[3], const uz_obstacle *o, const double x[3])
+static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
 {
-    double off[3] = {0}, along = 0, most = 0;
+    /* from the centre, or from the axis at right angles to it */
+    double off[3] = {0}, unit[3], along = 0, most = 0, size = 0;
     for (int c = 0; c < o->dim; c++) {
         off[c] = x[c] - o->point[c];
         along += off[c] * o->direction[c];
+        size += fabs(x[c]) + fabs(o->point[c]);
     }
     for (int c = 0; c < o->dim; c++) {
         off[c] -= along * o->direction[c];
         most = fmax(most, fabs(off[c]));
     }
-    const double scale = most > 0 ? most : 1;
-    const double length = scale * sqrt((off[0] / scale) * (off[0] / scale) + (off[1] / scale) * (off[1] / scale) +
-                                       (off[2] / scale) * (off[2] / scale));
+    const double scale = most > 0 ? most : 1, sign = o->inside ? -1 : 1;
+    const double distance = scale * sqrt((off[0] / scale) * (off[0] / scale) + (off[1] / scale) * (off[1] / scale) +
+                                         (off[2] / scale) * (off[2] / scale));
     for (int c = 0; c < 3; c++)
-        unit[c] = length > 0 ? off[c] / length : 0;
-    return length;
-}
-
-static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
-{
-    double unit[3], size = 0;
-    const double distance = radial(unit, o, x), sign = o->inside ? -1 : 1;
-    for (int c = 0; c < o->dim; c++)
-        size += fabs(x[c]) + fabs(o->point[c]);
+        unit[c] = distance > 0 ? off[c] / distance : 0;
     if (distance <= 4 * DBL_EPSILON * size) { /* what rounding can leave of the centre itself */
         char where[96];
         const bool cylinder = o->shape == &uz_shape_cylinder;
@@ -86,12 +81,6 @@ static int64_t outline_circle(double x[2], double way[2], const uz_contact *cont
     return STEPS + 1;
 }
 
-/* Half the angle of an arc as long as the patch. */
-static double angle_of(const uz_obstacle_patch *p)
-{
-    return fmin(PI, 1.5 * UZ_PATCH_REACH * p->size / p->contact->radius);
-}
-
 static void place_sphere(uz_obstacle_patch *p)
 {
     memcpy(p->foot, p->contact->point, sizeof p->foot);
@@ -99,7 +88,7 @@ static void place_sphere(uz_obstacle_patch *p)
         p->n[c] = p->middle[c] - p->foot[c];
     uz_make_unit3(p->n, (const double[3]){0, -1, 0});
     uz_patch_frame(p);
-    p->most = angle_of(p);
+    p->most = fmin(PI, ARC * p->size / p->contact->radius);
 }
 
 static void sphere_surface(double x[3], const uz_obstacle_patch *p, double s, double t)
@@ -126,7 +115,7 @@ static void place_cylinder(uz_obstacle_patch *p)
     uz_make_unit3(p->n, (const double[3]){fabs(p->b[0]) < 0.9, fabs(p->b[0]) >= 0.9, 0});
     uz_cross3(p->a, p->b, p->n);
     uz_make_unit3(p->a, (const double[3]){0, 1, 0});
-    p->most = angle_of(p);
+    p->most = fmin(PI, ARC * p->size / p->contact->radius);
 }
 
 static void cylinder_surface(double x[3], const uz_obstacle_patch *p, double s, double t)

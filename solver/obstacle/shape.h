@@ -55,7 +55,8 @@ struct uz_obstacle_shape {
     /* The border in the plane, the obstacle on its right: its i-th point, and the way (any length) in which it goes on
      * beyond the first and the last one, zero where it does not. Returns how many points; 1: a line. NULL: in space. */
     int64_t (*outline)(double x[2], double way[2], const uz_contact *contact, int64_t i);
-    /* The surface in space: fills the shape's part of a patch; a point of it. NULL: in the plane. */
+    /* The surface in space: fills the shape's part of a patch (NULL: it has none); a point of it (NULL: in the plane).
+     */
     void (*place)(uz_obstacle_patch *p);
     void (*surface)(double x[3], const uz_obstacle_patch *p, double s, double t);
 };

@@ -135,36 +135,6 @@ static void normal_at(double normal[3], const cell *s, double x, double y)
     normal[2] = 1 / length;
 }
 
-/* The larger in size of the curvatures k / (1 + k gap) of the surface that is `gap` away from the cell's, k its
- * principal curvatures, counted positive where it bulges upwards (do Carmo, "Differential Geometry of Curves and
- * Surfaces", section 3-3: graphs). */
-static double curvature_at(const cell *s, double x, double y, double gap)
-{
-    const double zx = s->a + s->c * (y - s->y0), zy = s->b + s->c * (x - s->x0);
-    const double w = 1 + zx * zx + zy * zy;
-    const double mean = zx * zy * s->c / (w * sqrt(w)), gauss = -(s->c / w) * (s->c / w);
-    const double root = sqrt(mean * mean - gauss), k1 = mean + root, k2 = mean - root;
-    const double there1 = k1 / (1 + k1 * gap), there2 = k2 / (1 + k2 * gap);
-    return fabs(there2) > fabs(there1) ? there2 : there1;
-}
-
-/* The cells that touch at a point of the border of `item`: at most 4. */
-static int cells_around(int64_t around[4], const uz_table *t, int64_t item, const cell *s, const double at[2])
-{
-    const int64_t row = t->n_x + 1;
-    const int64_t dx = at[0] == s->low[0] ? -1 : at[0] == s->high[0] ? 1 : 0;
-    const int64_t dy = at[1] == s->low[1] ? -row : at[1] == s->high[1] ? row : 0;
-    int count = 0;
-    around[count++] = item;
-    if (dx != 0)
-        around[count++] = item + dx;
-    if (dy != 0)
-        around[count++] = item + dy;
-    if (dx != 0 && dy != 0)
-        around[count++] = item + dx + dy;
-    return count;
-}
-
 /* The mean of the normals that meet on a crease; INFINITY with the sign of its bulge, 0 where it is no crease: normals
  * turn apart over a ridge, towards each other over a groove. */
 static double crease(double mean[3], const uz_table *t, const int64_t *around, int count, const double at[2])
@@ -198,7 +168,15 @@ static void gap_inside(uz_gap *out, const cell *s, const double q[3])
     normal_at(out->normal, s, out->foot[0], out->foot[1]);
     for (int c = 0; c < 3; c++)
         out->gap += (q[c] - out->foot[c]) * out->normal[c];
-    out->curvature = curvature_at(s, out->foot[0], out->foot[1], out->gap);
+    /* the larger in size of the curvatures k / (1 + k gap) of the surface that is `gap` away from the cell's, k its
+     * principal curvatures, counted positive where it bulges upwards (do Carmo, "Differential Geometry of Curves and
+     * Surfaces", section 3-3: graphs) */
+    const double zx = s->a + s->c * (out->foot[1] - s->y0), zy = s->b + s->c * (out->foot[0] - s->x0);
+    const double w = 1 + zx * zx + zy * zy;
+    const double mean = zx * zy * s->c / (w * sqrt(w)), gauss = -(s->c / w) * (s->c / w);
+    const double root = sqrt(mean * mean - gauss), k1 = mean + root, k2 = mean - root;
+    const double there1 = k1 / (1 + k1 * out->gap), there2 = k2 / (1 + k2 * out->gap);
+    out->curvature = fabs(there2) > fabs(there1) ? there2 : there1;
 }
 
 /* The foot is on the border of its cell: the direction from it to q, unless rounding is all that is in it. */
@@ -206,7 +184,18 @@ static void gap_on_border(uz_gap *out, const uz_table *t, int64_t item, const ce
 {
     int64_t around[4];
     double mean[3], off[3], size = 0, distance = 0;
-    const int count = cells_around(around, t, item, s, out->foot);
+    /* the cells that touch at a point of the border of `item`: at most 4 */
+    const int64_t row = t->n_x + 1;
+    const int64_t dx = out->foot[0] == s->low[0] ? -1 : out->foot[0] == s->high[0] ? 1 : 0;
+    const int64_t dy = out->foot[1] == s->low[1] ? -row : out->foot[1] == s->high[1] ? row : 0;
+    int count = 0;
+    around[count++] = item;
+    if (dx != 0)
+        around[count++] = item + dx;
+    if (dy != 0)
+        around[count++] = item + dy;
+    if (dx != 0 && dy != 0)
+        around[count++] = item + dx + dy;
     const double bulge = crease(mean, t, around, count, out->foot);
     if (bulge == 0) {
         gap_inside(out, s, q);
@@ -242,21 +231,6 @@ void uz_table_gap(uz_gap *out, const uz_table *table, const double x[3])
         gap_on_border(out, table, item, &s, x);
 }
 
-static uz_status build_tree(uz_table *table, uz_error *err)
-{
-    const int64_t cells = (table->n_x + 1) * (table->n_y + 1);
-    double *box = uz_alloc(cells, 6 * sizeof *box);
-    if (!box)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a table of %lld heights", (long long)cells);
-    for (int64_t i = 0; i < cells; i++) {
-        const cell s = cell_of(table, i);
-        box_of(box + 6 * i, &s);
-    }
-    const uz_status status = uz_box_tree_init(&table->tree, cells, 3, box, err);
-    free(box);
-    return status;
-}
-
 static double *scaled_copy(const double *values, int64_t n, double scale)
 {
     double *copy = uz_alloc(n, sizeof *copy);
@@ -271,9 +245,18 @@ uz_status uz_table_init(uz_table *out, const uz_contact *contact, double scale, 
     out->x = scaled_copy(contact->x, contact->n_x, scale);
     out->y = scaled_copy(contact->y, contact->n_y, scale);
     out->z = scaled_copy(contact->z, contact->n_x * contact->n_y, scale);
-    const uz_status status = out->x && out->y && out->z
-                                 ? build_tree(out, err)
-                                 : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a table of heights");
+    const int64_t cells = (out->n_x + 1) * (out->n_y + 1);
+    double *box = uz_alloc(cells, 6 * sizeof *box);
+    uz_status status = UZ_OK;
+    if (!box || !out->x || !out->y || !out->z)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a table of %lld heights", (long long)cells);
+    for (int64_t i = 0; status == UZ_OK && i < cells; i++) {
+        const cell s = cell_of(out, i);
+        box_of(box + 6 * i, &s);
+    }
+    if (status == UZ_OK)
+        status = uz_box_tree_init(&out->tree, cells, 3, box, err);
+    free(box);
     if (status != UZ_OK)
         uz_table_clear(out);
     return status;

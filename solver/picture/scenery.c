@@ -256,7 +256,8 @@ bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery)
         if (!shape)
             continue;
         memset(p.foot, 0, sizeof p.foot);
-        shape->place(&p);
+        if (shape->place)
+            shape->place(&p);
         paint_patch(raster, scenery, &p);
         painted = true;
     }
