@@ -50,20 +50,6 @@ bool uz_is_on_axis(const uz_body_model *model, int64_t node)
     return model->kind == UZ_AXISYMMETRIC && fabs(mesh->xyz[node * mesh->dim]) <= 1e-12 * mesh->extent;
 }
 
-/* Turns the nodes of an inclined support so that what it holds is one of their dofs, unless it is held already. */
-static uz_status mark_inclined(uz_body_model *model, const uz_group *group, const double n[3], uz_error *err)
-{
-    const int64_t count = uz_group_node_count(&model->mesh, group);
-    uz_status status = uz_reserve_frames(model, count, err);
-    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
-        const int64_t node = uz_group_node_at(group, i);
-        const int held = uz_hold_direction(model, node, n);
-        if (held >= 0)
-            model->dof[node * model->mesh.dim + held] = -1;
-    }
-    return status;
-}
-
 uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
@@ -81,13 +67,18 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
             const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
             if (!group)
                 return UZ_ERR_SCENE;
-            if (inclined) {
-                if (uz_support_is_inclined(n, support, mesh->dim))
-                    status = mark_inclined(model, group, n, err);
-                continue;
+            const int64_t count = uz_group_node_count(mesh, group);
+            if (inclined && uz_support_is_inclined(n, support, mesh->dim)) {
+                status = uz_reserve_frames(model, count, err);
+                for (int64_t i = 0; i < count && status == UZ_OK; i++) { /* turned so that one of their dofs is held */
+                    const int64_t node = uz_group_node_at(group, i);
+                    const int held = uz_hold_direction(model, node, n);
+                    if (held >= 0) /* else it is already */
+                        model->dof[node * mesh->dim + held] = -1;
+                }
             }
             uz_support_values(u, support, mesh->dim);
-            for (int64_t i = 0; i < uz_group_node_count(mesh, group); i++)
+            for (int64_t i = 0; i < count && !inclined; i++)
                 for (int c = 0; c < mesh->dim; c++)
                     if (!isnan(u[c]))
                         model->dof[uz_group_node_at(group, i) * mesh->dim + c] = -1;

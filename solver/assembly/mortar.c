@@ -44,7 +44,7 @@
 /* So has the area of a place: of a quadratic edge that ends on the axis of revolution the end has none. */
 #define LEAST_AREA 1e-9
 
-int uz_mortar_by_node(const void *a, const void *b)
+int uz_mortar_by_number(const void *a, const void *b)
 {
     const int64_t *x = a, *y = b;
     return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
@@ -86,7 +86,7 @@ void uz_mortar_surface_clear(uz_mortar_surface *surface)
     free(surface->patch);
 }
 
-static uz_status no_memory(uz_error *err)
+uz_status uz_mortar_no_memory(uz_error *err)
 {
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
 }
@@ -96,7 +96,7 @@ uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input 
 {
     char where[96];
     *out = (uz_mortar_surface){.n = group->n_faces, .side = uz_alloc_zero(group->n_faces, sizeof *out->side)};
-    uz_status status = out->side ? UZ_OK : no_memory(err);
+    uz_status status = out->side ? UZ_OK : uz_mortar_no_memory(err);
     for (int64_t i = 0; i < out->n && status == UZ_OK; i++) {
         uz_mortar_side *side = &out->side[i];
         uz_side shape;
@@ -111,7 +111,7 @@ uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input 
                          (long long)side->node[0], group->name);
     }
     if (status == UZ_OK && !uz_mortar_geometry_of(in->model->mesh.dim)->places(out, in))
-        status = no_memory(err);
+        status = uz_mortar_no_memory(err);
     return status;
 }
 
@@ -142,14 +142,6 @@ typedef struct {
     int64_t entries, room, *place, *node;
     double *value;
 } integrals;
-
-static void clear_integrals(integrals *of)
-{
-    free(of->D);
-    free(of->place);
-    free(of->node);
-    free(of->value);
-}
 
 static bool add_master(integrals *to, int64_t place, int64_t node, double value)
 {
@@ -382,8 +374,8 @@ static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const 
         else
             sites->ends[2 * p] = sites->ends[2 * p + 1] = -1;
     uz_csc_clear(&M);
-    status =
-        room ? uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, kept, node, place, value, err) : no_memory(err);
+    status = room ? uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, kept, node, place, value, err)
+                  : uz_mortar_no_memory(err);
     free(node);
     free(place);
     free(value);
@@ -421,8 +413,11 @@ static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_err
         memset(sites->ends, 0xff, (size_t)(2 * n) * sizeof *sites->ends);
         room = integrate(&of, sites, pair);
     }
-    const uz_status status = room ? fill_sites(sites, &of, &pair->surface, model, err) : no_memory(err);
-    clear_integrals(&of);
+    const uz_status status = room ? fill_sites(sites, &of, &pair->surface, model, err) : uz_mortar_no_memory(err);
+    free(of.D);
+    free(of.place);
+    free(of.node);
+    free(of.value);
     return status;
 }
 
@@ -463,7 +458,7 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
     if (status == UZ_OK)
         status = make_rows(sites, &pair, err);
     if (status == UZ_OK && !describe(sites, &pair))
-        status = no_memory(err);
+        status = uz_mortar_no_memory(err);
     if (status == UZ_OK && sites->first[sites->n] == 0 && !in->rest) {
         snprintf(where, sizeof where, "/contacts/%lld/on", (long long)in->index);
         status =

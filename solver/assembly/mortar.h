@@ -115,7 +115,9 @@ bool uz_mortar_describe(uz_contact_surface *out, const uz_mortar_surface *surfac
 /* Cosine of the feature angle: sides that turn by more make a corner. */
 double uz_mortar_least_cosine(const uz_contact_input *in);
 
-/* By node, then by the second number: pairs of numbers, for qsort. */
-int uz_mortar_by_node(const void *a, const void *b);
+/* Pairs of numbers by the first, then by the second, for qsort. */
+int uz_mortar_by_number(const void *a, const void *b);
+
+uz_status uz_mortar_no_memory(uz_error *err);
 
 #endif

@@ -16,22 +16,15 @@
 /* Degrees that rounding makes of no turn at all. */
 #define NO_TURN 1e-4
 
-static int64_t root_of(int64_t *part, int64_t p)
-{
-    while (part[p] != p)
-        p = part[p] = part[part[p]];
-    return p;
-}
-
 void uz_mortar_find_parts(int64_t *part, const uz_mortar_surface *surface)
 {
     for (int64_t p = 0; p < surface->n_places; p++)
         part[p] = p;
     for (int64_t i = 0; i < surface->n; i++)
         for (int a = 1; a < surface->side[i].nodes; a++)
-            part[root_of(part, surface->side[i].place[a])] = root_of(part, surface->side[i].place[0]);
+            part[uz_join_root(part, surface->side[i].place[a])] = uz_join_root(part, surface->side[i].place[0]);
     for (int64_t p = 0; p < surface->n_places; p++)
-        part[p] = root_of(part, p);
+        part[p] = uz_join_root(part, p);
 }
 
 static double degrees_between(const double *a, const double *b, int dim)

@@ -24,11 +24,6 @@
 /* Sides of a zone that are looked at before the slave is chosen. */
 enum { LOOKED_AT = 500 };
 
-static uz_status no_memory(uz_error *err)
-{
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
-}
-
 /* ---- both surfaces as one */
 
 static int by_face(const void *a, const void *b)
@@ -97,7 +92,7 @@ static uz_status plant_tree(uz_mortar_pair *pair, int dim, uz_error *err)
     uz_mortar_surface *surface = &pair->surface;
     double *box = uz_alloc(surface->n, 6 * sizeof *box);
     pair->ball = uz_alloc_zero(surface->n, 4 * sizeof *pair->ball);
-    uz_status status = box && pair->ball ? UZ_OK : no_memory(err);
+    uz_status status = box && pair->ball ? UZ_OK : uz_mortar_no_memory(err);
     for (int64_t i = 0; i < surface->n && status == UZ_OK; i++) {
         const uz_mortar_side *side = &surface->side[i];
         double *ball = pair->ball + 4 * i, most = 0;
@@ -142,10 +137,10 @@ uz_status uz_mortar_pair_make(uz_mortar_pair *pair, const uz_contact_input *in, 
     before.model = in->rest;
     before.rest = NULL;
     if (!join_groups(pair, in))
-        return no_memory(err);
+        return uz_mortar_no_memory(err);
     pair->near = uz_alloc(pair->group.n_faces, sizeof *pair->near);
     pair->way = uz_alloc_zero(pair->group.n_faces, sizeof *pair->way);
-    uz_status status = pair->near && pair->way ? UZ_OK : no_memory(err);
+    uz_status status = pair->near && pair->way ? UZ_OK : uz_mortar_no_memory(err);
     if (status == UZ_OK)
         status = uz_mortar_surface_make(&pair->surface, in, &pair->group, err);
     if (status == UZ_OK)
@@ -300,20 +295,6 @@ static int by_place(const void *a, const void *b)
                                 : (x->side > y->side) - (x->side < y->side);
 }
 
-static int64_t root_of(int64_t *of, int64_t p)
-{
-    while (of[p] != p)
-        p = of[p] = of[of[p]];
-    return p;
-}
-
-static void join(int64_t *of, int64_t p, int64_t q)
-{
-    p = root_of(of, p);
-    q = root_of(of, q);
-    of[p > q ? p : q] = p > q ? q : p;
-}
-
 /* zone (sides): zones numbered by their lowest nodes. Returns how many; -1: no memory. */
 static int64_t number_zones(int64_t *zone, const uz_mortar_pair *pair)
 {
@@ -331,20 +312,20 @@ static int64_t number_zones(int64_t *zone, const uz_mortar_pair *pair)
             of[p] = p;
         for (int64_t i = 0; i < surface->n; i++)
             for (int a = 0; a < surface->side[i].nodes && pair->of[i] == group; a++) {
-                join(of, surface->side[i].place[a], surface->side[i].place[0]);
+                uz_join(of, surface->side[i].place[a], surface->side[i].place[0]);
                 used[surface->side[i].place[a]] |= (unsigned char)(1u << group);
             }
         for (int64_t p = 1, last = 0; p < places && group < 3; p++) { /* around corners, too */
             if (!(used[p] >> group & 1))
                 continue;
             if (surface->node[p] == surface->node[last] && used[last] >> group & 1)
-                join(of, p, last);
+                uz_join(of, p, last);
             last = p;
         }
         for (int64_t i = 0; i < surface->n; i++) {
             if (pair->of[i] != group)
                 continue;
-            const int64_t root = root_of(of, surface->side[i].place[0]);
+            const int64_t root = uz_join_root(of, surface->side[i].place[0]);
             if (own[root] < 0) {
                 own[root] = count;
                 mark[count++] = (zone_mark){root, i, NULL};
@@ -384,12 +365,6 @@ static int by_zones(const void *a, const void *b)
     if (x->hi != y->hi)
         return (x->hi > y->hi) - (x->hi < y->hi);
     return x->from_hi != y->from_hi ? x->from_hi - y->from_hi : (x->order > y->order) - (x->order < y->order);
-}
-
-static int by_two(const void *a, const void *b)
-{
-    const int64_t *x = a, *y = b;
-    return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
 }
 
 /* How coarse a side is as a slave: its length, whichever edge a face begins with; twice that where it is quadratic. The
@@ -474,7 +449,7 @@ static bool rank_zones(uz_contact_sites *sites, uz_mortar_pair *pair, int64_t n_
         sites->rank[2 * sites->n_ranks++ + 1] = hi ? s[first].lo : s[first].hi;
     }
     if (sites->rank)
-        qsort(sites->rank, (size_t)sites->n_ranks, 2 * sizeof *sites->rank, by_two);
+        qsort(sites->rank, (size_t)sites->n_ranks, 2 * sizeof *sites->rank, uz_mortar_by_number);
     free(s);
     return sites->rank != NULL;
 }
@@ -485,10 +460,10 @@ bool uz_mortar_is_slave(const uz_contact_sites *sites, int64_t i, int64_t j)
     if (way[0] == way[1])
         return i < j;
     const size_t n = (size_t)sites->n_ranks, size = 2 * sizeof *sites->rank;
-    if (bsearch(way, sites->rank, n, size, by_two))
+    if (bsearch(way, sites->rank, n, size, uz_mortar_by_number))
         return true;
     return way[0] < way[1] &&
-           !bsearch(back, sites->rank, n, size, by_two); /* two that did not face each other before */
+           !bsearch(back, sites->rank, n, size, uz_mortar_by_number); /* two that did not face each other before */
 }
 
 /* ---- zones that face themselves */
@@ -590,8 +565,8 @@ static bool divide_zones(int64_t *zone, int64_t *n_zones, uz_mortar_pair *pair)
         queue = uz_alloc(surface->n, sizeof *queue);
         second = uz_alloc_zero(*n_zones, sizeof *second);
         good = half && queue && second;
-        qsort(across.pair, (size_t)across.n, sizeof *across.pair, by_two);
-        qsort(sides.pair, (size_t)sides.n, sizeof *sides.pair, by_two);
+        qsort(across.pair, (size_t)across.n, sizeof *across.pair, uz_mortar_by_number);
+        qsort(sides.pair, (size_t)sides.n, sizeof *sides.pair, uz_mortar_by_number);
     }
     if (good && across.n > 0)
         divide(half, surface, &across, &sides, queue);
@@ -614,17 +589,17 @@ uz_status uz_mortar_choose_slaves(uz_contact_sites *sites, uz_mortar_pair *pair,
     const uz_contact_sites *before = pair->in->rest ? &pair->in->rest->sites[pair->in->index] : NULL;
     sites->zone = uz_alloc(n, sizeof *sites->zone);
     if (!sites->zone)
-        return no_memory(err);
+        return uz_mortar_no_memory(err);
     sites->n_sides = n;
     if (!before) {
         int64_t n_zones = number_zones(sites->zone, pair);
         const bool good = n_zones >= 0 && divide_zones(sites->zone, &n_zones, pair) && rank_zones(sites, pair, n_zones);
         sites->n_zones = n_zones;
-        return good ? UZ_OK : no_memory(err);
+        return good ? UZ_OK : uz_mortar_no_memory(err);
     }
     sites->rank = uz_alloc(2 * before->n_ranks, sizeof *sites->rank);
     if (!sites->rank)
-        return no_memory(err);
+        return uz_mortar_no_memory(err);
     memcpy(sites->zone, before->zone, (size_t)n * sizeof *sites->zone);
     memcpy(sites->rank, before->rank, (size_t)(2 * before->n_ranks) * sizeof *sites->rank);
     sites->n_ranks = before->n_ranks;

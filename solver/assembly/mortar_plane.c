@@ -126,16 +126,6 @@ static double offset_along(const double n[2], const uz_mortar_side *e, double s)
 
 /* ---- a surface */
 
-/* The edges that begin and end at each node: 1 + their number, 0: none, -1: several. */
-static void list_ends(int64_t *at, const uz_mortar_surface *surface)
-{
-    for (int64_t i = 0; i < surface->n; i++)
-        for (int k = 0; k < 2; k++) {
-            int64_t *there = at + 2 * surface->side[i].node[k] + k;
-            *there = *there == 0 ? 1 + i : -1;
-        }
-}
-
 /* Tangents at the ends of all edges, and which edges go on into each other. */
 static void find_tangents(uz_mortar_surface *surface, const int64_t *at, double least_cosine)
 {
@@ -181,7 +171,12 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
     const bool room = key && at && surface->node && surface->normal;
     if (!room)
         goto done;
-    list_ends(at, surface);
+    /* The edges that begin and end at each node: 1 + their number, 0: none, -1: several. */
+    for (int64_t i = 0; i < surface->n; i++)
+        for (int k = 0; k < 2; k++) {
+            int64_t *there = at + 2 * surface->side[i].node[k] + k;
+            *there = *there == 0 ? 1 + i : -1;
+        }
     find_tangents(surface, at, uz_mortar_least_cosine(in));
     for (int64_t i = 0; i < surface->n; i++)
         for (int a = 0; a < surface->side[i].nodes; a++)
@@ -189,7 +184,7 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
                 key[n][0] = surface->side[i].node[a];
                 key[n++][1] = 3 * i + a;
             }
-    qsort(key, (size_t)n, sizeof *key, uz_mortar_by_node);
+    qsort(key, (size_t)n, sizeof *key, uz_mortar_by_number);
     for (int64_t p = 0; p < n; p++) {
         uz_mortar_side *e = &surface->side[key[p][1] / 3];
         const int a = (int)(key[p][1] % 3);

@@ -64,7 +64,7 @@ static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
         key[p][1] = p;
     }
     if (room)
-        qsort(key, (size_t)n, sizeof *key, uz_mortar_by_node);
+        qsort(key, (size_t)n, sizeof *key, uz_mortar_by_number);
     for (int64_t first = 0, end; first < n && room; first = end) {
         for (end = first; end < n && key[end][0] == key[first][0]; end++) {
             memcpy(xyz + 3 * (end - first), mesh->xyz + 3 * surface->node[key[end][1]], 3 * sizeof *xyz);
@@ -197,7 +197,7 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
             key[n++][1] = UZ_FACE_NODES * i + a;
         }
     if (room)
-        qsort(key, (size_t)n, sizeof *key, uz_mortar_by_node);
+        qsort(key, (size_t)n, sizeof *key, uz_mortar_by_number);
     int64_t first = 0;
     for (int64_t k = 0; k < n; k++) {
         uz_mortar_side *side = &surface->side[key[k][1] / UZ_FACE_NODES];

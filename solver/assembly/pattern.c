@@ -37,23 +37,6 @@ static bool neighbours_init(neighbours *n, const uz_body_model *model)
     return n->near != NULL;
 }
 
-static void gather(neighbours *n, int64_t node)
-{
-    const uz_mesh *mesh = &n->model->mesh;
-    n->n_near = 0;
-    for (int64_t i = n->start[node]; i < n->start[node + 1]; i++)
-        for (int64_t k = mesh->first[n->around[i]]; k < mesh->first[n->around[i] + 1]; k++) {
-            const int64_t other = mesh->node[k];
-            if (n->seen[other] == node + 1)
-                continue;
-            n->seen[other] = node + 1;
-            int64_t at = n->n_near++;
-            for (; at > 0 && n->near[at - 1] > other; at--) /* the list is short, and mostly comes in order */
-                n->near[at] = n->near[at - 1];
-            n->near[at] = other;
-        }
-}
-
 /* Free dofs >= first among the neighbours; written to out unless it is NULL. Returns how many. */
 static int64_t free_rows(int64_t *out, const neighbours *n, int64_t first)
 {
@@ -79,7 +62,19 @@ static void walk_columns(uz_body_model *model, neighbours *n, int64_t *ptr, int6
     const int dim = model->mesh.dim;
     memset(n->seen, 0, (size_t)model->mesh.n_nodes * sizeof *n->seen);
     for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-        gather(n, a);
+        const uz_mesh *mesh = &n->model->mesh;
+        n->n_near = 0;
+        for (int64_t i = n->start[a]; i < n->start[a + 1]; i++)
+            for (int64_t k = mesh->first[n->around[i]]; k < mesh->first[n->around[i] + 1]; k++) {
+                const int64_t other = mesh->node[k];
+                if (n->seen[other] == a + 1)
+                    continue;
+                n->seen[other] = a + 1;
+                int64_t at = n->n_near++;
+                for (; at > 0 && n->near[at - 1] > other; at--) /* the list is short, and mostly comes in order */
+                    n->near[at] = n->near[at - 1];
+                n->near[at] = other;
+            }
         for (int c = 0; c < dim; c++) {
             const int64_t column = model->dof[a * dim + c], fixed = -1 - column;
             if (ptr)

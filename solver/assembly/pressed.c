@@ -159,23 +159,6 @@ static uz_status fill_rows(nnls *s, const double *Z, const uz_csc *N, uz_error *
     return UZ_OK;
 }
 
-/* A row that is zero in Z'p's every mode, because there is no load, counts with the largest of the others. */
-static double loads(double *load, double *size, const double *Z, int64_t k, const double *p, int64_t d)
-{
-    double largest = 0.0;
-    for (int64_t c = 0; c < k; c++) {
-        load[c] = size[c] = 0.0;
-        for (int64_t j = 0; j < d; j++) {
-            load[c] += Z[c * d + j] * p[j];
-            size[c] += fabs(Z[c * d + j] * p[j]);
-        }
-        largest = fmax(largest, size[c]);
-    }
-    for (int64_t c = 0; c < k; c++)
-        size[c] = size[c] > 0.0 ? size[c] : largest > 0.0 ? largest : 1.0;
-    return largest > 0.0 ? largest : 1.0;
-}
-
 static double length_of(const nnls *s)
 {
     return sqrt(dot(s->y, s->y, s->k));
@@ -202,7 +185,7 @@ uz_status uz_load_on_modes(uz_pressing *how, double *y, const double *Z, int64_t
 {
     const int64_t m = N->rows;
     nnls s = {.m = m, .k = k};
-    double *load = uz_alloc_zero(2 * k, sizeof *load);
+    double *load = uz_alloc_zero(2 * k, sizeof *load), *terms = load + k, largest = 0.0;
     double **room[] = {&s.A, &s.Q, &s.R, &s.b, &s.y, &s.x, &s.trial, &s.scratch};
     const int64_t size[] = {m * k, k * k, k * k, k, k, k, k, k};
     bool ok =
@@ -214,12 +197,21 @@ uz_status uz_load_on_modes(uz_pressing *how, double *y, const double *Z, int64_t
     if (status == UZ_OK)
         status = fill_rows(&s, Z, N, err);
     if (status == UZ_OK && k > 0) {
-        double scale = loads(load, load + k, Z, k, p, N->cols);
+        for (int64_t c = 0; c < k; c++) {
+            for (int64_t j = 0; j < N->cols; j++) {
+                load[c] += Z[c * N->cols + j] * p[j];
+                terms[c] += fabs(Z[c * N->cols + j] * p[j]);
+            }
+            largest = fmax(largest, terms[c]);
+        }
+        const double scale = largest > 0.0 ? largest : 1.0;
+        for (int64_t c = 0; c < k; c++) /* what no load works on counts with the largest of the others */
+            terms[c] = terms[c] > 0.0 ? terms[c] : scale;
         memcpy(s.b, load, (size_t)k * sizeof *s.b);
         solve(&s, scale);
         if (length_of(&s) > tolerance * scale)
             *how = UZ_PUSHED_AWAY;
-        else if (strict && !is_inside(&s, load, load + k, scale, tolerance))
+        else if (strict && !is_inside(&s, load, terms, scale, tolerance))
             *how = UZ_COSTS_NOTHING;
         memcpy(y, s.y, (size_t)k * sizeof *y);
     }

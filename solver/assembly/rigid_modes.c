@@ -44,27 +44,11 @@ uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)
     return status;
 }
 
-/* Displacements of the free dofs (d) for the motion q of part i. */
-static void move_part(double *z, const uz_parts *parts, int64_t i, const double q[UZ_MOTIONS],
-                      const uz_body_model *model)
-{
-    const int dim = model->mesh.dim;
-    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-        double u[3], local[3];
-        if (parts->of[a] != i)
-            continue;
-        uz_move_node(u, parts, i, &model->mesh, a, q);
-        uz_to_frame(local, model, a, u);
-        for (int c = 0; c < dim; c++)
-            if (model->dof[a * dim + c] >= 0)
-                z[model->dof[a * dim + c]] = local[c];
-    }
-}
-
-/* Every motion that is left, as columns of z (d x n). */
+/* Every motion that is left, as columns of z (d x n): displacements of the free dofs. */
 static uz_status fill_modes(double **out, int64_t *count, const uz_parts *parts, const uz_body_model *model,
                             uz_error *err)
 {
+    const int dim = model->mesh.dim;
     double mode[UZ_MOTIONS][UZ_MOTIONS], *z = NULL;
     int64_t n = 0, at = 0;
     for (int64_t i = 0; i < parts->count; i++)
@@ -73,8 +57,17 @@ static uz_status fill_modes(double **out, int64_t *count, const uz_parts *parts,
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
     for (int64_t i = 0; i < parts->count; i++) {
         const int own = uz_free_motions(mode, parts, &parts->list[i]);
-        for (int k = 0; k < own && at < n; k++)
-            move_part(z + (at++) * model->d, parts, i, mode[k], model);
+        for (int k = 0; k < own && at < n; k++, at++)
+            for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+                double u[3], local[3];
+                if (parts->of[a] != i)
+                    continue;
+                uz_move_node(u, parts, i, &model->mesh, a, mode[k]);
+                uz_to_frame(local, model, a, u);
+                for (int c = 0; c < dim; c++)
+                    if (model->dof[a * dim + c] >= 0)
+                        z[at * model->d + model->dof[a * dim + c]] = local[c];
+            }
     }
     *out = z;
     *count = n;

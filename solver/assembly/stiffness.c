@@ -186,28 +186,9 @@ static void add_element(uz_body_model *model, const double *ke, int64_t element)
     }
 }
 
-/* The springs of a node as a matrix of its dofs: Q diag(k) Q'. */
-static void add_spring(uz_body_model *model, int64_t node)
-{
-    const int dim = model->mesh.dim;
-    const double *k = model->spring + node * dim, *Q = uz_node_frame(model, node);
-    const int64_t *dof = model->dof + node * dim;
-    for (int j = 0; j < dim; j++)
-        for (int i = 0; i < dim; i++) {
-            double value = Q || i != j ? 0 : k[i];
-            for (int c = 0; Q && c < dim; c++)
-                value += Q[i * dim + c] * k[c] * Q[j * dim + c];
-            if (value == 0 || dof[i] < 0 || (dof[j] >= 0 && dof[i] < dof[j]))
-                continue;
-            if (dof[j] >= 0)
-                model->K.val[uz_csc_find(&model->K, dof[i], dof[j])] += value;
-            else
-                model->K_fixed.val[uz_csc_find(&model->K_fixed, dof[i], -1 - dof[j])] += value;
-        }
-}
-
 uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
 {
+    const int dim = model->mesh.dim;
     stiffness_source source;
     const double *ke;
     uz_status status = source_init(&source, model, err);
@@ -218,8 +199,23 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
         if (status == UZ_OK)
             add_element(model, ke, e);
     }
-    for (int64_t a = 0; a < model->mesh.n_nodes && status == UZ_OK && model->spring; a++)
-        add_spring(model, a);
+    /* the springs of a node as a matrix of its dofs: Q diag(k) Q' */
+    for (int64_t a = 0; a < model->mesh.n_nodes && status == UZ_OK && model->spring; a++) {
+        const double *k = model->spring + a * dim, *Q = uz_node_frame(model, a);
+        const int64_t *dof = model->dof + a * dim;
+        for (int j = 0; j < dim; j++)
+            for (int i = 0; i < dim; i++) {
+                double value = Q || i != j ? 0 : k[i];
+                for (int c = 0; Q && c < dim; c++)
+                    value += Q[i * dim + c] * k[c] * Q[j * dim + c];
+                if (value == 0 || dof[i] < 0 || (dof[j] >= 0 && dof[i] < dof[j]))
+                    continue;
+                if (dof[j] >= 0)
+                    model->K.val[uz_csc_find(&model->K, dof[i], dof[j])] += value;
+                else
+                    model->K_fixed.val[uz_csc_find(&model->K_fixed, dof[i], -1 - dof[j])] += value;
+            }
+    }
     source_clear(&source);
     return status;
 }

@@ -17,14 +17,18 @@ struct uz_own_body {
     int64_t questions;
 };
 
-/* Representative of a node's part; halves the path on its way. */
-static int64_t find_root(int64_t *parent, int64_t a)
+int64_t uz_join_root(int64_t *of, int64_t a)
 {
-    while (parent[a] != a) {
-        parent[a] = parent[parent[a]];
-        a = parent[a];
-    }
+    while (of[a] != a)
+        a = of[a] = of[of[a]]; /* halves the path on its way */
     return a;
+}
+
+void uz_join(int64_t *of, int64_t a, int64_t b)
+{
+    a = uz_join_root(of, a);
+    b = uz_join_root(of, b);
+    of[a > b ? a : b] = a > b ? b : a;
 }
 
 int64_t uz_mesh_number_parts(int64_t *part, const uz_mesh *mesh)
@@ -36,13 +40,10 @@ int64_t uz_mesh_number_parts(int64_t *part, const uz_mesh *mesh)
     for (int64_t a = 0; a < mesh->n_nodes; a++)
         parent[a] = a;
     for (int64_t e = 0; e < mesh->n_elements; e++)
-        for (int64_t i = mesh->first[e] + 1; i < mesh->first[e + 1]; i++) {
-            int64_t a = find_root(parent, mesh->node[i]);
-            int64_t b = find_root(parent, mesh->node[mesh->first[e]]);
-            parent[a > b ? a : b] = a > b ? b : a; /* the lesser node leads, so a root is met before its followers */
-        }
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        part[a] = parent[a] == a ? count++ : part[find_root(parent, a)];
+        for (int64_t i = mesh->first[e] + 1; i < mesh->first[e + 1]; i++)
+            uz_join(parent, mesh->node[i], mesh->node[mesh->first[e]]);
+    for (int64_t a = 0; a < mesh->n_nodes; a++) /* a root is met before its followers */
+        part[a] = parent[a] == a ? count++ : part[uz_join_root(parent, a)];
     free(parent);
     return count;
 }

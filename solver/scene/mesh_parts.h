@@ -4,6 +4,10 @@
 
 #include "scene/mesh.h"
 
+/* Sets that are joined: of (as many as things, of[i] = i at first) leads from each to the least of its set. */
+int64_t uz_join_root(int64_t *of, int64_t a);
+void uz_join(int64_t *of, int64_t a, int64_t b);
+
 /* part (n_nodes): the number of each node's connected part; parts are numbered by their first nodes. Returns how many,
  * -1: no memory. */
 int64_t uz_mesh_number_parts(int64_t *part, const uz_mesh *mesh);

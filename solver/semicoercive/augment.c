@@ -46,33 +46,6 @@ static void add(triplets *t, int64_t a, int64_t b, double value)
     t->val[t->count++] = value;
 }
 
-static uz_status augment_stiffness(uz_csc *out, const uz_csc *K, const uz_csc *Nt, const double *weight, uz_error *err)
-{
-    int64_t most = K->ptr[K->cols];
-    for (int64_t i = 0; i < Nt->cols; i++) {
-        int64_t length = Nt->ptr[i + 1] - Nt->ptr[i];
-        most += weight[i] > 0.0 ? length * (length + 1) / 2 : 0;
-    }
-    triplets t = {0, uz_alloc(most, sizeof *t.row), uz_alloc(most, sizeof *t.col), uz_alloc(most, sizeof *t.val)};
-    uz_status status = UZ_OK;
-    if (!t.row || !t.col || !t.val) {
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld entries", (long long)most);
-    } else {
-        for (int64_t j = 0; j < K->cols; j++)
-            for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
-                add(&t, K->idx[q], j, K->val[q]);
-        for (int64_t i = 0; i < Nt->cols; i++)
-            for (int64_t a = Nt->ptr[i]; weight[i] > 0.0 && a < Nt->ptr[i + 1]; a++)
-                for (int64_t b = Nt->ptr[i]; b <= a; b++)
-                    add(&t, Nt->idx[a], Nt->idx[b], weight[i] * Nt->val[a] * Nt->val[b]);
-        status = uz_csc_from_triplets(out, K->rows, K->cols, t.count, t.row, t.col, t.val, err);
-    }
-    free(t.row);
-    free(t.col);
-    free(t.val);
-    return status;
-}
-
 uz_status uz_augment(uz_problem *out, const uz_singular *of, const uz_csc *Nt, const double *weight,
                      const double *target, uz_error *err)
 {
@@ -82,7 +55,29 @@ uz_status uz_augment(uz_problem *out, const uz_singular *of, const uz_csc *Nt, c
     double *p = uz_alloc(d, sizeof *p);
     if (!p)
         return uz_fail(err, UZ_ERR_MEMORY, "p", "no memory for a load on %lld dofs", (long long)d);
-    uz_status status = augment_stiffness(&out->qp.K, of->K, Nt, weight, err);
+    const uz_csc *K = of->K;
+    int64_t most = K->ptr[d];
+    for (int64_t i = 0; i < Nt->cols; i++) {
+        int64_t length = Nt->ptr[i + 1] - Nt->ptr[i];
+        most += weight[i] > 0.0 ? length * (length + 1) / 2 : 0;
+    }
+    triplets t = {0, uz_alloc(most, sizeof *t.row), uz_alloc(most, sizeof *t.col), uz_alloc(most, sizeof *t.val)};
+    uz_status status = UZ_OK;
+    if (!t.row || !t.col || !t.val) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld entries", (long long)most);
+    } else {
+        for (int64_t j = 0; j < d; j++)
+            for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+                add(&t, K->idx[q], j, K->val[q]);
+        for (int64_t i = 0; i < Nt->cols; i++)
+            for (int64_t a = Nt->ptr[i]; weight[i] > 0.0 && a < Nt->ptr[i + 1]; a++)
+                for (int64_t b = Nt->ptr[i]; b <= a; b++)
+                    add(&t, Nt->idx[a], Nt->idx[b], weight[i] * Nt->val[a] * Nt->val[b]);
+        status = uz_csc_from_triplets(&out->qp.K, d, d, t.count, t.row, t.col, t.val, err);
+    }
+    free(t.row);
+    free(t.col);
+    free(t.val);
     memcpy(p, of->p, (size_t)d * sizeof *p);
     for (int64_t i = 0; i < Nt->cols; i++)
         for (int64_t a = Nt->ptr[i]; weight[i] > 0.0 && a < Nt->ptr[i + 1]; a++)
