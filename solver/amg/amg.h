@@ -96,8 +96,6 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
 
 /* ---------------------------------------------------------------- the whole */
 
-typedef struct uz_amg uz_amg; /* immutable after creation: shared by any number of threads */
-
 typedef struct {
     int levels;
     size_t bytes;
@@ -108,14 +106,18 @@ typedef struct {
     int64_t iterations; /* that the bound on the spectrum took */
 } uz_amg_info;
 
+/* Immutable after creation: shared by any number of threads. */
+typedef struct {
+    uz_modes modes;
+    uz_multigrid *mg;
+    uz_amg_info info;
+} uz_amg;
+
 /* Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD also where K is singular to
  * working precision. */
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
                         uz_error *err);
 void uz_amg_free(uz_amg *amg);
-uz_amg_info uz_amg_describe(const uz_amg *amg);
-const uz_multigrid *uz_amg_multigrid(const uz_amg *amg);
-const uz_modes *uz_amg_modes(const uz_amg *amg);
 
 /* *value >= e'K^-1 e, and sharp to a hundredth unless hooks or the deadline cut it short; e (n) becomes K^-1 e, about.
  * cg: of the whole multigrid. */

@@ -286,41 +286,6 @@ static double *coarse_block(block_table *table, int32_t row, int32_t column)
     return table->block + table->count++ * size;
 }
 
-/* row = row i of A P */
-static bool multiply_row(block_row *row, const uz_row_walk *walk, const uz_level *level)
-{
-    int k = row->k;
-    for (int64_t q = 0; q < walk->count; q++) {
-        int64_t j = walk->column[q];
-        for (int64_t e = level->ptr[j]; e < level->ptr[j + 1]; e++) {
-            double *block = block_of(row, level->block[e]);
-            if (!block)
-                return false;
-            for (int c = 0; c < k; c++)
-                block[c] += walk->value[q] * (double)level->value[e * k + c];
-        }
-    }
-    return true;
-}
-
-/* table += (row i of P)' (row i of A P), blocks of the lower triangle. */
-static bool add_outer(block_table *table, const block_row *row, const uz_level *level, int64_t i)
-{
-    int k = row->k;
-    for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++)
-        for (int64_t s = 0; s < row->count; s++) {
-            if (row->met[s] > level->block[e])
-                continue;
-            double *to = coarse_block(table, level->block[e], row->met[s]);
-            if (!to)
-                return false;
-            for (int a = 0; a < k; a++)
-                for (int b = 0; b < k; b++)
-                    to[a * k + b] += (double)level->value[e * k + a] * row->block[s * k + b];
-        }
-    return true;
-}
-
 typedef struct {
     uint64_t by_column; /* column << 32 | row */
     int64_t block;
@@ -381,7 +346,24 @@ uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, in
         uz_row_walk_read(&walk, i);
         if (level->ptr[i] == level->ptr[i + 1])
             continue;
-        ok = multiply_row(&row, &walk, level) && add_outer(&table, &row, level, i);
+        for (int64_t q = 0; q < walk.count && ok; q++) /* row = row i of A P */
+            for (int64_t e = level->ptr[walk.column[q]]; e < level->ptr[walk.column[q] + 1] && ok; e++) {
+                double *block = block_of(&row, level->block[e]);
+                ok = block != NULL;
+                for (int c = 0; c < k && ok; c++)
+                    block[c] += walk.value[q] * (double)level->value[e * k + c];
+            }
+        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1] && ok;
+             e++) /* table += (row i of P)' row, lower triangle */
+            for (int64_t s = 0; s < row.count && ok; s++) {
+                if (row.met[s] > level->block[e])
+                    continue;
+                double *to = coarse_block(&table, level->block[e], row.met[s]);
+                ok = to != NULL;
+                for (int a = 0; a < k && ok; a++)
+                    for (int b = 0; b < k; b++)
+                        to[a * k + b] += (double)level->value[e * k + a] * row.block[s * k + b];
+            }
         block_row_empty(&row);
     }
     uz_status status = over ? uz_fail_stopped(err)

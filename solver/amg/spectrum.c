@@ -30,12 +30,6 @@ enum { STEPS_MOST = 3000, CHECK_EVERY = 4, POWERS = 8 };
 /* 0.8 times this is 1e-12. */
 #define LEAST_SHARE 1.25e-12
 
-struct uz_amg {
-    uz_modes modes;
-    uz_multigrid *mg;
-    uz_amg_info info;
-};
-
 typedef struct {
     double alpha[STEPS_MOST], beta[STEPS_MOST];
     int count;
@@ -239,21 +233,6 @@ void uz_amg_free(uz_amg *amg)
     uz_modes_clear(&amg->modes);
     uz_multigrid_free(amg->mg);
     free(amg);
-}
-
-uz_amg_info uz_amg_describe(const uz_amg *amg)
-{
-    return amg->info;
-}
-
-const uz_multigrid *uz_amg_multigrid(const uz_amg *amg)
-{
-    return amg->mg;
-}
-
-const uz_modes *uz_amg_modes(const uz_amg *amg)
-{
-    return &amg->modes;
 }
 
 /* The residual's share of the value that is sharp enough, as a share of its root. */

@@ -66,30 +66,6 @@ static double ratio(double value, double scale)
     return scale > 0.0 ? value / scale : INFINITY;
 }
 
-/* Paper, section 4; relative: force by ||p|| (by the reactions where there is no load), length by the size of h and
- * N u = h - g, or of what u could move a row by: where all rows touch and h = 0, N u is rounding. Energy by |psi|. */
-static void conclude_residuals(uz_certificate *out, const uz_bound_terms *t, const double *r, const double *g,
-                               const double *h, int64_t m)
-{
-    const double force = t->force > 0.0 ? t->force : uz_bound_norm(r, m);
-    double scale = 0.0, sum = 0.0;
-    uz_residual *a = &out->residual, *b = &out->relative_residual;
-    for (int64_t i = 0; i < m; i++)
-        scale = fmax(scale, fabs(h[i] - g[i]));
-    for (int64_t i = 0; scale > 0.0 && i < m; i++)
-        sum += ((h[i] - g[i]) / scale) * ((h[i] - g[i]) / scale);
-    a->e1 = t->e1;
-    a->e2 = uz_penetration_norm(g, m);
-    a->e3 = t->positive_part;
-    a->e4 = uz_complementarity_norm(r, g, m);
-    a->total = hypot(hypot(a->e1, a->e2), hypot(a->e3, a->e4));
-    b->e1 = ratio(a->e1, force);
-    b->e2 = ratio(a->e2, fmax(t->span, fmax(uz_bound_norm(h, m), scale * sqrt(sum))));
-    b->e3 = ratio(a->e3, force);
-    b->e4 = ratio(a->e4, fabs(out->energy_dual));
-    b->total = hypot(hypot(b->e1, b->e2), hypot(b->e3, b->e4));
-}
-
 double uz_bound_doubt(double inverse, int64_t d)
 {
     return DBL_EPSILON * sqrt((double)d) * 8.0 * inverse;
@@ -206,5 +182,25 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
     out->relative_error = out->absolute_error == 0.0               ? 0.0
                           : out->energy_norm > out->absolute_error ? out->absolute_error / least
                                                                    : INFINITY;
-    conclude_residuals(out, t, r, g, h, m);
+    /* residuals: paper, section 4; relative: force by ||p|| (by the reactions where there is no load), length by the
+     * size of h and N u = h - g, or of what u could move a row by: where all rows touch and h = 0, N u is rounding.
+     * Energy by |psi|.
+     */
+    const double force = t->force > 0.0 ? t->force : uz_bound_norm(r, m);
+    double scale = 0.0, sum = 0.0;
+    uz_residual *a = &out->residual, *b = &out->relative_residual;
+    for (int64_t i = 0; i < m; i++)
+        scale = fmax(scale, fabs(h[i] - g[i]));
+    for (int64_t i = 0; scale > 0.0 && i < m; i++)
+        sum += ((h[i] - g[i]) / scale) * ((h[i] - g[i]) / scale);
+    a->e1 = t->e1;
+    a->e2 = uz_penetration_norm(g, m);
+    a->e3 = t->positive_part;
+    a->e4 = uz_complementarity_norm(r, g, m);
+    a->total = hypot(hypot(a->e1, a->e2), hypot(a->e3, a->e4));
+    b->e1 = ratio(a->e1, force);
+    b->e2 = ratio(a->e2, fmax(t->span, fmax(uz_bound_norm(h, m), scale * sqrt(sum))));
+    b->e3 = ratio(a->e3, force);
+    b->e4 = ratio(a->e4, fabs(out->energy_dual));
+    b->total = hypot(hypot(b->e1, b->e2), hypot(b->e3, b->e4));
 }

@@ -67,16 +67,6 @@ void uz_certify_weights(double *weight, const uz_csc *K)
         weight[j] = uz_dof_weight(K, j);
 }
 
-static void release(certifier *c)
-{
-    double *room[] = {c->res.e, c->res.e_u, c->res.Ku, c->res.Kc, c->weight, c->weight_b, c->u_b, c->c};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
-    uz_csc_clear(&c->Nt);
-    free(c->dof);
-    uz_feasible_clear(&c->feasible);
-}
-
 /* How far an estimate of the inverse's norm, from single vectors that rounding made, may be below it. */
 #define SURELY 1e3
 
@@ -295,6 +285,11 @@ uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u,
     uz_status status = prepare(&c, input, u, err);
     if (status == UZ_OK)
         status = measure(&c, out, r, g, uz_cut_reactions(r, c.m), err);
-    release(&c);
+    double *room[] = {c.res.e, c.res.e_u, c.res.Ku, c.res.Kc, c.weight, c.weight_b, c.u_b, c.c};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    uz_csc_clear(&c.Nt);
+    free(c.dof);
+    uz_feasible_clear(&c.feasible);
     return status;
 }

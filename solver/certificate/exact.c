@@ -66,23 +66,6 @@ static void multiply(exact *c, mpq_t square, mpq_t *y, const mpq_t *x)
     }
 }
 
-/* Moves v to where no row penetrates; g: its gaps. false: no such place is known. */
-static bool settle(exact *c)
-{
-    uz_row_settle problem = {.Nt = &c->Nt, .weight = c->weight, .h = c->in->h, .at = c->v};
-    bool open = uz_row_settle_solve(&problem);
-    for (int64_t i = 0; open && i < c->m; i++) {
-        mpq_set_d(c->g[i], c->in->h[i]);
-        for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++) {
-            mpq_set_d(c->a, c->Nt.val[k]);
-            mpq_mul(c->a, c->a, c->v[c->Nt.idx[k]]);
-            mpq_sub(c->g[i], c->g[i], c->a);
-        }
-        open = mpq_sgn(c->g[i]) >= 0;
-    }
-    return open;
-}
-
 /* sum -= x'y */
 static void subtract_products(mpf_t sum, mpf_t term, const mpf_t *x, const mpf_t *y, int64_t n)
 {
@@ -254,7 +237,19 @@ static bool take(exact *c, const double *u, const mpf_t *v, const mpf_t *s)
     for (int64_t i = 0; i < c->m; i++)
         if (mpf_sgn(s[i]) < 0)
             mpq_set_f(c->s[i], s[i]);
-    if (!settle(c))
+    /* v moves to where no row penetrates, if such a place is known; g: its gaps */
+    uz_row_settle problem = {.Nt = &c->Nt, .weight = c->weight, .h = c->in->h, .at = c->v};
+    bool open = uz_row_settle_solve(&problem);
+    for (int64_t i = 0; open && i < c->m; i++) {
+        mpq_set_d(c->g[i], c->in->h[i]);
+        for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++) {
+            mpq_set_d(c->a, c->Nt.val[k]);
+            mpq_mul(c->a, c->a, c->v[c->Nt.idx[k]]);
+            mpq_sub(c->g[i], c->g[i], c->a);
+        }
+        open = mpq_sgn(c->g[i]) >= 0;
+    }
+    if (!open)
         return false;
     multiply(c, c->norm, c->Kw, (const mpq_t *)c->w);
     for (int64_t j = 0; j < c->d; j++)

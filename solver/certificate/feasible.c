@@ -72,17 +72,13 @@ void uz_feasible_clear(uz_feasible *c)
     uz_row_move_clear(&c->move);
 }
 
-double uz_feasible_gap(const uz_feasible *c, int64_t i)
-{
-    return uz_gap_of_row(c->Nt, i, c->h, c->u, c->correction);
-}
-
 double uz_feasible_complementarity(const uz_feasible *c, const double *r, bool settled)
 {
     const bool moved = settled && c->exact.length > 0.0;
     double sum = 0.0;
     for (int64_t i = 0; i < c->m; i++) {
-        const double gap = moved ? c->gap[i] : fabs(uz_feasible_gap(c, i)), product = -r[i] * gap;
+        const double gap = moved ? c->gap[i] : fabs(uz_gap_of_row(c->Nt, i, c->h, c->u, c->correction)),
+                     product = -r[i] * gap;
         sum += r[i] != 0.0 && gap > 0.0 ? fmax(product, DBL_MIN) : product; /* never 0 by underflow */
     }
     return sum;
@@ -95,7 +91,7 @@ static double choose_rows(const uz_feasible *c, const double *r)
 {
     double worst = 0.0;
     for (int64_t i = 0; i < c->m; i++) {
-        const double gap = uz_feasible_gap(c, i);
+        const double gap = uz_gap_of_row(c->Nt, i, c->h, c->u, c->correction);
         /* closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g */
         const bool close = uz_row_presses(r[i]) && fabs(gap) <= -2.0 * r[i] * uz_row_compliance(c->Nt, i, c->weight);
         double moved = 0.0; /* what the rounding of the correction, a vector of doubles, may do is relative to this */

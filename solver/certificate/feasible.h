@@ -34,8 +34,6 @@ void uz_feasible_clear(uz_feasible *f);
  * chose the rows, r - push (<= 0) presses on closed rows only: -r'g is then nothing, where rows that r presses on can't
  * all be closed, and N'(r - push) differs from N'r by W^-1 c. */
 bool uz_make_feasible(uz_feasible *f, const double *r);
-/* g_i(u + c) */
-double uz_feasible_gap(const uz_feasible *f, int64_t i);
 /* -r'g, what the pair adds to the duality gap: at u + c, where a gap below 0 by rounding counts as one above, or at
  * u + c + delta. */
 double uz_feasible_complementarity(const uz_feasible *f, const double *r, bool settled);

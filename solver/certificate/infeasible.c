@@ -14,13 +14,19 @@
 /* h'y is positive beyond what the rounding of each h_i may do to it. Its own sum is exact to far less. */
 #define RAY_NOISE (8.0 * DBL_EPSILON)
 
-bool uz_ray_is_likely(const double *y, const uz_csc *N, const double *h, double length)
+bool uz_ray_is_likely(const double *y, const uz_csc *N, const double *h, const double *g, double *row_room)
 {
     double_double work = {0};
-    double size = 0.0, residual = 0.0;
+    double size = 0.0, residual = 0.0, length = 0.0;
     bool rounded = true;
     if (!uz_is_ray_direction(y, N->rows))
         return false;
+    memset(row_room, 0, (size_t)N->rows * sizeof *row_room);
+    for (int64_t k = 0; k < N->ptr[N->cols]; k++)
+        row_room[N->idx[k]] = fmax(row_room[N->idx[k]], fabs(N->val[k]));
+    for (int64_t i = 0; i < N->rows; i++)
+        if (row_room[i] > 0.0)
+            length = fmax(length, (fabs(h[i]) + fabs(g[i])) / row_room[i]);
     for (int64_t i = 0; i < N->rows; i++) {
         dd_add_product(&work.hi, &work.lo, h[i], y[i], 0);
         size += fabs(h[i] * y[i]);
@@ -37,18 +43,6 @@ bool uz_ray_is_likely(const double *y, const uz_csc *N, const double *h, double 
     }
     double sure = work.hi + work.lo;
     return sure > RAY_NOISE * size && sure > residual * (rounded ? UZ_RAY_ROUNDED : UZ_RAY_FACTOR) * length;
-}
-
-double uz_gap_length(const uz_csc *N, const double *h, const double *g, double *row_room)
-{
-    double length = 0.0;
-    memset(row_room, 0, (size_t)N->rows * sizeof *row_room);
-    for (int64_t k = 0; k < N->ptr[N->cols]; k++)
-        row_room[N->idx[k]] = fmax(row_room[N->idx[k]], fabs(N->val[k]));
-    for (int64_t i = 0; i < N->rows; i++)
-        if (row_room[i] > 0.0)
-            length = fmax(length, (fabs(h[i]) + fabs(g[i])) / row_room[i]);
-    return length;
 }
 
 /* ------------------------------------------------------------------- exactly */
@@ -102,28 +96,6 @@ static void collect(parts *x, int64_t i)
         for (; k > 0 && x->y[x->row[k - 1]] > x->y[row]; k--)
             x->row[k] = x->row[k - 1];
         x->row[k] = row;
-    }
-}
-
-/* The equations N'y = 0 in integers. */
-static void fill(parts *x)
-{
-    for (int64_t k = 0; k < x->n_dof * x->n; k++)
-        mpz_set_ui(x->A[k], 0);
-    for (int64_t c = 0; c < x->n; c++) {
-        const int64_t first = x->Nt->ptr[x->row[c]], end = x->Nt->ptr[x->row[c] + 1];
-        int exponent, least = 0;
-        for (int64_t q = first; q < end; q++) {
-            frexp(x->Nt->val[q], &exponent);
-            least = x->Nt->val[q] != 0.0 && exponent - DBL_MANT_DIG < least ? exponent - DBL_MANT_DIG : least;
-        }
-        x->shift[c] = -least;
-        for (int64_t q = first; q < end; q++) {
-            mpz_t *entry = &x->A[x->place[x->Nt->idx[q]] * x->n + c];
-            mpz_set_d(*entry, ldexp(frexp(x->Nt->val[q], &exponent), DBL_MANT_DIG));
-            if (x->Nt->val[q] != 0.0)
-                mpz_mul_2exp(*entry, *entry, (mp_bitcnt_t)(exponent - DBL_MANT_DIG - least));
-        }
     }
 }
 
@@ -204,7 +176,23 @@ static bool prove_part(parts *x)
         int64_t solved = 0;
         memset(x->used, 0, (size_t)x->n_dof * sizeof *x->used);
         mpz_set_ui(x->last, 1);
-        fill(x);
+        for (int64_t k = 0; k < x->n_dof * x->n; k++) /* the equations N'y = 0 in integers */
+            mpz_set_ui(x->A[k], 0);
+        for (int64_t c = 0; c < x->n; c++) {
+            const int64_t first = x->Nt->ptr[x->row[c]], end = x->Nt->ptr[x->row[c] + 1];
+            int exponent, least = 0;
+            for (int64_t q = first; q < end; q++) {
+                frexp(x->Nt->val[q], &exponent);
+                least = x->Nt->val[q] != 0.0 && exponent - DBL_MANT_DIG < least ? exponent - DBL_MANT_DIG : least;
+            }
+            x->shift[c] = -least;
+            for (int64_t q = first; q < end; q++) {
+                mpz_t *entry = &x->A[x->place[x->Nt->idx[q]] * x->n + c];
+                mpz_set_d(*entry, ldexp(frexp(x->Nt->val[q], &exponent), DBL_MANT_DIG));
+                if (x->Nt->val[q] != 0.0)
+                    mpz_mul_2exp(*entry, *entry, (mp_bitcnt_t)(exponent - DBL_MANT_DIG - least));
+            }
+        }
         for (int64_t c = 0; c < x->n; c++)
             solved += eliminate(x, c);
         if (!(x->work > 0.0) || solved == x->n)

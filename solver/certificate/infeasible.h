@@ -9,16 +9,13 @@
 
 #include "uzawa.h"
 
-/* How large displacements of this problem are at all, from its gaps: max over rows of (|h_i| + |g_i|) / max_j |N_ij|.
- * Rows of zeros don't count. */
-double uz_gap_length(const uz_csc *N, const double *h, const double *g, double *row_room);
-
-/* Is y worth a proof? In double-double precision, original data, N: m x d. Where all that is left of N'y is the
- * rounding of y's doubles UZ_RAY_ROUNDED of the problem's lengths (uz_gap_length) without a feasible u are enough,
- * elsewhere UZ_RAY_FACTOR. */
+/* Is y worth a proof? In double-double precision, original data, N: m x d. How large displacements of this problem are
+ * at all is taken from its gaps g: max over rows of (|h_i| + |g_i|) / max_j |N_ij|, but for rows of zeros. Where all
+ * that is left of N'y is the rounding of y's doubles UZ_RAY_ROUNDED of these lengths without a feasible u are enough,
+ * elsewhere UZ_RAY_FACTOR. row_room: m. */
 #define UZ_RAY_FACTOR  1e6
 #define UZ_RAY_ROUNDED 100.0
-bool uz_ray_is_likely(const double *y, const uz_csc *N, const double *h, double length);
+bool uz_ray_is_likely(const double *y, const uz_csc *N, const double *h, const double *g, double *row_room);
 
 /* What y (m, <= 0) proves.
  *   y       in: a candidate; out, where *radius is INFINITY: an exact ray rounded to doubles, of the rows that

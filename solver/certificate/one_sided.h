@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Of one row: does it press, does it penetrate, is its gap allowed? false for NaN. */
+/* Of one row: does it press, does it penetrate? false for NaN. */
 static inline bool uz_row_presses(double r)
 {
     return r < 0.0;
@@ -19,11 +19,6 @@ static inline bool uz_row_presses(double r)
 static inline bool uz_row_penetrates(double g)
 {
     return g < 0.0;
-}
-
-static inline bool uz_row_is_open(double g)
-{
-    return g >= 0.0;
 }
 
 /* Can y (m) be the direction of a ray, r + t y allowed for all t > 0? false where an entry is NaN. */

@@ -155,29 +155,6 @@ static void exchange_many(exact *x)
     }
 }
 
-/* The row that penetrates most, by the displacement that would lift it; where none does, an open one that pushes more
- * than its bound; -1: none. */
-static int64_t choose(const exact *x)
-{
-    int64_t q = -1, open = -1;
-    double deepest = 0.0, widest = 0.0;
-    const double noise = PULL_NOISE * largest_push(x);
-    for (int64_t i = 0; i < x->m; i++) {
-        const double size = sqrt(x->f.size[i]), depth = -x->g[i] / size;
-        if (x->f.place[i] >= 0 || !(size > 0.0))
-            continue;
-        if (!x->barred[i] && penetrates(x, i) && !(depth <= deepest)) {
-            deepest = depth;
-            q = i;
-        }
-        if (x->g[i] > x->slack[i] && x->in->y[i] > x->least[i] + noise / size && -depth > widest) {
-            widest = -depth;
-            open = i;
-        }
-    }
-    return q >= 0 ? q : open;
-}
-
 /* Presses q, or eases it where it is open, until it joins the rows in contact, is at its bound or can't be pressed. By
  * `step` that moves u along `left`, and the rows in contact push less by w step. */
 static void admit(exact *x, int64_t q)
@@ -231,7 +208,25 @@ static bool exchange_single(exact *x)
             for (int pass = 0; pass < PASSES; pass++)
                 close_gaps(x);
         } while (let_go(x) > 0 && !x->failed);
-        const int64_t q = choose(x);
+        /* the row that penetrates most, by the displacement that would lift it; where none does, an open one that
+         * pushes more than its bound */
+        int64_t deep = -1, wide = -1;
+        double deepest = 0.0, widest = 0.0;
+        const double noise = PULL_NOISE * largest_push(x);
+        for (int64_t i = 0; i < x->m; i++) {
+            const double size = sqrt(x->f.size[i]), depth = -x->g[i] / size;
+            if (x->f.place[i] >= 0 || !(size > 0.0))
+                continue;
+            if (!x->barred[i] && penetrates(x, i) && !(depth <= deepest)) {
+                deepest = depth;
+                deep = i;
+            }
+            if (x->g[i] > x->slack[i] && x->in->y[i] > x->least[i] + noise / size && -depth > widest) {
+                widest = -depth;
+                wide = i;
+            }
+        }
+        const int64_t q = deep >= 0 ? deep : wide;
         if (q < 0) {
             bool open = !x->failed;
             for (int64_t i = 0; open && i < x->m; i++)

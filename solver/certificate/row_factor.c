@@ -101,36 +101,6 @@ void uz_row_factor_order(uz_row_factor *f, int64_t *rows, int64_t n)
     free(order);
 }
 
-static int64_t parent_of(const uz_row_factor *f, int64_t place)
-{
-    return f->column[place].count > 0 ? f->column[place].below[0].row : f->count;
-}
-
-/* x = N_A W n_q, and in l_place, from `top` on, where L^-1 x will not be zero: the paths of the elimination tree from
- * its entries, each place behind those that it needs. */
-static int64_t gather(uz_row_factor *f, int64_t q)
-{
-    int64_t top = f->Nt->cols;
-    for (int64_t e = f->Nt->ptr[q]; e < f->Nt->ptr[q + 1]; e++) {
-        const int64_t j = f->Nt->idx[e];
-        const double factor = f->Nt->val[e] * f->weight[j];
-        f->work += (double)(f->N.ptr[j + 1] - f->N.ptr[j]);
-        for (int64_t s = f->N.ptr[j]; s < f->N.ptr[j + 1]; s++) {
-            int64_t k = f->place[f->N.idx[s]], length = 0;
-            if (k < 0)
-                continue;
-            f->x[k] += factor * f->N.val[s];
-            for (; k < f->count && !f->seen[k]; k = parent_of(f, k)) {
-                f->seen[k] = true;
-                f->stack[length++] = k;
-            }
-            while (length > 0)
-                f->l_place[--top] = f->stack[--length];
-        }
-    }
-    return top;
-}
-
 static void backward(uz_row_factor *f, double *x)
 {
     for (int64_t k = f->count - 1; k >= 0; k--) {
@@ -210,7 +180,26 @@ static void resolve(uz_row_factor *f, int64_t q)
 
 void uz_row_factor_press(uz_row_factor *f, int64_t q, bool in_full)
 {
-    const int64_t top = gather(f, q);
+    /* x = N_A W n_q, and in l_place, from `top` on, where L^-1 x will not be zero: the paths of the elimination tree
+     * from its entries, each place behind those that it needs */
+    int64_t top = f->Nt->cols;
+    for (int64_t e = f->Nt->ptr[q]; e < f->Nt->ptr[q + 1]; e++) {
+        const int64_t j = f->Nt->idx[e];
+        const double factor = f->Nt->val[e] * f->weight[j];
+        f->work += (double)(f->N.ptr[j + 1] - f->N.ptr[j]);
+        for (int64_t s = f->N.ptr[j]; s < f->N.ptr[j + 1]; s++) {
+            int64_t k = f->place[f->N.idx[s]], length = 0;
+            if (k < 0)
+                continue;
+            f->x[k] += factor * f->N.val[s];
+            for (; k < f->count && !f->seen[k]; k = f->column[k].count > 0 ? f->column[k].below[0].row : f->count) {
+                f->seen[k] = true;
+                f->stack[length++] = k;
+            }
+            while (length > 0)
+                f->l_place[--top] = f->stack[--length];
+        }
+    }
     f->n_l = 0;
     f->compliance = f->size[q];
     for (int64_t s = top; s < f->Nt->cols; s++) {

@@ -62,7 +62,7 @@ uz_status uz_dual_block_open(uz_dual_load **out, const uz_dual_block *block, int
 {
     uz_dual_load *load = NULL;
     *out = NULL;
-    uz_status status = uz_dual_load_begin(&load, block->dual, K, h, err);
+    uz_status status = uz_dual_load_create(&load, block->dual, K, NULL, h, err);
     if (status == UZ_OK)
         status = block->dual->form->load_lane(load, block->Y + lane_start(block, lane), UZ_LANES, block->room, err);
     if (status == UZ_OK)

@@ -276,13 +276,6 @@ static void count_links(region *x, const uz_bounded *box, const uz_csc *K)
     }
 }
 
-static void leave_region(region *x)
-{
-    void *room[] = {x->links, x->place, x->dof, x->ptr, x->idx, x->val, x->inverse, x->pull, x->u};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
-}
-
 /* box->force = p - K point at entry; whole: all dofs; false: no memory, and no sweeps. */
 static bool enter_region(region *x, const uz_bounded *box, const uz_csc *K, bool whole)
 {
@@ -371,7 +364,9 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
     }
     for (int64_t a = 0; room && a < near.n; a++)
         box->point[near.dof[a]] = near.u[a];
-    leave_region(&near);
+    void *own[] = {near.links, near.place, near.dof, near.ptr, near.idx, near.val, near.inverse, near.pull, near.u};
+    for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
+        free(own[k]);
     box->point_energy = energy(box, K, box->point);
     memset(active, 0, (size_t)load->dual->m * sizeof *active);
     for (int64_t j = 0; j < K->cols; j++) {

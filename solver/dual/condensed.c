@@ -34,57 +34,6 @@ static bool find_scaled(uz_condensed *dense, int64_t m)
     return scaled;
 }
 
-/* D_chol, or NULL where D is singular to working precision (dependent rows of N). */
-static void factor_operator(uz_condensed *dense, const double *D, int64_t m, const uz_stop *stop)
-{
-    double *chol = malloc((size_t)m * (size_t)m * sizeof *chol + 1), least = INFINITY, largest = 0.0;
-    bool ok = chol != NULL;
-    if (ok) {
-        memcpy(chol, D, (size_t)m * (size_t)m * sizeof *chol);
-        ok = uz_potrf_lower_while(m, chol, stop);
-    }
-    for (int64_t i = 0; ok && i < m; i++) {
-        least = fmin(least, chol[i + i * m]);
-        largest = fmax(largest, chol[i + i * m]);
-    }
-    if (ok && least * least > UZ_PIVOT_LEAST * largest * largest) {
-        dense->D_chol = chol;
-        return;
-    }
-    free(chol);
-}
-
-static uz_status multiply_out(const uz_condensed *dense, double *D, int64_t m, const uz_stop *stop, uz_error *err)
-{
-    int64_t n_b = dense->n_b;
-    double *Z = uz_alloc_zero(n_b * m, sizeof *Z);
-    if (!Z)
-        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense %lld x %lld block", (long long)n_b,
-                       (long long)m);
-    for (int64_t k = 0; k < n_b; k++)
-        for (int64_t e = dense->N_b.ptr[k]; e < dense->N_b.ptr[k + 1]; e++)
-            Z[k + dense->N_b.idx[e] * n_b] = dense->N_b.val[e];
-    bool done = uz_trsm_lower_while(n_b, m, dense->L_bb, Z, stop) && uz_syrk_lower_t_while(m, n_b, Z, D, stop);
-    free(Z);
-    if (!done)
-        return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
-    return UZ_OK;
-}
-
-static bool allocate(uz_condensed *dense, int64_t n_b, bool contact_last)
-{
-    int64_t block;
-    if (__builtin_mul_overflow(n_b, n_b, &block))
-        return false;
-    dense->n_b = n_b;
-    dense->made = uz_alloc_zero(1, sizeof *dense->made);
-    dense->position = uz_alloc(n_b, sizeof(int64_t));
-    dense->L_bb = contact_last ? uz_alloc(block, sizeof(double)) : NULL;
-    dense->row_of = uz_alloc(n_b, sizeof(int64_t));
-    dense->scale = uz_alloc(n_b, sizeof(double));
-    return dense->made && dense->position && (dense->L_bb || !contact_last) && dense->row_of && dense->scale;
-}
-
 /* Where N_b is a scaled permutation, and the contact last, D waits until somebody iterates; otherwise every bound needs
  * it. */
 static uz_status make_operator(uz_condensed *dense, const uz_stop *stop, uz_error *err)
@@ -97,10 +46,40 @@ static uz_status make_operator(uz_condensed *dense, const uz_stop *stop, uz_erro
     double *D = dense->made->D = fits ? uz_alloc_zero(size, sizeof(double)) : NULL;
     if (!D)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)m);
-    uz_status status =
-        dense->reach ? uz_reach_gram(D, dense->reach, &dense->dual.N, err) : multiply_out(dense, D, m, stop, err);
-    if (status == UZ_OK)
-        factor_operator(dense, D, m, stop);
+    uz_status status = UZ_OK;
+    if (dense->reach) {
+        status = uz_reach_gram(D, dense->reach, &dense->dual.N, err);
+    } else {
+        const int64_t n_b = dense->n_b;
+        double *Z = uz_alloc_zero(n_b * m, sizeof *Z);
+        if (!Z)
+            return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense %lld x %lld block", (long long)n_b,
+                           (long long)m);
+        for (int64_t k = 0; k < n_b; k++)
+            for (int64_t e = dense->N_b.ptr[k]; e < dense->N_b.ptr[k + 1]; e++)
+                Z[k + dense->N_b.idx[e] * n_b] = dense->N_b.val[e];
+        if (!uz_trsm_lower_while(n_b, m, dense->L_bb, Z, stop) || !uz_syrk_lower_t_while(m, n_b, Z, D, stop))
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
+        free(Z);
+    }
+    /* D_chol stays NULL where D is singular to working precision (dependent rows of N) */
+    double *chol = status == UZ_OK ? malloc((size_t)size * sizeof *chol + 1) : NULL;
+    double least = INFINITY, largest = 0.0;
+    if (chol) {
+        memcpy(chol, D, (size_t)size * sizeof *chol);
+        if (uz_potrf_lower_while(m, chol, stop))
+            dense->D_chol = chol;
+        else
+            free(chol);
+    }
+    for (int64_t i = 0; dense->D_chol && i < m; i++) {
+        least = fmin(least, chol[i + i * m]);
+        largest = fmax(largest, chol[i + i * m]);
+    }
+    if (dense->D_chol && !(least * least > UZ_PIVOT_LEAST * largest * largest)) {
+        free(chol);
+        dense->D_chol = NULL;
+    }
     if (status == UZ_OK && uz_stop_is_due(stop))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
     return status;
@@ -132,11 +111,20 @@ static uz_status create(uz_dual *dual, const uz_stop *stop, uz_error *err)
 {
     uz_condensed *dense = (uz_condensed *)dual;
     const uz_csc *N = &dual->N;
-    int64_t m = dual->m, n_b = 0, *order = NULL;
+    int64_t m = dual->m, n_b = 0, *order = NULL, size;
     bool last = false;
     uz_status status = list_contact(&order, &n_b, &last, dual, err);
-    if (status == UZ_OK && !allocate(dense, n_b, last))
-        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense block of order %lld", (long long)n_b);
+    if (status == UZ_OK) {
+        const bool fits = !__builtin_mul_overflow(n_b, n_b, &size);
+        dense->n_b = n_b;
+        dense->made = uz_alloc_zero(1, sizeof *dense->made);
+        dense->position = uz_alloc(n_b, sizeof(int64_t));
+        dense->L_bb = last && fits ? uz_alloc(size, sizeof(double)) : NULL;
+        dense->row_of = uz_alloc(n_b, sizeof(int64_t));
+        dense->scale = uz_alloc(n_b, sizeof(double));
+        if (!fits || !dense->made || !dense->position || (last && !dense->L_bb) || !dense->row_of || !dense->scale)
+            status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense block of order %lld", (long long)n_b);
+    }
     /* The trailing block of the factor, which puts the dofs in its own order, or the paths that take its place. */
     if (status == UZ_OK && dense->L_bb) {
         status = uz_factor_last_block(dual->factor, dense->L_bb, order, dense->position, err);

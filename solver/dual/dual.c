@@ -123,9 +123,11 @@ double uz_dual_lambda_max_as_given(const uz_dual *dual)
     return value >= DBL_MIN && value <= DBL_MAX ? value : NAN;
 }
 
-uz_status uz_dual_load_begin(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *h, uz_error *err)
+uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p,
+                              const double *h, uz_error *err)
 {
     *out = NULL;
+    uz_status status = UZ_OK;
     uz_dual_load *load = uz_alloc_zero(1, dual->form->load_size);
     if (!load)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
@@ -134,23 +136,11 @@ uz_status uz_dual_load_begin(uz_dual_load **out, const uz_dual *dual, const uz_c
     load->stop.deadline = INFINITY;
     load->h = uz_alloc_zero(dual->m, sizeof(double));
     load->g0 = uz_alloc_zero(dual->m, sizeof(double));
-    if (!load->h || !load->g0) {
-        uz_dual_load_free(load);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->d);
-    }
-    for (int64_t i = 0; i < dual->m; i++)
+    if (!load->h || !load->g0)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->d);
+    for (int64_t i = 0; status == UZ_OK && i < dual->m; i++)
         load->h[i] = dual->row_scale[i] * h[i];
-    *out = load;
-    return UZ_OK;
-}
-
-uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p,
-                              const double *h, uz_error *err)
-{
-    *out = NULL;
-    uz_dual_load *load = NULL;
-    uz_status status = uz_dual_load_begin(&load, dual, K, h, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK && p)
         status = dual->form->load(load, p, err);
     if (status == UZ_OK)
         *out = load;

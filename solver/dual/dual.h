@@ -79,7 +79,8 @@ double uz_dual_known_lambda_max(const uz_dual *dual, bool weighted);
 /* Of the caller's rows, else NaN; NaN also where it is out of range. */
 double uz_dual_lambda_max_as_given(const uz_dual *dual);
 
-/* K (lower triangle) is borrowed for the life of the load, p and h are only read. */
+/* K (lower triangle) is borrowed for the life of the load, p and h are only read. p NULL: all but what follows from
+ * it. */
 uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p,
                               const double *h, uz_error *err);
 void uz_dual_load_free(uz_dual_load *load);

@@ -75,7 +75,4 @@ struct uz_dual_form {
 extern const uz_dual_form uz_dual_condensed, uz_dual_factored, uz_dual_matrix_free;
 const uz_dual_form *uz_dual_form_of(uz_operator op);
 
-/* A load with everything that does not follow from p. */
-uz_status uz_dual_load_begin(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *h, uz_error *err);
-
 #endif

@@ -17,19 +17,6 @@ typedef struct {
     double *d, *e, *vectors; /* its eigenproblem, steps x steps */
 } lanczos;
 
-/* A fixed pseudo-random start: no direction of a structured problem is orthogonal to it, and runs repeat. */
-static void start_vector(double *v, int64_t m)
-{
-    uint64_t state = 0x9E3779B97F4A7C15u;
-    for (int64_t i = 0; i < m; i++) {
-        state = state * 6364136223846793005u + 1442695040888963407u;
-        v[i] = 0.5 + (double)(state >> 11) * 0x1p-53;
-    }
-    double norm = uz_norm(m, v);
-    for (int64_t i = 0; i < m; i++)
-        v[i] /= norm;
-}
-
 /* Largest Ritz value of the first k + 1 steps and its residual norm beta |s_last|. */
 static bool ritz(lanczos *z, int64_t k, double *value, double *residual)
 {
@@ -57,8 +44,17 @@ uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, d
     *lambda = 0.0;
     if (!z.basis || !z.alpha || !z.beta || !z.d || !z.e || !z.vectors)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld Lanczos vectors", (long long)steps);
-    else if (m > 0)
-        start_vector(z.basis, m);
+    else if (m > 0) {
+        /* a fixed pseudo-random start: no direction of a structured problem is orthogonal to it, and runs repeat */
+        uint64_t state = 0x9E3779B97F4A7C15u;
+        for (int64_t i = 0; i < m; i++) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            z.basis[i] = 0.5 + (double)(state >> 11) * 0x1p-53;
+        }
+        double norm = uz_norm(m, z.basis);
+        for (int64_t i = 0; i < m; i++)
+            z.basis[i] /= norm;
+    }
     for (int64_t k = 0; status == UZ_OK && k < steps; k++) {
         double *v = z.basis + k * m, *w = v + m;
         status = apply(ctx, w, v, err);

@@ -1,7 +1,7 @@
 /* matrix_free.c: the dual operator by conjugate gradients: no factor of K.
  *
  * Every solve stops at a tolerance, and what it leaves is bounded: with the residual s of K u = p + N'r and lambda from
- * uz_amg_describe, ||u - u(r)||_K^2 = s'K^-1 s <= s'M^-1 s / lambda. That slack is part of the bound on the answer,
+ * uz_amg_info, ||u - u(r)||_K^2 = s'K^-1 s <= s'M^-1 s / lambda. That slack is part of the bound on the answer,
  * so that a tolerance decides about time and never about what is certified.
  *
  * Rule for the tolerance of D r: an error in u(r) of delta in the energy norm changes the dual gradient by N delta, and
@@ -62,7 +62,7 @@ static uz_cg_stop stop_at(const free_load *x, double relative, double absolute)
 
 static double root_of_lambda(const uz_dual_load *load)
 {
-    return sqrt(uz_amg_describe(load->dual->amg).lambda);
+    return sqrt(load->dual->amg->info.lambda);
 }
 
 /* base = K^-1 p to the aim, from where it stands; psi0 and g0 with it. */
@@ -99,7 +99,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     x->p = uz_alloc(d, sizeof *x->p);
     x->right = uz_alloc(d, sizeof *x->right);
     load->bytes += 8 * 8 * (size_t)d;
-    status = x->p && x->right ? uz_cg_init(&x->cg, uz_amg_multigrid(load->dual->amg), NULL, d, err)
+    status = x->p && x->right ? uz_cg_init(&x->cg, load->dual->amg->mg, NULL, d, err)
                               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
     if (status != UZ_OK)
         return status;
@@ -231,7 +231,7 @@ static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, b
         e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
     status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
     const double square = uz_dot(load->K->cols, e, x->cg.z);
-    x->slack = uz_root(square / uz_amg_describe(load->dual->amg).lambda);
+    x->slack = uz_root(square / load->dual->amg->info.lambda);
     return status;
 }
 
@@ -250,7 +250,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     }
     if (x->coarse <= 0.0)
         x->coarse = FIRST_TOLERANCE;
-    uz_status status = uz_multigrid_create(&mg, load->K, uz_amg_modes(amg), box->fixed, 0, &x->stop, err);
+    uz_status status = uz_multigrid_create(&mg, load->K, &amg->modes, box->fixed, 0, &x->stop, err);
     if (status == UZ_OK)
         status = uz_cg_init(&cg, mg, box->fixed, load->dual->d, err);
     if (status == UZ_OK) {

@@ -104,26 +104,6 @@ static double column_dot(const uz_csc *Nt, int64_t i, const double *x)
     return sum;
 }
 
-/* One pass; returns the largest move relative to the largest target. */
-static double sweep(double *c, const uz_csc *Nt, const double *weight, const double *g, const bool *close,
-                    bool only_lift)
-{
-    double moved = 0.0;
-    for (int64_t i = 0; i < Nt->cols; i++) {
-        bool closing = close[i] && !only_lift;
-        double miss = g[i] - column_dot(Nt, i, c);
-        double weighted = 0.0; /* n_i'W n_i */
-        for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
-            weighted += Nt->val[k] * Nt->val[k] * weight[Nt->idx[k]];
-        if (weighted <= 0.0 || (!closing && uz_gap_is_open(miss)))
-            continue;
-        for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
-            c[Nt->idx[k]] += miss / weighted * weight[Nt->idx[k]] * Nt->val[k];
-        moved = fmax(moved, fabs(miss));
-    }
-    return moved;
-}
-
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
  * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957); no bound where rows are left that penetrate by more than
  * rounding. */
@@ -139,8 +119,22 @@ uz_status uz_sparse_correct(uz_sparse_load *x, double *bound2, double slack, con
             scale = fmax(scale, fabs(g[i]));
     const double small = 8.0 * DBL_EPSILON * scale;
     double moved = scale;
-    for (int k = 0; k < MAX_SWEEPS && moved > small; k++)
-        moved = sweep(c, Nt, x->weight, g, close, k >= MAX_SWEEPS / 2);
+    for (int k = 0; k < MAX_SWEEPS && moved > small; k++) {
+        const bool only_lift = k >= MAX_SWEEPS / 2;
+        moved = 0.0;
+        for (int64_t i = 0; i < Nt->cols; i++) {
+            bool closing = close[i] && !only_lift;
+            double miss = g[i] - column_dot(Nt, i, c);
+            double weighted = 0.0; /* n_i'W n_i */
+            for (int64_t q = Nt->ptr[i]; q < Nt->ptr[i + 1]; q++)
+                weighted += Nt->val[q] * Nt->val[q] * x->weight[Nt->idx[q]];
+            if (weighted <= 0.0 || (!closing && uz_gap_is_open(miss)))
+                continue;
+            for (int64_t q = Nt->ptr[i]; q < Nt->ptr[i + 1]; q++)
+                c[Nt->idx[q]] += miss / weighted * x->weight[Nt->idx[q]] * Nt->val[q];
+            moved = fmax(moved, fabs(miss));
+        }
+    }
     for (int64_t i = 0; i < dual->m; i++) {
         Nc[i] = column_dot(Nt, i, c);
         if (uz_gap_penetration(g[i] - Nc[i]) > 4.0 * small)

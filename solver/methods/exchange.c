@@ -315,38 +315,8 @@ static uz_status begin(uz_exchange *x, double most_work, uz_error *err)
     return status;
 }
 
-/* The row that penetrates most, -1: none. Rows of N have a norm of about 1: gaps compare. */
-static int64_t choose(const uz_exchange *x)
-{
-    int64_t q = -1;
-    x->law->kind->penetration(x->law, x->depth, x->g, x->m);
-    for (int64_t i = 0; i < x->m; i++)
-        if (!x->barred[i] && x->depth[i] > NOISE * x->size[i] && (q < 0 || x->depth[i] > x->depth[q]))
-            q = i;
-    return q;
-}
-
 /* Where q depends on rows in contact, N'w = n_q: what rounding leaves of a w_k that is zero is no way out. */
 #define PULL_NOISE 1e-10
-
-/* Of the rows in contact the one whose reaction vanishes first, after a push of *step; -1: none does. */
-static int64_t first_to_go(const uz_exchange *x, bool dependent, double *step)
-{
-    int64_t first = -1;
-    double least = 0.0;
-    for (int64_t k = 0; dependent && k < x->count; k++)
-        least = fmax(least, PULL_NOISE * fabs(x->w[k]));
-    for (int64_t k = 0; k < x->count; k++) {
-        double reach = INFINITY, r = reaction(x, k);
-        if (x->w[k] > least)
-            x->law->kind->reach(x->law, &reach, &r, &x->w[k], 1);
-        if (reach < *step || (first < 0 && isfinite(reach) && reach <= *step)) {
-            *step = reach;
-            first = k;
-        }
-    }
-    return first;
-}
 
 /* s_q -= step, and the rows in contact yield. */
 static void advance(uz_exchange *x, int64_t q, double step)
@@ -368,15 +338,13 @@ static void advance(uz_exchange *x, int64_t q, double step)
 static uz_status look_at_ray(bool *likely, double *ray, uz_exchange *x, int64_t q, uz_error *err)
 {
     const uz_csc *N = &x->load->dual->N;
-    const double *h = x->load->h;
     memset(ray, 0, (size_t)x->m * sizeof *ray);
     ray[q] = -1.0;
     for (int64_t k = 0; k < x->count; k++)
         ray[x->rows[k]] = x->w[k];
     x->law->kind->project(x->law, ray, x->m);
-    uz_status status = uz_ray_project(ray, &x->load->dual->N, err);
-    double length = status == UZ_OK ? uz_gap_length(N, h, x->load->g0, x->size) : 0.0;
-    *likely = status == UZ_OK && uz_ray_is_likely(ray, N, h, length);
+    uz_status status = uz_ray_project(ray, N, err);
+    *likely = status == UZ_OK && uz_ray_is_likely(ray, N, x->load->h, x->load->g0, x->size);
     return status;
 }
 
@@ -388,7 +356,20 @@ static uz_status admit(uz_exchange *x, int64_t q, bool *likely, double *ray, uz_
         yield_to(x, q);
         bool dependent = depends(x, q);
         double step = dependent ? INFINITY : penetration(x, q) / x->compliance;
-        int64_t gone = first_to_go(x, dependent, &step);
+        /* the row in contact whose reaction vanishes first, after a push of `step`; -1: none does */
+        int64_t gone = -1;
+        double least = 0.0;
+        for (int64_t k = 0; dependent && k < x->count; k++)
+            least = fmax(least, PULL_NOISE * fabs(x->w[k]));
+        for (int64_t k = 0; k < x->count; k++) {
+            double reach = INFINITY, r = reaction(x, k);
+            if (x->w[k] > least)
+                x->law->kind->reach(x->law, &reach, &r, &x->w[k], 1);
+            if (reach < step || (gone < 0 && isfinite(reach) && reach <= step)) {
+                step = reach;
+                gone = k;
+            }
+        }
         if (gone < 0 && !dependent) {
             advance(x, q, step);
             return join(x, q, err);
@@ -464,7 +445,12 @@ uz_status uz_exchange_continue(uz_exchange_end *end, uz_exchange *x, int64_t mos
         }
         if (uz_stop_is_due(x->stop))
             break;
-        int64_t q = choose(x);
+        /* the row that penetrates most, -1: none. Rows of N have a norm of about 1: gaps compare */
+        int64_t q = -1;
+        x->law->kind->penetration(x->law, x->depth, x->g, x->m);
+        for (int64_t i = 0; i < x->m; i++)
+            if (!x->barred[i] && x->depth[i] > NOISE * x->size[i] && (q < 0 || x->depth[i] > x->depth[q]))
+                q = i;
         if (q < 0 && made) {
             *end = x->undecided ? UZ_EXCHANGE_UNDECIDED : UZ_EXCHANGE_SOLVED;
             break;

@@ -24,26 +24,6 @@ static double project(uz_iterate *it, const uz_dual_load *load)
     return sqrt(square);
 }
 
-/* rho(k+1) and tau; true if the momentum was dropped (O'Donoghue and Candes 2015). */
-static bool extrapolate(uz_iterate *it, bool momentum, bool restarts)
-{
-    double tau = 0.5 * (1.0 + sqrt(1.0 + 4.0 * it->tau * it->tau)), omega = (it->tau - 1.0) / tau, ascent = 0.0;
-    for (int64_t i = 0; i < it->m; i++)
-        ascent += it->gamma[i] * (it->r_next[i] - it->r[i]);
-    bool restart = restarts && ascent < 0.0;
-    if (!momentum || restart)
-        omega = 0.0;
-    for (int64_t i = 0; i < it->m; i++) {
-        it->rho[i] = it->r_next[i] + omega * (it->r_next[i] - it->r[i]);
-        it->Drho[i] = it->Dr_next[i] + omega * (it->Dr_next[i] - it->Dr[i]);
-    }
-    it->tau = restart ? 1.0 : tau;
-    uz_iterate_swap(&it->r, &it->r_next);
-    uz_iterate_swap(&it->Dr, &it->Dr_next);
-    it->restarts += restart;
-    return restart;
-}
-
 /* A projected gradient step from rho, then the next rho. */
 static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart,
                       uz_error *err)
@@ -59,7 +39,20 @@ static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load,
         *step_norm = NAN; /* no step was taken */
         return uz_dual_load_apply(load, it->Dr, it->r, err);
     }
-    *restart = extrapolate(it, steps->momentum, steps->restarts);
+    double tau = 0.5 * (1.0 + sqrt(1.0 + 4.0 * it->tau * it->tau)), omega = (it->tau - 1.0) / tau, ascent = 0.0;
+    for (int64_t i = 0; i < it->m; i++)
+        ascent += it->gamma[i] * (it->r_next[i] - it->r[i]);
+    *restart = steps->restarts && ascent < 0.0; /* the momentum is dropped (O'Donoghue and Candes 2015) */
+    if (!steps->momentum || *restart)
+        omega = 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        it->rho[i] = it->r_next[i] + omega * (it->r_next[i] - it->r[i]);
+        it->Drho[i] = it->Dr_next[i] + omega * (it->Dr_next[i] - it->Dr[i]);
+    }
+    it->tau = *restart ? 1.0 : tau;
+    uz_iterate_swap(&it->r, &it->r_next);
+    uz_iterate_swap(&it->Dr, &it->Dr_next);
+    it->restarts += *restart;
     return UZ_OK;
 }
 

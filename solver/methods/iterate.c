@@ -84,7 +84,7 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_
     it->best_iteration = it->iteration;
     it->made_by = by;
     memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
-    uz_milestones_note(it->milestones, it->best_relative, it->iteration, load->applications);
+    uz_milestones_note(it->milestones, UZ_MILESTONE_OF_ITERATION, it->best_relative, it->iteration, load->applications);
     return UZ_OK;
 }
 

@@ -44,42 +44,29 @@ void uz_milestones_pause(uz_milestones *d)
     d->trade.iterated_s = seconds_now(d);
 }
 
-/* Asked at every bound: the clock is read only where something is reached for the first time. */
-static void note(uz_milestones *d, double bound, const uz_trade_step *reached)
-{
-    if (d->reached >= UZ_TRADE_STEPS || !(bound <= uz_trade_error(d->reached)))
-        return;
-    uz_trade_step step = *reached;
-    step.seconds = seconds_now(d);
-    while (d->reached < UZ_TRADE_STEPS && bound <= uz_trade_error(d->reached))
-        d->trade.step[d->reached++] = step;
-}
-
-void uz_milestones_note(uz_milestones *d, double bound, int64_t iterations, int64_t applications)
-{
-    if (d)
-        note(d, d->partial ? bound / KEPT : bound,
-             &(uz_trade_step){.iterations = iterations, .applications = applications});
-}
-
 void uz_milestones_drop(uz_milestones *d, double bound)
 {
     while (d->reached > 0 && !(bound <= uz_trade_error(d->reached - 1)))
         d->trade.step[--d->reached] = (uz_trade_step){.seconds = NAN};
 }
 
-void uz_milestones_certify(uz_milestones *d, double bound, int64_t iterations, int64_t applications)
+void uz_milestones_note(uz_milestones *d, uz_milestone_of of, double bound, int64_t iterations, int64_t applications)
 {
-    uz_milestones_drop(d, bound);
-    note(d, d->partial ? bound / KEPT : bound, /* about the rows kept, as the bounds of the iterations are */
-         &(uz_trade_step){.iterations = iterations, .applications = applications, .by_certificate = !d->partial});
-}
-
-void uz_milestones_extend(uz_milestones *d, double bound, int64_t iterations, int64_t applications)
-{
-    uz_milestones_drop(d, bound / ALL);
-    d->partial = false;
-    note(d, bound, &(uz_trade_step){.iterations = iterations, .applications = applications, .by_certificate = true});
+    if (!d)
+        return;
+    if (of != UZ_MILESTONE_OF_ITERATION)
+        uz_milestones_drop(d, of == UZ_MILESTONE_OF_ALL_ROWS ? bound / ALL : bound);
+    if (of == UZ_MILESTONE_OF_ALL_ROWS)
+        d->partial = false;
+    const double sure = d->partial ? bound / KEPT : bound;
+    if (d->reached >= UZ_TRADE_STEPS || !(sure <= uz_trade_error(d->reached)))
+        return; /* the clock is read only where something is reached for the first time */
+    const uz_trade_step step = {.iterations = iterations,
+                                .applications = applications,
+                                .seconds = seconds_now(d),
+                                .by_certificate = of != UZ_MILESTONE_OF_ITERATION && !d->partial};
+    while (d->reached < UZ_TRADE_STEPS && sure <= uz_trade_error(d->reached))
+        d->trade.step[d->reached++] = step;
 }
 
 void uz_trade_shift(uz_trade *trade, double seconds)

@@ -16,15 +16,19 @@ void uz_milestones_init(uz_milestones *d, bool partial);
 void uz_milestones_resume(uz_milestones *d, double spent_s);
 /* The iterations ended, for now. */
 void uz_milestones_pause(uz_milestones *d);
-/* A bound of the iterations on the relative error. d NULL: nobody keeps it. */
-void uz_milestones_note(uz_milestones *d, double bound, int64_t iterations, int64_t applications);
-/* The certificate of the answer that the iterations gave. Bounds of theirs below it are taken back: the original data
- * do not confirm them. */
-void uz_milestones_certify(uz_milestones *d, double bound, int64_t iterations, int64_t applications);
-/* The same by the first certificate about all rows of a partial run. With c its bound and b that of an iterate on the
- * rows kept, whose solution is within c of that on all rows, the iterate is within b (1 + c) + c: what was noted stands
- * where that is enough. */
-void uz_milestones_extend(uz_milestones *d, double bound, int64_t iterations, int64_t applications);
+/* What a bound is of. */
+typedef enum {
+    UZ_MILESTONE_OF_ITERATION,
+    /* The certificate of the answer that the iterations gave, in a partial run on the rows kept. Bounds of theirs below
+     * it are taken back: the original data do not confirm them. */
+    UZ_MILESTONE_OF_CERTIFICATE,
+    /* The first certificate about all rows of a partial run. With c its bound and b that of an iterate on the rows
+     * kept, whose solution is within c of that on all rows, the iterate is within b (1 + c) + c: what was noted stands
+     * where that is enough. */
+    UZ_MILESTONE_OF_ALL_ROWS
+} uz_milestone_of;
+/* A bound on the relative error. d NULL: nobody keeps it. */
+void uz_milestones_note(uz_milestones *d, uz_milestone_of of, double bound, int64_t iterations, int64_t applications);
 /* What is above this bound stands; NaN: nothing. */
 void uz_milestones_drop(uz_milestones *d, double bound);
 

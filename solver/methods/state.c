@@ -26,17 +26,11 @@ void uz_state_free(uz_state *state)
     free(state);
 }
 
-/* to = from / scale (forces of the rows) or from x scale (lengths). */
-static void to_scaled_forces(double *to, const double *from, const double *scale, int64_t m)
+/* Lengths of the rows to scaled ones, and scaled forces back: to = from x scale. The other way by dividing. */
+static void rescale(double *to, const double *from, const double *scale, int64_t m, bool divide)
 {
     for (int64_t i = 0; i < m; i++)
-        to[i] = from[i] / scale[i];
-}
-
-static void times_scale(double *to, const double *from, const double *scale, int64_t m)
-{
-    for (int64_t i = 0; i < m; i++)
-        to[i] = scale[i] * from[i];
+        to[i] = divide ? from[i] / scale[i] : scale[i] * from[i];
 }
 
 uz_status uz_state_check(const uz_state *s, int64_t m, uz_error *err)
@@ -67,40 +61,15 @@ uz_status uz_state_check(const uz_state *s, int64_t m, uz_error *err)
  * active set is g0 - g, and far below what another load or body makes of it. */
 #define SAME 1e-5
 
-static bool alike(const double *x, const double *y, int64_t m)
-{
-    double size = 0.0, difference = 0.0;
-    for (int64_t i = 0; i < m; i++) {
-        size = fmax(size, fabs(x[i]));
-        difference = fmax(difference, fabs(x[i] - y[i]));
-    }
-    return difference <= SAME * size;
-}
-
-/* Makes the correction of the best answer, which a state does not have, and its bound with it. *same false: the bound
- * is another than the state's. */
-static uz_status bound_best_again(bool *same, uz_iterate *it, uz_dual_load *load, const uz_state *s, uz_error *err)
-{
-    *same = true;
-    if (isinf(s->best_bound))
-        return UZ_OK;
-    it->made_by = s->made_by;
-    uz_status status = uz_iterate_bound_best(it, load, err);
-    *same = it->best_bound <= (1.0 + 1e-3) * s->best_bound && s->best_bound <= (1.0 + 1e-3) * it->best_bound;
-    /* what rounding alone leaves of a bound is another number each time */
-    *same = *same || (it->best_relative <= 1e-11 && s->best_relative <= 1e-11);
-    return status;
-}
-
 static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const uz_state *s, uz_error *err)
 {
     const double *scale = load->dual->row_scale;
-    to_scaled_forces(it->r, s->r, scale, it->m);
-    to_scaled_forces(it->rho, s->rho, scale, it->m);
-    to_scaled_forces(it->best_r, s->best_r, scale, it->m);
-    to_scaled_forces(it->anchor, s->anchor, scale, it->m);
-    times_scale(it->Dr, s->Dr, scale, it->m);
-    times_scale(it->Drho, s->Drho, scale, it->m);
+    rescale(it->r, s->r, scale, it->m, true);
+    rescale(it->rho, s->rho, scale, it->m, true);
+    rescale(it->best_r, s->best_r, scale, it->m, true);
+    rescale(it->anchor, s->anchor, scale, it->m, true);
+    rescale(it->Dr, s->Dr, scale, it->m, false);
+    rescale(it->Drho, s->Drho, scale, it->m, false);
     /* of a state whose steps were those of other rows, it is no step size */
     if (s->alpha > 0.0 && s->as_given == (it->weight || !load->dual->row_weight))
         uz_iterate_set_alpha(it, fmin(DBL_MAX, fmax(DBL_MIN, s->alpha / it->unit / it->unit)));
@@ -112,9 +81,20 @@ static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const u
     it->phase = s->phase;
     it->phase_end = s->phase_end;
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r, err);
-    *same = status == UZ_OK && alike(it->Dr, it->Dr_next, it->m);
-    if (*same)
-        status = bound_best_again(same, it, load, s, err);
+    double size = 0.0, difference = 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        size = fmax(size, fabs(it->Dr[i]));
+        difference = fmax(difference, fabs(it->Dr[i] - it->Dr_next[i]));
+    }
+    *same = status == UZ_OK && difference <= SAME * size;
+    /* A state does not have the correction of its best answer: it is made again, and its bound with it. What rounding
+     * alone leaves of a bound is another number each time. */
+    if (*same && !isinf(s->best_bound)) {
+        it->made_by = s->made_by;
+        status = uz_iterate_bound_best(it, load, err);
+        *same = (it->best_bound <= (1.0 + 1e-3) * s->best_bound && s->best_bound <= (1.0 + 1e-3) * it->best_bound) ||
+                (it->best_relative <= 1e-11 && s->best_relative <= 1e-11);
+    }
     if (status != UZ_OK || !*same)
         return status;
     it->best_bound = s->best_bound;
@@ -171,12 +151,12 @@ uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_l
         uz_state_free(s);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)it->m);
     }
-    times_scale(s->r, it->r, scale, it->m);
-    times_scale(s->rho, it->rho, scale, it->m);
-    times_scale(s->best_r, before->kept ? before->r : it->best_r, scale, it->m);
-    times_scale(s->anchor, it->anchor, scale, it->m);
-    to_scaled_forces(s->Dr, it->Dr, scale, it->m);
-    to_scaled_forces(s->Drho, it->Drho, scale, it->m);
+    rescale(s->r, it->r, scale, it->m, false);
+    rescale(s->rho, it->rho, scale, it->m, false);
+    rescale(s->best_r, before->kept ? before->r : it->best_r, scale, it->m, false);
+    rescale(s->anchor, it->anchor, scale, it->m, false);
+    rescale(s->Dr, it->Dr, scale, it->m, true);
+    rescale(s->Drho, it->Drho, scale, it->m, true);
     s->m = it->m;
     s->alpha = uz_iterate_alpha(it);
     s->as_given = it->weight || !load->dual->row_weight;

@@ -40,39 +40,9 @@ static bool should_end(uz_end *end, const uz_iterate *it, const uz_dual_load *lo
 
 static uz_status try_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    uz_status status = uz_ray_project(it->ray, &load->dual->N, err);
-    if (status != UZ_OK)
-        return status;
-    double length = uz_gap_length(&load->dual->N, load->h, load->g0, it->gamma);
-    *found = uz_ray_is_likely(it->ray, &load->dual->N, load->h, length);
-    return UZ_OK;
-}
-
-/* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a ray.
- * Looked for at powers of two, from the growth since the last one. */
-static uz_status look_for_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
-{
-    bool power_of_two = (it->iteration & (it->iteration - 1)) == 0;
-    if (isfinite(it->best_bound) || it->iteration < 8 || !power_of_two)
-        return UZ_OK;
-    for (int64_t i = 0; i < it->m; i++)
-        it->ray[i] = it->r[i] - it->anchor[i];
-    memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
-    return try_ray(found, it, load, err);
-}
-
-/* Where D r is carried along the bound is with the one that an apply gives, and the run goes on with its own. */
-static uz_status bound_last(uz_iterate *it, uz_dual_load *load, uz_method method, uz_error *err)
-{
-    if (!uz_method_kind_of(method)->steps->settle)
-        return uz_iterate_bound(it, load, method, err);
-    if (isfinite(it->best_bound) && it->best_iteration == it->iteration)
-        return UZ_OK; /* it is the best, and has its bound */
-    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r, err);
-    uz_iterate_swap(&it->Dr, &it->Dr_next);
-    if (status == UZ_OK)
-        status = uz_iterate_bound(it, load, method, err);
-    uz_iterate_swap(&it->Dr, &it->Dr_next);
+    const uz_csc *N = &load->dual->N;
+    uz_status status = uz_ray_project(it->ray, N, err);
+    *found = status == UZ_OK && uz_ray_is_likely(it->ray, N, load->h, load->g0, it->gamma);
     return status;
 }
 
@@ -91,37 +61,20 @@ static uz_status finish(uz_iterate *it, uz_dual_load *load, const uz_method_opti
     memcpy(before->r, it->best_r, (size_t)it->m * sizeof *it->r);
     if (options->stopping == UZ_STOP_PAPER)
         it->best_bound = INFINITY;
-    uz_status status = bound_last(it, load, options->method, err);
+    /* where D r is carried along the bound is with the one that an apply gives, and the run goes on with its own */
+    const bool carried = uz_method_kind_of(options->method)->steps->settle != NULL;
+    const bool bounded = carried && isfinite(it->best_bound) && it->best_iteration == it->iteration;
+    uz_status status = carried && !bounded ? uz_dual_load_apply(load, it->Dr_next, it->r, err) : UZ_OK;
+    if (carried && !bounded)
+        uz_iterate_swap(&it->Dr, &it->Dr_next);
+    if (status == UZ_OK && !bounded)
+        status = uz_iterate_bound(it, load, options->method, err);
+    if (carried && !bounded)
+        uz_iterate_swap(&it->Dr, &it->Dr_next);
     if (isinf(it->best_bound)) /* nothing could be bounded: the last r is as good as any */
         memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
     if (history->count > 0) /* none in a run that continued another and ended at once */
         history->rows[history->count - 1].error_bound = it->best_bound;
-    return status;
-}
-
-/* Goes on with a state: r may have been changed by another engine, and preparing overwrites what the last apply left.
- * Before D was prepared it was applied by its factors, which rounds otherwise: the state's best answer gets the
- * correction that it had in the run that found it. Its numbers stay those of the state. */
-static uz_status resume(uz_iterate *it, uz_dual_load *load, uz_error *err)
-{
-    const double bound = it->best_bound, relative = it->best_relative;
-    const int64_t iteration = it->best_iteration;
-    uz_status status = UZ_OK;
-    if (it->resumed && isfinite(bound) && it->made_by != UZ_METHOD_ACTIVE_SET &&
-        it->made_by != UZ_METHOD_DUAL_ACTIVE_SET) {
-        status = uz_iterate_bound_best(it, load, err);
-        it->best_bound = bound;
-        it->best_relative = relative;
-        it->best_iteration = iteration;
-    }
-    it->resumed = false;
-    if (status != UZ_OK || it->fresh)
-        return status;
-    status = uz_dual_load_apply(load, it->Dr, it->r, err);
-    if (it->tau == 1.0) {
-        memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
-        memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
-    }
     return status;
 }
 
@@ -145,8 +98,26 @@ static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_optio
         uz_iterate_set_alpha(it, lambda > 0.0 ? 1.0 / lambda : 1.0);
     if (status == UZ_OK && !it->begun)
         return uz_iterate_begin(it, load, options, history, err);
-    if (status == UZ_OK)
-        status = resume(it, load, err);
+    /* Before D was prepared it was applied by its factors, which rounds otherwise: a state's best answer gets the
+     * correction that it had in the run that found it. Its numbers stay those of the state. */
+    if (status == UZ_OK && it->resumed && isfinite(it->best_bound) && it->made_by != UZ_METHOD_ACTIVE_SET &&
+        it->made_by != UZ_METHOD_DUAL_ACTIVE_SET) {
+        const double bound = it->best_bound, relative = it->best_relative;
+        const int64_t iteration = it->best_iteration;
+        status = uz_iterate_bound_best(it, load, err);
+        it->best_bound = bound;
+        it->best_relative = relative;
+        it->best_iteration = iteration;
+    }
+    it->resumed = false;
+    /* r may have been changed by another engine, and preparing overwrites what the last apply left */
+    if (status == UZ_OK && !it->fresh) {
+        status = uz_dual_load_apply(load, it->Dr, it->r, err);
+        if (it->tau == 1.0) {
+            memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
+            memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
+        }
+    }
     if (status == UZ_OK && it->warm && it->iteration == 0) /* with the step size it may be bounded better */
         status = uz_iterate_bound(it, load, options->method, err);
     return status;
@@ -185,8 +156,15 @@ uz_status uz_steps_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz
         it->along_ray = false;
         if (status == UZ_OK)
             status = check(it, load, options, steps, err);
-        if (status == UZ_OK && !ray)
-            status = look_for_ray(&ray, it, load, err);
+        /* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a
+         * ray. Looked for at powers of two, from the growth since the last one. */
+        const bool power_of_two = it->iteration >= 8 && (it->iteration & (it->iteration - 1)) == 0;
+        if (status == UZ_OK && !ray && !isfinite(it->best_bound) && power_of_two) {
+            for (int64_t i = 0; i < it->m; i++)
+                it->ray[i] = it->r[i] - it->anchor[i];
+            memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
+            status = try_ray(&ray, it, load, err);
+        }
         rho = it->rho;
         Drho = it->Drho;
         if (steps->rho_is_r) { /* the row is that of (u(r), r) */

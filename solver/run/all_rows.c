@@ -19,28 +19,14 @@
 /* Gaps left out may be negative by this part of what they are the difference of. */
 #define ROUNDING (64.0 * DBL_EPSILON)
 
-/* Where no gap left out is negative at u, but some may be at the feasible displacement: what stays nearest. */
-static void take_nearest(uz_candidates *wants, const uz_law *law, const double *g)
-{
-    double nearest = INFINITY;
-    for (int64_t i = 0; i < wants->m; i++) {
-        double depth;
-        law->kind->penetration(law, &depth, &g[i], 1);
-        nearest = wants->in[i] ? nearest : fmin(nearest, depth > 0.0 ? 0.0 : g[i]);
-    }
-    for (int64_t i = 0; i < wants->m; i++)
-        if (!wants->in[i] && !(g[i] > 2.0 * nearest)) {
-            wants->in[i] = 1;
-            wants->count++;
-        }
-}
-
 /* The rows of another round: those of this one, those that are penetrated, and those that would be next. */
 static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
 {
     const uz_candidates *rows = &run->asked->setup->rows;
     const uz_csc *N = uz_setup_all_rows(run->asked->setup, run->asked->problem);
-    const double *u = run->answer.u;
+    const uz_law *law = run->work.it.law;
+    const double *u = run->answer.u, *g = run->answer.g;
+    double nearest = INFINITY;
     uz_candidates wants = {0};
     double *size = uz_alloc(rows->m, sizeof *size);
     uz_status status =
@@ -53,9 +39,18 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
         for (int64_t j = 0; j < N->cols; j++)
             for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
                 size[N->idx[q]] += fabs(N->val[q] * u[j]);
-        int64_t added = uz_candidates_extend(&wants, run->work.it.law, run->answer.g, size, ROUNDING);
-        if (added == 0 && suspect)
-            take_nearest(&wants, run->work.it.law, run->answer.g);
+        const int64_t added = uz_candidates_extend(&wants, law, g, size, ROUNDING);
+        /* no gap left out is negative at u, but some may be at the feasible displacement: what stays nearest */
+        for (int64_t i = 0; added == 0 && suspect && i < wants.m; i++) {
+            double depth;
+            law->kind->penetration(law, &depth, &g[i], 1);
+            nearest = wants.in[i] ? nearest : fmin(nearest, depth > 0.0 ? 0.0 : g[i]);
+        }
+        for (int64_t i = 0; added == 0 && suspect && i < wants.m; i++)
+            if (!wants.in[i] && !(g[i] > 2.0 * nearest)) {
+                wants.in[i] = 1;
+                wants.count++;
+            }
     }
     free(size);
     if (status == UZ_OK && wants.count > rows->count)
@@ -93,7 +88,7 @@ uz_status uz_run_certify_all_rows(uz_run *run, uz_error *err)
         status = want_rows(run, met, err);
     run->result->summary.timings.certify += uz_seconds() - start;
     uz_milestones_resume(&run->work.milestones, uz_run_time(run));
-    uz_milestones_extend(&run->work.milestones, certificate->relative_error, run->work.it.iteration,
-                         run->work.dual->applications);
+    uz_milestones_note(&run->work.milestones, UZ_MILESTONE_OF_ALL_ROWS, certificate->relative_error,
+                       run->work.it.iteration, run->work.dual->applications);
     return status;
 }

@@ -109,29 +109,6 @@ uz_run *uz_block_runs(uz_block *block)
 
 enum { TILE = 512 }; /* rows at a time: what is read and written by turns stays in the first cache */
 
-/* The loads of UZ_LANES runs side by side; missing ones are zero. */
-static void interleave(double *P, const uz_run *runs, int64_t count, int64_t d)
-{
-    for (int64_t first = 0; first < d; first += TILE) {
-        int64_t last = first + TILE < d ? first + TILE : d;
-        for (int64_t lane = 0; lane < UZ_LANES; lane++) {
-            const double *p = lane < count ? runs[lane].load.p : NULL;
-            for (int64_t j = first; j < last; j++)
-                P[j * UZ_LANES + lane] = p ? p[j] : 0.0;
-        }
-    }
-}
-
-static void separate(uz_run *runs, int64_t count, const double *U, int64_t d)
-{
-    for (int64_t first = 0; first < d; first += TILE) {
-        int64_t last = first + TILE < d ? first + TILE : d;
-        for (int64_t lane = 0; lane < count; lane++)
-            for (int64_t j = first; j < last; j++)
-                runs[lane].answer.u[j] = U[j * UZ_LANES + lane];
-    }
-}
-
 /* Every load pays its share of what was done for all. */
 static void share_time(uz_block *block, int64_t count, double seconds, bool certify)
 {
@@ -155,8 +132,15 @@ static uz_status load_all(uz_block *block, const uz_request *asked, int64_t coun
     if (status != UZ_OK)
         return status;
     double start = uz_seconds(), *P = block->loads->P;
-    for (int64_t first = 0; first < block->width; first += UZ_LANES)
-        interleave(P + first * block->d, block->runs + first, count - first, block->d);
+    for (int64_t first = 0; first < block->width; first += UZ_LANES, P += UZ_LANES * block->d)
+        for (int64_t begin = 0; begin < block->d; begin += TILE) { /* side by side; missing ones are zero */
+            const int64_t end = begin + TILE < block->d ? begin + TILE : block->d;
+            for (int64_t lane = 0; lane < UZ_LANES; lane++) {
+                const double *p = first + lane < count ? block->runs[first + lane].load.p : NULL;
+                for (int64_t j = begin; j < end; j++)
+                    P[j * UZ_LANES + lane] = p ? p[j] : 0.0;
+            }
+        }
     status = uz_dual_block_forward(block->loads, err);
     share_time(block, count, uz_seconds() - start, false);
     return status;
@@ -169,7 +153,12 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
     const double *U = block->loads->U + first * block->d;
     uz_lane_answer answers[UZ_LANES];
     uz_run *runs = block->runs + first;
-    separate(runs, count, U, block->d);
+    for (int64_t begin = 0; begin < block->d; begin += TILE) {
+        const int64_t end = begin + TILE < block->d ? begin + TILE : block->d;
+        for (int64_t lane = 0; lane < count; lane++)
+            for (int64_t j = begin; j < end; j++)
+                runs[lane].answer.u[j] = U[j * UZ_LANES + lane];
+    }
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
         const double *scale = runs[k].work.dual->dual->row_scale;
         double whole_norm;

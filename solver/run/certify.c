@@ -104,9 +104,9 @@ uz_status uz_run_check_ray(uz_run *run, uz_error *err)
         it->ray[i] *= scale[i];
         it->r_next[i] = g0[i] / scale[i];
     }
-    double length = uz_gap_length(N, run->load.h, it->r_next, it->gamma);
     run->work.end = UZ_END_UNDECIDED;
-    return uz_ray_is_likely(it->ray, N, run->load.h, length) ? uz_run_take_ray(run, it->ray, err) : UZ_OK;
+    return uz_ray_is_likely(it->ray, N, run->load.h, it->r_next, it->gamma) ? uz_run_take_ray(run, it->ray, err)
+                                                                            : UZ_OK;
 }
 
 uz_status uz_run_take_ray(uz_run *run, double *y, uz_error *err)

@@ -18,24 +18,6 @@ enum { DENSE = 192, SPARSE = 60000, BAND = 10, REPEATS = 4 };
 /* What is assumed where there is no memory to measure: a core of 2020. */
 static const uz_cost_rates ASSUMED = {3e-11, 1e-9};
 
-/* A lower triangle with BAND entries in a column, far enough apart to be read as those of a mesh are. */
-static bool make_sparse(uz_csc *A)
-{
-    uz_error ignored = {0};
-    if (uz_csc_init(A, SPARSE, SPARSE, (int64_t)SPARSE * BAND, &ignored) != UZ_OK)
-        return false;
-    int64_t at = 0;
-    for (int64_t j = 0; j < SPARSE; j++) {
-        A->ptr[j] = at;
-        for (int64_t k = 0; k < BAND && j + k / 4 * 200 + k < SPARSE; k++) {
-            A->idx[at] = j + k / 4 * 200 + k;
-            A->val[at++] = 1.0;
-        }
-    }
-    A->ptr[SPARSE] = at;
-    return true;
-}
-
 static uz_cost_rates measured; /* written once, under the guard */
 
 static void measure(void)
@@ -53,7 +35,17 @@ static void measure(void)
         }
         measured.flop_s = dense / ((double)DENSE * DENSE * DENSE);
     }
-    if (room && make_sparse(&A)) {
+    if (room && uz_csc_init(&A, SPARSE, SPARSE, (int64_t)SPARSE * BAND, NULL) == UZ_OK) {
+        /* a lower triangle with BAND entries in a column, far enough apart to be read as those of a mesh are */
+        int64_t at = 0;
+        for (int64_t j = 0; j < SPARSE; j++) {
+            A.ptr[j] = at;
+            for (int64_t k = 0; k < BAND && j + k / 4 * 200 + k < SPARSE; k++) {
+                A.idx[at] = j + k / 4 * 200 + k;
+                A.val[at++] = 1.0;
+            }
+        }
+        A.ptr[SPARSE] = at;
         for (int k = 0; k < REPEATS; k++) {
             double start = uz_thread_seconds();
             uz_csc_symv(room + 2 * DENSE * DENSE, &A, 1.0, room);
@@ -63,14 +55,6 @@ static void measure(void)
     }
     uz_csc_clear(&A);
     free(room);
-}
-
-/* A property of the machine, not of any call: the only thing here that outlives one. */
-uz_cost_rates uz_cost_measure_rates(void)
-{
-    static pthread_once_t guard = PTHREAD_ONCE_INIT;
-    pthread_once(&guard, measure);
-    return measured;
 }
 
 /* -------------------------------------------------------------------- the model */
@@ -166,14 +150,15 @@ _Static_assert(sizeof((uz_cost){0}.considered) == UZ_DUAL_FORMS * sizeof(uz_cost
 void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
                     uz_operator asked, size_t memory_limit)
 {
-    uz_cost_rates rates = uz_cost_measure_rates();
+    static pthread_once_t guard = PTHREAD_ONCE_INIT; /* a property of the machine, not of any call */
+    pthread_once(&guard, measure);
     plan->count = 0;
     if (factor)
-        plan->form[plan->count++] = estimate(uz_dual_abilities_of(direct), size, factor, direct, &rates);
+        plan->form[plan->count++] = estimate(uz_dual_abilities_of(direct), size, factor, direct, &measured);
     for (int k = 0; k < UZ_DUAL_FORMS; k++) {
         const uz_dual_abilities *can = uz_dual_abilities_at(k);
         if (!can->needs_factor || (factor && can->op != direct))
-            plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, &rates);
+            plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, &measured);
     }
     plan->chosen = -1;
     for (int k = 0; k < plan->count; k++) {

@@ -15,9 +15,6 @@ typedef struct {
     int count, chosen;
 } uz_cost_plan;
 
-/* Measured once for the process. */
-uz_cost_rates uz_cost_measure_rates(void);
-
 /* Of K and of N, whose rows touch n_b dofs, for so many load cases. dim: of a scene's mesh, else 0. An active set
  * solves with the free dofs only where each row has one entry, unless gradient steps were asked for, which take
  * hundreds of solves. */

@@ -102,16 +102,6 @@ static uz_status prepare(moving *m, const uz_result *first, const uz_problem *pr
     return UZ_OK;
 }
 
-static void clear(moving *m)
-{
-    uz_setup_release(m->cache, m->base);
-    uz_cache_free(m->own_cache);
-    free(m->place);
-    free(m->v);
-    free(m->Kv);
-    free(m->before);
-}
-
 /* ||u - place||_K by the norm of the certificate, or by that of the answer before: of one that only supports carry, and
  * nothing deforms, it is the way that they go. Both answers have what supports prescribe. */
 static double change_by(moving *m, const uz_result *result)
@@ -245,7 +235,12 @@ uz_status uz_solve_moving(uz_result **result, const uz_problem *problem, const u
         }
         replace(result, next, &m);
     }
-    clear(&m);
+    uz_setup_release(m.cache, m.base);
+    uz_cache_free(m.own_cache);
+    free(m.place);
+    free(m.v);
+    free(m.Kv);
+    free(m.before);
     const bool lasting = status == UZ_ERR_MEMORY || status == UZ_ERR_INTERNAL || !is_auto;
     if (status == UZ_ERR_CANCELLED || (status == UZ_OK && answered && !settled && uz_stop_is_due(&stop))) {
         give_up(*result, &m, uz_cancelled(hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT);

@@ -115,8 +115,7 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
         status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, m->hooks, err);
     if (status == UZ_OK)
         status = make_dual(m, plan->form[plan->chosen].op, err);
-    *regretted =
-        choice && (status == UZ_OK ? uz_amg_describe(setup->amg).lambda < LAMBDA_LEAST : status == UZ_ERR_NOT_SPD);
+    *regretted = choice && (status == UZ_OK ? setup->amg->info.lambda < LAMBDA_LEAST : status == UZ_ERR_NOT_SPD);
     if (!*regretted)
         return status;
     uz_dual_free(setup->dual);

@@ -50,26 +50,6 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, i
     return UZ_OK;
 }
 
-/* The matrices of a scene with the rows that its solve begins with. */
-static uz_status make_scene(uz_qp *qp, int64_t *m, const uz_scene *scene, uz_error *err)
-{
-    uz_mesh_info info = {0};
-    uz_candidates rows = {0};
-    uz_csc N = {0};
-    uz_status status = uz_scene_to_qp(qp, &info, scene, err);
-    *m = qp->N.rows;
-    if (status == UZ_OK)
-        status = uz_choose_rows(&rows, qp->h, *m, &info, scene, NULL, err);
-    if (status == UZ_OK && rows.in) {
-        status = uz_candidates_reduce(&N, &qp->N, &rows, err);
-        uz_csc_clear(&qp->N);
-        qp->N = N;
-    }
-    uz_candidates_clear(&rows);
-    uz_mesh_info_clear(&info);
-    return status;
-}
-
 uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                      uz_error *err)
 {
@@ -80,7 +60,21 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
     uz_status status = uz_check_settings(settings, err);
     int64_t m = problem->qp.N.rows;
     if (status == UZ_OK && scene) {
-        status = make_scene(&made, &m, &problem->scene, err);
+        /* the matrices of a scene with the rows that its solve begins with */
+        uz_mesh_info info = {0};
+        uz_candidates rows = {0};
+        uz_csc N = {0};
+        status = uz_scene_to_qp(&made, &info, &problem->scene, err);
+        m = made.N.rows;
+        if (status == UZ_OK)
+            status = uz_choose_rows(&rows, made.h, m, &info, &problem->scene, NULL, err);
+        if (status == UZ_OK && rows.in) {
+            status = uz_candidates_reduce(&N, &made.N, &rows, err);
+            uz_csc_clear(&made.N);
+            made.N = N;
+        }
+        uz_candidates_clear(&rows);
+        uz_mesh_info_clear(&info);
         qp = &made;
     }
     if (status == UZ_OK) {

@@ -24,7 +24,7 @@ void uz_report_setup(uz_run *run)
     if (setup->factor) {
         factor = uz_factor_describe(setup->factor);
     } else { /* what stands in its place has no entries of L, but bytes and a condition */
-        const uz_amg_info amg = uz_amg_describe(setup->amg);
+        const uz_amg_info amg = setup->amg->info;
         factor = (uz_factor_info){.bytes = amg.bytes, .rcond = amg.rcond, .factor_s = amg.create_s + amg.spectrum_s};
     }
     summary->discretization_error = NAN;
@@ -182,7 +182,7 @@ uz_status uz_report_run(uz_run *run, uz_error *err)
     if (!result->ray)
         status = uz_iterate_state(&state, it, run->work.dual, asked->settings->method, err);
     if (status == UZ_OK && state && rows->in) {
-        status = uz_state_scatter(&result->state, state, rows, err);
+        status = uz_state_copy_rows(&result->state, state, rows, false, err);
         uz_state_free(state);
     } else {
         result->state = state;

@@ -144,7 +144,8 @@ bool uz_candidates_has(const uz_candidates *a, const uz_candidates *b)
 
 /* ---------------------------------------------------------------- states */
 
-static uz_status copy_rows(uz_state **out, const uz_state *from, const uz_candidates *rows, bool gather, uz_error *err)
+uz_status uz_state_copy_rows(uz_state **out, const uz_state *from, const uz_candidates *rows, bool gather,
+                             uz_error *err)
 {
     uz_state *s = uz_alloc_zero(1, sizeof *s);
     bool ok = true;
@@ -169,14 +170,4 @@ static uz_status copy_rows(uz_state **out, const uz_state *from, const uz_candid
     }
     uz_state_free(s);
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)rows->m);
-}
-
-uz_status uz_state_gather(uz_state **out, const uz_state *all, const uz_candidates *rows, uz_error *err)
-{
-    return copy_rows(out, all, rows, true, err);
-}
-
-uz_status uz_state_scatter(uz_state **out, const uz_state *part, const uz_candidates *rows, uz_error *err)
-{
-    return copy_rows(out, part, rows, false, err);
 }

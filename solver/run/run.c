@@ -78,24 +78,6 @@ uz_status uz_run_load(uz_run *run, uz_error *err)
     return status;
 }
 
-/* What the rows of the setup have of the start. */
-static uz_status take_start(uz_run *run, uz_error *err)
-{
-    const uz_candidates *rows = &run->asked->setup->rows;
-    const uz_state *start = run->asked->start;
-    uz_state *part = NULL, *scaled = NULL;
-    uz_status status = uz_state_check(start, run->all, err);
-    if (status == UZ_OK && rows->in)
-        status = uz_state_gather(&part, start, rows, err);
-    if (status == UZ_OK && run->work.exponent != 0)
-        status = uz_state_scaled(&scaled, part ? part : start, run->work.exponent, err);
-    if (status == UZ_OK)
-        status = uz_iterate_start(&run->work.it, run->work.dual, scaled ? scaled : part ? part : start, err);
-    uz_state_free(scaled);
-    uz_state_free(part);
-    return status;
-}
-
 static void tell_begin(const uz_request *asked)
 {
     if (asked->hooks && asked->hooks->begins)
@@ -126,8 +108,19 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     /* bounds of iterations are relative to another norm where supports move the body */
     work->it.milestones = run->load.moved ? NULL : &work->milestones;
     uz_milestones_resume(&work->milestones, uz_run_time(run));
-    if (status == UZ_OK && asked->start)
-        status = take_start(run, err);
+    if (status == UZ_OK && asked->start) {
+        const uz_candidates *rows = &asked->setup->rows;
+        uz_state *part = NULL, *scaled = NULL; /* what the rows of the setup have of it */
+        status = uz_state_check(asked->start, run->all, err);
+        if (status == UZ_OK && rows->in)
+            status = uz_state_copy_rows(&part, asked->start, rows, true, err);
+        if (status == UZ_OK && work->exponent != 0)
+            status = uz_state_scaled(&scaled, part ? part : asked->start, work->exponent, err);
+        if (status == UZ_OK)
+            status = uz_iterate_start(&work->it, work->dual, scaled ? scaled : part ? part : asked->start, err);
+        uz_state_free(scaled);
+        uz_state_free(part);
+    }
     work->it.guessed = asked->guessed;
     if (status == UZ_OK)
         tell_begin(asked);
@@ -179,8 +172,8 @@ uz_status uz_run_certify(uz_run *run, uz_error *err)
 static void note_certificate(uz_run *run)
 {
     uz_milestones_resume(&run->work.milestones, uz_run_time(run));
-    uz_milestones_certify(&run->work.milestones, run->answer.certificate.relative_error, run->work.it.iteration,
-                          run->work.dual->applications);
+    uz_milestones_note(&run->work.milestones, UZ_MILESTONE_OF_CERTIFICATE, run->answer.certificate.relative_error,
+                       run->work.it.iteration, run->work.dual->applications);
 }
 
 /* Where the method can't do better, but the request is missed. A run that was told to stop has an answer with a bound:

@@ -16,20 +16,6 @@
 /* Loads and gaps between 2^-USUAL and 2^USUAL are left alone. */
 enum { USUAL = 60 };
 
-/* The exponents by which x (n) can be multiplied without losing a bit, as far as [*least, *most] reaches. */
-static void keep_exact(int *least, int *most, const double *x, int64_t n)
-{
-    for (int64_t i = 0; i < n; i++) {
-        int exponent;
-        if (x[i] == 0.0)
-            continue;
-        frexp(x[i], &exponent);
-        const int down = DBL_MIN_EXP - exponent, up = DBL_MAX_EXP - exponent;
-        *least = down < 0 ? (down > *least ? down : *least) : 0;
-        *most = up < *most ? up : *most;
-    }
-}
-
 /* log2 of how large the answer may be in the energy norm, by what drives it: the load, dof by dof, and rows that u = 0
  * penetrates. -INFINITY: nothing does. */
 static double drive(const uz_run *run, double *row_room)
@@ -52,16 +38,6 @@ static double drive(const uz_run *run, double *row_room)
     return most;
 }
 
-static bool is_usual(const uz_run *run)
-{
-    const double force = uz_bound_largest(run->load.p, run->d);
-    double depth = 0.0;
-    for (int64_t i = 0; i < run->all; i++)
-        depth = fmax(depth, -run->load.h_all[i]);
-    return (force == 0.0 || (force > ldexp(1.0, -USUAL) && force < ldexp(1.0, USUAL))) &&
-           (depth == 0.0 || (depth > ldexp(1.0, -USUAL) && depth < ldexp(1.0, USUAL)));
-}
-
 static void multiply(double *x, int64_t n, int exponent)
 {
     for (int64_t i = 0; x && i < n; i++)
@@ -71,7 +47,12 @@ static void multiply(double *x, int64_t n, int exponent)
 uz_status uz_run_scale_load(uz_run *run, uz_error *err)
 {
     uz_load_vectors *load = &run->load;
-    if (is_usual(run))
+    const double force = uz_bound_largest(run->load.p, run->d);
+    double depth = 0.0;
+    for (int64_t i = 0; i < run->all; i++)
+        depth = fmax(depth, -run->load.h_all[i]);
+    if ((force == 0.0 || (force > ldexp(1.0, -USUAL) && force < ldexp(1.0, USUAL))) &&
+        (depth == 0.0 || (depth > ldexp(1.0, -USUAL) && depth < ldexp(1.0, USUAL))))
         return UZ_OK;
     /* in the order of a scene's */
     double *own = load->owned ? load->owned : uz_alloc(run->d + run->all, sizeof *own);
@@ -92,7 +73,16 @@ uz_status uz_run_scale_load(uz_run *run, uz_error *err)
     const double size = drive(run, row_room);
     int least = -2 * DBL_MAX_EXP, most = 2 * DBL_MAX_EXP;
     free(row_room);
-    keep_exact(&least, &most, load->owned, load->n_owned);
+    /* the exponents by which loads can be multiplied without losing a bit */
+    for (int64_t i = 0; i < load->n_owned; i++) {
+        int exponent;
+        if (load->owned[i] == 0.0)
+            continue;
+        frexp(load->owned[i], &exponent);
+        const int down = DBL_MIN_EXP - exponent, up = DBL_MAX_EXP - exponent;
+        least = down < 0 ? (down > least ? down : least) : 0;
+        most = up < most ? up : most;
+    }
     if (isfinite(size))
         load->exponent = (int)fmax(least, fmin(most, -floor(size)));
     multiply(load->owned, load->n_owned, load->exponent);

@@ -103,19 +103,6 @@ static uz_status prepare(uz_semi *s, uz_error *err)
     return UZ_OK;
 }
 
-static void clear(uz_semi *s)
-{
-    void *room[] = {s->load,   s->prescribed, s->inverse, s->stiffness, s->soft,
-                    s->weight, s->target,     s->active,  s->provable,  s->null_space};
-    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-        free(room[i]);
-    uz_csc_clear(&s->Nt);
-    if (s->is_scene)
-        uz_body_model_clear(&s->model);
-    uz_result_free(s->last);
-    uz_cache_free(s->own_cache);
-}
-
 /* Solves with the weights and targets that stand in s, in the time that is left; the result takes the place of s->last.
  * exact: by the method that was asked for. */
 static uz_status solve_augmented(uz_semi *s, bool exact, double relative_error, const uz_hooks *hooks, uz_error *err)
@@ -401,6 +388,14 @@ uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, cons
     } else if (err && !(status == UZ_ERR_NOT_SPD && refused == UZ_ERR_NOT_SPD)) {
         *err = own;
     }
-    clear(&s);
+    void *room[] = {s.load,   s.prescribed, s.inverse, s.stiffness, s.soft,
+                    s.weight, s.target,     s.active,  s.provable,  s.null_space};
+    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
+        free(room[i]);
+    uz_csc_clear(&s.Nt);
+    if (s.is_scene)
+        uz_body_model_clear(&s.model);
+    uz_result_free(s.last);
+    uz_cache_free(s.own_cache);
     return status;
 }

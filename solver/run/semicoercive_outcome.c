@@ -207,7 +207,8 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
     uz_milestones_init(&milestones, false);
     uz_milestones_resume(&milestones, summary->timings.total);
     uz_milestones_pause(&milestones);
-    uz_milestones_certify(&milestones, summary->certificate.relative_error, summary->iterations, 0);
+    uz_milestones_note(&milestones, UZ_MILESTONE_OF_CERTIFICATE, summary->certificate.relative_error,
+                       summary->iterations, 0);
     result->trade = milestones.trade;
     result->trade.total_s = milestones.trade.iterated_s;
     return status;

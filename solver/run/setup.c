@@ -15,23 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where the choice of rows begins: initial gaps follow from the places of planes and the values of supports, which the
- * key of the model leaves out. */
-static void add_rows(uz_digest *digest, const uz_problem *problem, const uz_candidates *wanted)
-{
-    const uz_scene *scene = &problem->scene;
-    if (!uz_may_omit_rows(problem))
-        return;
-    for (int64_t k = 0; k < scene->n_contacts; k++)
-        uz_digest_add(digest, scene->contacts[k].point, sizeof scene->contacts[k].point);
-    for (int64_t i = 0; i < scene->n_supports; i++) {
-        uz_digest_add(digest, scene->supports[i].u, sizeof scene->supports[i].u);
-        uz_digest_add(digest, &scene->supports[i].value, sizeof scene->supports[i].value);
-    }
-    if (wanted && wanted->in)
-        uz_digest_add(digest, wanted->in, (size_t)wanted->m);
-}
-
 uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz_candidates *wanted,
                           const uz_settings *settings, uz_error *err)
 {
@@ -50,7 +33,18 @@ uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz
         if (status == UZ_OK)
             uz_digest_add(state, body, len);
         free(body);
-        add_rows(state, problem, wanted);
+        /* Where the choice of rows begins: initial gaps follow from the places of planes and the values of supports,
+         * which the key of the model leaves out. */
+        const uz_scene *scene = &problem->scene;
+        const bool omits = uz_may_omit_rows(problem);
+        for (int64_t k = 0; omits && k < scene->n_contacts; k++)
+            uz_digest_add(state, scene->contacts[k].point, sizeof scene->contacts[k].point);
+        for (int64_t i = 0; omits && i < scene->n_supports; i++) {
+            uz_digest_add(state, scene->supports[i].u, sizeof scene->supports[i].u);
+            uz_digest_add(state, &scene->supports[i].value, sizeof scene->supports[i].value);
+        }
+        if (omits && wanted && wanted->in)
+            uz_digest_add(state, wanted->in, (size_t)wanted->m);
     } else {
         uz_matrix_key N = {.values = ""}; /* without rows it may be a zeroed struct */
         status = uz_matrix_digest(&key->K, &problem->qp.K, err);
@@ -171,7 +165,7 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
         uz_setup_free(setup);
         return status;
     }
-    size_t form = setup->amg ? uz_amg_describe(setup->amg).bytes : uz_factor_describe(setup->factor).bytes;
+    size_t form = setup->amg ? setup->amg->info.bytes : uz_factor_describe(setup->factor).bytes;
     setup->bytes = sizeof *setup + (setup->shared.item ? 0 : form) + setup->dual->bytes;
     if (setup->is_scene)
         setup->bytes += uz_body_model_bytes(&setup->model);

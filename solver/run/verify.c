@@ -84,7 +84,7 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
         memcpy(answer->r, r, size_r);
     uz_milestones_resume(&run->work.milestones, uz_run_time(run));
     uz_milestones_pause(&run->work.milestones);
-    uz_milestones_certify(&run->work.milestones, summary->certificate.relative_error, 0, 0);
+    uz_milestones_note(&run->work.milestones, UZ_MILESTONE_OF_CERTIFICATE, summary->certificate.relative_error, 0, 0);
     summary->outcome = summary->certificate.relative_error <= run->work.requested ? UZ_VERIFIED : UZ_NOT_VERIFIED;
     summary->method = UZ_METHOD_GIVEN;
     summary->alpha = NAN;

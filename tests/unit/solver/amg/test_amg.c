@@ -29,8 +29,8 @@ static bool open_pair(pair *p, uz_csc *K, uz_modes *modes, uz_error *err)
     memset(K, 0, sizeof *K);
     if (uz_amg_create(&p->amg, &p->K, modes, 0, NULL, err) != UZ_OK)
         return false;
-    p->info = uz_amg_describe(p->amg);
-    CHECK(uz_cg_init(&p->cg, uz_amg_multigrid(p->amg), NULL, p->K.cols, err) == UZ_OK);
+    p->info = p->amg->info;
+    CHECK(uz_cg_init(&p->cg, p->amg->mg, NULL, p->K.cols, err) == UZ_OK);
     CHECK(uz_factor_plain(&p->factor, &p->K, UZ_ORDERING_AUTO, 0, NULL, err) == UZ_OK);
     p->ws = uz_factor_workspace_new();
     return true;
@@ -333,7 +333,7 @@ TEST(held_dofs)
         held[j] = j % 7 == 0 || (j > n / 2 && j < n / 2 + 40);
         x[j] = held[j] ? 5.0 : 0.0;
     }
-    CHECK(uz_multigrid_create(&mg, &p.K, uz_amg_modes(p.amg), held, 0, NULL, &err) == UZ_OK);
+    CHECK(uz_multigrid_create(&mg, &p.K, &p.amg->modes, held, 0, NULL, &err) == UZ_OK);
     CHECK(uz_cg_init(&cg, mg, held, n, &err) == UZ_OK);
     uz_cg_stop stop = {.relative = 1e-10, .max_iterations = 200, .deadline = INFINITY};
     CHECK(uz_cg_solve(&info, x, &cg, &p.K, b, &stop, &err) == UZ_OK);

@@ -106,7 +106,7 @@ static double conditioning(double tilt)
     uz_error err = {0};
     problem.scene.contacts[0].normal[0] = tilt;
     CHECK_MSG(uz_setup_acquire(&setup, &reused, NULL, &problem, NULL, &freely, NULL, &err) == UZ_OK, "%s", err.message);
-    double lambda = uz_amg_describe(setup->amg).lambda;
+    double lambda = setup->amg->info.lambda;
     CHECK_INT(setup->model.info.n_rotated > 0, tilt != 0);
     uz_setup_release(NULL, setup);
     uz_problem_clear(&problem);

@@ -228,21 +228,21 @@ TEST(a_certificate_takes_back_what_it_does_not_confirm)
 {
     uz_milestones d;
     uz_milestones_init(&d, false);
-    uz_milestones_note(&d, 5e-3, 10, 11);
-    uz_milestones_note(&d, 2e-2, 12, 13); /* nothing new */
-    uz_milestones_note(&d, 1e-10, 20, 21);
-    uz_milestones_certify(&d, 3e-7, 20, 21);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_ITERATION, 5e-3, 10, 11);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_ITERATION, 2e-2, 12, 13); /* nothing new */
+    uz_milestones_note(&d, UZ_MILESTONE_OF_ITERATION, 1e-10, 20, 21);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_CERTIFICATE, 3e-7, 20, 21);
     CHECK(d.trade.step[7].iterations == 10 && d.trade.step[8].iterations == 10 && d.trade.step[9].iterations == 20);
     CHECK(is_reached(&d.trade.step[25]) && !is_reached(&d.trade.step[26]));
-    uz_milestones_certify(&d, 1e-9, 25, 30);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_CERTIFICATE, 1e-9, 25, 30);
     CHECK(d.trade.step[26].iterations == 25 && d.trade.step[26].by_certificate && !d.trade.step[25].by_certificate);
     CHECK(is_reached(&d.trade.step[35]) && !is_reached(&d.trade.step[36]));
     uz_milestones_drop(&d, NAN);
     CHECK(d.reached == 0 && !is_reached(&d.trade.step[0]));
-    uz_milestones_note(&d, INFINITY, 1, 1);
-    uz_milestones_note(NULL, 1e-3, 1, 1);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_ITERATION, INFINITY, 1, 1);
+    uz_milestones_note(NULL, UZ_MILESTONE_OF_ITERATION, 1e-3, 1, 1);
     CHECK(d.reached == 0);
-    uz_milestones_note(&d, 0.0, 1, 1);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_ITERATION, 0.0, 1, 1);
     CHECK_INT(d.reached, UZ_TRADE_STEPS);
 }
 
@@ -250,12 +250,12 @@ TEST(a_partial_run_has_to_have_room)
 {
     uz_milestones d;
     uz_milestones_init(&d, true);
-    uz_milestones_note(&d, 0.09, 1, 1); /* 0.09 / 0.85 > 0.1 */
+    uz_milestones_note(&d, UZ_MILESTONE_OF_ITERATION, 0.09, 1, 1); /* 0.09 / 0.85 > 0.1 */
     CHECK_INT(d.reached, 3);
-    uz_milestones_note(&d, 8e-9, 5, 5);
-    uz_milestones_certify(&d, 8e-9, 5, 5);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_ITERATION, 8e-9, 5, 5);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_CERTIFICATE, 8e-9, 5, 5);
     CHECK(d.reached == 32 && !d.trade.step[31].by_certificate);
-    uz_milestones_extend(&d, 1e-8, 5, 5);
+    uz_milestones_note(&d, UZ_MILESTONE_OF_ALL_ROWS, 1e-8, 5, 5);
     CHECK(d.trade.step[31].by_certificate && d.reached == 32);
     CHECK(d.trade.step[26].by_certificate && !d.trade.step[25].by_certificate); /* 1.8e-7 < 20e-8 <= 3.2e-7 */
 }
