@@ -3,7 +3,7 @@ usage: calculix.py BUILD_DIR OUTPUT.json [DECKS]
 
 Blocks on others whose meshes do not match, and press fits, with CalculiX's contact of surfaces with surfaces and of nodes
 with surfaces; and of CalculiX's own decks, where DECKS is a folder of them (they do not come with Debian's package), those
-that a scene can say (decks.py). Compared are the force through the contact, where it is known, displacements, and seconds of
+that a scene can say (decks.py); these a second time with a stiff contact, as their own may give by per cents. Compared are the force through the contact, where it is known, displacements, and seconds of
 processor of the whole: of CalculiX from deck to answer, of the daemon from request to answer. CalculiX's contact is a
 penalty, in what is made here of 100 E for each length of a side."""
 import json
@@ -22,6 +22,7 @@ from two_bodies import body  # noqa: E402
 
 # Edges of a brick with nodes amid, in their order.
 EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+STIFF = 10000  # contact of CalculiX's own decks, in E for the length of the shortest side
 KINDS = {"surfaces": "SURFACE TO SURFACE", "nodes": "NODE TO SURFACE"}
 
 
@@ -162,14 +163,19 @@ def row_of(build, name, request, discretization, text, numbers=None):
     printed, their_s = by_calculix(text)
     row = {"problem": name, "contact": discretization, "unknowns": ours["summary"]["problem"]["d"], "calculix": None, "apart": None,
            "ours": ours["summary"]["resultants"]["contacts"][0]["force"], "calculix_s": their_s, "ours_s": our_s}
-    if printed:
-        place = {number: k for k, number in enumerate(numbers or range(1, len(ours["displacements"]) + 1))}
+    place = {number: k for k, number in enumerate(numbers or range(1, len(ours["displacements"]) + 1))}
+
+    def apart(printed):
         both = [(u, ours["displacements"][place[k]]) for k, u in decks.printed(printed).items() if k in place]
-        row["apart"] = max(abs(a - b) for u, v in both for a, b in zip(u, v)) / max(abs(a) for u, _ in both for a in u)
+        return max(abs(a - b) for u, v in both for a, b in zip(u, v)) / max(abs(a) for u, _ in both for a in u)
+    if printed:
+        row["apart"] = apart(printed)
         row["calculix"] = None if numbers else force_on_slave(request["problem"], printed)
     shown = ["-" if f is None else " ".join(f"{t + 0.0:.5g}" if abs(t) > 1e-6 * max(map(abs, f)) else "0" for t in f) for f in (row["calculix"], row["ours"])]
-    apart = "-" if row["apart"] is None else f"{row['apart']:.2g}"
-    print(f"{name:22s} {discretization:9s} {shown[0]:>28s} {shown[1]:>28s} {apart:>8s} {their_s:8.2f} {our_s:8.2f} {their_s / max(our_s, 0.01):7.1f}", flush=True)
+    stiff = numbers and by_calculix(decks.stiffened(text, STIFF))[0]
+    row["apart_stiff"] = apart(stiff) if stiff else None
+    told = " ".join(f"{'-' if row[key] is None else format(row[key], '.2g'):>8s}" for key in ("apart", "apart_stiff"))
+    print(f"{name:22s} {discretization:9s} {shown[0]:>28s} {shown[1]:>28s} {told} {their_s:8.2f} {our_s:8.2f} {their_s / max(our_s, 0.01):7.1f}", flush=True)
     return row
 
 
@@ -179,7 +185,7 @@ def main():
     if not shutil.which("ccx"):
         sys.exit("ccx is not installed: make bench-deps")
     rows, unsaid = [], {}
-    print(f"{'problem':22s} {'contact':9s} {'force, CalculiX':>28s} {'force, ours':>28s} {'apart':>8s} {'s':>8s} {'ours, s':>8s} {'ratio':>7s}")
+    print(f"{'problem':22s} {'contact':9s} {'force, CalculiX':>28s} {'force, ours':>28s} {'apart':>8s} {'stiff':>8s} {'s':>8s} {'ours, s':>8s} {'ratio':>7s}")
     for name, make, sizes in (("block", block, (8, 16)), ("press fit", fit, (15, 30)), ("press fit, hex20", lambda n: fit(n, "hex20"), (15,)),
                               ("squares", pushed, (60,))):
         for size in sizes:

@@ -167,6 +167,20 @@ def scene(cards, discretization="surfaces"):
     return {"problem": problem}, numbers
 
 
+def stiffened(text, times):
+    """The deck with a linear contact instead of its own: so many times E for the length of its shortest side."""
+    deck, lines, own = Deck(read(text)), [], False
+    side = min(math.dist(deck.nodes[e[0]], deck.nodes[e[1]]) for e in deck.elements.values())
+    for line in text.splitlines():
+        own = own and not line.lstrip().startswith("*")  # the numbers of its contact
+        if line.lstrip().upper().startswith("*SURFACE BEHAVIOR"):
+            own = True
+            lines += ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{times * max(deck.young.values()) / side:.6g}"]
+        elif not own:
+            lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
 def printed(text):
     """{node: displacement} of the last block that was printed."""
     if "displacements (" not in text:
