@@ -57,8 +57,9 @@ class Scene:
     """What is generated: request(level) with 2^level as many cells along each axis, and what is known of its answer.
 
     force: sum of the forces on `on`, by contact, where equilibrium says it; pressure: its mean, where theory does;
-    mirror: a map of points to their images in a symmetric scene; tolerance: by which force of refined meshes differ."""
-    force = pressure = mirror = None
+    mirror: a map of points to their images in a symmetric scene; shape: what both surfaces are to be taken for; tolerance:
+    by which force of refined meshes differ."""
+    force = pressure = mirror = shape = None
     tolerance = 0.1
     even = True  # pressures are those of a smooth field on these meshes
 
@@ -223,6 +224,74 @@ def sleeve(rng, dim):
     return scene
 
 
+def revolved(rng, dim):
+    """A cone in a cone, a ring in a tube around it, a ball in a shell: bodies of revolution, or sectors of them, too thick by a
+    little. The part in between is known exactly, of the meridian or in space."""
+    shape = rng.choice(["cone", "torus", "sphere"])
+    kinds = [kind_of(rng, dim) for _ in range(2)]
+    inner, middle, outer = rng.uniform(2, 8), 12, 12 * rng.uniform(1.3, 1.8)
+    young, over = 10 ** rng.uniform(3, 5), middle * 10 ** rng.uniform(-3.3, -2.3)
+    far = middle * rng.uniform(2.2, 6) if shape == "torus" else 0  # from the axis to the middle of the tube
+    long, sector = rng.uniform(4, 12), math.radians(rng.choice([30, 60, 90]))
+    slope = rng.uniform(-1, 1) * min(0.4, (inner - 1) / long)
+    end = math.pi if shape == "torus" else math.radians(rng.uniform(40, 75))
+    maps = [distorted(rng, dim, False) for _ in range(2)]
+
+    def part(k, a, b):
+        def at(*t):
+            t = maps[k](*t)
+            r = a + (b - a) * t[0]
+            x, z = (r - slope * long * t[1], long * t[1]) if shape == "cone" else \
+                (far + r * math.cos(end * t[1]), r * math.sin(end * t[1]))
+            return (x, z) if dim == 2 else (x * math.cos(sector * t[2]), -x * math.sin(sector * t[2]), z)
+        return at
+    names = [("left", "right", "bottom", "top"), ("x0", "x1", "y0", "y1")][dim == 3]
+    groups = {"plug": [(0, names[1])], "socket": [(1, names[0])], "ends": [(k, names[j]) for k in range(2) for j in ([2, 3] if shape == "torus" else [2])]}
+    supports = [{"on": "ends", "uy" if dim == 2 else "uz": 0}]
+    if dim == 3:
+        groups.update(first=[(0, "z0"), (1, "z0")], last=[(0, "z1"), (1, "z1")])
+        supports += [{"on": "first", "normal": [0, 1, 0], "u": 0}, {"on": "last", "normal": [math.sin(sector), math.cos(sector), 0], "u": 0}]
+    on = rng.choice([("plug", "socket"), ("socket", "plug")])
+    along = math.degrees(end) / rng.uniform(4, 9) if shape != "cone" else rng.uniform(4, 9)
+    cells = [[2, max(3, math.ceil(along * rng.uniform(0.7, 1.3)))] + [max(3, math.ceil(math.degrees(sector) / rng.uniform(6, 12)))] * (dim - 2)
+             for _ in range(2)]
+    scene = Scene(f"revolved {shape}", kinds, cells,
+                  [part(0, inner, middle + over), part(1, middle, outer)], groups, model="axisymmetric" if dim == 2 else "solid",
+                  materials=[{"on": "all", "young": young, "poisson": 0.3}], supports=supports, loads=[],
+                  contacts=[{"on": on[0], "with": on[1]}])
+    scene.shape = shape if dim == 3 else None
+    scene.even = False  # pressures change along the meridian, and at free ends
+    return scene
+
+
+def balls(rng, dim):
+    """A patch of a hollow ball in another, between four planes through the centre: Lame's pressure everywhere."""
+    kinds = [kind_of(rng, 3) for _ in range(2)]
+    inner, middle, outer, end = rng.uniform(3, 8), 12, 12 * rng.uniform(1.3, 2), math.radians(rng.choice([20, 30, 45]))
+    young, poisson, over = 10 ** rng.uniform(3, 5), rng.uniform(0, 0.4), middle * 10 ** rng.uniform(-3.3, -2.3)
+    maps = [distorted(rng, 3, False) for _ in range(2)]
+
+    def shell(k, a, b):
+        def at(*t):
+            t = maps[k](*t)
+            way = (math.tan(end * t[0]), math.tan(end * t[1]), 1.0)
+            r = (a + (b - a) * t[2]) / math.sqrt(sum(x * x for x in way))
+            return tuple(r * x for x in way)
+        return at
+    groups = {"ball": [(0, "z1")], "socket": [(1, "z0")], **{side: [(0, side), (1, side)] for side in ("x0", "x1", "y0", "y1")}}
+    supports = [{"on": "x0", "ux": 0}, {"on": "y0", "uy": 0}, {"on": "x1", "normal": [math.cos(end), 0, -math.sin(end)], "u": 0},
+                {"on": "y1", "normal": [0, math.cos(end), -math.sin(end)], "u": 0}]
+    on = rng.choice([("ball", "socket"), ("socket", "ball")])
+    cells = [[rng.randint(3, 6), rng.randint(3, 6), 2] for _ in range(2)]
+    scene = Scene("balls", kinds, cells, [shell(0, inner, middle + over), shell(1, middle, outer)], groups, model="solid",
+                  materials=[{"on": "all", "young": young, "poisson": poisson}], supports=supports, loads=[],
+                  contacts=[{"on": on[0], "with": on[1]}])
+    give = ((1 - 2 * poisson) * middle**3 + 0.5 * (1 + poisson) * outer**3) / (outer**3 - middle**3) + \
+        ((1 - 2 * poisson) * middle**3 + 0.5 * (1 + poisson) * inner**3) / (middle**3 - inner**3)
+    scene.pressure, scene.shape = young * over / middle / give, "sphere"
+    return scene
+
+
 def roller(rng, dim):
     """A part of a ring pressed into a block: contact is a small part of both sides."""
     symmetric = rng.random() < 0.3 and dim == 2
@@ -322,7 +391,7 @@ def layers(rng, dim):
 
 
 FAMILIES = [(stack, 2), (press, 2), (roller, 2), (pocket, 2), (layers, 2), (sleeve, 2), (stack, 2), (press, 2),
-            (stack, 3), (press, 3), (layers, 3), (roller, 3)]
+            (stack, 3), (press, 3), (layers, 3), (roller, 3), (revolved, 2), (revolved, 3), (revolved, 3), (balls, 3)]
 
 
 def generate(number):
@@ -491,6 +560,8 @@ def look(scene, daemon, rng, refine=True):
         claim(largest < 3 * scene.pressure, "largest pressure / Lame", largest / scene.pressure)
         open_rows = sum(p == 0 for p in answer["pressure"])
         claim(open_rows <= max(2, 0.02 * len(answer["pressure"])), "of a press fit is open:", open_rows)  # but at its ends
+    taken_for = [x["shape"] for x in answer["summary"]["contact"].get("surfaces", [])]
+    claim(not scene.shape or taken_for == [scene.shape] * 2, "shapes", scene.shape, taken_for)
     if scene.mirror:
         def place(x):
             return tuple(round(t / size, 9) + 0.0 for t in x)  # nodes of the two bodies may share a place: both are left out

@@ -1,9 +1,10 @@
 """Generated bodies on rigid obstacles, each posted to a daemon at its defaults, and again mirrored, turned, in other units and refined.
-usage: generated_obstacles.py BUILD_DIR OUTPUT.json [SCENES [FIRST [KINEMATICS]]]
+usage: generated_obstacles.py BUILD_DIR OUTPUT.json [SCENES [FIRST [KINEMATICS [FAMILY]]]]
 
 What must hold of each: its mirror image has the mirrored answer; turning and units change rounding only; nothing pulls or stands in
 the obstacle; and the force is that of the mesh refined twice, or a warning says that it is not to be trusted. Obstacles have ridges,
-grooves and corners, half of them exactly where nodes are."""
+grooves and corners, half of them exactly where nodes are. Families: ground, what lies below the body; enclosing, holes, bowls and
+polygons; revolved, bodies of revolution on such obstacles."""
 import math
 import random
 import sys
@@ -18,12 +19,9 @@ TOLERANCE = 0.35
 
 # ---- obstacles: dictionaries of a request, and their images
 
-def mirror_obstacle(obstacle):
-    """The image of an obstacle under x -> -x. A line that goes on with the obstacle on its right does so backwards."""
+def mirror_obstacle(obstacle, flip):
+    """The image of an obstacle. A line that goes on with the obstacle on its right does so backwards."""
     kind, of = next(iter(obstacle.items()))
-
-    def flip(x):
-        return [-x[0], *x[1:]]
     if kind == "polyline":
         return {kind: {"points": [flip(p) for p in reversed(of["points"])]}}
     if kind == "height":
@@ -57,8 +55,11 @@ def with_obstacle(request, make):
     return {"problem": scene}
 
 
-def mirrored(request):
-    """Nodes at -x; elements and sides go around the other way."""
+def mirrored(request, axis=0):
+    """Nodes at -x, or -y; elements and sides go around the other way."""
+    def flip(x):
+        return [-t if c == axis else t for c, t in enumerate(x)]
+
     def order(kind):
         shape = kind.rstrip("0123456789")
         if shape in ("tri", "quad"):
@@ -71,12 +72,12 @@ def mirrored(request):
         return corners + (middles if kind in ("hex20", "tet10", "wedge15") else [])
     scene = dict(request["problem"])
     mesh = scene["mesh"]
-    scene["mesh"] = {**mesh, "nodes": [[-x[0], *x[1:]] for x in mesh["nodes"]],
+    scene["mesh"] = {**mesh, "nodes": [flip(x) for x in mesh["nodes"]],
                      "elements": {kind: [[e[k] for k in order(kind)] for e in list_] for kind, list_ in mesh["elements"].items()},
                      "groups": {name: {k: [side[::-1] if k == "edges" else [side[0], *side[:0:-1]] for side in sides]
                                        for k, sides in g.items()} for name, g in mesh["groups"].items()}}
-    scene["supports"] = [{k: -v if k == "ux" else v for k, v in s.items()} for s in scene["supports"]]
-    return with_obstacle({"problem": scene}, mirror_obstacle)
+    scene["supports"] = [{k: -v if k == ("ux", "uy")[axis] else v for k, v in s.items()} for s in scene["supports"]]
+    return with_obstacle({"problem": scene}, lambda o: mirror_obstacle(o, flip))
 
 
 def profile(rng, width, size, places):
@@ -109,10 +110,13 @@ def profile(rng, width, size, places):
     return kind, xs, [size - 0.5 * bend * (x - at) ** 2 for x in xs]
 
 
+FAMILIES = {"ground": "obstacles", "enclosing": "enclosing", "revolved": "revolved"}  # and what their random numbers begin with
+
+
 class Scene:
-    def __init__(self, number, kinematics="auto"):
-        rng = random.Random(f"obstacles {number}")
-        self.dim = dim = 3 if number % 3 == 2 else 2
+    def __init__(self, number, kinematics="auto", family="ground"):
+        rng = random.Random(f"{FAMILIES[family]} {number}")
+        self.dim = dim = 3 if number % 3 == 2 and family != "revolved" else 2
         self.kind, self.symmetric = kind_of(rng, dim), False
         width, high, deep = rng.uniform(4, 12), rng.uniform(2, 6), rng.uniform(3, 8)
         self.cells = [2 * rng.randint(2, 8), rng.randint(2, 4)] if dim == 2 else [2 * rng.randint(1, 3), rng.randint(2, 5), rng.randint(1, 2)]
@@ -120,26 +124,82 @@ class Scene:
         within = (lambda *t: list(t)) if even else distorted(rng, dim, False)
         under = rng.choice(["flat", "flat", "arc", "wedge", "corner"])
         under = under if even or under != "wedge" else "flat"  # whose tip is a node
+        turning = family == "revolved"
+        self.axis = 1 if turning else 0  # that is mirrored
+        inside = rng.choice((0, 0, rng.uniform(0.3, 3) * width)) if turning else -0.5 * width  # where the body begins
+        middle = 0 if inside == 0 else 0.5  # of what is below it, in its widths
+        shift = inside + middle * width
         slope, bend = rng.choice((0.05, 0.2, 0.5)), rng.uniform(0.05, 1.2) / width
         bottom = {"flat": lambda x: 0.0, "arc": lambda x: 0.5 * bend * x * x, "wedge": lambda x: slope * abs(x), "corner": lambda x: 0.0}[under]
 
         def place(*t):
             t = within(*t)
-            x, y, z = width * (t[0] - 0.5), [deep * (s - 0.5) for s in t[1:-1]], t[-1]
-            return (x, *y, bottom(x) + z * (high + 0.3 * width - bottom(x)))
+            x, y, z = width * (t[0] - middle), [deep * (s - 0.5) for s in t[1:-1]], t[-1]
+            return (x + shift, *y, bottom(x) + z * (high + 0.3 * width - bottom(x)))
         self.place = place
         names = [("bottom", "top", "left", "right"), ("z0", "z1", "x0", "x1")][dim == 3]
         self.groups = {"on": [(0, names[0])] + ([(0, names[3])] if under == "corner" else []), "head": [(0, names[1])]}
         size = width * 10 ** rng.uniform(-3, -1.7)
         places = [width * (k / self.cells[0] - 0.5) for k in range(1, self.cells[0])]
-        obstacle, shape = self.obstacle(rng, width, deep, size, places)
+        make = {"ground": self.obstacle, "enclosing": self.enclosing, "revolved": self.revolved}[family]
+        obstacle, shape = make(rng, width, deep, size, places, *[inside, high] * (family != "ground"))
         vertical = "uy" if dim == 2 else "uz"
-        aside = rng.choice((0, 0, rng.uniform(-3, 3) * size))
+        aside = rng.choice((0, 0, rng.uniform(-3, 3) * size)) if inside != 0 else 0
         motion = {"ux": aside, vertical: 0, **({"uy": 0} if dim == 3 else {})}
         self.family = f"{dim}D {self.kind:7s} {under:6s} {shape}"
-        self.scene = {"kinematics": kinematics, "model": "solid" if dim == 3 else rng.choice(["plane_strain", "plane_stress"]),
+        self.scene = {"kinematics": kinematics, "model": "solid" if dim == 3 else "axisymmetric" if turning else rng.choice(["plane_strain", "plane_stress"]),
                       "materials": [{"on": "all", "young": 1000, "poisson": rng.uniform(0, 0.4)}],
                       "supports": [{"on": "head", **motion}], "loads": [], "contacts": [{"on": "on", "obstacle": obstacle}]}
+        if inside == 0:
+            self.groups["axis"] = [(0, names[2])]
+            self.scene["supports"].append({"on": "axis", "ux": 0})
+
+    def enclosing(self, rng, width, deep, size, places, inside, high):
+        """The inside of a round hole, a polygon, or a hole with straight sides, around the body or below it."""
+        kind = rng.choice(["circle", "polygon", "hole"] if self.dim == 2 else ["sphere", "cylinder"])
+        at = rng.choice((0, rng.uniform(-0.1, 0.1) * width))
+        radius = width * rng.uniform(1.0, 4)
+        middle = 0.5 * width + inside
+        if kind == "circle":
+            return {"circle": {"center": [middle + at, size + radius], "radius": radius, "inside": True}}, "in circle"
+        if kind == "sphere":
+            return {"sphere": {"center": [at, 0, size + radius], "radius": radius, "inside": True}}, "in sphere"
+        if kind == "cylinder":
+            return {"cylinder": {"point": [at, 0, size + radius], "axis": rng.choice(([0, 1, 0], [1, 0, 0])), "radius": radius,
+                                 "inside": True}}, "in cylinder"
+        if kind == "polygon":  # the obstacle: it goes round clockwise
+            n, turn, radius = rng.randint(3, 8), rng.choice((0, rng.uniform(0, 1))), width * 10 ** rng.uniform(-1, 0.5)
+            angles = [0.5 * math.pi - 2 * math.pi * (k + turn) / n for k in range(n)]
+            rays = [radius * rng.choice((1, rng.uniform(0.4, 1))) for _ in angles]
+            at = rng.choice(places) if rng.random() < 0.5 else rng.uniform(-0.3, 0.3) * width
+            points = [[middle + at + r * math.cos(a), r * math.sin(a)] for r, a in zip(rays, angles)]
+            top = max(p[1] for p in points)
+            points = [[x, y - top + size] for x, y in points]
+        else:
+            wide, over = 0.5 * width - rng.uniform(0, 1) * size, 4 * (high + width)
+            floor = [[middle + at, size - rng.choice((0, 0.02, 0.2)) * width]] * rng.randint(0, 1)
+            points = [[middle - wide - rng.uniform(0, 0.5) * width, size], *floor, [middle + wide, size],
+                      [middle + wide + 0.8 * width, over], [middle - wide - rng.uniform(0.8, 1.3) * width, over]]  # clear of the head
+        return {"polyline": {"points": [*points, points[0]]}}, kind
+
+    def revolved(self, rng, width, deep, size, places, inside, high):
+        """Seen in the plane of a meridian: spheres, rings, cones, and what a line makes."""
+        kind = rng.choice(["plane", "sphere", "ring", "line", "line", "enclosing"])
+        middle = inside + 0.5 * width
+        radius = width * 10 ** rng.uniform(-0.5, 1)
+        if kind == "plane":
+            return {"plane": {"point": [middle, size], "normal": [rng.choice((0, rng.uniform(-0.1, 0.1))), 1]}}, kind
+        if kind == "sphere":  # it touches in a circle, or at the axis
+            foot = math.hypot(radius, inside) if rng.random() < 0.5 else radius
+            return {"circle": {"center": [0, size - radius * math.sqrt(max(0.1, 1 - (inside / foot) ** 2))], "radius": radius}}, kind
+        if kind == "ring":
+            radius = min(radius, 0.4 * (inside + width))
+            at = max(1.1 * radius, inside + rng.uniform(0.2, 0.8) * width)
+            return {"circle": {"center": [at, size - radius], "radius": radius}}, kind
+        if kind == "enclosing":
+            return self.enclosing(rng, width, deep, size, places, inside, high)
+        shape, x, z = profile(rng, width, size, places)
+        return {"polyline": {"points": [[middle + s, t] for s, t in zip(x, z)]}}, "line " + shape
 
     def obstacle(self, rng, width, deep, size, places):
         kind = rng.choice(["plane", "round", "polyline", "height", "height"] if self.dim == 2 else
@@ -182,18 +242,18 @@ def look(scene, daemon, rng, refine=True):
     false = []
     request = scene.request()
     answer, why = daemon.answer(request)
-    image, other_why = daemon.answer(mirrored(request))
+    image, other_why = daemon.answer(mirrored(request, scene.axis))
     if not answer or not image:
         return [f"base: {why}"] if not answer and not image else [f"only one of two images: {why or other_why}"]
     size = math.hypot(*force_of(answer)) or 1e-300
     u = answer["displacements"]
-    back = [[-x[0], *x[1:]] for x in image["displacements"]]
+    back = [[-t if c == scene.axis else t for c, t in enumerate(x)] for x in image["displacements"]]
     if off_by(u, back) > 1e-6:
         false.append(f"mirrored: {force_of(answer)} {force_of(image)}")
     if max(answer["reactions"], default=0) > 1e-9 * size:
         false.append("pulls")
     for R in ([[0, -1], [1, 0]] if scene.dim == 2 else [[0, 0, 1], [1, 0, 0], [0, 1, 0]], rotation(rng, scene.dim)):
-        if turn_obstacle(request["problem"]["contacts"][0]["obstacle"], R) is None:
+        if scene.axis or turn_obstacle(request["problem"]["contacts"][0]["obstacle"], R) is None:
             continue
         other, why = daemon.answer(with_obstacle(turned(request, R), lambda o: turn_obstacle(o, R)))
         back = other and [[sum(R[i][c] * x[i] for i in range(scene.dim)) for c in range(scene.dim)] for x in other["displacements"]]
@@ -213,11 +273,11 @@ def look(scene, daemon, rng, refine=True):
     return false
 
 
-def run(s, numbers, say=print, refine=True, kinematics="auto"):
+def run(s, numbers, say=print, refine=True, kinematics="auto", family="ground"):
     """Looks at scenes by number; returns what was counted, and what was false of which."""
     daemon, failures = contacts.Daemon(s), []
     for k in numbers:
-        scene = Scene(k, kinematics)
+        scene = Scene(k, kinematics, family)
         false = look(scene, daemon, random.Random(f"variations {k}"), refine)
         if false:
             failures.append((k, scene.family, false))
@@ -225,5 +285,14 @@ def run(s, numbers, say=print, refine=True, kinematics="auto"):
     return {"scenes": len(numbers), "solves": daemon.solves, "failures": failures}
 
 
+def run_all(s, numbers):
+    """Of the family that was asked for; else a third as many of each other one as of the first."""
+    how, family = [*sys.argv[5:], *["auto", ""][len(sys.argv[5:]):]][:2]
+    found = [run(s, numbers if name in (family, "ground") else numbers[:(len(numbers) + 2) // 3], kinematics=how, family=name)
+             for name in FAMILIES if family in ("", name)]
+    return {"scenes": sum(f["scenes"] for f in found), "solves": sum(f["solves"] for f in found),
+            "failures": [x for f in found for x in f["failures"]]}
+
+
 if __name__ == "__main__":
-    contacts.command(__doc__, lambda s, numbers: run(s, numbers, kinematics=(sys.argv[5:] or ["auto"])[0]), "bodies on obstacles", 300)
+    contacts.command(__doc__, run_all, "bodies on obstacles", 300)
