@@ -29,6 +29,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/root.h"
+#include "core/vector3.h"
 #include "obstacle/obstacle.h"
 #include "scene/scene.h"
 
@@ -44,9 +45,16 @@
 /* To rows the obstacle's edges are as if rounded with this part of the distance between nodes: of a node that settles
  * on an edge the direction from it would be rounding. */
 #define EDGE 0.5
+/* An edge that is no farther aside of a node than this part of that distance is before it, as one is before a place
+ * inside a side that is no farther aside than EDGE. */
+#define BEFORE 0.125
 
 /* A row inside has a normal that is against the side's, and nodes that can give way along it, by more than this. */
 #define LEAST_SHARE 0.1
+
+/* Cosine of the angle between a side and what holds it back, of a node beside an edge, from which on the edge holds it.
+ */
+#define LEAST_BEFORE 0.99
 
 /* Cosine of the angle between a side and the mean around a node from which on the node is a corner. */
 #define LEAST_COSINE 0.94
@@ -265,18 +273,20 @@ static void refine(deepest *of)
 }
 
 /* Does the way out of the obstacle lead a node into the body? On the flank of a block it leads along the side: its row
- * leaves the block where it stands. */
+ * leaves the block where it stands. Beside an edge the node may slip off. */
 static bool leads_in(const deepest *of, int a)
 {
-    double N[UZ_FACE_NODES], x[3], along = 0;
+    double N[UZ_FACE_NODES], x[3], at[3], along = 0;
     uz_gap gap;
     uz_side_shape(N, &of->side, uz_side_local_nodes(&of->side)[a]);
     place_of(x, NULL, of, N, NULL);
-    if (uz_obstacle_row_gap(&gap, NULL, of->obstacle, x, of->normal, EDGE * of->size, NULL) != UZ_OK)
+    if (uz_obstacle_row_gap(&gap, at, of->obstacle, x, of->normal, EDGE * of->size, BEFORE * of->size, NULL) != UZ_OK)
         return true;
     for (int c = 0; c < of->side.dim; c++)
         along -= gap.normal[c] * of->normal[c];
-    return along > LEAST_SHARE;
+    const bool edge = uz_obstacle_has_edges(of->obstacle) &&
+                      fabs(gap.curvature) * sqrt(uz_distance2(at, gap.foot, of->side.dim)) >= 0.5;
+    return along > (edge ? LEAST_BEFORE : LEAST_SHARE);
 }
 
 /* The places of the least w, roughly, where the nodes' gaps are `gap`. False: nothing is below the slack. */
@@ -335,6 +345,24 @@ static bool set_back(deepest *of, double *gap)
     return false;
 }
 
+/* From where w is least to the crest that is there, if it is within the side: what the nodes' rows are taken to push
+ * them out by tilts w, and a row beside the crest would slip off it. */
+static void move_to_crests(deepest *of)
+{
+    deepest alone = *of;
+    const bool triangle = is_triangle(&of->side);
+    bool within = true;
+    memset(alone.pushed, 0, sizeof alone.pushed);
+    alone.least = INFINITY;
+    refine(&alone);
+    for (int k = 0; k < alone.places; k++)
+        for (int i = 0; i < of->side.dim - 1; i++)
+            within = within && alone.at[k][i] < 1 - SAME_PLACE && alone.at[k][i] > (triangle ? 0 : -1) + SAME_PLACE &&
+                     !(triangle && alone.at[k][0] + alone.at[k][1] > 1 - SAME_PLACE);
+    if (within && alone.places == of->places)
+        memcpy(of->at, alone.at, sizeof of->at);
+}
+
 /* Are there places where the rows of the nodes, whose gaps are `gap`, leave more than the slack? */
 static bool find_deepest(deepest *of, double *gap)
 {
@@ -360,9 +388,10 @@ static bool find_deepest(deepest *of, double *gap)
             along -= there.normal[c] * of->normal[c];
         amid = amid || along <= LEAST_SHARE;
     }
-    if (amid && set_back(of, gap) && find_below(of, gap))
+    if (amid && set_back(of, gap) && find_below(of, gap)) {
         refine(of);
-    else if (amid) /* among edges w has kinks, where there is no refining it */
+        move_to_crests(of);
+    } else if (amid) /* among edges w has kinks, where there is no refining it */
         *of = plain;
     return true;
 }
@@ -416,14 +445,37 @@ static void set_curve(deepest *of, const double *normals, int corners)
     }
 }
 
+/* The body's own normal where the corners of a side have these shares: of the means around them, as rows of nodes have;
+ * beside a corner of the body the side's. In the middle of a side that a crest presses on, that of the side would tilt
+ * with what its two nodes give way by, and push aside what is pressed straight on. sums: n_nodes x dim. */
+static void outward_at(double outward[3], const deepest *of, const uz_inner_place *place, const double *sums)
+{
+    const int dim = of->side.dim;
+    double mean[3] = {0};
+    for (int a = 0; a < place->corners; a++) {
+        const double *sum = sums + dim * place->node[a];
+        double size = 0, along = 0;
+        for (int c = 0; c < dim; c++) {
+            size = hypot(size, sum[c]);
+            along += sum[c] * of->normal[c];
+        }
+        const bool own = !(along >= LEAST_COSINE * size) || !(size > 0);
+        for (int c = 0; c < dim; c++)
+            mean[c] += place->linear[a] * (own ? of->normal[c] : sum[c] / size);
+    }
+    outward[2] = 0;
+    if (!uz_unit_normal(outward, mean, dim))
+        memcpy(outward, of->normal, sizeof of->normal);
+}
+
 /* Fills a place that was found. Has it a row? Not where its nodes cannot give way, nor where the obstacle's normal
  * leads out of the body: its middle is past the side then, and no row tells how to leave it. */
-static bool describe(uz_inner_place *out, const deepest *of, const double local[2], const uz_body_model *model,
-                     uz_face face)
+static bool describe(uz_inner_place *out, const deepest *of, const double local[2], const double *normals,
+                     const uz_body_model *model, uz_face face)
 {
     const int dim = of->side.dim, corners = dim == 2 ? 2 : of->side.nodes % 4 == 0 ? 4 : 3;
     uz_side straight = of->side;
-    double along = 0, most = 0;
+    double along = 0, most = 0, outward[3];
     uz_gap gap;
     straight.nodes = corners;
     *out = (uz_inner_place){.face = face, .nodes = of->side.nodes, .corners = corners, .size = of->size};
@@ -431,7 +483,9 @@ static bool describe(uz_inner_place *out, const deepest *of, const double local[
     uz_side_shape(out->share, &of->side, local);
     uz_side_shape(out->linear, &straight, local);
     place_of(out->x, NULL, of, out->share, NULL);
-    if (uz_obstacle_row_gap(&gap, NULL, of->obstacle, out->x, of->normal, EDGE * of->size, NULL) != UZ_OK)
+    outward_at(outward, of, out, normals);
+    if (uz_obstacle_row_gap(&gap, NULL, of->obstacle, out->x, outward, EDGE * of->size + of->back, EDGE * of->size,
+                            NULL) != UZ_OK)
         return false;
     out->back = of->back;
     for (int c = 0; c < dim; c++) {
@@ -475,7 +529,7 @@ static uz_status reserve_inner(uz_contact_sites *sites, int64_t others, int64_t 
 
 /* The places that were found before anything moved, where they have come to. */
 static uz_status move_inner(uz_contact_sites *sites, const uz_contact_input *in, const uz_obstacle *obstacle,
-                            uz_error *err)
+                            const double *normals, uz_error *err)
 {
     const uz_contact_sites *before = &in->rest->sites[in->index];
     const int dim = in->model->mesh.dim;
@@ -485,11 +539,14 @@ static uz_status move_inner(uz_contact_sites *sites, const uz_contact_input *in,
         uz_inner_place *place = &sites->inner[i];
         deepest of = {.obstacle = obstacle, .back = before->inner[i].back + before->inner[i].curve};
         uz_gap gap;
+        double outward[3];
         *place = before->inner[i];
         uz_body_side(&of.side, of.xyz, of.node, in->model, place->face);
         normal_of(of.normal, &of.side);
         place_of(place->x, NULL, &of, place->share, NULL);
-        status = uz_obstacle_row_gap(&gap, NULL, obstacle, place->x, of.normal, EDGE * place->size, err);
+        outward_at(outward, &of, place, normals);
+        status = uz_obstacle_row_gap(&gap, NULL, obstacle, place->x, outward, EDGE * place->size + place->back,
+                                     EDGE * place->size, err);
         if (status != UZ_OK)
             break;
         place->gap = gap.gap - place->back;
@@ -512,7 +569,7 @@ static uz_status find_inner(uz_contact_sites *sites, const uz_contact_input *in,
     const int64_t nodes = sites->n;
     int64_t room = 0;
     if (in->rest)
-        return move_inner(sites, in, obstacle, err);
+        return move_inner(sites, in, obstacle, normals, err);
     for (int64_t f = 0; f < in->on->n_faces; f++) {
         deepest of = {.obstacle = obstacle};
         double gap[UZ_FACE_NODES];
@@ -542,8 +599,8 @@ static uz_status find_inner(uz_contact_sites *sites, const uz_contact_input *in,
         }
         for (int k = 0; k < of.places; k++) {
             uz_inner_place *place = &sites->inner[sites->n_inner++];
-            const bool row =
-                describe(place, &of, of.at[k], in->model, in->on->face[f]) && in->contact->between != UZ_CONTACT_NODES;
+            const bool row = describe(place, &of, of.at[k], normals, in->model, in->on->face[f]) &&
+                             in->contact->between != UZ_CONTACT_NODES;
             place->part = 1. / of.places;
             sites->gap[sites->n] = row ? place->gap : INFINITY;
             memcpy(sites->normal + dim * sites->n++, place->normal, (size_t)dim * sizeof *place->normal);
@@ -665,7 +722,7 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
         uz_unit_normal(outward, normals + node * mesh->dim, mesh->dim);
         near[node] *= EDGE;
         status = uz_obstacle_row_gap(&first[i].gap, first[i].at, obstacle, mesh->xyz + node * mesh->dim, outward,
-                                     near[node], err);
+                                     near[node], BEFORE / EDGE * near[node], err);
         if (status != UZ_OK)
             break;
         sites->gap[i] = gaps[node] = first[i].gap.gap;

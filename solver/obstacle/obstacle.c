@@ -13,9 +13,6 @@
 /* A way out that is longer than this many depths leads along the obstacle. */
 #define MOST_BACK 4
 
-/* An edge no farther aside, in `clear`, is before a point. */
-#define BEFORE 0.25
-
 /* Grooves (rad): what is deeper than the first is no curve, below the second there is none. */
 #define DEEP_GROOVE 0.1
 #define NO_GROOVE   1e-5
@@ -116,19 +113,19 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
 }
 
 uz_status uz_obstacle_row_gap(uz_gap *out, double *at, const uz_obstacle *obstacle, const double *x,
-                              const double *outward, double clear, uz_error *err)
+                              const double *outward, double clear, double before, uz_error *err)
 {
     enum { STEPS = 40 };
     const int dim = obstacle->dim;
-    uz_gap there;
-    double back = 0, taken[3] = {x[0], x[1], dim == 3 ? x[2] : 0};
+    uz_gap there, own;
+    double back = 0, own_part = 0, taken[3] = {x[0], x[1], dim == 3 ? x[2] : 0};
     if (at)
         memcpy(at, x, (size_t)dim * sizeof *at);
     const uz_status status = uz_obstacle_gap(out, obstacle, x, err);
     if (status != UZ_OK || !obstacle->shape->has_edges || out->gap >= clear)
         return status;
     const double enough = fmax(clear, -out->gap), most = 1.01 * enough + MOST_BACK * fmax(0, -out->gap);
-    there = *out;
+    there = own = *out;
     /* a distance grows by no more than the way: no step leads past where it is enough */
     for (int k = 0; k < STEPS && there.gap < 0.999 * enough && back <= most; k++) {
         back += enough - there.gap;
@@ -143,24 +140,37 @@ uz_status uz_obstacle_row_gap(uz_gap *out, double *at, const uz_obstacle *obstac
     /* An edge that is hardly aside, and juts out that way, is as good as before the point: along the
      * direction from it to the point the normal would tilt as the point slides, and push it down a flank. */
     if (fabs(there.curvature * there.gap) >= 0.5) {
-        double high = 0, aside = 0, length = 0, before[3] = {0};
+        double high = 0, aside = 0, length = 0, at_edge[3] = {0};
         uz_gap edge;
         for (int c = 0; c < dim; c++)
             high -= (taken[c] - there.foot[c]) * outward[c];
         for (int c = 0; c < dim; c++)
             aside = hypot(aside, taken[c] - there.foot[c] + high * outward[c]);
-        const double left = high > 0 ? fmax(0, 1 - BEFORE * clear / aside) : 1;
+        const double left = high > 0 ? fmax(0, 1 - before / aside) : 1;
         for (int c = 0; c < dim; c++) {
             const double off = left * (taken[c] - there.foot[c]) - (1 - left) * high * outward[c];
-            before[c] = there.foot[c] + off;
+            at_edge[c] = there.foot[c] + off;
             length = hypot(length, off);
         }
-        if (uz_obstacle_gap(&edge, obstacle, before, NULL) == UZ_OK && edge.gap >= (1 - 1e-9) * length)
+        if (uz_obstacle_gap(&edge, obstacle, at_edge, NULL) == UZ_OK && edge.gap >= (1 - 1e-9) * length)
             memcpy(out->normal, edge.normal, sizeof out->normal);
+        /* A point outside of the obstacle is held by nothing but what is closest, unless it is before the edge: the
+         * edge's plane would hold it where it is free, and push it aside. */
+        own_part = own.gap > 0 ? fmin(fmax(aside / before - 1, 0), 1) : 0;
     }
     out->gap = 0;
     for (int c = 0; c < dim; c++)
         out->gap += (x[c] - there.foot[c]) * out->normal[c];
+    if (own_part > 0) {
+        double size = 0;
+        for (int c = 0; c < dim; c++) {
+            out->normal[c] = (1 - own_part) * out->normal[c] + own_part * own.normal[c];
+            size = hypot(size, out->normal[c]);
+        }
+        for (int c = 0; c < dim; c++)
+            out->normal[c] /= size;
+        out->gap = ((1 - own_part) * out->gap + own_part * own.gap) / size;
+    }
     if (at)
         memcpy(at, taken, (size_t)dim * sizeof *at);
     return UZ_OK;

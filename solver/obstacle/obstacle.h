@@ -62,13 +62,14 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
  * of the way out: amid its flanks it is on either of them by rounding, and a row along one pushes the body aside that
  * the crest should hold. So where an obstacle has edges, a point that is not `clear` of it is taken back into its body,
  * until it is as far out as it was in and `clear` at least, and has the tangent plane of the point that is closest
- * there: a flank's, or at the crest, up to a quarter of `clear` aside of it, the body's own, as a crest presses on a
- * face along the face's normal, and from there on one that turns to the flank's.
+ * there: a flank's, or at the crest, up to `before` aside of it, the body's own, as a crest presses on a face along the
+ * face's normal, and from there on one that turns to the flank's.
  *   outward  dim; the body's unit normal at x; zero, or a way that does not lead out soon: as uz_obstacle_gap
  *   clear    a length: edges are as if rounded with this radius
+ *   before   a length; farther aside, a point outside has the plane of what is closest to itself, from twice that on
  *   at       dim; out: where x was taken back to (NULL: not wanted) */
 uz_status uz_obstacle_row_gap(uz_gap *out, double *at, const uz_obstacle *obstacle, const double *x,
-                              const double *outward, double clear, uz_error *err);
+                              const double *outward, double clear, double before, uz_error *err);
 
 /* In a groove a point is held by more than the flank that is closest: what is free about it is where all of them let
  * it, and on the bisector the closest one is either by rounding. Adds to the `count` planes at `out` (room: `most`)

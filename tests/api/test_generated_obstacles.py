@@ -1,6 +1,7 @@
 """Some generated bodies on rigid obstacles, mirrored, turned and in other units; the
 generator makes as many as are asked for: `tests/extremes/generated_obstacles.py BUILD OUT.json COUNT`."""
 # not under ThreadSanitizer: about answers, not about threads
+import math
 import pathlib
 import sys
 
@@ -56,6 +57,33 @@ def test_a_ridge_that_slides_along_a_side(s):
             check(answer, element, n, slope, how, why)
             forces.append(answer["summary"]["contact"]["force"])
         check(max(abs(a - b) for a, b in zip(*forces)) < 0.01 * forces[0][1], element, n, slope, forces)
+
+
+def test_a_crest_beside_a_node(s):
+    """Steep or not it is the crest alone that presses, straight up: of 75 ridges 24 did not settle and others pushed the body aside,
+    (10.8, 10.8) or (39.7, 13.2) for (0, 47)."""
+    def scene(element, n, slope, off, how):
+        at = 2 + off * 4 / n
+        line = [[at + x, 0.1 - abs(x) * slope] for x in (-3, 0, 3)]
+        return {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"size": [4, 2], "cells": [n, n // 2], "element": element}},
+                            "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "top", "ux": 0, "uy": 0}],
+                            "kinematics": how, "contacts": [{"on": "bottom", "obstacle": {"polyline": {"points": line}}}]}}
+    daemon = generated_obstacles.contacts.Daemon(s)
+    for element, n, off in (("quad4", 8, 0.25), ("quad4", 16, 0.5), ("quad4", 32, 0.4), ("quad8", 8, 0.4), ("quad8", 16, 0.25)):
+        forces = []
+        for slope, how in ((1, "fixed"), (1, "moving"), (3, "moving")):
+            answer, why = daemon.answer(scene(element, n, slope, off, how))
+            check(answer, element, n, slope, off, how, why)
+            forces.append(answer["summary"]["contact"]["force"])
+        check(all(abs(f[0]) < 0.05 * f[1] and abs(f[1] / forces[0][1] - 1) < 0.05 for f in forces), element, n, off, forces)
+        check(math.dist(*forces[1:]) < 0.01 * forces[0][1], element, n, off, forces)
+
+
+def test_holes_and_bodies_of_revolution(s):
+    """Inside of circles, on and within polygons, and on rings, spheres and cones."""
+    for family in ("enclosing", "revolved"):
+        found = generated_obstacles.run(s, range(12), lambda *said, **_: None, refine=False, family=family)
+        check(found["solves"] > 30 and not found["failures"], family, found["failures"])
 
 
 def test_overlap_that_is_not_due_to_sliding(s):

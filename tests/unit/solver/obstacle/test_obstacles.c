@@ -386,27 +386,27 @@ TEST(rows_on_a_ridge)
     for (int k = -1; k <= 1; k++)
         for (int deep = 0; deep < 3; deep++) { /* in it, on it, over it by less than is clear */
             const double at[2] = {1e-15 * k, 1 - 0.2 * (deep - 1)};
-            CHECK(uz_obstacle_row_gap(&gap, NULL, o, at, down, 0.3, NULL) == UZ_OK);
+            CHECK(uz_obstacle_row_gap(&gap, NULL, o, at, down, 0.3, 0.075, NULL) == UZ_OK);
             near(gap.gap, -0.2 * (deep - 1), 1e-12, "gap");
             near(gap.normal[0], 0, 1e-12, "normal");
             near(gap.normal[1], 1, 1e-12, "normal");
         }
     for (int k = -1; k <= 1; k += 2) { /* beside the crest the plane turns, and further on it is the flank's */
         const double before[2] = {0.002 * k, 0.8}, near_it[2] = {0.02 * k, 0.8}, far_off[2] = {k, -0.2};
-        CHECK(uz_obstacle_row_gap(&gap, NULL, o, before, down, 0.01, NULL) == UZ_OK);
+        CHECK(uz_obstacle_row_gap(&gap, NULL, o, before, down, 0.01, 0.0025, NULL) == UZ_OK);
         near(gap.normal[0], 0, 1e-12, "normal");
         near(gap.gap, -0.2, 1e-12, "gap");
-        CHECK(uz_obstacle_row_gap(&gap, NULL, o, near_it, down, 0.01, NULL) == UZ_OK);
+        CHECK(uz_obstacle_row_gap(&gap, NULL, o, near_it, down, 0.01, 0.0025, NULL) == UZ_OK);
         CHECK(k * gap.normal[0] > 0.01 && k * gap.normal[0] < 0.2 && gap.gap > -0.21 && gap.gap < -0.19);
-        CHECK(uz_obstacle_row_gap(&gap, NULL, o, far_off, down, 0.01, NULL) == UZ_OK);
+        CHECK(uz_obstacle_row_gap(&gap, NULL, o, far_off, down, 0.01, 0.0025, NULL) == UZ_OK);
         near(gap.normal[0], k * s, 1e-12, "normal");
         near(gap.gap, -0.2 * s, 1e-12, "gap");
     }
     const double beside[2] = {0.1, 0}, none[2] = {0, 0}, amid[2] = {0, 0.5};
-    CHECK(uz_obstacle_row_gap(&gap, NULL, b, beside, down, 0.01, NULL) == UZ_OK);
+    CHECK(uz_obstacle_row_gap(&gap, NULL, b, beside, down, 0.01, 0.0025, NULL) == UZ_OK);
     near(gap.normal[0], -1, 1e-12, "normal");
     near(gap.gap, -0.1, 1e-12, "gap");
-    CHECK(uz_obstacle_row_gap(&gap, NULL, o, amid, none, 0.01, NULL) == UZ_OK); /* of a node of no side */
+    CHECK(uz_obstacle_row_gap(&gap, NULL, o, amid, none, 0.01, 0.0025, NULL) == UZ_OK); /* of a node of no side */
     near(gap.gap, -0.5 * s, 1e-12, "gap");
     uz_obstacle_free(o);
     uz_obstacle_free(b);
@@ -431,7 +431,7 @@ TEST(flanks_of_grooves)
         for (int k = 0; k < 5; k++) {
             const double off = (double[]){0, 0.1, -0.1, 0, 0}[k], high = (double[]){0.2, 0.2, 0.2, -0.2, 0}[k];
             const double at[3] = {off, form ? 0.1 : high, high}, down[3] = {0, -up[1], -up[2]};
-            CHECK_INT(uz_obstacle_row_gap(&first, taken, o, at, down, 0.25, NULL), UZ_OK);
+            CHECK_INT(uz_obstacle_row_gap(&first, taken, o, at, down, 0.25, 0.0625, NULL), UZ_OK);
             const int found = uz_obstacle_flanks(out, 0, 3, o, at, taken, &first, way);
             bool seen[2] = {false};
             for (int j = -1; j < found; j++) {
@@ -461,7 +461,7 @@ TEST(flanks_of_grooves)
     const double at[][2] = {{0, -0.1}, {0.7, 0}, {0.03, 0.05}};
     for (int k = 0; k < 3; k++) {
         uz_obstacle *o = made(&none[k], UZ_PLANE_STRAIN);
-        CHECK_INT(uz_obstacle_row_gap(&first, taken, o, at[k], (double[]){0, -1}, 0.25, NULL), UZ_OK);
+        CHECK_INT(uz_obstacle_row_gap(&first, taken, o, at[k], (double[]){0, -1}, 0.25, 0.0625, NULL), UZ_OK);
         const int found = uz_obstacle_flanks(out, 0, 3, o, at[k], taken, &first, way);
         CHECK_MSG(found == (k == 1), "obstacle %d: %d flanks", k, found);
         uz_obstacle_free(o);
