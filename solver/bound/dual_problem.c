@@ -22,9 +22,11 @@
 #include <string.h>
 
 enum {
-    AIRY = 12,                                    /* most functions of a part: of degree 2 */
-    MOST = UZ_BOUND_PARTS * AIRY,                 /* of an element */
-    OUTER = UZ_BOUND_PARTS * UZ_BOUND_MOMENTS * 2 /* moments of its sides */
+    AIRY = 12,                                     /* most functions of a part: of degree 2 */
+    MOST = UZ_BOUND_PARTS * AIRY,                  /* of an element */
+    OUTER = UZ_BOUND_PARTS * UZ_BOUND_MOMENTS * 2, /* moments of its sides */
+    KEY = 32,
+    MADE = 4 /* elements that are kept: meshes have many alike */
 };
 static const double STATIONS[2][UZ_BOUND_MOMENTS] = {{0, 1}, {0, 0.5, 1}}; /* along an edge, by degree */
 
@@ -37,9 +39,14 @@ typedef struct {
     double Z[MOST * MOST];           /* all x kept */
     double A[(MOST + OUTER) * MOST]; /* kept + outer rows: [L; B] */
     double y[MOST], rest[OUTER];     /* L^-1 Z'f; D_0 */
+    double key[KEY];                 /* what these follow from: its first 6 numbers are the shape */
+    bool made;
+    int64_t last; /* element that it was used for */
 } macro;
 
-static bool make(macro *m, const uz_bound_body *body, int64_t element);
+static macro *make(macro *kept, const uz_bound_body *body, int64_t element);
+static inline double dot(int n, const double *x, const double *y);
+static inline void add(int n, double alpha, const double *x, double *y);
 static void spread(macro *m, double *stress, const double *v);
 
 /* ---- the problem */
@@ -70,8 +77,8 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     const int most = OUTER * (OUTER + 1) / 2;
     int64_t count = 0, room = 0, *row = NULL, *col = NULL;
     double *val = NULL;
-    macro *m = uz_alloc(1, sizeof *m);
-    uz_status status = m ? UZ_OK : UZ_ERR_MEMORY;
+    macro *kept = uz_alloc_zero(MADE, sizeof *kept), *m = NULL;
+    uz_status status = kept ? UZ_OK : UZ_ERR_MEMORY;
     for (int64_t e = 0; e < n && status == UZ_OK; e++) {
         int64_t dof_of[OUTER];
         double value[OUTER], K[OUTER * OUTER];
@@ -82,7 +89,7 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
                 break;
             }
         }
-        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !make(m, body, e)) {
+        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, body, e))) {
             status = fail_at(stop, e, err);
             break;
         }
@@ -113,7 +120,7 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     free(row);
     free(col);
     free(val);
-    free(m);
+    free(kept);
     return status;
 }
 
@@ -199,14 +206,14 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
 {
     const int64_t n = body->model->mesh.n_elements;
     uz_status status = UZ_OK;
-    macro *m = uz_alloc(1, sizeof *m);
-    if (!m)
+    macro *kept = uz_alloc_zero(MADE, sizeof *kept), *m = NULL;
+    if (!kept)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of an element");
     memset(stress, 0, (size_t)n * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 * sizeof *stress);
     for (int64_t e = 0; e < n && status == UZ_OK; e++) {
         int64_t dof_of[OUTER];
         double value[OUTER];
-        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !make(m, body, e)) {
+        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, body, e))) {
             status = fail_at(stop, e, err);
             break;
         }
@@ -216,11 +223,25 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
                 value[i] = v[dof_of[i]];
         spread(m, stress + e * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, value);
     }
-    free(m);
+    free(kept);
     return status;
 }
 
 /* ---- one element */
+
+static inline double dot(int n, const double *x, const double *y)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += x[i] * y[i];
+    return sum;
+}
+
+static inline void add(int n, double alpha, const double *x, double *y)
+{
+    for (int i = 0; i < n; i++)
+        y[i] += alpha * x[i];
+}
 
 /* The stresses of the Airy functions at a point: S[component][function]. They are polynomials in coordinates that the
  * element's shape is about a square in, however thin it is. */
@@ -298,7 +319,7 @@ static bool span_null_space(double *Z, double *M, int n, int columns, int rank)
         int best = j;
         largest = -1;
         for (int c = j; c < columns; c++) {
-            const double size = uz_norm(n - j, M + j + n * c);
+            const double size = sqrt(dot(n - j, M + j + n * c, M + j + n * c));
             best = size > largest ? c : best;
             largest = fmax(largest, size);
         }
@@ -314,11 +335,11 @@ static bool span_null_space(double *Z, double *M, int n, int columns, int rank)
         }
         double *h = M + n * j; /* becomes the unit vector of the reflection, from row j on */
         h[j] += h[j] < 0 ? -largest : largest;
-        const double size = uz_norm(n - j, h + j);
+        const double size = sqrt(dot(n - j, h + j, h + j));
         for (int i = j; i < n; i++)
             h[i] /= size;
         for (int c = j + 1; c < columns; c++)
-            uz_axpy(n - j, -2 * uz_dot(n - j, h + j, M + j + n * c), h + j, M + j + n * c);
+            add(n - j, -2 * dot(n - j, h + j, M + j + n * c), h + j, M + j + n * c);
         if (j + 1 == rank && rank == columns)
             largest = 0;
     }
@@ -328,7 +349,7 @@ static bool span_null_space(double *Z, double *M, int n, int columns, int rank)
         memset(v, 0, sizeof v);
         v[c] = 1;
         for (int j = rank - 1; j >= 0; j--)
-            uz_axpy(n - j, -2 * uz_dot(n - j, M + j + n * j, v + j), M + j + n * j, v + j);
+            add(n - j, -2 * dot(n - j, M + j + n * j, v + j), M + j + n * j, v + j);
         memcpy(Z + n * (c - rank), v, (size_t)n * sizeof *v);
     }
     return true;
@@ -397,13 +418,16 @@ static void scale(macro *m)
         m->times[i] = 1 / largest[i];
 }
 
-static bool make(macro *m, const uz_bound_body *body, int64_t element)
+/* Turns to an element. True: it is the one that was made there, but for where it stands and rounding of the shape, of
+ * which what the stress then lacks of equilibrium is found as any other. */
+static bool place(double key_of[KEY], macro *m, const uz_bound_body *body, int64_t element)
 {
-    static const double AXES[2][2] = {{1, 0}, {0, 1}};
     const uz_mesh *mesh = &body->model->mesh;
-    int count;
+    const uz_lame lame = uz_element_material(body->model, element)->lame;
+    int count, at = 6;
     const int64_t *node = uz_mesh_element(mesh, element, &count);
-    double inner[OUTER * MOST] = {0}, outer[OUTER * MOST] = {0}, F[AIRY * AIRY], f[AIRY];
+    double key[KEY] = {0}, size = 0;
+    bool same = m->made;
     m->body = body;
     m->element = element;
     m->degree = body->degree;
@@ -412,8 +436,51 @@ static bool make(macro *m, const uz_bound_body *body, int64_t element)
     m->all = m->parts * m->airy;
     m->outer = m->parts * 2 * (m->degree + 1);
     uz_bound_centre(m->centre, body, element);
-    for (int k = 0; k < m->parts; k++)
+    for (int k = 0; k < m->parts; k++) {
+        const uz_bound_edge *edge = &body->edge[body->edge_of[4 * element + k]];
         memcpy(m->corner[k], mesh->xyz + 2 * node[k], sizeof m->corner[k]);
+        for (int c = 0; c < 2 && k > 0; c++) {
+            key[2 * (k - 1) + c] = m->corner[k][c] - m->corner[0][c];
+            size = fmax(size, fabs(key[2 * (k - 1) + c]));
+        }
+        key[at++] = edge->node[0] == node[k];
+        memcpy(key + at, edge->axis, sizeof edge->axis);
+        at += 4;
+    }
+    const double rest[] = {m->parts,
+                           lame.lambda,
+                           lame.mu,
+                           body->force[2 * element],
+                           body->force[2 * element + 1],
+                           body->free_strain ? body->free_strain[element] : 0};
+    memcpy(key + KEY - 6, rest, sizeof rest);
+    for (int i = 0; i < KEY && same; i++)
+        same = fabs(key[i] - m->key[i]) <= (i < 6 ? 1e-13 * size : 0);
+    if (!same)
+        memcpy(key_of, key, sizeof key);
+    return same;
+}
+
+/* One of `kept`, made there unless one like it is; NULL: that cannot be. */
+static macro *make(macro *kept, const uz_bound_body *body, int64_t element)
+{
+    static const double AXES[2][2] = {{1, 0}, {0, 1}};
+    const uz_mesh *mesh = &body->model->mesh;
+    int count;
+    const int64_t *node = uz_mesh_element(mesh, element, &count);
+    double key[KEY];
+    macro *m = kept;
+    double inner[OUTER * MOST] = {0}, outer[OUTER * MOST] = {0}, F[AIRY * AIRY], f[AIRY];
+    for (int i = 0; i < MADE; i++) {
+        if (place(key, &kept[i], body, element)) {
+            kept[i].last = element;
+            return &kept[i];
+        }
+        m = kept[i].last < m->last || !kept[i].made ? &kept[i] : m; /* the one not used for longest */
+    }
+    memcpy(m->key, key, sizeof m->key);
+    m->made = false;
+    m->last = element;
     scale(m);
     memset(m->rest, 0, sizeof m->rest);
     for (int k = 0; k < m->parts; k++) {
@@ -428,7 +495,7 @@ static bool make(macro *m, const uz_bound_body *body, int64_t element)
     const int rank = m->outer - (m->parts == 4 ? 1 : 0);
     m->kept = m->all - rank;
     if (!span_null_space(m->Z, inner, m->all, m->outer, rank))
-        return false;
+        return NULL;
     const int ld = m->kept + m->outer;
     memset(m->A, 0, sizeof m->A);
     memset(m->y, 0, sizeof m->y);
@@ -438,19 +505,20 @@ static bool make(macro *m, const uz_bound_body *body, int64_t element)
             const double *z = m->Z + m->all * j + part * m->airy;
             double Fz[AIRY] = {0};
             for (int b = 0; b < m->airy; b++)
-                uz_axpy(m->airy, z[b], F + m->airy * b, Fz);
+                add(m->airy, z[b], F + m->airy * b, Fz);
             for (int i = j; i < m->kept; i++)
-                m->A[i + ld * j] += uz_dot(m->airy, m->Z + m->all * i + part * m->airy, Fz);
-            m->y[j] += uz_dot(m->airy, z, f);
+                m->A[i + ld * j] += dot(m->airy, m->Z + m->all * i + part * m->airy, Fz);
+            m->y[j] += dot(m->airy, z, f);
         }
     }
     for (int j = 0; j < m->kept; j++)
         for (int r = 0; r < m->outer; r++)
-            m->A[m->kept + r + ld * j] = uz_dot(m->all, outer + r * m->all, m->Z + m->all * j);
+            m->A[m->kept + r + ld * j] = dot(m->all, outer + r * m->all, m->Z + m->all * j);
     if (!uz_block_factor(m->kept, m->outer, m->A, ld))
-        return false;
+        return NULL;
     uz_trsv_lower(m->kept, m->A, ld, m->y, false);
-    return true;
+    m->made = true;
+    return m;
 }
 
 static void spread(macro *m, double *stress, const double *v)
@@ -458,10 +526,10 @@ static void spread(macro *m, double *stress, const double *v)
     const int ld = m->kept + m->outer, points = m->degree == 1 ? 3 : 6;
     double z[MOST], s[MOST] = {0};
     for (int k = 0; k < m->kept; k++)
-        z[k] = uz_dot(m->outer, m->A + m->kept + ld * k, v) - m->y[k];
+        z[k] = dot(m->outer, m->A + m->kept + ld * k, v) - m->y[k];
     uz_trsv_lower(m->kept, m->A, ld, z, true);
     for (int k = 0; k < m->kept; k++)
-        uz_axpy(m->all, z[k], m->Z + m->all * k, s);
+        add(m->all, z[k], m->Z + m->all * k, s);
     for (int part = 0; part < m->parts; part++) {
         const double *corner[3] = {m->corner[part], m->corner[(part + 1) % m->parts], m->centre};
         for (int i = 0; i < points; i++) {
@@ -471,7 +539,7 @@ static void spread(macro *m, double *stress, const double *v)
             airy(S, m, at);
             balance(to, m, at);
             for (int c = 0; c < 3; c++)
-                to[c] += uz_dot(m->airy, S[c], s + part * m->airy);
+                to[c] += dot(m->airy, S[c], s + part * m->airy);
         }
     }
 }

@@ -132,12 +132,15 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
                                     : "there is no answer to bound the error of");
         return;
     }
+    uz_cache *own_cache = cache ? NULL : uz_cache_new(SIZE_MAX); /* both of its problems have one K */
+    g.cache = cache ? cache : own_cache;
     uz_status status = uz_body_model_outline(&model, &problem->scene, &err);
     if (status == UZ_OK)
         status = prove(result, &g, &model, &problem->scene, &err);
     uz_bound_body_clear(&g.body);
     uz_body_model_clear(&model);
     uz_qp_clear(&g.qp);
+    uz_cache_free(own_cache);
     free(g.dof);
     free(g.stress);
     free(g.checked.residual);
