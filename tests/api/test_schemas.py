@@ -8,6 +8,8 @@ import json
 import pathlib
 import sys
 
+import service
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SCHEMAS = {path.name: json.loads(path.read_text()) for path in sorted((ROOT / "schemas").glob("*.json"))}
 OPENAPI = SCHEMAS.pop("openapi.json")
@@ -71,6 +73,21 @@ def test_requests_are_judged_alike():
     assert len(set(names)) == len(names) > 100
     wrong = [item["name"] for item in requests if check.is_valid(item["body"]) != item["valid"]]
     assert not wrong, wrong
+
+
+def test_a_wrong_number_stays_where_long_lists_are_cut():
+    """service.py cuts the replies of all tests before they are checked."""
+    count = {"type": "integer", "minimum": 0, "maximum": 9}
+    numbers = jsonschema.Draft202012Validator({"items": count})
+    rows = jsonschema.Draft202012Validator({"items": {"items": count, "minItems": 2}})
+    for place in (0, 500, 999):
+        for wrong in (-1, 10, 0.5, None, "x", [7]):
+            for judge, right, bad in ((numbers, 7, wrong), (rows, [7, 7], [7, wrong]), (rows, [7, 7], [7])):
+                told = [right] * 1000
+                assert judge.is_valid(service.shortened(told))
+                told[place] = bad
+                assert not judge.is_valid(service.shortened(told)), (place, bad)
+    assert len(service.shortened([7] * 1000)) < 20
 
 
 def test_request_objects_are_strict():
