@@ -195,6 +195,10 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
  * and the error is relative to the norm of the strain that has: free expansion would hide it. *share (may be NULL):
  * that norm over ||u_h||_E, 1 without temperature. A body that is carried along or expands freely has no error. */
 double uz_estimate_mesh_error(double *share, const uz_body_model *model, const uz_scene *scene, const double *nodal);
+/* The same, and what each element has of the square of the error, not relative: eta2, n_elements, or NULL; all 0 where
+ * the error is. */
+double uz_estimate_element_errors(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
+                                  const double *nodal);
 
 /* *out: n_elements, expansion times rise of temperature by the scene's loads; NULL where there are no such loads. The
  * caller frees it. */

@@ -12,6 +12,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
     const uz_body_model *model;
@@ -45,9 +46,17 @@ static void compare(void *ctx, const uz_strain_group *group)
 
 double uz_estimate_mesh_error(double *share, const uz_body_model *model, const uz_scene *scene, const double *nodal)
 {
+    return uz_estimate_element_errors(NULL, share, model, scene, nodal);
+}
+
+double uz_estimate_element_errors(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
+                                  const double *nodal)
+{
     double *free_strain = NULL;
     if (share)
         *share = 1;
+    if (eta2)
+        memset(eta2, 0, (size_t)model->mesh.n_elements * sizeof *eta2);
     if (scene && uz_free_strains(&free_strain, model, scene, NULL) != UZ_OK)
         return NAN;
     /* A translation strains nothing, unless along the radius of rings: what its strains come to is rounding. */
@@ -58,7 +67,7 @@ double uz_estimate_mesh_error(double *share, const uz_body_model *model, const u
     if (is_translation)
         return 0;
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
-    estimate x = {.model = model};
+    estimate x = {.model = model, .sums = {.eta2_of = eta2}};
     const uz_strain_work work = {make_rule, compare, &x};
     uz_status status = uz_nodal_strains_recover(&x.nodal, &from, UZ_CONTINUE_LINEAR, NULL, NULL);
     const int n = x.nodal.strains;

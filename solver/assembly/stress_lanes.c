@@ -196,6 +196,8 @@ INLINE void compare(uz_stress_sums *sums, const double *rows, const uz_strain_gr
     }
     for (int l = 0; l < g->count; l++) {
         sums->eta2 += eta[l];
+        if (sums->eta2_of)
+            sums->eta2_of[g->element[l]] = eta[l];
         sums->stress += energy[0][l];
         sums->whole += energy[size > n + 1][l];
     }

@@ -12,9 +12,10 @@ void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
                         const int64_t *const place[UZ_STRAIN_LANES], const double share[][UZ_ELEMENT_SAMPLES]);
 /* Integrals over elements. */
 typedef struct {
-    double eta2;   /* of (s* - s)' C^-1 (s* - s) */
-    double stress; /* of strain' C strain, of the strain that makes stress */
-    double whole;  /* the same of all of the strain */
+    double eta2;     /* of (s* - s)' C^-1 (s* - s) */
+    double stress;   /* of strain' C strain, of the strain that makes stress */
+    double whole;    /* the same of all of the strain */
+    double *eta2_of; /* NULL, or eta2 of each element */
 } uz_stress_sums;
 /* rows: stresses s*. */
 void uz_stress_rows_compare(uz_stress_sums *sums, const double *rows, int size, const uz_strain_group *group,
