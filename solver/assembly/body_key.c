@@ -165,7 +165,7 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
 
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err)
 {
-    static const char format[] = "uzawa body 4";
+    static const char format[] = "uzawa body 5";
     uz_buffer key = {0};
     char *text = NULL;
     const int dim = uz_scene_dim(scene);
@@ -189,6 +189,9 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
             put_double(&key, grading == 0 ? 1 : grading);
         }
     }
+    put_int(&key, scene->n_bisected);
+    if (scene->n_bisected > 0)
+        uz_buffer_put(&key, scene->bisected, (size_t)scene->n_bisected * sizeof *scene->bisected);
     put_int(&key, scene->n_materials);
     for (int64_t i = 0; i < scene->n_materials; i++) {
         put_name(&key, scene->materials[i].on, sizeof scene->materials[i].on);

@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/bisect.h"
 #include "scene/corner_table.h"
 
 #include <math.h>
@@ -114,6 +115,10 @@ uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
 {
     uz_status status = scene->source == UZ_MESH_GIVEN ? uz_mesh_from_given(out, &scene->given, uz_scene_dim(scene), err)
                                                       : uz_mesh_from_box(out, &scene->box, err);
+    if (status == UZ_OK && scene->refine)
+        status = uz_mesh_check_bisection(out, err);
+    if (status == UZ_OK && scene->n_bisected > 0)
+        status = uz_mesh_bisect(out, scene->bisected, scene->n_bisected, err);
     if (status == UZ_OK)
         status = uz_mesh_join_groups(out, scene, err);
     if (status != UZ_OK)

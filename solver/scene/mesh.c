@@ -21,6 +21,7 @@ void uz_mesh_clear(uz_mesh *mesh)
     free(mesh->kind);
     free(mesh->first);
     free(mesh->node);
+    free(mesh->from);
     memset(mesh, 0, sizeof *mesh);
 }
 

@@ -30,6 +30,8 @@ typedef struct {
     int64_t n_elements, *element; /* elements only, ascending */
 } uz_group;
 
+enum { UZ_BISECT_FROM = 8 };
+
 typedef struct {
     int dim;
     int64_t n_nodes, n_elements;
@@ -40,6 +42,8 @@ typedef struct {
     bool uniform; /* every element is a box of size `cell` and of one kind: they share one stiffness matrix */
     double cell[3];
     double extent;    /* diagonal of the bounding box */
+    int64_t n_given;  /* refined (bisect.h): nodes from this one on lie amid others, ... */
+    int64_t *from;    /* ... node i amid from[(i - n_given) * UZ_BISECT_FROM + k], up to k = 7 or a -1 */
     int64_t n_unused; /* nodes of a file that no element uses: left out, and the others numbered anew in their order */
     uz_group *groups;
     int64_t n_groups;

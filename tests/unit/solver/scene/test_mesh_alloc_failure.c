@@ -74,3 +74,20 @@ TEST(boxes)
 {
     CHECK(fail_each(make_box) > 10);
 }
+
+static uz_status refine_box(uz_error *err)
+{
+    static const int64_t MARKED[] = {2, 0, 7, 1, 12};
+    uz_mesh mesh;
+    uz_scene scene = {.model = UZ_SOLID, .refine = true, .bisected = MARKED, .n_bisected = 5};
+    scene.box = (uz_box){.size = {1, 1, 1}, .cells = {2, 1, 1}, .element = "tet10", .dim = 3};
+    const uz_status status = uz_mesh_from_scene(&mesh, &scene, err);
+    CHECK((mesh.xyz != NULL) == (status == UZ_OK));
+    uz_mesh_clear(&mesh);
+    return status;
+}
+
+TEST(refined_boxes)
+{
+    CHECK(fail_each(refine_box) > 30);
+}
