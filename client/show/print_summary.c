@@ -132,7 +132,7 @@ static void print_outcome(FILE *to, const json_t *summary)
     }
 }
 
-/* A box whose cells were chosen: the grid of the answer, and all that were tried. */
+/* A mesh that was chosen: the grid of the answer, and all that were tried. */
 static void print_ladder(FILE *to, const json_t *summary)
 {
     const json_t *ladder = client_json_at(summary, "mesh.ladder"), *level;
@@ -141,8 +141,13 @@ static void print_ladder(FILE *to, const json_t *summary)
     if (!json_is_array(ladder))
         return;
     label(to, "mesh");
-    print_cells(to, client_json_at(summary, "mesh.cells"));
-    fprintf(to, " cells, chosen after %zu grid%s:\n", json_array_size(ladder), json_array_size(ladder) > 1 ? "s" : "");
+    const bool refined = json_is_true(client_json_at(summary, "mesh.refined"));
+    if (refined)
+        fputs(number_in_words(d, summary, "mesh.elements", 9), to);
+    else
+        print_cells(to, client_json_at(summary, "mesh.cells"));
+    fprintf(to, " %s after %zu grid%s:\n", refined ? "elements, refined" : "cells, chosen", json_array_size(ladder),
+            json_array_size(ladder) > 1 ? "s" : "");
     fprintf(to, "%12s%9s  %10s  %10s  %10s  %s\n", "", "unknowns", "mesh error", "certified", "iterations", "time");
     json_array_foreach((json_t *)ladder, i, level)
     {
@@ -151,7 +156,10 @@ static void print_ladder(FILE *to, const json_t *summary)
                 number_in_words(certified, level, "certified_error", 2),
                 number_in_words(iterations, level, "iterations", 9),
                 client_format_seconds(seconds, sizeof seconds, client_json_number(level, "seconds")));
-        print_cells(to, json_object_get(level, "cells"));
+        if (refined)
+            fprintf(to, "%s elements", number_in_words(d, level, "elements", 9));
+        else
+            print_cells(to, json_object_get(level, "cells"));
         fputc('\n', to);
     }
 }

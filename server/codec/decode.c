@@ -155,14 +155,14 @@ static bool check_sizes(const codec_request *request, problem_details *problem)
     return true;
 }
 
-/* A box whose cells are to be chosen has no mesh yet that a vector could belong to, and no other rule than the error
- * that they could be chosen by. */
+/* A box whose cells are to be chosen, or a mesh that is to be refined, is none yet that a vector could belong to, and
+ * has no other rule than the error that it could be chosen by. */
 static bool decode_automatic(codec_request *out, decoding *d, const json_value *root)
 {
     const json_value *solver = json_get(root, "solver"), *start = json_get(solver, "warm_start");
-    const json_value *box = json_get(json_get(json_get(root, "problem"), "mesh"), "box");
+    const json_value *mesh = json_get(json_get(root, "problem"), "mesh"), *refine = json_get(mesh, "refine");
     const uz_problem *p = &out->problem;
-    if (p->kind != UZ_PROBLEM_SCENE || !p->scene.box.automatic)
+    if (p->kind != UZ_PROBLEM_SCENE || !(p->scene.box.automatic || p->scene.refine))
         return true;
     const json_value *accuracy = json_get(solver, "accuracy");
     const double total = out->settings.total_error;
@@ -171,17 +171,19 @@ static bool decode_automatic(codec_request *out, decoding *d, const json_value *
     if (total > 0) /* what the cells are chosen by */
         out->settings.relative_error = total;
     out->settings.total_error = 0;
-    if (json_get(root, "answer"))
-        problem_set(d->problem, 422, "not_allowed", json_get(box, "cells"),
+    if (json_get(root, "answer") && refine)
+        problem_set(d->problem, 422, "not_allowed", refine,
+                    "An answer belongs to a mesh, and this one is still to be refined: leave out \"refine\".");
+    else if (json_get(root, "answer"))
+        problem_set(d->problem, 422, "not_allowed", json_get(json_get(mesh, "box"), "cells"),
                     "An answer belongs to a mesh: give the numbers of its cells in place of \"auto\".");
     else if (out->settings.stopping == UZ_STOP_PAPER)
         problem_set(d->problem, 422, "not_allowed", json_get(solver, "stopping"),
-                    "The paper's rule bounds no error that the cells of the box could be chosen by.");
+                    "The paper's rule bounds no error that the mesh could be chosen by.");
     else if (start)
         problem_set(
             d->problem, 422, "not_allowed", start,
-            "Reactions belong to a mesh, and the cells of the box are still to be chosen: each grid starts from "
-            "the one before it.");
+            "Reactions belong to a mesh, and this one is still to be chosen: each grid starts from the one before it.");
     else
         return true;
     return false;

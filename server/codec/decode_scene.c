@@ -247,6 +247,7 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     out->all_candidates = json_text_is(json_get(object, "candidates"), "all");
     if (box ? !decode_box(out, d, box) : !decode_mesh(out, d, mesh))
         return false;
+    out->refine = json_get(mesh, "refine") != NULL; /* "auto" is all that it can be */
     out->materials = decode_room(d, materials, sizeof *out->materials, &out->n_materials);
     for (int64_t i = 0; i < out->n_materials; i++) {
         const json_value *item = &materials->items[i];

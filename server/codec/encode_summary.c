@@ -203,16 +203,21 @@ static void put_integers(text *t, const char *key, const int64_t *x, int64_t n)
     text_close(t, ']');
 }
 
-/* A box whose cells were chosen: the grids that were tried for it. */
+/* Cells that were chosen, elements that were bisected: the grids that were tried. */
 static void put_grids(text *t, const uz_grid_sequence *grids)
 {
     text_open(t, "mesh", '{');
-    put_integers(t, "cells", grids->cells, grids->dim);
+    if (grids->cells[0] > 0)
+        put_integers(t, "cells", grids->cells, grids->dim);
+    text_integer(t, "elements", grids->n_elements);
+    text_bool(t, "refined", grids->refined);
     text_open(t, "ladder", '[');
     for (int i = 0; i < grids->count; i++) {
         const uz_grid_level *level = &grids->level[i];
         text_open(t, NULL, '{');
-        put_integers(t, "cells", level->cells, grids->dim);
+        if (level->cells[0] > 0)
+            put_integers(t, "cells", level->cells, grids->dim);
+        text_integer(t, "elements", level->n_elements);
         text_integer(t, "d", level->d);
         text_integer(t, "iterations", level->iterations);
         put_named(t,

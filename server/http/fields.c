@@ -93,8 +93,8 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
     uz_field_source answer = {.u = NULL};
     uz_error err = {0};
     uz_status status = UZ_ERR_ARGUMENT;
-    double *u = NULL, *r = NULL, *g = NULL, *cells = NULL, *place = NULL;
-    int64_t n_gaps = 0, n_cells = 0, n_place = 0;
+    double *u = NULL, *r = NULL, *g = NULL, *cells = NULL, *place = NULL, *bisected = NULL;
+    int64_t n_gaps = 0, n_cells = 0, n_place = 0, *list = NULL;
     store_status found = store_get_vector(s, id, number, "displacements", &u, &answer.n_u);
     if (found == STORE_OK)
         found = store_get_vector(s, id, number, "reactions", &r, &answer.m);
@@ -106,6 +106,13 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
             scene.box.cells[i] = (int64_t)cells[i];
         scene.box.automatic = false;
     }
+    if (found == STORE_OK && scene.refine) {
+        found = store_get_vector(s, id, 0, "bisected", &bisected, &scene.n_bisected);
+        list = found == STORE_OK ? calloc((size_t)scene.n_bisected + 1, sizeof *list) : NULL;
+        for (int64_t i = 0; list && i < scene.n_bisected; i++)
+            list[i] = (int64_t)bisected[i];
+        scene.bisected = list;
+    }
     if (found == STORE_OK) { /* where its contacts were found */
         found = store_get_vector(s, id, number, "place", &place, &n_place);
         found = found == STORE_NOT_FOUND ? STORE_OK : found;
@@ -115,12 +122,14 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
     answer.r = r;
     answer.g = n_gaps == answer.m ? g : NULL;
     if (found == STORE_OK)
-        status = run(out, &scene, &answer, which, &hooks, &err);
+        status = scene.refine && !list ? UZ_ERR_MEMORY : run(out, &scene, &answer, which, &hooks, &err);
     free(u);
     free(r);
     free(g);
     free(cells);
     free(place);
+    free(bisected);
+    free(list);
     if (found != STORE_OK)
         reply_store_failure(context, found, reply);
     else if (status != UZ_OK)

@@ -268,8 +268,9 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         const size_t limit = request.settings.memory_limit = work_settings(context->work)->solve_bytes;
         int64_t m, n_u;
         bool known = false;
-        if (!request.settings.semidefinite && codec_request_sizes(&request, &m, &n_u, &ignored) &&
-            (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit)) {
+        if (!request.settings.semidefinite && !request.problem.scene.refine &&
+            codec_request_sizes(&request, &m, &n_u, &ignored) && (double)n_u < PREDICTED_MOST &&
+            (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit)) {
             pthread_mutex_lock(&context->predict_lock);
             uz_thread_init();
             known = !api_is_over(&asker) &&
@@ -397,8 +398,8 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
             /* A run on a grid that nobody gave can't go on: another accuracy asks for another grid. */
             reply_refuse(
                 reply, 409, "mesh_is_chosen", "The job chose its mesh",
-                "the cells of its box were chosen for its accuracy: send the problem again with another accuracy, or "
-                "with the cells of this job's summary");
+                "its mesh was made for its accuracy: send the problem again with another accuracy, or a box with the "
+                "cells of this job's summary");
         } else {
             make_request(context, rq, &old, old_body, old_len, &body, &len, &made, reply);
             free(old_body); /* as large as the new one: not kept while the client waits */

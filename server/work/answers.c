@@ -28,8 +28,8 @@ static bool add_contact_nodes(answer_parts *to, const uz_result *result)
     return to->contact_nodes != NULL;
 }
 
-/* The mesh is the same for all cases: dim, nodes, contact_nodes; cells where they were chosen, which the request does
- * not say. */
+/* The mesh is the same for all cases: dim, nodes, contact_nodes; where it was chosen also what the request does not
+ * say, cells and what was bisected. */
 static bool add_places(answers *a, answer_parts *to, const uz_result *result, bool is_scene)
 {
     a->dim = is_scene ? result->mesh.dim : 0;
@@ -40,6 +40,15 @@ static bool add_places(answers *a, answer_parts *to, const uz_result *result, bo
     for (int i = 0; result->grids && i < 3; i++)
         a->cells[i] = (double)result->grids->cells[i];
     add_vector(to, "cells", result->grids ? a->cells : NULL, 3);
+    if (result->grids && result->grids->refined) {
+        const int64_t n = result->grids->n_bisected;
+        a->bisected = calloc((size_t)n + 1, sizeof *a->bisected);
+        for (int64_t i = 0; a->bisected && i < n; i++)
+            a->bisected[i] = (double)result->grids->bisected[i];
+        add_vector(to, "bisected", a->bisected, n);
+        if (!a->bisected)
+            return false;
+    }
     return !result->mesh.contact_node || add_contact_nodes(to, result);
 }
 
@@ -197,5 +206,6 @@ void answers_clear(answers *a)
     free(a->parts);
     free(a->cases);
     free(a->findings);
+    free(a->bisected);
     *a = (answers){.n = 0};
 }

@@ -8,7 +8,7 @@
 #include "work/starts.h"
 #include "work/trade.h"
 
-#define ANSWER_VECTORS 12
+#define ANSWER_VECTORS 13
 
 /* What one case, or the job, leaves; owns everything but the vectors that are the result's own. */
 typedef struct {
@@ -26,7 +26,7 @@ typedef struct {
     answer_parts shared;     /* with cases: the job's own summary, and what all cases have in common */
     store_answer *cases;     /* n_cases */
     codec_finding *findings; /* of the request's assertions, over all cases */
-    double dim, cells[3];
+    double dim, cells[3], *bisected;
 } answers;
 
 /* Fills outcome->whole and outcome->cases from the results, which must outlive them. False: no memory. The caller

@@ -190,21 +190,26 @@ typedef struct {
     char why[160]; /* asked for and not proved: a clause; else "" */
 } uz_guarantee;
 
-/* One grid that was tried for a box whose cells are chosen here. Of several load cases: the worst errors. */
+/* One grid that was tried where cells are chosen or elements bisected. Of several load cases: the worst errors. */
 typedef struct {
-    int64_t cells[3], d, iterations;
+    int64_t cells[3]; /* of a box whose cells are chosen and whose elements are not bisected, else 0 */
+    int64_t n_elements, d, iterations;
     double discretization_error; /* estimated */
     double certified_error;      /* bound, of what the equations of this grid leave */
     double seconds;
 } uz_grid_level;
 
-enum { UZ_GRID_LEVELS = 16 };
+enum { UZ_GRID_LEVELS = 40 };
 
-/* The grids in the order in which they were tried; the answer is on `cells`, which need not be the last of them. */
+/* The grids in the order in which they were tried; the answer is on one which need not be the last of them. */
 typedef struct {
     int dim, count;
     uz_grid_level level[UZ_GRID_LEVELS];
-    int64_t cells[3];
+    int64_t cells[3]; /* box whose cells are chosen: with them, or before elements were bisected; else 0 */
+    int64_t n_elements;
+    bool refined;
+    int64_t n_bisected, *bisected; /* refined: makes its mesh, by uz_scene.bisected, from that which was given; round
+                                    * after round how many elements, then which of them are to be bisected */
 } uz_grid_sequence;
 
 typedef struct {
@@ -246,7 +251,7 @@ typedef struct {
     uz_timings timings;
     char message[256];               /* one sentence on the outcome where it is not `converged`; "" otherwise */
     const uz_evaluation *evaluation; /* scenes with an answer: the result's own; else NULL */
-    const uz_grid_sequence *grids;   /* cells chosen here: the result's own; else NULL */
+    const uz_grid_sequence *grids;   /* cells chosen or elements bisected: the result's own; else NULL */
 } uz_summary;
 
 /* The whole relative error in the energy norm: where one is proved, its bound; else the root of the sum of the squares
@@ -286,7 +291,7 @@ typedef struct {
                       infeasible_radius, h'y / ||N'y||_1. u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
     uz_evaluation *evaluation;
-    uz_grid_sequence *grids; /* box whose cells were chosen here */
+    uz_grid_sequence *grids; /* cells chosen or elements bisected here; owns its list */
     uz_history history;
     uz_trade trade;
     uz_state *state; /* where the iterations stood; NULL: nothing to continue */

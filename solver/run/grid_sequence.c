@@ -1,8 +1,9 @@
 /* grid_sequence.c: grid after grid until the total error is what was asked for.
  *
- *     grid n -> solve, started from the contact pressure of the best grid so far
- *            -> estimated discretization error and certified algebraic error: the total error
- *            -> the next n, from the rate at which the error was seen to fall
+ *     grid -> solve, started from the contact pressure of the best grid so far
+ *          -> estimated discretization error and certified algebraic error: the total error
+ *          -> the next grid: of a box whose cells are chosen another number of cells, from the rate at which the error
+ *             was seen to fall; of a mesh that is refined its elements where the error is, bisected
  *
  * The algebraic part is asked for a tenth of the total, so that it takes half a percent of it and the estimate, which
  * needs an answer to look at, is one of the mesh alone. */
@@ -14,6 +15,7 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "methods/milestones.h"
+#include "run/marking.h"
 #include "run/problem.h"
 #include "run/results.h"
 #include "run/settings.h"
@@ -40,11 +42,18 @@ typedef enum {
     STOP_ALGEBRA /* the equations of the grid could not be solved well enough: a finer one would be no better */
 } stop_kind;
 
+/* One grid. */
+typedef struct {
+    uz_box box;
+    int64_t n;          /* cells chosen: which grid of the family */
+    int64_t n_bisected; /* refined: how much of the search's list */
+    double dofs;        /* displacements of its nodes */
+} grid;
+
 /* The answers of one grid. */
 typedef struct {
     uz_result **results; /* n_cases; NULL: none */
-    uz_box box;
-    int64_t n;
+    grid on;
     double error; /* the largest total error of all cases that have an answer */
 } answers;
 
@@ -56,9 +65,13 @@ typedef struct {
     const uz_hooks *hooks;
     int64_t n_cases;
     double requested, deadline;
-    uz_grids grids;
+    bool refines;
+    uz_grids grids; /* cells chosen */
+    int order;
+    int64_t *bisected, n_bisected; /* refined: of the finest grid so far */
     answers best;
     uz_tried tried[UZ_GRID_LEVELS];
+    double tried_dofs;
     uz_grid_sequence sequence;
     uz_timings *spent; /* n_cases: of the answers that are dropped */
     stop_kind stop;
@@ -66,15 +79,16 @@ typedef struct {
 } search;
 
 static uz_status check(const search *g, const uz_state *const *starts, uz_error *err);
-static void tell(const search *g, int64_t next);
-static uz_status try_grid(search *g, int64_t n, uz_error *err);
-static int64_t choose_next(search *g);
-static int64_t choose_between(const search *g);
+static uz_status try_grid(search *g, grid on, uz_error *err);
+static void choose_next(grid *next, search *g);
+static bool choose_between(grid *next, const search *g);
 static uz_status publish(search *g, uz_error *err);
 
 uz_status uz_solve_grid_sequence(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
                                  const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
+    const uz_scene *scene = &problem->scene;
+    const bool chosen = scene->source == UZ_MESH_BOX && scene->box.automatic;
     search g = {.problem = problem,
                 .settings = settings,
                 .cache = cache,
@@ -82,29 +96,32 @@ uz_status uz_solve_grid_sequence(uz_result ***out, const uz_problem *problem, co
                 .n_cases = problem->n_cases > 0 ? problem->n_cases : 1,
                 .requested = settings->balanced ? UZ_BALANCED_TOTAL_ERROR : uz_requested_error(settings),
                 .deadline = uz_seconds() + settings->time_limit_s,
-                .grids = uz_grids_of_box(&problem->scene.box, MOST_DOFS),
-                .sequence = {.dim = problem->scene.box.dim}};
+                .refines = scene->refine,
+                .grids = {.most_dofs = MOST_DOFS},
+                .sequence = {.dim = uz_scene_dim(scene), .refined = scene->refine}};
+    grid next = {.box = scene->box};
     *out = NULL;
     uz_error_reset(err);
     uz_status status = check(&g, starts, err);
+    if (status == UZ_OK && chosen) {
+        g.grids = uz_grids_of_box(&scene->box, MOST_DOFS);
+        next = (grid){.box = uz_grid(&g.grids, g.grids.first), .n = g.grids.first};
+    }
     if (status == UZ_OK && !(g.spent = uz_alloc_zero(g.n_cases, sizeof *g.spent)))
         status = uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for the results of %lld cases", (long long)g.n_cases);
-    int64_t n = g.grids.first;
     while (status == UZ_OK && g.stop == STOP_NOT) {
-        tell(&g, n);
-        status = try_grid(&g, n, err);
+        status = try_grid(&g, next, err);
         if (status == UZ_OK && g.stop == STOP_NOT)
-            n = choose_next(&g);
+            choose_next(&next, &g);
     }
-    n = status == UZ_OK ? choose_between(&g) : 0;
-    if (n > 0) {
-        tell(&g, n);
-        status = try_grid(&g, n, err);
+    if (status == UZ_OK && choose_between(&next, &g)) {
+        status = try_grid(&g, next, err);
         g.stop = STOP_MET; /* whatever became of it */
     }
     if (status == UZ_OK)
         status = publish(&g, err);
     free(g.spent);
+    free(g.bisected);
     if (status == UZ_OK)
         *out = g.best.results;
     else
@@ -118,10 +135,11 @@ static uz_status check(const search *g, const uz_state *const *starts, uz_error 
     if (status == UZ_OK)
         status = uz_check_problem(g->problem, err);
     if (status == UZ_OK && g->settings->stopping == UZ_STOP_PAPER)
-        status = uz_fail(err, UZ_ERR_ARGUMENT, "", "the paper's rule bounds no error that cells could be chosen by");
+        status = uz_fail(err, UZ_ERR_ARGUMENT, "", "the paper's rule bounds no error that a mesh could be chosen by");
     for (int64_t i = 0; status == UZ_OK && starts && i < g->n_cases; i++)
         if (starts[i])
-            status = uz_fail(err, UZ_ERR_ARGUMENT, "start", "a start belongs to a mesh, and the cells are not chosen");
+            status =
+                uz_fail(err, UZ_ERR_ARGUMENT, "start", "a start belongs to a mesh, and this one is not chosen yet");
     return status;
 }
 
@@ -134,7 +152,13 @@ static double share_done(const search *g, double error)
     return whole > 0.0 && error > 0.0 ? fmin(1.0, fmax(0.0, log(g->tried[0].error / error) / whole)) : 0.0;
 }
 
-static void tell(const search *g, int64_t next)
+/* What the next grid is to the rate of convergence (uz_tried). */
+static double number_of(const search *g, const grid *on)
+{
+    return g->refines ? pow(on->dofs, 1.0 / g->sequence.dim) : (double)on->n;
+}
+
+static void tell(const search *g, const grid *next)
 {
     const int count = g->sequence.count;
     double from = 0.0, to = 0.2;
@@ -142,84 +166,87 @@ static void tell(const search *g, int64_t next)
         return;
     if (count > 0) {
         const uz_tried *last = &g->tried[count - 1];
-        const double rate = count > 1 ? uz_observed_rate(last - 1, last, g->grids.order) : g->grids.order;
+        const double rate = count > 1 ? uz_observed_rate(last - 1, last, g->order) : g->order;
         from = share_done(g, last->error);
-        to = share_done(g, last->error * pow((double)last->n / (double)next, rate));
+        to = share_done(g, last->error * pow(last->n / number_of(g, next), rate));
     }
     g->hooks->grid(g->hooks->ctx, from, fmax(from, to));
 }
 
 /* Factoring takes d^1.5 operations in the plane and d^2 in space (George and Liu, Computer Solution of Large Sparse
  * Positive Definite Systems, 1981, chapter 8). */
-static bool has_time(const search *g, int64_t n)
+static bool has_time(const search *g, double dofs)
 {
     const int last = g->sequence.count - 1;
-    const double growth = uz_grid_dofs(&g->grids, n) / uz_grid_dofs(&g->grids, g->tried[last].n);
-    const double expected = g->sequence.level[last].seconds * pow(growth, g->grids.box.dim == 3 ? 2.0 : 1.5);
+    const double expected =
+        g->sequence.level[last].seconds * pow(dofs / g->tried_dofs, g->sequence.dim == 3 ? 2.0 : 1.5);
     return uz_seconds() + expected <= g->deadline;
 }
 
 /* The next grid to try, or a reason to stop. */
-static int64_t choose_next(search *g)
+static void choose_next(grid *next, search *g)
 {
     const int count = g->sequence.count;
-    const int64_t n = count < UZ_GRID_LEVELS ? uz_next_grid(&g->grids, g->tried, count, g->requested) : 0;
-    if (n == 0) {
-        g->stop = STOP_GRID;
-        if (count < UZ_GRID_LEVELS)
-            snprintf(g->reason, sizeof g->reason, "a grid that meets it is expected to have more than %.0f unknowns",
-                     g->grids.most_dofs);
-        else
-            snprintf(g->reason, sizeof g->reason, "%d grids were tried", count);
-    } else if (uz_cancelled(g->hooks)) {
-        g->stop = STOP_CANCELLED;
-    } else if (!has_time(g, n)) {
-        g->stop = STOP_TIME;
+    bool in_vain = false;
+    if (g->refines) {
+        /* at best the error falls with the order of the elements, as it does once all of the mesh is fine enough */
+        const uz_tried *last = &g->tried[count - 1];
+        const double wanted = g->tried_dofs * pow(last->error / g->requested, (double)g->sequence.dim / g->order);
+        in_vain = next->n_bisected == g->n_bisected;
+        next->n_bisected = g->n_bisected;
+        g->stop = count == UZ_GRID_LEVELS || in_vain || (count > 2 && wanted > 2 * MOST_DOFS) ? STOP_GRID : STOP_NOT;
+    } else {
+        const int64_t n = count < UZ_GRID_LEVELS ? uz_next_grid(&g->grids, g->tried, count, g->requested) : 0;
+        if (n > 0)
+            *next = (grid){.box = uz_grid(&g->grids, n), .n = n, .dofs = uz_grid_dofs(&g->grids, n)};
+        g->stop = n > 0 ? STOP_NOT : STOP_GRID;
     }
-    return n;
+    if (g->stop == STOP_GRID && count == UZ_GRID_LEVELS)
+        snprintf(g->reason, sizeof g->reason, "%d grids were tried", count);
+    else if (in_vain)
+        snprintf(g->reason, sizeof g->reason, "nothing that bisecting elements makes smaller is left of the error");
+    else if (g->stop == STOP_GRID)
+        snprintf(g->reason, sizeof g->reason, "a grid that meets it is expected to have more than %.0f unknowns",
+                 g->grids.most_dofs);
+    else if (uz_cancelled(g->hooks))
+        g->stop = STOP_CANCELLED;
+    else if (!g->refines && !has_time(g, next->dofs))
+        g->stop = STOP_TIME;
 }
 
-/* One grid between the last that failed and the first that met the request, where that is expected to pay; else 0. */
-static int64_t choose_between(const search *g)
+/* One grid between the last that failed and the first that met the request, where that is expected to pay. */
+static bool choose_between(grid *next, const search *g)
 {
     const int count = g->sequence.count;
-    if (g->stop != STOP_MET || count < 2 || count >= UZ_GRID_LEVELS)
-        return 0;
+    if (g->refines || g->stop != STOP_MET || count < 2 || count >= UZ_GRID_LEVELS)
+        return false;
     const int64_t n = uz_grid_between(&g->grids, &g->tried[count - 2], &g->tried[count - 1], g->requested);
-    return n == 0 || uz_cancelled(g->hooks) || !has_time(g, n) ? 0 : n;
+    *next = (grid){.box = uz_grid(&g->grids, n), .n = n, .dofs = uz_grid_dofs(&g->grids, n)};
+    return n > 0 && !uz_cancelled(g->hooks) && has_time(g, next->dofs);
 }
 
 /* ---- one grid */
 
-/* Solves on grid n, from the best answers so far. On failure x has no results. */
-static uz_status solve_on_grid(answers *x, uz_grid_level *level, const search *g, int64_t n, uz_error *err)
+/* Solves the cases of a problem on a grid, from the best answers so far. */
+static uz_status solve_cases(answers *x, uz_grid_level *level, const search *g, const uz_problem *problem,
+                             const uz_body_model *outline, uz_error *err)
 {
-    uz_problem problem = *g->problem;
     uz_settings settings = *g->settings;
-    uz_body_model outline;
-    const double start = uz_seconds();
-    *x = (answers){.box = uz_grid(&g->grids, n), .n = n};
-    *level = (uz_grid_level){.d = 0};
-    memcpy(level->cells, x->box.cells, sizeof level->cells);
-    problem.scene.box = x->box;
+    uz_status status = UZ_OK;
     settings.balanced = false;
     settings.relative_error = ALGEBRAIC_SHARE * g->requested;
-    uz_status status = uz_body_model_outline(&outline, &problem.scene, err);
-    if (status != UZ_OK)
-        return status;
     uz_state **starts = uz_alloc_zero(g->n_cases, sizeof *starts);
     if (!starts)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
     for (int64_t i = 0; status == UZ_OK && g->best.results && i < g->n_cases; i++)
-        status = uz_transfer_start(&starts[i], g->best.results[i], &g->best.box, &outline.info, outline.m, err);
+        status = uz_transfer_start(&starts[i], g->best.results[i], g->refines ? NULL : &g->best.on.box, outline, err);
     settings.time_limit_s = fmax(0.0, g->deadline - uz_seconds());
     if (status == UZ_OK)
-        status = uz_solve_on_mesh(&x->results, &problem, &settings, (const uz_state *const *)starts, g->cache, g->hooks,
-                                  err);
+        status =
+            uz_solve_on_mesh(&x->results, problem, &settings, (const uz_state *const *)starts, g->cache, g->hooks, err);
     for (int64_t i = 0; starts && i < g->n_cases; i++)
         uz_state_free(starts[i]);
     free(starts);
-    uz_body_model_clear(&outline);
     for (int64_t i = 0; status == UZ_OK && i < g->n_cases; i++) {
         const uz_summary *s = &x->results[i]->summary;
         level->iterations += s->iterations;
@@ -230,6 +257,44 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, const search *g
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
         level->certified_error = fmax(level->certified_error, s->certificate.relative_error);
     }
+    return status;
+}
+
+/* Solves on a grid unless that would take too long, and chooses what to bisect. x has no results on failure, and where
+ * there is no time. */
+static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, const grid *on, uz_error *err)
+{
+    uz_problem problem = *g->problem;
+    uz_body_model outline;
+    const double start = uz_seconds();
+    *x = (answers){.on = *on};
+    *level = (uz_grid_level){.d = 0};
+    if (on->n > 0 && !g->refines)
+        memcpy(level->cells, on->box.cells, sizeof level->cells);
+    problem.scene.box = on->box;
+    problem.scene.bisected = g->bisected;
+    problem.scene.n_bisected = on->n_bisected;
+    uz_status status = uz_body_model_outline(&outline, &problem.scene, err);
+    if (status != UZ_OK)
+        return status;
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)outline.mesh.kind[0]);
+    g->order = type->nodes > type->corners ? 2 : 1;
+    level->n_elements = outline.mesh.n_elements;
+    x->on.dofs = (double)(outline.mesh.n_nodes * outline.mesh.dim);
+    if (x->on.dofs > MOST_DOFS && g->sequence.count > 0)
+        status =
+            uz_fail(err, UZ_ERR_LIMIT, "", "it has %.0f unknowns, and at most %.0f are tried", x->on.dofs, MOST_DOFS);
+    const bool late = status == UZ_OK && g->sequence.count > 0 && !has_time(g, x->on.dofs);
+    if (late)
+        g->stop = STOP_TIME;
+    if (status == UZ_OK && !late) {
+        tell(g, &x->on);
+        status = solve_cases(x, level, g, &problem, &outline, err);
+    }
+    if (status == UZ_OK && x->results && g->refines && x->error > g->requested)
+        status = uz_mark_elements(&g->bisected, &g->n_bisected, &outline, &problem, x->results, g->requested / x->error,
+                                  err);
+    uz_body_model_clear(&outline);
     level->seconds = uz_seconds() - start;
     if (status != UZ_OK) {
         uz_results_free(x->results, x->results ? g->n_cases : 0);
@@ -242,7 +307,8 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, const search *g
 static void keep_better(search *g, answers *x)
 {
     const bool meets = x->error <= g->requested, met = g->best.results && g->best.error <= g->requested;
-    const bool better = !g->best.results || (met ? meets && x->n < g->best.n : meets || x->error < g->best.error);
+    const bool better =
+        !g->best.results || (met ? meets && x->on.dofs < g->best.on.dofs : meets || x->error < g->best.error);
     answers *worse = better ? &g->best : x;
     for (int64_t i = 0; worse->results && i < g->n_cases; i++)
         uz_timings_add(&g->spent[i], &worse->results[i]->summary.timings);
@@ -250,7 +316,9 @@ static void keep_better(search *g, answers *x)
     worse->results = NULL;
     if (better) {
         g->best = *x;
-        memcpy(g->sequence.cells, x->box.cells, sizeof g->sequence.cells);
+        g->sequence.n_elements = g->sequence.level[g->sequence.count - 1].n_elements;
+        if (x->on.n > 0)
+            memcpy(g->sequence.cells, x->on.box.cells, sizeof g->sequence.cells);
     }
 }
 
@@ -271,13 +339,16 @@ static stop_kind judge(const search *g, const answers *x)
 }
 
 /* A grid that could not be solved ends the sequence where another one was; only lasting faults end the call. */
-static uz_status try_grid(search *g, int64_t n, uz_error *err)
+static uz_status try_grid(search *g, grid on, uz_error *err)
 {
     answers x;
     uz_error failure = {0};
-    uz_status status = solve_on_grid(&x, &g->sequence.level[g->sequence.count], g, n, &failure);
+    uz_status status = solve_on_grid(&x, &g->sequence.level[g->sequence.count], g, &on, &failure);
+    if (status == UZ_OK && !x.results)
+        return UZ_OK; /* no time */
     if (status == UZ_OK) {
-        g->tried[g->sequence.count++] = (uz_tried){n, x.error};
+        g->tried[g->sequence.count++] = (uz_tried){number_of(g, &x.on), x.error};
+        g->tried_dofs = x.on.dofs;
         g->stop = judge(g, &x);
         keep_better(g, &x);
         return UZ_OK;
@@ -330,6 +401,14 @@ static uz_status publish(search *g, uz_error *err)
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grids that were tried");
         *result->grids = g->sequence;
         result->summary.grids = result->grids;
+        if (g->refines) { /* may be shorter than the search's list: of a grid that was tried later */
+            const int64_t n = result->grids->n_bisected = g->best.on.n_bisected;
+            int64_t *list = result->grids->bisected = uz_alloc(n, sizeof *list);
+            if (!list)
+                return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the elements that were bisected");
+            if (n > 0)
+                memcpy(list, g->bisected, (size_t)n * sizeof *list);
+        }
         uz_timings_add(&result->summary.timings, &g->spent[i]);
         uz_trade_shift(&result->trade, g->spent[i].total);
         conclude(g, &result->summary);

@@ -163,6 +163,8 @@ void uz_result_free(uz_result *result)
     free(result->history.rows);
     uz_state_free(result->state);
     uz_mesh_info_clear(&result->mesh);
+    if (result->grids)
+        free(result->grids->bisected);
     free(result->grids);
     free(result);
 }

@@ -7,11 +7,12 @@
 
 #include <stdlib.h>
 
-/* Cells that are chosen by the error asked for belong to a box. */
+/* Are the cells of a box, or the elements to be bisected, chosen by the error asked for? */
 static uz_solver *solver_of(const uz_problem *problem)
 {
     const uz_scene *scene = &problem->scene;
-    bool chosen = problem->kind == UZ_PROBLEM_SCENE && scene->source == UZ_MESH_BOX && scene->box.automatic;
+    bool chosen =
+        problem->kind == UZ_PROBLEM_SCENE && (scene->refine || (scene->source == UZ_MESH_BOX && scene->box.automatic));
     return chosen ? uz_solve_grid_sequence : uz_solve_on_mesh;
 }
 

@@ -1,7 +1,7 @@
 /* solve.h: the layers between a call of the library and the solve of one load. Each calls only those below it:
  *
  *     uz_solve, uz_solve_cases    solve.c          which of the two that follow
- *     uz_solve_grid_sequence      grid_sequence.c  grid after grid, where the cells are chosen
+ *     uz_solve_grid_sequence      grid_sequence.c  grid after grid, where the mesh is chosen
  *     uz_solve_on_mesh            cases.c          all load cases; those that only the obstacle holds by themselves
  *     uz_judge_whole_error        guarantee.c      a bound on one answer, by problems that the layers below solve
  *     uz_solve_semicoercive       semicoercive.c   one of these, by problems that the next layer solves
@@ -16,7 +16,7 @@
 /* Grid sequence and mesh have the contract of uz_solve_cases. */
 typedef uz_status uz_solver(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
                             const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
-uz_solver uz_solve_grid_sequence; /* for a box whose cells are chosen so that the total error is what was asked for */
+uz_solver uz_solve_grid_sequence; /* for meshes that are made finer until the total error is what was asked for */
 uz_solver uz_solve_on_mesh;
 
 /* Where settings ask for it, a guaranteed bound on the whole error of an answer, or why there is none (uz_guarantee);

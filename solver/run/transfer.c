@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/bisect.h"
 #include "scene/box.h"
 
 #include <math.h>
@@ -11,12 +12,14 @@
 /* Weights below this are rounding. */
 #define NO_WEIGHT 1e-9
 
-/* The lattice of the coarse grid with a pressure at each of its nodes. */
+/* The pressure of one contact at the nodes of the coarse mesh, and of one that is refined from it also at its new ones.
+ * Grids of a box: the coarse one's lattice. */
 typedef struct {
-    const uz_box *box;
+    const uz_box *box;   /* NULL: ... */
+    const uz_mesh *fine; /* ... refined by bisection */
     uz_box_lattice lattice;
     double *line[3];
-    double *pressure; /* n_nodes; of the contact that is transferred */
+    double *pressure; /* nodes of the coarse mesh, or the fine one */
 } field;
 
 /* The lattice cell that x lies in along an axis, and where in it, 0 to 1. */
@@ -64,33 +67,41 @@ static void spread(field *f, const uz_result *result, int64_t contact, bool put)
     for (int64_t i = 0; i < result->m; i++)
         if (result->mesh.contact_of[i] == contact)
             f->pressure[result->mesh.contact_node[i]] = put ? result->pressure[i] : 0.0;
+    for (int64_t i = result->n_nodes; f->fine && i < f->fine->n_nodes; i++)
+        f->pressure[i] = uz_bisected_value(f->fine->from + (i - f->fine->n_given) * UZ_BISECT_FROM, f->pressure, 1);
 }
 
-uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_mesh_info *fine,
-                            int64_t m, uz_error *err)
+uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_body_model *fine,
+                            uz_error *err)
 {
+    const uz_mesh_info *rows = &fine->info;
+    const int64_t m = fine->m;
     *out = NULL;
     bool known = result->pressure && result->mesh.contact_of;
     for (int64_t i = 0; known && i < result->m; i++)
         known = isfinite(result->pressure[i]); /* else infeasible */
     if (!known)
         return UZ_OK;
-    field f = {.box = coarse, .lattice = uz_box_lattice_of(coarse)};
+    field f = {.box = coarse, .fine = coarse ? NULL : &fine->mesh};
+    if (coarse)
+        f.lattice = uz_box_lattice_of(coarse);
     uz_state *state = uz_alloc_zero(1, sizeof *state);
-    f.pressure = uz_alloc_zero(result->mesh.n_nodes, sizeof *f.pressure);
+    f.pressure = uz_alloc_zero(coarse ? result->n_nodes : rows->n_nodes, sizeof *f.pressure);
     bool room = state && f.pressure && (state->r = uz_alloc(m, sizeof *state->r));
-    for (int axis = 0; axis < coarse->dim; axis++)
+    for (int axis = 0; coarse && axis < coarse->dim; axis++)
         room = (f.line[axis] = uz_box_lines(coarse, axis, f.lattice.order)) && room;
     int64_t contact = -1;
     for (int64_t i = 0; room && i < m; i++) { /* rows come contact by contact */
-        if (fine->contact_of[i] != contact) {
+        if (rows->contact_of[i] != contact) {
             spread(&f, result, contact, false);
-            contact = fine->contact_of[i];
+            contact = rows->contact_of[i];
             spread(&f, result, contact, true);
         }
-        state->r[i] = -pressure_at(&f, fine->xyz + fine->contact_node[i] * fine->dim) * fine->contact_area[i];
+        const int64_t node = rows->contact_node[i];
+        const double pressure = coarse ? pressure_at(&f, rows->xyz + node * rows->dim) : f.pressure[node];
+        state->r[i] = -pressure * rows->contact_area[i];
     }
-    for (int axis = 0; axis < coarse->dim; axis++)
+    for (int axis = 0; axis < 3; axis++)
         free(f.line[axis]);
     free(f.pressure);
     if (!room) {

@@ -1,14 +1,15 @@
-/* transfer.h: the contact of one grid of a box, or at one place of a body, as the start of the next. */
+/* transfer.h: the contact of one grid, or at one place of a body, as the start of the next. */
 #ifndef UZ_ADAPTIVE_TRANSFER_H
 #define UZ_ADAPTIVE_TRANSFER_H
 
+#include "assembly/assembly.h"
 #include "uzawa.h"
 
 /* Reactions for the contact rows of `fine`: the pressure of the result on box `coarse`, interpolated from its nodes,
- * times the area of each row. Contacts are those of one scene. *out NULL and UZ_OK: the result has no pressure. The
- * caller frees with uz_state_free. */
-uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_mesh_info *fine,
-                            int64_t m, uz_error *err);
+ * times the area of each row. coarse NULL: the mesh of `fine` is refined by bisection from that of the result. Contacts
+ * are those of one scene. *out NULL and UZ_OK: the result has no pressure. The caller frees with uz_state_free. */
+uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_body_model *fine,
+                            uz_error *err);
 
 /* Reactions for the contact rows of a body at another place: those of the result at the same nodes, in the order in
  * which a contact has rows there. whole: a state that can be stored, which says nothing but these reactions. *out NULL

@@ -82,14 +82,14 @@ double uz_grid_dofs(const uz_grids *grids, int64_t n)
 
 double uz_observed_rate(const uz_tried *coarse, const uz_tried *fine, int order)
 {
-    const double rate = log(coarse->error / fine->error) / log((double)fine->n / (double)coarse->n);
+    const double rate = log(coarse->error / fine->error) / log(fine->n / coarse->n);
     return isnan(rate) ? (double)order : fmin(order + 0.25, fmax(0.25, rate));
 }
 
 /* The n at which the error is expected to be what is aimed at. */
 static double expect(const uz_tried *from, double rate, double requested)
 {
-    return (double)from->n * pow(from->error / (AIM * requested), 1.0 / rate);
+    return from->n * pow(from->error / (AIM * requested), 1.0 / rate);
 }
 
 int64_t uz_next_grid(const uz_grids *grids, const uz_tried *tried, int count, double requested)
@@ -100,7 +100,7 @@ int64_t uz_next_grid(const uz_grids *grids, const uz_tried *tried, int count, do
     /* little is known after one grid, and a solid grows with the cube */
     const double growth = count > 1 ? (solid ? 2.0 : 3.0) : (solid ? 1.6 : 2.0);
     const double wanted = expect(last, rate, requested);
-    int64_t top = last->n, beyond = top + 1; /* the largest n whose grid is allowed, by bisection */
+    int64_t top = (int64_t)last->n, beyond = top + 1; /* the largest n whose grid is allowed, by bisection */
     while (uz_grid_dofs(grids, beyond) <= grids->most_dofs)
         beyond *= 2;
     while (beyond - top > 1) {
@@ -110,19 +110,19 @@ int64_t uz_next_grid(const uz_grids *grids, const uz_tried *tried, int count, do
         else
             beyond = middle;
     }
-    if (top <= last->n || (count > 2 && wanted > 2.0 * (double)top))
+    if ((double)top <= last->n || (count > 2 && wanted > 2.0 * (double)top))
         return 0;
-    const double next = fmin(fmin(ceil(wanted), ceil(growth * (double)last->n)), (double)top);
-    return next > (double)last->n ? (int64_t)next : last->n + 1;
+    const double next = fmin(fmin(ceil(wanted), ceil(growth * last->n)), (double)top);
+    return next > last->n ? (int64_t)next : (int64_t)last->n + 1;
 }
 
 int64_t uz_grid_between(const uz_grids *grids, const uz_tried *failed, const uz_tried *passed, double requested)
 {
     const double rate = uz_observed_rate(failed, passed, grids->order);
     const double wanted = ceil(expect(failed, rate, requested));
-    if (!(wanted < (double)passed->n))
+    if (!(wanted < passed->n))
         return 0;
-    const int64_t n = wanted > (double)failed->n ? (int64_t)wanted : failed->n + 1;
-    const bool saves = uz_grid_dofs(grids, n) <= (1.0 - WORTH_SAVING) * uz_grid_dofs(grids, passed->n);
-    return n < passed->n && saves ? n : 0;
+    const int64_t n = wanted > failed->n ? (int64_t)wanted : (int64_t)failed->n + 1;
+    const bool saves = uz_grid_dofs(grids, n) <= (1.0 - WORTH_SAVING) * uz_grid_dofs(grids, (int64_t)passed->n);
+    return (double)n < passed->n && saves ? n : 0;
 }

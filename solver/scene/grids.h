@@ -24,10 +24,10 @@ uz_box uz_grid(const uz_grids *grids, int64_t n);
 /* Displacements of its nodes. */
 double uz_grid_dofs(const uz_grids *grids, int64_t n);
 
-/* What a grid was found to be. error > 0: the largest total error of all load cases. */
+/* What a grid was found to be. n: its number, or of other meshes what grows as it does, the root (cubic in space) of
+ * the number of nodes. error > 0: the largest total error of all load cases. */
 typedef struct {
-    int64_t n;
-    double error;
+    double n, error;
 } uz_tried;
 
 /* q of error ~ n^-q as two grids show it, coarser first, kept between what a corner and what a smooth solution can have

@@ -450,7 +450,7 @@ static void check_transfer(uz_model model, const char *element)
     memcpy(s.box.cells, fine, sizeof fine);
     uz_body_model next = body_model(&s);
     uz_state *start = NULL;
-    CHECK_INT(uz_transfer_start(&start, result, &box, &next.info, next.m, NULL), UZ_OK);
+    CHECK_INT(uz_transfer_start(&start, result, &box, &next, NULL), UZ_OK);
     CHECK(start && start->m == next.m && next.m > 0);
     /* the supported ends have no rows, so that the pressure falls to 0 there */
     for (int64_t i = 0; start && i < next.m; i++) {

@@ -1,0 +1,112 @@
+#include "run/marking.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "run/problem.h"
+#include "run/results.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BULK  0.5
+#define LEAST 0.05 /* one more grid is worth its while */
+
+typedef struct {
+    double share;
+    int64_t element;
+} indicator;
+
+/* The largest first; of equal ones the first element. */
+static int by_share(const void *a, const void *b)
+{
+    const indicator *x = a, *y = b;
+    return x->share > y->share ? -1 : x->share < y->share ? 1 : (x->element > y->element) - (x->element < y->element);
+}
+
+/* Twice the integral of pressure times gap over the sides that may touch, to which both belong as functions between
+ * their nodes: what it adds to the square of the error, beside that of the stress. room: 2 n_nodes zeros, left so. */
+static void add_contact(double *eta2, double *room, const uz_body_model *body, const uz_scene *scene,
+                        const uz_result *result)
+{
+    double *pressure = room, *gap = room + body->mesh.n_nodes;
+    const uz_mesh_info *rows = &result->mesh;
+    for (int64_t k = 0; k < 2 * scene->n_contacts && result->pressure && rows->contact_of; k++) {
+        const uz_contact *contact = &scene->contacts[k / 2];
+        const bool with = k % 2 == 1;
+        const uz_group *group = with && contact->kind != UZ_OBSTACLE_BODY
+                                    ? NULL
+                                    : uz_mesh_group(&body->mesh, with ? contact->with : contact->on, "", NULL);
+        for (int64_t i = 0; i < result->m && group; i++)
+            if (rows->contact_of[i] == k / 2) { /* a node may have several rows */
+                const int64_t node = rows->contact_node[i];
+                pressure[node] = fmax(pressure[node], result->pressure[i]);
+                gap[node] = fmax(gap[node], result->g[i]);
+            }
+        for (int64_t f = 0; group && f < group->n_faces; f++) {
+            uz_side side;
+            double xyz[3 * UZ_FACE_NODES], sum[2] = {0}, same = 0;
+            int64_t node[UZ_FACE_NODES];
+            uz_body_side(&side, xyz, node, body, group->face[f]);
+            for (int a = 0; a < side.nodes; a++) {
+                sum[0] += pressure[node[a]];
+                sum[1] += gap[node[a]];
+                same += pressure[node[a]] * gap[node[a]];
+            }
+            if (sum[0] > 0 && sum[1] > 0) /* the mean of what is linear between two corners, or three */
+                eta2[group->face[f].element] +=
+                    2 * uz_side_area(&side) * (sum[0] * sum[1] - same) / (double)(side.nodes * (side.nodes + 1));
+        }
+        for (int64_t i = 0; i < result->m && group; i++)
+            pressure[rows->contact_node[i]] = gap[rows->contact_node[i]] = 0;
+    }
+}
+
+uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body, const uz_problem *problem,
+                           uz_result *const *results, double left, uz_error *err)
+{
+    const int64_t n_elements = body->mesh.n_elements, n_cases = problem->n_cases > 0 ? problem->n_cases : 1;
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)body->mesh.kind[0]);
+    const int order = type->nodes > type->corners ? 2 : 1;
+    indicator *all = uz_alloc(n_elements, sizeof *all);
+    double *eta2 = uz_alloc(n_elements, sizeof *eta2), *room = uz_alloc_zero(2 * body->mesh.n_nodes, sizeof *room),
+           sum = 0, part = 0;
+    int64_t count = 0;
+    bool done = all && eta2 && room;
+    for (int64_t e = 0; e < n_elements && done; e++)
+        all[e] = (indicator){0, e};
+    for (int64_t i = 0; i < n_cases && done; i++) {
+        const uz_scene scene = uz_scene_of_case(problem, i);
+        double seen = 0;
+        if (uz_has_no_answer(&results[i]->summary))
+            continue;
+        const double error = uz_estimate_element_errors(eta2, NULL, body, &scene, results[i]->u);
+        done = !isnan(error);
+        for (int64_t e = 0; e < n_elements; e++)
+            seen += eta2[e];
+        add_contact(eta2, room, body, &scene, results[i]);
+        for (int64_t e = 0; e < n_elements && seen > 0 && isfinite(error); e++)
+            all[e].share = fmax(all[e].share, eta2[e] * (error * error / seen));
+    }
+    for (int64_t e = 0; e < n_elements && done; e++)
+        sum += all[e].share;
+    if (done)
+        qsort(all, (size_t)n_elements, sizeof *all, by_share);
+    /* what is bisected once along each direction keeps 4^-order of the square of its error */
+    const double needed = (1 - left * left) / (1 - pow(4, -order)), bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
+    while (done && count < n_elements && part < bulk && all[count].share > 0)
+        part += all[count++].share;
+    int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 1 + count, sizeof *grown) : NULL;
+    if (grown) {
+        *list = grown;
+        grown[(*n)++] = count;
+        for (int64_t i = 0; i < count; i++)
+            grown[(*n)++] = all[i].element;
+    }
+    done = done && (grown || count == 0);
+    free(all);
+    free(eta2);
+    free(room);
+    return done ? UZ_OK
+                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to choose among %lld elements", (long long)n_elements);
+}

@@ -1,0 +1,157 @@
+"""Meshes that the service refines where the error is. usage: test_refine_mesh.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
+import copy
+import json
+import os
+import subprocess
+import tempfile
+
+import service
+from service import SCENE, check, expect
+
+WAIT = {"Prefer": "wait=60"}
+
+
+def refined(accuracy=None, element="tri3", cells=(6, 2), **solver):
+    """The paper's body in few triangles, to be refined."""
+    request = copy.deepcopy(SCENE)
+    mesh = request["problem"]["mesh"]
+    mesh["refine"] = "auto"
+    mesh["box"]["cells"] = cells if isinstance(cells, str) else list(cells)
+    mesh["box"]["element"] = element
+    request["solver"] = dict(solver)
+    if accuracy:
+        request["solver"]["accuracy"] = accuracy
+    return request
+
+
+def in_numbers(request):
+    """The same body as nodes and elements, its sides as groups."""
+    nodes = [[10.0 * i, 10.0 * j] for j in range(3) for i in range(7)]
+    at = lambda i, j: j * 7 + i
+    elements = []
+    for j in range(2):
+        for i in range(6):
+            elements += [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+    sides = {"left": [[at(0, j + 1), at(0, j)] for j in range(2)], "right": [[at(6, j), at(6, j + 1)] for j in range(2)],
+             "bottom": [[at(i, 0), at(i + 1, 0)] for i in range(6)], "top": [[at(i + 1, 2), at(i, 2)] for i in range(6)]}
+    request["problem"]["mesh"] = {"nodes": nodes, "elements": {"tri3": elements}, "refine": "auto",
+                                  "groups": {name: {"edges": edges} for name, edges in sides.items()}}
+    return request
+
+
+def gmsh_of(mesh):
+    """A mesh in numbers as a Gmsh file."""
+    names = {name: k + 1 for k, name in enumerate(mesh["groups"])}
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
+    lines += [f'1 {k} "{name}"' for name, k in names.items()] + ["$EndPhysicalNames", "$Nodes", str(len(mesh["nodes"]))]
+    lines += [f"{i + 1} {x} {y} 0" for i, (x, y) in enumerate(mesh["nodes"])] + ["$EndNodes", "$Elements"]
+    items = [f"1 2 {names[name]} {names[name]} {a + 1} {b + 1}" for name in names for a, b in mesh["groups"][name]["edges"]]
+    items += [f"2 2 9 9 {a + 1} {b + 1} {c + 1}" for a, b, c in mesh["elements"]["tri3"]]
+    return "\n".join(lines + [str(len(items))] + [f"{i + 1} {item}" for i, item in enumerate(items)] + ["$EndElements", ""])
+
+
+def solved(s, request):
+    job = expect(s.post(request, WAIT), 200).json
+    check(job["status"] == "successful", job)
+    return job
+
+
+def test_grids_are_told(s):
+    summary = solved(s, refined({"relative_error": 0.03}))["summary"]
+    mesh = summary["mesh"]
+    check(summary["outcome"] == "converged" and summary["error"]["total"] <= 0.03, summary)
+    check(mesh["refined"] is True and "cells" not in mesh and len(mesh["ladder"]) > 3, mesh)
+    check(mesh["ladder"][0]["elements"] == 24 and mesh["elements"] == mesh["ladder"][-1]["elements"], mesh)
+    check(all(b["d"] > a["d"] for a, b in zip(mesh["ladder"], mesh["ladder"][1:])), mesh)
+    check(mesh["ladder"][-1]["d"] == summary["problem"]["d"], mesh)
+    check(summary["started_from"] == "warm" and summary["total_error"] == summary["error"]["total"], summary)
+
+
+def test_a_mesh_of_any_origin(s):
+    """A box, numbers and a file of the same triangles end on the same mesh."""
+    numbers = in_numbers(refined({"relative_error": 0.04}))
+    file = copy.deepcopy(numbers)
+    file["problem"]["mesh"] = {"gmsh": gmsh_of(numbers["problem"]["mesh"]), "refine": "auto"}
+    found = []
+    for request in (refined({"relative_error": 0.04}), numbers, file):
+        summary = solved(s, request)["summary"]
+        check(summary["outcome"] == "converged", summary)
+        found.append((summary["mesh"]["ladder"][0]["elements"], summary["mesh"]["elements"]))
+    check(found[0][0] == found[1][0] == 24 and found[1] == found[2], found)
+    check(found[0][1] == found[1][1], found)
+
+
+def test_fields_find_the_mesh(s):
+    for element, cells in (("tri3", (6, 2)), ("tri6", (6, 2)), ("tri3", "auto")):
+        job = solved(s, refined({"relative_error": 0.03}, element, cells))
+        answer = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=von_mises,pressure,nodes,stress,displacements"),
+                        200).json
+        nodes = len(answer["nodes"])
+        check(len(answer["von_mises"]) == len(answer["stress"]) == len(answer["displacements"]) == nodes, element)
+        check(nodes > 40 and max(answer["von_mises"]) > 0, nodes)
+        expect(s.get(f"/v1/jobs/{job['id']}/result.vtu"), 200)
+        expect(s.get(f"/v1/jobs/{job['id']}/deformed.svg"), 200)
+
+
+def test_levels_and_limits(s):
+    summary = solved(s, refined())["summary"]
+    check(summary["requested_error"] == 5e-2 and summary["outcome"] == "converged", summary)
+    summary = solved(s, refined("precise"))["summary"]
+    check(summary["outcome"] == "mesh_limit" and summary["message"], summary)
+    summary = solved(s, refined({"relative_error": 2e-3}, time_limit_s=0.2))["summary"]
+    check(summary["outcome"] == "time_limit" and summary["error"]["total"] > 2e-3, summary)
+
+
+def refused(s, request, code, pointer):
+    reply = expect(s.post(request), 422).json
+    check(reply["code"] == code and reply.get("pointer", "") == pointer, reply)
+    return reply
+
+
+def test_what_can_not_be_refined_is_refused(s):
+    solid = {"problem": {"kind": "scene", "model": "solid", "materials": SCENE["problem"]["materials"],
+                         "mesh": {"box": {"size": [1, 1, 1], "cells": [1, 1, 1]}, "refine": "auto"},
+                         "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}]}}
+    error = expect(s.post(solid, WAIT), 200).json["error"]
+    check(error["pointer"] == "/problem/mesh/refine" and "tet4" in error["detail"], error)
+    refused(s, refined(stopping="paper"), "not_allowed", "/solver/stopping")
+    refused(s, refined(warm_start={"reactions": [0.0]}), "not_allowed", "/solver/warm_start")
+    verify = {"problem": refined()["problem"], "answer": {"displacements": [0.0], "reactions": [0.0]}}
+    reply = expect(s.request("POST", "/v1/verify", verify), 422).json
+    check(reply["code"] == "not_allowed" and reply["pointer"] == "/problem/mesh/refine", reply)
+    wrong = refined()
+    wrong["problem"]["mesh"]["refine"] = "everywhere"
+    check(expect(s.post(wrong), 422).json["pointer"] == "/problem/mesh/refine", "another word")
+    del wrong["problem"]["mesh"]["box"]
+    wrong["problem"]["mesh"]["refine"] = "auto"
+    check(expect(s.post(wrong), 422).json["pointer"] == "/problem/mesh", "no mesh to refine")
+    job = solved(s, refined())
+    reply = expect(s.request("POST", f"/v1/jobs/{job['id']}/refine", {"accuracy": "quick"}), 409).json
+    check(reply["code"] == "mesh_is_chosen", reply)
+
+
+def test_load_cases(s):
+    request = refined({"relative_error": 0.04})
+    request["cases"] = [{"name": "a", "loads": SCENE["problem"]["loads"]},
+                        {"name": "b", "loads": [{"on": "right", "traction": [0, -0.1]}]}]
+    job = solved(s, request)
+    check(job["summary"]["outcome"] == "converged" and job["summary"]["mesh"]["refined"], job["summary"])
+    sizes = {len(expect(s.get(f"/v1/jobs/{job['id']}/result?case={name}&fields=von_mises"), 200).json["von_mises"])
+             for name in ("a", "b")}
+    check(len(sizes) == 1, sizes)
+
+
+def test_client_prints_the_grids(s):
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "body.json")
+        with open(path, "w") as to:
+            json.dump(refined({"relative_error": 0.04}), to)
+        done = subprocess.run([s.build / "uzawa", "--server", s.url, "submit", path, "--wait"], capture_output=True,
+                              text=True, timeout=120)
+    check(done.returncode == 0, done)
+    check("elements, refined after" in done.stdout and "24 elements" in done.stdout, done.stdout)
+
+
+if __name__ == "__main__":
+    service.main(globals())
