@@ -60,6 +60,13 @@ TEST(next_grids_follow_the_observed_rate)
     CHECK_INT(uz_next_grid(&grids, tried, 3, 1e-6), 0); /* out of reach */
     const uz_tried worse[2] = {{4, 0.1}, {8, 0.11}};
     CHECK_INT(uz_next_grid(&grids, worse, 2, 0.05), 24); /* an error that does not fall yet */
+    const uz_tried unseen[5] = {{4, 0.40}, {8, 0.37}, {24, 0.33}, {72, 0.31}, {216, 0.30}}; /* smaller than a cell */
+    CHECK_INT(uz_next_grid(&grids, unseen, 3, 0.05), 72);
+    CHECK_INT(uz_next_grid(&grids, unseen, 4, 0.05), 216);
+    CHECK_INT(uz_next_grid(&grids, unseen, 5, 0.05), 0);
+    const uz_tried corner[3] = {{8, 0.2}, {24, 0.2 / sqrt(3)}, {72, 0.2 / 3}}; /* a rate that will not get better */
+    CHECK_INT(uz_next_grid(&grids, corner, 3, 0.04), 213);
+    CHECK_INT(uz_next_grid(&grids, corner, 3, 0.004), 0);
     const uz_grids small = uz_grids_of_box(&s.box, uz_grid_dofs(&grids, 20));
     CHECK_INT(uz_next_grid(&small, tried, 3, 0.03), 20);
     const uz_tried failed = {8, 0.08}, passed = {24, 0.08 / 3}, near = {15, 0.08 * 8 / 15};

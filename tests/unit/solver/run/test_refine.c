@@ -110,14 +110,14 @@ TEST(a_quarter_of_the_unknowns)
     uz_scene_clear(&s);
 }
 
-/* Half a block pressed against a cylinder: the pressure of Hertz over a small part of its upper side. */
-static uz_scene hertz_block(const char *element, int64_t cells)
+/* Half a block pressed against a cylinder by so much: the pressure of Hertz over a small part of its upper side. */
+static uz_scene hertz_block(const char *element, int64_t cells, double depth)
 {
     uz_scene s = body_scene(UZ_PLANE_STRAIN, element, (double[3]){20, 40}, (int64_t[3]){cells, 2 * cells});
     s.materials[0].young = 1000;
     body_hold(&s, "bottom", NAN, 0, NAN);
     body_hold(&s, "left", 0, NAN, NAN);
-    uz_contact *contact = body_plane(&s, "top", (double[3]){0, 69.75, 0}, (double[3]){0});
+    uz_contact *contact = body_plane(&s, "top", (double[3]){0, 70 - depth, 0}, (double[3]){0});
     contact->kind = UZ_OBSTACLE_ROUND;
     contact->radius = 30;
     return s;
@@ -126,7 +126,7 @@ static uz_scene hertz_block(const char *element, int64_t cells)
 /* From a mesh that sees next to nothing of the contact. */
 TEST(hertz_is_met_on_few_unknowns)
 {
-    uz_scene s = hertz_block("tri3", 4);
+    uz_scene s = hertz_block("tri3", 4, 0.25);
     s.refine = true;
     const uz_settings settings = asking(0.05);
     uz_result *result = solve(&s, &settings);
@@ -140,14 +140,29 @@ TEST(hertz_is_met_on_few_unknowns)
     CHECK_MSG(result->d < 6000, "%lld", (long long)result->d);
     CHECK_MSG(iterations <= 8 * grids->count, "%lld iterations on %d grids", (long long)iterations, grids->count);
     uz_result_free(result);
-    /* the ladder of boxes gets there too, on more */
-    strcpy(s.box.element, "quad4");
-    s.refine = false;
+    uz_scene_clear(&s);
+}
+
+/* Of a contact that is smaller than a cell, whose error hardly falls from 4 to 8 to 24 cells, the ladder of boxes sees
+ * enough on the grids after these. */
+TEST(ladders_climb_to_what_the_first_grids_do_not_see)
+{
+    uz_scene s = hertz_block("quad4", 4, 0.1);
+    s.box.size[X] = 40;
+    const uz_settings settings = asking(0.05);
     s.box.automatic = true;
     uz_result *uniform = solve(&s, &settings);
     CHECK_MSG(uniform->summary.outcome == UZ_CONVERGED, "%s", uniform->summary.message);
-    printf("# Hertz, ladder: %lld unknowns, %d grids, force %g\n", (long long)uniform->d, uniform->grids->count,
-           uniform->summary.force[Y]);
+    s.box.automatic = false;
+    s.box.cells[X] = s.box.cells[Y] = 8;
+    s.refine = true;
+    uz_result *refined = solve(&s, &settings);
+    CHECK_MSG(refined->summary.outcome == UZ_CONVERGED, "%s", refined->summary.message);
+    CHECK(4 * refined->d < uniform->d);
+    printf("# small contact: %lld unknowns, %d grids; ladder %lld, %lld x %lld\n", (long long)refined->d,
+           refined->grids->count, (long long)uniform->d, (long long)uniform->grids->cells[X],
+           (long long)uniform->grids->cells[Y]);
+    uz_result_free(refined);
     uz_result_free(uniform);
     uz_scene_clear(&s);
 }
@@ -208,7 +223,7 @@ TEST(marks_have_half_of_the_error)
 /* The pressure of a coarse mesh at the rows of one that is refined from it. */
 TEST(starts_are_interpolated)
 {
-    uz_scene s = hertz_block("tri6", 8);
+    uz_scene s = hertz_block("tri6", 8, 0.25);
     uz_result *coarse = body_solve(&s, 1e-8);
     const uz_problem problem = problem_of_scene(&s);
     uz_body_model outline;
