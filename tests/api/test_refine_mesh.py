@@ -103,6 +103,15 @@ def test_levels_and_limits(s):
     check(summary["outcome"] == "time_limit" and summary["error"]["total"] > 2e-3, summary)
 
 
+def test_a_guaranteed_error_is_met(s):
+    """The whole error is the proved one: the energies enclose the body's, and further grids follow until it suffices."""
+    summary = solved(s, refined({"total": 0.02, "guaranteed": True}))["summary"]
+    error = summary["error"]
+    check(summary["outcome"] == "converged" and error["kind"] == "guaranteed" and error["total"] <= 0.02, summary)
+    check(summary["mesh"]["refined"] and summary["problem"]["d"] < 1000, summary["mesh"])
+    check(summary["mesh"]["ladder"][-1]["discretization_error"] < error["total"], summary["mesh"])
+
+
 def refused(s, request, code, pointer):
     reply = expect(s.post(request), 422).json
     check(reply["code"] == code and reply.get("pointer", "") == pointer, reply)
