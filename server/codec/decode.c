@@ -170,7 +170,6 @@ static bool decode_automatic(codec_request *out, decoding *d, const json_value *
         out->settings.balanced = true;
     if (total > 0) /* what the cells are chosen by */
         out->settings.relative_error = total;
-    out->settings.total_error = 0;
     if (json_get(root, "answer") && refine)
         problem_set(d->problem, 422, "not_allowed", refine,
                     "An answer belongs to a mesh, and this one is still to be refined: leave out \"refine\".");

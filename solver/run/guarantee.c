@@ -161,11 +161,16 @@ void uz_judge_whole_error(uz_result *result, const uz_problem *problem, const uz
     if (settings->guaranteed)
         guarantee_answer(result, problem, settings, cache, hooks, started);
     const double total = uz_total_error(NULL, s);
-    if (!(settings->total_error > 0) || s->outcome != UZ_CONVERGED || total <= settings->total_error)
+    const bool unproved = s->guarantee.asked && !s->guarantee.proved;
+    if (!(settings->total_error > 0) || s->outcome != UZ_CONVERGED || (total <= settings->total_error && !unproved))
         return;
     s->outcome = UZ_MESH_LIMIT;
     s->requested_error = settings->total_error;
-    snprintf(s->message, sizeof s->message,
-             "on this mesh the whole error is %s %.3g, asked for %.3g: refine it, or let the cells be chosen",
-             s->guarantee.proved ? "at most" : "about", total, settings->total_error);
+    if (unproved)
+        snprintf(s->message, sizeof s->message, "the whole error, about %.3g, is not guaranteed: %s", total,
+                 s->guarantee.why);
+    else
+        snprintf(s->message, sizeof s->message,
+                 "on this mesh the whole error is %s %.3g, asked for %.3g: refine it, or let the cells be chosen",
+                 s->guarantee.proved ? "at most" : "about", total, settings->total_error);
 }

@@ -45,6 +45,11 @@ def test_what_is_not_proved(s):
     error = summary["error"]
     check(error["kind"] == "estimated" and "not straight" in error["why"], error)
     check(summary["outcome"] == "converged" and error["total"] > 0 and "bound" not in error, summary)
+    for cells in ([30, 10], "auto"):  # an estimate is not what was asked for
+        request = asked({"total": 0.3, "guaranteed": True}, contacts=contacts)
+        request["problem"]["mesh"]["box"]["cells"] = cells
+        summary = summary_of(s, request)
+        check(summary["outcome"] == "mesh_limit" and "not guaranteed" in summary["message"], summary)
 
 
 def test_cases_and_chosen_cells(s):

@@ -134,6 +134,7 @@ int main(int argc, char **argv)
                                                 run_ranges,
                                                 run_exhaustive,
                                                 run_invariance,
+                                                run_guarantees,
                                                 run_generated_problems,
                                                 run_conditioned_problems,
                                                 run_degenerate_problems,

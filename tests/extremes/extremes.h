@@ -66,6 +66,7 @@ void run_rows(suite *all);
 void run_ranges(suite *all);
 void run_exhaustive(suite *all);
 void run_invariance(suite *all);
+void run_guarantees(suite *all);
 void run_generated_problems(suite *all);
 void run_degenerate_problems(suite *all);
 void run_contradictions(suite *all);

@@ -1,0 +1,50 @@
+/* guarantees.c: guaranteed bounds on the whole error of generated bodies, on meshes of every plane element, against
+ * each other and a finer one: a row for each body. `ratio` is the least of its bounds over the error by energies. */
+#include "extremes.h"
+
+#include "bound_scenes.h"
+
+enum { BODIES = 300 };
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+void run_guarantees(suite *all)
+{
+    static const char *const KINDS[] = {"linear", "quadratic"};
+    static double effect[2][8 * BODIES];
+    int count[2] = {0}, unproved = 0;
+    if (!wants_family(all, "guaranteed"))
+        return;
+    for (uint64_t seed = 1; seed <= BODIES; seed++) {
+        const bound_sweep x = sweep_bounds(seed, 3, 14);
+        judgement j = {.verdict = JUDGED_OK, .certified = NAN, .error = NAN, .floor = NAN, .ratio = NAN};
+        char name[64];
+        for (int k = 0; k < 2; k++)
+            for (int i = 0; i < x.count[k]; i++) {
+                effect[k][count[k]++] = x.effect[k][i];
+                j.ratio = isnan(j.ratio) ? x.effect[k][i] : fmin(j.ratio, x.effect[k][i]);
+            }
+        if (x.highest > x.lowest + 1e-12 * x.size || j.ratio < 1) {
+            j.verdict = JUDGED_WRONG;
+            snprintf(j.why, sizeof j.why, "energies of at least %.12e and at most %.12e", x.highest, x.lowest);
+        } else if (x.proved < x.answers || x.answers < 9) {
+            snprintf(j.why, sizeof j.why, "%.150s", x.why);
+        }
+        unproved += x.answers - x.proved;
+        add_row(all, "guaranteed", name_of(name, sizeof name, "body %d", (int)seed), "default",
+                x.proved == 9 ? "converged" : "not proved", &j, x.answers < 9);
+    }
+    for (int k = 0; k < 2 && count[k] > 0; k++) {
+        qsort(effect[k], (size_t)count[k], sizeof effect[k][0], by_size);
+        printf(
+            "guaranteed: %d bounds of %s elements over the error: least %.4f, median %.3f, 19 of 20 below %.3f, most "
+            "%.3f\n",
+            count[k], KINDS[k], effect[k][0], effect[k][count[k] / 2], effect[k][count[k] * 19 / 20],
+            effect[k][count[k] - 1]);
+    }
+    printf("guaranteed: %d answers without a proof\n", unproved);
+}

@@ -1,0 +1,159 @@
+/* bound_scenes.h: generated plane bodies before straight obstacles, and what is proved of their whole error on some
+ * meshes against each other: all that is below a body's energy is below all that is above it. */
+#ifndef TESTS_BOUND_SCENES_H
+#define TESTS_BOUND_SCENES_H
+
+#include "body_fixture.h"
+#include "generated.h"
+#include "scene_fixture.h"
+
+static const char *const BOUND_ELEMENTS[] = {"tri3", "quad4", "tri6", "quad8"};
+
+typedef struct {
+    int answers, proved;
+    double highest, lowest; /* of the energies that are below and above the body's; apart: nothing is wrong */
+    double size;            /* of an energy */
+    int count[2];           /* of linear and of quadratic elements: bounds */
+    double effect[2][8];    /* and what they are of the error by energies, sqrt(2 (J(u_h) - J)) */
+    char why[160];          /* where one was not proved */
+} bound_sweep;
+
+static double bound_cell[2], bound_low[2], bound_high[2]; /* what the map that follows is about */
+static qp_random bound_random;
+
+/* Moves corners within the body by up to a fifth of a cell. */
+static inline void bound_shuffle(double *x)
+{
+    for (int c = 0; c < 2; c++) {
+        const double margin = 1e-6 * (bound_high[c] - bound_low[c]);
+        if (x[c] < bound_low[c] + margin || x[c] > bound_high[c] - margin)
+            return;
+    }
+    for (int c = 0; c < 2; c++)
+        x[c] += 0.4 * bound_cell[c] * (random_unit(&bound_random) - 0.5);
+}
+
+static inline uz_load *bound_load(uz_scene *scene, uz_load_kind kind, const char *on, double x, double y)
+{
+    add_load(scene, on, x, y);
+    scene->loads[scene->n_loads - 1].kind = kind;
+    scene->loads[scene->n_loads - 1].value = x;
+    return &scene->loads[scene->n_loads - 1];
+}
+
+/* n: cells along the shorter side. Lengths are of the order of `unit`, displacements a thousandth of that. */
+static inline uz_scene bound_scene(uint64_t seed, const char *element, int64_t n)
+{
+    qp_random rng = {seed};
+    const double unit = random_power(&rng, -3, 3), young = random_power(&rng, 0, 11), stress = 1e-3 * young;
+    const double width = unit * (1 + 2 * random_unit(&rng)), height = unit, step = 1e-3 * unit;
+    const int64_t nx = (int64_t)((double)n * width / height + 0.5);
+    const bool far = random_chance(&rng, 0.2);
+    uz_scene scene = box_scene(width, height, nx, n);
+    snprintf(scene.box.element, sizeof scene.box.element, "%s", element);
+    scene.box.origin[0] = far ? 20 * unit : 0;
+    scene.box.origin[1] = far ? -7.3 * unit : 0;
+    scene.box.grading[0] = random_power(&rng, -0.7, 0.7);
+    scene.model = random_chance(&rng, 0.5) ? UZ_PLANE_STRESS : UZ_PLANE_STRAIN;
+    scene.formulation = (uz_formulation)random_int(&rng, 0, UZ_FORMULATIONS);
+    if (strcmp(element, "quad4") != 0)
+        scene.formulation = UZ_FORMULATION_AUTO;
+    scene.thickness = random_power(&rng, -2, 2);
+    scene.materials[0] = (uz_material){.on = "all", .young = young, .density = 1e-3, .expansion = 1e-5};
+    scene.materials[0].poisson = random_chance(&rng, 0.15) ? 0.499 : 0.47 * random_unit(&rng);
+    const double place = random_unit(&rng), turn = random_unit(&rng);
+    switch (random_int(&rng, 0, 4)) {
+    case 0:
+        add_support(&scene, "left", step * place, 0);
+        break;
+    case 1:
+        add_support(&scene, "left", 0, NAN);
+        add_support(&scene, "top", NAN, -step * place);
+        break;
+    case 2: /* a slide that is inclined to the body */
+        add_support(&scene, "top", NAN, NAN);
+        scene.supports[0].kind = UZ_SUPPORT_NORMAL;
+        scene.supports[0].normal[0] = 0.3 * turn;
+        scene.supports[0].normal[1] = 1;
+        scene.supports[0].value = -step * place;
+        add_support(&scene, "left", 0, NAN);
+        break;
+    default:
+        add_support(&scene, "top", step * turn, -step * place);
+    }
+    bound_load(&scene, UZ_LOAD_TRACTION, "right", stress * (random_unit(&rng) - 0.5),
+               stress * (random_unit(&rng) - 0.5));
+    if (random_chance(&rng, 0.5))
+        bound_load(&scene, UZ_LOAD_PRESSURE, "right", stress * random_unit(&rng), 0);
+    if (random_chance(&rng, 0.5))
+        bound_load(&scene, UZ_LOAD_BODY_FORCE, "all", stress / unit * random_unit(&rng),
+                   -stress / unit * random_unit(&rng));
+    if (random_chance(&rng, 0.25))
+        bound_load(&scene, UZ_LOAD_TEMPERATURE, "all", 100 * (random_unit(&rng) - 0.3), 0);
+    const double tilt = random_chance(&rng, 0.4) ? 2e-3 * (random_unit(&rng) - 0.5) : 0;
+    const double gap = random_chance(&rng, 0.5) ? 0.5 * step * random_unit(&rng) : 0;
+    const double least = fmin(0, fmin(-tilt * width, 0)); /* the corner that is deepest is at the gap */
+    add_plane(&scene, "bottom", scene.box.origin[0], scene.box.origin[1] - gap + least - fabs(tilt) * width, tilt, 1);
+    return scene;
+}
+
+/* A body on meshes of all elements, the last, finer one to compare with; `steps` halvings of the coarsest. */
+static inline bound_sweep sweep_bounds(uint64_t seed, int64_t coarsest, int64_t finest)
+{
+    bound_sweep x = {.highest = -INFINITY, .lowest = INFINITY};
+    double primal[16], bound[16];
+    int linear[16], n = 0;
+    for (int k = 0; k < 9; k++) {
+        const bool last = k == 8;
+        uz_scene scene = bound_scene(seed, last ? "quad8" : BOUND_ELEMENTS[k % 4],
+                                     last    ? finest
+                                     : k < 4 ? coarsest
+                                             : 2 * coarsest);
+        uz_problem problem;
+        uz_settings settings = uz_settings_default();
+        uz_result *result = NULL;
+        uz_error err = {0};
+        if (k < 4 && seed % 2 == 0) {
+            bound_random = (qp_random){seed + 1000};
+            for (int c = 0; c < 2; c++) {
+                bound_low[c] = scene.box.origin[c];
+                bound_high[c] = scene.box.origin[c] + scene.box.size[c];
+                bound_cell[c] = scene.box.size[c] / (double)scene.box.cells[c];
+            }
+            bound_cell[0] *= 0.2; /* cells are graded */
+            body_give_mesh(&scene, bound_shuffle);
+            body_straighten(&scene);
+        }
+        settings.guaranteed = true;
+        problem = (uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = scene};
+        if (uz_solve(&result, &problem, &settings, NULL, NULL, &err) != UZ_OK) {
+            snprintf(x.why, sizeof x.why, "%.100s", err.message);
+        } else {
+            const uz_guarantee g = result->summary.guarantee;
+            x.answers++;
+            x.proved += g.proved;
+            if (g.proved) {
+                x.lowest = fmin(x.lowest, g.primal);
+                x.highest = fmax(x.highest, g.dual);
+                x.size = fmax(x.size, fmax(fabs(g.primal), result->summary.evaluation->strain_energy));
+            } else {
+                snprintf(x.why, sizeof x.why, "%.158s", g.why);
+            }
+            if (g.proved && !last) {
+                linear[n] = k % 4 < 2 ? 0 : 1;
+                primal[n] = g.primal;
+                bound[n++] = g.bound;
+            }
+        }
+        uz_result_free(result);
+        uz_scene_clear(&scene);
+    }
+    for (int i = 0; i < n; i++) {
+        const double error = sqrt(2 * fmax(0, primal[i] - x.lowest));
+        if (primal[i] - x.lowest > 1e-9 * x.size)
+            x.effect[linear[i]][x.count[linear[i]]++] = bound[i] / error;
+    }
+    return x;
+}
+
+#endif
