@@ -23,6 +23,12 @@
 
 enum { MOST_CORNERS = 12, MOST_PIECES = 5, ENOUGH_ABOUT = 25, MOST_ABOUT = 60 };
 
+/* Of quadrics about places: how far they may be off faces, in lengths of these times the angle by which they turn, and
+ * their normals off the means of the faces', in such angles. */
+#define MOST_SAGITTA 1.0
+#define MOST_TILT    3.0
+#define ROUNDING     1e-9
+
 /* A piece smaller than this part of the slave face is what rounding leaves. */
 #define LEAST_PIECE 1e-12
 
@@ -112,6 +118,48 @@ static int list_about(int64_t about[MOST_ABOUT], const uz_mortar_surface *surfac
     return n;
 }
 
+/* Leaves out quadrics that are not what the faces around their places stand for: where a surface bends from one node to
+ * the next, as from the arm of a clip into its bend, the one through all nodes may be anywhere between them. A face of
+ * length l that turns by a from each of its ends to the middle has a sagitta of l a / 4. False: no memory. */
+static bool drop_wild_patches(bool *known, const uz_mortar_surface *surface)
+{
+    enum { POINTS = 5 };
+    static const double AT[2][POINTS][2] = {{{1. / 3, 1. / 3}, {0.5, 0}, {0.5, 0.5}, {0, 0.5}, {1. / 3, 1. / 3}},
+                                            {{0, 0}, {0, -1}, {1, 0}, {0, 1}, {-1, 0}}};
+    double *turn = uz_alloc_zero(surface->n_places, sizeof *turn);
+    const bool room = turn != NULL;
+    for (int64_t k = 0; k < 2 * surface->n && room; k++) { /* all turns first */
+        const uz_mortar_side *side = &surface->side[k % surface->n];
+        const uz_side shape = {.dim = 3, .nodes = side->nodes, .xyz = side->xyz};
+        double size = 0, most = 0;
+        for (int a = 0; a < side->nodes && side->fitted; a++) {
+            double normal[3];
+            uz_side_area_vector(normal, &shape, uz_side_local_nodes(&shape)[a]);
+            uz_unit3(normal);
+            double *own = &turn[side->place[a]];
+            *own = fmax(*own, sqrt(uz_distance2(normal, surface->normal + 3 * side->place[a], 3)));
+            most = fmax(most, *own);
+            for (int b = 0; b < a; b++)
+                size = fmax(size, sqrt(uz_distance2(side->xyz + 3 * a, side->xyz + 3 * b, 3)));
+        }
+        for (int q = 0; q < POINTS * side->nodes && side->fitted && k >= surface->n; q++) {
+            const int64_t place = side->place[q % side->nodes];
+            double N[UZ_FACE_NODES], x[3] = {0}, normal[3], here[3];
+            uz_side_shape(N, &shape, AT[side->nodes == 4][q / side->nodes]);
+            for (int i = 0; i < 3 * side->nodes; i++)
+                x[i % 3] += N[i / 3] * side->xyz[i];
+            if (!known[place])
+                continue;
+            const double height = uz_smooth_patch_height(normal, &surface->patch[place], x);
+            uz_smooth_patch_height(here, &surface->patch[place], surface->patch[place].at);
+            known[place] = fabs(height) <= MOST_SAGITTA * most * size + ROUNDING * size &&
+                           sqrt(uz_distance2(here, surface->normal + 3 * place, 3)) <= MOST_TILT * most + ROUNDING;
+        }
+    }
+    free(turn);
+    return room;
+}
+
 /* Linear faces that lie on no known shape get the quadrics about their places, and these the quadrics' normals. Faces
  * with middles have a shape of their own. */
 static bool fit_patches(uz_mortar_surface *surface, const uz_mesh *mesh)
@@ -130,7 +178,7 @@ static bool fit_patches(uz_mortar_surface *surface, const uz_mesh *mesh)
     int64_t *seen = uz_alloc_zero(n, sizeof *seen);
     bool *known = uz_alloc_zero(n, sizeof *known);
     surface->patch = uz_alloc_zero(n, sizeof *surface->patch);
-    const bool room = first && face && seen && known && surface->patch;
+    bool room = first && face && seen && known && surface->patch;
     for (int64_t i = 0; i < surface->n && room; i++)
         for (int a = 0; a < surface->side[i].nodes; a++)
             first[surface->side[i].place[a] + 2]++;
@@ -150,6 +198,7 @@ static bool fit_patches(uz_mortar_surface *surface, const uz_mesh *mesh)
             memcpy(xyz + 3 * k, mesh->xyz + 3 * surface->node[about[k]], 3 * sizeof *xyz);
         known[p] = wanted && uz_smooth_patch_fit(&surface->patch[p], xyz, surface->normal + 3 * p, xyz + 3, count - 1);
     }
+    room = room && drop_wild_patches(known, surface);
     for (int64_t i = 0; i < surface->n && room; i++)
         for (int a = 0; a < surface->side[i].nodes; a++)
             surface->side[i].fitted = surface->side[i].fitted && known[surface->side[i].place[a]];
