@@ -40,6 +40,8 @@
 /* In sizes of a side: what rows at nodes may leave, and how far a side is taken to enter the obstacle at least. */
 #define SLACK 0.01
 #define SINK  0.02
+/* Cosine of the angle between the way back and that out of the obstacle which is next there. */
+#define LEAST_BACK 0.5
 /* The side is set back until it is so far from the obstacle. */
 #define CLEAR 0.1
 /* To rows the obstacle's edges are as if rounded with this part of the distance between nodes: of a node that settles
@@ -285,7 +287,7 @@ static bool leads_in(const deepest *of, int a)
     for (int c = 0; c < of->side.dim; c++)
         along -= gap.normal[c] * of->normal[c];
     const bool edge = uz_obstacle_has_edges(of->obstacle) &&
-                      fabs(gap.curvature) * sqrt(uz_distance2(at, gap.foot, of->side.dim)) >= 0.5;
+                      gap.curvature * sqrt(uz_distance2(at, gap.foot, of->side.dim)) >= 0.5; /* that juts out */
     return along > (edge ? LEAST_BEFORE : LEAST_SHARE);
 }
 
@@ -317,7 +319,8 @@ static bool find_below(deepest *of, const double *gap)
     return of->places > 0 && of->least < s - SLACK * of->size;
 }
 
-/* Sets the side back until it is clear of the obstacle; gap: of its nodes there. False: it cannot be. */
+/* Sets the side back until it is clear of the obstacle; gap: of its nodes there. False: it cannot be, or what is next
+ * to it there is aside of it, as the wall of a hole: the way back along that is no depth. */
 static bool set_back(deepest *of, double *gap)
 {
     enum { STEPS = 60 };
@@ -338,8 +341,17 @@ static bool set_back(deepest *of, double *gap)
             of->least = fmin(of->least, gap[a]);
         }
         const double lacking = CLEAR * of->size - (of->least + of->back);
-        if (lacking <= 0.01 * CLEAR * of->size)
-            return true;
+        if (lacking <= 0.01 * CLEAR * of->size) {
+            double N[UZ_FACE_NODES], x[3], along = 0;
+            uz_gap there;
+            uz_side_shape(N, &of->side, of->at[0]);
+            place_of(x, NULL, of, N, NULL);
+            if (uz_obstacle_gap(&there, of->obstacle, x, NULL) != UZ_OK)
+                return false;
+            for (int c = 0; c < of->side.dim; c++)
+                along -= there.normal[c] * of->normal[c];
+            return along >= LEAST_BACK;
+        }
         of->back += lacking;
     }
     return false;
@@ -355,10 +367,16 @@ static void move_to_crests(deepest *of)
     memset(alone.pushed, 0, sizeof alone.pushed);
     alone.least = INFINITY;
     refine(&alone);
-    for (int k = 0; k < alone.places; k++)
+    for (int k = 0; k < alone.places; k++) {
+        double N[UZ_FACE_NODES], x[3];
+        uz_gap gap;
+        uz_side_shape(N, &of->side, alone.at[k]);
+        place_of(x, NULL, of, N, NULL);
+        within = within && uz_obstacle_gap(&gap, of->obstacle, x, NULL) == UZ_OK && gap.curvature * gap.gap >= 0.5;
         for (int i = 0; i < of->side.dim - 1; i++)
             within = within && alone.at[k][i] < 1 - SAME_PLACE && alone.at[k][i] > (triangle ? 0 : -1) + SAME_PLACE &&
                      !(triangle && alone.at[k][0] + alone.at[k][1] > 1 - SAME_PLACE);
+    }
     if (within && alone.places == of->places)
         memcpy(of->at, alone.at, sizeof of->at);
 }

@@ -86,6 +86,12 @@ def test_holes_and_bodies_of_revolution(s):
         check(found["solves"] > 30 and not found["failures"], family, found["failures"])
 
 
+def test_the_wall_of_a_hole_is_no_depth(s):
+    """A side set back along the wall at its end never came out of it: (-29.7, 29.6) on a fine mesh for (-2.8, 26.3)."""
+    found = generated_obstacles.run(s, [79, 102], lambda *said, **_: None, family="enclosing")
+    check(not found["failures"], found["failures"])
+
+
 def test_overlap_that_is_not_due_to_sliding(s):
     """`auto` finds that the answer would not change where the body has moved to: sliding no longer explains the overlap."""
     answer, why = generated_obstacles.contacts.Daemon(s).answer(generated_obstacles.Scene(92).request())
