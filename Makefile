@@ -189,7 +189,7 @@ $(call obj,tests/bench/ipopt.c): CFLAGS += $(patsubst -I%,-isystem %,$(call pkg,
 $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(call pkg,--libs ipopt) $(call pkg,--libs jansson libcurl) -lpthread
 
-$(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
+$(BUILD)/extremes: $(call obj,$(EXTREMES_SRC) tests/support/harness_measure.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath -lgmp
 
 $(BUILD)/theory: $(call obj,$(THEORY_SRC) tests/support/harness_measure.c) $(BUILD)/libuzawa.a
