@@ -11,6 +11,7 @@
 
 #define BULK  0.5
 #define LEAST 0.05 /* one more grid is worth its while */
+#define AIM   0.95 /* missing it by a hair would take another grid */
 
 typedef struct {
     double share;
@@ -93,7 +94,8 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
     if (done)
         qsort(all, (size_t)n_elements, sizeof *all, by_share);
     /* what is bisected once along each direction keeps 4^-order of the square of its error */
-    const double needed = (1 - left * left) / (1 - pow(4, -order)), bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
+    const double needed = (1 - AIM * AIM * left * left) / (1 - pow(4, -order)),
+                 bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
     while (done && count < n_elements && part < bulk && all[count].share > 0)
         part += all[count++].share;
     int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 1 + count, sizeof *grown) : NULL;

@@ -75,8 +75,10 @@ static void check_scenario(const char *name, uz_problem problem, uz_method metho
     s.settings.method = method;
     s.settings.op = op;
     s.settings.ordering = ordering;
-    const bool scene = problem.kind == UZ_PROBLEM_SCENE, chosen = scene && problem.scene.box.automatic;
-    s.settings.relative_error = chosen ? 0.02 : 1e-4; /* three grids */
+    const bool scene = problem.kind == UZ_PROBLEM_SCENE,
+               chosen = scene && (problem.scene.box.automatic || problem.scene.refine);
+    const bool refined = scene && problem.scene.refine;
+    s.settings.relative_error = refined ? 0.04 : chosen ? 0.02 : 1e-4; /* three grids */
     s.settings.balanced = scene && !chosen;
     long count = fail_each(&s);
     printf("# %s: %ld allocations\n", name, count);
@@ -154,6 +156,9 @@ TEST(scenes)
     uz_problem chosen = scene_problem();
     chosen.scene.box.automatic = true;
     check_scenario("chosen cells", chosen, UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
+    uz_problem refined = scene_problem();
+    refined.scene.refine = true;
+    check_scenario("refined mesh", refined, UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
     check_scenario("factored scene", scene_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_FACTORED,
                    UZ_ORDERING_METIS, false);
 }
