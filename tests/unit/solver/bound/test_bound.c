@@ -114,6 +114,45 @@ TEST(nothing_is_lost_where_the_answer_is_exact)
     }
 }
 
+/* Two materials in a row, of which neither contracts, and one of them warm: each has its constant strain. */
+TEST(each_element_has_its_material)
+{
+    for (int k = 0; k < 4; k++) {
+        uz_scene scene = box_scene(60, 20, 6, 2);
+        snprintf(scene.box.element, sizeof scene.box.element, "%s", BOUND_ELEMENTS[k]);
+        body_give_mesh(&scene, NULL);
+        uz_given_mesh *g = &scene.given;
+        for (int half = 0; half < 2; half++) {
+            uz_given_group *group = &g->groups[g->n_groups++];
+            *group = (uz_given_group){.element = body_room(g->n_elements, sizeof *group->element)};
+            snprintf(group->name, sizeof group->name, "%s", half ? "soft" : "stiff");
+            for (int64_t e = 0; e < g->n_elements; e++) {
+                double x = 0;
+                for (int64_t i = g->first[e]; i < g->first[e + 1]; i++)
+                    x += g->xyz[2 * g->node[i]] / (double)(g->first[e + 1] - g->first[e]);
+                if ((x > 30) == (half == 1))
+                    group->element[group->n_elements++] = e;
+            }
+        }
+        snprintf(scene.materials[0].on, sizeof scene.materials[0].on, "stiff");
+        scene.materials[0].poisson = 0;
+        scene.materials[1] = (uz_material){.on = "soft", .young = 1e3, .expansion = 1e-5};
+        scene.n_materials = 2;
+        add_support(&scene, "left", 0.01, NAN);
+        add_support(&scene, "bottom", NAN, 0);
+        add_support(&scene, "top", NAN, 0);
+        add_load(&scene, "right", 3, 0);
+        add_load(&scene, "soft", 0, 0);
+        scene.loads[1].kind = UZ_LOAD_TEMPERATURE;
+        scene.loads[1].value = 100;
+        const uz_guarantee found = bound_of(&scene);
+        CHECK_MSG(found.proved && found.relative < 1e-6, "%s: %g %s", scene.box.element, found.relative, found.why);
+        CHECK_MSG(found.bound >= 0 && fabs(found.primal - found.dual) < 1e-9 * fabs(found.dual), "%.12g %.12g",
+                  found.primal, found.dual);
+        uz_scene_clear(&scene);
+    }
+}
+
 TEST(paper_body)
 {
     static const struct {
