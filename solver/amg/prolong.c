@@ -159,32 +159,6 @@ static bool reserve_blocks(prolongation *p, int64_t more, int k)
     return true;
 }
 
-/* Row i of (I - omega D^-1 A) basis. */
-static bool smooth_row(prolongation *p, block_row *row, const uz_row_walk *walk, const float *basis, const int32_t *of,
-                       int64_t i, double scale)
-{
-    int k = row->k;
-    for (int64_t q = 0; q < walk->count; q++) {
-        int64_t j = walk->column[q];
-        if (of[j] < 0)
-            continue;
-        double *block = block_of(row, of[j]), factor = (j == i ? 1.0 : 0.0) - scale * walk->value[q];
-        if (!block)
-            return false;
-        for (int c = 0; c < k; c++)
-            block[c] += factor * (double)basis[j * k + c];
-    }
-    if (!reserve_blocks(p, row->count, k))
-        return false;
-    for (int64_t s = 0; s < row->count; s++) {
-        p->level->block[p->count] = row->met[s];
-        for (int c = 0; c < k; c++)
-            p->level->value[p->count * k + c] = (float)row->block[s * k + c];
-        p->count++;
-    }
-    return true;
-}
-
 uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *basis, const int32_t *of, double omega,
                               int k, const uz_stop *stop, uz_error *err)
 {
@@ -198,8 +172,22 @@ uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *bas
     ok = ok && level->ptr && reserve_blocks(&p, 2 * n, k);
     for (int64_t i = 0; ok && !(over = must_stop(i, stop)) && i < n; i++) {
         uz_row_walk_read(&walk, i);
-        if (level->inverse[i] > 0.0)
-            ok = smooth_row(&p, &row, &walk, basis, of, i, omega * level->inverse[i]);
+        for (int64_t q = 0; level->inverse[i] > 0.0 && ok && q < walk.count; q++) {
+            const int64_t j = walk.column[q];
+            if (of[j] < 0)
+                continue;
+            double *to = block_of(&row, of[j]);
+            const double factor = (j == i ? 1.0 : 0.0) - omega * level->inverse[i] * walk.value[q];
+            ok = to != NULL;
+            for (int c = 0; ok && c < k; c++)
+                to[c] += factor * (double)basis[j * k + c];
+        }
+        ok = ok && reserve_blocks(&p, row.count, k);
+        for (int64_t s = 0; ok && s < row.count; s++, p.count++) {
+            level->block[p.count] = row.met[s];
+            for (int c = 0; c < k; c++)
+                level->value[p.count * k + c] = (float)row.block[s * k + c];
+        }
         level->ptr[i + 1] = p.count;
         block_row_empty(&row);
     }

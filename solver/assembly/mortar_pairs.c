@@ -24,14 +24,6 @@
 /* Sides of a zone that are looked at before the slave is chosen. */
 enum { LOOKED_AT = 500 };
 
-/* ---- both surfaces as one */
-
-static int by_face(const void *a, const void *b)
-{
-    const uz_face *x = a, *y = b;
-    return x->element != y->element ? (x->element > y->element) - (x->element < y->element) : x->side - y->side;
-}
-
 /* The sides of both groups, each once: those of `on`, then the others of `with`; where there are common ones in an
  * order that does not depend on which group is called `on`. */
 static bool join_groups(uz_mortar_pair *pair, const uz_contact_input *in)
@@ -58,7 +50,7 @@ static bool join_groups(uz_mortar_pair *pair, const uz_contact_input *in)
             has[k][face.element] |= bit;
         }
     if (common)
-        qsort(all->face, (size_t)all->n_faces, sizeof *all->face, by_face);
+        qsort(all->face, (size_t)all->n_faces, sizeof *all->face, uz_face_order);
     for (int64_t i = 0; i < all->n_faces && room; i++) {
         pair->of[i] = 0;
         for (int k = 0; k < 2; k++)

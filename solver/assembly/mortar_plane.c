@@ -12,6 +12,7 @@
 #include "assembly/mortar.h"
 
 #include "core/alloc.h"
+#include "core/vector3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,16 +22,6 @@
 
 /* Less than this part of an edge is no segment: it is what rounding leaves between two nodes that face each other. */
 #define LEAST_SEGMENT 1e-9
-
-static double dot(const double a[2], const double b[2])
-{
-    return a[0] * b[0] + a[1] * b[1];
-}
-
-static double cross(const double a[2], const double b[2])
-{
-    return a[0] * b[1] - a[1] * b[0];
-}
 
 /* to - from as a unit vector; returns the length. */
 static double direction(double out[2], const double from[2], const double to[2])
@@ -101,11 +92,11 @@ static double offset_along(const double n[2], const uz_mortar_side *e, double s)
         *(first ? &B : &A) = middle;
         memcpy(chord, halves[!first], sizeof chord);
         for (int c = 0; c < 2 && !e->joined[!first]; c++)
-            T[!first][c] = 2 * dot(inner, chord) * chord[c] - inner[c];
+            T[!first][c] = 2 * uz_dot2(inner, chord) * chord[c] - inner[c];
     }
     const double length = direction(chord, A, B);
     for (int k = 0; k < 2; k++)
-        along[k] = 2 * length / (3 * (1 + dot(T[k], chord)));
+        along[k] = 2 * length / (3 * (1 + uz_dot2(T[k], chord)));
     edge_at(x, NULL, e, s);
     for (int k = 0; k < 8; k++) {
         double slope[2];
@@ -116,12 +107,12 @@ static double offset_along(const double n[2], const uz_mortar_side *e, double s)
             slope[c] =
                 3 * ((1 - t) * (1 - t) * (P[0] - A[c]) + 2 * t * (1 - t) * (P[1] - P[0]) + t * t * (B[c] - P[1]));
         }
-        const double change = cross(off, n) / cross(slope, n);
+        const double change = uz_cross2(off, n) / uz_cross2(slope, n);
         if (!(fabs(change) > 1e-13))
             break;
         t = fmin(fmax(t - change, -0.5), 1.5);
     }
-    return dot(off, n);
+    return uz_dot2(off, n);
 }
 
 /* ---- a surface */
@@ -143,7 +134,7 @@ static void find_tangents(uz_mortar_surface *surface, const int64_t *at, double 
             continue;
         uz_mortar_side *f = &surface->side[next];
         double t[2][2];
-        if (dot(e->tangent[1], f->tangent[0]) <= least_cosine)
+        if (uz_dot2(e->tangent[1], f->tangent[0]) <= least_cosine)
             continue;
         const double *last = e->xyz + (e->nodes == 3 ? 4 : 0), *following = f->xyz + (f->nodes == 3 ? 4 : 2);
         const double first = direction(t[0], last, e->xyz + 2), second = direction(t[1], f->xyz, following);
@@ -157,7 +148,7 @@ static void find_tangents(uz_mortar_surface *surface, const int64_t *at, double 
         direction(chord, e->xyz, e->xyz + 2);
         for (int k = 0; k < 2 && e->nodes == 2; k++)
             for (int c = 0; c < 2 && !e->joined[k] && e->joined[!k]; c++)
-                e->tangent[k][c] = 2 * dot(e->tangent[!k], chord) * chord[c] - e->tangent[!k][c];
+                e->tangent[k][c] = 2 * uz_dot2(e->tangent[!k], chord) * chord[c] - e->tangent[!k][c];
     }
 }
 
@@ -224,7 +215,7 @@ static double project_on_slave(const uz_mortar_surface *slave, const uz_mortar_s
 {
     double chord[2], off[2] = {x[0] - e->xyz[0], x[1] - e->xyz[1]};
     const double length = direction(chord, e->xyz, e->xyz + 2), step = 1e-6;
-    double s = fmin(fmax(2 * dot(off, chord) / length - 1, -3), 3);
+    double s = fmin(fmax(2 * uz_dot2(off, chord) / length - 1, -3), 3);
     for (int k = 0; k < 20; k++) {
         double f[3];
         for (int i = 0; i < 3; i++) {
@@ -233,7 +224,7 @@ static double project_on_slave(const uz_mortar_surface *slave, const uz_mortar_s
             normal_at(n, slave, e, s + (i - 1) * step);
             for (int c = 0; c < 2; c++)
                 to[c] = x[c] - at[c];
-            f[i] = cross(to, n);
+            f[i] = uz_cross2(to, n);
         }
         const double change = f[1] / ((f[2] - f[0]) / (2 * step));
         if (!isfinite(change))
@@ -253,7 +244,7 @@ static double project_on_master(double *s, const uz_mortar_side *e, const double
     for (int k = 0; k < 30; k++) {
         edge_at(at, slope, e, *s);
         const double off[2] = {at[0] - x[0], at[1] - x[1]};
-        const double change = cross(off, n) / cross(slope, n);
+        const double change = uz_cross2(off, n) / uz_cross2(slope, n);
         if (!isfinite(change))
             return INFINITY;
         *s = fmin(fmax(*s - change, -4), 4);
@@ -262,8 +253,8 @@ static double project_on_master(double *s, const uz_mortar_side *e, const double
     }
     edge_at(at, slope, e, *s);
     const double off[2] = {at[0] - x[0], at[1] - x[1]};
-    return fabs(cross(off, n)) <= 1e-9 * (fabs(slope[0]) + fabs(slope[1]) + hypot(off[0], off[1])) ? dot(off, n)
-                                                                                                   : INFINITY;
+    return fabs(uz_cross2(off, n)) <= 1e-9 * (fabs(slope[0]) + fabs(slope[1]) + hypot(off[0], off[1])) ? uz_dot2(off, n)
+                                                                                                       : INFINITY;
 }
 
 /* The nearest of some edges that the line through x on edge i along n meets from outside; -1: none. Behind x that ends
@@ -277,7 +268,7 @@ static int64_t edge_across(uz_mortar_pair *pair, int64_t i, const double x[2], c
         double chord[2], outward[2], s = 0;
         direction(chord, e->xyz, e->xyz + 2);
         turn_outward(outward, chord);
-        if (dot(outward, n) >= 0)
+        if (uz_dot2(outward, n) >= 0)
             continue;
         const double distance = project_on_master(&s, e, x, n);
         const double y[2] = {x[0] + distance * n[0], x[1] + distance * n[1]};

@@ -163,11 +163,6 @@ UZ_AVX2_FMA static void add_all_fused(sums *s, const double *const x[VECTORS], i
     add_all(s, x, d, 1);
 }
 
-static void add_all_split(sums *s, const double *const x[VECTORS], int64_t d)
-{
-    add_all(s, x, d, 0);
-}
-
 static double total(const four *x)
 {
     return ((*x)[0] + (*x)[1]) + ((*x)[2] + (*x)[3]);
@@ -181,7 +176,10 @@ static void add_up(certifier *c, uz_bound_terms *t)
     const double *const x[VECTORS] = {c->u, c->in->p, c->c, res->Ku, res->Kc, res->e, res->e_u, c->weight};
     sums s;
     memset(&s, 0, sizeof s);
-    (uz_cpu_has_avx2_fma() ? add_all_fused : add_all_split)(&s, x, c->d);
+    if (uz_cpu_has_avx2_fma())
+        add_all_fused(&s, x, c->d);
+    else
+        add_all(&s, x, c->d, 0);
     double_double load = {0.0, total(&s.load_low)};
     for (int l = 0; l < 4; l++)
         dd_add(&load, s.load[l]);

@@ -282,11 +282,6 @@ UZ_AVX2_FMA static void pass_fused(uz_lane_certifier *c, const double *U, const 
     pass(c, U, P, 1);
 }
 
-static void pass_split(uz_lane_certifier *c, const double *U, const double *P)
-{
-    pass(c, U, P, 0);
-}
-
 /* What a lane's answer has to do with the contact: gaps, correction, reactions; their part of the terms. */
 static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a, const double *U,
                          uz_energy_sums *energies, uz_bound_terms *terms)
@@ -401,7 +396,10 @@ void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, 
         feasible[l] = prepare_lane(c, l, &answers[l], U, &energies[l], &terms[l]);
     }
     memset(c->sum, 0, sizeof c->sum);
-    (uz_cpu_has_avx2_fma() ? pass_fused : pass_split)(c, U, P);
+    if (uz_cpu_has_avx2_fma())
+        pass_fused(c, U, P);
+    else
+        pass(c, U, P, 0);
     const bool solved = c->E && c->inverse_norms(c->in.ctx, squares, c->E, NULL) == UZ_OK;
     for (int l = 0; l < count; l++)
         conclude_lane(c, l, &answers[l], feasible[l], solved ? squares[l] : INFINITY, &energies[l], &terms[l]);

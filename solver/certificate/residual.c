@@ -339,11 +339,6 @@ UZ_AVX2_FMA static void run_fused(const uz_residuals *out, const product_of *q, 
     run(out, q, N, p, r, 1);
 }
 
-static void run_split(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p, const double *r)
-{
-    run(out, q, N, p, r, 0);
-}
-
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
                                   const double *c, const double *r, uz_error *err)
 {
@@ -359,7 +354,10 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
         product.first++;
     while (product.last >= 0 && c[product.last] == 0.0)
         product.last--;
-    (uz_cpu_has_avx2_fma() ? run_fused : run_split)(out, &product, N, p, r);
+    if (uz_cpu_has_avx2_fma())
+        run_fused(out, &product, N, p, r);
+    else
+        run(out, &product, N, p, r, 0);
     free(lo);
     return UZ_OK;
 }

@@ -35,22 +35,6 @@ typedef struct {
     double work;                      /* left to spend */
 } settle;
 
-/* What is surely left of the gap of row i at u + c: Ogita, Rump and Oishi's bound on Dot2, and what underflow may take.
- */
-static double sure_gap(const uz_row_settle *in, int64_t i)
-{
-    if (in->at)
-        return -INFINITY;
-    double size = fabs(in->h[i]), terms = 1.0;
-    for (int64_t k = in->Nt->ptr[i]; k < in->Nt->ptr[i + 1]; k++) {
-        const int64_t j = in->Nt->idx[k];
-        size += fabs(in->Nt->val[k] * in->u[j]) + fabs(in->Nt->val[k] * in->c[j]);
-        terms += 2.0;
-    }
-    const double gap = uz_gap_of_row(in->Nt, i, in->h, in->u, in->c);
-    return gap - (0x1p-51 * fabs(gap) + terms * (0x1p-104 * terms * size + 0x1p-1066));
-}
-
 /* sum += x y */
 static void add_product(settle *s, mpq_t sum, double x, double y)
 {
@@ -344,7 +328,16 @@ bool uz_row_settle_solve(uz_row_settle *problem)
     bool settled = wrong && s.sure;
     problem->length = 0.0;
     for (int64_t i = 0; settled && i < s.m; i++) {
-        s.sure[i] = sure_gap(problem, i);
+        /* What is surely left of the gap of row i at u + c: Ogita, Rump and Oishi's bound on Dot2, and what underflow
+         * may take. */
+        double size = fabs(problem->h[i]), terms = 1.0;
+        for (int64_t k = problem->Nt->ptr[i]; !problem->at && k < problem->Nt->ptr[i + 1]; k++) {
+            const int64_t j = problem->Nt->idx[k];
+            size += fabs(problem->Nt->val[k] * problem->u[j]) + fabs(problem->Nt->val[k] * problem->c[j]);
+            terms += 2.0;
+        }
+        const double gap = problem->at ? -INFINITY : uz_gap_of_row(problem->Nt, i, problem->h, problem->u, problem->c);
+        s.sure[i] = gap - (0x1p-51 * fabs(gap) + terms * (0x1p-104 * terms * size + 0x1p-1066));
         if (s.sure[i] >= 0.0)
             continue;
         settled = isfinite(problem->h[i]);

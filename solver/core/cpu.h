@@ -24,11 +24,6 @@
 #define UZ_CPU_HAS(FEATURE) false
 #endif
 
-static inline bool uz_cpu_has_avx2(void)
-{
-    return UZ_CPU_HAS("avx2");
-}
-
 static inline bool uz_cpu_has_avx2_fma(void)
 {
     return UZ_CPU_HAS("avx2") && UZ_CPU_HAS("fma");

@@ -1,8 +1,19 @@
-/* vector3.h: vectors in space. */
+/* vector3.h: vectors in space, and in the plane. */
 #ifndef UZ_CORE_VECTOR3_H
 #define UZ_CORE_VECTOR3_H
 
 #include <math.h>
+
+/* In the plane. */
+static inline double uz_dot2(const double a[2], const double b[2])
+{
+    return a[0] * b[0] + a[1] * b[1];
+}
+
+static inline double uz_cross2(const double a[2], const double b[2])
+{
+    return a[0] * b[1] - a[1] * b[0];
+}
 
 static inline double uz_dot3(const double a[3], const double b[3])
 {

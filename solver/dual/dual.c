@@ -109,17 +109,12 @@ void uz_dual_free(uz_dual *dual)
     free(dual);
 }
 
-double uz_dual_known_lambda_max(const uz_dual *dual, bool weighted)
-{
-    pthread_mutex_lock(&dual->lazy->known);
-    double value = dual->lazy->lambda_max[weighted && dual->row_weight];
-    pthread_mutex_unlock(&dual->lazy->known);
-    return value;
-}
-
 double uz_dual_lambda_max_as_given(const uz_dual *dual)
 {
-    const double value = uz_dual_known_lambda_max(dual, true) / dual->row_unit / dual->row_unit;
+    pthread_mutex_lock(&dual->lazy->known);
+    const double known = dual->lazy->lambda_max[dual->row_weight != NULL];
+    pthread_mutex_unlock(&dual->lazy->known);
+    const double value = known / dual->row_unit / dual->row_unit;
     return value >= DBL_MIN && value <= DBL_MAX ? value : NAN;
 }
 

@@ -74,9 +74,8 @@ typedef struct {
 
 uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_hooks *hooks, uz_error *err);
 void uz_dual_free(uz_dual *dual);
-/* The value of uz_dual_load_prepare if somebody asked for it, else NaN. */
-double uz_dual_known_lambda_max(const uz_dual *dual, bool weighted);
-/* Of the caller's rows, else NaN; NaN also where it is out of range. */
+/* What uz_dual_load_prepare found, for the caller's rows; NaN where nobody asked for it, or where it is out of range.
+ */
 double uz_dual_lambda_max_as_given(const uz_dual *dual);
 
 /* K (lower triangle) is borrowed for the life of the load, p and h are only read. p NULL: all but what follows from

@@ -78,18 +78,6 @@ enum { PASSES = 2 }; /* solve, and once more for the residual */
 #define CLEARLY_WRONG 1e-7
 #define LEAST_RCOND   1e-7
 
-static bool is_clearly_wrong(const uz_bounded *box, const double *h, const double *g, const bool *active, int64_t m)
-{
-    for (int64_t i = 0; i < m; i++) {
-        const int64_t j = box->bounds->dof[i];
-        const double scale = fabs(box->bounds->scale[i]);
-        if (active[i] ? uz_reaction_pulls(box->r[i]) && scale * fabs(box->r[i]) > CLEARLY_WRONG * box->size[j]
-                      : uz_gap_penetrates(g[i]) && -g[i] > CLEARLY_WRONG * (fabs(h[i]) + scale * fabs(box->u[j])))
-            return true;
-    }
-    return false;
-}
-
 /* From the displacement of the last guess, where there was one: of a guess that is as clearly wrong as that, one pass
  * tells. */
 static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active, uz_error *err)
@@ -120,7 +108,13 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
         uz_bounded_balance(box, load->K);
         if (one_tells && solved && pass + 1 < PASSES) {
             uz_bounded_react(&x->sparse, g, active);
-            wrong = is_clearly_wrong(box, load->h, g, active, m);
+            for (int64_t i = 0; !wrong && i < m; i++) {
+                const double scale = fabs(box->bounds->scale[i]), u = box->u[box->bounds->dof[i]];
+                wrong = active[i]
+                            ? uz_reaction_pulls(box->r[i]) &&
+                                  scale * fabs(box->r[i]) > CLEARLY_WRONG * box->size[box->bounds->dof[i]]
+                            : uz_gap_penetrates(g[i]) && -g[i] > CLEARLY_WRONG * (fabs(load->h[i]) + scale * fabs(u));
+            }
         }
     }
     if (status != UZ_OK || !solved || uz_stop_is_due(&load->stop))

@@ -10,33 +10,29 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The one nonzero entry of row i; false when there is none or another. */
-static bool single_entry(int64_t *dof, double *scale, const uz_csc *Nt, int64_t i)
-{
-    *scale = 0.0;
-    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++) {
-        if (Nt->val[k] == 0.0)
-            continue;
-        if (*scale != 0.0)
-            return false;
-        *dof = Nt->idx[k];
-        *scale = Nt->val[k];
-    }
-    return *scale != 0.0;
-}
-
 uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
 {
     (void)stop;
     uz_bounds *bounds = &((uz_sparse *)dual)->bounds;
-    int64_t m = dual->m, i = 0;
+    const uz_csc *Nt = &dual->Nt;
+    const int64_t m = dual->m;
+    bool single = true; /* nonzero entry in each row */
     bounds->dof = uz_alloc(m, sizeof *bounds->dof);
     bounds->scale = uz_alloc(m, sizeof *bounds->scale);
     if (!bounds->dof || !bounds->scale)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
-    while (i < m && single_entry(&bounds->dof[i], &bounds->scale[i], &dual->Nt, i))
-        i++;
-    if (i < m)
+    for (int64_t i = 0; single && i < m; i++) {
+        bounds->scale[i] = 0.0;
+        for (int64_t k = Nt->ptr[i]; single && k < Nt->ptr[i + 1]; k++) {
+            if (Nt->val[k] == 0.0)
+                continue;
+            single = bounds->scale[i] == 0.0;
+            bounds->dof[i] = Nt->idx[k];
+            bounds->scale[i] = Nt->val[k];
+        }
+        single = single && bounds->scale[i] != 0.0;
+    }
+    if (!single)
         uz_sparse_clear(dual);
     else
         dual->bytes += 16 * (size_t)m;

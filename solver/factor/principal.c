@@ -110,15 +110,6 @@ static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A
 #define ENTRY_PASSES    10.0
 #define ANALYSIS_PASSES 60.0
 
-/* Flops, about, to factor the reduced matrix: of K with fewer dofs. */
-static double work_anew(const uz_principal *part, const uz_csc *K)
-{
-    const uz_factor_info *info = &part->factor->info;
-    const double share = (double)part->n_free / (double)part->factor->n;
-    return share * share * info->flops + FLOPS_PER_ENTRY * (ENTRY_PASSES * share * (double)info->nnz +
-                                                            ANALYSIS_PASSES * share * (double)K->ptr[K->cols]);
-}
-
 uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K, const bool *fixed, const uz_stop *stop,
                             uz_error *err)
 {
@@ -136,7 +127,13 @@ uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K,
     }
     if (!part->paths)
         status = uz_paths_create(&part->paths, K, part->factor, part->ws, err);
-    part->by_paths = status == UZ_OK && uz_paths_work(part->paths, fixed) < work_anew(part, K);
+    /* flops, about, to factor the reduced matrix: of K with fewer dofs */
+    const uz_factor_info *info = &part->factor->info;
+    const double share = (double)part->n_free / (double)n;
+    const double anew =
+        share * share * info->flops + FLOPS_PER_ENTRY * (ENTRY_PASSES * share * (double)info->nnz +
+                                                         ANALYSIS_PASSES * share * (double)K->ptr[K->cols]);
+    part->by_paths = status == UZ_OK && uz_paths_work(part->paths, fixed) < anew;
     if (status == UZ_OK && part->by_paths) {
         status = uz_paths_hold(positive, part->paths, fixed, stop, err);
         count_bytes(part, NULL);

@@ -27,45 +27,33 @@ enum { FIRST_GUESS, WARMING_UP, SECOND_GUESS, ITERATING, FIRST_EXCHANGE, TURNS }
 #define LONGER     4.0
 #define UNBOUNDED  16.0
 
-static bool is_guess(int32_t phase)
-{
-    return phase == FIRST_GUESS || phase == SECOND_GUESS;
-}
+typedef struct {
+    bool guess, exchange; /* else it iterates */
+    double length;        /* FIRST_TURN at first, longer with each turn of both */
+    int32_t next;
+} phase_kind;
 
-static bool is_exchange(int32_t phase)
-{
-    return phase == FIRST_EXCHANGE || (phase >= TURNS && (phase - TURNS) % 2 == 0);
-}
-
-/* FIRST_TURN at first, longer with each turn of both. */
-static double turn_length(int32_t phase)
+static phase_kind kind_of(int32_t phase, bool exchanges)
 {
     const int32_t turns = phase < TURNS ? 0 : (phase - TURNS) / 2 + 1;
-    return FIRST_TURN * pow(LONGER, turns);
+    const int32_t after[] = {[FIRST_GUESS] = exchanges ? FIRST_EXCHANGE : WARMING_UP,
+                             [WARMING_UP] = SECOND_GUESS,
+                             [SECOND_GUESS] = ITERATING,
+                             [ITERATING] = TURNS,
+                             [FIRST_EXCHANGE] = WARMING_UP};
+    return (phase_kind){.guess = phase == FIRST_GUESS || phase == SECOND_GUESS,
+                        .exchange = phase == FIRST_EXCHANGE || (phase >= TURNS && (phase - TURNS) % 2 == 0),
+                        .length = FIRST_TURN * pow(LONGER, turns),
+                        .next = phase < TURNS ? after[phase] : phase + 1};
 }
 
-static void begin_phase(uz_iterate *it, int32_t phase)
+static void begin_phase(uz_iterate *it, int32_t phase, bool exchanges)
 {
-    const double most = phase == WARMING_UP ? WARM_UP : fmin(turn_length(phase), (double)(INT64_MAX / 4));
+    const phase_kind kind = kind_of(phase, exchanges);
+    const double most = phase == WARMING_UP ? WARM_UP : fmin(kind.length, (double)(INT64_MAX / 4));
     it->phase = phase;
-    if (!is_guess(phase) && !is_exchange(phase))
+    if (!kind.guess && !kind.exchange)
         it->phase_end = it->iteration + (int64_t)most;
-}
-
-static int32_t next_phase(int32_t phase, bool exchanges)
-{
-    switch (phase) {
-    case FIRST_GUESS:
-        return exchanges ? FIRST_EXCHANGE : WARMING_UP;
-    case FIRST_EXCHANGE:
-        return WARMING_UP;
-    case WARMING_UP:
-        return SECOND_GUESS;
-    case SECOND_GUESS:
-        return ITERATING;
-    default:
-        return phase == ITERATING ? TURNS : phase + 1;
-    }
 }
 
 static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
@@ -80,17 +68,18 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
         part.method = UZ_METHOD_CONJUGATE;
     part.yields = exchanges;
     if (options->again)
-        begin_phase(it, WARMING_UP);
+        begin_phase(it, WARMING_UP, exchanges);
     else if (it->phase == FIRST_EXCHANGE) /* what was handed over was not good enough */
         uz_iterate_go_back(it);
     for (bool stalled = false;;) {
         const int32_t phase = it->phase;
-        const bool guess = is_guess(phase), exchange = is_exchange(phase),
+        const phase_kind kind = kind_of(phase, exchanges);
+        const bool guess = kind.guess, exchange = kind.exchange,
                    limited = !guess && !exchange && (phase == WARMING_UP || exchanges);
         const double unbounded = phase >= TURNS && isinf(it->best_relative) ? UNBOUNDED : 1.0;
         part.max_iterations =
             limited && it->phase_end < options->max_iterations ? it->phase_end : options->max_iterations;
-        part.work = unbounded * turn_length(phase) * uz_dual_load_column_work(load);
+        part.work = unbounded * kind.length * uz_dual_load_column_work(load);
         uz_status status = guess      ? uz_method_active_set.run(end, it, load, &part, history, err)
                            : exchange ? uz_method_dual_active_set.run(end, it, load, &part, history, err)
                                       : uz_steps_run(end, it, load, &part, history, err);
@@ -100,7 +89,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
             !(at_limit || (gave_up && (guess || exchange || (limited && phase > WARMING_UP)))))
             return status;
         stalled = gave_up && !guess && !exchange; /* iterations do no better: the exchanges' turn is the last */
-        begin_phase(it, next_phase(phase, exchanges));
+        begin_phase(it, kind.next, exchanges);
         if (phase == FIRST_GUESS && exchanges && it->iteration > 0 && *end == UZ_END_STALLED) {
             *end = UZ_END_NEXT;
             return UZ_OK;

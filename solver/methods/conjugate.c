@@ -47,26 +47,6 @@ static void make_gaps(uz_iterate *it, const uz_dual_load *load)
         it->gamma[i] = g0[i] - it->Dr[i];
 }
 
-/* Is there more to be had from rows that should come into contact than from those that press? Of the latter only what
- * a plain step would leave them counts (the reduced free gradient). */
-static bool out_of_proportion(uz_iterate *it)
-{
-    const double *penetration = it->r_next;
-    const bool *presses = it->close;
-    const double *weight = it->weight;
-    double asked = 0.0, left = 0.0;
-    it->law->kind->active(it->law, it->close, it->r, it->m);
-    it->law->kind->penetration(it->law, it->r_next, it->gamma, it->m);
-    for (int64_t i = 0; i < it->m; i++) {
-        double w = weight ? weight[i] : 1.0, g = w * it->gamma[i];
-        if (presses[i])
-            left += g * fmin(g, w * (-it->r[i] / it->step[i]));
-        else
-            asked += (w * penetration[i]) * (w * penetration[i]);
-    }
-    return !(left > 0.0) || asked > left;
-}
-
 /* The direction (r_next): the gradient on the rows that press, in the metric of their weights, made conjugate to the
  * last step. Returns gamma'd. */
 static double make_direction(uz_iterate *it)
@@ -183,7 +163,22 @@ static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load,
 {
     (void)steps;
     make_gaps(it, load);
-    *restart = it->tau > 1.0 && out_of_proportion(it);
+    *restart = false;
+    if (it->tau > 1.0) {
+        /* Is there more to be had from rows that should come into contact than from those that press? Of the latter
+         * only what a plain step would leave them counts (the reduced free gradient). */
+        double asked = 0.0, left = 0.0;
+        it->law->kind->active(it->law, it->close, it->r, it->m);
+        it->law->kind->penetration(it->law, it->r_next, it->gamma, it->m);
+        for (int64_t i = 0; i < it->m; i++) {
+            const double w = it->weight ? it->weight[i] : 1.0, g = w * it->gamma[i], depth = w * it->r_next[i];
+            if (it->close[i])
+                left += g * fmin(g, w * (-it->r[i] / it->step[i]));
+            else
+                asked += depth * depth;
+        }
+        *restart = !(left > 0.0) || asked > left;
+    }
     if (*restart)
         forget(it);
     uz_status status = it->tau > 1.0 ? conjugate_step(restart, it, load, err) : projected_step(restart, it, load, err);

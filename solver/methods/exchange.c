@@ -334,23 +334,10 @@ static void advance(uz_exchange *x, int64_t q, double step)
     x->g[q] = own;
 }
 
-/* The direction in which q is pressed for ever: are the rows likely to contradict along it? */
-static uz_status look_at_ray(bool *likely, double *ray, uz_exchange *x, int64_t q, uz_error *err)
-{
-    const uz_csc *N = &x->load->dual->N;
-    memset(ray, 0, (size_t)x->m * sizeof *ray);
-    ray[q] = -1.0;
-    for (int64_t k = 0; k < x->count; k++)
-        ray[x->rows[k]] = x->w[k];
-    x->law->kind->project(x->law, ray, x->m);
-    uz_status status = uz_ray_project(ray, N, err);
-    *likely = status == UZ_OK && uz_ray_is_likely(ray, N, x->load->h, x->load->g0, x->size);
-    return status;
-}
-
 /* Presses q until it joins the rows in contact, or can't. */
 static uz_status admit(uz_exchange *x, int64_t q, bool *likely, double *ray, uz_error *err)
 {
+    const uz_csc *N = &x->load->dual->N;
     uz_status status = press(x, q, err);
     while (status == UZ_OK && !uz_stop_is_due(x->stop)) {
         yield_to(x, q);
@@ -378,7 +365,17 @@ static uz_status admit(uz_exchange *x, int64_t q, bool *likely, double *ray, uz_
             x->s[q] = 0.0;
             x->barred[q] = x->undecided = true;
             x->carried = CARRIED; /* the rows in contact have moved for it */
-            return x->side == UZ_EXCHANGE_GAPS ? UZ_OK : look_at_ray(likely, ray, x, q, err);
+            if (x->side == UZ_EXCHANGE_GAPS)
+                return UZ_OK;
+            /* the direction in which q is pressed for ever: are the rows likely to contradict along it? */
+            memset(ray, 0, (size_t)x->m * sizeof *ray);
+            ray[q] = -1.0;
+            for (int64_t k = 0; k < x->count; k++)
+                ray[x->rows[k]] = x->w[k];
+            x->law->kind->project(x->law, ray, x->m);
+            status = uz_ray_project(ray, N, err);
+            *likely = status == UZ_OK && uz_ray_is_likely(ray, N, x->load->h, x->load->g0, x->size);
+            return status;
         }
         advance(x, q, step);
         let_go(x, gone);

@@ -123,22 +123,6 @@ static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_optio
     return status;
 }
 
-/* The bound, where it is due. */
-static uz_status check(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, const uz_steps *steps,
-                       uz_error *err)
-{
-    bool due = options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check;
-    uz_status status = UZ_OK;
-    if (steps->settle)
-        status = steps->settle(it, load, due, err);
-    if (status != UZ_OK || !due)
-        return status;
-    status = uz_iterate_bound(it, load, options->method, err);
-    /* Bounds cost about one iteration; a check at every sixteenth of the way adds 6 % and overshoots by 6 %. */
-    it->next_check = it->iteration + (it->iteration < 16 ? 1 : it->iteration / 16);
-    return status;
-}
-
 uz_status uz_steps_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                        uz_history *history, uz_error *err)
 {
@@ -154,8 +138,14 @@ uz_status uz_steps_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz
         if (status == UZ_OK && it->along_ray && isinf(it->best_bound))
             status = try_ray(&ray, it, load, err);
         it->along_ray = false;
-        if (status == UZ_OK)
-            status = check(it, load, options, steps, err);
+        const bool due = options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check;
+        if (status == UZ_OK && steps->settle)
+            status = steps->settle(it, load, due, err);
+        if (status == UZ_OK && due) {
+            status = uz_iterate_bound(it, load, options->method, err);
+            /* bounds cost about one iteration; a check at every sixteenth of the way adds 6 % and overshoots by 6 % */
+            it->next_check = it->iteration + (it->iteration < 16 ? 1 : it->iteration / 16);
+        }
         /* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a
          * ray. Looked for at powers of two, from the growth since the last one. */
         const bool power_of_two = it->iteration >= 8 && (it->iteration & (it->iteration - 1)) == 0;

@@ -1,22 +1,13 @@
 /* line.c: the gap to a polyline, the obstacle on its right. */
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "obstacle/pieces.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static double dot(const double *a, const double *b)
-{
-    return a[0] * b[0] + a[1] * b[1];
-}
-
-static double cross(const double *a, const double *b)
-{
-    return a[0] * b[1] - a[1] * b[0];
-}
 
 /* Where piece i begins and ends, in lengths along its tangent from `origin`. */
 typedef struct {
@@ -38,7 +29,7 @@ static piece piece_of(const uz_line *line, int64_t i)
 static int64_t closest(double foot[2], const uz_line *line, int64_t i, const double x[2])
 {
     const piece p = piece_of(line, i);
-    const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]}, along = dot(off, p.tangent);
+    const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]}, along = uz_dot2(off, p.tangent);
     const double rounding = 4 * DBL_EPSILON * (fabs(x[0]) + fabs(x[1]));
     int64_t corner = -1;
     if (along <= p.first + rounding)
@@ -64,7 +55,7 @@ static double distance_to(const void *ctx, int64_t item, const double *x, double
     double foot[2];
     if (closest(foot, line, i, x) < 0) {
         const piece p = piece_of(line, i);
-        const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]}, height = cross(p.tangent, off);
+        const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]}, height = uz_cross2(p.tangent, off);
         return height * height;
     }
     return (x[0] - foot[0]) * (x[0] - foot[0]) + (x[1] - foot[1]) * (x[1] - foot[1]);
@@ -76,7 +67,7 @@ static void gap_to_piece(uz_gap *out, const uz_line *line, int64_t i, const doub
     out->normal[0] = -p.tangent[1];
     out->normal[1] = p.tangent[0];
     const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]};
-    out->gap = dot(off, out->normal);
+    out->gap = uz_dot2(off, out->normal);
     out->curvature = 0;
 }
 
@@ -97,7 +88,7 @@ void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
     /* the pieces that meet at the corner */
     const int64_t before = line->closed && corner == 0 ? line->n - 1 : corner;
     const int64_t after = line->closed && corner == line->n - 1 ? 1 : corner + 1;
-    const double *a = line->tangent + 2 * before, *b = line->tangent + 2 * after, turn = cross(a, b);
+    const double *a = line->tangent + 2 * before, *b = line->tangent + 2 * after, turn = uz_cross2(a, b);
     if (fabs(turn) <= UZ_SAME_DIRECTION) {
         gap_to_piece(out, line, before, x);
         return;
@@ -106,11 +97,11 @@ void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
     const double *at = line->point + 2 * corner;
     const double off[2] = {x[0] - at[0], x[1] - at[1]}, mean[2] = {-a[1] - b[1], a[0] + b[0]};
     const double distance = hypot(off[0], off[1]), length = hypot(mean[0], mean[1]);
-    const double size = fabs(x[0]) + fabs(x[1]), sign = dot(off, mean) < 0 ? -1 : 1;
+    const double size = fabs(x[0]) + fabs(x[1]), sign = uz_dot2(off, mean) < 0 ? -1 : 1;
     const bool on = distance <= 4 * DBL_EPSILON * size;
     for (int c = 0; c < 2; c++)
         out->normal[c] = on ? mean[c] / length : sign * off[c] / distance;
-    out->gap = on ? dot(off, out->normal) : sign * distance;
+    out->gap = on ? uz_dot2(off, out->normal) : sign * distance;
     out->curvature = on ? (turn < 0 ? INFINITY : -INFINITY) : sign / distance;
 }
 
@@ -171,16 +162,16 @@ static bool meet(const uz_line *line, int64_t i, int64_t j)
 {
     const piece a = piece_of(line, i), b = piece_of(line, j);
     const double between[2] = {b.origin[0] - a.origin[0], b.origin[1] - a.origin[1]};
-    const double turn = cross(a.tangent, b.tangent);
+    const double turn = uz_cross2(a.tangent, b.tangent);
     if (j == i + 1 || (line->closed && i == 1 && j == line->n - 1)) /* they share a point, and may only fold back */
-        return dot(a.tangent, b.tangent) < 0 && fabs(turn) <= UZ_SAME_DIRECTION;
+        return uz_dot2(a.tangent, b.tangent) < 0 && fabs(turn) <= UZ_SAME_DIRECTION;
     if (fabs(turn) <= UZ_SAME_DIRECTION) { /* parallel pieces: where they lie on one another */
-        const double sign = dot(a.tangent, b.tangent) < 0 ? -1 : 1, from = dot(between, a.tangent);
+        const double sign = uz_dot2(a.tangent, b.tangent) < 0 ? -1 : 1, from = uz_dot2(between, a.tangent);
         const double low = from + (sign > 0 ? b.first : -b.last), high = from + (sign > 0 ? b.last : -b.first);
-        return fabs(cross(between, a.tangent)) <= UZ_SAME_DIRECTION * hypot(between[0], between[1]) && low <= a.last &&
-               high >= a.first;
+        return fabs(uz_cross2(between, a.tangent)) <= UZ_SAME_DIRECTION * hypot(between[0], between[1]) &&
+               low <= a.last && high >= a.first;
     }
-    const double s = cross(between, b.tangent) / turn, t = cross(between, a.tangent) / turn;
+    const double s = uz_cross2(between, b.tangent) / turn, t = uz_cross2(between, a.tangent) / turn;
     return s >= a.first && s <= a.last && t >= b.first && t <= b.last;
 }
 

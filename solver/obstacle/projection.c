@@ -165,33 +165,6 @@ static uz_status out_of_memory(uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two bodies");
 }
 
-/* middles: also the faces that a node is a middle of. Counted, summed, placed: filling from the end leaves first[i] at
- * the beginning of its list. */
-static uz_status list_around(master *m, bool middles, uz_error *err)
-{
-    const int64_t n = m->mesh->n_nodes;
-    int64_t node[UZ_FACE_NODES];
-    m->first = uz_alloc_zero(n + 1, sizeof *m->first);
-    m->around = uz_alloc(m->group->n_faces, UZ_FACE_NODES * sizeof *m->around);
-    if (!m->first || !m->around)
-        return out_of_memory(err);
-    for (int64_t f = 0; f < m->group->n_faces; f++) {
-        const int all = uz_mesh_face(node, m->mesh, m->group->face[f]);
-        const int count = middles ? all : uz_face_corners(m->mesh->dim, all);
-        for (int i = 0; i < count; i++)
-            m->first[node[i]]++;
-    }
-    for (int64_t i = 0; i < n; i++)
-        m->first[i + 1] += m->first[i];
-    for (int64_t f = m->group->n_faces - 1; f >= 0; f--) {
-        const int all = uz_mesh_face(node, m->mesh, m->group->face[f]);
-        const int count = middles ? all : uz_face_corners(m->mesh->dim, all);
-        for (int i = 0; i < count; i++)
-            m->around[--m->first[node[i]]] = f;
-    }
-    return UZ_OK;
-}
-
 /* ---------------------------------------------------------------- the border */
 
 /* The place of a node among a face's corners; -1: not there. */
@@ -422,27 +395,7 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
     return status;
 }
 
-static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m, const master *slave, int64_t index,
-                           const uz_own_place *own, bool may_miss, uz_error *err)
-{
-    const uz_group *on = slave->group;
-    char where[96];
-    *count = 0;
-    for (int64_t i = 0; i < uz_group_node_count(m->mesh, on); i++) {
-        bool found;
-        const uz_status status = make_row(&found, &row[*count], m, slave, uz_group_node_at(on, i), index, own, err);
-        if (status != UZ_OK)
-            return status;
-        *count += found;
-    }
-    if (*count > 0 || may_miss)
-        return UZ_OK;
-    snprintf(where, sizeof where, "/contacts/%lld/on", (long long)index);
-    return uz_fail(err, UZ_ERR_SCENE, where, "no node of \"%.63s\" faces \"%.63s\": all of them lie beyond its border",
-                   on->name, m->group->name);
-}
-
-/* middles: as of list_around; tree: of a master. */
+/* middles: also the faces that a node is a middle of; tree: of a master. */
 static uz_status prepare(master *m, const uz_mesh *mesh, const uz_group *group, bool middles, bool tree, uz_error *err)
 {
     int exponent;
@@ -452,16 +405,34 @@ static uz_status prepare(master *m, const uz_mesh *mesh, const uz_group *group, 
                   .scale = ldexp(1, exponent < -1000  ? 1000
                                     : exponent > 1000 ? -1000
                                                       : -exponent)};
+    int64_t node[UZ_FACE_NODES];
     uz_status status = UZ_OK;
     if (tree) {
         double xyz[3 * UZ_FACE_NODES], *box = uz_alloc(group->n_faces, 6 * sizeof *box);
-        int64_t node[UZ_FACE_NODES];
         for (int64_t i = 0; box && i < group->n_faces; i++)
             box_of(box + 2 * mesh->dim * i, xyz, mesh->dim, gather(xyz, node, m, i, (const double[3]){0}));
         status = box ? uz_box_tree_init(&m->tree, group->n_faces, mesh->dim, box, err) : out_of_memory(err);
         free(box);
     }
-    return status == UZ_OK ? list_around(m, middles, err) : status;
+    m->first = uz_alloc_zero(mesh->n_nodes + 1, sizeof *m->first);
+    m->around = uz_alloc(group->n_faces, UZ_FACE_NODES * sizeof *m->around);
+    if (status == UZ_OK && (!m->first || !m->around))
+        status = out_of_memory(err);
+    /* counted, summed, placed: filling from the end leaves first[i] at the beginning of its list */
+    for (int pass = 0; pass < 2 && status == UZ_OK; pass++) {
+        for (int64_t f = group->n_faces - 1; f >= 0; f--) {
+            const int all = uz_mesh_face(node, mesh, group->face[f]);
+            const int count = middles ? all : uz_face_corners(mesh->dim, all);
+            for (int i = 0; i < count; i++)
+                if (pass == 0)
+                    m->first[node[i]]++;
+                else
+                    m->around[--m->first[node[i]]] = f;
+        }
+        for (int64_t i = 0; i < mesh->n_nodes && pass == 0; i++)
+            m->first[i + 1] += m->first[i];
+    }
+    return status;
 }
 
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
@@ -469,6 +440,7 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
 {
     master m = {.mesh = NULL}, slave = {.mesh = NULL};
     uz_contact_pair *row = NULL;
+    char where[96];
     *out = NULL;
     *count = 0;
     uz_status status = uz_contact_pair_check(mesh, on, with, index, err);
@@ -479,7 +451,17 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
     if (status == UZ_OK)
         status = prepare(&slave, mesh, on, true, false, err);
     if (status == UZ_OK)
-        status = make_rows(row, count, &m, &slave, index, own, may_miss, err);
+        for (int64_t i = 0; i < uz_group_node_count(mesh, on) && status == UZ_OK; i++) {
+            bool found = false;
+            status = make_row(&found, &row[*count], &m, &slave, uz_group_node_at(on, i), index, own, err);
+            *count += found;
+        }
+    if (status == UZ_OK && *count == 0 && !may_miss) {
+        snprintf(where, sizeof where, "/contacts/%lld/on", (long long)index);
+        status =
+            uz_fail(err, UZ_ERR_SCENE, where, "no node of \"%.63s\" faces \"%.63s\": all of them lie beyond its border",
+                    on->name, with->name);
+    }
     if (status == UZ_OK)
         *out = row;
     else

@@ -137,14 +137,6 @@ static double total(const uz_cost_estimate *e, const uz_cost_size *size)
     return e->setup_s + (double)(size->cases > 0 ? size->cases : 1) * e->case_s;
 }
 
-static bool is_better(const uz_cost_estimate *a, const uz_cost_estimate *b, const uz_cost_size *size)
-{
-    if (!b->fits)
-        return a->fits;
-    return a->fits && !uz_dual_abilities_of(a->op)->needs_factor && total(b, size) > WORTH_S &&
-           MUCH_CHEAPER * total(a, size) < total(b, size);
-}
-
 _Static_assert(sizeof((uz_cost){0}.considered) == UZ_DUAL_FORMS * sizeof(uz_cost_option), "a result names each form");
 
 void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
@@ -165,7 +157,11 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
         uz_cost_estimate *form = &plan->form[k];
         form->fits = memory_limit == 0 || form->bytes <= (double)memory_limit;
         bool allowed = asked == UZ_OPERATOR_AUTO || form->op == asked;
-        if (allowed && form->fits && (plan->chosen < 0 || is_better(form, &plan->form[plan->chosen], size)))
+        if (!allowed || !form->fits)
+            continue;
+        const double before = plan->chosen >= 0 ? total(&plan->form[plan->chosen], size) : INFINITY;
+        if (plan->chosen < 0 || (!uz_dual_abilities_of(form->op)->needs_factor && before > WORTH_S &&
+                                 MUCH_CHEAPER * total(form, size) < before))
             plan->chosen = k;
     }
 }

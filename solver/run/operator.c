@@ -7,54 +7,40 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* At a node whose dofs are along its normal and tangents the modes are turned there from the axes: numbered for this
- * are all dofs of a rotated node, also those that are held. */
-static uz_status turn_modes(uz_modes *modes, const uz_body_model *model, uz_error *err)
-{
-    const int dim = model->mesh.dim, count = modes->count;
-    const int64_t total = model->mesh.n_nodes * dim, *rotated = model->info.rotated_node;
-    uz_modes axes;
-    int64_t *number = uz_alloc(total, sizeof *number);
-    if (!number)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the modes of %lld dofs", (long long)total);
-    for (int64_t i = 0; i < total; i++)
-        number[i] = -1;
-    for (int64_t t = 0; t < model->info.n_rotated; t++)
-        for (int c = 0; c < dim; c++)
-            number[rotated[t] * dim + c] = t * dim + c;
-    uz_status status =
-        uz_modes_of_body(&axes, model->info.xyz, number, model->mesh.n_nodes, dim, model->info.n_rotated * dim, err);
-    free(number);
-    if (status != UZ_OK)
-        return status;
-    for (int64_t t = 0; t < model->info.n_rotated; t++) {
-        const int64_t *dof = model->dof + rotated[t] * dim;
-        const double *Q = model->info.frame + t * dim * dim;
-        for (int c = 0; c < dim; c++)
-            for (int k = 0; k < count && dof[c] >= 0; k++) {
-                double turned = 0.0;
-                for (int axis = 0; axis < dim; axis++)
-                    turned += Q[c * dim + axis] * (double)axes.value[(t * dim + axis) * count + k];
-                modes->value[dof[c] * count + k] = (float)turned;
-            }
-    }
-    uz_modes_clear(&axes);
-    return UZ_OK;
-}
-
-/* The near-null space: rigid-body modes where the mesh is known. */
+/* The near-null space: rigid-body modes where the mesh is known. At a node whose dofs are along its normal and tangents
+ * they are turned there from the axes: numbered for this are all dofs of a rotated node, also those that are held. */
 static uz_status find_modes(uz_modes *modes, const uz_setup *setup, const uz_csc *K, uz_error *err)
 {
     const uz_body_model *model = &setup->model;
+    const int dim = model->mesh.dim;
+    const int64_t total = model->mesh.n_nodes * dim, n_rotated = model->info.n_rotated;
     if (!setup->is_scene)
         return uz_modes_of_matrix(modes, K, err);
-    uz_status status =
-        uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, model->mesh.dim, model->d, err);
-    if (status != UZ_OK || model->info.n_rotated == 0)
+    uz_status status = uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, dim, model->d, err);
+    if (status != UZ_OK || n_rotated == 0)
         return status;
-    status = turn_modes(modes, model, err);
-    if (status != UZ_OK)
-        uz_modes_clear(modes);
+    uz_modes axes = {0};
+    int64_t *number = uz_alloc(total, sizeof *number);
+    for (int64_t i = 0; number && i < total; i++)
+        number[i] = -1;
+    for (int64_t t = 0; number && t < n_rotated; t++)
+        for (int c = 0; c < dim; c++)
+            number[model->info.rotated_node[t] * dim + c] = t * dim + c;
+    status = number ? uz_modes_of_body(&axes, model->info.xyz, number, model->mesh.n_nodes, dim, n_rotated * dim, err)
+                    : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the modes of %lld dofs", (long long)total);
+    free(number);
+    for (int64_t t = 0; status == UZ_OK && t < n_rotated; t++) {
+        const int64_t *dof = model->dof + model->info.rotated_node[t] * dim;
+        const double *Q = model->info.frame + t * dim * dim;
+        for (int c = 0; c < dim; c++)
+            for (int k = 0; k < modes->count && dof[c] >= 0; k++) {
+                double turned = 0.0;
+                for (int axis = 0; axis < dim; axis++)
+                    turned += Q[c * dim + axis] * (double)axes.value[(t * dim + axis) * modes->count + k];
+                modes->value[dof[c] * modes->count + k] = (float)turned;
+            }
+    }
+    uz_modes_clear(status == UZ_OK ? &axes : modes);
     return status;
 }
 

@@ -50,7 +50,7 @@ void uz_name_together(char name[64], uz_names *groups)
         snprintf(name + used, 64 - used, "%s#%08x", used > 0 ? " + " : "", (unsigned)number_of(groups));
 }
 
-static int by_side(const void *a, const void *b)
+int uz_face_order(const void *a, const void *b)
 {
     const uz_face *x = a, *y = b;
     return x->element != y->element ? (x->element > y->element) - (x->element < y->element) : x->side - y->side;
@@ -83,11 +83,11 @@ static uz_status join(uz_group *out, const uz_mesh *mesh, const uz_names *groups
         out->n_nodes += group->n_nodes;
         out->n_inner += group->n_inner;
     }
-    qsort(out->face, (size_t)out->n_faces, sizeof *out->face, by_side);
+    qsort(out->face, (size_t)out->n_faces, sizeof *out->face, uz_face_order);
     qsort(out->node, (size_t)out->n_nodes, sizeof *out->node, uz_ascending);
     faces = nodes = 0;
     for (int64_t i = 0; i < out->n_faces; i++)
-        if (i == 0 || by_side(&out->face[i], &out->face[faces - 1]) != 0)
+        if (i == 0 || uz_face_order(&out->face[i], &out->face[faces - 1]) != 0)
             out->face[faces++] = out->face[i];
     for (int64_t i = 0; i < out->n_nodes; i++)
         if (i == 0 || out->node[i] != out->node[nodes - 1])

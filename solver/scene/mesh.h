@@ -63,6 +63,9 @@ uz_status uz_mesh_from_box(uz_mesh *out, const uz_box *box, uz_error *err);
  */
 uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, uz_error *err);
 
+/* Faces (uz_face) by element, then by side, for qsort. */
+int uz_face_order(const void *a, const void *b);
+
 /* Adds the groups that contacts name together (uz_names). Errors: UZ_ERR_SCENE at "/contacts/i/on" or "with", _MEMORY.
  */
 uz_status uz_mesh_join_groups(uz_mesh *mesh, const uz_scene *scene, uz_error *err);

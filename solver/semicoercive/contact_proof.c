@@ -105,22 +105,6 @@ static bool witness_by_own_dofs(prover *x, int64_t i)
     return x->n_dof > 0 && isnormal(sum);
 }
 
-/* N z = e_i on all rows that count, z of least W^-1 norm. */
-static void witness_by_equations(prover *x, int64_t i)
-{
-    for (int64_t k = 0; k < x->n_dof; k++)
-        x->z[x->dof[k]] = 0.0;
-    for (int64_t k = 0; k < x->m; k++) {
-        x->move.in[k] = x->claim->Nt->ptr[k + 1] > x->claim->Nt->ptr[k] && !is_harmless(x, k, i);
-        x->move.target[k] = k == i;
-    }
-    uz_row_move_solve(&x->move, x->z, x->claim->Nt, x->claim->inverse);
-    x->n_dof = 0;
-    for (int64_t j = 0; j < x->d; j++)
-        if (x->z[j] != 0.0)
-            x->dof[x->n_dof++] = j;
-}
-
 /* How far z is from what row k wants of it. */
 static double miss_of(const prover *x, int64_t k, int64_t i)
 {
@@ -168,8 +152,20 @@ static uz_contact_verdict prove_row(prover *x, bool *provable, int64_t i)
     const uz_csc *N = x->claim->of->N;
     double miss = 0.0;
     x->n_dof = x->n_row = 0;
-    if (!witness_by_own_dofs(x, i))
-        witness_by_equations(x, i);
+    if (!witness_by_own_dofs(x, i)) {
+        /* N z = e_i on all rows that count, z of least W^-1 norm */
+        for (int64_t k = 0; k < x->n_dof; k++)
+            x->z[x->dof[k]] = 0.0;
+        for (int64_t k = 0; k < x->m; k++) {
+            x->move.in[k] = x->claim->Nt->ptr[k + 1] > x->claim->Nt->ptr[k] && !is_harmless(x, k, i);
+            x->move.target[k] = k == i;
+        }
+        uz_row_move_solve(&x->move, x->z, x->claim->Nt, x->claim->inverse);
+        x->n_dof = 0;
+        for (int64_t j = 0; j < x->d; j++)
+            if (x->z[j] != 0.0)
+                x->dof[x->n_dof++] = j;
+    }
     for (int64_t k = 0; k < x->n_dof; k++) /* image = N z, and the rows where it is not zero */
         for (int64_t q = N->ptr[x->dof[k]]; q < N->ptr[x->dof[k] + 1]; q++) {
             double *image = &x->image[N->idx[q]];
