@@ -163,9 +163,6 @@ size_t uz_body_model_bytes(const uz_body_model *model);
 /* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included.
  */
 uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
-/* f (n_nodes x dim) = the elements' stiffness times the displacements, element by element: what the nodes need to stay
- * where they are. Less the loads and the springs' -k u it is what supports and obstacles do. */
-uz_status uz_internal_forces(double *f, const uz_body_model *model, const double *nodal, uz_error *err);
 
 /* 1/2 u'K u over all dofs, springs included. carried: rigid motion may be most of u; elements are then rotated back one
  * by one, so that its rounding is none of the energy. */

@@ -99,32 +99,6 @@ void uz_turn_element(double *ke, const uz_body_model *model, int64_t element)
     }
 }
 
-/* Turns the node's free dofs so that one of them is along n, a unit vector along its present ones with a share in
- * several: Q = H Q. */
-static void turn_node(uz_body_model *model, int64_t node, const double n[3], int k)
-{
-    const int dim = model->mesh.dim;
-    uz_mesh_info *info = &model->info;
-    double H[9] = {0}, Q[9] = {0};
-    double w[3] = {n[0], n[1], n[2]};
-    w[k] += copysign(1, n[k]);
-    for (int i = 0; i < dim; i++)
-        for (int j = 0; j < dim; j++)
-            H[i * dim + j] = i == k ? n[j] : (i == j) - w[i] * w[j] / fabs(w[k]);
-    if (model->frame_of[node] <= 0) {
-        memcpy(info->frame + info->n_rotated * dim * dim, H, (size_t)(dim * dim) * sizeof *H);
-        info->rotated_node[info->n_rotated] = node;
-        model->frame_of[node] = ++info->n_rotated;
-        return;
-    }
-    double *frame = info->frame + (model->frame_of[node] - 1) * dim * dim;
-    for (int i = 0; i < dim; i++)
-        for (int j = 0; j < dim; j++)
-            for (int l = 0; l < dim; l++)
-                Q[i * dim + j] += H[i * dim + l] * frame[l * dim + j];
-    memcpy(frame, Q, (size_t)(dim * dim) * sizeof *Q);
-}
-
 int uz_hold_direction(uz_body_model *model, int64_t node, const double normal[3])
 {
     const int dim = model->mesh.dim;
@@ -140,8 +114,27 @@ int uz_hold_direction(uz_body_model *model, int64_t node, const double normal[3]
         k = fabs(n[c]) > fabs(n[k]) ? c : k;
         shares += n[c] != 0;
     }
-    if (shares > 1)
-        turn_node(model, node, n, k);
+    if (shares <= 1)
+        return k;
+    /* The node's free dofs are turned so that one of them is along n, by a reflection: Q = H Q. */
+    uz_mesh_info *info = &model->info;
+    double H[9] = {0}, Q[9] = {0}, w[3] = {n[0], n[1], n[2]};
+    w[k] += copysign(1, n[k]);
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            H[i * dim + j] = i == k ? n[j] : (i == j) - w[i] * w[j] / fabs(w[k]);
+    if (model->frame_of[node] <= 0) {
+        memcpy(info->frame + info->n_rotated * dim * dim, H, (size_t)(dim * dim) * sizeof *H);
+        info->rotated_node[info->n_rotated] = node;
+        model->frame_of[node] = ++info->n_rotated;
+        return k;
+    }
+    double *frame = info->frame + (model->frame_of[node] - 1) * dim * dim;
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            for (int l = 0; l < dim; l++)
+                Q[i * dim + j] += H[i * dim + l] * frame[l * dim + j];
+    memcpy(frame, Q, (size_t)(dim * dim) * sizeof *Q);
     return k;
 }
 

@@ -18,25 +18,6 @@ typedef struct {
     int64_t n_near;
 } neighbours;
 
-/* The most neighbours: each counted once for every element that it shares. */
-static bool neighbours_init(neighbours *n, const uz_body_model *model)
-{
-    const uz_mesh *mesh = &model->mesh;
-    int64_t most = 0;
-    memset(n, 0, sizeof *n);
-    n->model = model;
-    n->start = uz_alloc(mesh->n_nodes + 1, sizeof *n->start);
-    n->around = uz_alloc(mesh->first[mesh->n_elements], sizeof *n->around);
-    n->seen = uz_alloc_zero(mesh->n_nodes, sizeof *n->seen);
-    if (!n->start || !n->around || !n->seen)
-        return false;
-    uz_mesh_list_around(n->start, n->around, mesh);
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        most = n->start[a + 1] - n->start[a] > most ? n->start[a + 1] - n->start[a] : most;
-    n->near = uz_alloc(most * UZ_ELEMENT_NODES + 1, sizeof *n->near);
-    return n->near != NULL;
-}
-
 /* Free dofs >= first among the neighbours; written to out unless it is NULL. Returns how many. */
 static int64_t free_rows(int64_t *out, const neighbours *n, int64_t first)
 {
@@ -98,11 +79,21 @@ static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, int64_t *ptr
 
 uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
 {
-    neighbours n;
+    const uz_mesh *mesh = &model->mesh;
+    neighbours n = {.model = model,
+                    .start = uz_alloc(mesh->n_nodes + 1, sizeof *n.start),
+                    .around = uz_alloc(mesh->first[mesh->n_elements], sizeof *n.around),
+                    .seen = uz_alloc_zero(mesh->n_nodes, sizeof *n.seen)};
     uz_status status = UZ_ERR_MEMORY;
-    int64_t *ptr = uz_alloc_zero(model->d + 1, sizeof *ptr);
+    int64_t *ptr = uz_alloc_zero(model->d + 1, sizeof *ptr), most = 0;
     int64_t *ptr_fixed = uz_alloc_zero(model->n_fixed + 1, sizeof *ptr_fixed);
-    if (!neighbours_init(&n, model) || !ptr || !ptr_fixed) {
+    if (n.start && n.around && n.seen) {
+        uz_mesh_list_around(n.start, n.around, mesh);
+        for (int64_t a = 0; a < mesh->n_nodes; a++)
+            most = n.start[a + 1] - n.start[a] > most ? n.start[a + 1] - n.start[a] : most;
+        n.near = uz_alloc(most * UZ_ELEMENT_NODES + 1, sizeof *n.near); /* each counted for every element it shares */
+    }
+    if (!n.near || !ptr || !ptr_fixed) {
         uz_fail(err, status, "", "no memory for the pattern of %lld unknowns", (long long)model->d);
         goto done;
     }

@@ -220,32 +220,6 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
     return status;
 }
 
-/* ------------------------------------------------------------ internal forces */
-
-uz_status uz_internal_forces(double *f, const uz_body_model *model, const double *nodal, uz_error *err)
-{
-    const uz_mesh *mesh = &model->mesh;
-    const int dim = mesh->dim;
-    stiffness_source source;
-    const double *ke;
-    uz_status status = source_init(&source, model, err);
-    memset(f, 0, (size_t)(mesh->n_nodes * dim) * sizeof *f);
-    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++) {
-        int count;
-        const int64_t *node = uz_mesh_element(mesh, e, &count);
-        const int n = count * dim;
-        status = source_get(&ke, &source, e, err);
-        for (int i = 0; i < n && status == UZ_OK; i++) {
-            double sum = 0;
-            for (int j = 0; j < n; j++)
-                sum += ke[i * n + j] * nodal[node[j / dim] * dim + j % dim];
-            f[node[i / dim] * dim + i % dim] += sum;
-        }
-    }
-    source_clear(&source);
-    return status;
-}
-
 /* ------------------------------------------------------------ strain energy */
 
 /* An element's displacements against those of its first node: a translation strains nothing, and what it would leave by

@@ -184,30 +184,6 @@ static int64_t factor_projection(block *s)
     return n;
 }
 
-/* The combination of X that column `free_column` of the pivoted factor leaves without energy: L11'x = -L21'e, x = 1
- * there. */
-static void null_vector(double *z, const block *s, int64_t rank, int64_t free_column)
-{
-    const int64_t n = s->b;
-    double x[2 * UZ_NULL_MOST] = {0};
-    for (int64_t i = rank - 1; i >= 0; i--) {
-        double sum = -s->B[free_column * n + i];
-        for (int64_t j = i + 1; j < rank; j++)
-            sum -= s->B[j * n + i] * x[j];
-        x[i] = sum / s->B[i * n + i];
-    }
-    x[free_column] = 1.0;
-    memset(z, 0, (size_t)s->d * sizeof *z);
-    for (int64_t i = 0; i < n; i++)
-        if (x[i] != 0.0)
-            uz_axpy(s->d, x[i], s->X + s->pivot[i] * s->d, z);
-    double largest = 0.0;
-    for (int64_t j = 0; j < s->d; j++)
-        largest = fmax(largest, fabs(z[j]));
-    for (int64_t j = 0; largest > 0.0 && j < s->d; j++)
-        z[j] /= largest;
-}
-
 /* The null vectors in a block of b; *k may be all of them. */
 static uz_status search(block *s, double **Z, int64_t *k, int64_t b, uz_error *err)
 {
@@ -228,13 +204,30 @@ static uz_status search(block *s, double **Z, int64_t *k, int64_t b, uz_error *e
     if (status != UZ_OK)
         return status;
     orthonormalise(s);
-    const int64_t rank = factor_projection(s);
-    *k = s->b - rank;
+    const int64_t rank = factor_projection(s), n = s->b;
+    *k = n - rank;
     *Z = uz_alloc_zero(*k * s->d, sizeof **Z);
     if (!*Z)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld null vectors", (long long)*k);
-    for (int64_t c = 0; c < *k; c++)
-        null_vector(*Z + c * s->d, s, rank, rank + c);
+    for (int64_t c = rank; c < n; c++) {
+        /* the combination of X that column c of the pivoted factor leaves without energy: L11'x = -L21'e, x_c = 1 */
+        double *z = *Z + (c - rank) * s->d, x[2 * UZ_NULL_MOST] = {0}, largest = 0.0;
+        for (int64_t i = rank - 1; i >= 0; i--) {
+            double sum = -s->B[c * n + i];
+            for (int64_t j = i + 1; j < rank; j++)
+                sum -= s->B[j * n + i] * x[j];
+            x[i] = sum / s->B[i * n + i];
+        }
+        x[c] = 1.0;
+        memset(z, 0, (size_t)s->d * sizeof *z);
+        for (int64_t i = 0; i < n; i++)
+            if (x[i] != 0.0)
+                uz_axpy(s->d, x[i], s->X + s->pivot[i] * s->d, z);
+        for (int64_t j = 0; j < s->d; j++)
+            largest = fmax(largest, fabs(z[j]));
+        for (int64_t j = 0; largest > 0.0 && j < s->d; j++)
+            z[j] /= largest;
+    }
     return UZ_OK;
 }
 

@@ -77,8 +77,6 @@ static uz_status estimate(const uz_scene *scene, uz_error *err)
         snprintf(err->message, sizeof err->message, "no estimate");
     err->status = status;
     if (status == UZ_OK)
-        status = uz_internal_forces(f, &model, u, err);
-    if (status == UZ_OK)
         status = uz_nodal_loads(f, &model, scene, err);
     free(u);
     free(f);

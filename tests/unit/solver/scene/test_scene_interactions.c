@@ -2,6 +2,7 @@
  * converged is held against what does not come from the solver: the exact solution of its matrices, geometry,
  * equilibrium, virtual work, and the same scene turned, in other units, with its nodes in another order. */
 #include "harness.h"
+#include "internal_forces.h"
 
 #include "scene_move.h"
 #include "scene_norm.h"
@@ -211,7 +212,7 @@ static void find_forces(examined *e)
     e->inner = scene_room(total, sizeof *e->inner);
     e->contact = scene_room(total, sizeof *e->contact);
     CHECK(uz_nodal_loads(e->load, &e->model, &e->s->scene, &err) == UZ_OK);
-    CHECK(uz_internal_forces(e->inner, &e->model, e->x->u, &err) == UZ_OK);
+    CHECK(internal_forces(e->inner, &e->model, e->x->u));
     uz_row_forces(push, &e->model, e->x->r);
     for (int64_t i = 0; i < e->x->m; i++)
         add_row_force(e, i, push[i]);
@@ -386,7 +387,7 @@ static void compare(random_scene *s, const uz_result *x, const uz_result *y, con
             d[a * dim + c] = back / how->length - x->u[a * dim + c];
         }
     }
-    CHECK(uz_internal_forces(f, &e.model, d, &err) == UZ_OK && uz_internal_forces(ku, &e.model, x->u, &err) == UZ_OK);
+    CHECK(internal_forces(f, &e.model, d) && internal_forces(ku, &e.model, x->u));
     double square = dot_of(f, d, total), whole = dot_of(ku, x->u, total);
     for (int64_t i = 0; e.model.spring && i < total; i++) {
         square += e.model.spring[i] * d[i] * d[i];
