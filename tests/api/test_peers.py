@@ -14,6 +14,7 @@ import service
 from service import ROOT, check, options
 
 sys.path.insert(0, str(ROOT / "tests/peers"))
+import decks  # noqa: E402
 import peers  # noqa: E402
 import stats  # noqa: E402
 import draw  # noqa: E402  of tests/figures, whose path peers adds
@@ -49,6 +50,19 @@ def test_shifted_geometric_mean(_):
     check(abs(stats.shifted_geometric_mean([2.0, 14.0], 2.0) - 6.0) < 1e-12)
     check(abs(stats.shifted_geometric_mean([5.0] * 7, 10.0) - 5.0) < 1e-12)
     check(math.isnan(stats.shifted_geometric_mean([], 10.0)))
+
+
+@options(None)
+def test_a_deck_with_a_stiff_contact(_):
+    """Only its contact is another one."""
+    head = "*NODE\n" + "".join(f"{k + 1}, {x}, {y}\n" for k, (x, y) in enumerate([(0, 0), (2, 0), (2, 1), (0, 1), (0, 1), (2, 1), (2, 3), (0, 3)]))
+    head += "*ELEMENT, TYPE=CPE4, ELSET=E\n1, 1, 2, 3, 4\n2, 5, 6, 7, 8\n*MATERIAL, NAME=M\n*ELASTIC\n1000., 0.3\n*SOLID SECTION, ELSET=E, MATERIAL=M\n"
+    head += "*SURFACE, NAME=S\n2, S1\n*SURFACE, NAME=T\n1, S3\n*CONTACT PAIR, INTERACTION=I, TYPE=SURFACE TO SURFACE\nS, T\n*SURFACE INTERACTION, NAME=I\n"
+    tail = "*STEP\n*STATIC\n*BOUNDARY\n1, 1, 2\n*END STEP\n"
+    for own in ("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD\n** of its own\n", "*Surface behavior, pressure-overclosure=LINEAR\n1.E7, 3.\n"):
+        text = decks.stiffened(head + own + tail, 100)
+        check("=LINEAR\n50000\n" in text and "1.E7" not in text and text.startswith(head) and text.endswith(tail), text)
+        check(decks.scene(decks.read(text)) == decks.scene(decks.read(head + own + tail)), text)
 
 
 @options(None)
