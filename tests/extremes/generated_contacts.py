@@ -232,7 +232,7 @@ def revolved(rng, dim):
     inner, middle, outer = rng.uniform(2, 8), 12, 12 * rng.uniform(1.3, 1.8)
     young, over = 10 ** rng.uniform(3, 5), middle * 10 ** rng.uniform(-3.3, -2.3)
     far = middle * rng.uniform(2.2, 6) if shape == "torus" else 0  # from the axis to the middle of the tube
-    long, sector = rng.uniform(4, 12), math.radians(rng.choice([30, 60, 90]))
+    long, sector = rng.uniform(4, 12), math.radians(rng.choice([20, 30, 60]))
     slope = rng.uniform(-1, 1) * min(0.4, (inner - 1) / long)
     end = math.pi if shape == "torus" else math.radians(rng.uniform(40, 75))
     maps = [distorted(rng, dim, False) for _ in range(2)]
@@ -252,8 +252,8 @@ def revolved(rng, dim):
         groups.update(first=[(0, "z0"), (1, "z0")], last=[(0, "z1"), (1, "z1")])
         supports += [{"on": "first", "normal": [0, 1, 0], "u": 0}, {"on": "last", "normal": [math.sin(sector), math.cos(sector), 0], "u": 0}]
     on = rng.choice([("plug", "socket"), ("socket", "plug")])
-    along = math.degrees(end) / rng.uniform(4, 9) if shape != "cone" else rng.uniform(4, 9)
-    cells = [[2, max(3, math.ceil(along * rng.uniform(0.7, 1.3)))] + [max(3, math.ceil(math.degrees(sector) / rng.uniform(6, 12)))] * (dim - 2)
+    along = math.degrees(end) / (rng.uniform(4, 9) if dim == 2 else rng.uniform(12, 20)) if shape != "cone" else rng.uniform(4, 9)
+    cells = [[2, max(3, math.ceil(along * rng.uniform(0.7, 1.3)))] + [max(2, math.ceil(math.degrees(sector) / rng.uniform(8, 15)))] * (dim - 2)
              for _ in range(2)]
     scene = Scene(f"revolved {shape}", kinds, cells,
                   [part(0, inner, middle + over), part(1, middle, outer)], groups, model="axisymmetric" if dim == 2 else "solid",
@@ -282,7 +282,7 @@ def balls(rng, dim):
     supports = [{"on": "x0", "ux": 0}, {"on": "y0", "uy": 0}, {"on": "x1", "normal": [math.cos(end), 0, -math.sin(end)], "u": 0},
                 {"on": "y1", "normal": [0, math.cos(end), -math.sin(end)], "u": 0}]
     on = rng.choice([("ball", "socket"), ("socket", "ball")])
-    cells = [[rng.randint(3, 6), rng.randint(3, 6), 2] for _ in range(2)]
+    cells = [[rng.randint(3, 5), rng.randint(3, 5), 2] for _ in range(2)]
     scene = Scene("balls", kinds, cells, [shell(0, inner, middle + over), shell(1, middle, outer)], groups, model="solid",
                   materials=[{"on": "all", "young": young, "poisson": poisson}], supports=supports, loads=[],
                   contacts=[{"on": on[0], "with": on[1]}])
