@@ -90,7 +90,7 @@ def test_one_factorization_factored(s):
 @options("--workers", "4")
 def test_one_factorization_of_a_larger_body(s):
     """Each process factors once at most; none waits for another one's factor."""
-    jobs = together(CLIENTS, lambda i: s.solve(scaled_scene(1 + i, (200, 66))))
+    jobs = together(CLIENTS, lambda i: s.solve(scaled_scene(1 + i, (100, 33) if service.INSTRUMENTED else (200, 66))))
     fresh = sum(not job["summary"]["factor"]["cached"] for job in jobs)
     check(1 <= fresh <= WORKERS, fresh)
     energies = [job["summary"]["energy"]["primal"] / (1 + i) ** 2 for i, job in enumerate(jobs)]
@@ -145,7 +145,7 @@ def test_small_cache_under_load(s):
     alone = {cells: s.solve(scaled_scene(1, cells))["summary"]["energy"]["primal"] for cells in bodies}
 
     def work(i):
-        for round_ in range(8):
+        for round_ in range(4 if service.INSTRUMENTED else 8):
             cells = bodies[(i + 5 * round_) % len(bodies)]
             summary = s.solve(scaled_scene(1 + i, cells))["summary"]
             check(near(summary["energy"]["primal"], (1 + i) ** 2 * alone[cells]), cells, alone[cells], summary)

@@ -34,6 +34,10 @@ MIX += [(scene((30, 10), method="accelerated_restart", operator="factored"), -3.
             (scene((60, 20), operator="factored"), -3.9620174378e-3), (scene((120, 40)), -3.9624809230e-3)]
 
 
+# A daemon with a sanitizer is killed in the same ways, with fewer of them.
+JOBS, SLOW, KILLS = (20, 8, 4) if INSTRUMENTED else (50, 12, 8)
+
+
 # ---------------------------------------------------------------- helpers
 
 def submit(s, count, headers=None):
@@ -120,12 +124,12 @@ def check_file(s):
 # ---------------------------------------------------------------- kill -9
 
 @options("--workers", "2")
-def test_killed_with_fifty_jobs(s):
-    acknowledged = submit(s, 50)
+def test_killed_with_many_jobs(s):
+    acknowledged = submit(s, JOBS)
     done = {job_id: job for job_id, job in listed(s).items() if job["status"] == "successful"}
     # Posted last, so that the kill meets running jobs even where all others were done meanwhile.
     slow, energy = MIX[2]
-    acknowledged |= {expect(s.post(slow), 202).json["id"]: energy for _ in range(12)}
+    acknowledged |= {expect(s.post(slow), 202).json["id"]: energy for _ in range(SLOW)}
     before = counts(s)
     check(before["running"] > 0 and before["accepted"] >= 5, "too few were left to be killed:", before)
     check(s.restart() == -signal.SIGKILL)
@@ -140,9 +144,9 @@ def test_killed_with_fifty_jobs(s):
 
 @options("--workers", "2", "--max-attempts", "100")
 def test_killed_again_and_again(s):
-    acknowledged = submit(s, 50)
+    acknowledged = submit(s, JOBS)
     randomly = random.Random(7)
-    for _ in range(8):
+    for _ in range(KILLS):
         time.sleep(randomly.uniform(0, 0.2))
         check(s.restart() == -signal.SIGKILL)
         check(set(listed(s)) == set(acknowledged), "jobs were lost or made")

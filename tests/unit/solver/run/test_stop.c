@@ -1,4 +1,5 @@
-/* Solves that are told to stop at any of their questions, on every route: what comes back is the best answer so far,
+/* not under ThreadSanitizer: one thread, but for one that ends with a lock
+ * Solves that are told to stop at any of their questions, on every route: what comes back is the best answer so far,
  * with a bound that holds. */
 #include "harness.h"
 #include "membrane.h"
