@@ -24,6 +24,7 @@ function facts_of(summary) {
     ["Contact area", Number.isFinite(contact?.area) ? number(contact.area, 4) : null],
     ["Largest penetration", contact ? number(contact.max_penetration) : null],
     ["Energy", energy ? `${number(energy.primal, 6)} (at least ${number_towards(energy.dual, 6, -1)})` : null],
+    ["Potential energy of the body", Number.isFinite(energy?.potential) ? number(energy.potential, 6) : null],
     ["Imbalance of all forces", summary.resultants ? number(summary.resultants.imbalance) : null],
     ["Expected", summary.cost?.predicted ? `${seconds(summary.cost.predicted.seconds)} after the assembly; it took ${seconds(summary.cost.actual?.seconds)}` : null],
   ].filter(([, value]) => value);

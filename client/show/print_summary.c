@@ -429,7 +429,10 @@ void client_print_summary(FILE *to, const json_t *job)
     client_checks_assertions(&checks, summary, "");
     client_checks_print(to, &checks, 0, "assertions");
     if (checks.failed)
-        fputs("assertions  no memory to show all of them\n", to);
+        if (isfinite(client_json_number(summary, "energy.potential")))
+            fprintf(to, "%12sthe body's potential energy is %s\n", "",
+                    number_in_words(primal, summary, "energy.potential", 6));
+    fputs("assertions  no memory to show all of them\n", to);
     client_checks_clear(&checks);
 }
 

@@ -158,8 +158,9 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
     put_object(t, "energy",
                (named[]){{"primal", isfinite(c->gap) ? c->energy_primal : (double)INFINITY},
                          {"dual", c->energy_dual},
-                         {"strain", s->evaluation ? s->evaluation->strain_energy : (double)NAN}},
-               s->evaluation ? 3 : 2);
+                         {"strain", s->evaluation ? s->evaluation->strain_energy : (double)NAN},
+                         {"potential", s->evaluation ? s->evaluation->potential_energy : (double)NAN}},
+               s->evaluation ? 4 : 2);
     text_open(t, "certificate", '{');
     put_named(
         t, (named[]){{"relative_error", c->relative_error}, {"absolute_error", c->absolute_error}, {"gap", c->gap}}, 3);

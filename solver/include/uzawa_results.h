@@ -158,9 +158,11 @@ typedef struct {
 
 /* Scenes: what the answer comes to. */
 typedef struct {
-    double strain_energy; /* with that of springs */
-    double contact_area;  /* tributary area of the rows with r < 0 */
-    int64_t peak_node;    /* where max_pressure is; -1: no pressure */
+    double strain_energy;    /* with that of springs */
+    double potential_energy; /* strain_energy less the work of the loads, over the whole body: that of the certificate
+                              * leaves out what supported dofs add by themselves, and the loads' work on them */
+    double contact_area;     /* tributary area of the rows with r < 0 */
+    int64_t peak_node;       /* where max_pressure is; -1: no pressure */
     double peak_at[3];
     int64_t n_contacts, n_supports;
     uz_resultant *contacts,

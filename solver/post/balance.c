@@ -261,13 +261,13 @@ static double imbalance(const balance *b)
     return b->size > 0 ? largest / b->size : 0;
 }
 
-/* With thermal strain e: 1/2 (strain - e)' C (strain - e) = 1/2 u'K u - u'f + 1/2 e' C e, f the thermal forces. */
-static uz_status thermal_energy(double *energy, const balance *b, uz_error *err)
+/* With thermal strain e: 1/2 (strain - e)' C (strain - e) = 1/2 u'K u - u'f + 1/2 e' C e, f the thermal forces.
+ * work: u'f; own: the last term. */
+static uz_status thermal_energy(double *work, double *own, const balance *b, uz_error *err)
 {
     uz_field_body body = {.scene = b->scene};
     uz_status status = uz_field_body_init(&body, b->scene, b->model, err);
     const uz_mesh *mesh = &b->model->mesh;
-    *energy = 0;
     for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK && body.free_strain; e++) {
         uz_element element;
         double xyz[3 * UZ_ELEMENT_NODES], strain[UZ_ELEMENT_STRESSES], f[UZ_ELEMENT_DOFS] = {0},
@@ -280,10 +280,10 @@ static uz_status thermal_energy(double *energy, const balance *b, uz_error *err)
         uz_thermal_strain(strain, element.model, element.lame, body.free_strain[e]);
         uz_element_add_thermal_load(f, &element, strain);
         for (int i = 0; i < count * b->dim; i++)
-            *energy -= f[i] * b->u[node[i / b->dim] * b->dim + i % b->dim];
+            *work += f[i] * b->u[node[i / b->dim] * b->dim + i % b->dim];
         uz_elastic_stress(stress, element.model, element.lame, strain);
         for (int i = 0; i < uz_stress_count(element.model); i++)
-            *energy += 0.5 * stress[i] * strain[i] * uz_element_volume(&element);
+            *own += 0.5 * stress[i] * strain[i] * uz_element_volume(&element);
     }
     uz_field_body_clear(&body);
     return status;
@@ -294,7 +294,8 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
 {
     const int64_t n = model->mesh.n_nodes, dim = model->mesh.dim;
     balance b = {.model = model, .scene = scene, .u = u, .r = r, .out = out, .dim = model->mesh.dim};
-    double *force = model->row_ends ? uz_alloc(model->m, sizeof *force) : NULL, thermal = 0, energy = 0;
+    double *force = model->row_ends ? uz_alloc(model->m, sizeof *force) : NULL;
+    double expanding = 0, expanded = 0, energy = 0, work = 0; /* work: of all loads, the thermal forces included */
     uz_status status = UZ_OK;
     b.load = uz_alloc_zero(n * dim, sizeof *b.load);
     b.contact = uz_alloc_zero(n * dim, sizeof *b.contact);
@@ -316,6 +317,8 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     status = uz_nodal_loads(b.load, model, scene, err);
     for (int64_t a = 0; a < n && status == UZ_OK; a++) {
         const double *f = b.load + a * dim;
+        for (int64_t c = 0; c < dim; c++)
+            work += f[c] * u[a * dim + c];
         if (f[0] != 0 || f[1] != 0 || (dim == 3 && f[2] != 0))
             add_force(&b, &out->loads, a, f);
     }
@@ -329,7 +332,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     if (status == UZ_OK)
         status = add_springs(&b, err);
     if (status == UZ_OK)
-        status = thermal_energy(&thermal, &b, err);
+        status = thermal_energy(&expanding, &expanded, &b, err);
     if (status == UZ_OK) { /* not from the work of the forces: what they leave over works along with the whole body */
         /* Supports move the body, or do not hold it: then most of u may be rigid motion. */
         bool carried = model->n_modes > 0;
@@ -337,7 +340,8 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
             carried = model->dof[i] < 0 && u[i] != 0;
         status = uz_strain_energy(&energy, model, u, carried, err);
     }
-    out->strain_energy = energy + thermal;
+    out->strain_energy = energy - expanding + expanded;
+    out->potential_energy = energy - work + expanded;
     out->imbalance = imbalance(&b);
 done:
     free(force);

@@ -5,7 +5,7 @@
 #include "assembly/assembly.h"
 #include "uzawa.h"
 
-/* Fills out->contacts, supports, loads, imbalance and strain_energy; the names and zeros are there. u: n_nodes x dim;
+/* Fills out->contacts, supports, loads, imbalance and both energies; the names and zeros are there. u: n_nodes x dim;
  * r: m; scene: with the loads of the case. */
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                             const double *r, uz_error *err);

@@ -482,3 +482,36 @@ TEST(units_leave_the_digits)
     clear(&mm, a);
     clear(&m, b);
 }
+
+/* A block 10 x 10 that a support presses on a cylinder: the reduced system's energy grows with the mesh, the body's own
+ * does not. Without moved supports they are the same. */
+TEST(the_potential_energy_is_that_of_the_body)
+{
+    double primal[2], potential[2];
+    for (int k = 0; k < 4; k++) {
+        const bool moved = k < 2;
+        const int64_t cells = 30 << (k % 2);
+        uz_scene s = body_scene(UZ_PLANE_STRAIN, "quad4", (double[3]){10, 10, 0}, (int64_t[3]){cells, cells, 0});
+        body_hold(&s, "left", 0, NAN, NAN);
+        body_hold(&s, "top", NAN, moved ? -0.1 : 0, NAN);
+        uz_contact *contact = body_plane(&s, "bottom", (double[3]){0, moved ? -20 : -20.01, 0}, (double[3]){0});
+        contact->kind = UZ_OBSTACLE_ROUND;
+        contact->radius = 20;
+        if (!moved)
+            body_load(&s, UZ_LOAD_BODY_FORCE, "all", 10, -500, 0);
+        uz_result *result = body_solve(&s, 1e-8);
+        const uz_evaluation *e = result->evaluation;
+        CHECK(e->contacts[0].force[1] > 0);
+        primal[k % 2] = result->summary.certificate.energy_primal;
+        potential[k % 2] = e->potential_energy;
+        if (moved)
+            CHECK_REL(e->potential_energy, e->strain_energy, 1e-12); /* there is no load */
+        else
+            CHECK_REL(e->potential_energy, primal[k % 2], 1e-9);
+        clear(&s, result);
+        if (k == 1)
+            CHECK_MSG(primal[1] < 1.8 * primal[0] && primal[0] < 0, "%g %g", primal[0], primal[1]);
+        if (k % 2 == 1)
+            CHECK_REL(potential[1], potential[0], 0.01);
+    }
+}
