@@ -338,11 +338,12 @@ peers: deps bench-deps ## the same problems by what Debian has, one certificate 
 peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json; DECKS=folder: CalculiX's own decks, too
 	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json $(DECKS)
 
-extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles: tables, build/extremes.json, build/contacts.json, build/obstacles.json; FILTER=name: some, FILTER=contacts or obstacles: these scenes alone, SCENES=100: the first of them
+extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles, 100 with quantities: tables, build/extremes.json, build/contacts.json, build/obstacles.json, build/quantities.json; FILTER=name: some, FILTER=contacts, obstacles or quantities: these scenes alone, SCENES=100: the first of them
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/uzawad
-	@$(if $(filter contacts obstacles,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
+	@$(if $(filter contacts obstacles quantities,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
 	@$(if $(filter-out contacts,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_contacts.py $(BUILD) $(BUILD)/contacts.json $(SCENES))
 	@$(if $(filter-out obstacles,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_obstacles.py $(BUILD) $(BUILD)/obstacles.json $(SCENES))
+	@$(if $(filter-out quantities,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_quantities.py $(BUILD) $(BUILD)/quantities.json $(SCENES))
 
 theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table and build/theory.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory

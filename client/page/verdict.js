@@ -62,6 +62,15 @@ function assertions_of(summary) {
       h("td", null, limits_of(one), one.reason ? h("div", { class: "muted" }, one.reason) : null)))));
 }
 
+function quantities_of(summary) {
+  if (!summary.quantities?.length) return null;
+  return h("table", { class: "assertions", id: "quantities" }, h("caption", null, "Quantities, by estimate"),
+    h("thead", null, h("tr", null, ["Name", "Value", "On this mesh"].map((name) => h("th", { scope: "col" }, name)))),
+    h("tbody", null, summary.quantities.map((one) => h("tr", null, h("td", null, one.name),
+      h("td", null, number(one.value, 6), Number.isFinite(one.low) ? ` ± ${number((one.high - one.low) / 2, 2)}` : h("div", { class: "muted" }, one.why)),
+      h("td", null, number(one.on_this_mesh, 6))))));
+}
+
 /** The card of a summary. */
 export function verdict_card(summary) {
   const outcome = outcome_words(summary), whole = whole_words(summary);
@@ -70,7 +79,7 @@ export function verdict_card(summary) {
     whole ? h("p", { class: "certificate", id: "whole-error" }, whole) : null,
     h("p", { class: whole ? "" : "certificate", id: "certificate" }, certificate_words(summary)),
     h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
-    hint_of(summary), warnings_of(summary), assertions_of(summary),
+    quantities_of(summary), hint_of(summary), warnings_of(summary), assertions_of(summary),
     h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));
 }
 

@@ -66,8 +66,17 @@ void client_checks_outcome(client_checks *to, const json_t *job)
     static const char NAME[] = "converged";
     const char *outcome = client_json_text(job, "summary.outcome"), *message = client_json_text(job, "summary.message");
     const char *detail = client_json_text(job, "error.detail"), *title = client_json_text(job, "error.title");
-    char bound[32];
+    char bound[32], quantities[4 * CLIENT_QUANTITY] = "";
     client_format_error(bound, client_json_at(job, "summary"));
+    const json_t *one;
+    size_t i, used = 0;
+    json_array_foreach(client_json_at(job, "summary.quantities"), i, one)
+    {
+        char text[CLIENT_QUANTITY];
+        if (used < sizeof quantities)
+            used += (size_t)snprintf(quantities + used, sizeof quantities - used, "; %s",
+                                     client_format_quantity(text, one));
+    }
     if (!client_job_ended(job))
         client_checks_add(to, CLIENT_NO_ANSWER, "", NAME, "the job has not ended");
     else if (!*outcome)
@@ -76,7 +85,7 @@ void client_checks_outcome(client_checks *to, const json_t *job)
                           : *title ? title
                                    : "the job left no answer and no reason");
     else if (strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0)
-        client_checks_add(to, CLIENT_PASS, "", NAME, "%s: whole relative error %s", outcome, bound);
+        client_checks_add(to, CLIENT_PASS, "", NAME, "%s: whole relative error %s%s", outcome, bound, quantities);
     else
         client_checks_add(to, CLIENT_FAIL, "", NAME, "%s%s%s", outcome, *message ? ": " : "", message);
 }
@@ -109,9 +118,10 @@ void client_checks_assertions(client_checks *to, const json_t *summary, const ch
         const double open = client_json_number(line, "cases.uncertain");
         const char *reason = client_json_text(line, "reason"), *of = client_json_text(line, "case");
         int used = snprintf(text, sizeof text, "%s", reason);
+        const bool estimated = strncmp(client_json_text(line, "quantity"), "quantities.", 11) == 0;
         if (!*reason && error > 0)
-            used =
-                snprintf(text, sizeof text, "%.9g, the exact one within %s", found, client_format_bound(bound, error));
+            used = snprintf(text, sizeof text, "%.9g, %s within %s", found, estimated ? "by estimate" : "the exact one",
+                            client_format_bound(bound, error));
         else if (!*reason)
             used = snprintf(text, sizeof text, "%.9g", found);
         if (*of && used > 0 && (size_t)used < sizeof text)

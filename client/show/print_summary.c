@@ -119,6 +119,15 @@ static void print_outcome(FILE *to, const json_t *summary)
             fputc('\n', to);
         }
     }
+    const json_t *quantity;
+    size_t i;
+    json_array_foreach(json_object_get(summary, "quantities"), i, quantity)
+    {
+        char text[CLIENT_QUANTITY];
+        label(to, i == 0 ? "quantities" : "");
+        client_print_safe(to, client_format_quantity(text, quantity));
+        fputc('\n', to);
+    }
     if (json_is_object(json_object_get(summary, "cases"))) {
         label(to, "cases");
         fprintf(to, "%s; what follows is of the worst: ", number_in_words(count, summary, "cases.count", 9));
@@ -420,6 +429,9 @@ void client_print_summary(FILE *to, const json_t *job)
         label(to, "energy");
         fprintf(to, "%s primal, %s dual\n", number_in_words(primal, summary, "energy.primal", 11),
                 number_in_words(dual, summary, "energy.dual", 11));
+        if (isfinite(client_json_number(summary, "energy.potential")))
+            fprintf(to, "%12sthe body's potential energy is %s\n", "",
+                    number_in_words(primal, summary, "energy.potential", 6));
     }
     print_certificate(to, summary);
     print_factor(to, summary);

@@ -95,6 +95,23 @@ const char *client_format_error(char buffer[32], const json_t *summary)
     return buffer;
 }
 
+const char *client_format_quantity(char buffer[CLIENT_QUANTITY], const json_t *quantity)
+{
+    const char *name = client_json_text(quantity, "name"), *why = client_json_text(quantity, "why");
+    const double value = client_json_number(quantity, "value"), low = client_json_number(quantity, "low"),
+                 high = client_json_number(quantity, "high"), half = 0.5 * (high - low);
+    char within[32], relative[32] = "";
+    if (isfinite(half) && value != 0)
+        snprintf(relative, sizeof relative, " (%.2g %%)", 100 * half / fabs(value));
+    if (isfinite(half))
+        snprintf(buffer, CLIENT_QUANTITY, "%s %.6g within %s%s, by estimate; %.6g on this mesh", name, value,
+                 client_format_bound(within, half), relative, client_json_number(quantity, "on_this_mesh"));
+    else
+        snprintf(buffer, CLIENT_QUANTITY, "%s %.6g on this mesh, without an interval%s%s", name, value,
+                 *why ? ": " : "", why);
+    return buffer;
+}
+
 void client_print_tags(FILE *to, const json_t *job, const char *separator)
 {
     const json_t *tags = json_object_get(job, "tags");

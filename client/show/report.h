@@ -38,5 +38,8 @@ const char *client_format_seconds(char *buffer, size_t size, double seconds);
 const char *client_format_bound(char buffer[32], double bound);
 /* A summary's whole error: a bound, "about 0.022" of an estimate, "unknown". */
 const char *client_format_error(char buffer[32], const json_t *summary);
+/* A quantity of a summary: "force 12.3 within 0.2 (1.6 %), by estimate; 12.5 on this mesh". */
+enum { CLIENT_QUANTITY = 256 };
+const char *client_format_quantity(char buffer[CLIENT_QUANTITY], const json_t *quantity);
 
 #endif

@@ -41,7 +41,8 @@ const schemas *decode_schemas(void)
 
 void codec_problem_from_error(problem_details *out, const uz_error *err, uz_problem_kind kind)
 {
-    static const char *const MATRICES[] = {"K", "N", "p", "h"}, *const BESIDE[] = {"/cases", "/solver", "/answer"};
+    static const char *const MATRICES[] = {"K", "N", "p", "h"}, *const BESIDE[] = {"/cases", "/solver", "/answer",
+                                                                                   "/quantities"};
     const uz_status status = err->status;
     const char *where = err->where, *code = uz_status_name(status), *within = "/problem";
     if (strcmp(where, "/mesh/gmsh") == 0) /* the library reads two formats of text and has one status for both */
@@ -224,7 +225,9 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
     out->problem.kind = json_text_is(json_get(problem, "kind"), "scene") ? UZ_PROBLEM_SCENE : UZ_PROBLEM_MATRICES;
     const bool good = out->problem.kind == UZ_PROBLEM_SCENE ? decode_scene(&out->problem.scene, d, problem)
                                                             : decode_matrices(&out->problem.qp, d, problem);
-    if (!good || !decode_automatic(out, d, root) || !decode_cases(&out->problem, d, json_get(root, "cases")))
+    if (!good || !decode_automatic(out, d, root) || !decode_cases(&out->problem, d, json_get(root, "cases")) ||
+        !decode_quantities(&out->problem, &out->settings, d, json_get(root, "quantities"),
+                           json_get(solver, "accuracy")))
         return false;
     snprintf(out->start.job, sizeof out->start.job, "%s", from ? from : "");
     out->start.continued = json_truth(json_get(start, "continue"));

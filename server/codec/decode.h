@@ -32,6 +32,9 @@ bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh);
 /* What stands beside the problem (decode_beside.c); list or object NULL: none, or the defaults. */
 bool decode_cases(uz_problem *problem, decoding *d, const json_value *list);
 void decode_settings(uz_settings *out, const json_value *object);
+/* Numbers to be answered by intervals; first that of the accuracy (of the solver), if it is one. After the scene. */
+bool decode_quantities(uz_problem *problem, uz_settings *settings, decoding *d, const json_value *list,
+                       const json_value *accuracy);
 /* Assertions about the summary; after the cases. */
 bool decode_assertions(codec_request *out, decoding *d, const json_value *list);
 

@@ -1,4 +1,5 @@
-/* decode_beside.c: what a request says beside its problem: load cases, settings, assertions about the summary. */
+/* decode_beside.c: what a request says beside its problem: load cases, settings, quantities, assertions about the
+ * summary. */
 #include "codec/decode.h"
 #include "codec/problem.h"
 #include "codec/quantity.h"
@@ -118,10 +119,82 @@ void decode_settings(uz_settings *out, const json_value *object)
     *out = s;
 }
 
+/* ---- quantities */
+
+static bool decode_quantity(uz_quantity *to, decoding *d, const json_value *item, int dim)
+{
+    const json_value *window = json_get(item, "window"), *name = json_get(item, "name");
+    double length = 0;
+    uz_quantity_parse(&to->kind, json_text(json_get(item, "quantity")));
+    decode_name(to->on, sizeof to->on, item, "on", "");
+    if (json_get(item, "direction") &&
+        !decode_components(to->direction, d, item, "direction", 0, dim, "it must be the direction of the number"))
+        return false;
+    if (window && (!decode_components(to->low, d, window, "min", 0, dim, NULL) ||
+                   !decode_components(to->high, d, window, "max", 0, dim, NULL)))
+        return false;
+    for (int c = 0; c < dim; c++)
+        length = hypot(length, to->direction[c]);
+    for (int c = 0; c < dim && length > 0; c++)
+        to->direction[c] /= length;
+    for (int c = 0; c < dim && window; c++)
+        if (!(to->low[c] <= to->high[c]))
+            return decode_refuse(d, "out_of_range", window, "has min %.15g above max %.15g: nothing is between them.",
+                                 to->low[c], to->high[c]);
+    if (name && !decode_label(to->name, d, name, name->text, name->count, "A name of a quantity"))
+        return false;
+    if (name && (strchr(to->name, '.') || strspn(to->name, "0123456789") == strlen(to->name)))
+        return decode_refuse(d, "not_allowed", name, "must have no dot and be no number: assertions name it.");
+    if (!name)
+        snprintf(to->name, sizeof to->name, "%s%s%.40s", uz_quantity_name(to->kind), to->on[0] ? "_" : "", to->on);
+    for (char *at = to->name; *at; at++)
+        *at = *at == '.' ? '_' : *at;
+    return true;
+}
+
+bool decode_quantities(uz_problem *problem, uz_settings *settings, decoding *d, const json_value *list,
+                       const json_value *accuracy)
+{
+    const bool asked = json_get(accuracy, "quantity") != NULL;
+    const int64_t first = asked ? 1 : 0, count = first + (int64_t)json_size(list);
+    if (count == 0)
+        return true;
+    problem->quantities = calloc((size_t)count, sizeof *problem->quantities);
+    if (!problem->quantities)
+        return problem_no_memory(d->problem);
+    problem->n_quantities = count;
+    problem->quantities[0].asked = asked;
+    settings->quantity_error = decode_number(accuracy, "relative", 0);
+    for (int64_t i = 0; i < count; i++)
+        if (!decode_quantity(&problem->quantities[i], d, i < first ? accuracy : &list->items[i - first],
+                             uz_scene_dim(&problem->scene)))
+            return false;
+    return true;
+}
+
 /* ---- assertions */
 
 /* Each summary has a line for each assertion about it. */
 #define MOST_LINES 100000
+
+/* A quantity that is asserted by its name must be one of the request's. */
+static bool check_named(const codec_request *request, decoding *d, const json_value *quantity)
+{
+    static const char LIST[] = "quantities.";
+    const char *name = quantity->text + sizeof LIST - 1;
+    char shown[80];
+    if (strncmp(quantity->text, LIST, sizeof LIST - 1) != 0 || (*name >= '0' && *name <= '9'))
+        return true;
+    for (int64_t i = 0; i < request->problem.n_quantities; i++)
+        if (strcmp(request->problem.quantities[i].name, name) == 0)
+            return true;
+    problem_quote(shown, sizeof shown, name, strlen(name));
+    problem_set(d->problem, 422, "not_allowed", quantity, "The request asks for no quantity called %s%s%s%s.", shown,
+                request->problem.n_quantities > 0 ? "; the first is called \"" : "",
+                request->problem.n_quantities > 0 ? request->problem.quantities[0].name : "",
+                request->problem.n_quantities > 0 ? "\"" : "");
+    return false;
+}
 
 bool decode_assertions(codec_request *out, decoding *d, const json_value *list)
 {
@@ -145,6 +218,8 @@ bool decode_assertions(codec_request *out, decoding *d, const json_value *list)
         if (!quantity_check(decode_schemas(), quantity, d->problem))
             return false;
         memcpy(a->quantity, quantity->text, quantity->count + 1);
+        if (!check_named(out, d, quantity))
+            return false;
         a->least = decode_number(object, "min", (double)NAN);
         a->most = decode_number(object, "max", (double)NAN);
         a->near = decode_number(object, "near", (double)NAN);

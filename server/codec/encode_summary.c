@@ -87,6 +87,31 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
     text_close(t, ']');
 }
 
+/* Numbers that were asked for, as intervals. */
+static void put_quantities(text *t, const uz_evaluation *e)
+{
+    text_open(t, "quantities", '[');
+    for (int64_t i = 0; i < e->n_quantities; i++) {
+        const uz_quantity_found *q = &e->quantities[i];
+        text_open(t, NULL, '{');
+        text_string(t, "name", q->name);
+        text_string(t, "quantity", uz_quantity_name(q->kind));
+        put_named(t,
+                  (named[]){{"low", q->low},
+                            {"high", q->high},
+                            {"value", q->value},
+                            {"on_this_mesh", q->found},
+                            {"mesh", q->mesh},
+                            {"equations", q->equations}},
+                  6);
+        text_string(t, "kind", "estimated");
+        if (q->why[0])
+            text_string(t, "why", q->why);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+}
+
 /* How deep the deformed surfaces stand in each other: of all contacts, and of each. */
 static void put_overlap(text *t, const uz_evaluation *e, int dim)
 {
@@ -313,6 +338,8 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     put_certificate(&t, summary, scene);
     if (summary->evaluation)
         put_evaluation(&t, summary->evaluation, summary->dim);
+    if (summary->evaluation && summary->evaluation->n_quantities > 0)
+        put_quantities(&t, summary->evaluation);
     put_named(&t,
               (named[]){{"requested_error", summary->requested_error},
                         {"discretization_error", summary->discretization_error},

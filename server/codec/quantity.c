@@ -55,7 +55,8 @@ static bool may_be(schema_at at, unsigned wanted)
     return types != SCHEMA_ANY && (types & wanted);
 }
 
-/* The schema one step further; node NULL: there is none. A code leads to the warning's value. */
+/* The schema one step further; node NULL: there is none. A code leads to the warning's value, a name to the
+ * quantity's. */
 static schema_at schema_step(schema_at at, step s)
 {
     if (!(schema_types(at) & SCHEMA_ARRAY))
@@ -68,6 +69,8 @@ static schema_at schema_step(schema_at at, step s)
     for (size_t i = 0; i < json_size(codes); i++)
         if (step_is(s, codes->items[i].text))
             value = json_get(properties, "value");
+    if (json_get(properties, "name") && json_get(properties, "value"))
+        value = json_get(properties, "value");
     return schema_resolve(schema_child(items, value));
 }
 
@@ -161,17 +164,22 @@ bool quantity_read(double *value, const json_value *summary, const char *name)
     for (step s = first_step(name, end);; s = first_step(s.at + s.len + 1, end)) {
         if (json_is(node, JSON_IS_NULL)) /* max_pressure_at.node where nothing presses */
             return true;
-        if (json_is_list(node) &&
-            step_index(s) < 0) { /* the value of the warning of this code; 0 where there is none */
-            *value = 0.0;
-            for (size_t i = 0; node->kind == JSON_IS_ARRAY && i < node->count; i++) {
-                const char *code = json_text(json_get(&node->items[i], "code"));
-                if (code && step_is(s, code)) {
-                    *value = json_number(json_get(&node->items[i], "value"), (double)NAN);
-                    return true;
-                }
+        if (json_is_list(node) && step_index(s) < 0) {
+            /* The value of the warning of this code, 0 where there is none; or the quantity of this name. */
+            const json_value *found = NULL;
+            bool named = false;
+            for (size_t i = 0; node->kind == JSON_IS_ARRAY && i < node->count && !found; i++) {
+                const char *name_of = json_text(json_get(&node->items[i], "name")),
+                           *of = name_of ? name_of : json_text(json_get(&node->items[i], "code"));
+                named = named || name_of;
+                found = of && step_is(s, of) ? &node->items[i] : NULL;
             }
-            return true;
+            if (found && s.at + s.len < end) {
+                node = found;
+                continue;
+            }
+            *value = found ? json_number(json_get(found, "value"), (double)NAN) : 0.0;
+            return found || !named;
         }
         node = json_is_list(node) ? json_item(node, (size_t)step_index(s), &rooms[node == &rooms[0]])
                                   : json_get_n(node, s.at, s.len);

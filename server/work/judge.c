@@ -2,8 +2,8 @@
  *
  * What is asserted is meant of the exact answer, and a summary is of one that is certified to be near it. Where the
  * certificate bounds how far a number is from that of the exact answer, the whole range must meet the limits to pass,
- * and miss them to fail. The other numbers are taken as they are, and `error` says that no bound is known. An answer
- * that is not what was asked for passes nothing. */
+ * and miss them to fail; a quantity's interval is such a range, of the body itself. The other numbers are taken as they
+ * are, and `error` says that no bound is known. An answer that is not what was asked for passes nothing. */
 #include "work/judge.h"
 
 #include <math.h>
@@ -47,6 +47,14 @@ static bound exact_bound(const codec_summary *summary, const char *quantity, dou
         estimate = estimate || strncmp(quantity, ESTIMATES[i], strlen(ESTIMATES[i])) == 0;
     for (size_t i = 0; i < sizeof FACTS / sizeof FACTS[0]; i++)
         estimate = estimate && strcmp(quantity, FACTS[i]) != 0;
+    if (strncmp(quantity, "quantities.", 11) == 0) { /* the interval is of the body itself */
+        char end[160];
+        snprintf(end, sizeof end, "%s.low", quantity);
+        const double low = number_at(summary, end);
+        snprintf(end, sizeof end, "%s.high", quantity);
+        const double high = number_at(summary, end);
+        return isnan(low) || isnan(high) ? UNKNOWN : (bound){{low, high}, 0.5 * (high - low)};
+    }
     if (!estimate)
         return (bound){{value, value}, 0.0};
     if (!isnan(number_at(summary, "contact.geometry.left")))

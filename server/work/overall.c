@@ -24,7 +24,7 @@ void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *res
         const uz_summary *one = &results[i]->summary;
         const double relative = one->certificate.relative_error, known = isnan(relative) ? (double)INFINITY : relative;
         const double error =
-            one->grids ? uz_total_error(NULL, one) : known; /* where the cells were chosen it was asked for */
+            one->grids ? uz_asked_error(one) : known; /* where the cells were chosen it was asked for */
         const int badness = BADNESS[one->outcome], so_far = BADNESS[results[worst]->summary.outcome];
         if (i == 0 || badness > so_far || (badness == so_far && error > worst_error)) {
             worst = i;

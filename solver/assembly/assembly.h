@@ -197,6 +197,12 @@ double uz_estimate_mesh_error(double *share, const uz_body_model *model, const u
 double uz_estimate_element_errors(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
                                   const double *nodal);
 
+/* *energy: the same estimate of ||u - u_h||_E^2, not relative to anything. free_strain: as of uz_free_strains, or NULL.
+ * It is the square of a seminorm of (nodal, free_strain), so that two fields have an inner product by polarization.
+ * UZ_ERR_MEMORY. */
+uz_status uz_mesh_error_energy(double *energy, const uz_body_model *model, const double *free_strain,
+                               const double *nodal, uz_error *err);
+
 /* *out: n_elements, expansion times rise of temperature by the scene's loads; NULL where there are no such loads. The
  * caller frees it. */
 uz_status uz_free_strains(double **out, const uz_body_model *model, const uz_scene *scene, uz_error *err);

@@ -41,6 +41,40 @@ static void compare(void *ctx, const uz_strain_group *group)
     uz_stress_rows_compare(&x->sums, x->nodal.rows, x->nodal.size, group, place);
 }
 
+/* The integrals of both stresses, added to the sums. */
+static uz_status integrate(uz_stress_sums *sums, const uz_strain_source *from, uz_error *err)
+{
+    const uz_body_model *model = from->model;
+    estimate x = {.model = model, .sums = *sums};
+    const uz_strain_work work = {make_rule, compare, &x};
+    uz_status status = uz_nodal_strains_recover(&x.nodal, from, UZ_CONTINUE_LINEAR, NULL, err);
+    const int n = x.nodal.strains;
+    for (int64_t i = 0; i < x.nodal.count && status == UZ_OK; i++) { /* stresses from what they are averages of */
+        const uz_lame lame = model->materials[x.nodal.material ? x.nodal.material[i] : 0].lame;
+        double *row = x.nodal.rows + i * x.nodal.size, thermal[UZ_ELEMENT_STRESSES] = {0};
+        if (x.nodal.size > n + 1)
+            uz_thermal_strain(thermal, model->kind, lame, row[n + 1]);
+        for (int c = 0; c < n; c++)
+            row[c] -= thermal[c];
+        uz_elastic_stress(row, model->kind, lame, row);
+    }
+    if (status == UZ_OK)
+        status = uz_strain_groups(&work, from, NULL, err);
+    uz_nodal_strains_clear(&x.nodal);
+    *sums = x.sums;
+    return status;
+}
+
+uz_status uz_mesh_error_energy(double *energy, const uz_body_model *model, const double *free_strain,
+                               const double *nodal, uz_error *err)
+{
+    uz_stress_sums sums = {0};
+    const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
+    const uz_status status = integrate(&sums, &from, err);
+    *energy = sums.eta2;
+    return status;
+}
+
 /* Strain that makes stress, in parts of the whole, that is not told from rounding and what the equations left. */
 #define FREE 1e-7
 
@@ -67,31 +101,17 @@ double uz_estimate_element_errors(double *eta2, double *share, const uz_body_mod
     if (is_translation)
         return 0;
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
-    estimate x = {.model = model, .sums = {.eta2_of = eta2}};
-    const uz_strain_work work = {make_rule, compare, &x};
-    uz_status status = uz_nodal_strains_recover(&x.nodal, &from, UZ_CONTINUE_LINEAR, NULL, NULL);
-    const int n = x.nodal.strains;
-    for (int64_t i = 0; i < x.nodal.count && status == UZ_OK; i++) { /* stresses from what they are averages of */
-        const uz_lame lame = model->materials[x.nodal.material ? x.nodal.material[i] : 0].lame;
-        double *row = x.nodal.rows + i * x.nodal.size, thermal[UZ_ELEMENT_STRESSES] = {0};
-        if (x.nodal.size > n + 1)
-            uz_thermal_strain(thermal, model->kind, lame, row[n + 1]);
-        for (int c = 0; c < n; c++)
-            row[c] -= thermal[c];
-        uz_elastic_stress(row, model->kind, lame, row);
-    }
-    if (status == UZ_OK)
-        status = uz_strain_groups(&work, &from, NULL, NULL);
-    uz_nodal_strains_clear(&x.nodal);
+    uz_stress_sums sums = {.eta2_of = eta2};
+    const uz_status status = integrate(&sums, &from, NULL);
     free(free_strain);
     if (status != UZ_OK)
         return NAN;
-    if (!(x.sums.whole > 0 && isfinite(x.sums.whole)))
+    if (!(sums.whole > 0 && isfinite(sums.whole)))
         return INFINITY;
-    const double stressed = sqrt(x.sums.stress / x.sums.whole);
+    const double stressed = sqrt(sums.stress / sums.whole);
     if (stressed < FREE)
         return 0;
     if (share)
         *share = stressed;
-    return sqrt(x.sums.eta2 / (x.sums.stress + x.sums.eta2));
+    return sqrt(sums.eta2 / (sums.stress + sums.eta2));
 }

@@ -21,12 +21,34 @@ typedef struct {
     int64_t n_loads;
 } uz_load_case;
 
+/* One number that a scene is solved for. */
+typedef enum {
+    UZ_QUANTITY_CONTACT_FORCE, /* the sum of the contact forces of `on`: integral of the pressure, >= 0 */
+    UZ_QUANTITY_REACTION,      /* of the supports of `on` along `direction`, as it acts on the body */
+    UZ_QUANTITY_DISPLACEMENT,  /* mean over the group `on`, along `direction` */
+    UZ_QUANTITY_MEAN_PRESSURE, /* of the contacts of `on`, over the part of their sides between `low` and `high` */
+    UZ_QUANTITY_STRAIN_ENERGY, /* of the whole body, with its springs */
+    UZ_QUANTITIES              /* how many */
+} uz_quantity_kind;
+const char *uz_quantity_name(uz_quantity_kind kind); /* "contact.force"; never NULL */
+bool uz_quantity_parse(uz_quantity_kind *out, const char *name);
+typedef struct {
+    uz_quantity_kind kind;
+    char name[64];          /* what it is called in the result; unique in its problem */
+    char on[64];            /* a contact's, a support's or a group's name; contacts: "" is all of them */
+    double direction[3];    /* unit */
+    double low[3], high[3]; /* window, coordinates before anything moves */
+    bool asked;             /* refusals call it "/solver/accuracy", others "/quantities/i": those without this one */
+} uz_quantity;
+
 typedef struct {
     uz_problem_kind kind;
     uz_qp qp;            /* UZ_PROBLEM_MATRICES */
     uz_scene scene;      /* UZ_PROBLEM_SCENE */
     uz_load_case *cases; /* n_cases of them; none: the problem's own load is the only one */
     int64_t n_cases;
+    uz_quantity *quantities; /* scenes: n_quantities of them; only the first may be `asked` */
+    int64_t n_quantities;
 } uz_problem;
 void uz_problem_clear(uz_problem *problem);
 /* The scene with the loads of case i, from 0; its own where that has none, or is none. It borrows all it has. */
@@ -66,6 +88,8 @@ typedef struct {
     bool balanced;         /* scenes: relative_error is a tenth of the estimated discretization error instead */
     bool guaranteed;       /* scenes: bound the whole error, where that can be proved (uz_guarantee) */
     double total_error;    /* scenes on a given mesh: whole relative error that `converged` has to meet, too; 0: any */
+    double quantity_error; /* > 0: half the interval of the problem's first quantity, relative to its middle, that
+                            * `converged` has to meet as well; 0: none is asked for */
     double epsilon;        /* UZ_STOP_PAPER: stop when ||rho - r|| <= epsilon, a force */
     uz_row_scaling row_scaling;
     double alpha;           /* step size, of the rows that row_scaling leaves; 0: 1 / lambda_max(D) */

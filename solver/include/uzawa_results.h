@@ -156,6 +156,16 @@ typedef struct {
                      * (post/sliding.c); NaN: not known */
 } uz_geometry;
 
+/* A quantity of uz_problem: where its value for the body itself, without a mesh, is by estimate. */
+typedef struct {
+    uz_quantity_kind kind;
+    char name[64];
+    double found;            /* of this answer on this mesh */
+    double value, low, high; /* the middle of the interval, and its ends; value alone where the others are NaN */
+    double mesh, equations;  /* parts of half its width: what the mesh loses by estimate, what the solve leaves */
+    char why[96];            /* why there is no interval; else "" */
+} uz_quantity_found;
+
 /* Scenes: what the answer comes to. */
 typedef struct {
     double strain_energy;    /* with that of springs */
@@ -177,6 +187,9 @@ typedef struct {
     double approach;     /* see uz_contact_approach in post/overlap.h; a length, 0: nothing is pressed */
     int n_warnings;
     uz_warning warnings[8];
+    int64_t n_quantities;
+    uz_quantity_found *quantities; /* in the problem's order */
+    double asked;                  /* uz_settings.quantity_error */
 } uz_evaluation;
 void uz_evaluation_free(uz_evaluation *evaluation);
 
@@ -261,6 +274,9 @@ typedef struct {
  * INFINITY: not known. *equations: the
  * certificate's, of a scene relative to the strain that makes stress. May be NULL. */
 double uz_total_error(double *equations, const uz_summary *summary);
+/* What a request is met by where cells are chosen: the total error, or half the interval of the first quantity relative
+ * to its middle where that was asked for. INFINITY: not known. */
+double uz_asked_error(const uz_summary *summary);
 
 /* Where a run stood when it ended: enough to go on as if it had not. Rows are the caller's.
  * A start that knows no more than reactions has rho NULL: a warm start. */

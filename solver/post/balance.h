@@ -30,6 +30,7 @@ void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_sc
 /* Beyond the first, answers with their contacts as they are before anything moves have the second. */
 #define UZ_MOST_SLIDING 0.05
 #define UZ_WARN_SLIDING "sliding"
+#define UZ_WARN_COARSE  "coarse_contact"
 
 /* *sliding: uz_geometry.sliding of an answer with its contacts as they are before anything moves; approach: of
  * overlap.h. NaN of a model at a place. */

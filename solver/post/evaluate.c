@@ -19,6 +19,7 @@ void uz_evaluation_free(uz_evaluation *evaluation)
     free(evaluation->supports);
     free(evaluation->overlap);
     free(evaluation->surfaces);
+    free(evaluation->quantities);
     free(evaluation);
 }
 

@@ -275,13 +275,13 @@ static uz_status look_at_contact(const doubts *d, uz_error *err)
     if (status == UZ_OK)
         status = uz_find_coarse_contact(&coarse, d->model, d->scene, d->u, d->r, err);
     if (coarse.contact >= 0 && coarse.depth > 0)
-        warn(d->out, "coarse_contact", (double)coarse.sides,
+        warn(d->out, UZ_WARN_COARSE, (double)coarse.sides,
              "the obstacle of contact %lld stands %.3g deep in %lld sides between their nodes, as at node %lld, and "
              "meets no resistance there; use finer sides, or rows inside them",
              (long long)coarse.contact, coarse.depth, (long long)coarse.sides, (long long)coarse.node);
     else if (coarse.contact >= 0)
         warn(
-            d->out, "coarse_contact", (double)coarse.sides,
+            d->out, UZ_WARN_COARSE, (double)coarse.sides,
             "%.0f %% of the force of contact %lld are carried where it is narrower than three sides (%lld sides touch, "
             "as at node %lld): force and pressure there depend on the mesh; refine it there",
             100 * coarse.part, (long long)coarse.contact, (long long)coarse.sides, (long long)coarse.node);
@@ -348,8 +348,8 @@ static void look_at_facets(const doubts *d, int64_t k)
 /* Overlap that nothing else explains. */
 static void look_at_overlap(const doubts *d, int64_t k)
 {
-    static const char *const REASONS[] = {"facets",        "coarse_contact", "free_form",
-                                          "feature_angle", UZ_WARN_SLIDING,  "deep_overlap"};
+    static const char *const REASONS[] = {"facets",        UZ_WARN_COARSE,  "free_form",
+                                          "feature_angle", UZ_WARN_SLIDING, "deep_overlap"};
     const uz_overlap *o = &d->out->overlap[k];
     const double approach = d->out->approach;
     bool explained = false;

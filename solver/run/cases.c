@@ -8,6 +8,7 @@
 #include "methods/iterate.h"
 #include "run/moving.h"
 #include "run/problem.h"
+#include "run/results.h"
 #include "run/semicoercive.h"
 
 #include <stdlib.h>
@@ -73,10 +74,12 @@ uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const uz_problem one = uz_problem_of_case(problem, i);
         status = uz_solve_moving(&results[i], &one, settings, cache, hooks, started, err);
-        if (status == UZ_OK)
+        if (status == UZ_OK) {
             uz_judge_whole_error(results[i], &one, settings, cache, hooks, started);
-        if (status != UZ_OK)
+            uz_judge_quantity(results[i]);
+        } else {
             name_case(err, problem, i);
+        }
     }
     if (status == UZ_OK)
         *out = results;

@@ -29,6 +29,10 @@
 
 #define ALGEBRAIC_SHARE 0.1
 
+/* A quantity without an interval, as on grids that do not see a contact, is this far off, relative: the next one is
+ * finer. */
+#define NO_INTERVAL 2.0
+
 /* Beyond these unknowns a solve takes minutes, and estimates of where it ends are worth little. */
 #define MOST_DOFS 4e6
 
@@ -94,7 +98,9 @@ uz_status uz_solve_grid_sequence(uz_result ***out, const uz_problem *problem, co
                 .cache = cache,
                 .hooks = hooks,
                 .n_cases = problem->n_cases > 0 ? problem->n_cases : 1,
-                .requested = settings->balanced ? UZ_BALANCED_TOTAL_ERROR : uz_requested_error(settings),
+                .requested = settings->quantity_error > 0.0 ? settings->quantity_error
+                             : settings->balanced           ? UZ_BALANCED_TOTAL_ERROR
+                                                            : uz_requested_error(settings),
                 .deadline = uz_seconds() + settings->time_limit_s,
                 .refines = scene->refine,
                 .grids = {.most_dofs = MOST_DOFS},
@@ -105,6 +111,7 @@ uz_status uz_solve_grid_sequence(uz_result ***out, const uz_problem *problem, co
     uz_status status = check(&g, starts, err);
     if (status == UZ_OK && chosen) {
         g.grids = uz_grids_of_box(&scene->box, MOST_DOFS);
+        g.grids.order *= settings->quantity_error > 0.0 ? 2 : 1; /* of a product of two errors in the energy norm */
         next = (grid){.box = uz_grid(&g.grids, g.grids.first), .n = g.grids.first};
     }
     if (status == UZ_OK && !(g.spent = uz_alloc_zero(g.n_cases, sizeof *g.spent)))
@@ -234,7 +241,8 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, const search *g, 
     uz_settings settings = *g->settings;
     uz_status status = UZ_OK;
     settings.balanced = false;
-    settings.relative_error = ALGEBRAIC_SHARE * g->requested;
+    settings.relative_error =
+        settings.quantity_error > 0.0 ? uz_settings_default().relative_error : ALGEBRAIC_SHARE * g->requested;
     uz_state **starts = uz_alloc_zero(g->n_cases, sizeof *starts);
     if (!starts)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
@@ -253,7 +261,8 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, const search *g, 
         level->d = s->d;
         if (uz_has_no_answer(s))
             continue;
-        x->error = fmax(x->error, uz_total_error(NULL, s));
+        const double error = uz_asked_error(s);
+        x->error = fmax(x->error, settings.quantity_error > 0.0 ? fmin(error, NO_INTERVAL) : error);
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
         level->certified_error = fmax(level->certified_error, s->certificate.relative_error);
     }
@@ -278,7 +287,7 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
     if (status != UZ_OK)
         return status;
     const uz_element_type *type = uz_element_type_of((uz_element_kind)outline.mesh.kind[0]);
-    g->order = type->nodes > type->corners ? 2 : 1;
+    g->order = (type->nodes > type->corners ? 2 : 1) * (g->settings->quantity_error > 0.0 ? 2 : 1);
     level->n_elements = outline.mesh.n_elements;
     x->on.dofs = (double)(outline.mesh.n_nodes * outline.mesh.dim);
     if (x->on.dofs > MOST_DOFS && g->sequence.count > 0)
@@ -372,7 +381,7 @@ static void conclude(const search *g, uz_summary *s)
     s->requested_error = g->requested;
     if (uz_has_no_answer(s) || s->outcome == UZ_LOOSE || s->outcome == UZ_MOVING_GEOMETRY)
         return;
-    const double total = uz_total_error(NULL, s);
+    const double total = uz_asked_error(s);
     if (total <= g->requested && s->outcome == UZ_MESH_LIMIT && s->guarantee.asked && !s->guarantee.proved)
         return; /* a bound was asked for, and an estimate is none */
     if (total <= g->requested) {
@@ -390,8 +399,13 @@ static void conclude(const search *g, uz_summary *s)
                       : s->outcome == UZ_TIME_LIMIT ? "the time allowed was used up: raise time_limit_s"
                       : s->outcome == UZ_DISMISSED  ? "stopped by request"
                                                     : "the equations of this grid could not be solved better";
-    snprintf(s->message, sizeof s->message, "%s. Total error about %.3g (mesh %.3g, certified %.3g), asked for %.3g.",
-             why, total, s->discretization_error, s->certificate.relative_error, g->requested);
+    if (s->evaluation && s->evaluation->asked > 0.0 && s->evaluation->n_quantities > 0)
+        snprintf(s->message, sizeof s->message, "%.120s. %.40s is known within %.3g of itself, asked for %.3g.", why,
+                 s->evaluation->quantities[0].name, total, g->requested);
+    else
+        snprintf(s->message, sizeof s->message,
+                 "%s. Total error about %.3g (mesh %.3g, certified %.3g), asked for %.3g.", why, total,
+                 s->discretization_error, s->certificate.relative_error, g->requested);
 }
 
 static uz_status publish(search *g, uz_error *err)

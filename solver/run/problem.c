@@ -8,12 +8,75 @@
 #include <stdlib.h>
 #include <string.h>
 
+const char *uz_quantity_place(char where[UZ_QUANTITY_POINTER], const uz_problem *problem, int64_t i, const char *key)
+{
+    if (problem->quantities[i].asked)
+        snprintf(where, UZ_QUANTITY_POINTER, "/solver/accuracy/%s", key);
+    else
+        snprintf(where, UZ_QUANTITY_POINTER, "/quantities/%lld/%s", (long long)i - problem->quantities[0].asked, key);
+    return where;
+}
+
+/* Is there something of this name that a quantity of this kind is of? */
+static bool has_name(const uz_scene *scene, uz_quantity_kind kind, const char *on)
+{
+    static const char *const SIDES[] = {"left", "right", "bottom", "top", "back", "front"};
+    bool there = false;
+    const bool given = scene->source == UZ_MESH_GIVEN;
+    switch (kind) {
+    case UZ_QUANTITY_REACTION:
+        for (int64_t i = 0; i < scene->n_supports; i++)
+            there = there || strcmp(scene->supports[i].on, on) == 0;
+        return there;
+    case UZ_QUANTITY_DISPLACEMENT:
+        for (int i = 0; i < 2 * scene->box.dim && !given; i++)
+            there = there || strcmp(SIDES[i], on) == 0;
+        for (int64_t i = 0; i < scene->given.n_groups && given; i++)
+            there = there || strcmp(scene->given.groups[i].name, on) == 0;
+        return there || strcmp(on, "all") == 0 || (given && strcmp(on, "boundary") == 0);
+    case UZ_QUANTITY_CONTACT_FORCE:
+    case UZ_QUANTITY_MEAN_PRESSURE:
+        for (int64_t i = 0; i < scene->n_contacts; i++)
+            there = there || !on[0] || strcmp(scene->contacts[i].on, on) == 0;
+        return there;
+    default:
+        return true;
+    }
+}
+
+static uz_status check_quantity(const uz_problem *problem, int64_t i, uz_error *err)
+{
+    const uz_quantity *q = &problem->quantities[i];
+    const uz_scene *scene = &problem->scene;
+    const bool contact = q->kind == UZ_QUANTITY_CONTACT_FORCE || q->kind == UZ_QUANTITY_MEAN_PRESSURE;
+    char where[UZ_QUANTITY_POINTER];
+    if (problem->kind != UZ_PROBLEM_SCENE)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/quantities", "quantities are of scenes");
+    if (!has_name(scene, q->kind, q->on))
+        return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "on"), "no %s \"%.63s\"",
+                       contact && q->on[0]               ? "contact is on"
+                       : contact                         ? "contact is there for"
+                       : q->kind == UZ_QUANTITY_REACTION ? "support is on"
+                                                         : "group is called",
+                       q->on);
+    if (q->kind == UZ_QUANTITY_REACTION && scene->model == UZ_AXISYMMETRIC && q->direction[0] != 0)
+        return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "direction"),
+                       "around a ring what acts along the radius sums to nothing: use [0, 1]");
+    for (int64_t j = 0; j < i; j++)
+        if (strcmp(problem->quantities[j].name, q->name) == 0)
+            return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "name"),
+                           "another quantity is called \"%.63s\": give each a name of its own", q->name);
+    return UZ_OK;
+}
+
 uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
 {
     if (problem->n_cases < 0 || (problem->n_cases > 0 && !problem->cases))
         return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "the problem's load cases are missing");
     uz_status status = problem->kind == UZ_PROBLEM_MATRICES ? uz_qp_check(&problem->qp, err) : UZ_OK;
     const bool scene = problem->kind == UZ_PROBLEM_SCENE;
+    for (int64_t i = 0; status == UZ_OK && i < problem->n_quantities; i++)
+        status = check_quantity(problem, i, err);
     for (int64_t i = 0; status == UZ_OK && i < problem->n_cases; i++) {
         const uz_load_case *one = &problem->cases[i];
         if (scene ? one->p || one->h : one->loads != NULL)
@@ -79,5 +142,6 @@ void uz_problem_clear(uz_problem *problem)
         free(problem->cases[i].loads);
     }
     free(problem->cases);
+    free(problem->quantities);
     memset(problem, 0, sizeof *problem);
 }

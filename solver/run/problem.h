@@ -7,6 +7,10 @@
 /* The problem's matrices and load cases, as far as they can be checked before anything is computed. */
 uz_status uz_check_problem(const uz_problem *problem, uz_error *err);
 
+/* How refusals call quantity i, or what it says with this key: "/quantities/2/on". */
+enum { UZ_QUANTITY_POINTER = 64 };
+const char *uz_quantity_place(char where[UZ_QUANTITY_POINTER], const uz_problem *problem, int64_t i, const char *key);
+
 /* Load case i (from 0) as a problem of its own, which borrows all it has. Without load cases it is the problem. */
 uz_problem uz_problem_of_case(const uz_problem *problem, int64_t i);
 

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "linalg/linalg.h"
 #include "run/problem.h"
+#include "run/quantities.h"
 #include "run/results.h"
 #include "run/rows.h"
 
@@ -103,6 +104,24 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
     }
     const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
     uz_status status = uz_describe_scene(result, model, &scene, run->answer.u, run->load.prescribed, run->all, err);
+    if (status == UZ_OK && run->asked->problem->n_quantities > 0 && !result->ray) {
+        const uz_setup *setup = run->asked->setup;
+        const uz_stop stop = {run->asked->hooks, run->asked->deadline};
+        const double start = uz_seconds();
+        status = uz_find_quantities(result,
+                                    &(uz_quantity_work){.problem = run->asked->problem,
+                                                        .settings = run->asked->settings,
+                                                        .scene = &scene,
+                                                        .model = model,
+                                                        .K = &model->K,
+                                                        .dual = setup->dual,
+                                                        .rows = &setup->rows,
+                                                        .h = run->load.h_all,
+                                                        .prescribed = run->load.prescribed,
+                                                        .stop = &stop},
+                                    err);
+        result->summary.timings.certify += uz_seconds() - start;
+    }
     if (status != UZ_OK || model->info.n_rotated == 0)
         return status;
     status = uz_turning_energy(&energy, model, result->u, err);

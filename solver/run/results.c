@@ -62,6 +62,30 @@ double uz_total_error(double *equations, const uz_summary *s)
     return isnan(total) ? (double)INFINITY : total;
 }
 
+double uz_asked_error(const uz_summary *s)
+{
+    const uz_evaluation *e = s->evaluation;
+    if (!e || !(e->asked > 0.0) || e->n_quantities == 0)
+        return uz_total_error(NULL, s);
+    const uz_quantity_found *q = &e->quantities[0];
+    const double half = 0.5 * (q->high - q->low);
+    return half <= 0.0 ? 0.0 : isfinite(half) && q->value != 0.0 ? half / fabs(q->value) : (double)INFINITY;
+}
+
+void uz_judge_quantity(uz_result *result)
+{
+    uz_summary *s = &result->summary;
+    const uz_evaluation *e = s->evaluation;
+    const double error = uz_asked_error(s);
+    if (!e || !(e->asked > 0.0) || e->n_quantities == 0 || s->outcome != UZ_CONVERGED || error <= e->asked)
+        return;
+    const uz_quantity_found *q = &e->quantities[0];
+    s->outcome = UZ_MESH_LIMIT;
+    snprintf(s->message, sizeof s->message,
+             "%.40s is known within %.3g of itself on this mesh, asked for %.3g%s%.60s. %s.", q->name, error, e->asked,
+             q->why[0] ? ": " : "", q->why, "Use a finer mesh, or a box with \"cells\": \"auto\"");
+}
+
 /* The rows with a share in the contradiction: exactly, or by more than a ray's rounding. */
 static void explain_ray(const uz_result *result, char *text, size_t size)
 {

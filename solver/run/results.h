@@ -16,6 +16,9 @@ uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const
                             const double *prescribed, int64_t m, uz_error *err);
 /* There is no answer: nothing that looks like one may be left. */
 void uz_blank_answer(uz_result *result);
+/* An answer that converged, but on a mesh that leaves the first quantity a wider interval than was asked for, ends as
+ * UZ_MESH_LIMIT. */
+void uz_judge_quantity(uz_result *result);
 /* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */
 void uz_explain_outcome(uz_result *result, uz_end end);
 

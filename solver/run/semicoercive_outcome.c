@@ -5,7 +5,9 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "assembly/pressed.h"
+#include "run/quantities.h"
 #include "run/semicoercive_private.h"
+#include "run/setup_cache.h"
 #include "methods/milestones.h"
 #include "run/results.h"
 
@@ -165,6 +167,36 @@ static bool is_loose(const uz_semi *s)
     return loose;
 }
 
+/* On the factor of the last augmented problem, whose springs stand on rows that are in contact. */
+static uz_status find_quantities(uz_semi *s, uz_error *err)
+{
+    const uz_stop stop = {s->hooks, s->deadline};
+    uz_problem augmented;
+    uz_setup *setup = NULL;
+    uz_reuse reused;
+    uz_quantity_work work = {.problem = s->problem,
+                             .settings = s->settings,
+                             .scene = &s->problem->scene,
+                             .model = &s->model,
+                             .weight = s->weight,
+                             .h = s->of.h,
+                             .prescribed = s->prescribed,
+                             .stop = &stop};
+    if (!s->proved)
+        return uz_find_quantities(s->last, &work, err);
+    uz_status status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
+    if (status == UZ_OK)
+        status = uz_setup_acquire(&setup, &reused, s->cache, &augmented, NULL, s->settings, s->hooks, err);
+    if (status == UZ_OK) {
+        work.K = &augmented.qp.K;
+        work.dual = setup->dual;
+        status = uz_find_quantities(s->last, &work, err);
+    }
+    uz_setup_release(s->cache, setup);
+    uz_augmented_clear(&augmented);
+    return status;
+}
+
 uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
 {
     uz_result *result = s->last;
@@ -189,6 +221,8 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
         }
     if (s->is_scene)
         status = uz_describe_scene(result, &s->model, &s->problem->scene, result->u, s->prescribed, s->m, err);
+    if (s->is_scene && status == UZ_OK && !result->ray && s->problem->n_quantities > 0)
+        status = find_quantities(s, err);
     if (result->ray)
         uz_blank_answer(result);
     summary->message[0] = '\0';

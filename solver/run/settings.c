@@ -44,6 +44,11 @@ static const char *const OUTCOMES[] = {
     [UZ_LOOSE] = "loose",
     [UZ_MOVING_GEOMETRY] = "moving_geometry",
 };
+static const char *const QUANTITIES[] = {
+    [UZ_QUANTITY_CONTACT_FORCE] = "contact.force", [UZ_QUANTITY_REACTION] = "reaction",
+    [UZ_QUANTITY_DISPLACEMENT] = "displacement",   [UZ_QUANTITY_MEAN_PRESSURE] = "mean_pressure",
+    [UZ_QUANTITY_STRAIN_ENERGY] = "strain_energy",
+};
 static const char *const KINEMATICS[] = {
     [UZ_KINEMATICS_AUTO] = "auto",
     [UZ_KINEMATICS_FIXED] = "fixed",
@@ -76,6 +81,11 @@ const char *uz_kinematics_name(uz_kinematics value)
     return name_at(KINEMATICS, COUNT(KINEMATICS), (unsigned)value);
 }
 
+const char *uz_quantity_name(uz_quantity_kind value)
+{
+    return name_at(QUANTITIES, COUNT(QUANTITIES), (unsigned)value);
+}
+
 const char *uz_ordering_name(uz_ordering value)
 {
     return name_at(ORDERINGS, COUNT(ORDERINGS), (unsigned)value);
@@ -101,6 +111,14 @@ bool uz_operator_parse(uz_operator *out, const char *name)
     int found = find_name(OPERATORS, COUNT(OPERATORS), name);
     if (found >= 0)
         *out = (uz_operator)found;
+    return found >= 0;
+}
+
+bool uz_quantity_parse(uz_quantity_kind *out, const char *name)
+{
+    int found = find_name(QUANTITIES, COUNT(QUANTITIES), name);
+    if (found >= 0)
+        *out = (uz_quantity_kind)found;
     return found >= 0;
 }
 
@@ -153,6 +171,8 @@ uz_status uz_check_settings(const uz_settings *s, uz_error *err)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "epsilon must be finite and not negative, it is %g", s->epsilon);
     if (!(s->alpha >= 0.0 && isfinite(s->alpha)))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "alpha must be finite and not negative, it is %g", s->alpha);
+    if (!(s->quantity_error >= 0.0 && s->quantity_error <= 1.0))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "quantity_error must lie in [0, 1], it is %g", s->quantity_error);
     if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
     if (s->method >= UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||

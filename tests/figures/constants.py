@@ -75,7 +75,7 @@ PHRASES = {
     "SIAM J. Imaging Sciences 2, 2009": None, "Foundations of Computational Mathematics 15, 2015": None, "Methods in Engineering 24, 1987": None,
     "Applied Mathematics 5, 1947": None, "SIAM J. Scientific Computing 23, 2001": None, "Equilibrium Finite Element Formulations, 2017": None,
     "in ordinary precision, with 1e-14 of what they add up": constant(1e-14, r"#define SUM_ROUNDING +([\d.e-]+)"),
-    "Computing 56, 1996": None, "SIAM J. Numerical Analysis 33, 1996": None, "Computing 22, 2000": None, "Contact Mechanics, 1985": None, "SIAM J. Numerical Analysis 38, 2000": None,
+    "Computing 56, 1996": None, "SIAM J. Numerical Analysis 33, 1996": None, "Computing 22, 2000": None, "Contact Mechanics, 1985": None, "Acta Numerica 10, 2001": None, "SIAM J. Numerical Analysis 38, 2000": None,
     "Int. J. Numerical Methods in Engineering 83, 2010": None, "Applied Mechanics and Engineering 193, 2004": None,
     "Applied Mechanics and Engineering 200, 2011": None,
     "(Farkas 1902)": None, "Goldfarb and Idnani (Math. Programming 27 (1983))": None, "a K below 1e-289 is": None, "(below 1e-289)": None, "Mathematical Programming 27, 1983": None, "SIAM J. Optimization 2, 1992": None,

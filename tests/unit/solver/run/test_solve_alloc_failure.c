@@ -103,6 +103,24 @@ static uz_problem moving_problem(void)
     return problem;
 }
 
+/* The same scene for some of its numbers. */
+static uz_problem asking_problem(void)
+{
+    static const uz_quantity LIST[] = {
+        {.kind = UZ_QUANTITY_CONTACT_FORCE, .name = "force", .on = "bottom"},
+        {.kind = UZ_QUANTITY_REACTION, .name = "reaction", .on = "left", .direction = {0, 1}},
+        {.kind = UZ_QUANTITY_DISPLACEMENT, .name = "way", .on = "top", .direction = {0, 1}},
+        {.kind = UZ_QUANTITY_MEAN_PRESSURE, .name = "pressure", .low = {-1, -1}, .high = {100, 1}},
+        {.kind = UZ_QUANTITY_STRAIN_ENERGY, .name = "energy"}};
+    uz_problem problem = scene_problem();
+    problem.n_quantities = sizeof LIST / sizeof LIST[0];
+    problem.quantities = malloc(sizeof LIST);
+    if (!problem.quantities)
+        abort();
+    memcpy(problem.quantities, LIST, sizeof LIST);
+    return problem;
+}
+
 static uz_problem obstacle_problem(void)
 {
     qp_random rng = {3};
@@ -176,6 +194,13 @@ TEST(guaranteed_bound)
     s.settings.guaranteed = true;
     CHECK(fail_each(&s) > 200);
     uz_problem_clear(&s.problem);
+}
+
+TEST(quantities)
+{
+    check_scenario("quantities", asking_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
+    check_scenario("quantities without a factor", asking_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE,
+                   UZ_ORDERING_AUTO, false);
 }
 
 TEST(rows_left_out)

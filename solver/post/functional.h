@@ -1,0 +1,31 @@
+/* functional.h: quantities as functionals of the answer, and the problems whose answers weigh the error of the mesh. */
+#ifndef UZ_POST_FUNCTIONAL_H
+#define UZ_POST_FUNCTIONAL_H
+
+#include "assembly/assembly.h"
+#include "uzawa.h"
+
+/* The adjoint is z = own u + times w, where w is the displacement under the nodal forces `load`, with supported dofs at
+ * `held` and the rows in contact at N w = gap (functional.c). */
+typedef struct {
+    double found; /* the quantity's value of the answer */
+    double blur;  /* by how much it may be off as nodes with sides within and without a window count in part */
+    double own, times;
+    double *load; /* n_nodes x dim */
+    double *held; /* n_fixed */
+    double *gap;  /* m */
+    char why[96]; /* why the mesh's part can't be told; else "" */
+} uz_functional;
+
+/* scene: with the loads of the case; u: n_nodes x dim; r: m; h (m), prescribed (n_fixed): those of the load. The caller
+ * clears *out in every case. UZ_ERR_MEMORY; UZ_ERR_SCENE at `where`: no such group, no area in the window. */
+uz_status uz_functional_make(uz_functional *out, const uz_quantity *quantity, const char *where,
+                             const uz_body_model *model, const uz_scene *scene, const uz_result *answer,
+                             const double *h, const double *prescribed, uz_error *err);
+/* depth (m): how deep each row's obstacle stands, in the mean, in the sides of which all nodes press on it. Rows keep
+ * nodes out of a round obstacle, and sides between them are chords. 0 of contacts between two. UZ_ERR_MEMORY. */
+uz_status uz_contact_depth(double *depth, const uz_body_model *model, const uz_scene *scene, const uz_result *answer,
+                           uz_error *err);
+void uz_functional_clear(uz_functional *functional);
+
+#endif

@@ -1,0 +1,319 @@
+/* quantities.c: where a quantity's value for the body itself is, by estimate.
+ *
+ *     answer u_h -> value on this mesh (post/functional.c)
+ *     adjoint z_h: one solve on the factor that is there, the rows in contact held as equations
+ *     a(e_u, e_z) = 1/4 (|e_u + e_z|^2 - |e_u - e_z|^2), each square by the recovered stresses
+ *     depth: what obstacles that stand in sides between their nodes come to, by the adjoint's reactions
+ *     value = found + a(e_u, e_z) + depth, within parts of both, of |e_u| |e_z|, and of what the ends of contacts leave
+ *
+ * The parts cover the errors of generated scenes (tests/extremes/generated_quantities.py; docs/accuracy.md has the
+ * figures). To these comes what the certificate leaves of the equations: |z|_K times its bound. */
+#include "run/quantities.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hooks.h"
+#include "post/balance.h"
+#include "post/functional.h"
+#include "run/problem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Parts of the half width: of the estimate, of what depths and ends of contacts come to. */
+#define OF_ESTIMATE 0.5
+#define OF_DEPTH    0.5
+#define OF_END      0.2
+
+/* Of the product of both norms, by the kinds of elements. Beside corners where stress is singular an estimate is as
+ * small as 0.74 of the error of linear elements, 0.67 of those of eight and twenty nodes, 0.47 of six and ten
+ * (docs/theory.md): a product of two, times the square of one over it. Clamped ends of contacts need as much again. */
+static double of_product(const uz_mesh *mesh)
+{
+    double most = 1.7;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        const bool simplex = mesh->kind[e] == UZ_TRI6 || mesh->kind[e] == UZ_TET10;
+        most = fmax(most, simplex ? 7 : type->nodes > type->corners ? 3 : 0);
+    }
+    return most;
+}
+
+/* Solves that are not exact go on to this part of the adjoint's norm. */
+#define SOLVED 1e-6
+
+typedef struct {
+    const uz_quantity_work *work;
+    const uz_result *answer;
+    double *p;               /* d */
+    double *h, *y, *g;       /* rows of the dual */
+    double *of_rows, *depth; /* the model's rows: y; uz_contact_depth; ... */
+    double *slip;            /* ... how far the adjoint leaves those that do not press from where it holds the others */
+    int64_t *row_of;         /* n_nodes: a row that stands at the node, -1: none does */
+    bool *active, *pressing; /* rows of the dual; the model's */
+    double *z, *w;           /* n_nodes x dim; w: room of d as well */
+    double *free_strain;
+    double own_error, of_product; /* |e_u|^2 */
+} adjoint;
+
+static uz_status begin(adjoint *x, uz_error *err)
+{
+    const uz_body_model *model = x->work->model;
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim, m = x->work->dual->m;
+    x->p = uz_alloc(model->d, sizeof *x->p);
+    x->h = uz_alloc(m, sizeof *x->h);
+    x->y = uz_alloc_zero(m, sizeof *x->y);
+    x->g = uz_alloc(m, sizeof *x->g);
+    x->of_rows = uz_alloc(model->m, sizeof *x->of_rows);
+    x->depth = uz_alloc(model->m, sizeof *x->depth);
+    x->slip = uz_alloc(model->m, sizeof *x->slip);
+    x->row_of = uz_alloc(model->mesh.n_nodes, sizeof *x->row_of);
+    x->active = uz_alloc_zero(m, sizeof *x->active);
+    x->pressing = uz_alloc_zero(model->m, sizeof *x->pressing);
+    x->z = uz_alloc(n, sizeof *x->z);
+    x->w = uz_alloc(n, sizeof *x->w);
+    if (!x->p || !x->h || !x->y || !x->g || !x->of_rows || !x->depth || !x->slip || !x->row_of || !x->active ||
+        !x->pressing || !x->z || !x->w)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes",
+                       (long long)model->mesh.n_nodes);
+    x->of_product = of_product(&model->mesh);
+    memset(x->row_of, 0xff, (size_t)model->mesh.n_nodes * sizeof *x->row_of);
+    for (int64_t i = 0; i < model->m; i++)
+        if (!uz_row_inner(model, i))
+            x->row_of[model->info.contact_node[i]] = i;
+    uz_status status = uz_free_strains(&x->free_strain, model, x->work->scene, err);
+    if (status == UZ_OK)
+        status = uz_contact_depth(x->depth, model, x->work->scene, x->answer, err);
+    if (status == UZ_OK)
+        status = uz_mesh_error_energy(&x->own_error, model, x->free_strain, x->answer->u, err);
+    return status;
+}
+
+static void end(adjoint *x)
+{
+    double *room[] = {x->p, x->h, x->y, x->g, x->of_rows, x->depth, x->slip, x->z, x->w, x->free_strain};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    free(x->active);
+    free(x->row_of);
+    free(x->pressing);
+}
+
+/* y with D_AA y = g0_A by conjugate gradients, where the form of the operator has no exact solve or rows depend on each
+ * other. *solved false: it does not get there. */
+static uz_status iterate(adjoint *x, bool *solved, uz_dual_load *load, uz_error *err)
+{
+    enum { MOST_STEPS = 500 };
+    const int64_t m = load->dual->m;
+    double *r = uz_alloc(m, sizeof *r), *s = uz_alloc(m, sizeof *s), *Ds = uz_alloc(m, sizeof *Ds), rr = 0, aim;
+    uz_status status = r && s && Ds ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)m);
+    for (int64_t i = 0; i < m && status == UZ_OK; i++) {
+        x->y[i] = 0;
+        r[i] = s[i] = x->active[i] ? load->g0[i] : 0;
+        rr += r[i] * r[i];
+    }
+    aim = SOLVED * SOLVED * rr;
+    *solved = !(rr > 0);
+    for (int step = 0; step < MOST_STEPS && status == UZ_OK && !*solved && !uz_stop_is_due(x->work->stop); step++) {
+        double sDs = 0, next = 0;
+        status = uz_dual_load_apply(load, Ds, s, err);
+        for (int64_t i = 0; i < m && status == UZ_OK; i++)
+            sDs += x->active[i] ? s[i] * Ds[i] : 0;
+        if (!(sDs > 0))
+            break;
+        for (int64_t i = 0; i < m; i++) {
+            x->y[i] += rr / sDs * s[i];
+            r[i] -= x->active[i] ? rr / sDs * Ds[i] : 0;
+            next += r[i] * r[i];
+        }
+        for (int64_t i = 0; i < m; i++)
+            s[i] = r[i] + next / rr * s[i];
+        rr = next;
+        *solved = rr <= aim;
+    }
+    free(r);
+    free(s);
+    free(Ds);
+    return status;
+}
+
+/* z: the adjoint's displacement by node. *solved false: there is none. */
+static uz_status solve(adjoint *x, bool *solved, const uz_functional *of, uz_error *err)
+{
+    const uz_quantity_work *work = x->work;
+    const uz_body_model *model = work->model;
+    const int64_t m = work->dual->m, n = model->mesh.n_nodes * model->mesh.dim;
+    const uz_candidates *rows = work->rows && work->rows->in ? work->rows : NULL;
+    uz_dual_load *load = NULL;
+    uz_active_end ended;
+    int64_t count = 0;
+    model->law->kind->active(model->law, x->pressing, x->answer->r, model->m);
+    for (int64_t i = 0, k = 0; i < model->m; i++) { /* rows left out do not press */
+        if (rows && !rows->in[i])
+            continue;
+        x->active[k] = x->pressing[i];
+        x->h[k] = x->pressing[i] ? of->gap[i] : INFINITY;
+        count += x->pressing[i];
+        k++;
+    }
+    uz_restrict_nodal(x->p, model, of->load);
+    uz_csc_gaxpy(x->p, &model->K_fixed, -1, of->held);
+    if (work->weight) { /* springs that the rows in contact leave without force */
+        for (int64_t i = 0; i < model->m; i++)
+            x->of_rows[i] = x->pressing[i] ? work->weight[i] * of->gap[i] : 0;
+        uz_csc_gaxpy_t(x->p, &model->N, 1, x->of_rows);
+    }
+    uz_status status = uz_dual_load_create(&load, work->dual, work->K, x->p, x->h, err);
+    if (status == UZ_OK)
+        status = uz_dual_load_aim(load, SOLVED, work->stop, err);
+    memset(x->y, 0, (size_t)m * sizeof *x->y);
+    *solved = count == 0;
+    if (status == UZ_OK && !*solved) {
+        status = uz_dual_load_solve_active(load, &ended, x->y, x->g, x->active, err);
+        *solved = ended == UZ_ACTIVE_SOLVED;
+        if (status == UZ_OK && !*solved)
+            status = iterate(x, solved, load, err);
+    }
+    if (status == UZ_OK)
+        status = uz_dual_load_recover(load, x->w, x->y, false, err);
+    for (int64_t i = 0, k = 0; i < model->m && status == UZ_OK; i++) { /* back to the model's rows */
+        const bool in = !rows || rows->in[i];
+        x->of_rows[i] = in ? x->y[k] * work->dual->row_scale[k] : 0;
+        x->slip[i] = of->gap[i];
+        k += in;
+    }
+    if (status == UZ_OK)
+        uz_csc_gaxpy(x->slip, &model->N, -1, x->w);
+    uz_dual_load_free(load);
+    if (status == UZ_OK)
+        uz_recover_nodal(x->z, model, x->w, of->held);
+    for (int64_t i = 0; i < n && status == UZ_OK; i++)
+        x->z[i] = of->own * x->answer->u[i] + of->times * x->z[i];
+    return status;
+}
+
+/* What obstacles that stand in sides between their nodes come to, by the adjoint's reactions. */
+static double depth_shift(const adjoint *x, const uz_functional *of)
+{
+    double sum = 0;
+    for (int64_t i = 0; i < x->work->model->m; i++)
+        sum += x->depth[i] * x->of_rows[i];
+    return of->times * sum;
+}
+
+/* What the end of a contact amid a side leaves open: of each side with rows that press and others that do not, what it
+ * would come to if the open ones were closed by force, or the pressing ones let go. */
+static double end_error(const adjoint *x)
+{
+    const uz_body_model *model = x->work->model;
+    const uz_mesh *mesh = &model->mesh;
+    double sum = 0;
+    for (int64_t k = 0; k < x->work->scene->n_contacts; k++)
+        for (int other = 0; other < 2; other++) {
+            const uz_contact *contact = &x->work->scene->contacts[k];
+            const bool body = contact->kind == UZ_OBSTACLE_BODY;
+            const uz_group *group =
+                other && !body ? NULL : uz_mesh_group(mesh, other ? contact->with : contact->on, "", NULL);
+            for (int64_t f = 0; group && f < group->n_faces; f++) {
+                int64_t node[UZ_FACE_NODES];
+                const int count = uz_mesh_face(node, mesh, group->face[f]);
+                double gap = 0, slip = 0, y = 0, r = 0;
+                for (int a = 0; a < count; a++) {
+                    const int64_t i = x->row_of[node[a]];
+                    if (i < 0 || model->info.contact_of[i] != k)
+                        continue;
+                    if (x->pressing[i]) {
+                        y = fmax(y, fabs(x->of_rows[i]));
+                        r = fmax(r, fabs(x->answer->r[i]));
+                    } else {
+                        gap = fmax(gap, fmax(0, x->answer->g[i]));
+                        slip = fmax(slip, fabs(x->slip[i]));
+                    }
+                }
+                sum += y * gap + r * slip;
+            }
+        }
+    return sum;
+}
+
+static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functional *of, uz_error *err)
+{
+    const uz_body_model *model = x->work->model;
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    const double *u = x->answer->u;
+    double norm = 0, strain = 0, both[2] = {0};
+    bool solved = false;
+    uz_status status = solve(x, &solved, of, err);
+    if (status != UZ_OK)
+        return status;
+    if (!solved) {
+        snprintf(out->why, sizeof out->why, "the rows in contact could not be held for its adjoint problem");
+        return UZ_OK;
+    }
+    status = uz_strain_energy(&norm, model, x->z, true, err);
+    if (status == UZ_OK)
+        status = uz_strain_energy(&strain, model, u, true, err);
+    const double scale = norm > 0 && strain > 0 ? sqrt(strain / norm) : 1; /* both of one size */
+    for (int k = 0; k < 2 && status == UZ_OK; k++) {
+        for (int64_t i = 0; i < n; i++)
+            x->w[i] = u[i] + (k == 0 ? scale : -scale) * x->z[i];
+        status = uz_mesh_error_energy(&both[k], model, x->free_strain, x->w, err);
+    }
+    if (status != UZ_OK)
+        return status;
+    const double depth = depth_shift(x, of);
+    const double shift = (both[0] - both[1]) / (4 * scale),
+                 square = fmax(0, 0.5 * (both[0] + both[1]) - x->own_error) / (scale * scale);
+    out->mesh = OF_ESTIMATE * fabs(shift) + x->of_product * sqrt(x->own_error * square) + OF_DEPTH * fabs(depth) +
+                OF_END * end_error(x) + of->blur;
+    out->equations = sqrt(2 * fmax(0, norm)) * x->answer->summary.certificate.absolute_error;
+    const double half = out->mesh + out->equations;
+    if (!isfinite(half) || !isfinite(shift)) {
+        snprintf(out->why, sizeof out->why, "nothing bounds what the equations leave of it");
+        return UZ_OK;
+    }
+    out->value = out->found + shift + depth;
+    out->low = out->value - half;
+    out->high = out->value + half;
+    return UZ_OK;
+}
+
+uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz_error *err)
+{
+    uz_evaluation *e = answer->evaluation;
+    adjoint x = {.work = work, .answer = answer};
+    const int64_t n = work->problem->n_quantities;
+    if (!e || n == 0)
+        return UZ_OK;
+    e->quantities = uz_alloc_zero(n, sizeof *e->quantities);
+    if (!e->quantities)
+        return uz_fail(err, UZ_ERR_MEMORY, "/quantities", "no memory for %lld quantities", (long long)n);
+    uz_status status = work->dual ? begin(&x, err) : UZ_OK;
+    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        const uz_quantity *asked = &work->problem->quantities[i];
+        uz_quantity_found *out = &e->quantities[i];
+        uz_functional of;
+        char where[UZ_QUANTITY_POINTER];
+        uz_quantity_place(where, work->problem, i, asked->kind == UZ_QUANTITY_MEAN_PRESSURE ? "window" : "on");
+        *out = (uz_quantity_found){.kind = asked->kind, .low = NAN, .high = NAN, .mesh = NAN, .equations = NAN};
+        memcpy(out->name, asked->name, sizeof out->name);
+        status =
+            uz_functional_make(&of, asked, where, work->model, work->scene, answer, work->h, work->prescribed, err);
+        out->value = out->found = of.found;
+        memcpy(out->why, of.why, sizeof out->why);
+        for (int k = 0; k < e->n_warnings && !out->why[0]; k++)
+            if (strcmp(e->warnings[k].code, UZ_WARN_COARSE) == 0)
+                snprintf(out->why, sizeof out->why, "the mesh can't tell how wide the contact is (coarse_contact)");
+        if (!work->dual && !out->why[0])
+            snprintf(out->why, sizeof out->why, "no rows are proved to hold the body");
+        if (status == UZ_OK && !out->why[0])
+            status = estimate(out, &x, &of, err);
+        uz_functional_clear(&of);
+        e->n_quantities = i + 1;
+    }
+    e->asked = work->settings->quantity_error;
+    end(&x);
+    return status;
+}

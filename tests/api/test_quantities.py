@@ -1,0 +1,139 @@
+"""Quantities over HTTP and in the client: intervals, assertions by them, what is refused. usage: test_quantities.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
+import copy
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import service
+from service import check, expect
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
+import generated_quantities  # noqa: after its place is known
+
+WAIT = {"Prefer": "wait=60"}
+# A block that a support presses on a cylinder.
+HERTZ = {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"size": [10, 10], "cells": [16, 16]}},
+                     "materials": [{"on": "all", "young": 200e3, "poisson": 0.3}],
+                     "supports": [{"on": "left", "ux": 0}, {"on": "top", "uy": -0.1}],
+                     "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [0, -20], "radius": 20}}}]},
+         "quantities": [{"quantity": "contact.force", "on": "bottom", "name": "force"},
+                        {"quantity": "reaction", "on": "top", "direction": [0, -2]},
+                        {"quantity": "mean_pressure", "window": {"min": [-1, -1], "max": [5, 1]}}]}
+
+
+def solved(s, request):
+    job = expect(s.post(request, WAIT), 200).json
+    check(job["status"] == "successful", job)
+    return job["summary"]
+
+
+def test_a_summary_has_intervals(s):
+    summary = solved(s, HERTZ)
+    force, reaction, pressure = summary["quantities"]
+    check(force["name"] == "force" and reaction["name"] == "reaction_top" and pressure["name"] == "mean_pressure", summary["quantities"])
+    for one in summary["quantities"]:
+        half = (one["high"] - one["low"]) / 2
+        check(one["kind"] == "estimated" and one["low"] < one["value"] < one["high"] and "why" not in one, one)
+        check(abs(half - one["mesh"] - one["equations"]) < 1e-9 * half and one["equations"] < 1e-3 * one["mesh"], one)
+    check(abs(force["on_this_mesh"] / reaction["on_this_mesh"] - 1) < 1e-3, force, reaction)
+    check(abs(force["on_this_mesh"] / summary["contact"]["force"][1] - 1) < 0.05, force, summary["contact"]["force"])
+    fine = copy.deepcopy(HERTZ)
+    fine["problem"]["mesh"]["box"].update(cells=[96, 96], element="quad8")
+    for coarse, true in zip(summary["quantities"], solved(s, fine)["quantities"]):
+        check(coarse["low"] <= true["value"] <= coarse["high"], coarse, true)
+
+
+def test_without_being_asked_there_are_none(s):
+    request = copy.deepcopy(HERTZ)
+    del request["quantities"]
+    summary = solved(s, request)
+    check("quantities" not in summary and summary["energy"]["potential"] > 0 > summary["energy"]["primal"], summary["energy"])
+
+
+def test_assertions_are_judged_by_the_interval(s):
+    force = solved(s, HERTZ)["quantities"][0]
+    low, high = force["low"], force["high"]
+    request = {**HERTZ, "assert": [{"quantity": "quantities.force", "min": 0.9 * low}, {"quantity": "quantities.force", "max": 0.9 * low},
+                                   {"quantity": "quantities.force", "min": force["value"]}, {"quantity": "quantities.0.value", "max": 2 * high}]}
+    job = expect(s.post(request, WAIT), 200).json
+    lines = job["summary"]["assertions"]
+    check([one["result"] for one in lines] == ["pass", "fail", "uncertain", "pass"], lines)
+    check(abs(lines[0]["error"] - (high - low) / 2) < 1e-6 * high and lines[0]["value"] == force["value"], lines[0])
+
+
+def test_load_cases_have_their_own(s):
+    request = copy.deepcopy(HERTZ)
+    request["problem"]["supports"][1] = {"on": "top", "spring": [1, 1]}
+    request["cases"] = [{"name": str(p), "loads": [{"on": "top", "pressure": p}]} for p in (100, 200)]
+    request["quantities"] = [HERTZ["quantities"][0]]
+    job = expect(s.post(request, WAIT), 200).json
+    cases = expect(s.get(f"/v1/jobs/{job['id']}/result"), 200).json["cases"]
+    found = [one["summary"]["quantities"][0]["value"] for one in cases]
+    check(abs(found[0] / 1000 - 1) < 0.01 and abs(found[1] / 2000 - 1) < 0.01, found)
+
+
+def test_cells_are_chosen_for_a_quantity(s):
+    request = copy.deepcopy(HERTZ)
+    asked = {"quantity": "contact.force", "on": "bottom", "relative": 0.02}
+    request["solver"] = {"accuracy": asked}
+    given = solved(s, {**request, "problem": {**request["problem"], "mesh": {"box": {"size": [10, 10], "cells": [4, 4]}}},
+                       "quantities": []})
+    check(given["outcome"] == "mesh_limit" and "contact_force_bottom" in given["message"], given["message"])
+    request["problem"]["mesh"]["box"]["cells"] = "auto"
+    summary = solved(s, request)
+    first, second = summary["quantities"][:2]
+    check(summary["outcome"] == "converged" and first["name"] == "contact_force_bottom" and second["name"] == "force", summary)
+    check((first["high"] - first["low"]) / 2 <= 0.02 * first["value"] and first["value"] == second["value"], first)
+    check(len(summary["mesh"]["ladder"]) > 1 and summary["requested_error"] == 0.02, summary["mesh"])
+
+
+def test_refusals(s):
+    def refused(request, pointer, words):
+        found = expect(s.post(request), 422).json
+        check(found["pointer"] == pointer and words in found["detail"], found)
+
+    def failed(request, pointer):
+        job = expect(s.post(request, WAIT), 200).json
+        check(job["status"] == "failed" and job["error"]["pointer"] == pointer, job)
+    only = {**HERTZ, "quantities": [{"quantity": "contact.force", "relative": 0.1}]}
+    refused(only, "/quantities/0/relative", "not allowed")
+    refused({**HERTZ, "quantities": [{"quantity": "force"}]}, "/quantities/0/quantity", "contact.force")
+    refused({**HERTZ, "quantities": [{"quantity": "reaction", "on": "top"}]}, "/quantities/0", "direction")
+    refused({**HERTZ, "quantities": [{"quantity": "reaction", "on": "top", "direction": [0, 0]}]}, "/quantities/0/direction", "")
+    refused({**HERTZ, "quantities": [{"quantity": "strain_energy", "name": "a.b"}]}, "/quantities/0/name", "dot")
+    refused({**HERTZ, "assert": [{"quantity": "quantities.nothing", "min": 0}]}, "/assert/0/quantity", "force")
+    refused({**HERTZ, "solver": {"accuracy": {"quantity": "contact.force"}}}, "/solver/accuracy", "relative")
+    refused({**service.MATRICES, "quantities": [{"quantity": "strain_energy"}]}, "/quantities", "not allowed")
+    failed({**HERTZ, "quantities": [{"quantity": "contact.force", "on": "top"}]}, "/quantities/0/on")
+    failed({**HERTZ, "solver": {"accuracy": {"quantity": "reaction", "on": "bottom", "direction": [0, 1], "relative": 0.1}}},
+           "/solver/accuracy/on")
+
+
+def test_the_client_prints_them(s):
+    with tempfile.TemporaryDirectory() as folder:
+        path, report = os.path.join(folder, "hertz.json"), os.path.join(folder, "report.xml")
+        with open(path, "w", encoding="utf-8") as to:
+            json.dump({**HERTZ, "assert": [{"quantity": "quantities.force", "min": 0}]}, to)
+        done = subprocess.run([str(s.build / "uzawa"), "--server", f"http://{s.host}:{s.port}", "submit", path, "--wait", "--junit", report],
+                              capture_output=True, text=True, check=False)
+        check(done.returncode == 0 and "quantities  force " in done.stdout and "by estimate" in done.stdout, done.stdout, done.stderr)
+        with open(report, encoding="utf-8") as written:
+            text = written.read()
+        check("; force " in text and "by estimate within" in text, text)
+
+
+def test_generated_scenes(s):
+    """Of the generator's scenes a few: it makes as many as are asked for."""
+    found = generated_quantities.run(s, range(1000, 1005), lambda *said, **_: None)
+    off = [r for r in found["rows"] if r["low"] is not None and abs(r["true"] - r["value"]) > 3 * r["reference"] + 1e-7 * abs(r["true"])]
+    check(not found["failures"] and len(found["rows"]) > 15, found["failures"])
+    outside = [r for r in off if not r["low"] <= r["true"] <= r["high"]]
+    check(len(outside) <= 1, outside)
+
+
+if __name__ == "__main__":
+    service.main(globals())

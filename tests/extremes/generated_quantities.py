@@ -1,0 +1,204 @@
+"""Generated scenes with quantities, each posted on a coarse mesh and on one many times finer: how many of the fine mesh's values lie in
+the coarse mesh's intervals, and how wide these are over the true errors.
+usage: generated_quantities.py BUILD_DIR OUTPUT.json [SCENES [FIRST]]
+
+Bodies are boxes of every element and model: bars, blocks on planes, in holes, on circles, tables and lines, on springs and symmetric
+halves, pushed by loads, supports and heat. The reference is quad8 or hex20, with cells of a quarter to a twelfth of the size, in space of a half to a quarter."""
+import random
+import statistics
+import sys
+
+import generated_contacts as contacts
+
+PLANE = ("quad4", "quad4", "quad8", "tri3", "tri6")
+SOLID = ("hex8", "hex8", "tet4", "hex20", "tet10")
+# Values that are zero but for rounding; others are 1e-6 at least.
+ZERO = 1e-9
+# Cells along the shortest side of the reference.
+FINEST = {2: 48, 3: 8}
+
+
+class Scene:
+    """A scene by its number, and its requests on coarse and fine grids."""
+
+    def __init__(self, number):
+        rng = random.Random(f"quantities {number}")
+        self.number = number
+        self.dim = 3 if rng.random() < 0.15 else 2
+        self.model = "solid" if self.dim == 3 else rng.choice(("plane_strain", "plane_strain", "plane_stress", "axisymmetric"))
+        self.size = [rng.choice((1, 1, 1.5, 2)) for _ in range(self.dim)]
+        self.element = rng.choice(PLANE if self.dim == 2 else SOLID)
+        self.poisson = rng.choice((0, 0.2, 0.3, 0.3, 0.4))
+        self.formulation = rng.choice(("auto", "auto", "auto", "incompatible_modes", "bbar")) if self.element in ("quad4", "hex8") else "auto"
+        self.grading = [rng.choice((1, 1, 1, 2, 0.5)) for _ in range(self.dim)]
+        least, most = ((4, 12) if self.dim == 2 else (2, 4))
+        self.n = rng.randint(least, most if self.element in ("quad4", "tri3", "hex8", "tet4") else (least + most) // 2)
+        make = rng.choice((self.bar, self.block, self.pressed, self.pressed, self.held_aside, self.on_springs, self.heated))
+        self.family = make.__name__
+        self.supports, self.loads, self.contacts, self.quantities = [], [], [], [{"quantity": "strain_energy"}]
+        make(rng)
+
+    def down(self, value):
+        return [0] * (self.dim - 1 if self.dim == 2 else 1) + [value] + ([0] if self.dim == 3 else [])
+
+    def axes(self, **given):
+        return {k: v for k, v in given.items() if self.dim == 3 or k != "uz"}
+
+    def touch(self, rng, shapes, on="bottom"):
+        """An obstacle that the body just stands on, or that has a hump below its middle."""
+        width, depth = self.size[0], self.size[1]
+        middle = [rng.uniform(0, width), -rng.choice((0.5, 1, 2, 5)) * width]
+        kind = rng.choice(shapes)
+        if self.model == "axisymmetric":
+            middle[0] = 0.0
+        shape = {"plane": {"plane": {"point": [0] * self.dim, "normal": self.down(1)}}}
+        if self.dim == 2:
+            shape["round"] = {"circle": {"center": middle, "radius": -middle[1]}}
+            xs = [width * (-0.5 + k / 20) for k in range(41)]
+            bump = rng.uniform(0.002, 0.01)
+            shape["table"] = {"height": {"x": xs, "z": [-bump * ((x - middle[0]) / width) ** 2 * 4 for x in xs]}}
+            shape["line"] = {"polyline": {"points": [[-0.6 * width, -0.04 * width], [middle[0], 0], [1.6 * width, -0.05 * width]]}}
+        else:
+            shape["round"] = {"sphere": {"center": [middle[0], middle[1], 0.5 * self.size[2]], "radius": -middle[1]}}
+        self.contacts = [{"on": on, "obstacle": shape.get(kind, shape["plane"])}]
+        self.quantities.append({"quantity": "contact.force", "on": on})
+        ends = sorted(rng.uniform(-0.2, 1.2) * width for _ in range(2))
+        if rng.random() < 0.5 or ends[1] - ends[0] < 0.3 * width or ends[1] < 0 or ends[0] > width:
+            ends = [-width, 2 * width]
+        low, high = [ends[0], -0.1 * depth, -1], [ends[1], 0.1 * depth, 1 + self.size[-1]]
+        self.quantities.append({"quantity": "mean_pressure", "window": {"min": low[:self.dim], "max": high[:self.dim]}})
+
+    def reaction(self, on):
+        self.quantities.append({"quantity": "reaction", "on": on, "direction": self.down(1), "name": f"reaction_{on}"})
+
+    def displacement(self, on, direction):
+        self.quantities.append({"quantity": "displacement", "on": on, "direction": direction, "name": f"displacement_{on}"})
+
+    def bar(self, rng):
+        self.supports = [{"on": "bottom", **self.axes(ux=0, uy=0, uz=0)}]
+        self.loads = [{"on": "top", "traction": [rng.choice((0, 1)), *self.down(1)[1:]]}]
+        self.reaction("bottom")
+        self.displacement("top", self.down(1))
+        self.displacement("right", [1] + [0] * (self.dim - 1))
+
+    def block(self, rng):
+        """Supports on the left, which the contact touches, or on top."""
+        clamped = rng.random() < 0.6 and self.model != "axisymmetric"
+        self.supports = [{"on": "left", **self.axes(ux=0, uy=0, uz=0)}] if clamped else \
+            [{"on": "left", "ux": 0}, *([{"on": "back", "uz": 0}] if self.dim == 3 else []), {"on": "top", "uy": -0.01}]
+        if clamped:
+            self.loads = [{"on": "top", "traction": self.down(-1)}, {"on": "right", "traction": [rng.uniform(0, 3), *[0] * (self.dim - 1)]}]
+        self.touch(rng, ("plane", "plane", "table"))
+        self.reaction("left" if clamped else "top")
+        self.displacement("top" if clamped else "right", self.down(1) if clamped else [1] + [0] * (self.dim - 1))
+
+    def pressed(self, rng):
+        """By a support on top, or a traction on a body that symmetry holds."""
+        moved = rng.random() < 0.6
+        side = {"on": "left", "ux": 0}
+        self.supports = [] if self.model == "axisymmetric" else [side]
+        self.supports += [{"on": "back", "uz": 0}] if self.dim == 3 else []
+        self.touch(rng, ("round", "round", "table", "line") if moved else ("round", "table"))
+        if moved:
+            self.supports.append({"on": "top", "uy": -rng.uniform(0.005, 0.02) * self.size[1], **({"ux": 0} if rng.random() < 0.5 else {})})
+            self.reaction("top")
+            self.displacement("right", [1] + [0] * (self.dim - 1))
+        else:
+            self.supports.append({"on": "top", "spring": [0, 1e-3, 0][:self.dim]})
+            self.loads = [{"on": "top", "traction": self.down(-rng.uniform(2, 10))}]
+            self.displacement("top", self.down(1))
+
+    def held_aside(self, rng):
+        """A bracket on its obstacle, away from its support."""
+        self.size[0] = max(self.size[0], 2 * self.size[1])
+        if self.model == "axisymmetric":
+            self.model = "plane_strain"
+        self.supports = [{"on": "left", **self.axes(ux=0, uy=0, uz=0)}]
+        self.loads = [{"on": "top", "traction": self.down(-rng.uniform(1, 5))}]
+        self.touch(rng, ("line", "round"))
+        obstacle = self.contacts[0]["obstacle"]
+        at = 0.8 * self.size[0]
+        if "polyline" in obstacle:
+            obstacle["polyline"]["points"][1] = [at, -0.001]
+        for kind in ("circle", "sphere"):
+            if kind in obstacle:
+                obstacle[kind]["center"][0] = at
+        self.reaction("left")
+        self.displacement("right", self.down(1))
+
+    def on_springs(self, rng):
+        stiff = rng.choice((10, 300, 5000))
+        self.supports = [{"on": "top", "spring": [stiff, stiff, stiff][:self.dim]}]
+        self.loads = [{"on": "right", "traction": self.down(-1)}, {"on": "all", "body_force": self.down(-2)}]
+        self.touch(rng, ("round", "plane"))
+        self.reaction("top")
+        self.displacement("right", self.down(1))
+
+    def heated(self, rng):
+        self.supports = [{"on": "left", **self.axes(ux=0, uy=0, uz=0)}] if self.model != "axisymmetric" else [{"on": "bottom", "uy": 0}]
+        self.loads = [{"on": "all", "temperature": 1}]
+        if self.model != "axisymmetric":
+            self.touch(rng, ("plane",))
+        self.reaction(self.supports[0]["on"])
+        self.displacement("top", self.down(1))
+
+    def request(self, fine=False):
+        n = self.n if not fine else max(min(12 * self.n, FINEST[self.dim]), 2 * self.n)
+        n += fine and n % 2
+        shortest = min(self.size)
+        element = self.element if not fine else ("quad8" if self.dim == 2 else "hex20")
+        cells = [max(1, round(n * size / shortest)) for size in self.size]
+        mesh = {"box": {"size": self.size, "cells": cells, "element": element, "grading": self.grading}}
+        scene = {"kind": "scene", "model": self.model, "mesh": mesh, "kinematics": "fixed",
+                 "materials": [{"on": "all", "young": 1000, "poisson": self.poisson, "expansion": 1e-3}],
+                 "supports": self.supports, "loads": self.loads, "contacts": self.contacts}
+        if not fine:
+            scene["formulation"] = self.formulation
+        return {"problem": scene, "quantities": self.quantities}
+
+
+def run(s, numbers, say=print):
+    """Looks at scenes by number: every interval with its reference, and what was false."""
+    daemon, failures, rows = contacts.Daemon(s), [], []
+    contacts.FIELDS = "contact_status"
+    for number in numbers:
+        scene = Scene(number)
+        coarse, why = daemon.answer(scene.request())
+        fine, fine_why = daemon.answer(scene.request(True))
+        if not coarse or not fine:
+            failures.append((number, scene.family, why or fine_why))
+            say(*failures[-1], flush=True)
+            continue
+        for a, b in zip(coarse["summary"]["quantities"], fine["summary"]["quantities"]):
+            if abs(b["value"]) < ZERO:
+                continue
+            rows.append({"number": number, "family": scene.family, "element": scene.element, "model": scene.model, "dim": scene.dim, **a,
+                         "true": b["value"], "own": b["on_this_mesh"], "reference": abs(b["value"] - b["on_this_mesh"])})
+    return {"scenes": len(numbers), "solves": daemon.solves, "failures": failures, "rows": rows}
+
+
+def tell(rows):
+    """By quantity: how many true values are in their intervals, medians of half width and middle over the error of the mesh's value. Returns
+    the part that is inside."""
+    kinds = sorted({r["quantity"] for r in rows})
+    for kind in [*kinds, "all"]:
+        of = [r for r in rows if kind in (r["quantity"], "all") and r["low"] is not None]
+        without = sum(r["low"] is None for r in rows if kind in (r["quantity"], "all"))
+        off = [(r, abs(r["true"] - r["on_this_mesh"]), abs(r["true"] - r["value"]), 0.5 * (r["high"] - r["low"])) for r in of]
+        off = [o for o in off if o[1] > 3 * o[0]["reference"] and o[1] > 1e-7 * abs(o[0]["true"])]
+        inside = sum(o[2] <= o[3] for o in off)
+        print(f"{kind:14s} {inside:4d} of {len(off):4d} inside, half width over error of the mesh's value "
+              f"{statistics.median([o[3] / o[1] for o in off] or [0]):5.2f}, error of the middle over it "
+              f"{statistics.median([o[2] / o[1] for o in off] or [0]):5.2f}, {without} without an interval")
+    return inside / max(1, len(off))
+
+
+def look(s, numbers):
+    found = run(s, numbers)
+    if tell(found["rows"]) < 0.95:
+        found["failures"].append("fewer than 95 of 100 values are in their intervals")
+    return found
+
+
+if __name__ == "__main__":
+    contacts.command(__doc__, look, "scenes with quantities", 100)
