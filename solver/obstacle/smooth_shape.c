@@ -332,10 +332,11 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
         s.point[c] = xyz[c] - radius * normal[c];
     if (fits(&s, xyz, n, size))
         take_if_nearer(&found, &apart, &s, xyz, normal, n);
-    /* The axis is across all normals of a cylinder, and across the differences of those of a cone. */
-    for (int k = 0; k < 2; k++) {
+    /* The axis is across all normals of a cylinder, and across the differences of those of a cone; of a slender one
+     * with few faces the former is nearer, as means of the faces' normals differ at random. */
+    for (int k = 0; k < 3; k++) {
         best = 0;
-        for (int64_t i = 0; i < n; i++) {
+        for (int64_t i = 0; i < n && k < 2; i++) {
             double other[3], at[3];
             for (int c = 0; c < 3; c++)
                 other[c] = k == 0 ? normal[3 * i + c] : normal[3 * i + c] - normal[c];
@@ -347,9 +348,9 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
             }
         }
         s = (uz_smooth_shape){.kind = k == 0 ? UZ_SMOOTH_CYLINDER : UZ_SMOOTH_CONE, .radius = fabs(radius)};
-        if (!(uz_unit3(axis[k]) > 0))
+        if (!(uz_unit3(axis[k % 2]) > 0))
             continue;
-        memcpy(s.axis, axis[k], sizeof s.axis);
+        memcpy(s.axis, axis[k % 2], sizeof s.axis);
         for (int c = 0; c < 3; c++) /* opposite the normal, at the height of the points' mean */
             s.point[c] = xyz[c] - radius * normal[c];
         double up = 0;
