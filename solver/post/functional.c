@@ -80,7 +80,8 @@ static void measure_side(double *inside, double *area, const making *k, const uz
         return;
     for (int i = 0; i < (dim == 2 ? n : n * n); i++) {
         double N[UZ_FACE_NODES], vector[DIM] = {0}, x[DIM] = {0};
-        double point[2] = {(i % n + 0.5) / n, (i / n + 0.5) / n}, weight = 1;
+        const int row = i / n;
+        double point[2] = {(i % n + 0.5) / n, (row + 0.5) / n}, weight = 1;
         if (triangle) {
             weight = 1 - point[0];
             point[1] *= weight;

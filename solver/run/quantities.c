@@ -294,7 +294,7 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const uz_quantity *asked = &work->problem->quantities[i];
         uz_quantity_found *out = &e->quantities[i];
-        uz_functional of;
+        uz_functional of = {.found = 0};
         char where[UZ_QUANTITY_POINTER];
         uz_quantity_place(where, work->problem, i, asked->kind == UZ_QUANTITY_MEAN_PRESSURE ? "window" : "on");
         *out = (uz_quantity_found){.kind = asked->kind, .low = NAN, .high = NAN, .mesh = NAN, .equations = NAN};
