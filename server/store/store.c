@@ -302,10 +302,10 @@ store_status store_counts(store *s, int64_t counts[5])
 
 /* ---- webhooks */
 
-store_status store_webhook_next(store *s, webhook_due *out)
+store_status store_webhook_next(store *s, const char *const *except, size_t n, webhook_due *out)
 {
     *out = (webhook_due){.url = NULL};
-    return s->engine->webhook_next(s, out);
+    return s->engine->webhook_next(s, except, n, out);
 }
 
 store_status store_webhooks_open(store *s, bool *any)

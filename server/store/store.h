@@ -262,8 +262,10 @@ typedef struct {
     char *url;    /* freed by the caller */
     int attempts; /* made yet */
 } webhook_due;
-/* The one that has been due for longest, STORE_NOT_FOUND: none is. */
-store_status store_webhook_next(store *s, webhook_due *out);
+/* The one that has been due for longest of those whose address begins with none of `except` (n of them, at most
+ * STORE_WEBHOOKS_EXCEPT); STORE_NOT_FOUND: none is. */
+enum { STORE_WEBHOOKS_EXCEPT = 7 };
+store_status store_webhook_next(store *s, const char *const *except, size_t n, webhook_due *out);
 
 typedef enum { WEBHOOK_TOLD = 2, WEBHOOK_GIVEN_UP = 3, WEBHOOK_AGAIN = 1 } webhook_end;
 /* Is there anybody to be told, now or later? */

@@ -20,15 +20,31 @@
 #define WHOLE_S        15L
 #define SECRET_MAX     4096
 
+#define REPLY_S    2.0   /* what an answer still has to say once its status is known may take so long */
+#define REPLY_MOST 65536 /* and have so many bytes */
+
+enum { SENDERS = STORE_WEBHOOKS_EXCEPT + 1 };
+
+/* One thread, and what it tells: nobody else is told at the same host and port meanwhile, so that one that is slow
+ * holds up its own only. */
+typedef struct {
+    webhooks *all;
+    pthread_t thread;
+    char place[256]; /* "http://host:port"; "": it tells nothing now. Under all->lock */
+} sender;
+
 struct webhooks {
     store *store;
     server_log *log;
     webhook_options options;
-    pthread_t thread;
-    bool started, curl_ready;
+    sender senders[SENDERS];
+    int started;
+    bool curl_ready;
     atomic_bool stop;
-    pthread_mutex_t lock; /* for wake */
-    pthread_cond_t wake;
+    pthread_mutex_t lock; /* what follows */
+    pthread_cond_t look;  /* who looks is to look at once */
+    pthread_cond_t turn;  /* nobody looks */
+    bool looking;         /* one of the senders waits for what falls due */
 };
 
 /* ---- what may be called */
@@ -96,18 +112,37 @@ static bool sign(char out[128], const char *secret, size_t secret_len, long long
     return ok;
 }
 
+typedef struct {
+    const webhooks *all;
+    CURL *curl;
+    size_t bytes;   /* of the answer's body */
+    double ends_at; /* on CLOCK_MONOTONIC; 0: its status is not known yet */
+} exchange;
+
+/* Only the status counts; an answer that does not end is cut off. */
 static size_t drop(char *data, size_t size, size_t count, void *ctx)
 {
+    exchange *e = ctx;
     (void)data;
-    (void)ctx;
-    return size * count;
+    e->bytes += size * count;
+    return e->bytes <= REPLY_MOST ? size * count : 0;
 }
 
-static int go_on(void *ctx, curl_off_t a, curl_off_t b, curl_off_t c, curl_off_t d)
+static long status_of(CURL *curl)
 {
-    const webhooks *all = ctx;
+    long status = 0;
+    curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
+    return status >= 200 ? status : 0;
+}
+
+static int is_over(void *ctx, curl_off_t a, curl_off_t b, curl_off_t c, curl_off_t d)
+{
+    exchange *e = ctx;
+    const double now = clock_seconds(CLOCK_MONOTONIC);
     (void)a, (void)b, (void)c, (void)d;
-    return atomic_load(&all->stop);
+    if (e->ends_at == 0.0 && status_of(e->curl))
+        e->ends_at = now + REPLY_S;
+    return atomic_load(&e->all->stop) || (e->ends_at > 0.0 && now > e->ends_at);
 }
 
 /* NULL: no memory. */
@@ -139,6 +174,7 @@ static long post(webhooks *all, const webhook_due *due, const char *body, char *
     long status = 0;
     size_t len = strlen(body);
     CURL *curl = curl_easy_init();
+    exchange e = {.all = all, .curl = curl};
     struct curl_slist *headers = curl ? make_headers(all, due, body, len) : NULL;
     snprintf(cause, size, "no memory");
     if (headers) {
@@ -154,20 +190,21 @@ static long post(webhooks *all, const webhook_due *due, const char *body, char *
         curl_easy_setopt(curl, CURLOPT_POSTFIELDS, body);
         curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)len);
         curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, drop);
-        curl_easy_setopt(curl, CURLOPT_XFERINFOFUNCTION, go_on);
-        curl_easy_setopt(curl, CURLOPT_XFERINFODATA, all);
+        curl_easy_setopt(curl, CURLOPT_WRITEDATA, &e);
+        curl_easy_setopt(curl, CURLOPT_XFERINFOFUNCTION, is_over);
+        curl_easy_setopt(curl, CURLOPT_XFERINFODATA, &e);
         curl_easy_setopt(curl, CURLOPT_NOPROGRESS, 0L);
-        CURLcode rc = curl_easy_perform(curl);
+        const CURLcode rc = curl_easy_perform(curl);
         snprintf(cause, size, "%s", curl_easy_strerror(rc));
-        if (rc == CURLE_OK)
-            curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
+        if (rc == CURLE_OK || rc == CURLE_WRITE_ERROR || rc == CURLE_ABORTED_BY_CALLBACK)
+            status = status_of(curl);
     }
     curl_slist_free_all(headers);
     curl_easy_cleanup(curl);
     return status;
 }
 
-/* ---- the thread */
+/* ---- the threads */
 
 static double wait_after(const webhooks *all, int attempts)
 {
@@ -211,21 +248,50 @@ static void tell(webhooks *all, const webhook_due *due)
     store_webhook_attempted(all->store, due, end, wait_after(all, due->attempts), silent ? wait_after(all, 0) : 0.0);
 }
 
+/* Under the lock: waits for what falls due, at none of the places where somebody is told now. False: the end. One of
+ * the senders does that, and the next one when it has found something. */
+static bool find_due(sender *me, webhook_due *due)
+{
+    webhooks *all = me->all;
+    bool found = false;
+    while (all->looking && !atomic_load(&all->stop))
+        pthread_cond_wait(&all->turn, &all->lock);
+    all->looking = true;
+    while (!found && !atomic_load(&all->stop)) {
+        const char *except[SENDERS];
+        size_t n = 0;
+        for (int i = 0; i < SENDERS; i++)
+            if (all->senders[i].place[0])
+                except[n++] = all->senders[i].place;
+        found = store_webhook_next(all->store, except, n, due) == STORE_OK;
+        if (!found)
+            clock_wait(&all->look, &all->lock, clock_seconds(CLOCK_MONOTONIC) + LOOK_S);
+    }
+    all->looking = false;
+    if (found) {
+        const char *host = strstr(due->url, "://");
+        const size_t begin = host ? (size_t)(host - due->url) + 3 : 0;
+        snprintf(me->place, sizeof me->place, "%.*s", (int)(begin + strcspn(due->url + begin, "/?#")), due->url);
+    }
+    pthread_cond_signal(&all->turn);
+    return found;
+}
+
 static void *tell_loop(void *arg)
 {
-    webhooks *all = arg;
-    while (!atomic_load(&all->stop)) {
-        webhook_due due;
-        if (store_webhook_next(all->store, &due) == STORE_OK) {
-            tell(all, &due);
-            free(due.url);
-            continue;
-        }
-        pthread_mutex_lock(&all->lock);
-        if (!atomic_load(&all->stop))
-            clock_wait(&all->wake, &all->lock, clock_seconds(CLOCK_MONOTONIC) + LOOK_S);
+    sender *me = arg;
+    webhooks *all = me->all;
+    webhook_due due;
+    pthread_mutex_lock(&all->lock);
+    while (find_due(me, &due)) {
         pthread_mutex_unlock(&all->lock);
+        tell(all, &due);
+        free(due.url);
+        pthread_mutex_lock(&all->lock);
+        me->place[0] = '\0';
+        pthread_cond_signal(&all->look);
     }
+    pthread_mutex_unlock(&all->lock);
     return NULL;
 }
 
@@ -280,16 +346,21 @@ webhooks *webhooks_start(store *s, const webhook_options *options, server_log *l
     all->options = *options;
     atomic_init(&all->stop, false);
     pthread_mutex_init(&all->lock, NULL);
-    clock_condition(&all->wake);
+    clock_condition(&all->look);
+    clock_condition(&all->turn);
     if (options->n_allow == 0) { /* what was to be told before is given up, so that its jobs need not stay for it */
         bool any = false;
         if (store_webhooks_open(s, &any) != STORE_OK || !any)
             return all;
     }
-    snprintf(message, size, "cannot start the thread for webhooks");
+    snprintf(message, size, "cannot start the threads for webhooks");
     all->curl_ready = curl_global_init(CURL_GLOBAL_DEFAULT) == CURLE_OK;
-    all->started = all->curl_ready && pthread_create(&all->thread, NULL, tell_loop, all) == 0;
-    if (all->started)
+    for (bool ok = all->curl_ready; ok && all->started < SENDERS; all->started += ok) {
+        sender *next = &all->senders[all->started];
+        next->all = all;
+        ok = pthread_create(&next->thread, NULL, tell_loop, next) == 0;
+    }
+    if (all->started == SENDERS)
         return all;
     webhooks_stop(all);
     return NULL;
@@ -301,13 +372,15 @@ void webhooks_stop(webhooks *all)
         return;
     pthread_mutex_lock(&all->lock);
     atomic_store(&all->stop, true);
-    pthread_cond_signal(&all->wake);
+    pthread_cond_broadcast(&all->look);
+    pthread_cond_broadcast(&all->turn);
     pthread_mutex_unlock(&all->lock);
-    if (all->started)
-        pthread_join(all->thread, NULL);
+    for (int i = 0; i < all->started; i++)
+        pthread_join(all->senders[i].thread, NULL);
     if (all->curl_ready)
         curl_global_cleanup();
-    pthread_cond_destroy(&all->wake);
+    pthread_cond_destroy(&all->turn);
+    pthread_cond_destroy(&all->look);
     pthread_mutex_destroy(&all->lock);
     free(all);
 }

@@ -32,8 +32,8 @@ typedef struct {
 bool webhook_read_secret(webhook_options *out, const char *path, char *message, size_t size);
 void webhook_forget_secret(webhook_options *options); /* {.secret = NULL} is fine */
 
-/* Starts the thread where there is something to allow, or to give up. NULL: message. What options point to must outlive
- * it. */
+/* Starts the threads where there is something to allow, or to give up. NULL: message. What options point to must
+ * outlive it. */
 webhooks *webhooks_start(store *s, const webhook_options *options, server_log *log, char *message, size_t size);
 /* Cuts off what is on its way; it is told again after the next start. NULL is fine. */
 void webhooks_stop(webhooks *all);

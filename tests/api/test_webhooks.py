@@ -4,6 +4,7 @@ import hmac
 import http.server
 import json
 import os
+import socket
 import threading
 import time
 
@@ -105,6 +106,62 @@ def test_every_end_is_told(s):
     check(ends == {running["id"]: "dismissed", waiting["id"]: "dismissed", late["id"]: "failed", bad["id"]: "failed"}, ends)
     check(all("X-Uzawa-Signature" not in headers for _, headers, _ in receiver.told))
     receiver.close()
+
+
+class Slow:
+    """A server that keeps who tells it something: it says nothing, or goes on with its answer for ever."""
+
+    def __init__(self, answer):
+        self.socket, self.answer, self.halt, self.held = socket.create_server(("127.0.0.1", 0)), answer, threading.Event(), []
+        self.port = self.socket.getsockname()[1]
+        threading.Thread(target=self.serve, daemon=True).start()
+
+    def serve(self):
+        while not self.halt.is_set():
+            try:
+                connection = self.socket.accept()[0]
+            except OSError:
+                return
+            self.held.append(connection)
+            threading.Thread(target=self.hold, args=(connection,), daemon=True).start()
+
+    def hold(self, connection):
+        try:
+            connection.recv(65536)
+            connection.sendall(self.answer)
+            while self.answer and not self.halt.wait(0.1):
+                connection.sendall(b"x")
+            self.halt.wait(60)
+        except OSError:
+            pass
+
+    def close(self):
+        self.halt.set()
+        self.socket.close()
+        for one in self.held:
+            one.close()
+
+
+@options(None)
+def test_a_slow_receiver_holds_up_its_own_alone(s):
+    silent, endless, quick = [Slow(b"") for _ in range(3)], Slow(b"HTTP/1.1 200 OK\r\n\r\n"), Receiver()
+    ports = [one.port for one in silent] + [endless.port]
+    start(s, quick, *[word for port in ports for word in ("--webhook-allow", f"127.0.0.1:{port}")])
+    for port in ports:
+        for i in range(3):
+            s.solve({**MATRICES, "webhook": {"url": f"http://127.0.0.1:{port}/{i}"}})
+    began = time.monotonic()
+    for _ in range(5):
+        s.solve({**MATRICES, "webhook": {"url": quick.url()}})
+    quick.wait(5, seconds=5)
+    check(time.monotonic() - began < 5)
+    end = time.monotonic() + 20  # an answer's status counts, not its end
+    while len(s.events("webhook_told")) < 8:
+        check(time.monotonic() < end, s.events("webhook_told"))
+        time.sleep(0.05)
+    check(all(len(one.held) == 1 for one in silent), [len(one.held) for one in silent])
+    for one in (*silent, endless, quick):
+        one.close()
 
 
 @options(None)

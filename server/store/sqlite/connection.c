@@ -27,6 +27,16 @@
 #define LIST_CLIENT(than, order)                                                                                       \
     "SELECT " JOB_COLUMNS " FROM job INDEXED BY job_by_client WHERE client = ?11 AND client <> '' AND id " than " ?1"  \
     " AND (?3 IS NULL OR status = ?3) " LIST_FILTER "ORDER BY id " order " LIMIT ?2"
+#define NOT_AT(place) " AND (" place " IS NULL OR substr(url, 1, length(" place ")) <> " place ")"
+
+/* The job that is next: of the share whose turn it is. A share whose jobs have all waited longer than they may, which
+ * nobody has said yet, is passed over. */
+#define CLAIM(of_share, of_job)                                                                                        \
+    "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, finished = 0, owner = ?2,"        \
+    " lease = ?1 + ?3 WHERE id = (SELECT next FROM (SELECT (SELECT id FROM job INDEXED BY " of_job                     \
+    " AND share = share.name AND (priority > " SHARED ") = share.ahead AND (queue_until = 0 OR queue_until >= ?1)"     \
+    " ORDER BY priority DESC, id LIMIT 1) AS next FROM share INDEXED BY " of_share                                     \
+    " AND next IS NOT NULL ORDER BY ahead DESC, running, used, name LIMIT 1)) RETURNING " JOB_COLUMNS
 #define LIST_TAG(status, than, order)                                                                                  \
     "SELECT " JOB_COLUMNS " FROM tag CROSS JOIN job ON job.id = tag.job WHERE tag.tag = ?4 AND tag.job " than          \
     " ?1 " status LIST_FILTER "ORDER BY tag.job " order " LIMIT ?2"
@@ -84,8 +94,8 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_OLDEST_TAG] = LIST_TAG("", ">", "ASC"),
     [QUERY_OLDEST_TAG_STATUS] = LIST_TAG("AND status = ?3", ">", "ASC"),
     [QUERY_INSERT_WEBHOOK] = "INSERT INTO webhook(job, url) VALUES(?1, ?2)",
-    [QUERY_WEBHOOK_NEXT] =
-        "SELECT job, url, attempts FROM webhook WHERE state = 1 AND next <= ?1 ORDER BY next LIMIT 1",
+    [QUERY_WEBHOOK_NEXT] = "SELECT job, url, attempts FROM webhook WHERE state = 1 AND next <= ?1" NOT_AT("?2")
+        NOT_AT("?3") NOT_AT("?4") NOT_AT("?5") NOT_AT("?6") NOT_AT("?7") NOT_AT("?8") " ORDER BY next LIMIT 1",
     [QUERY_WEBHOOKS_OPEN] = "SELECT 1 FROM webhook WHERE state < 2 LIMIT 1",
     [QUERY_WEBHOOK_POSTPONE] = "UPDATE webhook SET next = max(next, ?2) WHERE state = ?3 AND url = ?1",
     [QUERY_WEBHOOK_ATTEMPTED] = "UPDATE webhook SET state = ?3, next = ?2, attempts = attempts + 1 WHERE job = ?1",

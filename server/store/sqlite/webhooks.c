@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-store_status sqlite_webhook_next(store *base, webhook_due *out)
+store_status sqlite_webhook_next(store *base, const char *const *except, size_t n, webhook_due *out)
 {
     sqlite_store *s = sqlite_of(base);
     bool ok = true;
@@ -11,6 +11,8 @@ store_status sqlite_webhook_next(store *base, webhook_due *out)
     connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_WEBHOOK_NEXT);
     bind_real(&st, 1, clock_seconds(CLOCK_REALTIME));
+    for (size_t i = 0; i < STORE_WEBHOOKS_EXCEPT; i++)
+        bind_text(&st, 2 + (int)i, i < n ? except[i] : NULL);
     if (statement_row(&st)) {
         snprintf(out->job, sizeof out->job, "%s", (const char *)sqlite3_column_text(st.stmt, 0));
         out->url = sqlite_copy_text(&st, 1, &ok);

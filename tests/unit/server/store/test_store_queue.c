@@ -214,19 +214,19 @@ STORE_TEST(a_job_stays_until_somebody_was_told)
     bool any = true;
     if (!place_begin(&p))
         return;
-    CHECK_INT(store_webhook_next(p.s, &due), STORE_NOT_FOUND);
+    CHECK_INT(store_webhook_next(p.s, NULL, 0, &due), STORE_NOT_FOUND);
     end_jobs(p.s, 1, "http://x/");
     CHECK_INT(store_retain(p.s, &(store_retention){.keep_s = 1e-9}, &count), STORE_OK);
     CHECK_INT(count, 0);
     place_reopen(&p);
-    CHECK_INT(store_webhook_next(p.s, &due), STORE_OK);
+    CHECK_INT(store_webhook_next(p.s, NULL, 0, &due), STORE_OK);
     CHECK_STR(due.url, "http://x/");
     CHECK_INT(due.attempts, 0);
     CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_AGAIN, 0.5, 0), STORE_OK);
     free(due.url);
-    CHECK_INT(store_webhook_next(p.s, &due), STORE_NOT_FOUND); /* not yet */
+    CHECK_INT(store_webhook_next(p.s, NULL, 0, &due), STORE_NOT_FOUND); /* not yet */
     sleep_s(0.6);
-    CHECK_INT(store_webhook_next(p.s, &due), STORE_OK);
+    CHECK_INT(store_webhook_next(p.s, NULL, 0, &due), STORE_OK);
     CHECK_INT(due.attempts, 1);
     /* nobody answers there: what else is due at that address waits too, and nothing at another one does */
     static const char *const NEXT[] = {"http://y/", "http://x/"};
@@ -235,16 +235,16 @@ STORE_TEST(a_job_stays_until_somebody_was_told)
     CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_AGAIN, 1000, 0.5), STORE_OK);
     for (int i = 0; i < 2; i++) {
         webhook_due other;
-        CHECK_INT(store_webhook_next(p.s, &other), STORE_OK);
+        CHECK_INT(store_webhook_next(p.s, NULL, 0, &other), STORE_OK);
         CHECK_STR(other.url, NEXT[i]);
         CHECK_INT(store_webhook_attempted(p.s, &other, WEBHOOK_TOLD, 0, 0), STORE_OK);
         free(other.url);
-        CHECK_INT(store_webhook_next(p.s, &other), STORE_NOT_FOUND);
+        CHECK_INT(store_webhook_next(p.s, NULL, 0, &other), STORE_NOT_FOUND);
         sleep_s(i == 0 ? 0.6 : 0);
     }
     CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_TOLD, 0, 0), STORE_OK);
     free(due.url);
-    CHECK_INT(store_webhook_next(p.s, &due), STORE_NOT_FOUND);
+    CHECK_INT(store_webhook_next(p.s, NULL, 0, &due), STORE_NOT_FOUND);
     CHECK_INT(store_retain(p.s, &(store_retention){.keep_s = 1e-9}, &count), STORE_OK);
     CHECK_INT(count, 3);
     CHECK_INT(store_webhooks_open(p.s, &any), STORE_OK);
