@@ -71,7 +71,7 @@ static inline bool place_reopen(place *p)
 static inline void place_remove_files(const place *p)
 {
     char name[128];
-    const char *const suffixes[] = {"", "-wal", "-shm", "-journal", "-trail"};
+    const char *const suffixes[] = {"", "-wal", "-shm", "-journal", "-trail", "-spare"};
     for (size_t i = 0; i < sizeof suffixes / sizeof suffixes[0]; i++) {
         snprintf(name, sizeof name, "%s%s", p->path, suffixes[i]);
         unlink(name);

@@ -46,6 +46,10 @@ typedef struct {
 
     trail trail; /* `waiting` is under sync_lock, what is appended the syncer's, the rest the writer's */
 
+    /* FILE-spare: room on the disk that a deletion gets where there is no other. -1: there is none. */
+    int spare;
+    bool spare_there; /* under writer_lock */
+
     char *path; /* absolute, of the file */
     int file;   /* holds the lock that keeps a second daemon out; closed after every connection (see sqlite_open) */
 } sqlite_store;
@@ -62,12 +66,15 @@ typedef store_status (*store_change)(sqlite_store *s, connection *c, void *args)
 /* When the caller is told. */
 typedef enum {
     WRITE_DURABLE, /* when it is on disk */
+    WRITE_FREES,   /* the same, of a change that makes room: a full disk does not refuse it (sqlite_store.spare) */
     WRITE_SOON, /* when it is committed: a power loss may undo it for a moment longer, but whoever reads what it wrote
                    waits (sqlite_settle) */
     WRITE_LAZY  /* when it is committed; it reaches the disk with whatever comes next. Right for what the start
                    after a crash undoes by itself: claims and leases */
 } write_durability;
 store_status sqlite_write(sqlite_store *s, write_durability durability, store_change change, void *args);
+/* Takes the spare room, if there is any to take. Before other threads, or under writer_lock. */
+void sqlite_take_spare(sqlite_store *s);
 
 /* ---- sync.c */
 bool sqlite_sync_begin(sqlite_store *s); /* once the writer has read the file; false: no thread, or no log */

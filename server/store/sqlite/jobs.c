@@ -441,7 +441,7 @@ static store_status dismiss(sqlite_store *s, connection *c, void *args)
 store_status sqlite_dismiss(store *base, const char *id, job_status *was)
 {
     dismiss_args a = {.id = id, .was = JOB_ACCEPTED};
-    store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, dismiss, &a);
+    store_status status = sqlite_write(sqlite_of(base), WRITE_FREES, dismiss, &a);
     *was = a.was;
     if (status == STORE_OK && a.was != JOB_RUNNING)
         store_tell(base, id, false, a.was == JOB_ACCEPTED ? NULL : a.client);

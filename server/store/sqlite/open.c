@@ -83,6 +83,11 @@ static bool open_connections(sqlite_store *s, const char *path, char *message, s
         trail_open(&s->trail, s->writer.db, s->path);
         s->trail.number = number; /* past those that are lost, so that they are told once */
     }
+    if (ok && asprintf(&folder, "%s-spare", s->path) >= 0) {
+        s->spare = open(folder, O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+        sqlite_take_spare(s);
+        free(folder);
+    }
     for (int i = 0; ok && i < STORE_READERS; i++) {
         ok = connection_open(&s->readers[i], s->path, false, message, size);
         s->readers_free[s->n_readers_free] = &s->readers[i];
@@ -124,7 +129,7 @@ store *sqlite_open(const char *path, char *message, size_t size)
     pthread_cond_init(&s->sync_asked, NULL);
     pthread_cond_init(&s->sync_ended, NULL);
     s->queue_end = &s->queue;
-    s->trail.fd = -1;
+    s->trail.fd = s->spare = -1;
     s->claims = (uint64_t)(clock_seconds(CLOCK_REALTIME) * 1e6);
     s->file = lock_file(path, message, size);
     bool ok = s->file >= 0 && open_connections(s, path, message, size);
@@ -147,6 +152,8 @@ void sqlite_close(store *base)
     connection_close(&s->writer); /* the last one: checkpoints and removes the journal */
     if (s->file >= 0)
         close(s->file);
+    if (s->spare >= 0)
+        close(s->spare);
     pthread_cond_destroy(&s->sync_ended);
     pthread_cond_destroy(&s->sync_asked);
     pthread_mutex_destroy(&s->sync_lock);

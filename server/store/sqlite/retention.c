@@ -120,7 +120,7 @@ store_status sqlite_retain(store *base, const store_retention *limits, double no
     connection *c = sqlite_take_reader(s);
     store_status status = sqlite_give_reader(s, c, choose(c, &a));
     if (status == STORE_OK && a.n_ids > 0) /* an ended job does not change any more: it may only be gone already */
-        status = sqlite_write(s, WRITE_DURABLE, delete_chosen, &a);
+        status = sqlite_write(s, WRITE_FREES, delete_chosen, &a);
     *count = status == STORE_OK ? a.count : 0;
     for (int i = 0; status == STORE_OK && i < a.n_ids; i++)
         store_tell(base, a.ids[i], false, a.clients[i]);

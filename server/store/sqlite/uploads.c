@@ -103,7 +103,7 @@ static store_status delete_row(sqlite_store *s, connection *c, void *args)
 store_status sqlite_upload_forget(store *base, const char *id, const char *client, bool *gone)
 {
     forget_args a = {.id = id, .client = client};
-    store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, delete_row, &a);
+    store_status status = sqlite_write(sqlite_of(base), WRITE_FREES, delete_row, &a);
     *gone = status == STORE_OK && a.gone;
     return status;
 }

@@ -5,7 +5,9 @@
  * alike (the ends of tables and indexes) is so written once for all. What they wait for next is the disk: sync.c. */
 #include "store/sqlite/internal.h"
 
+#include <fcntl.h>
 #include <string.h>
+#include <unistd.h>
 
 #define BATCH_MOST 32 /* so that the first of them does not wait for ever */
 
@@ -13,6 +15,7 @@
 struct pending {
     store_change change;
     void *args;
+    bool frees; /* WRITE_FREES */
     store_status status;
     uint64_t number; /* of its commit */
     bool done;
@@ -43,11 +46,25 @@ static bool is_failure(store_status status)
     return status == STORE_ERROR || status == STORE_FULL || status == STORE_LOCKED;
 }
 
-/* The change by itself; on a full disk once more when the journal is moved into the database. */
+/* What a deletion writes: the pages that held the rows' keys, those that list the free ones (one for a thousand), and
+ * all of it once more when the journal is moved. */
+#define SPARE_BYTES ((off_t)4 << 20)
+
+void sqlite_take_spare(sqlite_store *s)
+{
+    if (s->spare >= 0 && !s->spare_there)
+        s->spare_there = posix_fallocate(s->spare, 0, SPARE_BYTES) == 0;
+}
+
+/* The change by itself; on a full disk once more when the journal is moved into the database, and where the change
+ * makes room once more with what is kept for that. Then the disk has as much as before, and nobody else had it. */
 static void run_alone(sqlite_store *s, pending *p)
 {
     connection *c = &s->writer;
-    for (int tries = 0; tries < 2; tries++) {
+    bool given = false; /* the spare room */
+    for (int tries = 0; tries < 2 + (p->frees && s->spare_there); tries++) {
+        if (tries == 2)
+            s->spare_there = !(given = ftruncate(s->spare, 0) == 0);
         if (tries > 0)
             sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
         trail_begin(&s->trail);
@@ -61,6 +78,9 @@ static void run_alone(sqlite_store *s, pending *p)
         if (p->status != STORE_FULL)
             break;
     }
+    if (given)
+        sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
+    sqlite_take_spare(s);
     if (is_failure(p->status) || p->status == STORE_QUOTA)
         store_set_message(&s->base, c->message);
 }
@@ -136,7 +156,7 @@ static void lead(sqlite_store *s)
 
 store_status sqlite_write(sqlite_store *s, write_durability durability, store_change change, void *args)
 {
-    pending me = {.change = change, .args = args};
+    pending me = {.change = change, .args = args, .frees = durability == WRITE_FREES};
     pthread_cond_init(&me.turn, NULL);
     pthread_mutex_lock(&s->queue_lock);
     *s->queue_end = &me;
@@ -151,7 +171,7 @@ store_status sqlite_write(sqlite_store *s, write_durability durability, store_ch
     pthread_cond_destroy(&me.turn);
     if (me.status != STORE_OK || durability == WRITE_LAZY)
         return me.status;
-    return sqlite_sync(s, me.number, durability == WRITE_DURABLE);
+    return sqlite_sync(s, me.number, durability != WRITE_SOON);
 }
 
 /* There and back: a row that is given the value that it has is not written (SQLite, btreeOverwriteContent). */

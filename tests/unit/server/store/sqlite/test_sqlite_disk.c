@@ -3,7 +3,10 @@
 #include "store/engine.h"
 #include "store_place.h"
 
+#include <fcntl.h>
+#include <sched.h>
 #include <signal.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -204,6 +207,68 @@ TEST(a_failing_write_is_reported_as_full)
         CHECK_INT(counts[JOB_ACCEPTED], 2);
     }
     place_end(&p);
+}
+
+/* ---- a disk of its own that another file fills up */
+
+static int delete_on_a_full_disk(const char *folder)
+{
+    char path[128], filler[128], message[300] = "", ids[40][33];
+    static const char body[100000];
+    job_status was;
+    job j = {0};
+    bool repeated;
+    int n = 0;
+    snprintf(path, sizeof path, "%s/jobs.db", folder);
+    snprintf(filler, sizeof filler, "%s/filler", folder);
+    if (mount("none", folder, "tmpfs", 0, "size=16m") != 0)
+        return 100;
+    store *s = store_open(path, message, sizeof message);
+    while (s && n < 20 &&
+           store_submit(s, &(store_request){.body = body, .body_len = sizeof body}, &j, &repeated) == STORE_OK) {
+        strcpy(ids[n++], j.id);
+        job_clear(&j);
+    }
+    if (n < 20)
+        return 1;
+    const int fd = open(filler, O_WRONLY | O_CREAT, 0600);
+    for (size_t size = sizeof body; size > 0;)
+        if (write(fd, body, size) <= 0)
+            size /= 2;
+    if (store_submit(s, &(store_request){.body = body, .body_len = sizeof body}, &j, &repeated) != STORE_FULL)
+        return 2;
+    for (int i = 0; i < 2 * n; i++) { /* dismissed, then deleted; nobody makes room in between */
+        while (write(fd, body, 4096) > 0)
+            ;
+        if (store_dismiss(s, ids[i % n], &was) != STORE_OK)
+            return 10 + i;
+    }
+    int64_t counts[5];
+    if (store_counts(s, counts) != STORE_OK || counts[JOB_ACCEPTED] + counts[JOB_DISMISSED] != 0)
+        return 3;
+    store_close(s);
+    close(fd);
+    return 0;
+}
+
+TEST(a_full_disk_refuses_no_deletion)
+{
+    char folder[] = "/tmp/test-full-XXXXXX";
+    CHECK(mkdtemp(folder));
+    pid_t child = fork();
+    if (child == 0)
+        _exit(unshare(CLONE_NEWNS) == 0 || unshare(CLONE_NEWUSER | CLONE_NEWNS) == 0
+                  ? (mount("none", "/", NULL, MS_REC | MS_PRIVATE, NULL), delete_on_a_full_disk(folder))
+                  : 100);
+    int status = -1;
+    waitpid(child, &status, 0);
+    rmdir(folder);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 100) {
+        test_skip("no file system can be mounted here");
+        return;
+    }
+    CHECK(WIFEXITED(status));
+    CHECK_INT(WEXITSTATUS(status), 0);
 }
 
 /* Another program is in the middle of a change, as with the sqlite3 shell. */

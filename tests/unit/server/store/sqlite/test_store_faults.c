@@ -178,7 +178,8 @@ static void cut_power(void)
 
 static void remove_folder(const char *folder)
 {
-    static const char *const NAMES[] = {"jobs.db", "jobs.db-wal", "jobs.db-shm", "jobs.db-journal", "jobs.db-trail"};
+    static const char *const NAMES[] = {"jobs.db",         "jobs.db-wal",   "jobs.db-shm",
+                                        "jobs.db-journal", "jobs.db-trail", "jobs.db-spare"};
     char path[128];
     for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++) {
         snprintf(path, sizeof path, "%s/%s", folder, NAMES[i]);
