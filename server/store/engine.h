@@ -43,6 +43,7 @@ typedef struct {
                                       double silent_s);
     /* The rows of uploads. */
     store_status (*upload_get)(store *s, const char *id, const char *client, upload_info *out);
+    store_status (*upload_named)(store *s, const char *id, const char *of_job); /* STORE_NOT_FOUND: not by this job */
     store_status (*upload_add)(store *s, const char *id, const char *client, int64_t bytes, upload_info *out,
                                bool *known);
     /* It is no more this client's; NULL: nobody's. STORE_CONFLICT while a job of theirs refers to it. *gone: the row

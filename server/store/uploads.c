@@ -301,12 +301,14 @@ store_status blob_check(int fd, const char *id)
     return n < 0 ? STORE_ERROR : strcmp(found, id) == 0 ? STORE_OK : STORE_DAMAGED;
 }
 
-store_status store_upload_descriptor(store *s, const char *id, int *fd, int64_t *bytes)
+store_status store_upload_descriptor(store *s, const char *id, const char *of_job, int *fd, int64_t *bytes)
 {
     upload_info info;
     char cause[256];
     *fd = -1;
     store_status status = store_upload_get(s, id, NULL, &info);
+    if (status == STORE_OK && of_job)
+        status = s->engine->upload_named(s, id, of_job);
     if (status != STORE_OK)
         return status;
     *bytes = info.bytes;
@@ -322,7 +324,7 @@ store_status store_upload_descriptor(store *s, const char *id, int *fd, int64_t 
 store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes)
 {
     char cause[256];
-    store_status status = store_upload_descriptor(s, id, fd, bytes);
+    store_status status = store_upload_descriptor(s, id, NULL, fd, bytes);
     if (status != STORE_OK)
         return status;
     /* What it has must be what was sent, or a matrix would silently be another one. */

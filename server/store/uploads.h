@@ -53,8 +53,9 @@ store_status store_upload_delete(store *s, const char *id, const char *client);
  * STORE_DAMAGED where it is not what was sent any more, by its digest. */
 store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes);
 
-/* The same for who checks it himself (blob_check): its bytes are not read. */
-store_status store_upload_descriptor(store *s, const char *id, int *fd, int64_t *bytes);
+/* The same for who checks it himself (blob_check): its bytes are not read. STORE_NOT_FOUND unless the request of this
+ * job (NULL: of any, or none) names it. */
+store_status store_upload_descriptor(store *s, const char *id, const char *of_job, int *fd, int64_t *bytes);
 
 /* The bytes of an upload, checked like that, in memory for as long as they are looked at (mapped: pages that are read
  * come from the file). data is not NUL-terminated. */

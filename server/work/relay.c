@@ -34,7 +34,7 @@ static bool gather(void *ctx, const result_piece *piece)
     return true;
 }
 
-void relay_answer(packet *answer, int *fd, store *s, const packet *ask, segment *inbox, size_t at)
+void relay_answer(packet *answer, int *fd, store *s, const char *of_job, const packet *ask, segment *inbox, size_t at)
 {
     char id[sizeof ask->u.ask.id], name[CASE_NAME];
     snprintf(id, sizeof id, "%.*s", (int)sizeof id - 1, ask->u.ask.id);
@@ -42,7 +42,7 @@ void relay_answer(packet *answer, int *fd, store *s, const packet *ask, segment 
     *answer = (packet){.kind = MESSAGE_ANSWER, .status = STORE_ERROR, .u.answer = {.at = at}};
     *fd = -1;
     if (ask->u.ask.what == ASK_UPLOAD) {
-        answer->status = (int32_t)store_upload_descriptor(s, id, fd, &answer->u.answer.value);
+        answer->status = (int32_t)store_upload_descriptor(s, id, of_job, fd, &answer->u.answer.value);
     } else if (ask->u.ask.what == ASK_BLOB) {
         gathered g = {inbox, at, at, false};
         const result_key key = {id, ask->u.ask.number, ask->u.ask.named ? name : NULL};

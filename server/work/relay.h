@@ -11,8 +11,9 @@
  * operation. Socket and inbox must outlive it; closed with store_close. NULL: no memory. */
 store *relay_open(int socket, segment *inbox);
 
-/* The daemon's side: fills the ANSWER to an ASK; what is large goes into the inbox from `at` on. *fd: a descriptor that
- * goes with it, which the caller closes; -1: none. */
-void relay_answer(packet *answer, int *fd, store *s, const packet *ask, segment *inbox, size_t at);
+/* The daemon's side: fills the ANSWER to an ASK of the process that runs `job`, which gets no upload but those that its
+ * request names; what is large goes into the inbox from `at` on. *fd: a descriptor that goes with it, which the caller
+ * closes; -1: none. */
+void relay_answer(packet *answer, int *fd, store *s, const char *of_job, const packet *ask, segment *inbox, size_t at);
 
 #endif

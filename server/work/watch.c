@@ -75,7 +75,7 @@ static bool answer(watch *w, const packet *question)
 {
     packet reply;
     int fd;
-    relay_answer(&reply, &fd, w->me->w->store, question, &w->p->inbox, (w->body_len + 7) / 8 * 8);
+    relay_answer(&reply, &fd, w->me->w->store, w->job->id, question, &w->p->inbox, (w->body_len + 7) / 8 * 8);
     const bool sent = message_send(w->p->socket, &reply, fd);
     if (fd >= 0)
         close(fd);

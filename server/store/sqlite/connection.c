@@ -137,6 +137,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_DISOWN_UPLOAD] = "DELETE FROM upload_client WHERE upload = ?1 AND (?2 IS NULL OR client = ?2)"
                             " AND NOT EXISTS (SELECT 1 FROM " USES_OF("?1", "?2") ")",
     [QUERY_USE_UPLOAD] = "INSERT OR IGNORE INTO upload_use(upload, job) VALUES(?1, ?2)",
+    [QUERY_UPLOAD_NAMED] = "SELECT 1 FROM upload_use WHERE upload = ?1 AND job = ?2",
     [QUERY_DELETE_UPLOAD] = "DELETE FROM upload WHERE id = ?1"
                             " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = ?1)"
                             " AND NOT EXISTS (SELECT 1 FROM upload_client WHERE upload = ?1)",

@@ -133,6 +133,7 @@ store_status sqlite_webhooks_open(store *s, bool *any);
 store_status sqlite_webhook_attempted(store *s, const webhook_due *due, webhook_end end, double delay_s,
                                       double silent_s);
 store_status sqlite_upload_get(store *s, const char *id, const char *client, upload_info *out);
+store_status sqlite_upload_named(store *s, const char *id, const char *of_job);
 store_status sqlite_upload_add(store *s, const char *id, const char *client, int64_t bytes, upload_info *out,
                                bool *known);
 store_status sqlite_upload_forget(store *s, const char *id, const char *client, bool *gone);

@@ -191,6 +191,7 @@ const store_engine STORE_SQLITE = {
     .webhooks_open = sqlite_webhooks_open,
     .webhook_attempted = sqlite_webhook_attempted,
     .upload_get = sqlite_upload_get,
+    .upload_named = sqlite_upload_named,
     .upload_add = sqlite_upload_add,
     .upload_forget = sqlite_upload_forget,
     .upload_idle = sqlite_upload_idle,

@@ -28,6 +28,17 @@ store_status sqlite_upload_get(store *base, const char *id, const char *client, 
     return sqlite_give_reader(s, c, read_info(c, id, client, out));
 }
 
+store_status sqlite_upload_named(store *base, const char *id, const char *of_job)
+{
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
+    statement st = statement_begin(c, QUERY_UPLOAD_NAMED);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, of_job);
+    const bool named = statement_row(&st);
+    return sqlite_give_reader(s, c, statement_end(&st, named ? STORE_OK : STORE_NOT_FOUND));
+}
+
 typedef struct {
     const char *id, *client;
     int64_t bytes;

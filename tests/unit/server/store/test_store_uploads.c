@@ -113,6 +113,13 @@ STORE_TEST(an_upload_in_use_stays)
     request.uploads = ids;
     request.n_uploads = 1;
     CHECK_INT(store_submit(p.s, &request, &j, &repeated), STORE_OK);
+    /* To a process that solves it is open by the job that names it, and by no other. */
+    int fd;
+    int64_t bytes;
+    CHECK_INT(store_upload_descriptor(p.s, ABC, "00", &fd, &bytes), STORE_NOT_FOUND);
+    CHECK_INT(fd, -1);
+    CHECK_INT(store_upload_descriptor(p.s, ABC, j.id, &fd, &bytes), STORE_OK);
+    CHECK(fd >= 0 && bytes == 3 && close(fd) == 0);
     CHECK_INT(store_upload_delete(p.s, ABC, NULL), STORE_CONFLICT);
     store_configure(p.s, &(store_settings){.uploads = {.keep_s = 1e-6}});
     CHECK_INT(store_collect_uploads(p.s, &count), STORE_OK);
