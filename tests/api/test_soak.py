@@ -35,6 +35,12 @@ def test_terminated_under_load(s):
 
 
 @options(None)
+def test_workers_killed_under_load(s):
+    figures = clean(scenarios.killed_workers(s.build, 25))
+    check(figures["acknowledged"] > 50, figures)
+
+
+@options(None)
 def test_slow_clients(s):
     figures = clean(scenarios.slow_clients(s.build, 200, 2))
     check(figures["asked"] > 10, figures)

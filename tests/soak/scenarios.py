@@ -71,6 +71,12 @@ class Poster(threading.Thread):
             connection.close()
 
 
+def resident(s):
+    """Megabytes that the daemon holds."""
+    with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
+        return next(int(line.split()[1]) for line in file if line.startswith("VmRSS")) / 1024
+
+
 def rows(path, sql):
     connection = sqlite3.connect(path)
     try:
@@ -110,6 +116,40 @@ def endings(build, cycles, number, clients=16, seed=1):
         figures["damaged"] = int(check.returncode != 0)
         figures |= {"cycles": cycles, "acknowledged": len(acknowledged), "drain_p99_s": round(quantile(drains, 0.99), 3)}
         return figures
+    finally:
+        s.stop()
+
+
+def kill_worker(s, chance):
+    """One of the processes that solve, whatever it does; False: there was none."""
+    try:
+        os.kill(chance.choice(s.solvers()), signal.SIGKILL)
+        return True
+    except (IndexError, OSError):  # it has just gone
+        return False
+
+
+def killed_workers(build, kills, clients=16, seed=3):
+    """Kills processes that solve again and again under load: each job gets one answer all the same."""
+    chance = random.Random(seed)
+    s = service.Service(build, "--max-attempts", "1000", "--log-level", "warn", "--max-client-rate", "0")
+    acknowledged, halt, killed = [], threading.Event(), 0
+    try:
+        s.start()
+        posters = [Poster(s.port, halt, []) for _ in range(clients)]
+        for one in posters:
+            one.start()
+        while killed < kills:
+            time.sleep(chance.uniform(0.01, 0.1))
+            killed += kill_worker(s, chance)
+        halt.set()
+        for one in posters:
+            one.join()
+            acknowledged += one.ids
+        lost, stuck, twice = settle(s, acknowledged)
+        return {"kills": killed, "acknowledged": len(acknowledged), "died_at_work": len(s.events("process_died")), "lost": lost,
+                "stuck": stuck, "twice": twice, "refused": sum(one.refusals for one in posters),
+                "failed_to_start": len(s.events("process_not_started")), "wrong_exit": s.end()}
     finally:
         s.stop()
 
@@ -281,16 +321,12 @@ def leaks(build, jobs):
     """Descriptors and memory after many jobs, against those after a tenth of them."""
     s = service.Service(build, "--log-level", "warn", "--max-client-rate", "0", "--cache", "64M")
 
-    def resident():
-        with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
-            return next(int(line.split()[1]) for line in file if line.startswith("VmRSS")) / 1024
-
     def run(count):
         done = 0
         while done < count:
             done += load(build, s.port, 16, min(5, max(0.2, (count - done) / 1500)), small, "wait=30")["requests"]
         time.sleep(0.5)
-        return done, len(os.listdir(f"/proc/{s.process.pid}/fd")), resident()
+        return done, len(os.listdir(f"/proc/{s.process.pid}/fd")), resident(s)
     try:
         s.start()
         small = os.path.join(s.folder, "small.json")
