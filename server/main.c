@@ -123,6 +123,7 @@ static bool start_work(service *s, const server_options *options, char *message,
                                              .all = (int64_t)options->uploads,
                                              .keep_s = options->upload_days * 86400}};
     const work_options workers = {.workers = options->workers,
+                                  .lanes = options->lanes,
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
                                   .solve_bytes = options->memory,

@@ -175,6 +175,9 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
     }
     const auth_scope have = who.scope;
     rq->sees_all = !context->auth || have >= SCOPE_ADMIN;
+    memcpy(rq->share, rq->client, sizeof rq->share);
+    for (size_t i = 0; !rq->client[0] && i < rq->address_len; i++)
+        snprintf(rq->share + 2 * i, 3, "%02x", rq->address[i]);
     if (!check_rate(context, rq, problem))
         return false;
     if (!context->auth || have >= need)

@@ -5,7 +5,6 @@
 #include "http/page.h"
 #include "options/options.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -87,31 +86,14 @@ void service_health(api *context, http_request *rq, http_reply *reply)
 
 /* ---- ready: what a job needs, tried */
 
-/* Two springs of stiffness 2 and 1 pulled by 2; the first is stopped at 0.5 and pushes back with 2 - 2 * 0.5 = 1. */
-static const char PROBE[] =
-    "{\"problem\": {\"kind\": \"matrices\", \"K\": \"%%MatrixMarket matrix coordinate real symmetric\\n"
-    "2 2 2\\n1 1 2\\n2 2 1\\n\", \"N\": \"%%MatrixMarket matrix coordinate real general\\n1 2 1\\n1 1 1\\n\","
-    " \"h\": [0.5], \"p\": [2, 2]}}";
-
 static const char *why_not_ready(api *context)
 {
-    codec_request request;
     problem_details problem;
-    uz_result *result = NULL;
-    uz_error err = {0};
-    store_status status = store_try_write(context->store);
-    if (status != STORE_OK) {
-        api_store_failed(context, &problem);
-        return status == STORE_FULL ? "storage_full" : "store_unavailable";
-    }
-    uz_thread_init();
-    if (!codec_decode(&request, CODEC_SOLVE, PROBE, sizeof PROBE - 1, NULL, &problem))
-        return "solver_unavailable";
-    const bool solved = uz_solve(&result, &request.problem, &request.settings, NULL, NULL, &err) == UZ_OK &&
-                        result->summary.outcome == UZ_CONVERGED && fabs(result->summary.reaction_sum + 1.0) < 1e-6;
-    uz_result_free(result);
-    codec_request_clear(&request);
-    return solved ? "" : "solver_unavailable";
+    const store_status status = store_try_write(context->store);
+    if (status == STORE_OK)
+        return work_solves(context->work) ? "" : "solver_unavailable";
+    api_store_failed(context, &problem);
+    return status == STORE_FULL ? "storage_full" : "store_unavailable";
 }
 
 static const double READY_FOR_S = 1.0; /* so often at most it is tried, however many ask */

@@ -30,11 +30,32 @@ static bool read_key(const http_request *rq, char **key, problem_details *proble
     return true;
 }
 
+/* Beyond these a solve takes more than some tens of milliseconds, cold and on one core. */
+#define SMALL_DOFS 10000
+#define SMALL_ROWS 1000
+
+/* By its size alone: a prediction proper (uz_predict) takes longer than most jobs that are small. One that iterates for
+ * long all the same is found out by who runs it. */
+static bool is_small(const codec_request *request)
+{
+    const uz_problem *p = &request->problem;
+    const int64_t cases = p->n_cases > 0 ? p->n_cases : 1;
+    problem_details ignored;
+    int64_t m, n_u;
+    double cells = 1.0;
+    for (int i = 0; p->kind == UZ_PROBLEM_SCENE && i < p->scene.box.dim; i++)
+        cells *= (double)p->scene.box.cells[i];
+    return cells <= SMALL_DOFS && codec_request_sizes(request, &m, &n_u, &ignored) && n_u <= SMALL_DOFS / cases &&
+           m <= SMALL_ROWS;
+}
+
 /* What the store keeps of a decoded request, and of its body and key, which must outlive it. */
 static store_request kept_request(const http_request *rq, const codec_request *request, const char *body, size_t len,
                                   const char *key)
 {
     return (store_request){.client = rq->client,
+                           .share = rq->share,
+                           .small = is_small(request),
                            .any_upload = rq->sees_all,
                            .body = body,
                            .body_len = len,
@@ -47,10 +68,18 @@ static store_request kept_request(const http_request *rq, const codec_request *r
                            .webhook = request->webhook};
 }
 
-/* url NULL: there is none. False: a 422. */
-static bool check_webhook(api *context, const char *url, problem_details *problem)
+/* Whom it may call (url NULL: nobody), and how urgent it may be. False: a 422 or a 403. */
+static bool check_allowed(api *context, const http_request *rq, const char *url, int priority, problem_details *problem)
 {
     const char *why;
+    if (priority > STORE_PRIORITY_SHARED && !rq->sees_all) {
+        problem_fill(problem, 403, "insufficient_scope", "This token does not allow that",
+                     "/priority: %d would go before what others wait for, and needs the scope admin: the token \"%s\" "
+                     "may say %d at most, which orders its owner's jobs among themselves",
+                     priority, rq->token, STORE_PRIORITY_SHARED);
+        strcpy(problem->pointer, "/priority");
+        return false;
+    }
     if (!url || webhooks_allow(context->webhooks, url, &why))
         return true;
     problem_fill(problem, 422, "webhook_not_allowed", "The webhook cannot be called", "/webhook/url: %s", why);
@@ -63,7 +92,7 @@ static bool store_job(api *context, http_request *rq, const store_request *reque
 {
     bool repeated = false;
     problem_details problem;
-    if (!check_webhook(context, request->webhook, &problem)) {
+    if (!check_allowed(context, rq, request->webhook, request->priority, &problem)) {
         reply_problem(reply, &problem);
         return false;
     }
@@ -250,7 +279,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     good = good && read_key(rq, &key, &problem) &&
            codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
            check_uploads(context, rq, &request, &problem) && check_start(context, &request, rq, &problem) &&
-           check_webhook(context, request.webhook, &problem);
+           check_allowed(context, rq, request.webhook, request.priority, &problem);
     if (!good) {
         /* a problem, or the job that the request became when it came before */
         job j;

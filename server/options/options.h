@@ -31,7 +31,7 @@ typedef struct {
         audit_log[OPTION_PATH];
     bool insecure_public;
     /* work */
-    int workers, max_attempts;
+    int workers, lanes, max_attempts;
     size_t cache, memory; /* bytes; memory: of one solve */
     double max_solve_s;   /* of one job; 0: no limit */
     int max_queue;        /* jobs that wait; 0: no limit */

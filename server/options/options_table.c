@@ -53,6 +53,8 @@ static const uz_option ROWS[] = {
             .about = "become this user once the port is taken, when started as root"),
     SETTING("workers", INTEGER, workers, .value = "N", .least = 1, .most = 1024,
             .otherwise = "as many as there are processors", .unit = "threads", .about = "problems solved at once"),
+    SETTING("lanes", INTEGER, lanes, .value = "N", .most = 64, .normal = "1", .unit = "threads",
+            .about = "more workers, which solve small problems only, while all others are busy"),
     SETTING("cache", BYTES, cache, .value = "BYTES", .least = 1, .normal = "1G", .unit = "bytes",
             .about = "memory for factors that are kept; a quarter of it lies ready for the next one"),
     SETTING("memory", BYTES, memory, .value = "BYTES", .least = 1,

@@ -148,15 +148,15 @@ store_status store_find_repeat(store *s, const store_request *request, job *out)
     return publish_job(s->engine->find_repeat(s, request, out), out);
 }
 
-store_status store_claim(store *s, const char *owner, double lease_s, store_lease *lease, job *out, char **body,
-                         size_t *body_len)
+store_status store_claim(store *s, const char *owner, double lease_s, bool small, store_lease *lease, job *out,
+                         char **body, size_t *body_len)
 {
     *lease = (store_lease){.token = 0};
     snprintf(lease->owner, sizeof lease->owner, "%s", owner);
     *out = (job){.progress = 0};
     *body = NULL;
     *body_len = 0;
-    store_status status = publish_job(s->engine->claim(s, lease, lease_s, out, body, body_len), out);
+    store_status status = publish_job(s->engine->claim(s, lease, lease_s, small, out, body, body_len), out);
     memcpy(lease->job, out->id, sizeof lease->job);
     if (status == STORE_OK)
         return STORE_OK;

@@ -99,14 +99,16 @@ void store_listen(store *s, store_listener *changed, void *ctx);
 typedef struct {
     const char *body;
     size_t body_len;
-    const char *tags;            /* JSON array text; NULL: [] */
-    const char *client;          /* NULL: "" */
+    const char *tags;   /* JSON array text; NULL: [] */
+    const char *client; /* NULL: "" */
+    const char *share;  /* whose share of the workers it takes: the owner or the address that sent it; NULL: "" */
     const char *idempotency_key; /* of this client; may be NULL */
     const char *refines;         /* id, or NULL */
     const char (*uploads)[65];   /* n_uploads ids of uploads that the body names */
     size_t n_uploads;
     bool any_upload;
-    int priority;         /* -10..10: larger ones run first, of the same the older one */
+    int priority;         /* -10..10: larger ones of a share run first, of the same the older one */
+    bool small;           /* it is taken to end at once */
     const char *webhook;  /* address to tell of its end, or NULL */
     double queue_limit_s; /* it fails if it has not begun so long after it came; 0: no limit */
 } store_request;
@@ -126,14 +128,20 @@ typedef struct {
     uint64_t token; /* fencing token: no other claim of this job by this owner has it */
 } store_lease;
 
-/* ---- claim: of the accepted jobs with the highest priority the oldest becomes running, attempts + 1, for lease_s
- * seconds. *body is the request as submitted, freed by the caller, or NULL where it is not what was written any more:
- * the job can only be failed. STORE_NOT_FOUND when nothing waits.
+/* A priority above this goes before all shares. */
+#define STORE_PRIORITY_SHARED 5
+
+/* ---- claim: an accepted job becomes running, attempts + 1, for lease_s seconds. It is one of the share whose turn it
+ * is: of those for which fewest jobs run the one that has had the least time of workers, counted since all who wait now
+ * have waited. Of that share's it is the one with the highest priority, of these the oldest. Shares with a job of a
+ * priority above STORE_PRIORITY_SHARED go before all others. small: only jobs that are (those that were put back are
+ * not any more). *body is the request as submitted, freed by the caller, or NULL where it is not what was written any
+ * more: the job can only be failed. STORE_NOT_FOUND when nothing waits.
  * A lease that has run out is still good until the job is somebody else's: by a claim of another owner where the engine
  * has several processes, by recover where it has one. From then on everything that is done with it is STORE_CONFLICT
  * and changes nothing. */
-store_status store_claim(store *s, const char *owner, double lease_s, store_lease *lease, job *out, char **body,
-                         size_t *body_len);
+store_status store_claim(store *s, const char *owner, double lease_s, bool small, store_lease *lease, job *out,
+                         char **body, size_t *body_len);
 /* Extends the lease to lease_s from now; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
 store_status store_renew(store *s, const store_lease *lease, double lease_s, int progress);
 

@@ -14,6 +14,7 @@
 typedef struct {
     work *w;
     pthread_t thread;
+    bool lane;       /* takes small jobs only, and has none for long */
     char owner[128]; /* who it is to the store: host, process, a random number, worker */
 
     pthread_mutex_t lock; /* down to progress; only this thread changes these */
@@ -43,35 +44,46 @@ struct work {
 
     pthread_mutex_t pool_lock; /* of each process what its header says; taken alone */
     pthread_cond_t pool_idle;  /* one was given back */
-    process *processes;        /* options.workers of them */
+    process *processes;        /* n of them: the workers' first, then those of the lanes */
 
-    pthread_mutex_t lock; /* everything down to drain_until */
-    pthread_cond_t wake;  /* submitted or stopping */
-    pthread_cond_t idle;  /* alive became 0, the drain was shortened, or stopped */
-    pthread_cond_t tick;  /* finished */
+    pthread_mutex_t lock;  /* everything down to drain_until */
+    pthread_cond_t wake;   /* submitted or stopping */
+    pthread_cond_t probed; /* probe, or busy while one is asked for */
+    pthread_cond_t crowd;  /* for the lanes: the same, or all workers are busy */
+    pthread_cond_t idle;   /* alive became 0, the drain was shortened, or stopped */
+    pthread_cond_t tick;   /* finished */
     uint64_t
         submitted; /* times that the store told of a job that waits: a worker that saw none waits for another number */
+    int busy;      /* workers with a job, but for the lanes */
     int alive;     /* worker threads that have not ended */
-    bool stopping; /* no more claims */
-    bool finished; /* the keeper shall stop */
-    bool stopped;  /* every thread was joined */
+    enum { PROBE_NONE, PROBE_ASKED, PROBE_RUNS, PROBE_GOOD, PROBE_BAD } probe;
+    bool stopping;      /* no more claims */
+    bool finished;      /* the keeper shall stop */
+    bool stopped;       /* every thread was joined */
     double drain_until; /* on CLOCK_MONOTONIC */
 
     atomic_bool interrupt; /* the time to drain is over */
     int n_started;         /* workers to join; set before any other thread may call */
     bool keeper_started, housekeeper_started;
     pthread_t keeper, housekeeper;
-    worker *workers; /* options.workers of them */
+    int n;           /* options.workers + options.lanes */
+    worker *workers; /* n of them */
 };
 
 /* Has one claimed job solved and stores what came of it; takes over its texts and the body. */
 void work_run(worker *me, job *claimed, char *body, size_t body_len);
 
+/* Has a process solve a problem whose answer is known; false: it did not. */
+bool work_probe(worker *me);
+
 bool work_is_stopping(work *w);
 
-/* A process for a job with this text, that is: one that has its body, else the first one. There are as many as workers;
- * still there may be a moment in which one more is asked what it has. */
-process *work_take_process(work *w, const char *text, size_t len, uint64_t *body);
+/* Of the load case i of the job that it runs, once that was read. */
+void work_case_name(const process *p, int64_t i, char name[CASE_NAME]);
+
+/* A process for a job with this text, that is: one that has its body, else the first one; of the lanes' for a lane.
+ * There are as many as workers; still there may be a moment in which one more is asked what it has. */
+process *work_take_process(work *w, bool lane, const char *text, size_t len, uint64_t *body);
 /* body: of the text that it has solved, as taking said; 0: nothing. done: what it said at the end; NULL: it has ended.
  */
 void work_give_process(work *w, process *p, uint64_t body, const packet *done);

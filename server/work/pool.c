@@ -17,13 +17,14 @@ static bool has_body(const process *p, uint64_t body)
     return false;
 }
 
-process *work_take_process(work *w, const char *text, size_t len, uint64_t *body)
+process *work_take_process(work *w, bool lane, const char *text, size_t len, uint64_t *body)
 {
+    const int first = lane ? w->options.workers : 0, end = lane ? w->n : w->options.workers;
     process *found = NULL;
-    *body = text && w->options.workers > 1 && len <= TEXT_MOST ? process_body(text, len) : 0;
+    *body = text && end - first > 1 && len <= TEXT_MOST ? process_body(text, len) : 0;
     pthread_mutex_lock(&w->pool_lock);
     while (!found) {
-        for (int i = 0; i < w->options.workers; i++) {
+        for (int i = first; i < end; i++) {
             process *p = &w->processes[i];
             if (!p->taken && (!found || (*body && !has_body(found, *body) && has_body(p, *body))))
                 found = p;
@@ -33,9 +34,6 @@ process *work_take_process(work *w, const char *text, size_t len, uint64_t *body
     }
     found->taken = true;
     pthread_mutex_unlock(&w->pool_lock);
-    atomic_store(&found->board->stop, false);
-    atomic_store(&found->board->heard, false);
-    live_reset(&found->board->live);
     return found;
 }
 
@@ -56,7 +54,7 @@ void work_give_process(work *w, process *p, uint64_t body, const packet *done)
     if (body && !has_body(p, body))
         p->bodies[p->next_body++ % PROCESS_BODIES] = body;
     p->taken = false;
-    pthread_cond_signal(&w->pool_idle);
+    pthread_cond_broadcast(&w->pool_idle); /* who waits may want another kind */
     pthread_mutex_unlock(&w->pool_lock);
 }
 
@@ -90,7 +88,7 @@ bool work_factors(work *w, uz_cache_entry **entries, size_t *count)
 {
     *entries = NULL;
     *count = 0;
-    for (int i = 0; i < w->options.workers; i++) {
+    for (int i = 0; i < w->n; i++) {
         process *p = &w->processes[i];
         pthread_mutex_lock(&w->pool_lock);
         const bool ours = !p->taken;
@@ -114,7 +112,7 @@ bool work_factors(work *w, uz_cache_entry **entries, size_t *count)
         }
         if (ours)
             p->taken = false;
-        pthread_cond_signal(&w->pool_idle);
+        pthread_cond_broadcast(&w->pool_idle);
         pthread_mutex_unlock(&w->pool_lock);
         if (!grown) {
             free(*entries);
@@ -129,7 +127,7 @@ void work_cached(work *w, size_t *entries, size_t *bytes)
 {
     *entries = *bytes = 0;
     pthread_mutex_lock(&w->pool_lock);
-    for (int i = 0; i < w->options.workers; i++) {
+    for (int i = 0; i < w->n; i++) {
         *entries += w->processes[i].held_entries;
         *bytes += w->processes[i].held_bytes;
     }

@@ -4,6 +4,7 @@
 #include "work/watch.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,6 +28,7 @@ typedef struct {
     store_outcome outcome; /* points into what follows */
     parcel parcel;
     char *error;
+    double *rows; /* of the history of one whose process was ended */
     solve_figures figures;
 } run;
 
@@ -39,12 +41,13 @@ static void log_store_failure(const run *r, log_level level, const char *event)
     log_write(r->me->w->log, level, event, (log_field[]){LOG_S("job", r->job->id), LOG_S("cause", cause), {0}});
 }
 
-/* Without memory for the error the job fails without one. */
+/* With what else the outcome has. Without memory for the error the job fails without one. */
 static void fail(run *r, const problem_details *problem)
 {
     free(r->error);
     r->error = codec_encode_problem(problem);
-    r->outcome = (store_outcome){.status = JOB_FAILED, .error = r->error};
+    r->outcome.status = JOB_FAILED;
+    r->outcome.error = r->error;
 }
 
 static bool is_settled(store_status status)
@@ -93,6 +96,7 @@ static bool store_outcome_of(run *r)
             problem_fill(&problem, 500, "result_not_stored", TITLE, "%s",
                          "The store failed, and the service's log has the cause: submit the job again.");
         log_store_failure(r, LOG_ERROR, "result_given_up");
+        r->outcome = (store_outcome){.error = NULL};
         fail(r, &problem);
         if (atomic_load(&r->me->cancel))
             r->outcome = (store_outcome){.status = JOB_DISMISSED};
@@ -158,8 +162,35 @@ static void store_end(run *r, run_end end)
 
 /* ---- what came of it */
 
+enum { BOUND = 9 }; /* its column of a history's row */
+
+/* What a process had told when it was ended is the job's: the rows of its history, and in words where the last one
+ * stands. Rows of a load case have no place in the store: its answer would stand before them. */
+static void keep_told(run *r, char *words, size_t size)
+{
+    const worker *me = r->me;
+    const live *told = &me->process->board->live;
+    const live_state now = live_read(told);
+    char name[CASE_NAME] = "", bound[64] = "";
+    int64_t count = 0;
+    words[0] = '\0';
+    if (!now.any || !live_rows(told, -1, &r->rows, &count) || count == 0)
+        return;
+    if (me->n_cases > 0 && now.current >= 0 && now.current < me->n_cases)
+        work_case_name(me->process, now.current, name);
+    if (isfinite(now.latest[BOUND]))
+        snprintf(bound, sizeof bound, ", with an error of at most %.2g in the energy norm", now.latest[BOUND]);
+    snprintf(words, size, " It had come to iteration %.0f%s%s%s.", now.latest[0], name[0] ? " of case " : "", name,
+             bound);
+    if (me->n_cases > 0)
+        return;
+    r->outcome.whole.history = r->rows;
+    r->outcome.whole.history_rows = count;
+    r->outcome.whole.history_columns = CODEC_HISTORY_COLUMNS;
+}
+
 /* The process has died, of itself or because the system ended it. */
-static run_end judge_death(run *r, const watch_report *seen)
+static run_end judge_death(run *r, const watch_report *seen, const char *told)
 {
     problem_details problem;
     char how[64];
@@ -173,14 +204,15 @@ static run_end judge_death(run *r, const watch_report *seen)
                             LOG_S("cause", seen->out_of_memory ? "out of memory" : how),
                             {0}});
     if (seen->out_of_memory)
-        problem_fill(&problem, 503, "memory_limit", "Out of memory", "%s",
+        problem_fill(&problem, 503, "memory_limit", "Out of memory",
                      "The system ended the process that solved this job, for want of memory: take a coarser mesh, or "
-                     "a service with more.");
+                     "a service with more.%s",
+                     told);
     else if (r->job->attempts >= r->me->w->options.max_attempts)
         problem_fill(&problem, 500, "process_died", "The process that solved this job died",
                      "It was run %d times, and each time the process ended before it had an answer, the last time "
-                     "with %s. Please report the request.",
-                     r->job->attempts, how);
+                     "with %s. Please report the request.%s",
+                     r->job->attempts, how, told);
     else
         return END_RETRY;
     fail(r, &problem);
@@ -191,6 +223,7 @@ static run_end judge_end(run *r, watch_end end, const watch_report *seen)
 {
     worker *me = r->me;
     problem_details problem;
+    char told[256];
     const bool cancelled = atomic_load(&me->cancel), lost = atomic_load(&me->lost);
     if (end == WATCH_DONE) {
         segment *outbox = &me->process->outbox;
@@ -208,20 +241,22 @@ static run_end judge_end(run *r, watch_end end, const watch_report *seen)
     if (lost)
         return END_DROP;
     r->outcome = (store_outcome){.status = JOB_DISMISSED};
+    keep_told(r, told, sizeof told);
     if (cancelled)
         return END_FINISH;
     if (end == WATCH_STOPPED || atomic_load(&me->w->interrupt))
         return END_RELEASE;
     if (end == WATCH_DIED)
-        return judge_death(r, seen);
+        return judge_death(r, seen, told);
     if (end == WATCH_OVERDUE)
         problem_fill(
             &problem, 422, "time_limit", "The time was over before there was an answer",
             "After %g s, which time_limit_s or the service's --max-solve-s allow, %s. Allow more time, or take "
-            "a coarser mesh.",
+            "a coarser mesh.%s",
             seen->time_limit_s,
             seen->began ? "the best answer so far could not be certified in time"
-                        : "the body was still being factored: there is no answer and no bound yet");
+                        : "the body was still being factored: there is no answer and no bound yet",
+            told);
     else if (end == WATCH_NOT_STARTED)
         problem_fill(&problem, 503, "process_not_started", "No process could be started for the job", "%s",
                      "The service's log has the cause. Submit the job again later.");
@@ -242,7 +277,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     log_write(w->log, LOG_INFO, "job_started",
               (log_field[]){LOG_S("job", claimed->id), LOG_I("attempt", claimed->attempts), {0}});
     uint64_t key = 0;
-    process *p = work_take_process(w, body, body_len, &key);
+    process *p = work_take_process(w, me->lane, body, body_len, &key);
     pthread_mutex_lock(&me->lock);
     me->process = p;
     pthread_mutex_unlock(&me->lock);
@@ -255,6 +290,43 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     pthread_mutex_unlock(&me->lock);
     parcel_clear(&r.parcel);
     free(r.error);
+    free(r.rows);
     job_clear(claimed);
     work_give_process(w, p, end == WATCH_DONE ? key : 0, end == WATCH_DONE ? &seen.done : NULL);
+}
+
+/* ---- does anybody solve */
+
+/* Two springs of stiffness 2 and 1 pulled by 2; the first is stopped at 0.5 and pushes back with 2 - 2 * 0.5 = 1. */
+static const char PROBE[] =
+    "{\"problem\": {\"kind\": \"matrices\", \"K\": \"%%MatrixMarket matrix coordinate real symmetric\\n"
+    "2 2 2\\n1 1 2\\n2 2 1\\n\", \"N\": \"%%MatrixMarket matrix coordinate real general\\n1 2 1\\n1 1 1\\n\","
+    " \"h\": [0.5], \"p\": [2, 2]}}";
+
+bool work_probe(worker *me)
+{
+    const job probe = {.attempts = 1};
+    run r = {.me = me};
+    watch_report seen;
+    uint64_t key;
+    double force = 0.0;
+    char *body = strdup(PROBE);
+    if (!body)
+        return false;
+    process *p = work_take_process(me->w, me->lane, NULL, 0, &key);
+    pthread_mutex_lock(&me->lock);
+    me->process = p;
+    pthread_mutex_unlock(&me->lock);
+    const watch_end end = watch_job(me, &probe, body, sizeof PROBE - 1, 0.0, &seen);
+    const bool done = end == WATCH_DONE && judge_end(&r, end, &seen) == END_FINISH && r.outcome.whole.summary;
+    codec_summary *summary = done ? codec_summary_read(r.outcome.whole.summary) : NULL;
+    const bool good = summary && strcmp(codec_summary_text(summary, "outcome"), "converged") == 0 &&
+                      codec_summary_number(&force, summary, "contact.reaction_sum") && fabs(force + 1.0) < 1e-6;
+    codec_summary_free(summary);
+    pthread_mutex_lock(&me->lock);
+    me->process = NULL;
+    pthread_mutex_unlock(&me->lock);
+    parcel_clear(&r.parcel);
+    work_give_process(me->w, p, 0, end == WATCH_DONE ? &seen.done : NULL);
+    return good;
 }

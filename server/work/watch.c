@@ -17,6 +17,7 @@ enum { PATIENCE = SANITIZED ? 10 : 1 };
 #define RELEASE_S (0.5 * PATIENCE) /* the service stops, or another owner has the job */
 #define HEARD_S   (1.0 * PATIENCE) /* more, where the process has seen it and certifies its answer */
 #define START_S   (20.0 * PATIENCE)
+#define LANE_S    (1.0 * PATIENCE) /* a job that takes longer is no small one: another worker begins it again */
 
 /* Beyond its time limit. Once it iterates there is an answer, whose certificate may take a while. */
 #define LIMIT_S     (0.7 * PATIENCE)
@@ -27,7 +28,7 @@ typedef struct {
     process *p;
     const job *job;
     size_t body_len;
-    double told_at, stop_at, due_at; /* on CLOCK_MONOTONIC */
+    double told_at, stop_at, due_at, grown_at; /* on CLOCK_MONOTONIC */
     double limit_s;
     int told; /* percent */
     bool stopping;
@@ -39,7 +40,7 @@ typedef struct {
 static void tell_progress(watch *w, double now)
 {
     worker *me = w->me;
-    if (now - w->told_at < TELL_S || !live_read(&w->p->board->live).any)
+    if (!w->job->id[0] || now - w->told_at < TELL_S || !live_read(&w->p->board->live).any)
         return;
     w->told_at = now;
     pthread_mutex_lock(&me->lock);
@@ -57,7 +58,7 @@ static void pass_on(watch *w, double now)
 {
     worker *me = w->me;
     const bool cancelled = atomic_load(&me->cancel);
-    if (w->stopping || !(cancelled || atomic_load(&me->lost) || atomic_load(&me->w->interrupt)))
+    if (w->stopping || !(cancelled || now >= w->grown_at || atomic_load(&me->lost) || atomic_load(&me->w->interrupt)))
         return;
     atomic_store(&w->p->board->stop, true);
     w->stopping = true;
@@ -89,6 +90,7 @@ static bool hear(watch *w, const packet *m, double now)
     if (m->kind == MESSAGE_READY) {
         w->p->ready = true;
         w->due_at = w->limit_s > 0.0 ? now + w->limit_s + LIMIT_S : (double)INFINITY;
+        w->grown_at = me->lane ? now + LANE_S : (double)INFINITY;
         if (!m->u.ready.confined && !SANITIZED)
             log_write(me->w->log, LOG_WARN, "process_not_confined", (log_field[]){{0}});
         return true;
@@ -123,6 +125,7 @@ static watch_end follow(watch *w, watch_report *out)
         wait = w->stopping ? fmin(wait, fmax(0.0, w->stop_at - now)) : wait;
         wait = heard && now >= w->stop_at ? fmin(TELL_S, w->stop_at + HEARD_S - now) : wait;
         wait = w->due_at > now ? fmin(wait, w->due_at - now) : wait;
+        wait = w->grown_at > now ? fmin(wait, w->grown_at - now) : wait;
         if (poll(fds, 2, (int)(1e3 * wait) + 1) <= 0)
             continue;
         if (fds[1].revents) {
@@ -170,12 +173,16 @@ watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len,
     free(body);
     if (!room)
         return WATCH_NO_ROOM;
+    atomic_store(&p->board->stop, false);
+    atomic_store(&p->board->heard, false);
+    live_reset(&p->board->live);
     watch_end end = WATCH_NOT_STARTED;
     for (int tries = 0; tries < 2 && end == WATCH_NOT_STARTED && !atomic_load(&all->interrupt); tries++) {
         const double now = clock_seconds(CLOCK_MONOTONIC);
         if (!process_begin(p))
             continue;
         w.due_at = !p->ready ? now + START_S : w.limit_s > 0.0 ? now + w.limit_s + LIMIT_S : (double)INFINITY;
+        w.grown_at = me->lane && p->ready ? now + LANE_S : (double)INFINITY;
         w.again = tries > 0;
         end = message_send(p->socket, &m, -1) ? follow(&w, out) : WATCH_NOT_STARTED;
         if (end == WATCH_DONE)

@@ -13,7 +13,9 @@
 #include <time.h>
 #include <unistd.h>
 
-#define CLAIM_RETRY_S 1.0 /* after the store failed */
+#define CLAIM_RETRY_S 1.0                /* after the store failed */
+#define PROBE_S       30.0               /* a process that has to be started may take a while */
+#define LANE_CACHE    ((size_t)64 << 20) /* is enough for small jobs */
 
 /* The daemon's own end, a kill or a power loss, is no fault of the jobs that ran then. One that brings the daemon down
  * each time it runs is given up all the same, after so many times the attempts that it has. */
@@ -38,7 +40,8 @@ static store_status claim(worker *me, job *claimed, char **body, size_t *body_le
     work *w = me->w;
     store_lease lease;
     pthread_mutex_lock(&w->claim_lock);
-    store_status status = store_claim(w->store, me->owner, w->options.lease_s, &lease, claimed, body, body_len);
+    store_status status =
+        store_claim(w->store, me->owner, w->options.lease_s, me->lane, &lease, claimed, body, body_len);
     if (status == STORE_OK) {
         atomic_store(&me->cancel, false);
         atomic_store(&me->lost, false);
@@ -50,46 +53,76 @@ static store_status claim(worker *me, job *claimed, char **body, size_t *body_le
     return status;
 }
 
-/* Waits until something was submitted since `seen`; after a failure of the store it tries again anyway. */
-static void wait_for_work(work *w, uint64_t seen, bool store_failed)
+/* Under work.lock: waits until something was submitted since `seen`, a lane until nobody else is there for it either;
+ * after a failure of the store it is tried again anyway. */
+static void wait_for_work(worker *me, uint64_t seen, bool store_failed)
 {
+    work *w = me->w;
     const double until = store_failed ? clock_seconds(CLOCK_MONOTONIC) + CLAIM_RETRY_S : (double)INFINITY;
-    pthread_mutex_lock(&w->lock);
-    while (!w->stopping && (store_failed || w->submitted == seen) && clock_wait(&w->wake, &w->lock, until))
+    while (!w->stopping && (store_failed || w->submitted == seen || (me->lane && w->busy < w->options.workers)) &&
+           (me->lane || w->probe != PROBE_ASKED) && clock_wait(me->lane ? &w->crowd : &w->wake, &w->lock, until))
         ;
-    pthread_mutex_unlock(&w->lock);
+}
+
+/* Under work.lock: a job waits, or several may. Whoever else is idle has it, else a lane. */
+static void call_worker(work *w, bool several)
+{
+    w->submitted++;
+    (several ? pthread_cond_broadcast : pthread_cond_signal)(&w->wake);
+    if (several || w->busy == w->options.workers)
+        (several ? pthread_cond_broadcast : pthread_cond_signal)(&w->crowd);
 }
 
 static void *work_loop(void *arg)
 {
     worker *me = arg;
     work *w = me->w;
-    for (;;) {
+    bool store_failed = false;
+    pthread_mutex_lock(&w->lock);
+    for (uint64_t seen = w->submitted - 1;;) { /* of w->submitted before the last look at the store */
         job claimed;
         char *body, cause[256];
         size_t body_len;
-        pthread_mutex_lock(&w->lock);
-        uint64_t seen = w->submitted;
-        bool stopping = w->stopping;
-        pthread_mutex_unlock(&w->lock);
-        if (stopping)
+        wait_for_work(me, seen, store_failed);
+        if (w->stopping)
             break;
-        store_status status = claim(me, &claimed, &body, &body_len);
-        if (status == STORE_OK) {
-            char id[33];
-            strcpy(id, claimed.id);
-            work_run(me, &claimed, body, body_len);
-            publish(me, &(store_lease){.token = 0});
-            feed_changed(w->feed, id); /* ended, or put back */
+        if (w->probe == PROBE_ASKED && !me->lane) { /* before a job: somebody waits, and it takes a millisecond */
+            w->probe = PROBE_RUNS;
+            pthread_mutex_unlock(&w->lock);
+            const bool good = work_probe(me);
+            pthread_mutex_lock(&w->lock);
+            w->probe = good ? PROBE_GOOD : PROBE_BAD;
+            pthread_cond_broadcast(&w->probed);
             continue;
         }
-        if (status != STORE_NOT_FOUND) {
+        seen = w->submitted;
+        pthread_mutex_unlock(&w->lock);
+        const store_status status = claim(me, &claimed, &body, &body_len);
+        store_failed = status != STORE_OK && status != STORE_NOT_FOUND;
+        if (store_failed) {
             store_message(w->store, cause, sizeof cause);
             log_write(w->log, LOG_ERROR, "claim_failed", (log_field[]){LOG_S("cause", cause), {0}});
         }
-        wait_for_work(w, seen, status != STORE_NOT_FOUND);
+        pthread_mutex_lock(&w->lock);
+        if (status != STORE_OK)
+            continue;
+        w->busy += !me->lane;
+        if (w->busy == w->options.workers)
+            pthread_cond_signal(&w->crowd);
+        if (w->probe == PROBE_ASKED)
+            pthread_cond_broadcast(&w->probed);
+        pthread_mutex_unlock(&w->lock);
+        char id[33];
+        strcpy(id, claimed.id);
+        work_run(me, &claimed, body, body_len);
+        publish(me, &(store_lease){.token = 0});
+        feed_changed(w->feed, id); /* ended, or put back */
+        pthread_mutex_lock(&w->lock);
+        w->busy -= !me->lane;
+        if (me->lane) /* what it puts back is for another one */
+            call_worker(w, false);
+        seen = w->submitted - 1;
     }
-    pthread_mutex_lock(&w->lock);
     if (--w->alive == 0)
         pthread_cond_broadcast(&w->idle);
     pthread_mutex_unlock(&w->lock);
@@ -134,7 +167,7 @@ static void *keep_loop(void *arg)
         if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + w->options.lease_s / 3.0))
             continue;
         pthread_mutex_unlock(&w->lock);
-        for (int i = 0; i < w->options.workers; i++)
+        for (int i = 0; i < w->n; i++)
             renew(&w->workers[i]);
         pthread_mutex_lock(&w->lock);
     }
@@ -183,7 +216,7 @@ static bool start_threads(work *w)
     ok = ok && pthread_create(&w->housekeeper, NULL, housekeeping_loop, w) == 0;
     w->housekeeper_started = ok;
     pthread_mutex_lock(&w->lock);
-    for (int i = 0; ok && i < w->options.workers; i++) {
+    for (int i = 0; ok && i < w->n; i++) {
         ok = pthread_create(&w->workers[i].thread, NULL, work_loop, &w->workers[i]) == 0;
         w->n_started += ok;
         w->alive += ok;
@@ -207,6 +240,7 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     w->log = log;
     w->options = *options;
     w->options.workers = options->workers > 0 ? options->workers : 1;
+    w->n = w->options.workers + w->options.lanes;
     w->options.max_attempts = options->max_attempts > 0 ? options->max_attempts : 3;
     w->options.room_wait_s = options->room_wait_s > 0.0 ? options->room_wait_s : 60.0;
     w->options.lease_s = options->lease_s > 0.0 ? options->lease_s : 30.0;
@@ -215,15 +249,18 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     pthread_mutex_init(&w->lock, NULL);
     clock_condition(&w->pool_idle);
     clock_condition(&w->wake);
+    clock_condition(&w->crowd);
+    clock_condition(&w->probed);
     clock_condition(&w->idle);
     clock_condition(&w->tick);
     cpu_set_t may_use;
     w->processors = sched_getaffinity(0, sizeof may_use, &may_use) == 0 ? CPU_COUNT(&may_use) : 1;
     w->feed = feed_new();
-    w->workers = calloc((size_t)w->options.workers, sizeof *w->workers);
-    w->processes = calloc((size_t)w->options.workers, sizeof *w->processes);
-    for (int i = 0; w->workers && i < w->options.workers; i++) {
+    w->workers = calloc((size_t)w->n, sizeof *w->workers);
+    w->processes = calloc((size_t)w->n, sizeof *w->processes);
+    for (int i = 0; w->workers && i < w->n; i++) {
         w->workers[i].w = w;
+        w->workers[i].lane = i >= w->options.workers;
         snprintf(w->workers[i].owner, sizeof w->workers[i].owner, "%s:%ld:%08x:%d", host, (long)getpid(), random, i);
         pthread_mutex_init(&w->workers[i].lock, NULL);
         w->workers[i].wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -244,22 +281,21 @@ static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
     if (!waits && id)
         return;
     pthread_mutex_lock(&w->lock);
-    w->submitted++;
-    if (id)
-        pthread_cond_signal(&w->wake);
-    else
-        pthread_cond_broadcast(&w->wake);
+    call_worker(w, !id);
     pthread_mutex_unlock(&w->lock);
 }
 
-/* Half of the cache goes to all processes alike, of the other half each has as much as all after it together: the first
- * ones are those that work where there is little to do. */
-static size_t cache_share(size_t left, size_t all, int workers, int i)
+/* A small part goes to the lanes. Half of the rest goes to all other processes alike, of the other half each has as
+ * much as all after it together: the first ones are those that work where there is little to do. */
+static size_t cache_share(const work_options *o, size_t left, int i)
 {
-    if (i == workers - 1)
-        return left > 0 ? left : 1;
-    const size_t alike = all / 2 / (size_t)workers;
-    return alike + (i < 60 ? (all / 2) >> (i + 1) : 0);
+    const size_t part = o->lanes > 0 ? o->cache_bytes / 16 / (size_t)o->lanes : 0;
+    const size_t of_lane = part < LANE_CACHE ? part : LANE_CACHE, all = o->cache_bytes - (size_t)o->lanes * of_lane;
+    if (i >= o->workers)
+        return of_lane > 0 ? of_lane : 1;
+    if (i == o->workers - 1)
+        return left > (size_t)o->lanes * of_lane ? left - (size_t)o->lanes * of_lane : 1;
+    return all / 2 / (size_t)o->workers + (i < 60 ? (all / 2) >> (i + 1) : 0);
 }
 
 work *work_start(store *s, const work_options *options, server_log *log, char *message, size_t size)
@@ -267,9 +303,9 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
     work *w = make_work(s, options, log);
     bool made = w && w->workers && w->processes && w->feed;
     size_t left = made ? w->options.cache_bytes : 0;
-    for (int i = 0; made && i < w->options.workers; i++) {
-        const size_t share = cache_share(left, w->options.cache_bytes, w->options.workers, i);
-        left -= share;
+    for (int i = 0; made && i < w->n; i++) {
+        const size_t share = cache_share(&w->options, left, i);
+        left -= share < left ? share : left;
         made = process_make(&w->processes[i], options->program, share, w->options.solve_bytes, log) &&
                w->workers[i].wake >= 0;
     }
@@ -284,7 +320,7 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
     }
     store_listen(s, tell_change, w);
     if (!start_threads(w)) {
-        snprintf(message, size, "cannot start %d worker threads", w->options.workers);
+        snprintf(message, size, "cannot start %d worker threads", w->n);
         work_free(w);
         return NULL;
     }
@@ -301,6 +337,8 @@ void work_stop(work *w, double drain_s)
     w->drain_until = first || until < w->drain_until ? until : w->drain_until;
     w->stopping = true;
     pthread_cond_broadcast(&w->wake);
+    pthread_cond_broadcast(&w->crowd);
+    pthread_cond_broadcast(&w->probed);
     pthread_cond_broadcast(&w->idle);
     pthread_mutex_unlock(&w->lock);
     feed_wake_all(w->feed);
@@ -313,7 +351,7 @@ void work_stop(work *w, double drain_s)
     pthread_mutex_unlock(&w->lock);
     if (!first)
         return;
-    for (int i = 0; i < w->options.workers; i++)
+    for (int i = 0; i < w->n; i++)
         stop_job(&w->workers[i], &w->interrupt);
     for (int i = 0; i < w->n_started; i++)
         pthread_join(w->workers[i].thread, NULL);
@@ -338,12 +376,12 @@ void work_free(work *w)
     if (w->feed)
         work_stop(w, 0.0);
     store_listen(w->store, NULL, NULL);
-    for (int i = 0; w->workers && i < w->options.workers; i++) {
+    for (int i = 0; w->workers && i < w->n; i++) {
         if (w->workers[i].wake >= 0)
             close(w->workers[i].wake);
         pthread_mutex_destroy(&w->workers[i].lock);
     }
-    for (int i = 0; w->processes && i < w->options.workers; i++)
+    for (int i = 0; w->processes && i < w->n; i++)
         process_free(&w->processes[i]);
     free(w->workers);
     free(w->processes);
@@ -353,6 +391,8 @@ void work_free(work *w)
     pthread_cond_destroy(&w->tick);
     pthread_cond_destroy(&w->idle);
     pthread_cond_destroy(&w->wake);
+    pthread_cond_destroy(&w->crowd);
+    pthread_cond_destroy(&w->probed);
     pthread_mutex_destroy(&w->lock);
     pthread_mutex_destroy(&w->claim_lock);
     free(w);
@@ -363,7 +403,7 @@ void work_free(work *w)
 /* The worker that runs the job, with its lock held; NULL: none. */
 static worker *find_worker(work *w, const char *id)
 {
-    for (int i = 0; id[0] && i < w->options.workers; i++) {
+    for (int i = 0; id[0] && i < w->n; i++) {
         pthread_mutex_lock(&w->workers[i].lock);
         if (strcmp(w->workers[i].id, id) == 0)
             return &w->workers[i];
@@ -385,7 +425,7 @@ bool work_cancel(work *w, const char *id)
 }
 
 /* Names of the cases stand at the begin of the outbox while the job runs; the daemon has not read its text. */
-static void read_case_name(const process *p, int64_t i, char name[CASE_NAME])
+void work_case_name(const process *p, int64_t i, char name[CASE_NAME])
 {
     const ssize_t got = pread(p->outbox.fd, name, CASE_NAME, i * CASE_NAME);
     name[got == CASE_NAME ? CASE_NAME - 1 : 0] = '\0';
@@ -407,11 +447,11 @@ bool work_live(work *w, const char *id, int *progress, const char *case_name, in
     if (out) {
         const live_state now = p ? live_read(&p->board->live) : (live_state){.read = 0};
         if (now.current >= 0 && now.current < found->n_cases)
-            read_case_name(p, now.current, out->case_name);
+            work_case_name(p, now.current, out->case_name);
         out->is_case = case_name && !now.read;
         char name[CASE_NAME];
         for (int64_t i = 0; case_name && i < found->n_cases && !out->is_case; i++) {
-            read_case_name(p, i, name);
+            work_case_name(p, i, name);
             out->is_case = strcmp(name, case_name) == 0;
         }
         if (p && (!case_name || strcmp(case_name, out->case_name) == 0))
@@ -431,13 +471,27 @@ const work_options *work_settings(const work *w)
     return &w->options;
 }
 
+/* A worker without a job is asked; who has one solves, and its time is limited. One caller at a time. */
+bool work_solves(work *w)
+{
+    const double until = clock_seconds(CLOCK_MONOTONIC) + PROBE_S;
+    pthread_mutex_lock(&w->lock);
+    if (w->probe != PROBE_RUNS) /* an earlier one that nobody waited for any more */
+        w->probe = PROBE_ASKED;
+    pthread_cond_broadcast(&w->wake);
+    while (!w->stopping && (w->probe == PROBE_RUNS || (w->probe == PROBE_ASKED && w->busy < w->options.workers)) &&
+           clock_wait(&w->probed, &w->lock, until))
+        ;
+    const bool good = w->probe == PROBE_GOOD || (w->probe == PROBE_ASKED && w->busy == w->options.workers);
+    w->probe = w->probe == PROBE_RUNS ? PROBE_RUNS : PROBE_NONE;
+    pthread_mutex_unlock(&w->lock);
+    return good;
+}
+
 int work_busy(work *w)
 {
-    int busy = 0;
-    for (int i = 0; i < w->options.workers; i++) {
-        pthread_mutex_lock(&w->workers[i].lock);
-        busy += w->workers[i].id[0] != '\0';
-        pthread_mutex_unlock(&w->workers[i].lock);
-    }
+    pthread_mutex_lock(&w->lock);
+    const int busy = w->busy;
+    pthread_mutex_unlock(&w->lock);
     return busy;
 }

@@ -34,6 +34,7 @@ typedef struct work work;
 
 typedef struct {
     int workers;
+    int lanes;           /* workers beside those, which take small jobs only, while all of those are busy */
     const char *program; /* of the processes that solve; NULL: this one. It must call solver_process */
     int max_attempts;    /* runs begun before a job that keeps killing its process is failed */
     size_t cache_bytes;  /* factor caches of all processes, with their reserves */
@@ -77,7 +78,9 @@ bool work_factors(work *w, uz_cache_entry **entries, size_t *count);
 /* The same in numbers, as the last job of each process left it. */
 void work_cached(work *w, size_t *entries, size_t *bytes);
 const work_options *work_settings(const work *w); /* as they are in force */
-int work_busy(work *w);                           /* workers that run a job */
+int work_busy(work *w);                           /* workers, without the lanes, that run a job */
+/* A small problem is solved rightly by a worker that is idle; true too where all are at work. One thread asks. */
+bool work_solves(work *w);
 
 /* Stops: no more claims; running jobs get drain_s seconds to end, then they are interrupted and released back to
  * accepted. Waiters wake at once. Returns when every worker has ended, half a second later: what does not stop is

@@ -134,7 +134,8 @@ def validate(reply):
 
 
 class Service:
-    """One daemon. Options after --listen and --db; db names another database file."""
+    """One daemon. Options after --listen and --db; db names another database file. A test that says how many workers
+    there are counts on jobs that wait: no others are beside them unless it says so."""
 
     def __init__(self, build, *options, db=None):
         self.build = pathlib.Path(build)
@@ -151,7 +152,8 @@ class Service:
         self.close()
         self.log_file = open(os.path.join(self.folder, "log"), "ab")
         suppressions = f"suppressions={ROOT / 'tests' / 'tsan.supp'} {os.environ.get('TSAN_OPTIONS', '')}"
-        self.process = subprocess.Popen(self.command("--listen", "127.0.0.1:0", "--db", self.db, *self.options),
+        alone = ("--lanes", "0") if "--workers" in self.options and "--lanes" not in self.options else ()
+        self.process = subprocess.Popen(self.command("--listen", "127.0.0.1:0", "--db", self.db, *alone, *self.options),
                                         stdout=subprocess.PIPE, stderr=self.log_file,
                                         env={**os.environ, "TSAN_OPTIONS": suppressions, **self.environment})
         line = self.process.stdout.readline().decode()

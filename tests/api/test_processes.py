@@ -87,6 +87,49 @@ def test_a_death_is_one_jobs_alone(s):
     s.wait_status(other, "dismissed")
 
 
+def stopped_while_it_iterates(s, body):
+    """A job whose process stands still after some rows of its history."""
+    job = s.post(body).json["id"]
+    while len(s.get(f"/v1/jobs/{job}/history").json.get("rows", ())) < 5:
+        time.sleep(0.02)
+    os.kill(s.solvers()[0], signal.SIGSTOP)
+    return job
+
+
+@options("--workers", "1", "--max-attempts", "1")
+def test_a_job_that_is_ended_keeps_what_it_had(s):
+    """By its limit, by a dismissal, by its process's death: rows of its history, and where the last one stands in words."""
+    limited = {**ENDLESS, "solver": {**ENDLESS["solver"], "time_limit_s": 4}}
+    job = stopped_while_it_iterates(s, limited)
+    ended = s.wait_status(job, "failed")
+    check(ended["error"]["code"] == "time_limit" and "come to iteration" in ended["error"]["detail"], ended)
+    check("energy norm" in ended["error"]["detail"] or "iteration" in ended["error"]["detail"], ended)
+    check(len(s.get(f"/v1/jobs/{job}/history").json["rows"]) >= 5)
+    job = stopped_while_it_iterates(s, ENDLESS)
+    expect(s.request("DELETE", f"/v1/jobs/{job}"), 200)
+    check(s.wait_status(job, "dismissed")["summary"] is None)
+    check(len(s.get(f"/v1/jobs/{job}/history").json["rows"]) >= 5)
+    job = stopped_while_it_iterates(s, ENDLESS)
+    os.kill(s.solvers()[0], signal.SIGKILL)
+    ended = s.wait_status(job, "failed")
+    check(ended["error"]["code"] == "process_died" and "come to iteration" in ended["error"]["detail"], ended)
+    check(len(s.get(f"/v1/jobs/{job}/history").json["rows"]) >= 5)
+    check(s.solve(MATRICES)["status"] == "successful")
+
+
+@options("--workers", "1")
+def test_ready_is_asked_of_a_process(s):
+    """Not of the daemon, nor of one that works."""
+    check(s.get("/readyz").status == 200 and len(s.solvers()) == 1)
+    job = s.post(ENDLESS).json["id"]
+    s.wait_status(job, "running")
+    time.sleep(1.1)
+    check(s.get("/readyz").status == 200 and s.get(f"/v1/jobs/{job}").json["status"] == "running")
+    s.request("DELETE", f"/v1/jobs/{job}")
+    s.wait_status(job, "dismissed")
+    check(len(s.get("/v1/jobs").json["jobs"]) == 1)
+
+
 @options("--workers", "1")
 def test_an_idle_process_may_go(s):
     for _ in range(3):

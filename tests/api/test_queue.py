@@ -1,11 +1,18 @@
 """Which jobs run first, which wait too long, which are listed, and which are kept."""
+import contextlib
 import datetime
+import http.client
+import json
+import os
+import pathlib
+import sqlite3
+import tempfile
 import threading
 import time
 import urllib.parse
 
 import service
-from service import ENDLESS, MATRICES, check, expect, options, wait_until
+from service import ENDLESS, MATRICES, SCENE, check, expect, options, wait_until
 
 
 def ids(reply):
@@ -78,6 +85,102 @@ def test_priorities(s):
     check(all(job["status"] == "successful" for job in ended), ended)
     check([wanted[i][1] for i in order] == list(range(6)), order)
     check("priority" in s.get(f"/v1/jobs/{first['id']}").json)
+
+
+# ------------------------------------------------------------------ shares
+
+TOKENS = {"many": "many-" + "1" * 16, "one": "one-" + "2" * 16, "boss": "boss-" + "3" * 16}
+FOLDER = tempfile.TemporaryDirectory(prefix="uzawad-queue-")
+TOKEN_FILE = pathlib.Path(FOLDER.name, "tokens")
+TOKEN_FILE.write_text("".join(f"{name} {'admin' if name == 'boss' else 'submit'} {secret}\n" for name, secret in TOKENS.items()))
+TOKEN_FILE.chmod(0o600)
+
+
+def queue_of(s, share, client, count, body):
+    """So many jobs of one client wait in the database of a daemon that is not running."""
+    s.start()
+    check(s.end() == 0)
+    s.process.stdout.close()
+    s.log_file.close()
+    with contextlib.closing(sqlite3.connect(s.db)) as db, db:
+        names = [f"{i:012x}{0:04x}{i:016x}" for i in range(1, count + 1)]
+        db.executemany("INSERT INTO job(id, status, created, tags, client, share, small) VALUES(?, 0, 1e9, '[]', ?, ?, 1)",
+                       [(name, client, share) for name in names])
+        db.executemany("INSERT INTO request(job, body) VALUES(?, ?)", [(name, json.dumps(body).encode()) for name in names])
+    s.start()
+
+
+def ask_from(s, address, method, path, body=None):
+    connection = http.client.HTTPConnection(s.host, s.port, timeout=60, source_address=(address, 0))
+    with contextlib.closing(connection):
+        connection.request(method, path, json.dumps(body) if body else None, {"Content-Type": "application/json"} if body else {})
+        return json.loads(connection.getresponse().read())
+
+
+def check_turn(s, job, seconds=10):
+    """Hardly anybody had a turn while it waited: those that workers had taken by then, and that in time."""
+    times = [datetime.datetime.fromisoformat(job[name].replace("Z", "+00:00")).timestamp() for name in ("created", "started")]
+    check(job["status"] == "successful" and times[1] - times[0] < seconds, job)  # 0.01 s, where the machine does nothing else
+    between = s.sql("SELECT count(*) FROM job WHERE started > ? AND started < ?", times)[0][0]
+    check(between <= 2 * (os.cpu_count() + 1), between)
+
+
+@options(None)
+def test_one_job_beside_ten_thousand_by_token(s):
+    s.options = ("--token-file", str(TOKEN_FILE))
+    queue_of(s, "many", "many", 10000, SCENE)
+    for _ in range(3):
+        reply = s.post(MATRICES, {"Authorization": "Bearer " + TOKENS["one"], "Prefer": "wait=30"})
+        check_turn(s, expect(reply, 200).json)
+    left = s.request("GET", "/healthz").json["jobs"]["accepted"]
+    check(left > 1000, "nobody else was waiting any more", left)
+
+
+@options(None)
+def test_one_job_beside_ten_thousand_by_address(s):
+    queue_of(s, "7f000001", "", 10000, SCENE)
+    mine = s.post(MATRICES).json
+    for _ in range(3):
+        job = ask_from(s, "127.0.0.2", "POST", "/v1/jobs", MATRICES)
+        while job["status"] in ("accepted", "running"):
+            job = ask_from(s, "127.0.0.2", "GET", f"/v1/jobs/{job['id']}")
+        check_turn(s, job)
+    check(s.get(f"/v1/jobs/{mine['id']}").json["status"] == "accepted")  # behind the others of its address
+
+
+@options("--token-file", str(TOKEN_FILE), "--workers", "1")
+def test_who_may_go_before_others(s):
+    for query in ("", "?validate=true"):
+        for name, status in (("one", 403), ("boss", 202 if not query else 200)):
+            reply = s.request("POST", "/v1/jobs" + query, {**MATRICES, "priority": 6}, {"Authorization": "Bearer " + TOKENS[name]})
+            check(reply.status == status, name, reply)
+            if status == 403:
+                check(reply.json["code"] == "insufficient_scope" and reply.json["pointer"] == "/priority", reply)
+    expect(s.post({**MATRICES, "priority": 5}, {"Authorization": "Bearer " + TOKENS["one"]}), 202)
+
+
+# Too large to be taken for a small one.
+LARGE = {**ENDLESS, "problem": {**SCENE["problem"], "mesh": {"box": {"size": [60, 20], "cells": [150, 50], "element": "quad4"}}}}
+
+
+@options("--workers", "1", "--lanes", "1")
+def test_small_jobs_have_a_lane(s):
+    """They go past a large one that runs; what only seemed small is put back, and does not hold up the others."""
+    large = s.post(LARGE).json["id"]
+    s.wait_status(large, "running")
+    check(s.solve(MATRICES)["status"] == "successful")
+    seemed = s.post(ENDLESS).json["id"]
+    s.wait_status(seemed, "running")
+    after = s.post(MATRICES).json["id"]
+    ended = s.get(f"/v1/jobs/{after}", Prefer="wait=30").json
+    check_turn(s, ended)
+    job = s.get(f"/v1/jobs/{seemed}").json
+    check(job["status"] == "accepted" and job["attempts"] == 0, job)
+    s.request("DELETE", f"/v1/jobs/{large}")
+    s.wait_status(seemed, "running")
+    s.request("DELETE", f"/v1/jobs/{seemed}")
+    s.wait_status(seemed, "dismissed")
+    check(s.get(f"/v1/jobs/{seemed}").json["attempts"] == 1)
 
 
 def test_bad_values(s):

@@ -107,7 +107,7 @@ static inline store_status claim_id(store *s, const char *owner, char id[33])
     job j = {0};
     char *body;
     size_t len;
-    store_status status = store_claim(s, owner, 30.0, &leases_held[leases_given % 64], &j, &body, &len);
+    store_status status = store_claim(s, owner, 30.0, false, &leases_held[leases_given % 64], &j, &body, &len);
     leases_given += status == STORE_OK;
     strcpy(id, j.id);
     job_clear(&j);
@@ -122,7 +122,7 @@ static inline store_lease lease_of(const char *id, const char *owner)
     for (unsigned n = leases_given; n > 0 && leases_given - n < 64; n--)
         if (strcmp(leases_held[(n - 1) % 64].job, id) == 0 && strcmp(leases_held[(n - 1) % 64].owner, owner) == 0)
             return leases_held[(n - 1) % 64];
-    snprintf(made.job, sizeof made.job, "%s", id);
+    snprintf(made.job, sizeof made.job, "%.32s", id);
     snprintf(made.owner, sizeof made.owner, "%s", owner);
     return made;
 }

@@ -160,6 +160,7 @@ typedef struct http_request {
     char name[65];                /* what stood for {id} or {name} in the path */
     char token[64];               /* the name of the token that it came with; "": none */
     char client[64];              /* whose it is: the owner of that token */
+    char share[64];               /* whose share of the workers its jobs take: that owner, else its address */
     bool sees_all;                /* what others have too */
     char job_id[33];              /* the job that it is about; "": none */
     http_reply reply;

@@ -52,14 +52,12 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_FIND_KEY] = "SELECT " JOB_COLUMNS ", length(body) = ?2 AND body = ?3"
                        " FROM job JOIN request ON request.job = job.id WHERE idempotency_key = ?1",
     [QUERY_INSERT_JOB] = "INSERT INTO job(id, status, created, tags, idempotency_key, refines, priority, queue_until,"
-                         " bytes, client) VALUES(?1, 0, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+                         " bytes, client, share, small) VALUES(?1, 0, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
     [QUERY_INSERT_REQUEST] = "INSERT INTO request(job, body, sum) VALUES(?1, ?2, " SUM_OF("?1, ?2") ")",
     [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
                           " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
-    [QUERY_CLAIM] = "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, finished = 0,"
-                    " owner = ?2, lease = ?1 + ?3 WHERE id = (SELECT id FROM job INDEXED BY job_by_turn"
-                    " WHERE status = 0 AND (queue_until = 0 OR queue_until >= ?1) ORDER BY priority DESC, id LIMIT 1)"
-                    " RETURNING " JOB_COLUMNS,
+    [QUERY_CLAIM] = CLAIM("share_by_turn WHERE waiting > 0", "job_by_turn WHERE status = 0"),
+    [QUERY_CLAIM_SMALL] = CLAIM("share_by_lane WHERE small > 0", "job_by_lane WHERE status = 0 AND small > 0"),
     [QUERY_BODY] = "SELECT body, " SUM_IS("sum", SUM_REQUEST) " FROM request WHERE job = ?1",
     [QUERY_RENEW] = "UPDATE job SET lease = ?3, progress = ?4 WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_FINISH] = "UPDATE job SET status = ?3, finished = ?4, summary = ?5, error = ?6, owner = NULL, lease = 0,"
@@ -74,7 +72,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, last, part, version, columns, data, answer, sum)"
                              " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?3, ?4, ?5, ?2, ?6") ")",
     [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - ?3, progress = 0, started = 0, owner = NULL,"
-                      " lease = 0, queue_until = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
+                      " lease = 0, queue_until = 0, small = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_RECOVER_FAIL] = "UPDATE job SET status = 3, finished = ?2, error = ?3, owner = NULL, lease = 0"
                            " WHERE status = 1 AND attempts >= ?1",
     [QUERY_RECOVER_REQUEUE] = "UPDATE job SET status = 0, progress = 0, started = 0, owner = NULL, lease = 0,"

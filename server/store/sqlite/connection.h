@@ -9,6 +9,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* STORE_PRIORITY_SHARED as it stands in the queries and the indexes that they use. */
+#define SHARED "5"
+_Static_assert(STORE_PRIORITY_SHARED == 5, "SHARED is the same number");
+
 typedef enum {
     QUERY_BEGIN,
     QUERY_COMMIT,
@@ -22,6 +26,7 @@ typedef enum {
     QUERY_INSERT_REQUEST,
     QUERY_INSERT_TAGS,
     QUERY_CLAIM,
+    QUERY_CLAIM_SMALL,
     QUERY_BODY,
     QUERY_RENEW,
     QUERY_FINISH,

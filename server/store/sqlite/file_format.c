@@ -1,6 +1,6 @@
 #include "store/sqlite/file_format.h"
 
-#include "store/store.h"
+#include "store/sqlite/connection.h"
 
 #include <stdint.h>
 #include <stdio.h>
@@ -34,6 +34,11 @@
  * tally    how many jobs have each status; -1: the number of commits, -2: a random name of this file (trail.h).
  * upload_client who has sent which upload.
  * job.client: whose it is, "" where there are no tokens. Idempotency keys of others begin with the name and \x1f.
+ * share    of the workers: each owner or address that has jobs which wait or run, once for those with a priority above
+ *          STORE_PRIORITY_SHARED (ahead) and once for the others: how many wait, how many of these are small, how many
+ *          run, and what time of workers it has had. One that comes begins where the least of the others stands, and
+ *          goes when it has none and that one has passed it: there is no credit for the time before. This is start-time
+ *          fair queueing (Goyal, Vin and Cheng, 1997) with the time as it was instead of one that was foretold.
  * contents of an ended job: which rows its result has (result_blobs.h).
  * sum, summary_sum, contents_sum: checksums of what answers are made of (checksum.h); NULL in rows that an older format
  * wrote. Deleting a job deletes its rows in every other table. */
@@ -133,6 +138,41 @@
 /* Version 8. In a table that most commits change anyhow. */
 #define ROWS_8 "INSERT INTO tally(status, jobs) VALUES(-1, 0), (-2, random());"
 
+/* Version 9. A job that takes no time, by a clock that was set back too, still has had its turn. */
+#define TURN_LEAST "0.001"
+#define LEAST_USED "(SELECT min(used) FROM share WHERE waiting + running > 0)"
+#define TABLES_9                                                                                                       \
+    "ALTER TABLE job ADD COLUMN share TEXT NOT NULL DEFAULT '';"                                                       \
+    "ALTER TABLE job ADD COLUMN small INTEGER NOT NULL DEFAULT 0;"                                                     \
+    "DROP INDEX job_by_turn;"                                                                                          \
+    "CREATE INDEX job_by_turn ON job(share, priority DESC, id) WHERE status = 0;"                                      \
+    "CREATE INDEX job_by_lane ON job(share, priority DESC, id) WHERE status = 0 AND small > 0;"                        \
+    "UPDATE job SET share = client WHERE status < 2 AND client <> '';"                                                 \
+    "CREATE TABLE share("                                                                                              \
+    "  name TEXT NOT NULL, ahead INTEGER NOT NULL, waiting INTEGER NOT NULL DEFAULT 0,"                                \
+    "  small INTEGER NOT NULL DEFAULT 0, running INTEGER NOT NULL DEFAULT 0, used REAL NOT NULL DEFAULT 0,"            \
+    "  PRIMARY KEY(name, ahead)"                                                                                       \
+    ") STRICT, WITHOUT ROWID;"                                                                                         \
+    "INSERT INTO share(name, ahead, waiting, running)"                                                                 \
+    " SELECT share, priority > " SHARED ", sum(status = 0), sum(status = 1) FROM job WHERE status < 2 GROUP BY 1, 2;"  \
+    "CREATE INDEX share_by_turn ON share(ahead DESC, running, used, name) WHERE waiting > 0;"                          \
+    "CREATE INDEX share_by_lane ON share(ahead DESC, running, used, name) WHERE small > 0;"                            \
+    "CREATE INDEX share_at_work ON share(used) WHERE waiting + running > 0;"                                           \
+    "CREATE INDEX share_idle ON share(used) WHERE waiting + running = 0;"                                              \
+    "CREATE TRIGGER share_comes AFTER INSERT ON job WHEN NEW.status = 0 BEGIN"                                         \
+    " INSERT INTO share(name, ahead, waiting, small, used)"                                                            \
+    " VALUES(NEW.share, NEW.priority > " SHARED ", 1, NEW.small, coalesce(" LEAST_USED ", 0.0))"                       \
+    " ON CONFLICT(name, ahead) DO UPDATE SET waiting = waiting + 1, small = small + excluded.small,"                   \
+    " used = CASE WHEN waiting + running > 0 THEN used ELSE max(used, excluded.used) END; END;"                        \
+    "CREATE TRIGGER share_moves AFTER UPDATE OF status ON job WHEN NEW.status <> OLD.status BEGIN"                     \
+    " UPDATE share SET waiting = waiting + (NEW.status = 0) - (OLD.status = 0),"                                       \
+    " small = small + (NEW.status = 0) * NEW.small - (OLD.status = 0) * OLD.small,"                                    \
+    " running = running + (NEW.status = 1) - (OLD.status = 1),"                                                        \
+    " used = used + CASE WHEN OLD.status = 1 AND NEW.status >= 2"                                                      \
+    " THEN max(" TURN_LEAST ", NEW.finished - OLD.started) ELSE 0.0 END"                                               \
+    " WHERE name = NEW.share AND ahead = (NEW.priority > " SHARED ");"                                                 \
+    " DELETE FROM share WHERE waiting + running = 0 AND used <= coalesce(" LEAST_USED ", 9e999); END;"
+
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"
@@ -156,7 +196,7 @@ static const char *const SCHEMA =
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
     "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5 COLUMNS_6 TABLES_7
-        ROWS_8;
+        ROWS_8 TABLES_9;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -176,7 +216,7 @@ const char *file_format_why_unreadable(sqlite3 *db)
  * result tables grew by a column, which SQLite can only do by copying the rows. Version 3: uploads, webhooks, the turn
  * and the size of jobs. Version 4: the tally. Version 5: checksums. Version 6: what belongs
  * to a result. Version 7: clients. Version 8: the
- * number of commits. */
+ * number of commits. Version 9: shares. */
 static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [0] = NULL,
     [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
@@ -197,6 +237,7 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [5] = COLUMNS_6,
     [6] = TABLES_7,
     [7] = ROWS_8,
+    [8] = TABLES_9,
 };
 
 bool file_format_integer(sqlite3 *db, const char *sql, int64_t *value)

@@ -61,6 +61,8 @@ static store_status insert_job(connection *c, const store_request *r, const char
     bind_real(&st, 7, r->queue_limit_s > 0 ? now + r->queue_limit_s : 0);
     bind_integer(&st, 8, (int64_t)r->body_len);
     bind_text(&st, 9, client);
+    bind_text(&st, 10, r->share ? r->share : "");
+    bind_integer(&st, 11, r->small);
     store_status status = statement_run(&st);
     if (status != STORE_OK)
         return status;
@@ -234,6 +236,7 @@ static holder holder_of(const store_lease *lease)
 typedef struct {
     store_lease *lease;
     double lease_s;
+    bool small;
     job *out;
     char *body;
     size_t body_len;
@@ -248,7 +251,7 @@ static store_status claim(sqlite_store *s, connection *c, void *args)
     free(a->body);
     a->body = NULL;
     store_status status = STORE_NOT_FOUND;
-    statement st = statement_begin(c, QUERY_CLAIM);
+    statement st = statement_begin(c, a->small ? QUERY_CLAIM_SMALL : QUERY_CLAIM);
     bind_real(&st, 1, clock_seconds(CLOCK_REALTIME));
     bind_text(&st, 2, owner.text);
     bind_real(&st, 3, a->lease_s);
@@ -263,9 +266,10 @@ static store_status claim(sqlite_store *s, connection *c, void *args)
     return status == STORE_NOT_FOUND ? STORE_ERROR : status; /* a job without its request is a damaged file */
 }
 
-store_status sqlite_claim(store *base, store_lease *lease, double lease_s, job *out, char **body, size_t *len)
+store_status sqlite_claim(store *base, store_lease *lease, double lease_s, bool small, job *out, char **body,
+                          size_t *len)
 {
-    claim_args a = {lease, lease_s, out, NULL, 0};
+    claim_args a = {lease, lease_s, small, out, NULL, 0};
     store_status status = sqlite_write(sqlite_of(base), WRITE_LAZY, claim, &a);
     *body = a.body;
     *len = a.body_len;

@@ -58,6 +58,12 @@ static const struct {
      "SELECT name FROM client WHERE waiting <> (SELECT count(*) FROM job WHERE client = name AND status = 0)"
      " OR bytes <> (SELECT coalesce(sum(bytes), 0) FROM job WHERE client = name)",
      "what is counted of client %s is wrong\n"},
+    {9,
+     "SELECT name FROM share WHERE waiting <> (SELECT count(*) FROM job WHERE share = name AND status = 0 AND"
+     " (priority > " SHARED ") = ahead) OR running <> (SELECT count(*) FROM job WHERE share = name AND status = 1 AND"
+     " (priority > " SHARED ") = ahead) UNION ALL SELECT share FROM job WHERE status < 2 AND NOT EXISTS"
+     " (SELECT 1 FROM share AS of WHERE of.name = job.share AND of.ahead = (job.priority > " SHARED "))",
+     "what is counted of share %s is wrong\n"},
     {5, "SELECT job FROM request WHERE NOT " SUM_IS("sum", SUM_REQUEST),
      "the request of job %s is not what was written\n"},
     {5, "SELECT number || ' of job ' || job FROM answer WHERE NOT " SUM_IS("sum", SUM_ANSWER),

@@ -30,7 +30,7 @@ STORE_TEST(submit_claim_finish)
     CHECK(j.started == 0 && j.finished == 0 && !j.summary && !j.error);
     CHECK_STR(j.tags, "[\"demo\"]");
     job_clear(&j);
-    CHECK_INT(store_claim(p.s, "me", 30.0, &lease, &j, &body, &len), STORE_OK);
+    CHECK_INT(store_claim(p.s, "me", 30.0, false, &lease, &j, &body, &len), STORE_OK);
     CHECK_STR(lease.job, j.id);
     CHECK_STR(lease.owner, "me");
     CHECK(j.status == JOB_RUNNING && j.attempts == 1 && j.started >= j.created);
@@ -45,7 +45,7 @@ STORE_TEST(submit_claim_finish)
     CHECK(j.status == JOB_SUCCESSFUL && j.progress == 100 && j.finished >= j.started && !j.error);
     CHECK_STR(j.summary, PLAIN_SUCCESS.whole.summary);
     job_clear(&j);
-    CHECK_INT(store_claim(p.s, "me", 30.0, &lease, &j, &body, &len), STORE_NOT_FOUND);
+    CHECK_INT(store_claim(p.s, "me", 30.0, false, &lease, &j, &body, &len), STORE_NOT_FOUND);
     CHECK(!lease.job[0] && !body && len == 0 && !j.tags);
     place_end(&p);
 }
@@ -94,13 +94,13 @@ STORE_TEST(an_earlier_lease_is_fenced_off)
     if (!place_begin(&p))
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
-    CHECK_INT(store_claim(p.s, "a", 0.0, &first, &j, &body, &len), STORE_OK);
+    CHECK_INT(store_claim(p.s, "a", 0.0, false, &first, &j, &body, &len), STORE_OK);
     job_clear(&j);
     free(body);
     CHECK_INT(store_renew(p.s, &first, 0.0, 10), STORE_OK); /* it has run out, but nobody else has the job */
     CHECK_INT(store_release(p.s, &first, false), STORE_OK);
     CHECK_INT(store_renew(p.s, &first, 30.0, 20), STORE_CONFLICT);
-    CHECK_INT(store_claim(p.s, "a", 30.0, &second, &j, &body, &len), STORE_OK);
+    CHECK_INT(store_claim(p.s, "a", 30.0, false, &second, &j, &body, &len), STORE_OK);
     job_clear(&j);
     free(body);
     CHECK_STR(second.job, first.job);
@@ -128,7 +128,7 @@ STORE_TEST(a_lease_ends_with_its_process)
         job j = {0};
         char *body = NULL;
         size_t len = 0;
-        CHECK_INT(store_claim(p.s, "a", 30.0, &leases[i], &j, &body, &len), STORE_OK);
+        CHECK_INT(store_claim(p.s, "a", 30.0, false, &leases[i], &j, &body, &len), STORE_OK);
         CHECK_STR(leases[i].job, id);
         job_clear(&j);
         free(body);

@@ -1,5 +1,6 @@
 /* The queue of the store and those who work on it: order, recovery, expiry, retention, webhooks, many threads. */
 #include "store/engine.h"
+#include "sqlite_file.h"
 #include "store_place.h"
 
 #include <pthread.h>
@@ -65,6 +66,175 @@ STORE_TEST(priorities_go_before_age)
         CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
         CHECK_STR(claimed, id[ORDER[i]]);
     }
+    place_end(&p);
+}
+
+/* ---- shares */
+
+/* Who runs next, by the name of the share; "" when nobody waits. */
+static void claim_share(store *s, bool small, char (*ids)[33], char *out)
+{
+    job j = {0};
+    char *body = NULL;
+    size_t len = 0;
+    store_lease lease;
+    out[0] = '\0';
+    if (store_claim(s, "me", 30.0, small, &lease, &j, &body, &len) == STORE_OK)
+        leases_held[leases_given++ % 64] = lease;
+    for (int i = 0; j.id[0] && i < 26; i++)
+        if (strcmp(ids[i], j.id) == 0)
+            out[0] = (char)('a' + i);
+    out[1] = '\0';
+    job_clear(&j);
+    free(body);
+}
+
+/* One that comes goes before those of whom something runs, and at the next turn before those who have had more. */
+STORE_TEST(who_has_had_least_goes_first)
+{
+    static const char *const SHARES[] = {"many", "many", "many", "many", "one", "other"};
+    place p;
+    char id[26][33] = {""}, who[2];
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 4; i++)
+        submit_with(p.s, (store_request){.share = SHARES[i]}, id[i]);
+    claim_share(p.s, false, id, who);
+    CHECK_STR(who, "a");
+    submit_with(p.s, (store_request){.share = SHARES[4]}, id[4]);
+    claim_share(p.s, false, id, who);
+    CHECK_STR(who, "e");
+    sleep_s(0.05);
+    CHECK_INT(finish_as(p.s, id[0], "me", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(finish_as(p.s, id[4], "me", &PLAIN_SUCCESS), STORE_OK);
+    if (!place_reopen(&p))
+        return;
+    /* "one" comes again, with less time than "many" has had, and "other" begins where the least stands. */
+    submit_with(p.s, (store_request){.share = SHARES[4]}, id[5]);
+    submit_with(p.s, (store_request){.share = SHARES[5]}, id[6]);
+    char first[2], second[2], third[2];
+    claim_share(p.s, false, id, first);
+    claim_share(p.s, false, id, second);
+    claim_share(p.s, false, id, third);
+    CHECK_MSG((first[0] == 'f' || second[0] == 'f' || third[0] == 'f') &&
+                  (first[0] == 'g' || second[0] == 'g' || third[0] == 'g') &&
+                  (first[0] == 'b' || second[0] == 'b' || third[0] == 'b'),
+              "each of three has one of three turns: %s%s%s", first, second, third);
+    claim_share(p.s, false, id, who);
+    CHECK_STR(who, "c"); /* in their order of age */
+    check_counts(p.s, 1, 4, 2, 0, 0);
+    place_end(&p);
+}
+
+/* What one has used does not count for ever against it, nor what it has not used for it. */
+STORE_TEST(there_is_no_credit_for_the_time_before)
+{
+    place p;
+    char id[26][33] = {""}, who[2];
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 2; i++) { /* "old" works alone */
+        submit_with(p.s, (store_request){.share = "old"}, id[i]);
+        claim_share(p.s, false, id, who);
+        sleep_s(0.1);
+        CHECK_INT(finish_as(p.s, id[i], "me", &PLAIN_SUCCESS), STORE_OK);
+    }
+    for (int i = 2; i < 6; i++) /* now both at once: by turns, however long "old" worked */
+        submit_with(p.s, (store_request){.share = i < 4 ? "old" : "new"}, id[i]);
+    int of_old = 0;
+    for (int i = 0; i < 2; i++) {
+        claim_share(p.s, false, id, who);
+        of_old += who[0] == 'c';
+    }
+    CHECK_INT(of_old, 1);
+    place_end(&p);
+}
+
+STORE_TEST(what_goes_before_all_shares)
+{
+    place p;
+    char id[26][33] = {""}, who[2];
+    if (!place_begin(&p))
+        return;
+    submit_with(p.s, (store_request){.share = "x", .priority = 5}, id[0]);
+    submit_with(p.s, (store_request){.share = "y", .priority = -10}, id[1]);
+    submit_with(p.s, (store_request){.share = "x", .priority = 6}, id[2]);
+    submit_with(p.s, (store_request){.share = "x", .priority = 7}, id[3]);
+    static const char *const ORDER[] = {"d", "c"};
+    for (int i = 0; i < 2; i++) {
+        claim_share(p.s, false, id, who);
+        CHECK_STR(who, ORDER[i]);
+    }
+    char other[2];
+    claim_share(p.s, false, id, who);
+    claim_share(p.s, false, id, other);
+    CHECK((who[0] == 'a' && other[0] == 'b') || (who[0] == 'b' && other[0] == 'a'));
+    place_end(&p);
+}
+
+STORE_TEST(small_jobs_by_themselves)
+{
+    place p;
+    char id[26][33] = {""}, who[2];
+    if (!place_begin(&p))
+        return;
+    submit_with(p.s, (store_request){.share = "x", .priority = 3}, id[0]);
+    submit_with(p.s, (store_request){.share = "x", .small = true}, id[1]);
+    submit_with(p.s, (store_request){.share = "x", .small = true, .priority = 1}, id[2]);
+    claim_share(p.s, true, id, who);
+    CHECK_STR(who, "c");
+    CHECK_INT(release_as(p.s, id[2], "me"), STORE_OK); /* it was not small */
+    claim_share(p.s, true, id, who);
+    CHECK_STR(who, "b");
+    claim_share(p.s, true, id, who);
+    CHECK_STR(who, "");
+    claim_share(p.s, false, id, who);
+    CHECK_STR(who, "a");
+    claim_share(p.s, false, id, who);
+    CHECK_STR(who, "c");
+    check_counts(p.s, 0, 3, 0, 0, 0);
+    place_end(&p);
+}
+
+STORE_TEST(a_share_whose_jobs_are_all_too_late_is_passed_over)
+{
+    place p;
+    char id[26][33] = {""}, who[2];
+    if (!place_begin(&p))
+        return;
+    submit_with(p.s, (store_request){.share = "a", .queue_limit_s = 0.01}, id[0]);
+    submit_with(p.s, (store_request){.share = "b"}, id[1]);
+    sleep_s(0.05);
+    claim_share(p.s, false, id, who);
+    CHECK_STR(who, "b");
+    claim_share(p.s, false, id, who);
+    CHECK_STR(who, "");
+    place_end(&p);
+}
+
+/* However many wait: 20,000 jobs of one, and as many clients as that. */
+TEST(a_claim_is_as_quick_in_a_long_queue)
+{
+    place p;
+    char id[33];
+    double seconds[2];
+    if (!place_begin(&p))
+        return;
+    for (int round = 0; round < 2; round++) {
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+        if (round == 1)
+            change_file(p.path, "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 20000)"
+                                " INSERT INTO job(id, status, created, tags, share)"
+                                " SELECT printf('%032x', i), 0, 1.0, '[]', CASE WHEN i % 2 THEN 'm' ELSE i END FROM n;"
+                                "INSERT INTO request(job, body) SELECT id, x'7b7d' FROM job WHERE created = 1.0;");
+        const double begun = clock_seconds(CLOCK_MONOTONIC);
+        for (int i = 0; i < 200; i++) {
+            CHECK_INT(claim_id(p.s, "me", id), STORE_OK);
+            CHECK_INT(round == 1 ? finish_as(p.s, id, "me", &PLAIN_SUCCESS) : release_as(p.s, id, "me"), STORE_OK);
+        }
+        seconds[round] = clock_seconds(CLOCK_MONOTONIC) - begun;
+    }
+    CHECK_MSG(seconds[1] < 20 * seconds[0] + 0.2, "%g s, %g s in a long queue", seconds[0], seconds[1]);
     place_end(&p);
 }
 
@@ -281,7 +451,7 @@ STORE_TEST(large_bodies)
                                &j, &repeated),
                   STORE_CONFLICT);
         body[size - 1] = 'x';
-        CHECK_INT(store_claim(p.s, "a", 1, &(store_lease){.token = 0}, &j, &back, &len), STORE_OK);
+        CHECK_INT(store_claim(p.s, "a", 1, false, &(store_lease){.token = 0}, &j, &back, &len), STORE_OK);
         CHECK(len == size && memcmp(back, body, size) == 0 && back[len] == '\0');
         job_clear(&j);
         free(back);

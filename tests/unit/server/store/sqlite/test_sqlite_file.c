@@ -241,6 +241,10 @@ TEST(a_file_that_cannot_be_taken_over_stays_as_it_was)
 
 /* What a format added is taken away again: what is left is the format before it, as it was written then. */
 static const char *const TO_FORMAT[] = {
+    [8] = "DROP TRIGGER share_comes; DROP TRIGGER share_moves; DROP TABLE share;"
+          "DROP INDEX job_by_lane; DROP INDEX job_by_turn; ALTER TABLE job DROP COLUMN share;"
+          "ALTER TABLE job DROP COLUMN small;"
+          "CREATE INDEX job_by_turn ON job(priority DESC, id) WHERE status = 0; PRAGMA user_version = 8;",
     [7] = "DELETE FROM tally WHERE status < 0; PRAGMA user_version = 7;",
     [6] = "DROP TRIGGER client_insert; DROP TRIGGER client_delete; DROP TRIGGER client_update; DROP TRIGGER "
           "client_worked;"
@@ -310,7 +314,7 @@ static void check_taken_over(int version)
     CHECK_INT(claim_id(p.s, "me", ended), STORE_OK);
     CHECK_INT(finish_with_answer(p.s, ended), STORE_OK);
     store_close(p.s);
-    for (int at = 7; at >= version; at--)
+    for (int at = 8; at >= version; at--)
         change_file(p.path, TO_FORMAT[at]);
     CHECK_INT(rows_in(p.path, "tally WHERE status >= 0"), version < 4 ? -1 : 5);
     CHECK_INT(rows_in(p.path, "request WHERE sum > 0"), -1);
@@ -448,7 +452,7 @@ TEST(what_is_not_what_was_written_is_not_shown)
         CHECK_INT(store_get_body(p.s, other, &body, &len), request ? STORE_DAMAGED : STORE_OK);
         CHECK(!body == request);
         free(body);
-        CHECK_INT(store_claim(p.s, "me", 30.0, &(store_lease){.token = 0}, &j, &body, &len),
+        CHECK_INT(store_claim(p.s, "me", 30.0, false, &(store_lease){.token = 0}, &j, &body, &len),
                   STORE_OK); /* to be failed */
         CHECK_STR(j.id, other);
         CHECK(!body == request);
