@@ -248,6 +248,8 @@ static run_end judge_end(run *r, watch_end end, const watch_report *seen)
         return END_RELEASE;
     if (end == WATCH_DIED)
         return judge_death(r, seen, told);
+    if (end == WATCH_NOT_STARTED && r->job->attempts < me->w->options.max_attempts)
+        return END_RETRY; /* twice in a row it was killed before it had read the job */
     if (end == WATCH_OVERDUE)
         problem_fill(
             &problem, 422, "time_limit", "The time was over before there was an answer",
