@@ -4,6 +4,7 @@ usage: test_processes.py BUILD_DIR [FILTER]"""
 import copy
 import os
 import pathlib
+import resource
 import signal
 import time
 
@@ -128,6 +129,26 @@ def test_ready_is_asked_of_a_process(s):
     s.request("DELETE", f"/v1/jobs/{job}")
     s.wait_status(job, "dismissed")
     check(len(s.get("/v1/jobs").json["jobs"]) == 1)
+
+
+@options("--workers", "2")
+def test_memory_ends_in_a_factorization(s):
+    """The job fails with memory_limit, at once; its process lives, and the job beside it does not notice."""
+    other = s.post(ENDLESS).json["id"]
+    s.wait_status(other, "running")
+    first = set(s.solvers())
+    check(s.solve(MATRICES)["status"] == "successful")
+    pid = (set(s.solvers()) - first).pop()
+    status = pathlib.Path(f"/proc/{pid}/status").read_text()
+    room = 1024 * int(status.split("VmSize:")[1].split()[0]) + (60 << 20)  # the factor takes 327 MB
+    resource.prlimit(pid, resource.RLIMIT_AS, (room, room))
+    job = s.solve(cube(24))
+    check(job["status"] == "failed" and job["error"]["code"] == "memory_limit" and "factor" in job["error"]["detail"], job)
+    check(s.solve(MATRICES)["status"] == "successful" and pid in s.solvers() and not s.events("process_died"))
+    now = s.get(f"/v1/jobs/{other}").json
+    check(now["status"] == "running" and now["attempts"] == 1, now)
+    s.request("DELETE", f"/v1/jobs/{other}")
+    s.wait_status(other, "dismissed")
 
 
 @options("--workers", "1")
