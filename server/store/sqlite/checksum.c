@@ -1,6 +1,7 @@
 #include "store/sqlite/checksum.h"
 
 #include <endian.h>
+#include <gnutls/crypto.h>
 #include <stdint.h>
 #include <string.h>
 #include <zlib.h>
@@ -45,8 +46,24 @@ static void checksum(sqlite3_context *out, int count, sqlite3_value **values)
     sqlite3_result_int64(out, (sqlite3_int64)sum);
 }
 
+/* NULL of NULL. */
+static void sha256(sqlite3_context *out, int count, sqlite3_value **values)
+{
+    (void)count;
+    unsigned char digest[SHA256_BYTES];
+    const void *data = sqlite3_value_blob(values[0]);
+    if (sqlite3_value_type(values[0]) == SQLITE_NULL)
+        sqlite3_result_null(out);
+    else if (gnutls_hash_fast(GNUTLS_DIG_SHA256, data ? data : "", (size_t)sqlite3_value_bytes(values[0]), digest) != 0)
+        sqlite3_result_error_nomem(out);
+    else
+        sqlite3_result_blob(out, digest, sizeof digest, SQLITE_TRANSIENT);
+}
+
 bool checksum_register(sqlite3 *db)
 {
-    return sqlite3_create_function_v2(db, "checksum", -1, SQLITE_UTF8 | SQLITE_DETERMINISTIC, NULL, checksum, NULL,
+    return sqlite3_create_function_v2(db, "sha256", 1, SQLITE_UTF8 | SQLITE_DETERMINISTIC, NULL, sha256, NULL, NULL,
+                                      NULL) == SQLITE_OK &&
+           sqlite3_create_function_v2(db, "checksum", -1, SQLITE_UTF8 | SQLITE_DETERMINISTIC, NULL, checksum, NULL,
                                       NULL, NULL) == SQLITE_OK;
 }

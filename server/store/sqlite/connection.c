@@ -67,8 +67,10 @@ static const char *const SQL[QUERY_COUNT] = {
                                        " WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_INSERT_ANSWER] = "INSERT INTO answer(job, number, name, summary, sum) VALUES(?1, ?2, ?3, ?4,"
                             " " SUM_OF("?1, ?2, ?3, ?4") ")",
-    [QUERY_INSERT_VECTOR] = "INSERT INTO vector(job, name, part, version, count, data, answer, sum)"
-                            " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?2, ?3, ?4, ?5, ?6") ")",
+    [QUERY_INSERT_PIECE] = "INSERT INTO piece(digest, data) SELECT ?1, ?2"
+                           " WHERE NOT EXISTS (SELECT 1 FROM piece WHERE digest = ?1)",
+    [QUERY_INSERT_VECTOR] = "INSERT INTO vector(job, name, part, version, count, data, answer, shared, sum)"
+                            " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, " SUM_OF("?1, ?7, ?2, ?3, ?4, ?5, ?6") ")",
     [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, last, part, version, columns, data, answer, sum)"
                              " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?3, ?4, ?5, ?2, ?6") ")",
     [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - ?3, progress = 0, started = 0, owner = NULL,"
@@ -116,8 +118,8 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_OLD_JOBS] = "SELECT id, finished, bytes, client FROM job INDEXED BY job_by_end WHERE status >= 2"
                        " AND NOT EXISTS (SELECT 1 FROM webhook WHERE job = id AND state = 1)"
                        " ORDER BY finished, id LIMIT ?1",
-    [QUERY_VECTOR] = "SELECT part, version, count, 0, data, " SUM_IS(
-        "sum", SUM_VECTOR) " FROM vector WHERE job = ?1 AND answer = ?3 AND name = ?2 ORDER BY part",
+    [QUERY_VECTOR] = "SELECT part, version, count, 0, iif(shared, piece.data, vector.data), " PIECE_IS " AND " SUM_IS(
+        "sum", SUM_VECTOR) " FROM " FROM_PIECES " WHERE job = ?1 AND answer = ?3 AND name = ?2 ORDER BY part",
     [QUERY_COUNT_VECTORS] = "SELECT coalesce(sum(count), 0) FROM vector WHERE job = ?1 AND name = ?2 AND part = 0",
     [QUERY_ANSWERS] = "SELECT number, name, summary, " SUM_IS(
         "sum", SUM_ANSWER) " FROM answer WHERE job = ?1 AND (?2 IS NULL OR name = ?2)"

@@ -23,6 +23,8 @@
  * answer   one row for each load case of an ended job, numbered from 1 in the order of the request.
  * vector   a named vector of a result, in parts of bounded size; every part repeats the count of the whole vector.
  *          answer is the number of its load case; 0: of the job, or of all its cases.
+ * piece    what vectors of several jobs have in common, once: a row of vector with `shared` has the SHA-256 of its
+ *          bytes in `data`, and they are here until the last such row is deleted.
  * history  rows of a convergence history, in parts, by answer like vector; last is the iteration of the part's last
  *          row, so that a reader who has seen some rows skips whole parts.
  * upload   texts in files beside this one (uploads.h), by the digest of their bytes.
@@ -173,6 +175,15 @@
     " WHERE name = NEW.share AND ahead = (NEW.priority > " SHARED ");"                                                 \
     " DELETE FROM share WHERE waiting + running = 0 AND used <= coalesce(" LEAST_USED ", 9e999); END;"
 
+/* Version 10. Vectors that are there already keep their bytes. */
+#define TABLES_10                                                                                                      \
+    "ALTER TABLE vector ADD COLUMN shared INTEGER NOT NULL DEFAULT 0;"                                                 \
+    "CREATE TABLE piece(digest BLOB NOT NULL UNIQUE, data BLOB NOT NULL) STRICT;"                                      \
+    "CREATE INDEX vector_by_piece ON vector(data) WHERE shared;"                                                       \
+    "CREATE TRIGGER piece_unused AFTER DELETE ON vector WHEN OLD.shared"                                               \
+    " AND NOT EXISTS (SELECT 1 FROM vector INDEXED BY vector_by_piece WHERE shared AND data = OLD.data) BEGIN"         \
+    " DELETE FROM piece WHERE digest = OLD.data; END;"
+
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"
@@ -196,7 +207,7 @@ static const char *const SCHEMA =
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
     "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5 COLUMNS_6 TABLES_7
-        ROWS_8 TABLES_9;
+        ROWS_8 TABLES_9 TABLES_10;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -216,7 +227,7 @@ const char *file_format_why_unreadable(sqlite3 *db)
  * result tables grew by a column, which SQLite can only do by copying the rows. Version 3: uploads, webhooks, the turn
  * and the size of jobs. Version 4: the tally. Version 5: checksums. Version 6: what belongs
  * to a result. Version 7: clients. Version 8: the
- * number of commits. Version 9: shares. */
+ * number of commits. Version 9: shares. Version 10: what vectors have in common. */
 static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [0] = NULL,
     [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
@@ -238,6 +249,7 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [6] = TABLES_7,
     [7] = ROWS_8,
     [8] = TABLES_9,
+    [9] = TABLES_10,
 };
 
 bool file_format_integer(sqlite3 *db, const char *sql, int64_t *value)

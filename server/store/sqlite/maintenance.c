@@ -70,6 +70,10 @@ static const struct {
      "the summary of case %s is not what was written\n"},
     {5, "SELECT name || ' of job ' || job FROM vector WHERE NOT " SUM_IS("sum", SUM_VECTOR),
      "the %s is not what was written\n"},
+    {10, "SELECT name || ' of job ' || job FROM " FROM_PIECES " WHERE NOT " PIECE_IS,
+     "the %s is not what was written\n"},
+    {10, "SELECT hex(digest) FROM piece WHERE NOT EXISTS (SELECT 1 FROM vector WHERE shared AND vector.data = digest)",
+     "piece %s belongs to no result\n"},
     {5, "SELECT job FROM history WHERE NOT " SUM_IS("sum", SUM_HISTORY),
      "the history of job %s is not what was written\n"},
 };

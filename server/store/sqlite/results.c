@@ -1,11 +1,30 @@
 /* results.c: the blobs of results as rows of the database: each piece of one is a row, in the transaction that ends the
- * job. docs/architecture/store.md says why not as files. */
+ * job. Bytes of a vector that another job has too (the nodes of its mesh; all of it, where a job is run again) are kept
+ * once. docs/architecture/store.md says why not as files. */
+#include "store/sqlite/checksum.h"
 #include "store/sqlite/internal.h"
 
+#include <gnutls/crypto.h>
 #include <stdio.h>
+
+/* Bytes of a vector's piece that are looked for among those of other jobs: about a page, of which the search is small.
+ */
+#define SHARED_LEAST 4096
 
 static store_status put(void *transaction, const result_key *key, const result_piece *piece)
 {
+    unsigned char digest[SHA256_BYTES];
+    const bool shared = key->name && piece->size >= SHARED_LEAST;
+    if (shared) {
+        if (gnutls_hash_fast(GNUTLS_DIG_SHA256, piece->data, (size_t)piece->size, digest) != 0)
+            return STORE_ERROR;
+        statement st = statement_begin(transaction, QUERY_INSERT_PIECE);
+        bind_blob(&st, 1, digest, sizeof digest);
+        bind_blob(&st, 2, piece->data, (size_t)piece->size);
+        const store_status status = statement_run(&st);
+        if (status != STORE_OK)
+            return status;
+    }
     statement st = statement_begin(transaction, key->name ? QUERY_INSERT_VECTOR : QUERY_INSERT_HISTORY);
     bind_text(&st, 1, key->job);
     if (key->name)
@@ -15,8 +34,10 @@ static store_status put(void *transaction, const result_key *key, const result_p
     bind_integer(&st, 3, piece->part);
     bind_integer(&st, 4, piece->encoding);
     bind_integer(&st, 5, piece->header);
-    bind_blob(&st, 6, piece->data, (size_t)piece->size);
+    bind_blob(&st, 6, shared ? digest : piece->data, shared ? sizeof digest : (size_t)piece->size);
     bind_integer(&st, 7, key->number);
+    if (key->name)
+        bind_integer(&st, 8, shared);
     return statement_run(&st);
 }
 

@@ -120,6 +120,65 @@ TEST(deleting_a_job_deletes_its_cases)
     place_end(&p);
 }
 
+/* Of the closed file: "" none, else one of them has this in it. */
+static void check_findings(const place *p, const char *wanted)
+{
+    char message[300] = "";
+    store_findings found;
+    CHECK_MSG(store_check_file(p->path, &found, message, sizeof message), "%s", message);
+    CHECK_MSG(found.findings && (wanted[0] ? strstr(found.findings, wanted) != NULL : !found.findings[0]), "%s",
+              found.findings);
+    free(found.findings);
+}
+
+/* Two jobs on the same nodes. */
+TEST(what_two_results_have_in_common_is_kept_once)
+{
+    enum { COUNT = 150000, PIECES = 2 }; /* of 1 MiB */
+    place p;
+    char first[33], second[33], *const id[2] = {first, second};
+    double *x = malloc(2 * COUNT * sizeof *x), *found = NULL;
+    int64_t n = 0;
+    job_status was;
+    if (!x || !place_begin(&p)) {
+        free(x);
+        return;
+    }
+    for (int i = 0; i < 2 * COUNT; i++)
+        x[i] = 0.1 * i;
+    for (int k = 0; k < 2; k++) {
+        store_vector v[] = {{"nodes", COUNT, x}, {"displacements", COUNT, x + k * COUNT}, {"gaps", 3, x}};
+        store_outcome outcome = {
+            .status = JOB_SUCCESSFUL, .whole.summary = "{}", .whole.vectors = v, .whole.n_vectors = k ? 3 : 2};
+        CHECK_INT(submit_text(p.s, "{}", NULL, NULL, id[k]), STORE_OK);
+        CHECK_INT(claim_id(p.s, "a", id[k]), STORE_OK);
+        CHECK_INT(finish_as(p.s, id[k], "a", &outcome), STORE_OK);
+    }
+    CHECK_INT(rows_in(p.path, "piece"), 2 * PIECES); /* of eight */
+    CHECK_INT(rows_in(p.path, "vector WHERE shared"), 4 * PIECES);
+    store_close(p.s);
+    check_findings(&p, "");
+    CHECK(place_open(&p));
+    CHECK_INT(store_dismiss(p.s, id[0], &was), STORE_OK);
+    for (int k = 0; k < 2; k++) {
+        CHECK_INT(store_get_vector(p.s, id[1], 0, k ? "displacements" : "nodes", &found, &n), STORE_OK);
+        CHECK(n == COUNT && found && memcmp(found, x + k * COUNT, COUNT * sizeof *x) == 0);
+        free(found);
+    }
+    store_close(p.s);
+    change_file(p.path, "UPDATE piece SET data = zeroblob(length(data)) WHERE rowid = 1");
+    check_findings(&p, "nodes of job ");
+    CHECK(place_open(&p));
+    CHECK_INT(store_get_vector(p.s, id[1], 0, "nodes", &found, &n), STORE_DAMAGED);
+    CHECK_INT(store_get_vector(p.s, id[1], 0, "displacements", &found, &n), STORE_OK);
+    free(found);
+    CHECK_INT(store_dismiss(p.s, id[1], &was), STORE_OK);
+    CHECK_INT(rows_in(p.path, "piece"), 0);
+    CHECK_INT(rows_in(p.path, "vector"), 0);
+    place_end(&p);
+    free(x);
+}
+
 /* ---- format 1, as it was written before there were load cases */
 
 static const char *const FORMAT_1 =
@@ -241,6 +300,8 @@ TEST(a_file_that_cannot_be_taken_over_stays_as_it_was)
 
 /* What a format added is taken away again: what is left is the format before it, as it was written then. */
 static const char *const TO_FORMAT[] = {
+    [9] = "DROP TRIGGER piece_unused; DROP INDEX vector_by_piece; DROP TABLE piece;"
+          "ALTER TABLE vector DROP COLUMN shared; PRAGMA user_version = 9;",
     [8] = "DROP TRIGGER share_comes; DROP TRIGGER share_moves; DROP TABLE share;"
           "DROP INDEX job_by_lane; DROP INDEX job_by_turn; ALTER TABLE job DROP COLUMN share;"
           "ALTER TABLE job DROP COLUMN small;"
@@ -292,17 +353,6 @@ static void check_answer_of(store *s, const char *id)
     free(x);
 }
 
-/* Of the closed file: "" none, else one of them has this in it. */
-static void check_findings(const place *p, const char *wanted)
-{
-    char message[300] = "";
-    store_findings found;
-    CHECK_MSG(store_check_file(p->path, &found, message, sizeof message), "%s", message);
-    CHECK_MSG(found.findings && (wanted[0] ? strstr(found.findings, wanted) != NULL : !found.findings[0]), "%s",
-              found.findings);
-    free(found.findings);
-}
-
 static void check_taken_over(int version)
 {
     place p;
@@ -314,7 +364,7 @@ static void check_taken_over(int version)
     CHECK_INT(claim_id(p.s, "me", ended), STORE_OK);
     CHECK_INT(finish_with_answer(p.s, ended), STORE_OK);
     store_close(p.s);
-    for (int at = 8; at >= version; at--)
+    for (int at = (int)(sizeof TO_FORMAT / sizeof TO_FORMAT[0]) - 1; at >= version; at--)
         change_file(p.path, TO_FORMAT[at]);
     CHECK_INT(rows_in(p.path, "tally WHERE status >= 0"), version < 4 ? -1 : 5);
     CHECK_INT(rows_in(p.path, "request WHERE sum > 0"), -1);
