@@ -59,6 +59,9 @@ def throughput(f):
 SHOWN = {
     "500 x kill -9, 16 posting clients": (lambda f: f"{count(f['cycles'])} x kill -9 with 16 clients posting, {count(f.get('acknowledged'))} jobs acknowledged",
                                           lambda f: none_of(f, "lost", "twice", "stuck", "damaged")),
+    "500 x kill -9 of a worker, 16 posting clients": (
+        lambda f: f"{count(f['kills'])} x kill -9 of a process that solves, with 16 clients posting, {count(f.get('acknowledged'))} jobs acknowledged",
+        lambda f: none_of(f, "lost", "twice", "stuck")),
     "200 x SIGTERM under load": (lambda f: f"{count(f['cycles'])} x SIGTERM under load", lambda f: "all exit 0" if not f["wrong_exit"] else none_of(f, "wrong_exit")),
     "1,000 power losses, faults at every write, 1,000 damaged files": (
         lambda f: f"{count(f.get('power_losses'))} simulated power losses; a full disk or an I/O error at every write; {count(f.get('damaged_files'))} damaged database files",
