@@ -11,16 +11,22 @@ from service import MATRICES, SCENE, check, expect, options
 FIELDS = "?fields=displacements,reactions,gaps"
 
 
-def plate(**solver):
+def plate(cells=(48, 16), **solver):
+    """By default what is factored and certified before its process would be ended, on a busy machine too."""
     body = copy.deepcopy(SCENE)
-    body["problem"]["mesh"]["box"]["cells"] = [120, 40]
+    body["problem"]["mesh"]["box"]["cells"] = list(cells)
     body["solver"] = {"accuracy": {"relative_error": 1e-6}, **solver}
     return body
 
 
 def check_out_of_time(s, body):
-    """Factored, then out of time: the answer says so, bounds its own error, and can be gone on with."""
-    job = s.solve(body)
+    """Factored, then out of time: the answer says so, bounds its own error, and can be gone on with. A process that the
+    machine lets wait is ended before it has factored, and says that instead."""
+    for _ in range(5):
+        job = s.solve(body)
+        if job["status"] == "successful":
+            break
+        check(job["error"]["code"] == "time_limit" and "still being" in job["error"]["detail"], job)
     check(job["status"] == "successful", job)
     summary = job["summary"]
     check(summary["outcome"] == "time_limit" and summary["iterations"] == 0 and "time_limit_s" in summary["message"], summary)
@@ -56,7 +62,7 @@ def test_time_of_the_daemon(s):
 @options("--memory", "4M")
 def test_memory(s):
     """Refused before it is taken, with the bytes; what fits is solved beside it."""
-    refused, small = s.post(plate()).json, s.solve(MATRICES)
+    refused, small = s.post(plate((120, 40))).json, s.solve(MATRICES)
     job = s.get(f"/v1/jobs/{refused['id']}", Prefer="wait=60").json
     check(small["status"] == "successful" and job["status"] == "failed", small, job)
     check(job["error"]["code"] == "memory_limit", job)
