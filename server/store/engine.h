@@ -23,7 +23,7 @@ typedef struct {
     store_status (*submit)(store *s, const store_request *request, job *out, bool *repeated);
     store_status (*find_repeat)(store *s, const store_request *request, job *out);
     store_status (*claim)(store *s, store_lease *lease, double lease_s, bool small, job *out, char **body, size_t *len);
-    store_status (*renew)(store *s, const store_lease *lease, double lease_s, int progress);
+    store_status (*renew)(store *s, const store_lease *lease, int progress);
     store_status (*finish)(store *s, const store_lease *lease, const store_outcome *outcome);
     store_status (*release)(store *s, const store_lease *lease, bool counted);
     store_status (*recover)(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);

@@ -166,9 +166,9 @@ store_status store_claim(store *s, const char *owner, double lease_s, bool small
     return status;
 }
 
-store_status store_renew(store *s, const store_lease *lease, double lease_s, int progress)
+store_status store_renew(store *s, const store_lease *lease, int progress)
 {
-    return s->engine->renew(s, lease, lease_s, progress < 0 ? 0 : progress > 100 ? 100 : progress);
+    return s->engine->renew(s, lease, progress < 0 ? 0 : progress > 100 ? 100 : progress);
 }
 
 store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome)

@@ -126,6 +126,7 @@ store_status store_find_repeat(store *s, const store_request *request, job *out)
 typedef struct {
     char job[33], owner[128];
     uint64_t token; /* fencing token: no other claim of this job by this owner has it */
+    double seconds; /* that it lasts from its claim, and from each renewal */
 } store_lease;
 
 /* A priority above this goes before all shares. */
@@ -133,17 +134,17 @@ typedef struct {
 
 /* ---- claim: an accepted job becomes running, attempts + 1, for lease_s seconds. It is one of the share whose turn it
  * is: of those for which fewest jobs run the one that has had the least time of workers, counted since all who wait now
- * have waited. Of that share's it is the one with the highest priority, of these the oldest. Shares with a job of a
- * priority above STORE_PRIORITY_SHARED go before all others. small: only jobs that are (those that were put back are
- * not any more). *body is the request as submitted, freed by the caller, or NULL where it is not what was written any
- * more: the job can only be failed. STORE_NOT_FOUND when nothing waits.
- * A lease that has run out is still good until the job is somebody else's: by a claim of another owner where the engine
- * has several processes, by recover where it has one. From then on everything that is done with it is STORE_CONFLICT
- * and changes nothing. */
+ * have waited, and up to the last claim or renewal of what still runs. Of that share's it is the one with the highest
+ * priority, of these the oldest. Shares with a job of a priority above STORE_PRIORITY_SHARED go before all others.
+ * small: only jobs that are (those that were put back are not any more). *body is the request as submitted, freed by
+ * the caller, or NULL where it is not what was written any more: the job can only be failed. STORE_NOT_FOUND when
+ * nothing waits. A lease that has run out is still good until the job is somebody else's: by a claim of another owner
+ * where the engine has several processes, by recover where it has one. From then on everything that is done with it is
+ * STORE_CONFLICT and changes nothing. */
 store_status store_claim(store *s, const char *owner, double lease_s, bool small, store_lease *lease, job *out,
                          char **body, size_t *body_len);
-/* Extends the lease to lease_s from now; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
-store_status store_renew(store *s, const store_lease *lease, double lease_s, int progress);
+/* Extends the lease to its seconds from now; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
+store_status store_renew(store *s, const store_lease *lease, int progress);
 
 /* A named vector of doubles in a result: "reactions", "gaps", "displacements", "nodes", "contact_nodes", ...
  * On disk: little-endian IEEE 754 binary64, version in the row. */

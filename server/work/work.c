@@ -150,7 +150,7 @@ static void renew(worker *me)
     pthread_mutex_unlock(&me->lock);
     if (!lease.job[0])
         return;
-    store_status status = store_renew(me->w->store, &lease, me->w->options.lease_s, progress);
+    store_status status = store_renew(me->w->store, &lease, progress);
     if (status != STORE_CONFLICT && status != STORE_NOT_FOUND)
         return; /* a store that fails now may work before the lease ends */
     pthread_mutex_lock(&me->lock);

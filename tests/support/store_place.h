@@ -133,10 +133,10 @@ static inline store_status finish_as(store *s, const char *id, const char *owner
     return store_finish(s, &lease, outcome);
 }
 
-static inline store_status renew_as(store *s, const char *id, const char *owner, double lease_s, int progress)
+static inline store_status renew_as(store *s, const char *id, const char *owner, int progress)
 {
     const store_lease lease = lease_of(id, owner);
-    return store_renew(s, &lease, lease_s, progress);
+    return store_renew(s, &lease, progress);
 }
 
 static inline store_status release_as(store *s, const char *id, const char *owner)

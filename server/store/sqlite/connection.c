@@ -60,6 +60,10 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_CLAIM_SMALL] = CLAIM("share_by_lane WHERE small > 0", "job_by_lane WHERE status = 0 AND small > 0"),
     [QUERY_BODY] = "SELECT body, " SUM_IS("sum", SUM_REQUEST) " FROM request WHERE job = ?1",
     [QUERY_RENEW] = "UPDATE job SET lease = ?3, progress = ?4 WHERE id = ?1 AND status = 1 AND owner = ?2",
+    /* ?3: now. The lease was extended when its share was charged last, and by at most ?4. */
+    [QUERY_CHARGE] = "UPDATE share SET used = used + (SELECT min(?4, max(0.0, ?3 + ?4 - lease)) FROM job WHERE id = ?1)"
+                     " WHERE (name, ahead) = (SELECT share, priority > " SHARED " FROM job"
+                     " WHERE id = ?1 AND status = 1 AND owner = ?2)",
     [QUERY_FINISH] = "UPDATE job SET status = ?3, finished = ?4, summary = ?5, error = ?6, owner = NULL, lease = 0,"
                      " summary_sum = CASE WHEN ?5 IS NOT NULL THEN " SUM_OF(
                          "?1, ?3, ?5") " END,"

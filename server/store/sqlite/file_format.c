@@ -184,6 +184,27 @@
     " AND NOT EXISTS (SELECT 1 FROM vector INDEXED BY vector_by_piece WHERE shared AND data = OLD.data) BEGIN"         \
     " DELETE FROM piece WHERE digest = OLD.data; END;"
 
+/* Version 11. The time of a job is counted while it runs (QUERY_CHARGE), not at its end by two readings of a clock that
+ * may have been set. A run that takes no time, or comes to no end, still was a turn. Those ahead of the others have a
+ * time of their own: while they work, that of the others stands still. */
+#define LEAST_OF_11 "(SELECT min(used) FROM share WHERE waiting + running > 0 AND ahead = (NEW.priority > " SHARED "))"
+#define TRIGGERS_11                                                                                                    \
+    "DROP TRIGGER share_comes; DROP TRIGGER share_moves; DROP INDEX share_at_work; DROP INDEX share_idle;"             \
+    "CREATE INDEX share_at_work ON share(ahead, used) WHERE waiting + running > 0;"                                    \
+    "CREATE INDEX share_idle ON share(ahead, used) WHERE waiting + running = 0;"                                       \
+    "CREATE TRIGGER share_comes AFTER INSERT ON job WHEN NEW.status = 0 BEGIN"                                         \
+    " INSERT INTO share(name, ahead, waiting, small, used)"                                                            \
+    " VALUES(NEW.share, NEW.priority > " SHARED ", 1, NEW.small, coalesce(" LEAST_OF_11 ", 0.0))"                      \
+    " ON CONFLICT(name, ahead) DO UPDATE SET waiting = waiting + 1, small = small + excluded.small,"                   \
+    " used = CASE WHEN waiting + running > 0 THEN used ELSE max(used, excluded.used) END; END;"                        \
+    "CREATE TRIGGER share_moves AFTER UPDATE OF status ON job WHEN NEW.status <> OLD.status BEGIN"                     \
+    " UPDATE share SET waiting = waiting + (NEW.status = 0) - (OLD.status = 0),"                                       \
+    " small = small + (NEW.status = 0) * NEW.small - (OLD.status = 0) * OLD.small,"                                    \
+    " running = running + (NEW.status = 1) - (OLD.status = 1), used = used + 0.001 * (OLD.status = 1)"                 \
+    " WHERE name = NEW.share AND ahead = (NEW.priority > " SHARED ");"                                                 \
+    " DELETE FROM share WHERE waiting + running = 0 AND ahead = (NEW.priority > " SHARED ")"                           \
+    " AND used <= coalesce(" LEAST_OF_11 ", 9e999); END;"
+
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"
@@ -207,7 +228,7 @@ static const char *const SCHEMA =
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
     "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5 COLUMNS_6 TABLES_7
-        ROWS_8 TABLES_9 TABLES_10;
+        ROWS_8 TABLES_9 TABLES_10 TRIGGERS_11;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -227,7 +248,8 @@ const char *file_format_why_unreadable(sqlite3 *db)
  * result tables grew by a column, which SQLite can only do by copying the rows. Version 3: uploads, webhooks, the turn
  * and the size of jobs. Version 4: the tally. Version 5: checksums. Version 6: what belongs
  * to a result. Version 7: clients. Version 8: the
- * number of commits. Version 9: shares. Version 10: what vectors have in common. */
+ * number of commits. Version 9: shares. Version 10: what vectors have in common.
+ * Version 11: the time of shares. */
 static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [0] = NULL,
     [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
@@ -250,6 +272,7 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [7] = ROWS_8,
     [8] = TABLES_9,
     [9] = TABLES_10,
+    [10] = TRIGGERS_11,
 };
 
 bool file_format_integer(sqlite3 *db, const char *sql, int64_t *value)

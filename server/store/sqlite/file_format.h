@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 #define FILE_FORMAT_APPLICATION_ID 0x757a6177 /* "uzaw" */
-#define FILE_FORMAT_VERSION        10         /* PRAGMA user_version */
+#define FILE_FORMAT_VERSION        11         /* PRAGMA user_version */
 
 /* Why the last read of the file failed, for the person who gave its path. Valid until the next call on db. */
 const char *file_format_why_unreadable(sqlite3 *db);

@@ -246,6 +246,7 @@ static store_status claim(sqlite_store *s, connection *c, void *args)
 {
     claim_args *a = args;
     a->lease->token = ++s->claims;
+    a->lease->seconds = a->lease_s;
     const holder owner = holder_of(a->lease);
     job_clear(a->out);
     free(a->body);
@@ -294,7 +295,6 @@ static store_status end_dismissed(connection *c, const char *id, const char *own
 typedef struct {
     query_id query;
     const store_lease *lease;
-    double lease_s;
     int progress;
     const store_outcome *outcome;
     bool counted; /* release: the attempt */
@@ -305,21 +305,29 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
     const owner_args *a = args;
     const char *id = a->lease->job;
     const holder owner = holder_of(a->lease);
+    const double now = clock_seconds(CLOCK_REALTIME);
     int64_t dismissed = 0;
-    store_status status = a->query == QUERY_RELEASE ? end_dismissed(c, id, owner.text, &dismissed) : STORE_OK;
+    statement st = statement_begin(c, QUERY_CHARGE);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, owner.text);
+    bind_real(&st, 3, now);
+    bind_real(&st, 4, a->lease->seconds);
+    store_status status = statement_run(&st);
+    if (status == STORE_OK && a->query == QUERY_RELEASE)
+        status = end_dismissed(c, id, owner.text, &dismissed);
     if (status != STORE_OK || dismissed > 0)
         return status;
-    statement st = statement_begin(c, a->query);
+    st = statement_begin(c, a->query);
     bind_text(&st, 1, id);
     bind_text(&st, 2, owner.text);
     if (a->query == QUERY_RENEW) {
-        bind_real(&st, 3, clock_seconds(CLOCK_REALTIME) + a->lease_s);
+        bind_real(&st, 3, now + a->lease->seconds);
         bind_integer(&st, 4, a->progress);
     } else if (a->query == QUERY_RELEASE) {
         bind_integer(&st, 3, a->counted ? 0 : 1);
     } else if (a->query == QUERY_FINISH) {
         bind_integer(&st, 3, a->outcome->status);
-        bind_real(&st, 4, clock_seconds(CLOCK_REALTIME));
+        bind_real(&st, 4, now);
         bind_text(&st, 5, a->outcome->whole.summary);
         bind_text(&st, 6, a->outcome->error);
     }
@@ -356,9 +364,9 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
     return status;
 }
 
-store_status sqlite_renew(store *base, const store_lease *lease, double lease_s, int progress)
+store_status sqlite_renew(store *base, const store_lease *lease, int progress)
 {
-    owner_args a = {.query = QUERY_RENEW, .lease = lease, .lease_s = lease_s, .progress = progress};
+    owner_args a = {.query = QUERY_RENEW, .lease = lease, .progress = progress};
     return sqlite_write(sqlite_of(base), WRITE_LAZY, change_own, &a);
 }
 

@@ -59,10 +59,11 @@ static const struct {
      " OR bytes <> (SELECT coalesce(sum(bytes), 0) FROM job WHERE client = name)",
      "what is counted of client %s is wrong\n"},
     {9,
-     "SELECT name FROM share WHERE waiting <> (SELECT count(*) FROM job WHERE share = name AND status = 0 AND"
-     " (priority > " SHARED ") = ahead) OR running <> (SELECT count(*) FROM job WHERE share = name AND status = 1 AND"
-     " (priority > " SHARED ") = ahead) UNION ALL SELECT share FROM job WHERE status < 2 AND NOT EXISTS"
-     " (SELECT 1 FROM share AS of WHERE of.name = job.share AND of.ahead = (job.priority > " SHARED "))",
+     "WITH counted AS (SELECT share, priority > " SHARED ", sum(status = 0), sum(small * (status = 0)), sum(status = 1)"
+     " FROM job WHERE status < 2 GROUP BY 1, 2), kept AS (SELECT name, ahead, waiting, small, running FROM share"
+     " WHERE waiting <> 0 OR small <> 0 OR running <> 0) SELECT DISTINCT share FROM (SELECT * FROM"
+     " (SELECT * FROM counted EXCEPT SELECT * FROM kept) UNION ALL SELECT * FROM"
+     " (SELECT * FROM kept EXCEPT SELECT * FROM counted))",
      "what is counted of share %s is wrong\n"},
     {5, "SELECT job FROM request WHERE NOT " SUM_IS("sum", SUM_REQUEST),
      "the request of job %s is not what was written\n"},

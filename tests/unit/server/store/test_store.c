@@ -36,7 +36,7 @@ STORE_TEST(submit_claim_finish)
     CHECK(j.status == JOB_RUNNING && j.attempts == 1 && j.started >= j.created);
     CHECK(len == 8 && body && strcmp(body, "{\"a\": 1}") == 0);
     free(body);
-    CHECK_INT(store_renew(p.s, &lease, 30.0, 42), STORE_OK);
+    CHECK_INT(store_renew(p.s, &lease, 42), STORE_OK);
     CHECK_INT(store_finish(p.s, &lease, &PLAIN_SUCCESS), STORE_OK);
     char id[33];
     strcpy(id, j.id);
@@ -60,7 +60,7 @@ STORE_TEST(only_the_owner_of_a_running_job_may_change_it)
     CHECK_INT(finish_as(p.s, id, "a", &PLAIN_SUCCESS), STORE_CONFLICT); /* not running yet */
     CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
     CHECK_STR(other, id);
-    CHECK_INT(renew_as(p.s, id, "b", 30, 1), STORE_CONFLICT);
+    CHECK_INT(renew_as(p.s, id, "b", 1), STORE_CONFLICT);
     CHECK_INT(release_as(p.s, id, "b"), STORE_CONFLICT);
     CHECK_INT(finish_as(p.s, id, "b", &PLAIN_SUCCESS), STORE_CONFLICT);
     CHECK_INT(status_of(p.s, id), JOB_RUNNING);
@@ -77,7 +77,7 @@ STORE_TEST(only_the_owner_of_a_running_job_may_change_it)
     CHECK_INT(status_of(p.s, id), JOB_SUCCESSFUL);
     const char *nobody = "ffffffffffffffffffffffffffffffff";
     CHECK_INT(finish_as(p.s, nobody, "a", &PLAIN_SUCCESS), STORE_NOT_FOUND);
-    CHECK_INT(renew_as(p.s, nobody, "a", 1, 1), STORE_NOT_FOUND);
+    CHECK_INT(renew_as(p.s, nobody, "a", 1), STORE_NOT_FOUND);
     CHECK_INT(release_as(p.s, nobody, "a"), STORE_NOT_FOUND);
     place_end(&p);
 }
@@ -97,15 +97,15 @@ STORE_TEST(an_earlier_lease_is_fenced_off)
     CHECK_INT(store_claim(p.s, "a", 0.0, false, &first, &j, &body, &len), STORE_OK);
     job_clear(&j);
     free(body);
-    CHECK_INT(store_renew(p.s, &first, 0.0, 10), STORE_OK); /* it has run out, but nobody else has the job */
+    CHECK_INT(store_renew(p.s, &first, 10), STORE_OK); /* it has run out, but nobody else has the job */
     CHECK_INT(store_release(p.s, &first, false), STORE_OK);
-    CHECK_INT(store_renew(p.s, &first, 30.0, 20), STORE_CONFLICT);
+    CHECK_INT(store_renew(p.s, &first, 20), STORE_CONFLICT);
     CHECK_INT(store_claim(p.s, "a", 30.0, false, &second, &j, &body, &len), STORE_OK);
     job_clear(&j);
     free(body);
     CHECK_STR(second.job, first.job);
     CHECK(second.token != first.token);
-    CHECK_INT(store_renew(p.s, &first, 30.0, 30), STORE_CONFLICT);
+    CHECK_INT(store_renew(p.s, &first, 30), STORE_CONFLICT);
     CHECK_INT(store_finish(p.s, &first, &PLAIN_SUCCESS), STORE_CONFLICT);
     CHECK_INT(store_release(p.s, &first, false), STORE_CONFLICT);
     CHECK_INT(store_get(p.s, id, &j), STORE_OK);
@@ -137,7 +137,7 @@ STORE_TEST(a_lease_ends_with_its_process)
         if (i == 0)
             CHECK_INT(store_recover(p.s, 3, "{}", NULL, NULL), STORE_OK);
     }
-    CHECK_INT(store_renew(p.s, &leases[0], 30.0, 50), STORE_CONFLICT);
+    CHECK_INT(store_renew(p.s, &leases[0], 50), STORE_CONFLICT);
     CHECK_INT(store_finish(p.s, &leases[0], &PLAIN_SUCCESS), STORE_CONFLICT);
     CHECK_INT(store_finish(p.s, &leases[1], &PLAIN_SUCCESS), STORE_OK);
     place_end(&p);

@@ -150,6 +150,100 @@ STORE_TEST(there_is_no_credit_for_the_time_before)
     place_end(&p);
 }
 
+/* A lane puts back what took too long, and what died runs again: that time has been had, too. */
+STORE_TEST(a_run_that_is_put_back_was_a_turn)
+{
+    place p;
+    char id[26][33] = {""}, who[2];
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 4; i++)
+        submit_with(p.s, (store_request){.share = i % 2 ? "b" : "a", .small = true}, id[i]);
+    claim_share(p.s, true, id, who);
+    CHECK_STR(who, "a");
+    sleep_s(0.05);
+    CHECK_INT(release_as(p.s, id[0], "me"), STORE_OK);
+    for (int i = 0; i < 2; i++) { /* "b" has both of its turns in less than that */
+        claim_share(p.s, true, id, who);
+        CHECK_STR(who, i == 0 ? "b" : "d");
+        CHECK_INT(finish_as(p.s, id[2 * i + 1], "me", &PLAIN_SUCCESS), STORE_OK);
+    }
+    check_counts(p.s, 2, 0, 2, 0, 0);
+    place_end(&p);
+}
+
+/* A job that runs for hours has had them before it ends: else one that comes would begin where its share stood then,
+ * and have all the time of the other workers that others have had since. */
+STORE_TEST(who_still_runs_has_had_that_time)
+{
+    place p;
+    char id[26][33] = {""}, who[2];
+    int of_busy = 0;
+    if (!place_begin(&p))
+        return;
+    submit_with(p.s, (store_request){.share = "long"}, id[0]);
+    submit_with(p.s, (store_request){.share = "busy"}, id[1]);
+    claim_share(p.s, false, id, who);
+    claim_share(p.s, false, id, who);
+    sleep_s(0.1);
+    CHECK_INT(renew_as(p.s, id[0], "me", 50), STORE_OK);
+    CHECK_INT(finish_as(p.s, id[1], "me", &PLAIN_SUCCESS), STORE_OK);
+    for (int i = 2; i < 8; i++)
+        submit_with(p.s, (store_request){.share = i < 5 ? "busy" : "new"}, id[i]);
+    for (int i = 0; i < 3; i++) {
+        claim_share(p.s, false, id, who);
+        of_busy += who[0] < 'f';
+        CHECK_INT(finish_as(p.s, id[who[0] - 'a'], "me", &PLAIN_SUCCESS), STORE_OK);
+    }
+    CHECK_MSG(of_busy >= 1 && of_busy <= 2, "%d of 3 turns", of_busy);
+    place_end(&p);
+}
+
+/* A day more or less on the clock is no day that somebody has had. */
+TEST(a_clock_that_is_set_moves_no_turn)
+{
+    for (int back = 0; back < 2; back++) {
+        place p;
+        char id[26][33] = {""}, who[2];
+        if (!place_begin(&p))
+            return;
+        submit_with(p.s, (store_request){.share = "a"}, id[0]);
+        claim_share(p.s, false, id, who);
+        submit_with(p.s, (store_request){.share = "b"}, id[1]);
+        change_file(p.path, back ? "UPDATE job SET started = started + 86400, lease = lease + 86400 WHERE status = 1"
+                                 : "UPDATE job SET started = started - 86400, lease = lease - 86400 WHERE status = 1");
+        CHECK_INT(renew_as(p.s, id[0], "me", 50), STORE_OK);
+        CHECK_INT(finish_as(p.s, id[0], "me", &PLAIN_SUCCESS), STORE_OK);
+        CHECK_INT(rows_in(p.path, "share WHERE used BETWEEN 0 AND 31"), 2);
+        place_end(&p);
+    }
+}
+
+/* Those ahead of the others have the workers to themselves, and by turns. */
+STORE_TEST(those_ahead_have_turns_among_themselves)
+{
+    place p;
+    char id[26][33] = {""}, who[2];
+    if (!place_begin(&p))
+        return;
+    submit_with(p.s, (store_request){.share = "waits"}, id[0]);
+    for (int i = 1; i < 4; i++)
+        submit_with(p.s, (store_request){.share = "old", .priority = 10}, id[i]);
+    claim_share(p.s, false, id, who);
+    sleep_s(0.1);
+    CHECK_INT(finish_as(p.s, id[1], "me", &PLAIN_SUCCESS), STORE_OK);
+    for (int i = 4; i < 8; i++)
+        submit_with(p.s, (store_request){.share = "young", .priority = 10}, id[i]);
+    int of_old = 0;
+    for (int i = 0; i < 4; i++) {
+        claim_share(p.s, false, id, who);
+        of_old += who[0] < 'e';
+        CHECK_INT(finish_as(p.s, id[who[0] - 'a'], "me", &PLAIN_SUCCESS), STORE_OK);
+    }
+    CHECK_MSG(of_old >= 1 && of_old <= 3, "%d of 4 turns", of_old);
+    place_end(&p);
+}
+
 STORE_TEST(what_goes_before_all_shares)
 {
     place p;
@@ -483,7 +577,7 @@ static void *race(void *arg)
         job j = {0};
         r->problems += store_get(r->s, r->ids[r->count], &j) != STORE_OK || j.status != JOB_RUNNING;
         job_clear(&j);
-        r->problems += renew_as(r->s, r->ids[r->count], r->owner, 30, 50) != STORE_OK;
+        r->problems += renew_as(r->s, r->ids[r->count], r->owner, 50) != STORE_OK;
         r->problems += finish_as(r->s, r->ids[r->count], r->owner, &PLAIN_SUCCESS) != STORE_OK;
         r->count++;
     }

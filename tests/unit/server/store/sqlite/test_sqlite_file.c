@@ -300,6 +300,17 @@ TEST(a_file_that_cannot_be_taken_over_stays_as_it_was)
 
 /* What a format added is taken away again: what is left is the format before it, as it was written then. */
 static const char *const TO_FORMAT[] = {
+    [10] =
+        "DROP TRIGGER share_comes; DROP TRIGGER share_moves; DROP INDEX share_at_work; DROP INDEX share_idle;"
+        "CREATE INDEX share_at_work ON share(used) WHERE waiting + running > 0;"
+        "CREATE INDEX share_idle ON share(used) WHERE waiting + running = 0;"
+        "CREATE TRIGGER share_comes AFTER INSERT ON job WHEN NEW.status = 0 BEGIN"
+        " INSERT INTO share(name, ahead, waiting, small, used) VALUES(NEW.share, NEW.priority > 5, 1, NEW.small, 0.0)"
+        " ON CONFLICT(name, ahead) DO UPDATE SET waiting = waiting + 1, small = small + excluded.small; END;"
+        "CREATE TRIGGER share_moves AFTER UPDATE OF status ON job WHEN NEW.status <> OLD.status BEGIN"
+        " UPDATE share SET waiting = waiting + (NEW.status = 0) - (OLD.status = 0),"
+        " running = running + (NEW.status = 1) - (OLD.status = 1)"
+        " WHERE name = NEW.share AND ahead = (NEW.priority > 5); END; PRAGMA user_version = 10;",
     [9] = "DROP TRIGGER piece_unused; DROP INDEX vector_by_piece; DROP TABLE piece;"
           "ALTER TABLE vector DROP COLUMN shared; PRAGMA user_version = 9;",
     [8] = "DROP TRIGGER share_comes; DROP TRIGGER share_moves; DROP TABLE share;"
@@ -618,6 +629,9 @@ TEST(a_check_finds_what_is_wrong)
     } DAMAGES[] = {
         {"DELETE FROM request WHERE rowid = 1", "has no request"},
         {"UPDATE tally SET jobs = 7 WHERE status = 0", "tally of jobs with status 0"},
+        {"UPDATE share SET small = 1; INSERT INTO share(name, ahead) VALUES('idle', 0)", "counted of share  is wrong"},
+        {"UPDATE share SET waiting = 2", "counted of share  is wrong"},
+        {"UPDATE share SET name = 'other'", "counted of share other is wrong"},
         {"INSERT INTO tag VALUES('x', 'nobody')", "a row of tag refers to what is not there"},
     };
     for (size_t i = 0; i < sizeof DAMAGES / sizeof DAMAGES[0]; i++) {
