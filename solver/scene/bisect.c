@@ -528,9 +528,33 @@ static bool refine_items(uz_group *out, const bisection *x, const uz_mesh *fine,
     return true;
 }
 
-static bool refine_group(uz_group *group, const bisection *x, const uz_mesh *fine, unsigned char *has)
+/* Nodes of the refined mesh that lie amid nodes of a group join it. An edge through the body from one side to another
+ * is none of a group that has whole sides of the boundary: its middle joins only where an end lies inside. outer: nodes
+ * of the boundary; in: nodes of the group. */
+static void refine_nodes(unsigned char *in, const bisection *x, const uz_mesh *fine, const uz_corner_table *sides,
+                         const unsigned char *outer)
 {
     const int64_t old = x->mesh->n_nodes;
+    bool whole = false;
+    for (int pass = 0; pass < 1 + whole; pass++) {
+        for (int64_t i = old; i < fine->n_nodes; i++) {
+            const int64_t *from = x->from + (i - old) * FROM;
+            in[i] = pass == 0 || outer[i] || !outer[from[0]] || !outer[from[1]];
+            for (int k = 0; k < FROM && from[k] >= 0; k++)
+                in[i] = in[i] && in[from[k]];
+        }
+        for (int64_t i = 0; i < sides->count && !whole; i++) {
+            int64_t node[UZ_FACE_NODES];
+            whole = !sides->same[i] && !sides->same[i + 1];
+            for (int k = whole ? uz_mesh_face(node, fine, sides->item[i]) : 0; k > 0; k--)
+                whole = whole && in[node[k - 1]];
+        }
+    }
+}
+
+static bool refine_group(uz_group *group, const bisection *x, const uz_mesh *fine, unsigned char *has,
+                         const uz_corner_table *sides, const unsigned char *outer)
+{
     unsigned char *in = uz_alloc_zero(fine->n_nodes, 1);
     uz_group out = {.kind = group->kind, .n_inner = group->n_inner};
     memcpy(out.name, group->name, sizeof out.name);
@@ -539,12 +563,8 @@ static bool refine_group(uz_group *group, const bisection *x, const uz_mesh *fin
         in[group->node[i]] = 1;
     if (room && group->kind != UZ_GROUP_NODES)
         room = refine_items(&out, x, fine, group, has, in);
-    for (int64_t i = old; i < fine->n_nodes && room && group->kind == UZ_GROUP_NODES; i++) {
-        const int64_t *from = x->from + (i - old) * FROM;
-        in[i] = 1;
-        for (int k = 0; k < FROM && from[k] >= 0; k++)
-            in[i] = in[i] && in[from[k]];
-    }
+    else if (room)
+        refine_nodes(in, x, fine, sides, outer);
     for (int64_t i = 0; i < fine->n_nodes && room; i++)
         out.n_nodes += in[i];
     out.node = room ? uz_alloc(out.n_nodes, sizeof *out.node) : NULL;
@@ -557,6 +577,30 @@ static bool refine_group(uz_group *group, const bisection *x, const uz_mesh *fin
     free(group->element);
     *group = out;
     return out.node != NULL;
+}
+
+static bool refine_groups(bisection *x, const uz_mesh *fine)
+{
+    uz_mesh *mesh = x->mesh;
+    uz_corner_table sides = {.count = 0};
+    unsigned char *has = uz_alloc(mesh->n_elements, 1), *outer = uz_alloc_zero(fine->n_nodes, 1);
+    bool room = has && outer, nodes = false;
+    for (int64_t k = 0; k < mesh->n_groups; k++)
+        nodes = nodes || mesh->groups[k].kind == UZ_GROUP_NODES;
+    if (nodes && room)
+        room = uz_corner_table_build(&sides, fine, true, NULL) == UZ_OK;
+    for (int64_t i = 0; i < sides.count && room; i++) {
+        int64_t node[UZ_FACE_NODES];
+        const int count = sides.same[i] || sides.same[i + 1] ? 0 : uz_mesh_face(node, fine, sides.item[i]);
+        for (int k = 0; k < count; k++)
+            outer[node[k]] = 1;
+    }
+    for (int64_t k = 0; k < mesh->n_groups && room; k++)
+        room = mesh->groups[k].everything || refine_group(&mesh->groups[k], x, fine, has, &sides, outer);
+    uz_corner_table_clear(&sides);
+    free(has);
+    free(outer);
+    return room;
 }
 
 /* How many faces of its groups lie between two elements. */
@@ -597,8 +641,7 @@ static uz_status publish(bisection *x, uz_error *err)
     fine.kind = uz_alloc(x->parts, sizeof *fine.kind);
     fine.first = uz_alloc(x->parts + 1, sizeof *fine.first);
     fine.node = uz_alloc(most, sizeof *fine.node);
-    unsigned char *has = uz_alloc(mesh->n_elements, 1);
-    x->failed = !fine.kind || !fine.first || !fine.node || !has;
+    x->failed = !fine.kind || !fine.first || !fine.node;
     for (int64_t e = 0, q = 0; e < x->parts && !x->failed; e++) {
         const piece *part = &x->part[e];
         const uz_element_kind root = (uz_element_kind)mesh->kind[part->root];
@@ -616,9 +659,7 @@ static uz_status publish(bisection *x, uz_error *err)
         }
         fine.first[e + 1] = q;
     }
-    for (int64_t k = 0; k < mesh->n_groups && !x->failed; k++)
-        x->failed = !mesh->groups[k].everything && !refine_group(&mesh->groups[k], x, &fine, has);
-    free(has);
+    x->failed = x->failed || !refine_groups(x, &fine);
     if (x->failed) {
         free(fine.kind);
         free(fine.first);

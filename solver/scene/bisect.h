@@ -13,7 +13,8 @@ uz_status uz_mesh_check_bisection(const uz_mesh *mesh, uz_error *err);
  * and the shape of the body stay: one half of an element keeps its number, other elements and nodes follow those that
  * were there, so that the same list gives the same mesh, and a longer one that begins with it a refinement of that.
  * Curved edges and sides stay the curves that they are. Groups have the halves of their sides and elements, and of
- * their nodes' edges and sides the new nodes that lie between nodes of the group only. Errors: UZ_ERR_SCENE as above,
+ * their nodes' edges and sides the new nodes that lie between nodes of the group only; groups of nodes that have whole
+ * sides of the boundary only nodes of the boundary between those of it. Errors: UZ_ERR_SCENE as above,
  * _ARGUMENT where the list is none, _LIMIT beyond UZ_SCENE_MAX_DOFS, _MEMORY. *mesh, which is none that was refined
  * already, can then only be cleared. */
 uz_status uz_mesh_bisect(uz_mesh *mesh, const int64_t *marked, int64_t n, uz_error *err);

@@ -288,6 +288,46 @@ TEST(groups_of_nodes_elements_and_inner_sides)
     uz_mesh_clear(&mesh);
 }
 
+/* The nodes of two sides of a square that meet in a corner: the middle of the edge that leads through the body past
+ * that corner is none of them, however fine the mesh is. */
+TEST(groups_of_nodes_of_sides_stay_on_the_sides)
+{
+    static const char *const NAMES[] = {"tri3", "tri6", "quad4", "tet4"};
+    for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0]; k++) {
+        list *marked = calloc(1, sizeof *marked);
+        uint64_t seed = 5;
+        uz_mesh box = mesh_of(NAMES[k], 2), fine = mesh_of(NAMES[k], 2);
+        for (int round = 0; round < 4; round++)
+            add_some(marked, &box, &seed);
+        /* left becomes a group of the nodes of left and top */
+        uz_group *left = NULL;
+        for (int64_t i = 0; i < fine.n_groups; i++)
+            if (strcmp(fine.groups[i].name, "left") == 0)
+                left = &fine.groups[i];
+        left->kind = UZ_GROUP_NODES;
+        left->n_faces = 0;
+        left->node = realloc(left->node, (size_t)fine.n_nodes * sizeof *left->node);
+        left->n_nodes = 0;
+        for (int64_t i = 0; i < fine.n_nodes; i++)
+            if (fine.xyz[i * fine.dim] < 1e-9 || fine.xyz[i * fine.dim + 1] > 2 - 1e-9)
+                left->node[left->n_nodes++] = i;
+        CHECK_INT(uz_mesh_bisect(&fine, marked->value, marked->count, NULL), UZ_OK);
+        const uz_group *both = group_of(&fine, "left");
+        int64_t wanted = 0, inside = 0;
+        for (int64_t i = 0; i < fine.n_nodes; i++)
+            wanted += fine.xyz[i * fine.dim] < 1e-9 || fine.xyz[i * fine.dim + 1] > 2 - 1e-9;
+        for (int64_t i = 0; i < both->n_nodes; i++) {
+            const double *x = fine.xyz + both->node[i] * fine.dim, z = fine.dim == 3 ? x[Z] : 0;
+            inside += x[X] > 1e-9 && x[Y] < 2 - 1e-9 && !(fine.dim == 3 && (z < 1e-9 || z > 1.5 - 1e-9));
+        }
+        CHECK_MSG(inside == 0 && both->n_nodes >= wanted, "%s: %lld nodes, not %lld, and %lld inside", NAMES[k],
+                  (long long)both->n_nodes, (long long)wanted, (long long)inside);
+        uz_mesh_clear(&box);
+        uz_mesh_clear(&fine);
+        free(marked);
+    }
+}
+
 /* A quadratic map of the unit square: any part of it has the same map, so that curved sides stay what they are. */
 static void bend(double *x, int dim)
 {
