@@ -24,7 +24,8 @@ uz_status uz_prescribed_values(double *value, const uz_body_model *model, const 
 
 /* mesh -> spring. */
 uz_status uz_spread_springs(uz_body_model *model, const uz_scene *scene, uz_error *err);
-/* share (n_nodes) += what each node of the group has of a total of 1: by area of faces, else equally. */
+/* share (n_nodes) += what each node of the group has of a total of 1: by area of faces, by volume of elements, of nodes
+ * equally those that were given (uz_mesh.n_given). */
 uz_status uz_spread_over_group(double *share, const uz_body_model *model, const uz_group *group, bool positive,
                                const char *where, uz_error *err);
 

@@ -1,5 +1,5 @@
-/* springs.c: elastic ground. The stiffness of a group is its total, spread over its faces by area, over nodes equally.
- */
+/* springs.c: elastic ground. The stiffness of a group is its total, spread over its faces by area, over elements by
+ * volume, over the nodes that were given equally: a finer mesh has the same ground. */
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
@@ -9,27 +9,53 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* w: what each node has of a side's area, or of an element's volume; returns how many nodes there are. */
+static int weigh(double *w, int64_t *node, const uz_body_model *model, const uz_group *group, int64_t i, bool positive)
+{
+    double xyz[3 * UZ_ELEMENT_NODES], f[UZ_ELEMENT_DOFS] = {0};
+    const double one[3] = {1, 0, 0};
+    uz_element element;
+    uz_side side;
+    int count;
+    if (group->kind == UZ_GROUP_FACES) {
+        uz_body_side(&side, xyz, node, model, group->face[i]);
+        if (positive)
+            uz_side_positive_weights(w, &side);
+        else
+            uz_side_weights(w, &side);
+        return side.nodes;
+    }
+    const int64_t e = uz_group_element_at(group, i), *all = uz_mesh_element(&model->mesh, e, &count);
+    uz_body_element(&element, xyz, model, e);
+    uz_element_add_body_force(f, &element, one);
+    for (int a = 0; a < count; a++) { /* corners of quadratic elements have less than nothing */
+        node[a] = all[a];
+        w[a] = positive ? uz_element_volume(&element) / count : f[a * model->mesh.dim];
+    }
+    return count;
+}
+
 uz_status uz_spread_over_group(double *share, const uz_body_model *model, const uz_group *group, bool positive,
                                const char *where, uz_error *err)
 {
-    const int64_t count = uz_group_node_count(&model->mesh, group);
-    double total = 0, w[UZ_FACE_NODES];
-    if (group->kind != UZ_GROUP_FACES) {
-        for (int64_t i = 0; i < count; i++)
-            share[uz_group_node_at(group, i)] += 1 / (double)count;
-        return UZ_OK;
-    }
-    for (int pass = 0; pass < 2; pass++) /* the area first, then its shares */
-        for (int64_t i = 0; i < group->n_faces; i++) {
-            uz_side side;
-            double xyz[3 * UZ_FACE_NODES];
-            int64_t node[UZ_FACE_NODES];
-            uz_body_side(&side, xyz, node, model, group->face[i]);
-            if (positive)
-                uz_side_positive_weights(w, &side);
+    const uz_mesh *mesh = &model->mesh;
+    const bool nodes = group->kind == UZ_GROUP_NODES;
+    const int64_t most = mesh->from ? mesh->n_given : mesh->n_nodes, items = nodes ? group->n_nodes
+                                                                             : group->kind == UZ_GROUP_FACES
+                                                                                 ? group->n_faces
+                                                                                 : uz_group_element_count(mesh, group);
+    double total = 0, w[UZ_ELEMENT_NODES] = {1};
+    int64_t node[UZ_ELEMENT_NODES];
+    for (int pass = 0; pass < 2; pass++) /* the whole first, then its shares */
+        for (int64_t i = 0; i < items; i++) {
+            int count = 1;
+            if (!nodes)
+                count = weigh(w, node, model, group, i, positive);
+            else if (group->node[i] < most) /* nodes that a refined mesh has more are no part of what was asked for */
+                node[0] = group->node[i];
             else
-                uz_side_weights(w, &side);
-            for (int a = 0; a < side.nodes; a++) {
+                break;
+            for (int a = 0; a < count; a++) {
                 if (pass == 0)
                     total += w[a];
                 else if (total > 0)
