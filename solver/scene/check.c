@@ -90,8 +90,8 @@ static uz_status check_formulation(const uz_scene *scene, const uz_mesh *mesh, u
     if (formulation >= UZ_FORMULATIONS)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                        "unknown formulation; use auto, standard, bbar or incompatible_modes");
-    if (formulation == UZ_FORMULATION_AUTO || formulation == UZ_FORMULATION_STANDARD)
-        return UZ_OK;
+    if (formulation == UZ_FORMULATION_AUTO || formulation == UZ_FORMULATION_STANDARD || mesh->from)
+        return UZ_OK; /* what was given had some, and they may all be bisected */
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
         if (type->bbar || type->incompatible)

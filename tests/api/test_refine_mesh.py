@@ -151,6 +151,34 @@ def test_load_cases(s):
     check(len(sizes) == 1, sizes)
 
 
+def test_groups_of_nodes_mean_the_same(s):
+    """A force on nodes acts where it did, however many nodes come between; nodes of two sides hold these sides only."""
+    request = in_numbers(refined({"relative_error": 0.2}))
+    groups = request["problem"]["mesh"]["groups"]
+    groups["nodes"] = {"nodes": sorted({i for edge in groups["top"]["edges"] for i in edge})}
+    request["problem"]["loads"] = [{"on": "nodes", "force": [0, -1]}]
+    del request["problem"]["contacts"]
+    summary = solved(s, request)["summary"]
+    loads = summary["resultants"]["loads"]
+    check(len(summary["mesh"]["ladder"]) > 2 and abs(loads["force"][1] + 1) < 1e-9 and abs(loads["moment"][0] + 30) < 1e-6, loads)
+    request["problem"]["loads"] = [{"on": "all", "body_force": [1, -1]}]
+    groups["held"] = {"edges": groups["left"]["edges"] + groups["top"]["edges"]}
+    groups["held_nodes"] = {"nodes": sorted({i for edge in groups["held"]["edges"] for i in edge})}
+    found = []
+    for name in ("held", "held_nodes"):
+        request["problem"]["supports"] = [{"on": name, "ux": 0, "uy": 0}]
+        found.append(solved(s, request)["summary"])
+    check(len(found[0]["mesh"]["ladder"]) > 1 and abs(found[1]["energy"]["strain"] / found[0]["energy"]["strain"] - 1) < 1e-9,
+          found[0]["energy"], found[1]["energy"])
+
+
+def test_a_formulation_of_elements_that_are_all_bisected(s):
+    request = refined({"relative_error": 0.015}, "quad4", (2, 1))
+    request["problem"]["formulation"] = "incompatible_modes"
+    summary = solved(s, request)["summary"]
+    check(summary["outcome"] == "converged" and summary["mesh"]["elements"] > 16, summary["message"], summary["mesh"])
+
+
 def test_client_prints_the_grids(s):
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "body.json")
