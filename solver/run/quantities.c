@@ -7,7 +7,8 @@
  *     value = found + a(e_u, e_z) + depth, within parts of both, of |e_u| |e_z|, and of what the ends of contacts leave
  *
  * The parts cover the errors of generated scenes (tests/extremes/generated_quantities.py; docs/accuracy.md has the
- * figures). To these comes what the certificate leaves of the equations: |z|_K times its bound. */
+ * figures). To these comes what the certificate leaves of the equations: |z|_K times its bound, and the
+ * residual in z. */
 #include "run/quantities.h"
 
 #include "core/alloc.h"
@@ -243,7 +244,7 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     const uz_body_model *model = x->work->model;
     const int64_t n = model->mesh.n_nodes * model->mesh.dim;
     const double *u = x->answer->u;
-    double norm = 0, strain = 0, both[2] = {0};
+    double norm = 0, strain = 0, length = 0, both[2] = {0};
     bool solved = false;
     uz_status status = solve(x, &solved, of, err);
     if (status != UZ_OK)
@@ -263,12 +264,16 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     }
     if (status != UZ_OK)
         return status;
+    for (int64_t i = 0; i < n; i++)
+        length = hypot(length, x->z[i]);
     const double depth = depth_shift(x, of);
     const double shift = (both[0] - both[1]) / (4 * scale),
                  square = fmax(0, 0.5 * (both[0] + both[1]) - x->own_error) / (scale * scale);
     out->mesh = OF_ESTIMATE * fabs(shift) + x->of_product * sqrt(x->own_error * square) + OF_DEPTH * fabs(depth) +
                 OF_END * end_error(x) + of->blur;
-    out->equations = sqrt(2 * fmax(0, norm)) * x->answer->summary.certificate.absolute_error;
+    /* where z is a rigid motion, of forces that are in balance, the residual at free nodes is what is left */
+    out->equations = sqrt(2 * fmax(0, norm)) * x->answer->summary.certificate.absolute_error +
+                     length * x->answer->summary.certificate.residual.e1;
     const double half = out->mesh + out->equations;
     if (!isfinite(half) || !isfinite(shift)) {
         snprintf(out->why, sizeof out->why, "nothing bounds what the equations leave of it");

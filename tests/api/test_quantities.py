@@ -76,6 +76,32 @@ def test_load_cases_have_their_own(s):
     check(abs(found[0] / 1000 - 1) < 0.01 and abs(found[1] / 2000 - 1) < 0.01, found)
 
 
+def box(element, cells, grading, **scene):
+    mesh = {"box": {"origin": [1, 0], "size": [1, 1], "cells": [cells, cells], "element": element, "grading": grading}}
+    return {"problem": {"kind": "scene", "model": "plane_strain", "mesh": mesh, "materials": HERTZ["problem"]["materials"], **scene}}
+
+
+def test_a_mean_is_over_the_volume(s):
+    """Of a graded mesh, which has most of its nodes on one side, as of an even one."""
+    found = []
+    for element, cells, grading in (("quad4", 8, [10, 1]), ("tri6", 5, [1, 6]), ("quad8", 40, [1, 1])):
+        request = {**box(element, cells, grading, supports=[{"on": "left", "ux": 0, "uy": 0}], loads=[{"on": "right", "traction": [1, 0]}]),
+                   "quantities": [{"quantity": "displacement", "on": "all", "direction": [1, 0]}]}
+        found.append(solved(s, request)["quantities"][0])
+    true = found.pop()["value"]
+    check(all(one["low"] < true < one["high"] for one in found), found, true)
+
+
+def test_intervals_of_what_is_zero_have_zero_in_them(s):
+    for element, cells in (("quad4", 3), ("quad4", 6), ("quad8", 4), ("tri3", 5)):
+        for load in ([1, 0.3], [1, 0]):
+            request = {**box(element, cells, [1, 1], supports=[{"on": "left", "ux": 0}, {"on": "bottom", "uy": 0}],
+                             loads=[{"on": "right", "traction": [load[0], 0]}, {"on": "top", "traction": [load[1], 0]}]),
+                       "quantities": [{"quantity": "reaction", "on": "bottom", "direction": [0, 1]}]}
+            one = solved(s, request)["quantities"][0]
+            check(one["low"] <= 0 <= one["high"] and one["high"] - one["low"] < 1e-9, element, cells, one)
+
+
 def test_cells_are_chosen_for_a_quantity(s):
     request = copy.deepcopy(HERTZ)
     asked = {"quantity": "contact.force", "on": "bottom", "relative": 0.02}
