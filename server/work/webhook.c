@@ -56,6 +56,20 @@ static char *part_of(CURLU *url, CURLUPart part, unsigned flags)
     return curl_url_get(url, part, &text, flags) == CURLUE_OK ? text : NULL;
 }
 
+/* One place has one name, but for the case of letters: who tells it something keeps others from doing so meanwhile, by
+ * that name. libcurl also takes several slashes, 127.1 for 127.0.0.1, %6c for l, and zeros before a port. */
+static bool is_plain(const char *text, const char *scheme, const char *host, const char *port)
+{
+    const size_t s = strlen(scheme), h = strlen(host), p = strlen(port);
+    if (strncasecmp(text, scheme, s) != 0 || strncmp(text + s, "://", 3) != 0 ||
+        strncasecmp(text + s + 3, host, h) != 0)
+        return false;
+    const char *end = text + s + 3 + h;
+    if (end[0] == ':' && strncmp(end + 1, port, p) == 0)
+        end += 1 + p;
+    return strchr("/?#", end[0]) != NULL; /* also at the end of the text */
+}
+
 bool webhooks_allow(const webhooks *all, const char *text, const char **why)
 {
     *why = "this service calls nobody (its option --webhook-allow)";
@@ -74,6 +88,10 @@ bool webhooks_allow(const webhooks *all, const char *text, const char **why)
         *why = "it is no address that begins with http:// or https://";
     else if (user)
         *why = "it must not have a user or a password";
+    else if (!is_plain(text, scheme, host, port))
+        *why =
+            "its host or port is written in an unusual way: write SCHEME://HOST/ or SCHEME://HOST:PORT/, without zeros "
+            "before a number, and an address of IPv4 as four decimal numbers";
     else {
         const bool own_port = strcmp(port, strcmp(scheme, "https") == 0 ? "443" : "80") == 0;
         const size_t len = strlen(host);

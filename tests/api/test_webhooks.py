@@ -165,6 +165,28 @@ def test_a_slow_receiver_holds_up_its_own_alone(s):
 
 
 @options(None)
+def test_a_receiver_by_many_names_holds_up_its_own_alone(s):
+    """A name in other letters is no other host; other ways to write one are refused."""
+    silent, quick = Slow(b""), Receiver()
+    start(s, quick, "--webhook-allow", f"localhost:{silent.port}")
+    names = ["localhost"] + ["localhost"[:i] + "localhost"[i].upper() + "localhost"[i + 1:] for i in range(9)]
+    for name in names:
+        s.solve({**MATRICES, "webhook": {"url": f"http://{name}:{silent.port}/"}})
+    s.solve({**MATRICES, "webhook": {"url": quick.url()}})
+    quick.wait(1, seconds=5)
+    check(len(silent.held) == 1, len(silent.held))
+    host, port = "127.0.0.1", quick.port
+    for odd in (f"http:///{host}:{port}/", f"http:/{host}:{port}/", f"http://127.1:{port}/", f"http://{host}:0{port}/",
+                f"http://0x7f.0.0.1:{port}", f"http://2130706433:{port}/?x", f"http://%3127.0.0.1:{port}/"):
+        expect(s.post({**MATRICES, "webhook": {"url": odd}}), 422, "webhook_not_allowed")
+    for plain in (f"HTTP://{host}:{port}", f"http://{host}:{port}?x", f"http://{host}:{port}/%31"):
+        s.solve({**MATRICES, "webhook": {"url": plain}})
+    quick.wait(4)
+    silent.close()
+    quick.close()
+
+
+@options(None)
 def test_a_restart_forgets_none(s):
     receiver = Receiver(500)
     start(s, receiver)

@@ -27,7 +27,10 @@
 #define LIST_CLIENT(than, order)                                                                                       \
     "SELECT " JOB_COLUMNS " FROM job INDEXED BY job_by_client WHERE client = ?11 AND client <> '' AND id " than " ?1"  \
     " AND (?3 IS NULL OR status = ?3) " LIST_FILTER "ORDER BY id " order " LIMIT ?2"
-#define NOT_AT(place) " AND (" place " IS NULL OR substr(url, 1, length(" place ")) <> " place ")"
+/* Neither scheme nor host are of upper or lower case; what follows the place is no more of a host or port. */
+#define NOT_AT(place)                                                                                                  \
+    " AND (" place " IS NULL OR lower(substr(url, 1, length(" place "))) <> lower(" place ")"                          \
+    " OR instr('/?#', substr(url, length(" place ") + 1, 1)) = 0)"
 
 /* The job that is next: of the share whose turn it is. A share whose jobs have all waited longer than they may, which
  * nobody has said yet, is passed over. */

@@ -470,6 +470,28 @@ STORE_TEST(retention_goes_in_small_steps)
     place_end(&p);
 }
 
+/* What only begins like a place is another one. */
+STORE_TEST(whom_one_tells_nobody_else_tells)
+{
+    static const char *const URLS[] = {"http://10.0.0.15/a", "http://10.0.0.1:80/a", "http://10.0.0.1/a",
+                                       "HTTP://10.0.0.1"};
+    const char *except[] = {"http://10.0.0.1"};
+    place p;
+    webhook_due due;
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 4; i++) {
+        end_jobs(p.s, 1, URLS[i]);
+        if (i >= 2)
+            CHECK_INT(store_webhook_next(p.s, except, 1, &due), STORE_NOT_FOUND);
+        CHECK_INT(store_webhook_next(p.s, i < 2 ? except : NULL, i < 2, &due), STORE_OK);
+        CHECK_STR(due.url, URLS[i]);
+        free(due.url);
+        CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_TOLD, 0, 0), STORE_OK);
+    }
+    place_end(&p);
+}
+
 STORE_TEST(a_job_stays_until_somebody_was_told)
 {
     place p;
