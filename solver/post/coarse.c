@@ -257,8 +257,8 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
             row++;
         on.last = row;
         on.group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
-        if (scene->contacts[k].kind == UZ_OBSTACLE_BODY || !on.group || on.group->n_faces == 0)
-            continue;
+        if (scene->contacts[k].kind == UZ_OBSTACLE_BODY || !on.group || on.group->n_faces == 0 || on.first == on.last)
+            continue; /* without a row where supports hold all of the side */
         on.row_of = uz_alloc_zero(n, sizeof *on.row_of);
         on.sides = uz_alloc_zero(n, sizeof *on.sides);
         on.touching = uz_alloc_zero(n, sizeof *on.touching);

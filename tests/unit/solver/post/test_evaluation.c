@@ -358,6 +358,23 @@ TEST(a_deep_overlap_is_doubted)
     }
 }
 
+/* It has no row, and nothing to be doubted. */
+TEST(a_contact_that_supports_hold_all_of)
+{
+    for (int more = 0; more < 2; more++) {
+        uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){4, 2}, (int64_t[3]){4, 2});
+        body_hold(&s, "bottom", 0, 0, NAN);
+        body_load(&s, UZ_LOAD_TRACTION, "right", 0, -1, 0);
+        body_plane(&s, "bottom", (double[3]){0}, (double[3]){0, 1});
+        if (more)
+            body_plane(&s, "left", (double[3]){0}, (double[3]){1, 0});
+        uz_result *result = body_solve(&s, 1e-8);
+        CHECK_INT(result->m, more ? 2 : 0);
+        CHECK(!warning(result, "coarse_contact"));
+        clear(&s, result);
+    }
+}
+
 /* A plane, a circle and a ball below a block, whose bottom is to meet them, and above it. */
 TEST(an_obstacle_on_the_wrong_side_is_doubted)
 {
