@@ -45,7 +45,8 @@ typedef struct {
     double *pressure;  /* n_edges x moments: r_h, as resultants */
     double *lift;      /* n_nodes x 2: w */
     double sum, scale; /* of elements: int 1/2 |sigma_h - C eps(u_h)|^2; of the sizes of what it is made of */
-    double strain, complementary, inside;
+    double margin;     /* of the strain energy: what its integration may be off by */
+    double strain, complementary, inside, farthest; /* farthest: the largest displacement along an axis */
 } examination;
 
 static void examine_element(examination *x, const double *u, const double *stress, int64_t e);
@@ -69,31 +70,38 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     if (!out->residual || !x.resultant || !x.pressure || !x.lift)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check the stress of %lld elements",
                          (long long)mesh->n_elements);
+    for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
+        x.farthest = fmax(x.farthest, fabs(u[i]));
     for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++)
         examine_element(&x, u, stress + e * STRESSES, e);
-    const double load = status == UZ_OK ? work_of_loads(&x, scene, u, &status, err) : 0;
+    double load = status == UZ_OK ? work_of_loads(&x, scene, u, &status, err) : 0;
     if (status == UZ_OK) {
         out->primal = x.strain - load;
         out->dual = -x.complementary;
+        out->gap = x.margin + SUM_ROUNDING * x.scale;
+        const double rounding = out->gap;
         for (int64_t i = 0; i < body->n_edges; i++)
             examine_edge(&x, u, dof, i);
-        const double scale = x.scale + fabs(load), apart = out->primal - out->dual + out->defect - out->gap - x.sum;
+        const double scale = x.scale + fabs(load);
+        const double apart = out->primal - out->dual + out->defect - (out->gap - rounding) - x.sum;
         out->gap += x.sum;
         for (int64_t i = 0; i < body->n_edges; i++)
             look_at_lift(&x, u, i);
-        double lifted = 0, margin = 0;
+        double lifted = 0, margin = 0, strain = x.strain;
         for (int64_t e = 0; e < mesh->n_elements; e++)
             lifted += 2 * energy_of(&margin, &x, x.lift, false, e);
         out->lift = sqrt(lifted + 2 * margin);
-        out->norm = sqrt(2 * x.strain);
+        out->norm = sqrt(2 * fmax(0, x.strain - x.margin));
         if (lifted > 0) { /* of u_h + w: an admissible one has the larger energy than the minimum */
-            double strain = 0;
+            strain = x.margin = 0;
             for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
                 x.lift[i] += u[i];
             for (int64_t e = 0; e < mesh->n_elements; e++)
-                strain += energy_of(&margin, &x, x.lift, true, e);
-            out->primal = strain - work_of_loads(&x, scene, x.lift, &status, err);
+                strain += energy_of(&x.margin, &x, x.lift, true, e);
+            load = work_of_loads(&x, scene, x.lift, &status, err);
         }
+        out->primal = strain + x.margin - load + SUM_ROUNDING * (scale + strain + fabs(load));
+        out->dual -= SUM_ROUNDING * scale;
         out->inside = 100 * x.inside * sqrt(2 * fabs(x.complementary));
         if (!*out->fault && !(x.inside <= INSIDE))
             snprintf(out->fault, sizeof out->fault, "the stress is not in equilibrium within elements, by %.1e of it",
@@ -160,7 +168,8 @@ static void gap_along(double s[3], double lift[3], const examination *x, const d
 }
 
 /* The work of the gap that u_h leaves, and w where it is not >= 0 all along: its nodes are taken out, and the middle
- * one as far as makes the middle coefficient -sqrt(s_0 s_2), from where on the polynomial has no negative value. */
+ * one as far as makes the middle coefficient -sqrt(s_0 s_2), from where on the polynomial has no negative value. A node
+ * that a support holds goes along what is left to it. */
 static void examine_contact(examination *x, const double *u, const uz_bound_edge *edge, const double *pressure)
 {
     uz_bound_check_result *out = x->out;
@@ -173,27 +182,46 @@ static void examine_contact(examination *x, const double *u, const uz_bound_edge
         up[a] = fmax(0, -s[a] - (a == 1 ? sqrt(fmax(0, s[0]) * fmax(0, s[2])) : 0));
     const double nodal[3] = {up[0], up[2], (up[0] + 2 * fmax(up[1], (up[0] + up[2]) / 2) + up[2]) / 4};
     for (int a = 0; a < 3; a++) {
+        static const double AXIS[2][2] = {{1, 0}, {0, 1}};
+        const uz_body_model *model = x->body->model;
         const int64_t node = edge->node[a];
-        for (int c = 0; c < 2 && node >= 0 && nodal[a] > 0; c++) {
-            const double way = -nodal[a] * edge->normal[c];
-            if (x->body->model->dof[2 * node + c] >= 0 && fabs(way) > fabs(x->lift[2 * node + c]))
-                x->lift[2 * node + c] = way;
+        double way[2] = {0}, share = 0; /* the part of the normal along free dofs, and its square */
+        for (int k = 0; k < 2 && node >= 0 && nodal[a] > 0; k++) {
+            const double part = model->dof[2 * node + k] < 0 ? 0 : -uz_along_dof(model, node, k, edge->normal);
+            for (int c = 0; c < 2; c++)
+                way[c] += part * uz_along_dof(model, node, k, AXIS[c]);
+            share += part * part;
         }
+        for (int c = 0; c < 2 && share > 1e-6; c++)
+            if (fabs(nodal[a] * way[c] / share) > fabs(x->lift[2 * node + c]))
+                x->lift[2 * node + c] = nodal[a] * way[c] / share;
     }
 }
 
-/* w has to be what it is meant to be, but for rounding of places. */
+/* w has to be what it is meant to be, but for rounding of places, as far as that is nothing to the displacements: zero
+ * at supports, and out of the obstacle. */
 static void look_at_lift(examination *x, const double *u, int64_t i)
 {
     const uz_bound_edge *edge = &x->body->edge[i];
-    const double tolerance = 1e-12 * x->mesh->extent;
-    double s[3], lift[3], m[MOMENTS];
+    double s[3], lift[3], m[MOMENTS], size = 0, tolerance = fmin(1e-12 * x->mesh->extent, 1e-8 * x->farthest);
+    bool held = true;
+    for (int a = 0; a < 6; a++)
+        size = edge->node[a / 2] < 0 ? size : fmax(size, fabs(x->lift[2 * edge->node[a / 2] + a % 2]));
+    for (int k = 0; k < 2; k++) {
+        along_edge(lift, x->lift, edge->node, edge->axis[k]);
+        for (int a = 0; a < 3 && edge->held[k]; a++)
+            held = held && fabs(lift[a]) <= 1e-12 * size;
+    }
+    if (!*x->out->fault && !held)
+        snprintf(x->out->fault, sizeof x->out->fault, "what takes the answer out of the obstacle moves a support");
     if (edge->contact < 0)
         return;
     gap_along(s, lift, x, u, edge);
     means(m, lift, x->moments);
     for (int a = 0; a < x->moments; a++)
         x->out->gap += x->pressure[i * x->moments + a] * m[a];
+    for (int a = 0; a < 3; a++)
+        tolerance = fmax(tolerance, 1e-12 * (fabs(s[a]) + fabs(edge->gap[0]) + fabs(edge->gap[1])));
     for (int a = 0; a < 3; a++)
         s[a] += lift[a] + tolerance;
     const bool out_of_it = s[0] >= 0 && s[2] >= 0 && s[1] >= -sqrt(s[0] * s[2]) - tolerance;
@@ -409,7 +437,8 @@ static void examine_element(examination *x, const double *u, const double *stres
             work += volume * N[i / 2] * v[i] * x->body->force[2 * e + i % 2];
     }
     const double strain = energy_of(&margin, x, u, true, e);
-    x->sum += strain + complementary - work + margin + SUM_ROUNDING * (strain + fabs(complementary) + fabs(work));
+    x->sum += strain + complementary - work;
+    x->margin += margin;
     x->scale += strain + fabs(complementary) + fabs(work);
     x->strain += strain;
     x->complementary += complementary;

@@ -5,14 +5,16 @@
 #include "core/error.h"
 #include "scene/scene.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Relative to the body's extent: how far a middle may be off the middle of its side, and a point from an obstacle that
- * it touches. */
+ * it touches: displacements may be small, too. */
 #define ROUNDING 1e-13
+#define TOUCHING (16 * DBL_EPSILON)
 
 typedef struct {
     uz_bound_body *body;
@@ -251,7 +253,7 @@ static void take_contacts(survey *x)
                 const double *at = x->mesh->xyz + 2 * edge->node[a];
                 const double gap = (at[0] - contact->point[0]) * n[0] + (at[1] - contact->point[1]) * n[1];
                 edge->normal[a] = -n[a];
-                edge->gap[a] = fabs(gap) < ROUNDING * x->mesh->extent ? 0 : gap;
+                edge->gap[a] = fabs(gap) < TOUCHING * x->mesh->extent ? 0 : gap;
             }
             if (!edge->held[0]) { /* one unknown along the normal makes a row of one entry */
                 edge->axis[0][0] = edge->axis[1][1] = -n[0];

@@ -257,6 +257,66 @@ TEST(check_trusts_nobody)
     uz_scene_clear(&scene);
 }
 
+/* Held along a slide and stopped by an obstacle, a side has one way out of it, whatever the obstacle's normal is: here
+ * a bottom that rests is moved into it at one node, and only the opposite of that is zero at the supports. */
+TEST(what_leaves_the_obstacle_keeps_to_the_supports)
+{
+    uz_scene scene = box_scene(60, 20, 6, 2);
+    snprintf(scene.box.element, sizeof scene.box.element, "quad8");
+    add_support(&scene, "top", NAN, 0);
+    scene.supports[scene.n_supports++] = (uz_support){.kind = UZ_SUPPORT_NORMAL, .on = "bottom", .normal = {0.8, 0.6}};
+    add_load(&scene, "bottom", 1, -1);
+    add_plane(&scene, "bottom", 0, 0, 0, 1);
+    uz_result *result = answer(&scene, false);
+    uz_body_model model;
+    uz_bound_body body;
+    uz_bound_check_result moved, alone;
+    uz_qp qp;
+    uz_error err = {0};
+    int64_t *dof;
+    CHECK(uz_body_model_outline(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
+    CHECK(uz_bound_dual_problem(&qp, &dof, &body, NULL, &err) == UZ_OK);
+    double *stress = zeros(model.mesh.n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3);
+    double *u = zeros(2 * model.mesh.n_nodes), *bump = zeros(2 * model.mesh.n_nodes);
+    int64_t middle = 0;
+    while (fabs(model.mesh.xyz[2 * middle] - 25) > 1e-9 || model.mesh.xyz[2 * middle + 1] > 0)
+        middle++;
+    bump[2 * middle] = 0.6e-3;
+    bump[2 * middle + 1] = -0.8e-3;
+    for (int64_t i = 0; i < 2 * model.mesh.n_nodes; i++)
+        u[i] = result->u[i] + bump[i];
+    CHECK(fabs(result->u[2 * middle]) < 1e-12 && fabs(result->u[2 * middle + 1]) < 1e-12);
+    CHECK(uz_bound_check(&alone, &body, &scene, dof, qp.K.cols, bump, stress, &err) == UZ_OK);
+    CHECK(uz_bound_check(&moved, &body, &scene, dof, qp.K.cols, u, stress, &err) == UZ_OK);
+    CHECK_STR(moved.fault, "");
+    CHECK_REL(moved.lift, alone.norm, 1e-6);
+    free(moved.residual);
+    free(alone.residual);
+    free(stress);
+    free(bump);
+    free(u);
+    free(dof);
+    uz_qp_clear(&qp);
+    uz_result_free(result);
+    uz_bound_body_clear(&body);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&scene);
+}
+
+/* A held corner stands as far in the obstacle as the body moves, which is next to nothing. */
+TEST(small_displacements_excuse_nothing)
+{
+    uz_scene scene = paper_scene(6, 2);
+    for (int k = 0; k < 2; k++)
+        for (int c = 0; c < 2; c++)
+            scene.loads[k].v[c] *= 1e-8;
+    scene.contacts[0].point[1] = 1e-12;
+    const uz_guarantee g = bound_of(&scene);
+    CHECK_MSG(!g.proved && strstr(g.why, "keep it there"), "%g %s", g.relative, g.why);
+    uz_scene_clear(&scene);
+}
+
 TEST(what_is_not_proved_is_named)
 {
     static const char *const WHY[] = {"springs", "node", "not straight", "single nodes", "revolution"};
