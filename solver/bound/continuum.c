@@ -20,8 +20,8 @@ typedef struct {
     uz_bound_body *body;
     const uz_mesh *mesh;
     const uz_scene *scene;
-    bool *marked;   /* n_nodes: of the group at hand; afterwards those that are on none of its edges */
-    int64_t *found; /* n_edges: those of the group */
+    unsigned char *marked; /* n_nodes: of the group at hand 1, on one of its edges 2 */
+    int64_t *found;        /* n_edges: those of the group */
     int64_t n_found;
 } survey;
 
@@ -156,34 +156,40 @@ static bool has_straight_sides(const survey *x)
     return !*x->body->why;
 }
 
-/* The edges of a group -> found: of a group of edges those that it names, else all whose nodes are in it, as these are
- * what its nodes determine. Are they all of it? A node alone is nothing to the continuum. */
+/* The edges of a group -> found: of a group of edges those that it names. Its nodes determine more: all edges between
+ * them, of which those within the body are taken only where the border alone does not reach all of them. A diagonal
+ * that cuts off a corner between two sides is no part of these, and what is held by less is bounded all the same. Are
+ * the edges all of it? A node alone is nothing to the continuum. */
 static bool find_group(survey *x, const char *name)
 {
     const uz_bound_body *body = x->body;
     const uz_group *group = uz_mesh_group(x->mesh, name, "", NULL);
-    bool all = true;
+    bool all = false;
     x->n_found = 0;
     if (!group)
         return false;
     const int64_t count = uz_group_node_count(x->mesh, group);
     for (int64_t i = 0; i < count; i++)
-        x->marked[uz_group_node_at(group, i)] = true;
+        x->marked[uz_group_node_at(group, i)] = 1;
     for (int64_t i = 0; i < group->n_faces && group->kind == UZ_GROUP_FACES; i++)
         x->found[x->n_found++] = body->edge_of[4 * group->face[i].element + group->face[i].side];
-    for (int64_t i = 0; i < body->n_edges && group->kind != UZ_GROUP_FACES; i++) {
-        const int64_t *node = body->edge[i].node;
-        if (x->marked[node[0]] && x->marked[node[1]] && (node[2] < 0 || x->marked[node[2]]))
-            x->found[x->n_found++] = i;
+    for (int inner = 0; inner < 2 && !all; inner++) {
+        for (int64_t i = 0; i < body->n_edges && group->kind != UZ_GROUP_FACES; i++) {
+            const int64_t *node = body->edge[i].node;
+            if ((body->edge[i].element[1] >= 0) == (inner == 1) && x->marked[node[0]] && x->marked[node[1]] &&
+                (node[2] < 0 || x->marked[node[2]]))
+                x->found[x->n_found++] = i;
+        }
+        for (int64_t i = 0; i < x->n_found; i++)
+            for (int a = 0; a < 3; a++)
+                if (body->edge[x->found[i]].node[a] >= 0)
+                    x->marked[body->edge[x->found[i]].node[a]] = 2;
+        all = true;
+        for (int64_t i = 0; i < count; i++)
+            all = all && x->marked[uz_group_node_at(group, i)] == 2;
     }
-    for (int64_t i = 0; i < x->n_found; i++)
-        for (int a = 0; a < 3; a++)
-            if (body->edge[x->found[i]].node[a] >= 0)
-                x->marked[body->edge[x->found[i]].node[a]] = false;
-    for (int64_t i = 0; i < count; i++) {
-        all = all && !x->marked[uz_group_node_at(group, i)];
-        x->marked[uz_group_node_at(group, i)] = false;
-    }
+    for (int64_t i = 0; i < count; i++)
+        x->marked[uz_group_node_at(group, i)] = 0;
     return all && x->n_found > 0;
 }
 

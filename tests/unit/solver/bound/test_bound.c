@@ -317,6 +317,33 @@ TEST(small_displacements_excuse_nothing)
     uz_scene_clear(&scene);
 }
 
+/* All nodes of the border, and the border: diagonals that cut off corners between them are not held. */
+TEST(nodes_hold_the_border_that_they_are_on)
+{
+    double least[2];
+    for (int k = 0; k < 2; k++) {
+        uz_scene scene = box_scene(60, 20, 3, 2);
+        snprintf(scene.box.element, sizeof scene.box.element, "tri3");
+        body_give_mesh(&scene, NULL);
+        uz_given_mesh *mesh = &scene.given;
+        uz_given_group *group = &mesh->groups[mesh->n_groups++];
+        *group = (uz_given_group){.name = "rim", .node = calloc((size_t)mesh->n_nodes, sizeof *group->node)};
+        for (int64_t a = 0; a < mesh->n_nodes; a++) {
+            const double *x = mesh->xyz + 2 * a;
+            if (!(x[0] > 1e-9 && x[0] < 60 - 1e-9 && x[1] > 1e-9 && x[1] < 20 - 1e-9))
+                group->node[group->n_nodes++] = a;
+        }
+        add_support(&scene, k == 0 ? "boundary" : "rim", 0, 0);
+        add_load(&scene, "all", 1, -2);
+        scene.loads[0].kind = UZ_LOAD_BODY_FORCE;
+        const uz_guarantee g = bound_of(&scene);
+        CHECK_MSG(g.proved, "%s", g.why);
+        least[k] = g.dual;
+        uz_scene_clear(&scene);
+    }
+    CHECK_REL(least[1], least[0], 1e-12);
+}
+
 TEST(what_is_not_proved_is_named)
 {
     static const char *const WHY[] = {"springs", "node", "not straight", "single nodes", "revolution"};
