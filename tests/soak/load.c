@@ -3,7 +3,8 @@
  * usage: load PORT CLIENTS SECONDS BODY_FILE [PREFER]
  * Each client posts the body to /v1/jobs, waits for the reply and posts again, until the time is over. PREFER is the
  * value of a Prefer header field ("wait=30": the reply comes when the job has ended). Latencies are from the first byte
- * sent to the last byte received. Exit status 1 if a client met anything but 200 and 202. */
+ * sent to the last byte received. A client connects again where a reply announces that its connection ends: one that
+ * was waited for long does. Exit status 1 if a client met anything but 200 and 202. */
 #include <errno.h>
 #include <fcntl.h>
 #include <netinet/in.h>
@@ -23,6 +24,7 @@ typedef struct {
     int fd;
     size_t sent, got;
     double begun;
+    bool closes; /* the last reply said that the connection ends with it */
     char in[ROOM];
 } client;
 
@@ -89,7 +91,7 @@ static size_t reply_size(const client *c)
     return c->got >= all ? all : 0;
 }
 
-static void note(load *l, const client *c)
+static void note(load *l, client *c)
 {
     if (l->count == l->capacity) {
         l->capacity = l->capacity ? 2 * l->capacity : 65536;
@@ -101,6 +103,7 @@ static void note(load *l, const client *c)
     int status = atoi(c->in + 9);
     l->ended += status == 200;
     l->refused += status != 200 && status != 202;
+    c->closes = strcasestr(c->in, "\r\nconnection: close") != NULL;
 }
 
 /* Sends and receives what can be done now; false once the connection is broken. */
@@ -124,18 +127,22 @@ static bool go_on(load *l, client *c, bool again)
             continue;
         note(l, c);
         c->sent = c->got = 0;
-        if (!again)
+        if (!again || c->closes)
             return false;
     }
 }
 
-static void run(load *l, client *clients, int n, double seconds)
+static void watch(int poll, client *c)
+{
+    epoll_ctl(poll, EPOLL_CTL_ADD, c->fd, &(struct epoll_event){.events = EPOLLIN | EPOLLOUT | EPOLLET, .data.ptr = c});
+}
+
+static void run(load *l, client *clients, int n, int port, double seconds)
 {
     int poll = epoll_create1(0), open = n;
     struct epoll_event events[64];
     for (int i = 0; i < n; i++)
-        epoll_ctl(poll, EPOLL_CTL_ADD, clients[i].fd,
-                  &(struct epoll_event){.events = EPOLLIN | EPOLLOUT | EPOLLET, .data.ptr = &clients[i]});
+        watch(poll, &clients[i]);
     double end = now() + seconds;
     while (open > 0 && now() < end + 60) {
         int found = epoll_wait(poll, events, 64, 1000);
@@ -145,8 +152,14 @@ static void run(load *l, client *clients, int n, double seconds)
             size_t before = l->count;
             if (c->fd < 0 || go_on(l, c, again))
                 continue;
-            l->broken += again || l->count == before;
+            const bool announced = c->closes;
+            l->broken += (again && !announced) || l->count == before;
             close(c->fd);
+            c->closes = false;
+            if (again && announced && connect_client(c, port)) {
+                watch(poll, c);
+                continue;
+            }
             c->fd = -1;
             open--;
         }
@@ -170,7 +183,7 @@ int main(int argc, char **argv)
             return 1;
         }
     double begun = now();
-    run(&l, clients, n, atof(argv[3]));
+    run(&l, clients, n, atoi(argv[1]), atof(argv[3]));
     double took = now() - begun;
     qsort(l.latency, l.count, sizeof *l.latency, by_value);
     double p50 = l.count ? l.latency[l.count / 2] : 0, p99 = l.count ? l.latency[l.count - 1 - l.count / 100] : 0;
