@@ -239,12 +239,12 @@ guard: deps-test ## instructions of small problems against those kept in tests/d
 	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/guard
 	@$(PYTHON) -B tests/guard/guard.py $(BUILD) $(if $(KEEP),--keep)
 
-unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library $(PEER_LAB)
+unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB)
 
 test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 	@tests/run.sh $(BUILD) unit $(FILTER)
 
-test-api: all $(PRELOADS) $(BUILD)/library $(PEER_LAB) ## the tests that drive the real daemon and client; FILTER=name runs some
+test-api: all $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB) ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
 .PHONY: test-browser screenshots

@@ -41,6 +41,12 @@ def test_workers_killed_under_load(s):
 
 
 @options(None)
+def test_a_week(s):
+    figures = clean(scenarios.week(s.build, 4))
+    check(figures["jobs"] > 10, figures)
+
+
+@options(None)
 def test_slow_clients(s):
     figures = clean(scenarios.slow_clients(s.build, 200, 2))
     check(figures["asked"] > 10, figures)

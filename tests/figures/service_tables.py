@@ -62,6 +62,10 @@ SHOWN = {
     "500 x kill -9 of a worker, 16 posting clients": (
         lambda f: f"{count(f['kills'])} x kill -9 of a process that solves, with 16 clients posting, {count(f.get('acknowledged'))} jobs acknowledged",
         lambda f: none_of(f, "lost", "twice", "stuck")),
+    "a mixed load of ten minutes: kills of workers, dismissals, reloads": (
+        lambda f: f"{count(f['jobs'])} jobs with {count(f['killed'])} kills of processes that solve, {count(f['dismissed'])} dismissals "
+                  f"at any moment, {count(f['reloaded'])} reloads",
+        lambda f: none_of(f, "errors", "stuck", "twice", "broken") + f"; megabytes at each quarter {f['memory_mb']}"),
     "200 x SIGTERM under load": (lambda f: f"{count(f['cycles'])} x SIGTERM under load", lambda f: "all exit 0" if not f["wrong_exit"] else none_of(f, "wrong_exit")),
     "1,000 power losses, faults at every write, 1,000 damaged files": (
         lambda f: f"{count(f.get('power_losses'))} simulated power losses; a full disk or an I/O error at every write; {count(f.get('damaged_files'))} damaged database files",

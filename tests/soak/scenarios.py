@@ -170,6 +170,82 @@ def settle(s, acknowledged, seconds=300):
     return lost, stuck, twice
 
 
+class Chaos(threading.Thread):
+    """What befalls a service: processes die, jobs of all sizes come and are dismissed at any moment, the tokens are read
+    again, people look."""
+
+    def __init__(self, s, halt, seed, token):
+        super().__init__()
+        self.s, self.halt, self.chance, self.token, self.done, self.errors = s, halt, random.Random(seed), token, {}, []
+
+    def run(self):
+        deeds = [(self.killed, 3), (self.dismissed, 4), (self.reloaded, 1), (self.looked, 2)]  # and how often each comes
+        while not self.halt.wait(self.chance.uniform(0.02, 0.3)):
+            deed = self.chance.choices([one for one, _ in deeds], [weight for _, weight in deeds])[0]
+            try:
+                deed()
+                self.done[deed.__name__] = self.done.get(deed.__name__, 0) + 1
+            except Exception as why:  # whatever it was, it is told at the end
+                self.errors.append(f"{deed.__name__}: {why!r}")
+
+    def killed(self):
+        kill_worker(self.s, self.chance)
+
+    def dismissed(self):
+        body = self.chance.choice((service.ENDLESS, service.SCENE, LARGE, LARGE))
+        job = self.s.post(body, self.token).json["id"]
+        self.halt.wait(self.chance.uniform(0, 1.5))
+        reply = self.s.request("DELETE", f"/v1/jobs/{job}", headers=self.token)
+        service.check(reply.status in (200, 204), reply)
+
+    def reloaded(self):
+        self.s.process.send_signal(signal.SIGHUP)
+
+    def looked(self):
+        for path in ("/metrics", "/healthz", "/v1/jobs?limit=20", "/v1/factors"):
+            service.expect(self.s.get(path, **self.token), 200)
+
+
+def week(build, seconds, clients=8):
+    """A mixed load while all that happens in a week happens: jobs that are waited for get answers, and memory does not grow."""
+    s = service.Service(build, "--max-attempts", "1000", "--log-level", "warn", "--max-client-rate", "0", "--keep-jobs", "3000",
+                        "--cache", "64M")
+    halt, memory, figures = threading.Event(), [], {"jobs": 0, "refused": 0, "broken": 0}
+    token = {"Authorization": "Bearer 0123456789abcdef0123456789abcdef"}
+    try:
+        tokens, small = os.path.join(s.folder, "tokens"), os.path.join(s.folder, "small.json")
+        pathlib.Path(tokens).write_text(f"all admin {token['Authorization'].split()[1]}\n", encoding="ascii")
+        os.chmod(tokens, 0o600)
+        pathlib.Path(small).write_bytes(BODY)
+        s.options += ("--token-file", tokens)
+        s.start()
+        chaos = [Chaos(s, halt, seed, token) for seed in range(3)]
+        for one in chaos:
+            one.start()
+        for _ in range(4):
+            got = load(build, s.port, clients, seconds / 4, small, f"wait=30\r\nAuthorization: {token['Authorization']}")
+            for key, of in (("jobs", "requests"), ("refused", "refused"), ("broken", "broken")):
+                figures[key] += got[of]
+            memory.append(resident(s))
+        halt.set()
+        for one in chaos:
+            one.join()
+            for name, count in one.done.items():
+                figures[name] = figures.get(name, 0) + count
+            for why in one.errors:
+                print("#", why)
+        _, figures["stuck"], figures["twice"] = settle(s, [])
+        failed = rows(s.db, "SELECT count(*) FROM job WHERE status = 3")[0][0]
+        figures["errors"] = failed + sum(len(one.errors) for one in chaos)
+        figures["memory_mb"] = "/".join(f"{one:.0f}" for one in memory)
+        figures["died_at_work"] = len(s.events("process_died"))
+        figures["wrong_exit"] = s.end()
+        return figures
+    finally:
+        halt.set()
+        s.stop()
+
+
 # ---------------------------------------------------------------- clients that are slow, jobs that are cancelled
 
 def slow_clients(build, clients, seconds):

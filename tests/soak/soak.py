@@ -41,6 +41,7 @@ RUNS = [
     ("500 x kill -9, 16 posting clients", lambda b: scenarios.endings(b, 500, signal.SIGKILL)),
     ("200 x SIGTERM under load", lambda b: scenarios.endings(b, 200, signal.SIGTERM)),
     ("500 x kill -9 of a worker, 16 posting clients", lambda b: scenarios.killed_workers(b, 500)),
+    ("a mixed load of ten minutes: kills of workers, dismissals, reloads", lambda b: scenarios.week(b, 600)),
     ("1,000 power losses, faults at every write, 1,000 damaged files", lambda b: unit(b, "test_store_faults", 10)),
     ("1,000 slow clients, /healthz", lambda b: scenarios.slow_clients(b, 1000, 20)),
     ("2,000 event streams, 1,000 long polls", streams.crowds),
