@@ -31,6 +31,7 @@ void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_sc
 #define UZ_MOST_SLIDING 0.05
 #define UZ_WARN_SLIDING "sliding"
 #define UZ_WARN_COARSE  "coarse_contact"
+#define UZ_WARN_OVERLAP "overlap"
 
 /* *sliding: uz_geometry.sliding of an answer with its contacts as they are before anything moves; approach: of
  * overlap.h. NaN of a model at a place. */

@@ -22,10 +22,11 @@ typedef struct {
 uz_status uz_functional_make(uz_functional *out, const uz_quantity *quantity, const char *where,
                              const uz_body_model *model, const uz_scene *scene, const uz_result *answer,
                              const double *h, const double *prescribed, uz_error *err);
-/* depth (m): how deep each row's obstacle stands, in the mean, in the sides of which all nodes press on it. Rows keep
- * nodes out of a round obstacle, and sides between them are chords. 0 of contacts between two. UZ_ERR_MEMORY. */
-uz_status uz_contact_depth(double *depth, const uz_body_model *model, const uz_scene *scene, const uz_result *answer,
-                           uz_error *err);
+/* depth (m): how deep each row's obstacle stands, in the mean, in the surface whose sides' nodes all press on it. Rows
+ * keep nodes out of a round obstacle, and sides between them are chords: of the obstacle, and of the body where that is
+ * round itself, of which bulge (m) is what its surface stands out of them. 0 of contacts between two. UZ_ERR_MEMORY. */
+uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *model, const uz_scene *scene,
+                           const uz_result *answer, uz_error *err);
 void uz_functional_clear(uz_functional *functional);
 
 #endif

@@ -358,7 +358,7 @@ static void look_at_overlap(const doubts *d, int64_t k)
             explained = explained || strcmp(d->out->warnings[i].code, REASONS[j]) == 0;
     if (o->depth > fmax(MOST_OVERLAP * approach, 1e-9 * d->model->mesh.extent) && !explained)
         warn(
-            d->out, "overlap", o->depth / (approach > 0 ? approach : o->side),
+            d->out, UZ_WARN_OVERLAP, o->depth / (approach > 0 ? approach : o->side),
             "the surfaces of contact %lld stand %.2g deep in each other, with an approach of %.2g: what is between the "
             "rows is not resisted; refine there",
             (long long)k, o->depth, approach);

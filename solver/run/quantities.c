@@ -48,9 +48,9 @@ static double of_product(const uz_mesh *mesh)
 typedef struct {
     const uz_quantity_work *work;
     const uz_result *answer;
-    double *p;               /* d */
-    double *h, *y, *g;       /* rows of the dual */
-    double *of_rows, *depth; /* the model's rows: y; uz_contact_depth; ... */
+    double *p;                       /* d */
+    double *h, *y, *g;               /* rows of the dual */
+    double *of_rows, *depth, *bulge; /* the model's rows: y; uz_contact_depth; ... */
     double *slip;            /* ... how far the adjoint leaves those that do not press from where it holds the others */
     int64_t *row_of;         /* n_nodes: a row that stands at the node, -1: none does */
     bool *active, *pressing; /* rows of the dual; the model's */
@@ -69,14 +69,15 @@ static uz_status begin(adjoint *x, uz_error *err)
     x->g = uz_alloc(m, sizeof *x->g);
     x->of_rows = uz_alloc(model->m, sizeof *x->of_rows);
     x->depth = uz_alloc(model->m, sizeof *x->depth);
+    x->bulge = uz_alloc(model->m, sizeof *x->bulge);
     x->slip = uz_alloc(model->m, sizeof *x->slip);
     x->row_of = uz_alloc(model->mesh.n_nodes, sizeof *x->row_of);
     x->active = uz_alloc_zero(m, sizeof *x->active);
     x->pressing = uz_alloc_zero(model->m, sizeof *x->pressing);
     x->z = uz_alloc(n, sizeof *x->z);
     x->w = uz_alloc(n, sizeof *x->w);
-    if (!x->p || !x->h || !x->y || !x->g || !x->of_rows || !x->depth || !x->slip || !x->row_of || !x->active ||
-        !x->pressing || !x->z || !x->w)
+    if (!x->p || !x->h || !x->y || !x->g || !x->of_rows || !x->depth || !x->bulge || !x->slip || !x->row_of ||
+        !x->active || !x->pressing || !x->z || !x->w)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes",
                        (long long)model->mesh.n_nodes);
     x->of_product = of_product(&model->mesh);
@@ -86,7 +87,7 @@ static uz_status begin(adjoint *x, uz_error *err)
             x->row_of[model->info.contact_node[i]] = i;
     uz_status status = uz_free_strains(&x->free_strain, model, x->work->scene, err);
     if (status == UZ_OK)
-        status = uz_contact_depth(x->depth, model, x->work->scene, x->answer, err);
+        status = uz_contact_depth(x->depth, x->bulge, model, x->work->scene, x->answer, err);
     if (status == UZ_OK)
         status = uz_mesh_error_energy(&x->own_error, model, x->free_strain, x->answer->u, err);
     return status;
@@ -94,7 +95,7 @@ static uz_status begin(adjoint *x, uz_error *err)
 
 static void end(adjoint *x)
 {
-    double *room[] = {x->p, x->h, x->y, x->g, x->of_rows, x->depth, x->slip, x->z, x->w, x->free_strain};
+    double *room[] = {x->p, x->h, x->y, x->g, x->of_rows, x->depth, x->bulge, x->slip, x->z, x->w, x->free_strain};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     free(x->active);
@@ -195,12 +196,13 @@ static uz_status solve(adjoint *x, bool *solved, const uz_functional *of, uz_err
     return status;
 }
 
-/* What obstacles that stand in sides between their nodes come to, by the adjoint's reactions. */
-static double depth_shift(const adjoint *x, const uz_functional *of)
+/* What obstacles that stand in sides between their nodes come to, by the adjoint's reactions; or sides in what they
+ * stand for. */
+static double depth_shift(const adjoint *x, const uz_functional *of, const double *depth)
 {
     double sum = 0;
     for (int64_t i = 0; i < x->work->model->m; i++)
-        sum += x->depth[i] * x->of_rows[i];
+        sum += depth[i] * x->of_rows[i];
     return of->times * sum;
 }
 
@@ -266,11 +268,11 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
         return status;
     for (int64_t i = 0; i < n; i++)
         length = hypot(length, x->z[i]);
-    const double depth = depth_shift(x, of);
+    const double depth = depth_shift(x, of, x->depth), bulge = depth_shift(x, of, x->bulge);
     const double shift = (both[0] - both[1]) / (4 * scale),
                  square = fmax(0, 0.5 * (both[0] + both[1]) - x->own_error) / (scale * scale);
     out->mesh = OF_ESTIMATE * fabs(shift) + x->of_product * sqrt(x->own_error * square) + OF_DEPTH * fabs(depth) +
-                OF_END * end_error(x) + of->blur;
+                fabs(bulge) + OF_END * end_error(x) + of->blur;
     /* where z is a rigid motion, of forces that are in balance, the residual at free nodes is what is left */
     out->equations = sqrt(2 * fmax(0, norm)) * x->answer->summary.certificate.absolute_error +
                      length * x->answer->summary.certificate.residual.e1;
@@ -311,6 +313,9 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
         for (int k = 0; k < e->n_warnings && !out->why[0]; k++)
             if (strcmp(e->warnings[k].code, UZ_WARN_COARSE) == 0)
                 snprintf(out->why, sizeof out->why, "the mesh can't tell how wide the contact is (coarse_contact)");
+        for (int k = 0; k < e->n_warnings && !out->why[0] && answer->summary.active == 0; k++)
+            if (strcmp(e->warnings[k].code, UZ_WARN_OVERLAP) == 0)
+                snprintf(out->why, sizeof out->why, "surfaces stand in each other, and no row of a contact presses");
         if (!work->dual && !out->why[0])
             snprintf(out->why, sizeof out->why, "no rows are proved to hold the body");
         if (status == UZ_OK && !out->why[0])

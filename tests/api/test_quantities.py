@@ -2,6 +2,7 @@
 # not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
+import math
 import os
 import pathlib
 import subprocess
@@ -13,6 +14,7 @@ from service import check, expect
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
 import generated_quantities  # noqa: after its place is known
+from two_bodies import body  # noqa
 
 WAIT = {"Prefer": "wait=60"}
 # A block that a support presses on a cylinder.
@@ -100,6 +102,35 @@ def test_intervals_of_what_is_zero_have_zero_in_them(s):
                        "quantities": [{"quantity": "reaction", "on": "bottom", "direction": [0, 1]}]}
             one = solved(s, request)["quantities"][0]
             check(one["low"] <= 0 <= one["high"] and one["high"] - one["low"] < 1e-9, element, cells, one)
+
+
+def test_facets_of_a_hole_stand_for_its_circle(s):
+    """A sector of a plate on a pin too thick for its hole: chords of both circles are alike, and the pin is in none of them."""
+    found, turn = [], math.pi / 4
+    for kind, cells in (("quad4", [6, 5]), ("quad4", [10, 5]), ("tri3", [9, 6]), ("quad8", [64, 24])):
+        place = lambda x, y: ((2 - y) * math.sin(turn * (1 - 2 * x)), (2 - y) * math.cos(turn * (1 - 2 * x)))
+        request = body([kind], [cells], [place], {"hole": [(0, "top")], "outer": [(0, "bottom")]},
+                       model="plane_strain", materials=[{"on": "all", "young": 1000, "poisson": 0.3}],
+                       supports=[{"on": "outer", "ux": 0, "uy": 0}],
+                       contacts=[{"on": "hole", "obstacle": {"circle": {"center": [0, 0], "radius": 1.001}}}])
+        found.append(solved(s, {**request, "quantities": [{"quantity": "strain_energy"}, {"quantity": "contact.force"}]})["quantities"])
+    fine = found.pop()
+    for coarse in found:
+        for one, true in zip(coarse, fine):
+            check(one["low"] < true["value"] < one["high"], one, true)
+
+
+def test_what_no_row_sees_has_no_interval(s):
+    """A ridge amid the nodes of a coarse body, which alone look for contact: the two overlap, and nothing presses."""
+    def ridge(x, y):
+        return 3 * x, y - 1 + 0.05 * y * max(0, 1 - 6 * abs(x - 0.5))
+    groups = {"low": [(0, "top")], "high": [(1, "bottom")], "base": [(0, "bottom")], "head": [(1, "top")]}
+    request = body(["quad4", "quad4"], [[36, 6], [3, 2]], [ridge, lambda x, y: (3 * x, y + 0.01)], groups, model="plane_strain",
+                   materials=[{"on": "all", "young": 1000, "poisson": 0.3}], supports=[{"on": g, "ux": 0, "uy": 0} for g in ("base", "head")],
+                   contacts=[{"on": "high", "with": "low", "discretization": "nodes"}])
+    summary = solved(s, {**request, "quantities": [{"quantity": "contact.force"}, {"quantity": "strain_energy"}]})
+    check(summary["contact"]["active"] == 0 and summary["warnings"][-1]["code"] == "overlap", summary["warnings"])
+    check(all(one["low"] is None and "stand in each other" in one["why"] for one in summary["quantities"]), summary["quantities"])
 
 
 def test_cells_are_chosen_for_a_quantity(s):
