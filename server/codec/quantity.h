@@ -2,7 +2,8 @@
  * named is what schemas/summary.json says is a number, so that a new entry there can be asserted at once.
  *
  * A number in an array is named by its index from 0, a warning's value by its code ("warnings.large_strain"; 0 where
- * that warning was not given), a quantity's by its name ("quantities.contact_force_top"). An array's own name is the number of its items: "warnings". */
+ * that warning was not given), a quantity's by its name ("quantities.contact_force_top"). An array's own name is the
+ * number of its items: "warnings". */
 #ifndef SERVER_CODEC_QUANTITY_H
 #define SERVER_CODEC_QUANTITY_H
 
