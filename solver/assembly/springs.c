@@ -1,5 +1,6 @@
-/* springs.c: elastic ground. The stiffness of a group is its total, spread over its faces by area, over elements by
- * volume, over the nodes that were given equally: a finer mesh has the same ground. */
+/* springs.c: elastic ground. The stiffness of a group is its total, spread over its faces by area. Forces
+ * are spread likewise, over elements by volume, and over the nodes that were given equally: a finer mesh has the same.
+ */
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
@@ -9,7 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* w: what each node has of a side's area, or of an element's volume; returns how many nodes there are. */
+/* w: what each node has of a side's area (positive: of springs), or of an element's volume; returns how many nodes
+ * there are. */
 static int weigh(double *w, int64_t *node, const uz_body_model *model, const uz_group *group, int64_t i, bool positive)
 {
     double xyz[3 * UZ_ELEMENT_NODES], f[UZ_ELEMENT_DOFS] = {0};
@@ -30,7 +32,7 @@ static int weigh(double *w, int64_t *node, const uz_body_model *model, const uz_
     uz_element_add_body_force(f, &element, one);
     for (int a = 0; a < count; a++) { /* corners of quadratic elements have less than nothing */
         node[a] = all[a];
-        w[a] = positive ? uz_element_volume(&element) / count : f[a * model->mesh.dim];
+        w[a] = f[a * model->mesh.dim];
     }
     return count;
 }
