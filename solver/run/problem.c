@@ -52,10 +52,12 @@ static uz_status check_quantity(const uz_problem *problem, int64_t i, uz_error *
     char where[UZ_QUANTITY_POINTER];
     if (problem->kind != UZ_PROBLEM_SCENE)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/quantities", "quantities are of scenes");
+    if (contact && scene->n_contacts == 0)
+        return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "quantity"),
+                       "the scene has no contacts that it could be of: give it some, or leave the quantity out");
     if (!has_name(scene, q->kind, q->on))
         return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "on"), "no %s \"%.63s\"",
-                       contact && q->on[0]               ? "contact is on"
-                       : contact                         ? "contact is there for"
+                       contact                           ? "contact is on"
                        : q->kind == UZ_QUANTITY_REACTION ? "support is on"
                                                          : "group is called",
                        q->on);

@@ -166,6 +166,7 @@ def test_refusals(s):
     refused({**HERTZ, "solver": {"accuracy": {"quantity": "contact.force"}}}, "/solver/accuracy", "relative")
     refused({**service.MATRICES, "quantities": [{"quantity": "strain_energy"}]}, "/quantities", "not allowed")
     failed({**HERTZ, "quantities": [{"quantity": "contact.force", "on": "top"}]}, "/quantities/0/on")
+    failed({"problem": {**HERTZ["problem"], "contacts": []}, "quantities": [{"quantity": "contact.force"}]}, "/quantities/0/quantity")
     failed({**HERTZ, "solver": {"accuracy": {"quantity": "reaction", "on": "bottom", "direction": [0, 1], "relative": 0.1}}},
            "/solver/accuracy/on")
 
