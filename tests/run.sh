@@ -12,7 +12,7 @@ if [[ $filter == test_* ]]; then
     if [[ $filter == *.* ]]; then filter=${filter#*.}; else filter=; fi
 fi
 work=$(mktemp -d)
-log=$work/log
+log=$work/log limit=600
 trap 'rm -rf "$work"' EXIT
 : >"$log"
 
@@ -31,12 +31,14 @@ run_one() { # KIND NAME COMMAND...
     local kind=$1 name=$2 out=$work/$1.$2.out status TIMEFORMAT='%U %S' user system
     shift 2
     SECONDS=0
-    { time "$@" >"$out" 2>&1; } 2>"$out.time"
+    { time timeout -k 10 "$limit" "$@" >"$out" 2>&1; } 2>"$out.time"
     status=$?
     read -r user system < <(tail -1 "$out.time")
-    if [ $status -ne 0 ] && ! grep -q '^not ok ' "$out"; then
-        echo "not ok $name: exit status $status" >>"$out"
-    fi
+    if [ $status -eq 124 ]; then
+        echo "not ok $name: not over after $limit s"
+    elif [ $status -ne 0 ] && ! grep -q '^not ok ' "$out"; then
+        echo "not ok $name: exit status $status"
+    fi >>"$out"
     # Show failures with what led to them; successes stay one line per program.
     if grep -q '^not ok ' "$out"; then cat "$out"; elif [ -z "$filter" ] || grep -q '^ok \|^skip ' "$out"; then
         printf '%-34s %4s passed %4s s %4.0f s of processor\n' "$name" "$(grep -c '^ok ' "$out")" "$SECONDS" \

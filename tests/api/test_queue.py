@@ -117,10 +117,10 @@ def ask_from(s, address, method, path, body=None):
         return json.loads(connection.getresponse().read())
 
 
-def check_turn(s, job, seconds=10):
+def check_turn(s, job, seconds=40):
     """Hardly anybody had a turn while it waited: those that workers had taken by then, and that in time."""
     times = [datetime.datetime.fromisoformat(job[name].replace("Z", "+00:00")).timestamp() for name in ("created", "started")]
-    check(job["status"] == "successful" and times[1] - times[0] < seconds, job)  # 0.01 s, where the machine does nothing else
+    check(job["status"] == "successful" and times[1] - times[0] < seconds, job)  # 0.01 s, or 1 s in a lane that is taken, ten times as long with a sanitizer
     between = s.sql("SELECT count(*) FROM job WHERE started > ? AND started < ?", times)[0][0]
     check(between <= 2 * (os.cpu_count() + 1), between)
 

@@ -313,6 +313,7 @@ def cancels(build, count, body=None):
 def load(build, port, clients, seconds, body, prefer=None):
     command = [os.path.join(build, "load"), str(port), str(clients), str(seconds), str(body)]
     done = subprocess.run(command + ([prefer] if prefer else []), capture_output=True, text=True, check=False)
+    service.check(done.stdout, done.stderr)
     return json.loads(done.stdout)
 
 
