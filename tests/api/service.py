@@ -3,6 +3,10 @@
 A test program is a module with functions test_*; it ends in `service.main(globals())` and is called with
 BUILD_DIR [FILTER]. Each test gets a running Service that it may use up: stop() is always called after it. A test that
 needs other options is decorated with @options("--workers", "1"). Raise Skip("why") to skip.
+
+Where a module says SHARED = True, the tests that are not decorated have one Service for all of them, for a start costs
+as much as many a test: they leave it running, and count on nothing that others may have done to it. @options() gives a
+test a Service of its own.
 """
 import contextlib
 import functools
@@ -334,6 +338,17 @@ def options(*given):
     return mark
 
 
+def settle(service):
+    """Ends a service; leaks, races and mistakes show up then."""
+    try:
+        if service.process:
+            check(service.end() == 0, "the daemon ended with status", service.process.returncode, service.log())
+            log = service.log()
+            check("Sanitizer" not in log and "runtime error" not in log, log)
+    finally:
+        service.stop()
+
+
 def run_one(test, build):
     given = getattr(test, "options", ())
     service = Service(build, *(option for option in given if option is not None))
@@ -341,12 +356,30 @@ def run_one(test, build):
         if None not in given:
             service.start()
         test(service)
-        if service.process:
-            check(service.end() == 0, "the daemon ended with status", service.process.returncode, service.log())
-        log = service.log() if service.process else ""
-        check("Sanitizer" not in log and "runtime error" not in log, log)
+        settle(service)
     finally:
         service.stop()
+
+
+def run_shared(test, service):
+    if not service.process:
+        service.start()
+    test(service)
+    check(service.process.poll() is None, "it has ended the service of all tests: @options() gives it one of its own")
+
+
+def attempt(title, run, *what):
+    """Runs it and prints how it went; True unless it failed: a failing test must not end the others."""
+    try:
+        run(*what)
+        print(f"ok {title}", flush=True)
+    except Skip as why:
+        print(f"skip {title}: {why}", flush=True)
+    except Exception:
+        print("# " + "# ".join(traceback.format_exc().splitlines(True)).rstrip())
+        print(f"not ok {title}", flush=True)
+        return False
+    return True
 
 
 def main(names):
@@ -354,20 +387,19 @@ def main(names):
     if len(sys.argv) < 2:
         sys.exit("usage: PROGRAM BUILD_DIR [FILTER]")
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a shell's background job, and so in its children
-    program = pathlib.Path(sys.argv[0]).stem
+    program, build = pathlib.Path(sys.argv[0]).stem, sys.argv[1]
     wanted = sys.argv[2] if len(sys.argv) > 2 else ""
-    failed = False
+    failed, shared = False, None
     for name, test in list(names.items()):
         if not name.startswith("test_") or wanted not in name[5:]:
             continue
         title = f"{program}.{name[5:]}"
-        try:
-            run_one(test, sys.argv[1])
-            print(f"ok {title}", flush=True)
-        except Skip as why:
-            print(f"skip {title}: {why}", flush=True)
-        except Exception:  # noqa: a failing test must not end the others
-            failed = True
-            print("# " + "# ".join(traceback.format_exc().splitlines(True)).rstrip())
-            print(f"not ok {title}", flush=True)
+        if not names.get("SHARED") or hasattr(test, "options"):
+            failed |= not attempt(title, run_one, test, build)
+            continue
+        shared = shared or Service(build)
+        if not attempt(title, run_shared, test, shared):
+            failed, shared = True, shared.stop()
+    if shared:
+        failed |= not attempt(f"{program}.service", settle, shared)
     sys.exit(1 if failed else 0)

@@ -12,6 +12,8 @@ import xml.etree.ElementTree
 import service
 from service import MATRICES, SCENE, check, expect
 
+SHARED = True  # one service for all tests
+
 PASSING = [{"quantity": "contact.active", "min": 22, "max": 22},
            {"quantity": "contact.max_pressure", "max": 1, "name": "no yielding"},
            {"quantity": "contact.force.1", "near": 10.5137, "relative": 1e-4},

@@ -11,6 +11,8 @@ import time
 import service
 from service import MATRICES, SCENE, check, expect, head_of, read_all
 
+SHARED = True  # one service for all tests
+
 BODY = json.dumps(MATRICES)
 AS_JSON = {"Content-Type": "application/json"}
 BANNER = "%%MatrixMarket matrix coordinate real "

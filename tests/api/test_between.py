@@ -7,6 +7,8 @@ import service
 from service import check, expect
 from two_bodies import PLANE, body
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=120"}
 CIRCLE = {"circle": {"center": [52.5, -0.6], "radius": 1}}  # 0.4 deep in the block
 

@@ -12,6 +12,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
 from service import check, options
 
+SHARED = True  # one service for all tests
+
 CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
 PAPER, SPRINGS = "tests/data/paper_body.json", "tests/data/small_matrices.json"
 # No displacement can satisfy both rows: u1 <= -1 and -u1 <= -1.
@@ -62,6 +64,7 @@ def test_matrices_have_the_answer_of_hand(server):
     check(job["summary"]["contact"]["active"] == 1, job)
 
 
+@options()
 def test_status_list_and_tags(server):
     first = run(server, "submit", SPRINGS, "--wait", "--quiet", "--tag", "one", code=0).stdout.strip()
     run(server, "submit", SPRINGS, "--wait", "--quiet", "--tag", "two", code=0)

@@ -17,6 +17,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
 from fake_server import Cutter, Fake
 
+SHARED = True  # one service for all tests
+
 CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
 BODY = "tests/data/small_matrices.json"
 ID = "0" * 31 + "1"

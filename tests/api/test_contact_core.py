@@ -12,6 +12,8 @@ import service
 from service import check, expect
 from two_bodies import body
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=120"}
 METHODS = ["uzawa", "accelerated", "accelerated_restart", "conjugate", "active_set", "dual_active_set"]
 OPERATORS = ["condensed", "factored", "matrix_free"]

@@ -5,6 +5,8 @@ import json
 import service
 from service import ROOT, check
 
+SHARED = True  # one service for all tests
+
 BANNER = "%%MatrixMarket matrix coordinate real "
 CASES = ROOT / "tests" / "data" / "contradictions"
 

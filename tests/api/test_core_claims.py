@@ -11,6 +11,8 @@ from decimal import Decimal
 import service
 from service import ROOT, Skip, check, expect
 
+SHARED = True  # one service for all tests
+
 CASES = ROOT.parent / "shared" / "cases" / "core"
 
 

@@ -7,6 +7,8 @@ import tempfile
 import service
 from service import check, expect
 
+SHARED = True  # one service for all tests
+
 try:
     import meshio
 except ImportError:

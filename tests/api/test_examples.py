@@ -14,6 +14,8 @@ import xml.etree.ElementTree
 import service
 from service import ENDLESS, ROOT, SCENE, Skip, check, expect, options
 
+SHARED = True  # one service for all tests
+
 EXAMPLES = ROOT / "client/examples"
 ASSERTIONS = ROOT / "tests/data/assertions.json"
 PYTHON = [sys.executable, "-B"]

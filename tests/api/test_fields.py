@@ -10,6 +10,8 @@ import threading
 import service
 from service import MATRICES, SCENE, check, expect
 
+SHARED = True  # one service for all tests
+
 try:
     import meshio
 except ImportError:

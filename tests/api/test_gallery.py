@@ -14,6 +14,8 @@ import inline  # noqa: E402
 import service  # noqa: E402
 from service import ROOT, check, expect, options  # noqa: E402
 
+SHARED = True  # one service for all tests
+
 FOLDER = ROOT / "client/examples/gallery"
 FILES = {**{name: FOLDER / f"{name}.json" for name in ("cylinder", "press_fit", "gear", "bracket")},
          "paper_body": ROOT / "tests/data/paper_body.json"}

@@ -9,6 +9,8 @@ from service import check
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
 import generated_contacts  # noqa: after its place is known
 
+SHARED = True  # one service for all tests
+
 
 def test_generated_contacts(s):
     found = generated_contacts.run(s, range(20 if service.INSTRUMENTED else 40), lambda *said, **_: None, refine=False)

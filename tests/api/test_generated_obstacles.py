@@ -11,6 +11,8 @@ from service import check
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
 import generated_obstacles  # noqa: after its place is known
 
+SHARED = True  # one service for all tests
+
 
 def test_nodes_on_ridges_and_corners(s):
     """Scenes whose answer was that of one flank, as rounding had it: another one mirrored or in other units."""

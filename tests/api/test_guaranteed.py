@@ -5,6 +5,8 @@ import copy
 import service
 from service import SCENE, check, expect
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=60"}
 LOWEST, HIGHEST = -3.96275665e-3, -3.96275643e-3  # the continuum's minimum for the paper's body lies between
 

@@ -9,6 +9,8 @@ import urllib.request
 import service
 from service import ENDLESS, MATRICES, SCENE, check, expect, options
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=60"}
 TOP, RIGHT = {"on": "top", "traction": [0, -0.05]}, {"on": "right", "traction": [0.5, 0]}
 LOADS = {"light": [TOP], "heavy": [TOP, RIGHT], "tripled": [TOP, {"on": "right", "traction": [1.5, 0]}], "none": []}
@@ -74,6 +76,7 @@ def test_one_case_alone(s):
     check("displacements" not in few["cases"][0] and "nodes" not in few and few["contact_nodes"], few.keys())
 
 
+@options()
 def test_summary_of_the_job(s):
     job = solved(s, with_cases())
     summary = job["summary"]

@@ -5,6 +5,8 @@ import copy
 import service
 from service import check, expect
 
+SHARED = True  # one service for all tests
+
 BUMP = {"problem": {"kind": "scene", "model": "plane_strain",
                     "mesh": {"box": {"origin": [-5, 0], "size": [10, 5], "cells": [20, 10]}},
                     "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],

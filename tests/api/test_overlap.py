@@ -10,6 +10,8 @@ import service
 from service import check, expect
 from two_bodies import body
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=120"}
 SCENES = pathlib.Path(__file__).resolve().parent.parent / "data" / "scenes"
 

@@ -6,6 +6,8 @@ import service
 from service import check, expect
 from two_bodies import SOLID, body
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=120"}
 
 

@@ -10,6 +10,8 @@ sys.path[:0] = [str(ROOT / "tests" / "extremes")]
 
 import posted  # noqa: E402  the path is set above
 
+SHARED = True  # one service for all tests
+
 
 def test_claims_are_true(s):
     for kind, count in ("range", 120), ("hard", 60):

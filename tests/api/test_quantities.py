@@ -16,6 +16,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extreme
 import generated_quantities  # noqa: after its place is known
 from two_bodies import body  # noqa
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=60"}
 # A block that a support presses on a cylinder.
 HERTZ = {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"size": [10, 10], "cells": [16, 16]}},

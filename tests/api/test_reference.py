@@ -10,6 +10,8 @@ import os
 import service
 from service import SCENE, check, expect
 
+SHARED = True  # one service for all tests
+
 # cells: lambda_max(D), energy, sum of r, contacts, and for each (method, alpha) the (iterations, restarts)
 TABLE = {
     (30, 10): (9.427e-4, -3.9608186040e-3, -10.51371700, 22,

@@ -8,6 +8,8 @@ import time
 import service
 from service import ENDLESS, MATRICES, SCENE, check, expect, options
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=60"}
 AS_JSON = {"Content-Type": "application/json"}
 

@@ -9,6 +9,8 @@ import tempfile
 import service
 from service import SCENE, check, expect
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=60"}
 
 

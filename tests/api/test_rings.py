@@ -6,6 +6,8 @@ import service
 from service import check
 from two_bodies import plate
 
+SHARED = True  # one service for all tests
+
 
 def test_contact_force_is_axial(s):
     """A pipe swells against a rigid sleeve and rests on a floor: the sleeve's pushes cancel around the ring."""

@@ -10,6 +10,8 @@ import sys
 
 import service
 
+SHARED = True  # one service for all tests
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SCHEMAS = {path.name: json.loads(path.read_text()) for path in sorted((ROOT / "schemas").glob("*.json"))}
 OPENAPI = SCHEMAS.pop("openapi.json")

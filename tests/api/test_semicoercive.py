@@ -7,6 +7,8 @@ import subprocess
 import service
 from service import SCENE, check, expect
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=60"}
 K = "%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 1\n2 1 -1\n2 2 1\n"
 N = "%%MatrixMarket matrix coordinate real general\n1 2 1\n1 2 1\n"

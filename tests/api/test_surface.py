@@ -11,6 +11,8 @@ import service
 from service import MATRICES, SCENE, check, expect
 from two_bodies import body
 
+SHARED = True  # one service for all tests
+
 TRIANGLES, LINES, POINTS = 4, 1, 0
 
 

@@ -13,6 +13,8 @@ import service
 from service import check, options
 from terminal import Screen, Terminal
 
+SHARED = True  # one service for all tests
+
 CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
 PAPER = "tests/data/paper_body.json"
 # Long enough to be watched, and it ends by itself: with exit status 7.

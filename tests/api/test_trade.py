@@ -7,6 +7,8 @@ import xml.etree.ElementTree as ET
 import service
 from service import ENDLESS, MATRICES, SCENE, check, expect
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=60"}
 SVG = "{http://www.w3.org/2000/svg}"
 DECADES = [10.0 ** -k for k in range(1, 11)]

@@ -8,6 +8,8 @@ import urllib.request
 import service
 from service import ENDLESS, MATRICES, SCENE, check, expect, options
 
+SHARED = True  # one service for all tests
+
 WAIT = {"Prefer": "wait=60"}
 RIGHT = {"displacements": [0.5, 2], "reactions": [-1]}  # of MATRICES
 
@@ -125,6 +127,7 @@ def test_idempotency(s):
 
 # ---------------------------------------------------------------- what is refused
 
+@options()
 def test_what_is_refused(s):
     for answer, code, pointer in (
             ({"displacements": [0.5], "reactions": [-1]}, "size_mismatch", "/answer/displacements"),
