@@ -62,6 +62,7 @@ void *housekeeping_loop(void *arg)
             continue;
         pthread_mutex_unlock(&w->lock);
         trim_heap();
+        work_rest_processes(w);
         expire(w);
         retain(w, &told);
         store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */

@@ -87,5 +87,7 @@ process *work_take_process(work *w, bool lane, const char *text, size_t len, uin
 /* body: of the text that it has solved, as taking said; 0: nothing. done: what it said at the end; NULL: it has ended.
  */
 void work_give_process(work *w, process *p, uint64_t body, const packet *done);
+/* Those that nobody has had for a while give back the memory of texts and answers. */
+void work_rest_processes(work *w);
 
 #endif

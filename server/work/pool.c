@@ -7,6 +7,8 @@
 
 #define LIST_MS 500 /* a process that is idle gets so long to say what it has */
 
+#define IDLE_S 2.0 /* then what is shared with a process goes back to the system */
+
 #define TEXT_MOST ((size_t)8 << 20) /* a longer text is not read for this: its body takes seconds anyway */
 
 static bool has_body(const process *p, uint64_t body)
@@ -37,13 +39,29 @@ process *work_take_process(work *w, bool lane, const char *text, size_t len, uin
     return found;
 }
 
+static void rest_process(process *p, size_t most)
+{
+    if (p->inbox.mapped > most || p->outbox.mapped > most) {
+        segment_rest(&p->inbox, most, true);
+        segment_rest(&p->outbox, most, true);
+    }
+}
+
+void work_rest_processes(work *w)
+{
+    const double before = clock_seconds(CLOCK_MONOTONIC) - IDLE_S;
+    pthread_mutex_lock(&w->pool_lock);
+    for (int i = 0; i < w->n; i++)
+        if (!w->processes[i].taken && w->processes[i].given < before)
+            rest_process(&w->processes[i], SEGMENT_KEPT);
+    pthread_mutex_unlock(&w->pool_lock);
+}
+
 void work_give_process(work *w, process *p, uint64_t body, const packet *done)
 {
-    if (p->inbox.mapped > SEGMENT_KEPT || p->outbox.mapped > SEGMENT_KEPT) {
-        segment_rest(&p->inbox, true);
-        segment_rest(&p->outbox, true);
-    }
+    rest_process(p, SEGMENT_WARM);
     pthread_mutex_lock(&w->pool_lock);
+    p->given = clock_seconds(CLOCK_MONOTONIC);
     if (!done) {
         memset(p->bodies, 0, sizeof p->bodies);
         p->held_entries = p->held_bytes = p->n_entries = 0;

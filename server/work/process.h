@@ -27,6 +27,7 @@ typedef struct {
 
     /* For who chooses a process for a job; under the pool's lock. */
     bool taken;
+    double given;                    /* back to the pool, on CLOCK_MONOTONIC */
     uint64_t bodies[PROCESS_BODIES]; /* that it solved last; 0: none */
     int next_body;
     uz_cache_entry *entries; /* n_entries, as it listed them last */

@@ -56,11 +56,11 @@ bool segment_reach(segment *s, size_t bytes, bool grow)
     return true;
 }
 
-void segment_rest(segment *s, bool give_back)
+void segment_rest(segment *s, size_t most, bool give_back)
 {
-    const size_t size = size_of(s);
-    if (give_back && size > SEGMENT_KEPT)
-        fallocate(s->fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, SEGMENT_KEPT, (off_t)(size - SEGMENT_KEPT));
-    if (s->mapped > SEGMENT_KEPT && mremap(s->at, s->mapped, SEGMENT_KEPT, 0) == s->at)
-        s->mapped = SEGMENT_KEPT;
+    const size_t size = give_back ? size_of(s) : 0;
+    if (size > most)
+        fallocate(s->fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, (off_t)most, (off_t)(size - most));
+    if (s->mapped > most && mremap(s->at, s->mapped, most, 0) == s->at)
+        s->mapped = most;
 }

@@ -144,8 +144,8 @@ static void run_job(solver *s, const packet *m)
     }
     message_send(s->socket, &done, -1);
     solution_clear(&solved); /* while the daemon stores the answer */
-    segment_rest(&s->inbox, false);
-    segment_rest(&s->outbox, false);
+    segment_rest(&s->inbox, SEGMENT_WARM, false);
+    segment_rest(&s->outbox, SEGMENT_WARM, false);
     s->fresh = true;
 }
 
@@ -260,8 +260,8 @@ int solver_process(int argc, char **argv)
     if (made) {
         uz_process_reserve(s.reserve);
         s.board = (board *)(void *)s.board_memory.at;
-        segment_rest(&s.inbox, false);
-        segment_rest(&s.outbox, false);
+        segment_rest(&s.inbox, SEGMENT_KEPT, false);
+        segment_rest(&s.outbox, SEGMENT_KEPT, false);
         if (solve_bytes > 0 && solve_bytes < (SIZE_MAX - LIMIT_ROOM - s.cache_bytes) / 2)
             confine_memory(2 * solve_bytes + s.cache_bytes + LIMIT_ROOM);
         const packet ready = {.kind = MESSAGE_READY, .u.ready = {.confined = confine_process()}};
