@@ -107,7 +107,7 @@ static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *mod
     }
     out->proved = true;
     out->bound = bound;
-    out->relative = c->norm > bound ? bound / (c->norm - bound) : (double)INFINITY;
+    out->relative = !(bound > 0) ? 0 : c->norm > bound ? bound / (c->norm - bound) : (double)INFINITY;
     out->primal = c->primal;
     out->dual = c->dual - fabs(c->defect) - rho * bound;
     return UZ_OK;
@@ -169,6 +169,11 @@ void uz_judge_whole_error(uz_result *result, const uz_problem *problem, const uz
     if (unproved)
         snprintf(s->message, sizeof s->message, "the whole error, about %.3g, is not guaranteed: %s", total,
                  s->guarantee.why);
+    else if (s->guarantee.proved && !isfinite(total))
+        snprintf(s->message, sizeof s->message,
+                 "on this mesh the whole error, at most %.3g in the energy norm, may be all of the answer; asked for "
+                 "%.3g of it: refine it, or let the cells be chosen",
+                 s->guarantee.bound, settings->total_error);
     else
         snprintf(s->message, sizeof s->message,
                  "on this mesh the whole error is %s %.3g, asked for %.3g: refine it, or let the cells be chosen",

@@ -54,6 +54,18 @@ def test_what_is_not_proved(s):
         check(summary["outcome"] == "mesh_limit" and "not guaranteed" in summary["message"], summary)
 
 
+def test_nothing_to_be_relative_to(s):
+    for cells in ([30, 10], "auto"):  # nothing happens, and nothing is off
+        request = asked({"total": 0.01, "guaranteed": True}, loads=[])
+        request["problem"]["mesh"]["box"]["cells"] = cells
+        summary = summary_of(s, request)
+        check(summary["outcome"] == "converged" and summary["error"]["total"] == summary["error"]["bound"] == 0, summary)
+    held = [{"on": "left", "ux": 1, "uy": 1}]
+    summary = summary_of(s, asked({"total": 0.01, "guaranteed": True}, loads=[], supports=held, contacts=[]))
+    check(summary["outcome"] == "mesh_limit" and 0 < summary["error"]["bound"] < 1e-6, summary["error"])
+    check(summary["error"]["total"] is None and "may be all of the answer" in summary["message"], summary["message"])
+
+
 def test_cases_and_chosen_cells(s):
     request = asked({"guaranteed": True})
     loads = request["problem"]["loads"]
