@@ -31,6 +31,8 @@ typedef struct {
     int64_t contact;    /* of the scene; -1: none */
     double normal[2];   /* unit, into the obstacle */
     double gap[2];      /* at the ends: normal . u <= gap, which is linear between them */
+    bool round, inside; /* the obstacle is a disc, or all but one: neither its gap nor its normal are those two then */
+    double centre[2], radius;
     double traction[2]; /* of the loads, force per area, along x and y */
 } uz_bound_edge;
 
@@ -51,10 +53,16 @@ typedef struct {
 uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 void uz_bound_body_clear(uz_bound_body *body);
 
+/* The obstacle before an edge, at a part of the way along it, 0 to 1: its gap, and the unit normal into it. */
+double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part);
+/* Directions of the unknowns of an edge's a-th moments: its axes, but before a round obstacle, where the first is the
+ * normal at a / degree of the way: so a traction along them, with coefficients that press, is nowhere against it. */
+void uz_bound_axes(double axis[2][2], const uz_bound_body *body, int64_t edge, int a);
+
 /* The dual problem as min 1/2 v'Kv - p'v, h - Nv >= 0. An unknown is a mean of the displacement over an edge with one
- * of degree + 1 Bernstein polynomials as weight, along one of the edge's axes; -N'r are the resultants of the pressure.
- *   dof   out: n_edges x (degree + 1) x 2: number of each unknown, -1: held. The caller frees it
- * Errors: UZ_ERR_SCENE (an element too distorted), _CANCELLED, _MEMORY. */
+ * of degree + 1 Bernstein polynomials as weight, along one of its axes (uz_bound_axes); -N'r are the resultants of the
+ * pressure. dof   out: n_edges x (degree + 1) x 2: number of each unknown, -1: held. The caller frees it Errors:
+ * UZ_ERR_SCENE (an element too distorted), _CANCELLED, _MEMORY. */
 uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop,
                                 uz_error *err);
 
@@ -78,6 +86,7 @@ typedef struct {
     double dual;      /* D(sigma_h), from the stress */
     double defect;    /* what the residual works on u_h: J - D + defect is the gap but for the last two terms */
     double inside;    /* bound on the norm of what equilibrium within elements lacks: rounding */
+    double turning;   /* the same of tractions that are not along a normal that turns, but for their moments */
     double *residual; /* as many as unknowns: what edges lack of equilibrium; the caller frees it */
     char fault[160];  /* what is wrong, a clause: nothing is proved; "" */
 } uz_bound_check_result;
@@ -86,6 +95,8 @@ typedef struct {
 uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
                          const int64_t *dof, int64_t n_dofs, const double *u, const double *stress, uz_error *err);
 
+/* Bound on the norm of all that equilibrium lacks, with that of the residual in the norm of K^-1. */
+double uz_bound_lacking(const uz_bound_check_result *checked, double residual_norm);
 /* The bound on |u - u_h| with the norm of the residual in that of K^-1 (K of the dual problem). As the moments q of a
  * displacement have q'Kq <= |u|^2, this is a norm of the residual over all displacements of the continuum. */
 double uz_bound_error(const uz_bound_check_result *checked, double residual_norm);

@@ -17,7 +17,7 @@
  *      |e_u|      <= rho + sqrt(2 (G + int r_h w_n) + (|w| + rho)^2),        rho = sup R(w) / |w|.
  *
  * Nothing of it is taken from the dual problem: a wrong K makes a larger bound, or one whose sums do not agree. */
-#include "bound/bound.h"
+#include "bound/check.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
@@ -34,20 +34,7 @@
 #define AGREE        1e-9
 #define INSIDE       1e-9
 
-enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, MOMENTS = UZ_BOUND_MOMENTS };
-
-typedef struct {
-    uz_bound_check_result *out;
-    const uz_bound_body *body;
-    const uz_mesh *mesh;
-    int moments;
-    double *resultant; /* n_edges x moments x 2: of the stress's tractions on the elements beside the edge */
-    double *pressure;  /* n_edges x moments: r_h, as resultants */
-    double *lift;      /* n_nodes x 2: w */
-    double sum, scale; /* of elements: int 1/2 |sigma_h - C eps(u_h)|^2; of the sizes of what it is made of */
-    double margin;     /* of the strain energy: what its integration may be off by */
-    double strain, complementary, inside, farthest; /* farthest: the largest displacement along an axis */
-} examination;
+enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 };
 
 static void examine_element(examination *x, const double *u, const double *stress, int64_t e);
 static double energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e);
@@ -67,7 +54,9 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     x.resultant = uz_alloc_zero(body->n_edges * x.moments * 2, sizeof *x.resultant);
     x.pressure = uz_alloc_zero(body->n_edges * x.moments, sizeof *x.pressure);
     x.lift = uz_alloc_zero(2 * mesh->n_nodes, sizeof *x.lift);
-    if (!out->residual || !x.resultant || !x.pressure || !x.lift)
+    x.moved = uz_alloc_zero(2 * mesh->n_nodes, sizeof *x.moved);
+    x.gap = uz_alloc_zero(mesh->n_elements, sizeof *x.gap);
+    if (!out->residual || !x.resultant || !x.pressure || !x.lift || !x.moved || !x.gap)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check the stress of %lld elements",
                          (long long)mesh->n_elements);
     for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
@@ -90,7 +79,9 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         double lifted = 0, margin = 0, strain = x.strain;
         for (int64_t e = 0; e < mesh->n_elements; e++)
             lifted += 2 * energy_of(&margin, &x, x.lift, false, e);
-        out->lift = sqrt(lifted + 2 * margin);
+        const double by_nodes = sqrt(lifted + 2 * margin);
+        out->lift = by_nodes + sqrt(x.bulge);
+        out->turning = sqrt(x.turning);
         out->norm = sqrt(2 * fmax(0, x.strain - x.margin));
         if (lifted > 0) { /* of u_h + w: an admissible one has the larger energy than the minimum */
             strain = x.margin = 0;
@@ -101,6 +92,8 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
             load = work_of_loads(&x, scene, x.lift, &status, err);
         }
         out->primal = strain + x.margin - load + SUM_ROUNDING * (scale + strain + fabs(load));
+        /* a(u_h + w, b) - f(b) of the bulges b: of the stress it is their work, and the rest is by Schwarz */
+        out->primal += x.bulge_work + (sqrt(2 * x.bulged) + by_nodes) * sqrt(x.bulge) + x.bulge / 2;
         out->dual -= SUM_ROUNDING * scale;
         out->inside = 100 * x.inside * sqrt(2 * fabs(x.complementary));
         if (!*out->fault && !(x.inside <= INSIDE))
@@ -113,6 +106,8 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     free(x.resultant);
     free(x.pressure);
     free(x.lift);
+    free(x.moved);
+    free(x.gap);
     if (status != UZ_OK) {
         free(out->residual);
         out->residual = NULL;
@@ -120,9 +115,14 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     return status;
 }
 
+double uz_bound_lacking(const uz_bound_check_result *c, double residual_norm)
+{
+    return residual_norm + c->inside + c->turning;
+}
+
 double uz_bound_error(const uz_bound_check_result *c, double residual_norm)
 {
-    const double rho = residual_norm + c->inside, square = 2 * c->gap + (c->lift + rho) * (c->lift + rho);
+    const double rho = uz_bound_lacking(c, residual_norm), square = 2 * c->gap + (c->lift + rho) * (c->lift + rho);
     return *c->fault || !(square >= 0) ? (double)INFINITY : rho + sqrt(square);
 }
 
@@ -130,7 +130,7 @@ double uz_bound_error(const uz_bound_check_result *c, double residual_norm)
 
 /* Quadratic polynomial by its Bernstein coefficients, from its values at the ends and, where there is one, the middle.
  */
-static void bernstein(double b[3], double start, double end, const double *middle)
+void uz_bernstein(double b[3], double start, double end, const double *middle)
 {
     b[0] = start;
     b[2] = end;
@@ -138,7 +138,7 @@ static void bernstein(double b[3], double start, double end, const double *middl
 }
 
 /* Means of a quadratic polynomial over an edge with the Bernstein polynomials of `moments` - 1 as weights. */
-static void means(double m[MOMENTS], const double b[3], int moments)
+void uz_edge_means(double m[UZ_BOUND_MOMENTS], const double b[3], int moments)
 {
     static const double LINEAR[2][3] = {{3, 2, 1}, {1, 2, 3}};               /* sixths */
     static const double QUADRATIC[3][3] = {{6, 3, 1}, {3, 4, 3}, {1, 3, 6}}; /* tenths */
@@ -147,55 +147,62 @@ static void means(double m[MOMENTS], const double b[3], int moments)
                             : (QUADRATIC[a][0] * b[0] + QUADRATIC[a][1] * b[1] + QUADRATIC[a][2] * b[2]) / 10;
 }
 
-/* A displacement along n on an edge, as `bernstein`. */
-static void along_edge(double b[3], const double *u, const int64_t node[3], const double n[2])
+/* A displacement along n on an edge, as uz_bernstein. */
+void uz_along_edge(double b[3], const double *u, const int64_t node[3], const double n[2])
 {
     double at[3] = {0};
     for (int a = 0; a < 3; a++)
         at[a] = node[a] < 0 ? 0 : n[0] * u[2 * node[a]] + n[1] * u[2 * node[a] + 1];
-    bernstein(b, at[0], at[1], node[2] < 0 ? NULL : &at[2]);
+    uz_bernstein(b, at[0], at[1], node[2] < 0 ? NULL : &at[2]);
 }
 
-/* s: the gap that u_h leaves, as `bernstein`; lift: by how much w widens it. */
+/* s: the gap that u_h leaves, as uz_bernstein; lift: by how much w widens it. */
 static void gap_along(double s[3], double lift[3], const examination *x, const double *u, const uz_bound_edge *edge)
 {
-    along_edge(s, u, edge->node, edge->normal);
-    along_edge(lift, x->lift, edge->node, edge->normal);
+    uz_along_edge(s, u, edge->node, edge->normal);
+    uz_along_edge(lift, x->lift, edge->node, edge->normal);
     for (int a = 0; a < 3; a++) {
         s[a] = (a == 0 ? edge->gap[0] : a == 2 ? edge->gap[1] : (edge->gap[0] + edge->gap[1]) / 2) - s[a];
         lift[a] = -lift[a];
     }
 }
 
+void uz_lift_node(examination *x, int64_t node, const double normal[2], double by)
+{
+    static const double AXIS[2][2] = {{1, 0}, {0, 1}};
+    const uz_body_model *model = x->body->model;
+    double way[2] = {0}, share = 0; /* the part of the normal along free dofs, and its square */
+    for (int k = 0; k < 2 && node >= 0 && by > 0; k++) {
+        const double part = model->dof[2 * node + k] < 0 ? 0 : -uz_along_dof(model, node, k, normal);
+        for (int c = 0; c < 2; c++)
+            way[c] += part * uz_along_dof(model, node, k, AXIS[c]);
+        share += part * part;
+    }
+    for (int c = 0; c < 2 && share > 1e-6; c++)
+        if (fabs(by * way[c] / share) > fabs(x->lift[2 * node + c]))
+            x->lift[2 * node + c] = by * way[c] / share;
+}
+
 /* The work of the gap that u_h leaves, and w where it is not >= 0 all along: its nodes are taken out, and the middle
- * one as far as makes the middle coefficient -sqrt(s_0 s_2), from where on the polynomial has no negative value. A node
- * that a support holds goes along what is left to it. */
+ * one as far as makes the middle coefficient -sqrt(s_0 s_2), from where on the polynomial has no negative value. */
 static void examine_contact(examination *x, const double *u, const uz_bound_edge *edge, const double *pressure)
 {
     uz_bound_check_result *out = x->out;
-    double s[3], m[MOMENTS], up[3], none[3];
+    double s[3], m[UZ_BOUND_MOMENTS], up[3], none[3];
     gap_along(s, none, x, u, edge);
-    means(m, s, x->moments);
+    uz_edge_means(m, s, x->moments);
     for (int a = 0; a < x->moments; a++)
         out->gap += pressure[a] * m[a];
     for (int a = 0; a < 3; a++)
         up[a] = fmax(0, -s[a] - (a == 1 ? sqrt(fmax(0, s[0]) * fmax(0, s[2])) : 0));
     const double nodal[3] = {up[0], up[2], (up[0] + 2 * fmax(up[1], (up[0] + up[2]) / 2) + up[2]) / 4};
-    for (int a = 0; a < 3; a++) {
-        static const double AXIS[2][2] = {{1, 0}, {0, 1}};
-        const uz_body_model *model = x->body->model;
-        const int64_t node = edge->node[a];
-        double way[2] = {0}, share = 0; /* the part of the normal along free dofs, and its square */
-        for (int k = 0; k < 2 && node >= 0 && nodal[a] > 0; k++) {
-            const double part = model->dof[2 * node + k] < 0 ? 0 : -uz_along_dof(model, node, k, edge->normal);
-            for (int c = 0; c < 2; c++)
-                way[c] += part * uz_along_dof(model, node, k, AXIS[c]);
-            share += part * part;
-        }
-        for (int c = 0; c < 2 && share > 1e-6; c++)
-            if (fabs(nodal[a] * way[c] / share) > fabs(x->lift[2 * node + c]))
-                x->lift[2 * node + c] = nodal[a] * way[c] / share;
-    }
+    for (int a = 0; a < 3; a++)
+        uz_lift_node(x, edge->node[a], edge->normal, nodal[a]);
+}
+
+double uz_place_rounding(const examination *x)
+{
+    return fmin(1e-12 * x->mesh->extent, 1e-8 * x->farthest);
 }
 
 /* w has to be what it is meant to be, but for rounding of places, as far as that is nothing to the displacements: zero
@@ -203,21 +210,23 @@ static void examine_contact(examination *x, const double *u, const uz_bound_edge
 static void look_at_lift(examination *x, const double *u, int64_t i)
 {
     const uz_bound_edge *edge = &x->body->edge[i];
-    double s[3], lift[3], m[MOMENTS], size = 0, tolerance = fmin(1e-12 * x->mesh->extent, 1e-8 * x->farthest);
+    double s[3], lift[3], m[UZ_BOUND_MOMENTS], size = 0, tolerance = uz_place_rounding(x);
     bool held = true;
     for (int a = 0; a < 6; a++)
         size = edge->node[a / 2] < 0 ? size : fmax(size, fabs(x->lift[2 * edge->node[a / 2] + a % 2]));
     for (int k = 0; k < 2; k++) {
-        along_edge(lift, x->lift, edge->node, edge->axis[k]);
+        uz_along_edge(lift, x->lift, edge->node, edge->axis[k]);
         for (int a = 0; a < 3 && edge->held[k]; a++)
             held = held && fabs(lift[a]) <= 1e-12 * size;
     }
     if (!*x->out->fault && !held)
         snprintf(x->out->fault, sizeof x->out->fault, "what takes the answer out of the obstacle moves a support");
-    if (edge->contact < 0)
+    if (edge->round)
+        uz_look_at_round(x, u, i);
+    if (edge->contact < 0 || edge->round)
         return;
     gap_along(s, lift, x, u, edge);
-    means(m, lift, x->moments);
+    uz_edge_means(m, lift, x->moments);
     for (int a = 0; a < x->moments; a++)
         x->out->gap += x->pressure[i * x->moments + a] * m[a];
     for (int a = 0; a < 3; a++)
@@ -238,45 +247,55 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
     const uz_bound_edge *edge = &x->body->edge[i];
     const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
     const double each = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness / x->moments;
-    double *pressure = x->pressure + i * x->moments, share[2], b[3], m[MOMENTS];
-    for (int k = 0; k < 2; k++)
-        share[k] = edge->normal[0] * edge->axis[k][0] + edge->normal[1] * edge->axis[k][1];
+    double *pressure = x->pressure + i * x->moments, share[2], b[3], m[UZ_BOUND_MOMENTS];
+    double turned[UZ_BOUND_MOMENTS][2] = {{0}};
+    for (int a = 0; a < x->moments; a++) /* less the load */
+        for (int c = 0; c < 2; c++)
+            x->resultant[(i * x->moments + a) * 2 + c] -= each * edge->traction[c];
+    if (edge->round)
+        uz_examine_round(turned, x, u, i);
     for (int a = 0; a < x->moments; a++) {
-        double acts[2]; /* of the stress, less the load: along the edge's axes */
-        for (int k = 0; k < 2; k++)
-            acts[k] = edge->axis[k][0] * (x->resultant[(i * x->moments + a) * 2] - each * edge->traction[0]) +
-                      edge->axis[k][1] * (x->resultant[(i * x->moments + a) * 2 + 1] - each * edge->traction[1]);
+        double acts[2], axis[2][2], normal[2]; /* acts: of the stress, along the axes of these moments */
+        uz_bound_axes(axis, x->body, i, a);
+        uz_bound_gap(normal, x->body, i, (double)a / x->body->degree);
+        for (int k = 0; k < 2; k++) {
+            acts[k] = axis[k][0] * x->resultant[(i * x->moments + a) * 2] +
+                      axis[k][1] * x->resultant[(i * x->moments + a) * 2 + 1];
+            share[k] = normal[0] * axis[k][0] + normal[1] * axis[k][1];
+        }
         const bool free0 = !edge->held[0];
-        if (edge->contact >= 0 && free0) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
+        if (edge->contact >= 0 && free0 &&
+            !edge->round) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
             pressure[a] = fmax(0, -(acts[0] * share[0] + acts[1] * share[1]));
         else if (edge->contact >= 0 && !edge->held[1] && fabs(share[1]) > 1e-9)
             pressure[a] = fmax(0, -acts[1] / share[1]);
         for (int k = 0; k < 2; k++) {
-            const double missing = -pressure[a] * share[k] - acts[k];
+            const double missing =
+                -pressure[a] * share[k] - acts[k] + turned[a][0] * axis[k][0] + turned[a][1] * axis[k][1];
             if (edge->held[k]) {
                 out->dual -= missing * edge->value[k];
                 x->scale += fabs(missing * edge->value[k]);
             } else {
-                along_edge(b, u, edge->node, edge->axis[k]);
-                means(m, b, x->moments);
+                uz_along_edge(b, u, edge->node, axis[k]);
+                uz_edge_means(m, b, x->moments);
                 out->defect += missing * m[a];
                 out->residual[dof[(i * x->moments + a) * 2 + k]] = missing;
             }
         }
-        if (edge->contact >= 0)
+        if (edge->contact >= 0 && !edge->round)
             out->dual -= pressure[a] * (edge->gap[0] + (edge->gap[1] - edge->gap[0]) * (a + 1) / (x->moments + 1));
     }
     double size = 0;
     for (int a = 0; a < 6; a++)
         size = edge->node[a / 2] < 0 ? size : fmax(size, fabs(u[2 * edge->node[a / 2] + a % 2]));
     for (int k = 0; k < 2; k++) { /* the bound is about displacements that keep to the supports */
-        along_edge(b, u, edge->node, edge->axis[k]);
+        uz_along_edge(b, u, edge->node, edge->axis[k]);
         for (int a = 0; a < 3 && edge->held[k] && !*out->fault; a++)
             if (!(fabs(b[a] - edge->value[k]) <= 1e-12 * size))
                 snprintf(out->fault, sizeof out->fault, "at a support the displacement is %.9e in place of %.9e", b[a],
                          edge->value[k]);
     }
-    if (edge->contact >= 0)
+    if (edge->contact >= 0 && !edge->round)
         examine_contact(x, u, edge, pressure);
 }
 
@@ -361,7 +380,8 @@ static double examine_part(examination *x, const double corner[3][2], const doub
 
 /* Bernstein coefficients of the traction along a straight side of a part, times the side's length over the number of
  * moments: from its corner `from` to the next. */
-static void tractions(double t[MOMENTS][2], const examination *x, const double corner[3][2], const double *s, int from)
+static void tractions(double t[UZ_BOUND_MOMENTS][2], const examination *x, const double corner[3][2], const double *s,
+                      int from)
 {
     const int to = (from + 1) % 3;
     const double way[2] = {corner[to][0] - corner[from][0], corner[to][1] - corner[from][1]};
@@ -386,7 +406,7 @@ static void examine_element(examination *x, const double *u, const double *stres
     int count;
     const int64_t *node = uz_mesh_element(x->mesh, e, &count);
     double xyz[3 * UZ_ELEMENT_NODES], v[2 * UZ_ELEMENT_NODES] = {0}, centre[2], expansion[3] = {0};
-    double work = 0, complementary = 0, margin = 0, inner[UZ_BOUND_PARTS][2][MOMENTS][2];
+    double work = 0, complementary = 0, margin = 0, inner[UZ_BOUND_PARTS][2][UZ_BOUND_MOMENTS][2];
     take_element(&element, xyz, x, e);
     const int parts = uz_element_type_of(element.kind)->corners;
     for (int i = 0; i < 2 * count; i++)
@@ -406,14 +426,14 @@ static void examine_element(examination *x, const double *u, const double *stres
         const double *s = stress + k * UZ_BOUND_POINTS * 3;
         const int64_t local[3] = {k, next, count > parts ? parts + k : -1}, at = x->body->edge_of[4 * e + k];
         const bool reversed = x->body->edge[at].node[0] != node[k];
-        double t[MOMENTS][2], b[3], m[MOMENTS];
+        double t[UZ_BOUND_MOMENTS][2], b[3], m[UZ_BOUND_MOMENTS];
         complementary += examine_part(x, corner, s, expansion, largest, e);
         tractions(t, x, corner, s, 0);
         tractions(inner[next][0], x, corner, s, 1);
         tractions(inner[k][1], x, corner, s, 2);
         for (int c = 0; c < 2; c++) {
-            along_edge(b, v, local, (const double[2]){c == 0, c == 1});
-            means(m, b, x->moments);
+            uz_along_edge(b, v, local, (const double[2]){c == 0, c == 1});
+            uz_edge_means(m, b, x->moments);
             for (int a = 0; a < x->moments; a++) {
                 work += t[a][c] * m[a];
                 x->resultant[(at * x->moments + (reversed ? x->moments - 1 - a : a)) * 2 + c] += t[a][c];
@@ -437,6 +457,8 @@ static void examine_element(examination *x, const double *u, const double *stres
             work += volume * N[i / 2] * v[i] * x->body->force[2 * e + i % 2];
     }
     const double strain = energy_of(&margin, x, u, true, e);
+    x->gap[e] =
+        margin + fmax(0, strain + complementary - work) + SUM_ROUNDING * (strain + fabs(complementary) + fabs(work));
     x->sum += strain + complementary - work;
     x->margin += margin;
     x->scale += strain + fabs(complementary) + fabs(work);
@@ -445,7 +467,7 @@ static void examine_element(examination *x, const double *u, const double *stres
 }
 
 /* Gauss's rule of n points on [-1, 1], by Newton's method on Legendre's polynomial. */
-static void gauss(double *at, double *weight, int n)
+void uz_gauss(double *at, double *weight, int n)
 {
     for (int i = 0; i < n; i++) {
         double z = cos(3.14159265358979323846 * (i + 0.75) / (n + 0.5)), slope = 1;
@@ -501,7 +523,7 @@ static double energy_of(double *margin, const examination *x, const double *u, b
                 n++;
             off = 16 * pow(q, 2 * n - 6);
         }
-        gauss(at, weight, n);
+        uz_gauss(at, weight, n);
     }
     for (int g = 0; g < (triangle ? own.count : n * n); g++) {
         double point[3] = {0}, grad[UZ_ELEMENT_NODES][3], strain[3] = {-expansion[0], -expansion[1], 0}, w;

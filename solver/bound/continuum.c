@@ -232,6 +232,29 @@ static void take_supports(survey *x)
     }
 }
 
+/* Gap and normal are those of every point of the edge. They turn by less than an angle of 1 along it, and are analytic
+ * as far around it as it is long: sums over points integrate them to rounding (check_round.c). */
+static void take_round(survey *x, uz_bound_edge *edge, const uz_contact *contact)
+{
+    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+    const double way[2] = {to[0] - from[0], to[1] - from[1]}, length = hypot(way[0], way[1]);
+    const double off[2] = {contact->point[0] - from[0], contact->point[1] - from[1]};
+    const double part = fmin(1, fmax(0, (off[0] * way[0] + off[1] * way[1]) / (length * length)));
+    double n[2];
+    if (hypot(off[0] - part * way[0], off[1] - part * way[1]) < length)
+        refuse(x->body, "edges of \"%s\" are longer than they are away from the obstacle's centre", contact->on);
+    if (edge->held[0])
+        refuse(x->body, "supports hold edges of \"%s\" before a round obstacle", contact->on);
+    edge->round = true;
+    edge->inside = contact->inside;
+    edge->radius = contact->radius;
+    memcpy(edge->centre, contact->point, sizeof edge->centre);
+    uz_bound_gap(n, x->body, edge - x->body->edge, 0.5);
+    edge->axis[0][0] = edge->axis[1][1] = n[0];
+    edge->axis[0][1] = n[1];
+    edge->axis[1][0] = -n[1];
+}
+
 static void take_contacts(survey *x)
 {
     const uz_bound_body *body = x->body;
@@ -239,14 +262,15 @@ static void take_contacts(survey *x)
         const uz_contact *contact = &x->scene->contacts[k];
         const uz_group *group = uz_mesh_group(x->mesh, contact->on, "", NULL);
         double n[3];
-        if (contact->kind != UZ_OBSTACLE_PLANE)
+        const bool round = contact->kind == UZ_OBSTACLE_ROUND;
+        if (contact->kind != UZ_OBSTACLE_PLANE && !round)
             refuse(x->body,
                    contact->kind == UZ_OBSTACLE_BODY
-                       ? "the contact of \"%s\" is with another part of the body, not with a straight obstacle"
-                       : "the obstacle of \"%s\" is not straight",
+                       ? "the contact of \"%s\" is with another part of the body, whose gap no polynomials close"
+                       : "the obstacle of \"%s\" has corners, where its normal leaps",
                    contact->on);
         else if (!group || group->kind != UZ_GROUP_FACES || group->n_inner > 0 ||
-                 !uz_unit_normal(n, contact->normal, 2) || !find_group(x, contact->on))
+                 (!round && !uz_unit_normal(n, contact->normal, 2)) || !find_group(x, contact->on))
             refuse(x->body, "the contact's group \"%s\" is not made of edges of the border", contact->on);
         if (*x->body->why)
             return;
@@ -255,6 +279,10 @@ static void take_contacts(survey *x)
             if (edge->contact >= 0)
                 refuse(x->body, "an edge of \"%s\" has two obstacles before it", contact->on);
             edge->contact = k;
+            if (round) {
+                take_round(x, edge, contact);
+                continue;
+            }
             for (int a = 0; a < 2; a++) {
                 const double *at = x->mesh->xyz + 2 * edge->node[a];
                 const double gap = (at[0] - contact->point[0]) * n[0] + (at[1] - contact->point[1]) * n[1];
@@ -306,6 +334,34 @@ static void take_loads(survey *x)
                 body->force[2 * e + c] += times * load->v[c];
         }
     }
+}
+
+double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part)
+{
+    const uz_bound_edge *at = &body->edge[edge];
+    const double *from = body->model->mesh.xyz + 2 * at->node[0], *to = body->model->mesh.xyz + 2 * at->node[1];
+    double off[2];
+    memcpy(normal, at->normal, sizeof at->normal);
+    if (!at->round)
+        return at->gap[0] + part * (at->gap[1] - at->gap[0]);
+    for (int c = 0; c < 2; c++)
+        off[c] = from[c] - at->centre[c] + part * (to[c] - from[c]);
+    const double distance = hypot(off[0], off[1]), sign = at->inside ? 1 : -1;
+    for (int c = 0; c < 2; c++)
+        normal[c] = sign * off[c] / distance;
+    return sign * (at->radius - distance);
+}
+
+void uz_bound_axes(double axis[2][2], const uz_bound_body *body, int64_t edge, int a)
+{
+    double n[2];
+    memcpy(axis, body->edge[edge].axis, sizeof body->edge[edge].axis);
+    if (!body->edge[edge].round)
+        return;
+    uz_bound_gap(n, body, edge, (double)a / body->degree);
+    axis[0][0] = axis[1][1] = n[0];
+    axis[0][1] = n[1];
+    axis[1][0] = -n[1];
 }
 
 void uz_bound_centre(double centre[2], const uz_bound_body *body, int64_t element)

@@ -62,6 +62,39 @@ static void number(int64_t dof_of[OUTER], double value[OUTER], const macro *m, c
     }
 }
 
+/* From the edges' axes to those of their moments, which differ before round obstacles: x, and K (outer x outer, the
+ * lower triangle is given; NULL: none); or back. */
+static void turn(double *K, double x[OUTER], const macro *m, bool back)
+{
+    const int n = m->outer, moments = m->degree + 1;
+    bool mirrored = !K;
+    for (int i = 0; i < n; i += 2) {
+        const int64_t at = m->body->edge_of[4 * m->element + i / (2 * moments)];
+        const uz_bound_edge *edge = &m->body->edge[at];
+        double axis[2][2], R[2][2];
+        if (!edge->round)
+            continue;
+        for (int c = 0; c < n && !mirrored; c++)
+            for (int r = 0; r < c; r++)
+                K[r + n * c] = K[c + n * r];
+        mirrored = true;
+        uz_bound_axes(axis, m->body, at, i % (2 * moments) / 2);
+        for (int r = 0; r < 2; r++)
+            for (int k = 0; k < 2; k++)
+                R[back ? k : r][back ? r : k] = axis[r][0] * edge->axis[k][0] + axis[r][1] * edge->axis[k][1];
+        const double x0 = x[i], x1 = x[i + 1];
+        x[i] = R[0][0] * x0 + R[0][1] * x1;
+        x[i + 1] = R[1][0] * x0 + R[1][1] * x1;
+        for (int side = 0; side < 2 && K; side++)
+            for (int j = 0; j < n; j++) {
+                double *one = side == 0 ? &K[i + n * j] : &K[j + n * i], *other = one + (side == 0 ? 1 : n);
+                const double k0 = *one, k1 = *other;
+                *one = R[0][0] * k0 + R[0][1] * k1;
+                *other = R[1][0] * k0 + R[1][1] * k1;
+            }
+    }
+}
+
 static uz_status fail_at(const uz_stop *stop, int64_t element, uz_error *err)
 {
     return uz_stop_is_due(stop)
@@ -81,7 +114,7 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     uz_status status = kept ? UZ_OK : UZ_ERR_MEMORY;
     for (int64_t e = 0; e < n && status == UZ_OK; e++) {
         int64_t dof_of[OUTER];
-        double value[OUTER], K[OUTER * OUTER];
+        double value[OUTER], p[OUTER], K[OUTER * OUTER];
         if (count + most > room) {
             room = e == 0 ? 16 * most : count * n / e + count / 8 + 16 * most;
             if (!uz_triplets_grow(&row, &col, &val, room)) {
@@ -96,13 +129,16 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
         uz_block_outer(m->outer, m->outer, m->kept, m->A + m->kept, m->kept + m->outer, K);
         number(dof_of, value, m, dof);
         for (int i = 0; i < m->outer; i++) {
-            double p = -m->rest[i];
+            p[i] = -m->rest[i];
             for (int k = 0; k < m->kept; k++)
-                p += m->A[m->kept + i + (m->kept + m->outer) * k] * m->y[k];
+                p[i] += m->A[m->kept + i + (m->kept + m->outer) * k] * m->y[k];
+        }
+        turn(K, p, m, false);
+        for (int i = 0; i < m->outer; i++) {
             for (int j = 0; j < m->outer; j++) {
                 const double entry = i >= j ? K[i + m->outer * j] : K[j + m->outer * i];
                 if (dof_of[j] < 0)
-                    p -= entry * value[j];
+                    p[i] -= entry * value[j];
                 else if (dof_of[i] >= dof_of[j]) {
                     row[count] = dof_of[i];
                     col[count] = dof_of[j];
@@ -110,7 +146,7 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
                 }
             }
             if (dof_of[i] >= 0)
-                qp->p[dof_of[i]] += p;
+                qp->p[dof_of[i]] += p[i];
         }
     }
     if (status == UZ_OK)
@@ -124,8 +160,26 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     return status;
 }
 
-/* Rows of the edges before obstacles: the mean of the gap with the a-th weight is that of a line at (a + 1) / (degree +
- * 2) of its length. */
+/* The mean of the gap with the a-th weight, along the normal of the a-th moments: that of a line is its value at
+ * (a + 1) / (degree + 2) of its length; before round obstacles by Simpson's rule, as nothing is proved here. */
+static double mean_gap(double normal[2], const uz_bound_body *body, int64_t i, int a)
+{
+    enum { STEPS = 16 };
+    const int moments = body->degree + 1;
+    double n[2], sum = 0;
+    if (!body->edge[i].round)
+        return uz_bound_gap(normal, body, i, (a + 1.) / (moments + 1));
+    uz_bound_gap(normal, body, i, (double)a / body->degree);
+    for (int k = 0; k <= STEPS; k++) {
+        const double t = (double)k / STEPS, gap = uz_bound_gap(n, body, i, t);
+        const double weight = (k == 0 || k == STEPS ? 1. : k % 2 ? 4. : 2.) / (3 * STEPS);
+        const double phi = (a == 1 && moments == 3 ? 2 : 1) * pow(1 - t, moments - 1 - a) * pow(t, a);
+        sum += moments * weight * phi * (normal[0] * n[0] + normal[1] * n[1]) * gap;
+    }
+    return sum;
+}
+
+/* Rows of the edges before obstacles. */
 static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const int64_t *dof, uz_error *err)
 {
     const int moments = body->degree + 1;
@@ -141,10 +195,11 @@ static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) {
         const uz_bound_edge *edge = &body->edge[i];
         for (int a = 0; a < moments && edge->contact >= 0; a++) {
-            double gap = edge->gap[0] + (edge->gap[1] - edge->gap[0]) * (a + 1) / (moments + 1);
+            double axis[2][2], normal[2], gap = mean_gap(normal, body, i, a);
             const int64_t before = count;
+            uz_bound_axes(axis, body, i, a);
             for (int k = 0; k < 2; k++) {
-                const double share = edge->normal[0] * edge->axis[k][0] + edge->normal[1] * edge->axis[k][1];
+                const double share = normal[0] * axis[k][0] + normal[1] * axis[k][1];
                 const int64_t at = dof[(i * moments + a) * 2 + k];
                 if (at < 0)
                     gap -= share * edge->value[k];
@@ -186,9 +241,10 @@ uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *b
         const double each = hypot(to[0] - from[0], to[1] - from[1]) * body->model->thickness / moments;
         for (int a = 0; a < 2 * moments; a++) {
             const int64_t at = (*dof)[i * 2 * moments + a];
+            double axis[2][2];
+            uz_bound_axes(axis, body, i, a / 2);
             if (at >= 0)
-                qp->p[at] +=
-                    each * (edge->traction[0] * edge->axis[a % 2][0] + edge->traction[1] * edge->axis[a % 2][1]);
+                qp->p[at] += each * (edge->traction[0] * axis[a % 2][0] + edge->traction[1] * axis[a % 2][1]);
         }
     }
     if (status == UZ_OK)
@@ -221,6 +277,7 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
         for (int i = 0; i < m->outer; i++)
             if (dof_of[i] >= 0)
                 value[i] = v[dof_of[i]];
+        turn(NULL, value, m, true);
         spread(m, stress + e * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, value);
     }
     free(kept);

@@ -72,6 +72,10 @@ static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *mod
     uz_result *dual = NULL;
     double rho = INFINITY;
     uz_status status = uz_bound_body_make(&g->body, model, scene, err);
+    for (int64_t i = 0; i < g->body.n_edges && result->place && status == UZ_OK && !*g->body.why; i++)
+        if (g->body.edge[i].round)
+            snprintf(g->body.why, sizeof g->body.why,
+                     "gaps of the answer are those where the body has gone; they are proved with fixed kinematics");
     if (status != UZ_OK || *g->body.why) {
         snprintf(out->why, sizeof out->why, "%s", g->body.why);
         return status;
@@ -109,7 +113,7 @@ static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *mod
     out->bound = bound;
     out->relative = !(bound > 0) ? 0 : c->norm > bound ? bound / (c->norm - bound) : (double)INFINITY;
     out->primal = c->primal;
-    out->dual = c->dual - fabs(c->defect) - rho * bound;
+    out->dual = c->dual - fabs(c->defect) - uz_bound_lacking(c, rho) * bound;
     return UZ_OK;
 }
 

@@ -3,6 +3,7 @@
 #ifndef TESTS_BOUND_SCENES_H
 #define TESTS_BOUND_SCENES_H
 
+#include "assembly/assembly.h"
 #include "body_fixture.h"
 #include "generated.h"
 #include "scene_fixture.h"
@@ -14,6 +15,7 @@ typedef struct {
     double highest, lowest; /* of the energies that are below and above the body's; apart: nothing is wrong */
     double size;            /* of an energy */
     int count[2];           /* of linear and of quadratic elements: bounds */
+    double least;           /* what may not be below 1, of sweep_differences */
     double effect[2][8];    /* and what they are of the error by energies, sqrt(2 (J(u_h) - J)) */
     char why[160];          /* where one was not proved */
 } bound_sweep;
@@ -41,8 +43,10 @@ static inline uz_load *bound_load(uz_scene *scene, uz_load_kind kind, const char
     return &scene->loads[scene->n_loads - 1];
 }
 
+typedef enum { BOUND_STRAIGHT, BOUND_ROUND } bound_kind;
+
 /* n: cells along the shorter side. Lengths are of the order of `unit`, displacements a thousandth of that. */
-static inline uz_scene bound_scene(uint64_t seed, const char *element, int64_t n)
+static inline uz_scene bound_scene(uint64_t seed, bound_kind kind, const char *element, int64_t n)
 {
     qp_random rng = {seed};
     const double unit = random_power(&rng, -3, 3), young = random_power(&rng, 0, 11), stress = 1e-3 * young;
@@ -93,19 +97,32 @@ static inline uz_scene bound_scene(uint64_t seed, const char *element, int64_t n
     const double tilt = random_chance(&rng, 0.4) ? 2e-3 * (random_unit(&rng) - 0.5) : 0;
     const double gap = random_chance(&rng, 0.5) ? 0.5 * step * random_unit(&rng) : 0;
     const double least = fmin(0, fmin(-tilt * width, 0)); /* the corner that is deepest is at the gap */
-    add_plane(&scene, "bottom", scene.box.origin[0], scene.box.origin[1] - gap + least - fabs(tilt) * width, tilt, 1);
+    const double *x = scene.box.origin;
+    add_plane(&scene, "bottom", x[0], x[1] - gap + least - fabs(tilt) * width, tilt, 1);
+    if (kind == BOUND_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
+        uz_contact *c = &scene.contacts[0];
+        c->kind = UZ_OBSTACLE_ROUND;
+        c->radius = (width + height) * random_power(&rng, 0.3, 2.5);
+        c->inside = random_chance(&rng, 0.3);
+        c->point[0] = x[0] + width * (0.1 + 0.8 * random_unit(&rng));
+        c->point[1] = x[1] - gap - c->radius;
+        if (c->inside)
+            c->point[1] =
+                x[1] - gap +
+                sqrt(c->radius * c->radius - fmax(pow(c->point[0] - x[0], 2), pow(x[0] + width - c->point[0], 2)));
+    }
     return scene;
 }
 
 /* A body on meshes of all elements, the last, finer one to compare with; `steps` halvings of the coarsest. */
-static inline bound_sweep sweep_bounds(uint64_t seed, int64_t coarsest, int64_t finest)
+static inline bound_sweep sweep_bounds(uint64_t seed, bound_kind kind, int64_t coarsest, int64_t finest)
 {
     bound_sweep x = {.highest = -INFINITY, .lowest = INFINITY};
     double primal[16], bound[16];
     int linear[16], n = 0;
     for (int k = 0; k < 9; k++) {
         const bool last = k == 8;
-        uz_scene scene = bound_scene(seed, last ? "quad8" : BOUND_ELEMENTS[k % 4],
+        uz_scene scene = bound_scene(seed, kind, last ? "quad8" : BOUND_ELEMENTS[k % 4],
                                      last    ? finest
                                      : k < 4 ? coarsest
                                              : 2 * coarsest);
@@ -152,6 +169,112 @@ static inline bound_sweep sweep_bounds(uint64_t seed, int64_t coarsest, int64_t 
         const double error = sqrt(2 * fmax(0, primal[i] - x.lowest));
         if (primal[i] - x.lowest > 1e-9 * x.size)
             x.effect[linear[i]][x.count[linear[i]]++] = bound[i] / error;
+    }
+    return x;
+}
+
+/* ---- where answers enter the obstacle, energies say nothing of their error */
+
+/* The displacement of a coarser answer at the nodes of a finer one; elements are triangles or upright rectangles. */
+static inline void bound_interpolate(double *out, const uz_body_model *coarse, const double *u,
+                                     const uz_body_model *fine)
+{
+    for (int64_t a = 0; a < fine->mesh.n_nodes; a++) {
+        const double *x = fine->mesh.xyz + 2 * a;
+        double best = INFINITY;
+        for (int64_t e = 0; e < coarse->mesh.n_elements; e++) {
+            int count;
+            const int64_t *node = uz_mesh_element(&coarse->mesh, e, &count);
+            const uz_element_kind kind = (uz_element_kind)coarse->mesh.kind[e];
+            const int corners = uz_element_type_of(kind)->corners;
+            const double *p = coarse->mesh.xyz + 2 * node[0], *q = coarse->mesh.xyz + 2 * node[1],
+                         *r = coarse->mesh.xyz + 2 * node[corners - 1];
+            const double det = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+            double at[3] = {((x[0] - p[0]) * (r[1] - p[1]) - (x[1] - p[1]) * (r[0] - p[0])) / det,
+                            ((q[0] - p[0]) * (x[1] - p[1]) - (q[1] - p[1]) * (x[0] - p[0])) / det},
+                   N[UZ_ELEMENT_NODES];
+            const double outside = corners == 3 ? fmax(fmax(-at[0], -at[1]), at[0] + at[1] - 1)
+                                                : fmax(fmax(-at[0], -at[1]), fmax(at[0], at[1]) - 1);
+            if (!(outside < best))
+                continue;
+            best = outside;
+            for (int c = 0; c < 2 && corners == 4; c++)
+                at[c] = 2 * at[c] - 1;
+            uz_element_shape(N, kind, at);
+            for (int c = 0; c < 2; c++) {
+                out[2 * a + c] = 0;
+                for (int i = 0; i < count; i++)
+                    out[2 * a + c] += N[i] * u[2 * node[i] + c];
+            }
+        }
+    }
+}
+
+/* A body on nested meshes of all elements, against answers on finer ones of the same family: effect is the bound over
+ * the norm of the difference; low: no bound may be below that less the bound of the finer answer. */
+static inline bound_sweep sweep_differences(uint64_t seed, bound_kind kind, int64_t coarsest, int64_t finest)
+{
+    bound_sweep x = {.highest = -INFINITY, .lowest = INFINITY, .least = INFINITY};
+    for (int shape = 0; shape < 2; shape++) {
+        uz_body_model fine = {.d = 0};
+        uz_result *reference = NULL;
+        for (int k = 0; k < 5; k++) {
+            const int64_t n = k == 0 ? finest : k <= 2 ? coarsest : 2 * coarsest;
+            const bool quadratic = k == 0 || k % 2 == 0;
+            uz_scene scene = bound_scene(seed, kind, BOUND_ELEMENTS[shape + (quadratic ? 2 : 0)], n);
+            uz_settings settings = uz_settings_default();
+            uz_result *result = NULL;
+            uz_body_model model = {.d = 0};
+            uz_error err = {0};
+            scene.box.grading[0] = 1;
+            scene.box.cells[0] = n * (int64_t)(scene.box.size[0] / scene.box.size[1] + 0.5);
+            scene.formulation = k == 0 ? UZ_FORMULATION_STANDARD : scene.formulation;
+            scene.kinematics = UZ_KINEMATICS_FIXED;
+            settings.guaranteed = true;
+            const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene};
+            if (uz_solve(&result, &problem, &settings, NULL, NULL, &err) != UZ_OK ||
+                uz_body_model_outline(&model, &scene, &err) != UZ_OK) {
+                snprintf(x.why, sizeof x.why, "%.100s", err.message);
+                uz_result_free(result);
+                uz_scene_clear(&scene);
+                continue;
+            }
+            const uz_guarantee g = result->summary.guarantee;
+            x.answers++;
+            x.proved += g.proved;
+            if (g.proved) {
+                x.lowest = fmin(x.lowest, g.primal);
+                x.highest = fmax(x.highest, g.dual);
+                x.size = fmax(x.size, fmax(fabs(g.primal), result->summary.evaluation->strain_energy));
+            } else {
+                snprintf(x.why, sizeof x.why, "%.158s", g.why);
+            }
+            if (k == 0) {
+                reference = result;
+                fine = model;
+                uz_scene_clear(&scene);
+                continue;
+            }
+            if (g.proved && reference && reference->summary.guarantee.proved) {
+                double energy = NAN, *apart = malloc((size_t)(2 * fine.mesh.n_nodes) * sizeof *apart);
+                bound_interpolate(apart, &model, result->u, &fine);
+                for (int64_t i = 0; i < 2 * fine.mesh.n_nodes; i++)
+                    apart[i] -= reference->u[i];
+                if (uz_strain_energy(&energy, &fine, apart, true, &err) == UZ_OK) {
+                    const double difference = sqrt(2 * energy), off = reference->summary.guarantee.bound;
+                    if (difference > 1e-6 * reference->summary.certificate.energy_norm) {
+                        x.effect[quadratic][x.count[quadratic]++] = g.bound / difference;
+                        x.least = fmin(x.least, (g.bound + off) / difference);
+                    }
+                }
+                free(apart);
+            }
+            uz_result_free(result);
+            uz_body_model_clear(&model);
+            uz_scene_clear(&scene);
+        }
+        uz_result_free(reference);
+        uz_body_model_clear(&fine);
     }
     return x;
 }

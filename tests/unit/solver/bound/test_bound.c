@@ -176,7 +176,7 @@ TEST(never_below_the_truth)
     double least = INFINITY, sum = 0;
     int count = 0;
     for (uint64_t seed = 1; seed <= 6; seed++) {
-        const bound_sweep x = sweep_bounds(seed, 2, 8);
+        const bound_sweep x = sweep_bounds(seed, BOUND_STRAIGHT, 2, 8);
         CHECK_MSG(x.answers == 9 && x.proved == 9, "seed %d: %s", (int)seed, x.why);
         CHECK_MSG(x.highest <= x.lowest + 1e-12 * x.size, "seed %d: %.10e above %.10e", (int)seed, x.highest, x.lowest);
         for (int k = 0; k < 2; k++)
@@ -188,6 +188,45 @@ TEST(never_below_the_truth)
     }
     CHECK_MSG(least >= 1, "%g", least);
     CHECK_MSG(count > 40 && exp(sum / count) < 1.5, "%d: %g", count, exp(sum / count));
+}
+
+/* Between nodes answers enter discs: their energies are below the body's, and only differences say their error. */
+TEST(never_below_the_truth_before_round_obstacles)
+{
+    double most = 0;
+    int count = 0, lifted = 0;
+    for (uint64_t seed = 1; seed <= 12; seed += 2) {
+        const bound_sweep x = sweep_differences(seed, BOUND_ROUND, 3, 9);
+        CHECK_MSG(x.answers == 10 && x.proved == 10, "seed %d: %s", (int)seed, x.why);
+        CHECK_MSG(x.highest <= x.lowest + 1e-12 * x.size, "seed %d: %.10e above %.10e", (int)seed, x.highest, x.lowest);
+        CHECK_MSG(x.least >= 1, "seed %d: %g", (int)seed, x.least);
+        for (int k = 0; k < 2; k++)
+            for (int i = 0; i < x.count[k]; i++, count++) {
+                most = fmax(most, x.effect[k][i]);
+                lifted += x.effect[k][i] > 2;
+            }
+    }
+    CHECK_MSG(count == 48 && most < 10 && lifted < 24, "%d: %g, %d", count, most, lifted);
+}
+
+/* A disc of 10,000 lengths is a plane, and presses on nodes as that does. */
+TEST(a_large_disc_is_a_plane)
+{
+    uz_guarantee g[2];
+    for (int k = 0; k < 2; k++) {
+        uz_scene scene = paper_scene(24, 8);
+        if (k == 1) {
+            scene.contacts[0].kind = UZ_OBSTACLE_ROUND;
+            scene.contacts[0].point[0] = 30;
+            scene.contacts[0].radius = 6e9;
+            scene.contacts[0].point[1] = -6e9;
+        }
+        g[k] = bound_of(&scene);
+        CHECK_MSG(g[k].proved, "%s", g[k].why);
+        uz_scene_clear(&scene);
+    }
+    CHECK_REL(g[1].bound, g[0].bound, 1e-2);
+    CHECK_REL(g[1].dual, g[0].dual, 1e-4);
 }
 
 /* ---- the check finds what is wrong with a stress, a displacement, a contact */
@@ -346,17 +385,27 @@ TEST(nodes_hold_the_border_that_they_are_on)
 
 TEST(what_is_not_proved_is_named)
 {
-    static const char *const WHY[] = {"springs", "node", "not straight", "single nodes", "revolution"};
-    for (int k = 0; k < 5; k++) {
+    static const char *const WHY[] = {"springs", "node", "corners", "single nodes", "revolution", "longer than"};
+    for (int k = 0; k < 6; k++) {
         uz_scene scene = paper_scene(6, 2);
         if (k == 0)
             scene.supports[scene.n_supports++] = (uz_support){.kind = UZ_SUPPORT_SPRING, .on = "top", .spring = {1, 1}};
         if (k == 1)
             scene.loads[scene.n_loads++] = (uz_load){.kind = UZ_LOAD_NODE_FORCE, .node = 20, .v = {1, 0}};
         if (k == 2) {
+            uz_contact *c = &scene.contacts[0];
+            c->kind = UZ_OBSTACLE_HEIGHT;
+            c->n_x = 2;
+            c->x = calloc(2, sizeof *c->x);
+            c->z = calloc(2, sizeof *c->z);
+            c->x[1] = 60;
+            c->z[0] = -1;
+        }
+        if (k == 5) {
             scene.contacts[0].kind = UZ_OBSTACLE_ROUND;
-            scene.contacts[0].point[1] = -1000;
-            scene.contacts[0].radius = 1000;
+            scene.contacts[0].point[0] = 30;
+            scene.contacts[0].point[1] = -9;
+            scene.contacts[0].radius = 9;
         }
         if (k == 3) {
             int64_t *node = calloc(1, sizeof *node);
