@@ -191,11 +191,26 @@ static void *touch_ahead(void *arg)
 }
 
 /* Under the mutex. Without a thread pages come when they are touched. */
+static void start_helper(uz_reserve *reserve)
+{
+    if (reserve->has_helper)
+        return;
+    reserve->has_helper = pthread_create(&reserve->helper, NULL, touch_ahead, reserve) == 0;
+    if (reserve->has_helper)
+        pthread_setname_np(reserve->helper, "uzawad-pages");
+}
+
 static void wake_helper(uz_reserve *reserve)
 {
-    if (!reserve->has_helper)
-        reserve->has_helper = pthread_create(&reserve->helper, NULL, touch_ahead, reserve) == 0;
+    start_helper(reserve);
     pthread_cond_signal(&reserve->news);
+}
+
+void uz_reserve_start(uz_reserve *reserve)
+{
+    pthread_mutex_lock(&reserve->mutex);
+    start_helper(reserve);
+    pthread_mutex_unlock(&reserve->mutex);
 }
 
 void uz_reserve_expect(uz_reserve *reserve, size_t bytes)

@@ -4,6 +4,9 @@
 
 #include "uzawa.h"
 
+/* Starts the thread that touches pages, which else comes when it is needed first: a process that is confined by then
+ * may start none. */
+void uz_reserve_start(uz_reserve *reserve);
 /* A block of some `bytes` is going to be taken: their pages are made ready meanwhile, as far as `ready` of
  * uz_reserve_new allows. */
 void uz_reserve_expect(uz_reserve *reserve, size_t bytes);

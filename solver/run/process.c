@@ -2,6 +2,7 @@
 #include "uzawa.h"
 
 #include "core/alloc.h"
+#include "core/reserve.h"
 #include "factor/factor.h"
 #include "linalg/blas.h"
 
@@ -44,6 +45,7 @@ void uz_process_warm(void)
 void uz_process_reserve(uz_reserve *reserve)
 {
     uz_factor_use_reserve(reserve);
+    uz_reserve_start(reserve);
 }
 
 /* Debian's CHOLMOD asks for a team of 4 threads whatever the machine has. No active parallel level means a team of one.
