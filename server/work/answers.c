@@ -52,14 +52,6 @@ static bool add_places(answers *a, answer_parts *to, const uz_result *result, bo
     return !result->mesh.contact_node || add_contact_nodes(to, result);
 }
 
-/* Of cases whose contacts move, each may have rows of its own. */
-static bool has_own_rows(const uz_result *result, const uz_result *first)
-{
-    const size_t size = (size_t)first->m * sizeof *first->mesh.contact_node;
-    return result->place && (result->m != first->m ||
-                             (size > 0 && memcmp(result->mesh.contact_node, first->mesh.contact_node, size) != 0));
-}
-
 /* ---- history */
 
 /* Seconds count from the first iteration of the first run; the time between the runs is left out. */
@@ -88,19 +80,17 @@ static bool add_history(answer_parts *to, const uz_history *history, const doubl
 /* ---- one answer, all answers */
 
 /* What the solver made of the start that it was given, which may be less than what the request asked for. */
-static const char *origin_name(uz_origin origin)
-{
-    return origin == UZ_FROM_STATE ? "continued" : origin == UZ_FROM_REACTIONS ? "warm" : "zero";
-}
+static const char *const ORIGINS[] = {
+    [UZ_FROM_ZERO] = "zero", [UZ_FROM_REACTIONS] = "warm", [UZ_FROM_STATE] = "continued"};
 
 static bool build_one(answers *a, int64_t i, uz_result *const *results, const codec_request *request,
                       const starts *from)
 {
-    const uz_result *result = results[i];
+    const uz_result *result = results[i], *first = results[0];
     bool is_scene = request->problem.kind == UZ_PROBLEM_SCENE;
     bool has_earlier = from->histories != NULL && result->summary.origin == UZ_FROM_STATE;
     answer_parts *parts = &a->parts[i];
-    codec_run run = {.started_from = request->answer.u ? NULL : origin_name(result->summary.origin)};
+    codec_run run = {.started_from = request->answer.u ? NULL : ORIGINS[result->summary.origin]};
     parts->summary = codec_encode_summary(&result->summary, request->problem.kind, &run);
     add_vector(parts, "reactions", result->r, result->m);
     add_vector(parts, "gaps", result->g, result->m);
@@ -119,7 +109,12 @@ static bool build_one(answers *a, int64_t i, uz_result *const *results, const co
             trade_join(&trade, &from->trades[i]);
         add_vector(parts, TRADE_VECTOR, parts->trade, trade_pack(parts->trade, &trade));
     }
-    if (has_own_rows(result, results[0]) && !add_contact_nodes(parts, result))
+    /* Of cases whose contacts move, each may have rows of its own. */
+    const size_t size = (size_t)first->m * sizeof *first->mesh.contact_node;
+    const bool own_rows =
+        result->place &&
+        (result->m != first->m || (size > 0 && memcmp(result->mesh.contact_node, first->mesh.contact_node, size) != 0));
+    if (own_rows && !add_contact_nodes(parts, result))
         return false;
     const char *name = request->problem.n_cases > 0 ? request->problem.cases[i].name : NULL;
     return parts->summary && judge(&parts->summary, request, name, false, a->findings) &&
@@ -156,7 +151,7 @@ static bool build_whole(answers *a, store_outcome *outcome, uz_result *const *re
         first++;
     overall_summary(&overall, &counts, results, &request->problem);
     add_waiting(&overall.timings, queue_s, parse_s);
-    codec_run run = {.started_from = origin_name(results[first]->summary.origin), .cases = &counts};
+    codec_run run = {.started_from = ORIGINS[results[first]->summary.origin], .cases = &counts};
     a->shared.summary = codec_encode_summary(&overall, request->problem.kind, &run);
     a->cases = calloc((size_t)a->n, sizeof *a->cases);
     if (!a->cases || !a->shared.summary || !judge(&a->shared.summary, request, NULL, true, a->findings) ||
@@ -190,19 +185,15 @@ bool answers_build(answers *out, store_outcome *outcome, uz_result *const *resul
     return ok;
 }
 
-static void clear_parts(answer_parts *parts)
-{
-    free(parts->summary);
-    free(parts->history);
-    free(parts->state);
-    free(parts->contact_nodes);
-}
-
 void answers_clear(answers *a)
 {
-    for (int64_t i = 0; a->parts && i < a->n; i++)
-        clear_parts(&a->parts[i]);
-    clear_parts(&a->shared);
+    for (int64_t i = a->parts ? 0 : a->n; i <= a->n; i++) {
+        answer_parts *one = i < a->n ? &a->parts[i] : &a->shared;
+        free(one->summary);
+        free(one->history);
+        free(one->state);
+        free(one->contact_nodes);
+    }
     free(a->parts);
     free(a->cases);
     free(a->findings);

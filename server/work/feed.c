@@ -62,23 +62,21 @@ void feed_free(feed *f)
     free(f);
 }
 
-/* ---- telling; under the lock */
+/* ---- telling */
 
-static void wake(listener *l)
+/* Those who listen to this job; NULL: all of the list. Under the lock. */
+static void wake(listener *first, const char *id)
 {
-    if (!l->signaled && l->wake >= 0)
-        eventfd_write(l->wake, 1);
-    l->signaled = true;
+    for (listener *l = first; l; l = l->next) {
+        if (id && strcmp(l->id, id) != 0)
+            continue;
+        if (!l->signaled && l->wake >= 0)
+            eventfd_write(l->wake, 1);
+        l->signaled = true;
+    }
 }
 
-static void wake_those_of(listener *first, const char *id)
-{
-    for (listener *l = first; l; l = l->next)
-        if (strcmp(l->id, id) == 0)
-            wake(l);
-}
-
-static void tell(feed *f, const char *id, const char *deleted_of)
+void feed_changed(feed *f, const char *id, const char *deleted_of)
 {
     pthread_mutex_lock(&f->lock);
     uint64_t *newest = &f->newest[bucket(id)];
@@ -90,25 +88,15 @@ static void tell(feed *f, const char *id, const char *deleted_of)
     snprintf(now->change.id, sizeof now->change.id, "%s", id);
     now->change.deleted = deleted_of != NULL;
     snprintf(now->change.client, sizeof now->change.client, "%s", deleted_of ? deleted_of : "");
-    wake_those_of(f->listeners[bucket(id)], id);
-    wake_those_of(f->all, "");
+    wake(f->listeners[bucket(id)], id);
+    wake(f->all, NULL);
     pthread_mutex_unlock(&f->lock);
-}
-
-void feed_changed(feed *f, const char *id)
-{
-    tell(f, id, NULL);
-}
-
-void feed_deleted(feed *f, const char *id, const char *client)
-{
-    tell(f, id, client);
 }
 
 void feed_moved(feed *f, const char *id)
 {
     pthread_mutex_lock(&f->lock);
-    wake_those_of(f->listeners[bucket(id)], id);
+    wake(f->listeners[bucket(id)], id);
     pthread_mutex_unlock(&f->lock);
 }
 
@@ -116,9 +104,8 @@ void feed_wake_all(feed *f)
 {
     pthread_mutex_lock(&f->lock);
     for (size_t i = 0; i < BUCKETS; i++)
-        for (listener *l = f->listeners[i]; l; l = l->next)
-            wake(l);
-    wake_those_of(f->all, "");
+        wake(f->listeners[i], NULL);
+    wake(f->all, NULL);
     pthread_mutex_unlock(&f->lock);
 }
 

@@ -26,9 +26,8 @@ typedef struct {
 feed *feed_new(void);    /* NULL: no memory */
 void feed_free(feed *f); /* nobody listens any more; NULL is fine */
 
-void feed_changed(feed *f, const char *id);
-/* Of a job that is gone: whose it was is not known from the store any more. */
-void feed_deleted(feed *f, const char *id, const char *client);
+/* deleted_of: whose job it was, which is not known from the store any more; NULL: it is not gone. */
+void feed_changed(feed *f, const char *id, const char *deleted_of);
 /* Something that only those who follow this job want to know: no number, and nothing that is kept. */
 void feed_moved(feed *f, const char *id);
 /* Everybody looks again. */

@@ -11,23 +11,20 @@
 #define ROUND_S   0.5
 #define HEAP_FREE ((size_t)16 << 20) /* may lie free */
 
-static void expire(work *w)
+/* What waits too long fails, what is old or too much goes. *told: that the clock is not believed. */
+static void tidy(work *w, bool *told)
 {
-    int64_t count = 0;
+    int64_t expired = 0, total = 0, count = 1;
+    bool held;
     problem_details problem = {.status = 503, .code = "queue_time_limit", .title = "The job waited too long"};
     snprintf(problem.detail, sizeof problem.detail,
              "It had not begun when its queue_limit_s was over. Submit it again, with more time or a larger priority.");
     char *error = codec_encode_problem(&problem);
-    if (error && store_expire(w->store, error, &count) == STORE_OK && count > 0) {
-        log_write(w->log, LOG_INFO, "queue_time_limit", (log_field[]){LOG_I("jobs", count), {0}});
-        metrics_job(w->options.metrics, job_status_name(JOB_FAILED), NULL, count);
+    if (error && store_expire(w->store, error, &expired) == STORE_OK && expired > 0) {
+        log_write(w->log, LOG_INFO, "queue_time_limit", (log_field[]){LOG_I("jobs", expired), {0}});
+        metrics_job(w->options.metrics, job_status_name(JOB_FAILED), NULL, expired);
     }
     free(error);
-}
-
-static void retain(work *w, bool *told)
-{
-    bool held;
     store_age_time(w->store, &held);
     if (held && !*told)
         log_write(
@@ -36,20 +33,12 @@ static void retain(work *w, bool *told)
                                          "nothing is deleted for its age by it before the daemon has run for a day"),
                           {0}});
     *told = held;
-    int64_t total = 0, count = 1;
     while (count > 0 && !work_is_stopping(w) && store_retain(w->store, &w->options.retention, &count) == STORE_OK)
         total += count;
     metrics_add(w->options.metrics, METRIC_DELETED, total);
     if (total > 0)
         log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
-}
-
-/* What is freed stays in the heap (memory_keep_heap): where much lies free there, it goes back to the system. */
-static void trim_heap(void)
-{
-    const struct mallinfo2 heap = mallinfo2(); /* of another allocator all zero */
-    if (heap.fordblks > HEAP_FREE)
-        malloc_trim(0);
+    store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
 }
 
 void *housekeeping_loop(void *arg)
@@ -61,11 +50,13 @@ void *housekeeping_loop(void *arg)
         if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + ROUND_S))
             continue;
         pthread_mutex_unlock(&w->lock);
-        trim_heap();
+        /* What is freed stays in the heap (memory_keep_heap): where much lies free there, it goes back to the system.
+         */
+        const struct mallinfo2 heap = mallinfo2(); /* of another allocator all zero */
+        if (heap.fordblks > HEAP_FREE)
+            malloc_trim(0);
         work_rest_processes(w);
-        expire(w);
-        retain(w, &told);
-        store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
+        tidy(w, &told);
         pthread_mutex_lock(&w->lock);
     }
     pthread_mutex_unlock(&w->lock);

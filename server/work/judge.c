@@ -133,21 +133,6 @@ static codec_finding judge_one(const codec_assertion *a, const codec_summary *su
 
 /* ---- of many cases */
 
-/* The worst of several cases; of equally good ones that which is nearest to its limit. */
-static void gather(codec_finding *sum, const codec_finding *one, const char *name)
-{
-    const bool first = sum->counts[0] + sum->counts[1] + sum->counts[2] == 0;
-    sum->counts[one->verdict]++;
-    if (!first && (one->verdict < sum->verdict || (one->verdict == sum->verdict && !(one->margin < sum->margin))))
-        return;
-    sum->verdict = one->verdict;
-    sum->value = one->value;
-    sum->error = one->error;
-    sum->margin = one->margin;
-    memcpy(sum->reason, one->reason, sizeof sum->reason);
-    snprintf(sum->case_name, sizeof sum->case_name, "%s", name);
-}
-
 /* How many cases ended how, and how long all took, is known of the whole job alone. */
 static bool is_of_the_whole(const codec_assertion *a)
 {
@@ -171,8 +156,19 @@ bool judge(char **summary, const codec_request *request, const char *name, bool 
             continue;
         codec_judged *one = &list[told++];
         *one = (codec_judged){a, gathered ? all[i] : judge_one(a, read), gathered};
-        if (name)
-            gather(&all[i], &one->found, name);
+        if (!name)
+            continue;
+        /* The worst of several cases; of equally good ones that which is nearest to its limit. */
+        const codec_finding *found = &one->found, *sum = &all[i];
+        const bool first = sum->counts[0] + sum->counts[1] + sum->counts[2] == 0;
+        const bool worse = found->verdict > sum->verdict;
+        all[i].counts[found->verdict]++;
+        if (first || worse || (found->verdict == sum->verdict && found->margin < sum->margin)) {
+            codec_finding taken = *found;
+            memcpy(taken.counts, sum->counts, sizeof taken.counts);
+            snprintf(taken.case_name, sizeof taken.case_name, "%s", name);
+            all[i] = taken;
+        }
     }
     if (list && read)
         good = codec_add_findings(summary, list, told);

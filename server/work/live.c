@@ -28,15 +28,6 @@ static void publish(live *l, const live_state *state)
     atomic_store_explicit(&l->turn, turn + 1, memory_order_release);
 }
 
-static void put_row(live *l, int64_t at, const double row[CODEC_HISTORY_COLUMNS])
-{
-    for (int k = 0; k < CODEC_HISTORY_COLUMNS; k++) {
-        uint64_t bits;
-        memcpy(&bits, &row[k], 8);
-        atomic_store_explicit(&l->rows[at][k], bits, memory_order_release);
-    }
-}
-
 void live_begin(live_writer *w, live *shared, const uz_settings *settings, const uz_problem *problem)
 {
     *w = (live_writer){.shared = shared, .paper = settings->stopping == UZ_STOP_PAPER};
@@ -51,28 +42,18 @@ void live_begin(live_writer *w, live *shared, const uz_settings *settings, const
     publish(shared, &w->state);
 }
 
-static void restart(live_state *s, int64_t current)
+void live_restart(live_writer *w, int64_t current, double from, double to)
 {
+    live_state *s = &w->state;
     s->thinned += 2; /* rows that a reader has copied are of something else now */
     s->count = 0;
     s->stride = 1;
     s->any = 0;
     s->first = 0.0;
     s->current = current;
-}
-
-void live_case(live_writer *w, int64_t i)
-{
-    restart(&w->state, i);
-    publish(w->shared, &w->state);
-}
-
-void live_part(live_writer *w, double from, double to)
-{
-    restart(&w->state, 0);
-    w->state.from = from;
-    w->state.to = to;
-    publish(w->shared, &w->state);
+    s->from = from;
+    s->to = to;
+    publish(w->shared, s);
 }
 
 /* Every other row goes. */
@@ -104,7 +85,12 @@ void live_add(live_writer *w, const uz_history_row *row)
     if (row->iteration % s->stride == 0) {
         if (s->count == LIVE_ROWS)
             thin_out(w);
-        put_row(w->shared, s->count++, s->latest);
+        for (int k = 0; k < CODEC_HISTORY_COLUMNS; k++) {
+            uint64_t bits;
+            memcpy(&bits, &s->latest[k], 8);
+            atomic_store_explicit(&w->shared->rows[s->count][k], bits, memory_order_release);
+        }
+        s->count++;
     }
     publish(w->shared, s);
 }

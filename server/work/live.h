@@ -48,10 +48,8 @@ typedef struct {
 } live_writer;
 
 void live_begin(live_writer *w, live *shared, const uz_settings *settings, const uz_problem *problem);
-/* The next load case begins: rows are its own from here on. */
-void live_case(live_writer *w, int64_t i);
-/* What comes next is this part of the whole, all its load cases over again. */
-void live_part(live_writer *w, double from, double to);
+/* A load case begins, of this part of the whole (0, 0: it is the whole): rows are its own from here on. */
+void live_restart(live_writer *w, int64_t current, double from, double to);
 void live_add(live_writer *w, const uz_history_row *row);
 
 /* ---- the reader's side */

@@ -40,17 +40,12 @@ static int64_t text_size(const char *text)
     return text ? (int64_t)strlen(text) + 1 : 0;
 }
 
-static void put_text(char *to, size_t *at, const char *text)
-{
-    put(to, at, text, (size_t)text_size(text));
-}
-
-static size_t put_outcome(char *to, const store_outcome *outcome)
+size_t parcel_write(char *to, const store_outcome *outcome)
 {
     size_t at = 0;
     const head h = {outcome->status, 1 + (int64_t)outcome->n_cases, text_size(outcome->error)};
     put(to, &at, &h, sizeof h);
-    put_text(to, &at, outcome->error);
+    put(to, &at, outcome->error, (size_t)h.error);
     for (size_t i = 0; i <= outcome->n_cases; i++) {
         const store_answer *a = i == 0 ? &outcome->whole : &outcome->cases[i - 1];
         const answer_head ah = {text_size(a->name),
@@ -60,8 +55,8 @@ static size_t put_outcome(char *to, const store_outcome *outcome)
                                 a->history ? a->history_rows : 0,
                                 a->history ? a->history_columns : 0};
         put(to, &at, &ah, sizeof ah);
-        put_text(to, &at, a->name);
-        put_text(to, &at, a->summary);
+        put(to, &at, a->name, (size_t)ah.name);
+        put(to, &at, a->summary, (size_t)ah.summary);
         for (size_t k = 0; k < a->n_vectors; k++) {
             vector_head vh = {.count = a->vectors[k].count};
             memcpy(vh.name, a->vectors[k].name, sizeof vh.name);
@@ -71,16 +66,6 @@ static size_t put_outcome(char *to, const store_outcome *outcome)
         put(to, &at, a->history, (size_t)(ah.rows * ah.columns) * sizeof(double));
     }
     return at;
-}
-
-size_t parcel_size(const store_outcome *outcome)
-{
-    return put_outcome(NULL, outcome);
-}
-
-void parcel_write(char *to, const store_outcome *outcome)
-{
-    put_outcome(to, outcome);
 }
 
 /* ---- reading */

@@ -10,9 +10,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-size_t parcel_size(const store_outcome *outcome);
-/* to: parcel_size bytes at a multiple of 8. */
-void parcel_write(char *to, const store_outcome *outcome);
+/* Returns the parcel's size; to: so many bytes at a multiple of 8, NULL: it is only counted. */
+size_t parcel_write(char *to, const store_outcome *outcome);
 
 typedef struct {
     store_outcome outcome;

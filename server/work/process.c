@@ -34,9 +34,28 @@ bool process_make(process *p, const char *program, size_t cache_bytes, size_t so
     return true;
 }
 
+static void forget(process *p)
+{
+    if (p->socket >= 0)
+        close(p->socket);
+    p->socket = -1;
+    p->ready = false;
+}
+
 void process_free(process *p)
 {
-    process_end(p);
+    bool out_of_memory;
+    if (p->pid > 0) { /* it may end by itself, where it is idle */
+        const double until = clock_seconds(CLOCK_MONOTONIC) + END_S;
+        siginfo_t info = {.si_pid = 0};
+        forget(p); /* it sees that */
+        while (clock_seconds(CLOCK_MONOTONIC) < until &&
+               waitid(P_PID, (id_t)p->pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0)
+            nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
+        if (info.si_pid == 0)
+            kill(p->pid, SIGKILL);
+        process_reap(p, &out_of_memory);
+    }
     segment_close(&p->board_memory);
     segment_close(&p->inbox);
     segment_close(&p->outbox);
@@ -94,26 +113,13 @@ static int spawn(process *p, int socket)
     return error;
 }
 
-/* A process that ended while nobody looked is found by its end of the socket. */
-static bool has_gone(const process *p)
-{
-    struct pollfd peer = {.fd = p->socket, .events = POLLRDHUP};
-    return p->pid == 0 || p->socket < 0 || poll(&peer, 1, 0) < 0 || (peer.revents & (POLLRDHUP | POLLHUP | POLLERR));
-}
-
-static void forget(process *p)
-{
-    if (p->socket >= 0)
-        close(p->socket);
-    p->socket = -1;
-    p->ready = false;
-}
-
 bool process_begin(process *p)
 {
     int ends[2], error = 0;
     bool out_of_memory;
-    if (!has_gone(p))
+    /* One that ended while nobody looked is found by its end of the socket. */
+    struct pollfd peer = {.fd = p->socket, .events = POLLRDHUP};
+    if (p->pid != 0 && p->socket >= 0 && poll(&peer, 1, 0) >= 0 && !(peer.revents & (POLLRDHUP | POLLHUP | POLLERR)))
         return true;
     if (p->pid > 0)
         process_reap(p, &out_of_memory);
@@ -156,22 +162,6 @@ int process_reap(process *p, bool *out_of_memory)
     segment_rest(&p->outbox, SEGMENT_KEPT, true);
     segment_rest(&p->inbox, SEGMENT_KEPT, true);
     return status;
-}
-
-void process_end(process *p)
-{
-    bool out_of_memory;
-    const double until = clock_seconds(CLOCK_MONOTONIC) + END_S;
-    if (p->pid <= 0)
-        return;
-    forget(p); /* it sees that */
-    siginfo_t info = {.si_pid = 0};
-    while (clock_seconds(CLOCK_MONOTONIC) < until &&
-           waitid(P_PID, (id_t)p->pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0)
-        nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
-    if (info.si_pid == 0)
-        kill(p->pid, SIGKILL);
-    process_reap(p, &out_of_memory);
 }
 
 /* ---- which process has a body */

@@ -34,7 +34,8 @@ typedef struct {
     size_t n_entries, held_entries, held_bytes;
 } process;
 
-/* What it shares with the one that lives; false: no memory. process_free in every case. */
+/* What it shares with the one that lives; false: no memory. process_free in every case, which lets one that is idle end
+ * by itself and kills any other. */
 bool process_make(process *p, const char *program, size_t cache_bytes, size_t solve_bytes, server_log *log);
 void process_free(process *p);
 
@@ -45,8 +46,6 @@ void process_kill(process *p);
 /* Waits for its end, after it was killed or its socket closed: its status as waitpid has it. *out_of_memory: the
  * machine or the control group killed it for want of memory. */
 int process_reap(process *p, bool *out_of_memory);
-/* Lets it end by itself where it is idle, else kills it. */
-void process_end(process *p);
 
 /* What stands for the body of a job's text: the same for texts whose problems differ in loads only. */
 uint64_t process_body(const char *text, size_t len);

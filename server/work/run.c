@@ -144,22 +144,6 @@ static void count_job(const run *r)
                             {0}});
 }
 
-static void store_end(run *r, run_end end)
-{
-    work *w = r->me->w;
-    static const char *const EVENTS[] = {
-        [END_RELEASE] = "job_released", [END_RETRY] = "job_retried", [END_DROP] = "job_taken_over"};
-    if ((end == END_RELEASE || end == END_RETRY) &&
-        store_release(w->store, &r->me->lease, end == END_RETRY) != STORE_OK)
-        log_store_failure(r, LOG_ERROR, "release_failed");
-    if (end != END_FINISH) {
-        metrics_add(w->options.metrics, METRIC_REQUEUED, end != END_DROP);
-        log_write(w->log, LOG_INFO, EVENTS[end], (log_field[]){LOG_S("job", r->job->id), {0}});
-    } else if (store_outcome_of(r)) {
-        count_job(r);
-    }
-}
-
 /* ---- what came of it */
 
 enum { BOUND = 9 }; /* its column of a history's row */
@@ -271,6 +255,8 @@ static run_end judge_end(run *r, watch_end end, const watch_report *seen)
 
 void work_run(worker *me, job *claimed, char *body, size_t body_len)
 {
+    static const char *const EVENTS[] = {
+        [END_RELEASE] = "job_released", [END_RETRY] = "job_retried", [END_DROP] = "job_taken_over"};
     work *w = me->w;
     run r = {.me = me, .job = claimed, .began = clock_seconds(CLOCK_MONOTONIC)};
     watch_report seen;
@@ -286,7 +272,16 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     const watch_end end = watch_job(me, claimed, body, body_len, r.queue_s, &seen);
     if (end == WATCH_DONE && seen.done.u.done.start_lost)
         log_store_failure(&r, LOG_WARN, "start_not_read");
-    store_end(&r, judge_end(&r, end, &seen));
+    const run_end what = judge_end(&r, end, &seen);
+    if ((what == END_RELEASE || what == END_RETRY) &&
+        store_release(w->store, &me->lease, what == END_RETRY) != STORE_OK)
+        log_store_failure(&r, LOG_ERROR, "release_failed");
+    if (what != END_FINISH) {
+        metrics_add(w->options.metrics, METRIC_REQUEUED, what != END_DROP);
+        log_write(w->log, LOG_INFO, EVENTS[what], (log_field[]){LOG_S("job", claimed->id), {0}});
+    } else if (store_outcome_of(&r)) {
+        count_job(&r);
+    }
     pthread_mutex_lock(&me->lock);
     me->process = NULL;
     pthread_mutex_unlock(&me->lock);

@@ -6,14 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool any_dismissed(const solution *s)
-{
-    for (int64_t i = 0; s->results && i < s->n; i++)
-        if (s->results[i]->summary.outcome == UZ_DISMISSED)
-            return true;
-    return false;
-}
-
 /* What the library can't know: who may do something about it, and how. */
 static void add_remedy(uz_error *err, const char *remedy)
 {
@@ -106,7 +98,9 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
     }
     if (status == UZ_ERR_LIMIT)
         add_remedy(&err, " (the limit is the daemon's option --memory)");
-    out->stopped = status == UZ_ERR_CANCELLED || (status == UZ_OK && any_dismissed(out));
+    out->stopped = status == UZ_ERR_CANCELLED;
+    for (int64_t i = 0; status == UZ_OK && out->results && i < out->n; i++)
+        out->stopped = out->stopped || out->results[i]->summary.outcome == UZ_DISMISSED;
     if (status == UZ_OK) {
         out->outcome.status = out->stopped ? JOB_DISMISSED : JOB_SUCCESSFUL;
         if (!answers_build(&out->answers, &out->outcome, out->results, &out->request, &out->starts, with->queue_s,

@@ -63,12 +63,13 @@ static void note_progress(void *ctx, const uz_history_row *row)
 
 static void note_case(void *ctx, int64_t load_case)
 {
-    live_case(&((solver *)ctx)->live, load_case);
+    live_writer *w = &((solver *)ctx)->live;
+    live_restart(w, load_case, w->state.from, w->state.to);
 }
 
 static void note_grid(void *ctx, double from, double to)
 {
-    live_part(&((solver *)ctx)->live, from, to);
+    live_restart(&((solver *)ctx)->live, 0, from, to);
 }
 
 /* The names come before the news, and the news before the solve. */
@@ -88,19 +89,6 @@ static void note_request(void *ctx, const codec_request *request)
 }
 
 /* ---- messages */
-
-/* Where there is no room for the answer, that takes its place. */
-static void put_outcome(solver *s, solution *solved, packet *done)
-{
-    done->u.done.at = s->names;
-    done->u.done.size = parcel_size(&solved->outcome);
-    if (!segment_reach(&s->outbox, s->names + done->u.done.size, true)) {
-        solution_fail(solved, NULL);
-        done->u.done.at = s->names = 0;
-        done->u.done.size = parcel_size(&solved->outcome); /* that fits in any */
-    }
-    parcel_write(s->outbox.at + done->u.done.at, &solved->outcome);
-}
 
 static void run_job(solver *s, const packet *m)
 {
@@ -129,7 +117,14 @@ static void run_job(solver *s, const packet *m)
         solved = (solution){.n = 0};
         solution_fail(&solved, NULL);
     }
-    put_outcome(s, &solved, &done);
+    done.u.done.at = s->names;
+    done.u.done.size = parcel_write(NULL, &solved.outcome);
+    if (!segment_reach(&s->outbox, s->names + done.u.done.size, true)) {
+        solution_fail(&solved, NULL); /* takes the place of the answer */
+        done.u.done.at = s->names = 0;
+        done.u.done.size = parcel_write(NULL, &solved.outcome); /* that fits in any */
+    }
+    parcel_write(s->outbox.at + done.u.done.at, &solved.outcome);
     done.u.done.stopped = solved.stopped;
     done.u.done.start_lost = solved.start_lost;
     done.u.done.figures = solved.figures;

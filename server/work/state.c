@@ -9,32 +9,18 @@
  * 2^53, so that a double holds them. */
 enum { STATE_VERSION = 1, STATE_NUMBERS = 16, STATE_VECTORS = 6 };
 
-/* The numbers that methods have in stored states; new ones are added at the end. */
-static const struct {
-    int stored;
-    uz_method method;
-} METHODS[] = {{0, UZ_METHOD_AUTO},           {1, UZ_METHOD_UZAWA},
-               {2, UZ_METHOD_ACCELERATED},    {3, UZ_METHOD_ACCELERATED_RESTART},
-               {4, UZ_METHOD_ACTIVE_SET},     {5, UZ_METHOD_CONJUGATE},
-               {6, UZ_METHOD_DUAL_ACTIVE_SET}};
+/* The numbers that methods have in stored states are their places here; new ones are added at the end. */
+static const uz_method METHODS[] = {
+    UZ_METHOD_AUTO,       UZ_METHOD_UZAWA,     UZ_METHOD_ACCELERATED,    UZ_METHOD_ACCELERATED_RESTART,
+    UZ_METHOD_ACTIVE_SET, UZ_METHOD_CONJUGATE, UZ_METHOD_DUAL_ACTIVE_SET};
 enum { N_METHODS = sizeof METHODS / sizeof METHODS[0] };
 
 static double method_number(uz_method method)
 {
     for (int i = 0; i < N_METHODS; i++)
-        if (METHODS[i].method == method)
-            return METHODS[i].stored;
+        if (METHODS[i] == method)
+            return i;
     return -1.0;
-}
-
-static bool find_method(uz_method *out, double number)
-{
-    for (int i = 0; i < N_METHODS; i++)
-        if ((double)METHODS[i].stored == number) {
-            *out = METHODS[i].method;
-            return true;
-        }
-    return false;
 }
 
 static void list_vectors(uz_state *s, double **list[STATE_VECTORS])
@@ -87,7 +73,7 @@ static bool take_count(int64_t *out, double x)
 uz_state *state_unpack(const double *x, int64_t count)
 {
     double **vectors[STATE_VECTORS];
-    int64_t m = 0, phase = 0;
+    int64_t m = 0, phase = 0, method = 0, made_by = 0;
     if (count < STATE_NUMBERS || !take_count(&m, x[1]) || m > (count - STATE_NUMBERS) / STATE_VECTORS ||
         STATE_NUMBERS + STATE_VECTORS * m != count)
         return NULL;
@@ -95,10 +81,12 @@ uz_state *state_unpack(const double *x, int64_t count)
     if (!s)
         return NULL;
     s->m = m;
-    bool ok = x[0] == STATE_VERSION && find_method(&s->method, x[2]) && find_method(&s->made_by, x[3]) &&
-              take_count(&phase, x[4]) && take_count(&s->phase_end, x[5]) && take_count(&s->iteration, x[6]) &&
-              take_count(&s->restarts, x[7]) && take_count(&s->next_check, x[8]) &&
+    bool ok = x[0] == STATE_VERSION && take_count(&method, x[2]) && method < N_METHODS && take_count(&made_by, x[3]) &&
+              made_by < N_METHODS && take_count(&phase, x[4]) && take_count(&s->phase_end, x[5]) &&
+              take_count(&s->iteration, x[6]) && take_count(&s->restarts, x[7]) && take_count(&s->next_check, x[8]) &&
               take_count(&s->best_iteration, x[9]) && phase <= INT32_MAX;
+    s->method = METHODS[ok ? method : 0];
+    s->made_by = METHODS[ok ? made_by : 0];
     s->phase = (int32_t)phase;
     s->alpha = x[10];
     s->tau = x[11];

@@ -47,7 +47,7 @@ static void tell_progress(watch *w, double now)
     const int progress = me->progress = live_progress(&w->p->board->live, me->progress);
     pthread_mutex_unlock(&me->lock);
     if (progress != w->told)
-        feed_changed(me->w->feed, me->id); /* only this thread changes its id */
+        feed_changed(me->w->feed, me->id, NULL); /* only this thread changes its id */
     else
         feed_moved(me->w->feed, me->id);
     w->told = progress;
@@ -65,24 +65,6 @@ static void pass_on(watch *w, double now)
     w->stop_at = now + (cancelled ? CANCEL_S : RELEASE_S);
 }
 
-static bool is_overdue(const watch *w, double now)
-{
-    if (now < w->due_at)
-        return false;
-    return now >= w->due_at + LIMIT_SHARE * w->limit_s || !live_read(&w->p->board->live).any;
-}
-
-static bool answer(watch *w, const packet *question)
-{
-    packet reply;
-    int fd;
-    relay_answer(&reply, &fd, w->me->w->store, w->job->id, question, &w->p->inbox, (w->body_len + 7) / 8 * 8);
-    const bool sent = message_send(w->p->socket, &reply, fd);
-    if (fd >= 0)
-        close(fd);
-    return sent;
-}
-
 /* False: it is no message that may come now, and who says such things is not trusted with a job. */
 static bool hear(watch *w, const packet *m, double now)
 {
@@ -95,8 +77,15 @@ static bool hear(watch *w, const packet *m, double now)
             log_write(me->w->log, LOG_WARN, "process_not_confined", (log_field[]){{0}});
         return true;
     }
-    if (m->kind == MESSAGE_ASK)
-        return answer(w, m);
+    if (m->kind == MESSAGE_ASK) {
+        packet reply;
+        int fd;
+        relay_answer(&reply, &fd, me->w->store, w->job->id, m, &w->p->inbox, (w->body_len + 7) / 8 * 8);
+        const bool sent = message_send(w->p->socket, &reply, fd);
+        if (fd >= 0)
+            close(fd);
+        return sent;
+    }
     if (m->kind != MESSAGE_READ)
         return false;
     w->read = true;
@@ -118,7 +107,7 @@ static watch_end follow(watch *w, watch_report *out)
         const bool heard = w->stopping && atomic_load(&w->p->board->heard);
         if (w->stopping && now >= w->stop_at + (heard ? HEARD_S : 0.0))
             return WATCH_STOPPED;
-        if (is_overdue(w, now))
+        if (now >= w->due_at + LIMIT_SHARE * w->limit_s || (now >= w->due_at && !live_read(&w->p->board->live).any))
             return w->p->ready ? WATCH_OVERDUE : WATCH_NOT_STARTED;
         tell_progress(w, now);
         double wait = TELL_S;
@@ -144,19 +133,15 @@ static watch_end follow(watch *w, watch_report *out)
     }
 }
 
-/* A job that waits for nobody gets the processors that nobody uses; where all workers are busy each has its share. */
-static int threads_for(work *w)
-{
-    const int busy = work_busy(w), workers = w->options.workers, processors = w->processors;
-    const int threads = busy < workers ? processors - (busy - 1) : processors / workers;
-    return threads > 1 ? threads : 1;
-}
-
 watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len, double queue_s, watch_report *out)
 {
     work *all = me->w;
     process *p = me->process;
     const work_options *o = &all->options;
+    /* A job that waits for nobody gets the processors that nobody uses; where all workers are busy each has its share.
+     */
+    const int busy = work_busy(all);
+    const int threads = busy < o->workers ? all->processors - (busy - 1) : all->processors / o->workers;
     watch w = {.me = me, .p = p, .job = claimed, .body_len = body_len, .told = -1, .limit_s = o->max_solve_s};
     *out = (watch_report){.status = 0};
     packet m = {.kind = MESSAGE_JOB,
@@ -165,7 +150,7 @@ watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len,
                           .queue_s = queue_s,
                           .max_solve_s = o->max_solve_s,
                           .memory = o->solve_bytes,
-                          .threads = threads_for(all)}};
+                          .threads = threads > 1 ? threads : 1}};
     memcpy(m.u.job.id, claimed->id, sizeof m.u.job.id);
     const bool room = segment_reach(&p->inbox, body_len, true);
     if (room && body_len > 0 && body)

@@ -113,23 +113,6 @@ bool webhooks_allow(const webhooks *all, const char *text, const char **why)
 
 /* ---- one attempt */
 
-/* "t=...,v1=...": an HMAC over the time and the body; false where it can't be made. */
-static bool sign(char out[128], const char *secret, size_t secret_len, long long unix_s, const char *body, size_t len)
-{
-    gnutls_hmac_hd_t hmac;
-    unsigned char digest[32];
-    char time_text[32];
-    int used = snprintf(time_text, sizeof time_text, "%lld.", unix_s);
-    if (gnutls_hmac_init(&hmac, GNUTLS_MAC_SHA256, secret, secret_len) != 0)
-        return false;
-    bool ok = gnutls_hmac(hmac, time_text, (size_t)used) == 0 && gnutls_hmac(hmac, body, len) == 0;
-    gnutls_hmac_deinit(hmac, digest);
-    used = snprintf(out, 128, "t=%lld,v1=", unix_s);
-    for (int i = 0; i < 32; i++)
-        used += snprintf(out + used, 128 - (size_t)used, "%02x", digest[i]);
-    return ok;
-}
-
 typedef struct {
     const webhooks *all;
     CURL *curl;
@@ -163,17 +146,29 @@ static int is_over(void *ctx, curl_off_t a, curl_off_t b, curl_off_t c, curl_off
     return atomic_load(&e->all->stop) || (e->ends_at > 0.0 && now > e->ends_at);
 }
 
-/* NULL: no memory. */
+/* NULL: no memory, or the signature can't be made. */
 static struct curl_slist *make_headers(const webhooks *all, const webhook_due *due, const char *body, size_t len)
 {
-    char delivery[96], signature[160] = "X-Uzawa-Signature: ";
+    char delivery[96], signature[160] = "X-Uzawa-Signature:"; /* without a value: none is sent */
     snprintf(delivery, sizeof delivery, "X-Uzawa-Delivery: %s.%d", due->job, due->attempts + 1);
-    const bool is_signed = all->options.secret_len > 0;
-    if (is_signed && !sign(signature + strlen(signature), all->options.secret, all->options.secret_len,
-                           (long long)time(NULL), body, len))
-        return NULL;
+    if (all->options.secret_len > 0) { /* "t=...,v1=...": an HMAC over the time and the body */
+        const long long unix_s = (long long)time(NULL);
+        gnutls_hmac_hd_t hmac;
+        unsigned char digest[32];
+        char time_text[32];
+        int used = snprintf(time_text, sizeof time_text, "%lld.", unix_s);
+        if (gnutls_hmac_init(&hmac, GNUTLS_MAC_SHA256, all->options.secret, all->options.secret_len) != 0)
+            return NULL;
+        const bool ok = gnutls_hmac(hmac, time_text, (size_t)used) == 0 && gnutls_hmac(hmac, body, len) == 0;
+        gnutls_hmac_deinit(hmac, digest);
+        if (!ok)
+            return NULL;
+        used = snprintf(signature, sizeof signature, "X-Uzawa-Signature: t=%lld,v1=", unix_s);
+        for (int i = 0; i < 32; i++)
+            used += snprintf(signature + used, sizeof signature - (size_t)used, "%02x", digest[i]);
+    }
     const char *const lines[] = {"Content-Type: application/json", "Expect:", "X-Uzawa-Event: job.ended", delivery,
-                                 is_signed ? signature : "X-Uzawa-Signature:"}; /* without a value: none is sent */
+                                 signature};
     struct curl_slist *list = NULL;
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         struct curl_slist *longer = curl_slist_append(list, lines[i]);

@@ -49,7 +49,7 @@ static store_status claim(worker *me, job *claimed, char **body, size_t *body_le
     }
     pthread_mutex_unlock(&w->claim_lock);
     if (status == STORE_OK)
-        feed_changed(w->feed, claimed->id);
+        feed_changed(w->feed, claimed->id, NULL);
     return status;
 }
 
@@ -116,7 +116,7 @@ static void *work_loop(void *arg)
         strcpy(id, claimed.id);
         work_run(me, &claimed, body, body_len);
         publish(me, &(store_lease){.token = 0});
-        feed_changed(w->feed, id); /* ended, or put back */
+        feed_changed(w->feed, id, NULL); /* ended, or put back */
         pthread_mutex_lock(&w->lock);
         w->busy -= !me->lane;
         if (me->lane) /* what it puts back is for another one */
@@ -272,10 +272,8 @@ static work *make_work(store *s, const work_options *options, server_log *log)
 static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
 {
     work *w = ctx;
-    if (id && gone)
-        feed_deleted(w->feed, id, gone);
-    else if (id)
-        feed_changed(w->feed, id);
+    if (id)
+        feed_changed(w->feed, id, gone);
     else
         feed_wake_all(w->feed);
     if (!waits && id)

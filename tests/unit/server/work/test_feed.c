@@ -18,9 +18,9 @@ TEST(changes_are_numbered_and_kept)
     CHECK(feed_last(f) == 0);
     CHECK(feed_since(f, 0, got, 8, &count, &seen) && count == 0 && seen == 0);
     CHECK(!feed_since(f, 1, got, 8, &count, &seen)); /* not told yet */
-    feed_changed(f, "a");
-    feed_changed(f, "b");
-    feed_changed(f, "a");
+    feed_changed(f, "a", NULL);
+    feed_changed(f, "b", NULL);
+    feed_changed(f, "a", NULL);
     CHECK(feed_last(f) == 3);
     CHECK(feed_since(f, 0, got, 8, &count, &seen) && count == 2 && seen == 3); /* the first of "a" is past */
     CHECK(got[0].number == 2 && strcmp(got[0].id, "b") == 0 && got[1].number == 3 && strcmp(got[1].id, "a") == 0);
@@ -40,10 +40,10 @@ TEST(old_changes_are_missed_not_forgotten)
     char id[33];
     for (int i = 0; i < FEED_KEPT; i++) {
         snprintf(id, sizeof id, "%032x", (unsigned)i);
-        feed_changed(f, id);
+        feed_changed(f, id, NULL);
     }
     CHECK(feed_since(f, 0, got, 1, &count, &seen) && count == 1 && got[0].number == 1);
-    feed_changed(f, "one more");
+    feed_changed(f, "one more", NULL);
     CHECK(!feed_since(f, 0, got, 1, &count, &seen) && count == 0);
     CHECK(feed_since(f, 1, got, 1, &count, &seen) && got[0].number == 2);
     CHECK(!feed_since(f, UINT64_MAX, got, 1, &count, &seen));
@@ -55,7 +55,7 @@ TEST(who_listens_is_woken)
     feed *f = feed_new();
     listener *a = feed_listen(f, "a"), *b = feed_listen(f, "b"), *all = feed_listen(f, NULL);
     CHECK(!feed_wait(a, -1, 0) && !feed_wait(all, -1, 0));
-    feed_changed(f, "a");
+    feed_changed(f, "a", NULL);
     CHECK(feed_wait(a, -1, 60) && !feed_wait(b, -1, 0) && feed_wait(all, -1, 60));
     CHECK(!feed_wait(a, -1, 0)); /* once */
     feed_moved(f, "b");
@@ -63,7 +63,7 @@ TEST(who_listens_is_woken)
     feed_wake_all(f);
     CHECK(feed_wait(a, -1, 60) && feed_wait(b, -1, 60) && feed_wait(all, -1, 60));
     feed_unlisten(a);
-    feed_changed(f, "a"); /* nobody */
+    feed_changed(f, "a", NULL); /* nobody */
     feed_unlisten(all);
     feed_unlisten(b);
     feed_unlisten(NULL);
@@ -90,7 +90,7 @@ enum { TELLERS = 4, TOLD = 5000 };
 static void *tell(void *ctx)
 {
     for (int i = 0; i < TOLD; i++)
-        feed_changed(ctx, i % 2 ? "odd" : "even");
+        feed_changed(ctx, i % 2 ? "odd" : "even", NULL);
     return NULL;
 }
 

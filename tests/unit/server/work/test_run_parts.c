@@ -189,7 +189,7 @@ TEST(progress_of_cases)
     live_begin(&l, &shared, &settings, &problem);
     int before = live_progress(&shared, 0);
     for (int64_t i = 0; i < 4; i++) {
-        live_case(&l, i);
+        live_restart(&l, i, 0.0, 0.0);
         CHECK(live_rows(&shared, -1, &rows, &count) && count == 0);
         free(rows);
         for (int64_t k = 0; k <= 50; k++)

@@ -116,9 +116,9 @@ TEST(a_stream_comes_in_chunks)
     CHECK(read(ends[0], got, 8) == 8 && memcmp(got, "HEAD\r\n\r\n", 8) == 0);
     CHECK(poll(&(struct pollfd){ends[0], POLLIN, 0}, 1, 50) == 0); /* nothing until it is told */
     atomic_store(&s.is_on, true);
-    feed_changed(f, "another");
+    feed_changed(f, "another", NULL);
     CHECK(poll(&(struct pollfd){ends[0], POLLIN, 0}, 1, 50) == 0);
-    feed_changed(f, "job");
+    feed_changed(f, "job", NULL);
     size_t len = read_all(ends[0], got, sizeof got);
     CHECK(len == 41 && memcmp(got, "1e\r\nabcdefghijklmnopqrstuvwabcdefg\r\n0\r\n\r\n", 41) == 0);
     CHECK(atomic_load(&r.over) == 0); /* until the client closes too */
@@ -221,7 +221,7 @@ TEST(a_client_that_leaves_is_seen)
     wait_for(&r.over, 2);
     CHECK(atomic_load(&r.over) == 2 && atomic_load(&r.completed) == 0);
     CHECK(atomic_load(&s.freed) == 1 && atomic_load(&two.freed) == 1);
-    feed_changed(f, "job"); /* nobody listens any more */
+    feed_changed(f, "job", NULL); /* nobody listens any more */
     close(half[0]);
     holder_free(h);
     feed_free(f);
