@@ -27,9 +27,9 @@ typedef struct {
     /* A descriptor for reading, which the caller closes; -1: errno, ENOENT where there is none. */
     int (*open)(blobs *b, const char *id);
     void (*remove)(blobs *b, const char *id); /* what it fails to remove sweep does */
-    /* Removes half-written ones, and those that are not to be kept; while nobody writes. */
+    /* Removes half-written ones, and those that are not to be kept; while nobody writes. NULL: there are none. */
     void (*sweep)(blobs *b, bool (*keep)(void *ctx, const char *id), void *ctx);
-    void (*close)(blobs *b);
+    void (*close)(blobs *b); /* NULL: it belongs to the store */
 } blob_operations;
 
 /* What a place and a writer begin with. */

@@ -50,7 +50,7 @@ typedef struct {
      * went, since nobody has it any more and no job refers to it. */
     store_status (*upload_forget)(store *s, const char *id, const char *client, bool *gone);
     store_status (*upload_idle)(store *s, double before, upload_info *out); /* no job's, longest unused, since before */
-    store_status (*upload_total)(store *s, int64_t *bytes);
+    store_status (*upload_total)(store *s, int64_t *bytes);                 /* NULL: nobody sends it any */
     store_status (*try_write)(store *s);
     int64_t (*free_bytes)(store *s);
     store_status (*check)(store *s, store_findings *out);

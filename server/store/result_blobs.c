@@ -130,7 +130,7 @@ store_status result_blobs_missing(store *s, const result_key *key, int64_t n_cas
 {
     char *list = NULL, line[80], cause[128];
     long long blobs, cases;
-    store_status status = s->engine->results->contents(s, key->job, &list);
+    store_status status = s->engine->results->contents ? s->engine->results->contents(s, key->job, &list) : STORE_OK;
     bool lost = status == STORE_DAMAGED;
     if (status == STORE_OK && list && n_cases >= 0)
         lost = sscanf(list, "%lld %lld", &blobs, &cases) != 2 || cases != n_cases;
@@ -168,12 +168,6 @@ static store_status get_blob(store *s, const result_key *key, int64_t after, tak
         snprintf(cause, sizeof cause, "no memory for a result");
     store_set_message(s, cause);
     return t->status;
-}
-
-store_status result_blobs_pieces(store *s, const result_key *key, int64_t after,
-                                 bool (*take_piece)(void *ctx, const result_piece *piece), void *ctx)
-{
-    return s->engine->results->get(s, key, after, take_piece, ctx);
 }
 
 store_status store_get_vector(store *s, const char *id, int64_t number, const char *name, double **data, int64_t *count)

@@ -45,7 +45,7 @@ typedef struct {
     /* The sum of the headers of all vectors of that name in a job. */
     store_status (*count)(store *s, const char *id, const char *name, int64_t *total);
     /* The list that result_blobs_put made of the blobs of a job, freed by the caller; NULL: an older format kept none.
-     * STORE_DAMAGED: it is not what was written. */
+     * STORE_DAMAGED: it is not what was written. No such function: somebody else looks there. */
     store_status (*contents)(store *s, const char *id, char **list);
 } result_blobs;
 
@@ -60,9 +60,5 @@ store_status result_blobs_put(const result_blobs *place, void *transaction, cons
 /* For what was read and not found: STORE_DAMAGED, and a message, where the list has the blob, or where it has another
  * number of cases than that (-1: any); key->name NULL and n_cases not -1: nothing is looked for. Otherwise STORE_OK. */
 store_status result_blobs_missing(store *s, const result_key *key, int64_t n_cases);
-
-/* For who passes them on: the pieces of a blob, as the engine has them. */
-store_status result_blobs_pieces(store *s, const result_key *key, int64_t after,
-                                 bool (*take)(void *ctx, const result_piece *piece), void *ctx);
 
 #endif

@@ -52,15 +52,16 @@ bool store_uploads_begin(store *s, blobs *place, char *message, size_t size)
     store_uploads *u = place ? calloc(1, sizeof *u) : NULL;
     if (!u) {
         snprintf(message, size, "no memory");
-        if (place)
+        if (place && place->does->close)
             place->does->close(place);
         return false;
     }
     u->blobs = place;
     pthread_mutex_init(&u->lock, NULL);
     s->uploads = u;
-    if (s->engine->upload_total(s, &u->bytes) == STORE_OK) {
-        u->blobs->does->sweep(u->blobs, has_row, s);
+    if (!s->engine->upload_total || s->engine->upload_total(s, &u->bytes) == STORE_OK) {
+        if (place->does->sweep)
+            place->does->sweep(place, has_row, s);
         return true;
     }
     snprintf(message, size, "cannot read the uploads: %s", s->message);
@@ -71,7 +72,8 @@ void store_uploads_end(store *s)
 {
     if (!s->uploads)
         return;
-    s->uploads->blobs->does->close(s->uploads->blobs);
+    if (s->uploads->blobs->does->close)
+        s->uploads->blobs->does->close(s->uploads->blobs);
     pthread_mutex_destroy(&s->uploads->lock);
     free(s->uploads);
     s->uploads = NULL;

@@ -133,12 +133,6 @@ static codec_finding judge_one(const codec_assertion *a, const codec_summary *su
 
 /* ---- of many cases */
 
-/* How many cases ended how, and how long all took, is known of the whole job alone. */
-static bool is_of_the_whole(const codec_assertion *a)
-{
-    return !a->case_name[0] && (strncmp(a->quantity, "cases.", 6) == 0 || strncmp(a->quantity, "timings_s.", 10) == 0);
-}
-
 bool judge(char **summary, const codec_request *request, const char *name, bool whole, codec_finding *all)
 {
     const int64_t n = request->n_assertions;
@@ -150,8 +144,11 @@ bool judge(char **summary, const codec_request *request, const char *name, bool 
     codec_summary *read = codec_summary_read(*summary);
     for (int64_t i = 0; list && read && i < n; i++) {
         const codec_assertion *a = &request->assertions[i];
-        const bool gathered = whole && !is_of_the_whole(a);
-        const bool of_another = name && (a->case_name[0] ? strcmp(a->case_name, name) != 0 : is_of_the_whole(a));
+        /* How many cases ended how, and how long all took, is known of the whole job alone. */
+        const bool of_whole =
+            !a->case_name[0] && (strncmp(a->quantity, "cases.", 6) == 0 || strncmp(a->quantity, "timings_s.", 10) == 0);
+        const bool gathered = whole && !of_whole;
+        const bool of_another = name && (a->case_name[0] ? strcmp(a->case_name, name) != 0 : of_whole);
         if (!whole && of_another)
             continue;
         codec_judged *one = &list[told++];

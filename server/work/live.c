@@ -56,24 +56,9 @@ void live_restart(live_writer *w, int64_t current, double from, double to)
     publish(w->shared, s);
 }
 
-/* Every other row goes. */
-static void thin_out(live_writer *w)
-{
-    live *l = w->shared;
-    live_state *s = &w->state;
-    s->thinned++;
-    publish(l, s);
-    s->count = 0;
-    s->stride *= 2;
-    for (int64_t i = 0; i < LIVE_ROWS; i += 2, s->count++)
-        for (int k = 0; k < CODEC_HISTORY_COLUMNS; k++)
-            atomic_store_explicit(&l->rows[s->count][k], atomic_load_explicit(&l->rows[i][k], memory_order_relaxed),
-                                  memory_order_release);
-    s->thinned++;
-}
-
 void live_add(live_writer *w, const uz_history_row *row)
 {
+    live *l = w->shared;
     live_state *s = &w->state;
     /* ||u||_K is near sqrt(2 |psi|): equal where every gap that closes was 0. */
     const double scale = sqrt(2.0 * fabs(row->dual_objective));
@@ -83,16 +68,26 @@ void live_add(live_writer *w, const uz_history_row *row)
     codec_history_row(s->latest, row);
     s->any = 1;
     if (row->iteration % s->stride == 0) {
-        if (s->count == LIVE_ROWS)
-            thin_out(w);
+        if (s->count == LIVE_ROWS) { /* every other row goes */
+            s->thinned++;
+            publish(l, s);
+            s->count = 0;
+            s->stride *= 2;
+            for (int64_t i = 0; i < LIVE_ROWS; i += 2, s->count++)
+                for (int k = 0; k < CODEC_HISTORY_COLUMNS; k++)
+                    atomic_store_explicit(&l->rows[s->count][k],
+                                          atomic_load_explicit(&l->rows[i][k], memory_order_relaxed),
+                                          memory_order_release);
+            s->thinned++;
+        }
         for (int k = 0; k < CODEC_HISTORY_COLUMNS; k++) {
             uint64_t bits;
             memcpy(&bits, &s->latest[k], 8);
-            atomic_store_explicit(&w->shared->rows[s->count][k], bits, memory_order_release);
+            atomic_store_explicit(&l->rows[s->count][k], bits, memory_order_release);
         }
         s->count++;
     }
-    publish(w->shared, s);
+    publish(l, s);
 }
 
 /* ---- readers */

@@ -3,6 +3,7 @@
 #include "store/engine.h"
 
 #include <errno.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,7 +47,7 @@ void relay_answer(packet *answer, int *fd, store *s, const char *of_job, const p
     } else if (ask->u.ask.what == ASK_BLOB) {
         gathered g = {inbox, at, at, false};
         const result_key key = {id, ask->u.ask.number, ask->u.ask.named ? name : NULL};
-        answer->status = (int32_t)result_blobs_pieces(s, &key, ask->u.ask.after, gather, &g);
+        answer->status = (int32_t)s->engine->results->get(s, &key, ask->u.ask.after, gather, &g);
         answer->u.answer.size = g.end - at;
         if (g.full)
             answer->status = STORE_ERROR;
@@ -65,15 +66,11 @@ void relay_answer(packet *answer, int *fd, store *s, const char *of_job, const p
 
 typedef struct {
     store base;
+    blobs uploads;
     int socket;
     segment *inbox;
     int upload; /* the descriptor of the upload that was asked for last, until it is opened; -1: none */
 } relay;
-
-typedef struct {
-    blobs base;
-    relay *relay;
-} relay_blobs;
 
 static store_status ask(relay *r, const packet *question, packet *answer)
 {
@@ -101,7 +98,7 @@ static store_status get_upload(store *s, const char *id, const char *client, upl
 
 static int open_upload(blobs *b, const char *id)
 {
-    relay *r = ((relay_blobs *)b)->relay;
+    relay *r = (relay *)(void *)((char *)b - offsetof(relay, uploads));
     const int fd = r->upload;
     (void)id; /* get_upload comes before it, always */
     r->upload = -1;
@@ -133,14 +130,6 @@ static store_status get_pieces(store *s, const result_key *key, int64_t after,
     return status;
 }
 
-/* The daemon has looked there already. */
-static store_status get_contents(store *s, const char *id, char **list)
-{
-    (void)s, (void)id;
-    *list = NULL;
-    return STORE_OK;
-}
-
 static store_status get_cases(store *s, const char *id, const char *name, store_case **cases, size_t *count)
 {
     packet question = {.kind = MESSAGE_ASK, .u.ask = {.what = ASK_CASE}}, answer;
@@ -157,23 +146,6 @@ static store_status get_cases(store *s, const char *id, const char *name, store_
     return STORE_OK;
 }
 
-static store_status total_uploads(store *s, int64_t *bytes)
-{
-    (void)s;
-    *bytes = 0;
-    return STORE_OK;
-}
-
-static void sweep_nothing(blobs *b, bool (*is_kept)(void *ctx, const char *id), void *ctx)
-{
-    (void)b, (void)is_kept, (void)ctx;
-}
-
-static void close_blobs(blobs *b)
-{
-    free(b);
-}
-
 static void close_relay(store *s)
 {
     relay *r = (relay *)s;
@@ -183,31 +155,23 @@ static void close_relay(store *s)
     free(r);
 }
 
-static const result_blobs RESULTS = {.get = get_pieces, .contents = get_contents};
-static const blob_operations BLOBS = {.open = open_upload, .sweep = sweep_nothing, .close = close_blobs};
-static const store_engine ENGINE = {.close = close_relay,
-                                    .get_cases = get_cases,
-                                    .results = &RESULTS,
-                                    .upload_get = get_upload,
-                                    .upload_total = total_uploads};
+static const result_blobs RESULTS = {.get = get_pieces};
+static const blob_operations BLOBS = {.open = open_upload};
+static const store_engine ENGINE = {
+    .close = close_relay, .get_cases = get_cases, .results = &RESULTS, .upload_get = get_upload};
 
 store *relay_open(int socket, segment *inbox)
 {
     char why[64];
     relay *r = calloc(1, sizeof *r);
-    relay_blobs *place = calloc(1, sizeof *place);
-    if (!r || !place) {
-        free(r);
-        free(place);
+    if (!r)
         return NULL;
-    }
     store_base_begin(&r->base, &ENGINE);
     r->socket = socket;
     r->inbox = inbox;
     r->upload = -1;
-    place->base.does = &BLOBS;
-    place->relay = r;
-    if (store_uploads_begin(&r->base, &place->base, why, sizeof why))
+    r->uploads.does = &BLOBS;
+    if (store_uploads_begin(&r->base, &r->uploads, why, sizeof why))
         return &r->base;
     close_relay(&r->base);
     return NULL;

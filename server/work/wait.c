@@ -6,16 +6,6 @@
 /* Every change of a job is told; should a store have failed when one looked, it is asked again after this. */
 #define LOOK_AGAIN_S 15.0
 
-static bool has_ended(work *w, const char *id)
-{
-    job j;
-    store_status status = store_get(w->store, id, &j);
-    bool ended =
-        status == STORE_NOT_FOUND || (status == STORE_OK && j.status != JOB_ACCEPTED && j.status != JOB_RUNNING);
-    job_clear(&j);
-    return ended;
-}
-
 bool work_is_stopping(work *w)
 {
     pthread_mutex_lock(&w->lock);
@@ -27,14 +17,20 @@ bool work_is_stopping(work *w)
 bool work_wait(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more)
 {
     struct pollfd client = {.fd = fd, .events = POLLRDHUP}; /* poll passes over a negative one */
-    double until = clock_seconds(CLOCK_MONOTONIC) + seconds, left = seconds;
+    double until = clock_seconds(CLOCK_MONOTONIC) + seconds, left;
     listener *l = feed_listen(w->feed, id); /* before the first look, so that no end is missed */
-    bool ended = has_ended(w, id);
-    while (l && !ended && left > 0.0 && !work_is_stopping(w) && poll(&client, 1, 0) <= 0 &&
-           !(no_more && atomic_load(no_more))) {
-        feed_wait(l, fd, left < LOOK_AGAIN_S ? left : LOOK_AGAIN_S);
-        ended = has_ended(w, id);
+    bool ended;
+    for (;;) {
+        job j;
+        const store_status status = store_get(w->store, id, &j);
+        ended =
+            status == STORE_NOT_FOUND || (status == STORE_OK && j.status != JOB_ACCEPTED && j.status != JOB_RUNNING);
+        job_clear(&j);
         left = until - clock_seconds(CLOCK_MONOTONIC);
+        if (!l || ended || left <= 0.0 || work_is_stopping(w) || poll(&client, 1, 0) > 0 ||
+            (no_more && atomic_load(no_more)))
+            break;
+        feed_wait(l, fd, left < LOOK_AGAIN_S ? left : LOOK_AGAIN_S);
     }
     feed_unlisten(l);
     return ended;

@@ -53,18 +53,6 @@ static void tell_progress(watch *w, double now)
     w->told = progress;
 }
 
-/* Passes on the word to stop, once. */
-static void pass_on(watch *w, double now)
-{
-    worker *me = w->me;
-    const bool cancelled = atomic_load(&me->cancel);
-    if (w->stopping || !(cancelled || now >= w->grown_at || atomic_load(&me->lost) || atomic_load(&me->w->interrupt)))
-        return;
-    atomic_store(&w->p->board->stop, true);
-    w->stopping = true;
-    w->stop_at = now + (cancelled ? CANCEL_S : RELEASE_S);
-}
-
 /* False: it is no message that may come now, and who says such things is not trusted with a job. */
 static bool hear(watch *w, const packet *m, double now)
 {
@@ -103,7 +91,12 @@ static watch_end follow(watch *w, watch_report *out)
     struct pollfd fds[] = {{.fd = w->p->socket, .events = POLLIN}, {.fd = w->me->wake, .events = POLLIN}};
     for (;;) {
         double now = clock_seconds(CLOCK_MONOTONIC);
-        pass_on(w, now);
+        const bool cancelled = atomic_load(&w->me->cancel), stops = atomic_load(&w->me->w->interrupt);
+        if (!w->stopping && (cancelled || stops || now >= w->grown_at || atomic_load(&w->me->lost))) {
+            atomic_store(&w->p->board->stop, true); /* the word is passed on, once */
+            w->stopping = true;
+            w->stop_at = now + (cancelled ? CANCEL_S : RELEASE_S);
+        }
         const bool heard = w->stopping && atomic_load(&w->p->board->heard);
         if (w->stopping && now >= w->stop_at + (heard ? HEARD_S : 0.0))
             return WATCH_STOPPED;
