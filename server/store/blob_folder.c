@@ -23,11 +23,6 @@ typedef struct {
     char *path; /* of the unfinished file; NULL once it has its name */
 } file_writer;
 
-static const char *path_of(const blobs *b)
-{
-    return ((const folder *)b)->path;
-}
-
 static store_status fail(const char *what, char cause[BLOB_CAUSE])
 {
     int why = errno;
@@ -91,9 +86,9 @@ static store_status folder_begin(blobs *b, blob_writer **out, char cause[BLOB_CA
     if (!w)
         return fail("begin", cause);
     *w = (file_writer){.base.blobs = b, .fd = -1};
-    if (make_folder(path_of(b))) {
+    if (make_folder(((folder *)b)->path)) {
         errno = ENOMEM;
-        if (asprintf(&w->path, "%s/" INCOMING "XXXXXX", path_of(b)) < 0)
+        if (asprintf(&w->path, "%s/" INCOMING "XXXXXX", ((folder *)b)->path) < 0)
             w->path = NULL;
         else if ((w->fd = mkostemp(w->path, O_CLOEXEC)) < 0) {
             free(w->path);
@@ -124,13 +119,13 @@ static store_status folder_publish(blob_writer *writer, const char *id, char cau
     file_writer *w = (file_writer *)writer;
     char *name = NULL;
     errno = ENOMEM;
-    if (asprintf(&name, "%s/%s", path_of(writer->blobs), id) < 0)
+    if (asprintf(&name, "%s/%s", ((folder *)writer->blobs)->path, id) < 0)
         return fail("name", cause);
     bool ok = rename(w->path, name) == 0;
     if (ok) {
         free(w->path);
         w->path = NULL;
-        ok = blob_sync(path_of(writer->blobs), O_DIRECTORY);
+        ok = blob_sync(((folder *)writer->blobs)->path, O_DIRECTORY);
     }
     store_status status = ok ? STORE_OK : fail("name", cause);
     free(name);
@@ -141,7 +136,7 @@ static int folder_open(blobs *b, const char *id)
 {
     char *path = NULL;
     errno = ENOMEM;
-    if (asprintf(&path, "%s/%s", path_of(b), id) < 0)
+    if (asprintf(&path, "%s/%s", ((folder *)b)->path, id) < 0)
         return -1;
     int fd = open(path, O_RDONLY | O_CLOEXEC), cause = errno;
     free(path);
@@ -152,7 +147,7 @@ static int folder_open(blobs *b, const char *id)
 static void folder_remove(blobs *b, const char *id)
 {
     char *path = NULL;
-    if (asprintf(&path, "%s/%s", path_of(b), id) < 0)
+    if (asprintf(&path, "%s/%s", ((folder *)b)->path, id) < 0)
         return;
     unlink(path);
     free(path);
@@ -161,7 +156,7 @@ static void folder_remove(blobs *b, const char *id)
 /* Files with other names are not ours to remove. */
 static void folder_sweep(blobs *b, bool (*keep)(void *ctx, const char *id), void *ctx)
 {
-    DIR *dir = opendir(path_of(b));
+    DIR *dir = opendir(((folder *)b)->path);
     struct dirent *entry;
     while (dir && (entry = readdir(dir)))
         if (strncmp(entry->d_name, INCOMING, strlen(INCOMING)) == 0 ||

@@ -12,37 +12,31 @@ static uLong add_number(uLong sum, uint64_t bits)
     return crc32_z(sum, (const unsigned char *)&bits, sizeof bits);
 }
 
-/* False: no memory. */
-static bool add_value(uLong *sum, sqlite3_value *value)
-{
-    int type = sqlite3_value_type(value);
-    *sum = add_number(*sum, (uint64_t)type);
-    if (type == SQLITE_INTEGER) {
-        *sum = add_number(*sum, (uint64_t)sqlite3_value_int64(value));
-    } else if (type == SQLITE_FLOAT) {
-        double x = sqlite3_value_double(value);
-        uint64_t bits;
-        memcpy(&bits, &x, sizeof bits);
-        *sum = add_number(*sum, bits);
-    } else if (type != SQLITE_NULL) { /* the pointer before the length, as SQLite's manual asks */
-        const void *data = type == SQLITE_TEXT ? sqlite3_value_text(value) : sqlite3_value_blob(value);
-        int size = sqlite3_value_bytes(value);
-        if (!data && size > 0)
-            return false;
-        *sum = add_number(*sum, (uint64_t)size);
-        *sum = size > 0 ? crc32_z(*sum, data, (size_t)size) : *sum;
-    }
-    return true;
-}
-
 static void checksum(sqlite3_context *out, int count, sqlite3_value **values)
 {
     uLong sum = 0;
-    for (int i = 0; i < count; i++)
-        if (!add_value(&sum, values[i])) {
-            sqlite3_result_error_nomem(out);
-            return;
+    for (int i = 0; i < count; i++) {
+        sqlite3_value *value = values[i];
+        const int type = sqlite3_value_type(value);
+        sum = add_number(sum, (uint64_t)type);
+        if (type == SQLITE_INTEGER) {
+            sum = add_number(sum, (uint64_t)sqlite3_value_int64(value));
+        } else if (type == SQLITE_FLOAT) {
+            const double x = sqlite3_value_double(value);
+            uint64_t bits;
+            memcpy(&bits, &x, sizeof bits);
+            sum = add_number(sum, bits);
+        } else if (type != SQLITE_NULL) { /* the pointer before the length, as SQLite's manual asks */
+            const void *data = type == SQLITE_TEXT ? sqlite3_value_text(value) : sqlite3_value_blob(value);
+            const int size = sqlite3_value_bytes(value);
+            if (!data && size > 0) {
+                sqlite3_result_error_nomem(out);
+                return;
+            }
+            sum = add_number(sum, (uint64_t)size);
+            sum = size > 0 ? crc32_z(sum, data, (size_t)size) : sum;
         }
+    }
     sqlite3_result_int64(out, (sqlite3_int64)sum);
 }
 

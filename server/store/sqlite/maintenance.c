@@ -223,22 +223,6 @@ static bool copy_to(const char *part, const char *to, sqlite3 *from, const char 
     return ok;
 }
 
-/* Gives the copy its name, for good: never over a file that is there, and on disk before this returns. */
-static bool publish(const char *part, const char *to, char *message, size_t size)
-{
-    char folder[4096];
-    snprintf(folder, sizeof folder, "%s", to);
-    char *slash = strrchr(folder, '/');
-    if (slash)
-        slash[slash == folder] = '\0';
-    else
-        strcpy(folder, ".");
-    if (blob_sync(part, 0) && link(part, to) == 0 && unlink(part) == 0 && blob_sync(folder, O_DIRECTORY))
-        return true;
-    snprintf(message, size, "cannot put the copy at %s: %s", to, strerror(errno));
-    return false;
-}
-
 bool sqlite_backup_file(const char *path, const char *to, int64_t *bytes, char *message, size_t size)
 {
     char part[4096], folder[4096];
@@ -259,7 +243,18 @@ bool sqlite_backup_file(const char *path, const char *to, int64_t *bytes, char *
         snprintf(message, size, "cannot make %s: %s", part, strerror(errno));
     else
         close(fd);
-    ok = ok && copy_to(part, to, from, path, message, size) && publish(part, to, message, size);
+    ok = ok && copy_to(part, to, from, path, message, size);
+    if (ok) { /* gets its name, for good: never over a file that is there, and on disk before this returns */
+        snprintf(folder, sizeof folder, "%s", to);
+        char *slash = strrchr(folder, '/');
+        if (slash)
+            slash[slash == folder] = '\0';
+        else
+            strcpy(folder, ".");
+        ok = blob_sync(part, 0) && link(part, to) == 0 && unlink(part) == 0 && blob_sync(folder, O_DIRECTORY);
+        if (!ok)
+            snprintf(message, size, "cannot put the copy at %s: %s", to, strerror(errno));
+    }
     if (!ok && fd >= 0) {
         unlink(part);
         backup_uploads_undo(to);

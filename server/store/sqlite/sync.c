@@ -11,21 +11,6 @@
 
 #include <string.h>
 
-/* After a failed sync the kernel may take the log's pages for clean, and a second sync would succeed without them. A
- * checkpoint writes them once more, elsewhere, and syncs that. */
-static bool save_by_checkpoint(sqlite_store *s)
-{
-    pthread_mutex_lock(&s->writer_lock);
-    int rc = sqlite3_wal_checkpoint_v2(s->writer.db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
-    if (rc != SQLITE_OK)
-        snprintf(s->writer.message, sizeof s->writer.message, "the log could not be synced, nor moved: %s",
-                 sqlite3_errmsg(s->writer.db));
-    if (rc != SQLITE_OK)
-        store_set_message(&s->base, s->writer.message);
-    pthread_mutex_unlock(&s->writer_lock);
-    return rc == SQLITE_OK;
-}
-
 static void *sync_loop(void *argument)
 {
     sqlite_store *s = argument;
@@ -42,12 +27,24 @@ static void *sync_loop(void *argument)
         double begun = clock_seconds(CLOCK_MONOTONIC);
         /* xSync touches nothing of the log, which is open as long as the writer, but its descriptor. */
         suspect = suspect || s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY) != SQLITE_OK;
-        bool ok = !suspect || save_by_checkpoint(s);
-        suspect = !ok; /* until a checkpoint succeeds a sync's word counts for nothing */
-        trail_append(&s->trail, ok);
+        if (suspect) {
+            /* After a failed sync the kernel may take the log's pages for clean, and a second sync would succeed
+             * without them. A checkpoint writes them once more, elsewhere, and syncs that; until one succeeds a sync's
+             * word counts for nothing. */
+            connection *c = &s->writer;
+            pthread_mutex_lock(&s->writer_lock);
+            suspect = sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL) != SQLITE_OK;
+            if (suspect) {
+                snprintf(c->message, sizeof c->message, "the log could not be synced, nor moved: %s",
+                         sqlite3_errmsg(c->db));
+                store_set_message(&s->base, c->message);
+            }
+            pthread_mutex_unlock(&s->writer_lock);
+        }
+        trail_append(&s->trail, !suspect);
         metrics_seconds(s->base.settings.metrics, METRIC_COMMIT, clock_seconds(CLOCK_MONOTONIC) - begun);
         pthread_mutex_lock(&s->sync_lock);
-        if (ok) {
+        if (!suspect) {
             s->synced = upto;
         } else { /* those who wait are told so; who asks later has it tried again */
             s->failures++;

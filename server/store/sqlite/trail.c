@@ -108,11 +108,6 @@ void trail_close(trail *t)
     t->fd = -1;
 }
 
-void trail_begin(trail *t)
-{
-    t->noted.len = 0;
-}
-
 void trail_note(trail *t, const char *what, const char *id)
 {
     char *at = t->noted.data + t->noted.len;
@@ -141,11 +136,15 @@ void trail_take(trail *t)
     t->waiting.len = 0;
 }
 
-/* Leaves the newer half, in another file that takes the place of this one. */
-static void shorten(trail *t)
+void trail_append(trail *t, bool on_disk)
 {
     char fresh[4096];
     size_t len = 0;
+    if (t->fd >= 0 && on_disk && t->taken.len > 0 && blob_write_all(t->fd, t->taken.data, t->taken.len))
+        t->size += (int64_t)t->taken.len;
+    if (t->fd < 0 || t->size <= KEPT_MOST)
+        return;
+    /* The newer half stays, in another file that takes the place of this one. */
     char *text = read_all(t->path, &len), *from = text ? strchr(text + len / 2, '\n') : NULL;
     if (from && (size_t)snprintf(fresh, sizeof fresh, "%s.new", t->path) < sizeof fresh) {
         const size_t rest = len - (size_t)(from + 1 - text);
@@ -161,12 +160,4 @@ static void shorten(trail *t)
         }
     }
     free(text);
-}
-
-void trail_append(trail *t, bool on_disk)
-{
-    if (t->fd >= 0 && on_disk && t->taken.len > 0 && blob_write_all(t->fd, t->taken.data, t->taken.len))
-        t->size += (int64_t)t->taken.len;
-    if (t->fd >= 0 && t->size > KEPT_MOST)
-        shorten(t);
 }

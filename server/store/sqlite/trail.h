@@ -38,7 +38,7 @@ char *trail_missing(sqlite3 *db, const char *file, uint64_t *last);
 void trail_open(trail *t, sqlite3 *db, const char *file);
 void trail_close(trail *t);
 
-void trail_begin(trail *t); /* a transaction: what was noted of one that was rolled back goes */
+/* A transaction begins with noted.len 0: what was noted of one that was rolled back goes. */
 void trail_note(trail *t, const char *what, const char *id);
 /* What was noted belongs to the commit `number` now. */
 void trail_committed(trail *t, uint64_t number);

@@ -67,7 +67,7 @@ static void run_alone(sqlite_store *s, pending *p)
             s->spare_there = !(given = ftruncate(s->spare, 0) == 0);
         if (tries > 0)
             sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
-        trail_begin(&s->trail);
+        s->trail.noted.len = 0;
         p->status = run_query(c, QUERY_BEGIN);
         if (p->status == STORE_OK) {
             p->status = p->change(s, c, p->args);
@@ -90,7 +90,7 @@ static bool run_together(sqlite_store *s, pending *list)
 {
     connection *c = &s->writer;
     uint64_t number = 0;
-    trail_begin(&s->trail);
+    s->trail.noted.len = 0;
     bool good = run_query(c, QUERY_BEGIN) == STORE_OK;
     for (pending *p = list; p && good; p = p->next) {
         good = run_query(c, QUERY_SAVEPOINT) == STORE_OK;
@@ -108,10 +108,23 @@ static bool run_together(sqlite_store *s, pending *list)
     return good;
 }
 
-static void run_batch(sqlite_store *s, pending *list)
+/* ------------------------------------------------------------------- queue */
+
+/* Under queue_lock, which it gives up meanwhile: carries out the first ones of the queue, which begins with the
+ * caller's own. */
+static void lead(sqlite_store *s)
 {
+    pending *list = s->queue, *last = list, *next;
     int count = 0;
     bool locked = false; /* that was waited for once (busy_timeout): not again for each */
+    for (int n = 1; n < BATCH_MOST && last->next; n++)
+        last = last->next;
+    s->queue = last->next;
+    if (!s->queue)
+        s->queue_end = &s->queue;
+    last->next = NULL;
+    s->leading = true;
+    pthread_mutex_unlock(&s->queue_lock);
     pthread_mutex_lock(&s->writer_lock);
     if (!list->next || !run_together(s, list))
         for (pending *p = list; p; p = p->next) {
@@ -125,24 +138,6 @@ static void run_batch(sqlite_store *s, pending *list)
     for (pending *p = list; p; p = p->next)
         count += p->status == STORE_OK;
     metrics_add(s->base.settings.metrics, METRIC_CHANGES, count);
-}
-
-/* ------------------------------------------------------------------- queue */
-
-/* Under queue_lock, which it gives up meanwhile: carries out the first ones of the queue, which begins with the
- * caller's own. */
-static void lead(sqlite_store *s)
-{
-    pending *list = s->queue, *last = list, *next;
-    for (int n = 1; n < BATCH_MOST && last->next; n++)
-        last = last->next;
-    s->queue = last->next;
-    if (!s->queue)
-        s->queue_end = &s->queue;
-    last->next = NULL;
-    s->leading = true;
-    pthread_mutex_unlock(&s->queue_lock);
-    run_batch(s, list);
     pthread_mutex_lock(&s->queue_lock);
     s->leading = false;
     for (; list; list = next) {
