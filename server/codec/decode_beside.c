@@ -121,42 +121,12 @@ void decode_settings(uz_settings *out, const json_value *object)
 
 /* ---- quantities */
 
-static bool decode_quantity(uz_quantity *to, decoding *d, const json_value *item, int dim)
-{
-    const json_value *window = json_get(item, "window"), *name = json_get(item, "name");
-    double length = 0;
-    uz_quantity_parse(&to->kind, json_text(json_get(item, "quantity")));
-    decode_name(to->on, sizeof to->on, item, "on", "");
-    if (json_get(item, "direction") &&
-        !decode_components(to->direction, d, item, "direction", 0, dim, "it must be the direction of the number"))
-        return false;
-    if (window && (!decode_components(to->low, d, window, "min", 0, dim, NULL) ||
-                   !decode_components(to->high, d, window, "max", 0, dim, NULL)))
-        return false;
-    for (int c = 0; c < dim; c++)
-        length = hypot(length, to->direction[c]);
-    for (int c = 0; c < dim && length > 0; c++)
-        to->direction[c] /= length;
-    for (int c = 0; c < dim && window; c++)
-        if (!(to->low[c] <= to->high[c]))
-            return decode_refuse(d, "out_of_range", window, "has min %.15g above max %.15g: nothing is between them.",
-                                 to->low[c], to->high[c]);
-    if (name && !decode_label(to->name, d, name, name->text, name->count, "A name of a quantity"))
-        return false;
-    if (name && (strchr(to->name, '.') || strspn(to->name, "0123456789") == strlen(to->name)))
-        return decode_refuse(d, "not_allowed", name, "must have no dot and be no number: assertions name it.");
-    if (!name)
-        snprintf(to->name, sizeof to->name, "%s%s%.40s", uz_quantity_name(to->kind), to->on[0] ? "_" : "", to->on);
-    for (char *at = to->name; *at; at++)
-        *at = *at == '.' ? '_' : *at;
-    return true;
-}
-
 bool decode_quantities(uz_problem *problem, uz_settings *settings, decoding *d, const json_value *list,
                        const json_value *accuracy)
 {
     const bool asked = json_get(accuracy, "quantity") != NULL;
     const int64_t first = asked ? 1 : 0, count = first + (int64_t)json_size(list);
+    const int dim = uz_scene_dim(&problem->scene);
     if (count == 0)
         return true;
     problem->quantities = calloc((size_t)count, sizeof *problem->quantities);
@@ -165,10 +135,37 @@ bool decode_quantities(uz_problem *problem, uz_settings *settings, decoding *d, 
     problem->n_quantities = count;
     problem->quantities[0].asked = asked;
     settings->quantity_error = decode_number(accuracy, "relative", 0);
-    for (int64_t i = 0; i < count; i++)
-        if (!decode_quantity(&problem->quantities[i], d, i < first ? accuracy : &list->items[i - first],
-                             uz_scene_dim(&problem->scene)))
+    for (int64_t i = 0; i < count; i++) {
+        const json_value *item = i < first ? accuracy : &list->items[i - first];
+        const json_value *window = json_get(item, "window"), *name = json_get(item, "name");
+        uz_quantity *to = &problem->quantities[i];
+        double length = 0;
+        uz_quantity_parse(&to->kind, json_text(json_get(item, "quantity")));
+        decode_name(to->on, sizeof to->on, item, "on", "");
+        if (json_get(item, "direction") &&
+            !decode_components(to->direction, d, item, "direction", 0, dim, "it must be the direction of the number"))
             return false;
+        if (window && (!decode_components(to->low, d, window, "min", 0, dim, NULL) ||
+                       !decode_components(to->high, d, window, "max", 0, dim, NULL)))
+            return false;
+        for (int c = 0; c < dim; c++)
+            length = hypot(length, to->direction[c]);
+        for (int c = 0; c < dim && length > 0; c++)
+            to->direction[c] /= length;
+        for (int c = 0; c < dim && window; c++)
+            if (!(to->low[c] <= to->high[c]))
+                return decode_refuse(d, "out_of_range", window,
+                                     "has min %.15g above max %.15g: nothing is between them.", to->low[c],
+                                     to->high[c]);
+        if (name && !decode_label(to->name, d, name, name->text, name->count, "A name of a quantity"))
+            return false;
+        if (name && (strchr(to->name, '.') || strspn(to->name, "0123456789") == strlen(to->name)))
+            return decode_refuse(d, "not_allowed", name, "must have no dot and be no number: assertions name it.");
+        if (!name)
+            snprintf(to->name, sizeof to->name, "%s%s%.40s", uz_quantity_name(to->kind), to->on[0] ? "_" : "", to->on);
+        for (char *at = to->name; *at; at++)
+            *at = *at == '.' ? '_' : *at;
+    }
     return true;
 }
 

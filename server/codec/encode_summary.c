@@ -35,9 +35,25 @@ static void put_resultant(text *t, const char *key, const uz_resultant *r, int d
     text_close(t, '}');
 }
 
-/* What the sides of contacts are taken for. */
-static void put_surfaces(text *t, const uz_evaluation *e)
+/* How deep the deformed surfaces stand in each other, of all contacts and of each; what their sides are taken for. */
+static void put_surfaces(text *t, const uz_evaluation *e, int dim)
 {
+    double depth = 0;
+    for (int64_t k = 0; k < e->n_contacts; k++)
+        depth = e->overlap[k].depth > depth ? e->overlap[k].depth : depth; /* not those that are no number */
+    put_named(t, (named[]){{"geometric_penetration", depth}, {"approach", e->approach}}, 2);
+    text_open(t, "penetrations", '[');
+    for (int64_t k = 0; k < e->n_contacts; k++) {
+        const uz_overlap *o = &e->overlap[k];
+        text_open(t, NULL, '{');
+        put_named(t, (named[]){{"geometric_penetration", o->depth}, {"sagitta", o->facets}}, 2);
+        if (o->depth > 0)
+            text_numbers(t, "at", o->at, dim);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+    if (e->n_surfaces == 0)
+        return;
     text_open(t, "surfaces", '[');
     for (int64_t i = 0; i < e->n_surfaces; i++) {
         const uz_contact_surface *s = &e->surfaces[i];
@@ -61,7 +77,7 @@ static void put_surfaces(text *t, const uz_evaluation *e)
     text_close(t, ']');
 }
 
-/* Scenes: what acts on the body, and what makes the answer doubtful. */
+/* Scenes: what acts on the body, what makes the answer doubtful, and numbers that were asked for, as intervals. */
 static void put_evaluation(text *t, const uz_evaluation *e, int dim)
 {
     text_open(t, "resultants", '{');
@@ -85,11 +101,8 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
         text_close(t, '}');
     }
     text_close(t, ']');
-}
-
-/* Numbers that were asked for, as intervals. */
-static void put_quantities(text *t, const uz_evaluation *e)
-{
+    if (e->n_quantities == 0)
+        return;
     text_open(t, "quantities", '[');
     for (int64_t i = 0; i < e->n_quantities; i++) {
         const uz_quantity_found *q = &e->quantities[i];
@@ -112,25 +125,6 @@ static void put_quantities(text *t, const uz_evaluation *e)
     text_close(t, ']');
 }
 
-/* How deep the deformed surfaces stand in each other: of all contacts, and of each. */
-static void put_overlap(text *t, const uz_evaluation *e, int dim)
-{
-    double depth = 0;
-    for (int64_t k = 0; k < e->n_contacts; k++)
-        depth = e->overlap[k].depth > depth ? e->overlap[k].depth : depth; /* not those that are no number */
-    put_named(t, (named[]){{"geometric_penetration", depth}, {"approach", e->approach}}, 2);
-    text_open(t, "penetrations", '[');
-    for (int64_t k = 0; k < e->n_contacts; k++) {
-        const uz_overlap *o = &e->overlap[k];
-        text_open(t, NULL, '{');
-        put_named(t, (named[]){{"geometric_penetration", o->depth}, {"sagitta", o->facets}}, 2);
-        if (o->depth > 0)
-            text_numbers(t, "at", o->at, dim);
-        text_close(t, '}');
-    }
-    text_close(t, ']');
-}
-
 static void put_contact(text *t, const uz_summary *s, bool scene)
 {
     const uz_evaluation *e = s->evaluation;
@@ -146,9 +140,7 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
         text_number(t, "max_pressure", s->max_pressure);
         if (e) {
             text_number(t, "area", e->contact_area);
-            put_overlap(t, e, s->dim);
-            if (e->n_surfaces > 0)
-                put_surfaces(t, e);
+            put_surfaces(t, e, s->dim);
         }
         if (e && e->peak_node < 0) {
             text_raw(t, "max_pressure_at", NULL);
@@ -338,8 +330,6 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     put_certificate(&t, summary, scene);
     if (summary->evaluation)
         put_evaluation(&t, summary->evaluation, summary->dim);
-    if (summary->evaluation && summary->evaluation->n_quantities > 0)
-        put_quantities(&t, summary->evaluation);
     put_named(&t,
               (named[]){{"requested_error", summary->requested_error},
                         {"discretization_error", summary->discretization_error},

@@ -43,10 +43,7 @@ static long step_index(step s)
 /* ---- names against the schema */
 
 /* What a summary says of its own assertions is nothing to assert. */
-static bool is_verdict(const char *key)
-{
-    return strncmp(key, "assertions", 10) == 0;
-}
+static const char VERDICTS[] = "assertions";
 
 /* Does the schema name its types, and one of these? */
 static bool may_be(schema_at at, unsigned wanted)
@@ -92,7 +89,7 @@ static void collect(name_list *out, schema_at at, const char *above, const char 
     char name[64];
     const json_value *properties = json_get(at.node, "properties");
     const int len = snprintf(name, sizeof name, "%s%s%s", above, above[0] ? "." : "", key);
-    if (!at.node || len >= (int)sizeof name || is_verdict(name))
+    if (!at.node || len >= (int)sizeof name || strncmp(name, VERDICTS, sizeof VERDICTS - 1) == 0)
         return;
     if (may_be(at, SCHEMA_NUMBER | SCHEMA_ARRAY) && out->count < MOST_NAMES) {
         const char *whole = strcpy(out->name[out->count], name), *dot = strrchr(whole, '.');
@@ -112,7 +109,7 @@ bool quantity_check(const schemas *all, const json_value *quantity, problem_deta
     const size_t len = quantity->count;
     const char *end = name + len;
     schema_at at = schema_root(all, "summary.json");
-    bool own = len >= 10 && is_verdict(name);
+    bool own = len >= sizeof VERDICTS - 1 && strncmp(name, VERDICTS, sizeof VERDICTS - 1) == 0;
     for (step s = first_step(name, end); at.node && !own; s = first_step(s.at + s.len + 1, end)) {
         at = schema_step(at, s);
         if (s.at + s.len == end)

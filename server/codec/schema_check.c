@@ -367,15 +367,31 @@ static bool rule_ref(const visit *v, const json_value *argument, const keyword *
     return check(&(visit){v->problem, schema_resolve(v->at), v->value});
 }
 
-/* Among branches that are all objects, the one whose const the value names. */
-static bool choose_by_key(const visit *v, const json_value *branches)
+/* The one branch that has the value's type; among several, which are all objects, the one whose const it names. */
+static bool rule_choice(const visit *v, const json_value *argument, const keyword *k)
 {
     const char *names[MAX_NAMES];
-    size_t count = 0;
-    json_value room;
     const json_value *wanted = NULL, *named = NULL;
-    for (size_t i = 0; i < branches->count; i++) {
-        const schema_at at = schema_resolve(schema_child(v->at, json_item(branches, i, &room)));
+    schema_at chosen = v->at;
+    size_t fitting = 0, count = 0;
+    unsigned all = 0;
+    json_value room;
+    (void)k;
+    for (size_t i = 0; i < json_size(argument); i++) {
+        const schema_at at = schema_resolve(schema_child(v->at, json_item(argument, i, &room)));
+        const unsigned types = schema_types(at);
+        all |= types;
+        if (types & type_of(v->value)) {
+            chosen = at;
+            fitting++;
+        }
+    }
+    if (fitting == 0)
+        return refuse_type(v, all);
+    if (fitting == 1)
+        return check(&(visit){v->problem, chosen, v->value});
+    for (size_t i = 0; i < argument->count; i++) {
+        const schema_at at = schema_resolve(schema_child(v->at, json_item(argument, i, &room)));
         const char *key = schema_discriminator(at, &wanted);
         if (!key)
             continue;
@@ -396,27 +412,6 @@ static bool choose_by_key(const visit *v, const json_value *branches)
     add_names(v, "", names, count, ".");
     suggest(v, json_text(named), named->count, names, count);
     return false;
-}
-
-static bool rule_choice(const visit *v, const json_value *argument, const keyword *k)
-{
-    schema_at chosen = v->at;
-    size_t fitting = 0;
-    unsigned all = 0;
-    json_value room;
-    (void)k;
-    for (size_t i = 0; i < json_size(argument); i++) {
-        const schema_at at = schema_resolve(schema_child(v->at, json_item(argument, i, &room)));
-        const unsigned types = schema_types(at);
-        all |= types;
-        if (types & type_of(v->value)) {
-            chosen = at;
-            fitting++;
-        }
-    }
-    if (fitting == 0)
-        return refuse_type(v, all);
-    return fitting == 1 ? check(&(visit){v->problem, chosen, v->value}) : choose_by_key(v, argument);
 }
 
 /* "then" and "else" say in their description why they ask for more; it is added to what they refuse. */
