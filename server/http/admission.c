@@ -198,26 +198,21 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
                                     : "send the header field Authorization: Bearer TOKEN");
 }
 
-/* On a connection beyond the limit. */
-static bool check_room(const api *context, http_request *rq, bool has_route, problem_details *problem)
-{
-    if (!rq->spare)
-        return true;
-    rq->reply.close = true;
-    if (has_route && (strcmp(rq->route->pattern, "/healthz") == 0 || strcmp(rq->route->pattern, "/readyz") == 0))
-        return true;
-    rq->reply.retry_after_s = 5;
-    return problem_fill(problem, 503, "too_many_connections", "Too many connections are open",
-                        "%u connections are busy, as many as this server lets (its option --max-connections): try "
-                        "again later",
-                        context->options.max_connections);
-}
-
 bool admission_check(api *context, http_request *rq)
 {
     problem_details *problem = &rq->refused;
     bool found = target_parse(&rq->target, rq->raw_target, problem) &&
                  route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem);
-    return check_room(context, rq, found, problem) && check_name(context, rq, problem) &&
-           check_client(context, rq, found, problem) && found && check_request(context, rq, problem);
+    if (rq->spare) { /* on a connection beyond the limit */
+        rq->reply.close = true;
+        if (!found || (strcmp(rq->route->pattern, "/healthz") != 0 && strcmp(rq->route->pattern, "/readyz") != 0)) {
+            rq->reply.retry_after_s = 5;
+            return problem_fill(problem, 503, "too_many_connections", "Too many connections are open",
+                                "%u connections are busy, as many as this server lets (its option --max-connections): "
+                                "try again later",
+                                context->options.max_connections);
+        }
+    }
+    return check_name(context, rq, problem) && check_client(context, rq, found, problem) && found &&
+           check_request(context, rq, problem);
 }

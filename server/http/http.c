@@ -37,30 +37,6 @@ static void on_drop(void *ctx, http_request *rq)
     rq->upload = NULL;
 }
 
-/* What changed something, or was refused to whoever asked. */
-static void audit(const api *context, const http_request *rq, const char *path)
-{
-    char address[INET6_ADDRSTRLEN] = "";
-    unsigned char six[16] = {0};
-    const bool changes = strcmp(rq->method, "POST") == 0 || strcmp(rq->method, "DELETE") == 0;
-    if (!context->audit || !((changes && rq->status < 400) || rq->status == 401 || rq->status == 403))
-        return;
-    memcpy(six, rq->address, rq->address_len);
-    if (rq->address_len > 0)
-        inet_ntop(rq->address_len == 4 ? AF_INET : AF_INET6, six, address, sizeof address);
-    log_write(context->audit, LOG_INFO, "audit",
-              (log_field[]){LOG_S("owner", rq->client),
-                            LOG_S("token", rq->token),
-                            LOG_S("address", address),
-                            LOG_S("method", rq->method),
-                            LOG_S("path", path),
-                            LOG_I("status", rq->status),
-                            LOG_S("job", rq->job_id),
-                            LOG_S("upload", strlen(rq->name) == 64 ? rq->name : ""),
-                            LOG_S("request", rq->id),
-                            {0}});
-}
-
 static void on_account(void *ctx, const http_request *rq, bool completed, bool expired)
 {
     const api *context = ctx;
@@ -70,7 +46,26 @@ static void on_account(void *ctx, const http_request *rq, bool completed, bool e
     for (char *at = path; *at; at++)
         if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
             *at = '?';
-    audit(context, rq, path);
+    /* what changed something, or was refused to whoever asked */
+    const bool changes = strcmp(rq->method, "POST") == 0 || strcmp(rq->method, "DELETE") == 0;
+    if (context->audit && ((changes && rq->status < 400) || rq->status == 401 || rq->status == 403)) {
+        char address[INET6_ADDRSTRLEN] = "";
+        unsigned char six[16] = {0};
+        memcpy(six, rq->address, rq->address_len);
+        if (rq->address_len > 0)
+            inet_ntop(rq->address_len == 4 ? AF_INET : AF_INET6, six, address, sizeof address);
+        log_write(context->audit, LOG_INFO, "audit",
+                  (log_field[]){LOG_S("owner", rq->client),
+                                LOG_S("token", rq->token),
+                                LOG_S("address", address),
+                                LOG_S("method", rq->method),
+                                LOG_S("path", path),
+                                LOG_I("status", rq->status),
+                                LOG_S("job", rq->job_id),
+                                LOG_S("upload", strlen(rq->name) == 64 ? rq->name : ""),
+                                LOG_S("request", rq->id),
+                                {0}});
+    }
     if (context->options.access_log || rq->status >= 500) {
         const char *end = completed ? "complete" : expired ? "deadline" : "aborted";
         log_field fields[] = {LOG_S("method", rq->method),

@@ -43,21 +43,16 @@ void rate_free(rate *r)
     free(r);
 }
 
-/* FNV-1a with a seed, and the finishing steps of MurmurHash3 (both public domain algorithms). */
-static uint64_t hash(uint64_t seed, const unsigned char *key, size_t len)
-{
-    uint64_t h = seed ^ 0xcbf29ce484222325u;
-    for (size_t i = 0; i < len; i++)
-        h = (h ^ key[i]) * 0x100000001b3u;
-    h = (h ^ (h >> 33)) * 0xff51afd7ed558ccdu;
-    h = (h ^ (h >> 33)) * 0xc4ceb9fe1a85ec53u;
-    h ^= h >> 33;
-    return h ? h : 1;
-}
-
 double rate_take(rate *r, const void *key, size_t len, double now)
 {
-    const uint64_t hashed = hash(r->seed, key, len);
+    /* FNV-1a with a seed, and the finishing steps of MurmurHash3 (both public domain algorithms). */
+    uint64_t hashed = r->seed ^ 0xcbf29ce484222325u;
+    for (size_t i = 0; i < len; i++)
+        hashed = (hashed ^ ((const unsigned char *)key)[i]) * 0x100000001b3u;
+    hashed = (hashed ^ (hashed >> 33)) * 0xff51afd7ed558ccdu;
+    hashed = (hashed ^ (hashed >> 33)) * 0xc4ceb9fe1a85ec53u;
+    hashed ^= hashed >> 33;
+    hashed = hashed ? hashed : 1;
     bucket *set = r->buckets[hashed % SETS], *b = NULL, *oldest = set;
     pthread_mutex_lock(&r->lock);
     /* the client's bucket, or the one of its set that was not used for longest, filled */

@@ -84,18 +84,6 @@ void service_health(api *context, http_request *rq, http_reply *reply)
         codec_encode_health(answered ? "ok" : "store_unavailable", counts, work_settings(context->work)->workers));
 }
 
-/* ---- ready: what a job needs, tried */
-
-static const char *why_not_ready(api *context)
-{
-    problem_details problem;
-    const store_status status = store_try_write(context->store);
-    if (status == STORE_OK)
-        return work_solves(context->work) ? "" : "solver_unavailable";
-    api_store_failed(context, &problem);
-    return status == STORE_FULL ? "storage_full" : "store_unavailable";
-}
-
 static const double READY_FOR_S = 1.0; /* so often at most it is tried, however many ask */
 
 void service_ready(api *context, http_request *rq, http_reply *reply)
@@ -109,8 +97,15 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
         return;
     }
     pthread_mutex_lock(&context->ready_lock);
-    if (clock_seconds(CLOCK_MONOTONIC) >= context->ready_until) {
-        snprintf(context->ready_why, sizeof context->ready_why, "%s", why_not_ready(context));
+    if (clock_seconds(CLOCK_MONOTONIC) >= context->ready_until) { /* what a job needs is tried */
+        problem_details problem;
+        const store_status status = store_try_write(context->store);
+        const char *found = status == STORE_FULL ? "storage_full" : "store_unavailable";
+        if (status == STORE_OK)
+            found = work_solves(context->work) ? "" : "solver_unavailable";
+        else
+            api_store_failed(context, &problem);
+        snprintf(context->ready_why, sizeof context->ready_why, "%s", found);
         context->ready_until = clock_seconds(CLOCK_MONOTONIC) + READY_FOR_S;
     }
     memcpy(why, context->ready_why, sizeof context->ready_why);

@@ -34,10 +34,12 @@ static bool read_key(const http_request *rq, char **key, problem_details *proble
 #define SMALL_DOFS 10000
 #define SMALL_ROWS 1000
 
-/* By its size alone: a prediction proper (uz_predict) takes longer than most jobs that are small. One that iterates for
- * long all the same is found out by who runs it. */
-static bool is_small(const codec_request *request)
+/* What the store keeps of a decoded request, and of its body and key, which must outlive it. */
+static store_request kept_request(const http_request *rq, const codec_request *request, const char *body, size_t len,
+                                  const char *key)
 {
+    /* Small by its size alone: a prediction proper (uz_predict) takes longer than most jobs that are small. One that
+     * iterates for long all the same is found out by who runs it. */
     const uz_problem *p = &request->problem;
     const int64_t cases = p->n_cases > 0 ? p->n_cases : 1;
     problem_details ignored;
@@ -45,17 +47,11 @@ static bool is_small(const codec_request *request)
     double cells = 1.0;
     for (int i = 0; p->kind == UZ_PROBLEM_SCENE && i < p->scene.box.dim; i++)
         cells *= (double)p->scene.box.cells[i];
-    return cells <= SMALL_DOFS && codec_request_sizes(request, &m, &n_u, &ignored) && n_u <= SMALL_DOFS / cases &&
-           m <= SMALL_ROWS;
-}
-
-/* What the store keeps of a decoded request, and of its body and key, which must outlive it. */
-static store_request kept_request(const http_request *rq, const codec_request *request, const char *body, size_t len,
-                                  const char *key)
-{
+    const bool small = cells <= SMALL_DOFS && codec_request_sizes(request, &m, &n_u, &ignored) &&
+                       n_u <= SMALL_DOFS / cases && m <= SMALL_ROWS;
     return (store_request){.client = rq->client,
                            .share = rq->share,
-                           .small = is_small(request),
+                           .small = small,
                            .any_upload = rq->sees_all,
                            .body = body,
                            .body_len = len,

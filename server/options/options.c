@@ -134,13 +134,6 @@ static bool set_layer(server_options *o, option_source layer, const flags *f, ch
     return true;
 }
 
-/* Whether nobody else can reach an address "HOST:PORT", as far as its text says. */
-static bool is_loopback(const char *listen)
-{
-    return strncmp(listen, "127.", 4) == 0 || strncmp(listen, "[::1]:", 6) == 0 ||
-           strncmp(listen, "localhost:", 10) == 0;
-}
-
 options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size)
 {
     flags f = {.verdict = OPTIONS_RUN};
@@ -169,8 +162,11 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
     }
     if (out->max_streams == 0) /* they hold their connections for long: the others are for everything else */
         out->max_streams = out->max_connections - out->max_connections / 4;
-    if (out->max_client_connections < 0)
-        out->max_client_connections = is_loopback(out->listen) ? 0 : 1 + out->max_connections / 4;
+    if (out->max_client_connections < 0) { /* whether nobody else can reach the address, as far as its text says */
+        const bool loopback = strncmp(out->listen, "127.", 4) == 0 || strncmp(out->listen, "[::1]:", 6) == 0 ||
+                              strncmp(out->listen, "localhost:", 10) == 0;
+        out->max_client_connections = loopback ? 0 : 1 + out->max_connections / 4;
+    }
     if (out->memory == 0)
         out->memory = memory_share(memory_available(), out->cache, out->workers);
     if (backup)

@@ -204,30 +204,6 @@ static char *squeeze(const char *body, size_t len, size_t *out_len)
     return NULL;
 }
 
-static void apply_gzip(const http_request *rq, http_reply *reply)
-{
-    const char *type = reply->type ? reply->type : "";
-    /* text, and the arrays of a surface, whose numbers repeat their leading bytes */
-    const bool shrinks = strstr(type, "json") || strstr(type, "svg") || strncmp(type, "text/", 5) == 0 ||
-                         strncmp(type, "model/", 6) == 0;
-    size_t len = reply->packed_len;
-    if (!reply->body || !shrinks || reply->len < GZIP_LEAST)
-        return;
-    reply->varies_by_coding = true;
-    if (!request_takes_gzip(rq))
-        return;
-    char *small = reply->packed ? (char *)(uintptr_t)reply->packed : squeeze(reply->body, reply->len, &len);
-    if (!small)
-        return; /* as it is, then */
-    reply_drop_body(reply);
-    reply->body = small;
-    reply->len = len;
-    reply->body_is_static = reply->packed != NULL;
-    reply->gzip = true;
-    if (reply->tag[0])
-        strcat(reply->tag, GZIP_MARK); /* REPLY_TAG has room */
-}
-
 void negotiate(const http_request *rq, http_reply *reply)
 {
     if (reply->tag_by_body && reply->status == 200 && reply->body)
@@ -239,5 +215,24 @@ void negotiate(const http_request *rq, http_reply *reply)
         return;
     if (reply->status == 200 && reply->takes_ranges && apply_range(rq, reply))
         return;
-    apply_gzip(rq, reply);
+    /* gzip: text, and the arrays of a surface, whose numbers repeat their leading bytes */
+    const char *type = reply->type ? reply->type : "";
+    const bool shrinks = strstr(type, "json") || strstr(type, "svg") || strncmp(type, "text/", 5) == 0 ||
+                         strncmp(type, "model/", 6) == 0;
+    if (!reply->body || !shrinks || reply->len < GZIP_LEAST)
+        return;
+    reply->varies_by_coding = true;
+    if (!request_takes_gzip(rq))
+        return;
+    size_t len = reply->packed_len;
+    char *small = reply->packed ? (char *)(uintptr_t)reply->packed : squeeze(reply->body, reply->len, &len);
+    if (!small)
+        return; /* as it is, then */
+    reply_drop_body(reply);
+    reply->body = small;
+    reply->len = len;
+    reply->body_is_static = reply->packed != NULL;
+    reply->gzip = true;
+    if (reply->tag[0])
+        strcat(reply->tag, GZIP_MARK); /* REPLY_TAG has room */
 }

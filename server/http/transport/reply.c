@@ -203,10 +203,12 @@ static void free_source(void *ctx)
 
 #define STREAM_PIECE 16384 /* bytes asked for at once */
 
-/* Owns what the body was. */
-static struct MHD_Response *make_response(http_reply *reply)
+bool reply_send(struct MHD_Connection *connection, http_reply *reply)
 {
-    struct MHD_Response *response = NULL;
+    field fields[MAX_FIELDS];
+    field_texts texts = {.number = ""};
+    size_t n = list_fields(fields, reply, &texts);
+    struct MHD_Response *response = NULL; /* owns what the body was */
     if (reply->has_file) {
         response = MHD_create_response_from_fd_at_offset64(reply->len, reply->fd, reply->offset);
         reply->has_file = !response;
@@ -228,24 +230,12 @@ static struct MHD_Response *make_response(http_reply *reply)
         if (response)
             reply->body = NULL;
     }
-    return response;
-}
-
-bool reply_send(struct MHD_Connection *connection, http_reply *reply)
-{
-    field fields[MAX_FIELDS];
-    field_texts texts = {.number = ""};
-    bool sent = false;
-    size_t n = list_fields(fields, reply, &texts);
-    struct MHD_Response *response = make_response(reply);
-    if (!response)
-        goto done;
-    bool complete = true;
-    for (size_t i = 0; i < n; i++)
-        complete = complete && MHD_add_response_header(response, fields[i].name, fields[i].value) == MHD_YES;
-    sent = complete && MHD_queue_response(connection, (unsigned)reply->status, response) == MHD_YES;
-    MHD_destroy_response(response);
-done:
+    bool sent = response != NULL;
+    for (size_t i = 0; i < n && sent; i++)
+        sent = MHD_add_response_header(response, fields[i].name, fields[i].value) == MHD_YES;
+    sent = sent && MHD_queue_response(connection, (unsigned)reply->status, response) == MHD_YES;
+    if (response)
+        MHD_destroy_response(response);
     reply_clear(reply);
     return sent;
 }
