@@ -24,7 +24,7 @@ typedef client_exit (*command_run)(client_session *);
 static const command_run RUN[CLIENT_COMMANDS] = {
     [CLIENT_SUBMIT] = client_submit, [CLIENT_STATUS] = client_status,   [CLIENT_WAIT] = client_wait,
     [CLIENT_RESULT] = client_result, [CLIENT_HISTORY] = client_history, [CLIENT_LIST] = client_list,
-    [CLIENT_CANCEL] = client_cancel, [CLIENT_REFINE] = client_refine,   [CLIENT_VERIFY] = client_verify,
+    [CLIENT_CANCEL] = client_delete, [CLIENT_REFINE] = client_refine,   [CLIENT_VERIFY] = client_verify,
     [CLIENT_UPLOAD] = client_upload, [CLIENT_PICTURE] = client_picture, [CLIENT_PLOT] = client_plot,
     [CLIENT_DELETE] = client_delete, [CLIENT_FACTORS] = client_factors, [CLIENT_DOCTOR] = client_doctor,
 };

@@ -67,18 +67,6 @@ static double distance_of(const json_t *a, const json_t *b)
     return difference > 0.0 || isnan(difference) ? difference / size : 0.0;
 }
 
-/* Where the nodes are another mesh's, what stands at them can't be compared; the words say so. NULL: it can. */
-static const char *other_mesh(const json_t *now, const json_t *then)
-{
-    const json_t *a = json_object_get(now, "displacements"), *b = json_object_get(then, "displacements");
-    const json_t *x = json_object_get(now, "nodes"), *y = json_object_get(then, "nodes");
-    if (!json_is_array(x) != !json_is_array(y))
-        return "one job is a scene and the other a problem in matrices";
-    if (count_numbers(a) != count_numbers(b) || count_numbers(x) != count_numbers(y))
-        return x ? "the meshes differ in their number of nodes" : "the problems differ in their number of unknowns";
-    return x && distance_of(x, y) > 1e-9 ? "the nodes are at other places" : NULL;
-}
-
 /* ---- what touches */
 
 /* The places of a contact, each of which touches or not: nodes of a scene, rows of matrices. */
@@ -158,7 +146,18 @@ static void compare_contacts(client_checks *to, const char *group, const json_t 
 void client_baseline_results(client_checks *to, const char *group, const json_t *now, const json_t *then,
                              double tolerance)
 {
-    const char *other = other_mesh(now, then), *outcome = client_json_text(then, "summary.outcome");
+    static const char NAME[] = "displacements";
+    const json_t *a = json_object_get(now, NAME), *b = json_object_get(then, NAME);
+    const json_t *x = json_object_get(now, "nodes"), *y = json_object_get(then, "nodes");
+    const char *outcome = client_json_text(then, "summary.outcome");
+    /* Where the nodes are another mesh's, what stands at them can't be compared. */
+    const char *other = NULL;
+    if (!json_is_array(x) != !json_is_array(y))
+        other = "one job is a scene and the other a problem in matrices";
+    else if (count_numbers(a) != count_numbers(b) || count_numbers(x) != count_numbers(y))
+        other = x ? "the meshes differ in their number of nodes" : "the problems differ in their number of unknowns";
+    else if (x && distance_of(x, y) > 1e-9)
+        other = "the nodes are at other places";
     if (strcmp(outcome, "converged") != 0 && strcmp(outcome, "verified") != 0)
         client_checks_add(to, CLIENT_UNCERTAIN, group, "baseline", "it ended with %s", outcome);
     /* The exact energies are within the gaps of these. */
@@ -170,13 +169,10 @@ void client_baseline_results(client_checks *to, const char *group, const json_t 
                         i == 0 ? gaps : 0.0, tolerance);
     if (other) {
         client_checks_add(to, CLIENT_FAIL, group, "mesh",
-                          "%s (%zu and %zu): displacements and contacts can't be compared", other,
-                          count_numbers(json_object_get(now, "displacements")),
-                          count_numbers(json_object_get(then, "displacements")));
+                          "%s (%zu and %zu): displacements and contacts can't be compared", other, count_numbers(a),
+                          count_numbers(b));
         return;
     }
-    static const char NAME[] = "displacements";
-    const json_t *a = json_object_get(now, NAME), *b = json_object_get(then, NAME);
     const double drift = distance_of(a, b);
     if (isnan(drift))
         client_checks_add(to, CLIENT_UNCERTAIN, group, NAME, "they are not known");

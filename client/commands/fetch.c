@@ -51,10 +51,11 @@ static client_exit say_gone(client_session *s, const char *what, const client_re
     return code;
 }
 
-/* Sends the service's one DELETE, which dismisses a job or deletes an ended one: only where the job has ended, or has
- * not, as the command means; else says what the other command is. */
-static client_exit send_delete(client_session *s, bool of_ended)
+/* cancel too. Sends the service's one DELETE, which dismisses a job or deletes an ended one: only where the job has
+ * ended, or has not, as the command means; else says what the other command is. */
+client_exit client_delete(client_session *s)
 {
+    const bool of_ended = s->options->command == CLIENT_DELETE;
     json_t *job;
     char message[240], *path = NULL;
     client_exit code = client_get_json(s, &job, client_job_path(s, s->options->operand, ""));
@@ -87,16 +88,6 @@ static client_exit send_delete(client_session *s, bool of_ended)
     }
     free(path);
     return code;
-}
-
-client_exit client_cancel(client_session *s)
-{
-    return send_delete(s, false);
-}
-
-client_exit client_delete(client_session *s)
-{
-    return send_delete(s, true);
 }
 
 /* ----------------------------------------------- result, picture, history */

@@ -112,28 +112,24 @@ static char *picture_path(client_session *s)
     return path;
 }
 
-static client_exit fetch_trade(client_session *s)
-{
-    json_t *trade;
-    const client_query query[] = {{"case", s->options->case_name}, {NULL, NULL}};
-    client_exit code = client_get_json(s, &trade, client_path_with_query(s, "/work-precision", query));
-    if (code == CLIENT_OK && !json_is_array(json_object_get(trade, "decades")))
-        code = client_complain(s, CLIENT_SERVER_ERROR, "the reply has no decades; is this the right server?");
-    else if (code == CLIENT_OK && s->options->json)
-        code = client_print_json(s, trade);
-    else if (code == CLIENT_OK)
-        client_draw_trade(s, trade);
-    json_decref(trade);
-    return code;
-}
-
 client_exit client_plot(client_session *s)
 {
     client_reply reply;
     client_buffer png = {0};
     const char *output = s->options->output;
-    if (s->options->trade)
-        return fetch_trade(s);
+    if (s->options->trade) {
+        json_t *trade;
+        const client_query query[] = {{"case", s->options->case_name}, {NULL, NULL}};
+        client_exit code = client_get_json(s, &trade, client_path_with_query(s, "/work-precision", query));
+        if (code == CLIENT_OK && !json_is_array(json_object_get(trade, "decades")))
+            code = client_complain(s, CLIENT_SERVER_ERROR, "the reply has no decades; is this the right server?");
+        else if (code == CLIENT_OK && s->options->json)
+            code = client_print_json(s, trade);
+        else if (code == CLIENT_OK)
+            client_draw_trade(s, trade);
+        json_decref(trade);
+        return code;
+    }
     char *path = picture_path(s);
     if (!path)
         return CLIENT_LOCAL;

@@ -75,10 +75,8 @@ static void put_attribute(FILE *to, const char *name, const char *value)
     fputc('"', to);
 }
 
-static const char *tag_of(client_verdict verdict)
-{
-    return verdict == CLIENT_PASS ? NULL : verdict == CLIENT_NO_ANSWER ? "error" : "failure";
-}
+static const char *const TAGS[] = {
+    [CLIENT_PASS] = NULL, [CLIENT_UNCERTAIN] = "failure", [CLIENT_FAIL] = "failure", [CLIENT_NO_ANSWER] = "error"};
 
 /* The class is the suite, and the load case behind a dot. The first one has the time of all. */
 static void put_check(FILE *to, const client_suite *suite, size_t i)
@@ -86,7 +84,7 @@ static void put_check(FILE *to, const client_suite *suite, size_t i)
     static const char *const TYPES[] = {"", "uncertain", "fail", "no_answer"};
     const client_checks *checks = &suite->checks;
     const client_check *check = &checks->item[i];
-    const char *tag = tag_of(check->verdict);
+    const char *tag = TAGS[check->verdict];
     fputs("    <testcase classname=\"", to);
     put_text(to, suite->name);
     fputs(*check->group ? "." : "", to);
@@ -111,7 +109,7 @@ static size_t count_tag(const client_checks *checks, const char *tag)
 {
     size_t count = 0;
     for (size_t i = 0; i < checks->count; i++) {
-        const char *own = tag_of(checks->item[i].verdict);
+        const char *own = TAGS[checks->item[i].verdict];
         count += own && strcmp(own, tag) == 0;
     }
     return count;
