@@ -10,7 +10,8 @@ from service import ENDLESS, MATRICES, SCENE, check, expect, options
 
 
 class Stream:
-    """An open event stream. Iterating gives (event, id, data) until it ends; comments are counted."""
+    """An open event stream. Iterating gives (event, id, data) until it ends; comments are counted. They keep it alive
+    for ever: what has not come after two minutes does not come."""
 
     def __init__(self, s, job_id, last=None):
         self.comments = 0
@@ -24,8 +25,9 @@ class Stream:
         check(self.reply.getheader("content-type") == "text/event-stream", self.reply.getheaders())
 
     def __iter__(self):
-        fields = {}
+        fields, end = {}, time.monotonic() + 120
         while line := self.reply.readline():
+            check(time.monotonic() < end, "nothing but", self.comments, "comments for long")
             line = line.decode().rstrip("\n")
             if line.startswith(":"):
                 self.comments += 1
@@ -34,7 +36,7 @@ class Stream:
                 fields[name] = value
             elif fields:
                 yield fields["event"], fields["id"], json.loads(fields["data"])
-                fields = {}
+                fields, end = {}, time.monotonic() + 120
 
     def close(self):
         self.reply.close()
@@ -227,12 +229,13 @@ def test_all_jobs_progress(s):
     stream.close()
 
 
+@options("--workers", "2")
 def test_all_jobs_expired_and_dismissed(s):
     """What others than a job's owner do to it is told as well."""
     stream = Stream(s, None)
     events = iter(stream)
     next(events)
-    running = [s.post(ENDLESS).json["id"] for _ in range(s.get("/healthz").json["workers"])]
+    running = [s.post(ENDLESS).json["id"] for _ in range(2)]
     for job in running:
         s.wait_status(job, "running")
     late, waiting = s.post({**MATRICES, "queue_limit_s": 0.1}).json["id"], s.post(MATRICES).json["id"]
