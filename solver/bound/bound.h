@@ -18,7 +18,7 @@
 #include "core/hooks.h"
 #include "uzawa.h"
 
-enum { UZ_BOUND_PARTS = 4, UZ_BOUND_POINTS = 6, UZ_BOUND_MOMENTS = 3 };
+enum { UZ_BOUND_PARTS = 4, UZ_BOUND_POINTS = 6, UZ_BOUND_MOMENTS = 3, UZ_BOUND_LOOSE = 3 };
 
 /* A straight side of one or two elements, and what happens there. */
 typedef struct {
@@ -45,13 +45,27 @@ typedef struct {
     int64_t *edge_of;    /* n_elements x 4: by the element's sides */
     double *force;       /* n_elements x 2: force per volume */
     double *free_strain; /* n_elements; NULL: no temperature */
-    char why[160];       /* what of the scene is outside of what is proved, a clause; "": nothing */
+    int n_loose;         /* motions that only obstacles hold */
+    double *motion;      /* n_loose x n_nodes x 2 */
+    int n_pressed; /* of uz_bound_hold: n_loose moments that the obstacle is to hold, as edge x (degree + 1) + a */
+    int64_t pressed[UZ_BOUND_LOOSE];
+    char why[160]; /* what of the scene is outside of what is proved, a clause; "": nothing */
 } uz_bound_body;
 
 /* model: of `scene`, at least its outline; borrowed. A scene that no bound is proved for is no failure: out->why says
  * what it is, and nothing else of *out means anything. UZ_ERR_MEMORY. */
 uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 void uz_bound_body_clear(uz_bound_body *body);
+
+/* Of a body that only obstacles hold in some motions: chooses what holds it in the dual problem. pressure: n_nodes,
+ * that of the answer on obstacles, 0 elsewhere. body->why where there is too little of it. */
+void uz_bound_hold(uz_bound_body *body, const double *pressure);
+/* Which of the pressed moments an edge's a-th along the normal is; -1: none. */
+int uz_bound_pressed(const uz_bound_body *body, int64_t edge, int a);
+/* The mean along n of a motion over an edge with the a-th weight. */
+double uz_bound_moved(const uz_bound_body *body, int motion, int64_t edge, int a, const double n[2]);
+/* Part of uz_bound_body_make: n_loose and motion. */
+uz_status uz_bound_loose_motions(uz_bound_body *body, uz_error *err);
 
 /* The obstacle before an edge, at a part of the way along it, 0 to 1: its gap, and the unit normal into it. */
 double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part);

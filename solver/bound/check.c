@@ -39,6 +39,7 @@ enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 };
 static void examine_element(examination *x, const double *u, const double *stress, int64_t e);
 static double energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e);
 static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i);
+static void settle_motions(examination *x, const double *u, const int64_t *dof);
 static void look_at_lift(examination *x, const double *u, int64_t i);
 static double work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status,
                             uz_error *err);
@@ -71,6 +72,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         const double rounding = out->gap;
         for (int64_t i = 0; i < body->n_edges; i++)
             examine_edge(&x, u, dof, i);
+        settle_motions(&x, u, dof);
         const double scale = x.scale + fabs(load);
         const double apart = out->primal - out->dual + out->defect - (out->gap - rounding) - x.sum;
         out->gap += x.sum;
@@ -264,12 +266,16 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
             share[k] = normal[0] * axis[k][0] + normal[1] * axis[k][1];
         }
         const bool free0 = !edge->held[0];
-        if (edge->contact >= 0 && free0 &&
-            !edge->round) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
+        if (uz_bound_pressed(x->body, i, a) >= 0)
+            pressure[a] = -acts[0];
+        else if (edge->contact >= 0 && free0 &&
+                 !edge->round) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
             pressure[a] = fmax(0, -(acts[0] * share[0] + acts[1] * share[1]));
         else if (edge->contact >= 0 && !edge->held[1] && fabs(share[1]) > 1e-9)
             pressure[a] = fmax(0, -acts[1] / share[1]);
         for (int k = 0; k < 2; k++) {
+            if (k == 0 && uz_bound_pressed(x->body, i, a) >= 0)
+                continue; /* as the pressure is what acts, until settle_motions */
             const double missing =
                 -pressure[a] * share[k] - acts[k] + turned[a][0] * axis[k][0] + turned[a][1] * axis[k][1];
             if (edge->held[k]) {
@@ -297,6 +303,58 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
     }
     if (edge->contact >= 0 && !edge->round)
         examine_contact(x, u, edge, pressure);
+}
+
+/* What is missing of equilibrium does no work on motions that nothing but the obstacle holds: the pressures that hold
+ * them are what they have to be for that, exactly. A displacement less the motion that it has at these moments has none
+ * there, so that the norm of K^-1, with these held, is one over all displacements. */
+static void settle_motions(examination *x, const double *u, const int64_t *dof)
+{
+    const uz_bound_body *body = x->body;
+    const int n = body->n_loose;
+    double A[UZ_BOUND_LOOSE][UZ_BOUND_LOOSE + 1] = {{0}};
+    for (int k = 0; k < n; k++)
+        for (int64_t i = 0; i < body->n_edges; i++)
+            for (int a = 0; a < x->moments; a++) {
+                double axis[2][2];
+                uz_bound_axes(axis, body, i, a);
+                for (int c = 0; c < 2; c++) {
+                    const int64_t at = dof[(i * x->moments + a) * 2 + c];
+                    A[k][n] -= at < 0 ? 0 : x->out->residual[at] * uz_bound_moved(body, k, i, a, axis[c]);
+                }
+                const int held = uz_bound_pressed(body, i, a);
+                if (held >= 0)
+                    A[k][held] = uz_bound_moved(body, k, i, a, body->edge[i].normal);
+            }
+    for (int k = 0; k < n; k++) {
+        int best = k;
+        for (int i = k + 1; i < n; i++)
+            best = fabs(A[i][k]) > fabs(A[best][k]) ? i : best;
+        for (int j = 0; j <= n; j++) {
+            const double swapped = A[k][j];
+            A[k][j] = A[best][j];
+            A[best][j] = swapped;
+        }
+        for (int i = 0; i < n; i++)
+            for (int j = n; j >= k && i != k; j--)
+                A[i][j] -= A[i][k] / A[k][k] * A[k][j];
+    }
+    for (int k = 0; k < n; k++) {
+        const int64_t i = body->pressed[k] / x->moments;
+        const int a = (int)(body->pressed[k] % x->moments);
+        const uz_bound_edge *edge = &body->edge[i];
+        const double missing = A[k][n] / A[k][k];
+        double b[3], moved[UZ_BOUND_MOMENTS], none[2], *pressure = &x->pressure[body->pressed[k]];
+        const double gap = uz_bound_gap(none, body, i, (a + 1.) / (x->moments + 1));
+        uz_along_edge(b, u, edge->node, edge->normal);
+        uz_edge_means(moved, b, x->moments);
+        *pressure -= missing;
+        x->out->dual += missing * gap;
+        x->out->defect += missing * moved[a];
+        x->out->gap -= missing * (gap - moved[a]);
+        if (!*x->out->fault && !(*pressure >= 0))
+            snprintf(x->out->fault, sizeof x->out->fault, "the obstacle would have to pull at an edge that it holds");
+    }
 }
 
 /* ---- in an element */

@@ -47,8 +47,6 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
         refuse(out, "in three dimensions there are no equilibrium elements here", "");
     if (model->kind == UZ_AXISYMMETRIC)
         refuse(out, "for bodies of revolution there are no equilibrium elements here", "");
-    if (model->n_modes > 0)
-        refuse(out, "only the obstacle holds the body, and its dual problem wants supports", "");
     if (model->spring)
         refuse(out, "springs hold the body", "");
     for (int64_t e = 0; e < mesh->n_elements && !*out->why; e++)
@@ -67,6 +65,8 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
         take_contacts(&x);
         take_loads(&x);
         status = uz_free_strains(&out->free_strain, model, scene, err);
+        if (status == UZ_OK)
+            status = uz_bound_loose_motions(out, err);
     }
     free(x.marked);
     free(x.found);
@@ -81,6 +81,7 @@ void uz_bound_body_clear(uz_bound_body *body)
     free(body->edge_of);
     free(body->force);
     free(body->free_strain);
+    free(body->motion);
     *body = (uz_bound_body){.model = NULL};
 }
 

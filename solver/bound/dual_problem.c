@@ -44,12 +44,20 @@ typedef struct {
     int64_t last; /* element that it was used for */
 } macro;
 
+static double mean_gap(double normal[2], const uz_bound_body *body, int64_t i, int a);
 static macro *make(macro *kept, const uz_bound_body *body, int64_t element);
 static inline double dot(int n, const double *x, const double *y);
 static inline void add(int n, double alpha, const double *x, double *y);
 static void spread(macro *m, double *stress, const double *v);
 
 /* ---- the problem */
+
+/* What the k-th of an edge's a-th moments is given, where it is held. */
+static double given(const uz_bound_body *body, int64_t edge, int a, int k)
+{
+    double normal[2];
+    return k == 0 && uz_bound_pressed(body, edge, a) >= 0 ? mean_gap(normal, body, edge, a) : body->edge[edge].value[k];
+}
 
 /* Free dofs of the element's moments, -1 where held; value: what these are given. */
 static void number(int64_t dof_of[OUTER], double value[OUTER], const macro *m, const int64_t *dof)
@@ -58,7 +66,7 @@ static void number(int64_t dof_of[OUTER], double value[OUTER], const macro *m, c
     for (int i = 0; i < m->outer; i++) {
         const int64_t edge = m->body->edge_of[4 * m->element + i / (2 * moments)];
         dof_of[i] = dof[edge * 2 * moments + i % (2 * moments)];
-        value[i] = m->body->edge[edge].value[i % 2];
+        value[i] = given(m->body, edge, i % (2 * moments) / 2, i % 2);
     }
 }
 
@@ -202,7 +210,7 @@ static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const
                 const double share = normal[0] * axis[k][0] + normal[1] * axis[k][1];
                 const int64_t at = dof[(i * moments + a) * 2 + k];
                 if (at < 0)
-                    gap -= share * edge->value[k];
+                    gap -= share * given(body, i, a, k);
                 else if (fabs(share) > 1e-9) {
                     row[count] = m;
                     col[count] = at;
@@ -231,7 +239,10 @@ uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *b
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual problem of %lld edges",
                        (long long)body->n_edges);
     for (int64_t i = 0; i < body->n_edges * 2 * moments; i++)
-        (*dof)[i] = body->edge[i / (2 * moments)].held[i % 2] ? -1 : d++;
+        (*dof)[i] = body->edge[i / (2 * moments)].held[i % 2] ||
+                            (i % 2 == 0 && uz_bound_pressed(body, i / (2 * moments), (int)(i % (2 * moments) / 2)) >= 0)
+                        ? -1
+                        : d++;
     qp->p = uz_alloc_zero(d, sizeof *qp->p);
     uz_status status = qp->p ? assemble(qp, d, body, *dof, stop, err)
                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld unknowns", (long long)d);

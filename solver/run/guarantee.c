@@ -64,6 +64,22 @@ static uz_status measure_residual(double *norm, const guarantee *g, uz_error *er
     return status;
 }
 
+/* A body that only obstacles hold, where its answer presses on them. */
+static uz_status hold(guarantee *g, const uz_result *result, uz_error *err)
+{
+    const uz_mesh_info *mesh = &result->mesh;
+    double *pressure = uz_alloc_zero(result->n_nodes, sizeof *pressure);
+    if (!pressure)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld nodes", (long long)result->n_nodes);
+    for (int64_t i = 0; i < result->m; i++)
+        if (mesh->contact_area[i] > 0)
+            pressure[mesh->contact_node[i]] =
+                fmax(pressure[mesh->contact_node[i]], -result->r[i] / mesh->contact_area[i]);
+    uz_bound_hold(&g->body, pressure);
+    free(pressure);
+    return UZ_OK;
+}
+
 /* -> summary.guarantee, but for its time and reasons that are errors. */
 static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *model, const uz_scene *scene,
                        uz_error *err)
@@ -76,6 +92,8 @@ static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *mod
         if (g->body.edge[i].round)
             snprintf(g->body.why, sizeof g->body.why,
                      "gaps of the answer are those where the body has gone; they are proved with fixed kinematics");
+    if (status == UZ_OK && g->body.n_loose > 0)
+        status = hold(g, result, err);
     if (status != UZ_OK || *g->body.why) {
         snprintf(out->why, sizeof out->why, "%s", g->body.why);
         return status;
@@ -130,10 +148,8 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
     g.hooks.cancelled = hooks ? hooks->cancelled : NULL;
     g.stop = (uz_stop){&g.hooks, started + settings->time_limit_s};
     *out = (uz_guarantee){.asked = true, .bound = INFINITY, .relative = INFINITY, .primal = NAN, .dual = NAN};
-    if (!result->evaluation || s->semicoercive.free_modes > 0) {
-        snprintf(out->why, sizeof out->why, "%s",
-                 result->evaluation ? "only the obstacle holds the body, and its dual problem wants supports"
-                                    : "there is no answer to bound the error of");
+    if (!result->evaluation) {
+        snprintf(out->why, sizeof out->why, "there is no answer to bound the error of");
         return;
     }
     uz_cache *own_cache = cache ? NULL : uz_cache_new(SIZE_MAX); /* both of its problems have one K */

@@ -43,7 +43,7 @@ static inline uz_load *bound_load(uz_scene *scene, uz_load_kind kind, const char
     return &scene->loads[scene->n_loads - 1];
 }
 
-typedef enum { BOUND_STRAIGHT, BOUND_ROUND } bound_kind;
+typedef enum { BOUND_STRAIGHT, BOUND_ROUND, BOUND_RESTING } bound_kind;
 
 /* n: cells along the shorter side. Lengths are of the order of `unit`, displacements a thousandth of that. */
 static inline uz_scene bound_scene(uint64_t seed, bound_kind kind, const char *element, int64_t n)
@@ -99,6 +99,21 @@ static inline uz_scene bound_scene(uint64_t seed, bound_kind kind, const char *e
     const double least = fmin(0, fmin(-tilt * width, 0)); /* the corner that is deepest is at the gap */
     const double *x = scene.box.origin;
     add_plane(&scene, "bottom", x[0], x[1] - gap + least - fabs(tilt) * width, tilt, 1);
+    if (kind ==
+        BOUND_RESTING) { /* on the bottom, and on another plane or between two sides: what presses is the most */
+        const bool corner = random_chance(&rng, 0.5);
+        scene.n_supports = 0;
+        scene.n_loads = 1;
+        if (corner)
+            add_plane(&scene, "left", x[0] - gap, x[1], 1, 0);
+        else
+            add_support(&scene, "left", 0, NAN);
+        bound_load(&scene, UZ_LOAD_BODY_FORCE, "all", corner ? -stress / unit : 0,
+                   -stress / unit * (1 + random_unit(&rng)));
+        bound_load(&scene, UZ_LOAD_PRESSURE, "top", 2 * stress * random_unit(&rng), 0);
+        scene.loads[0].v[0] *= 0.3;
+        scene.loads[0].v[1] = -0.3 * fabs(scene.loads[0].v[1]);
+    }
     if (kind == BOUND_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
         uz_contact *c = &scene.contacts[0];
         c->kind = UZ_OBSTACLE_ROUND;
