@@ -44,15 +44,9 @@ void uz_csc_clear(uz_csc *A)
     memset(A, 0, sizeof *A);
 }
 
-/* A zeroed matrix has no arrays and counts as empty. */
-static int64_t entries(const uz_csc *A)
-{
-    return A->ptr ? A->ptr[A->cols] : 0;
-}
-
 uz_status uz_csc_copy(uz_csc *out, const uz_csc *A, uz_error *err)
 {
-    int64_t nnz = entries(A);
+    int64_t nnz = A->ptr ? A->ptr[A->cols] : 0; /* a zeroed matrix has no arrays and counts as empty */
     uz_csc made;
     memset(out, 0, sizeof *out);
     uz_status status = uz_csc_init(&made, A->rows, A->cols, nnz, err);
@@ -82,7 +76,7 @@ static void counts_to_starts(int64_t *ptr, int64_t count)
 
 uz_status uz_csc_transpose(uz_csc *out, const uz_csc *A, uz_error *err)
 {
-    int64_t nnz = entries(A);
+    int64_t nnz = A->ptr ? A->ptr[A->cols] : 0; /* a zeroed matrix has no arrays and counts as empty */
     uz_csc made;
     memset(out, 0, sizeof *out);
     uz_status status = uz_csc_init(&made, A->cols, A->rows, nnz, err);
@@ -197,7 +191,7 @@ void uz_csc_symv(double *y, const uz_csc *A, double alpha, const double *x)
     }
 }
 
-int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column)
+int64_t uz_csc_seek(const uz_csc *A, int64_t row, int64_t column)
 {
     int64_t low = A->ptr[column], high = A->ptr[column + 1];
     while (low < high) {
@@ -207,7 +201,13 @@ int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column)
         else
             high = middle;
     }
-    return low < A->ptr[column + 1] && A->idx[low] == row ? low : -1;
+    return low;
+}
+
+int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column)
+{
+    const int64_t k = uz_csc_seek(A, row, column);
+    return k < A->ptr[column + 1] && A->idx[k] == row ? k : -1;
 }
 
 bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room)

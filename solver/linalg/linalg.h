@@ -10,8 +10,10 @@ uz_status uz_check_finite(const double *x, int64_t n, const char *name, uz_error
 /* What the arrays of A take; 0 for a zeroed struct. */
 size_t uz_csc_bytes(const uz_csc *A);
 
-/* Where in A->idx and A->val the entry of `row` in `column` is, by bisection: rows ascend in a column. -1: A has none.
- */
+/* Where in A->idx and A->val the first entry of `column` in this row or below is, by bisection: rows ascend in a
+ * column. */
+int64_t uz_csc_seek(const uz_csc *A, int64_t row, int64_t column);
+/* Where the entry of `row` in `column` is; -1: A has none. */
 int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column);
 
 /* Room for so many triplets in each of three arrays. False: no memory, and all that is there stays. */

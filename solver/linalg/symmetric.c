@@ -2,6 +2,7 @@
 #include "uzawa.h"
 
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <math.h>
 #include <string.h>
@@ -21,20 +22,6 @@ typedef struct {
     int64_t j, at_k, at_t;
 } pair_walk;
 
-/* The first entry of column j on or below the diagonal; bisection, as it is asked for every unequal pair. */
-static int64_t skip_upper(const uz_csc *A, int64_t j)
-{
-    int64_t low = A->ptr[j], high = A->ptr[j + 1];
-    while (low < high) {
-        int64_t middle = low + (high - low) / 2;
-        if (A->idx[middle] < j)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 static bool walk_next(pair_walk *walk, pair *out)
 {
     const uz_csc *K = walk->K, *T = walk->T;
@@ -48,12 +35,6 @@ static bool walk_next(pair_walk *walk, pair *out)
     return out->i != INT64_MAX;
 }
 
-static double diagonal(const uz_csc *A, int64_t j)
-{
-    int64_t k = skip_upper(A, j);
-    return k < A->ptr[j + 1] && A->idx[k] == j ? A->val[k] : 0.0;
-}
-
 /* Counts the places of the lower triangle that either half fills, and finds the worst pair: by |a - b| over the larger
  * of the two diagonal entries, infinite where those are zero and a, b differ. */
 static int64_t inspect(const uz_csc *K, const uz_csc *T, pair *worst, double *worst_asymmetry)
@@ -61,12 +42,13 @@ static int64_t inspect(const uz_csc *K, const uz_csc *T, pair *worst, double *wo
     int64_t count = 0;
     *worst_asymmetry = 0.0;
     for (int64_t j = 0; j < K->cols; j++) {
-        pair_walk walk = {K, T, j, skip_upper(K, j), skip_upper(T, j)};
+        pair_walk walk = {K, T, j, uz_csc_seek(K, j, j), uz_csc_seek(T, j, j)};
         for (pair p; walk_next(&walk, &p); count++) {
             const double difference = fabs(p.a - p.b);
             if (difference == 0.0)
                 continue;
-            const double scale = fmax(fabs(diagonal(K, p.i)), fabs(diagonal(K, p.j)));
+            const int64_t ii = uz_csc_find(K, p.i, p.i), jj = uz_csc_find(K, j, j);
+            const double scale = fmax(ii < 0 ? 0.0 : fabs(K->val[ii]), jj < 0 ? 0.0 : fabs(K->val[jj]));
             const double ratio = scale > 0.0 ? difference / scale : INFINITY;
             if (ratio > *worst_asymmetry) {
                 *worst_asymmetry = ratio;
@@ -108,7 +90,7 @@ uz_status uz_symmetric_lower(uz_csc *K, uz_error *err)
     if (K->ptr) {
         int64_t at = 0;
         for (int64_t j = 0; j < K->cols; j++) {
-            pair_walk walk = {K, &T, j, skip_upper(K, j), skip_upper(&T, j)};
+            pair_walk walk = {K, &T, j, uz_csc_seek(K, j, j), uz_csc_seek(&T, j, j)};
             for (pair p; walk_next(&walk, &p); at++) {
                 lower.idx[at] = p.i;
                 lower.val[at] = p.a + 0.5 * (p.b - p.a); /* exactly a where a = b */
