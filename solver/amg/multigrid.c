@@ -125,10 +125,11 @@ static size_t count_bytes(const uz_multigrid *mg)
 
 /* M <= (D + L) D^-1 (D + L') for a cycle that smooths so, and for K itself; the norm of D^-1/2 L D^-1/2 is at most the
  * root of its largest row sum times its largest column sum. */
-static double bound_by_diagonal(const uz_level *level, const uz_csc *K, double *row)
+static uz_status bound_by_diagonal(double *bound, const uz_level *level, const uz_csc *K, uz_error *err)
 {
-    double by_row = 0.0, by_column = 0.0;
-    memset(row, 0, (size_t)level->n * sizeof *row);
+    double by_row = 0.0, by_column = 0.0, *row = uz_alloc_zero(level->n, sizeof *row);
+    if (!row)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)level->n);
     for (int64_t j = 0; j < level->n; j++) {
         double sum = 0.0;
         for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
@@ -141,7 +142,9 @@ static double bound_by_diagonal(const uz_level *level, const uz_csc *K, double *
     for (int64_t j = 0; j < level->n; j++)
         by_row = fmax(by_row, row[j]);
     double norm = 1.0 + sqrt(by_row * by_column);
-    return norm * norm;
+    *bound = norm * norm;
+    free(row);
+    return UZ_OK;
 }
 
 /* Level l + 1 from level l; *done: level l is the coarsest. */
@@ -205,12 +208,8 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
         status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarsen(mg, &done, &from, K, memory_limit, stop, err);
     free(from.node);
     free(from.modes);
-    double *row = status == UZ_OK ? uz_alloc(n, sizeof *row) : NULL;
-    if (status == UZ_OK && !row)
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)n);
     if (status == UZ_OK)
-        mg->most = bound_by_diagonal(&mg->level[0], K, row);
-    free(row);
+        status = bound_by_diagonal(&mg->most, &mg->level[0], K, err);
     if (status == UZ_OK) { /* the factor of the coarsest level */
         const int last = mg->levels - 1;
         uz_csc alone = {0};
@@ -222,9 +221,15 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
             for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
                 if (held[j] || held[K->idx[q]])
                     alone.val[q] = K->idx[q] == j ? 1.0 : 0.0;
+        const uz_csc *A = last == 0 ? &alone : &mg->level[last].A;
+        const uz_hooks *hooks = stop ? stop->hooks : NULL;
+        uz_error *into = last == 0 ? err : &inner;
+        uz_analysis *analysis = NULL;
         if (status == UZ_OK)
-            status = uz_factor_plain(&mg->coarsest, last == 0 ? &alone : &mg->level[last].A, UZ_ORDERING_AMD,
-                                     memory_limit, stop ? stop->hooks : NULL, last == 0 ? err : &inner);
+            status = uz_analysis_create(&analysis, A, NULL, 0, 0, UZ_ORDERING_AMD, hooks, into);
+        if (status == UZ_OK)
+            status = uz_factor_create(&mg->coarsest, A, analysis, memory_limit, hooks, into);
+        uz_analysis_free(analysis);
         uz_csc_clear(&alone);
         if (last > 0 && status == UZ_ERR_NOT_SPD)
             uz_fail(err, status, "K",

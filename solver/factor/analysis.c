@@ -23,26 +23,6 @@ bool uz_cholmod_start(cholmod_common *common)
     return true;
 }
 
-static uz_status analyze(uz_analysis *analysis, cholmod_sparse *A, int64_t rows, uz_ordering ordering,
-                         cholmod_common *common, uz_error *err)
-{
-    int64_t *group = uz_alloc(analysis->n, sizeof *group);
-    cholmod_sparse *graph = group ? uz_compress(group, A, analysis->last, analysis->n_last, common) : NULL;
-    uz_status status = UZ_OK;
-    if (graph)
-        status = uz_choose(analysis, graph, group, rows, ordering, common, err);
-    else
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld dofs", (long long)analysis->n);
-    cholmod_l_free_sparse(&graph, common);
-    free(group);
-    if (status != UZ_OK)
-        return status;
-    const SuiteSparse_long *perm = analysis->L->Perm;
-    for (int64_t k = 0; k < analysis->n; k++)
-        analysis->position[perm[k]] = k;
-    return UZ_OK;
-}
-
 uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
                              uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
 {
@@ -58,33 +38,36 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     }
     uz_expect_factor(K);
-    cholmod_sparse A;
-    memset(&A, 0, sizeof A);
-    A.nrow = (size_t)K->rows;
-    A.ncol = (size_t)K->cols;
-    A.nzmax = (size_t)K->ptr[K->cols];
-    A.p = K->ptr;
-    A.i = K->idx;
-    A.x = K->val;
-    A.stype = -1;
-    A.itype = CHOLMOD_LONG;
-    A.xtype = CHOLMOD_REAL;
-    A.dtype = CHOLMOD_DOUBLE;
-    A.sorted = 1;
-    A.packed = 1;
+    cholmod_sparse A = {.nrow = (size_t)K->rows,
+                        .ncol = (size_t)K->cols,
+                        .nzmax = (size_t)K->ptr[K->cols],
+                        .p = K->ptr,
+                        .i = K->idx,
+                        .x = K->val,
+                        .stype = -1,
+                        .itype = CHOLMOD_LONG,
+                        .xtype = CHOLMOD_REAL,
+                        .dtype = CHOLMOD_DOUBLE,
+                        .sorted = 1,
+                        .packed = 1};
     atomic_init(&analysis->holders, 1);
     analysis->n = K->cols;
     analysis->nnz = K->ptr[K->cols];
     analysis->n_last = n_dofs;
     analysis->last = uz_alloc(n_dofs, sizeof *dofs);
     analysis->position = uz_alloc(K->cols, sizeof *analysis->position);
-    uz_status status = UZ_OK;
-    if (!analysis->last || !analysis->position)
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to analyse a matrix of %lld dofs", (long long)K->cols);
-    else if (n_dofs > 0)
+    int64_t *group = uz_alloc(K->cols, sizeof *group);
+    const bool ok = analysis->last && analysis->position && group;
+    if (ok && n_dofs > 0)
         memcpy(analysis->last, dofs, (size_t)n_dofs * sizeof *dofs);
-    if (status == UZ_OK)
-        status = analyze(analysis, &A, rows, ordering, &common, err);
+    cholmod_sparse *graph = ok ? uz_compress(group, &A, analysis->last, n_dofs, &common) : NULL;
+    uz_status status =
+        graph ? uz_choose(analysis, graph, group, rows, ordering, &common, err)
+              : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld dofs", (long long)K->cols);
+    cholmod_l_free_sparse(&graph, &common);
+    free(group);
+    for (int64_t k = 0; status == UZ_OK && k < K->cols; k++)
+        analysis->position[((const SuiteSparse_long *)analysis->L->Perm)[k]] = k;
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     cholmod_l_finish(&common);
@@ -94,13 +77,6 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
     else
         uz_analysis_free(analysis);
     return status;
-}
-
-uz_analysis *uz_analysis_hold(const uz_analysis *analysis)
-{
-    uz_analysis *shared = (uz_analysis *)analysis; /* the count is all that is not constant of it */
-    atomic_fetch_add(&shared->holders, 1);
-    return shared;
 }
 
 void uz_analysis_free(uz_analysis *analysis)

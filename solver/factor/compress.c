@@ -18,11 +18,11 @@ static uint64_t mix(uint64_t x)
     return x ^ (x >> 31);
 }
 
-/* head[i]: the first dof of i's group, by sum[i]: of mix(j) over the neighbours j of i and i itself, and something else
+/* Groups are told by sum[i]: of mix(j) over the neighbours j of i and i itself, and something else
  * for the last dofs. Equal sums mean equal neighbourhoods but for a chance of 2^-64, and a wrong guess costs fill,
- * never correctness: the graph has an edge for every entry of the matrix. false: no memory. */
-static bool find_heads(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_t n, const int64_t *last,
-                       int64_t n_last)
+ * never correctness: the graph has an edge for every entry of the matrix. */
+bool uz_group_dofs(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_t n, const int64_t *last,
+                   int64_t n_last)
 {
     uint64_t *sum = uz_alloc(n, sizeof *sum);
     if (!sum)
@@ -50,11 +50,6 @@ static bool find_heads(int64_t *head, const int64_t *ptr, const int64_t *idx, in
                 head[idx[k]] = j;
     free(sum);
     return true;
-}
-
-bool uz_group_dofs(int64_t *head, const uz_csc *K)
-{
-    return find_heads(head, K->ptr, K->idx, K->cols, NULL, 0);
 }
 
 /* Counts the edges between groups by the column they belong to, or places them (rows not NULL) at next[column]. An edge
@@ -85,7 +80,7 @@ cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64
 {
     const int64_t n = (int64_t)A->ncol;
     int64_t groups = 0, edges = 0;
-    if (!find_heads(group, A->p, A->i, n, last, n_last))
+    if (!uz_group_dofs(group, A->p, A->i, n, last, n_last))
         return NULL;
     for (int64_t j = 0; j < n; j++) /* from heads to numbers, in the order of the heads */
         group[j] = group[j] == j ? groups++ : group[group[j]];

@@ -90,37 +90,6 @@ static uz_status factorize(uz_factor *factor, cholmod_sparse *S, cholmod_common 
     return UZ_OK;
 }
 
-/* Below this times n the factor's own rounding errors are as large as its smallest pivot: of a body that is free to
- * move, rounding was seen to leave up to half of n eps. */
-#define RCOND_LEAST DBL_EPSILON
-
-static uz_status describe(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
-{
-    uz_factor_info *info = &factor->info;
-    *info = uz_analysis_describe(factor->analysis);
-    /* min_j L_jj^2 / K_jj: what elimination left of each diagonal entry. It does not depend on the units of single
-     * dofs, and the accuracy of a Cholesky factorization is governed by the condition after diagonal scaling (Demmel
-     * 1989; Higham 2002, section 10.1). */
-    const cholmod_factor *L = &factor->L;
-    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *perm = L->Perm;
-    const double *x = L->x;
-    double least = 1.0;
-    for (size_t s = 0; s < L->nsuper; s++)
-        for (int64_t k = super[s]; k < super[s + 1]; k++) {
-            int64_t j = k - super[s], rows = pi[s + 1] - pi[s];
-            double pivot = x[px[s] + j + j * rows], share = pivot * pivot / K->val[K->ptr[perm[k]]];
-            least = share < least || isnan(share) ? share : least;
-        }
-    info->rcond = least;
-    if (!(info->rcond >= RCOND_LEAST * (double)factor->n))
-        return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                       "K is singular to working precision (reciprocal condition %.2g): the body can move without "
-                       "resistance, or its stiffnesses differ by more than double precision can hold",
-                       info->rcond);
-    /* The pivots alone may be short by any factor (Kahan's matrix). */
-    return uz_bound_inverse(factor, K, common, err);
-}
-
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
                            const uz_hooks *hooks, uz_error *err)
 {
@@ -134,7 +103,8 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     }
     factor->n = analysis->n;
-    factor->analysis = uz_analysis_hold(analysis);
+    factor->analysis = (uz_analysis *)analysis; /* the count is all that is not constant of it */
+    atomic_fetch_add(&factor->analysis->holders, 1);
     factor->L = *analysis->L;
     double start = uz_seconds();
     uz_status status = UZ_OK;
@@ -148,8 +118,9 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     if (status == UZ_OK)
         status = factorize(factor, S, &common, err);
     cholmod_l_free_sparse(&S, &common);
+    factor->info = uz_analysis_describe(analysis);
     if (status == UZ_OK)
-        status = describe(factor, K, &common, err);
+        status = uz_find_condition(factor, K, &common, err);
     factor->info.factor_s = uz_seconds() - start;
     cholmod_l_finish(&common);
     if (status == UZ_OK)
@@ -179,18 +150,6 @@ uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
     return status;
 }
 
-uz_status uz_factor_plain(uz_factor **out, const uz_csc *K, uz_ordering ordering, size_t memory_limit,
-                          const uz_hooks *hooks, uz_error *err)
-{
-    uz_analysis *analysis = NULL;
-    *out = NULL;
-    uz_status status = uz_analysis_create(&analysis, K, NULL, 0, 0, ordering, hooks, err);
-    if (status == UZ_OK)
-        status = uz_factor_create(out, K, analysis, memory_limit, hooks, err);
-    uz_analysis_free(analysis);
-    return status;
-}
-
 void uz_factor_free(uz_factor *factor)
 {
     if (!factor)
@@ -213,7 +172,8 @@ uz_factor_info uz_factor_describe(const uz_factor *factor)
 
 uz_analysis *uz_factor_analysis(const uz_factor *factor)
 {
-    return uz_analysis_hold(factor->analysis);
+    atomic_fetch_add(&factor->analysis->holders, 1);
+    return factor->analysis;
 }
 
 const int64_t *uz_factor_position(const uz_factor *factor)

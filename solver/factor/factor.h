@@ -60,9 +60,6 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
  * still that of the first values, and K that is singular but to rounding is not refused. After an error it is of no use
  * but for another attempt. */
 uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err);
-/* Both at once, with nothing that has to come last. */
-uz_status uz_factor_plain(uz_factor **out, const uz_csc *K, uz_ordering ordering, size_t memory_limit,
-                          const uz_hooks *hooks, uz_error *err);
 void uz_factor_free(uz_factor *factor);
 uz_factor_info uz_factor_describe(const uz_factor *factor);
 /* What it was made from, for other matrices of its pattern; ends with uz_analysis_free. */
@@ -129,9 +126,10 @@ size_t uz_principal_bytes(const uz_principal *part);
 /* x_F = K_FF^-1 x_F in place; x (n) at fixed dofs is neither read nor written. */
 uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err);
 
-/* head[i] (n): the first dof of i's group: dofs with the same neighbours in K (lower triangle), as those of a node
- * have. false: no memory. */
-bool uz_group_dofs(int64_t *head, const uz_csc *K);
+/* head[i] (n): the first dof of i's group: dofs with the same neighbours in a matrix (ptr, idx: columns of its lower
+ * triangle), as those of a node have, and either all or none of them among the n_last dofs `last`. false: no memory. */
+bool uz_group_dofs(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_t n, const int64_t *last,
+                   int64_t n_last);
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);

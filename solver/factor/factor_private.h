@@ -19,9 +19,6 @@ struct uz_analysis {
     double seconds;
 };
 
-/* Another holder of the same object; ends with uz_analysis_free. */
-uz_analysis *uz_analysis_hold(const uz_analysis *analysis);
-
 struct uz_factor {
     uz_analysis *analysis;
     cholmod_factor L; /* the analysis's with numbers: only x and what says so are this factor's own */
@@ -49,9 +46,6 @@ bool uz_cholmod_start(cholmod_common *common);
 
 /* Memory for a factor of K is made ready while K is analysed. */
 void uz_expect_factor(const uz_csc *K);
-
-/* A dense matrix over an array, column-major. */
-cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns);
 
 /* The graph of groups of dofs with equal neighbours (lower triangle without diagonal, pattern), freed by
  * cholmod_l_free_sparse; NULL: no memory. A: lower triangle. The n_last dofs `last` are in groups without others.
@@ -93,8 +87,8 @@ uz_status uz_paths_solve(double *v, uz_paths *x, uz_error *err);
  * memory. */
 double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_dofs, int64_t rows);
 
-/* Fills info.inverse_bound and lowers info.rcond to what the vectors that it is made with say. */
-uz_status uz_bound_inverse(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err);
+/* Fills info.inverse_bound and info.rcond. UZ_ERR_NOT_SPD where K is singular to working precision. */
+uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err);
 
 /* Gives ws->panel at least `need` entries. */
 uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err);

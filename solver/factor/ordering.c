@@ -11,24 +11,6 @@
 
 enum { TINY = 4 };
 
-/* METIS installs its own handlers for SIGTERM and SIGABRT while it runs and uses the process's rand(): calls are
- * serialised for the whole process and the dispositions put back. The mutex guards METIS's process-wide state, it holds
- * none of ours. Callers block these signals in their threads (see uz_thread_init). */
-static bool order_metis(SuiteSparse_long *perm, cholmod_sparse *A, cholmod_common *common)
-{
-    static pthread_mutex_t metis_mutex = PTHREAD_MUTEX_INITIALIZER;
-    static const int taken[2] = {SIGTERM, SIGABRT};
-    struct sigaction before[2];
-    pthread_mutex_lock(&metis_mutex);
-    for (int i = 0; i < 2; i++)
-        sigaction(taken[i], NULL, &before[i]);
-    bool ok = cholmod_l_metis(A, NULL, 0, 1, perm, common);
-    for (int i = 0; i < 2; i++)
-        sigaction(taken[i], &before[i], NULL);
-    pthread_mutex_unlock(&metis_mutex);
-    return ok;
-}
-
 uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last, uz_error *err)
 {
     bool *is_last = uz_alloc_zero(n, sizeof *is_last);
@@ -53,6 +35,8 @@ uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_
 uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *last, int64_t n_last, uz_ordering ordering,
                    cholmod_common *common, uz_error *err)
 {
+    static pthread_mutex_t metis_mutex = PTHREAD_MUTEX_INITIALIZER;
+    static const int taken[2] = {SIGTERM, SIGABRT};
     int64_t n = (int64_t)graph->nrow;
     bool ok = true;
     if (n < TINY) { /* nothing to reduce, and CAMD reads past the end at n = 1 */
@@ -67,7 +51,17 @@ uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *last, in
     } else if (ordering == UZ_ORDERING_AMD) {
         ok = cholmod_l_amd(graph, NULL, 0, (SuiteSparse_long *)perm, common);
     } else {
-        ok = order_metis((SuiteSparse_long *)perm, graph, common);
+        /* METIS installs its own handlers for SIGTERM and SIGABRT while it runs and uses the process's rand(): calls
+         * are serialised for the whole process and the dispositions put back. The mutex guards METIS's process-wide
+         * state, it holds none of ours. Callers block these signals in their threads (see uz_thread_init). */
+        struct sigaction before[2];
+        pthread_mutex_lock(&metis_mutex);
+        for (int i = 0; i < 2; i++)
+            sigaction(taken[i], NULL, &before[i]);
+        ok = cholmod_l_metis(graph, NULL, 0, 1, (SuiteSparse_long *)perm, common);
+        for (int i = 0; i < 2; i++)
+            sigaction(taken[i], &before[i], NULL);
+        pthread_mutex_unlock(&metis_mutex);
     }
     if (ok && common->status >= CHOLMOD_OK)
         return uz_move_last(perm, n, last, n_last, err);

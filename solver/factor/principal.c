@@ -41,42 +41,31 @@ static void count_bytes(uz_principal *part, const cholmod_sparse *A)
     part->most = bytes > part->most ? bytes : part->most;
 }
 
-/* Counts (values false) or places (values true) the entries of the reduced matrix's upper triangle; next (n_free + 1)
- * is where each column's next entry goes, or one past its count. */
-static void scatter(cholmod_sparse *A, SuiteSparse_long *next, const uz_csc *K, const int64_t *place, bool values)
-{
-    SuiteSparse_long *index = A ? A->i : NULL;
-    double *value = A ? A->x : NULL;
-    for (int64_t j = 0; j < K->cols; j++) {
-        for (int64_t k = K->ptr[j]; place[j] >= 0 && k < K->ptr[j + 1]; k++) {
-            int64_t a = place[j], b = place[K->idx[k]], column = a > b ? a : b;
-            if (b < 0)
-                continue;
-            if (!values) {
-                next[column + 1]++;
-                continue;
-            }
-            index[next[column]] = a > b ? b : a;
-            value[next[column]++] = K->val[k];
-        }
-    }
-}
-
 /* K_FF in the factor's order, upper triangle, columns unsorted; NULL: no memory. */
-static cholmod_sparse *reduce(const uz_principal *part, const uz_csc *K, const int64_t *place)
+static cholmod_sparse *reduce(const uz_principal *part, const uz_csc *K)
 {
-    int64_t n = part->n_free;
-    SuiteSparse_long *next = uz_alloc_zero(n + 1, sizeof *next);
+    const int64_t n = part->n_free, *place = part->place;
+    SuiteSparse_long *next = uz_alloc_zero(n + 1, sizeof *next); /* where each column's next entry goes */
     cholmod_sparse *A = NULL;
-    if (!next)
-        return NULL;
-    scatter(NULL, next, K, place, false);
-    for (int64_t j = 0; j < n; j++)
-        next[j + 1] += next[j];
-    A = cholmod_l_allocate_sparse((size_t)n, (size_t)n, (size_t)next[n], 0, 1, 1, CHOLMOD_REAL, &part->ws->common);
-    if (A) {
-        memcpy(A->p, next, (size_t)(n + 1) * sizeof *next);
-        scatter(A, next, K, place, true);
+    for (int pass = 0; next && (pass == 0 || A) && pass < 2; pass++) { /* entries are counted, then placed */
+        for (int64_t j = 0; j < K->cols; j++)
+            for (int64_t k = K->ptr[j]; place[j] >= 0 && k < K->ptr[j + 1]; k++) {
+                const int64_t a = place[j], b = place[K->idx[k]], column = a > b ? a : b;
+                if (b < 0)
+                    continue;
+                if (pass == 1) {
+                    ((SuiteSparse_long *)A->i)[next[column]] = a > b ? b : a;
+                    ((double *)A->x)[next[column]] = K->val[k];
+                }
+                next[pass == 1 ? column : column + 1]++;
+            }
+        if (pass == 1)
+            break;
+        for (int64_t j = 0; j < n; j++)
+            next[j + 1] += next[j];
+        A = cholmod_l_allocate_sparse((size_t)n, (size_t)n, (size_t)next[n], 0, 1, 1, CHOLMOD_REAL, &part->ws->common);
+        if (A)
+            memcpy(A->p, next, (size_t)(n + 1) * sizeof *next);
     }
     free(next);
     return A;
@@ -140,7 +129,7 @@ uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K,
         return status;
     }
     cholmod_l_free_factor(&part->L, &part->ws->common);
-    if (status == UZ_OK && part->n_free > 0 && !(A = reduce(part, K, part->place)))
+    if (status == UZ_OK && part->n_free > 0 && !(A = reduce(part, K)))
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
     if (uz_stop_is_due(stop))
         *positive = false;
@@ -200,7 +189,14 @@ uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err)
     if (part->by_paths)
         return uz_paths_solve(x, part->paths, err);
     cholmod_common *common = &part->ws->common;
-    cholmod_dense B = uz_view_dense(part->room, part->n_free, 1);
+    const size_t n_free = (size_t)part->n_free;
+    cholmod_dense B = {.nrow = n_free,
+                       .ncol = 1,
+                       .nzmax = n_free,
+                       .d = n_free,
+                       .x = part->room,
+                       .xtype = CHOLMOD_REAL,
+                       .dtype = CHOLMOD_DOUBLE};
     for (int64_t k = 0; k < part->n_free; k++)
         part->room[k] = x[part->dof[k]];
     bool ok = cholmod_l_solve2(CHOLMOD_A, part->L, &B, NULL, &part->X, NULL, &part->Y, &part->E, common);

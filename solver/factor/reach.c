@@ -186,10 +186,11 @@ static void add_column(gathering *g, share *own, int64_t row)
     own->column[own->count++] = row;
 }
 
-/* The rows of N on the supernode's own dofs, and all that its children had. */
-static bool collect_columns(gathering *g, int64_t k, const supernode *s)
+/* The right-hand sides of a supernode: the rows of N on its own dofs, and all that its children left. */
+static bool collect(gathering *g, int64_t k, const supernode *s)
 {
-    const SuiteSparse_long *perm = g->reach->factor->L.Perm;
+    const cholmod_factor *L = &g->reach->factor->L;
+    const SuiteSparse_long *perm = L->Perm;
     share *own = &g->shares[k];
     int64_t most = 0;
     for (int64_t j = s->first; j < s->first + s->columns; j++)
@@ -205,14 +206,9 @@ static bool collect_columns(gathering *g, int64_t k, const supernode *s)
     for (int64_t c = g->child[k]; c >= 0; c = g->shares[c].next)
         for (int64_t q = 0; q < g->shares[c].count; q++)
             add_column(g, own, g->shares[c].column[q]);
-    return true;
-}
-
-static void fill_block(gathering *g, int64_t k, const supernode *s)
-{
-    const cholmod_factor *L = &g->reach->factor->L;
-    const SuiteSparse_long *perm = L->Perm;
-    share *own = &g->shares[k];
+    own->block = uz_alloc_zero(s->rows * own->count, sizeof *own->block);
+    if (!own->block)
+        return false;
     for (int64_t i = 0; i < s->rows; i++)
         g->local[s->row[i]] = i;
     for (int64_t j = 0; j < s->columns; j++)
@@ -233,6 +229,7 @@ static void fill_block(gathering *g, int64_t k, const supernode *s)
         child->column = NULL;
         child->block = NULL;
     }
+    return true;
 }
 
 static bool visit(gathering *g, int64_t k)
@@ -240,9 +237,8 @@ static bool visit(gathering *g, int64_t k)
     supernode s = at(&g->reach->factor->L, g->reach->node[k]);
     share *own = &g->shares[k];
     int64_t parent = g->reach->parent[k];
-    if (!collect_columns(g, k, &s) || !(own->block = uz_alloc_zero(s.rows * own->count, sizeof *own->block)))
+    if (!collect(g, k, &s))
         return false;
-    fill_block(g, k, &s);
     uz_block_eliminate(s.columns, s.rows - s.columns, own->count, s.value, s.rows, own->block, s.rows);
     /* D += Z_s'Z_s */
     int64_t m = g->N->rows, count = own->count;

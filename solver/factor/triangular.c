@@ -51,20 +51,6 @@ uz_status uz_factor_solve(const uz_factor *factor, uz_factor_workspace *ws, doub
     return status;
 }
 
-cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns)
-{
-    cholmod_dense X;
-    memset(&X, 0, sizeof X);
-    X.nrow = (size_t)rows;
-    X.ncol = (size_t)columns;
-    X.d = X.nrow;
-    X.nzmax = X.nrow * X.ncol;
-    X.x = x;
-    X.xtype = CHOLMOD_REAL;
-    X.dtype = CHOLMOD_DOUBLE;
-    return X;
-}
-
 uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err)
 {
     if (ws->panel && need <= ws->panel_size)

@@ -55,6 +55,7 @@ done:
 uz_status uz_check_semidefinite(const uz_csc *K, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
     uz_csc shifted = {0};
+    uz_analysis *analysis = NULL;
     uz_factor *factor = NULL;
     uz_status status = without_empty(&shifted, K, err);
     const double delta = SHIFTS * DBL_EPSILON * (double)shifted.cols;
@@ -66,7 +67,10 @@ uz_status uz_check_semidefinite(const uz_csc *K, const uz_settings *settings, co
             shifted.val[first] *= 1.0 + delta;
     }
     if (status == UZ_OK && shifted.cols > 0)
-        status = uz_factor_plain(&factor, &shifted, settings->ordering, settings->memory_limit, hooks, err);
+        status = uz_analysis_create(&analysis, &shifted, NULL, 0, 0, settings->ordering, hooks, err);
+    if (status == UZ_OK && shifted.cols > 0)
+        status = uz_factor_create(&factor, &shifted, analysis, settings->memory_limit, hooks, err);
+    uz_analysis_free(analysis);
     uz_factor_free(factor);
     uz_csc_clear(&shifted);
     return status;

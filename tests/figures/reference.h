@@ -172,6 +172,17 @@ static inline bool reference_round(reference *x, const uz_factor *factor, uz_fac
     return ok;
 }
 
+/* A factor of K (lower triangle) with nothing that has to come last. */
+static inline bool reference_factor(uz_factor **out, const uz_csc *K)
+{
+    uz_analysis *analysis = NULL;
+    uz_error err = {0};
+    const bool ok = uz_analysis_create(&analysis, K, NULL, 0, 0, UZ_ORDERING_AMD, NULL, &err) == UZ_OK &&
+                    uz_factor_create(out, K, analysis, 0, NULL, &err) == UZ_OK;
+    uz_analysis_free(analysis);
+    return ok;
+}
+
 enum { REFERENCE_ROUNDS = 40 };
 
 /* Solves, from the rows that `start` (m) says touch. qp is borrowed. false: a row bounds more than one dof, or the
@@ -180,7 +191,6 @@ static inline bool reference_solve(reference *x, const uz_qp *qp, const bool *st
 {
     const int64_t d = qp->K.cols, m = qp->N.rows;
     uz_factor *factor = NULL;
-    uz_error err = {0};
     uz_factor_workspace *ws = uz_factor_workspace_new();
     *x = (reference){.qp = qp, .d = d, .m = m};
     x->dof = calloc((size_t)m + 1, sizeof *x->dof);
@@ -192,7 +202,7 @@ static inline bool reference_solve(reference *x, const uz_qp *qp, const bool *st
     bool ok = ws && x->dof && x->slope && x->touching && reference_read_rows(x);
     if (ok)
         memcpy(x->touching, start, (size_t)m * sizeof *start);
-    ok = ok && uz_factor_plain(&factor, &qp->K, UZ_ORDERING_AMD, 0, NULL, &err) == UZ_OK;
+    ok = ok && reference_factor(&factor, &qp->K);
     for (bool done = false; ok && !done;) {
         ok = x->rounds++ < REFERENCE_ROUNDS && reference_round(x, factor, ws);
         done = ok && reference_exchange(x) == 0;

@@ -1,6 +1,6 @@
 /* Multigrid and conjugate gradients against a factor of the same matrix, in two and three dimensions. */
 #include "brick.h"
-#include "factor/factor.h"
+#include "factor_fixture.h"
 #include "harness.h"
 #include "amg/amg.h"
 #include "qp_fixture.h"
@@ -31,7 +31,7 @@ static bool open_pair(pair *p, uz_csc *K, uz_modes *modes, uz_error *err)
         return false;
     p->info = p->amg->info;
     CHECK(uz_cg_init(&p->cg, p->amg->mg, NULL, p->K.cols, err) == UZ_OK);
-    CHECK(uz_factor_plain(&p->factor, &p->K, UZ_ORDERING_AUTO, 0, NULL, err) == UZ_OK);
+    CHECK(factor_by(&p->factor, &p->K, NULL, 0, UZ_ORDERING_AUTO, 0, err) == UZ_OK);
     p->ws = uz_factor_workspace_new();
     return true;
 }

@@ -18,7 +18,7 @@ static bool begin(body *b, const uz_qp *qp)
 {
     uz_error err = {0};
     *b = (body){0};
-    bool ok = uz_factor_plain(&b->factor, &qp->K, UZ_ORDERING_AMD, 0, NULL, &err) == UZ_OK;
+    bool ok = factor_by(&b->factor, &qp->K, NULL, 0, UZ_ORDERING_AMD, 0, &err) == UZ_OK;
     const uz_dual_source source = {.op = UZ_OPERATOR_FACTORED, .N = &qp->N, .factor = b->factor};
     ok = ok && uz_dual_create(&b->dual, &source, NULL, &err) == UZ_OK &&
          uz_dual_load_create(&b->load, b->dual, &qp->K, qp->p, qp->h, &err) == UZ_OK;

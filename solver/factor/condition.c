@@ -1,10 +1,12 @@
-/* inverse_norm.c: a bound on the norm of K^-1, from one linear solve with UZ_LANES random vectors, once per factor. */
+/* condition.c: what the pivots of a factor and one linear solve with UZ_LANES random vectors say about K: an estimate
+ * of its condition, and a bound on the norm of K^-1. Once per factor. */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/random.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -29,10 +31,33 @@ static double add_squares(double squares[UZ_LANES], const double *X, int64_t n)
     return largest;
 }
 
-uz_status uz_bound_inverse(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
+/* Below this times n the factor's own rounding errors are as large as its smallest pivot: of a body that is free to
+ * move, rounding was seen to leave up to half of n eps. */
+#define RCOND_LEAST DBL_EPSILON
+
+uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
 {
+    const cholmod_factor *L = &factor->L;
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *perm = L->Perm;
+    const double *x = L->x;
     const int64_t n = factor->n;
-    const SuiteSparse_long *perm = factor->L.Perm;
+    /* min_j L_jj^2 / K_jj: what elimination left of each diagonal entry. It does not depend on the units of single
+     * dofs, and the accuracy of a Cholesky factorization is governed by the condition after diagonal scaling (Demmel
+     * 1989; Higham 2002, section 10.1). */
+    double least = 1.0;
+    for (size_t s = 0; s < L->nsuper; s++)
+        for (int64_t k = super[s]; k < super[s + 1]; k++) {
+            int64_t j = k - super[s], rows = pi[s + 1] - pi[s];
+            double pivot = x[px[s] + j + j * rows], share = pivot * pivot / K->val[K->ptr[perm[k]]];
+            least = share < least || isnan(share) ? share : least;
+        }
+    factor->info.rcond = least;
+    if (!(least >= RCOND_LEAST * (double)n))
+        return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                       "K is singular to working precision (reciprocal condition %.2g): the body can move without "
+                       "resistance, or its stiffnesses differ by more than double precision can hold",
+                       least);
+    /* The pivots alone may be short by any factor (Kahan's matrix). */
     uint64_t state = 0x9E3779B97F4A7C15u;
     double half[UZ_LANES], whole[UZ_LANES], *root = uz_alloc(n, sizeof *root);
     double *X = cholmod_l_malloc((size_t)(n * UZ_LANES), sizeof *X, common); /* where factors have their memory */
