@@ -222,37 +222,28 @@ static uint64_t hash_place(uint64_t key)
     return key ^ (key >> 29);
 }
 
-static bool grow_table(block_table *table)
-{
-    int64_t room = table->room ? 2 * table->room : 1024;
-    uint64_t *key = uz_alloc_zero(room, sizeof *key);
-    int32_t *at = uz_alloc(room, sizeof *at);
-    if (!key || !at) {
-        free(key);
-        free(at);
-        return false;
-    }
-    free(table->key);
-    free(table->at);
-    table->key = key;
-    table->at = at;
-    table->room = room;
-    for (int64_t b = 0; b < table->count; b++) {
-        uint64_t mask = (uint64_t)room - 1, h = hash_place(table->place[b]) & mask;
-        while (key[h])
-            h = (h + 1) & mask;
-        key[h] = table->place[b];
-        at[h] = (int32_t)b;
-    }
-    return true;
-}
-
+/* The block of this place, 0 when it is new; NULL: no memory. */
 static double *coarse_block(block_table *table, int32_t row, int32_t column)
 {
-    uint64_t key = ((uint64_t)row << 32 | (uint32_t)column) + 1;
-    int64_t size = (int64_t)table->k * table->k;
-    if (2 * table->count >= table->room && !grow_table(table))
-        return NULL;
+    const uint64_t key = ((uint64_t)row << 32 | (uint32_t)column) + 1;
+    const int64_t size = (int64_t)table->k * table->k;
+    if (2 * table->count >= table->room) { /* twice as many places, with what there is at its new ones */
+        const int64_t room = table->room ? 2 * table->room : 1024;
+        free(table->key);
+        free(table->at);
+        table->key = uz_alloc_zero(room, sizeof *table->key);
+        table->at = uz_alloc(room, sizeof *table->at);
+        if (!table->key || !table->at)
+            return NULL;
+        table->room = room;
+        for (int64_t b = 0; b < table->count; b++) {
+            uint64_t mask = (uint64_t)room - 1, h = hash_place(table->place[b]) & mask;
+            while (table->key[h])
+                h = (h + 1) & mask;
+            table->key[h] = table->place[b];
+            table->at[h] = (int32_t)b;
+        }
+    }
     uint64_t mask = (uint64_t)table->room - 1, h = hash_place(key) & mask;
     for (; table->key[h]; h = (h + 1) & mask)
         if (table->key[h] == key)
