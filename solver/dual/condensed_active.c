@@ -33,32 +33,15 @@ static bool place_rows(double *to, const uz_condensed *dense, const double *from
     return true;
 }
 
-/* D = N_b S^-1 N_b': the inverse from the factor, then signs and places. */
-static bool form_operator(double *D, double *room, const uz_condensed *dense, const uz_stop *stop)
-{
-    if (!uz_invert_llt_while(dense->n_b, dense->L_bb, room, D, stop))
-        return false;
-    return place_rows(D, dense, room, false, stop);
-}
-
-/* D^-1 = N_b^-T S N_b^-1 with S = L_bb L_bb'. */
-static bool form_inverse(double *D_inverse, double *room, const uz_condensed *dense, const uz_stop *stop)
-{
-    if (!uz_multiply_llt_while(dense->n_b, dense->L_bb, room, D_inverse, stop))
-        return false;
-    if (!uz_clear_while(dense->n_b * dense->n_b, D_inverse, stop)) /* its pages, in order */
-        return false;
-    return place_rows(D_inverse, dense, room, true, stop);
-}
-
-typedef bool (*former)(double *out, double *room, const uz_condensed *dense, const uz_stop *stop);
-
-/* *slot once and for all; *out is the load's own copy of the pointer, NULL where making it had to stop. */
-static uz_status need(const double **out, double **slot, uz_condensed_load *x, former form, uz_error *err)
+/* D = N_b S^-1 N_b', the inverse from the factor, or D^-1 = N_b^-T S N_b^-1 with S = L_bb L_bb'; then signs and places.
+ * Made once for all loads; the load's own copy of the pointer stays NULL where making it had to stop. */
+static uz_status need(uz_condensed_load *x, bool inverse, uz_error *err)
 {
     const uz_condensed *dense = x->dense;
+    const double **out = inverse ? &x->D_inverse : &x->D, *L = dense->L_bb;
+    double **slot = inverse ? &dense->made->D_inverse : &dense->made->D;
     const uz_stop *stop = &x->load.stop;
-    int64_t size = dense->n_b * dense->n_b;
+    const int64_t n = dense->n_b, size = n * n;
     uz_status status = UZ_OK;
     if (*out)
         return UZ_OK;
@@ -66,10 +49,15 @@ static uz_status need(const double **out, double **slot, uz_condensed_load *x, f
         return UZ_OK;
     if (!*slot) {
         double *made = uz_alloc(size, sizeof *made), *room = uz_alloc(size, sizeof *room);
-        if (!made || !room)
-            status =
-                uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)dense->n_b);
-        else if (!form(made, room, dense, stop) && !uz_stop_is_due(stop))
+        bool ok = made && room;
+        if (!ok)
+            status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)n);
+        else if (inverse) /* and the pages of what it goes to, in order */
+            ok = uz_multiply_llt_while(n, L, room, made, stop) && uz_clear_while(size, made, stop);
+        else
+            ok = uz_invert_llt_while(n, L, room, made, stop);
+        ok = ok && place_rows(made, dense, room, inverse, stop);
+        if (status == UZ_OK && !ok && !uz_stop_is_due(stop))
             status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "the Schur complement on the contact is singular");
         free(room);
         if (status == UZ_OK && !uz_stop_is_due(stop))
@@ -84,8 +72,7 @@ static uz_status need(const double **out, double **slot, uz_condensed_load *x, f
 
 uz_status uz_condensed_prepare(uz_dual_load *load, uz_error *err)
 {
-    uz_condensed_load *x = (uz_condensed_load *)load;
-    return need(&x->D, &x->dense->made->D, x, form_operator, err);
+    return need((uz_condensed_load *)load, false, err);
 }
 
 uz_status uz_condensed_inverse_column(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err)
@@ -93,7 +80,7 @@ uz_status uz_condensed_inverse_column(uz_dual_load *load, bool *can, double *col
     uz_condensed_load *x = (uz_condensed_load *)load;
     const int64_t m = load->dual->m;
     *can = false;
-    uz_status status = x->dense->scaled ? need(&x->D_inverse, &x->dense->made->D_inverse, x, form_inverse, err) : UZ_OK;
+    uz_status status = x->dense->scaled ? need(x, true, err) : UZ_OK;
     if (status != UZ_OK || !x->dense->scaled || !x->D_inverse)
         return status;
     *can = true;
@@ -188,7 +175,7 @@ uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, doub
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
     count = list_rows(rows, active, !scaled, m);
     if (scaled)
-        status = need(&x->D_inverse, &x->dense->made->D_inverse, x, form_inverse, err);
+        status = need(x, true, err);
     const double *matrix = scaled ? x->D_inverse : x->D;
     double *block = uz_alloc(count * count, sizeof *block);
     if (status == UZ_OK && !block)

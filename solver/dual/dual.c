@@ -178,7 +178,8 @@ static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_err
         return UZ_ERR_CANCELLED;
     for (int64_t i = 0; op->weight && i < op->load->dual->m; i++)
         op->weighted[i] = op->weight[i] * x[i];
-    uz_status status = uz_dual_load_apply(op->load, y, op->weight ? op->weighted : x, err);
+    op->load->applications++;
+    uz_status status = op->load->dual->form->apply(op->load, y, op->weight ? op->weighted : x, err);
     for (int64_t i = 0; op->weight && i < op->load->dual->m; i++)
         y[i] *= op->weight[i];
     return status;

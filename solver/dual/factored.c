@@ -126,55 +126,48 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     return UZ_OK;
 }
 
-/* The factor of the dofs that no row bounds; held stays NULL where several rows bound a dof, or it had to stop. */
-static uz_status hold_all(factored_load *x, uz_error *err)
-{
-    const uz_dual_load *load = &x->sparse.load;
-    const uz_bounds *bounds = x->sparse.box ? x->sparse.box->bounds : NULL;
-    const int64_t d = load->dual->d, m = load->dual->m;
-    bool *fixed = uz_alloc_zero(d, sizeof *fixed), single = bounds != NULL;
-    uz_status status = UZ_OK;
-    for (int64_t i = 0; fixed && single && i < m; i++) {
-        single = !fixed[bounds->dof[i]];
-        fixed[bounds->dof[i]] = true;
-    }
-    if (fixed && single) {
-        x->held_ws = uz_factor_workspace_new();
-        x->unit = uz_alloc_zero(d, sizeof *x->unit);
-        x->force = uz_alloc_zero(d, sizeof *x->force);
-    }
-    if (!fixed || (single && (!x->held_ws || !x->unit || !x->force)))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
-    else if (single)
-        status = uz_principal_create(&x->held, load->K, fixed, load->dual->factor, x->held_ws, &load->stop, err);
-    free(fixed);
-    return status;
-}
-
 /* With dof j moved by 1 and the other bounded ones held, the free ones follow by -K_FF^-1 K_Fj; what holds the bounded
- * ones are the reactions. */
+ * ones are the reactions. The factor of the free ones is made first: none where several rows bound a dof, or it had to
+ * stop. */
 static uz_status inverse_column(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err)
 {
     factored_load *x = (factored_load *)load;
-    uz_status status = x->unit ? UZ_OK : hold_all(x, err);
+    const int64_t d = load->dual->d, m = load->dual->m;
+    const uz_bounds *bounds = x->sparse.box ? x->sparse.box->bounds : NULL;
+    uz_status status = UZ_OK;
+    if (!x->unit) {
+        bool *fixed = uz_alloc_zero(d, sizeof *fixed), single = bounds != NULL;
+        for (int64_t k = 0; fixed && single && k < m; k++) {
+            single = !fixed[bounds->dof[k]];
+            fixed[bounds->dof[k]] = true;
+        }
+        if (fixed && single) {
+            x->held_ws = uz_factor_workspace_new();
+            x->unit = uz_alloc_zero(d, sizeof *x->unit);
+            x->force = uz_alloc_zero(d, sizeof *x->force);
+        }
+        if (!fixed || (single && (!x->held_ws || !x->unit || !x->force)))
+            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
+        else if (single)
+            status = uz_principal_create(&x->held, load->K, fixed, load->dual->factor, x->held_ws, &load->stop, err);
+        free(fixed);
+    }
     *can = x->held != NULL;
     if (status != UZ_OK || !*can)
         return status;
-    const int64_t d = load->dual->d;
-    const uz_bounds *bounds = x->sparse.box->bounds;
     memset(x->unit, 0, (size_t)d * sizeof *x->unit);
     memset(x->force, 0, (size_t)d * sizeof *x->force);
     x->unit[bounds->dof[i]] = 1.0 / bounds->scale[i];
     uz_csc_symv(x->force, load->K, 1.0, x->unit);
     status = uz_principal_solve(x->force, x->held, err);
     /* the solve leaves held dofs as they are: unit is what moves */
-    for (int64_t k = 0; k < load->dual->m; k++)
+    for (int64_t k = 0; k < m; k++)
         x->force[bounds->dof[k]] = 0.0;
     for (int64_t j = 0; j < d; j++)
         x->unit[j] -= x->force[j];
     memset(x->force, 0, (size_t)d * sizeof *x->force);
     uz_csc_symv(x->force, load->K, 1.0, x->unit);
-    for (int64_t k = 0; k < load->dual->m; k++)
+    for (int64_t k = 0; k < m; k++)
         column[k] = x->force[bounds->dof[k]] / bounds->scale[k];
     return status;
 }
