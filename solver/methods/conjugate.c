@@ -76,36 +76,13 @@ static double make_direction(uz_iterate *it)
     return gradient;
 }
 
-/* The length that maximizes psi along d; gamma: how far each row can go, *bound: that at which the first row stops to
- * press. Along what is flat the step goes beyond the bound, unless what curvature there is says less; without a bound
- * it goes as far as a plain one: rise / curvature would be the quotient of two roundings. */
-static double best_length(double *bound, uz_iterate *it, double rise)
-{
-    const double *d = it->r_next, *Dd = it->Dr_next;
-    double curvature = 0.0, square = 0.0, *reach = it->gamma;
-    it->law->kind->reach(it->law, reach, it->r, d, it->m);
-    *bound = INFINITY;
-    for (int64_t i = 0; i < it->m; i++) {
-        const double part = it->weight ? d[i] / it->weight[i] : d[i];
-        curvature += d[i] * Dd[i];
-        square += part * part;
-        if (reach[i] < *bound)
-            *bound = reach[i];
-    }
-    it->along_ray = isinf(*bound) && it->alpha * curvature <= RAY * square;
-    if (it->along_ray)
-        memcpy(it->ray, d, (size_t)it->m * sizeof *d);
-    if (it->alpha * curvature > FLAT * square)
-        return rise / curvature;
-    if (isinf(*bound))
-        return it->alpha;
-    return curvature > 0.0 ? fmin(rise / curvature, 2.0 * *bound) : 2.0 * *bound;
-}
-
+/* Along d by the length that maximizes psi; *restart: it goes beyond `bound`, where the first row stops to press. Along
+ * what is flat the step goes beyond the bound, unless what curvature there is says less; without a bound it goes as far
+ * as a plain one: rise / curvature would be the quotient of two roundings. */
 static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     const double *d = it->r_next, *Dd = it->Dr_next;
-    double rise = make_direction(it), bound;
+    const double rise = make_direction(it);
     /* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near
      * r, a plain step's length away. Where D is exact the difference of two points would only lose digits. */
     const bool exact = load->dual->can->exact;
@@ -116,11 +93,28 @@ static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *loa
         return status;
     for (int64_t i = 0; !exact && i < it->m; i++)
         it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
-    double length = best_length(&bound, it, rise), taken = fmin(length, bound);
+    double curvature = 0.0, square = 0.0, bound = INFINITY, *reach = it->gamma; /* how far each row can go */
+    it->law->kind->reach(it->law, reach, it->r, d, it->m);
+    for (int64_t i = 0; i < it->m; i++) {
+        const double part = it->weight ? d[i] / it->weight[i] : d[i];
+        curvature += d[i] * Dd[i];
+        square += part * part;
+        if (reach[i] < bound)
+            bound = reach[i];
+    }
+    it->along_ray = isinf(bound) && it->alpha * curvature <= RAY * square;
+    if (it->along_ray)
+        memcpy(it->ray, d, (size_t)it->m * sizeof *d);
+    double length = curvature > 0.0 ? fmin(rise / curvature, 2.0 * bound) : 2.0 * bound;
+    if (it->alpha * curvature > FLAT * square)
+        length = rise / curvature;
+    else if (isinf(bound))
+        length = it->alpha;
+    const double taken = fmin(length, bound);
     *restart = length > bound;
     for (int64_t i = 0; i < it->m; i++) {
         double r = it->r[i], Dr = it->Dr[i];
-        bool stops = *restart && it->gamma[i] <= bound;
+        bool stops = *restart && reach[i] <= bound;
         it->r[i] = stops ? 0.0 : r + taken * d[i];
         it->Dr[i] = Dr + taken * Dd[i];
         it->rho[i] = *restart ? r + length * d[i] : r;

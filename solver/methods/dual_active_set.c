@@ -56,16 +56,18 @@ static uz_status run_race(bool *there, race *x, uz_iterate *it, uz_dual_load *lo
         uz_exchange *way = x->way[x->side];
         if (!way)
             continue;
-        if (uz_exchange_work(way) >= most)
+        int64_t made;
+        if (uz_exchange_work(way, &made) >= most)
             break;
         status = uz_exchange_continue(&x->end, way, steps, fmin(turn, most), it->ray, err);
-        if (status != UZ_OK || uz_stop_is_due(&stop) || uz_exchange_steps(way) >= steps)
+        const double work = uz_exchange_work(way, &made);
+        if (status != UZ_OK || uz_stop_is_due(&stop) || made >= steps)
             break;
         if (x->end != UZ_EXCHANGE_STOPPED)
             status = finish(there, x, load, err);
         if (*there)
             break;
-        if (x->end != UZ_EXCHANGE_STOPPED || uz_exchange_work(way) < fmin(turn, most)) { /* round in circles */
+        if (x->end != UZ_EXCHANGE_STOPPED || work < fmin(turn, most)) { /* round in circles */
             uz_exchange_free(way);
             x->way[x->side] = NULL;
         }
@@ -102,13 +104,16 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
         status = run_race(&there, &x, it, load, options, err);
     if (status != UZ_OK || (!there && options->yields))
         goto done;
+    int64_t steps = 0;
     if (there) {
         *end = ends[x.end];
-        it->iteration += uz_exchange_steps(x.way[x.side]) > 0 ? uz_exchange_steps(x.way[x.side]) - 1 : 0;
+        (void)uz_exchange_work(x.way[x.side], &steps);
+        it->iteration += steps > 0 ? steps - 1 : 0;
     } else if (x.way[UZ_EXCHANGE_REACTIONS]) { /* the reactions so far, which bound the energy from below */
         x.side = UZ_EXCHANGE_REACTIONS;
         status = finish(&there, &x, load, err);
-        it->iteration += uz_exchange_steps(x.way[x.side]);
+        (void)uz_exchange_work(x.way[x.side], &steps);
+        it->iteration += steps;
         (void)uz_should_stop(end, it, options);
     }
     if (status == UZ_OK)

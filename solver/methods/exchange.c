@@ -215,14 +215,6 @@ static double reaction(const uz_exchange *x, int64_t k)
     return x->base[x->rows[k]] + x->s[x->rows[k]];
 }
 
-/* How far row q penetrates. */
-static double penetration(const uz_exchange *x, int64_t q)
-{
-    double depth;
-    x->law->kind->penetration(x->law, &depth, &x->g[q], 1);
-    return depth;
-}
-
 /* g -= M w for weights w (count) by place; size (m, NULL: not wanted) += |M| |w|. Several columns in one pass of g: the
  * columns come from memory, once. */
 static void subtract_columns(uz_exchange *x, double *g, double *size, const double *w)
@@ -342,7 +334,10 @@ static uz_status admit(uz_exchange *x, int64_t q, bool *likely, double *ray, uz_
     while (status == UZ_OK && !uz_stop_is_due(x->stop)) {
         yield_to(x, q);
         bool dependent = depends(x, q);
-        double step = dependent ? INFINITY : penetration(x, q) / x->compliance;
+        double step = INFINITY;
+        x->law->kind->penetration(x->law, &x->depth[q], &x->g[q], 1);
+        if (!dependent)
+            step = x->depth[q] / x->compliance;
         /* the row in contact whose reaction vanishes first, after a push of `step`; -1: none does */
         int64_t gone = -1;
         double least = 0.0;
@@ -466,13 +461,9 @@ uz_status uz_exchange_continue(uz_exchange_end *end, uz_exchange *x, int64_t mos
     return status;
 }
 
-int64_t uz_exchange_steps(const uz_exchange *x)
+double uz_exchange_work(const uz_exchange *x, int64_t *steps)
 {
-    return x->steps;
-}
-
-double uz_exchange_work(const uz_exchange *x)
-{
+    *steps = x->steps;
     return x->work;
 }
 
@@ -505,7 +496,7 @@ uz_status uz_exchange_run(uz_exchange_end *end, int64_t *steps, double *s, doubl
         status = uz_exchange_continue(end, x, most, INFINITY, ray, err);
     if (status == UZ_OK) {
         uz_exchange_read(s, g, active, x);
-        *steps = uz_exchange_steps(x);
+        *steps = x->steps;
     }
     uz_exchange_free(x);
     return status;

@@ -42,9 +42,8 @@ void uz_exchange_free(uz_exchange *x);
  * passed. ray (m): out, UZ_EXCHANGE_RAY. */
 uz_status uz_exchange_continue(uz_exchange_end *end, uz_exchange *x, int64_t most_steps, double most_work, double *ray,
                                uz_error *err);
-/* What it has done so far. */
-int64_t uz_exchange_steps(const uz_exchange *x);
-double uz_exchange_work(const uz_exchange *x);
+/* What it has done so far: entries of matrices passed, and *steps. */
+double uz_exchange_work(const uz_exchange *x, int64_t *steps);
 /* active (m): the rows in contact. REACTIONS: s (m), the reactions are base + s; g (m), the gaps. GAPS: both are left
  * to who solves with these rows. */
 void uz_exchange_read(double *s, double *g, bool *active, uz_exchange *x);

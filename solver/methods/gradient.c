@@ -7,8 +7,9 @@
 
 #include <math.h>
 
-/* r(k+1) = P(rho + alpha gamma). Returns ||rho - r(k+1)||, in the caller's forces. */
-static double project(uz_iterate *it, const uz_dual_load *load)
+/* A projected gradient step from rho, r(k+1) = P(rho + alpha gamma), then the next rho. */
+static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart,
+                      uz_error *err)
 {
     const double *g0 = load->g0, *scale = load->dual->row_scale;
     double square = 0.0;
@@ -18,17 +19,10 @@ static double project(uz_iterate *it, const uz_dual_load *load)
     }
     it->law->kind->project(it->law, it->r_next, it->m);
     for (int64_t i = 0; i < it->m; i++) {
-        double step = scale[i] * (it->rho[i] - it->r_next[i]);
-        square += step * step;
+        const double length = scale[i] * (it->rho[i] - it->r_next[i]);
+        square += length * length;
     }
-    return sqrt(square);
-}
-
-/* A projected gradient step from rho, then the next rho. */
-static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart,
-                      uz_error *err)
-{
-    *step_norm = project(it, load);
+    *step_norm = sqrt(square);
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     it->iteration++;
     *restart = status == UZ_OK && uz_iterate_shorten(it, load);

@@ -123,13 +123,15 @@ uz_status uz_iterate_take(uz_iterate *it, const double *r, const double *g, uz_d
     return status == UZ_OK ? uz_iterate_bound(it, load, by, err) : status;
 }
 
-/* The paper's residual of the pair (u(rho(k)), r(k)): e1 = N'(rho - r), e3 = 0. */
-static uz_residual residual(uz_iterate *it, uz_dual_load *load)
+uz_status uz_iterate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
+                            double step_norm, bool restart, uz_error *err)
 {
+    uz_history_row row = {.iteration = it->iteration, .step_norm = step_norm, .restart = restart};
     const double *g0 = load->g0, *scale = load->dual->row_scale;
     const uz_csc *N = load->dual->touched;
-    uz_residual e = {0};
-    double e1 = 0.0, e2 = 0.0, e4 = 0.0, *difference = it->r_next, *penetration = it->gamma;
+    double norm2, e1 = 0.0, e2 = 0.0, e4 = 0.0, *difference = it->r_next, *penetration = it->gamma;
+    uz_dual_load_energies(load, &row.dual_objective, &norm2, it->r, it->Dr);
+    /* The paper's residual of the pair (u(rho(k)), r(k)): e1 = N'(rho - r), e3 = 0. */
     for (int64_t i = 0; i < it->m; i++) {
         double gap = g0[i] - it->Drho[i], complementarity = gap * it->r[i];
         difference[i] = it->rho[i] - it->r[i];
@@ -145,20 +147,11 @@ static uz_residual residual(uz_iterate *it, uz_dual_load *load)
             force += N->val[k] * difference[N->idx[k]];
         e1 += force * force;
     }
-    e.e1 = sqrt(e1);
-    e.e2 = sqrt(e2);
-    e.e4 = sqrt(e4);
-    e.total = sqrt(e.e1 * e.e1 + e2 + e4);
-    return e;
-}
-
-uz_status uz_iterate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
-                            double step_norm, bool restart, uz_error *err)
-{
-    uz_history_row row = {.iteration = it->iteration, .step_norm = step_norm, .restart = restart};
-    double norm2;
-    uz_dual_load_energies(load, &row.dual_objective, &norm2, it->r, it->Dr);
-    row.residual = residual(it, load);
+    uz_residual *e = &row.residual;
+    e->e1 = sqrt(e1);
+    e->e2 = sqrt(e2);
+    e->e4 = sqrt(e4);
+    e->total = sqrt(e->e1 * e->e1 + e2 + e4);
     row.contacts = it->law->kind->active(it->law, NULL, it->r, it->m);
     row.error_bound = it->best_bound;
     row.seconds = uz_seconds() - it->started;

@@ -11,11 +11,6 @@ static const uz_method_kind *const kinds[] = {
     &uz_method_active_set, &uz_method_conjugate, &uz_method_dual_active_set,
 };
 
-const uz_method_kind *uz_method_kind_at(int i)
-{
-    return i >= 0 && (size_t)i < sizeof kinds / sizeof kinds[0] ? kinds[i] : NULL;
-}
-
 const uz_method_kind *uz_method_kind_of(uz_method method)
 {
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)

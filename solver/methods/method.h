@@ -68,8 +68,7 @@ typedef struct {
 
 uz_method_runner uz_steps_run;
 
-/* The kinds there are, one after the other; NULL: no more. */
-const uz_method_kind *uz_method_kind_at(int i);
+/* NULL: there is none of that name to run. */
 const uz_method_kind *uz_method_kind_of(uz_method method);
 
 /* The kind to run with this law. UZ_ERR_ARGUMENT: there is none, or it can't with the law. */

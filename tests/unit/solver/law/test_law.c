@@ -131,11 +131,11 @@ TEST(methods_of_the_table_on_exact_answers)
         uz_problem problem = problem_of(random_obstacle(&rng, random_int(&rng, 5, 20), 1 + (int64_t)(seed % 3)));
         quad_exact exact;
         CHECK(quad_exact_solve(&exact, &problem.qp, NULL));
-        for (int k = 0; uz_method_kind_at(k); k++) {
-            const uz_method_kind *kind = uz_method_kind_at(k);
+        for (int k = UZ_METHOD_AUTO; k < UZ_METHOD_GIVEN; k++) {
+            const uz_method_kind *kind = uz_method_kind_of((uz_method)k);
             uz_settings settings = uz_settings_default();
             uz_method parsed;
-            CHECK(uz_method_kind_of(kind->method) == kind);
+            CHECK(kind->method == (uz_method)k);
             CHECK(uz_method_parse(&parsed, kind->name) && parsed == kind->method);
             settings.method = kind->method;
             settings.relative_error = 1e-6;
