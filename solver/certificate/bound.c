@@ -36,13 +36,6 @@ double uz_bound_norm(const double *x, int64_t n)
     return scale * sqrt(sum);
 }
 
-/* most = max(most, |x|), lane by lane; passes over what is not a number. */
-static inline __attribute__((always_inline)) void keep_largest(four *most, const double *x)
-{
-    const bits magnitude = (bits) * (const four *)x & INT64_MAX, more = (four)magnitude > *most;
-    *most = (four)((magnitude & more) | ((bits)*most & ~more));
-}
-
 double uz_bound_largest(const double *x, int64_t n)
 {
     enum { APART = 4 }; /* that a comparison need not wait for the one before */
@@ -50,8 +43,10 @@ double uz_bound_largest(const double *x, int64_t n)
     double largest = 0.0;
     int64_t i = 0;
     for (; i + 4 * APART <= n; i += 4 * APART)
-        for (int k = 0; k < APART; k++)
-            keep_largest(&most[k], x + i + 4 * k);
+        for (int k = 0; k < APART; k++) { /* lane by lane; passes over what is not a number */
+            const bits magnitude = *(const bits *)(x + i + 4 * k) & INT64_MAX, more = (four)magnitude > most[k];
+            most[k] = (four)((magnitude & more) | ((bits)most[k] & ~more));
+        }
     for (; i < n; i++)
         largest = fabs(x[i]) > largest ? fabs(x[i]) : largest;
     for (int k = 0; k < 4 * APART; k++)

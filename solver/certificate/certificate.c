@@ -243,47 +243,47 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
 /* More of the bound than this comes from rows that r presses on and that are open. */
 #define OPEN_SHARE 0.1
 
-static uz_status measure(certifier *c, uz_certificate *out, double *r, double *g, double positive_part, uz_error *err)
-{
-    for (int64_t i = 0; i < c->m; i++)
-        g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, c->u_b, NULL);
-    c->feasible.u = c->u_b;
-    c->feasible.h = c->in->h;
-    bool feasible = uz_make_feasible(&c->feasible, r);
-    for (int64_t b = 0; b < c->n_b; b++)
-        c->c[c->dof[b]] = c->feasible.correction[b];
-    uz_status status = conclude(c, out, r, g, positive_part, feasible, err);
-    const bool open = uz_feasible_complementarity(&c->feasible, r, feasible) > OPEN_SHARE * out->gap;
-    if (status != UZ_OK || !c->feasible.pushed || !open)
-        return status;
-    /* Rows that depend on each other share their reactions in many ways. Some press on rows that others leave no way to
-     * close: r takes the form that presses on closed rows only, where its bound is better. */
-    const uz_certificate before = *out;
-    double *kept = uz_alloc(c->m, sizeof *kept);
-    if (!kept)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld rows", (long long)c->m);
-    memcpy(kept, r, (size_t)c->m * sizeof *r);
-    for (int64_t i = 0; i < c->m; i++)
-        r[i] = r[i] - c->feasible.push[i];
-    uz_cut_reactions(r, c->m);
-    status = conclude(c, out, r, g, positive_part, true, err);
-    if (!(out->absolute_error < before.absolute_error)) {
-        memcpy(r, kept, (size_t)c->m * sizeof *r);
-        *out = before;
-    }
-    free(kept);
-    return status;
-}
-
 uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u, const uz_certify_input *input,
                      uz_error *err)
 {
     certifier c;
+    double positive_part = 0.0, *kept = NULL;
+    bool feasible = false;
     memset(out, 0, sizeof *out);
     uz_status status = prepare(&c, input, u, err);
-    if (status == UZ_OK)
-        status = measure(&c, out, r, g, uz_cut_reactions(r, c.m), err);
-    double *room[] = {c.res.e, c.res.e_u, c.res.Ku, c.res.Kc, c.weight, c.weight_b, c.u_b, c.c};
+    if (status == UZ_OK) {
+        positive_part = uz_cut_reactions(r, c.m);
+        for (int64_t i = 0; i < c.m; i++)
+            g[i] = uz_gap_of_row(&c.Nt, i, input->h, c.u_b, NULL);
+        c.feasible.u = c.u_b;
+        c.feasible.h = input->h;
+        feasible = uz_make_feasible(&c.feasible, r);
+        for (int64_t b = 0; b < c.n_b; b++)
+            c.c[c.dof[b]] = c.feasible.correction[b];
+        status = conclude(&c, out, r, g, positive_part, feasible, err);
+    }
+    if (status == UZ_OK && c.feasible.pushed &&
+        uz_feasible_complementarity(&c.feasible, r, feasible) > OPEN_SHARE * out->gap) {
+        /* Rows that depend on each other share their reactions in many ways. Some press on rows that others leave no
+         * way to close: r takes the form that presses on closed rows only, where its bound is better. */
+        const uz_certificate before = *out;
+        kept = uz_alloc(c.m, sizeof *kept);
+        if (!kept)
+            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld rows", (long long)c.m);
+        for (int64_t i = 0; kept && i < c.m; i++) {
+            kept[i] = r[i];
+            r[i] = r[i] - c.feasible.push[i];
+        }
+        if (kept) {
+            uz_cut_reactions(r, c.m);
+            status = conclude(&c, out, r, g, positive_part, true, err);
+        }
+        if (kept && !(out->absolute_error < before.absolute_error)) {
+            memcpy(r, kept, (size_t)c.m * sizeof *r);
+            *out = before;
+        }
+    }
+    double *room[] = {c.res.e, c.res.e_u, c.res.Ku, c.res.Kc, c.weight, c.weight_b, c.u_b, c.c, kept};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     uz_csc_clear(&c.Nt);

@@ -70,35 +70,6 @@ typedef struct {
     double work; /* left to spend */
 } parts;
 
-/* The rows that row i is joined to by dofs, directly or by others. */
-static void collect(parts *x, int64_t i)
-{
-    x->n = x->n_dof = 0;
-    x->row[x->n++] = i;
-    x->seen[i] = true;
-    for (int64_t c = 0; c < x->n; c++)
-        for (int64_t q = x->Nt->ptr[x->row[c]]; q < x->Nt->ptr[x->row[c] + 1]; q++) {
-            const int64_t j = x->Nt->idx[q];
-            if (x->place[j] >= 0)
-                continue;
-            x->place[j] = x->n_dof;
-            x->dof[x->n_dof++] = j;
-            for (int64_t k = x->N->ptr[j]; k < x->N->ptr[j + 1]; k++) {
-                const int64_t other = x->N->idx[k];
-                if (x->y[other] < 0.0 && !x->seen[other])
-                    x->row[x->n++] = other;
-                x->seen[other] = x->seen[other] || x->y[other] < 0.0;
-            }
-        }
-    for (int64_t c = 1; c < x->n && x->n <= MOST_SORTED; c++) {
-        const int64_t row = x->row[c];
-        int64_t k = c;
-        for (; k > 0 && x->y[x->row[k - 1]] > x->y[row]; k--)
-            x->row[k] = x->row[k - 1];
-        x->row[k] = row;
-    }
-}
-
 /* Column c out of all equations but one. false: there is no such equation. */
 static bool eliminate(parts *x, int64_t c)
 {
@@ -215,7 +186,31 @@ static bool prove_part(parts *x)
 static uz_status try_part(bool *proven, double *exact, parts *x, int64_t i, uz_error *err)
 {
     uz_status status = UZ_OK;
-    collect(x, i);
+    /* the rows that row i is joined to by dofs, directly or by others */
+    x->n = x->n_dof = 0;
+    x->row[x->n++] = i;
+    x->seen[i] = true;
+    for (int64_t c = 0; c < x->n; c++)
+        for (int64_t q = x->Nt->ptr[x->row[c]]; q < x->Nt->ptr[x->row[c] + 1]; q++) {
+            const int64_t j = x->Nt->idx[q];
+            if (x->place[j] >= 0)
+                continue;
+            x->place[j] = x->n_dof;
+            x->dof[x->n_dof++] = j;
+            for (int64_t k = x->N->ptr[j]; k < x->N->ptr[j + 1]; k++) {
+                const int64_t other = x->N->idx[k];
+                if (x->y[other] < 0.0 && !x->seen[other])
+                    x->row[x->n++] = other;
+                x->seen[other] = x->seen[other] || x->y[other] < 0.0;
+            }
+        }
+    for (int64_t c = 1; c < x->n && x->n <= MOST_SORTED; c++) {
+        const int64_t row = x->row[c];
+        int64_t k = c;
+        for (; k > 0 && x->y[x->row[k - 1]] > x->y[row]; k--)
+            x->row[k] = x->row[k - 1];
+        x->row[k] = row;
+    }
     const int64_t n = x->n, entries = x->n_dof * n;
     if (entries <= MOST_ENTRIES) {
         x->A = uz_alloc(entries, sizeof *x->A);

@@ -48,29 +48,6 @@ struct uz_lane_certifier {
     sums sum[HALVES];
 };
 
-/* Lists the entries of K in the columns of contact dofs; their number. row: NULL: counts only. */
-static int64_t list_columns(const uz_lane_certifier *c, int64_t *row, int64_t *column, double *value)
-{
-    const uz_csc *K = c->K;
-    int64_t count = 0;
-    for (int64_t j = 0; j < K->cols; j++) {
-        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
-            const int64_t i = K->idx[k], ends[2][2] = {{i, c->place[j]}, {j, i == j ? -1 : c->place[i]}};
-            for (int side = 0; side < 2; side++) {
-                if (ends[side][1] < 0)
-                    continue;
-                if (row) {
-                    row[count] = ends[side][0];
-                    column[count] = ends[side][1];
-                    value[count] = K->val[k];
-                }
-                count++;
-            }
-        }
-    }
-    return count;
-}
-
 /* What the contact couples: its dofs, N' on them and the columns of K. */
 static uz_status compress(uz_lane_certifier *c, uz_error *err)
 {
@@ -84,15 +61,33 @@ static uz_status compress(uz_lane_certifier *c, uz_error *err)
         c->place[c->dof[b]] = b;
         c->weight_b[b] = c->weight[c->dof[b]];
     }
-    const int64_t count = list_columns(c, NULL, NULL, NULL);
-    int64_t *row = uz_alloc(count, sizeof *row), *column = uz_alloc(count, sizeof *column);
-    double *value = uz_alloc(count, sizeof *value);
-    if (row && column && value) {
-        list_columns(c, row, column, value);
-        status = uz_csc_from_triplets(&c->K_b, c->K->cols, c->n_b, count, row, column, value, err);
-    } else {
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->K->cols);
+    /* the entries of K in the columns of contact dofs: counted, then listed */
+    const uz_csc *K = c->K;
+    int64_t count = 0, *row = NULL, *column = NULL;
+    double *value = NULL;
+    for (int pass = 0; status == UZ_OK && pass < 2; pass++) {
+        int64_t at = 0;
+        for (int64_t j = 0; j < K->cols; j++)
+            for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
+                const int64_t i = K->idx[k], ends[2][2] = {{i, c->place[j]}, {j, i == j ? -1 : c->place[i]}};
+                for (int side = 0; side < 2; side++) {
+                    if (ends[side][1] < 0)
+                        continue;
+                    if (pass == 1) {
+                        row[at] = ends[side][0];
+                        column[at] = ends[side][1];
+                        value[at] = K->val[k];
+                    }
+                    at++;
+                }
+            }
+        count = at;
+        if (pass == 0 && !((row = uz_alloc(count, sizeof *row)) && (column = uz_alloc(count, sizeof *column)) &&
+                           (value = uz_alloc(count, sizeof *value))))
+            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)K->cols);
     }
+    if (status == UZ_OK)
+        status = uz_csc_from_triplets(&c->K_b, K->cols, c->n_b, count, row, column, value, err);
     free(row);
     free(column);
     free(value);
@@ -178,27 +173,10 @@ static inline __attribute__((always_inline)) void add_product(lanes *hi, lanes *
     *hi = sum;
 }
 
-/* hi + lo -= x */
-static inline __attribute__((always_inline)) void subtract(lanes *hi, lanes *lo, const lanes *x)
-{
-    const lanes sum = *hi - *x;
-    const lanes back = sum - *hi;
-    const lanes kept = sum - back;
-    *lo += (*hi - kept) + (-*x - back);
-    *hi = sum;
-}
-
 /* sum += |x| */
 static inline __attribute__((always_inline)) void add_magnitude(lanes *sum, const lanes *x)
 {
     *sum += (lanes)((lane_bits)*x & INT64_MAX);
-}
-
-/* largest = max(largest, |x|) */
-static inline __attribute__((always_inline)) void keep_largest(lanes *largest, const lanes *x)
-{
-    const lane_bits magnitude = (lane_bits)*x & INT64_MAX, more = (lanes)magnitude > *largest;
-    *largest = (lanes)((magnitude & more) | ((lane_bits)*largest & ~more));
 }
 
 /* Row j is complete: what it adds to the sums. hi + lo: (K u)_j, lost. */
@@ -213,7 +191,9 @@ static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *
     lanes forces = {0.0};
     add_magnitude(&forces, &Ku);
     add_magnitude(&forces, p);
-    subtract(hi, lo, p);
+    const lanes rest = *hi - *p, back_p = rest - *hi, kept = rest - back_p; /* hi + lo -= p */
+    *lo += (*hi - kept) + (-*p - back_p);
+    *hi = rest;
     if (b >= 0) {
         const lanes moved = ((const lanes *)c->c)[b * HALVES + half];
         for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
@@ -242,7 +222,8 @@ static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *
     s->weighted += weight * e * e;
     s->noise += stiff * *u * *u + weight * forces * forces;
     add_magnitude(&s->sizes, u);
-    keep_largest(&s->largest, u);
+    const lane_bits magnitude = (lane_bits)*u & INT64_MAX, more = (lanes)magnitude > s->largest;
+    s->largest = (lanes)((magnitude & more) | ((lane_bits)s->largest & ~more));
     add_magnitude(&s->sizes, &e_u);
     add_magnitude(&s->residuals, &e_u);
 }

@@ -78,36 +78,6 @@ typedef struct {
     four hi4, lo4;
 } row_sums;
 
-/* The entries a of column j at row i, or at rows from i on: to row j goes a x_i, to row i goes a x_j. */
-static inline __attribute__((always_inline)) void take_one(row_sums *s, const product_of *q, const double *val,
-                                                           int64_t i, double x_j, int fused)
-{
-    dd_add_product(&s->hi, &s->lo, *val, q->x[i], fused);
-    dd_add_product(&q->hi[i], &q->lo[i], *val, x_j, fused);
-}
-
-static inline __attribute__((always_inline)) void take_two(row_sums *s, const product_of *q, const double *val,
-                                                           int64_t i, double x_j, int fused)
-{
-    const two a = READ(two, val), all_x = {x_j, x_j};
-    two hi = AT(two, q->hi + i), lo = AT(two, q->lo + i);
-    add_product2(&s->hi2, &s->lo2, &a, (const two *)(q->x + i), fused);
-    add_product2(&hi, &lo, &a, &all_x, fused);
-    AT(two, q->hi + i) = hi;
-    AT(two, q->lo + i) = lo;
-}
-
-static inline __attribute__((always_inline)) void take_four(row_sums *s, const product_of *q, const double *val,
-                                                            int64_t i, double x_j, int fused)
-{
-    const four a = READ(four, val), all_x = {x_j, x_j, x_j, x_j};
-    four hi = AT(four, q->hi + i), lo = AT(four, q->lo + i);
-    add_product4(&s->hi4, &s->lo4, &a, (const four *)(q->x + i), fused);
-    add_product4(&hi, &lo, &a, &all_x, fused);
-    AT(four, q->hi + i) = hi;
-    AT(four, q->lo + i) = lo;
-}
-
 /* Row j += its lanes. */
 static inline __attribute__((always_inline)) void add_lanes(const product_of *q, int64_t j, const row_sums *s)
 {
@@ -122,35 +92,35 @@ static inline __attribute__((always_inline)) void add_lanes(const product_of *q,
     q->lo[j] = sum.lo;
 }
 
-/* c is small beside x, and zero but at the contact. */
-static inline __attribute__((always_inline)) void add_correction(const product_of *q, int64_t j, int64_t k, int64_t end)
-{
-    const double c_j = q->c[j];
-    double sum = 0.0;
-    if (k < end && q->A->idx[k] == j)
-        sum = q->A->val[k++] * c_j;
-    for (; k < end; k++) {
-        sum += q->A->val[k] * q->c[q->A->idx[k]];
-        q->y[q->A->idx[k]] += q->A->val[k] * c_j;
-    }
-    q->y[j] += sum;
-}
-
-/* Entries k to end of column j, which lie below the diagonal. */
+/* Entries k to end of column j, which lie below the diagonal: to row j goes a x_i, to row i goes a x_j. */
 static inline __attribute__((always_inline)) void take_runs(row_sums *s, const product_of *q, int64_t k, int64_t end,
                                                             double x_j, int fused)
 {
     const int64_t *idx = q->A->idx;
+    const four x_j4 = {x_j, x_j, x_j, x_j};
+    const two x_j2 = {x_j, x_j};
     while (k < end) {
         const int64_t i = idx[k];
+        const double *val = q->A->val + k;
         if (k + 3 < end && idx[k + 3] == i + 3) {
-            take_four(s, q, q->A->val + k, i, x_j, fused);
+            const four a = READ(four, val);
+            four hi = AT(four, q->hi + i), lo = AT(four, q->lo + i);
+            add_product4(&s->hi4, &s->lo4, &a, (const four *)(q->x + i), fused);
+            add_product4(&hi, &lo, &a, &x_j4, fused);
+            AT(four, q->hi + i) = hi;
+            AT(four, q->lo + i) = lo;
             k += 4;
         } else if (k + 1 < end && idx[k + 1] == i + 1) {
-            take_two(s, q, q->A->val + k, i, x_j, fused);
+            const two a = READ(two, val);
+            two hi = AT(two, q->hi + i), lo = AT(two, q->lo + i);
+            add_product2(&s->hi2, &s->lo2, &a, (const two *)(q->x + i), fused);
+            add_product2(&hi, &lo, &a, &x_j2, fused);
+            AT(two, q->hi + i) = hi;
+            AT(two, q->lo + i) = lo;
             k += 2;
         } else {
-            take_one(s, q, q->A->val + k, i, x_j, fused);
+            dd_add_product(&s->hi, &s->lo, *val, q->x[i], fused);
+            dd_add_product(&q->hi[i], &q->lo[i], *val, x_j, fused);
             k++;
         }
     }
@@ -159,9 +129,19 @@ static inline __attribute__((always_inline)) void take_runs(row_sums *s, const p
 static inline __attribute__((always_inline)) void prepare_column(const product_of *q, int64_t j)
 {
     const uz_csc *A = q->A;
-    const int64_t k = A->ptr[j], end = A->ptr[j + 1];
-    if (j <= q->last && k < end && A->idx[end - 1] >= q->first)
-        add_correction(q, j, k, end);
+    int64_t k = A->ptr[j];
+    const int64_t end = A->ptr[j + 1];
+    if (j <= q->last && k < end && A->idx[end - 1] >= q->first) { /* c is small beside x, and zero but at the contact */
+        const double c_j = q->c[j];
+        double sum = 0.0;
+        if (A->idx[k] == j)
+            sum = A->val[k++] * c_j;
+        for (; k < end; k++) {
+            sum += A->val[k] * q->c[A->idx[k]];
+            q->y[A->idx[k]] += A->val[k] * c_j;
+        }
+        q->y[j] += sum;
+    }
     if (q->weight)
         q->weight[j] = uz_dof_weight(A, j);
 }
@@ -196,36 +176,6 @@ static inline __attribute__((always_inline)) bool is_pair(const uz_csc *A, int64
     return l - k == end - l + 1 && l - k >= 2 && A->idx[k] == j && A->idx[k + 1] == j + 1 && A->idx[l] == j + 1;
 }
 
-static inline __attribute__((always_inline)) void take_two_of_pair(pair_sums *s, const product_of *q, int64_t k,
-                                                                   int64_t l, const double x_j[2], int fused)
-{
-    const int64_t i = q->A->idx[k];
-    const two a = READ(two, q->A->val + k), b = READ(two, q->A->val + l), x = READ(two, q->x + i),
-              x_a = {x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1]};
-    const four both = __builtin_shufflevector(a, b, 0, 1, 2, 3), twice = __builtin_shufflevector(x, x, 0, 1, 0, 1);
-    two hi = AT(two, q->hi + i), lo = AT(two, q->lo + i);
-    add_product4(&s->hi2_both, &s->lo2_both, &both, &twice, fused);
-    add_product2(&hi, &lo, &a, &x_a, fused);
-    add_product2(&hi, &lo, &b, &x_b, fused);
-    AT(two, q->hi + i) = hi;
-    AT(two, q->lo + i) = lo;
-}
-
-static inline __attribute__((always_inline)) void take_four_of_pair(pair_sums *s, const product_of *q, int64_t k,
-                                                                    int64_t l, const double x_j[2], int fused)
-{
-    const int64_t i = q->A->idx[k];
-    const four a = READ(four, q->A->val + k), b = READ(four, q->A->val + l), x = READ(four, q->x + i),
-               x_a = {x_j[0], x_j[0], x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1], x_j[1], x_j[1]};
-    four hi = AT(four, q->hi + i), lo = AT(four, q->lo + i);
-    add_product4(&s->hi4[0], &s->lo4[0], &a, &x, fused);
-    add_product4(&s->hi4[1], &s->lo4[1], &b, &x, fused);
-    add_product4(&hi, &lo, &a, &x_a, fused);
-    add_product4(&hi, &lo, &b, &x_b, fused);
-    AT(four, q->hi + i) = hi;
-    AT(four, q->lo + i) = lo;
-}
-
 /* Rows j and j + 1 += their lanes: in fours two of the first beside two of the second. */
 static inline __attribute__((always_inline)) void add_pair_lanes(const product_of *q, int64_t j, const pair_sums *s)
 {
@@ -258,8 +208,8 @@ static inline __attribute__((always_inline)) void take_pair(const product_of *q,
 {
     const uz_csc *A = q->A;
     const int64_t *idx = A->idx, middle = A->ptr[j + 1];
-    const double x_j[2] = {q->x[j], q->x[j + 1]};
-    const two x_a = {x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1]};
+    const two x_a = {q->x[j], q->x[j]}, x_b = {q->x[j + 1], q->x[j + 1]};
+    const four x_a4 = {x_a[0], x_a[0], x_a[0], x_a[0]}, x_b4 = {x_b[0], x_b[0], x_b[0], x_b[0]};
     int64_t k = A->ptr[j], l = middle;
     const two first = READ(two, A->val + k), second = {first[1], A->val[l]}; /* the rows of their own */
     pair_sums s = {.hi_both = READ(two, q->hi + j), .lo_both = READ(two, q->lo + j)};
@@ -268,12 +218,28 @@ static inline __attribute__((always_inline)) void take_pair(const product_of *q,
     k += 2;
     l++;
     while (k + 1 < middle && idx[k] == idx[l] && idx[k + 1] == idx[k] + 1 && idx[l + 1] == idx[k] + 1) {
-        if (k + 3 < middle && idx[k + 3] == idx[k] + 3 && idx[l + 3] == idx[k] + 3) {
-            take_four_of_pair(&s, q, k, l, x_j, fused);
+        const int64_t i = idx[k];
+        if (k + 3 < middle && idx[k + 3] == i + 3 && idx[l + 3] == i + 3) {
+            const four a = READ(four, A->val + k), b = READ(four, A->val + l), x = READ(four, q->x + i);
+            four hi = AT(four, q->hi + i), lo = AT(four, q->lo + i);
+            add_product4(&s.hi4[0], &s.lo4[0], &a, &x, fused);
+            add_product4(&s.hi4[1], &s.lo4[1], &b, &x, fused);
+            add_product4(&hi, &lo, &a, &x_a4, fused);
+            add_product4(&hi, &lo, &b, &x_b4, fused);
+            AT(four, q->hi + i) = hi;
+            AT(four, q->lo + i) = lo;
             k += 4;
             l += 4;
         } else {
-            take_two_of_pair(&s, q, k, l, x_j, fused);
+            const two a = READ(two, A->val + k), b = READ(two, A->val + l), x = READ(two, q->x + i);
+            const four both = __builtin_shufflevector(a, b, 0, 1, 2, 3),
+                       twice = __builtin_shufflevector(x, x, 0, 1, 0, 1);
+            two hi = AT(two, q->hi + i), lo = AT(two, q->lo + i);
+            add_product4(&s.hi2_both, &s.lo2_both, &both, &twice, fused);
+            add_product2(&hi, &lo, &a, &x_a, fused);
+            add_product2(&hi, &lo, &b, &x_b, fused);
+            AT(two, q->hi + i) = hi;
+            AT(two, q->lo + i) = lo;
             k += 2;
             l += 2;
         }
