@@ -236,25 +236,6 @@ double uz_precise_round(const mpf_t x)
     return high;
 }
 
-/* u = L^-T (y0 - B lambda), r = -lambda. y0 is lost. */
-static void recover(tableau *t, mpf_t *u, mpf_t *r)
-{
-    for (int64_t i = 0; i < t->m; i++) {
-        mpf_set_ui(r[i], 0);
-        if (t->contact[i])
-            mpf_neg(r[i], t->value[i]);
-        for (int64_t j = 0; t->contact[i] && j < t->d; j++) {
-            mpf_mul(t->a, t->B[j + i * t->d], t->value[i]);
-            mpf_sub(t->y0[j], t->y0[j], t->a);
-        }
-    }
-    for (int64_t j = t->d - 1; j >= 0; j--) {
-        subtract_products(t, t->y0[j], t->L + j + 1 + j * t->d, 1, t->y0 + j + 1, 1, t->d - j - 1);
-        mpf_div(t->y0[j], t->y0[j], t->L[j + j * t->d]);
-        mpf_set(u[j], t->y0[j]);
-    }
-}
-
 uz_status uz_precise_solve(uz_precise_end *end, mpf_t *u, mpf_t *r, const uz_csc *K, const uz_csc *N, const double *p,
                            const double *h, int bits, const uz_stop *stop, uz_error *err)
 {
@@ -283,8 +264,20 @@ uz_status uz_precise_solve(uz_precise_end *end, mpf_t *u, mpf_t *r, const uz_csc
             q = choose(&t);
         }
         *end = ray ? UZ_PRECISE_RAY : q < 0 ? UZ_PRECISE_SOLVED : UZ_PRECISE_LEFT;
-        if (q < 0)
-            recover(&t, u, r);
+        for (int64_t i = 0; q < 0 && i < m; i++) { /* r = -lambda, y0 -= B lambda */
+            mpf_set_ui(r[i], 0);
+            if (t.contact[i])
+                mpf_neg(r[i], t.value[i]);
+            for (int64_t j = 0; t.contact[i] && j < d; j++) {
+                mpf_mul(t.a, t.B[j + i * d], t.value[i]);
+                mpf_sub(t.y0[j], t.y0[j], t.a);
+            }
+        }
+        for (int64_t j = d - 1; q < 0 && j >= 0; j--) { /* u = L^-T y0 */
+            subtract_products(&t, t.y0[j], t.L + j + 1 + j * d, 1, t.y0 + j + 1, 1, d - j - 1);
+            mpf_div(t.y0[j], t.y0[j], t.L[j + j * d]);
+            mpf_set(u[j], t.y0[j]);
+        }
         for (int64_t i = 0; ray && i < m; i++) {
             mpf_mul(t.sum, t.T[i + q * m], t.size[i]);
             mpf_div_2exp(t.b, t.size[q], t.sure);
