@@ -110,20 +110,22 @@ uz_formulation uz_element_formulation(const uz_body_model *model, int64_t e);
 void uz_body_side(uz_side *side, double xyz[3 * UZ_FACE_NODES], int64_t node[UZ_FACE_NODES], const uz_body_model *model,
                   uz_face face);
 
+typedef enum {
+    UZ_BODY_SUPPORTED, /* by supports and springs alone */
+    /* by obstacles, too: K is then singular and has `modes` for null space. Refuses with UZ_ERR_FREE_BODY only what no
+     * obstacle stands in the way of; whether the load presses the body on is the load's matter */
+    UZ_BODY_HELD,
+    UZ_BODY_OUTLINE /* the same but for the matrices: mesh, dofs and contact rows, for what follows from an answer */
+} uz_body_extent;
+
 /* Mesh, supports, stiffness, contact normals. Checks what it reads; loads and values are checked by _load.
  * Errors: UZ_ERR_SCENE, _FREE_BODY, _NOT_FINITE, _MEMORY. */
-uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_error *err);
-/* The same for a body that obstacles may hold: K is then singular and has `modes` for null space. Refuses with
- * UZ_ERR_FREE_BODY only what no obstacle stands in the way of; whether the load presses the body on is the load's
- * matter. */
-uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz_error *err);
-/* Everything but the matrices: mesh, dofs and contact rows, for what is computed from an answer that is there. */
-uz_status uz_body_model_outline(uz_body_model *out, const uz_scene *scene, uz_error *err);
+uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_body_extent extent, uz_error *err);
 void uz_body_model_clear(uz_body_model *model);
 /* The same body with its contacts found where it has been displaced by scene->place: gaps, normals and what faces what
  * are those there, and rows and gaps are linear about it, so that they are exact for a body that stays there. K, dofs
- * and frames are those of `model`, which has to outlive *out and must be at no place itself. Matrices of a model of
- * _outline are not there. Errors: UZ_ERR_SCENE (the contact can't be found there), _MEMORY. */
+ * and frames are those of `model`, which has to outlive *out and must be at no place itself. Matrices of an outline
+ * are not there. Errors: UZ_ERR_SCENE (the contact can't be found there), _MEMORY. */
 uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
 /* p (d), h (m) and the prescribed values of the supported dofs (n_fixed; NULL: not wanted) of a scene whose body is
@@ -131,7 +133,7 @@ uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, con
 uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_body_model *model,
                              const uz_scene *scene, uz_error *err);
 
-/* Does the load p (d) press a body of _build_held on its obstacles, in every mode that nothing else holds?
+/* Does the load p (d) press a body that obstacles may hold on its obstacles, in every mode that nothing else holds?
  * UZ_ERR_FREE_BODY at "/loads" names the motion by which the body leaves them, or could at no cost. */
 uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error *err);
 
@@ -147,11 +149,9 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
 /* The reverse: the free dofs u (d) of a displacement by node; what it says of supported dofs is left out. */
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal);
 
-/* The component of a vector at a node (dim) along its dof c; "x", "y", "z" or "its normal"; and what turning a vector
- * of this size may have left of it by rounding: 0 where the dofs are along the axes. */
+/* The component of a vector at a node (dim) along its dof c; "x", "y", "z" or "its normal". */
 double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v);
 const char *uz_dof_name(const uz_body_model *model, int64_t node, int c);
-double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v);
 
 /* The place of a row that stands inside a side; NULL: it is at a node. Such a row is told by the node nearest to it in
  * shares (info.contact_node), and its reaction is a force on all nodes of the side by their shares. */
@@ -190,12 +190,11 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
  * procedure for practical engineering analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared
  * with its own nodal averages. The strain of the temperatures among the scene's loads (scene NULL: none) has no stress,
  * and the error is relative to the norm of the strain that has: free expansion would hide it. *share (may be NULL):
- * that norm over ||u_h||_E, 1 without temperature. A body that is carried along or expands freely has no error. */
-double uz_estimate_mesh_error(double *share, const uz_body_model *model, const uz_scene *scene, const double *nodal);
-/* The same, and what each element has of the square of the error, not relative: eta2, n_elements, or NULL; all 0 where
- * the error is. */
-double uz_estimate_element_errors(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
-                                  const double *nodal);
+ * that norm over ||u_h||_E, 1 without temperature. A body that is carried along or expands freely has no error. eta2
+ * (n_elements, NULL: not wanted): what each element has of the square of the error, not relative; all 0 where the error
+ * is. */
+double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
+                              const double *nodal);
 
 /* *energy: the same estimate of ||u - u_h||_E^2, not relative to anything. free_strain: as of uz_free_strains, or NULL.
  * It is the square of a seminorm of (nodal, free_strain), so that two fields have an inner product by polarization.

@@ -115,9 +115,9 @@ static uz_status displace(uz_body_model *model, const uz_body_model *rest, const
     return uz_find_sites(model, rest, scene, err);
 }
 
-/* held: obstacles may hold the body where supports don't. */
-static uz_status build(uz_body_model *model, const uz_scene *scene, bool held, bool stiffness, uz_error *err)
+uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_body_extent extent, uz_error *err)
 {
+    const bool held = extent != UZ_BODY_SUPPORTED;
     memset(model, 0, sizeof *model);
     uz_status status = uz_mesh_from_scene(&model->mesh, scene, err);
     if (status == UZ_OK)
@@ -150,26 +150,11 @@ static uz_status build(uz_body_model *model, const uz_scene *scene, bool held, b
         status = uz_build_contact_rows(model, scene, err);
     if (status == UZ_OK && held)
         status = uz_rigid_modes(&model->modes, &model->n_modes, model, err);
-    if (status == UZ_OK && stiffness)
+    if (status == UZ_OK && extent != UZ_BODY_OUTLINE)
         status = uz_build_stiffness(model, err);
     if (status != UZ_OK)
         uz_body_model_clear(model);
     return status;
-}
-
-uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_error *err)
-{
-    return build(out, scene, false, true, err);
-}
-
-uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz_error *err)
-{
-    return build(out, scene, true, true, err);
-}
-
-uz_status uz_body_model_outline(uz_body_model *out, const uz_scene *scene, uz_error *err)
-{
-    return build(out, scene, true, false, err);
 }
 
 uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, const uz_scene *scene, uz_error *err)
@@ -200,7 +185,7 @@ static uz_status check_finite(const double *x, int64_t n, const char *where, uz_
 uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_body_model *model,
                              const uz_scene *scene, uz_error *err)
 {
-    double *own = NULL;
+    double *own = NULL, *f = NULL;
     uz_status status = uz_scene_check_load(scene, &model->mesh, err);
     if (status != UZ_OK)
         return status;
@@ -211,13 +196,18 @@ uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_
         status = uz_initial_gaps(h, prescribed, model, scene, err);
     if (status == UZ_OK)
         status = check_finite(h, model->m, "/contacts", err);
+    if (status == UZ_OK && !(f = uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *f)))
+        status =
+            uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)model->mesh.n_nodes);
     if (status == UZ_OK)
-        status = uz_load_vector(p, model, scene, err);
+        status = uz_nodal_loads(f, model, scene, err);
     if (status == UZ_OK) {
+        uz_restrict_nodal(p, model, f);
         uz_csc_gaxpy(p, &model->K_fixed, -1, prescribed);
         status = check_finite(p, model->d, "/loads", err);
     }
     free(own);
+    free(f);
     return status;
 }
 
@@ -239,7 +229,7 @@ uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, u
     memset(qp, 0, sizeof *qp);
     if (info)
         memset(info, 0, sizeof *info);
-    uz_status status = uz_body_model_build(&model, scene, err);
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_SUPPORTED, err);
     if (status == UZ_OK)
         status = new_load(&p, &h, &model, scene, err);
     if (status == UZ_OK) {
@@ -270,7 +260,7 @@ uz_status uz_scene_check(const uz_scene *scene, uz_error *err)
         first.box = uz_grid(&grids, grids.first);
     }
     scene = &first;
-    uz_status status = uz_body_model_outline(&model, scene, err);
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_OUTLINE, err);
     if (status == UZ_OK)
         status = uz_check_elements(&model, err);
     if (status == UZ_OK)
@@ -289,7 +279,7 @@ uz_status uz_scene_sizes(int *dim, int64_t *n_nodes, int64_t *m, const uz_scene 
     uz_error_reset(err);
     *dim = 0;
     *n_nodes = *m = 0;
-    uz_status status = uz_body_model_outline(&model, scene, err);
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_OUTLINE, err);
     if (status == UZ_OK) {
         *dim = model.mesh.dim;
         *n_nodes = model.mesh.n_nodes;

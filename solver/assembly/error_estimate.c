@@ -78,13 +78,8 @@ uz_status uz_mesh_error_energy(double *energy, const uz_body_model *model, const
 /* Strain that makes stress, in parts of the whole, that is not told from rounding and what the equations left. */
 #define FREE 1e-7
 
-double uz_estimate_mesh_error(double *share, const uz_body_model *model, const uz_scene *scene, const double *nodal)
-{
-    return uz_estimate_element_errors(NULL, share, model, scene, nodal);
-}
-
-double uz_estimate_element_errors(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
-                                  const double *nodal)
+double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
+                              const double *nodal)
 {
     double *free_strain = NULL;
     if (share)

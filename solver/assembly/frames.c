@@ -154,35 +154,27 @@ uz_status uz_reserve_frames(uz_body_model *model, int64_t more, uz_error *err)
     return UZ_OK;
 }
 
-/* Most nodes that contacts can turn: 0 where every normal is an axis and no support has turned a node. */
-static uz_status count_candidates(int64_t *most, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const int dim = model->mesh.dim;
-    bool oblique = model->info.n_rotated > 0;
-    *most = 0;
+    bool oblique = model->info.n_rotated > 0; /* else every normal is an axis, and no support has turned a node */
+    int64_t most = 0;                         /* nodes that contacts can turn */
+    uz_status status = UZ_OK;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
         double normal[3];
         int axes = 0;
         uz_contact_input in;
-        const uz_status status = uz_contact_input_of(&in, model, scene, k, err);
+        status = uz_contact_input_of(&in, model, scene, k, err);
         if (status != UZ_OK)
             return status;
         uz_unit_normal(normal, scene->contacts[k].normal, dim);
         for (int c = 0; c < dim; c++)
             axes += normal[c] != 0;
         oblique = oblique || axes > 1 || model->sites[k].n > 0;
-        *most += uz_discretization_of(in.contact)->places(&in);
+        most += uz_discretization_of(in.contact)->places(&in);
     }
-    *most = oblique ? *most : 0;
-    return UZ_OK;
-}
-
-uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error *err)
-{
-    int64_t most;
-    uz_status status = count_candidates(&most, model, scene, err);
-    if (status != UZ_OK || most == 0)
-        return status;
+    if (!oblique || most == 0)
+        return UZ_OK;
     bool *chosen = uz_alloc_zero(model->mesh.n_nodes, sizeof *chosen);
     if (!chosen)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the directions of %lld nodes", (long long)most);

@@ -22,46 +22,11 @@ static void add_to_nodes(const loading *x, const double *f, const int64_t *node,
         x->f[node[i / dim] * dim + i % dim] += f[i];
 }
 
-static void load_faces(const loading *x, const uz_group *group)
-{
-    for (int64_t i = 0; i < group->n_faces; i++) {
-        uz_side side;
-        int64_t node[UZ_FACE_NODES];
-        double xyz[3 * UZ_FACE_NODES], f[3 * UZ_FACE_NODES] = {0}, pressure[UZ_FACE_NODES];
-        uz_body_side(&side, xyz, node, x->model, group->face[i]);
-        for (int a = 0; a < side.nodes; a++)
-            pressure[a] = x->load->value;
-        if (x->load->kind == UZ_LOAD_PRESSURE)
-            uz_side_add_pressure(f, &side, pressure);
-        else
-            uz_side_add_traction(f, &side, x->load->v);
-        add_to_nodes(x, f, node, side.nodes);
-    }
-}
-
-/* Body force, gravity or temperature on one element. */
-static void load_element(const loading *x, int64_t e)
-{
-    uz_element element;
-    double xyz[3 * UZ_ELEMENT_NODES], f[UZ_ELEMENT_DOFS] = {0}, b[3], strain[UZ_ELEMENT_STRESSES];
-    const uz_body_material *material = uz_element_material(x->model, e);
-    int count;
-    const int64_t *node = uz_mesh_element(&x->model->mesh, e, &count);
-    uz_body_element(&element, xyz, x->model, e);
-    if (x->load->kind == UZ_LOAD_TEMPERATURE) {
-        uz_thermal_strain(strain, element.model, element.lame, material->expansion * x->load->value);
-        uz_element_add_thermal_load(f, &element, strain);
-    } else {
-        for (int c = 0; c < 3; c++)
-            b[c] = x->load->v[c] * (x->load->kind == UZ_LOAD_GRAVITY ? material->density : 1);
-        uz_element_add_body_force(f, &element, b);
-    }
-    add_to_nodes(x, f, node, count);
-}
-
 static uz_status add_load(const loading *x, const char *where, uz_error *err)
 {
     const uz_mesh *mesh = &x->model->mesh;
+    double xyz[3 * UZ_ELEMENT_NODES];
+    int64_t node[UZ_FACE_NODES];
     if (x->load->kind == UZ_LOAD_NODE_FORCE) {
         if (x->load->node < 0 || x->load->node >= mesh->n_nodes)
             return uz_fail(err, UZ_ERR_SCENE, where, "there is no node %lld; this mesh has 0 to %lld",
@@ -76,7 +41,18 @@ static uz_status add_load(const loading *x, const char *where, uz_error *err)
     switch (x->load->kind) {
     case UZ_LOAD_TRACTION:
     case UZ_LOAD_PRESSURE:
-        load_faces(x, group);
+        for (int64_t i = 0; i < group->n_faces; i++) {
+            uz_side side;
+            double pressure[UZ_FACE_NODES], of_side[3 * UZ_FACE_NODES] = {0};
+            uz_body_side(&side, xyz, node, x->model, group->face[i]);
+            for (int a = 0; a < side.nodes; a++)
+                pressure[a] = x->load->value;
+            if (x->load->kind == UZ_LOAD_PRESSURE)
+                uz_side_add_pressure(of_side, &side, pressure);
+            else
+                uz_side_add_traction(of_side, &side, x->load->v);
+            add_to_nodes(x, of_side, node, side.nodes);
+        }
         return UZ_OK;
     case UZ_LOAD_FORCE: {
         double *share = uz_alloc_zero(mesh->n_nodes, sizeof *share);
@@ -88,9 +64,25 @@ static uz_status add_load(const loading *x, const char *where, uz_error *err)
         free(share);
         return status;
     }
-    default:
-        for (int64_t i = 0; i < uz_group_element_count(mesh, group); i++)
-            load_element(x, uz_group_element_at(group, i));
+    default: /* body force, gravity or temperature */
+        for (int64_t i = 0; i < uz_group_element_count(mesh, group); i++) {
+            const int64_t e = uz_group_element_at(group, i);
+            const uz_body_material *material = uz_element_material(x->model, e);
+            double of_element[UZ_ELEMENT_DOFS] = {0}, strain[UZ_ELEMENT_STRESSES], b[3];
+            int count;
+            const int64_t *nodes = uz_mesh_element(mesh, e, &count);
+            uz_element element;
+            uz_body_element(&element, xyz, x->model, e);
+            for (int c = 0; c < 3; c++)
+                b[c] = x->load->v[c] * (x->load->kind == UZ_LOAD_GRAVITY ? material->density : 1);
+            if (x->load->kind == UZ_LOAD_TEMPERATURE) {
+                uz_thermal_strain(strain, element.model, element.lame, material->expansion * x->load->value);
+                uz_element_add_thermal_load(of_element, &element, strain);
+            } else {
+                uz_element_add_body_force(of_element, &element, b);
+            }
+            add_to_nodes(x, of_element, nodes, count);
+        }
         return UZ_OK;
     }
 }
@@ -106,18 +98,6 @@ uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *
                  scene->loads[i].kind == UZ_LOAD_NODE_FORCE ? "node" : "on");
         status = add_load(&x, where, err);
     }
-    return status;
-}
-
-uz_status uz_load_vector(double *p, const uz_body_model *model, const uz_scene *scene, uz_error *err)
-{
-    double *f = uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *f);
-    if (!f)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)model->mesh.n_nodes);
-    uz_status status = uz_nodal_loads(f, model, scene, err);
-    if (status == UZ_OK)
-        uz_restrict_nodal(p, model, f);
-    free(f);
     return status;
 }
 

@@ -421,31 +421,6 @@ static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_err
     return status;
 }
 
-/* What the sides of each group are taken for. False: no memory. */
-static bool describe(uz_contact_sites *sites, const uz_mortar_pair *pair)
-{
-    const uz_contact_input *in = pair->in;
-    const uz_mortar_surface *all = pair->rest.n > 0 ? &pair->rest : &pair->surface;
-    uz_mortar_surface some = *all;
-    some.n = 0;
-    some.side = uz_alloc(all->n, sizeof *some.side);
-    bool room = some.side != NULL;
-    for (int k = 0; k < 2 && room; k++) {
-        some.n = 0;
-        for (int64_t i = 0; i < all->n; i++)
-            if (pair->of[i] & (k == 0 ? UZ_OF_ON : UZ_OF_WITH))
-                some.side[some.n++] = all->side[i];
-        room = uz_mortar_describe(&sites->surface[k], &some, in, k == 0 ? in->on : in->with);
-        sites->surface[k].contact = in->index;
-        for (int64_t p = 0; p < sites->n; p++)
-            sites->surface[k].slave =
-                sites->surface[k].slave ||
-                (isfinite(sites->gap[p]) && sites->of[p] & (k == 0 ? UZ_SLAVE_ON : UZ_SLAVE_WITH));
-    }
-    free(some.side);
-    return room;
-}
-
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
 {
     uz_mortar_pair pair = {.in = in};
@@ -457,8 +432,24 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
         status = uz_mortar_choose_slaves(sites, &pair, err);
     if (status == UZ_OK)
         status = make_rows(sites, &pair, err);
-    if (status == UZ_OK && !describe(sites, &pair))
-        status = uz_mortar_no_memory(err);
+    /* what the sides of each group are taken for */
+    const uz_mortar_surface *all = pair.rest.n > 0 ? &pair.rest : &pair.surface;
+    uz_mortar_surface some = *all;
+    some.side = status == UZ_OK ? uz_alloc(all->n, sizeof *some.side) : NULL;
+    for (int k = 0; k < 2 && status == UZ_OK; k++) {
+        some.n = 0;
+        for (int64_t i = 0; i < all->n && some.side; i++)
+            if (pair.of[i] & (k == 0 ? UZ_OF_ON : UZ_OF_WITH))
+                some.side[some.n++] = all->side[i];
+        if (!some.side || !uz_mortar_describe(&sites->surface[k], &some, in, k == 0 ? in->on : in->with))
+            status = uz_mortar_no_memory(err);
+        sites->surface[k].contact = in->index;
+        for (int64_t p = 0; p < sites->n; p++)
+            sites->surface[k].slave =
+                sites->surface[k].slave ||
+                (isfinite(sites->gap[p]) && sites->of[p] & (k == 0 ? UZ_SLAVE_ON : UZ_SLAVE_WITH));
+    }
+    free(some.side);
     if (status == UZ_OK && sites->first[sites->n] == 0 && !in->rest) {
         snprintf(where, sizeof where, "/contacts/%lld/on", (long long)in->index);
         status =

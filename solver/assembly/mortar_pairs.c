@@ -101,26 +101,6 @@ static uz_status plant_tree(uz_mortar_pair *pair, int dim, uz_error *err)
     return status;
 }
 
-/* The normals that smooth shapes give a surface in space at rest differ from those of its facets: so they do where it
- * has moved. */
-static uz_status turn_with_rest(uz_mortar_pair *pair, const uz_contact_input *at_rest, uz_error *err)
-{
-    uz_contact_input before = *at_rest; /* by its facets alone */
-    uz_mortar_surface facets = {0}, *surface = &pair->surface;
-    uz_contact faceted = *at_rest->contact;
-    faceted.faceted = true;
-    before.contact = &faceted;
-    uz_status status = uz_mortar_surface_make(&facets, &before, &pair->group, err);
-    const bool same = status == UZ_OK && facets.n_places == surface->n_places;
-    for (int64_t p = 0; p < surface->n_places && same; p++) {
-        for (int c = 0; c < 3; c++)
-            surface->normal[3 * p + c] += pair->rest.normal[3 * p + c] - facets.normal[3 * p + c];
-        uz_unit3(surface->normal + 3 * p);
-    }
-    uz_mortar_surface_clear(&facets);
-    return status;
-}
-
 uz_status uz_mortar_pair_make(uz_mortar_pair *pair, const uz_contact_input *in, uz_error *err)
 {
     uz_contact_input before = *in;
@@ -142,8 +122,22 @@ uz_status uz_mortar_pair_make(uz_mortar_pair *pair, const uz_contact_input *in, 
     if (status == UZ_OK && in->rest && !in->contact->faceted) {
         status = uz_mortar_surface_make(&pair->rest, &before, &pair->group, err);
         pair->surface.rest = &pair->rest;
-        if (status == UZ_OK && dim == 3)
-            status = turn_with_rest(pair, &before, err);
+    }
+    /* The normals that smooth shapes give a surface in space at rest differ from those of its facets: so they do where
+     * it has moved. */
+    if (status == UZ_OK && pair->surface.rest && dim == 3) {
+        uz_mortar_surface facets = {0}, *surface = &pair->surface;
+        uz_contact faceted = *in->contact;
+        faceted.faceted = true;
+        before.contact = &faceted;
+        status = uz_mortar_surface_make(&facets, &before, &pair->group, err);
+        const bool same = status == UZ_OK && facets.n_places == surface->n_places;
+        for (int64_t p = 0; p < surface->n_places && same; p++) {
+            for (int c = 0; c < 3; c++)
+                surface->normal[3 * p + c] += pair->rest.normal[3 * p + c] - facets.normal[3 * p + c];
+            uz_unit3(surface->normal + 3 * p);
+        }
+        uz_mortar_surface_clear(&facets);
     }
     return status;
 }
@@ -162,19 +156,6 @@ void uz_mortar_pair_clear(uz_mortar_pair *pair)
 }
 
 /* ---- the points of a side */
-
-static bool may_touch(const uz_mortar_pair *pair, int64_t i, int64_t j)
-{
-    const unsigned char mine = pair->of[i], its = pair->of[j];
-    if (!(mine & UZ_OF_ON && its & UZ_OF_WITH) && !(mine & UZ_OF_WITH && its & UZ_OF_ON))
-        return false;
-    const uz_mortar_side *a = &pair->surface.side[i], *b = &pair->surface.side[j];
-    for (int k = 0; k < a->nodes && pair->own; k++)
-        for (int l = 0; l < b->nodes; l++)
-            if (a->node[k] == b->node[l])
-                return false;
-    return true;
-}
 
 uz_way uz_mortar_way(uz_mortar_pair *pair, int64_t i, int64_t j, const double *x, const double *y)
 {
@@ -196,6 +177,8 @@ typedef struct {
 static bool list_near(void *ctx, int64_t item)
 {
     search *s = ctx;
+    const unsigned char of_mine = s->pair->of[s->i], of_its = s->pair->of[item];
+    const uz_mortar_side *a = &s->pair->surface.side[s->i], *b = &s->pair->surface.side[item];
     s->met++;
     if (s->pair->in->model->mesh.dim == 3) {
         const double *mine = s->pair->ball + 4 * s->i, *its = s->pair->ball + 4 * item;
@@ -206,8 +189,13 @@ static bool list_near(void *ctx, int64_t item)
         if (uz_dot3(across, across) > reach * reach)
             return false;
     }
-    if (may_touch(s->pair, s->i, item))
-        s->pair->near[s->pair->n_near++] = item;
+    if (!(of_mine & UZ_OF_ON && of_its & UZ_OF_WITH) && !(of_mine & UZ_OF_WITH && of_its & UZ_OF_ON))
+        return false;
+    for (int k = 0; k < a->nodes && s->pair->own; k++)
+        for (int l = 0; l < b->nodes; l++)
+            if (a->node[k] == b->node[l])
+                return false; /* neighbours do not touch */
+    s->pair->near[s->pair->n_near++] = item;
     return false;
 }
 

@@ -74,7 +74,4 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err);
 /* Refuses what uz_build_stiffness would refuse. */
 uz_status uz_check_elements(const uz_body_model *model, uz_error *err);
 
-/* p (d) = the scene's loads on the free dofs. */
-uz_status uz_load_vector(double *p, const uz_body_model *model, const uz_scene *scene, uz_error *err);
-
 #endif

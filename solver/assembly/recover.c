@@ -62,11 +62,6 @@ double uz_turning_error(const uz_body_model *model, int64_t node, const double *
     return uz_node_frame(model, node) ? 4 * DBL_EPSILON * size : 0;
 }
 
-double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v)
-{
-    return 2 * uz_turning_error(model, node, v);
-}
-
 static void *duplicate(const void *from, int64_t count, size_t size)
 {
     void *copy = uz_alloc(count, size);

@@ -44,36 +44,6 @@ uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)
     return status;
 }
 
-/* Every motion that is left, as columns of z (d x n): displacements of the free dofs. */
-static uz_status fill_modes(double **out, int64_t *count, const uz_parts *parts, const uz_body_model *model,
-                            uz_error *err)
-{
-    const int dim = model->mesh.dim;
-    double mode[UZ_MOTIONS][UZ_MOTIONS], *z = NULL;
-    int64_t n = 0, at = 0;
-    for (int64_t i = 0; i < parts->count; i++)
-        n += parts->motions - parts->list[i].rank;
-    if (n > 0 && !(z = uz_alloc_zero(n * model->d, sizeof *z)))
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
-    for (int64_t i = 0; i < parts->count; i++) {
-        const int own = uz_free_motions(mode, parts, &parts->list[i]);
-        for (int k = 0; k < own && at < n; k++, at++)
-            for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-                double u[3], local[3];
-                if (parts->of[a] != i)
-                    continue;
-                uz_move_node(u, parts, i, &model->mesh, a, mode[k]);
-                uz_to_frame(local, model, a, u);
-                for (int c = 0; c < dim; c++)
-                    if (model->dof[a * dim + c] >= 0)
-                        z[at * model->d + model->dof[a * dim + c]] = local[c];
-            }
-    }
-    *out = z;
-    *count = n;
-    return UZ_OK;
-}
-
 /* -------------------------------------------------------------- parts that lean on parts */
 
 /* What of part i moves in the null space, rows rank .. n of basis: the rest of its motions counts as held. */
@@ -140,14 +110,32 @@ static uz_status hold_by_bodies(uz_parts *parts, const uz_body_model *model, con
 
 uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *model, uz_error *err)
 {
+    const int dim = model->mesh.dim;
     uz_parts parts;
-    double *z = NULL;
+    double mode[UZ_MOTIONS][UZ_MOTIONS], *z = NULL;
     int64_t n = 0;
     *modes = NULL;
     *count = 0;
     uz_status status = uz_find_parts(&parts, model, err);
-    if (status == UZ_OK)
-        status = fill_modes(&z, &n, &parts, model, err);
+    for (int64_t i = 0; status == UZ_OK && i < parts.count; i++)
+        n += parts.motions - parts.list[i].rank;
+    if (n > 0 && !(z = uz_alloc_zero(n * model->d, sizeof *z)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
+    /* every motion that is left, as columns of z (d x n): displacements of the free dofs */
+    for (int64_t i = 0, at = 0; status == UZ_OK && i < parts.count; i++) {
+        const int own = uz_free_motions(mode, &parts, &parts.list[i]);
+        for (int k = 0; k < own && at < n; k++, at++)
+            for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+                double u[3], local[3];
+                if (parts.of[a] != i)
+                    continue;
+                uz_move_node(u, &parts, i, &model->mesh, a, mode[k]);
+                uz_to_frame(local, model, a, u);
+                for (int c = 0; c < dim; c++)
+                    if (model->dof[a * dim + c] >= 0)
+                        z[at * model->d + model->dof[a * dim + c]] = local[c];
+            }
+    }
     if (status == UZ_OK && n > 0 && model->n_pair_rows > 0) {
         status = hold_by_bodies(&parts, model, z, n, err);
     } else if (status == UZ_OK) {
@@ -168,14 +156,22 @@ uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *mo
     return status;
 }
 
-/* The motion with these coefficients (n_modes) in words, of the part that it moves most: "translation along +y". */
-static void name_motion(char *text, size_t size, const uz_body_model *model, const double *y)
+/* Loads this small beside those that balance in a mode are rounding. */
+#define BALANCED 1e-9
+
+uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error *err)
 {
+    uz_pressing how = UZ_PRESSED_ON;
     uz_parts parts;
-    double mode[UZ_MOTIONS][UZ_MOTIONS], largest = 0;
-    snprintf(text, size, "a rigid motion");
-    if (uz_find_parts(&parts, model, NULL) == UZ_OK)
-        for (int64_t i = 0, at = 0; i < parts.count; i++) {
+    char motion[240] = "a rigid motion";
+    double *y = uz_alloc_zero(model->n_modes, sizeof *y);
+    if (!y)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)model->n_modes);
+    uz_status status = uz_load_on_modes(&how, y, model->modes, model->n_modes, &model->N, p, BALANCED, true, err);
+    if (status == UZ_OK && how != UZ_PRESSED_ON) {
+        double mode[UZ_MOTIONS][UZ_MOTIONS], largest = 0;
+        const bool known = uz_find_parts(&parts, model, NULL) == UZ_OK;
+        for (int64_t i = 0, at = 0; known && i < parts.count; i++) { /* of the part that it moves most */
             double q[UZ_MOTIONS] = {0}, square = 0;
             const int own = uz_free_motions(mode, &parts, &parts.list[i]);
             for (int k = 0; k < own; k++, at++)
@@ -186,27 +182,13 @@ static void name_motion(char *text, size_t size, const uz_body_model *model, con
             if (square <= largest)
                 continue;
             largest = square;
-            uz_name_part_motion(text, size, &parts, &parts.list[i], q, true);
-            const size_t used = strlen(text);
+            uz_name_part_motion(motion, sizeof motion, &parts, &parts.list[i], q, true);
+            const size_t used = strlen(motion);
             if (parts.count > 1)
-                snprintf(text + used, size - used, " of the part with node %lld", (long long)parts.list[i].node);
+                snprintf(motion + used, sizeof motion - used, " of the part with node %lld",
+                         (long long)parts.list[i].node);
         }
-    uz_parts_clear(&parts);
-}
-
-/* Loads this small beside those that balance in a mode are rounding. */
-#define BALANCED 1e-9
-
-uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error *err)
-{
-    uz_pressing how = UZ_PRESSED_ON;
-    char motion[240];
-    double *y = uz_alloc_zero(model->n_modes, sizeof *y);
-    if (!y)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)model->n_modes);
-    uz_status status = uz_load_on_modes(&how, y, model->modes, model->n_modes, &model->N, p, BALANCED, true, err);
-    if (status == UZ_OK && how != UZ_PRESSED_ON) {
-        name_motion(motion, sizeof motion, model, y);
+        uz_parts_clear(&parts);
         status = uz_fail(err, UZ_ERR_FREE_BODY, "/loads",
                          how == UZ_PUSHED_AWAY
                              ? "the loads push the body away: %s; no obstacle or support stands in its way. Hold it by "

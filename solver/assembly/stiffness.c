@@ -222,24 +222,9 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
 
 /* ------------------------------------------------------------ strain energy */
 
-/* An element's displacements against those of its first node: a translation strains nothing, and what it would leave by
- * rounding grows with it. Not along the radius. */
-static inline __attribute__((always_inline)) void take_relative(double *d, bool along_radius, const double *nodal,
-                                                                const int64_t *node, int count, int dim)
-{
-    double first[3] = {0};
-    for (int c = 0; c < dim; c++)
-        first[c] = nodal[node[0] * dim + c];
-    if (along_radius)
-        first[0] = 0;
-    for (int a = 0; a < count; a++)
-        for (int c = 0; c < dim; c++)
-            *d++ = nodal[node[a] * dim + c] - first[c];
-}
-
-/* The same less the rotation that fits it best, which strains nothing either: what it leaves by rounding is eps of its
- * square, while the strain beside it may be a millionth of it. Minimizes sum |d_a - w x x_a|^2, with x and d from the
- * first node. */
+/* An element's displacements less the rotation that fits them best, which strains nothing: what it leaves by rounding
+ * is eps of its square, while the strain beside it may be a millionth of it. Minimizes sum |d_a - w x x_a|^2, with x
+ * and d from the first node. */
 static void take_unrotated(double *d, const uz_mesh *mesh, const int64_t *node, int count)
 {
     const int dim = mesh->dim;
@@ -280,8 +265,12 @@ static double energy_any(const uz_body_model *model, const double *ke, const dou
     int count;
     const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
     const bool rings = model->kind == UZ_AXISYMMETRIC;
-    const int n = count * model->mesh.dim;
-    take_relative(d, rings, nodal, node, count, model->mesh.dim);
+    const int dim = model->mesh.dim, n = count * dim;
+    /* Against those of the first node: a translation strains nothing, and what it would leave by rounding grows with
+     * it. Not along the radius. */
+    for (int a = 0; a < count; a++)
+        for (int c = 0; c < dim; c++)
+            d[a * dim + c] = nodal[node[a] * dim + c] - (rings && c == 0 ? 0 : nodal[node[0] * dim + c]);
     if (carried && !rings)
         take_unrotated(d, &model->mesh, node, count);
     for (int i = 0; i < n; i++) {

@@ -39,15 +39,6 @@ INLINE void gather(uz_lanes *out, const uz_strain_group *g, const double *value,
     }
 }
 
-static void take_equal_shape(uz_strain_group *g, const uz_body_model *model)
-{
-    uz_element element;
-    double xyz[3 * UZ_ELEMENT_NODES];
-    uz_body_element(&element, xyz, model, g->element[0]);
-    for (int i = 0; i < g->rule.nodes * g->rule.dim; i++)
-        g->x[i] = xyz[i] - (uz_lanes){0};
-}
-
 INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
 {
     const uz_mesh *mesh = &from->model->mesh;
@@ -60,10 +51,14 @@ INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
     gather(g->u, g, from->nodal, dim);
     if (!g->shaped) {
         const bool equal = mesh->uniform && from->model->kind != UZ_AXISYMMETRIC;
+        uz_element element;
+        double xyz[3 * UZ_ELEMENT_NODES];
         if (equal)
-            take_equal_shape(g, from->model);
+            uz_body_element(&element, xyz, from->model, g->element[0]);
         else
             gather(g->x, g, mesh->xyz, dim);
+        for (int i = 0; equal && i < g->rule.nodes * dim; i++)
+            g->x[i] = xyz[i] - (uz_lanes){0};
         uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
         g->shaped = equal;
     }

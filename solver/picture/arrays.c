@@ -260,7 +260,7 @@ uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_fi
     surface_work w = {.scene = scene, .model = &model, .answer = answer};
     uz_error_reset(err);
     memset(out, 0, sizeof *out);
-    uz_status status = uz_body_model_outline(&model, scene, err);
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_OUTLINE, err);
     if (status == UZ_OK)
         status = uz_scenery_check_answer(answer, &model, err);
     if (status == UZ_OK)

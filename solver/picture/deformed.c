@@ -150,7 +150,7 @@ uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, co
     uz_error_reset(err);
     *svg = NULL;
     *len = 0;
-    uz_status status = uz_body_model_outline(&model, scene, err);
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_OUTLINE, err);
     if (status == UZ_OK && how->width != 0 && (how->width < 200 || how->width > 4000))
         status =
             uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a picture must lie in 200 to 4000, it is %d", how->width);

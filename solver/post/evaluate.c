@@ -87,7 +87,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
         status = uz_measure_overlap(e->overlap, model, scene, result->u, err);
     if (status != UZ_OK)
         return status;
-    summary->discretization_error = uz_estimate_mesh_error(&summary->stress_share, model, scene, result->u);
+    summary->discretization_error = uz_estimate_mesh_error(NULL, &summary->stress_share, model, scene, result->u);
     if (isnan(summary->discretization_error) && !result->ray)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
     e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);

@@ -218,7 +218,7 @@ uz_status uz_fields_compute(uz_fields *out, const uz_scene *scene, const uz_fiel
     uz_field_body body = {.scene = scene};
     uz_error_reset(err);
     memset(out, 0, sizeof *out);
-    uz_status status = uz_body_model_outline(&model, scene, err);
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_OUTLINE, err);
     if (status == UZ_OK)
         status = uz_field_body_init(&body, scene, &model, err);
     if (status == UZ_OK)

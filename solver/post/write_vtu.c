@@ -101,7 +101,7 @@ uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz
     uz_error_reset(err);
     *text = NULL;
     *len = 0;
-    uz_status status = uz_body_model_outline(&model, scene, err);
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_OUTLINE, err);
     if (status == UZ_OK)
         status = uz_field_body_init(&body, scene, &model, err);
     if (status == UZ_OK)

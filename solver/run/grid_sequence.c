@@ -283,7 +283,7 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
     problem.scene.box = on->box;
     problem.scene.bisected = g->bisected;
     problem.scene.n_bisected = on->n_bisected;
-    uz_status status = uz_body_model_outline(&outline, &problem.scene, err);
+    uz_status status = uz_body_model_build(&outline, &problem.scene, UZ_BODY_OUTLINE, err);
     if (status != UZ_OK)
         return status;
     const uz_element_type *type = uz_element_type_of((uz_element_kind)outline.mesh.kind[0]);

@@ -154,7 +154,7 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
     }
     uz_cache *own_cache = cache ? NULL : uz_cache_new(SIZE_MAX); /* both of its problems have one K */
     g.cache = cache ? cache : own_cache;
-    uz_status status = uz_body_model_outline(&model, &problem->scene, &err);
+    uz_status status = uz_body_model_build(&model, &problem->scene, UZ_BODY_OUTLINE, &err);
     if (status == UZ_OK)
         status = prove(result, &g, &model, &problem->scene, &err);
     uz_bound_body_clear(&g.body);

@@ -81,7 +81,7 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
         double seen = 0;
         if (uz_has_no_answer(&results[i]->summary))
             continue;
-        const double error = uz_estimate_element_errors(eta2, NULL, body, &scene, results[i]->u);
+        const double error = uz_estimate_mesh_error(eta2, NULL, body, &scene, results[i]->u);
         done = !isnan(error);
         for (int64_t e = 0; e < n_elements; e++)
             seen += eta2[e];

@@ -46,7 +46,7 @@ bool uz_may_be_semicoercive(uz_status refused, const uz_result *result, const uz
 
 static uz_status build_scene(uz_semi *s, uz_error *err)
 {
-    uz_status status = uz_body_model_build_held(&s->model, &s->problem->scene, err);
+    uz_status status = uz_body_model_build(&s->model, &s->problem->scene, UZ_BODY_HELD, err);
     if (status != UZ_OK)
         return status;
     s->load = uz_alloc_zero(s->model.d + s->model.m, sizeof(double));

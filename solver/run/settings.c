@@ -199,7 +199,7 @@ void uz_balance_request(double *requested, const uz_body_model *model, const uz_
     for (int64_t i = 0; exponent != 0 && i < count; i++)
         nodal[i] = ldexp(nodal[i], -exponent);
     double share;
-    const double mesh = uz_estimate_mesh_error(&share, model, scene, nodal);
+    const double mesh = uz_estimate_mesh_error(NULL, &share, model, scene, nodal);
     free(nodal);
     if (mesh > 0.0 && isfinite(mesh))
         *requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * mesh * share));

@@ -147,7 +147,7 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
     if (setup->is_scene)
         status = refuse_large_box(problem, settings, err);
     if (status == UZ_OK && setup->is_scene)
-        status = uz_body_model_build(&setup->model, &problem->scene, err);
+        status = uz_body_model_build(&setup->model, &problem->scene, UZ_BODY_SUPPORTED, err);
     else if (status == UZ_OK && problem->qp.N.rows == 0) /* N may come as a zeroed struct */
         status = uz_csc_init(&setup->no_rows, 0, problem->qp.K.cols, 0, err);
     if (status == UZ_OK)

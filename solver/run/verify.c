@@ -29,7 +29,7 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
     for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++) {
         int64_t dof = model->dof[i], node = i / dim;
         double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
-        double rounding = uz_dof_rounding(model, node, u + node * dim);
+        double rounding = 2 * uz_turning_error(model, node, u + node * dim); /* there and back */
         const double held = dof < 0 ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent) : given;
         if (!(fabs(given - held) <= rounding))
             return uz_fail(err, UZ_ERR_SCENE, "u",

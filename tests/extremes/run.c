@@ -150,8 +150,8 @@ void run_scene(suite *all, const char *family_name, const char *name, uz_scene s
     uz_qp qp = {0};
     uz_body_model model = {0};
     if (wants_family(all, family_name)) {
-        bool known =
-            uz_body_model_build(&model, &scene, NULL) == UZ_OK && uz_scene_to_qp(&qp, NULL, &scene, NULL) == UZ_OK;
+        bool known = uz_body_model_build(&model, &scene, UZ_BODY_SUPPORTED, NULL) == UZ_OK &&
+                     uz_scene_to_qp(&qp, NULL, &scene, NULL) == UZ_OK;
         task t = {all, family_name, name, &problem, known ? &qp : NULL, known ? &model : NULL, what};
         run_ways(&t);
     }

@@ -126,7 +126,7 @@ static bool finish_scene(figure_problem *out)
     uz_body_model model;
     uz_error err = {0};
     if (!made(uz_scene_to_qp(&out->qp, NULL, &out->problem.scene, &err), &err) ||
-        !made(uz_body_model_outline(&model, &out->problem.scene, &err), &err))
+        !made(uz_body_model_build(&model, &out->problem.scene, UZ_BODY_OUTLINE, &err), &err))
         return false;
     out->places = model.mesh.n_nodes * model.mesh.dim;
     out->dof = calloc((size_t)out->places + 1, sizeof *out->dof);

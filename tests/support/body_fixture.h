@@ -96,7 +96,7 @@ static inline uz_body_model body_model(const uz_scene *scene)
 {
     uz_body_model model;
     uz_error err = {0};
-    uz_status status = uz_body_model_build_held(&model, scene, &err);
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_HELD, &err);
     CHECK_MSG(status == UZ_OK, "%s: %s", err.where, err.message);
     if (status != UZ_OK)
         exit(1);

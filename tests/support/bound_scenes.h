@@ -248,7 +248,7 @@ static inline bound_sweep sweep_differences(uint64_t seed, bound_kind kind, int6
             settings.guaranteed = true;
             const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene};
             if (uz_solve(&result, &problem, &settings, NULL, NULL, &err) != UZ_OK ||
-                uz_body_model_outline(&model, &scene, &err) != UZ_OK) {
+                uz_body_model_build(&model, &scene, UZ_BODY_OUTLINE, &err) != UZ_OK) {
                 snprintf(x.why, sizeof x.why, "%.100s", err.message);
                 uz_result_free(result);
                 uz_scene_clear(&scene);

@@ -188,7 +188,7 @@ static inline uz_qp two_blocks(const double press[2])
     add_plane(&scene, "left", 0, 0, 1, 0);
     uz_body_model model;
     uz_error err = {0};
-    CHECK(uz_body_model_build_held(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_body_model_build(&model, &scene, UZ_BODY_HELD, &err) == UZ_OK);
     const int64_t d = model.d, m = model.m;
     double *one = dense_symmetric(&model.K), *K = vector(4 * d * d), *N = vector(4 * m * d);
     uz_qp qp = {.p = vector(2 * d), .h = vector(2 * m)};

@@ -14,7 +14,7 @@ TEST(load_on_a_kept_body_equals_a_new_body)
     second.loads[0].v[0] = 3;
     second.n_loads = 1;
     second.contacts[0].point[1] = -0.25;
-    CHECK(uz_body_model_build(&model, &first, &err) == UZ_OK);
+    CHECK(uz_body_model_build(&model, &first, UZ_BODY_SUPPORTED, &err) == UZ_OK);
     CHECK(uz_scene_to_qp(&qp, NULL, &second, NULL) == UZ_OK);
     double *p = zeros(model.d), *h = zeros(model.m), *fixed = zeros(model.n_fixed);
     CHECK(uz_body_model_load(p, h, fixed, &model, &second, &err) == UZ_OK);
@@ -42,7 +42,7 @@ TEST(load_of_another_body_is_refused)
     uz_body_model model;
     uz_error err = {0};
     double p[64], h[64];
-    CHECK(uz_body_model_build(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_body_model_build(&model, &scene, UZ_BODY_SUPPORTED, &err) == UZ_OK);
     add_support(&scene, "right", 0, NAN);
     CHECK(uz_body_model_load(p, h, NULL, &model, &scene, &err) == UZ_ERR_ARGUMENT);
     scene.n_supports--;
@@ -81,7 +81,7 @@ TEST(copy_of_mesh_info_is_whole)
     uz_body_model model;
     uz_mesh_info copy;
     uz_error err = {0};
-    CHECK(uz_body_model_build(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_body_model_build(&model, &scene, UZ_BODY_SUPPORTED, &err) == UZ_OK);
     CHECK(uz_mesh_info_copy(&copy, &model.info, model.m, &err) == UZ_OK);
     CHECK(copy.xyz != model.info.xyz && copy.contact_node != model.info.contact_node);
     CHECK(memcmp(copy.xyz, model.mesh.xyz, (size_t)copy.n_nodes * 2 * sizeof *copy.xyz) == 0);

@@ -115,7 +115,7 @@ static double estimate_paper_body(int64_t nx, int64_t ny)
     reference ref = solve_contact(&qp);
     double *nodal = zeros(model.mesh.n_nodes * 2);
     uz_recover_nodal(nodal, &model, ref.u, NULL);
-    const double estimate = uz_estimate_mesh_error(NULL, &model, NULL, nodal);
+    const double estimate = uz_estimate_mesh_error(NULL, NULL, &model, NULL, nodal);
     free(nodal);
     free(ref.u);
     free(qp.p);
@@ -150,7 +150,7 @@ static double check_bent_beam(const char *element, uz_formulation formulation, d
         const double share = 5.0 / (double)(2 << k); /* force of one edge */
         for (int64_t j = 0; j <= 2 << k; j++)
             work[k] += share * (j == 0 || j == 2 << k ? 0.5 : 1) * u[2 * (j * ((12 << k) + 1) + (12 << k)) + 1];
-        estimate[k] = uz_estimate_mesh_error(NULL, &model, NULL, u);
+        estimate[k] = uz_estimate_mesh_error(NULL, NULL, &model, NULL, u);
         free(u);
         uz_body_model_clear(&model);
         uz_scene_clear(&scene);

@@ -19,7 +19,7 @@ TEST(a_block_carried_far_by_inclined_supports)
         uz_error err = {0};
         uz_body_model model;
         uz_result *x = body_solve(&s, 1e-8);
-        CHECK(uz_body_model_build_held(&model, &s, &err) == UZ_OK);
+        CHECK(uz_body_model_build(&model, &s, UZ_BODY_HELD, &err) == UZ_OK);
         const int64_t total = x->n_nodes * dim;
         double *d = body_room(total, sizeof *d), *f = body_room(total, sizeof *f), energy = 0;
         for (int64_t i = 0; i < total; i++)

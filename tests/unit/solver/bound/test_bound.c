@@ -241,7 +241,7 @@ TEST(check_trusts_nobody)
     uz_qp qp;
     uz_error err = {0};
     int64_t *dof;
-    CHECK(uz_body_model_outline(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_body_model_build(&model, &scene, UZ_BODY_OUTLINE, &err) == UZ_OK);
     CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
     CHECK(uz_bound_dual_problem(&qp, &dof, &body, NULL, &err) == UZ_OK);
     const int64_t n = qp.K.cols, entries = model.mesh.n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3;
@@ -318,7 +318,7 @@ TEST(what_only_obstacles_hold)
         uz_error err = {0};
         int64_t *dof;
         CHECK_MSG(result->summary.guarantee.proved, "%s", result->summary.guarantee.why);
-        CHECK(uz_body_model_outline(&model, &scene, &err) == UZ_OK);
+        CHECK(uz_body_model_build(&model, &scene, UZ_BODY_OUTLINE, &err) == UZ_OK);
         CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
         CHECK_INT(body.n_loose, k == 0 ? 1 : 3);
         double *press = zeros(model.mesh.n_nodes), *u = zeros(2 * model.mesh.n_nodes);
@@ -379,7 +379,7 @@ TEST(what_leaves_the_obstacle_keeps_to_the_supports)
     uz_qp qp;
     uz_error err = {0};
     int64_t *dof;
-    CHECK(uz_body_model_outline(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_body_model_build(&model, &scene, UZ_BODY_OUTLINE, &err) == UZ_OK);
     CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
     CHECK(uz_bound_dual_problem(&qp, &dof, &body, NULL, &err) == UZ_OK);
     double *stress = zeros(model.mesh.n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3);

@@ -185,7 +185,7 @@ TEST(arc_is_the_place_along_a_straight_side)
     uz_scene scene = pressed_scene(UZ_PLANE_STRAIN, "quad8");
     uz_body_model model;
     uz_error err = {0};
-    CHECK(uz_body_model_outline(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_body_model_build(&model, &scene, UZ_BODY_OUTLINE, &err) == UZ_OK);
     double arc[7];
     unsigned part[7];
     CHECK_INT(model.m, 7); /* middles too */

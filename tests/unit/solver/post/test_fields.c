@@ -279,7 +279,7 @@ static double *stress_of_box(int64_t *n, uz_scene *scene, const double *u, bool 
 {
     uz_body_model model;
     uz_field_body body;
-    CHECK(uz_body_model_outline(&model, scene, NULL) == UZ_OK && model.mesh.uniform);
+    CHECK(uz_body_model_build(&model, scene, UZ_BODY_OUTLINE, NULL) == UZ_OK && model.mesh.uniform);
     model.mesh.uniform = alike;
     CHECK(uz_field_body_init(&body, scene, &model, NULL) == UZ_OK);
     const int64_t nodal = model.mesh.n_nodes * body.components, points = uz_field_gauss_count(&body);

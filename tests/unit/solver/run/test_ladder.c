@@ -85,7 +85,7 @@ static double total_at(const uz_scene *scene, int64_t n, double requested)
     uz_result *result = body_solve(&s, 0.1 * requested);
     uz_body_model model = body_model(&s);
     double share;
-    const double mesh = uz_estimate_mesh_error(&share, &model, &s, result->u);
+    const double mesh = uz_estimate_mesh_error(NULL, &share, &model, &s, result->u);
     const double total = hypot(mesh, result->summary.certificate.relative_error);
     uz_body_model_clear(&model);
     uz_result_free(result);

@@ -198,9 +198,9 @@ TEST(marks_have_half_of_the_error)
     const uz_problem problem = problem_of_scene(&s);
     uz_body_model body;
     int64_t *list = NULL, n = 0;
-    CHECK_INT(uz_body_model_outline(&body, &s, NULL), UZ_OK);
+    CHECK_INT(uz_body_model_build(&body, &s, UZ_BODY_OUTLINE, NULL), UZ_OK);
     double eta2[6], sum = 0, marked = 0, least = INFINITY;
-    const double error = uz_estimate_element_errors(eta2, NULL, &body, &s, result->u);
+    const double error = uz_estimate_mesh_error(eta2, NULL, &body, &s, result->u);
     CHECK_REL(error, result->summary.discretization_error, 1e-12);
     for (int e = 0; e < 6; e++)
         sum += eta2[e];
@@ -229,12 +229,12 @@ TEST(starts_are_interpolated)
     uz_body_model outline;
     uz_state *start = NULL;
     int64_t *list = NULL, n = 0;
-    CHECK_INT(uz_body_model_outline(&outline, &s, NULL), UZ_OK);
+    CHECK_INT(uz_body_model_build(&outline, &s, UZ_BODY_OUTLINE, NULL), UZ_OK);
     CHECK_INT(uz_mark_elements(&list, &n, &outline, &problem, &coarse, 1e-3, NULL), UZ_OK);
     uz_body_model_clear(&outline);
     s.bisected = list;
     s.n_bisected = n;
-    CHECK_INT(uz_body_model_outline(&outline, &s, NULL), UZ_OK);
+    CHECK_INT(uz_body_model_build(&outline, &s, UZ_BODY_OUTLINE, NULL), UZ_OK);
     CHECK_INT(uz_transfer_start(&start, coarse, NULL, &outline, NULL), UZ_OK);
     CHECK(start && start->m == outline.m && outline.m > coarse->m);
     double before = 0, after = 0;

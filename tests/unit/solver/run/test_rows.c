@@ -81,7 +81,7 @@ static exact solve_exactly(const uz_problem *problem, const uz_result *answer)
     exact x = {.all = {.p = NULL}};
     uz_error err = {0};
     CHECK_INT(uz_scene_to_qp(&x.all, NULL, &problem->scene, &err), UZ_OK);
-    CHECK_INT(uz_body_model_build(&x.model, &problem->scene, &err), UZ_OK);
+    CHECK_INT(uz_body_model_build(&x.model, &problem->scene, UZ_BODY_SUPPORTED, &err), UZ_OK);
     CHECK_INT(answer->m, x.all.N.rows);
     x.touching = (uz_candidates){.m = answer->m, .in = body_room(answer->m, 1)};
     for (int64_t i = 0; i < answer->m; i++) {
@@ -140,7 +140,7 @@ static void check_apart(const uz_problem *problem, const uz_result *a, const uz_
 {
     uz_body_model model;
     uz_error err = {0};
-    CHECK_INT(uz_body_model_build(&model, &problem->scene, &err), UZ_OK);
+    CHECK_INT(uz_body_model_build(&model, &problem->scene, UZ_BODY_SUPPORTED, &err), UZ_OK);
     double *u = body_room(model.d, sizeof *u), *v = body_room(model.d, sizeof *v), square = 0;
     uz_restrict_nodal(u, &model, a->u);
     uz_restrict_nodal(v, &model, b->u);

@@ -106,7 +106,7 @@ TEST(tilted_body_is_that_of_the_exhaustive_search)
     uz_settings settings = uz_settings_default();
     uz_body_model model;
     uz_error err = {0};
-    CHECK(uz_body_model_build_held(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_body_model_build(&model, &scene, UZ_BODY_HELD, &err) == UZ_OK);
     uz_qp qp = {.K = model.K, .N = model.N, .p = vector(model.d), .h = vector(model.m)};
     CHECK(uz_body_model_load(qp.p, qp.h, NULL, &model, &scene, &err) == UZ_OK);
     exhaustive exact = search_all_above(&qp, 1e-6); /* K's entries are of 1e6 and rounded */

@@ -72,7 +72,7 @@ static uz_status estimate(const uz_scene *scene, uz_error *err)
     double *u = zeros(3 * model.mesh.n_nodes), *f = zeros(3 * model.mesh.n_nodes);
     u[5] = 1;
     heap.until_failure = asked;
-    uz_status status = isnan(uz_estimate_mesh_error(NULL, &model, scene, u)) ? UZ_ERR_MEMORY : UZ_OK;
+    uz_status status = isnan(uz_estimate_mesh_error(NULL, NULL, &model, scene, u)) ? UZ_ERR_MEMORY : UZ_OK;
     if (status != UZ_OK)
         snprintf(err->message, sizeof err->message, "no estimate");
     err->status = status;
@@ -241,10 +241,10 @@ TEST(error_estimate_without_memory_is_nan)
         heap.until_failure = n;
         heap.failed = false;
         heap.watching = true;
-        CHECK(isnan(uz_estimate_mesh_error(NULL, &model, NULL, u)));
+        CHECK(isnan(uz_estimate_mesh_error(NULL, NULL, &model, NULL, u)));
         heap.watching = false;
     }
-    CHECK(uz_estimate_mesh_error(NULL, &model, NULL, u) > 0);
+    CHECK(uz_estimate_mesh_error(NULL, NULL, &model, NULL, u) > 0);
     free(u);
     uz_body_model_clear(&model);
     uz_scene_clear(&scene);

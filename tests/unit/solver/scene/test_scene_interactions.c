@@ -349,7 +349,7 @@ static void examine(random_scene *s, const uz_result *x, tally *t, uint64_t seed
 {
     uz_error err = {0};
     examined e = {.s = s, .x = x, .seed = seed, .what = "as it is"};
-    if (uz_body_model_build_held(&e.model, &s->scene, &err) != UZ_OK || e.model.m != x->m) {
+    if (uz_body_model_build(&e.model, &s->scene, UZ_BODY_HELD, &err) != UZ_OK || e.model.m != x->m) {
         HOLDS(&e, false, "solved, but the body has %lld rows, not %lld: %s", (long long)e.model.m, (long long)x->m,
               err.message);
         uz_body_model_clear(&e.model);
@@ -372,7 +372,7 @@ static void compare(random_scene *s, const uz_result *x, const uz_result *y, con
 {
     examined e = {.s = s, .x = x, .seed = seed, .what = what};
     uz_error err = {0};
-    if (uz_body_model_build_held(&e.model, &s->scene, &err) != UZ_OK)
+    if (uz_body_model_build(&e.model, &s->scene, UZ_BODY_HELD, &err) != UZ_OK)
         return;
     const int dim = e.model.info.dim;
     const int64_t total = e.model.info.n_nodes * dim;
