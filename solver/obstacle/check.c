@@ -42,18 +42,6 @@ uz_status uz_obstacle_check_direction(const uz_obstacle_subject *s, const char *
     return status;
 }
 
-uz_status uz_obstacle_check_radius(const uz_obstacle_subject *s)
-{
-    char where[UZ_OBSTACLE_POINTER];
-    const double radius = s->contact->radius;
-    if (!isfinite(radius))
-        return uz_obstacle_not_finite(s, "radius", -1);
-    if (radius <= 0)
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "radius", -1),
-                       "the radius must be positive; it is %g", radius);
-    return UZ_OK;
-}
-
 uz_status uz_obstacle_check_lists(const uz_obstacle_subject *s, int64_t least, const char *key, const char *what)
 {
     char where[UZ_OBSTACLE_POINTER];

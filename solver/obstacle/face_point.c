@@ -35,13 +35,6 @@ static void curve_at(double x[3], const curve *k, double s)
         x[i] = k->a[i] + s * (k->b[i] + s * k->c[i]);
 }
 
-static double curve_distance(const curve *k, double s)
-{
-    double x[3];
-    curve_at(x, k, s);
-    return uz_dot3(x, x);
-}
-
 /* Half the derivative of the squared distance, and half the second one. */
 static double curve_slope(double *second, const curve *k, double s)
 {
@@ -60,9 +53,11 @@ static double closest_on_curve(const curve *k)
     if (uz_dot3(k->c, k->c) <= DBL_EPSILON * DBL_EPSILON * uz_dot3(k->b, k->b))
         return fmin(fmax(-uz_dot3(k->a, k->b) / uz_dot3(k->b, k->b), -1), 1);
     for (int i = 0; i <= SAMPLES; i++) {
-        const double s = 2.0 * i / SAMPLES - 1, d = curve_distance(k, s);
-        if (d < best) {
-            best = d;
+        const double s = 2.0 * i / SAMPLES - 1;
+        double x[3];
+        curve_at(x, k, s);
+        if (uz_dot3(x, x) < best) {
+            best = uz_dot3(x, x);
             at = s;
         }
     }
@@ -111,13 +106,6 @@ static void surface_at(double x[3], double *N, double T[2][3], const surface *f,
                 T[k][c] += slope[i][k] * f->x[i][c];
         }
     }
-}
-
-static double distance_at(const surface *f, const double at[2])
-{
-    double x[3];
-    surface_at(x, NULL, NULL, f, at);
-    return uz_dot3(x, x);
 }
 
 /* How far outside the face's own coordinates; < 0 within. */
@@ -176,13 +164,14 @@ static bool descend(double at[2], const surface *f)
     static const double TRIANGLE[7][2] = {{1. / 3, 1. / 3}, {0.1, 0.1},   {0.8, 0.1}, {0.1, 0.8},
                                           {0.45, 0.1},      {0.45, 0.45}, {0.1, 0.45}};
     const int starts = f->type->nodes == 3 ? 1 : f->type->nodes == 6 ? 7 : 9;
-    double distance = INFINITY;
+    double x[3], distance = INFINITY;
     for (int i = 0; i < starts; i++) {
         const int column = i % 3, line = i / 3;
         const double grid[2] = {0.7 * (column - 1), 0.7 * (line - 1)};
-        const double *start = f->type->corners == 4 ? grid : TRIANGLE[i], there = distance_at(f, start);
-        if (there < distance) {
-            distance = there;
+        const double *start = f->type->corners == 4 ? grid : TRIANGLE[i];
+        surface_at(x, NULL, NULL, f, start);
+        if (uz_dot3(x, x) < distance) {
+            distance = uz_dot3(x, x);
             memcpy(at, start, sizeof grid);
         }
     }
@@ -194,7 +183,8 @@ static bool descend(double at[2], const surface *f)
         for (int halving = 0; halving < HALVINGS; halving++, part *= 0.5) {
             next[0] = at[0] + part * step[0];
             next[1] = at[1] + part * step[1];
-            there = distance_at(f, next);
+            surface_at(x, NULL, NULL, f, next);
+            there = uz_dot3(x, x);
             if (there <= distance || fabs(step[0]) + fabs(step[1]) < SMALL)
                 break;
         }
@@ -217,13 +207,6 @@ int uz_face_corners(int dim, int count)
     return dim == 2 ? 2 : count % 4 == 0 ? 4 : 3;
 }
 
-static void set_normal(uz_foot *out, const double normal[3])
-{
-    const double length = sqrt(uz_dot3(normal, normal));
-    for (int c = 0; c < 3; c++)
-        out->normal[c] = normal[c] / length;
-}
-
 /* The closest point of the border; its squared distance is returned, its place in *out. */
 static double closest_on_border(uz_foot *out, const surface *f, double x[3])
 {
@@ -234,11 +217,12 @@ static double closest_on_border(uz_foot *out, const surface *f, double x[3])
         const curve k = curve_of(f->x[edge], f->x[next], f->type->nodes > corners ? f->x[corners + edge] : NULL, 3);
         double s = closest_on_curve(&k);
         s = s >= 1 - SNAP ? 1 : s <= -1 + SNAP ? -1 : s;
-        const double distance = curve_distance(&k, s);
-        if (!(distance < best))
+        double there[3];
+        curve_at(there, &k, s);
+        if (!(uz_dot3(there, there) < best))
             continue;
-        best = distance;
-        curve_at(x, &k, s);
+        best = uz_dot3(there, there);
+        memcpy(x, there, sizeof there);
         const double *from = f->type->local[edge], *to = f->type->local[next];
         for (int c = 0; c < 2; c++)
             out->local[c] = s == -1 ? from[c] : s == 1 ? to[c] : 0.5 * ((1 - s) * from[c] + (1 + s) * to[c]);
@@ -250,6 +234,7 @@ static double closest_on_border(uz_foot *out, const surface *f, double x[3])
 
 void uz_face_closest(uz_foot *out, int dim, int count, const double *xyz)
 {
+    double normal[3] = {0};
     memset(out, 0, sizeof *out);
     if (dim == 2) {
         const curve k = curve_of(xyz, xyz + 2, count == 3 ? xyz + 4 : NULL, 2);
@@ -263,11 +248,11 @@ void uz_face_closest(uz_foot *out, int dim, int count, const double *xyz)
         out->weight[1] = 0.5 * (1 + s) - 0.5 * bubble;
         out->weight[2] = bubble;
         curve_at(out->point, &k, s);
-        const double tangent[2] = {k.b[0] + 2 * s * k.c[0], k.b[1] + 2 * s * k.c[1]};
-        set_normal(out, (double[3]){tangent[1], -tangent[0], 0});
+        normal[0] = k.b[1] + 2 * s * k.c[1];
+        normal[1] = -(k.b[0] + 2 * s * k.c[0]);
     } else {
         surface f = {.type = uz_face_type(count), .x = {{0}}};
-        double at[2] = {0}, border[3], normal[3], T[2][3];
+        double at[2] = {0}, border[3], T[2][3];
         memcpy(f.x, xyz, (size_t)count * sizeof f.x[0]);
         const double distance = closest_on_border(out, &f, border);
         if (descend(at, &f)) {
@@ -286,7 +271,9 @@ void uz_face_closest(uz_foot *out, int dim, int count, const double *xyz)
         }
         surface_at(out->point, out->weight, T, &f, out->local);
         uz_cross3(normal, T[0], T[1]);
-        set_normal(out, normal);
     }
+    const double length = sqrt(uz_dot3(normal, normal));
+    for (int c = 0; c < 3; c++)
+        out->normal[c] = normal[c] / length;
     out->distance2 = uz_dot3(out->point, out->point);
 }

@@ -67,15 +67,6 @@ static uz_status check(const uz_obstacle_subject *s)
     return status;
 }
 
-static double largest(const uz_contact *contact, int dim)
-{
-    const double most = uz_obstacle_largest(0, contact->x, contact->n_x);
-    if (dim == 2)
-        return uz_obstacle_largest(most, contact->z, contact->n_x);
-    return uz_obstacle_largest(uz_obstacle_largest(most, contact->z, contact->n_x * contact->n_y), contact->y,
-                               contact->n_y);
-}
-
 /* own is a uz_line in the plane, flat beyond its ends, and a uz_table in space. */
 static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
 {
@@ -152,7 +143,6 @@ static void surface(double x[3], const uz_obstacle_patch *p, double s, double t)
 const uz_obstacle_shape uz_shape_height = {.name = {"height", "height"},
                                            .has_edges = true,
                                            .check = check,
-                                           .largest = largest,
                                            .init = init,
                                            .clear = clear,
                                            .gap = gap,

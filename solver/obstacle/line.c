@@ -41,17 +41,12 @@ static int64_t closest(double foot[2], const uz_line *line, int64_t i, const dou
     return corner;
 }
 
-/* Pieces are numbered in the tree without the half lines that a closed line has not. */
-static int64_t piece_number(const uz_line *line, int64_t item)
-{
-    return item + (line->closed ? 1 : 0);
-}
-
+/* An item of the tree is piece item + closed: a closed line has no half line at its beginning. */
 static double distance_to(const void *ctx, int64_t item, const double *x, double best)
 {
     (void)best;
     const uz_line *line = ctx;
-    const int64_t i = piece_number(line, item);
+    const int64_t i = item + line->closed;
     double foot[2];
     if (closest(foot, line, i, x) < 0) {
         const piece p = piece_of(line, i);
@@ -74,7 +69,7 @@ static void gap_to_piece(uz_gap *out, const uz_line *line, int64_t i, const doub
 void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
 {
     const int64_t item = uz_box_tree_nearest(&line->tree, x, INFINITY, distance_to, line);
-    const int64_t i = piece_number(line, item);
+    const int64_t i = item + line->closed;
     if (item < 0) {
         out->gap = NAN;
         return;
@@ -142,7 +137,7 @@ uz_status uz_line_init(uz_line *out, int64_t n, const double *x, const double *y
     memcpy(out->tangent, ends ? ends : out->tangent + 2, 2 * sizeof *ends);
     memcpy(out->tangent + 2 * n, ends ? ends + 2 : out->tangent + 2 * n - 2, 2 * sizeof *ends);
     for (int64_t i = 0; i < items; i++)
-        box_of(box + 4 * i, out, piece_number(out, i));
+        box_of(box + 4 * i, out, i + out->closed);
     const uz_status status = uz_box_tree_init(&out->tree, items, 2, box, err);
     free(box);
     if (status != UZ_OK)
@@ -184,7 +179,7 @@ typedef struct {
 static bool visit_pair(void *ctx, int64_t item)
 {
     crossing *search = ctx;
-    const int64_t j = piece_number(search->line, item);
+    const int64_t j = item + search->line->closed;
     if (j <= search->i)
         return false;
     if (search->left-- <= 0)
@@ -200,7 +195,7 @@ bool uz_line_crosses(int64_t pair[2], const uz_line *line)
     crossing search = {.line = line, .found = -1, .left = UZ_LINE_PAIRS * line->n};
     for (int64_t item = 0; item < line->tree.n && search.left > 0; item++) {
         double box[4];
-        search.i = piece_number(line, item);
+        search.i = item + line->closed;
         box_of(box, line, search.i);
         if (uz_box_tree_meet(&line->tree, box, visit_pair, &search) && search.found >= 0) {
             pair[0] = search.i;

@@ -30,7 +30,8 @@ const uz_obstacle_shape *uz_obstacle_shape_of(uz_obstacle_kind kind)
     return (size_t)kind < sizeof shapes / sizeof shapes[0] ? shapes[kind] : NULL;
 }
 
-double uz_obstacle_largest(double most, const double *v, int64_t n)
+/* The largest magnitude of n numbers (v NULL: none) and `most`. */
+static double largest(double most, const double *v, int64_t n)
 {
     for (int64_t i = 0; v && i < n; i++)
         most = fmax(most, fabs(v[i]));
@@ -53,8 +54,12 @@ uz_status uz_obstacle_new(uz_obstacle **out, const uz_contact *contact, int64_t 
     o->index = index;
     o->inside = contact->inside;
     /* The power of two that brings numbers up to `most` to 1/2..1. */
-    double most = o->shape->largest(contact, o->dim);
+    int64_t n[3] = {0};
     int exponent;
+    if (o->shape->lists)
+        o->shape->lists(n, contact);
+    double most = largest(fabs(contact->radius), contact->point, o->dim);
+    most = largest(largest(largest(most, contact->x, n[0]), contact->y, n[1]), contact->z, n[2]);
     frexp(most > 0 ? most : 1, &exponent);
     o->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
     o->radius = contact->radius * o->scale;
@@ -80,25 +85,18 @@ void uz_obstacle_free(uz_obstacle *obstacle)
     free(obstacle);
 }
 
-static uz_status refuse_overflow(const uz_obstacle *o, uz_error *err)
-{
-    char where[96];
-    snprintf(where, sizeof where, "/contacts/%lld/obstacle", (long long)o->index);
-    return uz_fail(err, UZ_ERR_NOT_FINITE, where, "the gap to this obstacle overflows");
-}
-
 uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, uz_error *err)
 {
     const uz_obstacle *o = obstacle;
     double at[3] = {0};
     uz_gap scaled = {0};
+    bool finite = true;
     memset(out, 0, sizeof *out);
     for (int c = 0; c < o->dim; c++) {
         at[c] = x[c] * o->scale;
-        if (!isfinite(at[c]))
-            return refuse_overflow(o, err);
+        finite = finite && isfinite(at[c]);
     }
-    const uz_status status = o->shape->gap(&scaled, o, at, err);
+    const uz_status status = finite ? o->shape->gap(&scaled, o, at, err) : UZ_OK;
     if (status != UZ_OK)
         return status;
     scaled.gap /= o->scale; /* back to the caller's units */
@@ -106,8 +104,11 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
     for (int c = 0; c < 3; c++)
         scaled.foot[c] /= o->scale;
     const double sum = scaled.gap + scaled.normal[0] + scaled.normal[1] + scaled.normal[2];
-    if (!isfinite(sum) || isnan(scaled.curvature))
-        return refuse_overflow(o, err);
+    if (!finite || !isfinite(sum) || isnan(scaled.curvature)) {
+        char where[96];
+        snprintf(where, sizeof where, "/contacts/%lld/obstacle", (long long)o->index);
+        return uz_fail(err, UZ_ERR_NOT_FINITE, where, "the gap to this obstacle overflows");
+    }
     *out = scaled;
     return UZ_OK;
 }
@@ -181,20 +182,6 @@ bool uz_obstacle_has_edges(const uz_obstacle *obstacle)
     return obstacle->shape->has_edges;
 }
 
-/* The plane that is closest to at + step * way, as a gap of x. False: an edge that juts out is closest, or nothing. */
-static bool plane_beside(uz_gap *out, const uz_obstacle *obstacle, const double *x, const double *at, const double *way,
-                         double step)
-{
-    double beside[3] = {0};
-    for (int c = 0; c < obstacle->dim; c++)
-        beside[c] = at[c] + step * way[c];
-    if (uz_obstacle_gap(out, obstacle, beside, NULL) != UZ_OK || !(fabs(out->curvature * out->gap) < 0.5))
-        return false;
-    for (int c = 0; c < obstacle->dim; c++)
-        out->gap += (x[c] - beside[c]) * out->normal[c];
-    return true;
-}
-
 /* Do two planes turn by more than `least` (rad), and does either rise above the other? */
 static bool is_groove(const uz_gap *a, const uz_gap *b, double least, double rounding)
 {
@@ -215,8 +202,16 @@ int uz_obstacle_flanks(uz_gap *out, int count, int most, const uz_obstacle *obst
     const double rounding = 1e-9 * sqrt(way[0] * way[0] + way[1] * way[1] + (obstacle->dim == 3 ? way[2] * way[2] : 0));
     for (int k = 0; k < 4; k++) {
         bool seen[2];
-        for (int j = 0; j < 2; j++)
-            seen[j] = plane_beside(&pair[j], obstacle, x, at, way, j ? -STEP[k] : STEP[k]);
+        for (int j = 0; j < 2; j++) {
+            double beside[3] = {0};
+            for (int c = 0; c < obstacle->dim; c++)
+                beside[c] = at[c] + (j ? -STEP[k] : STEP[k]) * way[c];
+            /* an edge that juts out has no plane */
+            seen[j] = uz_obstacle_gap(&pair[j], obstacle, beside, NULL) == UZ_OK &&
+                      fabs(pair[j].curvature * pair[j].gap) < 0.5;
+            for (int c = 0; c < obstacle->dim && seen[j]; c++)
+                pair[j].gap += (x[c] - beside[c]) * pair[j].normal[c];
+        }
         /* a shallow one is told from a curve by a leap at the point */
         const bool leaps = STEP[k] == AS_CLOSE && seen[0] && seen[1] && is_groove(&pair[0], &pair[1], NO_GROOVE, 0);
         for (int j = 0; j < 2; j++) {

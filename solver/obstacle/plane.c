@@ -12,11 +12,6 @@ static uz_status check(const uz_obstacle_subject *s)
     return status == UZ_OK ? uz_obstacle_check_finite(s, "point", s->contact->point, s->dim) : status;
 }
 
-static double largest(const uz_contact *contact, int dim)
-{
-    return uz_obstacle_largest(0, contact->point, dim);
-}
-
 static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
 {
     (void)err;
@@ -63,7 +58,6 @@ static void surface(double x[3], const uz_obstacle_patch *p, double s, double t)
 const uz_obstacle_shape uz_shape_plane = {.name = {"plane", "plane"},
                                           .has_direction = true,
                                           .check = check,
-                                          .largest = largest,
                                           .gap = gap,
                                           .outline = outline,
                                           .place = place,

@@ -32,12 +32,6 @@ static uz_status check(const uz_obstacle_subject *s)
     return UZ_OK;
 }
 
-static double largest(const uz_contact *contact, int dim)
-{
-    (void)dim;
-    return uz_obstacle_largest(uz_obstacle_largest(0, contact->x, contact->n_x), contact->y, contact->n_x);
-}
-
 static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
 {
     char where[96], of[2][64];
@@ -97,7 +91,6 @@ const uz_obstacle_shape uz_shape_polyline = {
     .refused = {NULL, "a polyline is an obstacle of plane models; use height for a solid"},
     .has_edges = true,
     .check = check,
-    .largest = largest,
     .init = init,
     .clear = clear,
     .gap = gap,

@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "obstacle/box_tree.h"
 #include "obstacle/face_point.h"
 #include "scene/scene.h"
@@ -88,10 +89,7 @@ static double face_size(const double *xyz, int dim, int corners)
     double most = 0;
     for (int i = 0; i < corners; i++) {
         const int j = (i + 1) % corners;
-        double sum = 0;
-        for (int c = 0; c < dim; c++)
-            sum += (xyz[j * dim + c] - xyz[i * dim + c]) * (xyz[j * dim + c] - xyz[i * dim + c]);
-        most = fmax(most, sqrt(sum));
+        most = fmax(most, sqrt(uz_distance2(xyz + j * dim, xyz + i * dim, dim)));
     }
     return most;
 }
@@ -265,22 +263,6 @@ static bool normal_between(double normal[3], const master *m, const uz_contact_p
     return true;
 }
 
-/* Do all faces of the slave around its node (at x, scaled) look the way the master does? Then what is behind the master
- * there is the far side of the slave, as of a clamp around a plate, and did not come through it. */
-static bool looks_away(const master *slave, int64_t node, const double *x, const double normal[3])
-{
-    for (int64_t q = slave->first[node]; q < slave->first[node + 1]; q++) {
-        uz_foot foot;
-        double cosine = 0;
-        closest_on(&foot, slave, slave->around[q], x);
-        for (int c = 0; c < 3; c++)
-            cosine += foot.normal[c] * normal[c];
-        if (!(cosine > SAME_WAY))
-            return false;
-    }
-    return slave->first[node + 1] > slave->first[node];
-}
-
 /* Fills all of a row but its node for a point x, scaled; *found false: it faces no part of the master. Returns false
  * where the face has no normal: *row tells which. */
 static bool place_on(bool *found, uz_contact_pair *row, const master *m, const double x[3], const uz_own_place *own)
@@ -352,8 +334,15 @@ static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, co
                        (long long)row->master[0], m->group->name);
     }
     row->node = node;
-    if (*found && row->gap < -ON_BORDER * row->size && looks_away(slave, node, x, row->normal))
-        *found = false;
+    /* Where all faces of the slave around its node look the way the master does, what is behind the master there is
+     * the far side of the slave, as of a clamp around a plate, and did not come through it. */
+    bool away = *found && row->gap < -ON_BORDER * row->size && slave->first[node + 1] > slave->first[node];
+    for (int64_t q = slave->first[node]; q < slave->first[node + 1] && away; q++) {
+        uz_foot foot;
+        closest_on(&foot, slave, slave->around[q], x);
+        away = uz_dot3(foot.normal, row->normal) > SAME_WAY;
+    }
+    *found = *found && !away;
     return UZ_OK;
 }
 

@@ -13,23 +13,21 @@ static const double PI = 3.14159265358979;
 /* Of the length of a patch: half an arc that is as long. */
 #define ARC (1.5 * UZ_PATCH_REACH)
 
-static uz_status check_round(const uz_obstacle_subject *s)
+static uz_status check(const uz_obstacle_subject *s)
 {
-    const uz_status status = uz_obstacle_check_radius(s);
-    return status == UZ_OK ? uz_obstacle_check_finite(s, "center", s->contact->point, s->dim) : status;
-}
-
-static uz_status check_cylinder(const uz_obstacle_subject *s)
-{
-    uz_status status = uz_obstacle_check_radius(s);
-    if (status == UZ_OK)
+    char where[UZ_OBSTACLE_POINTER];
+    const bool cylinder = s->shape == &uz_shape_cylinder;
+    const double radius = s->contact->radius;
+    uz_status status = UZ_OK;
+    if (!isfinite(radius))
+        return uz_obstacle_not_finite(s, "radius", -1);
+    if (radius <= 0)
+        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "radius", -1),
+                       "the radius must be positive; it is %g", radius);
+    if (cylinder)
         status = uz_obstacle_check_direction(s, "axis", "the axis has no direction: it is zero");
-    return status == UZ_OK ? uz_obstacle_check_finite(s, "point", s->contact->point, 3) : status;
-}
-
-static double largest(const uz_contact *contact, int dim)
-{
-    return fmax(uz_obstacle_largest(0, contact->point, dim), contact->radius);
+    return status == UZ_OK ? uz_obstacle_check_finite(s, cylinder ? "point" : "center", s->contact->point, s->dim)
+                           : status;
 }
 
 static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
@@ -128,8 +126,7 @@ static void cylinder_surface(double x[3], const uz_obstacle_patch *p, double s, 
 }
 
 const uz_obstacle_shape uz_shape_round = {.name = {"circle", "sphere"},
-                                          .check = check_round,
-                                          .largest = largest,
+                                          .check = check,
                                           .gap = gap,
                                           .outline = outline_circle,
                                           .place = place_sphere,
@@ -139,8 +136,7 @@ const uz_obstacle_shape uz_shape_cylinder = {
     .name = {"cylinder", "cylinder"},
     .refused = {"a cylinder is an obstacle of solid models; in a plane use a circle, or a plane"},
     .has_direction = true,
-    .check = check_cylinder,
-    .largest = largest,
+    .check = check,
     .gap = gap,
     .place = place_cylinder,
     .surface = cylinder_surface};

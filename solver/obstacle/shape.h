@@ -43,14 +43,13 @@ struct uz_obstacle_shape {
     bool has_direction;     /* the contact's `normal` is one */
     bool has_edges;         /* its normal jumps */
     uz_status (*check)(const uz_obstacle_subject *s);
-    double (*largest)(const uz_contact *contact, int dim); /* magnitude among its coordinates */
     /* own from the contact, coordinates times o->scale; clear: frees what it holds, also after a failure. NULL: none.
      */
     uz_status (*init)(uz_obstacle *o, const uz_contact *contact, uz_error *err);
     void (*clear)(uz_obstacle *o);
     /* All of out, which is zero. */
     uz_status (*gap)(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err);
-    /* How many numbers of x, y and z belong to it, for the body's key; NULL: none. */
+    /* How many numbers of x, y and z belong to it, for its scale and the body's key; NULL: none. */
     void (*lists)(int64_t n[3], const uz_contact *contact);
     /* The border in the plane, the obstacle on its right: its i-th point, and the way (any length) in which it goes on
      * beyond the first and the last one, zero where it does not. Returns how many points; 1: a line. NULL: in space. */

@@ -43,23 +43,12 @@ static double height(const cell *s, double x, double y)
     return s->z0 + s->a * (x - s->x0) + (s->b + s->c * (x - s->x0)) * (y - s->y0);
 }
 
-static double clamp(double value, double low, double high)
-{
-    return fmin(fmax(value, low), high);
-}
-
 /* The point of the cell closest to q among those of this x: there the surface is a straight line. */
 static double best_y(const cell *s, const double q[3], double x)
 {
     const double slope = s->b + s->c * (x - s->x0), base = s->z0 + s->a * (x - s->x0);
     const double along = (q[1] - s->y0 + slope * (q[2] - base)) / (1 + slope * slope);
-    return clamp(s->y0 + along, s->low[1], s->high[1]);
-}
-
-static double distance_at(const cell *s, const double q[3], double x, double y)
-{
-    const double dx = x - q[0], dy = y - q[1], dz = height(s, x, y) - q[2];
-    return dx * dx + dy * dy + dz * dz;
+    return fmin(fmax(s->y0 + along, s->low[1]), s->high[1]);
 }
 
 typedef struct {
@@ -84,16 +73,15 @@ static double closest(double at[2], const cell *s, const double q[3])
     double best = INFINITY;
     const bool flat = s->c == 0 && s->a == 0; /* along x, and so in endless cells */
     const int stretches = flat ? 0 : s->c == 0 ? 1 : STRETCHES;
-    at[0] = clamp(q[0], s->low[0], s->high[0]);
-    at[1] = best_y(s, q, at[0]);
-    best = distance_at(s, q, at[0], at[1]);
-    for (int k = 0; k < stretches; k++) {
+    for (int k = -1; k < stretches; k++) { /* first straight above or below q */
         const double width = s->high[0] - s->low[0];
         const double low = s->low[0] + width * k / stretches;
         const double high = k + 1 < stretches ? s->low[0] + width * (k + 1) / stretches : s->high[0];
-        const double x = uz_root_between(slope_at, &(cell_point){s, q}, low, high, 0), y = best_y(s, q, x);
-        const double distance = distance_at(s, q, x, y);
-        if (distance < best) {
+        const double x = k < 0 ? fmin(fmax(q[0], s->low[0]), s->high[0])
+                               : uz_root_between(slope_at, &(cell_point){s, q}, low, high, 0);
+        const double y = best_y(s, q, x), z = height(s, x, y);
+        const double distance = (x - q[0]) * (x - q[0]) + (y - q[1]) * (y - q[1]) + (z - q[2]) * (z - q[2]);
+        if (k < 0 || distance < best) {
             best = distance;
             at[0] = x;
             at[1] = y;
