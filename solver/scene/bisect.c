@@ -28,6 +28,7 @@ enum { CORNERS = 4, FROM = UZ_BISECT_FROM };
 typedef struct {
     int64_t corner[CORNERS], root;
     int corners;
+    bool quadratic;              /* its root has nodes amid its edges */
     unsigned char split;         /* ends of the edge that is halved next */
     unsigned char mark[CORNERS]; /* in space: ends of the marked edge of the face opposite each corner */
     bool flag;                   /* in space: of Arnold, Mukherjee and Pouly */
@@ -67,17 +68,6 @@ static void cut(bisection *x, int64_t e);
 static void bisect(bisection *x, int64_t e);
 static void conform(bisection *x);
 static uz_status publish(bisection *x, uz_error *err);
-
-static void end(bisection *x)
-{
-    free(x->part);
-    free(x->edges);
-    free(x->users);
-    free(x->xyz);
-    free(x->from);
-    free(x->waits);
-    free(x->table);
-}
 
 uz_status uz_mesh_check_bisection(const uz_mesh *mesh, uz_error *err)
 {
@@ -129,7 +119,13 @@ uz_status uz_mesh_bisect(uz_mesh *mesh, const int64_t *marked, int64_t n, uz_err
     if (x.failed)
         status =
             uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine a mesh of %lld elements", (long long)mesh->n_elements);
-    end(&x);
+    free(x.part);
+    free(x.edges);
+    free(x.users);
+    free(x.xyz);
+    free(x.from);
+    free(x.waits);
+    free(x.table);
     return status;
 }
 
@@ -313,7 +309,7 @@ static bool begin(bisection *x, uz_mesh *mesh)
         const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
         const int64_t *node = mesh->node + mesh->first[e];
         piece *part = &x->part[e];
-        *part = (piece){.root = e, .corners = type->corners};
+        *part = (piece){.root = e, .corners = type->corners, .quadratic = type->nodes > type->corners};
         memcpy(part->corner, node, (size_t)type->corners * sizeof *node);
         for (int s = 0; s < type->sides; s++) {
             int opposite = type->corners > x->dim + 1 ? 1 << s : all;
@@ -339,13 +335,6 @@ static bool begin(bisection *x, uz_mesh *mesh)
 
 /* ---- one bisection */
 
-/* Has its root nodes amid its edges? */
-static bool is_quadratic(const bisection *x, const piece *part)
-{
-    const uz_element_type *type = uz_element_type_of((uz_element_kind)x->mesh->kind[part->root]);
-    return type->nodes > type->corners;
-}
-
 /* A quadrilateral becomes two triangles, both as due as it was. */
 static void cut(bisection *x, int64_t e)
 {
@@ -358,7 +347,7 @@ static void cut(bisection *x, int64_t e)
         }
     const int i = length[1] < length[0] ? 1 : 0;
     const int64_t at = edge_of(x, whole.corner[i], whole.corner[i + 2]);
-    if (!x->failed && is_quadratic(x, &whole) && x->edges[at].middle < 0) {
+    if (!x->failed && whole.quadratic && x->edges[at].middle < 0) {
         int64_t from[FROM];
         for (int k = 0; k < 4; k++) {
             from[k] = whole.corner[k];
@@ -373,7 +362,7 @@ static void cut(bisection *x, int64_t e)
     for (int k = 0; k < 2; k++) { /* from corner i on, over the next two */
         piece *half = &x->part[k == 0 ? e : x->parts];
         const int next = (i + 1 + k) % 4, last = (i + 2 + k) % 4;
-        *half = (piece){.root = whole.root, .corners = 3, .due = whole.due};
+        *half = (piece){.root = whole.root, .corners = 3, .quadratic = whole.quadratic, .due = whole.due};
         half->corner[0] = whole.corner[i];
         half->corner[1] = whole.corner[next];
         half->corner[2] = whole.corner[last];
@@ -436,19 +425,18 @@ static void mark_halves(piece *one, piece *two, const piece *whole, int a, int b
 static void bisect(bisection *x, int64_t e)
 {
     const piece whole = x->part[e];
-    const bool quadratic = is_quadratic(x, &whole);
     int a = 0, b = x->dim;
     while (!(whole.split >> a & 1))
         a++;
     while (!(whole.split >> b & 1))
         b--;
-    const int64_t na = whole.corner[a], nb = whole.corner[b], at = halve(x, na, nb, quadratic);
+    const int64_t na = whole.corner[a], nb = whole.corner[b], at = halve(x, na, nb, whole.quadratic);
     if (x->failed || x->too_many || !grow(&x->part, &x->room_parts, x->parts, sizeof *x->part)) {
         x->failed = x->failed || !x->too_many;
         return;
     }
     const int64_t middle = x->edges[at].middle;
-    for (int c = 0; c <= x->dim && quadratic && !x->failed; c++) {
+    for (int c = 0; c <= x->dim && whole.quadratic && !x->failed; c++) {
         const int64_t nc = whole.corner[c];
         if (c == a || c == b)
             continue;
@@ -646,7 +634,7 @@ static uz_status publish(bisection *x, uz_error *err)
         const piece *part = &x->part[e];
         const uz_element_kind root = (uz_element_kind)mesh->kind[part->root];
         const uz_element_kind kind = part->corners == uz_element_type_of(root)->corners ? root
-                                     : is_quadratic(x, part)                            ? UZ_TRI6
+                                     : part->quadratic                                  ? UZ_TRI6
                                                                                         : UZ_TRI3;
         const uz_element_type *type = uz_element_type_of(kind);
         fine.kind[e] = (unsigned char)kind;

@@ -84,24 +84,6 @@ static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mes
     return status;
 }
 
-static uz_status check_formulation(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
-{
-    const uz_formulation formulation = scene->formulation;
-    if (formulation >= UZ_FORMULATIONS)
-        return uz_fail(err, UZ_ERR_SCENE, "/formulation",
-                       "unknown formulation; use auto, standard, bbar or incompatible_modes");
-    if (formulation == UZ_FORMULATION_AUTO || formulation == UZ_FORMULATION_STANDARD || mesh->from)
-        return UZ_OK; /* what was given had some, and they may all be bisected */
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
-        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
-        if (type->bbar || type->incompatible)
-            return UZ_OK;
-    }
-    return uz_fail(err, UZ_ERR_SCENE, "/formulation",
-                   "the formulations bbar and incompatible_modes are those of quad4 and hex8, and the mesh has none; "
-                   "use auto");
-}
-
 uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     if (scene->model > UZ_SOLID)
@@ -121,9 +103,21 @@ uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_err
                            "node %lld at (%g, %g) has a negative x, which is the radius in a body of revolution; "
                            "mesh the half with x >= 0",
                            (long long)i, mesh->xyz[2 * i], mesh->xyz[2 * i + 1]);
-    uz_status status = check_formulation(scene, mesh, err);
-    if (status == UZ_OK)
-        status = uz_check_materials(scene, mesh, err);
+    const uz_formulation formulation = scene->formulation;
+    if (formulation >= UZ_FORMULATIONS)
+        return uz_fail(err, UZ_ERR_SCENE, "/formulation",
+                       "unknown formulation; use auto, standard, bbar or incompatible_modes");
+    bool fits = formulation == UZ_FORMULATION_AUTO || formulation == UZ_FORMULATION_STANDARD ||
+                mesh->from; /* what was given had some, and they may all be bisected */
+    for (int64_t e = 0; e < mesh->n_elements && !fits; e++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        fits = type->bbar || type->incompatible;
+    }
+    if (!fits)
+        return uz_fail(err, UZ_ERR_SCENE, "/formulation",
+                       "the formulations bbar and incompatible_modes are those of quad4 and hex8, and the mesh has "
+                       "none; use auto");
+    const uz_status status = uz_check_materials(scene, mesh, err);
     return status == UZ_OK ? check_supports_and_contacts(scene, mesh, err) : status;
 }
 

@@ -14,16 +14,6 @@ static int by_name(const void *a, const void *b)
     return strncmp(a, b, sizeof(char[64]));
 }
 
-/* FNV-1a (G. Fowler, L. Noll, K. Vo): long lists that begin alike are called differently. */
-static uint32_t number_of(const uz_names *groups)
-{
-    uint32_t sum = 2166136261u;
-    for (int64_t i = 0; i < groups->n; i++)
-        for (int k = 0; k < 64 && (k == 0 || groups->name[i][k - 1]); k++)
-            sum = (sum ^ (unsigned char)groups->name[i][k]) * 16777619u;
-    return sum;
-}
-
 void uz_name_together(char name[64], uz_names *groups)
 {
     enum { NUMBER = 12 }; /* bytes of " ...#0123abcd" less its end */
@@ -46,8 +36,14 @@ void uz_name_together(char name[64], uz_names *groups)
             break;
         used += (size_t)snprintf(name + used, 64 - used, "%s%.63s", i > 0 ? " + " : "", groups->name[i]);
     }
-    if (!whole)
-        snprintf(name + used, 64 - used, "%s#%08x", used > 0 ? " + " : "", (unsigned)number_of(groups));
+    if (whole)
+        return;
+    /* FNV-1a (G. Fowler, L. Noll, K. Vo): long lists that begin alike are called differently */
+    uint32_t sum = 2166136261u;
+    for (int64_t i = 0; i < groups->n; i++)
+        for (int k = 0; k < 64 && (k == 0 || groups->name[i][k - 1]); k++)
+            sum = (sum ^ (unsigned char)groups->name[i][k]) * 16777619u;
+    snprintf(name + used, 64 - used, "%s#%08x", used > 0 ? " + " : "", (unsigned)sum);
 }
 
 int uz_face_order(const void *a, const void *b)

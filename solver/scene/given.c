@@ -74,21 +74,6 @@ static uz_status copy_mesh(uz_mesh *mesh, const uz_given_mesh *given, const int6
                    "the mesh reaches beyond the largest number");
 }
 
-/* Two elements on the same corners would count the material twice. */
-static uz_status check_twins(const uz_mesh *mesh, const uz_given_mesh *given, uz_error *err)
-{
-    uz_corner_table table;
-    char what[64];
-    uz_status status = uz_corner_table_build(&table, mesh, false, err);
-    for (int64_t i = 0; i < table.count && status == UZ_OK; i++)
-        if (table.same[i]) {
-            snprintf(what, sizeof what, "has the corners of element %lld", (long long)table.item[i - 1].element);
-            status = uz_given_refuse(given, table.item[i].element, what, "each may be there only once", err);
-        }
-    uz_corner_table_clear(&table);
-    return status;
-}
-
 uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, uz_error *err)
 {
     memset(out, 0, sizeof *out);
@@ -101,8 +86,16 @@ uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, 
     status = number_nodes(new_node, out, given, err);
     if (status == UZ_OK)
         status = copy_mesh(out, given, new_node, err);
+    uz_corner_table table = {.count = 0};
     if (status == UZ_OK)
-        status = check_twins(out, given, err);
+        status = uz_corner_table_build(&table, out, false, err);
+    for (int64_t i = 0; i < table.count && status == UZ_OK; i++)
+        if (table.same[i]) { /* two elements on the same corners would count the material twice */
+            char what[64];
+            snprintf(what, sizeof what, "has the corners of element %lld", (long long)table.item[i - 1].element);
+            status = uz_given_refuse(given, table.item[i].element, what, "each may be there only once", err);
+        }
+    uz_corner_table_clear(&table);
     if (status == UZ_OK)
         status = uz_given_groups(out, given, new_node, err);
     free(new_node);

@@ -241,44 +241,6 @@ static uz_status finish_group(const group_work *work, const char *name, named_pa
     return status;
 }
 
-/* The group of all that is given under the name of group i, unless an earlier one had it. */
-static uz_status add_named(const group_work *work, int64_t i)
-{
-    const uz_given_group *groups = work->given->groups;
-    named_parts parts = {0};
-    uz_status status = UZ_OK;
-    for (int64_t k = 0; k < i; k++)
-        if (strcmp(groups[k].name, groups[i].name) == 0)
-            return UZ_OK;
-    for (int64_t k = i; k < work->given->n_groups && status == UZ_OK; k++)
-        if (strcmp(groups[k].name, groups[i].name) == 0)
-            status = collect(&parts, work, &groups[k]);
-    return finish_group(work, groups[i].name, &parts, status);
-}
-
-/* ---- the groups that every mesh has */
-
-/* The faces that belong to one element only, in the order of their elements. */
-static uz_status add_boundary(const group_work *work)
-{
-    const uz_corner_table *sides = &work->sides;
-    named_parts parts = {0};
-    uz_status status = UZ_OK;
-    for (int64_t i = 0; i < sides->count && status == UZ_OK; i++)
-        if (!sides->same[i] && !sides->same[i + 1] && !append_face(&parts, work, sides->item[i]))
-            status = no_memory(work);
-    sort_unique(&parts.faces);
-    return finish_group(work, "boundary", &parts, status);
-}
-
-static uz_group *find_group(uz_mesh *mesh, const char *name)
-{
-    for (int64_t i = 0; i < mesh->n_groups; i++)
-        if (strcmp(mesh->groups[i].name, name) == 0)
-            return &mesh->groups[i];
-    return NULL;
-}
-
 uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64_t *new_node, uz_error *err)
 {
     group_work work = {.mesh = mesh, .given = given, .new_node = new_node, .err = err};
@@ -295,11 +257,27 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
     if (!mesh->groups)
         return no_memory(&work);
     uz_status status = uz_corner_table_build(&work.sides, mesh, true, err);
-    for (int64_t i = 0; i < given->n_groups && status == UZ_OK; i++)
-        status = add_named(&work, i);
-    if (status == UZ_OK && !find_group(mesh, "boundary"))
-        status = add_boundary(&work);
-    uz_group *all = find_group(mesh, "all");
+    for (int64_t i = 0; i < given->n_groups && status == UZ_OK;
+         i++) { /* all of its name, unless an earlier one has it */
+        const char *name = given->groups[i].name;
+        named_parts parts = {0};
+        if (uz_mesh_group(mesh, name, "", NULL))
+            continue;
+        for (int64_t k = i; k < given->n_groups && status == UZ_OK; k++)
+            if (strcmp(given->groups[k].name, name) == 0)
+                status = collect(&parts, &work, &given->groups[k]);
+        status = finish_group(&work, name, &parts, status);
+    }
+    if (status == UZ_OK && !uz_mesh_group(mesh, "boundary", "", NULL)) { /* faces of one element only, by element */
+        named_parts parts = {0};
+        for (int64_t i = 0; i < work.sides.count && status == UZ_OK; i++)
+            if (!work.sides.same[i] && !work.sides.same[i + 1] && !append_face(&parts, &work, work.sides.item[i]))
+                status = no_memory(&work);
+        sort_unique(&parts.faces);
+        status = finish_group(&work, "boundary", &parts, status);
+    }
+    const uz_group *named = uz_mesh_group(mesh, "all", "", NULL);
+    uz_group *all = named ? &mesh->groups[named - mesh->groups] : NULL;
     if (status == UZ_OK && all && all->n_elements < mesh->n_elements)
         status = uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : "/mesh/groups/all",
                          "a group called \"all\" is not all elements of the mesh; give it another name");

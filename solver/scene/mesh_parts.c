@@ -48,44 +48,34 @@ int64_t uz_mesh_number_parts(int64_t *part, const uz_mesh *mesh)
     return count;
 }
 
-/* Does a part have faces of both groups? *parts: how many there are. False with *parts < 0: no memory. */
-static bool shares_part(int64_t *part, int64_t *parts, const uz_mesh *mesh, const uz_group *one, const uz_group *other)
-{
-    *parts = uz_mesh_number_parts(part, mesh);
-    unsigned char *has = *parts >= 0 ? uz_alloc_zero(*parts, 1) : NULL;
-    bool shared = false;
-    if (!has) {
-        *parts = -1;
-        return false;
-    }
-    for (int64_t i = 0; i < one->n_faces; i++)
-        has[part[mesh->node[mesh->first[one->face[i].element]]]] = 1;
-    for (int64_t i = 0; i < other->n_faces && !shared; i++)
-        shared = has[part[mesh->node[mesh->first[other->face[i].element]]]];
-    free(has);
-    return shared;
-}
-
 uz_status uz_own_body_new(uz_own_body **out, const uz_mesh *mesh, const uz_group *one, const uz_group *other,
                           uz_error *err)
 {
-    int64_t parts = -1;
     uz_own_body *own = uz_alloc_zero(1, sizeof *own);
     *out = NULL;
     if (own)
         own->part = uz_alloc(mesh->n_nodes, sizeof *own->part);
-    if (own && own->part && !shares_part(own->part, &parts, mesh, one, other) && parts >= 0) {
+    const int64_t parts = own && own->part ? uz_mesh_number_parts(own->part, mesh) : -1;
+    unsigned char *has = parts >= 0 ? uz_alloc_zero(parts, 1) : NULL; /* a face of `one` */
+    const bool room = has != NULL;
+    bool shared = false;
+    for (int64_t i = 0; i < one->n_faces && room; i++)
+        has[own->part[mesh->node[mesh->first[one->face[i].element]]]] = 1;
+    for (int64_t i = 0; i < other->n_faces && room && !shared; i++)
+        shared = has[own->part[mesh->node[mesh->first[other->face[i].element]]]];
+    free(has);
+    if (room && !shared) {
         uz_own_body_free(own);
         return UZ_OK;
     }
-    if (parts >= 0) {
+    if (room) {
         own->mesh = mesh;
         own->first = uz_alloc(mesh->n_nodes + 1, sizeof *own->first);
         own->around = uz_alloc(mesh->first[mesh->n_elements], sizeof *own->around);
         own->seen = uz_alloc_zero(mesh->n_elements, sizeof *own->seen);
         own->queue = uz_alloc(mesh->n_elements, sizeof *own->queue);
     }
-    if (parts < 0 || !own->first || !own->around || !own->seen || !own->queue) {
+    if (!room || !own->first || !own->around || !own->seen || !own->queue) {
         uz_own_body_free(own);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact of a body with itself");
     }
