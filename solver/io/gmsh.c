@@ -18,8 +18,7 @@
 
 /* A physical group, and how much of the mesh it has. */
 typedef struct {
-    int dim;
-    int64_t tag;
+    gmsh_key key;
     int64_t items, nodes; /* elements or faces, and the nodes of faces */
 } physical_group;
 
@@ -32,18 +31,12 @@ typedef struct {
     int64_t n_groups;
 } grouping;
 
-static int compare_groups(const void *a, const void *b)
-{
-    const physical_group *x = a, *y = b;
-    return gmsh_compare_keys(x->dim, x->tag, y->dim, y->tag);
-}
-
 /* In version 2.2 elements name their physical group themselves: each is a part of one group. */
 static uz_status parts_of_tags(gmsh_file *file)
 {
     for (int64_t e = 0; e < file->n_elements; e++) {
-        const gmsh_part part = {.dim = gmsh_type_of(file->type[e]).dim, .tag = file->part_tag[e]};
-        if (part.tag == 0 || (file->n_parts > 0 && gmsh_compare_parts(&part, &file->parts[file->n_parts - 1]) == 0))
+        const gmsh_part part = {.key = {gmsh_type_of(file->type[e]).dim, file->part_tag[e]}};
+        if (part.key.tag == 0 || (file->n_parts > 0 && gmsh_compare(&part, &file->parts[file->n_parts - 1]) == 0))
             continue;
         if (!gmsh_grow((void **)&file->parts, file->n_parts, &file->part_room, sizeof *file->parts))
             return gmsh_no_memory(file);
@@ -51,9 +44,9 @@ static uz_status parts_of_tags(gmsh_file *file)
     }
     int64_t kept = 0;
     if (file->n_parts > 1)
-        qsort(file->parts, (size_t)file->n_parts, sizeof *file->parts, gmsh_compare_parts);
+        qsort(file->parts, (size_t)file->n_parts, sizeof *file->parts, gmsh_compare);
     for (int64_t i = 0; i < file->n_parts; i++)
-        if (i == 0 || gmsh_compare_parts(&file->parts[i], &file->parts[kept - 1]) != 0)
+        if (i == 0 || gmsh_compare(&file->parts[i], &file->parts[kept - 1]) != 0)
             file->parts[kept++] = file->parts[i];
     file->n_parts = kept;
     free(file->physical);
@@ -61,7 +54,7 @@ static uz_status parts_of_tags(gmsh_file *file)
     if (!file->physical)
         return gmsh_no_memory(file);
     for (int64_t i = 0; i < file->n_parts; i++) {
-        file->physical[i] = file->parts[i].tag;
+        file->physical[i] = file->parts[i].key.tag;
         file->parts[i].first = i;
         file->parts[i].count = 1;
     }
@@ -71,12 +64,12 @@ static uz_status parts_of_tags(gmsh_file *file)
 /* The part that an element belongs to, NULL: none. *last is where the one before was. */
 static gmsh_part *part_of(const gmsh_file *file, int64_t e, gmsh_part **last)
 {
-    const gmsh_part key = {.dim = gmsh_type_of(file->type[e]).dim, .tag = file->part_tag[e]};
-    if (*last && gmsh_compare_parts(&key, *last) == 0)
+    const gmsh_key key = {gmsh_type_of(file->type[e]).dim, file->part_tag[e]};
+    if (*last && gmsh_compare(&key, *last) == 0)
         return *last;
     if (file->n_parts == 0)
         return NULL;
-    gmsh_part *found = bsearch(&key, file->parts, (size_t)file->n_parts, sizeof key, gmsh_compare_parts);
+    gmsh_part *found = bsearch(&key, file->parts, (size_t)file->n_parts, sizeof *file->parts, gmsh_compare);
     *last = found ? found : *last;
     return found;
 }
@@ -97,12 +90,12 @@ static uz_status list_groups(grouping *g)
             if (!gmsh_grow((void **)&g->group, g->n_groups, &room, sizeof *g->group))
                 return gmsh_no_memory(file);
             g->group[g->n_groups++] =
-                (physical_group){file->parts[i].dim, file->physical[file->parts[i].first + k], 0, 0};
+                (physical_group){{file->parts[i].key.dim, file->physical[file->parts[i].first + k]}, 0, 0};
         }
     if (g->n_groups > 1)
-        qsort(g->group, (size_t)g->n_groups, sizeof *g->group, compare_groups);
+        qsort(g->group, (size_t)g->n_groups, sizeof *g->group, gmsh_compare);
     for (int64_t i = 0; i < g->n_groups; i++)
-        if (i == 0 || compare_groups(&g->group[i], &g->group[kept - 1]) != 0)
+        if (i == 0 || gmsh_compare(&g->group[i], &g->group[kept - 1]) != 0)
             g->group[kept++] = g->group[i];
     g->n_groups = kept;
     if (kept > UZ_MESH_MAX_GROUPS)
@@ -119,15 +112,15 @@ static void walk_members(grouping *g, bool add)
         const gmsh_part *part = part_of(g->file, e, &last);
         const int64_t *node = g->file->node + g->file->first[e], n = g->file->first[e + 1] - g->file->first[e];
         for (int64_t k = 0; part && k < part->count; k++) {
-            const physical_group key = {part->dim, g->file->physical[part->first + k], 0, 0};
-            physical_group *found = bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups);
+            const gmsh_key key = {part->key.dim, g->file->physical[part->first + k]};
+            physical_group *found = bsearch(&key, g->group, (size_t)g->n_groups, sizeof *g->group, gmsh_compare);
             uz_given_group *to = &g->out->groups[found - g->group];
             if (!add) {
                 found->items++;
                 found->nodes += n;
-            } else if (part->dim == g->dim) {
+            } else if (part->key.dim == g->dim) {
                 to->element[to->n_elements++] = g->new_element[e];
-            } else if (part->dim == g->dim - 1) {
+            } else if (part->key.dim == g->dim - 1) {
                 memcpy(to->face_node + to->face_first[to->n_faces], node, (size_t)n * sizeof *node);
                 to->n_faces++;
                 to->face_first[to->n_faces] = to->face_first[to->n_faces - 1] + n;
@@ -139,41 +132,33 @@ static void walk_members(grouping *g, bool add)
     }
 }
 
-/* Names by dimension and tag, for many groups. */
-static int compare_names(const void *a, const void *b)
+static const gmsh_name *find_name(const gmsh_file *file, gmsh_key key)
 {
-    const gmsh_name *x = a, *y = b;
-    return gmsh_compare_keys(x->dim, x->tag, y->dim, y->tag);
-}
-
-static const gmsh_name *find_name(const gmsh_file *file, int dim, int64_t tag)
-{
-    const gmsh_name key = {dim, tag, ""};
     if (file->n_names == 0)
         return NULL;
-    return bsearch(&key, file->names, (size_t)file->n_names, sizeof key, compare_names);
+    return bsearch(&key, file->names, (size_t)file->n_names, sizeof *file->names, gmsh_compare);
 }
 
 static uz_status make_group(const grouping *g, int64_t i)
 {
     const physical_group *from = &g->group[i];
     uz_given_group *to = &g->out->groups[i];
-    const gmsh_name *found = find_name(g->file, from->dim, from->tag);
+    const gmsh_name *found = find_name(g->file, from->key);
     bool good, shared = false; /* has a nameless group of higher dimension the same tag? */
-    for (int dim = from->dim + 1; dim <= 3 && !found; dim++) {
-        const physical_group key = {dim, from->tag, 0, 0};
-        shared = shared || (!find_name(g->file, dim, key.tag) &&
-                            bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups));
+    for (int dim = from->key.dim + 1; dim <= 3 && !found; dim++) {
+        const gmsh_key key = {dim, from->key.tag};
+        shared = shared || (!find_name(g->file, key) &&
+                            bsearch(&key, g->group, (size_t)g->n_groups, sizeof *g->group, gmsh_compare));
     }
     if (found)
         memcpy(to->name, found->name, sizeof found->name);
     else if (shared)
-        snprintf(to->name, 64, "physical_%lld_dim%d", (long long)from->tag, from->dim);
+        snprintf(to->name, 64, "physical_%lld_dim%d", (long long)from->key.tag, from->key.dim);
     else
-        snprintf(to->name, 64, "physical_%lld", (long long)from->tag);
-    if (from->dim == g->dim) {
+        snprintf(to->name, 64, "physical_%lld", (long long)from->key.tag);
+    if (from->key.dim == g->dim) {
         good = (to->element = uz_alloc(from->items, sizeof *to->element)) != NULL;
-    } else if (from->dim == g->dim - 1) {
+    } else if (from->key.dim == g->dim - 1) {
         to->face_first = uz_alloc(from->items + 1, sizeof *to->face_first);
         to->face_node = uz_alloc(from->nodes, sizeof *to->face_node);
         good = to->face_first && to->face_node;
@@ -198,7 +183,7 @@ static uz_status make_groups(uz_given_mesh *out, gmsh_file *file, int dim, const
         out->n_groups = g.n_groups;
         walk_members(&g, false);
         if (file->n_names > 1)
-            qsort(file->names, (size_t)file->n_names, sizeof *file->names, compare_names);
+            qsort(file->names, (size_t)file->n_names, sizeof *file->names, gmsh_compare);
     }
     for (int64_t i = 0; i < g.n_groups && status == UZ_OK; i++)
         status = make_group(&g, i);

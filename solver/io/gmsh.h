@@ -24,7 +24,8 @@ uz_status gmsh_fail_at(const gmsh_text *text, const gmsh_text *place, uz_status 
 /* A number: 4 bytes, 8 bytes without a sign, 8 bytes, or a word. `what` is what it should be, for the message. */
 uz_status gmsh_int(gmsh_text *text, int64_t *value, const char *what);
 uz_status gmsh_size(gmsh_text *text, int64_t *value, const char *what);
-uz_status gmsh_real(gmsh_text *text, double *value);
+/* So many reals, which xyz NULL skips. */
+uz_status gmsh_reals(gmsh_text *text, int count, double *xyz);
 /* Words also in a binary file. */
 uz_status gmsh_int_text(gmsh_text *text, int64_t *value, const char *what);
 uz_status gmsh_real_text(gmsh_text *text, double *value);
@@ -50,16 +51,22 @@ uz_status gmsh_skip_section(gmsh_text *text, const char *name);
 
 /* ---- what a file says */
 
-/* What elements of one entity (4.1), or with one physical tag (2.2), belong to. */
 typedef struct {
     int dim;
-    int64_t tag, first, count; /* physical[first..first + count) */
+    int64_t tag;
+} gmsh_key;
+/* By dimension, then by tag, for qsort and bsearch: keys, and what begins with one. */
+int gmsh_compare(const void *a, const void *b);
+
+/* What elements of one entity (4.1), or with one physical tag (2.2), belong to. */
+typedef struct {
+    gmsh_key key;
+    int64_t first, count; /* physical[first..first + count) */
     bool used;
 } gmsh_part;
 
 typedef struct {
-    int dim;
-    int64_t tag;
+    gmsh_key key;
     char name[64];
 } gmsh_name;
 
@@ -103,10 +110,6 @@ uz_status gmsh_read_elements(gmsh_file *file);
 
 /* Index of the node with that tag, -1: there is none. */
 int64_t gmsh_find_node(const gmsh_file *file, int64_t tag);
-
-/* By dimension, then by tag: keys, and parts (for qsort). */
-int gmsh_compare_keys(int dim, int64_t tag, int other_dim, int64_t other_tag);
-int gmsh_compare_parts(const void *a, const void *b);
 
 /* ---- elements of Gmsh */
 

@@ -44,9 +44,9 @@ uz_status gmsh_read_names(gmsh_file *file)
         status = gmsh_int_text(&file->text, &dim, "the dimension of a physical group");
         if (status == UZ_OK && (dim < 0 || dim > 3))
             status = gmsh_fail(&file->text, UZ_ERR_FORMAT, "a physical group has no dimension %lld", (long long)dim);
-        name->dim = (int)dim;
+        name->key.dim = (int)dim;
         if (status == UZ_OK)
-            status = gmsh_int_text(&file->text, &name->tag, "the number of a physical group");
+            status = gmsh_int_text(&file->text, &name->key.tag, "the number of a physical group");
         if (status == UZ_OK)
             status = gmsh_quoted(&file->text, name->name);
     }
@@ -55,16 +55,6 @@ uz_status gmsh_read_names(gmsh_file *file)
 }
 
 /* ---- entities (4.1) */
-
-/* Reads so many reals; xyz == NULL: skips them. */
-static uz_status read_reals(gmsh_text *text, int count, double *xyz)
-{
-    double value;
-    uz_status status = UZ_OK;
-    for (int i = 0; i < count && status == UZ_OK; i++)
-        status = gmsh_real(text, xyz ? &xyz[i] : &value);
-    return status;
-}
 
 static uz_status skip_ints(gmsh_text *text, int64_t count)
 {
@@ -80,9 +70,9 @@ static uz_status skip_ints(gmsh_text *text, int64_t count)
 static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
 {
     gmsh_text *text = &file->text;
-    gmsh_part part = {.dim = dim};
+    gmsh_part part = {.key = {.dim = dim}};
     int64_t count = 0, partitions = 0, groups = 0, tag = 0;
-    uz_status status = gmsh_int(text, &part.tag, "the number of an entity");
+    uz_status status = gmsh_int(text, &part.key.tag, "the number of an entity");
     if (status == UZ_OK && partitioned)
         status = skip_ints(text, 2);
     if (status == UZ_OK && partitioned)
@@ -90,7 +80,7 @@ static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
     if (status == UZ_OK)
         status = skip_ints(text, partitions);
     if (status == UZ_OK)
-        status = read_reals(text, dim == 0 ? 3 : 6, NULL);
+        status = gmsh_reals(text, dim == 0 ? 3 : 6, NULL);
     if (status == UZ_OK)
         status = gmsh_size(text, &groups, "the number of physical groups of an entity");
     if (status == UZ_OK)
@@ -116,17 +106,12 @@ static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
     return UZ_OK;
 }
 
-int gmsh_compare_keys(int dim, int64_t tag, int other_dim, int64_t other_tag)
+int gmsh_compare(const void *a, const void *b)
 {
-    if (dim != other_dim)
-        return dim < other_dim ? -1 : 1;
-    return (tag > other_tag) - (tag < other_tag);
-}
-
-int gmsh_compare_parts(const void *a, const void *b)
-{
-    const gmsh_part *x = a, *y = b;
-    return gmsh_compare_keys(x->dim, x->tag, y->dim, y->tag);
+    const gmsh_key *x = a, *y = b;
+    if (x->dim != y->dim)
+        return x->dim < y->dim ? -1 : 1;
+    return (x->tag > y->tag) - (x->tag < y->tag);
 }
 
 /* [numPartitions numGhosts (tag partition)...] entities. Elements of a partitioned mesh name partitioned entities,
@@ -156,7 +141,7 @@ uz_status gmsh_read_entities(gmsh_file *file, bool partitioned)
             status = read_entity(file, dim, partitioned);
     }
     if (status == UZ_OK && file->n_parts > 1)
-        qsort(file->parts, (size_t)file->n_parts, sizeof *file->parts, gmsh_compare_parts);
+        qsort(file->parts, (size_t)file->n_parts, sizeof *file->parts, gmsh_compare);
     file->entities_read = true;
     return status;
 }
@@ -245,7 +230,7 @@ uz_status gmsh_read_nodes(gmsh_file *file)
     for (; old && file->n_nodes < count && status == UZ_OK; file->n_nodes += status == UZ_OK) {
         status = gmsh_int(text, &file->tag[file->n_nodes], WHAT[2]);
         if (status == UZ_OK)
-            status = read_reals(text, 3, file->xyz + 3 * file->n_nodes);
+            status = gmsh_reals(text, 3, file->xyz + 3 * file->n_nodes);
     }
     for (int64_t b = 0; b < blocks && status == UZ_OK; b++) {
         /* entityDim entityTag parametric numNodes, the tags of all, the coordinates of all. */
@@ -261,9 +246,9 @@ uz_status gmsh_read_nodes(gmsh_file *file)
         for (int64_t i = 0; i < n && status == UZ_OK; i++)
             status = gmsh_size(text, &file->tag[file->n_nodes + i], WHAT[2]);
         for (int64_t i = 0; i < n && status == UZ_OK; i++) {
-            status = read_reals(text, 3, file->xyz + 3 * (file->n_nodes + i));
+            status = gmsh_reals(text, 3, file->xyz + 3 * (file->n_nodes + i));
             if (status == UZ_OK && head[2])
-                status = read_reals(text, (int)head[0], NULL);
+                status = gmsh_reals(text, (int)head[0], NULL);
         }
         file->n_nodes += status == UZ_OK ? n : 0;
     }

@@ -149,13 +149,18 @@ uz_status gmsh_size(gmsh_text *text, int64_t *value, const char *what)
     return status;
 }
 
-uz_status gmsh_real(gmsh_text *text, double *value)
+uz_status gmsh_reals(gmsh_text *text, int count, double *xyz)
 {
-    const gmsh_text before = *text;
-    if (!text->binary)
-        return gmsh_real_text(text, value);
-    uz_status status = take_bytes(text, value, sizeof *value, "a coordinate");
-    return status == UZ_OK && !isfinite(*value) ? not_finite(&before) : status;
+    double value;
+    uz_status status = UZ_OK;
+    for (int i = 0; i < count && status == UZ_OK; i++) {
+        const gmsh_text before = *text;
+        double *to = xyz ? &xyz[i] : &value;
+        status = text->binary ? take_bytes(text, to, sizeof *to, "a coordinate") : gmsh_real_text(text, to);
+        if (status == UZ_OK && !isfinite(*to))
+            status = not_finite(&before);
+    }
+    return status;
 }
 
 uz_status gmsh_count(const gmsh_text *text, int64_t count, size_t each, const char *what)

@@ -8,20 +8,15 @@ static const uz_mesh_reader READERS[] = {
     {"gmsh", uz_gmsh_recognises, uz_gmsh_read},
 };
 
-const uz_mesh_reader *uz_mesh_reader_find(const char *format, const char *text, size_t len)
-{
-    for (size_t i = 0; i < sizeof READERS / sizeof READERS[0]; i++)
-        if (format ? strcmp(READERS[i].name, format) == 0 : READERS[i].recognises(text, len))
-            return &READERS[i];
-    return NULL;
-}
-
 uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,
                        uz_error *err)
 {
-    const uz_mesh_reader *reader = uz_mesh_reader_find(format, text, len);
+    const uz_mesh_reader *reader = NULL;
     uz_error_reset(err);
     memset(out, 0, sizeof *out);
+    for (size_t i = 0; i < sizeof READERS / sizeof READERS[0] && !reader; i++)
+        if (format ? strcmp(READERS[i].name, format) == 0 : READERS[i].recognises(text, len))
+            reader = &READERS[i];
     if (reader)
         return reader->read(out, text, len, max_bytes, err);
     if (format)

@@ -17,9 +17,6 @@ typedef struct {
     uz_status (*read)(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 } uz_mesh_reader;
 
-/* The reader of that name; NULL: by what the file looks like. NULL if there is none. */
-const uz_mesh_reader *uz_mesh_reader_find(const char *format, const char *text, size_t len);
-
 /* Rows of the table. */
 bool uz_gmsh_recognises(const char *text, size_t len);
 

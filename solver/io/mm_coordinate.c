@@ -17,17 +17,12 @@ typedef struct {
 
 enum { SHORT_RUN = 16 };
 
-static int64_t smaller(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
-}
-
 /* Stable, by row. work: count places. */
 static void merge_sort(place *places, place *work, int64_t count)
 {
     place *from = places, *to = work;
     for (int64_t first = 0; first < count; first += SHORT_RUN)
-        for (int64_t k = first + 1; k < first + smaller(SHORT_RUN, count - first); k++) {
+        for (int64_t k = first + 1; k < first + SHORT_RUN && k < count; k++) {
             const place moving = places[k];
             int64_t at = k;
             for (; at > first && places[at - 1].row > moving.row; at--)
@@ -37,7 +32,8 @@ static void merge_sort(place *places, place *work, int64_t count)
     for (int64_t run = SHORT_RUN; run < count; run *= 2) {
         for (int64_t k = 0; k < count; k += 2 * run) {
             /* A merge of two neighbours; the right half may be empty. */
-            const int64_t n_left = smaller(run, count - k), n_right = smaller(run, count - k - n_left);
+            const int64_t left_over = count - k, n_left = run < left_over ? run : left_over;
+            const int64_t n_right = run < left_over - n_left ? run : left_over - n_left;
             const place *left = from + k, *right = left + n_left;
             place *out = to + k;
             int64_t i = 0, j = 0;
