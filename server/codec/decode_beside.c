@@ -96,10 +96,10 @@ void decode_settings(uz_settings *out, const json_value *object)
     uz_settings s = uz_settings_default();
     const json_value *accuracy = json_get(object, "accuracy");
     uz_method_parse(&s.method, text_or(object, "method", "auto"));
-    uz_operator_parse(&s.op, text_or(object, "operator", "auto"));
-    uz_ordering_parse(&s.ordering, text_or(object, "ordering", "auto"));
-    uz_stopping_parse(&s.stopping, text_or(object, "stopping", "certified"));
-    uz_row_scaling_parse(&s.row_scaling, text_or(object, "row_scaling", "auto"));
+    s.op = (uz_operator)uz_choice_find(UZ_CHOICE_OPERATOR, text_or(object, "operator", "auto"));
+    s.ordering = (uz_ordering)uz_choice_find(UZ_CHOICE_ORDERING, text_or(object, "ordering", "auto"));
+    s.stopping = (uz_stopping)uz_choice_find(UZ_CHOICE_STOPPING, text_or(object, "stopping", "certified"));
+    s.row_scaling = (uz_row_scaling)uz_choice_find(UZ_CHOICE_ROW_SCALING, text_or(object, "row_scaling", "auto"));
     const char *level = text_or(object, "accuracy", s.stopping == UZ_STOP_PAPER ? "quick" : "precise");
     for (size_t i = 0; i < sizeof LEVELS / sizeof LEVELS[0]; i++)
         if (strcmp(LEVELS[i].name, level) == 0) {
@@ -140,7 +140,7 @@ bool decode_quantities(uz_problem *problem, uz_settings *settings, decoding *d, 
         const json_value *window = json_get(item, "window"), *name = json_get(item, "name");
         uz_quantity *to = &problem->quantities[i];
         double length = 0;
-        uz_quantity_parse(&to->kind, json_text(json_get(item, "quantity")));
+        to->kind = (uz_quantity_kind)uz_choice_find(UZ_CHOICE_QUANTITY, json_text(json_get(item, "quantity")));
         decode_name(to->on, sizeof to->on, item, "on", "");
         if (json_get(item, "direction") &&
             !decode_components(to->direction, d, item, "direction", 0, dim, "it must be the direction of the number"))
@@ -162,7 +162,8 @@ bool decode_quantities(uz_problem *problem, uz_settings *settings, decoding *d, 
         if (name && (strchr(to->name, '.') || strspn(to->name, "0123456789") == strlen(to->name)))
             return decode_refuse(d, "not_allowed", name, "must have no dot and be no number: assertions name it.");
         if (!name)
-            snprintf(to->name, sizeof to->name, "%s%s%.40s", uz_quantity_name(to->kind), to->on[0] ? "_" : "", to->on);
+            snprintf(to->name, sizeof to->name, "%s%s%.40s", uz_choice_name(UZ_CHOICE_QUANTITY, to->kind),
+                     to->on[0] ? "_" : "", to->on);
         for (char *at = to->name; *at; at++)
             *at = *at == '.' ? '_' : *at;
     }

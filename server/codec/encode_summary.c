@@ -108,7 +108,7 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
         const uz_quantity_found *q = &e->quantities[i];
         text_open(t, NULL, '{');
         text_string(t, "name", q->name);
-        text_string(t, "quantity", uz_quantity_name(q->kind));
+        text_string(t, "quantity", uz_choice_name(UZ_CHOICE_QUANTITY, q->kind));
         put_named(t,
                   (named[]){{"low", q->low},
                             {"high", q->high},
@@ -154,7 +154,7 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
             const uz_geometry *g = &s->geometry;
             const bool moving = g->kind == UZ_KINEMATICS_MOVING;
             text_open(t, "geometry", '{');
-            text_string(t, "kinematics", uz_kinematics_name(g->kind));
+            text_string(t, "kinematics", uz_choice_name(UZ_CHOICE_KINEMATICS, g->kind));
             text_integer(t, "passes", g->passes);
             put_named(
                 t, (named[]){{"change", g->change}, moving ? (named){"left", g->left} : (named){"sliding", g->sliding}},
@@ -262,7 +262,7 @@ static void put_effort(text *t, const uz_summary *s)
     text_bool(t, "factor", s->reused.factor);
     text_bool(t, "operator", s->reused.op);
     text_close(t, '}');
-    text_string(t, "ordering", uz_ordering_name(s->ordering));
+    text_string(t, "ordering", uz_choice_name(UZ_CHOICE_ORDERING, s->ordering));
     text_bool(t, "contact_last", s->contact_last);
     text_integer(t, "nnz", s->factor_nnz);
     text_integer(t, "bytes", (int64_t)s->factor_bytes);
@@ -309,7 +309,7 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     text_integer(&t, "iterations", summary->iterations);
     text_integer(&t, "restarts", summary->restarts);
     text_integer(&t, "refinements", summary->refinements);
-    text_string(&t, "row_scaling", uz_row_scaling_name(summary->row_scaling));
+    text_string(&t, "row_scaling", uz_choice_name(UZ_CHOICE_ROW_SCALING, summary->row_scaling));
     if (run && run->started_from)
         text_string(&t, "started_from", run->started_from);
     if (cases) {

@@ -30,8 +30,6 @@ typedef enum {
     UZ_QUANTITY_STRAIN_ENERGY, /* of the whole body, with its springs */
     UZ_QUANTITIES              /* how many */
 } uz_quantity_kind;
-const char *uz_quantity_name(uz_quantity_kind kind); /* "contact.force"; never NULL */
-bool uz_quantity_parse(uz_quantity_kind *out, const char *name);
 typedef struct {
     uz_quantity_kind kind;
     char name[64];          /* what it is called in the result; unique in its problem */
@@ -101,17 +99,23 @@ typedef struct {
 /* auto, certified 1e-8, 100000 iterations, no time limit. */
 uz_settings uz_settings_default(void);
 
-/* Names as in the HTTP interface ("accelerated_restart"); never NULL. uz_*_parse: false if the name is unknown. */
+/* Names as in the HTTP interface ("accelerated_restart"); never NULL. uz_method_parse: false if the name is unknown. */
 const char *uz_method_name(uz_method);
-const char *uz_operator_name(uz_operator);
-const char *uz_ordering_name(uz_ordering);
-const char *uz_stopping_name(uz_stopping);
-const char *uz_row_scaling_name(uz_row_scaling);
 bool uz_method_parse(uz_method *out, const char *name);
-bool uz_operator_parse(uz_operator *out, const char *name);
-bool uz_ordering_parse(uz_ordering *out, const char *name);
-bool uz_stopping_parse(uz_stopping *out, const char *name);
-bool uz_row_scaling_parse(uz_row_scaling *out, const char *name);
+const char *uz_operator_name(uz_operator);
+/* The same of any enumeration of these: the name of a value ("unknown": it has none), the value of a name (-1: none).
+ */
+typedef enum {
+    UZ_CHOICE_OPERATOR,
+    UZ_CHOICE_ORDERING,
+    UZ_CHOICE_STOPPING,
+    UZ_CHOICE_ROW_SCALING,
+    UZ_CHOICE_KINEMATICS,
+    UZ_CHOICE_QUANTITY,
+    UZ_CHOICE_OUTCOME
+} uz_choice;
+const char *uz_choice_name(uz_choice of, unsigned value);
+int uz_choice_find(uz_choice of, const char *name);
 
 #ifdef __cplusplus
 }

@@ -170,7 +170,6 @@ typedef enum {
     UZ_KINEMATICS_FIXED, /* before anything moves */
     UZ_KINEMATICS_MOVING /* where the answer itself has moved the surfaces to */
 } uz_kinematics;
-const char *uz_kinematics_name(uz_kinematics);
 
 typedef struct {
     uz_model model;

@@ -55,95 +55,39 @@ static const char *const KINEMATICS[] = {
     [UZ_KINEMATICS_MOVING] = "moving",
 };
 
-#define COUNT(table) (sizeof(table) / sizeof((table)[0]))
+#define COUNTED(table) table, sizeof(table) / sizeof((table)[0])
 
-static const char *name_at(const char *const *table, size_t count, unsigned value)
+static const struct {
+    const char *const *names;
+    size_t count;
+} CHOICES[] = {
+    [UZ_CHOICE_OPERATOR] = {COUNTED(OPERATORS)},    [UZ_CHOICE_ORDERING] = {COUNTED(ORDERINGS)},
+    [UZ_CHOICE_STOPPING] = {COUNTED(STOPPINGS)},    [UZ_CHOICE_ROW_SCALING] = {COUNTED(ROW_SCALINGS)},
+    [UZ_CHOICE_KINEMATICS] = {COUNTED(KINEMATICS)}, [UZ_CHOICE_QUANTITY] = {COUNTED(QUANTITIES)},
+    [UZ_CHOICE_OUTCOME] = {COUNTED(OUTCOMES)},
+};
+
+const char *uz_choice_name(uz_choice of, unsigned value)
 {
-    return value < count ? table[value] : "unknown";
+    return value < CHOICES[of].count ? CHOICES[of].names[value] : "unknown";
 }
 
-/* The index of the name in the table, or -1. */
-static int find_name(const char *const *table, size_t count, const char *name)
+int uz_choice_find(uz_choice of, const char *name)
 {
-    for (size_t i = 0; i < count; i++)
-        if (strcmp(table[i], name) == 0)
+    for (size_t i = 0; i < CHOICES[of].count; i++)
+        if (strcmp(CHOICES[of].names[i], name) == 0)
             return (int)i;
     return -1;
 }
 
 const char *uz_operator_name(uz_operator value)
 {
-    return name_at(OPERATORS, COUNT(OPERATORS), (unsigned)value);
-}
-
-const char *uz_kinematics_name(uz_kinematics value)
-{
-    return name_at(KINEMATICS, COUNT(KINEMATICS), (unsigned)value);
-}
-
-const char *uz_quantity_name(uz_quantity_kind value)
-{
-    return name_at(QUANTITIES, COUNT(QUANTITIES), (unsigned)value);
-}
-
-const char *uz_ordering_name(uz_ordering value)
-{
-    return name_at(ORDERINGS, COUNT(ORDERINGS), (unsigned)value);
-}
-
-const char *uz_stopping_name(uz_stopping value)
-{
-    return name_at(STOPPINGS, COUNT(STOPPINGS), (unsigned)value);
-}
-
-const char *uz_row_scaling_name(uz_row_scaling value)
-{
-    return name_at(ROW_SCALINGS, COUNT(ROW_SCALINGS), (unsigned)value);
+    return uz_choice_name(UZ_CHOICE_OPERATOR, (unsigned)value);
 }
 
 const char *uz_outcome_name(uz_outcome value)
 {
-    return name_at(OUTCOMES, COUNT(OUTCOMES), (unsigned)value);
-}
-
-bool uz_operator_parse(uz_operator *out, const char *name)
-{
-    int found = find_name(OPERATORS, COUNT(OPERATORS), name);
-    if (found >= 0)
-        *out = (uz_operator)found;
-    return found >= 0;
-}
-
-bool uz_quantity_parse(uz_quantity_kind *out, const char *name)
-{
-    int found = find_name(QUANTITIES, COUNT(QUANTITIES), name);
-    if (found >= 0)
-        *out = (uz_quantity_kind)found;
-    return found >= 0;
-}
-
-bool uz_ordering_parse(uz_ordering *out, const char *name)
-{
-    int found = find_name(ORDERINGS, COUNT(ORDERINGS), name);
-    if (found >= 0)
-        *out = (uz_ordering)found;
-    return found >= 0;
-}
-
-bool uz_stopping_parse(uz_stopping *out, const char *name)
-{
-    int found = find_name(STOPPINGS, COUNT(STOPPINGS), name);
-    if (found >= 0)
-        *out = (uz_stopping)found;
-    return found >= 0;
-}
-
-bool uz_row_scaling_parse(uz_row_scaling *out, const char *name)
-{
-    int found = find_name(ROW_SCALINGS, COUNT(ROW_SCALINGS), name);
-    if (found >= 0)
-        *out = (uz_row_scaling)found;
-    return found >= 0;
+    return uz_choice_name(UZ_CHOICE_OUTCOME, (unsigned)value);
 }
 
 uz_settings uz_settings_default(void)
@@ -155,12 +99,6 @@ uz_settings uz_settings_default(void)
         .time_limit_s = INFINITY,
     };
     return settings;
-}
-
-/* An enumerator that has a name. */
-static bool is_known(const char *name)
-{
-    return strcmp(name, "unknown") != 0;
 }
 
 uz_status uz_check_settings(const uz_settings *s, uz_error *err)
@@ -175,9 +113,11 @@ uz_status uz_check_settings(const uz_settings *s, uz_error *err)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "quantity_error must lie in [0, 1], it is %g", s->quantity_error);
     if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
-    if (s->method >= UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
-        !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)) ||
-        !is_known(uz_row_scaling_name(s->row_scaling)))
+    if (s->method >= UZ_METHOD_GIVEN || strcmp(uz_method_name(s->method), "unknown") == 0 ||
+        (size_t)s->op >= CHOICES[UZ_CHOICE_OPERATOR].count ||
+        (size_t)s->ordering >= CHOICES[UZ_CHOICE_ORDERING].count ||
+        (size_t)s->stopping >= CHOICES[UZ_CHOICE_STOPPING].count ||
+        (size_t)s->row_scaling >= CHOICES[UZ_CHOICE_ROW_SCALING].count)
         return uz_fail(err, UZ_ERR_ARGUMENT, "",
                        "method, operator, ordering, stopping or row_scaling is not one of the known ones");
     return UZ_OK;

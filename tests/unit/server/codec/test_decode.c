@@ -132,7 +132,7 @@ TEST(every_name_of_the_schema_is_known_to_the_library)
         snprintf(solver, sizeof solver, "{\"method\":\"%s\",\"ordering\":\"%s\"}", METHODS[i], ORDERINGS[i]);
         uz_settings s = settings_of(solver);
         CHECK_STR(uz_method_name(s.method), METHODS[i]);
-        CHECK_STR(uz_ordering_name(s.ordering), ORDERINGS[i]);
+        CHECK_STR(uz_choice_name(UZ_CHOICE_ORDERING, s.ordering), ORDERINGS[i]);
     }
     for (size_t i = 0; i < 3; i++) {
         snprintf(solver, sizeof solver, "{\"operator\":\"%s\"}", OPERATORS[i]);

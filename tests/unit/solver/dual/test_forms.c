@@ -345,9 +345,8 @@ TEST(the_table_is_complete)
     for (int k = 0; k < UZ_DUAL_FORMS; k++) {
         const uz_dual_abilities *can = uz_dual_abilities_at(k);
         const uz_dual_form *form = uz_dual_form_of(can->op);
-        uz_operator named;
         CHECK(can->op != UZ_OPERATOR_AUTO && can == &form->can && uz_dual_abilities_of(can->op) == can);
-        CHECK(uz_operator_parse(&named, uz_operator_name(can->op)) && named == can->op);
+        CHECK_INT(uz_choice_find(UZ_CHOICE_OPERATOR, uz_operator_name(can->op)), can->op);
         CHECK(form->dual_size >= sizeof(uz_dual) && form->load_size >= sizeof(uz_dual_load));
         CHECK(form->create && form->clear && form->load && form->unload && form->apply && form->correct);
         CHECK(form->recover && form->solve_active && form->add_cost);

@@ -25,7 +25,8 @@ static void check_refused(const uz_csc *K, uz_status want, const char *what)
         uz_factor *factor;
         uz_error err;
         uz_status status = factor_of(&factor, K, NULL, 0, orderings[k], 0, &err);
-        CHECK_MSG(status == want, "%s, %s: %s", what, uz_ordering_name(orderings[k]), uz_status_name(status));
+        CHECK_MSG(status == want, "%s, %s: %s", what, uz_choice_name(UZ_CHOICE_ORDERING, orderings[k]),
+                  uz_status_name(status));
         CHECK(factor == NULL && err.status == want && err.message[0] != '\0');
         CHECK_STR(err.where, "K");
         if (status == UZ_OK)
