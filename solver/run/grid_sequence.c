@@ -331,22 +331,6 @@ static void keep_better(search *g, answers *x)
     }
 }
 
-/* What the ends of the cases' solves say about going on. */
-static stop_kind judge(const search *g, const answers *x)
-{
-    stop_kind stop = x->error <= g->requested ? STOP_MET : STOP_NOT;
-    for (int64_t i = 0; stop != STOP_MET && i < g->n_cases; i++) {
-        const uz_summary *s = &x->results[i]->summary;
-        if (s->outcome == UZ_DISMISSED)
-            return STOP_CANCELLED;
-        if (s->outcome == UZ_TIME_LIMIT)
-            stop = STOP_TIME;
-        else if (!uz_has_no_answer(s) && !(s->certificate.relative_error < g->requested) && stop == STOP_NOT)
-            stop = STOP_ALGEBRA;
-    }
-    return stop;
-}
-
 /* A grid that could not be solved ends the sequence where another one was; only lasting faults end the call. */
 static uz_status try_grid(search *g, grid on, uz_error *err)
 {
@@ -358,7 +342,17 @@ static uz_status try_grid(search *g, grid on, uz_error *err)
     if (status == UZ_OK) {
         g->tried[g->sequence.count++] = (uz_tried){number_of(g, &x.on), x.error};
         g->tried_dofs = x.on.dofs;
-        g->stop = judge(g, &x);
+        g->stop = x.error <= g->requested ? STOP_MET : STOP_NOT;
+        /* what the ends of the cases' solves say about going on */
+        for (int64_t i = 0; g->stop != STOP_MET && g->stop != STOP_CANCELLED && i < g->n_cases; i++) {
+            const uz_summary *s = &x.results[i]->summary;
+            if (s->outcome == UZ_DISMISSED)
+                g->stop = STOP_CANCELLED;
+            else if (s->outcome == UZ_TIME_LIMIT)
+                g->stop = STOP_TIME;
+            else if (!uz_has_no_answer(s) && !(s->certificate.relative_error < g->requested) && g->stop == STOP_NOT)
+                g->stop = STOP_ALGEBRA;
+        }
         keep_better(g, &x);
         return UZ_OK;
     }

@@ -28,20 +28,6 @@
 #define OF_DEPTH    0.5
 #define OF_END      0.2
 
-/* Of the product of both norms, by the kinds of elements. Beside corners where stress is singular an estimate is as
- * small as 0.74 of the error of linear elements, 0.67 of those of eight and twenty nodes, 0.47 of six and ten
- * (docs/theory.md): a product of two, times the square of one over it. Clamped ends of contacts need as much again. */
-static double of_product(const uz_mesh *mesh)
-{
-    double most = 1.7;
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
-        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
-        const bool simplex = mesh->kind[e] == UZ_TRI6 || mesh->kind[e] == UZ_TET10;
-        most = fmax(most, simplex ? 7 : type->nodes > type->corners ? 3 : 0);
-    }
-    return most;
-}
-
 /* Solves that are not exact go on to this part of the adjoint's norm. */
 #define SOLVED 1e-6
 
@@ -80,7 +66,17 @@ static uz_status begin(adjoint *x, uz_error *err)
         !x->active || !x->pressing || !x->z || !x->w)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes",
                        (long long)model->mesh.n_nodes);
-    x->of_product = of_product(&model->mesh);
+    /* Of the product of both norms, by the kinds of elements. Beside corners where stress is singular an estimate is as
+     * small as 0.74 of the error of linear elements, 0.67 of those of eight and twenty nodes, 0.47 of six and ten
+     * (docs/theory.md): a product of two, times the square of one over it. Clamped ends of contacts need as much again.
+     */
+    x->of_product = 1.7;
+    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
+        const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
+        const uz_element_type *type = uz_element_type_of(kind);
+        const bool simplex = kind == UZ_TRI6 || kind == UZ_TET10;
+        x->of_product = fmax(x->of_product, simplex ? 7 : type->nodes > type->corners ? 3 : 0);
+    }
     memset(x->row_of, 0xff, (size_t)model->mesh.n_nodes * sizeof *x->row_of);
     for (int64_t i = 0; i < model->m; i++)
         if (!uz_row_inner(model, i))
@@ -91,16 +87,6 @@ static uz_status begin(adjoint *x, uz_error *err)
     if (status == UZ_OK)
         status = uz_mesh_error_energy(&x->own_error, model, x->free_strain, x->answer->u, err);
     return status;
-}
-
-static void end(adjoint *x)
-{
-    double *room[] = {x->p, x->h, x->y, x->g, x->of_rows, x->depth, x->bulge, x->slip, x->z, x->w, x->free_strain};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
-    free(x->active);
-    free(x->row_of);
-    free(x->pressing);
 }
 
 /* y with D_AA y = g0_A by conjugate gradients, where the form of the operator has no exact solve or rows depend on each
@@ -324,6 +310,9 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
         e->n_quantities = i + 1;
     }
     e->asked = work->settings->quantity_error;
-    end(&x);
+    void *room[] = {x.p,    x.h, x.y, x.g,           x.of_rows, x.depth,  x.bulge,
+                    x.slip, x.z, x.w, x.free_strain, x.active,  x.row_of, x.pressing};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
     return status;
 }

@@ -60,15 +60,6 @@ static uz_status begin(refinement *x, uz_run *run, uz_error *err)
     return uz_csc_transpose(&x->Nt, uz_setup_N(run->asked->setup, run->asked->problem), err);
 }
 
-static void end(refinement *x)
-{
-    double *room[] = {x->res.e, x->res.e_u, x->res.Ku, x->res.Kc, x->zero, x->e, x->c, x->f, x->s, x->r, x->g, x->ray};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
-    free(x->active);
-    uz_csc_clear(&x->Nt);
-}
-
 /* c and s for e and f. */
 static uz_status correct(refinement *x, uz_error *err)
 {
@@ -179,8 +170,12 @@ uz_status uz_run_refine(uz_run *run, uz_error *err)
         memcpy(run->work.it.ray, x.ray, (size_t)run->m * sizeof *x.ray);
         run->work.end = UZ_END_RAY; /* to be proved by the original data */
     }
+    double *room[] = {x.res.e, x.res.e_u, x.res.Ku, x.res.Kc, x.zero, x.e, x.c, x.f, x.s, x.r, x.g, x.ray};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    free(x.active);
+    uz_csc_clear(&x.Nt);
     uz_answer_clear(&latest);
-    end(&x);
     return status;
 }
 

@@ -201,7 +201,7 @@ uz_status uz_report_run(uz_run *run, uz_error *err)
     if (!result->ray)
         status = uz_iterate_state(&state, it, run->work.dual, asked->settings->method, err);
     if (status == UZ_OK && state && rows->in) {
-        status = uz_state_copy_rows(&result->state, state, rows, false, err);
+        status = uz_state_copy(&result->state, state, rows, false, 0, err);
         uz_state_free(state);
     } else {
         result->state = state;

@@ -141,33 +141,3 @@ bool uz_candidates_has(const uz_candidates *a, const uz_candidates *b)
             return false;
     return true;
 }
-
-/* ---------------------------------------------------------------- states */
-
-uz_status uz_state_copy_rows(uz_state **out, const uz_state *from, const uz_candidates *rows, bool gather,
-                             uz_error *err)
-{
-    uz_state *s = uz_alloc_zero(1, sizeof *s);
-    bool ok = true;
-    *out = NULL;
-    if (!s)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a state");
-    *s = *from;
-    s->m = gather ? rows->count : rows->m;
-    double **to[] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
-    for (size_t k = 0; k < sizeof to / sizeof to[0]; k++) {
-        const double *given = *to[k];
-        *to[k] = given ? uz_alloc(s->m, sizeof *given) : NULL;
-        ok = ok && (*to[k] || !given);
-        if (*to[k] && gather)
-            uz_candidates_gather(*to[k], given, rows);
-        else if (*to[k])
-            uz_candidates_scatter(*to[k], given, rows);
-    }
-    if (ok) {
-        *out = s;
-        return UZ_OK;
-    }
-    uz_state_free(s);
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)rows->m);
-}

@@ -26,8 +26,4 @@ uz_status uz_candidates_add_start(uz_candidates *to, const uz_state *start, uz_e
 /* Is each row of b in a? */
 bool uz_candidates_has(const uz_candidates *a, const uz_candidates *b);
 
-/* A state of all rows as one of those that are in (gather), or back: the others have zeros. The caller frees *out. */
-uz_status uz_state_copy_rows(uz_state **out, const uz_state *from, const uz_candidates *rows, bool gather,
-                             uz_error *err);
-
 #endif

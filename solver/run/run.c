@@ -110,16 +110,13 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     uz_milestones_resume(&work->milestones, uz_run_time(run));
     if (status == UZ_OK && asked->start) {
         const uz_candidates *rows = &asked->setup->rows;
-        uz_state *part = NULL, *scaled = NULL; /* what the rows of the setup have of it */
+        uz_state *own = NULL; /* what the rows of the setup have of it */
         status = uz_state_check(asked->start, run->all, err);
-        if (status == UZ_OK && rows->in)
-            status = uz_state_copy_rows(&part, asked->start, rows, true, err);
-        if (status == UZ_OK && work->exponent != 0)
-            status = uz_state_scaled(&scaled, part ? part : asked->start, work->exponent, err);
+        if (status == UZ_OK && (rows->in || work->exponent != 0))
+            status = uz_state_copy(&own, asked->start, rows->in ? rows : NULL, true, work->exponent, err);
         if (status == UZ_OK)
-            status = uz_iterate_start(&work->it, work->dual, scaled ? scaled : part ? part : asked->start, err);
-        uz_state_free(scaled);
-        uz_state_free(part);
+            status = uz_iterate_start(&work->it, work->dual, own ? own : asked->start, err);
+        uz_state_free(own);
     }
     work->it.guessed = asked->guessed;
     if (status == UZ_OK)

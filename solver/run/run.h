@@ -100,8 +100,10 @@ uz_status uz_run_round_to_units(uz_run *run, uz_error *err);
 void uz_run_restore_units(uz_run *run);
 /* History and state of the result as well. */
 uz_status uz_run_unscale_history(uz_run *run, uz_error *err);
-/* *out: the state in other units. */
-uz_status uz_state_scaled(uz_state **out, const uz_state *from, int exponent, uz_error *err);
+/* The state in units 2^-exponent as large; of rows (NULL: of all) with those alone that are in (gather), or back: the
+ * others have zeros. The caller frees *out. Error: UZ_ERR_MEMORY. */
+uz_status uz_state_copy(uz_state **out, const uz_state *from, const uz_candidates *rows, bool gather, int exponent,
+                        uz_error *err);
 /* The caller's hooks, told in the caller's units; room lives as long as they. */
 typedef struct {
     const uz_hooks *outer;

@@ -114,21 +114,29 @@ static void scale_row(uz_history_row *row, int exponent)
     scale_residual(&row->residual, exponent);
 }
 
-uz_status uz_state_scaled(uz_state **out, const uz_state *from, int exponent, uz_error *err)
+uz_status uz_state_copy(uz_state **out, const uz_state *from, const uz_candidates *rows, bool gather, int exponent,
+                        uz_error *err)
 {
     uz_state *s = uz_alloc_zero(1, sizeof *s);
+    bool ok = true;
     *out = NULL;
     if (!s)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a state");
     *s = *from;
+    s->m = !rows ? from->m : gather ? rows->count : rows->m;
     double **to[] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
-    bool ok = true;
     for (size_t k = 0; k < sizeof to / sizeof to[0]; k++) {
-        const double *x = *to[k];
-        *to[k] = x ? uz_alloc(s->m, sizeof *x) : NULL;
-        ok = ok && (*to[k] || !x);
-        for (int64_t i = 0; *to[k] && i < s->m; i++) {
-            const double y = ldexp(x[i], exponent);
+        const double *given = *to[k];
+        *to[k] = given ? uz_alloc(s->m, sizeof *given) : NULL;
+        ok = ok && (*to[k] || !given);
+        if (*to[k] && !rows)
+            memcpy(*to[k], given, (size_t)s->m * sizeof *given);
+        else if (*to[k] && gather)
+            uz_candidates_gather(*to[k], given, rows);
+        else if (*to[k])
+            uz_candidates_scatter(*to[k], given, rows);
+        for (int64_t i = 0; *to[k] && exponent != 0 && i < s->m; i++) {
+            const double y = ldexp((*to[k])[i], exponent);
             (*to[k])[i] = isfinite(y) ? y : 0.0; /* of another load, and of no use to this one */
         }
     }
@@ -225,7 +233,7 @@ uz_status uz_run_unscale_history(uz_run *run, uz_error *err)
         return UZ_OK;
     for (int64_t k = 0; k < result->history.count; k++)
         scale_row(&result->history.rows[k], exponent);
-    uz_status status = state ? uz_state_scaled(&result->state, state, exponent, err) : UZ_OK;
+    uz_status status = state ? uz_state_copy(&result->state, state, NULL, false, exponent, err) : UZ_OK;
     uz_state_free(state);
     run->work.exponent = 0;
     return status;

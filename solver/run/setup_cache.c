@@ -13,25 +13,6 @@ static void destroy_setup(void *object)
     uz_setup_free(object);
 }
 
-/* A setup at a place is made on that of the scene at none, which it keeps. */
-static uz_status acquire_at_place(uz_setup **setup, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
-                                  const uz_candidates *wanted, const uz_settings *settings, const uz_hooks *hooks,
-                                  uz_error *err)
-{
-    uz_problem rest = *problem;
-    uz_setup *base;
-    rest.scene.place = NULL;
-    uz_status status = uz_setup_acquire(&base, reused, cache, &rest, NULL, settings, hooks, err);
-    if (status != UZ_OK)
-        return status;
-    status = uz_setup_move(setup, base, problem, wanted, settings, hooks, err);
-    if (status == UZ_OK)
-        *reused = (*setup)->reused;
-    else
-        uz_setup_release(cache, base);
-    return status;
-}
-
 uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
                            const uz_candidates *wanted, const uz_settings *settings, const uz_hooks *hooks,
                            uz_error *err)
@@ -42,8 +23,20 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
     bool create = true;
     *setup = NULL;
     *reused = nothing;
-    if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.place)
-        return acquire_at_place(setup, reused, cache, problem, wanted, settings, hooks, err);
+    if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.place) { /* made on that at no place, which it keeps */
+        uz_problem rest = *problem;
+        uz_setup *base;
+        rest.scene.place = NULL;
+        uz_status moved = uz_setup_acquire(&base, reused, cache, &rest, NULL, settings, hooks, err);
+        if (moved != UZ_OK)
+            return moved;
+        moved = uz_setup_move(setup, base, problem, wanted, settings, hooks, err);
+        if (moved == UZ_OK)
+            *reused = (*setup)->reused;
+        else
+            uz_setup_release(cache, base);
+        return moved;
+    }
     if (!cache)
         return uz_setup_create(setup, problem, wanted, NULL, settings, NULL, hooks, err);
     uz_status status = uz_setup_digest(&key, problem, wanted, settings, err);

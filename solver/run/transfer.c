@@ -22,30 +22,25 @@ typedef struct {
     double *pressure; /* nodes of the coarse mesh, or the fine one */
 } field;
 
-/* The lattice cell that x lies in along an axis, and where in it, 0 to 1. */
-static int64_t locate(double *share, const field *f, int axis, double x)
-{
-    const double *line = f->line[axis];
-    int64_t low = 0, high = f->lattice.order * f->box->cells[axis];
-    while (high - low > 1) {
-        const int64_t middle = low + (high - low) / 2;
-        if (line[middle] <= x)
-            low = middle;
-        else
-            high = middle;
-    }
-    *share = fmin(1.0, fmax(0.0, (x - line[low]) / (line[low + 1] - line[low])));
-    return low;
-}
-
 /* Linear along each axis between the nodes of the lattice. */
 static double pressure_at(const field *f, const double *x)
 {
     const int dim = f->box->dim;
     int64_t low[3] = {0};
     double share[3] = {0}, sum = 0.0;
-    for (int axis = 0; axis < dim; axis++)
-        low[axis] = locate(&share[axis], f, axis, x[axis]);
+    for (int axis = 0; axis < dim; axis++) { /* the lattice's cell that x lies in, and where in it, 0 to 1 */
+        const double *line = f->line[axis];
+        int64_t high = f->lattice.order * f->box->cells[axis];
+        while (high - low[axis] > 1) {
+            const int64_t middle = low[axis] + (high - low[axis]) / 2;
+            if (line[middle] <= x[axis])
+                low[axis] = middle;
+            else
+                high = middle;
+        }
+        const double *from = line + low[axis];
+        share[axis] = fmin(1.0, fmax(0.0, (x[axis] - from[0]) / (from[1] - from[0])));
+    }
     for (int corner = 0; corner < 1 << dim; corner++) {
         int64_t at[3] = {0};
         double weight = 1.0;

@@ -2,6 +2,7 @@
 #include "body_fixture.h"
 #include "quad_exact.h"
 #include "run/rows.h"
+#include "run/run.h"
 
 #include <string.h>
 
@@ -497,9 +498,9 @@ TEST(sets_of_rows)
     set.in[3] = 1;
     set.count = 3;
     CHECK(uz_candidates_has(&set, &other) && !uz_candidates_has(&other, &set));
-    CHECK_INT(uz_state_copy_rows(&part, &state, &set, true, &err), UZ_OK);
+    CHECK_INT(uz_state_copy(&part, &state, &set, true, 0, &err), UZ_OK);
     CHECK(part->m == 3 && part->r[0] == -1 && part->rho[1] == -2 && part->r[2] == 0);
-    CHECK_INT(uz_state_copy_rows(&back, part, &set, false, &err), UZ_OK);
+    CHECK_INT(uz_state_copy(&back, part, &set, false, 0, &err), UZ_OK);
     CHECK(back->m == 4 && memcmp(back->r, r, sizeof r) == 0 && memcmp(back->rho, rho, sizeof rho) == 0);
     uz_state_free(part);
     uz_state_free(back);
