@@ -22,6 +22,7 @@ typedef struct {
     int64_t n_dofs, rows;
     uz_ordering ordering;
     const uz_hooks *hooks;
+    bool last; /* the contact, and not much else, has to come last: what is dense is as large as all that does */
 } wanted;
 
 uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *A, uz_error *err)
@@ -104,18 +105,11 @@ static bool fits(const void *object, void *ctx)
 {
     const kept_factor *kept = object;
     const wanted *w = ctx;
-    return kept->ordering == w->ordering && strcmp(kept->K, w->key->values) == 0 &&
-           uz_factor_describe(kept->factor).rcond >= SHARED_RCOND;
-}
-
-/* The contact, and not much else, comes last: what is dense is as large as all that does. */
-static bool fits_best(const void *object, void *ctx)
-{
-    const kept_factor *kept = object;
-    const wanted *w = ctx;
     int64_t count;
     uz_factor_last_dofs(kept->factor, &count);
-    return fits(object, ctx) && count <= 2 * w->n_dofs + 256 && uz_factor_ends_with(kept->factor, w->dofs, w->n_dofs);
+    return kept->ordering == w->ordering && strcmp(kept->K, w->key->values) == 0 &&
+           uz_factor_describe(kept->factor).rcond >= SHARED_RCOND &&
+           (!w->last || (count <= 2 * w->n_dofs + 256 && uz_factor_ends_with(kept->factor, w->dofs, w->n_dofs)));
 }
 
 /* Puts a factor into the place that was reserved for it, and owns it also on failure. */
@@ -137,7 +131,7 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
                                const int64_t *dofs, int64_t n_dofs, int64_t rows, uz_ordering ordering,
                                uz_factor_accept accept, void *ctx, const uz_hooks *hooks, uz_error *err)
 {
-    wanted w = {key, K, dofs, n_dofs, rows, ordering, hooks};
+    wanted w = {key, K, dofs, n_dofs, rows, ordering, hooks, .last = true};
     uz_item *item = NULL, *kept_analysis = NULL;
     uz_analysis *own_analysis = NULL;
     uz_factor *factor = NULL;
@@ -145,7 +139,8 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
     memset(out, 0, sizeof *out);
     uz_status status = UZ_OK;
     if (cache) { /* one that is there, which ends with the contact if possible */
-        item = uz_table_search(cache, UZ_ITEM_FACTOR, fits_best, &w);
+        item = uz_table_search(cache, UZ_ITEM_FACTOR, fits, &w);
+        w.last = false;
         item = item ? item : uz_table_search(cache, UZ_ITEM_FACTOR, fits, &w);
         create = false;
     }

@@ -19,31 +19,12 @@ static int direct_count(uz_model model)
     return model == UZ_SOLID || model == UZ_AXISYMMETRIC ? 3 : 2;
 }
 
-static double trace(uz_model model, const double *v)
-{
-    return model == UZ_SOLID || model == UZ_AXISYMMETRIC ? v[0] + v[1] + v[2] : v[0] + v[1];
-}
-
 void uz_elastic_stress(double *stress, uz_model model, uz_lame lame, const double *strain)
 {
     const int n = uz_stress_count(model), direct = direct_count(model);
-    const double mean = lame.lambda * trace(model, strain);
+    const double mean = lame.lambda * (direct == 3 ? strain[0] + strain[1] + strain[2] : strain[0] + strain[1]);
     for (int i = 0; i < n; i++)
         stress[i] = i < direct ? mean + 2 * lame.mu * strain[i] : lame.mu * strain[i];
-}
-
-/* Deviator and trace apart, so that a large lambda cancels nothing: with n directions and t = trace(s),
- * s' C^-1 s = t^2 / (n (n lambda + 2 mu)) + (s_dev . s_dev) / (2 mu). */
-double uz_complementary(uz_model model, uz_lame lame, const double *stress)
-{
-    const int n = uz_stress_count(model), direct = direct_count(model);
-    const double sum = trace(model, stress);
-    double deviator = 0;
-    for (int i = 0; i < direct; i++)
-        deviator += (stress[i] - sum / direct) * (stress[i] - sum / direct);
-    for (int i = direct; i < n; i++)
-        deviator += 2 * stress[i] * stress[i];
-    return sum * sum / (direct * (direct * lame.lambda + 2 * lame.mu)) + deviator / (2 * lame.mu);
 }
 
 /* Of Lame's own lambda, not that of plane stress. */

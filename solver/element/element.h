@@ -32,8 +32,6 @@ int uz_stress_count(uz_model model);
 
 /* stress = C strain, each uz_stress_count(model) numbers; the two may be the same array. */
 void uz_elastic_stress(double *stress, uz_model model, uz_lame lame, const double *strain);
-/* stress' C^-1 stress, twice the complementary energy per volume. */
-double uz_complementary(uz_model model, uz_lame lame, const double *stress);
 
 /* The strain of a free body whose temperature rose, `free_strain` = expansion * rise: that in each direct component.
  * In plane strain (1 + nu) times it, for what the held third direction adds. */

@@ -28,11 +28,6 @@ typedef struct {
     unsigned *part;     /* m; plane models */
 } surface_work;
 
-static uz_status fail_memory(uz_error *err, const uz_surface *s)
-{
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the surface of %lld elements", (long long)s->n_elements);
-}
-
 /* The least power of two that is not below a number >= 0; 1 for zero. */
 static double unit_of(double largest)
 {
@@ -62,7 +57,7 @@ static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *e
     s->displacement = uz_alloc_zero(3 * s->n_vertices, sizeof *s->displacement);
     s->node = renumbered ? uz_alloc(s->n_vertices, sizeof *s->node) : NULL;
     if (!s->position || !s->displacement || (renumbered && !s->node))
-        return fail_memory(err, s);
+        return uz_skin_no_memory(s->n_elements, err);
     /* The middle of the body and the size of what is drawn. */
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
@@ -111,7 +106,7 @@ static uz_status draw_values(uz_drawn *out, const uz_surface *s, const double *v
 {
     out->x = uz_alloc(count, sizeof *out->x);
     if (!out->x)
-        return fail_memory(err, s);
+        return uz_skin_no_memory(s->n_elements, err);
     double low = INFINITY, high = -INFINITY;
     for (int64_t i = 0; i < count; i++) {
         low = fmin(low, value[place ? place[i] : i]); /* of two numbers of which one is NaN: the other */
@@ -136,7 +131,7 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
     /* A group between two elements has nodes within the body: their rows are left out. */
     w->drawn = uz_alloc(m, sizeof *w->drawn);
     if (!w->drawn)
-        return fail_memory(err, s);
+        return uz_skin_no_memory(s->n_elements, err);
     for (int64_t i = 0; i < m; i++)
         if (w->vertex_of[info->contact_node[i]] >= 0)
             w->drawn[s->n_rows++] = i;
@@ -144,7 +139,7 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
     s->row_contact = uz_alloc(s->n_rows, sizeof *s->row_contact);
     s->row_normal = uz_alloc_zero(3 * s->n_rows, sizeof *s->row_normal);
     if (!s->row_vertex || !s->row_contact || !s->row_normal)
-        return fail_memory(err, s);
+        return uz_skin_no_memory(s->n_elements, err);
     for (int64_t i = 0; i < s->n_rows; i++) {
         const int64_t row = w->drawn[i];
         s->row_vertex[i] = (unsigned)w->vertex_of[info->contact_node[row]];
@@ -163,7 +158,7 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
     w->part = uz_alloc(m, sizeof *w->part);
     s->row_part = uz_alloc(s->n_rows, sizeof *s->row_part);
     if (!w->arc || !w->part || !s->row_part)
-        return fail_memory(err, s);
+        return uz_skin_no_memory(s->n_elements, err);
     status = uz_contact_arc(w->arc, w->part, w->model, w->scene, err);
     for (int64_t i = 0; status == UZ_OK && i < s->n_rows; i++)
         s->row_part[i] = w->part[w->drawn[i]];
@@ -197,7 +192,7 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
     /* The nodes that are drawn are numbered. */
     w->vertex_of = uz_alloc_zero(s->n_nodes, sizeof *w->vertex_of);
     if (!w->vertex_of)
-        return fail_memory(err, s);
+        return uz_skin_no_memory(s->n_elements, err);
     for (int64_t i = 0; i < skin->first[skin->n_cells]; i++)
         w->vertex_of[skin->point[i]] = 1;
     for (int64_t a = 0; a < s->n_nodes; a++)
@@ -222,7 +217,7 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
     s->outline = as_vertices(w, w->edges.outline, 2 * s->n_outline);
     s->triangle = uz_alloc(3 * s->n_triangles, sizeof *s->triangle);
     if (!s->line || !s->outline || !s->triangle)
-        return fail_memory(err, s);
+        return uz_skin_no_memory(s->n_elements, err);
     for (int64_t i = 0, n = 0; i < skin->n_cells; i++) {
         const int64_t *point = skin->point + skin->first[i];
         const int count = uz_cell_triangles(&triangle, (int)(skin->first[i + 1] - skin->first[i]));
@@ -241,7 +236,8 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
         pair = pair || w->scene->contacts[k].kind == UZ_OBSTACLE_BODY;
     if (status == UZ_OK && w->fields.pressure && pair) {
         double *touch = uz_alloc(s->n_nodes, sizeof *touch);
-        status = touch ? uz_nodal_pressure(touch, w->model, w->scene, w->fields.pressure, err) : fail_memory(err, s);
+        status = touch ? uz_nodal_pressure(touch, w->model, w->scene, w->fields.pressure, err)
+                       : uz_skin_no_memory(s->n_elements, err);
         for (int64_t a = 0; status == UZ_OK && a < s->n_nodes; a++)
             if (w->vertex_of[a] >= 0)
                 touch[w->vertex_of[a]] = touch[a];

@@ -40,7 +40,8 @@ static double up(const uz_panel *panel, double y)
     return panel->top + panel->height * ((panel->y.high - y) / (panel->y.high - panel->y.low));
 }
 
-bool uz_panel_place(double *px, double *py, const uz_panel *panel, double x, double y)
+/* What has no place (not finite, or not positive on a logarithmic axis) has none: false. */
+static bool place(double *px, double *py, const uz_panel *panel, double x, double y)
 {
     if (!isfinite(x) || !uz_axis_has(y, panel->log))
         return false;
@@ -143,7 +144,7 @@ void uz_panel_put_curve(uz_buffer *svg, const uz_panel *panel, const uz_curve_of
     bool gap = false;
     for (int64_t i = 0; i < curve->x.count && !svg->failed; i++) {
         point at;
-        if (!uz_panel_place(&at.x, &at.y, panel, uz_column_at(curve->x, i), uz_curve_value(curve, i))) {
+        if (!place(&at.x, &at.y, panel, uz_column_at(curve->x, i), uz_curve_value(curve, i))) {
             gap = true; /* one within a column of pixels is too small to see */
             continue;
         }
@@ -179,7 +180,7 @@ void uz_panel_put_marks(uz_buffer *svg, const uz_panel *panel, const uz_curve_of
     for (int64_t i = 0; i < curve->x.count && !svg->failed; i++) {
         point at;
         if (!(uz_column_at(flag, i) > 0.0) ||
-            !uz_panel_place(&at.x, &at.y, panel, uz_column_at(curve->x, i), uz_curve_value(curve, i)) ||
+            !place(&at.x, &at.y, panel, uz_column_at(curve->x, i), uz_curve_value(curve, i)) ||
             (floor(at.x) >= column && floor(at.x) <= column))
             continue;
         column = floor(at.x);

@@ -24,8 +24,6 @@ typedef struct {
 
 /* y is widened to whole decades, or to ticks of a round step from 0 on. */
 uz_panel uz_panel_make(double left, double top, double width, double height, uz_range x, uz_range y, bool log);
-/* What has no place (not finite, or not positive on a logarithmic axis) has none: false. */
-bool uz_panel_place(double *px, double *py, const uz_panel *panel, double x, double y);
 
 /* Frame, ticks with their numbers and lines through the panel, the name above it. x_numbers: below the ticks of x. */
 void uz_panel_put_axes(uz_buffer *svg, const uz_panel *panel, const char *name, bool x_numbers);

@@ -37,19 +37,6 @@ uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double 
     return point;
 }
 
-/* Adds where the nodes are, drawn with this factor, to the box low..high in lengths. */
-static void extend_box(double low[2], double high[2], const uz_scenery *scenery, double factor)
-{
-    for (int64_t a = 0; a < scenery->model->mesh.n_nodes; a++) {
-        const uz_raster_point p = uz_scenery_node(scenery, a, factor);
-        const double at[2] = {p.x, -p.y};
-        for (int i = 0; i < 2; i++) {
-            low[i] = fmin(low[i], at[i]);
-            high[i] = fmax(high[i], at[i]);
-        }
-    }
-}
-
 double uz_show_factor(const uz_mesh *mesh, const double *u)
 {
     double largest = 0;
@@ -77,8 +64,15 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
         scenery->factor = uz_show_factor(&scenery->model->mesh, scenery->answer->u);
     scenery->scale = 1;
     scenery->offset[0] = scenery->offset[1] = 0;
-    extend_box(low, high, scenery, 0);
-    extend_box(low, high, scenery, scenery->factor);
+    /* where the nodes are before and after, in lengths */
+    for (int64_t i = 0; i < 2 * scenery->model->mesh.n_nodes; i++) {
+        const uz_raster_point p = uz_scenery_node(scenery, i / 2, i % 2 ? scenery->factor : 0);
+        const double at[2] = {p.x, -p.y};
+        for (int c = 0; c < 2; c++) {
+            low[c] = fmin(low[c], at[c]);
+            high[c] = fmax(high[c], at[c]);
+        }
+    }
     const double wide = high[0] - low[0], tall = high[1] - low[1];
     if (!(isfinite(wide) && isfinite(tall) && wide + tall > 0))
         return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacements cannot be drawn: they are not finite");

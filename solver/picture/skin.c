@@ -11,9 +11,9 @@
 
 /* -------------------------------------------------------------------- cells */
 
-static uz_status fail_memory(uz_error *err, int64_t cells)
+uz_status uz_skin_no_memory(int64_t elements, uz_error *err)
 {
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the surface of %lld elements", (long long)cells);
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the surface of %lld elements", (long long)elements);
 }
 
 /* Appends one cell whose nodes come corners first. Room is there. */
@@ -30,50 +30,37 @@ static void add_cell(uz_skin *skin, const int64_t *node, int corners, int count)
     skin->n_cells++;
 }
 
-static bool make_room(uz_skin *skin, int64_t cells, int64_t points)
-{
-    skin->first = uz_alloc_zero(cells + 1, sizeof *skin->first);
-    skin->point = uz_alloc(points, sizeof *skin->point);
-    return skin->first && skin->point;
-}
-
-static bool is_outer(const uz_corner_table *sides, int64_t i)
-{
-    return !sides->same[i] && !sides->same[i + 1];
-}
-
 uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks, uz_error *err)
 {
+    const bool solid = mesh->dim == 3;
     uz_corner_table sides = {0};
-    int64_t cells = 0;
-    uz_status status = UZ_OK;
+    int64_t cells = solid ? 0 : mesh->n_elements;
     memset(out, 0, sizeof *out);
-    if (mesh->dim == 2) {
-        if (!make_room(out, mesh->n_elements, mesh->first[mesh->n_elements]))
-            status = fail_memory(err, mesh->n_elements);
-        for (int64_t e = 0; status == UZ_OK && e < mesh->n_elements; e++) {
-            int count;
-            const int64_t *node = uz_mesh_element(mesh, e, &count);
-            add_cell(out, node, uz_element_type_of((uz_element_kind)mesh->kind[e])->corners, count);
-        }
-    } else {
-        status = uz_corner_table_build(&sides, mesh, true, err);
-        for (int64_t i = 0; status == UZ_OK && i < sides.count; i++)
-            cells += is_outer(&sides, i);
-        if (status == UZ_OK && uz_cancelled(hooks))
-            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the surface was found");
-        if (status == UZ_OK && !make_room(out, cells, UZ_CELL_POINTS * cells))
-            status = fail_memory(err, mesh->n_elements);
-        for (int64_t i = 0; status == UZ_OK && i < sides.count; i++) {
-            int64_t node[UZ_FACE_NODES];
-            if (!is_outer(&sides, i))
-                continue;
-            const int count = uz_mesh_face(node, mesh, sides.item[i]);
-            const uz_element_kind kind = (uz_element_kind)mesh->kind[sides.item[i].element];
-            add_cell(out, node, uz_element_type_of(kind)->side[sides.item[i].side].corners, count);
-        }
-        uz_corner_table_clear(&sides);
+    uz_status status = solid ? uz_corner_table_build(&sides, mesh, true, err) : UZ_OK;
+    for (int64_t i = 0; i < sides.count; i++) /* sides of one element only */
+        cells += !sides.same[i] && !sides.same[i + 1];
+    if (status == UZ_OK && solid && uz_cancelled(hooks))
+        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the surface was found");
+    if (status == UZ_OK) {
+        out->first = uz_alloc_zero(cells + 1, sizeof *out->first);
+        out->point = uz_alloc(solid ? UZ_CELL_POINTS * cells : mesh->first[cells], sizeof *out->point);
+        if (!out->first || !out->point)
+            status = uz_skin_no_memory(mesh->n_elements, err);
     }
+    for (int64_t e = 0; status == UZ_OK && !solid && e < mesh->n_elements; e++) {
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        add_cell(out, node, uz_element_type_of((uz_element_kind)mesh->kind[e])->corners, count);
+    }
+    for (int64_t i = 0; status == UZ_OK && i < sides.count; i++) {
+        int64_t node[UZ_FACE_NODES];
+        if (sides.same[i] || sides.same[i + 1])
+            continue;
+        const int count = uz_mesh_face(node, mesh, sides.item[i]);
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[sides.item[i].element];
+        add_cell(out, node, uz_element_type_of(kind)->side[sides.item[i].side].corners, count);
+    }
+    uz_corner_table_clear(&sides);
     if (status != UZ_OK)
         uz_skin_clear(out);
     return status;
@@ -158,7 +145,7 @@ static uz_status prepare_edges(edge_work *w, const uz_mesh *mesh, uz_error *err)
     enum { FEW = 16 };
     w->start = uz_alloc_zero(mesh->n_nodes + 1, sizeof *w->start);
     if (!w->start)
-        return fail_memory(err, mesh->n_elements);
+        return uz_skin_no_memory(mesh->n_elements, err);
     walk_edges(w, false);
     for (int64_t i = 0; i < mesh->n_nodes; i++)
         w->start[i + 1] += w->start[i];
@@ -166,7 +153,7 @@ static uz_status prepare_edges(edge_work *w, const uz_mesh *mesh, uz_error *err)
     w->half = uz_alloc(w->count, sizeof *w->half);
     w->normal = mesh->dim == 3 ? uz_alloc(3 * w->skin->n_cells, sizeof *w->normal) : NULL;
     if (!w->half || (mesh->dim == 3 && !w->normal))
-        return fail_memory(err, mesh->n_elements);
+        return uz_skin_no_memory(mesh->n_elements, err);
     walk_edges(w, true);
     memmove(w->start + 1, w->start, (size_t)mesh->n_nodes * sizeof *w->start); /* placing moved each on */
     w->start[0] = 0;
@@ -232,7 +219,7 @@ uz_status uz_skin_edges_build(uz_skin_edges *out, const uz_skin *skin, const uz_
         out->line = uz_alloc(2 * out->n_lines, sizeof *out->line);
         out->outline = uz_alloc(2 * out->n_outline, sizeof *out->outline);
         if (!out->line || !out->outline)
-            status = fail_memory(err, mesh->n_elements);
+            status = uz_skin_no_memory(mesh->n_elements, err);
         else
             collect_edges(out, &w, mesh->n_nodes);
     }

@@ -61,17 +61,6 @@ void uz_field_points_states(uz_field_state *state, uz_field_points *points, int6
     }
 }
 
-double uz_field_points_volume(uz_field_points *points, int64_t element)
-{
-    if (!points->group.shaped || points->volume == 0) {
-        uz_element own;
-        double xyz[3 * UZ_ELEMENT_NODES];
-        uz_body_element(&own, xyz, points->body->model, element);
-        points->volume = uz_element_volume(&own);
-    }
-    return points->volume;
-}
-
 /* Shear strains become tensor components. Axisymmetric: rr, zz, hoop, rz are xx, yy, zz, xy here. */
 void uz_field_state_of_strain(uz_field_state *out, uz_model model, const uz_body_material *material, double free_strain,
                               double *strain)

@@ -40,8 +40,6 @@ typedef struct {
 } uz_field_points;
 void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const double *u);
 void uz_field_points_states(uz_field_state *state, uz_field_points *points, int64_t element);
-/* Of an element whose states were asked for. */
-double uz_field_points_volume(uz_field_points *points, int64_t element);
 
 /* Nodal averages, n_nodes x components each; either may be NULL. UZ_ERR_CANCELLED, _MEMORY. */
 uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,

@@ -225,7 +225,13 @@ static uz_status take_samples(patches *p, uz_field_points *middle, const double 
         const int64_t *node = uz_mesh_element(mesh, e, &nodes);
         uz_field_points_states(&state, &middle[kind], e);
         memset(to->x, 0, sizeof to->x);
-        to->volume = uz_field_points_volume(&middle[kind], e);
+        if (!middle[kind].group.shaped || middle[kind].volume == 0) { /* equal boxes have one */
+            uz_element own;
+            double xyz[3 * UZ_ELEMENT_NODES];
+            uz_body_element(&own, xyz, p->body->model, e);
+            middle[kind].volume = uz_element_volume(&own);
+        }
+        to->volume = middle[kind].volume;
         memcpy(to->value, state.stress, bytes);
         memcpy(to->value + p->body->components, state.strain, bytes);
         for (int a = 0; a < nodes; a++)

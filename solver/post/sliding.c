@@ -51,22 +51,6 @@ typedef struct {
     double force, gap, turn, aside, overlap;
 } misfit;
 
-/* How far a row's node has slid along the other body. */
-static double slid_by(const uz_body_model *model, const uz_contact_sites *sites, int64_t row, const double *u)
-{
-    const int dim = model->mesh.dim;
-    const int64_t p = model->row_place[row];
-    double along = 0, square = 0;
-    for (int c = 0; c < dim && sites->first; c++) {
-        double v = u[model->info.contact_node[row] * dim + c];
-        for (int64_t j = sites->first[p]; j < sites->first[p + 1]; j++)
-            v -= sites->weight[j] * u[sites->node[j] * dim + c];
-        along += v * sites->normal[p * dim + c];
-        square += v * v;
-    }
-    return sqrt(fmax(0, square - along * along));
-}
-
 /* The diagonal of the box around the nodes of contact k that are pushed, at least one face of the other body. */
 static double size_of_zone(const uz_body_model *model, int64_t k, const double *push)
 {
@@ -107,12 +91,19 @@ static void add_rows(misfit *to, const uz_body_model *model, const uz_body_model
             continue;
         const int64_t p = model->row_place[i], q = place_now(now, before, p, dim);
         const bool found = q >= 0 && isfinite(now->gap[q]);
-        double chord = 0;
+        double chord = 0, along = 0, square = 0;
         for (int c = 0; c < dim && found; c++)
             chord = hypot(chord, now->normal[q * dim + c] - before->normal[p * dim + c]);
+        for (int c = 0; c < dim && before->first; c++) { /* how far its node has slid along the other body */
+            double v = u[model->info.contact_node[i] * dim + c];
+            for (int64_t j = before->first[p]; j < before->first[p + 1]; j++)
+                v -= before->weight[j] * u[before->node[j] * dim + c];
+            along += v * before->normal[p * dim + c];
+            square += v * v;
+        }
         to->gap += force * (found ? fabs(now->gap[q]) : approach);
         to->turn += force * 2 * asin(fmin(1, 0.5 * chord));
-        to->aside += before->first ? force * slid_by(model, before, i, u) / zone : 0;
+        to->aside += before->first ? force * sqrt(fmax(0, square - along * along)) / zone : 0;
     }
     for (int64_t k = 0; k < there->n_sites; k++)
         for (int64_t p = 0; p < there->sites[k].n; p++)

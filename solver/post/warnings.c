@@ -158,32 +158,22 @@ static void look_at_elements(const doubts *d)
 
 /* ---- contact */
 
-static double length(const double v[3])
-{
-    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
-/* Of the face that a node meets: its longest distance between corners. */
-static double size_of_face(const uz_mesh *mesh, uz_face face)
-{
-    int64_t node[UZ_FACE_NODES];
-    double largest = 0;
-    const int count = uz_mesh_face(node, mesh, face);
-    for (int a = 0; a < count; a++)
-        for (int b = 0; b < a; b++)
-            largest = fmax(largest,
-                           uz_distance2(mesh->xyz + node[a] * mesh->dim, mesh->xyz + node[b] * mesh->dim, mesh->dim));
-    return sqrt(largest);
-}
-
 /* The deepest that a node begins in the other body, in lengths of the face that it meets. */
 static double deepest_overlap(int64_t *node, const uz_body_model *model)
 {
+    const uz_mesh *mesh = &model->mesh;
     double most = 0;
     for (int64_t row = 0; row < model->m; row++) {
         const uz_contact_sites *sites = &model->sites[model->info.contact_of[row]];
         const int64_t i = model->row_place[row];
-        const double face = sites->first ? size_of_face(&model->mesh, sites->face[i]) : 0;
+        int64_t corner[UZ_FACE_NODES];
+        const int count = sites->first ? uz_mesh_face(corner, mesh, sites->face[i]) : 0;
+        double face = 0; /* its longest distance between nodes */
+        for (int a = 0; a < count; a++)
+            for (int b = 0; b < a; b++)
+                face = fmax(face, uz_distance2(mesh->xyz + corner[a] * mesh->dim, mesh->xyz + corner[b] * mesh->dim,
+                                               mesh->dim));
+        face = sqrt(face);
         if (face > 0 && -sites->gap[i] > most * face) {
             most = -sites->gap[i] / face;
             *node = model->info.contact_node[row];
@@ -200,7 +190,7 @@ static double turned_away(const doubts *d, const uz_obstacle *obstacle, const uz
     const int dim = mesh->dim;
     const uz_group *group = uz_mesh_group(mesh, contact->on, "", NULL);
     const bool faces = group && group->kind == UZ_GROUP_FACES && group->n_faces > 0;
-    const double size = length(contact->normal);
+    const double size = sqrt(uz_dot3(contact->normal, contact->normal));
     double least = faces ? 1 : -1;
     for (int64_t i = 0; faces && i < group->n_faces && least > AWAY; i++) {
         /* Out of the body, in the middle of a face, and that place. */
@@ -222,7 +212,7 @@ static double turned_away(const doubts *d, const uz_obstacle *obstacle, const uz
             side[1][2] = 1; /* the element on the left */
         for (int c = 0; c < 3; c++)
             n[c] = side[0][(c + 1) % 3] * side[1][(c + 2) % 3] - side[0][(c + 2) % 3] * side[1][(c + 1) % 3];
-        const double area = length(n);
+        const double area = sqrt(uz_dot3(n, n));
         for (int c = 0; c < 3; c++)
             n[c] /= area;
         if (obstacle && uz_obstacle_gap(&there, obstacle, middle, NULL) != UZ_OK)

@@ -39,17 +39,12 @@ static bool is_digit(char c)
     return (unsigned char)(c - '0') <= 9;
 }
 
-static uint64_t digit_value(char c)
-{
-    return (uint64_t)(unsigned char)(c - '0');
-}
-
 /* Adds the digits at text[at..len) to *w (mod 2^64) and returns where they end. */
 static size_t take_digits(uint64_t *w, const char *text, size_t at, size_t len)
 {
     uint64_t value = *w;
     while (at < len && is_digit(text[at]))
-        value = 10 * value + digit_value(text[at++]);
+        value = 10 * value + (uint64_t)(text[at++] - '0');
     *w = value;
     return at;
 }
@@ -71,7 +66,7 @@ static void keep_leading_digits(scan *s, const char *text)
             s->truncated = s->truncated || text[at] != '0';
             continue;
         }
-        s->digits = 10 * s->digits + digit_value(text[at]);
+        s->digits = 10 * s->digits + (uint64_t)(text[at] - '0');
         kept += s->digits != 0;
         s->exponent -= after_point;
     }
@@ -105,7 +100,7 @@ static bool scan_number(scan *s, const char *text, size_t len)
         if (at < len && is_digit(text[at])) {
             int64_t value = 0;
             for (; at < len && is_digit(text[at]); at++)
-                value = value < EXPONENT_CEILING / 10 ? 10 * value + (int64_t)digit_value(text[at]) : EXPONENT_CEILING;
+                value = value < EXPONENT_CEILING / 10 ? 10 * value + (text[at] - '0') : EXPONENT_CEILING;
             s->written_exponent = negative ? -value : value;
             s->used = at;
         }

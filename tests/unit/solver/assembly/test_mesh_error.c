@@ -256,6 +256,21 @@ static void add_averages(const plain *x, const plain_element *s, int64_t e)
     }
 }
 
+/* stress' C^-1 stress, twice the complementary energy per volume, by deviator and trace apart: with n directions and
+ * t = trace(s) it is t^2 / (n (n lambda + 2 mu)) + (s_dev . s_dev) / (2 mu). */
+static double complementary(uz_model model, uz_lame lame, const double *stress)
+{
+    const int n = uz_stress_count(model), direct = n == 3 ? 2 : 3;
+    double trace = 0, deviator = 0;
+    for (int i = 0; i < direct; i++)
+        trace += stress[i];
+    for (int i = 0; i < direct; i++)
+        deviator += (stress[i] - trace / direct) * (stress[i] - trace / direct);
+    for (int i = direct; i < n; i++)
+        deviator += 2 * stress[i] * stress[i];
+    return trace * trace / (direct * (direct * lame.lambda + 2 * lame.mu)) + deviator / (2 * lame.mu);
+}
+
 static void add_energies(plain *x, const plain_element *s, int64_t e)
 {
     for (int g = 0; g < s->points; g++) {
@@ -269,8 +284,8 @@ static void add_energies(plain *x, const plain_element *s, int64_t e)
             }
             work += whole[c] * s->strain[g][c];
         }
-        x->eta2 += s->volume[g] * uz_complementary(s->element.model, s->element.lame, jump);
-        x->stress2 += s->volume[g] * uz_complementary(s->element.model, s->element.lame, s->stress[g]);
+        x->eta2 += s->volume[g] * complementary(s->element.model, s->element.lame, jump);
+        x->stress2 += s->volume[g] * complementary(s->element.model, s->element.lame, s->stress[g]);
         x->whole2 += s->volume[g] * work;
     }
 }

@@ -48,7 +48,7 @@ TEST(elasticity_matches_textbook)
     }
 }
 
-TEST(stress_and_its_energy_agree_with_the_matrix)
+TEST(stress_agrees_with_the_matrix)
 {
     const double strain[6] = {0.3, -0.5, 0.7, 0.2, -0.9, 0.4}, nus[3] = {0, 0.3, 0.4999};
     for (int model = 0; model <= UZ_SOLID; model++)
@@ -56,7 +56,7 @@ TEST(stress_and_its_energy_agree_with_the_matrix)
             const uz_model m = (uz_model)model;
             const uz_lame lame = uz_lame_of(m, 200, nus[k]);
             const int n = uz_stress_count(m);
-            double C[36], stress[6], work = 0;
+            double C[36], stress[6];
             elastic_matrix(C, m, lame);
             uz_elastic_stress(stress, m, lame, strain);
             for (int i = 0; i < n; i++) {
@@ -64,9 +64,7 @@ TEST(stress_and_its_energy_agree_with_the_matrix)
                 for (int j = 0; j < n; j++)
                     want += C[n * i + j] * strain[j];
                 CHECK(fabs(stress[i] - want) <= 1e-14 * C[0]);
-                work += stress[i] * strain[i];
             }
-            CHECK_REL(uz_complementary(m, lame, stress), work, 1e-12);
         }
 }
 
