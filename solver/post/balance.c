@@ -8,6 +8,7 @@
 #include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "post/parts.h"
 
 #include <math.h>
@@ -30,12 +31,6 @@ typedef struct {
     double size;
 } balance;
 
-static void add_moment(double moment[DIM], const double x[DIM], const double f[DIM])
-{
-    for (int c = 0; c < DIM; c++)
-        moment[c] += x[(c + 1) % DIM] * f[(c + 2) % DIM] - x[(c + 2) % DIM] * f[(c + 1) % DIM];
-}
-
 /* `to` NULL: only to the sum of everything. */
 static void add_force(balance *b, uz_resultant *to, int64_t node, const double *force)
 {
@@ -49,11 +44,14 @@ static void add_force(balance *b, uz_resultant *to, int64_t node, const double *
         if (to && (c > 0 || b->model->kind != UZ_AXISYMMETRIC)) /* around the ring a radial force sums to nothing */
             to->force[c] += f[c];
     }
-    if (b->model->kind == UZ_AXISYMMETRIC)
-        return;
-    add_moment(b->moment, arm, f);
-    if (to)
-        add_moment(to->moment, x, f);
+    double about[2][DIM]; /* the moments about the centre and about the origin */
+    uz_cross3(about[0], arm, f);
+    uz_cross3(about[1], x, f);
+    for (int c = 0; c < DIM && b->model->kind != UZ_AXISYMMETRIC; c++) {
+        b->moment[c] += about[0][c];
+        if (to)
+            to->moment[c] += about[1][c];
+    }
 }
 
 /* ---- contact */

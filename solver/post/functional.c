@@ -316,21 +316,6 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
 
 /* ---- supports */
 
-/* Forces of springs are displacements. */
-static uz_status take_springs(const making *k, const uz_support *support, const uz_group *group, double *share,
-                              uz_error *err)
-{
-    const int64_t n = k->model->mesh.n_nodes;
-    memset(share, 0, (size_t)n * sizeof *share);
-    const uz_status status = uz_spread_over_group(share, k->model, group, true, k->where, err);
-    for (int64_t i = 0; i < n * k->dim && status == UZ_OK; i++) {
-        const double stiffness = support->spring[i % k->dim];
-        if (stiffness > 0)
-            k->out->load[i] -= fmax(0, share[i / k->dim]) * stiffness * k->quantity->direction[i % k->dim];
-    }
-    return status;
-}
-
 /* held becomes the direction on the dofs that the support holds and none before it did. */
 static void take_directions(const making *k, const uz_support *support, const uz_group *group, bool asked, bool *taken)
 {
@@ -392,8 +377,9 @@ static uz_status take_reaction(const making *k, uz_error *err)
 {
     const uz_scene *scene = k->scene;
     const uz_evaluation *known = k->answer->evaluation;
+    const int64_t n_nodes = k->model->mesh.n_nodes;
     bool *taken = uz_alloc_zero(k->model->n_fixed, sizeof *taken), springs = false, holds = false;
-    double *share = uz_alloc(k->model->mesh.n_nodes, sizeof *share);
+    double *share = uz_alloc(n_nodes, sizeof *share);
     uz_status status = UZ_OK;
     if (!taken || !share)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
@@ -403,10 +389,17 @@ static uz_status take_reaction(const making *k, uz_error *err)
         const uz_group *group = uz_mesh_group(&k->model->mesh, support->on, "/supports", err);
         if (!group)
             status = UZ_ERR_SCENE;
-        else if (spring && asked)
-            status = take_springs(k, support, group, share, err);
         else if (!spring)
             take_directions(k, support, group, asked, taken);
+        else if (asked) { /* their forces are displacements */
+            memset(share, 0, (size_t)n_nodes * sizeof *share);
+            status = uz_spread_over_group(share, k->model, group, true, k->where, err);
+            for (int64_t i = 0; i < n_nodes * k->dim && status == UZ_OK; i++) {
+                const int c = (int)(i % k->dim);
+                if (support->spring[c] > 0)
+                    k->out->load[i] -= fmax(0, share[i / k->dim]) * support->spring[c] * k->quantity->direction[c];
+            }
+        }
         springs = springs || (asked && spring);
         holds = holds || (asked && !spring);
         for (int c = 0; c < k->dim && asked; c++)

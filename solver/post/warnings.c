@@ -323,18 +323,6 @@ static void look_at_mismatch(const doubts *d, int64_t k, int64_t *row)
              contact->on, contact->with);
 }
 
-/* Facets that stand for smooth surfaces. */
-static void look_at_facets(const doubts *d, int64_t k)
-{
-    const uz_overlap *o = &d->out->overlap[k];
-    const double approach = d->out->approach, scale = fmax(approach, o->depth);
-    if (d->scene->contacts[k].kind == UZ_OBSTACLE_BODY && o->facets_left > MOST_FACETS * scale)
-        warn(d->out, "facets", o->facets_left / scale,
-             "facets of contact %lld are off their smooth surface by %.2g, with an approach of %.2g and an overlap of "
-             "%.2g; smooth, or refine",
-             (long long)k, o->facets_left, approach, o->depth);
-}
-
 /* Overlap that nothing else explains. */
 static void look_at_overlap(const doubts *d, int64_t k)
 {
@@ -414,8 +402,14 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     look_at_surfaces(&d);
     const uz_status status = look_at_contact(&d, err);
     for (int64_t k = 0, row = 0; k < scene->n_contacts && status == UZ_OK; k++) {
+        const uz_overlap *o = &d.out->overlap[k];
+        const double approach = d.out->approach, scale = fmax(approach, o->depth);
         look_at_mismatch(&d, k, &row);
-        look_at_facets(&d, k);
+        if (scene->contacts[k].kind == UZ_OBSTACLE_BODY && o->facets_left > MOST_FACETS * scale)
+            warn(d.out, "facets", o->facets_left / scale,
+                 "facets of contact %lld are off their smooth surface by %.2g, with an approach of %.2g and an overlap "
+                 "of %.2g; smooth, or refine",
+                 (long long)k, o->facets_left, approach, o->depth);
         look_at_overlap(&d, k);
     }
     return status;
