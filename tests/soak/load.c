@@ -191,5 +191,8 @@ int main(int argc, char **argv)
            "\"p99_ms\": %.2f, \"max_ms\": %.2f}\n",
            l.count, l.ended, l.refused, l.broken, (double)l.count / took, 1e3 * p50, 1e3 * p99,
            l.count ? 1e3 * l.latency[l.count - 1] : 0);
+    free(clients);
+    free(l.latency);
+    free(l.message);
     return l.refused || l.broken ? 1 : 0;
 }
