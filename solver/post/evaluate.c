@@ -23,7 +23,8 @@ void uz_evaluation_free(uz_evaluation *evaluation)
     free(evaluation);
 }
 
-uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_ahead *ahead,
+                      uz_error *err)
 {
     uz_summary *summary = &result->summary;
     const uz_mesh_info *mesh = &result->mesh;
@@ -87,7 +88,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
         status = uz_measure_overlap(e->overlap, model, scene, result->u, err);
     if (status != UZ_OK)
         return status;
-    summary->discretization_error = uz_estimate_mesh_error(NULL, &summary->stress_share, model, scene, result->u);
+    if (!uz_ahead_take(ahead, &summary->discretization_error, &summary->stress_share, result->u))
+        summary->discretization_error = uz_estimate_mesh_error(NULL, &summary->stress_share, model, scene, result->u);
     if (isnan(summary->discretization_error) && !result->ray)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
     e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);

@@ -12,12 +12,27 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* The certificate looks at K, N and loads, the estimate of the mesh's error at each element: they don't need each
+ * other. Loads in other units are left out: u is not yet what is told. */
+static void look_ahead(uz_run *run)
+{
+    const uz_request *asked = run->asked;
+    uz_ahead_free(run->work.ahead);
+    run->work.ahead = NULL;
+    if (!asked->setup->is_scene || asked->in_block || run->load.exponent != 0)
+        return;
+    const uz_scene scene = uz_scene_of_case(asked->problem, asked->index);
+    run->work.ahead = uz_ahead_start(&asked->setup->model, &scene, run->answer.u, run->load.prescribed);
+}
+
 uz_status uz_run_certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_correction, uz_error *err)
 {
     const double *scale = run->work.dual->dual->row_scale;
     uz_status status = uz_dual_load_recover(run->work.dual, answer->u, r, with_correction, err);
     for (int64_t i = 0; i < answer->m; i++)
         answer->r[i] = scale[i] * r[i];
+    if (status == UZ_OK && answer == &run->answer)
+        look_ahead(run);
     return status == UZ_OK ? uz_run_certify_answer(run, answer, err) : status;
 }
 

@@ -2,6 +2,7 @@
 #include "uzawa.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/reserve.h"
 #include "factor/factor.h"
 #include "linalg/blas.h"
@@ -28,8 +29,10 @@ void uz_process_init(int workers)
 void uz_process_threads(int threads)
 {
     uz_factor_use_threads(threads);
+    uz_aside_allow(threads > 1);
 }
 
+/* Also the thread on which a solve has something computed aside: a process that is confined later can start none. */
 void uz_process_warm(void)
 {
     enum { N = 512, K = 128 };
@@ -38,6 +41,7 @@ void uz_process_warm(void)
     if (Z && C)
         uz_block_syrk_t(N, K, Z, K, C);
     openblas_set_num_threads(1);
+    uz_aside_begin();
     free(Z);
     free(C);
 }

@@ -103,7 +103,8 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
         return UZ_OK;
     }
     const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
-    uz_status status = uz_describe_scene(result, model, &scene, run->answer.u, run->load.prescribed, run->all, err);
+    uz_status status =
+        uz_describe_scene(result, model, &scene, run->answer.u, run->load.prescribed, run->all, run->work.ahead, err);
     if (status == UZ_OK && run->asked->problem->n_quantities > 0 && !result->ray) {
         const uz_setup *setup = run->asked->setup;
         const uz_stop stop = {run->asked->hooks, run->asked->deadline};

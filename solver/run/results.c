@@ -35,7 +35,7 @@ void uz_blank_answer(uz_result *result)
 }
 
 uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const uz_scene *scene, const double *u,
-                            const double *prescribed, int64_t m, uz_error *err)
+                            const double *prescribed, int64_t m, uz_ahead *ahead, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
     double *nodal = uz_alloc(mesh->n_nodes * mesh->dim, sizeof *nodal);
@@ -47,7 +47,7 @@ uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const
     result->u = nodal;
     result->n_nodes = mesh->n_nodes;
     uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, m, err);
-    return status == UZ_OK ? uz_evaluate(result, model, scene, err) : status;
+    return status == UZ_OK ? uz_evaluate(result, model, scene, ahead, err) : status;
 }
 
 double uz_total_error(double *equations, const uz_summary *s)

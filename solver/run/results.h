@@ -4,6 +4,7 @@
 
 #include "assembly/assembly.h"
 #include "methods/method.h"
+#include "post/ahead.h"
 #include "uzawa.h"
 
 static inline bool uz_has_no_answer(const uz_summary *s)
@@ -11,9 +12,9 @@ static inline bool uz_has_no_answer(const uz_summary *s)
     return s->outcome == UZ_INFEASIBLE || s->outcome == UZ_OUT_OF_REACH;
 }
 /* Of the free dofs u (d; may be result->u) of an answer with m rows: displacements by node, mesh, forces, pressures.
- * Errors: UZ_ERR_MEMORY. */
+ * ahead: as uz_evaluate takes it. Errors: UZ_ERR_MEMORY. */
 uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const uz_scene *scene, const double *u,
-                            const double *prescribed, int64_t m, uz_error *err);
+                            const double *prescribed, int64_t m, uz_ahead *ahead, uz_error *err);
 /* There is no answer: nothing that looks like one may be left. */
 void uz_blank_answer(uz_result *result);
 /* An answer that converged, but on a mesh that leaves the first quantity a wider interval than was asked for, ends as

@@ -307,6 +307,7 @@ uz_status uz_run_finish(uz_run *run, uz_error *err)
 
 void uz_run_end(uz_run *run)
 {
+    uz_ahead_free(run->work.ahead);
     uz_dual_load_free(run->work.dual);
     uz_iterate_clear(&run->work.it);
     uz_factor_workspace_free(run->work.ws);

@@ -9,6 +9,7 @@
 #include "certificate/certificate.h"
 #include "methods/milestones.h"
 #include "methods/iterate.h"
+#include "post/ahead.h"
 #include "run/setup.h"
 #include "uzawa.h"
 
@@ -44,6 +45,7 @@ typedef struct {
     uz_milestones milestones;
     uz_factor_workspace *ws; /* this and d numbers for linear solves, made when the first is needed */
     double *scratch;
+    uz_ahead *ahead;  /* what is computed of the answer while it is certified; NULL: nothing */
     int exponent;     /* of iterates and history */
     double requested; /* relative error that the certificate must meet */
     double target;    /* relative error at which the method returns */

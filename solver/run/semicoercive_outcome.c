@@ -220,7 +220,7 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
             held->held++;
         }
     if (s->is_scene)
-        status = uz_describe_scene(result, &s->model, &s->problem->scene, result->u, s->prescribed, s->m, err);
+        status = uz_describe_scene(result, &s->model, &s->problem->scene, result->u, s->prescribed, s->m, NULL, err);
     if (s->is_scene && status == UZ_OK && !result->ray && s->problem->n_quantities > 0)
         status = find_quantities(s, err);
     if (result->ray)

@@ -122,7 +122,7 @@ uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u,
         *out = run.result;
         run.result = NULL;
     }
-    uz_setup_release(cache, asked.setup);
     uz_run_end(&run);
+    uz_setup_release(cache, asked.setup);
     return status;
 }

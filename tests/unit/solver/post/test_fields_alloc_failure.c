@@ -98,7 +98,7 @@ static bool evaluate_at(const uz_scene *scene, const uz_body_model *model, const
     heap.until_failure = n;
     heap.failed = false;
     heap.watching = true;
-    const uz_status status = uz_evaluate(&again, model, scene, &err);
+    const uz_status status = uz_evaluate(&again, model, scene, NULL, &err);
     free(again.pressure);
     uz_evaluation_free(again.evaluation);
     heap.watching = false;
