@@ -156,7 +156,8 @@ INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, con
         }
 }
 
-/* Deviator and trace apart, as in uz_complementary. */
+/* Deviator and trace apart, so that a large lambda cancels nothing: with n direct components and t = trace(s),
+ * s' C^-1 s = t^2 / (n (n lambda + 2 mu)) + (s_dev . s_dev) / (2 mu). */
 INLINE void compare(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
                     const int64_t *const place[LANES], int n, int direct, int size)
 {
