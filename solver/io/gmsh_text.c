@@ -151,7 +151,7 @@ uz_status gmsh_size(gmsh_text *text, int64_t *value, const char *what)
 
 uz_status gmsh_reals(gmsh_text *text, int count, double *xyz)
 {
-    double value;
+    double value = 0;
     uz_status status = UZ_OK;
     for (int i = 0; i < count && status == UZ_OK; i++) {
         const gmsh_text before = *text;
