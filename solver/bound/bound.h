@@ -33,6 +33,7 @@ typedef struct {
     double gap[2];      /* at the ends: normal . u <= gap, which is linear between them */
     bool round, inside; /* the obstacle is a disc, or all but one: neither its gap nor its normal are those two then */
     double centre[2], radius;
+    double spring[2];   /* stiffness of the ground along x and y, force per length and area; 0: none */
     double traction[2]; /* of the loads, force per area, along x and y */
 } uz_bound_edge;
 
@@ -67,6 +68,10 @@ double uz_bound_moved(const uz_bound_body *body, int motion, int64_t edge, int a
 /* Part of uz_bound_body_make: n_loose and motion. */
 uz_status uz_bound_loose_motions(uz_bound_body *body, uz_error *err);
 
+/* Of the products of the Bernstein polynomials that are an edge's weights the integrals over 0 to 1, and the inverse.
+ */
+extern const double uz_bound_product[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS]; /* by degree - 1 */
+extern const double uz_bound_product_inverse[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS];
 /* The obstacle before an edge, at a part of the way along it, 0 to 1: its gap, and the unit normal into it. */
 double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part);
 /* Directions of the unknowns of an edge's a-th moments: its axes, but before a round obstacle, where the first is the

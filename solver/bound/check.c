@@ -39,6 +39,8 @@ enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 };
 static void examine_element(examination *x, const double *u, const double *stress, int64_t e);
 static double energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e);
 static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i);
+static double spring_energy(const examination *x, const double *u);
+static void examine_springs(examination *x, const double *u, int64_t i, int k);
 static void settle_motions(examination *x, const double *u, const int64_t *dof);
 static void look_at_lift(examination *x, const double *u, int64_t i);
 static double work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status,
@@ -73,14 +75,18 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         for (int64_t i = 0; i < body->n_edges; i++)
             examine_edge(&x, u, dof, i);
         settle_motions(&x, u, dof);
-        const double scale = x.scale + fabs(load);
+        const double ground = spring_energy(&x, u), scale = x.scale + fabs(load) + ground;
+        x.sum += x.springs + ground;
+        x.strain += ground;
+        out->primal += ground;
         const double apart = out->primal - out->dual + out->defect - (out->gap - rounding) - x.sum;
-        out->gap += x.sum;
+        out->gap += x.sum + 4 * SUM_ROUNDING * ground;
         for (int64_t i = 0; i < body->n_edges; i++)
             look_at_lift(&x, u, i);
         double lifted = 0, margin = 0, strain = x.strain;
         for (int64_t e = 0; e < mesh->n_elements; e++)
             lifted += 2 * energy_of(&margin, &x, x.lift, false, e);
+        lifted += 2 * spring_energy(&x, x.lift);
         const double by_nodes = sqrt(lifted + 2 * margin);
         out->lift = by_nodes + sqrt(x.bulge);
         out->turning = sqrt(x.turning);
@@ -91,6 +97,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
                 x.lift[i] += u[i];
             for (int64_t e = 0; e < mesh->n_elements; e++)
                 strain += energy_of(&x.margin, &x, x.lift, true, e);
+            strain += spring_energy(&x, x.lift);
             load = work_of_loads(&x, scene, x.lift, &status, err);
         }
         out->primal = strain + x.margin - load + SUM_ROUNDING * (scale + strain + fabs(load));
@@ -241,6 +248,50 @@ static void look_at_lift(examination *x, const double *u, int64_t i)
         snprintf(x->out->fault, sizeof x->out->fault, "the answer is in the obstacle where supports keep it there");
 }
 
+/* 1/2 int k |u|^2 of the springs along the edges. */
+static double spring_energy(const examination *x, const double *u)
+{
+    double sum = 0, b[3], at[3], weight[3];
+    uz_gauss(at, weight, 3);
+    for (int64_t i = 0; i < x->body->n_edges; i++)
+        for (int c = 0; c < 2; c++) {
+            const uz_bound_edge *edge = &x->body->edge[i];
+            const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+            if (!(edge->spring[c] > 0))
+                continue;
+            uz_along_edge(b, u, edge->node, (const double[2]){c == 0, c == 1});
+            for (int g = 0; g < 3; g++) {
+                const double q = (1 + at[g]) / 2, v = b[0] * (1 - q) * (1 - q) + 2 * b[1] * q * (1 - q) + b[2] * q * q;
+                sum += weight[g] / 4 * hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness *
+                       edge->spring[c] * v * v;
+            }
+        }
+    return sum;
+}
+
+/* The stress's traction along an axis is the springs' there. */
+static void examine_springs(examination *x, const double *u, int64_t i, int k)
+{
+    const uz_bound_edge *edge = &x->body->edge[i];
+    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+    const double area = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness;
+    double b[3], m[UZ_BOUND_MOMENTS], own = 0, work = 0;
+    if (!(edge->spring[k] > 0))
+        return;
+    uz_along_edge(b, u, edge->node, (const double[2]){k == 0, k == 1});
+    uz_edge_means(m, b, x->moments);
+    for (int a = 0; a < x->moments; a++) {
+        const double acts = x->resultant[(i * x->moments + a) * 2 + k];
+        for (int c = 0; c < x->moments; c++)
+            own += acts * x->resultant[(i * x->moments + c) * 2 + k] * x->moments * x->moments / area *
+                   uz_bound_product[x->moments - 2][a][c] / (2 * edge->spring[k]);
+        work += acts * m[a];
+    }
+    x->out->dual -= own;
+    x->springs += own + work; /* with 1/2 int k |u_h|^2 for the square */
+    x->scale += own + fabs(work);
+}
+
 /* What the edge lacks of equilibrium, and what supports and obstacle do there. A pressure below zero is none: it is
  * what is missing. */
 static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i)
@@ -276,6 +327,8 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
         for (int k = 0; k < 2; k++) {
             if (k == 0 && uz_bound_pressed(x->body, i, a) >= 0)
                 continue; /* as the pressure is what acts, until settle_motions */
+            if (edge->spring[k] > 0)
+                continue; /* springs take whatever acts, at their price */
             const double missing =
                 -pressure[a] * share[k] - acts[k] + turned[a][0] * axis[k][0] + turned[a][1] * axis[k][1];
             if (edge->held[k]) {
@@ -291,6 +344,8 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
         if (edge->contact >= 0 && !edge->round)
             out->dual -= pressure[a] * (edge->gap[0] + (edge->gap[1] - edge->gap[0]) * (a + 1) / (x->moments + 1));
     }
+    for (int k = 0; k < 2; k++)
+        examine_springs(x, u, i, k);
     double size = 0;
     for (int a = 0; a < 6; a++)
         size = edge->node[a / 2] < 0 ? size : fmax(size, fabs(u[2 * edge->node[a / 2] + a % 2]));

@@ -16,6 +16,7 @@ typedef struct {
     double *gap;       /* n_elements: int 1/2 |sigma_h - C eps(u_h)|^2, from above */
     double sum, scale; /* of elements: int 1/2 |sigma_h - C eps(u_h)|^2; of the sizes of what it is made of */
     double margin;     /* of the strain energy: what its integration may be off by */
+    double springs;    /* of the gap: int 1/2 |t + k u_h|^2 / k, t the traction where springs hold */
     double strain, complementary, inside, farthest; /* farthest: the largest displacement along an axis */
     double turning;                                 /* square of the result's */
     /* Of bulges, the part of w that is zero at all nodes: square of their norm, the gap of their elements, and the work

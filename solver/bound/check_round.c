@@ -64,9 +64,6 @@ static double shape_factor(double corner[3][2], double area2, double length)
 
 void uz_examine_round(double turned[MOMENTS][2], examination *x, const double *u, int64_t i)
 {
-    /* inverses of the integrals of products of the weights */
-    static const double LINEAR[2][2] = {{4, -2}, {-2, 4}};
-    static const double QUADRATIC[3][3] = {{9, -9, 3}, {-9, 21, -9}, {3, -9, 9}};
     const uz_bound_edge *edge = &x->body->edge[i];
     const uz_lame lame = uz_element_material(x->body->model, edge->element[0])->lame;
     const int moments = x->moments;
@@ -106,7 +103,7 @@ void uz_examine_round(double turned[MOMENTS][2], examination *x, const double *u
     for (int a = 0; a < moments; a++)
         for (int c = 0; c < 2; c++) {
             for (int k = 0; k < moments; k++)
-                coefficient[a][c] += (moments == 2 ? LINEAR[a][k] : QUADRATIC[a][k]) * integral[k][c];
+                coefficient[a][c] += uz_bound_product_inverse[moments - 2][a][k] * integral[k][c];
             turned[a][c] = coefficient[a][c] * length * thickness / moments;
         }
     for (int g = 0; g < POINTS; g++) {

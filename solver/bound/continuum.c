@@ -16,6 +16,11 @@
 #define ROUNDING 1e-13
 #define TOUCHING (16 * DBL_EPSILON)
 
+const double uz_bound_product[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS] = {
+    {{1. / 3, 1. / 6}, {1. / 6, 1. / 3}}, {{0.2, 0.1, 1. / 30}, {0.1, 2. / 15, 0.1}, {1. / 30, 0.1, 0.2}}};
+const double uz_bound_product_inverse[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS] = {{{4, -2}, {-2, 4}},
+                                                                                {{9, -9, 3}, {-9, 21, -9}, {3, -9, 9}}};
+
 typedef struct {
     uz_bound_body *body;
     const uz_mesh *mesh;
@@ -29,6 +34,7 @@ static uz_status find_edges(survey *x, uz_error *err);
 static bool has_straight_sides(const survey *x);
 static void take_supports(survey *x);
 static void take_contacts(survey *x);
+static void take_springs(survey *x);
 static void take_loads(survey *x);
 
 /* The first reason stays. */
@@ -47,8 +53,6 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
         refuse(out, "in three dimensions there are no equilibrium elements here", "");
     if (model->kind == UZ_AXISYMMETRIC)
         refuse(out, "for bodies of revolution there are no equilibrium elements here", "");
-    if (model->spring)
-        refuse(out, "springs hold the body", "");
     for (int64_t e = 0; e < mesh->n_elements && !*out->why; e++)
         if (uz_element_type_of((uz_element_kind)mesh->kind[e])->nodes >
             uz_element_type_of((uz_element_kind)mesh->kind[e])->corners)
@@ -63,6 +67,7 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
     if (status == UZ_OK && has_straight_sides(&x)) {
         take_supports(&x);
         take_contacts(&x);
+        take_springs(&x);
         take_loads(&x);
         status = uz_free_strains(&out->free_strain, model, scene, err);
         if (status == UZ_OK)
@@ -296,6 +301,30 @@ static void take_contacts(survey *x)
                 edge->axis[1][0] = n[1];
             }
         }
+    }
+}
+
+/* The stiffness of a group is its total. */
+static void take_springs(survey *x)
+{
+    for (int64_t k = 0; k < x->scene->n_supports && !*x->body->why; k++) {
+        const uz_support *support = &x->scene->supports[k];
+        double area = 0;
+        if (support->kind != UZ_SUPPORT_SPRING)
+            continue;
+        const uz_group *group = uz_mesh_group(x->mesh, support->on, "", NULL);
+        if (!group || group->kind != UZ_GROUP_FACES || !find_group(x, support->on))
+            refuse(x->body, "the springs on \"%s\" hold single nodes, which the continuum does not feel", support->on);
+        for (int pass = 0; pass < 2; pass++)
+            for (int64_t i = 0; i < x->n_found && !*x->body->why; i++) {
+                uz_bound_edge *edge = &x->body->edge[x->found[i]];
+                const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+                if (edge->held[0] || edge->contact >= 0)
+                    refuse(x->body, "supports or obstacles hold edges of \"%s\", which springs hold too", support->on);
+                area += pass == 0 ? hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness : 0;
+                for (int c = 0; c < 2 && pass == 1; c++)
+                    edge->spring[c] += fmax(0, support->spring[c]) / area;
+            }
     }
 }
 

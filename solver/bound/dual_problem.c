@@ -103,6 +103,24 @@ static void turn(double *K, double x[OUTER], const macro *m, bool back)
     }
 }
 
+/* Springs along an edge are of its first element: a displacement with moments v has 1/2 int k |u|^2 of 1/2 v'Sv at
+ * least, S = k A / moments^2 times the inverse of the weights' products. */
+static void add_springs(double *K, const macro *m)
+{
+    const int moments = m->degree + 1, n = m->outer;
+    for (int i = 0; i < n; i++) {
+        const int64_t at = m->body->edge_of[4 * m->element + i / (2 * moments)];
+        const uz_bound_edge *edge = &m->body->edge[at];
+        const double *from = m->body->model->mesh.xyz + 2 * edge->node[0],
+                     *to = m->body->model->mesh.xyz + 2 * edge->node[1];
+        const double area = hypot(to[0] - from[0], to[1] - from[1]) * m->body->model->thickness;
+        const int first = i - i % (2 * moments), a = i % (2 * moments) / 2;
+        for (int b = 0; b < moments && edge->element[0] == m->element; b++)
+            K[i + n * (first + 2 * b + i % 2)] +=
+                edge->spring[i % 2] * area / (moments * moments) * uz_bound_product_inverse[m->degree - 1][a][b];
+    }
+}
+
 static uz_status fail_at(const uz_stop *stop, int64_t element, uz_error *err)
 {
     return uz_stop_is_due(stop)
@@ -141,6 +159,7 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
             for (int k = 0; k < m->kept; k++)
                 p[i] += m->A[m->kept + i + (m->kept + m->outer) * k] * m->y[k];
         }
+        add_springs(K, m);
         turn(K, p, m, false);
         for (int i = 0; i < m->outer; i++) {
             for (int j = 0; j < m->outer; j++) {

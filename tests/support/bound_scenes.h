@@ -43,7 +43,48 @@ static inline uz_load *bound_load(uz_scene *scene, uz_load_kind kind, const char
     return &scene->loads[scene->n_loads - 1];
 }
 
-typedef enum { BOUND_STRAIGHT, BOUND_ROUND, BOUND_RESTING } bound_kind;
+typedef enum { BOUND_STRAIGHT, BOUND_ROUND, BOUND_RESTING, BOUND_SPRINGS } bound_kind;
+
+/* Makes the scene before a plane one of its kind. */
+static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, double stress, qp_random *rng)
+{
+    const double *x = scene->box.origin, width = scene->box.size[0], height = scene->box.size[1];
+    if (kind == BOUND_RESTING) { /* on the bottom, and at another plane or along a slide; what presses is the most */
+        const bool corner = random_chance(rng, 0.5);
+        scene->n_supports = 0;
+        scene->n_loads = 1;
+        if (corner)
+            add_plane(scene, "left", x[0] - gap, x[1], 1, 0);
+        else
+            add_support(scene, "left", 0, NAN);
+        bound_load(scene, UZ_LOAD_BODY_FORCE, "all", corner ? -stress / height : 0,
+                   -stress / height * (1 + random_unit(rng)));
+        bound_load(scene, UZ_LOAD_PRESSURE, "top", 2 * stress * random_unit(rng), 0);
+        scene->loads[0].v[0] *= 0.3;
+        scene->loads[0].v[1] = -0.3 * fabs(scene->loads[0].v[1]);
+    }
+    if (kind == BOUND_SPRINGS) { /* all over the top; the left slides, or has none */
+        const double k = scene->materials[0].young * scene->thickness * width / height * random_power(rng, -1.5, 1.5);
+        const bool slides = random_chance(rng, 0.5);
+        scene->n_supports = 0;
+        if (slides)
+            add_support(scene, "left", 0, NAN);
+        scene->supports[scene->n_supports++] =
+            (uz_support){.kind = UZ_SUPPORT_SPRING, .on = "top", .spring = {slides ? 0 : k * random_unit(rng), k}};
+    }
+    if (kind == BOUND_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
+        uz_contact *c = &scene->contacts[0];
+        c->kind = UZ_OBSTACLE_ROUND;
+        c->radius = (width + height) * random_power(rng, 0.3, 2.5);
+        c->inside = random_chance(rng, 0.3);
+        c->point[0] = x[0] + width * (0.1 + 0.8 * random_unit(rng));
+        c->point[1] = x[1] - gap - c->radius;
+        if (c->inside)
+            c->point[1] =
+                x[1] - gap +
+                sqrt(c->radius * c->radius - fmax(pow(c->point[0] - x[0], 2), pow(x[0] + width - c->point[0], 2)));
+    }
+}
 
 /* n: cells along the shorter side. Lengths are of the order of `unit`, displacements a thousandth of that. */
 static inline uz_scene bound_scene(uint64_t seed, bound_kind kind, const char *element, int64_t n)
@@ -99,33 +140,7 @@ static inline uz_scene bound_scene(uint64_t seed, bound_kind kind, const char *e
     const double least = fmin(0, fmin(-tilt * width, 0)); /* the corner that is deepest is at the gap */
     const double *x = scene.box.origin;
     add_plane(&scene, "bottom", x[0], x[1] - gap + least - fabs(tilt) * width, tilt, 1);
-    if (kind ==
-        BOUND_RESTING) { /* on the bottom, and on another plane or between two sides: what presses is the most */
-        const bool corner = random_chance(&rng, 0.5);
-        scene.n_supports = 0;
-        scene.n_loads = 1;
-        if (corner)
-            add_plane(&scene, "left", x[0] - gap, x[1], 1, 0);
-        else
-            add_support(&scene, "left", 0, NAN);
-        bound_load(&scene, UZ_LOAD_BODY_FORCE, "all", corner ? -stress / unit : 0,
-                   -stress / unit * (1 + random_unit(&rng)));
-        bound_load(&scene, UZ_LOAD_PRESSURE, "top", 2 * stress * random_unit(&rng), 0);
-        scene.loads[0].v[0] *= 0.3;
-        scene.loads[0].v[1] = -0.3 * fabs(scene.loads[0].v[1]);
-    }
-    if (kind == BOUND_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
-        uz_contact *c = &scene.contacts[0];
-        c->kind = UZ_OBSTACLE_ROUND;
-        c->radius = (width + height) * random_power(&rng, 0.3, 2.5);
-        c->inside = random_chance(&rng, 0.3);
-        c->point[0] = x[0] + width * (0.1 + 0.8 * random_unit(&rng));
-        c->point[1] = x[1] - gap - c->radius;
-        if (c->inside)
-            c->point[1] =
-                x[1] - gap +
-                sqrt(c->radius * c->radius - fmax(pow(c->point[0] - x[0], 2), pow(x[0] + width - c->point[0], 2)));
-    }
+    bound_change(&scene, kind, gap, stress, &rng);
     return scene;
 }
 
