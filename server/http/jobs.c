@@ -88,12 +88,6 @@ bool jobs_ended(const job *j)
     return j->status != JOB_ACCEPTED && j->status != JOB_RUNNING;
 }
 
-static void note_preference(const api *context, const http_request *rq, double seconds, http_reply *reply)
-{
-    if (request_wait(rq, -1, context->options.max_wait_s) >= 0)
-        snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
-}
-
 static bool load_again(api *context, job *j, http_reply *reply)
 {
     char id[sizeof j->id];
@@ -111,7 +105,8 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
     if (seconds <= 0 || jobs_ended(j))
         return true;
     work_wait(context->work, j->id, seconds, rq->fd, transport_draining(context->server));
-    note_preference(context, rq, seconds, reply);
+    if (request_wait(rq, -1, context->options.max_wait_s) >= 0)
+        snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
     return load_again(context, j, reply);
 }
 
@@ -159,7 +154,8 @@ void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http
         then(context, j, reply);
         return;
     }
-    note_preference(context, rq, seconds, reply);
+    /* by the request's own preference: without one there is nothing to wait for */
+    snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
     const bool ended = work_wait(context->work, j->id, seconds - rest, rq->fd, transport_draining(context->server));
     waiting *w = ended || rest == 0.0 ? NULL : calloc(1, sizeof *w);
     if (w) {

@@ -140,35 +140,10 @@ static void add_waiting(uz_timings *t, double queue_s, double parse_s)
     t->total += queue_s + parse_s;
 }
 
-/* All cases together: their summary, what they share, and the list of them. */
-static bool build_whole(answers *a, store_outcome *outcome, uz_result *const *results, const codec_request *request,
-                        double queue_s, double parse_s)
-{
-    codec_cases counts;
-    uz_summary overall;
-    int64_t first = 0; /* of those that did not begin at zero */
-    while (first + 1 < a->n && results[first]->summary.origin == UZ_FROM_ZERO)
-        first++;
-    overall_summary(&overall, &counts, results, &request->problem);
-    add_waiting(&overall.timings, queue_s, parse_s);
-    codec_run run = {.started_from = ORIGINS[results[first]->summary.origin], .cases = &counts};
-    a->shared.summary = codec_encode_summary(&overall, request->problem.kind, &run);
-    a->cases = calloc((size_t)a->n, sizeof *a->cases);
-    if (!a->cases || !a->shared.summary || !judge(&a->shared.summary, request, NULL, true, a->findings) ||
-        !add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE))
-        return false;
-    for (int64_t i = 0; i < a->n; i++)
-        a->cases[i] = as_stored(&a->parts[i], request->problem.cases[i].name);
-    outcome->cases = a->cases;
-    outcome->n_cases = (size_t)a->n;
-    outcome->whole = as_stored(&a->shared, NULL);
-    return true;
-}
-
 bool answers_build(answers *out, store_outcome *outcome, uz_result *const *results, const codec_request *request,
                    const starts *from, double queue_s, double parse_s)
 {
-    bool has_cases = request->problem.n_cases > 0, ok = true;
+    bool has_cases = request->problem.n_cases > 0, is_scene = request->problem.kind == UZ_PROBLEM_SCENE, ok = true;
     *out = (answers){.n = has_cases ? request->problem.n_cases : 1};
     out->parts = calloc((size_t)out->n, sizeof *out->parts);
     out->findings = calloc((size_t)request->n_assertions + 1, sizeof *out->findings);
@@ -178,11 +153,33 @@ bool answers_build(answers *out, store_outcome *outcome, uz_result *const *resul
         add_waiting(&results[0]->summary.timings, queue_s, parse_s);
     for (int64_t i = 0; ok && i < out->n; i++)
         ok = build_one(out, i, results, request, from);
-    if (ok && has_cases)
-        return build_whole(out, outcome, results, request, queue_s, parse_s);
-    ok = ok && add_places(out, &out->parts[0], results[0], request->problem.kind == UZ_PROBLEM_SCENE);
-    outcome->whole = as_stored(&out->parts[0], NULL);
-    return ok;
+    if (!has_cases) {
+        ok = ok && add_places(out, &out->parts[0], results[0], is_scene);
+        outcome->whole = as_stored(&out->parts[0], NULL);
+        return ok;
+    }
+    /* All cases together: their summary, what they share, and the list of them. */
+    codec_cases counts;
+    uz_summary overall;
+    int64_t first = 0; /* of those that did not begin at zero */
+    while (first + 1 < out->n && results[first]->summary.origin == UZ_FROM_ZERO)
+        first++;
+    out->cases = ok ? calloc((size_t)out->n, sizeof *out->cases) : NULL;
+    if (!out->cases)
+        return false;
+    overall_summary(&overall, &counts, results, &request->problem);
+    add_waiting(&overall.timings, queue_s, parse_s);
+    codec_run run = {.started_from = ORIGINS[results[first]->summary.origin], .cases = &counts};
+    out->shared.summary = codec_encode_summary(&overall, request->problem.kind, &run);
+    if (!out->shared.summary || !judge(&out->shared.summary, request, NULL, true, out->findings) ||
+        !add_places(out, &out->shared, results[0], is_scene))
+        return false;
+    for (int64_t i = 0; i < out->n; i++)
+        out->cases[i] = as_stored(&out->parts[i], request->problem.cases[i].name);
+    outcome->cases = out->cases;
+    outcome->n_cases = (size_t)out->n;
+    outcome->whole = as_stored(&out->shared, NULL);
+    return true;
 }
 
 void answers_clear(answers *a)

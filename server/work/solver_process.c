@@ -144,20 +144,6 @@ static void run_job(solver *s, const packet *m)
     s->fresh = true;
 }
 
-static void list_cache(solver *s)
-{
-    uz_cache_entry *entries = NULL;
-    size_t count = 0;
-    packet m = {.kind = MESSAGE_LISTED};
-    if (uz_cache_list(s->cache, &entries, &count, NULL) == UZ_OK && count > 0 &&
-        segment_reach(&s->outbox, count * sizeof *entries, true)) {
-        memcpy(s->outbox.at, entries, count * sizeof *entries);
-        m.u.listed.count = count;
-    }
-    free(entries);
-    message_send(s->socket, &m, -1);
-}
-
 /* ---- between jobs */
 
 /* Memory for the next body is touched while nobody waits for it, and given back when no job has run for long. What is
@@ -204,8 +190,18 @@ static void serve(solver *s)
             return;
         if (m.kind == MESSAGE_JOB)
             run_job(s, &m);
-        else if (m.kind == MESSAGE_LIST)
-            list_cache(s);
+        if (m.kind == MESSAGE_LIST) {
+            packet listed = {.kind = MESSAGE_LISTED};
+            uz_cache_entry *entries = NULL;
+            size_t count = 0;
+            if (uz_cache_list(s->cache, &entries, &count, NULL) == UZ_OK && count > 0 &&
+                segment_reach(&s->outbox, count * sizeof *entries, true)) {
+                memcpy(s->outbox.at, entries, count * sizeof *entries);
+                listed.u.listed.count = count;
+            }
+            free(entries);
+            message_send(s->socket, &listed, -1);
+        }
         wait = s->fresh ? SETTLE_MS : IDLE_MS;
     }
 }

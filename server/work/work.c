@@ -140,25 +140,6 @@ static void stop_job(worker *me, atomic_bool *why)
 /* ---- the keeper: a factorization may take longer than a lease and asks nothing meanwhile, so leases are renewed from
  * a thread of their own */
 
-static void renew(worker *me)
-{
-    pthread_mutex_lock(&me->lock);
-    const store_lease lease = me->lease;
-    if (me->process)
-        me->progress = live_progress(&me->process->board->live, me->progress);
-    const int progress = me->progress;
-    pthread_mutex_unlock(&me->lock);
-    if (!lease.job[0])
-        return;
-    store_status status = store_renew(me->w->store, &lease, progress);
-    if (status != STORE_CONFLICT && status != STORE_NOT_FOUND)
-        return; /* a store that fails now may work before the lease ends */
-    pthread_mutex_lock(&me->lock);
-    if (me->lease.token == lease.token && strcmp(me->id, lease.job) == 0) /* else it ended meanwhile */
-        stop_job(me, &me->lost);
-    pthread_mutex_unlock(&me->lock);
-}
-
 static void *keep_loop(void *arg)
 {
     work *w = arg;
@@ -167,8 +148,24 @@ static void *keep_loop(void *arg)
         if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + w->options.lease_s / 3.0))
             continue;
         pthread_mutex_unlock(&w->lock);
-        for (int i = 0; i < w->n; i++)
-            renew(&w->workers[i]);
+        for (int i = 0; i < w->n; i++) {
+            worker *me = &w->workers[i];
+            pthread_mutex_lock(&me->lock);
+            const store_lease lease = me->lease;
+            if (me->process)
+                me->progress = live_progress(&me->process->board->live, me->progress);
+            const int progress = me->progress;
+            pthread_mutex_unlock(&me->lock);
+            if (!lease.job[0])
+                continue;
+            const store_status status = store_renew(w->store, &lease, progress);
+            if (status != STORE_CONFLICT && status != STORE_NOT_FOUND)
+                continue; /* a store that fails now may work before the lease ends */
+            pthread_mutex_lock(&me->lock);
+            if (me->lease.token == lease.token && strcmp(me->id, lease.job) == 0) /* else it ended meanwhile */
+                stop_job(me, &me->lost);
+            pthread_mutex_unlock(&me->lock);
+        }
         pthread_mutex_lock(&w->lock);
     }
     pthread_mutex_unlock(&w->lock);

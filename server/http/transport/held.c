@@ -195,12 +195,6 @@ static bool serve(holder *h, held *one)
     return true;
 }
 
-static void attend(holder *h, held *one)
-{
-    if (!one->over && !serve(h, one))
-        end_held(h, one, one->ending);
-}
-
 /* ---- the thread */
 
 static void make_ready(holder *h, held *one)
@@ -265,7 +259,8 @@ static void *hold(void *argument)
         for (held *next; one; one = next) {
             next = one->next_ready;
             one->is_ready = false;
-            attend(h, one);
+            if (!one->over && !serve(h, one))
+                end_held(h, one, one->ending);
         }
         const double now = clock_seconds(CLOCK_MONOTONIC);
         const bool due = now >= h->soonest;
@@ -273,8 +268,8 @@ static void *hold(void *argument)
             h->soonest = INFINITY;
         for (held *next, *at = due ? h->first : NULL; at; at = next) {
             next = at->next;
-            if (at->due <= now)
-                attend(h, at);
+            if (at->due <= now && !at->over && !serve(h, at))
+                end_held(h, at, at->ending);
             if (!at->over)
                 h->soonest = fmin(h->soonest, at->due);
         }
