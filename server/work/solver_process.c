@@ -1,7 +1,7 @@
 /* solver_process.c: the life of a process that solves: its limits, then one job after another, with a cache that stays.
  *
- * One thread, besides those of BLAS. It may be killed at any instruction: nothing outlives it but what it has put into
- * shared memory. */
+ * One thread, besides those of BLAS, one that touches pages ahead and one that computes aside. It may be killed at any
+ * instruction: nothing outlives it but what it has put into shared memory. */
 #include "work/solver_process.h"
 #include "base/clock.h"
 #include "base/memory.h"
