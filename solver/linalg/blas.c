@@ -162,39 +162,6 @@ static bool forward_while(int64_t n, int64_t columns, const double *L, int64_t l
     return true;
 }
 
-/* Column j of L, of a panel that begins with column k: what is right of it has not seen the panel's columns yet,
- * squares has those of each row added up. false: the largest pivot left is not above `stop`. */
-static bool pivot_column(int64_t n, double *A, int64_t *pivot, double *squares, int64_t k, int64_t j, double stop)
-{
-    int64_t best = j;
-    for (int64_t i = j; i < n; i++) {
-        double last = j > k ? A[i + (j - 1) * n] : 0.0;
-        squares[i] += last * last;
-        if (A[i + i * n] - squares[i] > A[best + best * n] - squares[best])
-            best = i;
-    }
-    double left = A[best + best * n] - squares[best];
-    if (!(left > stop))
-        return false;
-    if (best != j) { /* rows and columns change places in the lower triangle */
-        const int64_t index = pivot[j];
-        const double diagonal = A[j + j * n];
-        A[j + j * n] = A[best + best * n];
-        A[best + best * n] = diagonal;
-        cblas_dswap((int)j, A + j, (int)n, A + best, (int)n);
-        cblas_dswap((int)(best - j - 1), A + j + 1 + j * n, 1, A + best + (j + 1) * n, (int)n);
-        cblas_dswap((int)(n - best - 1), A + best + 1 + j * n, 1, A + best + 1 + best * n, 1);
-        squares[best] = squares[j];
-        pivot[j] = pivot[best];
-        pivot[best] = index;
-    }
-    A[j + j * n] = sqrt(left);
-    cblas_dgemv(CblasColMajor, CblasNoTrans, (int)(n - j - 1), (int)(j - k), -1.0, A + j + 1 + k * n, (int)n,
-                A + j + k * n, (int)n, 1.0, A + j + 1 + j * n, 1);
-    cblas_dscal((int)(n - j - 1), 1.0 / A[j + j * n], A + j + 1 + j * n, 1);
-    return true;
-}
-
 enum { PIVOTED_PANEL = 64 };
 
 int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least, const uz_stop *stop)
@@ -209,8 +176,37 @@ int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least,
     for (int64_t k = 0; k < end && rank == k; k += width) {
         int64_t next = least_of(k + width, n);
         memset(squares, 0, (size_t)n * sizeof *squares);
-        while (rank < next && !uz_stop_is_due(stop) && pivot_column(n, A, pivot, squares, k, rank, least * largest))
+        /* Column j of L: what is right of it has not seen the panel's columns yet, squares has those of each row added
+         * up. */
+        for (int64_t j = k; j < next && !uz_stop_is_due(stop); j++) {
+            int64_t best = j;
+            for (int64_t i = j; i < n; i++) {
+                double last = j > k ? A[i + (j - 1) * n] : 0.0;
+                squares[i] += last * last;
+                if (A[i + i * n] - squares[i] > A[best + best * n] - squares[best])
+                    best = i;
+            }
+            const double left = A[best + best * n] - squares[best];
+            if (!(left > least * largest))
+                break;
+            if (best != j) { /* rows and columns change places in the lower triangle */
+                const int64_t index = pivot[j];
+                const double diagonal = A[j + j * n];
+                A[j + j * n] = A[best + best * n];
+                A[best + best * n] = diagonal;
+                cblas_dswap((int)j, A + j, (int)n, A + best, (int)n);
+                cblas_dswap((int)(best - j - 1), A + j + 1 + j * n, 1, A + best + (j + 1) * n, (int)n);
+                cblas_dswap((int)(n - best - 1), A + best + 1 + j * n, 1, A + best + 1 + best * n, 1);
+                squares[best] = squares[j];
+                pivot[j] = pivot[best];
+                pivot[best] = index;
+            }
+            A[j + j * n] = sqrt(left);
+            cblas_dgemv(CblasColMajor, CblasNoTrans, (int)(n - j - 1), (int)(j - k), -1.0, A + j + 1 + k * n, (int)n,
+                        A + j + k * n, (int)n, 1.0, A + j + 1 + j * n, 1);
+            cblas_dscal((int)(n - j - 1), 1.0 / A[j + j * n], A + j + 1 + j * n, 1);
             rank++;
+        }
         if (rank == next &&
             !syrk_while(n - next, next - k, -1.0, A + next + k * n, n, false, 1.0, A + next + next * n, n, stop))
             break;
