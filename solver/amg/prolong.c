@@ -13,31 +13,6 @@
 /* A mode that differs less than this from the span of earlier ones on an aggregate adds nothing there. */
 #define DEPENDENT 1e-4
 
-/* Modified Gram-Schmidt on the k columns of Q (rows x k); R (k x k): Q_old = Q R. Dependent columns become 0. */
-static void orthonormalise(double *Q, float *R, int64_t rows, int k)
-{
-    for (int c = 0; c < k; c++) {
-        double before = 0.0, after = 0.0;
-        for (int64_t i = 0; i < rows; i++)
-            before += Q[i * k + c] * Q[i * k + c];
-        for (int b = 0; b < c; b++) {
-            double dot = 0.0;
-            for (int64_t i = 0; i < rows; i++)
-                dot += Q[i * k + b] * Q[i * k + c];
-            for (int64_t i = 0; i < rows; i++)
-                Q[i * k + c] -= dot * Q[i * k + b];
-            R[b * k + c] = (float)dot;
-        }
-        for (int64_t i = 0; i < rows; i++)
-            after += Q[i * k + c] * Q[i * k + c];
-        bool kept = after > DEPENDENT * DEPENDENT * before;
-        double norm = sqrt(after);
-        R[c * k + c] = kept ? (float)norm : 0.0F;
-        for (int64_t i = 0; i < rows; i++)
-            Q[i * k + c] = kept ? Q[i * k + c] / norm : 0.0;
-    }
-}
-
 uz_status uz_tentative(float *basis, float *coarse, const float *modes, const int32_t *of, int64_t n,
                        int64_t aggregates, int k, uz_error *err)
 {
@@ -57,7 +32,28 @@ uz_status uz_tentative(float *basis, float *coarse, const float *modes, const in
         const int32_t *own = dof + start[a];
         for (int64_t i = 0; i < rows * k; i++)
             Q[i] = (double)modes[own[i / k] * (int64_t)k + i % k];
-        orthonormalise(Q, coarse + a * k * k, rows, k);
+        /* modified Gram-Schmidt on the k columns of Q, Q_old = Q R; dependent columns become 0 */
+        for (int c = 0; c < k; c++) {
+            double before = 0.0, after = 0.0;
+            float *R = coarse + a * k * k;
+            for (int64_t i = 0; i < rows; i++)
+                before += Q[i * k + c] * Q[i * k + c];
+            for (int b = 0; b < c; b++) {
+                double dot = 0.0;
+                for (int64_t i = 0; i < rows; i++)
+                    dot += Q[i * k + b] * Q[i * k + c];
+                for (int64_t i = 0; i < rows; i++)
+                    Q[i * k + c] -= dot * Q[i * k + b];
+                R[b * k + c] = (float)dot;
+            }
+            for (int64_t i = 0; i < rows; i++)
+                after += Q[i * k + c] * Q[i * k + c];
+            const bool kept = after > DEPENDENT * DEPENDENT * before;
+            const double norm = sqrt(after);
+            R[c * k + c] = kept ? (float)norm : 0.0F;
+            for (int64_t i = 0; i < rows; i++)
+                Q[i * k + c] = kept ? Q[i * k + c] / norm : 0.0;
+        }
         for (int64_t i = 0; i < rows * k; i++)
             basis[own[i / k] * (int64_t)k + i % k] = (float)Q[i];
     }

@@ -119,43 +119,6 @@ static uz_status bound_below(double *lambda, coefficients *c, uz_cg *cg, const u
 /* Below this rounding of the entries of K alone makes or unmakes a digit of lambda_min(D^-1 K). */
 #define RCOND_LEAST DBL_EPSILON
 
-static uz_status bound_spectrum(uz_amg *amg, uz_cg *cg, const uz_csc *K, const uz_hooks *hooks, uz_error *err)
-{
-    uz_amg_info *info = &amg->info;
-    coefficients *c = uz_alloc_zero(1, sizeof *c);
-    double most = INFINITY;
-    if (!c)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a spectrum");
-    info->lambda = 0.0;
-    uz_status status = bound_below(&info->lambda, c, cg, K, hooks, err);
-    info->iterations = c->count;
-    free(c);
-    /* lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), by powers: some per cent too small. */
-    if (status == UZ_OK)
-        random_residual(cg, K);
-    for (int power = 0; status == UZ_OK && power < POWERS; power++) {
-        status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
-        double square = 0.0;
-        for (int64_t j = 0; j < cg->n; j++) {
-            double scaled = sqrt(K->val[K->ptr[j]]) * cg->z[j];
-            square += scaled * scaled;
-        }
-        most = sqrt(square);
-        for (int64_t j = 0; j < cg->n; j++)
-            cg->r[j] = K->val[K->ptr[j]] * cg->z[j] / most;
-    }
-    if (status != UZ_OK)
-        return status;
-    info->rcond = info->lambda / most;
-    if (info->rcond >= RCOND_LEAST)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                   "K is singular to working precision, or too ill-conditioned for conjugate gradients (reciprocal "
-                   "condition %.2g after %lld iterations): the body can move without resistance, or its stiffnesses "
-                   "differ by too much",
-                   info->rcond, (long long)info->iterations);
-}
-
 static uz_status try_threshold(uz_amg *amg, const uz_csc *K, double strong, size_t memory_limit, const uz_hooks *hooks,
                                uz_error *err)
 {
@@ -173,9 +136,38 @@ static uz_status try_threshold(uz_amg *amg, const uz_csc *K, double strong, size
     info->levels = made.levels;
     info->bytes = made.bytes + n * (4 + 4 * (size_t)amg->modes.count);
     start = uz_seconds();
-    status = uz_cg_init(&cg, amg->mg, NULL, K->cols, err);
+    coefficients *c = uz_alloc_zero(1, sizeof *c);
+    double most = INFINITY;
+    status =
+        c ? uz_cg_init(&cg, amg->mg, NULL, K->cols, err) : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a spectrum");
+    if (status == UZ_OK) {
+        info->lambda = 0.0;
+        status = bound_below(&info->lambda, c, &cg, K, hooks, err);
+        info->iterations = c->count;
+    }
+    free(c);
+    /* lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), by powers: some per cent too small. */
     if (status == UZ_OK)
-        status = bound_spectrum(amg, &cg, K, hooks, err);
+        random_residual(&cg, K);
+    for (int power = 0; status == UZ_OK && power < POWERS; power++) {
+        status = uz_multigrid_apply(cg.mg, K, cg.room, cg.z, cg.r, err);
+        double square = 0.0;
+        for (int64_t j = 0; j < cg.n; j++) {
+            double scaled = sqrt(K->val[K->ptr[j]]) * cg.z[j];
+            square += scaled * scaled;
+        }
+        most = sqrt(square);
+        for (int64_t j = 0; j < cg.n; j++)
+            cg.r[j] = K->val[K->ptr[j]] * cg.z[j] / most;
+    }
+    if (status == UZ_OK)
+        info->rcond = info->lambda / most;
+    if (status == UZ_OK && !(info->rcond >= RCOND_LEAST))
+        status = uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                         "K is singular to working precision, or too ill-conditioned for conjugate gradients "
+                         "(reciprocal condition %.2g after %lld iterations): the body can move without resistance, or "
+                         "its stiffnesses differ by too much",
+                         info->rcond, (long long)info->iterations);
     uz_cg_clear(&cg);
     info->spectrum_s += uz_seconds() - start;
     return status;
