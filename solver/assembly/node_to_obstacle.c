@@ -357,30 +357,6 @@ static bool set_back(deepest *of, double *gap)
     return false;
 }
 
-/* From where w is least to the crest that is there, if it is within the side: what the nodes' rows are taken to push
- * them out by tilts w, and a row beside the crest would slip off it. */
-static void move_to_crests(deepest *of)
-{
-    deepest alone = *of;
-    const bool triangle = is_triangle(&of->side);
-    bool within = true;
-    memset(alone.pushed, 0, sizeof alone.pushed);
-    alone.least = INFINITY;
-    refine(&alone);
-    for (int k = 0; k < alone.places; k++) {
-        double N[UZ_FACE_NODES], x[3];
-        uz_gap gap;
-        uz_side_shape(N, &of->side, alone.at[k]);
-        place_of(x, NULL, of, N, NULL);
-        within = within && uz_obstacle_gap(&gap, of->obstacle, x, NULL) == UZ_OK && gap.curvature * gap.gap >= 0.5;
-        for (int i = 0; i < of->side.dim - 1; i++)
-            within = within && alone.at[k][i] < 1 - SAME_PLACE && alone.at[k][i] > (triangle ? 0 : -1) + SAME_PLACE &&
-                     !(triangle && alone.at[k][0] + alone.at[k][1] > 1 - SAME_PLACE);
-    }
-    if (within && alone.places == of->places)
-        memcpy(of->at, alone.at, sizeof of->at);
-}
-
 /* Are there places where the rows of the nodes, whose gaps are `gap`, leave more than the slack? */
 static bool find_deepest(deepest *of, double *gap)
 {
@@ -407,8 +383,29 @@ static bool find_deepest(deepest *of, double *gap)
         amid = amid || along <= LEAST_SHARE;
     }
     if (amid && set_back(of, gap) && find_below(of, gap)) {
+        /* From where w is least to the crest that is there, if it is within the side: what the nodes' rows are taken to
+         * push them out by tilts w, and a row beside the crest would slip off it. */
         refine(of);
-        move_to_crests(of);
+        deepest alone = *of;
+        const bool triangle = is_triangle(&of->side);
+        bool within = true;
+        memset(alone.pushed, 0, sizeof alone.pushed);
+        alone.least = INFINITY;
+        refine(&alone);
+        for (int k = 0; k < alone.places; k++) {
+            double N[UZ_FACE_NODES], x[3];
+            uz_gap gap_of_crest;
+            uz_side_shape(N, &of->side, alone.at[k]);
+            place_of(x, NULL, of, N, NULL);
+            within = within && uz_obstacle_gap(&gap_of_crest, of->obstacle, x, NULL) == UZ_OK &&
+                     gap_of_crest.curvature * gap_of_crest.gap >= 0.5;
+            for (int i = 0; i < of->side.dim - 1; i++)
+                within = within && alone.at[k][i] < 1 - SAME_PLACE &&
+                         alone.at[k][i] > (triangle ? 0 : -1) + SAME_PLACE &&
+                         !(triangle && alone.at[k][0] + alone.at[k][1] > 1 - SAME_PLACE);
+        }
+        if (within && alone.places == of->places)
+            memcpy(of->at, alone.at, sizeof of->at);
     } else if (amid) /* among edges w has kinks, where there is no refining it */
         *of = plain;
     return true;

@@ -159,11 +159,6 @@ static uz_status fill_rows(nnls *s, const double *Z, const uz_csc *N, uz_error *
     return UZ_OK;
 }
 
-static double length_of(const nnls *s)
-{
-    return sqrt(dot(s->y, s->y, s->k));
-}
-
 /* Is the load inside of the cone of the contact forces, not on its border? It is, when moving it a little in every
  * direction does not lead out. */
 static bool is_inside(nnls *s, const double *load, const double *size, double scale, double tolerance)
@@ -174,7 +169,7 @@ static bool is_inside(nnls *s, const double *load, const double *size, double sc
             memcpy(s->b, load, (size_t)s->k * sizeof *s->b);
             s->b[c] += sign * shift;
             solve(s, scale);
-            if (length_of(s) > 1e-2 * shift)
+            if (sqrt(dot(s->y, s->y, s->k)) > 1e-2 * shift)
                 return false;
         }
     return true;
@@ -209,7 +204,7 @@ uz_status uz_load_on_modes(uz_pressing *how, double *y, const double *Z, int64_t
             terms[c] = terms[c] > 0.0 ? terms[c] : scale;
         memcpy(s.b, load, (size_t)k * sizeof *s.b);
         solve(&s, scale);
-        if (length_of(&s) > tolerance * scale)
+        if (sqrt(dot(s.y, s.y, k)) > tolerance * scale)
             *how = UZ_PUSHED_AWAY;
         else if (strict && !is_inside(&s, load, terms, scale, tolerance))
             *how = UZ_COSTS_NOTHING;

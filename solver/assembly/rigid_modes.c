@@ -46,66 +46,62 @@ uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)
 
 /* -------------------------------------------------------------- parts that lean on parts */
 
-/* What of part i moves in the null space, rows rank .. n of basis: the rest of its motions counts as held. */
-static void keep_free(uz_parts *parts, int64_t i, const double *basis, int64_t rank, int64_t n, int64_t first)
-{
-    double mode[UZ_MOTIONS][UZ_MOTIONS], free_rows[UZ_MOTIONS][UZ_MOTIONS];
-    uz_part *p = &parts->list[i];
-    const int own = uz_free_motions(mode, parts, p);
-    int moving = 0;
-    for (int64_t r = rank; r < n; r++) {
-        double q[UZ_MOTIONS] = {0};
-        for (int k = 0; k < own; k++)
-            for (int c = 0; c < UZ_MOTIONS; c++)
-                q[c] += basis[r * n + first + k] * mode[k][c];
-        uz_extend_rows(free_rows, &moving, q);
-    }
-    int total = moving;
-    for (int k = 0; k < parts->motions; k++)
-        uz_extend_rows(free_rows, &total, parts->unit[k]);
-    p->rank = total - moving;
-    memcpy(p->held, free_rows[moving], (size_t)p->rank * sizeof free_rows[0]);
-}
-
 static uz_status hold_by_bodies(uz_parts *parts, const uz_body_model *model, const double *z, int64_t n, uz_error *err)
 {
     double *rows = uz_alloc_zero(model->m * n, sizeof *rows), *basis = uz_alloc(n * n, sizeof *basis);
-    const bool ok = rows && basis;
-    if (ok) {
-        const uz_csc *N = &model->N; /* rows (m x n) = N Z, each of length 1 or 0 */
+    if (!rows || !basis) {
+        free(rows);
+        free(basis);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
+    }
+    const uz_csc *N = &model->N; /* rows (m x n) = N Z, each of length 1 or 0 */
+    for (int64_t k = 0; k < n; k++)
+        for (int64_t j = 0; j < model->d; j++)
+            for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+                rows[N->idx[q] * n + k] += N->val[q] * z[k * model->d + j];
+    for (int64_t i = 0; i < model->m; i++) {
+        double square = 0;
         for (int64_t k = 0; k < n; k++)
-            for (int64_t j = 0; j < model->d; j++)
-                for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
-                    rows[N->idx[q] * n + k] += N->val[q] * z[k * model->d + j];
-        for (int64_t i = 0; i < model->m; i++) {
-            double square = 0;
-            for (int64_t k = 0; k < n; k++)
-                square += rows[i * n + k] * rows[i * n + k];
-            for (int64_t k = 0; k < n; k++)
-                rows[i * n + k] *= square > UZ_DEPENDENT * UZ_DEPENDENT ? 1 / sqrt(square) : 0;
+            square += rows[i * n + k] * rows[i * n + k];
+        for (int64_t k = 0; k < n; k++)
+            rows[i * n + k] *= square > UZ_DEPENDENT * UZ_DEPENDENT ? 1 / sqrt(square) : 0;
+    }
+    /* The rows of N together hold what they span of all modes; what is left goes back to the parts. Gram and
+     * Schmidt, as there are few modes. basis: n x n. */
+    int64_t rank = 0, all, first = 0;
+    for (int64_t i = 0; i < model->m && rank < n; i++) {
+        memcpy(basis + rank * n, rows + i * n, (size_t)n * sizeof *basis);
+        rank += uz_reject_rows(basis + rank * n, basis, rank, n);
+    }
+    all = rank;
+    for (int64_t k = 0; k < n && all < n; k++) {
+        memset(basis + all * n, 0, (size_t)n * sizeof *basis);
+        basis[all * n + k] = 1;
+        all += uz_reject_rows(basis + all * n, basis, all, n);
+    }
+    for (int64_t i = 0; i < parts->count; i++) {
+        /* what of part i moves in the null space, rows rank .. all of basis: the rest of its motions counts as held */
+        double mode[UZ_MOTIONS][UZ_MOTIONS], free_rows[UZ_MOTIONS][UZ_MOTIONS];
+        uz_part *p = &parts->list[i];
+        const int own = uz_free_motions(mode, parts, p);
+        int moving = 0;
+        for (int64_t r = rank; r < all; r++) {
+            double q[UZ_MOTIONS] = {0};
+            for (int k = 0; k < own; k++)
+                for (int c = 0; c < UZ_MOTIONS; c++)
+                    q[c] += basis[r * n + first + k] * mode[k][c];
+            uz_extend_rows(free_rows, &moving, q);
         }
-        /* The rows of N together hold what they span of all modes; what is left goes back to the parts. Gram and
-         * Schmidt, as there are few modes. basis: n x n. */
-        int64_t rank = 0, all, first = 0;
-        for (int64_t i = 0; i < model->m && rank < n; i++) {
-            memcpy(basis + rank * n, rows + i * n, (size_t)n * sizeof *basis);
-            rank += uz_reject_rows(basis + rank * n, basis, rank, n);
-        }
-        all = rank;
-        for (int64_t k = 0; k < n && all < n; k++) {
-            memset(basis + all * n, 0, (size_t)n * sizeof *basis);
-            basis[all * n + k] = 1;
-            all += uz_reject_rows(basis + all * n, basis, all, n);
-        }
-        for (int64_t i = 0; i < parts->count; i++) {
-            const int own = parts->motions - parts->list[i].rank;
-            keep_free(parts, i, basis, rank, all, first);
-            first += own;
-        }
+        int total = moving;
+        for (int k = 0; k < parts->motions; k++)
+            uz_extend_rows(free_rows, &total, parts->unit[k]);
+        first += parts->motions - p->rank;
+        p->rank = total - moving;
+        memcpy(p->held, free_rows[moving], (size_t)p->rank * sizeof free_rows[0]);
     }
     free(rows);
     free(basis);
-    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
+    return UZ_OK;
 }
 
 uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *model, uz_error *err)
