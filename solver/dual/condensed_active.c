@@ -15,24 +15,6 @@
 
 enum { PLACED = 64 }; /* columns between questions whether to go on: their entries go all over memory */
 
-/* to = scale_k scale_l from_kl at the rows of k and l: from the factor's order to the order of the rows. */
-static bool place_rows(double *to, const uz_condensed *dense, const double *from, bool invert_scale,
-                       const uz_stop *stop)
-{
-    int64_t m = dense->n_b;
-    for (int64_t l = 0; l < m; l++) {
-        if (l % PLACED == 0 && uz_stop_is_due(stop))
-            return false;
-        double scale_l = invert_scale ? 1.0 / dense->scale[l] : dense->scale[l];
-        for (int64_t k = l; k < m; k++) {
-            double scale_k = invert_scale ? 1.0 / dense->scale[k] : dense->scale[k];
-            int64_t row = dense->row_of[k], column = dense->row_of[l];
-            to[row >= column ? row + column * m : column + row * m] = scale_k * scale_l * from[k + l * m];
-        }
-    }
-    return true;
-}
-
 /* D = N_b S^-1 N_b', the inverse from the factor, or D^-1 = N_b^-T S N_b^-1 with S = L_bb L_bb'; then signs and places.
  * Made once for all loads; the load's own copy of the pointer stays NULL where making it had to stop. */
 static uz_status need(uz_condensed_load *x, bool inverse, uz_error *err)
@@ -56,7 +38,15 @@ static uz_status need(uz_condensed_load *x, bool inverse, uz_error *err)
             ok = uz_multiply_llt_while(n, L, room, made, stop) && uz_clear_while(size, made, stop);
         else
             ok = uz_invert_llt_while(n, L, room, made, stop);
-        ok = ok && place_rows(made, dense, room, inverse, stop);
+        for (int64_t l = 0; ok && l < n; l++) { /* from the factor's order to that of the rows, scaled */
+            const double scale_l = inverse ? 1.0 / dense->scale[l] : dense->scale[l];
+            ok = l % PLACED != 0 || !uz_stop_is_due(stop);
+            for (int64_t k = l; ok && k < n; k++) {
+                const double scale_k = inverse ? 1.0 / dense->scale[k] : dense->scale[k];
+                const int64_t row = dense->row_of[k], column = dense->row_of[l];
+                made[row >= column ? row + column * n : column + row * n] = scale_k * scale_l * room[k + l * n];
+            }
+        }
         if (status == UZ_OK && !ok && !uz_stop_is_due(stop))
             status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "the Schur complement on the contact is singular");
         free(room);
@@ -235,50 +225,37 @@ enum { CORRECTION_ROUNDS = 6 };
 
 enum { REFINEMENTS = 2 };
 
-/* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
- * inverse of a stiffness and as badly conditioned. Dw (m) is D w, also where it had to stop before w was right. D_AA is
- * room for count^2. */
-static bool solve_rows(double *w, double *Dw, double *D_AA, uz_condensed_load *x, const double *target,
-                       const int64_t *rows, int64_t count)
-{
-    int64_t m = x->load.dual->m, *pivot = uz_alloc(count, sizeof *pivot);
-    double *part = uz_alloc(count, sizeof *part);
-    bool ok = pivot && part;
-    memset(w, 0, (size_t)m * sizeof *w);
-    memset(Dw, 0, (size_t)m * sizeof *Dw);
-    if (ok) {
-        bool gathered = gather_lower(D_AA, x->D, rows, count, m, &x->load.stop);
-        int64_t rank = gathered ? uz_pstrf_lower_while(count, D_AA, pivot, UZ_PIVOT_LEAST, &x->load.stop) : 0;
-        ok = rank >= 0;
-        for (int pass = 0; ok && pass <= REFINEMENTS && !uz_stop_is_due(&x->load.stop); pass++) {
-            for (int64_t k = 0; k < rank; k++)
-                part[k] = target[rows[pivot[k]]] - Dw[rows[pivot[k]]];
-            uz_potrs_lower(rank, D_AA, count, part);
-            for (int64_t k = 0; k < rank; k++)
-                w[rows[pivot[k]]] += part[k];
-            (void)uz_condensed_apply(&x->load, Dw, w, NULL);
-        }
-    }
-    free(pivot);
-    free(part);
-    return ok;
-}
-
 /* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
- * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
+ * because of it, until none does. By w (m) with D w = g on these rows as far as they are independent, zero elsewhere;
+ * refined, as D_AA is the inverse of a stiffness and as badly conditioned. target (m) becomes what was reached, N c =
+ * D w, also where it had to stop before w was right; the correction is K^-1 N'w. */
 static bool correct_rows(uz_condensed_load *x, double *w, double *target, const double *g, const bool *close)
 {
-    int64_t m = x->load.dual->m, *rows = uz_alloc(m, sizeof *rows);
+    const uz_stop *stop = &x->load.stop;
+    int64_t m = x->load.dual->m, *rows = uz_alloc(m, sizeof *rows), *pivot = uz_alloc(m, sizeof *pivot);
     const double *D = x->D;
-    bool *in = uz_alloc(m, sizeof *in), feasible = false, ok = rows && in;
+    double *part = uz_alloc(m, sizeof *part);
+    bool *in = uz_alloc(m, sizeof *in), feasible = false, ok = rows && in && pivot && part;
     double *D_AA = ok ? uz_alloc(m * m, sizeof *D_AA) : NULL, scale = 0.0;
     for (int64_t i = 0; D_AA && i < m; i++) {
         in[i] = close[i] || uz_gap_penetrates(g[i]);
         scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
     }
-    for (int round = 0; D_AA && ok && !feasible && round < CORRECTION_ROUNDS && !uz_stop_is_due(&x->load.stop);
-         round++) {
-        ok = solve_rows(w, target, D_AA, x, g, rows, list_rows(rows, in, true, m));
+    for (int round = 0; D_AA && ok && !feasible && round < CORRECTION_ROUNDS && !uz_stop_is_due(stop); round++) {
+        const int64_t count = list_rows(rows, in, true, m);
+        const bool gathered = gather_lower(D_AA, D, rows, count, m, stop);
+        const int64_t rank = gathered ? uz_pstrf_lower_while(count, D_AA, pivot, UZ_PIVOT_LEAST, stop) : 0;
+        memset(w, 0, (size_t)m * sizeof *w);
+        memset(target, 0, (size_t)m * sizeof *target);
+        ok = rank >= 0;
+        for (int pass = 0; ok && pass <= REFINEMENTS && !uz_stop_is_due(stop); pass++) {
+            for (int64_t k = 0; k < rank; k++)
+                part[k] = g[rows[pivot[k]]] - target[rows[pivot[k]]];
+            uz_potrs_lower(rank, D_AA, count, part);
+            for (int64_t k = 0; k < rank; k++)
+                w[rows[pivot[k]]] += part[k];
+            (void)uz_condensed_apply(&x->load, target, w, NULL);
+        }
         /* |D| |w| row by row is at most sqrt(D_ii) times this sum: what rounding leaves of D w is in proportion. */
         double sum = 0.0;
         for (int64_t j = 0; j < m; j++)
@@ -293,6 +270,8 @@ static bool correct_rows(uz_condensed_load *x, double *w, double *target, const 
         }
     }
     free(rows);
+    free(pivot);
+    free(part);
     free(in);
     free(D_AA);
     return feasible;

@@ -60,11 +60,6 @@ static uz_cg_stop stop_at(const free_load *x, double relative, double absolute)
                         .deadline = x->stop.deadline};
 }
 
-static double root_of_lambda(const uz_dual_load *load)
-{
-    return sqrt(load->dual->amg->info.lambda);
-}
-
 /* base = K^-1 p to the aim, from where it stands; psi0 and g0 with it. */
 static uz_status solve_base(free_load *x, double aim, uz_error *err)
 {
@@ -72,7 +67,7 @@ static uz_status solve_base(free_load *x, double aim, uz_error *err)
     double *base = x->sparse.base;
     int64_t d = load->dual->d;
     uz_cg_info info;
-    double root = root_of_lambda(load), norm = uz_root(uz_dot(d, x->p, base));
+    double root = sqrt(load->dual->amg->info.lambda), norm = uz_root(uz_dot(d, x->p, base));
     /* From 0 the first residual has the size of the solution. */
     uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : aim * root, aim * norm * root);
     uz_status status = uz_cg_solve(&info, base, &x->cg, load->K, x->p, &stop, err);
@@ -140,7 +135,7 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
 {
     free_load *x = (free_load *)load;
     const uz_dual *dual = load->dual;
-    const double root = root_of_lambda(load), base = uz_root(-2.0 * load->psi0);
+    const double root = sqrt(load->dual->amg->info.lambda), base = uz_root(-2.0 * load->psi0);
     double psi, norm2;
     uz_cg_info info;
     memset(Dr, 0, (size_t)dual->m * sizeof *Dr);
@@ -188,7 +183,7 @@ static uz_status solve_to(free_load *x, uz_cg *cg, double tolerance, double *g, 
     const uz_dual_load *load = &x->sparse.load;
     const int64_t d = load->dual->d, m = load->dual->m;
     uz_bounded *box = x->sparse.box;
-    double root = root_of_lambda(load), most = uz_root(-2.0 * load->psi0), square = 0.0;
+    double root = sqrt(load->dual->amg->info.lambda), most = uz_root(-2.0 * load->psi0), square = 0.0;
     uz_bounded_balance(box, load->K);
     for (int64_t j = 0; j < d; j++)
         square += box->u[j] * (box->force[j] + box->p[j]);
