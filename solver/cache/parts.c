@@ -105,11 +105,9 @@ static bool fits(const void *object, void *ctx)
 {
     const kept_factor *kept = object;
     const wanted *w = ctx;
-    int64_t count;
-    uz_factor_last_dofs(kept->factor, &count);
-    return kept->ordering == w->ordering && strcmp(kept->K, w->key->values) == 0 &&
-           uz_factor_describe(kept->factor).rcond >= SHARED_RCOND &&
-           (!w->last || (count <= 2 * w->n_dofs + 256 && uz_factor_ends_with(kept->factor, w->dofs, w->n_dofs)));
+    const uz_factor_info info = uz_factor_describe(kept->factor);
+    return kept->ordering == w->ordering && strcmp(kept->K, w->key->values) == 0 && info.rcond >= SHARED_RCOND &&
+           (!w->last || (info.n_last <= 2 * w->n_dofs + 256 && uz_factor_ends_with(kept->factor, w->dofs, w->n_dofs)));
 }
 
 /* Puts a factor into the place that was reserved for it, and owns it also on failure. */

@@ -92,8 +92,8 @@ static uz_status list_contact(int64_t **order, int64_t *n_b, bool *last, const u
     uz_status status = uz_dual_contact_dofs(order, n_b, &dual->N, err);
     if (status != UZ_OK)
         return status;
-    int64_t count;
-    const int64_t *dofs = uz_factor_last_dofs(dual->factor, &count);
+    const uz_factor_info factor = uz_factor_describe(dual->factor);
+    const int64_t count = factor.n_last;
     *last = uz_factor_ends_with(dual->factor, *order, *n_b);
     if (!*last)
         return UZ_OK;
@@ -103,7 +103,7 @@ static uz_status list_contact(int64_t **order, int64_t *n_b, bool *last, const u
     if (!*order)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld contact dofs", (long long)count);
     if (count > 0)
-        memcpy(*order, dofs, (size_t)count * sizeof **order);
+        memcpy(*order, factor.last, (size_t)count * sizeof **order);
     return UZ_OK;
 }
 
@@ -129,8 +129,9 @@ static uz_status create(uz_dual *dual, const uz_stop *stop, uz_error *err)
     if (status == UZ_OK && dense->L_bb) {
         status = uz_factor_last_block(dual->factor, dense->L_bb, order, dense->position, err);
     } else if (status == UZ_OK) {
+        const int64_t *position = uz_factor_describe(dual->factor).position;
         for (int64_t k = 0; k < n_b; k++)
-            dense->position[k] = uz_factor_position(dual->factor)[order[k]];
+            dense->position[k] = position[order[k]];
         status = uz_reach_create(&dense->reach, dual->factor, order, n_b, err);
     }
     if (status == UZ_OK)

@@ -106,6 +106,9 @@ uz_factor_info uz_analysis_describe(const uz_analysis *analysis)
         .bytes = 8 * L->xsize + 8 * L->ssize + 32 * (size_t)analysis->n,
         .room = 8 * (L->maxcsize + 3 * (size_t)analysis->n),
         .order_s = analysis->seconds,
+        .position = analysis->position,
+        .last = analysis->last,
+        .n_last = analysis->chosen.contact_last ? analysis->n_last : 0,
     };
     memcpy(info.considered, analysis->considered, sizeof info.considered);
     return info;

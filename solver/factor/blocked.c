@@ -27,29 +27,6 @@ typedef struct {
     lanes *b; /* rows x HALVES */
 } panel_of;
 
-/* b_i -= L_ij b_j for rows of one column. */
-static inline __attribute__((always_inline)) void take_column(lanes *b, const double *L, int64_t j, int64_t first,
-                                                              int64_t last)
-{
-    for (int64_t i = first; i < last; i++) {
-        b[2 * i] -= L[i] * b[2 * j];
-        b[2 * i + 1] -= L[i] * b[2 * j + 1];
-    }
-}
-
-/* The same for PANEL columns from j on. */
-static inline __attribute__((always_inline)) void take_panel(lanes *b, const double *L, int64_t rows, int64_t j)
-{
-    const double *L0 = L, *L1 = L0 + rows, *L2 = L1 + rows, *L3 = L2 + rows;
-    const lanes x0 = b[2 * j], x1 = b[2 * j + 2], x2 = b[2 * j + 4], x3 = b[2 * j + 6];
-    const lanes y0 = b[2 * j + 1], y1 = b[2 * j + 3], y2 = b[2 * j + 5], y3 = b[2 * j + 7];
-    for (int64_t i = j + PANEL; i < rows; i++) {
-        const double l0 = L0[i], l1 = L1[i], l2 = L2[i], l3 = L3[i];
-        b[2 * i] = b[2 * i] - l0 * x0 - l1 * x1 - l2 * x2 - l3 * x3;
-        b[2 * i + 1] = b[2 * i + 1] - l0 * y0 - l1 * y1 - l2 * y2 - l3 * y3;
-    }
-}
-
 /* b = L^-1 b on the columns, and what that takes from the rows below. */
 static inline __attribute__((always_inline)) void eliminate(const panel_of *s)
 {
@@ -58,29 +35,29 @@ static inline __attribute__((always_inline)) void eliminate(const panel_of *s)
         int64_t width = s->cols - j < PANEL ? s->cols - j : PANEL;
         const double *L = s->L + j * s->rows;
         for (int64_t k = 0; k < width; k++) {
-            b[2 * (j + k)] /= L[j + k + k * s->rows];
-            b[2 * (j + k) + 1] /= L[j + k + k * s->rows];
-            take_column(b, L + k * s->rows, j + k, j + k + 1, width == PANEL ? j + width : s->rows);
+            const double *of_k = L + k * s->rows;
+            b[2 * (j + k)] /= of_k[j + k];
+            b[2 * (j + k) + 1] /= of_k[j + k];
+            const int64_t end = width == PANEL ? j + width : s->rows;
+            for (int64_t i = j + k + 1; i < end; i++) {
+                b[2 * i] -= of_k[i] * b[2 * (j + k)];
+                b[2 * i + 1] -= of_k[i] * b[2 * (j + k) + 1];
+            }
         }
-        if (width == PANEL)
-            take_panel(b, L, s->rows, j);
+        if (width < PANEL)
+            break;
+        const double *L0 = L, *L1 = L0 + s->rows, *L2 = L1 + s->rows, *L3 = L2 + s->rows;
+        const lanes x0 = b[2 * j], x1 = b[2 * j + 2], x2 = b[2 * j + 4], x3 = b[2 * j + 6];
+        const lanes y0 = b[2 * j + 1], y1 = b[2 * j + 3], y2 = b[2 * j + 5], y3 = b[2 * j + 7];
+        for (int64_t i = j + PANEL; i < s->rows; i++) { /* the same for PANEL columns at once */
+            const double l0 = L0[i], l1 = L1[i], l2 = L2[i], l3 = L3[i];
+            b[2 * i] = b[2 * i] - l0 * x0 - l1 * x1 - l2 * x2 - l3 * x3;
+            b[2 * i + 1] = b[2 * i + 1] - l0 * y0 - l1 * y1 - l2 * y2 - l3 * y3;
+        }
     }
 }
 
-/* b_j -= L_ij b_i summed over rows. */
-static inline __attribute__((always_inline)) void gather_column(lanes *b, const double *L, int64_t j, int64_t first,
-                                                                int64_t last)
-{
-    lanes x = b[2 * j], y = b[2 * j + 1];
-    for (int64_t i = first; i < last; i++) {
-        x -= L[i] * b[2 * i];
-        y -= L[i] * b[2 * i + 1];
-    }
-    b[2 * j] = x;
-    b[2 * j + 1] = y;
-}
-
-/* The same for PANEL columns from j on, over the rows below them. */
+/* b_j -= L_ij b_i summed over the rows below PANEL columns from j on. */
 static inline __attribute__((always_inline)) void gather_panel(lanes *b, const double *L, int64_t rows, int64_t j)
 {
     const double *L0 = L, *L1 = L0 + rows, *L2 = L1 + rows, *L3 = L2 + rows;
@@ -118,9 +95,15 @@ static inline __attribute__((always_inline)) void substitute_back(const panel_of
         if (width == PANEL)
             gather_panel(b, L, s->rows, j);
         for (int64_t k = width - 1; k >= 0; k--) {
-            gather_column(b, L + k * s->rows, j + k, j + k + 1, width == PANEL ? j + width : s->rows);
-            b[2 * (j + k)] /= L[j + k + k * s->rows];
-            b[2 * (j + k) + 1] /= L[j + k + k * s->rows];
+            const double *of_k = L + k * s->rows;
+            const int64_t end = width == PANEL ? j + width : s->rows;
+            lanes x = b[2 * (j + k)], y = b[2 * (j + k) + 1];
+            for (int64_t i = j + k + 1; i < end; i++) {
+                x -= of_k[i] * b[2 * i];
+                y -= of_k[i] * b[2 * i + 1];
+            }
+            b[2 * (j + k)] = x / of_k[j + k];
+            b[2 * (j + k) + 1] = y / of_k[j + k];
         }
     }
 }

@@ -176,22 +176,10 @@ uz_analysis *uz_factor_analysis(const uz_factor *factor)
     return factor->analysis;
 }
 
-const int64_t *uz_factor_position(const uz_factor *factor)
-{
-    return factor->analysis->position;
-}
-
-const int64_t *uz_factor_last_dofs(const uz_factor *factor, int64_t *count)
-{
-    *count = factor->info.contact_last ? factor->analysis->n_last : 0;
-    return factor->analysis->last;
-}
-
 bool uz_factor_ends_with(const uz_factor *factor, const int64_t *dofs, int64_t n)
 {
-    int64_t count, found = 0;
-    const int64_t *last = uz_factor_last_dofs(factor, &count);
-    for (int64_t k = 0; k < count && found < n; k++)
-        found += last[k] == dofs[found];
+    int64_t found = 0;
+    for (int64_t k = 0; k < factor->info.n_last && found < n; k++)
+        found += factor->info.last[k] == dofs[found];
     return found == n;
 }

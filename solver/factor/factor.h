@@ -36,6 +36,10 @@ typedef struct {
     double inverse_bound;
     double order_s; /* what the analysis took, whoever waited for it */
     double factor_s;
+    /* The analysis's own: where dof i stands in the factor's order (n), and the n_last dofs, ascending, that come last:
+     * 0 where none has to. */
+    const int64_t *position, *last;
+    int64_t n_last;
 } uz_factor_info;
 
 /* What the pattern of K (lower triangle, n x n) alone decides: the order of elimination and the supernodes; values are
@@ -64,8 +68,6 @@ void uz_factor_free(uz_factor *factor);
 uz_factor_info uz_factor_describe(const uz_factor *factor);
 /* What it was made from, for other matrices of its pattern; ends with uz_analysis_free. */
 uz_analysis *uz_factor_analysis(const uz_factor *factor);
-/* The dofs that come last, ascending; *count of them, 0 where none has to. */
-const int64_t *uz_factor_last_dofs(const uz_factor *factor, int64_t *count);
 /* Are the n dofs (ascending) among those that come last? Always where n = 0. */
 bool uz_factor_ends_with(const uz_factor *factor, const int64_t *dofs, int64_t n);
 
@@ -88,9 +90,6 @@ enum { UZ_LANES = 8 };
 void uz_factor_permute_lanes(const uz_factor *factor, double *permuted, const double *X);
 void uz_factor_unpermute_lanes(const uz_factor *factor, double *X, const double *permuted);
 uz_status uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err);
-
-/* Where dof i stands in the factor's order: position[i], n. */
-const int64_t *uz_factor_position(const uz_factor *factor);
 
 /* The rows and columns of L at the `last` dofs as a dense lower triangle, n_last x n_last column-major, strict upper
  * part zero; order[k] is the dof of row k (ascending position), where[k] its position. It is the Cholesky factor of the

@@ -68,8 +68,8 @@ uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *
 {
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s, *perm = L->Perm;
-    int64_t n_last, count = 0, *rank = uz_alloc(factor->n, sizeof *rank);
-    const int64_t *last = uz_factor_last_dofs(factor, &n_last); /* none of the analysis' where they are not last */
+    const int64_t n_last = factor->info.n_last, *last = factor->info.last;
+    int64_t count = 0, *rank = uz_alloc(factor->n, sizeof *rank);
     if (!rank)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)factor->n);
     for (int64_t k = 0; k < factor->n; k++) /* the place of position k among the last dofs, -1 for the others */

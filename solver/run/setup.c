@@ -223,7 +223,7 @@ typedef struct {
 static uz_status half_solve(void *ctx, double *X, int64_t columns, bool transposed, uz_error *err)
 {
     const half_solver *s = ctx;
-    const int64_t d = s->d, *position = uz_factor_position(s->factor);
+    const int64_t d = s->d, *position = uz_factor_describe(s->factor).position;
     uz_status status = UZ_OK;
     for (int64_t first = 0; status == UZ_OK && first < columns; first += UZ_LANES) {
         const int64_t lanes = columns - first < UZ_LANES ? columns - first : UZ_LANES;

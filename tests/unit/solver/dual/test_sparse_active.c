@@ -372,7 +372,7 @@ TEST(principal_submatrix_that_is_not_positive_definite)
     CHECK(factor_by(&factor, &qp.K, NULL, 0, UZ_ORDERING_AUTO, 0, &err) == UZ_OK);
     uz_factor_workspace *ws = uz_factor_workspace_new();
     for (int64_t i = 0; i < 25; i++)
-        last = uz_factor_position(factor)[i] == 24 ? i : last;
+        last = uz_factor_describe(factor).position[i] == 24 ? i : last;
     qp.K.val[qp.K.ptr[last]] = -1;
     fixed[(last + 1) % 25] = true;
     CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, NULL, &err) == UZ_OK && !part);

@@ -209,7 +209,7 @@ static void check_block(const uz_factor *factor, const double *S, const int64_t 
         while (rank[k] < n_last && last[rank[k]] != order[k])
             rank[k]++;
         CHECK(rank[k] < n_last);
-        CHECK_INT(uz_factor_position(factor)[order[k]], where[k]);
+        CHECK_INT(uz_factor_describe(factor).position[order[k]], where[k]);
         CHECK(k == 0 || where[k] > where[k - 1]);
         CHECK(block[k + k * n_last] > 0);
         for (int64_t l = k + 1; l < n_last; l++)

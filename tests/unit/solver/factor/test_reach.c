@@ -106,7 +106,7 @@ static void check_substitutions(const uz_reach *reach, const uz_factor *factor, 
     CHECK(uz_reach_backward(reach, ws, x, &err) == UZ_OK);
     CHECK(uz_factor_solve_one(factor, ws, full, false, &err) == UZ_OK);
     for (int64_t k = 0; k < count; k++) {
-        int64_t at = uz_factor_position(factor)[dofs[k]];
+        int64_t at = uz_factor_describe(factor).position[dofs[k]];
         CHECK(fabs(x[at] - full[at]) <= 1e-12 * largest(full, n));
     }
     free(x);
