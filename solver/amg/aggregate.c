@@ -100,36 +100,6 @@ static void take_free_neighbours(const graph *g, int32_t *aggregate, int64_t a, 
             aggregate[g->node[k]] = number;
 }
 
-/* Whole neighbourhoods first; then what is left joins a neighbour's aggregate; what has none forms its own. */
-static int64_t collect(const graph *g, int32_t *aggregate, int64_t n_nodes)
-{
-    int32_t count = 0;
-    for (int64_t a = 0; a < n_nodes; a++)
-        aggregate[a] = g->ptr[a] == g->ptr[a + 1] ? ALONE : NONE;
-    for (int64_t a = 0; a < n_nodes; a++) {
-        bool free_around = aggregate[a] == NONE;
-        for (int64_t k = g->ptr[a]; free_around && k < g->ptr[a + 1]; k++)
-            free_around = aggregate[g->node[k]] < 0;
-        if (free_around)
-            take_free_neighbours(g, aggregate, a, count++);
-    }
-    int32_t kept = count;
-    for (int64_t a = 0; a < n_nodes; a++)
-        for (int64_t k = g->ptr[a]; aggregate[a] == NONE && k < g->ptr[a + 1]; k++) {
-            int32_t joined = aggregate[g->node[k]];
-            if (joined >= 0 && joined < kept)
-                aggregate[a] = kept + joined; /* marked, so that joiners attract no joiners */
-        }
-    for (int64_t a = 0; a < n_nodes; a++)
-        aggregate[a] = aggregate[a] >= kept ? aggregate[a] - kept : aggregate[a];
-    for (int64_t a = 0; a < n_nodes; a++)
-        if (aggregate[a] == NONE)
-            take_free_neighbours(g, aggregate, a, count++);
-    for (int64_t a = 0; a < n_nodes; a++)
-        aggregate[a] = aggregate[a] == ALONE ? -1 : aggregate[a];
-    return count;
-}
-
 uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_csc *A, const double *inverse, const int32_t *node,
                        int64_t n_nodes, double threshold, uz_error *err)
 {
@@ -141,7 +111,32 @@ uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_csc *A, cons
     if (ok)
         uz_list_members(list.ptr, list.dof, node, A->cols, n_nodes);
     ok = ok && build_graph(&g, &v, found, n_nodes);
-    *count = ok ? collect(&g, aggregate, n_nodes) : 0;
+    /* whole neighbourhoods first; then what is left joins a neighbour's aggregate; what has none forms its own */
+    int32_t number = 0;
+    for (int64_t a = 0; ok && a < n_nodes; a++)
+        aggregate[a] = g.ptr[a] == g.ptr[a + 1] ? ALONE : NONE;
+    for (int64_t a = 0; ok && a < n_nodes; a++) {
+        bool free_around = aggregate[a] == NONE;
+        for (int64_t k = g.ptr[a]; free_around && k < g.ptr[a + 1]; k++)
+            free_around = aggregate[g.node[k]] < 0;
+        if (free_around)
+            take_free_neighbours(&g, aggregate, a, number++);
+    }
+    const int32_t kept = number;
+    for (int64_t a = 0; ok && a < n_nodes; a++)
+        for (int64_t k = g.ptr[a]; aggregate[a] == NONE && k < g.ptr[a + 1]; k++) {
+            int32_t joined = aggregate[g.node[k]];
+            if (joined >= 0 && joined < kept)
+                aggregate[a] = kept + joined; /* marked, so that joiners attract no joiners */
+        }
+    for (int64_t a = 0; ok && a < n_nodes; a++)
+        aggregate[a] = aggregate[a] >= kept ? aggregate[a] - kept : aggregate[a];
+    for (int64_t a = 0; ok && a < n_nodes; a++)
+        if (aggregate[a] == NONE)
+            take_free_neighbours(&g, aggregate, a, number++);
+    for (int64_t a = 0; ok && a < n_nodes; a++)
+        aggregate[a] = aggregate[a] == ALONE ? -1 : aggregate[a];
+    *count = number;
     free(found);
     free(seen);
     free(list.ptr);

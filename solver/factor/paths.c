@@ -181,42 +181,15 @@ double uz_paths_work(uz_paths *x, const bool *fixed)
     return work;
 }
 
-/* What the rows of a link take from the columns of s: block -= L_d L_d'. Below so many flops a product of matrices
- * takes longer to begin than to do. */
+/* Below so many flops a product of matrices takes longer to begin than to do. */
 enum { FEW_FLOPS = 256 };
-
-static void take(uz_paths *x, double *block, int64_t height, const link *from)
-{
-    const cholmod_factor *L = &x->factor->L;
-    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px,
-                           *row = (SuiteSparse_long *)L->s + pi[from->from];
-    const int64_t columns = super[from->from + 1] - super[from->from], ld = pi[from->from + 1] - pi[from->from],
-                  width = from->end - from->begin, rest = ld - from->begin;
-    const double *value = x->block[from->from] ? x->block[from->from] : (double *)L->x + px[from->from];
-    const bool few = columns * width * rest <= FEW_FLOPS;
-    if (!few)
-        uz_block_outer(rest, width, columns, value + from->begin, ld, x->room);
-    for (int64_t c = from->begin; c < from->end; c++) {
-        double *to = block + x->local[row[c]] * height;
-        if (x->held[row[c]])
-            continue;
-        for (int64_t q = 0; few && q < columns; q++) {
-            const double *own = value + q * ld, weight = own[c];
-            for (int64_t i = c; i < ld; i++)
-                to[x->local[row[i]]] -= own[i] * weight;
-        }
-        const double *product = x->room + (c - from->begin) * rest;
-        for (int64_t i = c; !few && i < ld; i++)
-            to[x->local[row[i]]] -= product[i - from->begin];
-    }
-}
 
 /* Supernode s for the dofs that are held now. */
 static uz_status make(bool *positive, uz_paths *x, int64_t s, uz_error *err)
 {
     const cholmod_factor *L = &x->factor->L;
-    const SuiteSparse_long *super = L->super, *pi = L->pi, *row = (SuiteSparse_long *)L->s + pi[s], *ptr = x->K->p,
-                           *index = x->K->i;
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *row = (SuiteSparse_long *)L->s + pi[s],
+                           *ptr = x->K->p, *index = x->K->i;
     const int64_t columns = super[s + 1] - super[s], height = pi[s + 1] - pi[s];
     const double *value = x->K->x;
     x->idle[s] = true;
@@ -233,9 +206,29 @@ static uz_status make(bool *positive, uz_paths *x, int64_t s, uz_error *err)
     for (int64_t c = 0; c < columns; c++)
         for (int64_t e = ptr[super[s] + c]; !x->held[super[s] + c] && e < ptr[super[s] + c + 1]; e++)
             block[x->local[index[e]] + c * height] = value[e];
-    for (int64_t k = x->first[s]; k < x->first[s + 1]; k++)
-        if (!x->idle[x->links[k].from])
-            take(x, block, height, &x->links[k]);
+    for (int64_t k = x->first[s]; k < x->first[s + 1]; k++) { /* what its rows take from s: block -= L_d L_d' */
+        const link *from = &x->links[k];
+        const int64_t d = from->from, own_columns = super[d + 1] - super[d], ld = pi[d + 1] - pi[d],
+                      width = from->end - from->begin, rest = ld - from->begin;
+        const SuiteSparse_long *row_of_d = (SuiteSparse_long *)L->s + pi[d];
+        const double *L_d = x->block[d] ? x->block[d] : (double *)L->x + px[d];
+        const bool few = own_columns * width * rest <= FEW_FLOPS;
+        if (x->idle[d])
+            continue;
+        if (!few)
+            uz_block_outer(rest, width, own_columns, L_d + from->begin, ld, x->room);
+        for (int64_t c = from->begin; c < from->end; c++) {
+            double *to = block + x->local[row_of_d[c]] * height;
+            const double *product = x->room + (c - from->begin) * rest;
+            if (x->held[row_of_d[c]])
+                continue;
+            for (int64_t q = 0; few && q < own_columns; q++)
+                for (int64_t i = c; i < ld; i++)
+                    to[x->local[row_of_d[i]]] -= L_d[i + q * ld] * L_d[c + q * ld];
+            for (int64_t i = c; !few && i < ld; i++)
+                to[x->local[row_of_d[i]]] -= product[i - from->begin];
+        }
+    }
     for (int64_t c = 0; c < columns; c++) {
         if (!x->held[super[s] + c])
             continue;

@@ -71,29 +71,6 @@ static cholmod_sparse *reduce(const uz_principal *part, const uz_csc *K)
     return A;
 }
 
-/* Few flops for each entry of L make supernodes a burden: CHOLMOD_AUTO decides by that ratio. */
-static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A, const uz_stop *stop, uz_error *err)
-{
-    cholmod_common *common = &part->ws->common;
-    common->supernodal = CHOLMOD_AUTO;
-    common->method[0].ordering = CHOLMOD_NATURAL;
-    part->L = cholmod_l_analyze(A, common);
-    common->supernodal = CHOLMOD_SUPERNODAL;
-    common->method[0].ordering = CHOLMOD_GIVEN;
-    if (part->L && uz_stop_is_due(stop)) {
-        *positive = false;
-        return UZ_OK;
-    }
-    bool ok = part->L && cholmod_l_factorize(A, part->L, common);
-    int status = common->status;
-    if (status == CHOLMOD_OUT_OF_MEMORY || status == CHOLMOD_TOO_LARGE)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)part->n_free);
-    *positive = status == CHOLMOD_OK && part->L && (int64_t)part->L->minor == part->n_free;
-    if (!*positive && status != CHOLMOD_NOT_POSDEF && !ok)
-        return uz_fail(err, UZ_ERR_INTERNAL, "K", "factorization failed (CHOLMOD status %d)", status);
-    return UZ_OK;
-}
-
 /* Entries of L, and of K in an analysis, that are passed in the time of a flop of a dense kernel; as in dual/cost.h. */
 #define FLOPS_PER_ENTRY 8.0
 #define ENTRY_PASSES    10.0
@@ -128,15 +105,31 @@ uz_status uz_principal_hold(bool *positive, uz_principal *part, const uz_csc *K,
         count_bytes(part, NULL);
         return status;
     }
-    cholmod_l_free_factor(&part->L, &part->ws->common);
+    cholmod_common *common = &part->ws->common;
+    cholmod_l_free_factor(&part->L, common);
     if (status == UZ_OK && part->n_free > 0 && !(A = reduce(part, K)))
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
-    if (uz_stop_is_due(stop))
-        *positive = false;
-    else if (status == UZ_OK && A)
-        status = factorize(part, positive, A, stop, err);
+    *positive = !uz_stop_is_due(stop);
+    if (status == UZ_OK && A && *positive) {
+        /* few flops for each entry of L make supernodes a burden: CHOLMOD_AUTO decides by that ratio */
+        common->supernodal = CHOLMOD_AUTO;
+        common->method[0].ordering = CHOLMOD_NATURAL;
+        part->L = cholmod_l_analyze(A, common);
+        common->supernodal = CHOLMOD_SUPERNODAL;
+        common->method[0].ordering = CHOLMOD_GIVEN;
+        *positive = !part->L || !uz_stop_is_due(stop);
+    }
+    if (status == UZ_OK && A && *positive) {
+        const bool ok = part->L && cholmod_l_factorize(A, part->L, common);
+        const int state = common->status;
+        *positive = state == CHOLMOD_OK && part->L && (int64_t)part->L->minor == part->n_free;
+        if (state == CHOLMOD_OUT_OF_MEMORY || state == CHOLMOD_TOO_LARGE)
+            status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)part->n_free);
+        else if (!*positive && state != CHOLMOD_NOT_POSDEF && !ok)
+            status = uz_fail(err, UZ_ERR_INTERNAL, "K", "factorization failed (CHOLMOD status %d)", state);
+    }
     count_bytes(part, A);
-    cholmod_l_free_sparse(&A, &part->ws->common);
+    cholmod_l_free_sparse(&A, common);
     return status;
 }
 

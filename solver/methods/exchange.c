@@ -278,29 +278,6 @@ static void settle(uz_exchange *x)
     }
 }
 
-/* From the rows asked for: an independent part of them. Where it had to stop, or has done its work for now, what has
- * come together. */
-static uz_status begin(uz_exchange *x, double most_work, uz_error *err)
-{
-    uz_status status = UZ_OK;
-    for (; status == UZ_OK && x->taken < x->m && x->work < most_work && !uz_stop_is_due(x->stop); x->taken++) {
-        const int64_t i = x->taken;
-        if (!x->asked[i] && x->base[i] == 0.0)
-            continue;
-        status = press(x, i, err);
-        if (status != UZ_OK)
-            return status;
-        if (x->asked[i])
-            yield_to(x, i);
-        if (x->asked[i] && !depends(x, i))
-            status = join(x, i, err);
-        else
-            forget_base(x, i, x->incoming);
-        x->steps = 0;
-    }
-    return status;
-}
-
 /* Where q depends on rows in contact, N'w = n_q: what rounding leaves of a w_k that is zero is no way out. */
 #define PULL_NOISE 1e-10
 
@@ -420,7 +397,24 @@ uz_status uz_exchange_continue(uz_exchange_end *end, uz_exchange *x, int64_t mos
 {
     bool likely = false;
     *end = UZ_EXCHANGE_STOPPED;
-    uz_status status = begin(x, most_work, err);
+    uz_status status = UZ_OK;
+    /* From the rows asked for: an independent part of them. Where it had to stop, or has done its work for now, what
+     * has come together. */
+    for (; status == UZ_OK && x->taken < x->m && x->work < most_work && !uz_stop_is_due(x->stop); x->taken++) {
+        const int64_t i = x->taken;
+        if (!x->asked[i] && x->base[i] == 0.0)
+            continue;
+        status = press(x, i, err);
+        if (status != UZ_OK)
+            break;
+        if (x->asked[i])
+            yield_to(x, i);
+        if (x->asked[i] && !depends(x, i))
+            status = join(x, i, err);
+        else
+            forget_base(x, i, x->incoming);
+        x->steps = 0;
+    }
     for (int64_t k = 0; status == UZ_OK && x->taken == x->m && x->steps < most_steps && x->work < most_work &&
                         k < CIRCLES * (x->m + 1);
          k++) {
