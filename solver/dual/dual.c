@@ -164,27 +164,6 @@ uz_status uz_dual_load_aim(uz_dual_load *load, double relative_error, const uz_s
     return form->aim && !isnan(relative_error) ? form->aim(load, relative_error, err) : UZ_OK;
 }
 
-typedef struct {
-    uz_dual_load *load;
-    const double *weight; /* m; NULL: all 1 */
-    double *weighted;     /* m: room, with a weight */
-} lanczos_operator;
-
-/* y = W D W x */
-static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)
-{
-    const lanczos_operator *op = ctx;
-    if (uz_stop_is_due(&op->load->stop))
-        return UZ_ERR_CANCELLED;
-    for (int64_t i = 0; op->weight && i < op->load->dual->m; i++)
-        op->weighted[i] = op->weight[i] * x[i];
-    op->load->applications++;
-    uz_status status = op->load->dual->form->apply(op->load, y, op->weight ? op->weighted : x, err);
-    for (int64_t i = 0; op->weight && i < op->load->dual->m; i++)
-        y[i] *= op->weight[i];
-    return status;
-}
-
 /* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
 #define LAMBDA_TOLERANCE 1e-4
 
@@ -202,16 +181,14 @@ uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weig
         status = form->prepare(load, err);
     if (status != UZ_OK || !lambda_max || !uz_lock_while(&lazy->making, &load->stop))
         return status;
-    lanczos_operator op = {.load = load, .weight = weighted ? dual->row_weight : NULL};
-    double *known = &lazy->lambda_max[op.weight != NULL];
+    const double *weight = weighted ? dual->row_weight : NULL;
+    double *known = &lazy->lambda_max[weight != NULL];
     if (!isnan(*known)) {
         *lambda_max = *known;
-    } else if (op.weight && !(op.weighted = uz_alloc(dual->m, sizeof *op.weighted))) {
-        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a vector of %lld contacts", (long long)dual->m);
     } else {
         if (form->probe)
             form->probe(load, true, 0.1 * LAMBDA_TOLERANCE);
-        status = uz_lanczos_max(lambda_max, dual->m, apply_for_lanczos, &op, LAMBDA_TOLERANCE, err);
+        status = uz_lanczos_max(lambda_max, load, weight, LAMBDA_TOLERANCE, err);
         if (form->probe)
             form->probe(load, false, 0.0);
         if (status != UZ_OK || uz_stop_is_due(&load->stop)) {
@@ -223,7 +200,6 @@ uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weig
         }
     }
     pthread_mutex_unlock(&lazy->making);
-    free(op.weighted);
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 

@@ -2,8 +2,10 @@
 #include "dual/lanczos.h"
 
 #include "core/alloc.h"
-#include "linalg/blas.h"
 #include "core/error.h"
+#include "core/hooks.h"
+#include "dual/form.h"
+#include "linalg/blas.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,17 +13,18 @@
 
 enum { MAX_STEPS = 120, CHECK_EVERY = 4 };
 
-uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, double tolerance, uz_error *err)
+uz_status uz_lanczos_max(double *lambda, uz_dual_load *load, const double *weight, double tolerance, uz_error *err)
 {
-    int64_t steps = m < MAX_STEPS ? m : MAX_STEPS;
-    double *basis = uz_alloc(m * (steps + 1), sizeof *basis); /* m x (steps + 1) */
+    const int64_t m = load->dual->m, steps = m < MAX_STEPS ? m : MAX_STEPS;
+    double *weighted = uz_alloc(weight ? m : 0, sizeof *weighted); /* W v */
+    double *basis = uz_alloc(m * (steps + 1), sizeof *basis);      /* m x (steps + 1) */
     /* diagonal, subdiagonal of the tridiagonal matrix; room for its eigenproblem, and its vectors */
     double *alpha = uz_alloc(steps, sizeof *alpha), *beta = uz_alloc(steps + 1, sizeof *beta);
     double *d = uz_alloc(steps, sizeof *d), *e = uz_alloc(steps + 1, sizeof *e);
     double *vectors = uz_alloc(steps * steps, sizeof *vectors), value = 0.0, residual = 0.0;
     uz_status status = UZ_OK;
     *lambda = 0.0;
-    if (!basis || !alpha || !beta || !d || !e || !vectors)
+    if (!weighted || !basis || !alpha || !beta || !d || !e || !vectors)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld Lanczos vectors", (long long)steps);
     else if (m > 0) {
         /* a fixed pseudo-random start: no direction of a structured problem is orthogonal to it, and runs repeat */
@@ -36,9 +39,17 @@ uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, d
     }
     for (int64_t k = 0; status == UZ_OK && k < steps; k++) {
         double *v = basis + k * m, *w = v + m;
-        status = apply(ctx, w, v, err);
+        for (int64_t i = 0; weight && i < m; i++)
+            weighted[i] = weight[i] * v[i];
+        status = UZ_ERR_CANCELLED;
+        if (uz_stop_is_due(&load->stop))
+            break;
+        load->applications++;
+        status = load->dual->form->apply(load, w, weight ? weighted : v, err);
         if (status != UZ_OK)
             break;
+        for (int64_t i = 0; weight && i < m; i++)
+            w[i] *= weight[i];
         alpha[k] = uz_dot(m, v, w);
         /* Two passes of Gram-Schmidt against all earlier vectors ("twice is enough", Parlett 1980). */
         for (int pass = 0; pass < 2; pass++)
@@ -64,6 +75,7 @@ uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, d
     }
     if (status == UZ_OK)
         *lambda = fmax(0.0, value + residual);
+    free(weighted);
     free(basis);
     free(alpha);
     free(beta);

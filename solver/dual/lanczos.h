@@ -2,11 +2,11 @@
 #ifndef UZ_DUAL_LANCZOS_H
 #define UZ_DUAL_LANCZOS_H
 
-#include "uzawa.h"
+#include "dual/dual.h"
 
-/* Largest eigenvalue of a symmetric positive semidefinite operator of order m by Lanczos with full
- * reorthogonalisation: Ritz value plus residual bound, relative accuracy `tolerance`. */
-typedef uz_status (*uz_apply)(void *ctx, double *y, const double *x, uz_error *err);
-uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, double tolerance, uz_error *err);
+/* Largest eigenvalue of D, or of W D W (weight: m, NULL: all 1), by Lanczos with full reorthogonalisation: Ritz value
+ * plus residual bound, relative accuracy `tolerance`. Errors: those of the form's apply; UZ_ERR_CANCELLED, which nobody
+ * was told, where the load's stop came. */
+uz_status uz_lanczos_max(double *lambda, uz_dual_load *load, const double *weight, double tolerance, uz_error *err);
 
 #endif

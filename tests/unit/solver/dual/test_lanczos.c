@@ -1,4 +1,5 @@
 /* The largest eigenvalue of the dual operator: never too small, so that no step is too long. */
+#include "dual/form.h"
 #include "dual/lanczos.h"
 #include "harness.h"
 #include "qp_fixture.h"
@@ -6,20 +7,30 @@
 enum { MOST = 4000 };
 
 typedef struct {
+    uz_dual_load load;
+    uz_dual dual;
     int64_t m;
     double eigenvalue[MOST];
     int applied, fail_after;
 } diagonal;
 
-static uz_status apply(void *ctx, double *y, const double *x, uz_error *err)
+static uz_status apply(uz_dual_load *load, double *y, const double *x, uz_error *err)
 {
-    diagonal *D = ctx;
+    diagonal *D = (diagonal *)load;
     (void)err;
     if (D->applied++ == D->fail_after)
         return UZ_ERR_CANCELLED;
     for (int64_t i = 0; i < D->m; i++)
         y[i] = D->eigenvalue[i] * x[i];
     return UZ_OK;
+}
+
+static uz_status find_largest(double *lambda, diagonal *D, uz_error *err)
+{
+    static const uz_dual_form form = {.apply = apply};
+    D->dual = (uz_dual){.form = &form, .m = D->m};
+    D->load = (uz_dual_load){.dual = &D->dual, .stop = {.deadline = INFINITY}};
+    return uz_lanczos_max(lambda, &D->load, NULL, 1e-4, err);
 }
 
 static void check_within(diagonal *D, const char *what, double tolerance)
@@ -30,7 +41,7 @@ static void check_within(diagonal *D, const char *what, double tolerance)
     D->fail_after = -1;
     for (int64_t i = 0; i < D->m; i++)
         truth = fmax(truth, D->eigenvalue[i]);
-    CHECK_INT(uz_lanczos_max(&lambda, D->m, apply, D, 1e-4, &err), UZ_OK);
+    CHECK_INT(find_largest(&lambda, D, &err), UZ_OK);
     CHECK_MSG(lambda >= truth * (1 - 1e-12), "%s: %.17g for %.17g", what, lambda, truth);
     CHECK_MSG(lambda <= truth * (1 + tolerance), "%s: %.17g for %.17g", what, lambda, truth);
     CHECK_MSG(D->applied <= 121, "%s: %d applications", what, D->applied);
@@ -52,11 +63,11 @@ TEST(no_rows_and_no_operator)
     double lambda = 7;
     uz_error err = {0};
     diagonal D = {.m = 0, .fail_after = -1};
-    CHECK_INT(uz_lanczos_max(&lambda, 0, apply, &D, 1e-4, &err), UZ_OK);
+    CHECK_INT(find_largest(&lambda, &D, &err), UZ_OK);
     CHECK(lambda == 0);
     D.m = 50;
     lambda = 7;
-    CHECK_INT(uz_lanczos_max(&lambda, 50, apply, &D, 1e-4, &err), UZ_OK);
+    CHECK_INT(find_largest(&lambda, &D, &err), UZ_OK);
     CHECK(lambda == 0);
 }
 
@@ -139,7 +150,7 @@ TEST(failure_of_the_operator_is_passed_on)
         diagonal D = {.m = 30, .fail_after = k};
         for (int64_t i = 0; i < D.m; i++)
             D.eigenvalue[i] = (double)i;
-        CHECK_INT(uz_lanczos_max(&lambda, D.m, apply, &D, 1e-4, &err), UZ_ERR_CANCELLED);
+        CHECK_INT(find_largest(&lambda, &D, &err), UZ_ERR_CANCELLED);
         CHECK(lambda == 0);
     }
 }
