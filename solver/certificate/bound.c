@@ -44,7 +44,8 @@ double uz_bound_largest(const double *x, int64_t n)
     int64_t i = 0;
     for (; i + 4 * APART <= n; i += 4 * APART)
         for (int k = 0; k < APART; k++) { /* lane by lane; passes over what is not a number */
-            const bits magnitude = *(const bits *)(x + i + 4 * k) & INT64_MAX, more = (four)magnitude > most[k];
+            const four here = *(const four *)(x + i + 4 * k);
+            const bits magnitude = (bits)here & INT64_MAX, more = (four)magnitude > most[k];
             most[k] = (four)((magnitude & more) | ((bits)most[k] & ~more));
         }
     for (; i < n; i++)
