@@ -161,7 +161,7 @@ static double step_towards(uz_smooth_shape *s, const double *xyz, int64_t n, int
  * Marquardt, J. SIAM 11 (1963) 431-441)? size: of the surface. Of many points some are stepped with, all looked at. */
 static bool fits(uz_smooth_shape *s, const double *xyz, int64_t n, double size)
 {
-    enum { STEPS = 100, SOME = 300 };
+    enum { STEPS = 400, SOME = 300 }; /* cones of few faces lie at the end of a long bent valley */
     double most = 0, least = INFINITY, damping = 1e-3;
     uz_smooth_shape next = *s;
     const int64_t some = n < SOME ? n : SOME;

@@ -99,6 +99,28 @@ TEST(two_circles_are_told_by_their_normals)
         }
 }
 
+/* Two faces around and four along: only normals of facets, of which those at the ends are turned by half a face. */
+TEST(few_faces_of_a_cone_are_enough)
+{
+    enum { COLUMNS = 3, ROWS = 5 };
+    static const double AT[COLUMNS] = {0, 0.1647, 0.3491}, NORMAL[COLUMNS] = {0.0823, 0.1745, 0.2569};
+    static const double Z[ROWS] = {0, 1.5, 2.5, 3.6, 5.6}, SLOPE = -0.27;
+    double xyz[3 * COLUMNS * ROWS], normal[3 * COLUMNS * ROWS], off[3];
+    for (int i = 0; i < COLUMNS * ROWS; i++) {
+        const double a = AT[i % COLUMNS], b = NORMAL[i % COLUMNS], z = Z[i / COLUMNS], r = 12 + SLOPE * z;
+        const double length = sqrt(1 + SLOPE * SLOPE);
+        memcpy(xyz + 3 * i, (double[3]){r * cos(a), r * sin(a), z}, sizeof off);
+        memcpy(normal + 3 * i, (double[3]){cos(b) / length, sin(b) / length, -SLOPE / length}, sizeof off);
+    }
+    const uz_smooth_shape s = uz_smooth_shape_of(xyz, normal, COLUMNS * ROWS);
+    CHECK_INT(s.kind, UZ_SMOOTH_CONE);
+    CHECK_MSG(fabs(fabs(s.slope) + SLOPE) < 1e-12 && fabs(fabs(s.axis[2]) - 1) < 1e-12, "%g", s.slope);
+    for (int i = 0; i < COLUMNS * ROWS; i++) {
+        uz_smooth_nearest(off, NULL, &s, xyz + 3 * i);
+        CHECK_MSG(fabs(off[0]) + fabs(off[1]) + fabs(off[2]) < 1e-12, "point %d is off by %g", i, off[0]);
+    }
+}
+
 TEST(offsets_lead_to_the_nearest_point)
 {
     const uz_smooth_shape cone = {UZ_SMOOTH_CONE, {0, 0, 0}, {0, 0, 1}, 2, 0.75, 0};
