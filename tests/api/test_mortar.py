@@ -225,12 +225,14 @@ def test_flat_cells_press_evenly(s):
     def ring(inner, outer):
         return lambda x, y, z: ((inner + (outer - inner) * x) * math.cos(math.pi / 2 * y), (inner + (outer - inner) * x) * math.sin(math.pi / 2 * y), 2 * z)
     ends = []
-    for facets in (11, 15):
+    for facets in (11, 15):  # warned of where the peak is 7 % off
         request = fit_in_space("hex8", ring(10, 20.005), ring(20, 40), ((4, 15, 6), (6, facets, 6 if facets == 15 else 8)))
         answer, nodes = answer_of(s, request), request["problem"]["mesh"]["nodes"]
         pressures = [(nodes[k][2], p / lame(0.005)) for k, p in zip(answer["contact_nodes"], answer["pressure"])]
         check(all(abs(p - 1) < 0.011 for z, p in pressures if z < 1.99), facets, pressures)
         ends.append(max(p for _, p in pressures))
+        found = {w["code"]: w["value"] for w in answer["summary"]["warnings"]}
+        check(0.03 < found.get("pressure_peak", 0) < 0.04, facets, found)  # which is half of what it is off by
     check(abs(ends[0] - ends[1]) < 0.011 and max(ends) < 1.08, ends)
 
 

@@ -325,8 +325,9 @@ TEST(two_bodies_balance)
     CHECK_REL(e->supports[0].force[1], 3 * 1.6 + 0.5 * 2, 1e-6);
     CHECK_MSG(e->imbalance < 1e-6, "%g", e->imbalance);
     CHECK_REL(e->contact_area, 1.6, 1e-12);
-    CHECK_INT(e->n_warnings, 1); /* of the mesh alone, which is coarse */
+    CHECK_INT(e->n_warnings, 2); /* of the mesh, which is coarse, and of the pressure at the upper one's corners */
     CHECK_STR(e->warnings[0].code, "coarse_mesh");
+    CHECK_STR(e->warnings[1].code, "pressure_peak");
     clear(&s, result);
 }
 
