@@ -18,6 +18,11 @@ enum { LEAST_ROUNDS = 2, MAX_ROUNDS = 8 };
  */
 #define NEGLIGIBLE 0x1p-80
 
+/* Words multiplied before rows are moved apart instead: 50 ms. */
+#define LITTLE_WORK 1e6
+/* Of the size of a row: a gap that double-double arithmetic surely tells from a penetration, too small for a bound. */
+#define APART 0x1p-90
+
 /* Corrections up to this many times as large, squared, as the moves of single rows are taken. */
 #define STRETCH 64.0
 
@@ -85,9 +90,9 @@ double uz_feasible_complementarity(const uz_feasible *c, const double *r, bool s
 }
 
 /* The rows to move in this round and by how much: target_i is the gap to take away and a little more, so that the
- * correction's own rounding leaves the gap open; 0 for rows left alone. Returns the worst violation, relative to the
- * size of its row. */
-static double choose_rows(const uz_feasible *c, const double *r)
+ * correction's own rounding leaves the gap open; 0 for rows left alone. apart: gaps to be left, in sizes of their rows.
+ * Returns the worst violation, relative to the size of its row. */
+static double choose_rows(const uz_feasible *c, const double *r, double apart)
 {
     double worst = 0.0;
     for (int64_t i = 0; i < c->m; i++) {
@@ -95,10 +100,10 @@ static double choose_rows(const uz_feasible *c, const double *r)
         /* closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g */
         const bool close = uz_row_presses(r[i]) && fabs(gap) <= -2.0 * r[i] * uz_row_compliance(c->Nt, i, c->weight);
         double moved = 0.0; /* what the rounding of the correction, a vector of doubles, may do is relative to this */
-        c->move.in[i] = close || uz_row_penetrates(gap);
+        c->move.in[i] = close || uz_row_penetrates(gap - apart * c->size[i]);
         for (int64_t k = c->Nt->ptr[i]; c->move.in[i] && k < c->Nt->ptr[i + 1]; k++)
             moved += fabs(c->Nt->val[k] * c->correction[c->Nt->idx[k]]);
-        c->move.target[i] = c->move.in[i] ? gap - 4.0 * DBL_EPSILON * moved : 0.0;
+        c->move.target[i] = c->move.in[i] ? gap - 4.0 * DBL_EPSILON * moved - apart * c->size[i] : 0.0;
         worst = isnan(gap) ? INFINITY : uz_row_penetrates(gap) ? fmax(worst, -gap / c->size[i]) : worst;
     }
     return worst;
@@ -109,21 +114,30 @@ static double choose_rows(const uz_feasible *c, const double *r)
 static bool move_rows(uz_feasible *c, const double *r)
 {
     for (int round = 0; round < MAX_ROUNDS; round++) {
-        double worst = choose_rows(c, r);
+        double worst = choose_rows(c, r, 0.0);
         if (round >= LEAST_ROUNDS && worst <= NEGLIGIBLE)
             return true;
         if (!uz_row_move_solve(&c->move, c->correction, c->Nt, c->weight) && round < LEAST_ROUNDS)
             return false;
     }
-    return choose_rows(c, r) <= NEGLIGIBLE;
+    return choose_rows(c, r, 0.0) <= NEGLIGIBLE;
 }
 
-/* Does u + c, but for a delta that it bounds, have no penetration at all? */
-static bool settle(uz_feasible *c)
+/* Does u + c, but for a delta that it bounds, have no penetration at all? work: as in row_settle.h. */
+static bool settle(uz_feasible *c, double work)
 {
-    c->exact =
-        (uz_row_settle){.Nt = c->Nt, .weight = c->weight, .h = c->h, .u = c->u, .c = c->correction, .gap = c->gap};
+    c->exact = (uz_row_settle){
+        .Nt = c->Nt, .weight = c->weight, .h = c->h, .u = c->u, .c = c->correction, .gap = c->gap, .work = work};
     return uz_row_settle_solve(&c->exact);
+}
+
+/* Rows that hang together take long in rational numbers, as each that is moved moves its neighbours. Moved apart a
+ * little more, they need none. */
+static bool move_apart(uz_feasible *c, const double *r)
+{
+    for (int round = 0; round < MAX_ROUNDS && choose_rows(c, r, APART) > 0.0; round++)
+        uz_row_move_solve(&c->move, c->correction, c->Nt, c->weight);
+    return choose_rows(c, r, APART) == 0.0 && settle(c, 0);
 }
 
 /* Rows that depend on each other, or nearly so, can't all be closed as equations, or only by a correction far larger
@@ -141,18 +155,18 @@ bool uz_make_feasible(uz_feasible *c, const double *r)
             c->size[i] += fabs(c->Nt->val[k] * c->u[c->Nt->idx[k]]);
     }
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
-    choose_rows(c, r);
+    choose_rows(c, r, 0.0);
     for (int64_t i = 0; i < c->m; i++) /* the moves that would close the chosen rows one by one, added up */
         if (c->move.in[i] && c->move.target[i] != 0.0)
             expected += c->move.target[i] / uz_row_compliance(c->Nt, i, c->weight) * c->move.target[i];
     bool feasible = move_rows(c, r);
     for (int64_t j = 0; j < c->d; j++)
         size += c->correction[j] / c->weight[j] * c->correction[j];
-    if (feasible && size <= STRETCH * expected && settle(c))
+    if (feasible && size <= STRETCH * expected && (settle(c, LITTLE_WORK) || move_apart(c, r)))
         return true;
-    c->pushed = uz_row_exact_solve(&exact) && settle(c);
+    c->pushed = uz_row_exact_solve(&exact) && settle(c, 0);
     if (c->pushed)
         return true;
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
-    return feasible && move_rows(c, r) && settle(c);
+    return feasible && move_rows(c, r) && settle(c, 0);
 }

@@ -15,6 +15,12 @@
 enum { MOST_TOGETHER = 32 };
 static const double MOST_WORK = 2e7;
 
+/* What a sum or product of rationals with as many words takes: it ends in a greatest common divisor. */
+static double work_of(size_t words)
+{
+    return 20.0 + (double)words + 0.1 * (double)words * (double)words;
+}
+
 /* Upper bounds from sums of doubles. */
 #define SURELY (1.0 + 0x1p-40)
 
@@ -116,7 +122,7 @@ static void take_gap(settle *s, int64_t i)
         mpq_set_d(s->b, -in->Nt->val[k]);
         mpq_mul(s->b, s->b, s->delta[j]);
         mpq_add(s->gap, s->gap, s->b);
-        s->work -= 20.0 + (double)mpz_size(mpq_denref(s->gap));
+        s->work -= work_of(mpz_size(mpq_denref(s->gap)));
     }
 }
 
@@ -153,7 +159,7 @@ static void push(settle *s, int64_t i, const mpq_t step)
         mpq_mul(s->a, s->a, step);
         mpq_sub(s->delta[j], s->delta[j], s->a);
         s->moved[j] = SURELY * fabs(mpq_get_d(s->delta[j])) + DBL_MIN;
-        s->work -= 30.0 + (double)mpz_size(mpq_denref(s->delta[j]));
+        s->work -= 10.0 + work_of(mpz_size(mpq_denref(s->delta[j])));
         for (int64_t q = s->N.ptr[j]; q < s->N.ptr[j + 1]; q++)
             if (!s->near[s->N.idx[q]]) {
                 s->near[s->N.idx[q]] = true;
@@ -178,7 +184,7 @@ static void press(settle *s, int64_t q)
             for (int64_t k = c; k <= n && mpq_sgn(s->part) != 0; k++) {
                 mpq_mul(s->a, s->part, s->A[c][k]);
                 mpq_sub(s->A[i][k], s->A[i][k], s->a);
-                s->work -= 4.0 + 2.0 * (double)mpz_size(mpq_numref(s->A[i][k]));
+                s->work -= work_of(mpz_size(mpq_numref(s->A[i][k])));
             }
         }
     for (int64_t i = n - 1; i >= 0; i--) {
@@ -252,7 +258,7 @@ static int64_t choose(settle *s)
 {
     int64_t q = -1;
     double deepest = 0.0;
-    for (int64_t n = 0; n < s->n_near; n++) {
+    for (int64_t n = 0; n < s->n_near && s->work > 0.0; n++) {
         const int64_t i = s->list[n];
         double reach = DBL_MIN;
         for (int64_t k = s->in->Nt->ptr[i]; k < s->in->Nt->ptr[i + 1]; k++)
@@ -295,6 +301,7 @@ static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
         take_gap(s, wrong[k]);
         for (int64_t q = mpq_sgn(s->gap) < 0 ? wrong[k] : -1; q >= 0 && settled; q = settled ? choose(s) : -1)
             settled = admit(s, q);
+        settled = settled && s->work > 0.0;
         for (int64_t i = 0; i < s->n_near; i++)
             s->near[s->list[i]] = false;
     }
@@ -322,7 +329,10 @@ static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
 
 bool uz_row_settle_solve(uz_row_settle *problem)
 {
-    settle s = {.in = problem, .d = problem->Nt->rows, .m = problem->Nt->cols, .work = MOST_WORK};
+    settle s = {.in = problem,
+                .d = problem->Nt->rows,
+                .m = problem->Nt->cols,
+                .work = problem->work > 0 ? problem->work : MOST_WORK};
     int64_t *wrong = uz_alloc(s.m, sizeof *wrong), n = 0;
     s.sure = uz_alloc(s.m, sizeof *s.sure);
     bool settled = wrong && s.sure;

@@ -18,6 +18,7 @@ typedef struct {
     const double *h;      /* m */
     const double *u, *c;  /* d: rows are to be open at u + c + delta */
     mpq_t *at;            /* d, or NULL: in place of u + c, and delta is added to it */
+    double work;          /* at most so many words multiplied; 0: as many as a bound is worth, about a second */
     /* out, without `at`: */
     double length; /* a bound on ||delta||_K for every K with the diagonal W^-1; 0: u + c needs none */
     double *gap;   /* m: where length is not 0: at least the gaps of u + c + delta */

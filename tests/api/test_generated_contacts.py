@@ -23,5 +23,13 @@ def test_a_slender_cone_of_few_faces(s):
     check(not found["failures"], found["failures"])
 
 
+def test_a_certificate_whose_rows_share_many_dofs(s):
+    """A ball of hex20 in one of tet10: the rational numbers of its certificate grew without end."""
+    if service.INSTRUMENTED:
+        raise service.Skip("three seconds of processor without a sanitizer")
+    answer, why = generated_contacts.Daemon(s).answer(generated_contacts.generate(2543).request(1))
+    check(answer, why)
+
+
 if __name__ == "__main__":
     service.main(globals())
