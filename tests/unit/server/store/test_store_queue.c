@@ -181,13 +181,13 @@ STORE_TEST(who_still_runs_has_had_that_time)
     int of_busy = 0;
     if (!place_begin(&p))
         return;
-    submit_with(p.s, (store_request){.share = "long"}, id[0]);
+    submit_with(p.s, (store_request){.share = "at work"}, id[0]);
     submit_with(p.s, (store_request){.share = "busy"}, id[1]);
-    claim_share(p.s, false, id, who);
+    claim_share(p.s, false, id, who); /* "at work" first, and it is counted last: it has had no less than "busy" */
     claim_share(p.s, false, id, who);
     sleep_s(0.1);
-    CHECK_INT(renew_as(p.s, id[0], "me", 50), STORE_OK);
     CHECK_INT(finish_as(p.s, id[1], "me", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(renew_as(p.s, id[0], "me", 50), STORE_OK);
     for (int i = 2; i < 8; i++)
         submit_with(p.s, (store_request){.share = i < 5 ? "busy" : "new"}, id[i]);
     for (int i = 0; i < 3; i++) {
