@@ -300,10 +300,9 @@ TEST(groups_of_nodes_of_sides_stay_on_the_sides)
         for (int round = 0; round < 4; round++)
             add_some(marked, &box, &seed);
         /* left becomes a group of the nodes of left and top */
-        uz_group *left = NULL;
-        for (int64_t i = 0; i < fine.n_groups; i++)
-            if (strcmp(fine.groups[i].name, "left") == 0)
-                left = &fine.groups[i];
+        uz_group *left = fine.groups;
+        while (strcmp(left->name, "left") != 0)
+            left++;
         left->kind = UZ_GROUP_NODES;
         left->n_faces = 0;
         left->node = realloc(left->node, (size_t)fine.n_nodes * sizeof *left->node);
