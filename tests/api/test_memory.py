@@ -2,6 +2,7 @@
 refused, and the daemon lives through both. usage: test_memory.py BUILD_DIR [FILTER]
 """
 # not under ThreadSanitizer: about answers, not about threads
+import contextlib
 import copy
 import http.client
 import os
@@ -118,8 +119,9 @@ def memory_shared(s):
     """MiB that the daemon and its processes have in common."""
     folder, blocks = f"/proc/{s.process.pid}/fd", 0
     for fd in os.listdir(folder):
-        if "memfd" in os.readlink(f"{folder}/{fd}"):
-            blocks += os.stat(f"{folder}/{fd}").st_blocks
+        with contextlib.suppress(FileNotFoundError):  # it was closed just now
+            if "memfd" in os.readlink(f"{folder}/{fd}"):
+                blocks += os.stat(f"{folder}/{fd}").st_blocks
     return blocks * 512 / 2 ** 20
 
 
