@@ -32,7 +32,7 @@ static const command_run RUN[CLIENT_COMMANDS] = {
 /* command: the one that was named, CLIENT_HELP where none was. */
 static client_exit complain_usage(const char *message, client_command command)
 {
-    const client_page *page = client_page_of(command);
+    const client_page *page = &CLIENT_PAGES[command];
     fprintf(stderr, "uzawa: %s\n", message);
     if (command == CLIENT_HELP)
         fputs("usage: uzawa [--server URL] [--timeout S] COMMAND ...; see: uzawa help\n", stderr);

@@ -25,7 +25,7 @@ __attribute__((format(printf, 2, 3))) static bool fail(parser *p, const char *fo
 /* One walk finds the command, the next one (apply) takes the options as that command understands them. */
 static bool take_words(parser *p, int argc, char *const *argv, bool apply)
 {
-    uz_option_walk walk = {.table = client_option_table(), .argc = argc, .argv = argv};
+    uz_option_walk walk = {.table = CLIENT_OPTIONS, .argc = argc, .argv = argv};
     bool command_seen = false;
     char wants[200];
     for (;;) {
@@ -46,7 +46,7 @@ static bool take_words(parser *p, int argc, char *const *argv, bool apply)
             if (!apply)
                 break;
             if (!(walk.row->places & walk.places))
-                return fail(p, "%s does not take --%s", client_page_of(p->options->command)->name, walk.row->name);
+                return fail(p, "%s does not take --%s", CLIENT_PAGES[p->options->command].name, walk.row->name);
             if (uz_option_set(p->options, walk.row, walk.value))
                 break;
             if (walk.row->kind == UZ_OPTION_FLAG)
@@ -59,14 +59,14 @@ static bool take_words(parser *p, int argc, char *const *argv, bool apply)
                 if (!p->have_command) {
                     const char *names[CLIENT_COMMANDS];
                     for (int i = 0; i < CLIENT_COMMANDS; i++)
-                        names[i] = client_page_of((client_command)i)->name;
+                        names[i] = CLIENT_PAGES[i].name;
                     const int near = uz_closest(walk.word, strlen(walk.word), names, CLIENT_COMMANDS);
                     return near >= 0 ? fail(p, "unknown command \"%s\"; did you mean \"%s\"?", walk.word, names[near])
                                      : fail(p, "unknown command \"%s\"", walk.word);
                 }
             } else if (apply && command_seen) {
                 if (p->options->operand)
-                    return fail(p, "%s: one operand too many: \"%s\"", client_page_of(p->options->command)->name,
+                    return fail(p, "%s: one operand too many: \"%s\"", CLIENT_PAGES[p->options->command].name,
                                 walk.word);
                 p->options->operand = walk.word;
             }
@@ -74,30 +74,6 @@ static bool take_words(parser *p, int argc, char *const *argv, bool apply)
             break;
         }
     }
-}
-
-static bool has_matrices(const client_options *o)
-{
-    return o->K || o->N || o->h || o->p;
-}
-
-/* What each command needs to be complete. */
-static bool check_operand(parser *p)
-{
-    const client_options *o = p->options;
-    const client_page *page = client_page_of(o->command);
-    if (o->operand && !page->operand)
-        return fail(p, "%s takes no operand, but got \"%s\"", page->name, o->operand);
-    if (o->operand && !*o->operand)
-        return fail(p, "%s: %s is empty", page->name, page->operand);
-    if (!o->operand && page->operands & CLIENT_OPERAND_NEEDED)
-        return fail(p, "%s wants %s %s", page->name, *page->operand == 'I' ? "an" : "a", page->operand);
-    if (!o->operand && o->command == CLIENT_SUBMIT && !has_matrices(o))
-        return o->mesh ? fail(p, "--mesh wants a FILE with the scene whose mesh it replaces")
-                       : fail(p, "submit wants a FILE, or --K and --p");
-    if (!o->operand && o->command == CLIENT_SUBMIT && (!o->K || !o->p || !o->N != !o->h))
-        return fail(p, "without a FILE submit wants --K and --p, and --N and --h both or neither");
-    return true;
 }
 
 static bool check_plot(parser *p)
@@ -123,10 +99,24 @@ static bool check_plot(parser *p)
     return true;
 }
 
-static bool check_combination(parser *p)
+/* What the command needs to be complete, and what goes together. */
+static bool check_all(parser *p)
 {
     const client_options *o = p->options;
+    const bool matrices = o->K || o->N || o->h || o->p;
     const bool drawing = o->command == CLIENT_PICTURE || (o->command == CLIENT_PLOT && !o->trade);
+    const client_page *page = &CLIENT_PAGES[o->command];
+    if (o->operand && !page->operand)
+        return fail(p, "%s takes no operand, but got \"%s\"", page->name, o->operand);
+    if (o->operand && !*o->operand)
+        return fail(p, "%s: %s is empty", page->name, page->operand);
+    if (!o->operand && page->operands & CLIENT_OPERAND_NEEDED)
+        return fail(p, "%s wants %s %s", page->name, *page->operand == 'I' ? "an" : "a", page->operand);
+    if (!o->operand && o->command == CLIENT_SUBMIT && !matrices)
+        return o->mesh ? fail(p, "--mesh wants a FILE with the scene whose mesh it replaces")
+                       : fail(p, "submit wants a FILE, or --K and --p");
+    if (!o->operand && o->command == CLIENT_SUBMIT && (!o->K || !o->p || !o->N != !o->h))
+        return fail(p, "without a FILE submit wants --K and --p, and --N and --h both or neither");
     if (o->csv + o->plot + o->json > 1)
         return fail(p, "--csv, --plot and --json are alternatives: choose one");
     if (o->json && o->format && strcmp(o->format, "json") != 0)
@@ -140,10 +130,9 @@ static bool check_combination(parser *p)
     if (o->command == CLIENT_LIST && o->tags.count > 1)
         return fail(p, "list filters by one --tag");
     /* Options that change nothing without another. */
-    const bool stays = o->wait || o->command == CLIENT_WAIT || o->command == CLIENT_VERIFY;
-    if (o->progress && !stays)
+    if (o->progress && !o->wait)
         return fail(p, "--progress wants --wait");
-    if ((o->junit || o->baseline) && !stays)
+    if ((o->junit || o->baseline) && !o->wait)
         return fail(p, "%s wants --wait", o->junit ? "--junit" : "--baseline");
     if (o->tolerance >= 0 && !o->baseline)
         return fail(p, "--tolerance wants --baseline");
@@ -153,7 +142,7 @@ static bool check_combination(parser *p)
         return fail(p, "--quiet and --json contradict each other");
     if (o->command == CLIENT_HISTORY && !o->plot && (o->width >= 0 || o->height >= 0 || o->ascii))
         return fail(p, "--width, --height and --ascii want --plot");
-    if (o->mesh && has_matrices(o))
+    if (o->mesh && matrices)
         return fail(p, "--mesh is of a scene, --K, --N, --h and --p of a problem in matrices: choose one");
     /* At most one of the files is standard input. */
     const char *files[] = {o->operand, o->K, o->N, o->h, o->p, o->mesh};
@@ -185,5 +174,6 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
         return true;
     if (!p.have_command)
         return fail(&p, "no command given");
-    return check_operand(&p) && check_combination(&p);
+    out->wait = out->wait || out->command == CLIENT_WAIT || out->command == CLIENT_VERIFY;
+    return check_all(&p);
 }

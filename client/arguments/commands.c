@@ -9,7 +9,7 @@
     "8 infeasible, "                                                                                                   \
     "9 dismissed, 10 --timeout passed (the job goes on), 130 interrupted (the job goes on)."
 
-static const client_page PAGES[CLIENT_COMMANDS] = {
+const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
     [CLIENT_SUBMIT] =
         {"submit", "submit [FILE] [options]", "send a problem, and wait for its answer if told to", "FILE",
          CLIENT_OPERAND_ALLOWED,
@@ -196,7 +196,7 @@ static const uz_option OPTIONS[] = {
     OPTION("version", 'V', FLAG, version, CLIENT_EVERYWHERE, .about = "print the version"),
 };
 
-static const client_exit_line EXITS[] = {
+const client_exit_line CLIENT_EXITS[] = {
     {0, "done; wait, verify and --wait: ended and certified as asked"},
     {2, "the command line is wrong, or a PATH is not in the request; nothing was sent"},
     {3, "the answer fails an assertion or a comparison that was asked for"},
@@ -211,42 +211,26 @@ static const client_exit_line EXITS[] = {
     {11, "a local file could not be read or written"},
     {12, "the server cannot be reached, or does not answer in time"},
     {130, "interrupted; a job that was waited for goes on"},
+    {0, NULL},
 };
 
-const client_page *client_page_of(client_command command)
-{
-    return &PAGES[command];
-}
-
-uz_option_table client_option_table(void)
-{
-    return (uz_option_table){OPTIONS, sizeof OPTIONS / sizeof *OPTIONS};
-}
+const uz_option_table CLIENT_OPTIONS = {OPTIONS, sizeof OPTIONS / sizeof *OPTIONS};
 
 bool client_option_is_own(const uz_option *option, client_command command)
 {
-    if (!(option->places & CLIENT_IN(command)))
-        return false;
+    const bool general = option->places == ASKING || (option->places == CLIENT_EVERYWHERE && option->letter != 'j');
+    if (command == CLIENT_COMMANDS || !(option->places & CLIENT_IN(command)))
+        return command == CLIENT_COMMANDS && general;
     for (const uz_option *before = OPTIONS; before != option; before++)
         if (strcmp(before->name, option->name) == 0 && before->places & CLIENT_IN(command))
             return false;
     return true;
 }
 
-bool client_option_is_general(const uz_option *option)
-{
-    return option->places == ASKING || (option->places == CLIENT_EVERYWHERE && option->letter != 'j');
-}
-
-const client_exit_line *client_exit_line_at(size_t i)
-{
-    return i < sizeof EXITS / sizeof *EXITS ? &EXITS[i] : NULL;
-}
-
 bool client_command_find(client_command *out, const char *name)
 {
     for (int i = 0; i < CLIENT_COMMANDS; i++) {
-        if (strcmp(PAGES[i].name, name) != 0)
+        if (strcmp(CLIENT_PAGES[i].name, name) != 0)
             continue;
         *out = (client_command)i;
         return true;

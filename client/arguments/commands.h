@@ -45,23 +45,21 @@ typedef struct {
     const char *exits;   /* how it ends, beyond what is true of all commands; NULL: nothing */
 } client_page;
 
-const client_page *client_page_of(client_command command);
+extern const client_page CLIENT_PAGES[CLIENT_COMMANDS];
 /* A row's places are the commands that it belongs to. A name may have several rows where it means something else to
  * other commands; the first one for the command counts. */
-uz_option_table client_option_table(void);
-/* The first row of its name for the command. */
+extern const uz_option_table CLIENT_OPTIONS;
+/* The first row of its name for the command; CLIENT_COMMANDS: one that every command that talks to the server has. */
 bool client_option_is_own(const uz_option *option, client_command command);
-/* True of the options that every command that talks to the server has. */
-bool client_option_is_general(const uz_option *option);
 
 bool client_command_find(client_command *out, const char *name);
 
-/* The exit codes, "0" first; NULL past the end. */
+/* The exit codes, 0 first; `about` NULL ends the list. */
 typedef struct {
     int code;
     const char *about;
 } client_exit_line;
-const client_exit_line *client_exit_line_at(size_t i);
+extern const client_exit_line CLIENT_EXITS[];
 
 /* The overview (CLIENT_COMMANDS) or one command's page. */
 void client_help_print(FILE *to, client_command command);

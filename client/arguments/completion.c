@@ -6,14 +6,14 @@
 /* Patterns of `case $command$previous`: what may follow an option. */
 static void print_values(FILE *to, client_command command)
 {
-    const uz_option_table all = client_option_table();
+    const uz_option_table all = CLIENT_OPTIONS;
     for (size_t i = 0; i < all.count; i++) {
         const uz_option *o = &all.rows[i];
         if (!o->value || !client_option_is_own(o, command))
             continue;
-        fprintf(to, "    %s--%s", client_page_of(command)->name, o->name);
+        fprintf(to, "    %s--%s", CLIENT_PAGES[command].name, o->name);
         if (o->letter)
-            fprintf(to, "|%s-%c", client_page_of(command)->name, o->letter);
+            fprintf(to, "|%s-%c", CLIENT_PAGES[command].name, o->letter);
         if (o->choices)
             fprintf(to, ") words='%s' ;;\n", o->choices);
         else if (strcmp(o->value, "FILE") == 0)
@@ -35,7 +35,7 @@ void client_completion_print(FILE *to)
           "    local command='' options='' words='' files='' i commands='",
           to);
     for (int i = 0; i < CLIENT_COMMANDS; i++)
-        fprintf(to, "%s%s", i ? " " : "", client_page_of((client_command)i)->name);
+        fprintf(to, "%s%s", i ? " " : "", CLIENT_PAGES[i].name);
     fputs("'\n    COMPREPLY=()\n", to);
     /* The command is the first word that is one: bash takes a URL apart at its colons, and words at "=". */
     fputs("    if [[ $current == '=' ]]; then current=''; previous='='; fi\n"
@@ -51,8 +51,8 @@ void client_completion_print(FILE *to)
           to);
     for (int i = 0; i < CLIENT_COMMANDS; i++) {
         /* "    submit) options='--K --N ...' ;;" */
-        const uz_option_table all = client_option_table();
-        fprintf(to, "    %s) options='", client_page_of((client_command)i)->name);
+        const uz_option_table all = CLIENT_OPTIONS;
+        fprintf(to, "    %s) options='", CLIENT_PAGES[i].name);
         for (size_t k = 0; k < all.count; k++)
             if (client_option_is_own(&all.rows[k], (client_command)i))
                 fprintf(to, "--%s ", all.rows[k].name);
@@ -63,7 +63,7 @@ void client_completion_print(FILE *to)
         print_values(to, (client_command)i);
     fputs("    *)  if [[ $current == -* ]]; then words=$options; else case $command in\n", to);
     for (int i = 0; i < CLIENT_COMMANDS; i++) {
-        const client_page *p = client_page_of((client_command)i);
+        const client_page *p = &CLIENT_PAGES[i];
         if (!p->operand)
             continue;
         fprintf(to, "    %s) ", p->name);

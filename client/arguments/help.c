@@ -16,11 +16,11 @@ static const char *print_paragraph(FILE *to, const char *text, int at, int inden
 
 static void print_options(FILE *to, client_command command, bool general)
 {
-    const uz_option_table all = client_option_table();
+    const uz_option_table all = CLIENT_OPTIONS;
     bool any = false;
     for (size_t i = 0; i < all.count; i++) {
         const uz_option *o = &all.rows[i];
-        if (client_option_is_general(o) != general || (!general && !client_option_is_own(o, command)))
+        if (client_option_is_own(o, CLIENT_COMMANDS) != general || (!general && !client_option_is_own(o, command)))
             continue;
         fputs(any ? "" : general ? "\nGeneral options:\n" : "\n", to);
         any = true;
@@ -31,22 +31,20 @@ static void print_options(FILE *to, client_command command, bool general)
 void client_help_print(FILE *to, client_command command)
 {
     if (command >= CLIENT_COMMANDS) {
-        const client_exit_line *line;
         fputs("usage: uzawa [--server URL] [--timeout S] COMMAND ...\n"
               "Solves frictionless contact problems by a contact solver service.\n\nCommands:\n",
               to);
         for (int i = 0; i < CLIENT_COMMANDS; i++)
-            fprintf(to, "  %-9s %s\n", client_page_of((client_command)i)->name,
-                    client_page_of((client_command)i)->about);
+            fprintf(to, "  %-9s %s\n", CLIENT_PAGES[i].name, CLIENT_PAGES[i].about);
         print_options(to, CLIENT_COMMANDS, true);
         fputs("\nExit status:\n", to);
-        for (size_t i = 0; (line = client_exit_line_at(i)); i++) {
+        for (const client_exit_line *line = CLIENT_EXITS; line->about; line++) {
             fprintf(to, " %3d  ", line->code);
             print_paragraph(to, line->about, 6, 6);
         }
         return;
     }
-    const client_page *p = client_page_of(command);
+    const client_page *p = &CLIENT_PAGES[command];
     fprintf(to, "usage: uzawa %s\n%c%s.\n", p->usage, p->about[0] - 'a' + 'A', p->about + 1);
     for (const char *rest = p->details; *rest;) {
         fputc('\n', to);

@@ -86,11 +86,11 @@ static const char *print_paragraph(FILE *to, const char *text)
 
 static void print_options(FILE *to, client_command command, bool general)
 {
-    const uz_option_table all = client_option_table();
+    const uz_option_table all = CLIENT_OPTIONS;
     bool open = false;
     for (size_t i = 0; i < all.count; i++) {
         const uz_option *o = &all.rows[i];
-        if (client_option_is_general(o) != general || (!general && !client_option_is_own(o, command)))
+        if (client_option_is_own(o, CLIENT_COMMANDS) != general || (!general && !client_option_is_own(o, command)))
             continue;
         fputs(open ? "" : ".Bl -tag -width Ds\n", to);
         open = true;
@@ -109,7 +109,7 @@ static void print_options(FILE *to, client_command command, bool general)
 /* "submit [FILE] [options]" with macros; about is said first. */
 static void print_command(FILE *to, client_command command)
 {
-    const client_page *p = client_page_of(command);
+    const client_page *p = &CLIENT_PAGES[command];
     const char *open = p->operands & CLIENT_OPERAND_NEEDED ? "" : "Op ";
     fprintf(to, ".Ss %s\n.Nm uzawa Cm %s\n", p->name, p->name);
     if (p->operand)
@@ -157,9 +157,8 @@ void client_manual_print(FILE *to)
     for (size_t i = 0; i < sizeof LINES / sizeof *LINES; i++)
         fprintf(to, ".It Ev %s\n%s\n", LINES[i][0], LINES[i][1]);
     fputs(".El\n", to);
-    const client_exit_line *line;
     fputs(".Sh EXIT STATUS\n.Bl -tag -width Ds -compact\n", to);
-    for (size_t i = 0; (line = client_exit_line_at(i)); i++) {
+    for (const client_exit_line *line = CLIENT_EXITS; line->about; line++) {
         fprintf(to, ".It %d\n", line->code);
         print_paragraph(to, line->about);
     }
@@ -180,8 +179,8 @@ bool client_help_print_json(FILE *to)
 {
     json_t *commands = json_array();
     for (int i = 0; commands && i < CLIENT_COMMANDS; i++) {
-        const client_page *p = client_page_of((client_command)i);
-        const uz_option_table table = client_option_table();
+        const client_page *p = &CLIENT_PAGES[i];
+        const uz_option_table table = CLIENT_OPTIONS;
         json_t *options = json_array();
         for (size_t k = 0; options && k < table.count; k++) {
             const uz_option *o = &table.rows[k];

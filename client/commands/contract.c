@@ -234,24 +234,6 @@ static bool has_case(const json_t *result, const char *name)
 
 #define TOLERANCE 1e-3 /* where --tolerance is not given */
 
-/* Whether each converged, and its assertions. */
-static client_exit add_cases(client_session *s, client_checks *to, const json_t *job)
-{
-    json_t *result = NULL, *of;
-    size_t i;
-    const client_exit code = fetch_result(s, &result, client_json_text(job, "id"), "/result?fields=summary", NULL);
-    json_array_foreach(json_object_get(result, "cases"), i, of)
-    {
-        const json_t *summary = json_object_get(of, "summary");
-        const char *outcome = client_json_text(summary, "outcome"), *name = client_json_text(of, "name");
-        const bool met = strcmp(outcome, "converged") == 0;
-        client_checks_add(to, met ? CLIENT_PASS : CLIENT_FAIL, name, "converged", "%s", outcome);
-        client_checks_assertions(to, summary, name);
-    }
-    json_decref(result);
-    return code;
-}
-
 /* An ended job that has an answer with the baseline, case by case where they have load cases. Fetches both results, one
  * case at a time. Not CLIENT_OK: one could not be had, said on s->err, or something differs. */
 static client_exit compare(client_session *s, client_checks *checks, const json_t *job)
@@ -325,8 +307,20 @@ client_exit client_contract(client_session *s, const json_t *job, const char *la
         }
     } else
         client_checks_assertions(&checks, json_object_get(job, "summary"), "");
-    if (cases && o->junit)
-        more = add_cases(s, &checks, job);
+    if (cases && o->junit) { /* whether each converged, and its assertions */
+        json_t *result = NULL, *of;
+        size_t i;
+        more = fetch_result(s, &result, client_json_text(job, "id"), "/result?fields=summary", NULL);
+        json_array_foreach(json_object_get(result, "cases"), i, of)
+        {
+            const json_t *summary = json_object_get(of, "summary");
+            const char *outcome = client_json_text(summary, "outcome"), *name = client_json_text(of, "name");
+            const bool met = strcmp(outcome, "converged") == 0;
+            client_checks_add(&checks, met ? CLIENT_PASS : CLIENT_FAIL, name, "converged", "%s", outcome);
+            client_checks_assertions(&checks, summary, name);
+        }
+        json_decref(result);
+    }
     if (more == CLIENT_OK && o->baseline && answered)
         more = compare(s, &checks, job);
     if (o->junit) {

@@ -15,19 +15,17 @@
 #define PLOT_LEAST  24
 #define PLOT_HEIGHT 20
 
-static bool locale_is_utf8(void)
+/* As asked for, else as wide as the terminal allows, in what characters and colours it has. */
+static client_plot_style style_of(const client_session *s)
 {
+    const client_options *o = s->options;
+    const int columns = o->output ? PLOT_WIDTH : client_columns(s->out, PLOT_WIDTH);
+    const int width = columns < PLOT_LEAST ? PLOT_LEAST : columns < PLOT_WIDTH ? columns : PLOT_WIDTH;
     setlocale(LC_CTYPE, "");
-    return strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
-}
-
-/* As asked for, else as wide as the terminal allows. */
-static int drawing_width(const client_session *s)
-{
-    if (s->options->width >= 0)
-        return s->options->width;
-    int columns = s->options->output ? PLOT_WIDTH : client_columns(s->out, PLOT_WIDTH);
-    return columns < PLOT_LEAST ? PLOT_LEAST : columns < PLOT_WIDTH ? columns : PLOT_WIDTH;
+    return (client_plot_style){.width = o->width >= 0 ? o->width : width,
+                               .height = o->height < 0 ? PLOT_HEIGHT : o->height,
+                               .ascii = o->ascii || strcmp(nl_langinfo(CODESET), "UTF-8") != 0,
+                               .colour = !o->output && isatty(fileno(s->out)) == 1 && !getenv("NO_COLOR")};
 }
 
 client_exit client_draw_history(client_session *s, const char *csv)
@@ -35,10 +33,7 @@ client_exit client_draw_history(client_session *s, const char *csv)
     char message[512], *text = NULL;
     size_t len = 0;
     client_series series;
-    const client_options *o = s->options;
-    client_plot_style style = {.width = drawing_width(s), .height = o->height < 0 ? PLOT_HEIGHT : o->height};
-    style.ascii = o->ascii || !locale_is_utf8();
-    style.colour = !o->output && isatty(fileno(s->out)) == 1 && !getenv("NO_COLOR");
+    const client_plot_style style = style_of(s);
     if (!client_series_read(&series, csv, message, sizeof message))
         return client_complain(s, CLIENT_SERVER_ERROR, message);
     FILE *drawing = open_memstream(&text, &len);
@@ -61,8 +56,8 @@ client_exit client_draw_history(client_session *s, const char *csv)
 void client_draw_trade(client_session *s, const json_t *trade)
 {
     const json_t *decades = json_object_get(trade, "decades");
-    const bool ascii = s->options->ascii || !locale_is_utf8();
-    const int cells = drawing_width(s) - 27;
+    const client_plot_style style = style_of(s);
+    const int cells = style.width - 27;
     /* The least and the largest time that is there, as powers of ten. */
     double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < json_array_size(decades); i++) {
@@ -88,7 +83,7 @@ void client_draw_trade(client_session *s, const json_t *trade)
             /* A bar whose length is the logarithm of the time. */
             const int full = (int)lround((log10(seconds) - low) / (high - low) * cells);
             for (int k = 0; k < full; k++)
-                fputs(ascii ? "#" : "\u2588", s->out);
+                fputs(style.ascii ? "#" : "\u2588", s->out);
         }
         fputc('\n', s->out);
     }

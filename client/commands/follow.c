@@ -44,44 +44,42 @@ static const char *field(const char *line, const char *name)
     return line + len + 1 + (line[len + 1] == ' ');
 }
 
-static bool take_line(stream *st)
-{
-    const char *line = st->line.data ? st->line.data : "", *value;
-    bool go_on = true;
-    if (!*line) { /* the end of an event */
-        json_t *told = st->data.len ? json_loadb(st->data.data, st->data.len, 0, NULL) : NULL;
-        if (json_is_object(told) && strcmp(st->event, "status") == 0) {
-            json_decref(st->job);
-            st->job = json_incref(told);
-            client_progress_show(st->progress, told);
-            st->events++;
-        } else if (json_is_object(told) && strcmp(st->event, "progress") == 0) {
-            client_progress_row(st->progress, told);
-            st->events++;
-        }
-        json_decref(told);
-        st->data.len = 0;
-        st->event[0] = '\0';
-        go_on = !client_job_ended(st->job);
-    } else if ((value = field(line, "event")))
-        snprintf(st->event, sizeof st->event, "%s", value);
-    else if ((value = field(line, "data")) && st->data.len < EVENT_MOST)
-        go_on = client_buffer_append(&st->data, value, strlen(value));
-    st->line.len = 0;
-    return client_buffer_append(&st->line, "", 0) && go_on;
-}
-
 static bool take_bytes(void *ctx, const char *bytes, size_t count)
 {
     stream *st = ctx;
-    for (size_t i = 0; i < count; i++) {
+    bool go_on = true;
+    for (size_t i = 0; go_on && i < count; i++) {
         if (bytes[i] == '\r')
             continue;
-        if (bytes[i] == '\n' ? !take_line(st)
-                             : st->line.len > EVENT_MOST || !client_buffer_append(&st->line, bytes + i, 1))
-            return false;
+        if (bytes[i] != '\n') {
+            go_on = st->line.len <= EVENT_MOST && client_buffer_append(&st->line, bytes + i, 1);
+            continue;
+        }
+        const char *line = st->line.data ? st->line.data : "", *value;
+        if (!*line) { /* the end of an event */
+            json_t *told = st->data.len ? json_loadb(st->data.data, st->data.len, 0, NULL) : NULL;
+            if (json_is_object(told) && strcmp(st->event, "status") == 0) {
+                json_decref(st->job);
+                st->job = json_incref(told);
+                client_progress_show(st->progress, told);
+                st->events++;
+            } else if (json_is_object(told) && strcmp(st->event, "progress") == 0) {
+                client_progress_row(st->progress, told);
+                st->events++;
+            }
+            json_decref(told);
+            st->data.len = 0;
+            st->event[0] = '\0';
+            go_on = !client_job_ended(st->job);
+        } else if ((value = field(line, "event"))) {
+            snprintf(st->event, sizeof st->event, "%s", value);
+        } else if ((value = field(line, "data")) && st->data.len < EVENT_MOST) {
+            go_on = client_buffer_append(&st->data, value, strlen(value));
+        }
+        st->line.len = 0;
+        go_on = client_buffer_append(&st->line, "", 0) && go_on;
     }
-    return true;
+    return go_on;
 }
 
 /* Shows the progress as the server tells it, until the stream ends for whatever reason. True: it told something. */

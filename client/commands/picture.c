@@ -88,30 +88,6 @@ static client_exit convert(client_session *s, const client_buffer *svg, client_b
 
 /* ------------------------------------------------------------ the command */
 
-static char *picture_path(client_session *s)
-{
-    const client_options *o = s->options;
-    char width[24];
-    client_query query[16] = {{"case", o->case_name}};
-    int n = 1;
-    snprintf(width, sizeof width, "%d", o->width);
-    if (o->deformed) {
-        query[n++] = (client_query){"colour", o->colour};
-        query[n++] = (client_query){"factor", o->factor};
-        query[n++] = (client_query){"width", o->width < 0 ? NULL : width};
-        return client_path_with_query(s, "/deformed.svg", query);
-    }
-    client_buffer with = {0};
-    const bool ok = client_append_words(&with, &o->with);
-    query[n++] = (client_query){"x", o->axis};
-    query[n++] = (client_query){"with", ok && with.len ? with.data : NULL};
-    char *path = ok ? client_path_with_query(s, "/convergence.svg", query) : NULL;
-    if (!ok)
-        client_complain(s, CLIENT_LOCAL, "no memory");
-    free(with.data);
-    return path;
-}
-
 client_exit client_plot(client_session *s)
 {
     client_reply reply;
@@ -130,7 +106,24 @@ client_exit client_plot(client_session *s)
         json_decref(trade);
         return code;
     }
-    char *path = picture_path(s);
+    const client_options *o = s->options;
+    char width[24];
+    client_buffer with = {0};
+    snprintf(width, sizeof width, "%d", o->width);
+    if (!client_append_words(&with, &o->with)) {
+        free(with.data);
+        return client_complain(s, CLIENT_LOCAL, "no memory");
+    }
+    const client_query deformed[] = {{"case", o->case_name},
+                                     {"colour", o->colour},
+                                     {"factor", o->factor},
+                                     {"width", o->width < 0 ? NULL : width},
+                                     {NULL, NULL}};
+    const client_query curves[] = {
+        {"case", o->case_name}, {"x", o->axis}, {"with", with.len ? with.data : NULL}, {NULL, NULL}};
+    char *path =
+        client_path_with_query(s, o->deformed ? "/deformed.svg" : "/convergence.svg", o->deformed ? deformed : curves);
+    free(with.data);
     if (!path)
         return CLIENT_LOCAL;
     client_request request = client_request_new(s, "GET", path);

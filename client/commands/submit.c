@@ -24,12 +24,6 @@ static bool have_key(client_session *s)
     return true;
 }
 
-/* A certificate is wanted at once. */
-static bool stays(const client_session *s)
-{
-    return s->options->wait || s->options->command == CLIENT_VERIFY;
-}
-
 /* One of several jobs, from 0; -1: the only one, which may be waited for at once. */
 static client_exit post_body(client_session *s, const char *path, const client_buffer *body, client_watch *watch,
                              int number, json_t **job)
@@ -49,7 +43,7 @@ static client_exit post_body(client_session *s, const char *path, const client_b
     request.headers[0] = header;
     request.body = body->data ? body->data : "";
     request.body_len = body->len;
-    if (stays(s) && number < 0)
+    if (s->options->wait && number < 0)
         client_hold(s, &request, watch->progress, prefer);
     client_exit code = client_ask_json(s, job, &request);
     if (code == CLIENT_INTERRUPTED) {
@@ -63,20 +57,20 @@ static client_exit post_body(client_session *s, const char *path, const client_b
     return code;
 }
 
-static void print_id(client_session *s, const char *id)
-{
-    client_print_safe(s->out, id);
-    fputc('\n', s->out);
-    fflush(s->out); /* whoever reads it may want to use it while we wait */
-}
-
-/* Of a job, or of the result that verify answers with. "" where the reply has none, which is told. */
-static client_exit job_id(client_session *s, char id[128], const json_t *job)
+/* The id of a job, or of the result that verify answers with, which is printed where it is wanted. "" where the reply
+ * has none, which is told. */
+static client_exit take_id(client_session *s, char id[128], const json_t *job, bool print)
 {
     const char *of_result = client_json_text(job, "job");
     snprintf(id, 128, "%s", *of_result ? of_result : client_json_text(job, "id"));
-    return *id ? CLIENT_OK
-               : client_complain(s, CLIENT_SERVER_ERROR, "the reply names no job; is this the right server?");
+    if (!*id)
+        return client_complain(s, CLIENT_SERVER_ERROR, "the reply names no job; is this the right server?");
+    if (print) {
+        client_print_safe(s->out, id);
+        fputc('\n', s->out);
+        fflush(s->out); /* whoever reads it may want to use it while we wait */
+    }
+    return CLIENT_OK;
 }
 
 /* --------------------------------------------------------------- one job */
@@ -87,16 +81,16 @@ static client_exit post_and_stay(client_session *s, const char *path, const clie
     json_t *job = NULL;
     client_watch watch;
     client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
-    progress.shown = progress.shown && stays(s);
+    progress.shown = progress.shown && s->options->wait;
     client_watch_begin(&watch, s->http, &progress);
     client_exit code = post_body(s, path, body, &watch, -1, &job);
+    const bool whole = !s->options->wait && s->options->json;
     if (code == CLIENT_OK)
-        code = job_id(s, id, job);
-    if (code == CLIENT_OK && !stays(s) && s->options->json)
+        code = take_id(s, id, job,
+                       !whole && (!s->options->wait || (s->options->quiet && s->options->command != CLIENT_VERIFY)));
+    if (code == CLIENT_OK && whole)
         code = client_print_json(s, job);
-    else if (code == CLIENT_OK && (!stays(s) || (s->options->quiet && s->options->command != CLIENT_VERIFY)))
-        print_id(s, id);
-    if (code == CLIENT_OK && stays(s)) {
+    if (code == CLIENT_OK && s->options->wait) {
         if (*client_json_text(job, "job")) { /* verify answered with a result, which is no job */
             json_decref(job);
             job = NULL;
@@ -106,7 +100,7 @@ static client_exit post_and_stay(client_session *s, const char *path, const clie
         code = client_follow(s, id, &job, &watch);
     }
     client_watch_end(&watch, s->http);
-    if (stays(s))
+    if (s->options->wait)
         code = client_report_end(s, job, code);
     json_decref(job);
     return code;
@@ -114,21 +108,38 @@ static client_exit post_and_stay(client_session *s, const char *path, const clie
 
 /* -------------------------------------------------------------- several */
 
-/* Each job to its end. The first exit code that is not 0 counts, but an interrupt or a timeout ends it all. */
-static client_exit follow_all(client_session *s, const client_bodies *bodies, client_watch *watch, json_t *jobs)
+static client_exit post_several(client_session *s, const client_bodies *bodies)
 {
-    client_exit worst = CLIENT_OK;
-    if (!s->options->json && !s->options->quiet)
+    client_watch watch;
+    client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
+    json_t *jobs = json_array();
+    progress.shown = progress.shown && s->options->wait;
+    client_watch_begin(&watch, s->http, &progress);
+    client_exit code = CLIENT_OK;
+    for (size_t i = 0; code == CLIENT_OK && i < bodies->count; i++) {
+        char id[128];
+        json_t *job;
+        code = post_body(s, "/v1/jobs", &bodies->item[i].body, &watch, (int)i, &job);
+        if (code == CLIENT_OK)
+            code = take_id(s, id, job, !s->options->json && (!s->options->wait || s->options->quiet));
+        if (code == CLIENT_OK && json_array_append(jobs, job) != 0)
+            code = client_complain(s, CLIENT_LOCAL, "no memory");
+        json_decref(job);
+    }
+    /* Each job to its end. The first exit code that is not 0 counts, but an interrupt or a timeout ends it all. */
+    const bool follows = code == CLIENT_OK && s->options->wait, told = !s->options->json && !s->options->quiet;
+    bool ended = follows;
+    if (follows && told)
         fprintf(s->out, "%-32s  %-15s  %-13s  %s\n", "id", "outcome", "whole error", "values");
-    for (size_t i = 0; i < json_array_size(jobs); i++) {
+    for (size_t i = 0; ended && i < json_array_size(jobs); i++) {
         json_t *job = json_incref(json_array_get(jobs, i));
-        client_exit code = client_follow(s, client_json_text(job, "id"), &job, watch);
+        const char *label = bodies->item[i].label;
+        client_exit one = client_follow(s, client_json_text(job, "id"), &job, &watch);
         json_array_set(jobs, i, job);
-        bool ended = code == CLIENT_OK;
+        ended = one == CLIENT_OK;
         if (ended)
-            code = client_job_exit(job);
-        if (ended && !s->options->json && !s->options->quiet) {
-            const char *label = bodies->item[i].label;
+            one = client_job_exit(job);
+        if (ended && told) {
             char text[32];
             const char *outcome = client_json_text(job, "summary.outcome");
             client_print_cell(s->out, client_json_text(job, "id"), 32);
@@ -137,37 +148,10 @@ static client_exit follow_all(client_session *s, const client_bodies *bodies, cl
             client_print_safe(s->out, label);
             fputc('\n', s->out);
         }
-        code = client_contract(s, job, bodies->item[i].label, code);
+        one = client_contract(s, job, label, one);
         json_decref(job);
-        worst = worst == CLIENT_OK ? code : worst;
-        if (!ended)
-            return code;
+        code = code == CLIENT_OK || !ended ? one : code;
     }
-    return worst;
-}
-
-static client_exit post_several(client_session *s, const client_bodies *bodies)
-{
-    client_watch watch;
-    client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
-    json_t *jobs = json_array();
-    progress.shown = progress.shown && stays(s);
-    client_watch_begin(&watch, s->http, &progress);
-    client_exit code = CLIENT_OK;
-    for (size_t i = 0; code == CLIENT_OK && i < bodies->count; i++) {
-        char id[128];
-        json_t *job;
-        code = post_body(s, "/v1/jobs", &bodies->item[i].body, &watch, (int)i, &job);
-        if (code == CLIENT_OK)
-            code = job_id(s, id, job);
-        if (code == CLIENT_OK && !s->options->json && (!stays(s) || s->options->quiet))
-            print_id(s, id);
-        if (code == CLIENT_OK && json_array_append(jobs, job) != 0)
-            code = client_complain(s, CLIENT_LOCAL, "no memory");
-        json_decref(job);
-    }
-    if (code == CLIENT_OK && stays(s))
-        code = follow_all(s, bodies, &watch, jobs);
     client_watch_end(&watch, s->http);
     if (s->options->json && json_array_size(jobs) && client_print_json(s, jobs) != CLIENT_OK)
         code = CLIENT_LOCAL;

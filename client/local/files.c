@@ -82,43 +82,29 @@ static bool write_all(int fd, const char *bytes, size_t count)
     return true;
 }
 
-static bool write_beside(const char *path, const char *bytes, size_t count)
-{
-    bool ok = false;
-    int fd = -1, why = 0;
-    char *beside = NULL;
-    if (asprintf(&beside, "%s.part-%ld", path, (long)getpid()) < 0) {
-        errno = ENOMEM;
-        return false;
-    }
-    fd = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd >= 0) {
-        ok = write_all(fd, bytes, count) && fsync(fd) == 0;
-        ok = close(fd) == 0 && ok && rename(beside, path) == 0;
-        why = errno;
-        if (!ok)
-            unlink(beside);
-        errno = why;
-    }
-    free(beside);
-    return ok;
-}
-
 bool client_file_write(const char *path, const char *bytes, size_t count, char *message, size_t size)
 {
     struct stat st;
     if (strcmp(path, "-") == 0)
         return (fwrite(bytes, 1, count, stdout) == count && fflush(stdout) == 0) ||
                complain(message, size, "write to", "standard output");
-    bool ok;
-    if (lstat(path, &st) != 0 || S_ISREG(st.st_mode))
-        ok = write_beside(path, bytes, count);
-    else {
-        int fd = open(path, O_WRONLY | O_TRUNC | O_CLOEXEC);
-        ok = fd >= 0 && write_all(fd, bytes, count);
-        if (fd >= 0 && close(fd) != 0)
-            ok = false;
+    /* A regular file is written beside its place, into which it then goes whole; all else as it is. */
+    const bool regular = lstat(path, &st) != 0 || S_ISREG(st.st_mode);
+    char *beside = NULL;
+    if (regular && asprintf(&beside, "%s.part-%ld", path, (long)getpid()) < 0) {
+        errno = ENOMEM;
+        return complain(message, size, "write", path);
     }
+    const int fd = regular ? open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)
+                           : open(path, O_WRONLY | O_TRUNC | O_CLOEXEC);
+    bool ok = fd >= 0 && write_all(fd, bytes, count) && (!regular || fsync(fd) == 0);
+    if (fd >= 0)
+        ok = close(fd) == 0 && ok && (!regular || rename(beside, path) == 0);
+    const int why = errno;
+    if (regular && fd >= 0 && !ok)
+        unlink(beside);
+    free(beside);
+    errno = why;
     return ok || complain(message, size, "write", path);
 }
 

@@ -26,25 +26,6 @@ static size_t skip_string(const client_buffer *text, size_t at)
     return at < text->len ? at + 1 : text->len;
 }
 
-/* Index after the value that begins at `at`: of the ',' or bracket that ends it in the enclosing object. */
-static size_t skip_value(const client_buffer *text, size_t at)
-{
-    size_t depth = 0;
-    while (at < text->len) {
-        char c = text->data[at];
-        if (c == '"') {
-            at = skip_string(text, at);
-            continue;
-        }
-        if (depth == 0 && (c == ',' || c == '}' || c == ']'))
-            break;
-        depth += c == '{' || c == '[';
-        depth -= c == '}' || c == ']';
-        at++;
-    }
-    return at;
-}
-
 /* False: the text is no object as far as can be seen. */
 static bool find_place(tags_place *place, const client_buffer *text)
 {
@@ -61,7 +42,13 @@ static bool find_place(tags_place *place, const client_buffer *text)
         if (at >= text->len || text->data[at] != ':')
             return false;
         size_t from = skip_space(text, at + 1);
-        at = skip_value(text, from);
+        /* behind the value: at the ',' or bracket that ends it in this object */
+        int depth = 0;
+        for (at = from; at < text->len && (depth > 0 || !memchr(",}]", text->data[at], 3));) {
+            const char c = text->data[at];
+            depth += (c == '{' || c == '[') - (c == '}' || c == ']');
+            at = c == '"' ? skip_string(text, at) : at + 1;
+        }
         if (is_tags) {
             *place = (tags_place){.from = from, .to = at, .has_tags = true};
             return true;

@@ -49,47 +49,43 @@ static json_t *read_range(const char *text)
     return values;
 }
 
-/* A,B,C as JSON, or else as words. NULL: one is empty, or *memory, which becomes false. */
-static json_t *read_list(const char *text, bool *memory)
-{
-    client_buffer array = {0};
-    json_t *values = NULL;
-    *memory = client_buffer_append(&array, "[", 1) && client_buffer_append(&array, text, strlen(text)) &&
-              client_buffer_append(&array, "]", 1);
-    if (*memory)
-        values = json_loadb(array.data, array.len, JSON_REJECT_DUPLICATES, NULL);
-    free(array.data);
-    if (json_array_size(values) || !*memory)
-        return values;
-    json_decref(values);
-    values = json_array();
-    for (const char *at = text; values; at++) {
-        const size_t len = strcspn(at, ",");
-        if (!len || json_array_append_new(values, client_value_read(at, len)) != 0) {
-            json_decref(values);
-            return NULL;
-        }
-        at += len;
-        if (!*at)
-            break;
-    }
-    return values;
-}
-
 json_t *client_vary_values(const char *text, char *message, size_t size)
 {
     char *end;
     strtod(text, &end);
-    bool range = end != text && *end == ':', memory = true;
-    json_t *values = range ? read_range(text) : read_list(text, &memory);
+    const bool range = end != text && *end == ':';
+    json_t *values = range ? read_range(text) : NULL;
     message[0] = '\0';
-    if (values || !memory)
-        return values;
-    snprintf(message, size,
-             range ? "\"%.100s\" is no FIRST:LAST:COUNT: two numbers and a count from 2 to 10000, such as 0.1:1.0:10"
-                   : "\"%.100s\" is no list: values with commas between them, or FIRST:LAST:COUNT",
-             text);
-    return NULL;
+    if (!range) { /* A,B,C as JSON, or else as words, none of them empty */
+        client_buffer array = {0};
+        const bool memory = client_buffer_append(&array, "[", 1) && client_buffer_append(&array, text, strlen(text)) &&
+                            client_buffer_append(&array, "]", 1);
+        values = memory ? json_loadb(array.data, array.len, JSON_REJECT_DUPLICATES, NULL) : NULL;
+        free(array.data);
+        if (!memory)
+            return NULL;
+        bool more = !json_array_size(values);
+        if (more) {
+            json_decref(values);
+            values = json_array();
+        }
+        for (const char *at = text; more && values; at++) {
+            const size_t len = strcspn(at, ",");
+            if (!len || json_array_append_new(values, client_value_read(at, len)) != 0) {
+                json_decref(values);
+                values = NULL;
+            }
+            at += len;
+            more = *at == ',';
+        }
+    }
+    if (!values)
+        snprintf(message, size,
+                 range
+                     ? "\"%.100s\" is no FIRST:LAST:COUNT: two numbers and a count from 2 to 10000, such as 0.1:1.0:10"
+                     : "\"%.100s\" is no list: values with commas between them, or FIRST:LAST:COUNT",
+                 text);
+    return values;
 }
 
 /* -------------------------------------------------------------- what varies */

@@ -212,25 +212,6 @@ static bool look_around(client_http *http, int ms)
     return true;
 }
 
-/* What curl_easy_perform does, but for the watch: CURLE_ABORTED_BY_CALLBACK. */
-static CURLcode perform(client_http *http)
-{
-    int running = 1, left = 0;
-    CURLcode code = CURLE_ABORTED_BY_CALLBACK;
-    if (curl_multi_add_handle(http->multi, http->curl) != CURLM_OK)
-        return CURLE_OUT_OF_MEMORY;
-    bool ok = curl_multi_perform(http->multi, &running) == CURLM_OK;
-    while (ok && running && look_around(http, TICK_MS))
-        ok = curl_multi_perform(http->multi, &running) == CURLM_OK;
-    CURLMsg *message = curl_multi_info_read(http->multi, &left);
-    if (!ok)
-        code = CURLE_OUT_OF_MEMORY;
-    else if (!running && message && message->msg == CURLMSG_DONE)
-        code = message->data.result;
-    curl_multi_remove_handle(http->multi, http->curl);
-    return code;
-}
-
 /* The server's own certificate is the first of the chain. */
 static void note_certificate(client_http *http, client_reply *reply)
 {
@@ -274,7 +255,19 @@ static CURLcode send_once(client_http *http, client_reply *reply, const client_r
         set_request(http, &sink, request);
         curl_easy_setopt(http->curl, CURLOPT_URL, url);
         curl_easy_setopt(http->curl, CURLOPT_HTTPHEADER, headers);
-        code = perform(http);
+        /* What curl_easy_perform does, but for the watch: CURLE_ABORTED_BY_CALLBACK. */
+        int running = 1, left = 0;
+        ok = curl_multi_add_handle(http->multi, http->curl) == CURLM_OK;
+        bool goes_on = ok;
+        while (goes_on && running) {
+            ok = curl_multi_perform(http->multi, &running) == CURLM_OK;
+            goes_on = ok && (!running || look_around(http, TICK_MS));
+        }
+        CURLMsg *message = ok ? curl_multi_info_read(http->multi, &left) : NULL;
+        if (ok)
+            code =
+                !running && message && message->msg == CURLMSG_DONE ? message->data.result : CURLE_ABORTED_BY_CALLBACK;
+        curl_multi_remove_handle(http->multi, http->curl);
         if (code == CURLE_OK && !sink.header_whole)
             code = CURLE_PARTIAL_FILE;
         code = sink.enough ? CURLE_OK : code;

@@ -105,21 +105,23 @@ static void put_check(FILE *to, const client_suite *suite, size_t i)
     }
 }
 
-static size_t count_tag(const client_checks *checks, const char *tag)
+/* Of these suites together. Seconds have a point whatever the locale: the client never sets LC_NUMERIC. */
+static void put_counts(FILE *to, const client_suite *suites, size_t n)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < checks->count; i++) {
-        const char *own = TAGS[checks->item[i].verdict];
-        count += own && strcmp(own, tag) == 0;
+    size_t tests = 0, failures = 0, errors = 0;
+    double seconds = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        const client_checks *checks = &suites[i].checks;
+        tests += checks->count;
+        for (size_t k = 0; k < checks->count; k++) {
+            const char *tag = TAGS[checks->item[k].verdict];
+            failures += tag && strcmp(tag, "failure") == 0;
+            errors += tag && strcmp(tag, "error") == 0;
+        }
+        seconds += isfinite(suites[i].seconds) ? suites[i].seconds : 0.0;
     }
-    return count;
-}
-
-/* Seconds have a point whatever the locale: the client never sets LC_NUMERIC. */
-static void put_counts(FILE *to, size_t tests, size_t failures, size_t errors, double seconds)
-{
     fprintf(to, " tests=\"%zu\" failures=\"%zu\" errors=\"%zu\" skipped=\"0\"", tests, failures, errors);
-    fprintf(to, " time=\"%.6f\"", isfinite(seconds) ? seconds : 0.0);
+    fprintf(to, " time=\"%.6f\"", seconds);
 }
 
 bool client_junit_write(const client_suites *suites, const char *path, char *message, size_t size)
@@ -128,17 +130,8 @@ bool client_junit_write(const client_suites *suites, const char *path, char *mes
     size_t len = 0;
     FILE *report = open_memstream(&text, &len);
     if (report) {
-        size_t tests = 0, failures = 0, errors = 0;
-        double seconds = 0.0;
-        for (size_t i = 0; i < suites->count; i++) {
-            const client_suite *suite = &suites->item[i];
-            tests += suite->checks.count;
-            failures += count_tag(&suite->checks, "failure");
-            errors += count_tag(&suite->checks, "error");
-            seconds += isfinite(suite->seconds) ? suite->seconds : 0.0;
-        }
         fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"uzawa\"", report);
-        put_counts(report, tests, failures, errors, seconds);
+        put_counts(report, suites->item, suites->count);
         fputs(">\n", report);
         for (size_t i = 0; i < suites->count; i++) {
             const client_suite *suite = &suites->item[i];
@@ -148,7 +141,7 @@ bool client_junit_write(const client_suites *suites, const char *path, char *mes
             snprintf(created, sizeof created, "%.19s", suite->created);
             fputs("  <testsuite", report);
             put_attribute(report, "name", suite->name);
-            put_counts(report, checks->count, count_tag(checks, "failure"), count_tag(checks, "error"), suite->seconds);
+            put_counts(report, suite, 1);
             put_attribute(report, "timestamp", created);
             fputs(">\n    <properties>\n", report);
             for (size_t k = 0; k < sizeof properties / sizeof *properties; k++) {

@@ -23,22 +23,6 @@ static const char *next_line(const char *line)
     return line + strspn(line, "\r\n");
 }
 
-/* The number in the cell `place` of a line, NaN where there is none. */
-static double cell_value(const char *line, int place)
-{
-    for (; place > 0; place--) {
-        line += strcspn(line, ",\r\n");
-        if (*line != ',')
-            return NAN;
-        line++;
-    }
-    if (strncmp(line, "true", 4) == 0)
-        return 1;
-    char *end;
-    double value = strtod(line, &end);
-    return end == line || !strchr(",\r\n", *end) ? NAN : value;
-}
-
 bool client_series_read(client_series *out, const char *csv, char *message, size_t size)
 {
     int place[CLIENT_COLUMNS];
@@ -73,8 +57,18 @@ bool client_series_read(client_series *out, const char *csv, char *message, size
         }
     }
     for (; *line; line = next_line(line), series.count++)
-        for (int i = 0; i < CLIENT_COLUMNS; i++)
-            series.column[i][series.count] = cell_value(line, place[i]);
+        for (int i = 0; i < CLIENT_COLUMNS; i++) { /* NaN where there is no number */
+            const char *cell = line;
+            for (int at = 0; cell && at < place[i]; at++) {
+                cell += strcspn(cell, ",\r\n");
+                cell = *cell == ',' ? cell + 1 : NULL;
+            }
+            char *end = NULL;
+            const bool truth = cell && strncmp(cell, "true", 4) == 0;
+            const double value = cell && !truth ? strtod(cell, &end) : NAN;
+            const bool number = end && end != cell && strchr(",\r\n", *end);
+            series.column[i][series.count] = truth ? 1 : number ? value : (double)NAN;
+        }
     *out = series;
     return true;
 }

@@ -8,22 +8,18 @@
 
 /* ---- words */
 
-/* A number for a person; "unknown" where the job has none, since nan looks like an answer. Buffer of 32. */
+/* A number for a person; "unknown" where the job has none, since nan looks like an answer. digits 0: a bound, which
+ * must not be shown smaller than it is. Buffer of 32. */
 static const char *number_in_words(char text[32], const json_t *object, const char *path, int digits)
 {
     double value = client_json_number(object, path);
-    if (isfinite(value))
-        snprintf(text, 32, "%.*g", digits, value);
-    else
+    if (!isfinite(value))
         snprintf(text, 32, "unknown");
+    else if (digits == 0)
+        client_format_bound(text, value);
+    else
+        snprintf(text, 32, "%.*g", digits, value);
     return text;
-}
-
-/* The same of a bound, which must not be shown smaller than it is. */
-static const char *bound_in_words(char text[32], const json_t *object, const char *path)
-{
-    const double value = client_json_number(object, path);
-    return isfinite(value) ? client_format_bound(text, value) : number_in_words(text, object, path, 2);
 }
 
 /* Places behind the point that leave two digits, up to six. */
@@ -237,13 +233,8 @@ static void print_contact(FILE *to, const json_t *summary)
     fputc('\n', to);
     label(to, "penetration");
     fprintf(to, "%s at most\n", number_in_words(text, summary, "contact.max_penetration", 3));
-}
-
-/* What facets are taken for: "shaft: cylinder of radius 20, 0.027 off the facets, which turn by 6 degrees". */
-static void print_surfaces(FILE *to, const json_t *summary)
-{
+    /* What facets are taken for: "shaft: cylinder of radius 20, 0.027 off the facets, which turn by 6 degrees". */
     const json_t *list = client_json_at(summary, "contact.surfaces");
-    char text[32];
     for (size_t i = 0; i < json_array_size(list); i++) {
         const json_t *one = json_array_get(list, i);
         label(to, i == 0 ? "surfaces" : "");
@@ -321,7 +312,7 @@ static void print_certificate(FILE *to, const json_t *summary)
         fprintf(to, " (asked for rounding level: %s)\n", met);
     label(to, "");
     fprintf(to, "absolute %s, duality gap %s, relative KKT residual %s\n",
-            bound_in_words(absolute, certificate, "absolute_error"), bound_in_words(gap, certificate, "gap"),
+            number_in_words(absolute, certificate, "absolute_error", 0), number_in_words(gap, certificate, "gap", 0),
             number_in_words(residual, certificate, "relative_residual.total", 3));
     if (isfinite(left)) {
         label(to, "");
@@ -330,67 +321,54 @@ static void print_certificate(FILE *to, const json_t *summary)
     }
 }
 
-/* The factor, or the coarse levels that stand in its place. */
-static void print_factor(FILE *to, const json_t *summary)
-{
-    const json_t *factor = client_json_at(summary, "factor");
-    const double bytes = client_json_number(factor, "bytes");
-    const char *from = json_is_true(json_object_get(factor, "cached")) ? "from the cache" : "new";
-    char entries[32], rcond[32];
-    if (!json_is_object(factor))
-        return;
-    label(to, "factor");
-    if (strcmp(client_json_text(summary, "operator"), "matrix_free") == 0) {
-        fprintf(to, "none: coarse levels of %.3g MB, %s\n", isfinite(bytes) ? bytes / 1e6 : 0.0, from);
-        return;
-    }
-    fprintf(to, "%s, ", from);
-    client_print_safe(to, client_json_text(factor, "ordering"));
-    fprintf(to, " ordering, %s entries", number_in_words(entries, factor, "nnz", 15));
-    if (isfinite(bytes))
-        fprintf(to, ", %.3g MB", bytes / 1e6);
-    fprintf(to, ", rcond %s\n", number_in_words(rcond, factor, "rcond", 2));
-}
-
-/* Why this form of the operator: what each was expected to take, and what the one that was taken took. */
-static void print_cost(FILE *to, const json_t *summary)
-{
-    const json_t *cost = client_json_at(summary, "cost"), *considered = client_json_at(cost, "considered"), *form;
-    double predicted = client_json_number(cost, "predicted.seconds"),
-           actual = client_json_number(cost, "actual.seconds");
-    char text[32], more[32];
-    size_t i;
-    if (!isfinite(predicted) || !isfinite(actual))
-        return;
-    label(to, "cost");
-    fprintf(to, "%s predicted, %s in fact", client_format_seconds(text, sizeof text, predicted),
-            client_format_seconds(more, sizeof more, actual));
-    json_array_foreach(considered, i, form)
-    {
-        double seconds = client_json_number(form, "seconds");
-        fputs(i ? ", " : "; considered: ", to);
-        client_print_safe(to, client_json_text(form, "operator"));
-        fprintf(to, " %s", isfinite(seconds) ? client_format_seconds(text, sizeof text, seconds) : "unknown");
-        if (json_is_false(json_object_get(form, "fits")))
-            fputs(" (too much memory)", to);
-    }
-    fputc('\n', to);
-}
-
-/* The stages that took at least a hundredth of the whole, in the order in which they ran. */
-static void print_timings(FILE *to, const json_t *summary)
+/* What the answer took: the factor, or the coarse levels that stand in its place; why this form of the operator, by
+ * what each was expected to take; the stages that took at least a hundredth of the whole, in the order in which they
+ * ran. */
+static void print_effort(FILE *to, const json_t *summary)
 {
     static const char *const STAGES[] = {"queue",  "parse",    "assemble", "order",
                                          "factor", "condense", "iterate",  "certify"};
+    const json_t *cost = client_json_at(summary, "cost"), *considered = client_json_at(cost, "considered"), *form;
     const json_t *timings = client_json_at(summary, "timings_s");
-    double total = client_json_number(timings, "total");
-    const char *before = ": ";
-    char text[32];
+    const double predicted = client_json_number(cost, "predicted.seconds"),
+                 actual = client_json_number(cost, "actual.seconds"), total = client_json_number(timings, "total");
+    const json_t *factor = client_json_at(summary, "factor");
+    const double bytes = client_json_number(factor, "bytes");
+    const char *before = ": ", *from = json_is_true(json_object_get(factor, "cached")) ? "from the cache" : "new";
+    char text[32], more[32];
+    size_t i;
+    if (json_is_object(factor))
+        label(to, "factor");
+    if (json_is_object(factor) && strcmp(client_json_text(summary, "operator"), "matrix_free") == 0) {
+        fprintf(to, "none: coarse levels of %.3g MB, %s\n", isfinite(bytes) ? bytes / 1e6 : 0.0, from);
+    } else if (json_is_object(factor)) {
+        fprintf(to, "%s, ", from);
+        client_print_safe(to, client_json_text(factor, "ordering"));
+        fprintf(to, " ordering, %s entries", number_in_words(text, factor, "nnz", 15));
+        if (isfinite(bytes))
+            fprintf(to, ", %.3g MB", bytes / 1e6);
+        fprintf(to, ", rcond %s\n", number_in_words(text, factor, "rcond", 2));
+    }
+    if (isfinite(predicted) && isfinite(actual)) {
+        label(to, "cost");
+        fprintf(to, "%s predicted, %s in fact", client_format_seconds(text, sizeof text, predicted),
+                client_format_seconds(more, sizeof more, actual));
+        json_array_foreach(considered, i, form)
+        {
+            double seconds = client_json_number(form, "seconds");
+            fputs(i ? ", " : "; considered: ", to);
+            client_print_safe(to, client_json_text(form, "operator"));
+            fprintf(to, " %s", isfinite(seconds) ? client_format_seconds(text, sizeof text, seconds) : "unknown");
+            if (json_is_false(json_object_get(form, "fits")))
+                fputs(" (too much memory)", to);
+        }
+        fputc('\n', to);
+    }
     if (!isfinite(total))
         return;
     label(to, "time");
     fprintf(to, "%s", client_format_seconds(text, sizeof text, total));
-    for (size_t i = 0; i < sizeof STAGES / sizeof *STAGES; i++) {
+    for (i = 0; i < sizeof STAGES / sizeof *STAGES; i++) {
         double seconds = client_json_number(timings, STAGES[i]);
         if (!(seconds >= 0.01 * total) || !(seconds > 0))
             continue;
@@ -415,7 +393,6 @@ void client_print_summary(FILE *to, const json_t *job)
     print_method(to, summary);
     if (json_is_object(json_object_get(summary, "contact")))
         print_contact(to, summary);
-    print_surfaces(to, summary);
     print_resultants(to, summary);
     json_array_foreach(json_object_get(summary, "warnings"), i, warning)
     {
@@ -434,17 +411,12 @@ void client_print_summary(FILE *to, const json_t *job)
                     number_in_words(primal, summary, "energy.potential", 6));
     }
     print_certificate(to, summary);
-    print_factor(to, summary);
-    print_cost(to, summary);
-    print_timings(to, summary);
+    print_effort(to, summary);
     client_checks checks = {.item = NULL};
     client_checks_assertions(&checks, summary, "");
     client_checks_print(to, &checks, 0, "assertions");
     if (checks.failed)
-        if (isfinite(client_json_number(summary, "energy.potential")))
-            fprintf(to, "%12sthe body's potential energy is %s\n", "",
-                    number_in_words(primal, summary, "energy.potential", 6));
-    fputs("assertions  no memory to show all of them\n", to);
+        fputs("assertions  no memory to show all of them\n", to);
     client_checks_clear(&checks);
 }
 

@@ -178,7 +178,7 @@ static bool takes(client_command command, const uz_option *option)
 {
     client_options o;
     char message[256] = "", line[200];
-    const client_page *page = client_page_of(command);
+    const client_page *page = &CLIENT_PAGES[command];
     const char *value = option->kind == UZ_OPTION_FLAG ? "" : option->kind == UZ_OPTION_CHOICE ? " json" : " 60";
     snprintf(line, sizeof line, "%s %s --%s%s", page->name, page->operands & CLIENT_OPERAND_NEEDED ? "x" : "",
              option->name, value);
@@ -187,12 +187,12 @@ static bool takes(client_command command, const uz_option *option)
 
 TEST(arguments_are_refused_by_commands_that_do_not_have_them)
 {
-    const uz_option_table all = client_option_table();
+    const uz_option_table all = CLIENT_OPTIONS;
     for (size_t i = 0; i < all.count; i++)
         for (int c = 0; c < CLIENT_COMMANDS; c++) {
             const uz_option *option = &all.rows[i];
             bool has = uz_option_find(all, CLIENT_IN(c), option->name, strlen(option->name)) != NULL;
-            CHECK_MSG(takes((client_command)c, option) == has, "%s %s", client_page_of((client_command)c)->name,
+            CHECK_MSG(takes((client_command)c, option) == has, "%s %s", CLIENT_PAGES[(client_command)c].name,
                       option->name);
         }
 }
@@ -222,7 +222,7 @@ TEST(help_has_a_page_for_each_command)
         client_help_print(memory, (client_command)i);
         fclose(memory);
         CHECK(strncmp(text, "usage: uzawa ", 13) == 0);
-        CHECK(strstr(text, i < CLIENT_COMMANDS ? client_page_of((client_command)i)->name : "Commands:") != NULL);
+        CHECK(strstr(text, i < CLIENT_COMMANDS ? CLIENT_PAGES[i].name : "Commands:") != NULL);
         free(text);
     }
 }

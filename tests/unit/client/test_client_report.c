@@ -211,6 +211,7 @@ TEST(summary_says_everything_that_counts)
     for (size_t i = 0; i < sizeof PARTS / sizeof *PARTS; i++)
         CHECK_MSG(strstr(text, PARTS[i]), "missing: %s", PARTS[i]);
     CHECK(strchr(text, '\033') == NULL);
+    CHECK(!strstr(text, "assertions")); /* it has none */
     free(text);
     json_decref(job);
 }
