@@ -8,6 +8,7 @@
 #include "base/metrics.h"
 #include "options/options.h"
 #include "privileges.h"
+#include "store/engine_base.h"
 #include "store/engines/engines.h"
 #include "uzawa.h"
 #include "work/solver_process.h"
@@ -30,13 +31,12 @@ enum { EXIT_ENDED = 0, EXIT_FAILED = 1, EXIT_USAGE = 2 };
 static const double LEASE_S = 60;
 
 typedef struct {
-    server_log *log, *audit; /* audit: who did what; NULL: not kept */
-    FILE *audit_file;
+    server_log log, audit; /* audit: who did what; its stream NULL: not kept */
     metrics *metrics;
     store *store;
     work *work;
     webhooks *webhooks;
-    http_server *http;
+    http_server http;
     auth *auth; /* NULL: no token file */
     http_tls tls;
     option_words origins, callable; /* --cors, --webhook-allow */
@@ -75,7 +75,7 @@ static void own_signals(char **argv, sigset_t *signals)
 }
 
 /* An address that others can reach needs tokens, or a word that says it is meant. */
-static bool check_exposure(const service *s, const server_options *options, int fd, char *message, size_t size)
+static bool check_exposure(service *s, const server_options *options, int fd, char *message, size_t size)
 {
     if (!http_is_public(fd))
         return true;
@@ -88,7 +88,7 @@ static bool check_exposure(const service *s, const server_options *options, int 
         return false;
     }
     if (!options->tls_cert[0])
-        log_write(s->log, LOG_WARN, "public_without_tls", (log_field[]){LOG_S("listen", options->listen), {0}});
+        log_write(&s->log, LOG_WARN, "public_without_tls", (log_field[]){LOG_S("listen", options->listen), {0}});
     return true;
 }
 
@@ -101,9 +101,9 @@ static bool read_secrets(service *s, const server_options *options, char *messag
         return false;
     if (options->audit_log[0]) {
         const int fd = open(options->audit_log, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0600);
-        s->audit_file = fd >= 0 ? fdopen(fd, "a") : NULL;
-        s->audit = s->audit_file ? log_open(s->audit_file, LOG_INFO) : NULL;
-        if (!s->audit) {
+        s->audit = (server_log){
+            .lock = PTHREAD_MUTEX_INITIALIZER, .stream = fd >= 0 ? fdopen(fd, "a") : NULL, .least = LOG_INFO};
+        if (!s->audit.stream) {
             snprintf(message, size, "cannot write the audit log %s: %s", options->audit_log, strerror(errno));
             return false;
         }
@@ -114,14 +114,14 @@ static bool read_secrets(service *s, const server_options *options, char *messag
 /* The store and those who work on it. */
 static bool start_work(service *s, const server_options *options, char *message, size_t size)
 {
-    const store_settings kept = {.metrics = s->metrics,
-                                 .max_queue = options->max_queue,
-                                 .quotas = {.waiting = options->client_queue,
-                                            .bytes = (int64_t)options->client_bytes,
-                                            .seconds = options->client_seconds},
-                                 .uploads = {.one = (int64_t)options->max_upload,
-                                             .all = (int64_t)options->uploads,
-                                             .keep_s = options->upload_days * 86400}};
+    const store_settings settings = {.metrics = s->metrics,
+                                     .max_queue = options->max_queue,
+                                     .quotas = {.waiting = options->client_queue,
+                                                .bytes = (int64_t)options->client_bytes,
+                                                .seconds = options->client_seconds},
+                                     .uploads = {.one = (int64_t)options->max_upload,
+                                                 .all = (int64_t)options->uploads,
+                                                 .keep_s = options->upload_days * 86400}};
     const work_options workers = {.workers = options->workers,
                                   .lanes = options->lanes,
                                   .max_attempts = options->max_attempts,
@@ -136,17 +136,17 @@ static bool start_work(service *s, const server_options *options, char *message,
     s->store = store_open(options->db, message, size);
     if (!s->store)
         return false;
-    store_configure(s->store, &kept);
-    if (store_missing(s->store))
-        log_write(s->log, LOG_ERROR, "commits_missing", (log_field[]){LOG_S("cause", store_missing(s->store)), {0}});
-    s->work = work_start(s->store, &workers, s->log, message, size);
+    s->store->settings = settings;
+    if (s->store->missing)
+        log_write(&s->log, LOG_ERROR, "commits_missing", (log_field[]){LOG_S("cause", s->store->missing), {0}});
+    s->work = work_start(s->store, &workers, &s->log, message, size);
     if (!s->work)
         return false;
     options_split(&s->callable, options->webhook_allow);
     s->hooks.allow = s->callable.words;
     s->hooks.n_allow = s->callable.n;
     s->hooks.metrics = s->metrics;
-    s->webhooks = webhooks_start(s->store, &s->hooks, s->log, message, size);
+    s->webhooks = webhooks_start(s->store, &s->hooks, &s->log, message, size);
     return s->webhooks != NULL;
 }
 
@@ -156,8 +156,8 @@ static bool start_http(service *s, const server_options *options, int fd, char *
     const http_parts parts = {.store = s->store,
                               .work = s->work,
                               .webhooks = s->webhooks,
-                              .log = s->log,
-                              .audit = s->audit,
+                              .log = &s->log,
+                              .audit = s->audit.stream ? &s->audit : NULL,
                               .metrics = s->metrics,
                               .auth = s->auth};
     options_split(&s->origins, options->cors);
@@ -178,8 +178,7 @@ static bool start_http(service *s, const server_options *options, int fd, char *
                                  .access_log = options->access_log,
                                  .limits = s->limits,
                                  .n_limits = n_limits};
-    s->http = http_start(fd, &parts, &limits, message, size);
-    return s->http != NULL;
+    return http_start(&s->http, fd, &parts, &limits, message, size);
 }
 
 static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
@@ -211,7 +210,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
         return false;
     }
     if (s->auth && access(options->token_file, R_OK) != 0) /* now, as the user that the process has become */
-        log_write(s->log, LOG_WARN, "tokens_not_readable_again",
+        log_write(&s->log, LOG_WARN, "tokens_not_readable_again",
                   (log_field[]){LOG_S("file", options->token_file),
                                 LOG_S("user", options->user),
                                 LOG_S("cause", strerror(errno)),
@@ -224,15 +223,14 @@ static void forget_secrets(service *s)
     auth_free(s->auth);
     http_tls_clear(&s->tls);
     webhook_forget_secret(&s->hooks);
-    log_close(s->audit);
-    if (s->audit_file)
-        fclose(s->audit_file);
+    if (s->audit.stream)
+        fclose(s->audit.stream);
 }
 
 /* Legal at every stage of a start that failed. */
 static void end(service *s)
 {
-    http_stop(s->http);
+    http_stop(&s->http);
     webhooks_stop(s->webhooks);
     if (s->work) {
         work_stop(s->work, 0);
@@ -269,40 +267,21 @@ static void drain_until_stopped(service *s, double seconds)
     sigset_t expected = s->signals;
     int taken = 0;
     sigaddset(&expected, SIGUSR1);
-    http_drain(s->http);
+    transport_drain(s->http.transport);
     if (pthread_create(&thread, NULL, drain_work, &d) != 0) {
         work_stop(s->work, seconds);
         return;
     }
     while (sigwait(&expected, &taken) == 0 && taken != SIGUSR1) {
-        log_write(s->log, LOG_INFO, "drain_cut_short", (log_field[]){{0}});
+        log_write(&s->log, LOG_INFO, "drain_cut_short", (log_field[]){{0}});
         work_stop(s->work, 0);
     }
     pthread_join(thread, NULL);
 }
 
-/* What SIGHUP asks for: the tokens and the certificate anew, each as it was where its files are wrong. */
-static void read_again(const service *s, const server_options *options)
-{
-    char message[2 * OPTION_PATH + 256] = "";
-    http_tls fresh = {NULL, NULL};
-    if (s->auth && auth_reload(s->auth, message, sizeof message))
-        log_write(s->log, LOG_INFO, "tokens_reloaded", (log_field[]){{0}});
-    else if (s->auth)
-        log_write(s->log, LOG_ERROR, "tokens_kept", (log_field[]){LOG_S("cause", message), {0}});
-    if (!s->tls.cert)
-        return;
-    if (http_tls_read(&fresh, options->tls_cert, options->tls_key, message, sizeof message) &&
-        http_use_tls(s->http, &fresh, message, sizeof message))
-        log_write(s->log, LOG_INFO, "certificate_reloaded", (log_field[]){{0}});
-    else
-        log_write(s->log, LOG_ERROR, "certificate_kept", (log_field[]){LOG_S("cause", message), {0}});
-    http_tls_clear(&fresh);
-}
-
 static int run(service *s, const server_options *options)
 {
-    char url[160], message[OPTION_PATH + 512] = "";
+    char url[160], message[2 * OPTION_PATH + 512] = "";
     if (!start(s, options, url, sizeof url, message, sizeof message)) {
         fprintf(stderr, "uzawad: %s\n", message);
         end(s);
@@ -310,25 +289,36 @@ static int run(service *s, const server_options *options)
     }
     printf("listening on %s\n", url);
     fflush(stdout);
-    log_write(s->log, LOG_INFO, "started",
+    log_write(&s->log, LOG_INFO, "started",
               (log_field[]){LOG_S("url", url),
                             LOG_S("db", options->db),
                             LOG_I("workers", options->workers),
                             LOG_S("version", UZAWAD_VERSION),
                             {0}});
-    /* SIGHUP reads again what it can; where there is nothing it ends the daemon, as for every program of a terminal */
+    /* SIGHUP reads the tokens and the certificate anew, each stays as it was where its files are wrong; where there is
+     * nothing to read it ends the daemon, as for every program of a terminal */
     int taken = 0;
     while (sigwait(&s->signals, &taken) != 0 || (taken == SIGHUP && (s->auth || s->tls.cert))) {
-        if (taken == SIGHUP)
-            read_again(s, options);
+        if (taken == SIGHUP && s->auth && auth_reload(s->auth, message, sizeof message))
+            log_write(&s->log, LOG_INFO, "tokens_reloaded", (log_field[]){{0}});
+        else if (taken == SIGHUP && s->auth)
+            log_write(&s->log, LOG_ERROR, "tokens_kept", (log_field[]){LOG_S("cause", message), {0}});
+        http_tls fresh = {NULL, NULL};
+        if (taken == SIGHUP && s->tls.cert &&
+            http_tls_read(&fresh, options->tls_cert, options->tls_key, message, sizeof message) &&
+            transport_use_tls(s->http.transport, &fresh, message, sizeof message))
+            log_write(&s->log, LOG_INFO, "certificate_reloaded", (log_field[]){{0}});
+        else if (taken == SIGHUP && s->tls.cert)
+            log_write(&s->log, LOG_ERROR, "certificate_kept", (log_field[]){LOG_S("cause", message), {0}});
+        http_tls_clear(&fresh);
         taken = 0;
     }
     if (taken == SIGABRT) /* somebody wants a core file */
         abort();
-    log_write(s->log, LOG_INFO, "stopping", (log_field[]){LOG_S("signal", strsignal(taken)), {0}});
+    log_write(&s->log, LOG_INFO, "stopping", (log_field[]){LOG_S("signal", strsignal(taken)), {0}});
     drain_until_stopped(s, options->drain_s);
     end(s);
-    log_write(s->log, LOG_INFO, "stopped", (log_field[]){{0}});
+    log_write(&s->log, LOG_INFO, "stopped", (log_field[]){{0}});
     return EXIT_ENDED;
 }
 
@@ -336,14 +326,14 @@ static int run(service *s, const server_options *options)
 static int check_config(const server_options *options)
 {
     char message[OPTION_PATH + 512] = "", address[OPTION_PATH], url[160];
-    service s = {.log = log_open(stderr, LOG_ERROR)};
+    service s = {.log = {.lock = PTHREAD_MUTEX_INITIALIZER, .stream = stderr, .least = LOG_ERROR}};
     options_show(options, stdout);
     /* the address with a free port: the daemon that it is meant for may be running */
     snprintf(address, sizeof address, "%s", options->listen);
     char *port = strrchr(address, ':');
     if (port && port[1] && !port[1 + strspn(port + 1, "0123456789")] && atol(port + 1) <= 65535)
         strcpy(port + 1, "0");
-    const bool secrets = s.log && read_secrets(&s, options, message, sizeof message);
+    const bool secrets = read_secrets(&s, options, message, sizeof message);
     const int fd = secrets ? http_listen(address, "http", url, sizeof url, message, sizeof message) : -1;
     const bool good = fd >= 0 && check_exposure(&s, options, fd, message, sizeof message);
     if (fd >= 0)
@@ -351,7 +341,6 @@ static int check_config(const server_options *options)
     if (!good)
         fprintf(stderr, "uzawad: %s\n", message);
     forget_secrets(&s);
-    log_close(s.log);
     return good ? EXIT_ENDED : EXIT_FAILED;
 }
 
@@ -377,23 +366,11 @@ static int check_db(const char *path)
     return whole ? EXIT_ENDED : EXIT_FAILED;
 }
 
-/* --backup */
-static int backup_db(const char *path, const char *to)
-{
-    char message[2 * OPTION_PATH + 512] = "";
-    int64_t bytes = 0;
-    if (!store_backup_file(path, to, &bytes, message, sizeof message)) {
-        fprintf(stderr, "uzawad: %s\n", message);
-        return EXIT_FAILED;
-    }
-    printf("%s: %lld bytes\n", to, (long long)bytes);
-    return EXIT_ENDED;
-}
-
 int main(int argc, char **argv)
 {
     server_options options;
-    char message[OPTION_PATH + 512], backup[OPTION_PATH];
+    char message[2 * OPTION_PATH + 512], backup[OPTION_PATH];
+    int64_t bytes = 0;
     if (argc > 1 && strcmp(argv[1], SOLVER_ROLE) == 0)
         return solver_process(argc, argv);
     switch (options_read(&options, argc, argv, backup, message, sizeof message)) {
@@ -414,20 +391,24 @@ int main(int argc, char **argv)
     case OPTIONS_CHECK_DB:
         return check_db(options.db);
     case OPTIONS_BACKUP:
-        return backup_db(options.db, backup);
+        if (!store_backup_file(options.db, backup, &bytes, message, sizeof message)) {
+            fprintf(stderr, "uzawad: %s\n", message);
+            return EXIT_FAILED;
+        }
+        printf("%s: %lld bytes\n", backup, (long long)bytes);
+        return EXIT_ENDED;
     case OPTIONS_RUN:
         break;
     }
     service s = {0};
     own_signals(argv, &s.signals);
-    s.log = log_open(stderr, (log_level)options.level);
+    s.log = (server_log){.lock = PTHREAD_MUTEX_INITIALIZER, .stream = stderr, .least = (log_level)options.level};
     s.metrics = metrics_new();
-    if (!s.log || !s.metrics) {
+    if (!s.metrics) {
         fprintf(stderr, "uzawad: no memory\n");
         return EXIT_FAILED;
     }
     int status = run(&s, &options);
     metrics_free(s.metrics);
-    log_close(s.log);
     return status;
 }

@@ -3,36 +3,9 @@
 #include "text/utf8.h"
 
 #include <math.h>
-#include <pthread.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-
-struct server_log {
-    pthread_mutex_t lock; /* stream */
-    FILE *stream;
-    log_level least;
-};
-
-server_log *log_open(FILE *stream, log_level least)
-{
-    server_log *log = calloc(1, sizeof *log);
-    if (!log)
-        return NULL;
-    pthread_mutex_init(&log->lock, NULL);
-    log->stream = stream;
-    log->least = least;
-    return log;
-}
-
-void log_close(server_log *log)
-{
-    if (!log)
-        return;
-    pthread_mutex_destroy(&log->lock);
-    free(log);
-}
 
 static void write_string(FILE *out, const char *text)
 {

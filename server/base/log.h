@@ -2,13 +2,15 @@
 #ifndef SERVER_LOG_H
 #define SERVER_LOG_H
 
+#include <pthread.h>
 #include <stdio.h>
 
 typedef enum { LOG_DEBUG, LOG_INFO, LOG_WARN, LOG_ERROR } log_level;
-typedef struct server_log server_log;
-
-server_log *log_open(FILE *stream, log_level least);
-void log_close(server_log *log);
+typedef struct {
+    pthread_mutex_t lock; /* the stream; PTHREAD_MUTEX_INITIALIZER */
+    FILE *stream;
+    log_level least;
+} server_log;
 
 /* A named value of a log line. */
 typedef struct {

@@ -154,7 +154,8 @@ static void write_histogram(FILE *out, const char *name, const char *labels, con
     fprintf(out, "uzawad_%s_count%s%.*s%s %" PRIu64 "\n", name, open, shown, labels, close, sum);
 }
 
-static void write_counters(const metrics *m, FILE *out)
+/* All that was counted. */
+static void write_counted(const metrics *m, FILE *out)
 {
     static const struct {
         const char *name, *help;
@@ -172,6 +173,11 @@ static void write_counters(const metrics *m, FILE *out)
         [METRIC_RATE_LIMITED] = {"http_rate_limited_total", "Requests answered 429."},
         [METRIC_UNAUTHORIZED] = {"http_unauthorized_total", "Requests answered 401 or 403 for their token."},
     };
+    static const char *const PHASES[METRIC_HISTOGRAMS] = {
+        [METRIC_QUEUE] = "queue",     [METRIC_PARSE] = "parse",     [METRIC_ASSEMBLE] = "assemble",
+        [METRIC_ORDER] = "order",     [METRIC_FACTOR] = "factor",   [METRIC_CONDENSE] = "condense",
+        [METRIC_ITERATE] = "iterate", [METRIC_CERTIFY] = "certify", [METRIC_TOTAL] = "total"};
+    char labels[160];
     for (size_t i = 0; i < METRIC_COUNTERS; i++) {
         write_head(out, ROWS[i].name, "counter", ROWS[i].help);
         fprintf(out, "uzawad_%s %" PRIu64 "\n", ROWS[i].name, m->counters[i]);
@@ -183,15 +189,6 @@ static void write_counters(const metrics *m, FILE *out)
     write_head(out, "http_requests_total", "counter", "Requests by status code; 0: no reply was sent.");
     for (size_t i = 0; i < m->n_codes; i++)
         fprintf(out, "uzawad_http_requests_total{code=\"%d\"} %" PRIu64 "\n", m->codes[i].code, m->codes[i].count);
-}
-
-static void write_histograms(const metrics *m, FILE *out)
-{
-    static const char *const PHASES[METRIC_HISTOGRAMS] = {
-        [METRIC_QUEUE] = "queue",     [METRIC_PARSE] = "parse",     [METRIC_ASSEMBLE] = "assemble",
-        [METRIC_ORDER] = "order",     [METRIC_FACTOR] = "factor",   [METRIC_CONDENSE] = "condense",
-        [METRIC_ITERATE] = "iterate", [METRIC_CERTIFY] = "certify", [METRIC_TOTAL] = "total"};
-    char labels[160];
     write_head(out, "store_commit_seconds", "histogram", "Time of a commit, which is on disk after it.");
     write_histogram(out, "store_commit_seconds", "", &m->histograms[METRIC_COMMIT]);
     write_head(out, "job_phase_seconds", "histogram", "Time of a job's phases; total is from its submission.");
@@ -251,8 +248,7 @@ char *metrics_text(metrics *m, const metrics_now *now, size_t *len)
     memcpy(copy, m, sizeof *copy);
     pthread_mutex_unlock(&m->lock);
     write_now(copy, now, out);
-    write_counters(copy, out);
-    write_histograms(copy, out);
+    write_counted(copy, out);
     free(copy);
 
     /* The names that Prometheus's client libraries use for a process. Source: Prometheus documentation, "Writing client

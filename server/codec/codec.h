@@ -7,6 +7,7 @@
 #define SERVER_CODEC_H
 
 #include "base/problem_details.h"
+#include "codec/json.h"
 #include "store/store.h"
 #include "store/uploads.h"
 #include "uzawa.h"
@@ -82,8 +83,6 @@ bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u,
  * that continues `id`. malloc'ed; NULL: *problem says why. */
 char *codec_refine(const char *old, size_t old_len, const char *id, const char *body, size_t len, size_t *out_len,
                    problem_details *problem);
-/* True if a valid stored body is one of POST /v1/verify. */
-bool codec_is_verify(const char *body, size_t len);
 /* True if two valid requests have the same problem and cases, byte by byte. */
 bool codec_same_problem(const char *a, size_t a_len, const char *b, size_t b_len);
 
@@ -105,15 +104,11 @@ char *codec_encode_job(const job *j);
 char *codec_encode_jobs(const job *jobs, size_t count,
                         bool more); /* {"jobs": [...], "next": cursor or null, "links": ...} */
 
-/* A summary of this service, read back from its text, which must outlive it. NULL: no memory. */
-typedef struct codec_summary codec_summary;
-codec_summary *codec_summary_read(const char *json);
-void codec_summary_free(codec_summary *summary); /* NULL is fine */
-/* The number of this name (codec/quantity.h). False: there is no such entry. True: *value, NaN where it is not known.
- */
-bool codec_summary_number(double *value, const codec_summary *summary, const char *name);
+/* A summary of this service, read back from its text, which must outlive it: its numbers by quantity_read. False: no
+ * memory, and *out is empty. json_clear in every case. */
+bool codec_summary_read(json_tree *out, const char *json);
 /* The text at a name like "problem.kind"; "": it has none, or summary is NULL. Lives as long as the summary. */
-const char *codec_summary_text(const codec_summary *summary, const char *name);
+const char *codec_summary_text(const json_value *summary, const char *name);
 
 /* How many cases of a job ended in each way. */
 #define CODEC_OUTCOMES (UZ_MOVING_GEOMETRY + 1)
@@ -154,15 +149,12 @@ char *codec_encode_valid(const uz_prediction *predicted);
 /* The data of a progress event; row: the newest of the history, or NULL. */
 char *codec_encode_progress(int progress, const double *row);
 char *codec_encode_upload(const upload_info *info);
-/* What a check of the database found, one finding a line. */
-char *codec_encode_findings(const char *findings, int64_t jobs, double seconds);
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers);
 /* A bound that holds for this service. */
 typedef struct {
     const char *name, *unit, *meaning;
     double value; /* infinity: no bound */
 } codec_limit;
-char *codec_encode_limits(const codec_limit *limits, size_t count);
 
 /* A result as GET /v1/jobs/{id}/result answers it. Vectors that were not asked for are NULL. dim 0: plain numbers;
  * 2, 3: displacements and nodes are written as [[x, y], ...]. Doubles are written with the digits that read back
@@ -182,12 +174,12 @@ typedef struct {
 } codec_result;
 char *codec_encode_result(const codec_result *result, size_t *len);
 
-/* The answers of many cases in one text, case by case, so that only one case's vectors need be there at a time. */
-typedef struct codec_results codec_results;
-codec_results *codec_results_begin(const char *job_id, const char *summary); /* NULL: no memory */
-void codec_results_add(codec_results *all, const codec_result *one);         /* job_id, nodes, contact_nodes unused */
-/* Ends the text and frees `all`; shared: nodes and contact_nodes. NULL: no memory. shared NULL frees only. */
-char *codec_results_end(codec_results *all, const codec_result *shared, size_t *len);
+/* Pieces of such a text, for the answers of many cases in one, of which only one case's vectors need be there at a
+ * time: an item of "cases", which has all but the job, nodes and contact_nodes (unless own_rows); and these, once for
+ * all. */
+struct text;
+void codec_put_case(struct text *t, const codec_result *one);
+void codec_put_places(struct text *t, const codec_result *shared);
 
 /* The surface of a deformed body as a binary glTF file. NULL: no memory. */
 typedef struct {

@@ -18,7 +18,7 @@ bool codec_init(const codec_limits *given, char *message, size_t size)
 {
     codec_end();
     limits = NO_LIMITS; /* the schemas are no request */
-    loaded = schemas_load(message, size);
+    loaded = schemas_load(NULL, 0, message, size);
     limits = given ? *given : NO_LIMITS;
     return loaded != NULL;
 }
@@ -200,8 +200,8 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
                *from = json_text(json_get(start, "job"));
     text t = {0};
     decode_settings(&out->settings, solver);
-    out->priority = (int)decode_number(root, "priority", 0);
-    out->queue_limit_s = decode_number(root, "queue_limit_s", 0);
+    out->priority = (int)json_number(json_get(root, "priority"), 0);
+    out->queue_limit_s = json_number(json_get(root, "queue_limit_s"), 0);
     out->webhook = webhook ? strdup(webhook) : NULL;
     if (webhook && !out->webhook)
         return problem_no_memory(d->problem);
@@ -244,7 +244,9 @@ bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t 
 {
     json_tree tree;
     codec_request request = {.tags = NULL};
-    decoding d = {.store = uploads, .bound = decode_memory_bound(len), .problem = problem};
+    /* A matrix that can be solved has an entry of at least six bytes of text for each unknown, so no honest request
+     * comes near this; a size line alone must not fill the machine. */
+    decoding d = {.store = uploads, .bound = ((size_t)64 << 20) + 32 * len, .problem = problem};
     *out = request;
     if (!json_scan(&tree, body, len, problem))
         return false;

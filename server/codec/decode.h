@@ -15,12 +15,10 @@ typedef struct {
     struct store *store; /* where uploads are read that it names; NULL: there are none */
     char (*uploads)[65]; /* n_uploads ids that were read, each once; who takes them sets it to NULL */
     size_t n_uploads;
-    size_t bound; /* bytes that one matrix or vector may take: decode_memory_bound */
+    size_t bound; /* bytes that one matrix or vector may take */
     problem_details *problem;
 } decoding;
 
-/* What one matrix or vector of a request of so many bytes may take. */
-size_t decode_memory_bound(size_t body_len);
 /* The schema files; set while the codec is. */
 const schemas *decode_schemas(void);
 
@@ -52,8 +50,6 @@ bool decode_unsafe(const char *text, size_t len);
 /* A short text of the user's, label[0..len): 1 to 63 bytes without such characters, since it is compared as a C
  * string by the store and shown in terminals. at: where the refusal points; what: "A name of a case". */
 bool decode_label(char out[64], decoding *d, const json_value *at, const char *label, size_t len, const char *what);
-/* A number of an object that may be absent. */
-double decode_number(const json_value *object, const char *key, double otherwise);
 /* The vector `key` of an object into out[0..dim), `otherwise` in what is absent and 0 beyond dim; false if it has not
  * dim numbers, or if it is zero where it must not be: what: "it must point out of the obstacle", or NULL. */
 bool decode_components(double out[3], decoding *d, const json_value *object, const char *key, double otherwise, int dim,

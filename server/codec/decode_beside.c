@@ -107,14 +107,14 @@ void decode_settings(uz_settings *out, const json_value *object)
             s.balanced = LEVELS[i].balanced;
         }
     s.guaranteed = json_truth(json_get(accuracy, "guaranteed"));
-    s.total_error = decode_number(accuracy, "total", 0);
+    s.total_error = json_number(json_get(accuracy, "total"), 0);
     if (s.total_error > 0) /* the equations may have a tenth of it */
         s.relative_error = 0.1 * s.total_error;
-    s.relative_error = decode_number(accuracy, "relative_error", s.relative_error);
-    s.epsilon = decode_number(object, "epsilon", 1e-6);
-    s.alpha = decode_number(object, "alpha", s.alpha);
-    s.max_iterations = (int64_t)decode_number(object, "max_iterations", (double)s.max_iterations);
-    s.time_limit_s = decode_number(object, "time_limit_s", s.time_limit_s);
+    s.relative_error = json_number(json_get(accuracy, "relative_error"), s.relative_error);
+    s.epsilon = json_number(json_get(object, "epsilon"), 1e-6);
+    s.alpha = json_number(json_get(object, "alpha"), s.alpha);
+    s.max_iterations = (int64_t)json_number(json_get(object, "max_iterations"), (double)s.max_iterations);
+    s.time_limit_s = json_number(json_get(object, "time_limit_s"), s.time_limit_s);
     s.semidefinite = json_truth(json_get(object, "semidefinite"));
     *out = s;
 }
@@ -134,7 +134,7 @@ bool decode_quantities(uz_problem *problem, uz_settings *settings, decoding *d, 
         return problem_no_memory(d->problem);
     problem->n_quantities = count;
     problem->quantities[0].asked = asked;
-    settings->quantity_error = decode_number(accuracy, "relative", 0);
+    settings->quantity_error = json_number(json_get(accuracy, "relative"), 0);
     for (int64_t i = 0; i < count; i++) {
         const json_value *item = i < first ? accuracy : &list->items[i - first];
         const json_value *window = json_get(item, "window"), *name = json_get(item, "name");
@@ -218,11 +218,11 @@ bool decode_assertions(codec_request *out, decoding *d, const json_value *list)
         memcpy(a->quantity, quantity->text, quantity->count + 1);
         if (!check_named(out, d, quantity))
             return false;
-        a->least = decode_number(object, "min", (double)NAN);
-        a->most = decode_number(object, "max", (double)NAN);
-        a->near = decode_number(object, "near", (double)NAN);
-        a->absolute = decode_number(object, "absolute", (double)NAN);
-        a->relative = decode_number(object, "relative", (double)NAN);
+        a->least = json_number(json_get(object, "min"), (double)NAN);
+        a->most = json_number(json_get(object, "max"), (double)NAN);
+        a->near = json_number(json_get(object, "near"), (double)NAN);
+        a->absolute = json_number(json_get(object, "absolute"), (double)NAN);
+        a->relative = json_number(json_get(object, "relative"), (double)NAN);
         if ((name && !decode_label(a->name, d, name, name->text, name->count, "The name of an assertion")) ||
             (of && !decode_label(a->case_name, d, of, of->text, of->count, "A name of a case")))
             return false;

@@ -63,14 +63,6 @@ static bool add_upper_half(decoding *d, uz_csc *A)
     return good || refuse_call(d, &err, "N");
 }
 
-/* A member that does not go with K. */
-static bool refuse_size(decoding *d, const uz_qp *out, const json_value *at, int64_t rows, int64_t cols,
-                        const char *should)
-{
-    return decode_refuse(d, "size_mismatch", at, "is %lld x %lld, but K is %lld x %lld; %s.", (long long)rows,
-                         (long long)cols, (long long)out->K.rows, (long long)out->K.cols, should);
-}
-
 bool decode_matrices(uz_qp *out, decoding *d, const json_value *object)
 {
     uz_mm_info info;
@@ -90,7 +82,8 @@ bool decode_matrices(uz_qp *out, decoding *d, const json_value *object)
     if (!decode_vector(&out->p, &n, d, p))
         return false;
     if (n != K->rows)
-        return refuse_size(d, out, p, n, 1, "p needs a number for each row");
+        return decode_refuse(d, "size_mismatch", p, "is %lld x 1, but K is %lld x %lld; p needs a number for each row.",
+                             (long long)n, (long long)K->rows, (long long)K->cols);
 
     /* without N there are no contacts */
     if (!of_N && uz_csc_init(N, 0, K->cols, 0, &err) != UZ_OK)
@@ -98,7 +91,9 @@ bool decode_matrices(uz_qp *out, decoding *d, const json_value *object)
     if (of_N && !read_matrix(N, &info, d, of_N, "N"))
         return false;
     if (N->cols != K->cols)
-        return refuse_size(d, out, of_N, N->rows, N->cols, "they must have as many columns");
+        return decode_refuse(d, "size_mismatch", of_N,
+                             "is %lld x %lld, but K is %lld x %lld; they must have as many columns.",
+                             (long long)N->rows, (long long)N->cols, (long long)K->rows, (long long)K->cols);
     if (of_N && info.symmetry != UZ_MM_GENERAL && !add_upper_half(d, N))
         return false;
     if (h ? !decode_vector(&out->h, &m, d, h) : !(out->h = room_for(0, sizeof(double))))

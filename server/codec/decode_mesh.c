@@ -113,28 +113,6 @@ static bool read_faces(uz_given_group *to, decoding *d, const json_value *value,
     return true;
 }
 
-static bool read_groups(uz_given_mesh *to, decoding *d, const json_value *groups, int dim)
-{
-    const char *key = dim == 2 ? "edges" : "faces", *other = dim == 2 ? "faces" : "edges";
-    int64_t count;
-    to->groups = decode_room(d, groups, sizeof *to->groups, &count);
-    for (int64_t i = 0; i < count; i++) {
-        const json_value *item = &groups->items[i], *wrong = json_get(item, other);
-        uz_given_group *group = &to->groups[to->n_groups++];
-        if (!decode_label(group->name, d, item->parent, item->key, item->place, "A name of a group"))
-            return false;
-        if (wrong)
-            return decode_refuse(d, "not_allowed", wrong,
-                                 dim == 2 ? "is for solids; sides of plane meshes are edges."
-                                          : "is for plane meshes; sides of solids are faces.");
-        if (!read_list(&group->node, &group->n_nodes, d, json_get(item, "nodes")) ||
-            !read_faces(group, d, json_get(item, key), dim) ||
-            !read_list(&group->element, &group->n_elements, d, json_get(item, "elements")))
-            return false;
-    }
-    return to->groups != NULL;
-}
-
 bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh)
 {
     const json_value *gmsh = json_get(mesh, "gmsh"), *nodes = json_get(mesh, "nodes");
@@ -168,5 +146,25 @@ bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh)
                     dim, columns, dim == 3 ? "solid" : "one in the plane");
         return false;
     }
-    return read_elements(to, d, json_get(mesh, "elements")) && read_groups(to, d, json_get(mesh, "groups"), dim);
+    if (!read_elements(to, d, json_get(mesh, "elements")))
+        return false;
+    const json_value *groups = json_get(mesh, "groups");
+    const char *key = dim == 2 ? "edges" : "faces", *other = dim == 2 ? "faces" : "edges";
+    int64_t count;
+    to->groups = decode_room(d, groups, sizeof *to->groups, &count);
+    for (int64_t i = 0; i < count; i++) {
+        const json_value *item = &groups->items[i], *wrong = json_get(item, other);
+        uz_given_group *group = &to->groups[to->n_groups++];
+        if (!decode_label(group->name, d, item->parent, item->key, item->place, "A name of a group"))
+            return false;
+        if (wrong)
+            return decode_refuse(d, "not_allowed", wrong,
+                                 dim == 2 ? "is for solids; sides of plane meshes are edges."
+                                          : "is for plane meshes; sides of solids are faces.");
+        if (!read_list(&group->node, &group->n_nodes, d, json_get(item, "nodes")) ||
+            !read_faces(group, d, json_get(item, key), dim) ||
+            !read_list(&group->element, &group->n_elements, d, json_get(item, "elements")))
+            return false;
+    }
+    return to->groups != NULL;
 }

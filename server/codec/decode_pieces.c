@@ -64,11 +64,6 @@ bool decode_label(char out[64], decoding *d, const json_value *at, const char *l
     return fits;
 }
 
-double decode_number(const json_value *object, const char *key, double otherwise)
-{
-    return json_number(json_get(object, key), otherwise);
-}
-
 bool decode_components(double out[3], decoding *d, const json_value *object, const char *key, double otherwise, int dim,
                        const char *what)
 {
@@ -86,13 +81,6 @@ bool decode_components(double out[3], decoding *d, const json_value *object, con
 }
 
 /* ---- texts, in the request or uploaded before */
-
-/* A matrix that can be solved has an entry of at least six bytes of text for each unknown, so no honest request comes
- * near this; a size line alone must not fill the machine. */
-size_t decode_memory_bound(size_t body_len)
-{
-    return ((size_t)64 << 20) + 32 * body_len;
-}
 
 bool decode_source_open(decode_source *out, decoding *d, const json_value *value)
 {

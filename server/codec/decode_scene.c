@@ -9,16 +9,6 @@
 
 static const double MAX_CELLS = 1e7; /* keeps a tiny request from asking for a mesh that fills the machine */
 
-/* The place of a word among names; 0, the default, where there is none. */
-static int word_of(const json_value *object, const char *key, const char *const *names, int count)
-{
-    const json_value *word = json_get(object, key);
-    for (int i = 0; i < count; i++)
-        if (json_text_is(word, names[i]))
-            return i;
-    return 0;
-}
-
 /* ---- mesh */
 
 static bool decode_box(uz_scene *out, decoding *d, const json_value *box)
@@ -46,31 +36,6 @@ static bool decode_box(uz_scene *out, decoding *d, const json_value *box)
 
 /* ---- lists */
 
-static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
-{
-    static const char *const KEYS[3] = {"ux", "uy", "uz"};
-    const int dim = uz_scene_dim(out);
-    bool good = true;
-    out->supports = decode_room(d, list, sizeof *out->supports, &out->n_supports);
-    for (int64_t i = 0; i < out->n_supports && good; i++) {
-        const json_value *item = &list->items[i];
-        uz_support *to = &out->supports[i];
-        decode_name(to->on, sizeof to->on, item, "on", "");
-        for (int c = 0; c < 3; c++)
-            to->u[c] = decode_number(item, KEYS[c], (double)NAN);
-        to->kind = UZ_SUPPORT_COMPONENTS;
-        if (json_get(item, "normal")) {
-            to->kind = UZ_SUPPORT_NORMAL;
-            to->value = decode_number(item, "u", 0);
-            good = decode_components(to->normal, d, item, "normal", 0, dim, "it must be the direction that is held");
-        } else if (json_get(item, "spring")) {
-            to->kind = UZ_SUPPORT_SPRING;
-            good = decode_components(to->spring, d, item, "spring", 0, dim, NULL);
-        }
-    }
-    return out->supports && good;
-}
-
 bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list, int dim)
 {
     static const struct {
@@ -89,7 +54,7 @@ bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list
             if (!json_get(item, LOADS[k].key))
                 continue;
             to->kind = LOADS[k].kind;
-            to->value = LOADS[k].vector ? 0 : decode_number(item, LOADS[k].key, 0);
+            to->value = LOADS[k].vector ? 0 : json_number(json_get(item, LOADS[k].key), 0);
             if (LOADS[k].vector && !decode_components(to->v, d, item, LOADS[k].key, 0, dim, NULL))
                 return false;
         }
@@ -213,13 +178,13 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
         to->kind = UZ_OBSTACLE_BODY;
         to->between = json_text_is(json_get(item, "discretization"), "nodes") ? UZ_CONTACT_NODES : UZ_CONTACT_SURFACES;
         to->faceted = json_is(json_get(item, "smooth"), JSON_IS_BOOLEAN) && !json_truth(json_get(item, "smooth"));
-        to->feature_angle = decode_number(item, "feature_angle", 0);
+        to->feature_angle = json_number(json_get(item, "feature_angle"), 0);
         for (size_t k = 0; k < sizeof SHAPES / sizeof SHAPES[0]; k++) {
             const obstacle o = {to, d, json_get(given, SHAPES[k].key), uz_scene_dim(out)};
             if (!o.shape)
                 continue;
             to->kind = SHAPES[k].kind;
-            to->radius = decode_number(o.shape, "radius", 0);
+            to->radius = json_number(json_get(o.shape, "radius"), 0);
             to->inside = json_truth(json_get(o.shape, "inside"));
             if ((SHAPES[k].point && !decode_components(to->point, d, o.shape, SHAPES[k].point, 0, o.dim, NULL)) ||
                 (SHAPES[k].direction &&
@@ -235,30 +200,55 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
 
 bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
 {
-    static const char *const MODELS[] = {"plane_stress", "plane_strain", "axisymmetric", "solid"};
-    static const char *const FORMULATIONS[] = {"auto", "standard", "bbar", "incompatible_modes"};
-    static const char *const KINEMATICS[] = {"auto", "fixed", "moving"};
+    static const struct {
+        const char *key, *names[4]; /* the first is the default; in the order of the library's enums */
+    } WORDS[] = {{"model", {"plane_stress", "plane_strain", "axisymmetric", "solid"}},
+                 {"formulation", {"auto", "standard", "bbar", "incompatible_modes"}},
+                 {"kinematics", {"auto", "fixed", "moving"}}};
+    static const char *const COMPONENTS[] = {"ux", "uy", "uz"};
     const json_value *mesh = json_get(object, "mesh"), *box = json_get(mesh, "box");
-    const json_value *materials = json_get(object, "materials");
-    out->model = (uz_model)word_of(object, "model", MODELS, 4);
-    out->formulation = (uz_formulation)word_of(object, "formulation", FORMULATIONS, 4);
-    out->kinematics = (uz_kinematics)word_of(object, "kinematics", KINEMATICS, 3);
-    out->thickness = decode_number(object, "thickness", 1);
+    const json_value *materials = json_get(object, "materials"), *supports = json_get(object, "supports");
+    int words[3] = {0};
+    for (size_t k = 0; k < 3; k++)
+        for (int i = 0; i < 4 && WORDS[k].names[i]; i++)
+            if (json_text_is(json_get(object, WORDS[k].key), WORDS[k].names[i]))
+                words[k] = i;
+    out->model = (uz_model)words[0];
+    out->formulation = (uz_formulation)words[1];
+    out->kinematics = (uz_kinematics)words[2];
+    out->thickness = json_number(json_get(object, "thickness"), 1);
     out->all_candidates = json_text_is(json_get(object, "candidates"), "all");
     if (box ? !decode_box(out, d, box) : !decode_mesh(out, d, mesh))
         return false;
     out->refine = json_get(mesh, "refine") != NULL; /* "auto" is all that it can be */
+    const int dim = uz_scene_dim(out);
     out->materials = decode_room(d, materials, sizeof *out->materials, &out->n_materials);
     for (int64_t i = 0; i < out->n_materials; i++) {
         const json_value *item = &materials->items[i];
         uz_material *to = &out->materials[i];
         decode_name(to->on, sizeof to->on, item, "on", "");
-        to->young = decode_number(item, "young", 0);
-        to->poisson = decode_number(item, "poisson", 0);
-        to->density = decode_number(item, "density", 0);
-        to->expansion = decode_number(item, "expansion", 0);
+        to->young = json_number(json_get(item, "young"), 0);
+        to->poisson = json_number(json_get(item, "poisson"), 0);
+        to->density = json_number(json_get(item, "density"), 0);
+        to->expansion = json_number(json_get(item, "expansion"), 0);
     }
-    return out->materials && decode_supports(out, d, json_get(object, "supports")) &&
-           decode_loads(&out->loads, &out->n_loads, d, json_get(object, "loads"), uz_scene_dim(out)) &&
+    bool good = out->materials && (out->supports = decode_room(d, supports, sizeof *out->supports, &out->n_supports));
+    for (int64_t i = 0; i < out->n_supports && good; i++) {
+        const json_value *item = &supports->items[i];
+        uz_support *to = &out->supports[i];
+        decode_name(to->on, sizeof to->on, item, "on", "");
+        for (int c = 0; c < 3; c++)
+            to->u[c] = json_number(json_get(item, COMPONENTS[c]), (double)NAN);
+        to->kind = UZ_SUPPORT_COMPONENTS;
+        if (json_get(item, "normal")) {
+            to->kind = UZ_SUPPORT_NORMAL;
+            to->value = json_number(json_get(item, "u"), 0);
+            good = decode_components(to->normal, d, item, "normal", 0, dim, "it must be the direction that is held");
+        } else if (json_get(item, "spring")) {
+            to->kind = UZ_SUPPORT_SPRING;
+            good = decode_components(to->spring, d, item, "spring", 0, dim, NULL);
+        }
+    }
+    return good && decode_loads(&out->loads, &out->n_loads, d, json_get(object, "loads"), dim) &&
            decode_contacts(out, d, json_get(object, "contacts"));
 }

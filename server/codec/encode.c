@@ -170,7 +170,7 @@ char *codec_encode_valid(const uz_prediction *predicted)
         text_open(&t, NULL, '{');
         text_integer(&t, "d", predicted->d);
         text_integer(&t, "m", predicted->m);
-        text_string(&t, "operator", uz_operator_name(predicted->op));
+        text_string(&t, "operator", uz_choice_name(UZ_CHOICE_OPERATOR, predicted->op));
         text_integer(&t, "factor_nnz", predicted->factor_nnz);
         text_number(&t, "bytes", predicted->bytes);
         text_number(&t, "seconds", predicted->seconds);
@@ -205,43 +205,6 @@ char *codec_encode_upload(const upload_info *info)
     text_open(&t, "links", '[');
     put_link(&t, "self", "uploads", info->id, "");
     text_close(&t, ']');
-    text_close(&t, '}');
-    return text_finish(&t, NULL);
-}
-
-char *codec_encode_findings(const char *findings, int64_t jobs, double seconds)
-{
-    text t = {0};
-    char line[512];
-    text_open(&t, NULL, '{');
-    text_bool(&t, "whole", findings[0] == '\0');
-    text_open(&t, "findings", '[');
-    for (const char *at = findings; *at;) {
-        size_t len = strcspn(at, "\n");
-        snprintf(line, sizeof line, "%.*s", (int)len, at);
-        text_string(&t, NULL, line);
-        at += len + (at[len] == '\n');
-    }
-    text_close(&t, ']');
-    text_integer(&t, "jobs", jobs);
-    text_number(&t, "seconds", seconds);
-    text_close(&t, '}');
-    return text_finish(&t, NULL);
-}
-
-char *codec_encode_limits(const codec_limit *limits, size_t count)
-{
-    text t = {0};
-    text_open(&t, NULL, '{');
-    text_open(&t, "limits", '{');
-    for (size_t i = 0; i < count; i++) {
-        text_open(&t, limits[i].name, '{');
-        text_number(&t, "value", limits[i].value);
-        text_string(&t, "unit", limits[i].unit);
-        text_string(&t, "description", limits[i].meaning);
-        text_close(&t, '}');
-    }
-    text_close(&t, '}');
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }

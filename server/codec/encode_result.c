@@ -55,7 +55,7 @@ static void put_fields(text *t, const codec_result *result)
     }
 }
 
-static void put_places(text *t, const codec_result *result)
+void codec_put_places(text *t, const codec_result *result)
 {
     if (result->part)
         text_integer(t, "from", result->from);
@@ -72,52 +72,20 @@ char *codec_encode_result(const codec_result *result, size_t *len)
         text_string(&t, "case", result->case_name);
     text_raw(&t, "summary", result->summary);
     put_fields(&t, result);
-    put_places(&t, result);
+    codec_put_places(&t, result);
     text_close(&t, '}');
     return text_finish(&t, len);
 }
 
-/* ---- many cases */
-
-struct codec_results {
-    text t;
-};
-
-codec_results *codec_results_begin(const char *job_id, const char *summary)
+void codec_put_case(text *t, const codec_result *one)
 {
-    codec_results *all = calloc(1, sizeof *all);
-    if (!all)
-        return NULL;
-    text_open(&all->t, NULL, '{');
-    text_string(&all->t, "job", job_id);
-    text_raw(&all->t, "summary", summary);
-    text_open(&all->t, "cases", '[');
-    return all;
-}
-
-void codec_results_add(codec_results *all, const codec_result *one)
-{
-    text_open(&all->t, NULL, '{');
-    text_string(&all->t, "name", one->case_name);
-    text_raw(&all->t, "summary", one->summary);
-    put_fields(&all->t, one);
+    text_open(t, NULL, '{');
+    text_string(t, "name", one->case_name);
+    text_raw(t, "summary", one->summary);
+    put_fields(t, one);
     if (one->own_rows)
-        put_vector(&all->t, "contact_nodes", one->contact_nodes, one->m, 0);
-    text_close(&all->t, '}');
-}
-
-char *codec_results_end(codec_results *all, const codec_result *shared, size_t *len)
-{
-    if (all && shared) {
-        text_close(&all->t, ']');
-        put_places(&all->t, shared);
-        text_close(&all->t, '}');
-    }
-    char *finished = all && shared ? text_finish(&all->t, len) : NULL;
-    if (all)
-        free(all->t.data); /* NULL after the end */
-    free(all);
-    return finished;
+        put_vector(t, "contact_nodes", one->contact_nodes, one->m, 0);
+    text_close(t, '}');
 }
 
 const char *const CODEC_HISTORY_NAMES[CODEC_HISTORY_COLUMNS] = {

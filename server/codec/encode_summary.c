@@ -12,17 +12,15 @@ typedef struct {
     double value;
 } named;
 
-static void put_named(text *t, const named *list, size_t count)
+/* In an object under this key; NULL: in the one that is open. */
+static void put_named(text *t, const char *key, const named *list, size_t count)
 {
+    if (key)
+        text_open(t, key, '{');
     for (size_t i = 0; i < count; i++)
         text_number(t, list[i].key, list[i].value);
-}
-
-static void put_object(text *t, const char *key, const named *list, size_t count)
-{
-    text_open(t, key, '{');
-    put_named(t, list, count);
-    text_close(t, '}');
+    if (key)
+        text_close(t, '}');
 }
 
 static void put_resultant(text *t, const char *key, const uz_resultant *r, int dim)
@@ -41,12 +39,12 @@ static void put_surfaces(text *t, const uz_evaluation *e, int dim)
     double depth = 0;
     for (int64_t k = 0; k < e->n_contacts; k++)
         depth = e->overlap[k].depth > depth ? e->overlap[k].depth : depth; /* not those that are no number */
-    put_named(t, (named[]){{"geometric_penetration", depth}, {"approach", e->approach}}, 2);
+    put_named(t, NULL, (named[]){{"geometric_penetration", depth}, {"approach", e->approach}}, 2);
     text_open(t, "penetrations", '[');
     for (int64_t k = 0; k < e->n_contacts; k++) {
         const uz_overlap *o = &e->overlap[k];
         text_open(t, NULL, '{');
-        put_named(t, (named[]){{"geometric_penetration", o->depth}, {"sagitta", o->facets}}, 2);
+        put_named(t, NULL, (named[]){{"geometric_penetration", o->depth}, {"sagitta", o->facets}}, 2);
         if (o->depth > 0)
             text_numbers(t, "at", o->at, dim);
         text_close(t, '}');
@@ -68,10 +66,10 @@ static void put_surfaces(text *t, const uz_evaluation *e, int dim)
             text_numbers(t, "point", s->point, s->dim);
         if (s->dim > 0 && strcmp(s->shape, "sphere") != 0)
             text_numbers(t, "axis", s->axis, s->dim);
-        put_named(t, (named[]){{"radius", s->radius}}, s->radius > 0);
-        put_named(t, (named[]){{"tube", s->tube}}, s->tube > 0);
-        put_named(t, (named[]){{"slope", s->slope}}, cone);
-        put_named(t, (named[]){{"largest_offset", s->largest_offset}, {"largest_turn", s->largest_turn}}, 2);
+        put_named(t, NULL, (named[]){{"radius", s->radius}}, s->radius > 0);
+        put_named(t, NULL, (named[]){{"tube", s->tube}}, s->tube > 0);
+        put_named(t, NULL, (named[]){{"slope", s->slope}}, cone);
+        put_named(t, NULL, (named[]){{"largest_offset", s->largest_offset}, {"largest_turn", s->largest_turn}}, 2);
         text_close(t, '}');
     }
     text_close(t, ']');
@@ -109,7 +107,7 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
         text_open(t, NULL, '{');
         text_string(t, "name", q->name);
         text_string(t, "quantity", uz_choice_name(UZ_CHOICE_QUANTITY, q->kind));
-        put_named(t,
+        put_named(t, NULL,
                   (named[]){{"low", q->low},
                             {"high", q->high},
                             {"value", q->value},
@@ -134,7 +132,7 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
     text_integer(t, "added", s->added);
     text_integer(t, "rounds", s->rounds);
     text_integer(t, "active", s->active);
-    put_named(t, (named[]){{"reaction_sum", s->reaction_sum}, {"max_penetration", s->max_penetration}}, 2);
+    put_named(t, NULL, (named[]){{"reaction_sum", s->reaction_sum}, {"max_penetration", s->max_penetration}}, 2);
     if (scene) {
         text_numbers(t, "force", s->force, s->dim);
         text_number(t, "max_pressure", s->max_pressure);
@@ -157,7 +155,8 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
             text_string(t, "kinematics", uz_choice_name(UZ_CHOICE_KINEMATICS, g->kind));
             text_integer(t, "passes", g->passes);
             put_named(
-                t, (named[]){{"change", g->change}, moving ? (named){"left", g->left} : (named){"sliding", g->sliding}},
+                t, NULL,
+                (named[]){{"change", g->change}, moving ? (named){"left", g->left} : (named){"sliding", g->sliding}},
                 2);
             text_close(t, '}');
         }
@@ -172,19 +171,20 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
     const uz_residual *const residuals[] = {&c->residual, &c->relative_residual};
     /* the primal one bounds the minimum from above only where a feasible displacement was found, so with a finite gap
      */
-    put_object(t, "energy",
-               (named[]){{"primal", isfinite(c->gap) ? c->energy_primal : (double)INFINITY},
-                         {"dual", c->energy_dual},
-                         {"strain", s->evaluation ? s->evaluation->strain_energy : (double)NAN},
-                         {"potential", s->evaluation ? s->evaluation->potential_energy : (double)NAN}},
-               s->evaluation ? 4 : 2);
+    put_named(t, "energy",
+              (named[]){{"primal", isfinite(c->gap) ? c->energy_primal : (double)INFINITY},
+                        {"dual", c->energy_dual},
+                        {"strain", s->evaluation ? s->evaluation->strain_energy : (double)NAN},
+                        {"potential", s->evaluation ? s->evaluation->potential_energy : (double)NAN}},
+              s->evaluation ? 4 : 2);
     text_open(t, "certificate", '{');
-    put_named(
-        t, (named[]){{"relative_error", c->relative_error}, {"absolute_error", c->absolute_error}, {"gap", c->gap}}, 3);
+    put_named(t, NULL,
+              (named[]){{"relative_error", c->relative_error}, {"absolute_error", c->absolute_error}, {"gap", c->gap}},
+              3);
     for (int i = 0; i < 2; i++) {
         const uz_residual *e = residuals[i];
-        put_object(t, i == 0 ? "residual" : "relative_residual",
-                   (named[]){{"total", e->total}, {"e1", e->e1}, {"e2", e->e2}, {"e3", e->e3}, {"e4", e->e4}}, 5);
+        put_named(t, i == 0 ? "residual" : "relative_residual",
+                  (named[]){{"total", e->total}, {"e1", e->e1}, {"e2", e->e2}, {"e3", e->e3}, {"e4", e->e4}}, 5);
     }
     text_close(t, '}');
     double equations;
@@ -192,7 +192,7 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
     text_open(t, "error", '{');
     const uz_guarantee *g = &s->guarantee;
     /* what is proved of the answer holds of the mesh's own one but for what the equations left */
-    put_named(t,
+    put_named(t, NULL,
               (named[]){{"equations", equations},
                         {"mesh", g->proved ? g->relative + equations : s->discretization_error},
                         {"total", total}},
@@ -201,7 +201,7 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
     if (g->asked && !g->proved)
         text_string(t, "why", g->why);
     if (g->proved) {
-        put_named(t,
+        put_named(t, NULL,
                   (named[]){{"estimated_mesh", s->discretization_error},
                             {"bound", g->bound},
                             {"energy_low", g->dual},
@@ -238,7 +238,7 @@ static void put_grids(text *t, const uz_grid_sequence *grids)
         text_integer(t, "elements", level->n_elements);
         text_integer(t, "d", level->d);
         text_integer(t, "iterations", level->iterations);
-        put_named(t,
+        put_named(t, NULL,
                   (named[]){{"discretization_error", level->discretization_error},
                             {"certified_error", level->certified_error},
                             {"seconds", level->seconds}},
@@ -266,33 +266,33 @@ static void put_effort(text *t, const uz_summary *s)
     text_bool(t, "contact_last", s->contact_last);
     text_integer(t, "nnz", s->factor_nnz);
     text_integer(t, "bytes", (int64_t)s->factor_bytes);
-    put_named(t, (named[]){{"flops", s->factor_flops}, {"rcond", s->rcond}}, 2);
+    put_named(t, NULL, (named[]){{"flops", s->factor_flops}, {"rcond", s->rcond}}, 2);
     text_close(t, '}');
     text_open(t, "cost", '{');
-    put_object(t, "predicted", (named[]){{"seconds", c->seconds}, {"bytes", c->bytes}, {"flops", c->flops}}, 3);
-    put_object(t, "actual", (named[]){{"seconds", c->actual_seconds}, {"bytes", c->actual_bytes}}, 2);
+    put_named(t, "predicted", (named[]){{"seconds", c->seconds}, {"bytes", c->bytes}, {"flops", c->flops}}, 3);
+    put_named(t, "actual", (named[]){{"seconds", c->actual_seconds}, {"bytes", c->actual_bytes}}, 2);
     text_open(t, "considered", '[');
     for (int k = 0; k < c->n_considered; k++) {
         const uz_cost_option *form = &c->considered[k];
         text_open(t, NULL, '{');
-        text_string(t, "operator", uz_operator_name(form->op));
-        put_named(t, (named[]){{"seconds", form->seconds}, {"bytes", form->bytes}}, 2);
+        text_string(t, "operator", uz_choice_name(UZ_CHOICE_OPERATOR, form->op));
+        put_named(t, NULL, (named[]){{"seconds", form->seconds}, {"bytes", form->bytes}}, 2);
         text_bool(t, "fits", form->fits);
         text_close(t, '}');
     }
     text_close(t, ']');
     text_close(t, '}');
-    put_object(t, "timings_s",
-               (named[]){{"queue", spent->queue},
-                         {"parse", spent->parse},
-                         {"assemble", spent->assemble},
-                         {"order", spent->order},
-                         {"factor", spent->factor},
-                         {"condense", spent->condense},
-                         {"iterate", spent->iterate},
-                         {"certify", spent->certify},
-                         {"total", spent->total}},
-               9);
+    put_named(t, "timings_s",
+              (named[]){{"queue", spent->queue},
+                        {"parse", spent->parse},
+                        {"assemble", spent->assemble},
+                        {"order", spent->order},
+                        {"factor", spent->factor},
+                        {"condense", spent->condense},
+                        {"iterate", spent->iterate},
+                        {"certify", spent->certify},
+                        {"total", spent->total}},
+              9);
 }
 
 char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, const codec_run *run)
@@ -302,10 +302,10 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     const uz_semicoercive *held = &summary->semicoercive;
     const codec_cases *cases = run ? run->cases : NULL;
     text_open(&t, NULL, '{');
-    text_string(&t, "outcome", uz_outcome_name(summary->outcome));
+    text_string(&t, "outcome", uz_choice_name(UZ_CHOICE_OUTCOME, summary->outcome));
     text_string(&t, "message", summary->message);
     text_string(&t, "method", uz_method_name(summary->method));
-    text_string(&t, "operator", uz_operator_name(summary->op));
+    text_string(&t, "operator", uz_choice_name(UZ_CHOICE_OPERATOR, summary->op));
     text_integer(&t, "iterations", summary->iterations);
     text_integer(&t, "restarts", summary->restarts);
     text_integer(&t, "refinements", summary->refinements);
@@ -318,7 +318,7 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
         text_string(&t, "worst", cases->worst);
         for (int i = 0; i < CODEC_OUTCOMES; i++)
             if (cases->outcomes[i] > 0 || i == UZ_CONVERGED)
-                text_integer(&t, uz_outcome_name((uz_outcome)i), cases->outcomes[i]);
+                text_integer(&t, uz_choice_name(UZ_CHOICE_OUTCOME, (uz_outcome)i), cases->outcomes[i]);
         text_close(&t, '}');
     }
     text_open(&t, "problem", '{');
@@ -330,7 +330,7 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     put_certificate(&t, summary, scene);
     if (summary->evaluation)
         put_evaluation(&t, summary->evaluation, summary->dim);
-    put_named(&t,
+    put_named(&t, NULL,
               (named[]){{"requested_error", summary->requested_error},
                         {"discretization_error", summary->discretization_error},
                         {"alpha", summary->alpha},

@@ -76,22 +76,18 @@ static bool stop_syntax(scanner *s, size_t at, const char *why)
     return false;
 }
 
-/* One more value, at this place. */
-static bool count_value(scanner *s, const json_value *at)
+/* One more value at this place, or an array or object that is opened there. */
+static bool allow(scanner *s, const json_value *at, bool opens)
 {
-    if (++s->values <= JSON_MAX_VALUES)
+    const size_t most = opens ? (size_t)json_depth_limit() : JSON_MAX_VALUES;
+    const size_t have = opens ? (size_t)s->depth + 1 : ++s->values;
+    if (have <= most)
         return true;
-    problem_set(s->problem, 413, "too_many_values", at, "More than %d %s (byte %zu).", JSON_MAX_VALUES,
-                "values besides long number arrays; write vectors as one flat array", s->at);
-    return false;
-}
-
-static bool check_depth(scanner *s, const json_value *at)
-{
-    if (s->depth < json_depth_limit())
-        return true;
-    problem_set(s->problem, 400, "json_depth", at, "More than %d %s (byte %zu).", json_depth_limit(),
-                "levels of arrays and objects", s->at);
+    problem_set(s->problem, opens ? 400 : 413, opens ? "json_depth" : "too_many_values", at,
+                "More than %zu %s (byte %zu).", most,
+                opens ? "levels of arrays and objects"
+                      : "values besides long number arrays; write vectors as one flat array",
+                s->at);
     return false;
 }
 
@@ -249,7 +245,7 @@ static bool scan_row(scanner *s, const json_value *row, double *numbers, bool on
     for (size_t i = 0;; i++) {
         const json_value here = {.parent = row, .place = i};
         const int c = peek(s);
-        if (!one && !count_value(s, &here))
+        if (!one && !allow(s, &here, false))
             return false;
         if (c != '-' && (c < '0' || c > '9'))
             return stop_syntax(s, s->at, one ? "a number was expected" : EXPECTED);
@@ -277,10 +273,10 @@ static bool scan_numbers(scanner *s, json_value *out, size_t count, size_t colum
     for (size_t i = 0; more; i++) {
         const json_value row = {.parent = out, .place = i};
         const int c = peek(s);
-        failed = !one && !count_value(s, &row);
+        failed = !one && !allow(s, &row, false);
         if (!failed && c != '[')
             failed = !stop_syntax(s, s->at, one ? "a row of numbers was expected" : EXPECTED);
-        failed = failed || (!one && !check_depth(s, &row)) ||
+        failed = failed || (!one && !allow(s, &row, true)) ||
                  !scan_row(s, &row, numbers + i * columns, one || columns > JSON_SHORT_ARRAY);
         more = !failed && next_item(s, ']', &failed);
     }
@@ -298,22 +294,6 @@ static bool scan_numbers(scanner *s, json_value *out, size_t count, size_t colum
 
 /* ------------------------------------------------------ arrays and objects */
 
-static bool push(scanner *s, json_value *value)
-{
-    if (s->used == s->capacity) {
-        const size_t capacity = s->capacity ? 2 * s->capacity : 64;
-        json_value *grown = room_grow(s->stack, capacity, sizeof *grown);
-        if (!grown) {
-            json_free_numbers(value);
-            return problem_no_memory(s->problem);
-        }
-        s->stack = grown;
-        s->capacity = capacity;
-    }
-    s->stack[s->used++] = *value;
-    return true;
-}
-
 static int compare_keys(const void *a, const void *b)
 {
     const json_value *x = a, *y = b;
@@ -322,39 +302,13 @@ static int compare_keys(const void *a, const void *b)
     return order ? order : (x->place > y->place) - (x->place < y->place);
 }
 
-/* Is the key of `member` among those from `base` on? A few are compared one by one; more are kept in *keys, a red-black
- * tree, which no choice of keys makes slow. */
-static bool key_stands_twice(scanner *s, size_t base, const json_value *member, void **keys, bool *failed)
+/* The key of a member and the colon. Is it among those from `base` on? A few are compared one by one; more are kept in
+ * *keys, a red-black tree, which no choice of keys makes slow. */
+static bool scan_key(scanner *s, size_t base, json_value *member, void **keys)
 {
     enum { FEW = 16 };
     const size_t n = s->used - base;
-    if (n < FEW) {
-        for (size_t i = base; i < s->used; i++)
-            if (compare_keys(&s->stack[i], member) == 0)
-                return true;
-        return false;
-    }
-    for (size_t i = n == FEW ? 0 : n; i <= n; i++) {
-        json_value *entry = json_room(s->tree, sizeof *entry);
-        void *found = NULL;
-        if (entry) {
-            *entry = i < n ? s->stack[base + i] : *member;
-            found = tsearch(entry, keys, compare_keys);
-        }
-        if (!found) {
-            *failed = !problem_no_memory(s->problem);
-            return false;
-        }
-        if (i == n)
-            return *(json_value **)found != entry;
-    }
-    return false;
-}
-
-/* The key of a member and the colon. */
-static bool scan_key(scanner *s, size_t base, json_value *member, void **keys)
-{
-    bool failed = false;
+    bool twice = false;
     char shown[64];
     if (peek(s) != '"')
         return stop_syntax(s, s->at, "a key in double quotes was expected");
@@ -364,11 +318,24 @@ static bool scan_key(scanner *s, size_t base, json_value *member, void **keys)
     if (peek(s) != ':')
         return stop_syntax(s, s->at, "a colon was expected after the key");
     s->at++;
-    if (key_stands_twice(s, base, member, keys, &failed) && s->problem->status == 0) {
+    for (size_t i = base; n < FEW && i < s->used && !twice; i++)
+        twice = compare_keys(&s->stack[i], member) == 0;
+    for (size_t i = n == FEW ? 0 : n; n >= FEW && i <= n; i++) {
+        json_value *entry = json_room(s->tree, sizeof *entry);
+        void *found = NULL;
+        if (entry) {
+            *entry = i < n ? s->stack[base + i] : *member;
+            found = tsearch(entry, keys, compare_keys);
+        }
+        if (!found)
+            return problem_no_memory(s->problem);
+        twice = i == n && *(json_value **)found != entry;
+    }
+    if (twice && s->problem->status == 0) {
         problem_quote(shown, sizeof shown, member->key, member->place);
         problem_set(s->problem, 422, "duplicate_key", member, "The key %s stands twice in the same object.", shown);
     }
-    return !failed;
+    return true;
 }
 
 static void keep_key(void *key)
@@ -384,7 +351,7 @@ static bool scan_container(scanner *s, json_value *out, bool object)
     size_t count, columns;
     bool failed = false;
     void *keys = NULL;
-    if (!check_depth(s, out))
+    if (!allow(s, out, true))
         return false;
     s->depth++;
     if (!object && looks_like_numbers(s, &count, &columns)) {
@@ -397,7 +364,18 @@ static bool scan_container(scanner *s, json_value *out, bool object)
     s->at += !more;
     while (more) {
         json_value item = {.parent = out, .place = s->used - base};
-        failed = (object && !scan_key(s, base, &item, &keys)) || !scan_value(s, &item) || !push(s, &item);
+        failed = (object && !scan_key(s, base, &item, &keys)) || !scan_value(s, &item);
+        if (!failed && s->used == s->capacity) {
+            const size_t capacity = s->capacity ? 2 * s->capacity : 64;
+            json_value *grown = room_grow(s->stack, capacity, sizeof *grown);
+            failed = !grown && !problem_no_memory(s->problem);
+            if (failed)
+                json_free_numbers(&item);
+            s->stack = grown ? grown : s->stack;
+            s->capacity = grown ? capacity : s->capacity;
+        }
+        if (!failed)
+            s->stack[s->used++] = item;
         more = !failed && next_item(s, close, &failed);
     }
     /* What was pushed moves into the tree, where what is in it learns where that is. */
@@ -432,7 +410,7 @@ static bool scan_value(scanner *s, json_value *out)
         bool truth;
     } WORDS[] = {{"true", JSON_IS_BOOLEAN, true}, {"false", JSON_IS_BOOLEAN, false}, {"null", JSON_IS_NULL, false}};
     const int c = peek(s);
-    if (!count_value(s, out))
+    if (!allow(s, out, false))
         return false;
     switch (c) {
     case '{':

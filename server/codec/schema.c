@@ -24,35 +24,27 @@ static void fail(fault *f, const char *file, const char *what, const char *name)
     f->failed = true;
 }
 
-schemas *schemas_load(char *message, size_t size)
-{
-    embedded_file *files = calloc(embedded_count(), sizeof *files);
-    size_t count = 0;
-    for (size_t i = 0; files && i < embedded_count(); i++)
-        if (strcmp(embedded_at(i).name, "openapi.json") != 0)
-            files[count++] = embedded_at(i);
-    schemas *all = schemas_parse(files, count, message, size);
-    free(files);
-    return all;
-}
-
-schemas *schemas_parse(const embedded_file *files, size_t count, char *message, size_t size)
+schemas *schemas_load(const embedded_file *files, size_t count, char *message, size_t size)
 {
     fault f = {message, size, false};
     problem_details problem;
+    const size_t n = files ? count : embedded_count();
     schemas *all = calloc(1, sizeof *all);
     if (all)
-        all->files = calloc(count + 1, sizeof *all->files);
-    if (!files || !all || !all->files)
+        all->files = calloc(n + 1, sizeof *all->files);
+    if (!all || !all->files)
         fail(&f, "", "no memory for", "the schemas");
-    for (size_t i = 0; i < count && !f.failed; i++) {
-        all->files[i].name = files[i].name;
-        all->count++;
-        if (!json_scan(&all->files[i].tree, files[i].text, files[i].len, &problem))
-            fail(&f, files[i].name, "no JSON:", problem.detail);
+    for (size_t i = 0; i < n && !f.failed; i++) {
+        const embedded_file file = files ? files[i] : embedded_at(i);
+        if (!files && strcmp(file.name, "openapi.json") == 0)
+            continue;
+        schema_file *to = &all->files[all->count++];
+        to->name = file.name;
+        if (!json_scan(&to->tree, file.text, file.len, &problem))
+            fail(&f, file.name, "no JSON:", problem.detail);
     }
-    for (size_t i = 0; i < count && !f.failed; i++)
-        audit(&f, schema_root(all, files[i].name), 0);
+    for (size_t i = 0; !f.failed && i < all->count; i++)
+        audit(&f, schema_root(all, all->files[i].name), 0);
     if (!f.failed)
         return all;
     schemas_free(all);

@@ -23,10 +23,9 @@ typedef struct {
     size_t count;
 } schemas;
 
-/* Parses and checks every embedded file but openapi.json, which is no schema. NULL: message. */
-schemas *schemas_load(char *message, size_t size);
-/* The same for these files; their names and texts must outlive what is made of them. */
-schemas *schemas_parse(const embedded_file *files, size_t count, char *message, size_t size);
+/* Parses and checks these files, whose names and texts must outlive what is made of them; NULL: every embedded one but
+ * openapi.json, which is no schema. NULL: message. */
+schemas *schemas_load(const embedded_file *files, size_t count, char *message, size_t size);
 void schemas_free(schemas *all);
 
 /* Checks a value against the file `name`. False: *problem is the first violation, 422 with code unknown_key,

@@ -4,7 +4,6 @@
 #include "codec/decode.h"
 #include "codec/json.h"
 #include "codec/problem.h"
-#include "codec/quantity.h"
 #include "codec/text.h"
 
 #include <math.h>
@@ -39,35 +38,15 @@ bool codec_decode_problem(problem_details *out, const char *json)
     return good;
 }
 
-struct codec_summary {
-    json_tree tree;
-};
-
-codec_summary *codec_summary_read(const char *json)
+bool codec_summary_read(json_tree *out, const char *json)
 {
     problem_details ignored;
-    codec_summary *summary = calloc(1, sizeof *summary);
-    if (summary && json_scan(&summary->tree, json, strlen(json), &ignored))
-        return summary;
-    free(summary);
-    return NULL;
+    return json_scan(out, json, strlen(json), &ignored);
 }
 
-void codec_summary_free(codec_summary *summary)
+const char *codec_summary_text(const json_value *summary, const char *name)
 {
-    if (summary)
-        json_clear(&summary->tree);
-    free(summary);
-}
-
-bool codec_summary_number(double *value, const codec_summary *summary, const char *name)
-{
-    return quantity_read(value, summary->tree.root, name);
-}
-
-const char *codec_summary_text(const codec_summary *summary, const char *name)
-{
-    const json_value *node = summary ? summary->tree.root : NULL;
+    const json_value *node = summary;
     for (size_t len = strcspn(name, "."); node; name += len + 1, len = strcspn(name, ".")) {
         node = json_get_n(node, name, len);
         if (!name[len])
@@ -77,12 +56,6 @@ const char *codec_summary_text(const codec_summary *summary, const char *name)
 }
 
 /* ---- requests, as text: a body may be large, and its matrices must not be read again only to be written again */
-
-bool codec_is_verify(const char *body, size_t len)
-{
-    size_t answer_len;
-    return json_member_text(body, len, "answer", &answer_len) != NULL;
-}
 
 bool codec_same_problem(const char *a, size_t a_len, const char *b, size_t b_len)
 {

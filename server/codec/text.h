@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-typedef struct {
+typedef struct text {
     char *data; /* len bytes, not terminated until text_finish */
     size_t len, capacity;
     bool failed;

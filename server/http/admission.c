@@ -15,45 +15,38 @@ static size_t name_len(const char *text, size_t len)
     return colon ? (size_t)(colon - text) : len;
 }
 
-/* True for a name that nobody can lead here from elsewhere: an address, a name without a dot, localhost and what is
- * below it (RFC 6761, section 6.3), the hosts of --cors. */
-static bool is_own_name(const api *context, const char *host, size_t len)
-{
-    static const char LOCAL[] = ".localhost";
-    const size_t n = name_len(host, len), local = sizeof LOCAL - 1;
-    if (len == 0 || host[0] == '[' || !memchr(host, '.', n) || strspn(host, "0123456789.") >= n)
-        return true;
-    if (n > local && token_equal(host + n - local, local, LOCAL))
-        return true;
-    for (size_t i = 0; i < context->options.n_cors; i++) {
-        const char *one = context->options.cors[i], *name = strstr(one, "//");
-        const size_t size = name ? name_len(name + 2, strlen(name + 2)) : 0;
-        if (strcmp(one, "*") == 0 || (size == n && strncasecmp(name + 2, host, n) == 0))
-            return true;
-    }
-    return false;
-}
-
 /* Without tokens it is the loopback address that lets nobody in. A page gets behind it where its own host name is made
  * to point here (DNS rebinding): for its visitor's browser this service is then the page's own server. The name that
- * it asks for tells. */
+ * it asks for tells: nobody can lead an address here from elsewhere, a name without a dot, localhost and what is below
+ * it (RFC 6761, section 6.3), or the hosts of --cors. */
 static bool check_name(const api *context, const http_request *rq, problem_details *problem)
 {
+    static const char LOCAL[] = ".localhost";
     /* header fields that a browser sends whatever its page wants; other programs hardly do */
     static const char *const SENT[] = {"Accept-Language", "Origin", "Referer", "Sec-Fetch-Site"};
-    const header_field *host = header_find(&rq->headers, "Host", NULL);
+    const header_field *field = header_find(&rq->headers, "Host", NULL);
     const header_field *agent = header_find(&rq->headers, "User-Agent", NULL);
+    if (context->auth || !field)
+        return true;
+    const char *host = field->value;
+    const size_t n = name_len(host, field->value_len), local = sizeof LOCAL - 1;
+    bool own = field->value_len == 0 || host[0] == '[' || !memchr(host, '.', n) || strspn(host, "0123456789.") >= n ||
+               (n > local && token_equal(host + n - local, local, LOCAL));
+    for (size_t i = 0; i < context->options.n_cors && !own; i++) {
+        const char *one = context->options.cors[i], *name = strstr(one, "//");
+        const size_t size = name ? name_len(name + 2, strlen(name + 2)) : 0;
+        own = strcmp(one, "*") == 0 || (size == n && strncasecmp(name + 2, host, n) == 0);
+    }
     bool browser = agent && agent->value_len >= 8 && strncasecmp(agent->value, "Mozilla/", 8) == 0;
     for (size_t i = 0; i < sizeof SENT / sizeof SENT[0]; i++)
         browser = browser || header_find(&rq->headers, SENT[i], NULL);
-    if (context->auth || !host || is_own_name(context, host->value, host->value_len) || !browser ||
-        http_is_public(rq->fd))
+    if (own || !browser || http_is_public(rq->fd))
         return true;
     return problem_fill(problem, 421, "unknown_host", "This service does not go by that name",
                         "a browser asks for \"%.*s\" on an address that is for this machine only: use "
                         "http://127.0.0.1 or localhost, give the daemon a --token-file, or name the page's origin "
                         "with its option --cors",
-                        (int)(host->value_len < 100 ? host->value_len : 100), host->value);
+                        (int)(field->value_len < 100 ? field->value_len : 100), host);
 }
 
 /* A page of another origin must not submit or delete through its visitor's browser, unless its origin is one that may
@@ -131,28 +124,7 @@ static bool check_request(const api *context, http_request *rq, problem_details 
                         "no new work is taken: try again when the server is back");
 }
 
-/* ---- who asks, and how often */
-
-/* A known token counts by its name, everybody else by address: guesses too. */
-static bool check_rate(api *context, http_request *rq, problem_details *problem)
-{
-    double now = clock_seconds(CLOCK_MONOTONIC), wait = 0.0;
-    if (!context->rate || (rq->route && strcmp(rq->route->pattern, "/healthz") == 0))
-        return true;
-    if (rq->token[0])
-        wait = rate_take(context->rate, rq->token, strlen(rq->token), now);
-    else if (rq->address_len > 0)
-        wait = rate_take(context->rate, rq->address, rq->address_len, now);
-    if (wait == 0.0)
-        return true;
-    metrics_add(context->metrics, METRIC_RATE_LIMITED, 1);
-    rq->reply.retry_after_s = 1 + (int)wait;
-    return problem_fill(problem, 429, "too_many_requests", "Too many requests",
-                        "one client may send %d requests per second (the daemon's option --max-client-rate)",
-                        context->options.max_client_rate);
-}
-
-/* Before anything about the request is told, even whether its path exists. */
+/* Who asks, and how often; before anything about the request is told, even whether its path exists. */
 static bool check_client(api *context, http_request *rq, bool has_route, problem_details *problem)
 {
     static const char SCHEME[] = "Bearer";
@@ -178,18 +150,28 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
     memcpy(rq->share, rq->client, sizeof rq->share);
     for (size_t i = 0; !rq->client[0] && i < rq->address_len; i++)
         snprintf(rq->share + 2 * i, 3, "%02x", rq->address[i]);
-    if (!check_rate(context, rq, problem))
-        return false;
+    /* how often: a known token counts by its name, everybody else by address: guesses too */
+    const bool limited = context->rate.per_s > 0.0 && !(rq->route && strcmp(rq->route->pattern, "/healthz") == 0);
+    const void *key = rq->token[0] ? (const void *)rq->token : rq->address;
+    const size_t key_len = rq->token[0] ? strlen(rq->token) : rq->address_len;
+    const double wait =
+        limited && key_len > 0 ? rate_take(&context->rate, key, key_len, clock_seconds(CLOCK_MONOTONIC)) : 0.0;
+    if (wait > 0.0) {
+        metrics_add(context->metrics, METRIC_RATE_LIMITED, 1);
+        rq->reply.retry_after_s = 1 + (int)wait;
+        return problem_fill(problem, 429, "too_many_requests", "Too many requests",
+                            "one client may send %d requests per second (the daemon's option --max-client-rate)",
+                            context->options.max_client_rate);
+    }
     if (!context->auth || have >= need)
         return true;
     rq->reply.allow[0] = '\0';
     metrics_add(context->metrics, METRIC_UNAUTHORIZED, 1);
     if (have != SCOPE_NONE) {
-        snprintf(field, size, "Bearer realm=\"uzawad\", error=\"insufficient_scope\", scope=\"%s\"",
-                 auth_scope_name(need));
+        snprintf(field, size, "Bearer realm=\"uzawad\", error=\"insufficient_scope\", scope=\"%s\"", AUTH_SCOPES[need]);
         return problem_fill(problem, 403, "insufficient_scope", "This token does not allow that",
-                            "the token \"%s\" has the scope %s, and this needs %s", rq->token, auth_scope_name(have),
-                            auth_scope_name(need));
+                            "the token \"%s\" has the scope %s, and this needs %s", rq->token, AUTH_SCOPES[have],
+                            AUTH_SCOPES[need]);
     }
     snprintf(field, size, "Bearer realm=\"uzawad\"%s", given ? ", error=\"invalid_token\"" : "");
     return problem_fill(problem, 401, "unauthorized", "A token is needed", "%s",
@@ -198,8 +180,9 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
                                     : "send the header field Authorization: Bearer TOKEN");
 }
 
-bool admission_check(api *context, http_request *rq)
+bool admission_check(void *ctx, http_request *rq)
 {
+    api *context = ctx;
     problem_details *problem = &rq->refused;
     bool found = target_parse(&rq->target, rq->raw_target, problem) &&
                  route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem);
@@ -213,6 +196,10 @@ bool admission_check(api *context, http_request *rq)
                                 context->options.max_connections);
         }
     }
-    return check_name(context, rq, problem) && check_client(context, rq, found, problem) && found &&
-           check_request(context, rq, problem);
+    if (!check_name(context, rq, problem) || !check_client(context, rq, found, problem) || !found ||
+        !check_request(context, rq, problem))
+        return false;
+    rq->streamed = rq->route->streamed;
+    rq->body_limit = rq->streamed ? context->options.max_upload : context->options.max_body;
+    return !rq->streamed || uploads_begin(context, rq);
 }

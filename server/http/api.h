@@ -26,14 +26,14 @@ typedef struct {
 } told_text;
 
 /* What handlers may use, the same for all requests. */
-typedef struct {
+typedef struct api {
     store *store;
     work *work;
     server_log *log, *audit; /* audit may be NULL */
     metrics *metrics;
     const webhooks *webhooks; /* NULL: there are none */
     auth *auth;               /* NULL: everybody may all */
-    rate *rate;               /* NULL: no limit */
+    rate rate;                /* per_s 0: no limit */
     http_options options;
     transport *server;
     sem_t turns;                  /* so many replies may be computed at a time, the others wait: fields.c */
@@ -63,7 +63,7 @@ typedef struct {
 bool api_is_over(void *asker);
 
 /* ---- before a body is read (admission.c, uploads.c): false with rq->refused */
-bool admission_check(api *context, http_request *rq);
+bool admission_check(void *ctx, http_request *rq); /* ctx: the api, as below */
 bool uploads_begin(api *context, http_request *rq);
 /* A piece of the body; ctx: the api. */
 bool uploads_take(void *ctx, http_request *rq, const char *data, size_t size);

@@ -34,25 +34,9 @@ struct auth {
     token_list list;
 };
 
-static const char *const SCOPES[] = {"none", "read", "submit", "admin"};
-
-const char *auth_scope_name(auth_scope scope)
-{
-    return SCOPES[scope];
-}
+const char *const AUTH_SCOPES[] = {"none", "read", "submit", "admin"};
 
 /* ------------------------------------------------------------------- file */
-
-/* "2026-12-31" or "2026-12-31T12:00:00Z", in UTC, as Unix seconds: until the end of the day, or the moment. */
-static bool read_end(const char *text, double *out)
-{
-    struct tm t = {0};
-    const char *rest = strptime(text, "%Y-%m-%d", &t);
-    const bool day = rest && !*rest;
-    rest = rest && !day ? strptime(rest, "T%H:%M:%SZ", &t) : rest;
-    *out = (double)timegm(&t) + (day ? 86400.0 : 0.0);
-    return rest && !*rest;
-}
 
 /* The SHA-256 of a secret, or the one that is given in its place: "sha256:" and 64 hexadecimal digits in lower case. */
 static const char *take_secret(token *t, const char *secret)
@@ -86,18 +70,25 @@ static const char *take_line(token_list *list, char *line)
     if (!scope || !secret)
         return "a line must be \"name scope secret\"";
     for (int i = SCOPE_READ; i <= SCOPE_ADMIN; i++)
-        if (strcmp(scope, SCOPES[i]) == 0)
+        if (strcmp(scope, AUTH_SCOPES[i]) == 0)
             t.who.scope = (auth_scope)i;
     if (t.who.scope == SCOPE_NONE)
         return "the second word must be read, submit or admin";
     const char *owner = name;
     while ((word = strtok_r(NULL, " \t\r\n", &rest)))
-        if (strncmp(word, "owner=", 6) == 0)
+        if (strncmp(word, "owner=", 6) == 0) {
             owner = word + 6;
-        else if (strncmp(word, "until=", 6) != 0)
+        } else if (strncmp(word, "until=", 6) == 0) { /* until the end of the day, or the moment */
+            struct tm end = {0};
+            const char *behind = strptime(word + 6, "%Y-%m-%d", &end);
+            const bool day = behind && !*behind;
+            behind = behind && !day ? strptime(behind, "T%H:%M:%SZ", &end) : behind;
+            if (!behind || *behind)
+                return "until= must be followed by a date of UTC such as 2026-12-31 or 2026-12-31T12:00:00Z";
+            t.until = (double)timegm(&end) + (day ? 86400.0 : 0.0);
+        } else {
             return "behind \"name scope secret\" there may be owner=NAME and until=DATE";
-        else if (!read_end(word + 6, &t.until))
-            return "until= must be followed by a date of UTC such as 2026-12-31 or 2026-12-31T12:00:00Z";
+        }
     if (strlen(name) >= sizeof t.who.name || strspn(name, ALLOWED) != strlen(name) || !owner[0] ||
         strlen(owner) >= sizeof t.who.owner || strspn(owner, ALLOWED) != strlen(owner))
         return "the name must be 1 to 63 letters, digits and -._~+/=, and so must the owner";

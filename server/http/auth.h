@@ -13,7 +13,7 @@
 #include <stddef.h>
 
 typedef enum { SCOPE_NONE, SCOPE_READ, SCOPE_SUBMIT, SCOPE_ADMIN } auth_scope;
-const char *auth_scope_name(auth_scope scope);
+extern const char *const AUTH_SCOPES[]; /* their names */
 
 typedef struct auth auth;
 /* Reads the file. NULL with the reason, which names file and line, in message. */

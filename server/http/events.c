@@ -115,36 +115,6 @@ typedef struct {
     bool reset;    /* that it must be told first */
 } all_stream;
 
-/* ---- texts */
-
-/* Under the lock. It may describe a later state than the change made: then there is a later change, told after it. */
-static const told_text *text_of(api *context, const feed_change *change)
-{
-    told_text *kept = &context->told[change->number % TOLD_TEXTS];
-    if (kept->number == change->number)
-        return kept;
-    free(kept->data);
-    /* What has become of the job; NULL: no memory, or the store failed. */
-    const char **event = &kept->event;
-    job j;
-    char *data = NULL, whose[STORE_CLIENT] = "";
-    store_status status = store_get(context->store, change->id, &j);
-    *event = status == STORE_NOT_FOUND ? "deleted" : "job";
-    if (status == STORE_NOT_FOUND && asprintf(&data, "{\"id\": \"%s\"}", change->id) < 0)
-        data = NULL;
-    if (status == STORE_OK) {
-        jobs_freshen(context, &j);
-        data = codec_encode_job(&j);
-        memcpy(whose, j.client, sizeof whose);
-        job_clear(&j);
-    }
-    kept->nobodys = status == STORE_NOT_FOUND && !change->deleted;
-    snprintf(kept->client, sizeof kept->client, "%s", status == STORE_OK ? whose : change->client);
-    kept->data = data;
-    kept->number = kept->data ? change->number : 0;
-    return kept->data ? kept : NULL;
-}
-
 /* ---- a stream */
 
 static bool say(all_stream *s, const char *event, uint64_t number, const char *data)
@@ -161,17 +131,38 @@ static bool look_at_all(event_stream *base)
     feed_change changes[AT_ONCE];
     size_t count;
     uint64_t seen;
-    if (s->reset || !feed_since(work_feed(context->work), s->seen, changes, AT_ONCE, &count, &seen)) {
-        s->seen = feed_last(work_feed(s->context->work));
+    const uint64_t after = s->reset ? UINT64_MAX : s->seen; /* the first is the number of no change */
+    if (!feed_since(work_feed(context->work), after, changes, AT_ONCE, &count, &seen)) {
+        s->seen = seen;
         s->reset = false;
         return say(s, "reset", s->seen, "{}");
     }
     bool ok = true;
     pthread_mutex_lock(&context->told_lock);
     for (size_t i = 0; ok && i < count; i++) {
-        const told_text *text = text_of(context, &changes[i]);
-        const bool told = text && (s->all || (!text->nobodys && strcmp(text->client, s->client) == 0));
-        ok = text && (!told || say(s, text->event, changes[i].number, text->data));
+        const feed_change *change = &changes[i];
+        told_text *text = &context->told[change->number % TOLD_TEXTS];
+        if (text->number != change->number) { /* what has become of the job; a later state has a change told after it */
+            job j = {0};
+            char *data = NULL;
+            const store_status status = store_get(context->store, change->id, &j);
+            free(text->data);
+            text->event = status == STORE_NOT_FOUND ? "deleted" : "job";
+            if (status == STORE_NOT_FOUND && asprintf(&data, "{\"id\": \"%s\"}", change->id) < 0)
+                data = NULL;
+            if (status == STORE_OK) {
+                jobs_freshen(context, &j);
+                data = codec_encode_job(&j);
+            }
+            text->nobodys = status == STORE_NOT_FOUND && !change->deleted;
+            snprintf(text->client, sizeof text->client, "%s", status == STORE_OK ? j.client : change->client);
+            job_clear(&j);
+            text->data = data; /* NULL: no memory, or the store failed */
+            text->number = data ? change->number : 0;
+        }
+        ok = text->number > 0;
+        if (ok && (s->all || (!text->nobodys && strcmp(text->client, s->client) == 0)))
+            ok = say(s, text->event, change->number, text->data);
     }
     pthread_mutex_unlock(&context->told_lock);
     s->seen = seen;

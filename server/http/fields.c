@@ -137,16 +137,10 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
     return found == STORE_OK && status == UZ_OK;
 }
 
-static uz_status run_fields(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
-                            const uz_hooks *hooks, uz_error *err)
+uz_status fields_of_case(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                         const uz_hooks *hooks, uz_error *err)
 {
     return uz_fields_compute(out, scene, answer, which, hooks, err);
-}
-
-bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply)
-{
-    *out = (uz_fields){.dim = 0};
-    return fields_compute(out, run_fields, reader, number, which, reply);
 }
 
 /* -------------------------------------------------------------------- names */

@@ -24,8 +24,9 @@ typedef uz_status (*field_computation)(void *out, const uz_scene *scene, const u
                                        const uz_hooks *hooks, uz_error *err);
 bool fields_compute(void *out, field_computation run, const field_reader *reader, int64_t number, unsigned which,
                     http_reply *reply);
-/* `which`: uz_field bits. */
-bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply);
+/* A computation of uz_fields; `which`: uz_field bits. */
+uz_status fields_of_case(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                         const uz_hooks *hooks, uz_error *err);
 
 /* Fields of a list separated by commas: "summary", "nodes" and those of `allowed` (uz_field bits); of no list (NULL)
  * `otherwise`. False with a 400 that has the list. */

@@ -1,6 +1,7 @@
 /* history.c: how jobs went: the rows of their histories, /v1/jobs/{id}/convergence.svg and
  * /v1/jobs/{id}/work-precision.
  */
+#include "codec/quantity.h"
 #include "http/jobs.h"
 #include "http/results.h"
 #include "work/trade.h"
@@ -78,13 +79,15 @@ static bool add_job(curve_list *list, api *context, const job *j, const char *ca
     if (!history_rows(context, j, case_name, -1, found, reply))
         return false;
     /* The end of an id tells jobs of one minute apart; the beginning is the time. */
-    codec_summary *summary = j->summary ? codec_summary_read(j->summary) : NULL;
-    const char *method = codec_summary_text(summary, "method"), *op = codec_summary_text(summary, "operator");
+    json_tree summary = {.root = NULL};
+    if (j->summary)
+        codec_summary_read(&summary, j->summary);
+    const char *method = codec_summary_text(summary.root, "method"), *op = codec_summary_text(summary.root, "operator");
     curve_name named;
     snprintf(named.text, sizeof named.text, "%s%s%s%s%s, job \u2026%s", found->case_name,
              found->case_name[0] ? ": " : "", method[0] ? method : job_status_name(j->status), op[0] ? ", " : "", op,
              j->id + 24);
-    codec_summary_free(summary);
+    json_clear(&summary);
     list->names[list->n - 1] = named;
     static const double NOTHING[CODEC_HISTORY_COLUMNS];
     const double *rows = found->rows ? found->rows : NOTHING;
@@ -205,7 +208,7 @@ void trade_get(api *context, http_request *rq, http_reply *reply)
     double *x = NULL;
     int64_t count = 0;
     results_place at = {.cases = NULL};
-    codec_summary *summary = NULL;
+    json_tree summary = {.root = NULL};
     codec_trade of = {.job_id = j.id};
     if (!jobs_load(context, rq, &j, reply) || !results_exist(&j, reply) || results_known(rq, &j, reply) ||
         !results_one(&at, context, &j, target_value(&rq->target, "case"), "a record", reply))
@@ -217,18 +220,18 @@ void trade_get(api *context, http_request *rq, http_reply *reply)
     } else if (status == STORE_NOT_FOUND || !trade_unpack(&of.trade, x, count)) {
         reply_refuse(reply, 409, "not_recorded", "What accuracy took was not recorded",
                      "the job ran under another version of the service: its history has the bounds of its iterations");
-    } else if (!(summary = codec_summary_read(at.summary))) {
+    } else if (!codec_summary_read(&summary, at.summary)) {
         reply_no_memory(reply);
     } else {
-        codec_summary_number(&of.mesh_error, summary, "discretization_error");
-        codec_summary_number(&of.solver_error, summary, "certificate.relative_error");
+        quantity_read(&of.mesh_error, summary.root, "discretization_error");
+        quantity_read(&of.solver_error, summary.root, "certificate.relative_error");
         size_t len = 0;
         char *text = codec_encode_trade(&of, &len);
         reply_text(reply, 200, "application/json", text, len);
     }
 done:
     free(x);
-    codec_summary_free(summary);
+    json_clear(&summary);
     store_cases_free(at.cases, at.count);
     jobs_check_still_there(context, &j, reply);
     job_clear(&j);

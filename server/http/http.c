@@ -9,21 +9,7 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-struct http_server {
-    api context;
-};
-
 /* ---- what the transport asks for */
-
-static bool on_admit(void *ctx, http_request *rq)
-{
-    api *context = ctx;
-    if (!admission_check(context, rq))
-        return false;
-    rq->streamed = rq->route->streamed;
-    rq->body_limit = rq->streamed ? context->options.max_upload : context->options.max_body;
-    return !rq->streamed || uploads_begin(context, rq);
-}
 
 static void on_answer(void *ctx, http_request *rq)
 {
@@ -86,28 +72,29 @@ static void on_account(void *ctx, const http_request *rq, bool completed, bool e
 
 /* ---- start to stop */
 
-static void free_server(http_server *server)
+static void free_context(api *context)
 {
-    sem_destroy(&server->context.turns);
+    sem_destroy(&context->turns);
     for (size_t i = 0; i < TOLD_TEXTS; i++)
-        free(server->context.told[i].data);
-    pthread_mutex_destroy(&server->context.told_lock);
-    rate_free(server->context.rate);
-    pthread_mutex_destroy(&server->context.predict_lock);
-    pthread_mutex_destroy(&server->context.ready_lock);
-    free(server);
+        free(context->told[i].data);
+    pthread_mutex_destroy(&context->told_lock);
+    pthread_mutex_destroy(&context->rate.lock);
+    pthread_mutex_destroy(&context->predict_lock);
+    pthread_mutex_destroy(&context->ready_lock);
+    free(context);
 }
 
-http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message, size_t size)
+bool http_start(http_server *out, int listen_fd, const http_parts *parts, const http_options *options, char *message,
+                size_t size)
 {
-    http_server *server = calloc(1, sizeof *server);
+    api *context = calloc(1, sizeof *context);
     uint64_t random = 0;
-    if (!server) {
+    *out = (http_server){NULL, NULL};
+    if (!context) {
         snprintf(message, size, "cannot start the HTTP server: out of memory");
         close(listen_fd);
-        return NULL;
+        return false;
     }
-    api *context = &server->context;
     context->store = parts->store;
     context->work = parts->work;
     context->webhooks = parts->webhooks;
@@ -123,16 +110,12 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
         random = (uint64_t)(clock_seconds(CLOCK_MONOTONIC) * 1e9);
     snprintf(context->run, sizeof context->run, "%016llx", (unsigned long long)random);
-    if (options->max_client_rate > 0)
-        context->rate = rate_new(options->max_client_rate);
-    if (options->max_client_rate > 0 && !context->rate) {
-        snprintf(message, size, "cannot start the HTTP server: out of memory");
-        close(listen_fd);
-        free_server(server);
-        return NULL;
-    }
+    pthread_mutex_init(&context->rate.lock, NULL);
+    context->rate.per_s = options->max_client_rate > 0 ? options->max_client_rate : 0;
+    if (getrandom(&context->rate.seed, sizeof context->rate.seed, 0) != (ssize_t)sizeof context->rate.seed)
+        context->rate.seed = (uint64_t)(uintptr_t)context;
     const transport_handlers handlers = {.ctx = context,
-                                         .admit = on_admit,
+                                         .admit = admission_check,
                                          .take = uploads_take,
                                          .answer = on_answer,
                                          .account = on_account,
@@ -150,10 +133,11 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
                                             .n_cors = options->n_cors,
                                             .tls = options->tls};
     if (!transport_start(&context->server, listen_fd, &handlers, &of_transport, message, size)) {
-        free_server(server);
-        return NULL;
+        free_context(context);
+        return false;
     }
-    return server;
+    *out = (http_server){context->server, context};
+    return true;
 }
 
 bool api_draining(const api *context)
@@ -181,20 +165,11 @@ bool api_is_over(void *asker)
     return api_draining(a->context) || request_client_gone(a->rq);
 }
 
-bool http_use_tls(http_server *server, const http_tls *tls, char *message, size_t size)
-{
-    return transport_use_tls(server->context.server, tls, message, size);
-}
-
-void http_drain(http_server *server)
-{
-    transport_drain(server->context.server);
-}
-
 void http_stop(http_server *server)
 {
-    if (!server)
+    if (!server->context)
         return;
-    transport_stop(server->context.server);
-    free_server(server);
+    transport_stop(server->transport);
+    free_context(server->context);
+    *server = (http_server){NULL, NULL};
 }

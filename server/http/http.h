@@ -17,7 +17,12 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-typedef struct http_server http_server;
+/* All NULL: it has not been started. transport_use_tls and transport_drain are for its owner too: once it drains,
+ * submissions and /readyz are answered 503 and long polls end early; everything else goes on. */
+typedef struct {
+    transport *transport;
+    struct api *context;
+} http_server;
 
 typedef struct {
     store *store;
@@ -45,18 +50,12 @@ typedef struct {
     size_t n_limits;
 } http_options;
 
-/* Serves on listen_fd, which it owns from then on, also on failure. NULL on failure with the reason in message. */
-http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message,
-                        size_t size);
+/* Serves on listen_fd, which it owns from then on, also on failure. False with the reason in message. */
+bool http_start(http_server *out, int listen_fd, const http_parts *parts, const http_options *options, char *message,
+                size_t size);
 
-/* For connections that begin from now on: transport_use_tls. */
-bool http_use_tls(http_server *server, const http_tls *tls, char *message, size_t size);
-
-/* From now on submissions are answered 503, /readyz too, and long polls end early; everything else goes on. */
-void http_drain(http_server *server);
-
-/* Ends every connection and frees the server. The work must have been stopped (not freed) before, so that no handler
- * waits in it. */
+/* Ends every connection. The work must have been stopped (not freed) before, so that no handler waits in it. Nothing
+ * happens where it has not been started. */
 void http_stop(http_server *server);
 
 #endif

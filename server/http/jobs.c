@@ -319,7 +319,9 @@ static bool read_query(const http_request *rq, store_query *query, problem_detai
     query->before = target_value(&rq->target, "cursor");
     query->by_status = status != NULL;
     query->ascending = order && strcmp(order, "asc") == 0;
-    if (status && !job_status_parse(&query->status, status))
+    while (status && query->status <= JOB_DISMISSED && strcmp(job_status_name(query->status), status) != 0)
+        query->status++;
+    if (query->status > JOB_DISMISSED)
         return refuse_query(problem, "status must be accepted, running, successful, failed or dismissed");
     if (query->before && !(strlen(query->before) == 32 && strspn(query->before, "0123456789abcdef") == 32))
         return refuse_query(problem, "cursor must be the \"next\" of an earlier page");

@@ -44,7 +44,7 @@ typedef struct output {
     bool negotiated; /* a client that accepts the type of the next row gets that */
 } output;
 
-const output *output_at(size_t i); /* NULL past the end */
+extern const output OUTPUTS[]; /* `type` NULL ends it */
 void output_get(api *context, http_request *rq, http_reply *reply);
 
 #endif

@@ -97,7 +97,7 @@ static const char *const CURVES[] = {"case", "x", "with", "theme", "width", NULL
         "GET", "/v1/jobs/{id}/" suffix, parameters, handler, false                                                     \
     }
 
-static const output OUTPUTS[] = {
+const output OUTPUTS[] = {
     {OUTPUT("result", RESULT, results_get), "application/json", OUTPUT_OWN, NULL, 0, 0, NULL, false},
     {OUTPUT("result.vtu", FILE_OF, output_get), "application/xml", OUTPUT_OF_ANSWER, write_vtu, VTU_BY_DEFAULT, IN_VTU,
      NULL, false},
@@ -110,12 +110,8 @@ static const output OUTPUTS[] = {
      write_history_csv, 0, 0, NULL, false},
     {OUTPUT("work-precision", OF_CASE, trade_get), "application/json", OUTPUT_OWN, NULL, 0, 0, NULL, false},
     {OUTPUT("convergence.svg", CURVES, convergence_get), "image/svg+xml", OUTPUT_OWN, NULL, 0, 0, NULL, false},
+    {.type = NULL},
 };
-
-const output *output_at(size_t i)
-{
-    return i < sizeof OUTPUTS / sizeof OUTPUTS[0] ? &OUTPUTS[i] : NULL;
-}
 
 /* ---- of a case of a scene */
 

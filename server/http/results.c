@@ -1,5 +1,6 @@
 /* results.c: what a job leaves behind: /v1/jobs/{id}/result, and which of its cases is meant. */
 #include "codec/codec.h"
+#include "codec/text.h"
 #include "http/api.h"
 #include "http/fields.h"
 #include "http/jobs.h"
@@ -182,7 +183,7 @@ static void reply_one(api *context, const http_request *rq, const place *at, con
     size_t len = 0;
     if (which) {
         const bool done = fields_open(&reader, context, rq, at->j, reply) &&
-                          fields_of_case(&computed, &reader, at->number, which, reply);
+                          fields_compute(&computed, fields_of_case, &reader, at->number, which, reply);
         fields_close(&reader);
         if (!done) {
             uz_fields_clear(&computed);
@@ -195,8 +196,8 @@ static void reply_one(api *context, const http_request *rq, const place *at, con
     if (status == STORE_OK) {
         const uz_fields part = cut_computed(&computed, fields);
         codec_result result = as_encoded(at, &own, &shared, which ? &part : NULL, fields);
-        char *text = codec_encode_result(&result, &len);
-        reply_text(reply, 200, "application/json", text, len);
+        char *body = codec_encode_result(&result, &len);
+        reply_text(reply, 200, "application/json", body, len);
     } else {
         reply_store_failure(context, status, reply);
     }
@@ -238,72 +239,61 @@ static bool check_room(api *context, const job *j, size_t cases, const field_lis
 }
 
 /* All cases of a job in one reply. */
-typedef struct {
-    api *context;
-    const job *j;
-    const store_case *cases;
-    size_t count;
-    const field_list *fields;
-    vectors shared;
-    field_reader reader; /* where something is computed */
-    codec_results *all;
-} many;
-
-/* False with a reply. */
-static bool add_case(many *of, size_t i, http_reply *reply)
+static void reply_cases(api *context, const http_request *rq, const job *j, const store_case *cases, size_t count,
+                        const field_list *fields, http_reply *reply)
 {
-    const place at = {of->j, of->cases[i].number, of->cases[i].name, of->cases[i].summary};
-    const unsigned which = of->fields->which & COMPUTED;
-    vectors own = {.n = {0}};
-    uz_fields computed = {.dim = 0};
-    bool done = !which || fields_of_case(&computed, &of->reader, at.number, which, reply);
-    if (done && which && i == 0) {
-        const uz_fields *f = &computed;
-        const int64_t k = f->components;
-        const int64_t of_node =
-            (f->stress ? k : 0) + (f->strain ? k : 0) + (f->principal ? 3 : 0) + (f->von_mises ? 1 : 0);
-        const int64_t numbers = (f->contact_status ? f->m : 0) + f->n_nodes * of_node + f->n_points * (1 + f->dim + k);
-        done = check_room(of->context, of->j, of->count, of->fields, (int64_t)of->count * numbers, reply);
-    }
-    store_status status = done ? fetch(of->context, &at, of->fields, &own, REACTIONS, OWN_NODES) : STORE_OK;
-    if (status != STORE_OK) {
-        reply_store_failure(of->context, status, reply);
-        done = false;
-    }
-    const uz_fields part = cut_computed(&computed, of->fields);
-    codec_result one = as_encoded(&at, &own, &of->shared, &part, of->fields);
-    if (done)
-        codec_results_add(of->all, &one);
-    vectors_free(&own);
-    uz_fields_clear(&computed);
-    return done;
-}
-
-static void reply_cases(many *of, const http_request *rq, http_reply *reply)
-{
-    const place whole = {.j = of->j, .summary = of->j->summary};
-    store_status status = fetch(of->context, &whole, of->fields, &of->shared, DIM, NODES);
+    const place whole = {.j = j, .summary = j->summary};
+    const unsigned which = fields->which & COMPUTED;
+    vectors shared = {.n = {0}};
+    field_reader reader = {.j = NULL}; /* where something is computed */
+    text t = {0};
+    size_t len = 0;
+    store_status status = fetch(context, &whole, fields, &shared, DIM, NODES);
     if (status != STORE_OK)
-        reply_store_failure(of->context, status, reply);
-    else if (!(of->fields->which & COMPUTED) || fields_open(&of->reader, of->context, rq, of->j, reply)) {
-        size_t len = 0;
-        of->all = codec_results_begin(of->j->id, of->j->summary);
-        bool done = of->all != NULL;
-        for (size_t i = 0; done && i < of->count; i++)
-            done = add_case(of, i, reply);
-        if (!of->all) {
-            reply_no_memory(reply);
-        } else if (!done) {
-            codec_results_end(of->all, NULL, NULL);
-        } else {
-            codec_result rest = as_encoded(&whole, &(vectors){.n = {0}}, &of->shared, NULL, of->fields);
-            char *text = codec_results_end(of->all, &rest, &len);
-            reply_text(reply, 200, "application/json", text, len);
+        reply_store_failure(context, status, reply);
+    bool done = status == STORE_OK && (!which || fields_open(&reader, context, rq, j, reply));
+    text_open(&t, NULL, '{');
+    text_string(&t, "job", j->id);
+    text_raw(&t, "summary", j->summary);
+    text_open(&t, "cases", '[');
+    for (size_t i = 0; done && !t.failed && i < count; i++) {
+        const place at = {j, cases[i].number, cases[i].name, cases[i].summary};
+        vectors own = {.n = {0}};
+        uz_fields computed = {.dim = 0};
+        done = !which || fields_compute(&computed, fields_of_case, &reader, at.number, which, reply);
+        if (done && which && i == 0) {
+            const uz_fields *f = &computed;
+            const int64_t k = f->components;
+            const int64_t of_node =
+                (f->stress ? k : 0) + (f->strain ? k : 0) + (f->principal ? 3 : 0) + (f->von_mises ? 1 : 0);
+            const int64_t numbers =
+                (f->contact_status ? f->m : 0) + f->n_nodes * of_node + f->n_points * (1 + f->dim + k);
+            done = check_room(context, j, count, fields, (int64_t)count * numbers, reply);
         }
+        status = done ? fetch(context, &at, fields, &own, REACTIONS, OWN_NODES) : STORE_OK;
+        if (status != STORE_OK) {
+            reply_store_failure(context, status, reply);
+            done = false;
+        }
+        const uz_fields part = cut_computed(&computed, fields);
+        codec_result one = as_encoded(&at, &own, &shared, &part, fields);
+        if (done)
+            codec_put_case(&t, &one);
+        vectors_free(&own);
+        uz_fields_clear(&computed);
     }
-    if (of->fields->which & COMPUTED)
-        fields_close(&of->reader);
-    vectors_free(&of->shared);
+    if (done) {
+        const codec_result rest = as_encoded(&whole, &(vectors){.n = {0}}, &shared, NULL, fields);
+        text_close(&t, ']');
+        codec_put_places(&t, &rest);
+        text_close(&t, '}');
+        char *body = text_finish(&t, &len);
+        reply_text(reply, 200, "application/json", body, len);
+    }
+    free(t.data); /* NULL after the end */
+    if (which)
+        fields_close(&reader);
+    vectors_free(&shared);
 }
 
 /* ------------------------------------------------------------ which of them */
@@ -389,8 +379,7 @@ void results_get(api *context, http_request *rq, http_reply *reply)
         else if (name)
             reply_one(context, rq, &(place){&j, cases[0].number, cases[0].name, cases[0].summary}, &fields, reply);
         else if (check_room(context, &j, count, &fields, 0, reply))
-            reply_cases(&(many){.context = context, .j = &j, .cases = cases, .count = count, .fields = &fields}, rq,
-                        reply);
+            reply_cases(context, rq, &j, cases, count, &fields, reply);
         store_cases_free(cases, count);
     }
     jobs_check_still_there(context, &j, reply);

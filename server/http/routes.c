@@ -40,8 +40,7 @@ static const route ROUTES[] = {
 static const route *route_at(size_t i)
 {
     const size_t own = sizeof ROUTES / sizeof ROUTES[0];
-    const output *row = i < own ? NULL : output_at(i - own);
-    return i < own ? &ROUTES[i] : row ? &row->route : NULL;
+    return i < own ? &ROUTES[i] : OUTPUTS[i - own].type ? &OUTPUTS[i - own].route : NULL;
 }
 
 /* Compares segment by segment; what stands for a placeholder is copied to name. any: whatever its form is, which is 32

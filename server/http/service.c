@@ -1,6 +1,7 @@
 /* service.c: routes about the service itself: what is cached, whether it lives, what is valid, and its page. */
 #include "codec/codec.h"
 #include "codec/embedded.h"
+#include "codec/text.h"
 #include "http/api.h"
 #include "http/page.h"
 #include "options/options.h"
@@ -31,19 +32,23 @@ enum { N_FIXED = sizeof FIXED / sizeof FIXED[0] };
 
 void service_limits(api *context, http_request *rq, http_reply *reply)
 {
-    size_t n = context->options.n_limits;
-    codec_limit *all = malloc((n + N_FIXED) * sizeof *all);
+    const size_t n = context->options.n_limits;
+    text t = {0};
     (void)rq;
-    if (!all) {
-        reply_no_memory(reply);
-        return;
+    text_open(&t, NULL, '{');
+    text_open(&t, "limits", '{');
+    for (size_t i = 0; i < n + N_FIXED; i++) {
+        const codec_limit *one = i < n ? &context->options.limits[i] : &FIXED[i - n];
+        text_open(&t, one->name, '{');
+        text_number(&t, "value", one->value);
+        text_string(&t, "unit", one->unit);
+        text_string(&t, "description", one->meaning);
+        text_close(&t, '}');
     }
-    if (n > 0)
-        memcpy(all, context->options.limits, n * sizeof *all);
-    memcpy(all + n, FIXED, sizeof FIXED);
+    text_close(&t, '}');
+    text_close(&t, '}');
     reply->tag_by_body = true;
-    reply_json(reply, 200, codec_encode_limits(all, n + N_FIXED));
-    free(all);
+    reply_json(reply, 200, text_finish(&t, NULL));
 }
 
 void service_metrics(api *context, http_request *rq, http_reply *reply)
@@ -68,8 +73,8 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
         now.job_names[i] = job_status_name((job_status)i);
     work_cached(context->work, &now.cache_entries, &now.cache_bytes);
     now.cache_max_bytes = work_settings(context->work)->cache_bytes;
-    char *text = metrics_text(context->metrics, &now, &len);
-    reply_text(reply, 200, "text/plain; version=0.0.4; charset=utf-8", text, len);
+    char *body = metrics_text(context->metrics, &now, &len);
+    reply_text(reply, 200, "text/plain; version=0.0.4; charset=utf-8", body, len);
 }
 
 /* Alive: the process answers. A supervisor restarts it on anything else, which would not help a failing store, so a
@@ -151,6 +156,8 @@ void service_schema(api *context, http_request *rq, http_reply *reply)
 void admin_check(api *context, http_request *rq, http_reply *reply)
 {
     store_findings found;
+    text t = {0};
+    char line[512];
     (void)rq;
     store_status status = store_check(context->store, &found);
     if (status != STORE_OK) {
@@ -159,7 +166,20 @@ void admin_check(api *context, http_request *rq, http_reply *reply)
     }
     if (found.findings[0])
         log_write(context->log, LOG_ERROR, "database_damaged", (log_field[]){LOG_S("findings", found.findings), {0}});
-    reply_json(reply, 200, codec_encode_findings(found.findings, found.jobs, found.seconds));
+    text_open(&t, NULL, '{');
+    text_bool(&t, "whole", found.findings[0] == '\0');
+    text_open(&t, "findings", '[');
+    for (const char *at = found.findings; *at;) { /* one a line */
+        const size_t len = strcspn(at, "\n");
+        snprintf(line, sizeof line, "%.*s", (int)len, at);
+        text_string(&t, NULL, line);
+        at += len + (at[len] == '\n');
+    }
+    text_close(&t, ']');
+    text_integer(&t, "jobs", found.jobs);
+    text_number(&t, "seconds", found.seconds);
+    text_close(&t, '}');
+    reply_json(reply, 200, text_finish(&t, NULL));
     free(found.findings);
 }
 

@@ -122,15 +122,6 @@ static bool find_repeat(api *context, http_request *rq, const char *key, job *ou
     return true;
 }
 
-/* Stores a request, waits as it prefers and answers with the job. */
-static void store_and_wait(api *context, http_request *rq, const store_request *request, http_reply *reply)
-{
-    job j = {0};
-    if (store_job(context, rq, request, &j, reply))
-        jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
-    job_clear(&j);
-}
-
 /* The uploads that it names must be the client's. */
 static bool check_uploads(api *context, const http_request *rq, const codec_request *request, problem_details *problem)
 {
@@ -161,25 +152,6 @@ static bool refuse_store(api *context, const codec_start *start, store_status st
         return api_store_failed(context, problem);
     codec_problem_damaged(problem, start->job);
     return false;
-}
-
-/* The job must have ended with an answer. */
-static bool check_job(api *context, const http_request *rq, const codec_start *start, problem_details *problem)
-{
-    job other = {0};
-    store_status status = api_get_job(context, rq, start->job, &other);
-    bool ended = status == STORE_OK && jobs_ended(&other), good = ended && other.summary;
-    status = status == STORE_OK && other.damaged ? STORE_DAMAGED : status;
-    job_clear(&other);
-    if (good)
-        return true;
-    if (status == STORE_NOT_FOUND)
-        return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: there is no job with this id");
-    if (status != STORE_OK)
-        return refuse_store(context, start, status, problem);
-    return refuse(problem, "job", "not_allowed",
-                  ended ? "/solver/warm_start/job: this job ended without an answer"
-                        : "/solver/warm_start/job: this job has not ended");
 }
 
 /* Its case, if it has some, must have as many reactions as the problem has rows. */
@@ -232,17 +204,28 @@ static bool check_start(api *context, const codec_request *request, const http_r
     const codec_start *start = &request->start;
     char *body = NULL;
     size_t len = 0;
+    job other = {0};
     if (!start->job[0])
         return true;
-    if (!check_job(context, rq, start, problem))
-        return false;
+    store_status status = api_get_job(context, rq, start->job, &other);
+    const bool ended = status == STORE_OK && jobs_ended(&other), answered = ended && other.summary;
+    status = status == STORE_OK && other.damaged ? STORE_DAMAGED : status;
+    job_clear(&other);
+    if (!answered && status == STORE_NOT_FOUND)
+        return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: there is no job with this id");
+    if (!answered && status != STORE_OK)
+        return refuse_store(context, start, status, problem);
+    if (!answered)
+        return refuse(problem, "job", "not_allowed",
+                      ended ? "/solver/warm_start/job: this job ended without an answer"
+                            : "/solver/warm_start/job: this job has not ended");
     if (!start->continued)
         return check_reactions(context, request, problem);
     /* A run that goes on with another problem would be another run. */
     if (start->case_name[0])
         return refuse(problem, "case", "not_allowed",
                       "/solver/warm_start/case: a run is continued with all its cases; leave this out");
-    store_status status = store_get_body(context->store, start->job, &body, &len);
+    status = store_get_body(context->store, start->job, &body, &len);
     bool same = status == STORE_OK && codec_same_problem(rq->body, rq->body_len, body, len);
     free(body);
     if (same)
@@ -265,6 +248,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem = {0}, ignored;
     codec_request request = {0};
+    job j = {0};
     char *key = NULL;
     const char *validate = target_value(&rq->target, "validate");
     const bool validate_only = validate && strcmp(validate, "true") == 0;
@@ -278,12 +262,10 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
            check_allowed(context, rq, request.webhook, request.priority, &problem);
     if (!good) {
         /* a problem, or the job that the request became when it came before */
-        job j;
         if (!find_repeat(context, rq, validate_only ? NULL : key, &j))
             reply_problem(reply, &problem);
         else
             jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
-        job_clear(&j);
     } else if (validate_only) {
         /* One prediction at a time: it takes memory and a processor that are counted for the workers. */
         uz_prediction predicted;
@@ -306,8 +288,10 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     } else {
         codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
         store_request stored = kept_request(rq, &request, rq->body, rq->body_len, key);
-        store_and_wait(context, rq, &stored, reply);
+        if (store_job(context, rq, &stored, &j, reply))
+            jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
     }
+    job_clear(&j);
     codec_request_clear(&request);
     free(key);
 }
@@ -316,40 +300,36 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
 
 static const double VERIFY_WAIT_S = 30.0; /* where the request does not say; openapi.json says so */
 
-static void reply_end(api *context, job *j, http_reply *reply)
+void verify_submit(api *context, http_request *rq, http_reply *reply)
 {
-    problem_details error = {0};
-    if (!jobs_ended(j))
-        jobs_acknowledge(context, j, reply);
-    else if (j->status != JOB_FAILED) {
-        if (results_exist(j, reply))
-            results_reply(context, j, reply);
-    } else if (j->error && codec_decode_problem(&error, j->error) && error.status >= 400) {
+    problem_details problem = {0}, error = {0};
+    codec_request request = {0};
+    job j = {0};
+    char *key = NULL;
+    bool there;
+    if (!read_key(rq, &key, &problem) ||
+        !codec_decode(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
+        !check_uploads(context, rq, &request, &problem)) {
+        there = find_repeat(context, rq, key, &j);
+        if (!there)
+            reply_problem(reply, &problem);
+    } else {
+        codec_request_strip(&request);
+        store_request stored = kept_request(rq, &request, rq->body, rq->body_len, key);
+        there = store_job(context, rq, &stored, &j, reply);
+    }
+    if (!there || !jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
+        goto done;
+    if (!jobs_ended(&j))
+        jobs_acknowledge(context, &j, reply);
+    else if (j.status != JOB_FAILED) {
+        if (results_exist(&j, reply))
+            results_reply(context, &j, reply);
+    } else if (j.error && codec_decode_problem(&error, j.error) && error.status >= 400) {
         reply_problem(reply, &error); /* what kept the answer from being certified is an error in the request */
     } else {
         reply_refuse(reply, 500, "internal", "A fault of this service", "the job failed and left no reason");
     }
-}
-
-void verify_submit(api *context, http_request *rq, http_reply *reply)
-{
-    problem_details problem = {0};
-    codec_request request = {0};
-    job j = {0};
-    char *key = NULL;
-    if (!read_key(rq, &key, &problem) ||
-        !codec_decode(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
-        !check_uploads(context, rq, &request, &problem)) {
-        if (!find_repeat(context, rq, key, &j))
-            reply_problem(reply, &problem);
-        else if (jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
-            reply_end(context, &j, reply);
-        goto done;
-    }
-    codec_request_strip(&request);
-    store_request stored = kept_request(rq, &request, rq->body, rq->body_len, key);
-    if (store_job(context, rq, &stored, &j, reply) && jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
-        reply_end(context, &j, reply);
 done:
     job_clear(&j);
     codec_request_clear(&request);
@@ -416,7 +396,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
         store_status status = store_get_body(context->store, old.id, &old_body, &old_len);
         if (status != STORE_OK) {
             reply_store_failure(context, status, reply);
-        } else if (codec_is_verify(old_body, old_len)) {
+        } else if (json_member_text(old_body, old_len, "answer", &len)) {
             reply_refuse(reply, 409, "not_solved_here", "The job solved nothing",
                          "it certified an answer that was given to it, and there is no run to continue");
         } else if (store_get_vector(context->store, old.id, 0, "cells", &cells, &n_cells) == STORE_OK) {
@@ -431,8 +411,10 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
             old_body = NULL;
             store_request request = kept_request(rq, &made, body, len, key);
             request.refines = old.id;
-            if (body)
-                store_and_wait(context, rq, &request, reply);
+            job new = {0};
+            if (body && store_job(context, rq, &request, &new, reply))
+                jobs_wait_then(context, rq, &new, jobs_acknowledge, reply);
+            job_clear(&new);
         }
         free(cells);
         free(old_body);

@@ -76,7 +76,7 @@ static bool take_flag(flags *f, const uz_option_walk *walk, char *message, size_
 
 static options_verdict read_flags(flags *f, int argc, char **argv, char *message, size_t size)
 {
-    uz_option_walk walk = {.table = options_table(),
+    uz_option_walk walk = {.table = DAEMON_OPTIONS,
                            .places = OPTION_SETTING | OPTION_REQUEST,
                            .abbreviated = true,
                            .argc = argc,
@@ -118,7 +118,7 @@ static options_verdict read_flags(flags *f, int argc, char **argv, char *message
 /* The values of a layer, FROM_ENVIRONMENT or FROM_FLAG, over those below it. */
 static bool set_layer(server_options *o, option_source layer, const flags *f, char *message, size_t size)
 {
-    const uz_option_table table = options_table();
+    const uz_option_table table = DAEMON_OPTIONS;
     char name[64], why[256];
     for (size_t i = 0; i < table.count && table.rows[i].places & OPTION_SETTING; i++) {
         const bool flag = layer == FROM_FLAG;
@@ -138,7 +138,7 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
 {
     flags f = {.verdict = OPTIONS_RUN};
     char name[64];
-    const uz_option_table table = options_table();
+    const uz_option_table table = DAEMON_OPTIONS;
     const uz_option *config = uz_option_find(table, OPTION_SETTING, "config", strlen("config"));
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
     memset(out, 0, sizeof *out);
@@ -176,7 +176,7 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
 
 size_t options_limits(const server_options *o, option_limit *out, size_t most)
 {
-    const uz_option_table table = options_table();
+    const uz_option_table table = DAEMON_OPTIONS;
     size_t n = 0;
     for (size_t i = 0; i < table.count && n < most; i++) {
         const uz_option *row = &table.rows[i];

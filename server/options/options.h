@@ -105,7 +105,7 @@ size_t options_limits(const server_options *o, option_limit *out, size_t most);
 /* ---- for the files of this folder */
 
 #define OPTION_LEVELS "debug info warn error" /* in the order of log_level */
-uz_option_table options_table(void);
+extern const uz_option_table DAEMON_OPTIONS;
 /* Gives a value to an option; false with what it takes instead in message. */
 bool options_set(server_options *o, const uz_option *row, const char *text, char *message, size_t size);
 /* options_file.c: reads the file into *o; false with "FILE:LINE: what is wrong; what to do" in message. */

@@ -56,7 +56,7 @@ static bool read_value(char *text)
 
 static bool take_line(server_options *o, char *text, const line_place *at)
 {
-    const uz_option_table table = options_table();
+    const uz_option_table table = DAEMON_OPTIONS;
     char why[256];
     text = trim(text);
     if (!text[0] || text[0] == '#')
@@ -69,7 +69,7 @@ static bool take_line(server_options *o, char *text, const line_place *at)
     const uz_option *row = uz_option_find(table, OPTION_SETTING, name, strlen(name));
     if (!row) {
         char what[256];
-        const char *meant = uz_option_closest(options_table(), OPTION_SETTING, name, strlen(name));
+        const char *meant = uz_option_closest(DAEMON_OPTIONS, OPTION_SETTING, name, strlen(name));
         if (meant)
             snprintf(what, sizeof what, "there is no option \"%.60s\": did you mean \"%s\"?", name, meant);
         else

@@ -7,7 +7,7 @@ enum { COLUMN = 30, WIDTH = 118 };
 
 void options_usage(FILE *to)
 {
-    const uz_option_table table = options_table();
+    const uz_option_table table = DAEMON_OPTIONS;
     char text[512];
     fputs("usage: uzawad [OPTION]...\n"
           "Solves frictionless contact problems for whoever asks by HTTP.\n\n",
@@ -78,7 +78,7 @@ static void write_value(const server_options *o, const uz_option *row, FILE *to)
 void options_show(const server_options *o, FILE *to)
 {
     static const char *const NAMES[] = {"default", "file", "environment", "command line"};
-    const uz_option_table table = options_table();
+    const uz_option_table table = DAEMON_OPTIONS;
     const uz_option *rows = table.rows;
     for (size_t i = 0; i < table.count && rows[i].places & OPTION_SETTING; i++) {
         bool is_this_file = strcmp(rows[i].name, "config") == 0; /* can't stand in a file */
@@ -96,7 +96,7 @@ void options_show(const server_options *o, FILE *to)
 
 void options_example(FILE *to)
 {
-    const uz_option_table table = options_table();
+    const uz_option_table table = DAEMON_OPTIONS;
     const uz_option *rows = table.rows;
     fputs("# Configuration of uzawad: uzawad --config FILE. Every option is here with its default; take the '#' away\n"
           "# before the ones to change. uzawad --config FILE --check-config says what is in effect.\n",

@@ -152,7 +152,4 @@ static const uz_option ROWS[] = {
 #define N_ROWS (sizeof ROWS / sizeof ROWS[0])
 _Static_assert(N_ROWS <= OPTIONS_MAX, "server_options has room for the sources");
 
-uz_option_table options_table(void)
-{
-    return (uz_option_table){ROWS, N_ROWS};
-}
+const uz_option_table DAEMON_OPTIONS = {ROWS, N_ROWS};

@@ -52,22 +52,6 @@ bool blob_sync(const char *path, int flags)
     return ok;
 }
 
-/* The folder; a new one is in its own folder durably before anything is put into it. */
-static bool make_folder(const char *path)
-{
-    if (mkdir(path, 0700) != 0)
-        return errno == EEXIST;
-    const char *slash = strrchr(path, '/');
-    char *parent = strndup(slash ? path : ".", slash ? (size_t)(slash - path) + 1 : 1);
-    bool ok = parent && blob_sync(parent, O_DIRECTORY);
-    int cause = errno;
-    free(parent);
-    if (!ok)
-        rmdir(path); /* the next one tries again */
-    errno = cause;
-    return ok;
-}
-
 static void folder_end(blob_writer *writer)
 {
     file_writer *w = (file_writer *)writer;
@@ -86,9 +70,22 @@ static store_status folder_begin(blobs *b, blob_writer **out, char cause[BLOB_CA
     if (!w)
         return fail("begin", cause);
     *w = (file_writer){.base.blobs = b, .fd = -1};
-    if (make_folder(((folder *)b)->path)) {
+    /* A new folder is in its own folder durably before anything is put into it. */
+    const char *path = ((folder *)b)->path, *slash = strrchr(path, '/');
+    const bool made = mkdir(path, 0700) == 0;
+    bool there = made || errno == EEXIST;
+    if (made) {
+        char *parent = strndup(slash ? path : ".", slash ? (size_t)(slash - path) + 1 : 1);
+        there = parent && blob_sync(parent, O_DIRECTORY);
+        const int cause_of = errno;
+        free(parent);
+        if (!there)
+            rmdir(path); /* the next one tries again */
+        errno = cause_of;
+    }
+    if (there) {
         errno = ENOMEM;
-        if (asprintf(&w->path, "%s/" INCOMING "XXXXXX", ((folder *)b)->path) < 0)
+        if (asprintf(&w->path, "%s/" INCOMING "XXXXXX", path) < 0)
             w->path = NULL;
         else if ((w->fd = mkostemp(w->path, O_CLOEXEC)) < 0) {
             free(w->path);

@@ -1,5 +1,6 @@
 /* engine.h: an engine of the store, for who writes one. store.h and uploads.h have the contract of each operation;
- * docs/architecture/store.md says what holds for all of them and shows how to add one.
+ * docs/architecture/store.md says what holds for all of them and shows how to add one. What engines share:
+ * engine_base.h.
  *
  *   - Each operation is one transaction, all of it or nothing, and may be called from any thread.
  *   - STORE_OK means: durable, but for claim and renew, which recover makes good for. What may still be lost is not
@@ -10,11 +11,16 @@
 #ifndef SERVER_STORE_ENGINE_H
 #define SERVER_STORE_ENGINE_H
 
-#include "base/clock.h"
 #include "store/result_blobs.h"
 #include "store/uploads.h"
 
-#include <pthread.h>
+/* What only the owner of a running job does: store_renew, store_finish or store_release. */
+typedef struct {
+    enum { LEASE_RENEW, LEASE_FINISH, LEASE_RELEASE } what;
+    int progress;                 /* renew */
+    const store_outcome *outcome; /* finish */
+    bool counted;                 /* release: the attempt */
+} lease_use;
 
 typedef struct {
     const char *scheme; /* how its addresses begin: "postgresql://"; "": it takes all others, as names of files */
@@ -23,9 +29,7 @@ typedef struct {
     store_status (*submit)(store *s, const store_request *request, job *out, bool *repeated);
     store_status (*find_repeat)(store *s, const store_request *request, job *out);
     store_status (*claim)(store *s, store_lease *lease, double lease_s, bool small, job *out, char **body, size_t *len);
-    store_status (*renew)(store *s, const store_lease *lease, int progress);
-    store_status (*finish)(store *s, const store_lease *lease, const store_outcome *outcome);
-    store_status (*release)(store *s, const store_lease *lease, bool counted);
+    store_status (*use_lease)(store *s, const store_lease *lease, const lease_use *use);
     store_status (*recover)(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
     store_status (*expire)(store *s, const char *error_json, int64_t *count);
     /* At least one limit; now: for ages. */
@@ -58,28 +62,5 @@ typedef struct {
     bool (*check_file)(const char *address, store_findings *out, char *message, size_t size);
     bool (*backup_file)(const char *address, const char *to, int64_t *bytes, char *message, size_t size);
 } store_engine;
-
-/* What every store begins with; an engine's own struct has it as its first member. */
-struct store {
-    const store_engine *engine;
-    store_settings settings;
-    store_listener *changed; /* may be NULL */
-    void *changed_ctx;
-    store_uploads *uploads;
-    age_clock ages;               /* of who retains and collects */
-    char *missing;                /* set at opening: store_missing */
-    pthread_mutex_t message_lock; /* message; taken last */
-    char message[256];
-};
-
-void store_base_begin(store *s, const store_engine *engine);
-void store_base_end(store *s);
-void store_set_message(store *s, const char *cause);
-/* As a store_listener is told. */
-void store_tell(const store *s, const char *id, bool waits, const char *gone);
-
-/* The next id of a job: 12 hex digits of milliseconds, 4 of a counter within them, 16 random. Under the engine's lock.
- * last_ms and sequence are those of the newest id, so that ids ascend when the clock does not. */
-void store_next_id(uint64_t *last_ms, unsigned *sequence, char id[33]);
 
 #endif

@@ -1,6 +1,6 @@
 /* result_blobs.c: vectors and histories as little-endian doubles, in pieces of bounded size. */
 #include "store/result_blobs.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 
 #include <endian.h>
 #include <stdio.h>

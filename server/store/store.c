@@ -1,6 +1,6 @@
 /* store.c: what is the same whatever engine keeps the jobs; every operation goes to the engine of the store. */
 #include "store/blobs.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -17,16 +17,6 @@ static const char *const STATUS_NAMES[] = {"accepted", "running", "successful", 
 const char *job_status_name(job_status status)
 {
     return (size_t)status < STATUS_COUNT ? STATUS_NAMES[status] : "unknown";
-}
-
-bool job_status_parse(job_status *out, const char *name)
-{
-    for (size_t i = 0; i < STATUS_COUNT; i++)
-        if (strcmp(name, STATUS_NAMES[i]) == 0) {
-            *out = (job_status)i;
-            return true;
-        }
-    return false;
 }
 
 void job_clear(job *j)
@@ -50,11 +40,6 @@ void store_cases_free(store_case *cases, size_t count)
 
 /* ---- the store itself */
 
-void store_configure(store *s, const store_settings *settings)
-{
-    s->settings = *settings;
-}
-
 void store_base_begin(store *s, const store_engine *engine)
 {
     *s = (store){.engine = engine};
@@ -74,21 +59,10 @@ void store_close(store *s)
         s->engine->close(s);
 }
 
-void store_listen(store *s, store_listener *changed, void *ctx)
-{
-    s->changed = changed;
-    s->changed_ctx = ctx;
-}
-
 void store_tell(const store *s, const char *id, bool waits, const char *gone)
 {
     if (s->changed)
         s->changed(s->changed_ctx, id, waits, gone);
-}
-
-const char *store_missing(const store *s)
-{
-    return s->missing;
 }
 
 void store_set_message(store *s, const char *cause)
@@ -168,20 +142,21 @@ store_status store_claim(store *s, const char *owner, double lease_s, bool small
 
 store_status store_renew(store *s, const store_lease *lease, int progress)
 {
-    return s->engine->renew(s, lease, progress < 0 ? 0 : progress > 100 ? 100 : progress);
+    const lease_use use = {.what = LEASE_RENEW, .progress = progress < 0 ? 0 : progress > 100 ? 100 : progress};
+    return s->engine->use_lease(s, lease, &use);
 }
 
 store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome)
 {
     if (outcome->status == JOB_SUCCESSFUL || outcome->status == JOB_FAILED || outcome->status == JOB_DISMISSED)
-        return s->engine->finish(s, lease, outcome);
+        return s->engine->use_lease(s, lease, &(lease_use){.what = LEASE_FINISH, .outcome = outcome});
     store_set_message(s, "a job cannot be finished with a status that is not an end");
     return STORE_ERROR;
 }
 
 store_status store_release(store *s, const store_lease *lease, bool counted)
 {
-    return s->engine->release(s, lease, counted);
+    return s->engine->use_lease(s, lease, &(lease_use){.what = LEASE_RELEASE, .counted = counted});
 }
 
 store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed)

@@ -29,7 +29,6 @@ typedef enum {
 
 typedef enum { JOB_ACCEPTED, JOB_RUNNING, JOB_SUCCESSFUL, JOB_FAILED, JOB_DISMISSED } job_status;
 const char *job_status_name(job_status status);
-bool job_status_parse(job_status *out, const char *name);
 
 /* Whose a job, a key or an upload is: the name of an owner of tokens, "" where there are none. Where an operation takes
  * one, NULL means that it is of no matter. */
@@ -65,35 +64,31 @@ typedef struct {
     double seconds;  /* of workers, in a day (UTC); counted when jobs end */
 } client_quotas;
 
-/* Kept nowhere: each start gives them. */
+/* Kept nowhere: each start gives them, as the member `settings` of the store (engine.h), before other threads use it;
+ * until then nothing is limited or counted. */
 typedef struct {
     metrics *metrics;  /* counts commits and changes there; may be NULL */
     int64_t max_queue; /* so many jobs may wait; a submission beyond it is STORE_BUSY; 0: no limit */
     upload_limits uploads;
     client_quotas quotas;
 } store_settings;
-/* Before other threads use the store; until then nothing is limited or counted. */
-void store_configure(store *s, const store_settings *settings);
 /* NULL is fine. */
 void store_close(store *s);
 
 /* The last failure's cause, for the log; copied to buffer. */
 void store_message(store *s, char *buffer, size_t size);
 
-/* What was on disk once and was not any more when the store was opened, in words; NULL: nothing that is known. */
-const char *store_missing(const store *s);
-
 /* What a program without privileges may still write to the store's disk; -1: not known. */
 int64_t store_free_bytes(store *s);
 
-/* ---- notification: who waits learns of changes. From now on changed(ctx, id, waits) is called after every change of a
- * job was committed that anybody but its owner made (submitted, dismissed, expired, deleted), without a lock, by the
- * thread that made it or by one of the engine's. What owners do (claim, finish, release) they tell themselves; an
- * engine of several processes tells what owners in the others do. waits: the job now waits to be claimed. gone: the job
- * was deleted, and this client's it was; else NULL. id NULL: changes may have been missed, everybody is to look again.
- * NULL: nobody is told. Before other threads use the store, and after they did. */
+/* ---- notification: who waits learns of changes: the member `changed` of the store (engine.h) is called with
+ * changed_ctx after every change of a job was committed that anybody but its owner made (submitted, dismissed, expired,
+ * deleted), without a lock, by the thread that made it or by one of the engine's. What owners do (claim, finish,
+ * release) they tell themselves; an engine of several processes tells what owners in the others do. waits: the job now
+ * waits to be claimed. gone: the job was deleted, and this client's it was; else NULL. id NULL: changes may have been
+ * missed, everybody is to look again. NULL: nobody is told. It is set before other threads use the store, and after
+ * they did. */
 typedef void store_listener(void *ctx, const char *id, bool waits, const char *gone);
-void store_listen(store *s, store_listener *changed, void *ctx);
 
 /* What is submitted. */
 typedef struct {

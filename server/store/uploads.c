@@ -1,7 +1,7 @@
 /* uploads.c: what is sent becomes a blob and a row of the engine; the limits of both. */
 #include "store/uploads.h"
 #include "store/blobs.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 
 #include <errno.h>
 #include <gnutls/crypto.h>

@@ -166,20 +166,14 @@ int feed_descriptor(const listener *l)
 
 /* ---- reading */
 
-uint64_t feed_last(feed *f)
-{
-    pthread_mutex_lock(&f->lock);
-    uint64_t last = f->last;
-    pthread_mutex_unlock(&f->lock);
-    return last;
-}
-
 bool feed_since(feed *f, uint64_t after, feed_change *out, size_t most, size_t *count, uint64_t *seen)
 {
     *count = 0;
     *seen = after;
     pthread_mutex_lock(&f->lock);
     bool known = after <= f->last && f->last - after <= FEED_KEPT;
+    if (!known)
+        *seen = f->last;
     while (known && *seen < f->last && *count < most) {
         const kept_change *one = &f->kept[++*seen % FEED_KEPT];
         if (!one->is_past)

@@ -43,11 +43,10 @@ bool feed_wait(listener *l, int fd, double seconds);
  * one has none. */
 int feed_descriptor(const listener *l);
 
-/* The number of the last change; 0: there was none. */
-uint64_t feed_last(feed *f);
 /* The changes with numbers above `after`, the oldest first, at most `most`; of several of one job only the last (a few
  * earlier ones may be among them). *seen: the number up to which they go, from which the next call goes on. False: some
- * of them are not kept any more, or `after` is no number of this feed. */
+ * of them are not kept any more, or `after` is no number of this feed; *seen is the number of the last one, 0: there
+ * was none. */
 bool feed_since(feed *f, uint64_t after, feed_change *out, size_t most, size_t *count, uint64_t *seen);
 
 #endif

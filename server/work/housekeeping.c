@@ -11,40 +11,18 @@
 #define ROUND_S   0.5
 #define HEAP_FREE ((size_t)16 << 20) /* may lie free */
 
-/* What waits too long fails, what is old or too much goes. *told: that the clock is not believed. */
-static void tidy(work *w, bool *told)
-{
-    int64_t expired = 0, total = 0, count = 1;
-    bool held;
-    problem_details problem = {.status = 503, .code = "queue_time_limit", .title = "The job waited too long"};
-    snprintf(problem.detail, sizeof problem.detail,
-             "It had not begun when its queue_limit_s was over. Submit it again, with more time or a larger priority.");
-    char *error = codec_encode_problem(&problem);
-    if (error && store_expire(w->store, error, &expired) == STORE_OK && expired > 0) {
-        log_write(w->log, LOG_INFO, "queue_time_limit", (log_field[]){LOG_I("jobs", expired), {0}});
-        metrics_job(w->options.metrics, job_status_name(JOB_FAILED), NULL, expired);
-    }
-    free(error);
-    store_age_time(w->store, &held);
-    if (held && !*told)
-        log_write(
-            w->log, LOG_WARN, "clock_jumped",
-            (log_field[]){LOG_S("cause", "the clock is more than a day past what was stored last, or was set forward: "
-                                         "nothing is deleted for its age by it before the daemon has run for a day"),
-                          {0}});
-    *told = held;
-    while (count > 0 && !work_is_stopping(w) && store_retain(w->store, &w->options.retention, &count) == STORE_OK)
-        total += count;
-    metrics_add(w->options.metrics, METRIC_DELETED, total);
-    if (total > 0)
-        log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
-    store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
-}
+/* What the jobs are told that have waited too long. */
+static const problem_details WAITED = {
+    .status = 503,
+    .code = "queue_time_limit",
+    .title = "The job waited too long",
+    .detail =
+        "It had not begun when its queue_limit_s was over. Submit it again, with more time or a larger priority."};
 
 void *housekeeping_loop(void *arg)
 {
     work *w = arg;
-    bool told = false;
+    bool told = false; /* that the clock is not believed */
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {
         if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + ROUND_S))
@@ -56,7 +34,28 @@ void *housekeeping_loop(void *arg)
         if (heap.fordblks > HEAP_FREE)
             malloc_trim(0);
         work_rest_processes(w);
-        tidy(w, &told);
+        int64_t expired = 0, total = 0, count = 1;
+        bool held;
+        char *error = codec_encode_problem(&WAITED);
+        if (error && store_expire(w->store, error, &expired) == STORE_OK && expired > 0) {
+            log_write(w->log, LOG_INFO, "queue_time_limit", (log_field[]){LOG_I("jobs", expired), {0}});
+            metrics_job(w->options.metrics, job_status_name(JOB_FAILED), NULL, expired);
+        }
+        free(error);
+        store_age_time(w->store, &held);
+        if (held && !told)
+            log_write(w->log, LOG_WARN, "clock_jumped",
+                      (log_field[]){LOG_S("cause",
+                                          "the clock is more than a day past what was stored last, or was set forward: "
+                                          "nothing is deleted for its age by it before the daemon has run for a day"),
+                                    {0}});
+        told = held;
+        while (count > 0 && !work_is_stopping(w) && store_retain(w->store, &w->options.retention, &count) == STORE_OK)
+            total += count;
+        metrics_add(w->options.metrics, METRIC_DELETED, total);
+        if (total > 0)
+            log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
+        store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
         pthread_mutex_lock(&w->lock);
     }
     pthread_mutex_unlock(&w->lock);

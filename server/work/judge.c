@@ -5,6 +5,7 @@
  * and miss them to fail; a quantity's interval is such a range, of the body itself. The other numbers are taken as they
  * are, and `error` says that no bound is known. An answer that is not what was asked for passes nothing. */
 #include "work/judge.h"
+#include "codec/quantity.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -27,16 +28,16 @@ static const bound UNKNOWN = {{NAN, NAN}, NAN};
 
 /* ---- how far a number may be from that of the exact answer */
 
-static double number_at(const codec_summary *summary, const char *name)
+static double number_at(const json_value *summary, const char *name)
 {
     double value = NAN;
-    return codec_summary_number(&value, summary, name) ? value : (double)NAN;
+    return quantity_read(&value, summary, name) ? value : (double)NAN;
 }
 
 /* The minimum of the energy is between the dual and the primal value. The strain energy W is half the square of a
  * seminorm of the strain without its thermal part, and by the triangle inequality sqrt(2 W) differs from the exact one
  * by at most the energy norm of the displacement's error. */
-static bound exact_bound(const codec_summary *summary, const char *quantity, double value)
+static bound exact_bound(const json_value *summary, const char *quantity, double value)
 {
     /* Numbers of the answer, which a finer one would have otherwise; the others are what they are. */
     static const char *const FACTS[] = {"contact.candidates", "contact.kept", "contact.added", "contact.rounds"};
@@ -85,11 +86,11 @@ static const char *shown(char out[DIGITS], double x)
 }
 
 /* A finding without a reason passes. */
-static codec_finding judge_one(const codec_assertion *a, const codec_summary *summary)
+static codec_finding judge_one(const codec_assertion *a, const json_value *summary)
 {
     codec_finding out = {.verdict = CODEC_FAIL, .value = NAN, .error = NAN, .margin = -INFINITY};
     char first[DIGITS], second[DIGITS], third[DIGITS];
-    if (!codec_summary_number(&out.value, summary, a->quantity)) {
+    if (!quantity_read(&out.value, summary, a->quantity)) {
         if (strncmp(a->quantity, "cases.", 6) != 0 || isnan(number_at(summary, "cases.count"))) {
             snprintf(out.reason, sizeof out.reason, "the summary of this job has no such number");
             return out;
@@ -141,7 +142,8 @@ bool judge(char **summary, const codec_request *request, const char *name, bool 
     if (n == 0)
         return true;
     codec_judged *list = calloc((size_t)n, sizeof *list);
-    codec_summary *read = codec_summary_read(*summary);
+    json_tree tree;
+    const bool read = codec_summary_read(&tree, *summary);
     for (int64_t i = 0; list && read && i < n; i++) {
         const codec_assertion *a = &request->assertions[i];
         /* How many cases ended how, and how long all took, is known of the whole job alone. */
@@ -152,7 +154,7 @@ bool judge(char **summary, const codec_request *request, const char *name, bool 
         if (!whole && of_another)
             continue;
         codec_judged *one = &list[told++];
-        *one = (codec_judged){a, gathered ? all[i] : judge_one(a, read), gathered};
+        *one = (codec_judged){a, gathered ? all[i] : judge_one(a, tree.root), gathered};
         if (!name)
             continue;
         /* The worst of several cases; of equally good ones that which is nearest to its limit. */
@@ -169,7 +171,7 @@ bool judge(char **summary, const codec_request *request, const char *name, bool 
     }
     if (list && read)
         good = codec_add_findings(summary, list, told);
-    codec_summary_free(read);
+    json_clear(&tree);
     free(list);
     return good;
 }

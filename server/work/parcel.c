@@ -102,36 +102,6 @@ static char *take_text(reading *r, int64_t size)
     return copy;
 }
 
-static void take_answer(reading *r, store_answer *out)
-{
-    answer_head h = {0};
-    const answer_head *found = take(r, 1, sizeof h);
-    if (found)
-        h = *found;
-    out->name = take_text(r, h.name);
-    out->summary = take_text(r, h.summary);
-    r->good = r->good && h.n_vectors >= 0 && h.n_vectors <= MOST_VECTORS;
-    store_vector *vectors = r->good ? calloc((size_t)h.n_vectors + 1, sizeof *vectors) : NULL;
-    out->vectors = vectors;
-    r->good = r->good && vectors;
-    for (int64_t k = 0; r->good && k < h.n_vectors; k++) {
-        const vector_head *vh = take(r, 1, sizeof *vh);
-        if (!vh)
-            return;
-        memcpy(vectors[k].name, vh->name, sizeof vectors[k].name);
-        vectors[k].name[sizeof vectors[k].name - 1] = '\0';
-        vectors[k].count = vh->count;
-        vectors[k].data = take(r, vectors[k].count, sizeof(double));
-        out->n_vectors = (size_t)k + 1;
-    }
-    if (!h.history)
-        return;
-    r->good = r->good && h.columns > 0 && h.columns <= 1024;
-    out->history = take(r, h.rows, sizeof(double) * (size_t)h.columns);
-    out->history_rows = h.rows;
-    out->history_columns = h.columns;
-}
-
 bool parcel_read(parcel *out, const char *from, size_t size)
 {
     reading r = {from, 0, size, true};
@@ -148,8 +118,33 @@ bool parcel_read(parcel *out, const char *from, size_t size)
     out->answers = calloc((size_t)h.n_answers, sizeof *out->answers);
     if (!out->answers)
         return false;
-    for (; r.good && out->n < (size_t)h.n_answers; out->n++)
-        take_answer(&r, &out->answers[out->n]);
+    while (r.good && out->n < (size_t)h.n_answers) {
+        store_answer *one = &out->answers[out->n++];
+        const answer_head *there = take(&r, 1, sizeof *there);
+        const answer_head of = there ? *there : (answer_head){0};
+        one->name = take_text(&r, of.name);
+        one->summary = take_text(&r, of.summary);
+        r.good = r.good && of.n_vectors >= 0 && of.n_vectors <= MOST_VECTORS;
+        store_vector *vectors = r.good ? calloc((size_t)of.n_vectors + 1, sizeof *vectors) : NULL;
+        one->vectors = vectors;
+        r.good = r.good && vectors;
+        for (int64_t k = 0; r.good && k < of.n_vectors; k++) {
+            const vector_head *vh = take(&r, 1, sizeof *vh);
+            if (!vh)
+                break;
+            memcpy(vectors[k].name, vh->name, sizeof vectors[k].name);
+            vectors[k].name[sizeof vectors[k].name - 1] = '\0';
+            vectors[k].count = vh->count;
+            vectors[k].data = take(&r, vectors[k].count, sizeof(double));
+            one->n_vectors = (size_t)k + 1;
+        }
+        if (!of.history)
+            continue;
+        r.good = r.good && of.columns > 0 && of.columns <= 1024;
+        one->history = take(&r, of.rows, sizeof(double) * (size_t)of.columns);
+        one->history_rows = of.rows;
+        one->history_columns = of.columns;
+    }
     if (!r.good)
         return false;
     out->outcome.whole = out->answers[0];

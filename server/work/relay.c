@@ -1,6 +1,6 @@
 #include "work/relay.h"
 #include "store/blobs.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 
 #include <errno.h>
 #include <stddef.h>

@@ -1,4 +1,5 @@
 /* run.c: one job from its claim to its stored result. */
+#include "codec/quantity.h"
 #include "work/internal.h"
 #include "work/parcel.h"
 #include "work/watch.h"
@@ -116,7 +117,7 @@ static void count_job(const run *r)
     metrics *m = r->me->w->options.metrics;
     const solve_figures *f = &r->figures;
     const bool kept = f->has_answer && r->outcome.status != JOB_FAILED;
-    const char *outcome = kept ? uz_outcome_name(f->outcome) : NULL;
+    const char *outcome = kept ? uz_choice_name(UZ_CHOICE_OUTCOME, f->outcome) : NULL;
     const double total = clock_seconds(CLOCK_MONOTONIC) - r->began + r->queue_s;
     metrics_job(m, job_status_name(r->outcome.status), outcome, 1);
     metrics_seconds(m, METRIC_QUEUE, r->queue_s);
@@ -316,10 +317,11 @@ bool work_probe(worker *me)
     pthread_mutex_unlock(&me->lock);
     const watch_end end = watch_job(me, &probe, body, sizeof PROBE - 1, 0.0, &seen);
     const bool done = end == WATCH_DONE && judge_end(&r, end, &seen) == END_FINISH && r.outcome.whole.summary;
-    codec_summary *summary = done ? codec_summary_read(r.outcome.whole.summary) : NULL;
-    const bool good = summary && strcmp(codec_summary_text(summary, "outcome"), "converged") == 0 &&
-                      codec_summary_number(&force, summary, "contact.reaction_sum") && fabs(force + 1.0) < 1e-6;
-    codec_summary_free(summary);
+    json_tree summary = {.root = NULL};
+    const bool good = done && codec_summary_read(&summary, r.outcome.whole.summary) &&
+                      strcmp(codec_summary_text(summary.root, "outcome"), "converged") == 0 &&
+                      quantity_read(&force, summary.root, "contact.reaction_sum") && fabs(force + 1.0) < 1e-6;
+    json_clear(&summary);
     pthread_mutex_lock(&me->lock);
     me->process = NULL;
     pthread_mutex_unlock(&me->lock);

@@ -35,19 +35,6 @@ static uz_status verify(solution *s, const solve_with *with, uz_error *err)
     return status;
 }
 
-static uz_status solve_cases(solution *s, const solve_with *with, uz_error *err)
-{
-    const uz_problem *problem = &s->request.problem;
-    /* A store that fails now may work when the result is kept: the run begins at zero, and says so. */
-    s->start_lost = starts_load(&s->starts, with->source, &s->request) != STORE_OK;
-    s->n = problem->n_cases > 0 ? problem->n_cases : 1;
-    uz_status status = uz_solve_cases(&s->results, problem, &s->request.settings,
-                                      (const uz_state *const *)s->starts.states, with->cache, with->hooks, err);
-    if (strstr(err->where, "start")) /* the library's name for what the request calls warm_start */
-        strcpy(err->where, "/solver/warm_start");
-    return status;
-}
-
 /* Phases and cache: of the first case, which paid for the body; iterating and certifying of all. */
 static void count(solution *s)
 {
@@ -91,7 +78,19 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
     settings->memory_limit = with->memory_limit;
     if (with->read)
         with->read(with->hooks->ctx, &out->request);
-    uz_status status = out->request.answer.u ? verify(out, with, &err) : solve_cases(out, with, &err);
+    uz_status status;
+    if (out->request.answer.u) {
+        status = verify(out, with, &err);
+    } else {
+        const uz_problem *of = &out->request.problem;
+        /* A store that fails now may work when the result is kept: the run begins at zero, and says so. */
+        out->start_lost = starts_load(&out->starts, with->source, &out->request) != STORE_OK;
+        out->n = of->n_cases > 0 ? of->n_cases : 1;
+        status = uz_solve_cases(&out->results, of, settings, (const uz_state *const *)out->starts.states, with->cache,
+                                with->hooks, &err);
+        if (strstr(err.where, "start")) /* the library's name for what the request calls warm_start */
+            strcpy(err.where, "/solver/warm_start");
+    }
     if (status == UZ_ERR_MEMORY) {
         err.status = UZ_ERR_LIMIT;
         add_remedy(&err, ": the process that solves may take no more than it has");

@@ -208,31 +208,28 @@ static void serve(solver *s)
 
 /* ---- beginning and end */
 
-/* Nobody is to outlive the daemon; and where memory ends, this process goes, not the daemon. */
-static bool settle(pid_t daemon)
-{
-    struct rlimit limit;
-    FILE *file = fopen("/proc/self/oom_score_adj", "w");
-    if (file) {
-        fputs("900\n", file);
-        fclose(file);
-    }
-    if (getrlimit(RLIMIT_FSIZE, &limit) == 0) { /* what it writes is memory */
-        limit.rlim_cur = limit.rlim_max;
-        setrlimit(RLIMIT_FSIZE, &limit);
-    }
-    prctl(PR_SET_NAME, "uzawad-solver", 0, 0, 0);
-    return prctl(PR_SET_PDEATHSIG, SIGKILL, 0, 0, 0) == 0 && getppid() == daemon;
-}
-
 int solver_process(int argc, char **argv)
 {
     char why[128];
     solver s = {.socket = SOLVER_SOCKET};
     int kind = 0;
     socklen_t len = sizeof kind;
-    if (argc != SOLVER_ARGUMENTS || getsockopt(SOLVER_SOCKET, SOL_SOCKET, SO_TYPE, &kind, &len) != 0 ||
-        kind != SOCK_SEQPACKET || !settle((pid_t)atol(argv[2]))) {
+    struct rlimit limit;
+    const bool called = argc == SOLVER_ARGUMENTS && getsockopt(SOLVER_SOCKET, SOL_SOCKET, SO_TYPE, &kind, &len) == 0 &&
+                        kind == SOCK_SEQPACKET;
+    FILE *file = called ? fopen("/proc/self/oom_score_adj", "w") : NULL;
+    if (file) { /* where memory ends, this process goes, not the daemon */
+        fputs("900\n", file);
+        fclose(file);
+    }
+    if (called && getrlimit(RLIMIT_FSIZE, &limit) == 0) { /* what it writes is memory */
+        limit.rlim_cur = limit.rlim_max;
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    /* nobody is to outlive the daemon */
+    if (called)
+        prctl(PR_SET_NAME, "uzawad-solver", 0, 0, 0);
+    if (!called || prctl(PR_SET_PDEATHSIG, SIGKILL, 0, 0, 0) != 0 || getppid() != (pid_t)atol(argv[2])) {
         fputs("uzawad: " SOLVER_ROLE " is how uzawad starts itself\n", stderr);
         return 2;
     }

@@ -41,56 +41,6 @@ static store_status load_state(uz_state **out, store *s, const char *id, int64_t
     return status == STORE_NOT_FOUND ? STORE_OK : status;
 }
 
-/* ---- all of them */
-
-static store_status load_continued(starts *out, store *s, const codec_request *request)
-{
-    const char *id = request->start.job;
-    for (int64_t i = 0; i < out->n; i++) {
-        const int64_t number = request->problem.n_cases > 0 ? i + 1 : 0;
-        int64_t columns = 0, count = 0;
-        double *trade = NULL;
-        store_status status = load_state(&out->states[i], s, id, number, true);
-        if (status == STORE_OK && (!out->states[i] || !out->states[i]->rho))
-            continue; /* reactions alone: nothing goes on from there */
-        if (status == STORE_OK)
-            status = store_get_history(s, id, number, -1, &out->histories[i], &out->rows[i], &columns);
-        if (status != STORE_OK && status != STORE_NOT_FOUND)
-            return status;
-        if (status == STORE_OK && columns != CODEC_HISTORY_COLUMNS)
-            out->rows[i] = 0; /* written by another version: left out */
-        /* What accuracy took that run; nothing where it was not recorded, or is damaged: an answer does not need it. */
-        status = store_get_vector(s, id, number, TRADE_VECTOR, &trade, &count);
-        trade_unpack(&out->trades[i], trade, status == STORE_OK ? count : 0);
-        free(trade);
-        if (status != STORE_OK && status != STORE_NOT_FOUND && status != STORE_DAMAGED)
-            return status;
-    }
-    return STORE_OK;
-}
-
-/* Every case from the same reactions. */
-static store_status load_warm(starts *out, store *s, const codec_start *start)
-{
-    uz_state *first = NULL;
-    store_case *found = NULL;
-    size_t count = 0;
-    int64_t number = 0; /* of the case that the request names; 0: the job has none */
-    store_status status = STORE_OK;
-    if (start->reactions)
-        first = state_from_reactions(start->reactions, start->n_reactions);
-    else if (start->case_name[0])
-        status = store_get_cases(s, start->job, start->case_name, &found, &count);
-    if (count > 0)
-        number = found[0].number;
-    store_cases_free(found, count);
-    if (!start->reactions && status == STORE_OK)
-        status = load_state(&first, s, start->job, number, false);
-    for (int64_t i = 0; first && i < out->n; i++)
-        out->states[i] = i == 0 ? first : state_from_reactions(first->r, first->m);
-    return status;
-}
-
 store_status starts_load(starts *out, store *s, const codec_request *request)
 {
     const codec_start *start = &request->start;
@@ -108,7 +58,44 @@ store_status starts_load(starts *out, store *s, const codec_request *request)
         starts_clear(out);
         return STORE_OK; /* without the memory for it the run begins at zero */
     }
-    return start->continued ? load_continued(out, s, request) : load_warm(out, s, start);
+    store_status status = STORE_OK;
+    if (!start->continued) { /* every case from the same reactions */
+        uz_state *first = NULL;
+        store_case *found = NULL;
+        size_t count = 0;
+        if (start->reactions)
+            first = state_from_reactions(start->reactions, start->n_reactions);
+        else if (start->case_name[0])
+            status = store_get_cases(s, start->job, start->case_name, &found, &count);
+        const int64_t number = count > 0 ? found[0].number : 0; /* of the case that it names; 0: the job has none */
+        store_cases_free(found, count);
+        if (!start->reactions && status == STORE_OK)
+            status = load_state(&first, s, start->job, number, false);
+        for (int64_t i = 0; first && i < out->n; i++)
+            out->states[i] = i == 0 ? first : state_from_reactions(first->r, first->m);
+        return status;
+    }
+    for (int64_t i = 0; i < out->n; i++) {
+        const int64_t number = request->problem.n_cases > 0 ? i + 1 : 0;
+        int64_t columns = 0, count = 0;
+        double *trade = NULL;
+        status = load_state(&out->states[i], s, start->job, number, true);
+        if (status == STORE_OK && (!out->states[i] || !out->states[i]->rho))
+            continue; /* reactions alone: nothing goes on from there */
+        if (status == STORE_OK)
+            status = store_get_history(s, start->job, number, -1, &out->histories[i], &out->rows[i], &columns);
+        if (status != STORE_OK && status != STORE_NOT_FOUND)
+            return status;
+        if (status == STORE_OK && columns != CODEC_HISTORY_COLUMNS)
+            out->rows[i] = 0; /* written by another version: left out */
+        /* What accuracy took that run; nothing where it was not recorded, or is damaged: an answer does not need it. */
+        status = store_get_vector(s, start->job, number, TRADE_VECTOR, &trade, &count);
+        trade_unpack(&out->trades[i], trade, status == STORE_OK ? count : 0);
+        free(trade);
+        if (status != STORE_OK && status != STORE_NOT_FOUND && status != STORE_DAMAGED)
+            return status;
+    }
+    return STORE_OK;
 }
 
 void starts_clear(starts *s)

@@ -36,23 +36,6 @@ typedef struct {
     bool again; /* it is not the first process that has it */
 } watch;
 
-/* To all who follow this job; to those who follow all jobs only where the percentage is another one. */
-static void tell_progress(watch *w, double now)
-{
-    worker *me = w->me;
-    if (!w->job->id[0] || now - w->told_at < TELL_S || !live_read(&w->p->board->live).any)
-        return;
-    w->told_at = now;
-    pthread_mutex_lock(&me->lock);
-    const int progress = me->progress = live_progress(&w->p->board->live, me->progress);
-    pthread_mutex_unlock(&me->lock);
-    if (progress != w->told)
-        feed_changed(me->w->feed, me->id, NULL); /* only this thread changes its id */
-    else
-        feed_moved(me->w->feed, me->id);
-    w->told = progress;
-}
-
 /* False: it is no message that may come now, and who says such things is not trusted with a job. */
 static bool hear(watch *w, const packet *m, double now)
 {
@@ -102,7 +85,18 @@ static watch_end follow(watch *w, watch_report *out)
             return WATCH_STOPPED;
         if (now >= w->due_at + LIMIT_SHARE * w->limit_s || (now >= w->due_at && !live_read(&w->p->board->live).any))
             return w->p->ready ? WATCH_OVERDUE : WATCH_NOT_STARTED;
-        tell_progress(w, now);
+        /* To all who follow this job; to those who follow all jobs only where the percentage is another one. */
+        if (w->job->id[0] && now - w->told_at >= TELL_S && live_read(&w->p->board->live).any) {
+            w->told_at = now;
+            pthread_mutex_lock(&w->me->lock);
+            const int progress = w->me->progress = live_progress(&w->p->board->live, w->me->progress);
+            pthread_mutex_unlock(&w->me->lock);
+            if (progress != w->told)
+                feed_changed(w->me->w->feed, w->me->id, NULL); /* only this thread changes its id */
+            else
+                feed_moved(w->me->w->feed, w->me->id);
+            w->told = progress;
+        }
         double wait = TELL_S;
         wait = w->stopping ? fmin(wait, fmax(0.0, w->stop_at - now)) : wait;
         wait = heard && now >= w->stop_at ? fmin(TELL_S, w->stop_at + HEARD_S - now) : wait;

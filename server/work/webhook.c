@@ -261,42 +261,36 @@ static void tell(webhooks *all, const webhook_due *due)
     store_webhook_attempted(all->store, due, end, wait_after(all, due->attempts), silent ? wait_after(all, 0) : 0.0);
 }
 
-/* Under the lock: waits for what falls due, at none of the places where somebody is told now. False: the end. One of
- * the senders does that, and the next one when it has found something. */
-static bool find_due(sender *me, webhook_due *due)
-{
-    webhooks *all = me->all;
-    bool found = false;
-    while (all->looking && !atomic_load(&all->stop))
-        pthread_cond_wait(&all->turn, &all->lock);
-    all->looking = true;
-    while (!found && !atomic_load(&all->stop)) {
-        const char *except[SENDERS];
-        size_t n = 0;
-        for (int i = 0; i < SENDERS; i++)
-            if (all->senders[i].place[0])
-                except[n++] = all->senders[i].place;
-        found = store_webhook_next(all->store, except, n, due) == STORE_OK;
-        if (!found)
-            clock_wait(&all->look, &all->lock, clock_seconds(CLOCK_MONOTONIC) + LOOK_S);
-    }
-    all->looking = false;
-    if (found) {
-        const char *host = strstr(due->url, "://");
-        const size_t begin = host ? (size_t)(host - due->url) + 3 : 0;
-        snprintf(me->place, sizeof me->place, "%.*s", (int)(begin + strcspn(due->url + begin, "/?#")), due->url);
-    }
-    pthread_cond_signal(&all->turn);
-    return found;
-}
-
+/* Waits for what falls due, at none of the places where somebody is told now. One of the senders does that, and the
+ * next one when it has found something. */
 static void *tell_loop(void *arg)
 {
     sender *me = arg;
     webhooks *all = me->all;
     webhook_due due;
     pthread_mutex_lock(&all->lock);
-    while (find_due(me, &due)) {
+    for (;;) {
+        bool found = false;
+        while (all->looking && !atomic_load(&all->stop))
+            pthread_cond_wait(&all->turn, &all->lock);
+        all->looking = true;
+        while (!found && !atomic_load(&all->stop)) {
+            const char *except[SENDERS];
+            size_t n = 0;
+            for (int i = 0; i < SENDERS; i++)
+                if (all->senders[i].place[0])
+                    except[n++] = all->senders[i].place;
+            found = store_webhook_next(all->store, except, n, &due) == STORE_OK;
+            if (!found)
+                clock_wait(&all->look, &all->lock, clock_seconds(CLOCK_MONOTONIC) + LOOK_S);
+        }
+        all->looking = false;
+        pthread_cond_signal(&all->turn);
+        if (!found)
+            break;
+        const char *host = strstr(due.url, "://");
+        const size_t begin = host ? (size_t)(host - due.url) + 3 : 0;
+        snprintf(me->place, sizeof me->place, "%.*s", (int)(begin + strcspn(due.url + begin, "/?#")), due.url);
         pthread_mutex_unlock(&all->lock);
         tell(all, &due);
         free(due.url);

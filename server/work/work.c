@@ -1,4 +1,5 @@
 /* work.c: the threads: workers that claim, a keeper that renews their leases, and those who wait for a job. */
+#include "store/engine_base.h"
 #include "work/housekeeping.h"
 #include "work/internal.h"
 
@@ -53,17 +54,6 @@ static store_status claim(worker *me, job *claimed, char **body, size_t *body_le
     return status;
 }
 
-/* Under work.lock: waits until something was submitted since `seen`, a lane until nobody else is there for it either;
- * after a failure of the store it is tried again anyway. */
-static void wait_for_work(worker *me, uint64_t seen, bool store_failed)
-{
-    work *w = me->w;
-    const double until = store_failed ? clock_seconds(CLOCK_MONOTONIC) + CLAIM_RETRY_S : (double)INFINITY;
-    while (!w->stopping && (store_failed || w->submitted == seen || (me->lane && w->busy < w->options.workers)) &&
-           (me->lane || w->probe != PROBE_ASKED) && clock_wait(me->lane ? &w->crowd : &w->wake, &w->lock, until))
-        ;
-}
-
 /* Under work.lock: a job waits, or several may. Whoever else is idle has it, else a lane. */
 static void call_worker(work *w, bool several)
 {
@@ -83,7 +73,12 @@ static void *work_loop(void *arg)
         job claimed;
         char *body, cause[256];
         size_t body_len;
-        wait_for_work(me, seen, store_failed);
+        /* until something was submitted since, a lane until nobody else is there for it either; after a failure of the
+         * store it is tried again anyway */
+        const double until = store_failed ? clock_seconds(CLOCK_MONOTONIC) + CLAIM_RETRY_S : (double)INFINITY;
+        while (!w->stopping && (store_failed || w->submitted == seen || (me->lane && w->busy < w->options.workers)) &&
+               (me->lane || w->probe != PROBE_ASKED) && clock_wait(me->lane ? &w->crowd : &w->wake, &w->lock, until))
+            ;
         if (w->stopping)
             break;
         if (w->probe == PROBE_ASKED && !me->lane) { /* before a job: somebody waits, and it takes a millisecond */
@@ -199,30 +194,6 @@ static bool recover(work *w, char *message, size_t size)
     return true;
 }
 
-/* Signals are for the thread that waits for them; those that a fault raises in its own thread stay open. */
-static bool start_threads(work *w)
-{
-    static const int FAULTS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP};
-    sigset_t blocked, before;
-    sigfillset(&blocked);
-    for (size_t i = 0; i < sizeof FAULTS / sizeof FAULTS[0]; i++)
-        sigdelset(&blocked, FAULTS[i]);
-    pthread_sigmask(SIG_SETMASK, &blocked, &before);
-    bool ok = pthread_create(&w->keeper, NULL, keep_loop, w) == 0;
-    w->keeper_started = ok;
-    ok = ok && pthread_create(&w->housekeeper, NULL, housekeeping_loop, w) == 0;
-    w->housekeeper_started = ok;
-    pthread_mutex_lock(&w->lock);
-    for (int i = 0; ok && i < w->n; i++) {
-        ok = pthread_create(&w->workers[i].thread, NULL, work_loop, &w->workers[i]) == 0;
-        w->n_started += ok;
-        w->alive += ok;
-    }
-    pthread_mutex_unlock(&w->lock);
-    pthread_sigmask(SIG_SETMASK, &before, NULL);
-    return ok;
-}
-
 static work *make_work(store *s, const work_options *options, server_log *log)
 {
     char host[65] = "";
@@ -313,13 +284,32 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
         work_free(w);
         return NULL;
     }
-    store_listen(s, tell_change, w);
-    if (!start_threads(w)) {
-        snprintf(message, size, "cannot start %d worker threads", w->n);
-        work_free(w);
-        return NULL;
+    s->changed = tell_change;
+    s->changed_ctx = w;
+    /* Signals are for the thread that waits for them; those that a fault raises in its own thread stay open. */
+    static const int FAULTS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP};
+    sigset_t blocked, before;
+    sigfillset(&blocked);
+    for (size_t i = 0; i < sizeof FAULTS / sizeof FAULTS[0]; i++)
+        sigdelset(&blocked, FAULTS[i]);
+    pthread_sigmask(SIG_SETMASK, &blocked, &before);
+    bool ok = pthread_create(&w->keeper, NULL, keep_loop, w) == 0;
+    w->keeper_started = ok;
+    ok = ok && pthread_create(&w->housekeeper, NULL, housekeeping_loop, w) == 0;
+    w->housekeeper_started = ok;
+    pthread_mutex_lock(&w->lock);
+    for (int i = 0; ok && i < w->n; i++) {
+        ok = pthread_create(&w->workers[i].thread, NULL, work_loop, &w->workers[i]) == 0;
+        w->n_started += ok;
+        w->alive += ok;
     }
-    return w;
+    pthread_mutex_unlock(&w->lock);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (ok)
+        return w;
+    snprintf(message, size, "cannot start %d worker threads", w->n);
+    work_free(w);
+    return NULL;
 }
 
 /* ---- stopping */
@@ -370,7 +360,7 @@ void work_free(work *w)
         return;
     if (w->feed)
         work_stop(w, 0.0);
-    store_listen(w->store, NULL, NULL);
+    w->store->changed = NULL;
     for (int i = 0; w->workers && i < w->n; i++) {
         if (w->workers[i].wake >= 0)
             close(w->workers[i].wake);

@@ -166,7 +166,8 @@ static bool read_operator(problem_of *p, const uz_problem *problem, uz_setup *se
     uz_mesh_info info = {0};
     bool good = uz_scene_to_qp(&qp, &info, &problem->scene, &err) == UZ_OK &&
                 uz_dual_load_create(&load, setup->dual, K, qp.p, qp.h, &err) == UZ_OK &&
-                uz_dual_load_prepare(load, &lambda, false, &err) == UZ_OK && lambda > 0.0;
+                uz_dual_load_prepare(load, &err) == UZ_OK &&
+                uz_dual_load_lambda_max(load, &lambda, false, &err) == UZ_OK && lambda > 0.0;
     for (int i = 0; good && i < p->m; i++)
         good = uz_dual_load_column(load, p->D + (size_t)i * (size_t)p->m, i, &err) == UZ_OK;
     for (size_t k = 0; good && k < (size_t)p->m * (size_t)p->m; k++)

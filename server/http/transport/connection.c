@@ -16,28 +16,6 @@ static const double LINGER_S = 2.0;
 static const double HANDSHAKE_S = 5.0;
 #define LOOK_MS 50 /* so soon it sees that the service ends */
 
-connection *connection_new(transport *server, int fd, const struct sockaddr *address)
-{
-    connection *c = calloc(1, sizeof *c);
-    if (!c)
-        return NULL;
-    c->server = server;
-    c->fd = fd;
-    c->spare = server->next_is_spare;
-    c->place = peer_begin(server->peers, address);
-    const double most_s = server->options.request_deadline_s,
-                 patience_s = server->tls ? fmin(HANDSHAKE_S, most_s) : most_s;
-    c->deadline = deadlines_add(server->deadlines, fd, clock_seconds(CLOCK_MONOTONIC) + patience_s, c, c->spare);
-    if (!c->deadline || !c->place) {
-        deadline_remove(c->deadline);
-        peer_end(c->place);
-        free(c);
-        return NULL;
-    }
-    atomic_fetch_add(&server->connections, 1);
-    return c;
-}
-
 static void drop_body(transport *server, http_request *rq)
 {
     atomic_fetch_sub(&server->body_bytes, rq->body_capacity);
@@ -61,16 +39,51 @@ static void request_free(transport *server, http_request **place)
     *place = NULL;
 }
 
-void connection_free(connection *c)
+connection *connection_of(struct MHD_Connection *mhd)
 {
-    if (!c)
-        return;
-    deadline_remove(c->deadline);
-    request_free(c->server, &c->request);
-    peer_end(c->place);
-    atomic_fetch_sub(&c->server->refusing, c->refusing);
-    atomic_fetch_sub(&c->server->connections, 1);
-    free(c);
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    return info ? info->socket_context : NULL;
+}
+
+void connection_notify(void *ctx, struct MHD_Connection *mhd, void **socket_context,
+                       enum MHD_ConnectionNotificationCode code)
+{
+    transport *server = ctx;
+    const bool begins = code == MHD_CONNECTION_NOTIFY_STARTED;
+    /* each answer is read before the next question: in libmicrohttpd 1.0 all of them lie at the same place */
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CONNECTION_FD);
+    const MHD_socket fd = info ? info->connect_fd : MHD_INVALID_SOCKET;
+    connection *c = !begins ? *socket_context : info ? calloc(1, sizeof *c) : NULL;
+    bool good = begins && c;
+    if (good) {
+        const union MHD_ConnectionInfo *from = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+        const double most_s = server->options.request_deadline_s,
+                     patience_s = server->tls ? fmin(HANDSHAKE_S, most_s) : most_s;
+        c->server = server;
+        c->fd = fd;
+        c->spare = server->next_is_spare;
+        c->place = peer_begin(&server->peers, from ? from->client_addr : NULL);
+        c->deadline = deadlines_add(server->deadlines, c->fd, clock_seconds(CLOCK_MONOTONIC) + patience_s, c, c->spare);
+        atomic_fetch_add(&server->connections, 1);
+        good = c->deadline && c->place;
+    }
+    if (c && !good) { /* it ends, or there is no memory for it: its requests are then refused */
+        deadline_remove(c->deadline);
+        request_free(server, &c->request);
+        peer_end(c->place);
+        atomic_fetch_sub(&server->refusing, c->refusing);
+        atomic_fetch_sub(&server->connections, 1);
+        free(c);
+    }
+    *socket_context = good ? c : NULL;
+    const union MHD_ConnectionInfo *session =
+        begins ? MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_GNUTLS_SESSION) : NULL;
+    if (server->tls && session) { /* instead of those that libmicrohttpd keeps for all its life */
+        pthread_mutex_lock(&server->tls_lock);
+        gnutls_credentials_set(session->tls_session, GNUTLS_CRD_CERTIFICATE,
+                               server->credentials[server->n_credentials - 1]);
+        pthread_mutex_unlock(&server->tls_lock);
+    }
 }
 
 void connection_begin_request(connection *c, const char *raw_target)
@@ -86,7 +99,8 @@ void connection_begin_request(connection *c, const char *raw_target)
     }
     rq->server = c->server;
     rq->fd = c->fd;
-    rq->address_len = peer_address(c->place, rq->address);
+    rq->address_len = c->place->len;
+    memcpy(rq->address, c->place->address, c->place->len);
     rq->spare = c->spare;
     rq->reply.secure = c->server->tls;
     rq->started = clock_seconds(CLOCK_MONOTONIC);
@@ -287,37 +301,11 @@ bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *m
 
 /* -------------------------------------------------------------------- body */
 
-/* Within the server's budget for all bodies, and with a NUL behind it. */
-static bool keep(connection *c, const char *data, size_t size)
-{
-    http_request *rq = c->request;
-    const size_t need = rq->body_len + size + 1;
-    if (need > rq->body_capacity) {
-        const size_t capacity = need < 4096 ? 4096 : need + need / 2, added = capacity - rq->body_capacity;
-        const bool fits = atomic_fetch_add(&c->server->body_bytes, added) + added <= c->server->options.body_budget;
-        char *grown = fits ? realloc(rq->body, capacity) : NULL;
-        if (!grown)
-            atomic_fetch_sub(&c->server->body_bytes, added);
-        if (!fits) {
-            rq->reply.retry_after_s = 5;
-            return problem_fill(&rq->refused, 503, "too_busy", "Too many large requests at once",
-                                "try again in a moment");
-        }
-        if (!grown)
-            return problem_fill(&rq->refused, 503, "no_memory", "Out of memory", "try again later");
-        rq->body = grown;
-        rq->body_capacity = capacity;
-    }
-    memcpy(rq->body + rq->body_len, data, size);
-    rq->body_len += size;
-    rq->body[rq->body_len] = '\0';
-    return true;
-}
-
 bool connection_body(connection *c, const char *data, size_t size)
 {
     http_request *rq = c->request;
     const transport_handlers *handlers = &c->server->handlers;
+    const size_t need = rq->body_len + size + 1;
     bool taken = false;
     if (size > rq->body_limit - rq->body_len) {
         problem_fill(&rq->refused, 413, "body_too_large", "The request body is too large",
@@ -325,8 +313,28 @@ bool connection_body(connection *c, const char *data, size_t size)
     } else if (rq->streamed) {
         rq->body_len += size;
         taken = handlers->take(handlers->ctx, rq, data, size);
+    } else if (need > rq->body_capacity) { /* more room, within the server's budget for all bodies */
+        const size_t capacity = need < 4096 ? 4096 : need + need / 2, added = capacity - rq->body_capacity;
+        const bool fits = atomic_fetch_add(&c->server->body_bytes, added) + added <= c->server->options.body_budget;
+        char *grown = fits ? realloc(rq->body, capacity) : NULL;
+        taken = grown != NULL;
+        if (taken) {
+            rq->body = grown;
+            rq->body_capacity = capacity;
+        } else {
+            atomic_fetch_sub(&c->server->body_bytes, added);
+            rq->reply.retry_after_s = fits ? rq->reply.retry_after_s : 5;
+            problem_fill(&rq->refused, 503, fits ? "no_memory" : "too_busy",
+                         fits ? "Out of memory" : "Too many large requests at once",
+                         fits ? "try again later" : "try again in a moment");
+        }
     } else {
-        taken = keep(c, data, size);
+        taken = true;
+    }
+    if (taken && !rq->streamed) { /* with a NUL behind it */
+        memcpy(rq->body + rq->body_len, data, size);
+        rq->body_len += size;
+        rq->body[rq->body_len] = '\0';
     }
     if (taken) {
         if (rq->chunked) /* the length is not known before: the allowance grows with what has come */
@@ -342,34 +350,6 @@ bool connection_body(connection *c, const char *data, size_t size)
 
 /* ------------------------------------------------------------------ answer */
 
-/* Lets the reply go on without libmicrohttpd, whose connection then ends. False: nothing has happened. */
-static bool hold(connection *c)
-{
-    http_request *rq = c->request;
-    reply_source source = rq->reply.source;
-    char *head = NULL;
-    size_t len;
-    if (!source.held || !rq->can_be_held || !request_keep_fields(rq))
-        return false;
-    if (!source.is_message) {
-        request_note_reply(rq);
-        rq->reply.close = true;
-        head = reply_message(&rq->reply, true, &len);
-    }
-    rq->reply.source.read = NULL;
-    rq->place = c->place;
-    if ((source.is_message || head) && holder_take(c->server->holder, c->fd, rq, head, !source.is_message, &source)) {
-        c->place = NULL;
-        c->request = NULL;
-        return true;
-    }
-    rq->reply.source = source;
-    rq->reply.close = false;
-    rq->place = NULL;
-    free(head);
-    return false;
-}
-
 bool connection_answer(connection *c, struct MHD_Connection *mhd)
 {
     http_request *rq = c->request;
@@ -379,13 +359,33 @@ bool connection_answer(connection *c, struct MHD_Connection *mhd)
         reply_problem(&rq->reply, &rq->refused);
     else
         c->server->handlers.answer(c->server->handlers.ctx, rq);
-    if (rq->reply.source.read)
+    const reply_source source = rq->reply.source;
+    if (source.read)
         drop_body(c->server, rq); /* what takes long is not beside it */
-    if (rq->reply.source.read && hold(c))
-        return false;
-    if (rq->reply.source.read && rq->reply.source.is_message) {
+    if (source.read && source.held && rq->can_be_held && request_keep_fields(rq)) {
+        /* The reply goes on without libmicrohttpd, whose connection then ends; or nothing has happened. */
+        char *head = NULL;
+        size_t len;
+        if (!source.is_message) {
+            request_note_reply(rq);
+            rq->reply.close = true;
+            head = reply_message(&rq->reply, true, &len);
+        }
+        rq->reply.source.read = NULL;
+        rq->place = c->place;
+        if ((source.is_message || head) &&
+            holder_take(c->server->holder, c->fd, rq, head, !source.is_message, &source)) {
+            c->place = NULL;
+            c->request = NULL;
+            return false;
+        }
+        rq->reply.source = source;
+        rq->reply.close = false;
+        rq->place = NULL;
+        free(head);
+    }
+    if (source.read && source.is_message) {
         /* the thread stays: the reply that was to come as a message is waited for here */
-        const reply_source source = rq->reply.source;
         rq->reply.source.read = NULL;
         source.answer(source.ctx);
         source.free(source.ctx);
@@ -402,12 +402,18 @@ void connection_end_held(void *ctx, http_request *rq, bool completed)
     request_free(server, &rq);
 }
 
-void connection_end_request(connection *c, unsigned status, bool completed)
+void connection_completed(void *ctx, struct MHD_Connection *mhd, void **request_context,
+                          enum MHD_RequestTerminationCode code)
 {
-    if (!c->request)
+    const bool completed = code == MHD_REQUEST_TERMINATED_COMPLETED_OK;
+    connection *c = connection_of(mhd);
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_HTTP_STATUS);
+    (void)ctx;
+    (void)request_context;
+    if (!c || !c->request)
         return;
-    if (c->request->status == 0)
-        c->request->status = (int)status;
+    if (c->request->status == 0 && info) /* of the reply that libmicrohttpd made by itself */
+        c->request->status = (int)info->http_status;
     if (c->request->unread_body && completed)
         linger(c);
     c->server->handlers.account(c->server->handlers.ctx, c->request, completed, deadline_expired(c->deadline));

@@ -26,7 +26,7 @@ struct transport {
     struct MHD_Daemon *daemon;
     deadlines *deadlines;
     holder *holder; /* NULL: every connection keeps its thread */
-    peers *peers;
+    peers peers;
     /* Certificates, the one in use last; those before it may be in use by connections. */
     pthread_mutex_t tls_lock;
     gnutls_certificate_credentials_t *credentials;
@@ -65,9 +65,13 @@ typedef struct {
 /* Certificate and key as GnuTLS takes them, freed by the caller; false with the reason. */
 bool http_tls_load(gnutls_certificate_credentials_t *out, const http_tls *tls, char *message, size_t size);
 
-/* NULL: no memory; the connection's requests are then refused. */
-connection *connection_new(transport *server, int fd, const struct sockaddr *address);
-void connection_free(connection *c);
+/* NULL: there was no memory for it; its requests are then refused. */
+connection *connection_of(struct MHD_Connection *mhd);
+/* Of libmicrohttpd, with the server as context: a connection begins or ends; a request has ended. */
+void connection_notify(void *ctx, struct MHD_Connection *mhd, void **socket_context,
+                       enum MHD_ConnectionNotificationCode code);
+void connection_completed(void *ctx, struct MHD_Connection *mhd, void **request_context,
+                          enum MHD_RequestTerminationCode code);
 
 void connection_begin_request(connection *c, const char *raw_target);
 /* The next three return false when the connection must be closed without a (further) reply. */
@@ -76,8 +80,6 @@ bool connection_body(connection *c, const char *data, size_t size);
 bool connection_answer(connection *c, struct MHD_Connection *mhd);
 /* Answers a request that libmicrohttpd is about to refuse with this status. */
 void connection_refuse(connection *c, int status);
-/* status: of the reply that libmicrohttpd made by itself, 0 if there was none. */
-void connection_end_request(connection *c, unsigned status, bool completed);
 
 /* A request that was held, with its connection, is over: of the holder. ctx is the server. */
 void connection_end_held(void *ctx, http_request *rq, bool completed);

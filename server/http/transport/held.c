@@ -206,27 +206,6 @@ static void make_ready(holder *h, held *one)
     h->ready = one;
 }
 
-static void notice(holder *h, const struct epoll_event *e)
-{
-    held *one = (held *)(uintptr_t)(e->data.u64 & ~(uint64_t)1); /* NOLINT(performance-no-int-to-ptr) */
-    eventfd_t unused;
-    if (!one) {
-        eventfd_read(h->wake, &unused);
-        return;
-    }
-    if (one->over)
-        return;
-    if (e->data.u64 & 1) {
-        feed_wait(one->listener, -1, 0.0);
-        if (!one->out && !one->last)
-            one->due = fmin(one->due, one->source.due(one->source.ctx, true));
-    } else if (!one->ending && (e->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR))) {
-        end_held(h, one, false);
-        return;
-    }
-    make_ready(h, one);
-}
-
 /* False: the thread is to end. */
 static bool receive(holder *h)
 {
@@ -276,8 +255,24 @@ static void *hold(void *argument)
         free_buried(h);
         const double left = h->soonest - clock_seconds(CLOCK_MONOTONIC);
         int n = epoll_wait(h->epoll, events, EVENTS, left <= 0.0 ? 0 : (int)fmin(ceil(left * 1e3), 1e6));
-        for (int i = 0; i < n; i++)
-            notice(h, &events[i]);
+        for (int i = 0; i < n; i++) {
+            const uint64_t of = events[i].data.u64;
+            held *at = (held *)(uintptr_t)(of & ~(uint64_t)1); /* NOLINT(performance-no-int-to-ptr) */
+            eventfd_t unused;
+            if (!at)
+                eventfd_read(h->wake, &unused);
+            if (!at || at->over)
+                continue;
+            if (of & 1) {
+                feed_wait(at->listener, -1, 0.0);
+                if (!at->out && !at->last)
+                    at->due = fmin(at->due, at->source.due(at->source.ctx, true));
+            } else if (!at->ending && (events[i].events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR))) {
+                end_held(h, at, false);
+                continue;
+            }
+            make_ready(h, at);
+        }
     }
     while (h->first) {
         held *one = h->first;

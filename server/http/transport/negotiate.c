@@ -108,8 +108,6 @@ bool request_still_means(const http_request *rq, char *body, double changed, htt
 
 /* ---- Range */
 
-typedef enum { RANGE_NONE, RANGE_GOOD, RANGE_BEYOND } range_kind;
-
 /* Digits of text[0..len), at most 18; -1: none. */
 static int64_t read_offset(const char *text, size_t len)
 {
@@ -121,58 +119,49 @@ static int64_t read_offset(const char *text, size_t len)
     return value;
 }
 
-/* "bytes=A-B", "bytes=A-", "bytes=-N"; anything else, several ranges too, is as if it were not there. */
-static range_kind read_range(const header_field *field, int64_t size, int64_t *from, int64_t *to)
-{
-    static const char UNIT[] = "bytes=";
-    size_t skip = sizeof UNIT - 1;
-    if (field->value_len <= skip || strncasecmp(field->value, UNIT, skip) != 0)
-        return RANGE_NONE;
-    const char *at = field->value + skip, *end = field->value + field->value_len;
-    const char *dash = memchr(at, '-', (size_t)(end - at));
-    if (!dash)
-        return RANGE_NONE;
-    int64_t first = read_offset(at, (size_t)(dash - at)), last = read_offset(dash + 1, (size_t)(end - dash - 1));
-    bool open = dash + 1 == end, suffix = dash == at;
-    if ((first < 0 && !suffix) || (last < 0 && !open) || (open && suffix) || (!open && !suffix && last < first))
-        return RANGE_NONE;
-    *from = suffix ? (last < size ? size - last : 0) : first;
-    *to = suffix || open || last >= size ? size - 1 : last;
-    return *from >= size || (suffix && last == 0) ? RANGE_BEYOND : RANGE_GOOD;
-}
-
-/* True if the reply is a part, or says that there is no such part. */
+/* True if the reply is a part, or says that there is no such part: for "bytes=A-B", "bytes=A-" or "bytes=-N"; anything
+ * else, several ranges too, is as if it were not there. */
 static bool apply_range(const http_request *rq, http_reply *reply)
 {
+    static const char UNIT[] = "bytes=";
     size_t count;
-    int64_t from = 0, to = 0;
     const header_field *field = header_find(&rq->headers, "Range", &count);
     const header_field *of = header_find(&rq->headers, "If-Range", NULL);
-    const size_t len = strlen(reply->tag);
+    const size_t len = strlen(reply->tag), skip = sizeof UNIT - 1;
     if (!field || count != 1 || strcmp(rq->method, "GET") != 0)
         return false;
     /* A range is of the representation that the client has the first part of, if it says which (If-Range: strong). */
     if (of && (of->value_len != len + 2 || of->value[0] != '"' || of->value[len + 1] != '"' ||
                memcmp(of->value + 1, reply->tag, len) != 0))
         return false;
-    size_t size = reply->len;
-    range_kind kind = read_range(field, (int64_t)size, &from, &to);
-    if (kind == RANGE_GOOD) {
-        snprintf(reply->content_range, sizeof reply->content_range, "bytes %lld-%lld/%zu", (long long)from,
-                 (long long)to, reply->len);
-        reply->status = 206;
-        reply->len = (size_t)(to - from + 1);
-        if (reply->has_file)
-            reply->offset = (size_t)from;
-        else if (reply->body)
-            memmove(reply->body, reply->body + from, reply->len);
-    } else if (kind == RANGE_BEYOND) {
-        reply_refuse(reply, 416, "range_not_satisfiable", "There is no such range", "the representation has %zu bytes",
-                     size);
-        snprintf(reply->content_range, sizeof reply->content_range, "bytes */%zu", size);
+    if (field->value_len <= skip || strncasecmp(field->value, UNIT, skip) != 0)
+        return false;
+    const char *at = field->value + skip, *end = field->value + field->value_len;
+    const char *dash = memchr(at, '-', (size_t)(end - at));
+    if (!dash)
+        return false;
+    const int64_t first = read_offset(at, (size_t)(dash - at)), last = read_offset(dash + 1, (size_t)(end - dash - 1));
+    const bool open = dash + 1 == end, suffix = dash == at;
+    if ((first < 0 && !suffix) || (last < 0 && !open) || (open && suffix) || (!open && !suffix && last < first))
+        return false;
+    const int64_t size = (int64_t)reply->len, from = !suffix ? first : last < size ? size - last : 0;
+    const int64_t to = suffix || open || last >= size ? size - 1 : last;
+    if (from >= size || (suffix && last == 0)) {
+        reply_refuse(reply, 416, "range_not_satisfiable", "There is no such range", "the representation has %lld bytes",
+                     (long long)size);
+        snprintf(reply->content_range, sizeof reply->content_range, "bytes */%lld", (long long)size);
         reply->tag[0] = '\0';
+        return true;
     }
-    return kind != RANGE_NONE;
+    snprintf(reply->content_range, sizeof reply->content_range, "bytes %lld-%lld/%lld", (long long)from, (long long)to,
+             (long long)size);
+    reply->status = 206;
+    reply->len = (size_t)(to - from + 1);
+    if (reply->has_file)
+        reply->offset = (size_t)from;
+    else if (reply->body)
+        memmove(reply->body, reply->body + from, reply->len);
+    return true;
 }
 
 /* ---- gzip */

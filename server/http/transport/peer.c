@@ -1,23 +1,9 @@
 #include "http/transport/peer.h"
 
 #include <netinet/in.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-
-struct peer {
-    peers *all;
-    peer *previous, *next;
-    unsigned char address[16];
-    size_t len;
-};
-
-struct peers {
-    pthread_mutex_t lock;
-    peer *first;
-    size_t count;
-};
 
 /* The part of an address that names a client: IPv4, or the first 64 bits of IPv6, of which a client often has all
  * (RFC 6177). Returns its length, at most 16; 0: unknown. */
@@ -38,22 +24,6 @@ static size_t name_client(const struct sockaddr *address, unsigned char out[16])
     }
     memcpy(out, six->s6_addr, 8);
     return 8;
-}
-
-peers *peers_new(void)
-{
-    peers *all = calloc(1, sizeof *all);
-    if (all)
-        pthread_mutex_init(&all->lock, NULL);
-    return all;
-}
-
-void peers_free(peers *all)
-{
-    if (!all)
-        return;
-    pthread_mutex_destroy(&all->lock);
-    free(all);
 }
 
 peer *peer_begin(peers *all, const struct sockaddr *from)
@@ -90,25 +60,13 @@ void peer_end(peer *p)
     free(p);
 }
 
-size_t peer_address(const peer *p, unsigned char out[16])
-{
-    memcpy(out, p->address, p->len);
-    return p->len;
-}
-
-size_t peers_count(peers *all)
-{
-    pthread_mutex_lock(&all->lock);
-    size_t count = all->count;
-    pthread_mutex_unlock(&all->lock);
-    return count;
-}
-
-size_t peers_from(peers *all, const struct sockaddr *from)
+size_t peers_count(peers *all, const struct sockaddr *from)
 {
     unsigned char address[16];
     size_t len = name_client(from, address), count = 0;
     pthread_mutex_lock(&all->lock);
+    if (!from)
+        count = all->count;
     for (const peer *p = len > 0 ? all->first : NULL; p; p = p->next)
         count += p->len == len && memcmp(p->address, address, len) == 0;
     pthread_mutex_unlock(&all->lock);

@@ -223,27 +223,6 @@ static bool percent_decode(char *text, bool in_query)
     return true;
 }
 
-static bool add_parameter(target *out, char *pair, problem_details *problem)
-{
-    char *value = strchr(pair, '=');
-    if (value)
-        *value++ = '\0';
-    else
-        value = pair + strlen(pair);
-    if (!percent_decode(pair, true) || !percent_decode(value, true))
-        return problem_fill(problem, 400, "bad_target", "The request target is malformed",
-                            "the query has a '%%' that is not followed by two hexadecimal digits other than 00");
-    if (target_value(out, pair) && strcmp(pair, TARGET_REPEATABLE) != 0)
-        return problem_fill(problem, 400, "repeated_parameter", "A query parameter is given twice",
-                            "\"%.100s\" occurs more than once in the query", pair);
-    if (out->count == TARGET_MAX_PARAMETERS)
-        return problem_fill(problem, 400, "bad_target", "The request target is malformed",
-                            "the query has more than %d parameters", TARGET_MAX_PARAMETERS);
-    out->parameters[out->count].key = pair;
-    out->parameters[out->count++].value = value;
-    return true;
-}
-
 bool target_parse(target *out, const char *raw, problem_details *problem)
 {
     memset(out, 0, sizeof *out);
@@ -265,12 +244,31 @@ bool target_parse(target *out, const char *raw, problem_details *problem)
                      "the target must be a path such as /v1/jobs, with '%%' followed by two hexadecimal digits "
                      "other than 00");
     t.path = path;
-    while (good && query && *query) {
-        char *next = strchr(query, '&');
+    for (char *pair = query, *next; good && pair && *pair; pair = next) {
+        next = strchr(pair, '&');
         if (next)
             *next++ = '\0';
-        good = !*query || add_parameter(&t, query, problem);
-        query = next;
+        if (!*pair)
+            continue;
+        char *value = strchr(pair, '=');
+        if (value)
+            *value++ = '\0';
+        else
+            value = pair + strlen(pair);
+        good = percent_decode(pair, true) && percent_decode(value, true);
+        if (!good)
+            problem_fill(problem, 400, "bad_target", "The request target is malformed",
+                         "the query has a '%%' that is not followed by two hexadecimal digits other than 00");
+        else if (target_value(&t, pair) && strcmp(pair, TARGET_REPEATABLE) != 0)
+            good = problem_fill(problem, 400, "repeated_parameter", "A query parameter is given twice",
+                                "\"%.100s\" occurs more than once in the query", pair);
+        else if (t.count == TARGET_MAX_PARAMETERS)
+            good = problem_fill(problem, 400, "bad_target", "The request target is malformed",
+                                "the query has more than %d parameters", TARGET_MAX_PARAMETERS);
+        if (good) {
+            t.parameters[t.count].key = pair;
+            t.parameters[t.count++].value = value;
+        }
     }
     if (good)
         *out = t;

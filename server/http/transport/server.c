@@ -1,9 +1,9 @@
 /* server.c: libmicrohttpd's callbacks and the life of a connection.
  *
  * A connection has at most one request at a time. The request is made when its first line has come (on_target), looked
- * at when its header block has come (begin), fed with its body (take_body), answered (answer) and ended
- * (on_completed). All of this happens in the connection's own thread; a reply that then only waits leaves both
- * (held.h). */
+ * at when its header block has come (connection_headers), fed with its body (connection_body), answered
+ * (connection_answer) and ended (connection_completed). All of this happens in the connection's own thread; a reply
+ * that then only waits leaves both (held.h). */
 #include "http/transport/connection.h"
 #include "http/transport/message.h"
 #include "http/transport/reading.h"
@@ -18,33 +18,6 @@
 #include <sys/random.h>
 #include <time.h>
 #include <unistd.h>
-
-static connection *connection_of(struct MHD_Connection *mhd)
-{
-    const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
-    return info ? info->socket_context : NULL;
-}
-
-static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_context,
-                          enum MHD_ConnectionNotificationCode code)
-{
-    transport *server = ctx;
-    if (code == MHD_CONNECTION_NOTIFY_STARTED) {
-        const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CONNECTION_FD);
-        const union MHD_ConnectionInfo *from = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
-        *socket_context = info ? connection_new(server, info->connect_fd, from ? from->client_addr : NULL) : NULL;
-        const union MHD_ConnectionInfo *session = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_GNUTLS_SESSION);
-        if (server->tls && session) { /* instead of those that libmicrohttpd keeps for all its life */
-            pthread_mutex_lock(&server->tls_lock);
-            gnutls_credentials_set(session->tls_session, GNUTLS_CRD_CERTIFICATE,
-                                   server->credentials[server->n_credentials - 1]);
-            pthread_mutex_unlock(&server->tls_lock);
-        }
-    } else {
-        connection_free(*socket_context);
-        *socket_context = NULL;
-    }
-}
 
 static const double WARN_EVERY_S = 10.0;
 
@@ -61,8 +34,8 @@ static void warn_of_crowd(transport *server, const struct sockaddr *from)
     getnameinfo(from, len, name, sizeof name, NULL, 0, NI_NUMERICHOST);
     log_write(server->options.log, LOG_WARN, "too_many_connections",
               (log_field[]){LOG_S("address", name),
-                            LOG_I("of_this_address", peers_from(server->peers, from)),
-                            LOG_I("connections", peers_count(server->peers)),
+                            LOG_I("of_this_address", peers_count(&server->peers, from)),
+                            LOG_I("connections", peers_count(&server->peers, NULL)),
                             LOG_I("max_connections", server->options.max_connections),
                             LOG_I("max_client_connections", server->options.max_client_connections),
                             LOG_I("cut", server->cut),
@@ -80,9 +53,10 @@ static enum MHD_Result on_accept(void *ctx, const struct sockaddr *address, sock
     const transport_options *options = &server->options;
     struct sockaddr_storage from;
     (void)len;
-    const size_t count = peers_count(server->peers);
+    const size_t count = peers_count(&server->peers, NULL);
     server->next_is_spare = false;
-    if (options->max_client_connections > 0 && peers_from(server->peers, address) >= options->max_client_connections) {
+    if (options->max_client_connections > 0 &&
+        peers_count(&server->peers, address) >= options->max_client_connections) {
         server->refused++;
         warn_of_crowd(server, address);
         return MHD_NO;
@@ -132,17 +106,6 @@ static enum MHD_Result on_request(void *ctx, struct MHD_Connection *mhd, const c
     return ok ? MHD_YES : MHD_NO;
 }
 
-static void on_completed(void *ctx, struct MHD_Connection *mhd, void **request_context,
-                         enum MHD_RequestTerminationCode code)
-{
-    (void)ctx;
-    (void)request_context;
-    connection *c = connection_of(mhd);
-    const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_HTTP_STATUS);
-    if (c)
-        connection_end_request(c, info ? info->http_status : 0, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
-}
-
 /* libmicrohttpd's messages, from the thread they are about. What it refuses by itself (a header block without end, a
  * malformed length or chunk) it answers in HTML, in some cases with the head written twice; this message comes before
  * that answer, so ours is sent first and the connection is closed for writing. */
@@ -189,8 +152,8 @@ static struct MHD_Daemon *start_daemon(transport *server, int listen_fd, const t
         {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)idle_s, NULL},
         {MHD_OPTION_STRICT_FOR_CLIENT, 1, NULL},
         {MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, NULL},
-        {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)on_completed, server},
-        {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, server},
+        {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)connection_completed, server},
+        {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)connection_notify, server},
         {MHD_OPTION_URI_LOG_CALLBACK, (intptr_t)on_target, server},
         {server->tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, server->tls ? options->tls->cert : NULL},
         {MHD_OPTION_HTTPS_MEM_KEY, 0, server->tls ? options->tls->key : NULL},
@@ -223,12 +186,17 @@ bool transport_use_tls(transport *server, const http_tls *tls, char *message, si
     return false;
 }
 
-static void free_tls(transport *server)
+/* When nobody adds a connection any more. */
+static void free_server(transport *server)
 {
+    holder_free(server->holder);
+    deadlines_free(server->deadlines);
+    pthread_mutex_destroy(&server->peers.lock);
     for (size_t i = 0; i < server->n_credentials; i++)
         gnutls_certificate_free_credentials(server->credentials[i]);
     free(server->credentials);
     pthread_mutex_destroy(&server->tls_lock);
+    free(server);
 }
 
 bool transport_start(transport **out, int listen_fd, const transport_handlers *handlers,
@@ -243,6 +211,7 @@ bool transport_start(transport **out, int listen_fd, const transport_handlers *h
     server->options = *options;
     server->tls = options->tls != NULL;
     pthread_mutex_init(&server->tls_lock, NULL);
+    pthread_mutex_init(&server->peers.lock, NULL);
     atomic_init(&server->id, 0);
     atomic_init(&server->connections, 0);
     atomic_init(&server->refusing, 0);
@@ -260,8 +229,7 @@ bool transport_start(transport **out, int listen_fd, const transport_handlers *h
         goto fail;
     has_key = true;
     server->deadlines = deadlines_new(words);
-    server->peers = peers_new();
-    if (!server->deadlines || !server->peers)
+    if (!server->deadlines)
         goto fail;
     if (server->tls && !transport_use_tls(server, options->tls, message, size))
         goto fail;
@@ -276,15 +244,10 @@ bool transport_start(transport **out, int listen_fd, const transport_handlers *h
 fail:
     *out = NULL;
     snprintf(message, size, "cannot start the HTTP server: %s", errno ? strerror(errno) : "out of memory");
-    if (server) {
-        holder_free(server->holder);
-        peers_free(server->peers);
-        deadlines_free(server->deadlines);
-        free_tls(server);
-    }
     if (has_key)
         pthread_key_delete(server->current);
-    free(server);
+    if (server)
+        free_server(server);
     free(words);
     close(listen_fd);
     return false;
@@ -303,7 +266,7 @@ const atomic_bool *transport_draining(const transport *server)
 
 transport_counts transport_count(transport *server)
 {
-    return (transport_counts){.connections = (unsigned)peers_count(server->peers),
+    return (transport_counts){.connections = (unsigned)peers_count(&server->peers, NULL),
                               .streams = atomic_load(&server->streams),
                               .body_bytes = atomic_load(&server->body_bytes)};
 }
@@ -330,10 +293,6 @@ void transport_stop(transport *server)
     MHD_stop_daemon(server->daemon);
     if (listening != MHD_INVALID_SOCKET)
         close(listening);
-    holder_free(server->holder); /* nobody adds to it any more */
-    peers_free(server->peers);
-    deadlines_free(server->deadlines);
     pthread_key_delete(server->current);
-    free_tls(server);
-    free(server);
+    free_server(server);
 }

@@ -4,7 +4,7 @@
 
 #include "store/sqlite/connection.h"
 #include "store/sqlite/trail.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 
 #include <pthread.h>
 
@@ -116,9 +116,7 @@ void sqlite_close(store *s);
 store_status sqlite_submit(store *s, const store_request *request, job *out, bool *repeated);
 store_status sqlite_find_repeat(store *s, const store_request *request, job *out);
 store_status sqlite_claim(store *s, store_lease *lease, double lease_s, bool small, job *out, char **body, size_t *len);
-store_status sqlite_renew(store *s, const store_lease *lease, int progress);
-store_status sqlite_finish(store *s, const store_lease *lease, const store_outcome *outcome);
-store_status sqlite_release(store *s, const store_lease *lease, bool counted);
+store_status sqlite_use_lease(store *s, const store_lease *lease, const lease_use *use);
 store_status sqlite_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 store_status sqlite_expire(store *s, const char *error_json, int64_t *count);
 store_status sqlite_retain(store *s, const store_retention *limits, double now, int64_t *count);

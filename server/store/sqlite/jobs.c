@@ -291,18 +291,17 @@ static store_status end_dismissed(connection *c, const char *id, const char *own
     return status;
 }
 
-/* What only the owner of a running job may do: QUERY_RENEW, QUERY_FINISH or QUERY_RELEASE. */
 typedef struct {
-    query_id query;
     const store_lease *lease;
-    int progress;
-    const store_outcome *outcome;
-    bool counted; /* release: the attempt */
+    const lease_use *use;
 } owner_args;
 
 static store_status change_own(sqlite_store *s, connection *c, void *args)
 {
+    static const query_id QUERIES[] = {
+        [LEASE_RENEW] = QUERY_RENEW, [LEASE_FINISH] = QUERY_FINISH, [LEASE_RELEASE] = QUERY_RELEASE};
     const owner_args *a = args;
+    const lease_use *use = a->use;
     const char *id = a->lease->job;
     const holder owner = holder_of(a->lease);
     const double now = clock_seconds(CLOCK_REALTIME);
@@ -313,23 +312,23 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
     bind_real(&st, 3, now);
     bind_real(&st, 4, a->lease->seconds);
     store_status status = statement_run(&st);
-    if (status == STORE_OK && a->query == QUERY_RELEASE)
+    if (status == STORE_OK && use->what == LEASE_RELEASE)
         status = end_dismissed(c, id, owner.text, &dismissed);
     if (status != STORE_OK || dismissed > 0)
         return status;
-    st = statement_begin(c, a->query);
+    st = statement_begin(c, QUERIES[use->what]);
     bind_text(&st, 1, id);
     bind_text(&st, 2, owner.text);
-    if (a->query == QUERY_RENEW) {
+    if (use->what == LEASE_RENEW) {
         bind_real(&st, 3, now + a->lease->seconds);
-        bind_integer(&st, 4, a->progress);
-    } else if (a->query == QUERY_RELEASE) {
-        bind_integer(&st, 3, a->counted ? 0 : 1);
-    } else if (a->query == QUERY_FINISH) {
-        bind_integer(&st, 3, a->outcome->status);
+        bind_integer(&st, 4, use->progress);
+    } else if (use->what == LEASE_RELEASE) {
+        bind_integer(&st, 3, use->counted ? 0 : 1);
+    } else if (use->what == LEASE_FINISH) {
+        bind_integer(&st, 3, use->outcome->status);
         bind_real(&st, 4, now);
-        bind_text(&st, 5, a->outcome->whole.summary);
-        bind_text(&st, 6, a->outcome->error);
+        bind_text(&st, 5, use->outcome->whole.summary);
+        bind_text(&st, 6, use->outcome->error);
     }
     status = statement_run(&st);
     if (status == STORE_OK && sqlite3_changes64(c->db) == 0) {
@@ -338,20 +337,20 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
         const bool exists = statement_row(&st);
         return statement_end(&st, exists ? STORE_CONFLICT : STORE_NOT_FOUND);
     }
-    if (status != STORE_OK || a->query != QUERY_FINISH)
+    if (status != STORE_OK || use->what != LEASE_FINISH)
         return status;
-    for (size_t i = 0; i < a->outcome->n_cases && status == STORE_OK; i++) { /* the job's own is in its row */
+    for (size_t i = 0; i < use->outcome->n_cases && status == STORE_OK; i++) { /* the job's own is in its row */
         st = statement_begin(c, QUERY_INSERT_ANSWER);
         bind_text(&st, 1, id);
         bind_integer(&st, 2, (int64_t)i + 1);
-        bind_text(&st, 3, a->outcome->cases[i].name);
-        bind_text(&st, 4, a->outcome->cases[i].summary);
+        bind_text(&st, 3, use->outcome->cases[i].name);
+        bind_text(&st, 4, use->outcome->cases[i].summary);
         status = statement_run(&st);
     }
     int64_t bytes = 0;
     char *contents = NULL;
     if (status == STORE_OK)
-        status = result_blobs_put(&SQLITE_RESULTS, c, id, a->outcome, &bytes, &contents, c->message);
+        status = result_blobs_put(&SQLITE_RESULTS, c, id, use->outcome, &bytes, &contents, c->message);
     if (status != STORE_OK)
         return status;
     st = statement_begin(c, QUERY_ADD_CONTENTS);
@@ -364,22 +363,10 @@ static store_status change_own(sqlite_store *s, connection *c, void *args)
     return status;
 }
 
-store_status sqlite_renew(store *base, const store_lease *lease, int progress)
+store_status sqlite_use_lease(store *base, const store_lease *lease, const lease_use *use)
 {
-    owner_args a = {.query = QUERY_RENEW, .lease = lease, .progress = progress};
-    return sqlite_write(sqlite_of(base), WRITE_LAZY, change_own, &a);
-}
-
-store_status sqlite_finish(store *base, const store_lease *lease, const store_outcome *outcome)
-{
-    owner_args a = {.query = QUERY_FINISH, .lease = lease, .outcome = outcome};
-    return sqlite_write(sqlite_of(base), WRITE_SOON, change_own, &a);
-}
-
-store_status sqlite_release(store *base, const store_lease *lease, bool counted)
-{
-    owner_args a = {.query = QUERY_RELEASE, .lease = lease, .counted = counted};
-    return sqlite_write(sqlite_of(base), WRITE_SOON, change_own, &a);
+    owner_args a = {lease, use};
+    return sqlite_write(sqlite_of(base), use->what == LEASE_RENEW ? WRITE_LAZY : WRITE_SOON, change_own, &a);
 }
 
 /* ---- recover */

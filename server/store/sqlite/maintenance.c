@@ -89,12 +89,14 @@ static bool check(sqlite3 *db, const char *file, store_findings *out)
     FILE *text = open_memstream(&out->findings, &len);
     if (!text)
         return false;
-    int rc = SQLITE_OK;
     int64_t version = 0;
-    file_format_integer(db, "PRAGMA user_version", &version);
+    char why[200] = ""; /* kept at once: what is asked next has an error of its own */
+    int rc = file_format_integer(db, "PRAGMA user_version", &version) ? SQLITE_OK : SQLITE_ERROR;
     for (size_t i = 0; i < sizeof CHECKS / sizeof CHECKS[0] && rc == SQLITE_OK; i++)
         if (version >= CHECKS[i].version)
             rc = collect(db, CHECKS[i].sql, CHECKS[i].finding, text);
+    if (rc != SQLITE_OK)
+        snprintf(why, sizeof why, "%s", sqlite3_errmsg(db));
     uint64_t numbered;
     char *lost = version >= 8 ? trail_missing(db, file, &numbered) : NULL;
     if (lost)
@@ -134,9 +136,10 @@ static bool check(sqlite3 *db, const char *file, store_findings *out)
                 memcpy(last, ids[n - 1], sizeof last);
         }
     }
-    if (rc != SQLITE_OK)
-        fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
-    file_format_integer(db, "SELECT count(*) FROM job", &out->jobs);
+    if ((!file_format_integer(db, "SELECT count(*) FROM job", &out->jobs) || rc != SQLITE_OK) && !why[0])
+        snprintf(why, sizeof why, "%s", sqlite3_errmsg(db));
+    if (why[0])
+        fprintf(text, "the check ended early: %s\n", why);
     out->seconds = clock_seconds(CLOCK_MONOTONIC) - begun;
     if (fclose(text) == 0)
         return true;

@@ -16,47 +16,6 @@
 
 /* ---- opening */
 
-/* Opens or creates the file and locks it against a second daemon; -1 with the reason. flock, not a file beside it:
- * it follows links, ends with the process and leaves nothing behind. It does not meet SQLite's own locks, but closing
- * any descriptor of the file drops those of this process, so this one is closed after SQLite's. */
-static int lock_file(const char *path, char *message, size_t size)
-{
-    struct stat st;
-    int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0600);
-    if (file < 0) {
-        const char *remedy = errno == ENOENT   ? "; make its folder first, or give another path"
-                             : errno == EACCES ? "; give a path that this user may write"
-                                               : "";
-        snprintf(message, size, "cannot open the file: %m%s", remedy);
-        return -1;
-    }
-    if (fstat(file, &st) != 0 || !S_ISREG(st.st_mode))
-        snprintf(message, size, "it is not a regular file");
-    else if (flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-        snprintf(message, size, "another daemon is using this file; stop it or give another path");
-    else
-        return file; /* a file system without flock (ENOLCK, EOPNOTSUPP) is used unguarded */
-    close(file);
-    return -1;
-}
-
-/* Continues the ids where the file's newest one stands. */
-static bool read_newest_id(sqlite_store *s, char *message, size_t size)
-{
-    statement st = statement_begin(&s->writer, QUERY_NEWEST_ID);
-    unsigned long long ms = 0;
-    unsigned sequence = 0;
-    if (statement_row(&st) && sqlite3_column_type(st.stmt, 0) == SQLITE_TEXT &&
-        sscanf((const char *)sqlite3_column_text(st.stmt, 0), "%12llx%4x", &ms, &sequence) == 2) {
-        s->last_ms = ms;
-        s->sequence = sequence;
-    }
-    if (statement_end(&st, STORE_OK) == STORE_OK)
-        return true;
-    snprintf(message, size, "cannot read the jobs: %s", s->writer.message);
-    return false;
-}
-
 static bool open_connections(sqlite_store *s, const char *path, char *message, size_t size)
 {
     int version = 0;
@@ -76,7 +35,20 @@ static bool open_connections(sqlite_store *s, const char *path, char *message, s
         if (!ok)
             snprintf(message, size, "cannot use a write-ahead log beside the file: %s", sqlite3_errmsg(s->writer.db));
     }
-    ok = ok && file_format_upgrade(s->writer.db, version, message, size) && read_newest_id(s, message, size);
+    ok = ok && file_format_upgrade(s->writer.db, version, message, size);
+    if (ok) { /* ids go on where the file's newest one stands */
+        statement st = statement_begin(&s->writer, QUERY_NEWEST_ID);
+        unsigned long long ms = 0;
+        unsigned sequence = 0;
+        if (statement_row(&st) && sqlite3_column_type(st.stmt, 0) == SQLITE_TEXT &&
+            sscanf((const char *)sqlite3_column_text(st.stmt, 0), "%12llx%4x", &ms, &sequence) == 2) {
+            s->last_ms = ms;
+            s->sequence = sequence;
+        }
+        ok = statement_end(&st, STORE_OK) == STORE_OK;
+        if (!ok)
+            snprintf(message, size, "cannot read the jobs: %s", s->writer.message);
+    }
     if (ok) {
         uint64_t number;
         s->base.missing = trail_missing(s->writer.db, s->path, &number);
@@ -131,8 +103,23 @@ store *sqlite_open(const char *path, char *message, size_t size)
     s->queue_end = &s->queue;
     s->trail.fd = s->spare = -1;
     s->claims = (uint64_t)(clock_seconds(CLOCK_REALTIME) * 1e6);
-    s->file = lock_file(path, message, size);
-    bool ok = s->file >= 0 && open_connections(s, path, message, size);
+    /* The file is locked against a second daemon by flock, not by a file beside it: that follows links, ends with the
+     * process and leaves nothing behind. It does not meet SQLite's own locks, but closing any descriptor of the file
+     * drops those of this process, so this one is closed after SQLite's. */
+    struct stat st;
+    bool ok = false;
+    s->file = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0600);
+    if (s->file < 0)
+        snprintf(message, size, "cannot open the file: %m%s",
+                 errno == ENOENT   ? "; make its folder first, or give another path"
+                 : errno == EACCES ? "; give a path that this user may write"
+                                   : "");
+    else if (fstat(s->file, &st) != 0 || !S_ISREG(st.st_mode))
+        snprintf(message, size, "it is not a regular file");
+    else if (flock(s->file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        snprintf(message, size, "another daemon is using this file; stop it or give another path");
+    else /* a file system without flock (ENOLCK, EOPNOTSUPP) is used unguarded */
+        ok = open_connections(s, path, message, size);
     if (ok && !sqlite_sync_begin(s)) {
         snprintf(message, size, "cannot start a thread");
         ok = false;
@@ -161,7 +148,9 @@ void sqlite_close(store *base)
     pthread_mutex_destroy(&s->readers_lock);
     pthread_mutex_destroy(&s->queue_lock);
     pthread_mutex_destroy(&s->writer_lock);
-    trail_close(&s->trail);
+    if (s->trail.fd >= 0)
+        close(s->trail.fd);
+    free(s->trail.path);
     store_base_end(base);
     free(s->path);
     free(s);
@@ -174,9 +163,7 @@ const store_engine STORE_SQLITE = {
     .submit = sqlite_submit,
     .find_repeat = sqlite_find_repeat,
     .claim = sqlite_claim,
-    .renew = sqlite_renew,
-    .finish = sqlite_finish,
-    .release = sqlite_release,
+    .use_lease = sqlite_use_lease,
     .recover = sqlite_recover,
     .expire = sqlite_expire,
     .retain = sqlite_retain,

@@ -60,43 +60,10 @@ store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
 /* ---- retention */
 
 typedef struct {
-    const store_retention *limits;
-    double now;
-    int64_t jobs, bytes; /* ended, as they stand */
     char ids[MOST_AT_ONCE][33], clients[MOST_AT_ONCE][STORE_CLIENT];
     int n_ids;
     int64_t count;
 } retain_args;
-
-/* The oldest jobs that must go. */
-static store_status choose(connection *c, retain_args *a)
-{
-    const store_retention *limits = a->limits;
-    const double now = a->now;
-    int64_t chosen_bytes = 0;
-    statement st = statement_begin(c, QUERY_ENDED);
-    if (statement_row(&st)) {
-        a->jobs = sqlite3_column_int64(st.stmt, 0);
-        a->bytes = sqlite3_column_int64(st.stmt, 1);
-    }
-    store_status status = statement_end(&st, STORE_OK);
-    if (status != STORE_OK)
-        return status;
-    st = statement_begin(c, QUERY_OLD_JOBS);
-    bind_integer(&st, 1, MOST_AT_ONCE);
-    while (a->n_ids < MOST_AT_ONCE && chosen_bytes < BYTES_AT_ONCE && statement_row(&st) &&
-           ((limits->keep_s > 0 && sqlite3_column_double(st.stmt, 1) < now - limits->keep_s) ||
-            (limits->keep_jobs > 0 && a->jobs > limits->keep_jobs) ||
-            (limits->keep_bytes > 0 && a->bytes > limits->keep_bytes))) {
-        const char *client = (const char *)sqlite3_column_text(st.stmt, 3);
-        snprintf(a->clients[a->n_ids], sizeof a->clients[0], "%s", client ? client : "");
-        snprintf(a->ids[a->n_ids++], sizeof a->ids[0], "%s", (const char *)sqlite3_column_text(st.stmt, 0));
-        a->jobs--;
-        a->bytes -= sqlite3_column_int64(st.stmt, 2);
-        chosen_bytes += sqlite3_column_int64(st.stmt, 2);
-    }
-    return statement_end(&st, STORE_OK);
-}
 
 static store_status delete_chosen(sqlite_store *s, connection *c, void *args)
 {
@@ -116,9 +83,32 @@ static store_status delete_chosen(sqlite_store *s, connection *c, void *args)
 store_status sqlite_retain(store *base, const store_retention *limits, double now, int64_t *count)
 {
     sqlite_store *s = sqlite_of(base);
-    retain_args a = {.limits = limits, .now = now};
+    retain_args a = {.n_ids = 0};
+    int64_t jobs = 0, bytes = 0, chosen_bytes = 0; /* the first two: ended, as they stand */
     connection *c = sqlite_take_reader(s);
-    store_status status = sqlite_give_reader(s, c, choose(c, &a));
+    statement st = statement_begin(c, QUERY_ENDED);
+    if (statement_row(&st)) {
+        jobs = sqlite3_column_int64(st.stmt, 0);
+        bytes = sqlite3_column_int64(st.stmt, 1);
+    }
+    store_status status = statement_end(&st, STORE_OK);
+    if (status == STORE_OK) { /* the oldest ones that must go */
+        st = statement_begin(c, QUERY_OLD_JOBS);
+        bind_integer(&st, 1, MOST_AT_ONCE);
+        while (a.n_ids < MOST_AT_ONCE && chosen_bytes < BYTES_AT_ONCE && statement_row(&st) &&
+               ((limits->keep_s > 0 && sqlite3_column_double(st.stmt, 1) < now - limits->keep_s) ||
+                (limits->keep_jobs > 0 && jobs > limits->keep_jobs) ||
+                (limits->keep_bytes > 0 && bytes > limits->keep_bytes))) {
+            const char *client = (const char *)sqlite3_column_text(st.stmt, 3);
+            snprintf(a.clients[a.n_ids], sizeof a.clients[0], "%s", client ? client : "");
+            snprintf(a.ids[a.n_ids++], sizeof a.ids[0], "%s", (const char *)sqlite3_column_text(st.stmt, 0));
+            jobs--;
+            bytes -= sqlite3_column_int64(st.stmt, 2);
+            chosen_bytes += sqlite3_column_int64(st.stmt, 2);
+        }
+        status = statement_end(&st, STORE_OK);
+    }
+    status = sqlite_give_reader(s, c, status);
     if (status == STORE_OK && a.n_ids > 0) /* an ended job does not change any more: it may only be gone already */
         status = sqlite_write(s, WRITE_FREES, delete_chosen, &a);
     *count = status == STORE_OK ? a.count : 0;

@@ -3,7 +3,7 @@
 #ifndef SERVER_STORE_SQLITE_SQLITE_H
 #define SERVER_STORE_SQLITE_SQLITE_H
 
-#include "store/engine.h"
+#include "store/engine_base.h"
 
 extern const store_engine STORE_SQLITE;
 

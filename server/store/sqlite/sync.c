@@ -22,7 +22,9 @@ static void *sync_loop(void *argument)
             continue;
         }
         uint64_t upto = s->committed;
-        trail_take(&s->trail);
+        memcpy(s->trail.taken.data, s->trail.waiting.data, s->trail.waiting.len);
+        s->trail.taken.len = s->trail.waiting.len;
+        s->trail.waiting.len = 0;
         pthread_mutex_unlock(&s->sync_lock);
         double begun = clock_seconds(CLOCK_MONOTONIC);
         /* xSync touches nothing of the log, which is open as long as the writer, but its descriptor. */

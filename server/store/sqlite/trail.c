@@ -51,7 +51,7 @@ char *trail_missing(sqlite3 *db, const char *file, uint64_t *last)
         return NULL;
     char *text = read_all(path, &len); /* before the number: a daemon may be at work */
     first_line(db, first);
-    file_format_integer(db, "SELECT jobs FROM tally WHERE status = -1", &number);
+    const bool known = file_format_integer(db, "SELECT jobs FROM tally WHERE status = -1", &number);
     *last = (uint64_t)number;
     FILE *out = text && strncmp(text, first, strlen(first)) == 0 ? open_memstream(&said, &said_len) : NULL;
     for (char *line = out ? text + strlen(first) : NULL, *end; line && (end = strchr(line, '\n')); line = end + 1) {
@@ -69,7 +69,7 @@ char *trail_missing(sqlite3 *db, const char *file, uint64_t *last)
         fclose(out);
     free(text);
     char *words = NULL;
-    if (lost > 0 && said &&
+    if (known && lost > 0 && said &&
         asprintf(&words,
                  "the database ends with commit %" PRId64 ", but %" PRIu64 " to %" PRIu64
                  " were on disk once: its write-ahead log was cut or deleted, or it is an older copy. Lost: %s",
@@ -99,15 +99,6 @@ void trail_open(trail *t, sqlite3 *db, const char *file)
     }
 }
 
-void trail_close(trail *t)
-{
-    if (t->fd >= 0)
-        close(t->fd);
-    free(t->path);
-    t->path = NULL;
-    t->fd = -1;
-}
-
 void trail_note(trail *t, const char *what, const char *id)
 {
     char *at = t->noted.data + t->noted.len;
@@ -127,13 +118,6 @@ void trail_committed(trail *t, uint64_t number)
         to->len += all < room ? all : 0;
     }
     t->noted.len = 0;
-}
-
-void trail_take(trail *t)
-{
-    memcpy(t->taken.data, t->waiting.data, t->waiting.len);
-    t->taken.len = t->waiting.len;
-    t->waiting.len = 0;
 }
 
 void trail_append(trail *t, bool on_disk)

@@ -34,16 +34,14 @@ typedef struct {
  * last number of both. */
 char *trail_missing(sqlite3 *db, const char *file, uint64_t *last);
 
-/* Opens the trail of the file to append. */
+/* Opens the trail of the file to append. The caller closes fd and frees path. */
 void trail_open(trail *t, sqlite3 *db, const char *file);
-void trail_close(trail *t);
 
 /* A transaction begins with noted.len 0: what was noted of one that was rolled back goes. */
 void trail_note(trail *t, const char *what, const char *id);
 /* What was noted belongs to the commit `number` now. */
 void trail_committed(trail *t, uint64_t number);
-/* Takes what waits; then either it is on disk and is appended, or it is forgotten. */
-void trail_take(trail *t);
+/* What was taken is on disk and is appended, or it is forgotten. */
 void trail_append(trail *t, bool on_disk);
 
 #endif

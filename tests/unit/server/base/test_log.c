@@ -8,20 +8,18 @@ typedef struct {
     char *text;
     size_t len;
     FILE *stream;
-    server_log *log;
+    server_log log;
 } capture;
 
 static void capture_begin(capture *c, log_level least)
 {
     memset(c, 0, sizeof *c);
     c->stream = open_memstream(&c->text, &c->len);
-    c->log = log_open(c->stream, least);
-    CHECK(c->log);
+    c->log = (server_log){.lock = PTHREAD_MUTEX_INITIALIZER, .stream = c->stream, .least = least};
 }
 
 static void capture_end(capture *c)
 {
-    log_close(c->log);
     fclose(c->stream);
     free(c->text);
 }
@@ -42,7 +40,7 @@ TEST(a_line_with_every_kind_of_field)
 {
     capture c;
     capture_begin(&c, LOG_INFO);
-    log_write(c.log, LOG_WARN, "job_finished",
+    log_write(&c.log, LOG_WARN, "job_finished",
               (log_field[]){LOG_S("job", "abc"), LOG_I("rows", -3), LOG_N("seconds", 0.25), {0}});
     CHECK_STR(after_time(c.text),
               "\"level\": \"warn\", \"event\": \"job_finished\", \"job\": \"abc\", \"rows\": -3, \"seconds\": 0.25}\n");
@@ -53,10 +51,10 @@ TEST(lower_levels_are_dropped)
 {
     capture c;
     capture_begin(&c, LOG_WARN);
-    log_write(c.log, LOG_DEBUG, "a", NULL);
-    log_write(c.log, LOG_INFO, "b", NULL);
+    log_write(&c.log, LOG_DEBUG, "a", NULL);
+    log_write(&c.log, LOG_INFO, "b", NULL);
     CHECK_INT(c.len, 0);
-    log_write(c.log, LOG_ERROR, "c", NULL);
+    log_write(&c.log, LOG_ERROR, "c", NULL);
     CHECK_STR(after_time(c.text), "\"level\": \"error\", \"event\": \"c\"}\n");
     log_write(NULL, LOG_ERROR, "nowhere", NULL);
     capture_end(&c);
@@ -67,7 +65,7 @@ static void check_string(const char *value, const char *want)
     capture c;
     char line[256];
     capture_begin(&c, LOG_DEBUG);
-    log_write(c.log, LOG_DEBUG, "e", (log_field[]){LOG_S("k", value), {0}});
+    log_write(&c.log, LOG_DEBUG, "e", (log_field[]){LOG_S("k", value), {0}});
     snprintf(line, sizeof line, "\"level\": \"debug\", \"event\": \"e\", \"k\": %s}\n", want);
     CHECK_STR(after_time(c.text), line);
     capture_end(&c);
@@ -92,7 +90,7 @@ TEST(numbers_that_json_lacks)
 {
     capture c;
     capture_begin(&c, LOG_DEBUG);
-    log_write(c.log, LOG_INFO, "e", (log_field[]){LOG_N("a", NAN), LOG_N("b", -INFINITY), LOG_N("c", 1e-9), {0}});
+    log_write(&c.log, LOG_INFO, "e", (log_field[]){LOG_N("a", NAN), LOG_N("b", -INFINITY), LOG_N("c", 1e-9), {0}});
     CHECK_STR(after_time(c.text), "\"level\": \"info\", \"event\": \"e\", \"a\": null, \"b\": null, \"c\": 1e-09}\n");
     capture_end(&c);
 }
@@ -114,7 +112,7 @@ TEST(lines_from_many_threads_are_whole)
     int lines = 0;
     capture_begin(&c, LOG_INFO);
     for (int i = 0; i < 4; i++)
-        CHECK_INT(pthread_create(&threads[i], NULL, write_many, c.log), 0);
+        CHECK_INT(pthread_create(&threads[i], NULL, write_many, &c.log), 0);
     for (int i = 0; i < 4; i++)
         pthread_join(threads[i], NULL);
     size_t first = strcspn(c.text, "\n");

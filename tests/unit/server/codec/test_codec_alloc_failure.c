@@ -1,6 +1,7 @@
 /* Every allocation of the codec fails once. What comes out then is a whole answer or a clear
  * refusal, and not one block is left behind. Linked with malloc, calloc, realloc and free wrapped. */
 #include "codec/codec.h"
+#include "codec/text.h"
 #include "codec/decode.h"
 #include "harness.h"
 #include "sanitized.h"
@@ -137,10 +138,10 @@ static bool try_encode(const char *argument)
     static const double rows[40 * CODEC_HISTORY_COLUMNS];
     size_t len;
     (void)argument;
-    char *text = codec_encode_history(NULL, rows, 40, &len);
-    CHECK(text ? len > 0 : len == 0);
-    free(text);
-    return text != NULL;
+    char *written = codec_encode_history(NULL, rows, 40, &len);
+    CHECK(written ? len > 0 : len == 0);
+    free(written);
+    return written != NULL;
 }
 
 static bool try_refine(const char *old)
@@ -162,13 +163,13 @@ static bool try_judge(const char *summary)
     codec_finding found = {.reason = ""};
     int64_t planned = countdown;
     countdown = -1;
-    char *text =
+    char *written =
         __wrap_malloc(strlen(summary) + 1); /* counted, unlike strdup; of malloc gcc knows that it reads no countdown */
-    memcpy(text, summary, strlen(summary) + 1);
+    memcpy(written, summary, strlen(summary) + 1);
     countdown = planned;
-    const bool good = judge(&text, &request, "a", false, &found) && judge(&text, &request, NULL, true, &found);
-    CHECK(good ? strstr(text, "\"pass\"") != NULL : strncmp(text, summary, strlen(summary) - 1) == 0);
-    free(text);
+    const bool good = judge(&written, &request, "a", false, &found) && judge(&written, &request, NULL, true, &found);
+    CHECK(good ? strstr(written, "\"pass\"") != NULL : strncmp(written, summary, strlen(summary) - 1) == 0);
+    free(written);
     return good;
 }
 
@@ -178,25 +179,25 @@ static bool try_results(const char *argument)
     const codec_result one = {.case_name = "a", .summary = "{}", .m = 100, .reactions = r};
     size_t len;
     (void)argument;
-    codec_results *all = codec_results_begin("id", "{}");
-    if (!all)
-        return false;
-    codec_results_add(all, &one);
-    char *text = codec_results_end(all, &one, &len);
-    free(text);
-    return text != NULL;
+    text all = {0};
+    codec_put_case(&all, &one);
+    codec_put_places(&all, &one);
+    char *written = text_finish(&all, &len);
+    free(written);
+    return written != NULL;
 }
 
 static bool try_trade(const char *summary)
 {
     codec_trade of = {.job_id = "id", .case_name = "a"};
     uz_trade_clear(&of.trade);
-    codec_summary *read = codec_summary_read(summary);
-    const bool named = strcmp(codec_summary_text(read, "method"), "auto") == 0;
-    codec_summary_free(read);
-    char *text = named ? codec_encode_trade(&of, NULL) : NULL;
-    free(text);
-    return text != NULL;
+    json_tree read;
+    const bool named =
+        codec_summary_read(&read, summary) && strcmp(codec_summary_text(read.root, "method"), "auto") == 0;
+    json_clear(&read);
+    char *written = named ? codec_encode_trade(&of, NULL) : NULL;
+    free(written);
+    return written != NULL;
 }
 
 static bool try_surface(const char *argument)

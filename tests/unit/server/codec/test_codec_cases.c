@@ -1,5 +1,6 @@
 /* Requests with load cases, starts and answers, and what is made of them. */
 #include "codec/codec.h"
+#include "codec/text.h"
 #include "harness.h"
 
 #include <jansson.h>
@@ -267,8 +268,9 @@ TEST(same_problem)
     CHECK(!same("{\"problem\":{\"a\":1}}", "{\"problem\":{\"a\":1 }}"));
     CHECK(!same("{\"problem\":1,\"cases\":[2]}", "{\"problem\":1}"));
     CHECK(!same("{\"problem\":1,\"cases\":[2]}", "{\"problem\":1,\"cases\":[3]}"));
-    CHECK(codec_is_verify("{\"problem\":{},\"answer\":{}}", 26) &&
-          !codec_is_verify("{\"problem\":{\"answer\":1}}", 24));
+    size_t len; /* a request to verify has an answer, and no other has */
+    CHECK(json_member_text("{\"problem\":{},\"answer\":{}}", 26, "answer", &len) &&
+          !json_member_text("{\"problem\":{\"answer\":1}}", 24, "answer", &len));
 }
 
 /* ---- replies */
@@ -280,29 +282,33 @@ TEST(results_of_cases)
         .case_name = "a\"b", .summary = "{\"x\":1}", .dim = 2, .m = 2, .n_u = 4, .reactions = r, .displacements = u};
     const codec_result shared = {.dim = 2, .m = 2, .n_nodes = 4, .nodes = nodes, .contact_nodes = contact};
     size_t len = 0;
-    codec_results *all = codec_results_begin("id", "{\"y\":2}");
-    codec_results_add(all, &one);
-    codec_results_add(all, &one);
-    char *text = codec_results_end(all, &shared, &len);
-    CHECK_STR(text, "{\"job\":\"id\",\"summary\":{\"y\":2},\"cases\":["
-                    "{\"name\":\"a\\\"b\",\"summary\":{\"x\":1},\"reactions\":[-1,0],\"displacements\":[[1,2],[3,4]]},"
-                    "{\"name\":\"a\\\"b\",\"summary\":{\"x\":1},\"reactions\":[-1,0],\"displacements\":[[1,2],[3,4]]}],"
-                    "\"nodes\":[[0,0],[1,0]],\"contact_nodes\":[1,2]}");
-    CHECK_INT(len, strlen(text));
-    free(text);
-    codec_results_end(codec_results_begin("id", "{}"), NULL, NULL);
-    codec_results_end(NULL, NULL, NULL);
+    text all = {0};
+    text_open(&all, NULL, '{');
+    text_open(&all, "cases", '[');
+    codec_put_case(&all, &one);
+    codec_put_case(&all, &one);
+    text_close(&all, ']');
+    codec_put_places(&all, &shared);
+    text_close(&all, '}');
+    char *written = text_finish(&all, &len);
+    CHECK_STR(written,
+              "{\"cases\":["
+              "{\"name\":\"a\\\"b\",\"summary\":{\"x\":1},\"reactions\":[-1,0],\"displacements\":[[1,2],[3,4]]},"
+              "{\"name\":\"a\\\"b\",\"summary\":{\"x\":1},\"reactions\":[-1,0],\"displacements\":[[1,2],[3,4]]}],"
+              "\"nodes\":[[0,0],[1,0]],\"contact_nodes\":[1,2]}");
+    CHECK_INT(len, strlen(written));
+    free(written);
 }
 
 TEST(summaries_of_cases)
 {
     uz_summary summary = {.outcome = UZ_ITERATION_LIMIT};
     codec_cases counts = {.count = 3, .outcomes = {[UZ_CONVERGED] = 2, [UZ_ITERATION_LIMIT] = 1}, .worst = "b"};
-    char *text = codec_encode_summary(&summary, UZ_PROBLEM_SCENE, &(codec_run){"warm", &counts});
-    CHECK(text && strstr(text, "\"started_from\":\"warm\",\"cases\":{\"count\":3,\"worst\":\"b\",\"converged\":2,"
-                               "\"iteration_limit\":1}"));
-    free(text);
-    text = codec_encode_summary(&summary, UZ_PROBLEM_SCENE, NULL);
-    CHECK(text && !strstr(text, "cases") && !strstr(text, "started_from"));
-    free(text);
+    char *written = codec_encode_summary(&summary, UZ_PROBLEM_SCENE, &(codec_run){"warm", &counts});
+    CHECK(written && strstr(written, "\"started_from\":\"warm\",\"cases\":{\"count\":3,\"worst\":\"b\",\"converged\":2,"
+                                     "\"iteration_limit\":1}"));
+    free(written);
+    written = codec_encode_summary(&summary, UZ_PROBLEM_SCENE, NULL);
+    CHECK(written && !strstr(written, "cases") && !strstr(written, "started_from"));
+    free(written);
 }

@@ -136,7 +136,7 @@ TEST(every_name_of_the_schema_is_known_to_the_library)
     }
     for (size_t i = 0; i < 3; i++) {
         snprintf(solver, sizeof solver, "{\"operator\":\"%s\"}", OPERATORS[i]);
-        CHECK_STR(uz_operator_name(settings_of(solver).op), OPERATORS[i]);
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OPERATOR, settings_of(solver).op), OPERATORS[i]);
     }
 }
 

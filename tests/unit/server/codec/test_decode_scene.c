@@ -15,7 +15,7 @@ static bool ready(void)
 static bool decode(uz_scene *out, const char *body, problem_details *problem)
 {
     json_tree doc;
-    decoding d = {.bound = decode_memory_bound(strlen(body)), .problem = problem};
+    decoding d = {.bound = (size_t)64 << 20, .problem = problem};
     *problem = (problem_details){0};
     *out = (uz_scene){0};
     if (!ready() || !json_scan(&doc, body, strlen(body), problem))

@@ -46,7 +46,7 @@ TEST(requests)
     char message[256] = "";
     size_t i;
     json_t *list = read_requests(), *item;
-    schemas *all = schemas_load(message, sizeof message);
+    schemas *all = schemas_load(NULL, 0, message, sizeof message);
     CHECK_MSG(all, "%s", message);
     json_array_foreach(list, i, item) if (all) check_request(all, item);
     CHECK(json_array_size(list) > 60);
@@ -57,7 +57,7 @@ TEST(requests)
 static schemas *parse(const char *schema, char message[256])
 {
     const embedded_file file = {"s.json", schema, strlen(schema)};
-    return schemas_parse(&file, 1, message, 256);
+    return schemas_load(&file, 1, message, 256);
 }
 
 /* Loads one file with the given text; true if it is taken. */

@@ -1,5 +1,5 @@
 /* What the store keeps of load cases and of jobs that refine others. */
-#include "store/engine.h"
+#include "store/engine_base.h"
 #include "store_place.h"
 
 /* ---- cases */

@@ -1,5 +1,5 @@
 /* The queue of the store and those who work on it: order, recovery, expiry, retention, webhooks, many threads. */
-#include "store/engine.h"
+#include "store/engine_base.h"
 #include "sqlite_file.h"
 #include "store_place.h"
 
@@ -340,7 +340,7 @@ STORE_TEST(a_full_queue)
     bool repeated;
     if (!place_begin(&p))
         return;
-    store_configure(p.s, &(store_settings){.max_queue = 2});
+    p.s->settings = (store_settings){.max_queue = 2};
     submit_with(p.s, (store_request){.priority = 0}, id);
     submit_with(p.s, (store_request){.idempotency_key = "k"}, id);
     store_request request = {.body = "{}", .body_len = 2};

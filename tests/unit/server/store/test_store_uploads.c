@@ -1,5 +1,5 @@
 /* Uploads in the store: what the API tests can't reach or would wait for. */
-#include "store/engine.h"
+#include "store/engine_base.h"
 #include "upload_place.h"
 
 #include <zlib.h>
@@ -78,7 +78,7 @@ STORE_TEST(limits_of_one_and_of_all)
     char data[100] = {0};
     if (!place_begin(&p))
         return;
-    store_configure(p.s, &(store_settings){.uploads = {.one = 50, .all = 100, .keep_s = 0}});
+    p.s->settings = (store_settings){.uploads = {.one = 50, .all = 100, .keep_s = 0}};
     CHECK_INT(send(p.s, data, 51, 7, false, &info, &known), UPLOAD_TOO_LARGE);
     CHECK_INT(send(p.s, data, 50, 7, false, &info, &known), UPLOAD_OK);
     CHECK_INT(send(p.s, data, 40, 7, false, &info, &known), UPLOAD_OK);
@@ -86,7 +86,7 @@ STORE_TEST(limits_of_one_and_of_all)
     CHECK_INT(send(p.s, data, 10, 7, false, &info, &known), UPLOAD_OK);
     CHECK_INT(files_in(&p), 3);
     place_reopen(&p); /* counts what is there; limits are not kept */
-    store_configure(p.s, &(store_settings){.uploads = {.one = 50, .all = 100}});
+    p.s->settings = (store_settings){.uploads = {.one = 50, .all = 100}};
     CHECK_INT(send(p.s, data, 1, 7, false, &info, &known), UPLOAD_NO_ROOM);
     end_place(&p);
 }
@@ -121,7 +121,7 @@ STORE_TEST(an_upload_in_use_stays)
     CHECK_INT(store_upload_descriptor(p.s, ABC, j.id, &fd, &bytes), STORE_OK);
     CHECK(fd >= 0 && bytes == 3 && close(fd) == 0);
     CHECK_INT(store_upload_delete(p.s, ABC, NULL), STORE_CONFLICT);
-    store_configure(p.s, &(store_settings){.uploads = {.keep_s = 1e-6}});
+    p.s->settings = (store_settings){.uploads = {.keep_s = 1e-6}};
     CHECK_INT(store_collect_uploads(p.s, &count), STORE_OK);
     CHECK(count == 0 && files_in(&p) == 1);
     CHECK_INT(store_dismiss(p.s, j.id, &was), STORE_OK);

@@ -38,7 +38,7 @@ static const char *const SCENE = SCENE_OF("30, 10"), *const LARGE = SCENE_OF("12
 typedef struct {
     place place;
     FILE *log_file;
-    server_log *log;
+    server_log log;
     work *w;
 } service;
 
@@ -60,7 +60,7 @@ static bool service_start(service *v, const work_options *options)
     static char path[4096]; /* as long as the workers */
     work_options with = *options;
     with.program = daemon_program(path);
-    v->w = work_start(v->place.s, &with, v->log, message, sizeof message);
+    v->w = work_start(v->place.s, &with, &v->log, message, sizeof message);
     CHECK_MSG(v->w, "%s", message);
     return v->w != NULL;
 }
@@ -77,7 +77,7 @@ static bool service_begin(service *v)
         CHECK_MSG(ready, "%s", message);
     }
     v->log_file = tmpfile();
-    v->log = log_open(v->log_file, LOG_DEBUG);
+    v->log = (server_log){.lock = PTHREAD_MUTEX_INITIALIZER, .stream = v->log_file, .least = LOG_DEBUG};
     return ready && place_begin(&v->place);
 }
 
@@ -85,7 +85,6 @@ static void service_end(service *v)
 {
     work_free(v->w);
     place_end(&v->place);
-    log_close(v->log);
     fclose(v->log_file);
 }
 

@@ -1,6 +1,6 @@
 /* The database file and its disk: kills, foreign files, a second daemon, a full disk, other programs. */
 #include "sqlite_file.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 #include "store_place.h"
 
 #include <fcntl.h>

@@ -1,6 +1,6 @@
 /* The database file: its rows, checks, backups, damages, and files of earlier formats. */
 #include "sqlite_file.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 #include "store_place.h"
 
 #include <sys/stat.h>
@@ -589,7 +589,7 @@ TEST(a_trail_of_what_was_committed)
     snprintf(path, sizeof path, "%s-trail", p.path);
     for (int i = 0; i < 3; i++)
         CHECK_INT(submit_text(p.s, "{}", NULL, NULL, id), STORE_OK);
-    CHECK(!store_missing(p.s));
+    CHECK(!p.s->missing);
     store_close(p.s);
     text = test_read_file(path, &len);
     CHECK(text && strstr(text, id) && strstr(text, " submitted ") && strncmp(text, "uzawad trail ", 13) == 0);
@@ -603,7 +603,7 @@ TEST(a_trail_of_what_was_committed)
     check_findings(&p, "Lost: ended lostlostlostlost (900000)");
     if (!place_open(&p))
         return;
-    CHECK(store_missing(p.s) && strstr(store_missing(p.s), "900000 to 900000") && !strstr(store_missing(p.s), "half"));
+    CHECK(p.s->missing && strstr(p.s->missing, "900000 to 900000") && !strstr(p.s->missing, "half"));
     CHECK_INT(submit_text(p.s, "{}", NULL, NULL, id), STORE_OK);
     store_close(p.s);
     check_findings(&p, "");
@@ -612,13 +612,13 @@ TEST(a_trail_of_what_was_committed)
     free(text);
     if (!place_open(&p))
         return;
-    CHECK(!store_missing(p.s));
+    CHECK(!p.s->missing);
     store_close(p.s);
     change_file(p.path,
                 "UPDATE tally SET jobs = jobs + 1 WHERE status = -2; UPDATE tally SET jobs = 1 WHERE status = -1");
     if (!place_open(&p))
         return;
-    CHECK(!store_missing(p.s));
+    CHECK(!p.s->missing);
     place_end(&p);
 }
 
@@ -652,6 +652,33 @@ TEST(a_check_finds_what_is_wrong)
         place_open(&p);
         place_end(&p);
     }
+}
+
+/* A check that SQLite has no memory for says so: it calls nothing whole that it has not seen, and nothing lost. */
+TEST(a_check_without_memory_ends_early)
+{
+    place p;
+    char id[33];
+    int early = 0, whole = 0;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    for (int room = 0; room < 400 << 10; room += 1 << 10) {
+        store_findings found = {0};
+        sqlite3_hard_heap_limit64(sqlite3_memory_used() + room + 1);
+        const store_status status = store_check(p.s, &found);
+        sqlite3_hard_heap_limit64(0);
+        if (status == STORE_OK && found.findings[0])
+            early += strstr(found.findings, "out of memory") || strstr(found.findings, "error code=7");
+        else if (status == STORE_OK)
+            whole += found.jobs == 1;
+        CHECK_MSG(early + whole == room / 1024 + 1, "with %d bytes: %d, %s", room, (int)status, found.findings);
+        free(found.findings);
+        if (early + whole != room / 1024 + 1)
+            break;
+    }
+    CHECK_MSG(early > 0 && whole > 0, "%d and %d", early, whole);
+    place_end(&p);
 }
 
 TEST(what_is_no_database_of_ours_is_not_checked)

@@ -1,7 +1,7 @@
 /* Files of uploads beside a database: in its backups, damaged, checked. */
 #include "sqlite_file.h"
 #include "store/sqlite/backup_uploads.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 #include "upload_place.h"
 
 #include <sys/stat.h>

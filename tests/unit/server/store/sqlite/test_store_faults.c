@@ -3,7 +3,7 @@
 #include "faulty_vfs.h"
 #include "sanitized.h"
 #include "sqlite_file.h"
-#include "store/engine.h"
+#include "store/engine_base.h"
 #include "store_place.h"
 
 #include <stdatomic.h>
