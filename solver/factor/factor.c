@@ -53,6 +53,18 @@ static int blas_threads =
 /* A tenth of a second: threads cost the milliseconds that they spin afterwards. */
 #define LARGE_FLOPS 5e9
 
+/* For each entry of L: where supernodes are small two threads take as long as one, and where other programs run too
+ * they wait for each other at each of very many calls: of a plane body (200 flops) ten seconds in place of one. On a
+ * quiet machine, one thread and two: plane bodies of 240,000 and 540,000 dofs 0.53 and 0.56 s, 1.52 and 1.55 s; a cube
+ * of 19,000 dofs (620 flops) 0.32 and 0.24 s. */
+#define DENSE_FLOPS 400.0
+
+/* Few flops for each entry of L: the kernels of refill.c take two thirds of CHOLMOD's time. */
+static bool has_small_supernodes(const uz_factor *factor)
+{
+    return factor->info.flops <= DENSE_FLOPS * (double)factor->info.nnz;
+}
+
 void uz_factor_use_threads(int threads)
 {
     blas_threads = threads;
@@ -65,7 +77,7 @@ static uz_status factorize(uz_factor *factor, cholmod_sparse *S, cholmod_common 
     bool ok = S != NULL;
     if (S) {
         int ordering = factor->L.ordering;
-        const bool threads = blas_threads > 1 && uz_analysis_describe(factor->analysis).flops > LARGE_FLOPS;
+        const bool threads = blas_threads > 1 && factor->info.flops > LARGE_FLOPS && !has_small_supernodes(factor);
         factor->L.ordering = CHOLMOD_NATURAL;
         if (threads)
             openblas_set_num_threads(blas_threads);
@@ -90,6 +102,20 @@ static uz_status factorize(uz_factor *factor, cholmod_sparse *S, cholmod_common 
     return UZ_OK;
 }
 
+uz_status uz_factor_new(uz_factor **out, const uz_analysis *analysis, uz_error *err)
+{
+    uz_factor *factor = uz_alloc_zero(1, sizeof *factor);
+    *out = factor;
+    if (!factor)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
+    factor->n = analysis->n;
+    factor->analysis = (uz_analysis *)analysis; /* the count is all that is not constant of it */
+    atomic_fetch_add(&factor->analysis->holders, 1);
+    factor->L = *analysis->L;
+    factor->info = uz_analysis_describe(analysis);
+    return UZ_OK;
+}
+
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
                            const uz_hooks *hooks, uz_error *err)
 {
@@ -97,28 +123,31 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     if (K->rows != K->cols || K->cols != analysis->n || K->ptr[K->cols] != analysis->nnz)
         return uz_fail(err, UZ_ERR_ARGUMENT, "K", "K is not of the pattern that was analysed");
     cholmod_common common;
-    uz_factor *factor = uz_alloc_zero(1, sizeof *factor);
-    if (!factor || !uz_cholmod_start(&common)) {
-        free(factor);
+    uz_factor *factor;
+    uz_status status = uz_factor_new(&factor, analysis, err);
+    if (status != UZ_OK)
+        return status;
+    if (!uz_cholmod_start(&common)) {
+        uz_factor_free(factor);
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     }
-    factor->n = analysis->n;
-    factor->analysis = (uz_analysis *)analysis; /* the count is all that is not constant of it */
-    atomic_fetch_add(&factor->analysis->holders, 1);
-    factor->L = *analysis->L;
     double start = uz_seconds();
-    uz_status status = UZ_OK;
     const double bytes = 8.0 * (double)factor->L.xsize + 8.0 * (double)factor->L.ssize + 24.0 * (double)factor->n;
     if (memory_limit > 0 && bytes > (double)memory_limit)
         status = uz_fail(err, UZ_ERR_LIMIT, "K",
                          "the factor would take %.0f bytes and the limit is %zu: raise the limit", bytes, memory_limit);
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
-    cholmod_sparse *S = status == UZ_OK ? uz_permute(K, factor->analysis->position, NULL, &common) : NULL;
-    if (status == UZ_OK)
+    bool filled = false;
+    if (status == UZ_OK && has_small_supernodes(factor))
+        status = uz_fill(&filled, factor, K, err);
+    if (status == UZ_OK && !filled) { /* it names a pivot that is not positive */
+        SuiteSparse_free(factor->L.x);
+        factor->L = *analysis->L;
+        cholmod_sparse *S = uz_permute(K, factor->analysis->position, NULL, &common);
         status = factorize(factor, S, &common, err);
-    cholmod_l_free_sparse(&S, &common);
-    factor->info = uz_analysis_describe(analysis);
+        cholmod_l_free_sparse(&S, &common);
+    }
     if (status == UZ_OK)
         status = uz_find_condition(factor, K, &common, err);
     factor->info.factor_s = uz_seconds() - start;
@@ -130,36 +159,11 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     return status;
 }
 
-uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
-{
-    cholmod_common common;
-    if (K->cols != factor->n || K->ptr[K->cols] != factor->analysis->nnz)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "K", "K is not of the pattern that was analysed");
-    if (!uz_cholmod_start(&common))
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
-    const int64_t count = K->ptr[K->cols];
-    double *value = factor->again ? factor->again->x : NULL;
-    for (int64_t k = 0; value && k < count; k++)
-        value[factor->place[k]] = K->val[k];
-    if (!factor->place)
-        factor->place = uz_alloc(count, sizeof *factor->place);
-    if (factor->place && !factor->again)
-        factor->again = uz_permute(K, factor->analysis->position, factor->place, &common);
-    uz_status status = factorize(factor, factor->again, &common, err);
-    cholmod_l_finish(&common);
-    return status;
-}
-
 void uz_factor_free(uz_factor *factor)
 {
     if (!factor)
         return;
-    cholmod_common common;
-    if (factor->again && uz_cholmod_start(&common)) {
-        cholmod_l_free_sparse(&factor->again, &common);
-        cholmod_l_finish(&common);
-    }
-    free(factor->place);
+    uz_refill_free(factor->refill);
     SuiteSparse_free(factor->L.x); /* all else of L is the analysis's */
     uz_analysis_free(factor->analysis);
     free(factor);

@@ -60,9 +60,13 @@ uz_factor_info uz_analysis_describe(const uz_analysis *analysis);
  * predicted bytes, ARGUMENT another size or number of entries than the analysis's. */
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
                            const uz_hooks *hooks, uz_error *err);
-/* A factor that nobody shares, of K with other values: in the memory that it has. What is known of its condition is
- * still that of the first values, and K that is singular but to rounding is not refused. After an error it is of no use
- * but for another attempt. */
+/* A factor without numbers, which nobody shares: of use once uz_factor_again has made them. Its condition stays
+ * unknown. UZ_ERR_MEMORY. */
+uz_status uz_factor_new(uz_factor **out, const uz_analysis *analysis, uz_error *err);
+/* The numbers of such a factor for a K of the pattern that was analysed, in the memory that it has, with what was found
+ * of the pattern kept for the next time. K that is singular but to rounding is not refused. Errors:
+ * ARGUMENT another size or number of entries than the analysis's; NOT_SPD: of no use then but for another attempt;
+ * MEMORY. */
 uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err);
 void uz_factor_free(uz_factor *factor);
 uz_factor_info uz_factor_describe(const uz_factor *factor);
@@ -132,7 +136,7 @@ bool uz_group_dofs(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);
-/* BLAS may use so many threads in a large factorization, of which there is one at a time; elsewhere it has one.
+/* BLAS may use so many threads in a large factorization of large supernodes, one at a time; elsewhere it has one.
  * Process-wide: called once at most, by uz_process_init. */
 void uz_factor_use_threads(int threads);
 /* The big blocks, which are the factor's above all, come from the reserve from now on. Process-wide: called once at

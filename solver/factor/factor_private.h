@@ -19,13 +19,19 @@ struct uz_analysis {
     double seconds;
 };
 
+/* What making the numbers of a factor again takes (refill.c). */
+typedef struct uz_refill uz_refill;
+void uz_refill_free(uz_refill *x);
+/* The numbers of a factor that has none, by its kernels for small supernodes; *positive false: at a pivot that is not,
+ * with memory to be given back. UZ_ERR_MEMORY. */
+uz_status uz_fill(bool *positive, uz_factor *factor, const uz_csc *K, uz_error *err);
+
 struct uz_factor {
     uz_analysis *analysis;
     cholmod_factor L; /* the analysis's with numbers: only x and what says so are this factor's own */
     int64_t n;
     uz_factor_info info;
-    cholmod_sparse *again; /* the last K of uz_factor_again in the factor's order; NULL: not asked */
-    int64_t *place;        /* of its entries there */
+    uz_refill *refill; /* for uz_factor_again; NULL: not asked */
 };
 
 /* A factor with other supernodes here and there. */

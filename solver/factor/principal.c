@@ -30,12 +30,13 @@ size_t uz_principal_bytes(const uz_principal *part)
     return part ? part->most : 0;
 }
 
-/* A: the reduced matrix, while it is there, or NULL. */
+/* A: the reduced matrix, while it is there, which CHOLMOD transposes, or NULL. */
 static void count_bytes(uz_principal *part, const cholmod_sparse *A)
 {
     const cholmod_factor *L = part->L;
     size_t bytes = 24 * (size_t)part->factor->n + uz_paths_bytes(part->paths);
-    bytes += A ? 16 * A->nzmax + 8 * A->ncol : 0;
+    bytes += A ? 2 * (16 * A->nzmax + 8 * A->ncol) : 0;
+    bytes += A && L && L->is_super ? 8 * L->maxcsize : 0; /* what supernodes take from each other */
     if (L)
         bytes += 16 * L->n + (L->is_super ? 8 * (L->xsize + L->ssize + 3 * L->nsuper) : 16 * L->nzmax + 32 * L->n);
     part->most = bytes > part->most ? bytes : part->most;

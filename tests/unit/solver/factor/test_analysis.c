@@ -1,6 +1,8 @@
 /* One analysis for many factors of one pattern: the same bits as an analysis of their own, in any number of threads. */
 #include "factor_fixture.h"
+#include "floor.h"
 #include "harness.h"
+#include "hex8.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 
@@ -49,6 +51,49 @@ TEST(shared_analysis_gives_the_same_bits)
         uz_qp_clear(&first);
         uz_qp_clear(&second);
         free(dofs);
+        free(x);
+        free(y);
+    }
+}
+
+/* A plate that is stiffer here and there has supernodes of every width; those of bricks are large enough for BLAS. */
+TEST(numbers_made_again_are_those_of_a_new_factor)
+{
+    uz_thread_init();
+    for (int body = 0; body < 3; body++) {
+        uz_qp qp = {0};
+        uz_analysis *analysis;
+        uz_factor *again, *fresh;
+        uz_error err;
+        CHECK((body == 2 ? hex8_qp(&qp, 8, &err) : floor_qp(&qp, 30, body == 1, 2.0, 0.3, &err)) == UZ_OK);
+        const int64_t n = qp.K.cols;
+        double *x = vector(n), *y = vector(n), size = 0, off = 0;
+        CHECK_INT(uz_analysis_create(&analysis, &qp.K, NULL, 0, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
+        CHECK_INT(uz_factor_new(&again, analysis, &err), UZ_OK);
+        for (int k = 0; k < 4; k++) {
+            const bool singular = k == 2;
+            qp.K.val[qp.K.ptr[n / 2]] *= singular ? -1 : k == 3 ? -3 : 2;
+            for (int64_t j = 0; j < n; j += 7)
+                qp.K.val[qp.K.ptr[j]] *= 1.5;
+            CHECK_INT(uz_factor_again(again, &qp.K, &err), singular ? UZ_ERR_NOT_SPD : UZ_OK);
+            if (singular)
+                continue;
+            CHECK_INT(uz_factor_create(&fresh, &qp.K, analysis, 0, NULL, &err), UZ_OK);
+            solve(x, again, qp.p, n);
+            solve(y, fresh, qp.p, n);
+            for (int64_t i = 0; i < n; i++) {
+                size = fmax(size, fabs(y[i]));
+                off = fmax(off, fabs(x[i] - y[i]));
+            }
+            CHECK_MSG(off <= 1e-11 * size, "body %d, %d: %g of %g", body, k, off, size);
+            uz_factor_free(fresh);
+        }
+        qp.K.ptr[n]--; /* an entry less */
+        CHECK_INT(uz_factor_again(again, &qp.K, &err), UZ_ERR_ARGUMENT);
+        qp.K.ptr[n]++;
+        uz_factor_free(again);
+        uz_analysis_free(analysis);
+        uz_qp_clear(&qp);
         free(x);
         free(y);
     }

@@ -1,0 +1,356 @@
+/* refill.c: the numbers of a factor whose supernodes are small, and of any made again for K with other values.
+ *
+ * Factors of bodies in the plane, and of slender ones, consist of supernodes of a few columns: CHOLMOD spends most of
+ * its time there between calls of dense kernels, each of which also opens a parallel region. Here supernodes are made
+ * one after the other, each from the columns of K and what those before it take from it (left-looking, Ng and Peyton,
+ * SIAM J. Sci. Comput. 14 (1993)), by products of small blocks in registers; only large ones are left to BLAS. Compiled
+ * with contraction to fused multiply-add allowed (see the Makefile): here it only saves roundings. */
+#include "factor/factor_private.h"
+
+#include "core/alloc.h"
+#include "core/cpu.h"
+#include "core/error.h"
+#include "linalg/blas.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <suitesparse/SuiteSparse_config.h>
+
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+
+enum { TILE = 4 };
+
+/* Multiplications of a product of blocks from which on BLAS is worth its calls. */
+enum { MANY = 1 << 15 };
+
+struct uz_refill {
+    cholmod_sparse *K; /* the last one, in the factor's order, lower triangle */
+    int64_t *place;    /* of its entries there; NULL: for once */
+    int64_t *owner;    /* n: the supernode of each column */
+    int64_t *local;    /* n: a row's place in the current supernode */
+    int64_t *head;     /* nsuper: the first one that takes from it next; -1: none */
+    int64_t *next;     /* nsuper: the one after it in the list that it is in */
+    int64_t *from;     /* nsuper: its first row that has not taken its part yet */
+    double *room;      /* n_room + TILE: the largest product */
+};
+
+void uz_refill_free(uz_refill *x)
+{
+    cholmod_common common;
+    if (!x)
+        return;
+    if (x->K && uz_cholmod_start(&common)) {
+        cholmod_l_free_sparse(&x->K, &common);
+        cholmod_l_finish(&common);
+    }
+    void *room[] = {x->place, x->owner, x->local, x->head, x->next, x->from, x->room};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    free(x);
+}
+
+/* C (rows x width, leading dimension `pitch`) = A B', A (rows x depth) and B (width x depth) with leading dimension ld,
+ * of columns c the entries from row c on. Up to three entries behind A's columns are read, and rows of C up to a
+ * multiple of TILE written. */
+typedef struct {
+    int64_t rows, width, depth;
+    const double *A, *B;
+    int64_t ld;
+    double *C;
+    int64_t pitch;
+} product;
+
+static inline __attribute__((always_inline)) void multiply_tile(const product *p, int64_t i, int64_t c, int columns)
+{
+    four sum[TILE] = {{0}};
+    for (int64_t q = 0; q < p->depth; q++) {
+        const four a = *(const four *)(p->A + i + q * p->ld);
+        const double *b = p->B + c + q * p->ld;
+        for (int k = 0; k < columns; k++)
+            sum[k] += a * b[k];
+    }
+    for (int k = 0; k < columns; k++)
+        *(four *)(p->C + i + (c + k) * p->pitch) = sum[k];
+}
+
+/* Two tiles, one below the other: sums enough that none waits for the last one's. */
+static inline __attribute__((always_inline)) void multiply_two(const product *p, int64_t i, int64_t c)
+{
+    four low[TILE] = {{0}}, high[TILE] = {{0}};
+    for (int64_t q = 0; q < p->depth; q++) {
+        const four a = *(const four *)(p->A + i + q * p->ld), e = *(const four *)(p->A + i + TILE + q * p->ld);
+        const double *b = p->B + c + q * p->ld;
+        for (int k = 0; k < TILE; k++) {
+            low[k] += a * b[k];
+            high[k] += e * b[k];
+        }
+    }
+    for (int k = 0; k < TILE; k++) {
+        *(four *)(p->C + i + (c + k) * p->pitch) = low[k];
+        *(four *)(p->C + i + TILE + (c + k) * p->pitch) = high[k];
+    }
+}
+
+static inline __attribute__((always_inline)) void multiply(const product *p)
+{
+    int64_t c = 0;
+    for (; c + TILE <= p->width; c += TILE) {
+        int64_t i = c;
+        for (; i + TILE < p->rows; i += 2 * TILE)
+            multiply_two(p, i, c);
+        if (i < p->rows)
+            multiply_tile(p, i, c, TILE);
+    }
+    for (; c < p->width; c++)
+        for (int64_t i = c / TILE * TILE; i < p->rows; i += TILE)
+            multiply_tile(p, i, c, 1);
+}
+
+UZ_AVX2_FMA static void multiply_fused(const product *p)
+{
+    multiply(p);
+}
+
+static void multiply_plain(const product *p)
+{
+    multiply(p);
+}
+
+/* The kernels that the processor has. */
+typedef struct {
+    void (*multiply)(const product *p);
+    bool (*factor)(double *block, int64_t columns, int64_t rows);
+} kernels;
+
+static int64_t pitch_of(int64_t rows)
+{
+    return (rows + TILE - 1) / TILE * TILE;
+}
+
+/* sum_k = row i.. of the first j columns of the block times their row j + k. */
+static inline __attribute__((always_inline)) void add_left(four sum[TILE], const double *block, int64_t rows, int64_t i,
+                                                           int64_t j, int width)
+{
+    for (int64_t q = 0; q < j; q++) {
+        const four a = *(const four *)(block + i + q * rows);
+        const double *b = block + j + q * rows;
+        for (int k = 0; k < width; k++)
+            sum[k] += a * b[k];
+    }
+}
+
+/* Columns j .. j + width - 1 of a block whose columns before them are done; false: a pivot is not positive. */
+static inline __attribute__((always_inline)) bool factor_strip(double *block, int64_t rows, int64_t j, int width)
+{
+    double L[TILE][TILE] = {{0}}, inverse[TILE] = {0}; /* of their own rows */
+    four own[TILE] = {{0}};
+    add_left(own, block, rows, j, j, width);
+    for (int c = 0; c < width; c++) {
+        double *column = block + j + (j + c) * rows;
+        for (int r = c; r < width; r++) {
+            double value = column[r] - own[c][r];
+            for (int k = 0; k < c; k++)
+                value -= L[r][k] * L[c][k];
+            L[r][c] = r == c ? sqrt(value) : value * inverse[c];
+            if (r == c && !(value > 0.0 && value < INFINITY))
+                return false;
+            inverse[c] = r == c ? 1.0 / L[c][c] : inverse[c];
+            column[r] = L[r][c];
+        }
+    }
+    for (int64_t i = j + width; i < rows; i += TILE) {
+        const int64_t left = rows - i;
+        four sum[TILE] = {{0}};
+        add_left(sum, block, rows, i, j, width);
+        for (int c = 0; c < width; c++) {
+            double *column = block + i + (j + c) * rows;
+            four value = *(const four *)column - sum[c];
+            for (int k = 0; k < c; k++)
+                value -= sum[k] * L[c][k];
+            sum[c] = value * inverse[c];
+            if (left >= TILE)
+                *(four *)column = sum[c];
+            for (int r = 0; left < TILE && r < left; r++)
+                column[r] = sum[c][r];
+        }
+    }
+    return true;
+}
+
+/* The first `columns` columns of a block become those of its Cholesky factor, some at a time. */
+static inline __attribute__((always_inline)) bool factor_columns(double *block, int64_t columns, int64_t rows)
+{
+    bool positive = true;
+    int64_t j = 0;
+    for (; positive && j + TILE <= columns; j += TILE)
+        positive = factor_strip(block, rows, j, TILE);
+    for (; positive && j < columns; j++)
+        positive = factor_strip(block, rows, j, 1);
+    return positive;
+}
+
+UZ_AVX2_FMA static bool factor_fused(double *block, int64_t columns, int64_t rows)
+{
+    return factor_columns(block, columns, rows);
+}
+
+static bool factor_plain(double *block, int64_t columns, int64_t rows)
+{
+    return factor_columns(block, columns, rows);
+}
+
+/* What the columns of supernode s take from supernode d, which goes on to the next one that takes something. */
+static void take(uz_refill *x, const cholmod_factor *L, int64_t s, int64_t d, const kernels *by)
+{
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *row = (const SuiteSparse_long *)L->s + pi[d];
+    const int64_t height = pi[s + 1] - pi[s], ld = pi[d + 1] - pi[d], depth = super[d + 1] - super[d],
+                  begin = x->from[d];
+    int64_t end = begin;
+    while (end < ld && row[end] < super[s + 1])
+        end++;
+    const int64_t rest = ld - begin, width = end - begin;
+    const double *from = (const double *)L->x + px[d] + begin;
+    const bool many = rest * width * depth > MANY;
+    const product p = {rest, width, depth, from, from, ld, x->room, many ? rest : pitch_of(rest)};
+    if (many)
+        uz_block_outer(rest, width, depth, from, ld, x->room);
+    else
+        by->multiply(&p);
+    for (int64_t c = 0; c < width; c++) {
+        double *to = (double *)L->x + px[s] + x->local[row[begin + c]] * height;
+        const double *of_c = x->room + c * p.pitch;
+        for (int64_t i = c; i < rest; i++)
+            to[x->local[row[begin + i]]] -= of_c[i];
+    }
+    x->from[d] = end;
+    if (end < ld) {
+        const int64_t to = x->owner[row[end]];
+        x->next[d] = x->head[to];
+        x->head[to] = d;
+    }
+}
+
+static uz_status begin(uz_refill **out, const uz_factor *factor, const uz_csc *K, bool once, uz_error *err)
+{
+    const cholmod_factor *L = &factor->L;
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *row = L->s;
+    const int64_t n = factor->n, count = (int64_t)L->nsuper;
+    cholmod_common common;
+    int64_t most = 0; /* entries of a product */
+    uz_refill *x = uz_alloc_zero(1, sizeof *x);
+    *out = NULL;
+    if (x) {
+        x->place = once ? NULL : uz_alloc(K->ptr[K->cols], sizeof *x->place);
+        x->owner = uz_alloc(n, sizeof *x->owner);
+        x->local = uz_alloc(n, sizeof *x->local);
+        x->head = uz_alloc(count, sizeof *x->head);
+        x->next = uz_alloc(count, sizeof *x->next);
+        x->from = uz_alloc(count, sizeof *x->from);
+    }
+    bool ok =
+        x && (once || x->place) && x->owner && x->local && x->head && x->next && x->from && uz_cholmod_start(&common);
+    if (ok) {
+        x->K = uz_permute(K, factor->analysis->position, x->place, &common);
+        cholmod_l_finish(&common);
+    }
+    for (int64_t s = 0; ok && s < count; s++)
+        for (int64_t j = super[s]; j < super[s + 1]; j++)
+            x->owner[j] = s;
+    for (int64_t d = 0; ok && d < count; d++) {
+        const int64_t last = pi[d + 1];
+        for (int64_t at = pi[d] + super[d + 1] - super[d], end; at < last; at = end) {
+            for (end = at + 1; end < last && x->owner[row[end]] == x->owner[row[at]];)
+                end++;
+            const int64_t size = pitch_of(last - at) * (end - at);
+            most = size > most ? size : most;
+        }
+    }
+    ok = ok && x->K && (x->room = uz_alloc(most, sizeof *x->room));
+    if (ok) {
+        *out = x;
+        return UZ_OK;
+    }
+    uz_refill_free(x);
+    return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
+}
+
+/* All supernodes, from x->K. */
+static bool fill(uz_refill *x, cholmod_factor *L)
+{
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *row = L->s, *ptr = x->K->p, *index = x->K->i;
+    const kernels by =
+        uz_cpu_has_avx2_fma() ? (kernels){multiply_fused, factor_fused} : (kernels){multiply_plain, factor_plain};
+    const int64_t count = (int64_t)L->nsuper;
+    const double *value = x->K->x;
+    for (int64_t s = 0; s < count; s++)
+        x->head[s] = -1;
+    for (int64_t s = 0; s < count; s++) {
+        const int64_t columns = super[s + 1] - super[s], rows = pi[s + 1] - pi[s];
+        double *block = (double *)L->x + px[s];
+        memset(block, 0, (size_t)(columns * rows) * sizeof *block);
+        for (int64_t i = 0; i < rows; i++)
+            x->local[row[pi[s] + i]] = i;
+        for (int64_t c = 0; c < columns; c++)
+            for (int64_t e = ptr[super[s] + c]; e < ptr[super[s] + c + 1]; e++)
+                block[x->local[index[e]] + c * rows] = value[e];
+        for (int64_t d = x->head[s], after; d >= 0; d = after) {
+            after = x->next[d];
+            take(x, L, s, d, &by);
+        }
+        const bool many = columns * columns * rows > MANY;
+        if (!(many ? uz_block_factor(columns, rows - columns, block, rows) : by.factor(block, columns, rows)))
+            return false;
+        x->from[s] = columns;
+        if (rows > columns) {
+            const int64_t to = x->owner[row[pi[s] + columns]];
+            x->next[s] = x->head[to];
+            x->head[to] = s;
+        }
+    }
+    return true;
+}
+
+/* The memory of the factor's numbers: some entries behind the last column are read with it. */
+static uz_status make_room(cholmod_factor *L, uz_error *err)
+{
+    if (!L->x)
+        L->x = SuiteSparse_malloc(L->xsize + TILE, sizeof(double));
+    if (!L->x)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %.3g bytes", 8.0 * (double)L->xsize);
+    L->xtype = CHOLMOD_REAL;
+    L->minor = L->n;
+    return UZ_OK;
+}
+
+uz_status uz_fill(bool *positive, uz_factor *factor, const uz_csc *K, uz_error *err)
+{
+    uz_refill *x;
+    uz_status status = begin(&x, factor, K, true, err);
+    if (status == UZ_OK)
+        status = make_room(&factor->L, err);
+    *positive = status == UZ_OK && fill(x, &factor->L);
+    uz_refill_free(x);
+    return status;
+}
+
+uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
+{
+    const int64_t count = K->ptr[K->cols];
+    cholmod_factor *L = &factor->L;
+    if (K->cols != factor->n || count != factor->analysis->nnz)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "K", "K is not of the pattern that was analysed");
+    if (!factor->refill) {
+        uz_status status = begin(&factor->refill, factor, K, false, err);
+        if (status != UZ_OK)
+            return status;
+    } else {
+        double *value = factor->refill->K->x;
+        for (int64_t k = 0; k < count; k++)
+            value[factor->refill->place[k]] = K->val[k];
+    }
+    uz_status status = make_room(L, err);
+    if (status != UZ_OK || fill(factor->refill, L))
+        return status;
+    return uz_fail(err, UZ_ERR_NOT_SPD, "K", "K is not positive definite to working precision");
+}
