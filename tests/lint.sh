@@ -41,6 +41,10 @@ tidy() { # every warning of clang, and the quick checks that find mistakes; thos
 long_files() { # names every source of more than 1,000 lines
     wc -l $sources | awk '$2 != "total" && $1 > 1000 {print; bad = 1} END {exit bad}'
 }
+long_interfaces() { # names every interface of a plug point (docs/architecture.md) of more than 80 lines
+    wc -l solver/{element/element_type,dual/form,law/law,assembly/discretization,obstacle/shape,io/mesh_reader,methods/method}.h \
+        server/{store/engine,http/output}.h | awk '$2 != "total" && $1 > 80 {print; bad = 1} END {exit bad}'
+}
 long_functions() { # names every function of more than 80 lines: its braces stand alone in column one
     awk 'FNR == 1 {start = 0}
          /^\{$/ {start = FNR}
@@ -68,6 +72,7 @@ check cppcheck cppcheck -j "$cores" --quiet --std=c11 --error-exitcode=1 --inlin
 check headers_alone headers_alone
 check rooms python3 -B tests/rooms.py
 check file_length long_files
+check interface_length long_interfaces
 check function_length long_functions
 check shell shell_syntax
 check cholmod_only_in_factor only_in 'cholmod' '^solver/factor/'

@@ -57,9 +57,7 @@ typedef struct {
     double most; /* a bound on lambda_max(diag(K)^-1 M) */
 } uz_multigrid_info;
 uz_multigrid_info uz_multigrid_describe(const uz_multigrid *mg);
-uz_multigrid_room *uz_multigrid_room_new(const uz_multigrid *mg); /* NULL: no memory */
-void uz_multigrid_room_free(uz_multigrid_room *room);
-/* z = M^-1 r (n); z and r do not overlap. */
+/* z = M^-1 r (n); z and r do not overlap. room: of a uz_cg. */
 uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,
                              const double *r, uz_error *err);
 
@@ -118,11 +116,6 @@ typedef struct {
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
                         uz_error *err);
 void uz_amg_free(uz_amg *amg);
-
-/* *value >= e'K^-1 e, and sharp to a hundredth unless hooks or the deadline cut it short; e (n) becomes K^-1 e, about.
- * cg: of the whole multigrid. */
-uz_status uz_amg_inverse_norm(double *value, double *e, const uz_amg *amg, uz_cg *cg, const uz_csc *K,
-                              const uz_hooks *hooks, double deadline, uz_error *err);
 
 /* The root of what rounding may have made negative; INFINITY of what is no number, so that overflow never looks like 0.
  */

@@ -1,5 +1,5 @@
 /* cg.c: preconditioned conjugate gradients (Hestenes and Stiefel 1952). */
-#include "amg/amg.h"
+#include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
 #include "linalg/blas.h"
@@ -16,13 +16,17 @@ enum { RESTARTS_MOST = 4 };
 
 uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, const bool *held, int64_t n, uz_error *err)
 {
-    memset(cg, 0, sizeof *cg);
-    cg->mg = mg;
-    cg->held = held;
-    cg->n = n;
-    cg->room = uz_multigrid_room_new(mg);
+    uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
     double **vectors[] = {&cg->r, &cg->z, &cg->p, &cg->q};
-    bool ok = cg->room != NULL;
+    *cg = (uz_cg){.mg = mg, .held = held, .n = n, .room = room};
+    bool ok = room && (room->ws = uz_factor_workspace_new());
+    for (int l = 0; ok && l < mg->levels; l++) {
+        const int64_t of_level = mg->level[l].n;
+        room->t[l] = uz_alloc(of_level, sizeof(double));
+        room->x[l] = uz_alloc(l > 0 ? of_level : 0, sizeof(double));
+        room->b[l] = uz_alloc(l > 0 ? of_level : 0, sizeof(double));
+        ok = room->t[l] && room->x[l] && room->b[l];
+    }
     for (int k = 0; k < 4; k++)
         ok = (*vectors[k] = uz_alloc(n, sizeof(double))) && ok;
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to solve for %lld dofs", (long long)n);
@@ -30,7 +34,15 @@ uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, const bool *held, int64_
 
 void uz_cg_clear(uz_cg *cg)
 {
-    uz_multigrid_room_free(cg->room);
+    uz_multigrid_room *room = cg->room;
+    if (room)
+        uz_factor_workspace_free(room->ws);
+    for (int l = 0; room && l < UZ_LEVELS_MOST; l++) {
+        free(room->t[l]);
+        free(room->x[l]);
+        free(room->b[l]);
+    }
+    free(room);
     free(cg->r);
     free(cg->z);
     free(cg->p);

@@ -1,42 +1,7 @@
 /* cycle.c: one V-cycle. */
 #include "amg/multigrid_private.h"
 
-#include "core/alloc.h"
-
-#include <stdlib.h>
 #include <string.h>
-
-uz_multigrid_room *uz_multigrid_room_new(const uz_multigrid *mg)
-{
-    uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
-    if (!room)
-        return NULL;
-    bool ok = (room->ws = uz_factor_workspace_new()) != NULL;
-    for (int l = 0; ok && l < mg->levels; l++) {
-        int64_t n = mg->level[l].n;
-        room->t[l] = uz_alloc(n, sizeof(double));
-        room->x[l] = uz_alloc(l > 0 ? n : 0, sizeof(double));
-        room->b[l] = uz_alloc(l > 0 ? n : 0, sizeof(double));
-        ok = room->t[l] && room->x[l] && room->b[l];
-    }
-    if (ok)
-        return room;
-    uz_multigrid_room_free(room);
-    return NULL;
-}
-
-void uz_multigrid_room_free(uz_multigrid_room *room)
-{
-    if (!room)
-        return;
-    uz_factor_workspace_free(room->ws);
-    for (int l = 0; l < UZ_LEVELS_MOST; l++) {
-        free(room->t[l]);
-        free(room->x[l]);
-        free(room->b[l]);
-    }
-    free(room);
-}
 
 /* Downwards: one sweep from 0, x = (D + L)^-1 b, then the residual to the next level, coarse = P'(b - A x). All of the
  * residual but -L'x is 0. A dof whose inverse is 0 stays at 0. t: room. */
@@ -104,8 +69,12 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
         double *x = l == 0 ? z : room->x[l];
         descend(x, room->b[l + 1], room->t[l], level, A, l == 0 ? r : room->b[l], mg->k);
     }
-    uz_status status = uz_factor_solve(mg->coarsest, room->ws, last == 0 ? z : room->x[last],
-                                       last == 0 ? r : room->b[last], room->t[last], err);
+    double *coarse = room->t[last];
+    uz_factor_permute(mg->coarsest, coarse, last == 0 ? r : room->b[last]);
+    uz_status status = uz_factor_solve_one(mg->coarsest, room->ws, coarse, true, err);
+    if (status == UZ_OK)
+        status = uz_factor_solve_one(mg->coarsest, room->ws, coarse, false, err);
+    uz_factor_unpermute(mg->coarsest, last == 0 ? z : room->x[last], coarse);
     if (last == 0) {
         /* Where K itself is the coarsest matrix: held dofs are rows of the unit matrix there. */
         const uz_level *level = &mg->level[0];

@@ -38,29 +38,6 @@ static uz_status invert_diagonal(uz_level *level, const uz_csc *A, const bool *h
     return UZ_OK;
 }
 
-/* lambda_max(D^-1 A), a little too large: power iterations reach it within some per cent from below. */
-static double smoothing_range(const uz_level *level, const uz_csc *A, double *x, double *y)
-{
-    uint64_t state = 1;
-    double value = 1.0;
-    for (int64_t i = 0; i < level->n; i++)
-        x[i] = level->inverse[i] > 0.0 ? uz_uniform(&state) - 0.5 : 0.0;
-    for (int step = 0; step < POWER_STEPS; step++) {
-        double before = uz_norm(level->n, x);
-        memset(y, 0, (size_t)level->n * sizeof *y);
-        uz_csc_symv(y, A, 1.0, x);
-        for (int64_t i = 0; i < level->n; i++)
-            y[i] *= level->inverse[i];
-        double after = uz_norm(level->n, y);
-        if (!(before > 0.0) || !(after > 0.0))
-            return 1.0;
-        value = after / before;
-        for (int64_t i = 0; i < level->n; i++)
-            x[i] = y[i] / after;
-    }
-    return 1.1 * value;
-}
-
 /* What a level is made of; the modes and nodes of level 0 are the caller's. */
 typedef struct {
     int32_t *node;
@@ -77,6 +54,7 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
     int32_t *aggregate = uz_alloc(from->n_nodes, sizeof *aggregate), *of = uz_alloc(n, sizeof *of);
     float *basis = uz_alloc(n * k, sizeof *basis);
     double *x = uz_alloc(n, sizeof *x), *y = uz_alloc(n, sizeof *y);
+    double range = 1.0; /* lambda_max(D^-1 A), a little too large: powers reach it within some per cent from below */
     uz_status status = UZ_OK;
     *coarse = NULL;
     if (!aggregate || !of || !basis || !x || !y)
@@ -95,9 +73,24 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
             status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
         else
             status = uz_tentative(basis, *coarse, from->modes, of, n, level->aggregates, k, err);
+        uint64_t state = 1;
+        for (int64_t i = 0; status == UZ_OK && i < n; i++)
+            x[i] = level->inverse[i] > 0.0 ? uz_uniform(&state) - 0.5 : 0.0;
+        for (int step = 0; status == UZ_OK && step < POWER_STEPS; step++) {
+            const double before = uz_norm(n, x);
+            memset(y, 0, (size_t)n * sizeof *y);
+            uz_csc_symv(y, A, 1.0, x);
+            for (int64_t i = 0; i < n; i++)
+                y[i] *= level->inverse[i];
+            const double after = uz_norm(n, y);
+            range = before > 0.0 && after > 0.0 ? 1.1 * (after / before) : 1.0;
+            if (!(before > 0.0) || !(after > 0.0))
+                break;
+            for (int64_t i = 0; i < n; i++)
+                x[i] = y[i] / after;
+        }
         if (status == UZ_OK)
-            status =
-                uz_prolong_smoothed(level, A, basis, of, 4.0 / 3.0 / smoothing_range(level, A, x, y), k, stop, err);
+            status = uz_prolong_smoothed(level, A, basis, of, 4.0 / 3.0 / range, k, stop, err);
     }
     free(aggregate);
     free(of);

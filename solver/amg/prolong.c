@@ -128,12 +128,6 @@ uz_status uz_fail_stopped(uz_error *err)
     return uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the multigrid was made");
 }
 
-/* Asked for each row, and asks for every UZ_ROWS_AT_ONCE-th. */
-static bool must_stop(int64_t row, const uz_stop *stop)
-{
-    return row % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop);
-}
-
 typedef struct {
     uz_level *level;
     int64_t count, room; /* blocks of the prolongation so far, and room for */
@@ -166,7 +160,7 @@ uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *bas
     ok = block_row_init(&row, level->aggregates, k) && ok;
     level->ptr = uz_alloc_zero(n + 1, sizeof *level->ptr);
     ok = ok && level->ptr && reserve_blocks(&p, 2 * n, k);
-    for (int64_t i = 0; ok && !(over = must_stop(i, stop)) && i < n; i++) {
+    for (int64_t i = 0; ok && !(over = i % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop)) && i < n; i++) {
         uz_row_walk_read(&walk, i);
         for (int64_t q = 0; level->inverse[i] > 0.0 && ok && q < walk.count; q++) {
             const int64_t j = walk.column[q];
@@ -317,7 +311,7 @@ uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, in
     block_table table = {.k = k};
     bool ok = uz_row_walk_init(&walk, A), over = false;
     ok = block_row_init(&row, level->aggregates, k) && ok;
-    for (int64_t i = 0; ok && !(over = must_stop(i, stop)) && i < level->n; i++) {
+    for (int64_t i = 0; ok && !(over = i % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop)) && i < level->n; i++) {
         uz_row_walk_read(&walk, i);
         if (level->ptr[i] == level->ptr[i + 1])
             continue;

@@ -75,16 +75,17 @@ static void random_residual(uz_cg *cg, const uz_csc *K)
 /* M is K but for rounding where there is one level only, and steps are cheap. */
 #define NEAR_ONE 0.9
 
-/* *lambda: the bound, 0 where STEPS_MOST steps do not give one. */
-static uz_status bound_below(double *lambda, coefficients *c, uz_cg *cg, const uz_csc *K, const uz_hooks *hooks,
+/* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. */
+static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, const uz_csc *K, const uz_hooks *hooks,
                              uz_error *err)
 {
     double share = LEAST_SHARE / sqrt(uz_multigrid_describe(cg->mg).most), before = 0.0;
+    info->lambda = 0.0;
     random_residual(cg, K);
     uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
     double square = uz_dot(cg->n, cg->r, cg->z);
     memcpy(cg->p, cg->z, (size_t)cg->n * sizeof *cg->p);
-    while (status == UZ_OK && c->count < STEPS_MOST && square > 0.0) {
+    for (c->count = 0; status == UZ_OK && c->count < STEPS_MOST && square > 0.0;) {
         if (uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
         /* a step of conjugate gradients without the solution */
@@ -104,73 +105,49 @@ static uz_status bound_below(double *lambda, coefficients *c, uz_cg *cg, const u
             cg->p[j] = cg->z[j] + beta * cg->p[j];
         c->alpha[c->count] = alpha;
         c->beta[c->count++] = beta;
+        info->iterations = c->count;
         if (status != UZ_OK || c->count % CHECK_EVERY != 0 || sqrt(square) >= share)
             continue;
-        *lambda = excluded(c, sqrt(square) / share);
-        if (*lambda > NEAR_ONE || (*lambda > 0.0 && *lambda < 1.1 * before))
+        info->lambda = excluded(c, sqrt(square) / share);
+        if (info->lambda > NEAR_ONE || (info->lambda > 0.0 && info->lambda < 1.1 * before))
             return status;
-        before = *lambda;
+        before = info->lambda;
     }
-    if (status == UZ_OK && *lambda == 0.0) /* the residual may have vanished, too */
-        *lambda = excluded(c, sqrt(square) / share);
+    if (status == UZ_OK && info->lambda == 0.0) /* the residual may have vanished, too */
+        info->lambda = excluded(c, sqrt(square) / share);
     return status;
 }
 
 /* Below this rounding of the entries of K alone makes or unmakes a digit of lambda_min(D^-1 K). */
 #define RCOND_LEAST DBL_EPSILON
 
-static uz_status try_threshold(uz_amg *amg, const uz_csc *K, double strong, size_t memory_limit, const uz_hooks *hooks,
-                               uz_error *err)
+/* info->rcond: lambda over lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), by powers: some per cent too small. */
+static uz_status find_rcond(uz_amg_info *info, uz_cg *cg, const uz_csc *K, uz_error *err)
 {
-    double start = uz_seconds();
-    uz_amg_info *info = &amg->info;
-    uz_stop stop = {hooks, INFINITY};
-    uz_cg cg = {0};
-    size_t n = (size_t)K->cols;
-    amg->modes.strong = strong;
-    uz_status status = uz_multigrid_create(&amg->mg, K, &amg->modes, NULL, memory_limit, &stop, err);
-    info->create_s += uz_seconds() - start;
-    if (status != UZ_OK)
-        return status;
-    const uz_multigrid_info made = uz_multigrid_describe(amg->mg);
-    info->levels = made.levels;
-    info->bytes = made.bytes + n * (4 + 4 * (size_t)amg->modes.count);
-    start = uz_seconds();
-    coefficients *c = uz_alloc_zero(1, sizeof *c);
     double most = INFINITY;
-    status =
-        c ? uz_cg_init(&cg, amg->mg, NULL, K->cols, err) : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a spectrum");
-    if (status == UZ_OK) {
-        info->lambda = 0.0;
-        status = bound_below(&info->lambda, c, &cg, K, hooks, err);
-        info->iterations = c->count;
-    }
-    free(c);
-    /* lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), by powers: some per cent too small. */
-    if (status == UZ_OK)
-        random_residual(&cg, K);
+    uz_status status = UZ_OK;
+    random_residual(cg, K);
     for (int power = 0; status == UZ_OK && power < POWERS; power++) {
-        status = uz_multigrid_apply(cg.mg, K, cg.room, cg.z, cg.r, err);
+        status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
         double square = 0.0;
-        for (int64_t j = 0; j < cg.n; j++) {
-            double scaled = sqrt(K->val[K->ptr[j]]) * cg.z[j];
+        for (int64_t j = 0; j < cg->n; j++) {
+            double scaled = sqrt(K->val[K->ptr[j]]) * cg->z[j];
             square += scaled * scaled;
         }
         most = sqrt(square);
-        for (int64_t j = 0; j < cg.n; j++)
-            cg.r[j] = K->val[K->ptr[j]] * cg.z[j] / most;
+        for (int64_t j = 0; j < cg->n; j++)
+            cg->r[j] = K->val[K->ptr[j]] * cg->z[j] / most;
     }
-    if (status == UZ_OK)
-        info->rcond = info->lambda / most;
-    if (status == UZ_OK && !(info->rcond >= RCOND_LEAST))
-        status = uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                         "K is singular to working precision, or too ill-conditioned for conjugate gradients "
-                         "(reciprocal condition %.2g after %lld iterations): the body can move without resistance, or "
-                         "its stiffnesses differ by too much",
-                         info->rcond, (long long)info->iterations);
-    uz_cg_clear(&cg);
-    info->spectrum_s += uz_seconds() - start;
-    return status;
+    if (status != UZ_OK)
+        return status;
+    info->rcond = info->lambda / most;
+    if (info->rcond >= RCOND_LEAST)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                   "K is singular to working precision, or too ill-conditioned for conjugate gradients (reciprocal "
+                   "condition %.2g after %lld iterations): the body can move without resistance, or its stiffnesses "
+                   "differ by too much",
+                   info->rcond, (long long)info->iterations);
 }
 
 /* Bilinear elements of aspect 10 to 1 couple as strongly along their long sides, in absolute value, as square ones do
@@ -184,38 +161,59 @@ static uz_status try_threshold(uz_amg *amg, const uz_csc *K, double strong, size
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
                         uz_error *err)
 {
-    uz_error ignored = {0}, failure = {0}, *into = err ? err : &ignored;
+    const uz_stop stop = {hooks, INFINITY};
+    uz_amg *amg = uz_alloc_zero(1, sizeof *amg), tried[2] = {{.modes = *modes}};
+    coefficients *c = uz_alloc_zero(1, sizeof *c);
+    uz_error failure[2] = {{.status = UZ_OK}};
+    uz_status end[2] = {UZ_OK, UZ_ERR_INTERNAL}; /* the second: not tried */
     *out = NULL;
-    uz_amg *amg = uz_alloc_zero(1, sizeof *amg);
-    if (!amg) {
-        uz_modes_clear(modes);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
-    }
-    amg->modes = *modes;
     memset(modes, 0, sizeof *modes);
-    uz_status status = try_threshold(amg, K, amg->modes.strong, memory_limit, hooks, into);
-    const bool may_improve = status == UZ_OK ? amg->info.levels > 1 && amg->info.lambda < BAD_LAMBDA
-                                             : status == UZ_ERR_NOT_SPD && amg->mg && amg->info.iterations > 0;
-    if (may_improve) {
-        uz_amg second = {.modes = amg->modes, .info = amg->info};
-        second.info.lambda = 0.0;
-        const uz_status other = try_threshold(&second, K, SECOND_STRONG, memory_limit, hooks, &failure);
-        const bool better = other == UZ_OK && (status != UZ_OK || second.info.lambda > WORTH_LAMBDA * amg->info.lambda);
-        uz_multigrid_free(better ? amg->mg : second.mg);
-        if (better) {
-            *amg = second;
-            uz_error_reset(into);
-            status = UZ_OK;
-        } else if (other == UZ_ERR_CANCELLED || (other == UZ_ERR_MEMORY && status != UZ_OK)) {
-            *into = failure;
-            status = other;
+    if (!amg || !c)
+        end[0] = uz_fail(&failure[0], UZ_ERR_MEMORY, "", "no memory for a multigrid");
+    for (int k = 0; amg && c && k < 2; k++) {
+        uz_amg *x = &tried[k];
+        uz_cg cg = {0};
+        double start = uz_seconds();
+        end[k] = uz_multigrid_create(&x->mg, K, &x->modes, NULL, memory_limit, &stop, &failure[k]);
+        x->info.create_s += uz_seconds() - start;
+        start = uz_seconds();
+        if (end[k] == UZ_OK) {
+            const uz_multigrid_info made = uz_multigrid_describe(x->mg);
+            x->info.levels = made.levels;
+            x->info.bytes = made.bytes + (size_t)K->cols * (4 + 4 * (size_t)x->modes.count);
+            end[k] = uz_cg_init(&cg, x->mg, NULL, K->cols, &failure[k]);
         }
+        if (end[k] == UZ_OK)
+            end[k] = bound_below(&x->info, c, &cg, K, hooks, &failure[k]);
+        if (end[k] == UZ_OK)
+            end[k] = find_rcond(&x->info, &cg, K, &failure[k]);
+        uz_cg_clear(&cg);
+        x->info.spectrum_s += uz_seconds() - start;
+        const bool may_improve = end[k] == UZ_OK ? x->info.levels > 1 && x->info.lambda < BAD_LAMBDA
+                                                 : end[k] == UZ_ERR_NOT_SPD && x->mg && x->info.iterations > 0;
+        if (k == 1 || !may_improve)
+            break;
+        tried[1] = (uz_amg){.modes = x->modes, .info = x->info};
+        tried[1].modes.strong = SECOND_STRONG;
+        tried[1].info.lambda = 0.0;
     }
-    if (status == UZ_OK)
+    const bool better =
+        end[1] == UZ_OK && (end[0] != UZ_OK || tried[1].info.lambda > WORTH_LAMBDA * tried[0].info.lambda);
+    const int told = better || end[1] == UZ_ERR_CANCELLED || (end[1] == UZ_ERR_MEMORY && end[0] != UZ_OK);
+    const bool made = end[told] == UZ_OK;
+    uz_multigrid_free(made && told == 0 ? NULL : tried[0].mg);
+    uz_multigrid_free(made && told == 1 ? NULL : tried[1].mg);
+    free(c);
+    if (made) {
+        *amg = tried[told];
         *out = amg;
-    else
-        uz_amg_free(amg);
-    return status;
+        return UZ_OK;
+    }
+    uz_modes_clear(&tried[0].modes);
+    free(amg);
+    if (err)
+        *err = failure[told];
+    return end[told];
 }
 
 void uz_amg_free(uz_amg *amg)
@@ -225,42 +223,6 @@ void uz_amg_free(uz_amg *amg)
     uz_modes_clear(&amg->modes);
     uz_multigrid_free(amg->mg);
     free(amg);
-}
-
-/* The residual's share of the value that is sharp enough, as a share of its root. */
-#define SHARP 0.1
-enum { NORM_STEPS_MOST = 400 };
-
-uz_status uz_amg_inverse_norm(double *value, double *e, const uz_amg *amg, uz_cg *cg, const uz_csc *K,
-                              const uz_hooks *hooks, double deadline, uz_error *err)
-{
-    int64_t n = cg->n;
-    double *w = uz_alloc_zero(n, sizeof *w), sum = 0.0, largest = 0.0;
-    uz_cg_stop stop = {.relative = SHARP * sqrt(amg->info.lambda),
-                       .max_iterations = NORM_STEPS_MOST,
-                       .hooks = hooks,
-                       .deadline = deadline};
-    uz_cg_info info;
-    *value = INFINITY;
-    if (!w)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)n);
-    for (int64_t j = 0; j < n; j++)
-        largest = fmax(largest, fabs(e[j]));
-    /* By the power of two below the largest: squares of forces stay in range; what is left is exact. */
-    const double unit = largest > 0.0 && !isinf(largest) ? ldexp(1.0, ilogb(largest)) : 1.0;
-    for (int64_t j = 0; j < n; j++)
-        e[j] /= unit;
-    uz_status status = uz_cg_solve(&info, w, cg, K, e, &stop, err);
-    for (int64_t j = 0; j < n; j++)
-        sum += w[j] * (e[j] + cg->r[j]);
-    if (status == UZ_OK) {
-        double scaled = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / amg->info.lambda;
-        *value = scaled * unit * unit;
-        for (int64_t j = 0; j < n; j++)
-            e[j] = unit * w[j];
-    }
-    free(w);
-    return status;
 }
 
 /* Measured on plane and solid bodies: coarse levels take less than four tenths of K, the prolongation 4 + 4 k bytes for

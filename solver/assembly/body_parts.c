@@ -46,16 +46,12 @@ double uz_part_size(const uz_part *p)
     return size > 0 ? 0.5 * size : 1;
 }
 
-double uz_part_centre(const uz_part *p, int axis)
+void uz_place_in_part(double place[3], const uz_part *p, const uz_mesh *mesh, int64_t node)
 {
-    return 0.5 * p->low[axis] + 0.5 * p->high[axis];
-}
-
-/* Place of a node in its part: from the centre, over the size. */
-static void place_in_part(double place[3], const uz_part *p, const uz_mesh *mesh, int64_t node)
-{
-    for (int c = 0; c < 3; c++)
-        place[c] = c < mesh->dim ? (mesh->xyz[node * mesh->dim + c] - uz_part_centre(p, c)) / uz_part_size(p) : 0;
+    for (int c = 0; c < 3; c++) {
+        const double centre = 0.5 * p->low[c] + 0.5 * p->high[c];
+        place[c] = c < mesh->dim ? (mesh->xyz[node * mesh->dim + c] - centre) / uz_part_size(p) : 0;
+    }
 }
 
 void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n)
@@ -64,23 +60,13 @@ void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const doub
     double at[3], row[UZ_MOTIONS] = {0}, allowed[UZ_MOTIONS] = {0};
     if (p->rank == parts->motions)
         return;
-    place_in_part(at, p, mesh, node);
+    uz_place_in_part(at, p, mesh, node);
     memcpy(row, n, (size_t)mesh->dim * sizeof *n);
     uz_cross3(row + 3, at, row);
     for (int k = 0; k < parts->motions; k++)
         for (int c = 0; c < UZ_MOTIONS; c++)
             allowed[c] += parts->unit[k][c] * row[c];
     uz_extend_rows(p->held, &p->rank, allowed);
-}
-
-void uz_move_node(double u[3], const uz_parts *parts, int64_t i, const uz_mesh *mesh, int64_t node,
-                  const double q[UZ_MOTIONS])
-{
-    double at[3];
-    place_in_part(at, &parts->list[i], mesh, node);
-    uz_cross3(u, q + 3, at);
-    for (int c = 0; c < 3; c++)
-        u[c] += q[c];
 }
 
 void uz_parts_clear(uz_parts *parts)

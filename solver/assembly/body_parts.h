@@ -32,7 +32,6 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
 void uz_parts_clear(uz_parts *parts);
 
 double uz_part_size(const uz_part *p);
-double uz_part_centre(const uz_part *p, int axis);
 
 /* v (n) becomes what the orthonormal rows of basis (rank x n) leave of it, scaled to length 1: Gram and Schmidt, twice
  * for accuracy. False: nothing is left. */
@@ -41,9 +40,8 @@ bool uz_reject_rows(double *v, const double *basis, int64_t rank, int64_t n);
 void uz_extend_rows(double rows[][UZ_MOTIONS], int *n, const double v[UZ_MOTIONS]);
 /* The direction n (dim) at a node is held. */
 void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n);
-/* Displacement of a node of part i that moves by q. */
-void uz_move_node(double u[3], const uz_parts *parts, int64_t i, const uz_mesh *mesh, int64_t node,
-                  const double q[UZ_MOTIONS]);
+/* Place of a node in its part, from the centre, over the size: a motion q moves it by q[0..2] + q[3..5] x place. */
+void uz_place_in_part(double place[3], const uz_part *p, const uz_mesh *mesh, int64_t node);
 /* Orthonormal motions that nothing holds, translations first. Returns how many. */
 int uz_free_motions(double mode[UZ_MOTIONS][UZ_MOTIONS], const uz_parts *parts, const uz_part *p);
 

@@ -373,10 +373,7 @@ static uz_status check_held(const uz_body_model *model, const uz_contact_row *ro
                    (long long)row->node, at, -gap);
 }
 
-static uz_status other_body(uz_error *err)
-{
-    return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", "the scene's contacts are not those of this body");
-}
+#define OTHER_BODY "the scene's contacts are not those of this body"
 
 uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_model *model, const uz_scene *scene,
                           uz_error *err)
@@ -384,13 +381,13 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
     int64_t row = 0;
     uz_status status = UZ_OK;
     if (model->n_sites != scene->n_contacts)
-        return other_body(err);
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", OTHER_BODY);
     for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++) {
         uz_contact_input in;
         status = uz_contact_input_of(&in, model, scene, k, err);
         const int64_t places = status == UZ_OK ? uz_discretization_of(in.contact)->places(&in) : 0;
         if (status == UZ_OK && model->sites[k].n > 0 && model->sites[k].n != places)
-            return other_body(err);
+            return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", OTHER_BODY);
         for (int64_t i = 0; i < places && status == UZ_OK; i++) {
             double scale;
             uz_contact_row at;
@@ -400,13 +397,13 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
             if (!moves_something(model, &at))
                 status = check_held(model, &at, k, gap, scale, err);
             else if (row == model->m)
-                return other_body(err);
+                return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", OTHER_BODY);
             else
                 h[row++] = gap;
         }
     }
     if (status == UZ_OK && row != model->m)
-        return other_body(err);
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", OTHER_BODY);
     for (int64_t i = 0; status == UZ_OK && i < model->m && model->row_ends; i++)
         if (model->row_ends[2 * i] >= 0)
             h[i] = (h[i] - UZ_MIDDLE_SHARE * (h[model->row_ends[2 * i]] + h[model->row_ends[2 * i + 1]])) /

@@ -25,12 +25,11 @@ static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_
     const estimate *x = ctx;
     const uz_gauss_rule *energy = &uz_element_type_of(kind)->energy;
     double point[UZ_ELEMENT_GAUSS][3], weight[UZ_ELEMENT_GAUSS];
-    for (int g = 0; g < energy->count; g++)
-        weight[g] = energy->point(point[g], g);
-    if (energy->count > 0)
-        uz_strain_rule_at(rule, kind, x->model->kind, formulation, (const double(*)[3])point, weight, energy->count);
-    else
-        uz_strain_rule_init(rule, kind, x->model->kind, formulation);
+    for (int g = 0; g < energy->count; g++) {
+        memcpy(point[g], energy->point[g].at, sizeof point[g]);
+        weight[g] = energy->point[g].weight;
+    }
+    uz_strain_rule_at(rule, kind, x->model->kind, formulation, (const double(*)[3])point, weight, energy->count);
 }
 
 static void compare(void *ctx, const uz_strain_group *group)

@@ -61,7 +61,7 @@ void uz_body_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], cons
     int count;
     const int64_t *node = uz_mesh_element(mesh, e, &count);
     /* elements that are all one box share its corners, so that all have the same stiffness to the last bit */
-    const double(*local)[3] = mesh->uniform && model->kind != UZ_AXISYMMETRIC ? uz_element_local_nodes(kind) : NULL;
+    const double(*local)[3] = mesh->uniform && model->kind != UZ_AXISYMMETRIC ? uz_element_type_of(kind)->local : NULL;
     for (int a = 0; a < count; a++)
         for (int c = 0; c < mesh->dim; c++)
             xyz[a * mesh->dim + c] = !local ? mesh->xyz[node[a] * mesh->dim + c] : local[a][c] > 0 ? mesh->cell[c] : 0;

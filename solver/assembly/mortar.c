@@ -86,17 +86,12 @@ void uz_mortar_surface_clear(uz_mortar_surface *surface)
     free(surface->patch);
 }
 
-uz_status uz_mortar_no_memory(uz_error *err)
-{
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
-}
-
 uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
                                  uz_error *err)
 {
     char where[96];
     *out = (uz_mortar_surface){.n = group->n_faces, .side = uz_alloc_zero(group->n_faces, sizeof *out->side)};
-    uz_status status = out->side ? UZ_OK : uz_mortar_no_memory(err);
+    uz_status status = out->side ? UZ_OK : uz_no_memory(err, UZ_OF_SURFACES);
     for (int64_t i = 0; i < out->n && status == UZ_OK; i++) {
         uz_mortar_side *side = &out->side[i];
         uz_side shape;
@@ -111,7 +106,7 @@ uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input 
                          (long long)side->node[0], group->name);
     }
     if (status == UZ_OK && !uz_mortar_geometry_of(in->model->mesh.dim)->places(out, in))
-        status = uz_mortar_no_memory(err);
+        status = uz_no_memory(err, UZ_OF_SURFACES);
     return status;
 }
 
@@ -375,7 +370,7 @@ static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const 
             sites->ends[2 * p] = sites->ends[2 * p + 1] = -1;
     uz_csc_clear(&M);
     status = room ? uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, kept, node, place, value, err)
-                  : uz_mortar_no_memory(err);
+                  : uz_no_memory(err, UZ_OF_SURFACES);
     free(node);
     free(place);
     free(value);
@@ -413,7 +408,8 @@ static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_err
         memset(sites->ends, 0xff, (size_t)(2 * n) * sizeof *sites->ends);
         room = integrate(&of, sites, pair);
     }
-    const uz_status status = room ? fill_sites(sites, &of, &pair->surface, model, err) : uz_mortar_no_memory(err);
+    const uz_status status =
+        room ? fill_sites(sites, &of, &pair->surface, model, err) : uz_no_memory(err, UZ_OF_SURFACES);
     free(of.D);
     free(of.place);
     free(of.node);
@@ -442,7 +438,7 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
             if (pair.of[i] & (k == 0 ? UZ_OF_ON : UZ_OF_WITH))
                 some.side[some.n++] = all->side[i];
         if (!some.side || !uz_mortar_describe(&sites->surface[k], &some, in, k == 0 ? in->on : in->with))
-            status = uz_mortar_no_memory(err);
+            status = uz_no_memory(err, UZ_OF_SURFACES);
         sites->surface[k].contact = in->index;
         for (int64_t p = 0; p < sites->n; p++)
             sites->surface[k].slave =

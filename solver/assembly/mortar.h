@@ -118,6 +118,6 @@ double uz_mortar_least_cosine(const uz_contact_input *in);
 /* Pairs of numbers by the first, then by the second, for qsort. */
 int uz_mortar_by_number(const void *a, const void *b);
 
-uz_status uz_mortar_no_memory(uz_error *err);
+#define UZ_OF_SURFACES "contact between two surfaces" /* what there may be no memory for */
 
 #endif

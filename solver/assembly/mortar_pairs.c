@@ -84,7 +84,7 @@ static uz_status plant_tree(uz_mortar_pair *pair, int dim, uz_error *err)
     uz_mortar_surface *surface = &pair->surface;
     double *box = uz_alloc(surface->n, 6 * sizeof *box);
     pair->ball = uz_alloc_zero(surface->n, 4 * sizeof *pair->ball);
-    uz_status status = box && pair->ball ? UZ_OK : uz_mortar_no_memory(err);
+    uz_status status = box && pair->ball ? UZ_OK : uz_no_memory(err, UZ_OF_SURFACES);
     for (int64_t i = 0; i < surface->n && status == UZ_OK; i++) {
         const uz_mortar_side *side = &surface->side[i];
         double *ball = pair->ball + 4 * i, most = 0;
@@ -109,10 +109,10 @@ uz_status uz_mortar_pair_make(uz_mortar_pair *pair, const uz_contact_input *in, 
     before.model = in->rest;
     before.rest = NULL;
     if (!join_groups(pair, in))
-        return uz_mortar_no_memory(err);
+        return uz_no_memory(err, UZ_OF_SURFACES);
     pair->near = uz_alloc(pair->group.n_faces, sizeof *pair->near);
     pair->way = uz_alloc_zero(pair->group.n_faces, sizeof *pair->way);
-    uz_status status = pair->near && pair->way ? UZ_OK : uz_mortar_no_memory(err);
+    uz_status status = pair->near && pair->way ? UZ_OK : uz_no_memory(err, UZ_OF_SURFACES);
     if (status == UZ_OK)
         status = uz_mortar_surface_make(&pair->surface, in, &pair->group, err);
     if (status == UZ_OK)
@@ -569,17 +569,17 @@ uz_status uz_mortar_choose_slaves(uz_contact_sites *sites, uz_mortar_pair *pair,
     const uz_contact_sites *before = pair->in->rest ? &pair->in->rest->sites[pair->in->index] : NULL;
     sites->zone = uz_alloc(n, sizeof *sites->zone);
     if (!sites->zone)
-        return uz_mortar_no_memory(err);
+        return uz_no_memory(err, UZ_OF_SURFACES);
     sites->n_sides = n;
     if (!before) {
         int64_t n_zones = number_zones(sites->zone, pair);
         const bool good = n_zones >= 0 && divide_zones(sites->zone, &n_zones, pair) && rank_zones(sites, pair, n_zones);
         sites->n_zones = n_zones;
-        return good ? UZ_OK : uz_mortar_no_memory(err);
+        return good ? UZ_OK : uz_no_memory(err, UZ_OF_SURFACES);
     }
     sites->rank = uz_alloc(2 * before->n_ranks, sizeof *sites->rank);
     if (!sites->rank)
-        return uz_mortar_no_memory(err);
+        return uz_no_memory(err, UZ_OF_SURFACES);
     memcpy(sites->zone, before->zone, (size_t)n * sizeof *sites->zone);
     memcpy(sites->rank, before->rank, (size_t)(2 * before->n_ranks) * sizeof *sites->rank);
     sites->n_ranks = before->n_ranks;

@@ -53,7 +53,8 @@ void uz_name_part_motion(char *text, size_t size, const uz_parts *parts, const u
     const double square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
     for (int c = 0; c < 3; c++) {
         const double offset = w[(c + 1) % 3] * t[(c + 2) % 3] - w[(c + 2) % 3] * t[(c + 1) % 3];
-        x[c] = tidy(uz_part_centre(p, c) + tidy(offset / square, 1) * L, L);
+        const double centre = 0.5 * p->low[c] + 0.5 * p->high[c];
+        x[c] = tidy(centre + tidy(offset / square, 1) * L, L);
     }
     name_vector(point, sizeof point, x, parts->dim);
     if (parts->dim == 2) {

@@ -22,16 +22,13 @@ typedef struct {
     int64_t *source; /* n_fixed: 1 + the support that gave it, 0: none yet */
 } prescription;
 
-static uz_status other_body(uz_error *err)
-{
-    return uz_fail(err, UZ_ERR_ARGUMENT, "/supports", "the scene's supports are not those of this body");
-}
+#define OTHER_BODY "the scene's supports are not those of this body"
 
 static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c, double value, uz_error *err)
 {
     const int64_t dof = p->model->dof[node * p->model->mesh.dim + c];
     if (dof >= 0)
-        return other_body(err);
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/supports", OTHER_BODY);
     const int64_t fixed = -1 - dof;
     if (c == 0 && value != 0 && uz_is_on_axis(p->model, node))
         return uz_fail(err, UZ_ERR_SCENE, "/supports",
@@ -73,7 +70,7 @@ static uz_status prescribe_along(prescription *p, int64_t support, int64_t node,
     }
     if (own >= 0) {
         if (dof[own] >= 0)
-            return other_body(err);
+            return uz_fail(err, UZ_ERR_ARGUMENT, "/supports", OTHER_BODY);
         p->value[-1 - dof[own]] = (value - known) / share[own];
         p->source[-1 - dof[own]] = support + 1;
         return UZ_OK;

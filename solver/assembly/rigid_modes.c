@@ -5,6 +5,7 @@
 #include "assembly/body_parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "assembly/pressed.h"
 
 #include <math.h>
@@ -122,10 +123,13 @@ uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *mo
         const int own = uz_free_motions(mode, &parts, &parts.list[i]);
         for (int k = 0; k < own && at < n; k++, at++)
             for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-                double u[3], local[3];
+                double u[3], local[3], at_node[3];
                 if (parts.of[a] != i)
                     continue;
-                uz_move_node(u, &parts, i, &model->mesh, a, mode[k]);
+                uz_place_in_part(at_node, &parts.list[i], &model->mesh, a);
+                uz_cross3(u, mode[k] + 3, at_node);
+                for (int c = 0; c < 3; c++)
+                    u[c] += mode[k][c];
                 uz_to_frame(local, model, a, u);
                 for (int c = 0; c < dim; c++)
                     if (model->dof[a * dim + c] >= 0)

@@ -120,69 +120,53 @@ uz_status uz_check_elements(const uz_body_model *model, uz_error *err)
 
 /* ---------------------------------------------------------------- adding up */
 
-/* One element on its way into K. */
-typedef struct {
-    const double *ke; /* n x n */
-    int n, dim;
-    const int64_t *dof[UZ_ELEMENT_NODES]; /* of each of its nodes: dim of them */
-} addition;
-
-/* The block of nodes a (columns) and b (rows), b the later one. The rows of a node stand together in every column, at a
- * place that the column of a's first free dof tells: each following one lacks the rows of a before its diagonal. */
-static void add_block(uz_csc *K, const addition *x, int a, int b)
-{
-    int64_t place = -1, first_column = 0, rank = 0;
-    for (int j = 0; j < x->dim; j++) {
-        const int64_t column = x->dof[a][j];
-        const double *ke = x->ke + (size_t)(b * x->dim * x->n + a * x->dim + j);
-        if (column < 0)
-            continue;
-        int64_t at = 0;
-        for (int i = 0; i < x->dim; i++) {
-            if (x->dof[b][i] < 0)
-                continue;
-            if (place < 0) {
-                place = uz_csc_find(K, x->dof[b][i], column) - K->ptr[column];
-                first_column = column;
-            }
-            rank = column - first_column;
-            K->val[K->ptr[column] + place - rank + at++] += ke[i * x->n];
-        }
-    }
-}
-
+/* The rows of a node stand together in every column, at a place that the column of another's first free dof tells: each
+ * following one lacks the rows of that node before its diagonal. */
 static void add_element(uz_body_model *model, const double *ke, int64_t element)
 {
     double turned[DOFS * DOFS];
     int count;
-    const int64_t *node = uz_mesh_element(&model->mesh, element, &count);
+    const int64_t *node = uz_mesh_element(&model->mesh, element, &count), *dof[UZ_ELEMENT_NODES];
     const int dim = model->mesh.dim, n = count * dim;
     uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
-    addition x = {.ke = ke, .n = n, .dim = dim};
     if (uz_is_rotated_element(model, element)) {
         memcpy(turned, ke, (size_t)(n * n) * sizeof *ke);
         uz_turn_element(turned, model, element);
-        x.ke = turned;
+        ke = turned;
     }
     for (int a = 0; a < count; a++)
-        x.dof[a] = model->dof + node[a] * dim;
+        dof[a] = model->dof + node[a] * dim;
     for (int a = 0; a < count; a++) {
         for (int j = 0; j < dim; j++) {
-            const int64_t column = x.dof[a][j];
+            const int64_t column = dof[a][j];
             /* the block of the node itself: its lower triangle, at the head of each column */
             for (int i = j; i < dim && column >= 0; i++)
-                if (x.dof[a][i] >= 0)
-                    K->val[K->ptr[column] + x.dof[a][i] - column] += x.ke[(a * dim + i) * n + a * dim + j];
+                if (dof[a][i] >= 0)
+                    K->val[K->ptr[column] + dof[a][i] - column] += ke[(a * dim + i) * n + a * dim + j];
             /* the free rows of a supported dof */
             for (int i = 0; i < n && column < 0; i++) {
-                const int64_t row = x.dof[i / dim][i % dim];
+                const int64_t row = dof[i / dim][i % dim];
                 if (row >= 0)
-                    K_fixed->val[uz_csc_find(K_fixed, row, -1 - column)] += x.ke[i * n + a * dim + j];
+                    K_fixed->val[uz_csc_find(K_fixed, row, -1 - column)] += ke[i * n + a * dim + j];
             }
         }
-        for (int b = 0; b < count; b++)
-            if (node[b] > node[a])
-                add_block(K, &x, a, b);
+        for (int b = 0; b < count; b++) { /* the block of two nodes, b the later one */
+            int64_t place = -1, first_column = 0;
+            for (int j = 0; j < dim && node[b] > node[a]; j++) {
+                const int64_t column = dof[a][j];
+                int64_t at = 0;
+                for (int i = 0; i < dim && column >= 0; i++) {
+                    if (dof[b][i] < 0)
+                        continue;
+                    if (place < 0) {
+                        place = uz_csc_find(K, dof[b][i], column) - K->ptr[column];
+                        first_column = column;
+                    }
+                    K->val[K->ptr[column] + place - (column - first_column) + at++] +=
+                        ke[(b * dim + i) * n + a * dim + j];
+                }
+            }
+        }
     }
 }
 

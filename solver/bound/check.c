@@ -137,15 +137,6 @@ double uz_bound_error(const uz_bound_check_result *c, double residual_norm)
 
 /* ---- along an edge */
 
-/* Quadratic polynomial by its Bernstein coefficients, from its values at the ends and, where there is one, the middle.
- */
-void uz_bernstein(double b[3], double start, double end, const double *middle)
-{
-    b[0] = start;
-    b[2] = end;
-    b[1] = middle ? 2 * *middle - (start + end) / 2 : (start + end) / 2;
-}
-
 /* Means of a quadratic polynomial over an edge with the Bernstein polynomials of `moments` - 1 as weights. */
 void uz_edge_means(double m[UZ_BOUND_MOMENTS], const double b[3], int moments)
 {
@@ -156,16 +147,17 @@ void uz_edge_means(double m[UZ_BOUND_MOMENTS], const double b[3], int moments)
                             : (QUADRATIC[a][0] * b[0] + QUADRATIC[a][1] * b[1] + QUADRATIC[a][2] * b[2]) / 10;
 }
 
-/* A displacement along n on an edge, as uz_bernstein. */
 void uz_along_edge(double b[3], const double *u, const int64_t node[3], const double n[2])
 {
     double at[3] = {0};
     for (int a = 0; a < 3; a++)
         at[a] = node[a] < 0 ? 0 : n[0] * u[2 * node[a]] + n[1] * u[2 * node[a] + 1];
-    uz_bernstein(b, at[0], at[1], node[2] < 0 ? NULL : &at[2]);
+    b[0] = at[0];
+    b[2] = at[1];
+    b[1] = node[2] < 0 ? (at[0] + at[1]) / 2 : 2 * at[2] - (at[0] + at[1]) / 2;
 }
 
-/* s: the gap that u_h leaves, as uz_bernstein; lift: by how much w widens it. */
+/* s: the gap that u_h leaves, as uz_along_edge; lift: by how much w widens it. */
 static void gap_along(double s[3], double lift[3], const examination *x, const double *u, const uz_bound_edge *edge)
 {
     uz_along_edge(s, u, edge->node, edge->normal);
@@ -442,13 +434,6 @@ static void without_motion(double v[2 * UZ_ELEMENT_NODES], const uz_element *ele
     }
 }
 
-/* sigma : C^-1 : tau. */
-static double comply(uz_lame lame, const double s[3], const double t[3])
-{
-    return ((s[0] - s[1]) * (t[0] - t[1]) / 2 + 2 * s[2] * t[2]) / (2 * lame.mu) +
-           (s[0] + s[1]) * (t[0] + t[1]) / (4 * (lame.lambda + lame.mu));
-}
-
 /* int sigma : C^-1 : sigma / 2 + sigma : expansion over a part, and what its equilibrium lacks: div sigma + force. */
 static double examine_part(examination *x, const double corner[3][2], const double *s, const double expansion[3],
                            double largest, int64_t e)
@@ -462,9 +447,12 @@ static double examine_part(examination *x, const double corner[3][2], const doub
     const double volume = area2 / 2 * x->body->model->thickness;
     double sum = 0, slope[3][2];
     for (int i = 0; i < points; i++)
-        for (int j = 0; j < points; j++)
-            sum += volume / 2 * (points == 3 ? (i == j ? 2. : 1.) / 12 : SIXTH[i][j] / 180) *
-                   comply(lame, s + 3 * i, s + 3 * j);
+        for (int j = 0; j < points; j++) {
+            const double *a = s + 3 * i, *b = s + 3 * j; /* a : C^-1 : b */
+            const double product = ((a[0] - a[1]) * (b[0] - b[1]) / 2 + 2 * a[2] * b[2]) / (2 * lame.mu) +
+                                   (a[0] + a[1]) * (b[0] + b[1]) / (4 * (lame.lambda + lame.mu));
+            sum += volume / 2 * (points == 3 ? (i == j ? 2. : 1.) / 12 : SIXTH[i][j] / 180) * product;
+        }
     for (int i = points == 3 ? 0 : 3; i < points; i++)
         sum += volume / 3 * (s[3 * i] * expansion[0] + s[3 * i + 1] * expansion[1]);
     for (int i = 0; i < 3; i++) { /* gradients of the coordinates of the triangle */
@@ -562,9 +550,9 @@ static void examine_element(examination *x, const double *u, const double *stres
             }
     const uz_gauss_rule rule = uz_element_type_of(element.kind)->rule;
     for (int g = 0; g < rule.count; g++) { /* the force's work: polynomials that all rules integrate */
-        double point[3], grad[UZ_ELEMENT_NODES][3], N[UZ_ELEMENT_NODES];
-        const double weight = rule.point(point, g);
-        const double volume = weight * uz_element_gradients(grad, &element, point) * model->thickness;
+        double grad[UZ_ELEMENT_NODES][3], N[UZ_ELEMENT_NODES];
+        const double *point = rule.point[g].at;
+        const double volume = rule.point[g].weight * uz_element_gradients(grad, &element, point) * model->thickness;
         uz_element_shape(N, element.kind, point);
         for (int i = 0; i < 2 * count; i++)
             work += volume * N[i / 2] * v[i] * x->body->force[2 * e + i % 2];
@@ -640,9 +628,10 @@ static double energy_of(double *margin, const examination *x, const double *u, b
     }
     for (int g = 0; g < (triangle ? own.count : n * n); g++) {
         double point[3] = {0}, grad[UZ_ELEMENT_NODES][3], strain[3] = {-expansion[0], -expansion[1], 0}, w;
-        if (triangle)
-            w = own.point(point, g);
-        else {
+        if (triangle) {
+            memcpy(point, own.point[g].at, sizeof point);
+            w = own.point[g].weight;
+        } else {
             point[0] = at[g % n];
             point[1] = at[g / n];
             w = weight[g % n] * weight[g / n];

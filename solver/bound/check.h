@@ -24,12 +24,10 @@ typedef struct {
     double bulge, bulged, bulge_work;
 } examination;
 
-/* A quadratic polynomial by its Bernstein coefficients, from its values at the ends and, where there is one, the
- * middle. */
-void uz_bernstein(double b[3], double start, double end, const double *middle);
 /* Means of a quadratic polynomial over an edge with the Bernstein polynomials of degree `moments` - 1 as weights. */
 void uz_edge_means(double m[UZ_BOUND_MOMENTS], const double b[3], int moments);
-/* A displacement (n_nodes x 2) along n on an edge, as uz_bernstein. */
+/* A displacement (n_nodes x 2) along n on an edge: the Bernstein coefficients of a quadratic polynomial, from its
+ * values at the ends and, where there is a node, in the middle. */
 void uz_along_edge(double b[3], const double *u, const int64_t node[3], const double n[2]);
 /* Gauss's rule of n points on [-1, 1]. */
 void uz_gauss(double *at, double *weight, int n);

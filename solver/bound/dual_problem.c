@@ -457,8 +457,8 @@ static void comply(double F[AIRY * AIRY], double f[AIRY], const macro *m, int pa
     memset(F, 0, AIRY * AIRY * sizeof *F);
     memset(f, 0, AIRY * sizeof *f);
     for (int g = 0; g < rule.count; g++) {
-        double point[3], at[2], S[3][AIRY], own[3], strain[3][AIRY + 1];
-        const double weight = rule.point(point, g) * area2 * model->thickness;
+        double at[2], S[3][AIRY], own[3], strain[3][AIRY + 1];
+        const double *point = rule.point[g].at, weight = rule.point[g].weight * area2 * model->thickness;
         for (int i = 0; i < 2; i++)
             at[i] = p[i] + point[0] * (q[i] - p[i]) + point[1] * (c[i] - p[i]);
         airy(S, m, at);

@@ -80,19 +80,16 @@ double uz_bound_rounding(const uz_energy_sums *s, int64_t d)
     return DBL_EPSILON * n * (n + (double)d + 8.0) * s->correction;
 }
 
-double uz_bound_noise(double inverse, double weighted, const uz_energy_sums *s)
-{
-    const double n = (double)s->terms;
-    return (1.0 + 0x1p-20) * sqrt(1.0 + inverse) *
-           (2.0 * (n + 1.0) * hidden(s->terms) * sqrt(s->noise + s->rows + s->correction) +
-            DBL_EPSILON * (sqrt(weighted) + n * n * sqrt(s->correction)));
-}
-
 /* Beyond it too little is left of the factor to say anything. */
 #define MOST_DOUBT 0.9
 
-double uz_bound_enlarge(double square, double doubt, double noise)
+double uz_bound_enlarge(double square, double doubt, double inverse, double weighted, const uz_energy_sums *s)
 {
+    /* what rounding may hide of e, in the norm of K^-1: that of its double-double sums, of K c and of e to doubles */
+    const double n = (double)s->terms;
+    const double noise = (1.0 + 0x1p-20) * sqrt(1.0 + inverse) *
+                         (2.0 * (n + 1.0) * hidden(s->terms) * sqrt(s->noise + s->rows + s->correction) +
+                          DBL_EPSILON * (sqrt(weighted) + n * n * sqrt(s->correction)));
     const double norm = doubt < MOST_DOUBT ? (sqrt(square) + noise) / sqrt(1.0 - doubt) : INFINITY;
     return norm * norm;
 }

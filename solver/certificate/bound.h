@@ -45,9 +45,10 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
  * whether one is known depends on whom the body has served before. */
 bool uz_bound_blames_distance(const uz_certificate *out, double square, double requested);
 
-/* e'K^-1 e, enlarged by what the rounding of the factor (relative part `doubt`) and of double-double sums (see
- * uz_bound_noise; by the factor's inverse) may hide of it. */
-double uz_bound_enlarge(double square, double doubt, double noise);
+/* e'K^-1 e, enlarged by what the rounding of the factor (relative part `doubt`) and of sums may hide of it: of those in
+ * double-double arithmetic, of K c and of e to doubles. inverse: e'K^-1 e <= inverse e'W e; weighted: e'W e. Proofs of
+ * this and of uz_bound_rounding: docs/theory.md, rounding of sums. */
+double uz_bound_enlarge(double square, double doubt, double inverse, double weighted, const uz_energy_sums *s);
 
 /* How much the factor's rounding may falsify e'K^-1 e, relative, where the inverse of diag(K)^-1/2 K diag(K)^-1/2 has
  * the norm `inverse`: the factor is that of K + E with |E_ij| within d eps, in practice sqrt(d) eps, of the root of
@@ -56,13 +57,8 @@ double uz_bound_doubt(double inverse, int64_t d);
 /* A doubt that does no harm need not be measured. */
 #define UZ_BOUND_HARMLESS 1e-2
 
-/* What the rounding of K c and of the sum, both in double precision, may hide of c'K c. Proofs of this and the next:
- * docs/theory.md, rounding of sums. */
+/* What the rounding of K c and of the sum, both in double precision, may hide of c'K c. */
 double uz_bound_rounding(const uz_energy_sums *s, int64_t d);
-
-/* What rounding may hide of e, in the norm of K^-1: that of its double-double sums, of K c and of e to doubles.
- * inverse: e'K^-1 e <= inverse e'W e; weighted: e'W e. */
-double uz_bound_noise(double inverse, double weighted, const uz_energy_sums *s);
 
 /* What an error is relative to where supports move the body. u'Ku over the free dofs counts that motion as if it tore
  * the body off its supports: an error relative to free_norm says nothing of strain and reactions. So it is whole_norm,

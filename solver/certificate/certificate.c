@@ -61,12 +61,6 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, const double 
     return UZ_OK;
 }
 
-void uz_certify_weights(double *weight, const uz_csc *K)
-{
-    for (int64_t j = 0; j < K->cols; j++)
-        weight[j] = uz_dof_weight(K, j);
-}
-
 /* How far an estimate of the inverse's norm, from single vectors that rounding made, may be below it. */
 #define SURELY 1e3
 
@@ -97,7 +91,7 @@ uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_inp
         if (status == UZ_OK && in->measure_doubt && !small)
             status = in->measure_doubt(in->ctx, &doubt, err);
     }
-    *square = uz_bound_enlarge(*square, doubt, uz_bound_noise(inverse, weighted, energies));
+    *square = uz_bound_enlarge(*square, doubt, inverse, weighted, energies);
     return status;
 }
 

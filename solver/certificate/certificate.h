@@ -53,11 +53,8 @@ uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u,
 
 /* *square >= e'K^-1 e = ||v - u_r||_K^2, with all that the rounding of the factor and of e may hide; INFINITY: none is
  * known. *spared: it was bounded by the inverse's norm, and e (d) stands; else that is lost. weighted: e'W e; energy:
- * u'Ku; sums: those that uz_bound_noise reads. */
+ * u'Ku; sums: those that uz_bound_enlarge reads. */
 uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_input *input, double *e, int64_t d,
                               double weighted, double energy, const uz_energy_sums *sums, uz_error *err);
-
-/* A part of it, for answers in lanes. weight (d): W = diag(K)^-1. */
-void uz_certify_weights(double *weight, const uz_csc *K);
 
 #endif

@@ -282,7 +282,8 @@ uz_status uz_certify_exact(uz_certificate *out, const double *u, const mpf_t *v,
                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c.d);
     bool feasible = false;
     if (status == UZ_OK) {
-        uz_certify_weights(c.weight, input->K);
+        for (int64_t j = 0; j < c.d; j++)
+            c.weight[j] = uz_dof_weight(input->K, j);
         feasible = isfinite(input->whole_norm) && take(&c, u, v, s);
     }
     if (feasible)

@@ -131,15 +131,6 @@ static bool settle(uz_feasible *c, double work)
     return uz_row_settle_solve(&c->exact);
 }
 
-/* Rows that hang together take long in rational numbers, as each that is moved moves its neighbours. Moved apart a
- * little more, they need none. */
-static bool move_apart(uz_feasible *c, const double *r)
-{
-    for (int round = 0; round < MAX_ROUNDS && choose_rows(c, r, APART) > 0.0; round++)
-        uz_row_move_solve(&c->move, c->correction, c->Nt, c->weight);
-    return choose_rows(c, r, APART) == 0.0 && settle(c, 0);
-}
-
 /* Rows that depend on each other, or nearly so, can't all be closed as equations, or only by a correction far larger
  * than the gaps; and in long chains of rows conjugate gradients take a step for each. Then an active set chooses. */
 bool uz_make_feasible(uz_feasible *c, const double *r)
@@ -162,8 +153,16 @@ bool uz_make_feasible(uz_feasible *c, const double *r)
     bool feasible = move_rows(c, r);
     for (int64_t j = 0; j < c->d; j++)
         size += c->correction[j] / c->weight[j] * c->correction[j];
-    if (feasible && size <= STRETCH * expected && (settle(c, LITTLE_WORK) || move_apart(c, r)))
-        return true;
+    if (feasible && size <= STRETCH * expected) {
+        if (settle(c, LITTLE_WORK))
+            return true;
+        /* Rows that hang together take long in rational numbers, as each that is moved moves its neighbours. Moved
+         * apart a little more, they need none. */
+        for (int round = 0; round < MAX_ROUNDS && choose_rows(c, r, APART) > 0.0; round++)
+            uz_row_move_solve(&c->move, c->correction, c->Nt, c->weight);
+        if (choose_rows(c, r, APART) == 0.0 && settle(c, 0))
+            return true;
+    }
     c->pushed = uz_row_exact_solve(&exact) && settle(c, 0);
     if (c->pushed)
         return true;

@@ -119,7 +119,8 @@ uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_certify_inp
     bool ok = c->weight && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo && (c->E || in->spares);
     uz_status status = UZ_OK;
     if (ok) {
-        uz_certify_weights(c->weight, K);
+        for (int64_t j = 0; j < d; j++)
+            c->weight[j] = uz_dof_weight(K, j);
         c->in.terms = in->terms > 0 ? in->terms : uz_most_terms(K, N);
         ok = c->in.terms > 0;
         c->steepest = N->rows > 0 ? uz_bound_largest(N->val, N->ptr[N->cols]) : 0.0;

@@ -62,3 +62,8 @@ uz_status uz_fail_line(uz_error *err, uz_status status, int64_t line, const char
     va_end(args);
     return status;
 }
+
+uz_status uz_no_memory(uz_error *err, const char *what)
+{
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %s", what);
+}

@@ -14,6 +14,9 @@ uz_status uz_fail(uz_error *err, uz_status status, const char *where, const char
 uz_status uz_fail_line(uz_error *err, uz_status status, int64_t line, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
+/* UZ_ERR_MEMORY: "no memory for <what>". */
+uz_status uz_no_memory(uz_error *err, const char *what);
+
 void uz_error_reset(uz_error *err);
 
 #endif

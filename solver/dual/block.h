@@ -22,7 +22,7 @@ uz_status uz_dual_block_forward(uz_dual_block *block, uz_error *err);
 /* The load of a lane, until the next uz_dual_block_forward. K and h (m) as in uz_dual_load_create. */
 uz_status uz_dual_block_open(uz_dual_load **out, const uz_dual_block *block, int64_t lane, const uz_csc *K,
                              const double *h, uz_error *err);
-/* uz_dual_load_recover for the loads of lanes 0 .. count - 1, r[lane] (m). */
+/* `recover` of the form for the loads of lanes 0 .. count - 1, r[lane] (m). */
 uz_status uz_dual_block_recover(uz_dual_block *block, uz_dual_load *const *loads, const double *const *r,
                                 const bool *corrected, int64_t count, uz_error *err);
 

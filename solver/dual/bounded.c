@@ -56,20 +56,6 @@ uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const do
     return UZ_OK;
 }
 
-void uz_bounded_free(uz_bounded *box)
-{
-    if (!box)
-        return;
-    double *room[] = {box->p, box->top, box->bottom, box->u, box->force, box->size, box->point, box->r};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
-    free(box->upper);
-    free(box->lower);
-    free(box->holder);
-    free(box->fixed);
-    free(box);
-}
-
 /* Which row holds each dof. Of several rows on a dof the tightest counts; a dof is not held from both sides. */
 bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
 {
@@ -362,6 +348,7 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
         sweep(&near, box, false);
         sweep(&near, box, true);
     }
+    box->swept_bytes = 12 * (size_t)K->cols + (room ? 40 * (size_t)near.n + 16 * (size_t)near.ptr[near.n] : 0);
     for (int64_t a = 0; room && a < near.n; a++)
         box->point[near.dof[a]] = near.u[a];
     void *own[] = {near.links, near.place, near.dof, near.ptr, near.idx, near.val, near.inverse, near.pull, near.u};

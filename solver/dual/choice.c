@@ -7,24 +7,14 @@
 #include <stdlib.h>
 
 /* In the order of preference among those that suit. */
-static const uz_dual_form *const forms[UZ_DUAL_FORMS] = {&uz_dual_condensed, &uz_dual_factored, &uz_dual_matrix_free};
-
-const uz_dual_abilities *uz_dual_abilities_at(int k)
-{
-    return &forms[k]->can;
-}
+const uz_dual_form *const uz_dual_forms[UZ_DUAL_FORMS] = {&uz_dual_condensed, &uz_dual_factored, &uz_dual_matrix_free};
 
 const uz_dual_form *uz_dual_form_of(uz_operator op)
 {
     int k = 0;
-    while (k < UZ_DUAL_FORMS - 1 && forms[k]->can.op != op)
+    while (k < UZ_DUAL_FORMS - 1 && uz_dual_forms[k]->can.op != op)
         k++;
-    return forms[k];
-}
-
-const uz_dual_abilities *uz_dual_abilities_of(uz_operator op)
-{
-    return &uz_dual_form_of(op)->can;
+    return uz_dual_forms[k];
 }
 
 enum { SMALL_BOUNDS = 128 };
@@ -35,15 +25,9 @@ uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked)
         return asked;
     uz_dual_shape shape = {N->cols, N->rows, n_b, N->rows > SMALL_BOUNDS && uz_dual_bounds_dofs(N)};
     int k = 0;
-    while (k < UZ_DUAL_FORMS - 1 && !(forms[k]->suits && forms[k]->suits(&shape)))
+    while (k < UZ_DUAL_FORMS - 1 && !(uz_dual_forms[k]->suits && uz_dual_forms[k]->suits(&shape)))
         k++;
-    return forms[k]->can.op;
-}
-
-void uz_dual_add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
-                      const uz_cost_rates *rates)
-{
-    uz_dual_form_of(cost->op)->add_cost(cost, size, factor, rates);
+    return uz_dual_forms[k]->can.op;
 }
 
 uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err)

@@ -16,19 +16,16 @@ typedef struct {
     bool lanes;        /* several loads with one pass over the factor: block.h */
 } uz_dual_abilities;
 
+typedef struct uz_dual_form uz_dual_form; /* form.h */
 enum { UZ_DUAL_FORMS = 3 };
-/* Of form k < UZ_DUAL_FORMS, in the order of preference of uz_dual_choose. */
-const uz_dual_abilities *uz_dual_abilities_at(int k);
-/* Of a form by its name, not AUTO. */
-const uz_dual_abilities *uz_dual_abilities_of(uz_operator op);
+/* In the order of preference of uz_dual_choose. */
+extern const uz_dual_form *const uz_dual_forms[UZ_DUAL_FORMS];
+/* By its name, not AUTO. */
+const uz_dual_form *uz_dual_form_of(uz_operator op);
 
 /* The form that AUTO stands for, among those with a factor, from the sizes (n_b: dofs that N touches) and whether
  * each row bounds one dof. */
 uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked);
-
-/* Adds what the form cost->op takes to *cost (form.h). */
-void uz_dual_add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
-                      const uz_cost_rates *rates);
 
 /* The dofs that N touches, ascending; the caller frees *dofs. */
 uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err);

@@ -5,8 +5,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "core/lock.h"
-#include "dual/lanczos.h"
 
 #include <float.h>
 #include <math.h>
@@ -164,43 +162,10 @@ uz_status uz_dual_load_aim(uz_dual_load *load, double relative_error, const uz_s
     return form->aim && !isnan(relative_error) ? form->aim(load, relative_error, err) : UZ_OK;
 }
 
-/* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
-#define LAMBDA_TOLERANCE 1e-4
-
-uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weighted, uz_error *err)
+uz_status uz_dual_load_prepare(uz_dual_load *load, uz_error *err)
 {
-    const uz_dual *dual = load->dual;
-    const uz_dual_form *form = dual->form;
-    uz_dual_lazy *lazy = dual->lazy;
-    uz_status status = UZ_OK;
-    if (lambda_max) {
-        *lambda_max = 0.0;
-        load->asked_lambda_max = true;
-    }
-    if (form->prepare)
-        status = form->prepare(load, err);
-    if (status != UZ_OK || !lambda_max || !uz_lock_while(&lazy->making, &load->stop))
-        return status;
-    const double *weight = weighted ? dual->row_weight : NULL;
-    double *known = &lazy->lambda_max[weight != NULL];
-    if (!isnan(*known)) {
-        *lambda_max = *known;
-    } else {
-        if (form->probe)
-            form->probe(load, true, 0.1 * LAMBDA_TOLERANCE);
-        status = uz_lanczos_max(lambda_max, load, weight, LAMBDA_TOLERANCE, err);
-        if (form->probe)
-            form->probe(load, false, 0.0);
-        if (status != UZ_OK || uz_stop_is_due(&load->stop)) {
-            *lambda_max = 0.0; /* applications may have been cut short */
-        } else {
-            pthread_mutex_lock(&lazy->known); /* kept for the body's other runs */
-            *known = *lambda_max;
-            pthread_mutex_unlock(&lazy->known);
-        }
-    }
-    pthread_mutex_unlock(&lazy->making);
-    return status == UZ_ERR_CANCELLED ? UZ_OK : status;
+    const uz_dual_form *form = load->dual->form;
+    return form->prepare ? form->prepare(load, err) : UZ_OK;
 }
 
 /* psi(r) = psi0 + r'g0 - 1/2 r'Dr, and psi(r) = -1/2 ||u(r)||_K^2 + r'h. */
@@ -233,7 +198,8 @@ uz_status uz_dual_load_column(uz_dual_load *load, double *column, int64_t i, uz_
     unit[i] = 1.0;
     if (dual->form->probe) /* a unit is of another size than the load, which must not matter to the column */
         dual->form->probe(load, true, 0.0);
-    uz_status status = uz_dual_load_apply(load, column, unit, err);
+    load->applications++;
+    uz_status status = dual->form->apply(load, column, unit, err);
     if (dual->form->probe)
         dual->form->probe(load, false, 0.0);
     free(unit);
@@ -287,9 +253,4 @@ uz_status uz_dual_load_solve_active(uz_dual_load *load, uz_active_end *end, doub
 bool uz_dual_load_guess_active(uz_dual_load *load, bool *active)
 {
     return load->dual->form->guess_active && load->dual->form->guess_active(load, active);
-}
-
-uz_status uz_dual_load_inverse_norm(uz_dual_load *load, double *value, double *e, uz_error *err)
-{
-    return load->dual->form->inverse_norm(load, value, e, err);
 }

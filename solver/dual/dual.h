@@ -24,8 +24,6 @@
 /* Rows smaller than this part of the largest have weights that their squares can hold. */
 #define UZ_LEAST_WEIGHT 0x1p-500
 
-typedef struct uz_dual_form uz_dual_form; /* form.h */
-
 typedef struct {
     const uz_dual_form *form;
     const uz_dual_abilities *can; /* the form's */
@@ -60,7 +58,7 @@ typedef struct {
                      * theirs near these, which all press */
     double *correction, *kept; /* feasible corrections, as the form writes them: the last, and the kept one */
     bool has_kept;
-    bool asked_lambda_max; /* by uz_dual_load_prepare: others on the same body may have, too */
+    bool asked_lambda_max; /* by uz_dual_load_lambda_max: others on the same body may have, too */
 } uz_dual_load;
 
 /* What an operator is made from. */
@@ -74,8 +72,8 @@ typedef struct {
 
 uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_hooks *hooks, uz_error *err);
 void uz_dual_free(uz_dual *dual);
-/* What uz_dual_load_prepare found, for the caller's rows; NaN where nobody asked for it, or where it is out of range.
- */
+/* What uz_dual_load_lambda_max found, for the caller's rows; NaN where nobody asked for it, or where it is out of
+ * range. */
 double uz_dual_lambda_max_as_given(const uz_dual *dual);
 
 /* K (lower triangle) is borrowed for the life of the load, p and h are only read. p NULL: all but what follows from
@@ -89,14 +87,15 @@ void uz_dual_load_free(uz_dual_load *load);
  *   relative_error  in the energy norm: forms that are not exact solve no better than that (before the first call: than
  *                   1e-10). 0: no worse than rounding, so that iterations are those of the exact D. NaN: as before
  *   stop            asked inside long work; NULL or no call: never. Where it came, solve_active comes back unsolved,
- *                   and uz_dual_load_prepare leaves D to be applied by its factors and lambda_max 0: nothing is wrong,
+ *                   uz_dual_load_prepare leaves D to be applied by its factors, and lambda_max is 0: nothing is wrong,
  *                   and whoever asks next finds that it came */
 uz_status uz_dual_load_aim(uz_dual_load *load, double relative_error, const uz_stop *stop, uz_error *err);
 
-/* Makes what only many applications of D pay for, once per body: a dense D. lambda_max (may be NULL: not wanted): of D,
- * or, weighted, of W D W with the row_weight; Lanczos value plus its residual bound; 0 when m = 0 or D = 0. Overwrites
- * what the last apply left. */
-uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weighted, uz_error *err);
+/* Makes what only many applications of D pay for, once per body: a dense D. */
+uz_status uz_dual_load_prepare(uz_dual_load *load, uz_error *err);
+/* The largest eigenvalue of D, or, weighted, of W D W with the row_weight: Lanczos value plus its residual bound,
+ * within 1e-4; 0 when m = 0 or D = 0. Found once per body. Overwrites what the last apply left. */
+uz_status uz_dual_load_lambda_max(uz_dual_load *load, double *lambda_max, bool weighted, uz_error *err);
 
 /* Dr = D r (m). */
 uz_status uz_dual_load_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
@@ -137,8 +136,5 @@ uz_status uz_dual_load_solve_active(uz_dual_load *load, uz_active_end *end, doub
 /* A guess of the active rows (m) that is better than the signs of the last solve_active (of g0 before the first), for
  * much less than its cost. Successive guesses converge by themselves. false, `active` untouched: there is none. */
 bool uz_dual_load_guess_active(uz_dual_load *load, bool *active);
-
-/* Where the operator has no factor: *value >= e'K^-1 e, sharp where time allows; e (d) becomes K^-1 e, about. */
-uz_status uz_dual_load_inverse_norm(uz_dual_load *load, double *value, double *e, uz_error *err);
 
 #endif

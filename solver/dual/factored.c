@@ -66,11 +66,6 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     return status;
 }
 
-static uz_status correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
-{
-    return uz_sparse_correct((uz_sparse_load *)load, bound2, 0.0, r, g, close);
-}
-
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
 /* Signs beyond this, relative to the terms of a sum, are wrong after one pass as after two, if K is not conditioned
@@ -93,12 +88,15 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
         *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
         return UZ_OK;
     }
+    size_t most = uz_principal_bytes(x->part) + uz_principal_bytes(x->held) + box->swept_bytes;
+    load->most = most > load->most ? most : load->most;
     /* The displacement of the dofs that are not held. */
     uz_status status =
         x->part ? uz_principal_hold(&solved, x->part, load->K, box->fixed, &load->stop, err)
                 : uz_principal_create(&x->part, load->K, box->fixed, load->dual->factor, x->ws, &load->stop, err);
     solved = solved && x->part;
-    load->most = uz_principal_bytes(x->part) + uz_principal_bytes(x->held);
+    most = uz_principal_bytes(x->part) + uz_principal_bytes(x->held);
+    load->most = most > load->most ? most : load->most;
     uz_bounded_balance(box, load->K);
     for (int pass = 0; status == UZ_OK && solved && !wrong && pass < PASSES; pass++) {
         if ((solved = !uz_stop_is_due(&load->stop)))
@@ -214,7 +212,7 @@ const uz_dual_form uz_dual_factored = {
     .unload = unload,
     .apply = apply,
     .inverse_column = inverse_column,
-    .correct = correct,
+    .correct = uz_sparse_correct,
     .recover = uz_sparse_recover,
     .solve_active = solve_active,
     .guess_active = uz_sparse_guess_active,

@@ -58,12 +58,14 @@ struct uz_dual_form {
     uz_status (*inverse_column)(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err);
     /* *bound2: the square of the bound, INFINITY at entry; load->correction: the correction. */
     uz_status (*correct)(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
-    /* corrected: load->kept is to be added. */
+    /* u (d) = u(r), and where `corrected` load->kept added. */
     uz_status (*recover)(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err);
     uz_status (*solve_active)(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active,
                               uz_error *err);               /* *end: UNSOLVED at entry */
     bool (*guess_active)(uz_dual_load *load, bool *active); /* NULL: none */
-    uz_status (*inverse_norm)(uz_dual_load *load, double *value, double *e, uz_error *err); /* NULL: has a factor */
+    /* *value >= e'K^-1 e, sharp to a hundredth where time allows; e (d) becomes K^-1 e, about. load: a uz_dual_load.
+     * NULL: has a factor. */
+    uz_status (*inverse_norm)(void *load, double *value, double *e, uz_error *err);
 
     /* can.lanes; y = L^-1 P p, whose entry k stands at y[k stride], and x (d) is room: g0 and the rest as `load`, and
      * y += L^-1 P N'r and, where corrected, the kept correction. */
@@ -73,6 +75,5 @@ struct uz_dual_form {
 };
 
 extern const uz_dual_form uz_dual_condensed, uz_dual_factored, uz_dual_matrix_free;
-const uz_dual_form *uz_dual_form_of(uz_operator op);
 
 #endif

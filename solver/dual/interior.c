@@ -168,8 +168,9 @@ static uz_status advance(interior *x, bool *on, double mu, uz_error *err)
         x->aim[i] = -x->s[i] * x->z[i];
     }
     uz_springs_fill(&x->springs, x->sigma);
-    uz_status status = x->factor ? uz_factor_again(x->factor, &x->springs.S, err)
-                                 : uz_factor_create(&x->factor, &x->springs.S, x->springs.analysis, 0, NULL, err);
+    uz_status status = x->factor ? UZ_OK : uz_factor_new(&x->factor, x->springs.analysis, err);
+    if (status == UZ_OK)
+        status = uz_factor_again(x->factor, &x->springs.S, err);
     *on = status == UZ_OK;
     if (status == UZ_ERR_NOT_SPD) { /* to working precision */
         uz_error_reset(err);

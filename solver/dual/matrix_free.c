@@ -43,7 +43,6 @@ typedef struct {
     double aim; /* relative */
     uz_stop stop;
     double base_slack; /* of base = K^-1 p */
-    double slack;      /* of what the last apply or solve_active left */
     double tight;      /* relative accuracy of a change of the response, */
     double probed;     /* and while probing */
     bool probing;      /* r is a vector of any size: the answer's says nothing about how accurate D r must be */
@@ -74,7 +73,7 @@ static uz_status solve_base(free_load *x, double aim, uz_error *err)
     if (status != UZ_OK)
         return status;
     x->base_slack = info.last / root;
-    x->slack = x->base_slack;
+    x->sparse.slack = x->base_slack;
     load->psi0 = -0.5 * uz_dot(d, x->p, base);
     memcpy(load->g0, load->h, (size_t)load->dual->m * sizeof *load->g0);
     uz_csc_gaxpy(load->g0, &load->dual->N, -1.0, base);
@@ -151,20 +150,46 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
         return status;
     uz_csc_gaxpy(Dr, &dual->N, 1.0, x->sparse.response);
     load->left = info.last / root;
-    x->slack = x->base_slack + load->left;
+    x->sparse.slack = x->base_slack + load->left;
     return UZ_OK;
 }
 
-static uz_status correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
-{
-    free_load *x = (free_load *)load;
-    return uz_sparse_correct(&x->sparse, bound2, x->slack, r, g, close);
-}
+/* The residual's share of the value that is sharp enough, as a share of its root. */
+#define SHARP 0.1
+enum { NORM_STEPS_MOST = 400 };
 
-static uz_status inverse_norm(uz_dual_load *load, double *value, double *e, uz_error *err)
+/* With w from conjugate gradients, s = e - K w: e'K^-1 e = w'(e + s) + s'K^-1 s. */
+static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
 {
-    free_load *x = (free_load *)load;
-    return uz_amg_inverse_norm(value, e, load->dual->amg, &x->cg, load->K, x->stop.hooks, x->stop.deadline, err);
+    free_load *x = ctx;
+    const double lambda = x->sparse.load.dual->amg->info.lambda;
+    const int64_t n = x->cg.n;
+    double *w = uz_alloc_zero(n, sizeof *w), sum = 0.0, largest = 0.0;
+    uz_cg_stop stop = {.relative = SHARP * sqrt(lambda),
+                       .max_iterations = NORM_STEPS_MOST,
+                       .hooks = x->stop.hooks,
+                       .deadline = x->stop.deadline};
+    uz_cg_info info;
+    *value = INFINITY;
+    if (!w)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)n);
+    for (int64_t j = 0; j < n; j++)
+        largest = fmax(largest, fabs(e[j]));
+    /* By the power of two below the largest: squares of forces stay in range; what is left is exact. */
+    const double unit = largest > 0.0 && !isinf(largest) ? ldexp(1.0, ilogb(largest)) : 1.0;
+    for (int64_t j = 0; j < n; j++)
+        e[j] /= unit;
+    uz_status status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
+    for (int64_t j = 0; j < n; j++)
+        sum += w[j] * (e[j] + x->cg.r[j]);
+    if (status == UZ_OK) {
+        double scaled = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / lambda;
+        *value = scaled * unit * unit;
+        for (int64_t j = 0; j < n; j++)
+            e[j] = unit * w[j];
+    }
+    free(w);
+    return status;
 }
 
 /* ------------------------------------------------------------- given rows as equations */
@@ -176,57 +201,50 @@ static uz_status inverse_norm(uz_dual_load *load, double *value, double *e, uz_e
 /* Of the aim: below this a solve is as good as exact. */
 #define ACTIVE_FLOOR 0.02
 
-/* u, r, g and active at this tolerance of the energy norm. *go_on: it was reached, and the guess still looks right. */
-static uz_status solve_to(free_load *x, uz_cg *cg, double tolerance, double *g, bool *active, bool *go_on,
-                          uz_error *err)
+/* u, r, g and active: at the coarse tolerance of the energy norm, and, while the guess still looks right, at the one
+ * that is as good as exact. */
+static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, bool *active, uz_error *err)
 {
     const uz_dual_load *load = &x->sparse.load;
     const int64_t d = load->dual->d, m = load->dual->m;
     uz_bounded *box = x->sparse.box;
-    double root = sqrt(load->dual->amg->info.lambda), most = uz_root(-2.0 * load->psi0), square = 0.0;
-    uz_bounded_balance(box, load->K);
-    for (int64_t j = 0; j < d; j++)
-        square += box->u[j] * (box->force[j] + box->p[j]);
-    double norm = fmin(uz_root(square), most > 0.0 ? most : INFINITY);
-    uz_cg_stop stop = stop_at(x, 0.0, tolerance * norm * root);
-    uz_cg_info info;
-    uz_status status = uz_cg_solve(&info, box->u, cg, load->K, x->right, &stop, err);
-    *go_on = status == UZ_OK && info.met;
-    if (status != UZ_OK)
-        return status;
-    uz_bounded_balance(box, load->K);
-    uz_bounded_react(&x->sparse, g, active);
-    for (int64_t i = 0; *go_on && i < m; i++)
-        *go_on = !(active[i] ? uz_reaction_pulls(box->r[i]) : uz_gap_penetrates(g[i]));
-    return UZ_OK;
-}
-
-static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, bool *active, uz_error *err)
-{
-    const uz_dual_load *load = &x->sparse.load;
-    const uz_bounded *box = x->sparse.box;
     const uz_bounds *bounds = box->bounds;
-    double least = ACTIVE_FLOOR * x->aim, tolerance = fmax(least, x->coarse), *held = x->cg.p, *e = x->cg.r;
-    bool go_on = true;
-    for (int64_t j = 0; j < load->K->cols; j++)
+    const double least = ACTIVE_FLOOR * x->aim, root = sqrt(load->dual->amg->info.lambda),
+                 most = uz_root(-2.0 * load->psi0);
+    double tolerance = fmax(least, x->coarse), *held = x->cg.p, *e = x->cg.r;
+    uz_status status = UZ_OK;
+    for (int64_t j = 0; j < d; j++)
         held[j] = box->fixed[j] ? box->u[j] : 0.0;
-    memcpy(x->right, x->p, (size_t)load->K->cols * sizeof *x->right);
+    memcpy(x->right, x->p, (size_t)d * sizeof *x->right);
     uz_csc_symv(x->right, load->K, -1.0, held); /* p - K u of the dofs that are held, and no others */
-    uz_status status = solve_to(x, cg, tolerance, g, active, &go_on, err);
-    if (go_on && tolerance > least)
-        status = solve_to(x, cg, least, g, active, &go_on, err);
-    memcpy(r, box->r, (size_t)load->dual->m * sizeof *r);
+    for (bool go_on = true; status == UZ_OK && go_on; tolerance = least) {
+        double square = 0.0;
+        uz_bounded_balance(box, load->K);
+        for (int64_t j = 0; j < d; j++)
+            square += box->u[j] * (box->force[j] + box->p[j]);
+        double norm = fmin(uz_root(square), most > 0.0 ? most : INFINITY);
+        uz_cg_stop stop = stop_at(x, 0.0, tolerance * norm * root);
+        uz_cg_info info;
+        status = uz_cg_solve(&info, box->u, cg, load->K, x->right, &stop, err);
+        if (status != UZ_OK)
+            break;
+        uz_bounded_balance(box, load->K);
+        uz_bounded_react(&x->sparse, g, active);
+        go_on = info.met && tolerance > least;
+        for (int64_t i = 0; go_on && i < m; i++)
+            go_on = !(active[i] ? uz_reaction_pulls(box->r[i]) : uz_gap_penetrates(g[i]));
+    }
+    memcpy(r, box->r, (size_t)m * sizeof *r);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
     if (status != UZ_OK)
         return status;
     /* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears.
      */
-    memcpy(e, box->force, (size_t)load->K->cols * sizeof *e);
-    for (int64_t i = 0; i < load->dual->m; i++)
+    memcpy(e, box->force, (size_t)d * sizeof *e);
+    for (int64_t i = 0; i < m; i++)
         e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
     status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
-    const double square = uz_dot(load->K->cols, e, x->cg.z);
-    x->slack = uz_root(square / load->dual->amg->info.lambda);
+    x->sparse.slack = uz_root(uz_dot(d, e, x->cg.z) / load->dual->amg->info.lambda);
     return status;
 }
 
@@ -251,6 +269,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     if (status == UZ_OK) {
         const size_t bytes = uz_multigrid_describe(mg).bytes + 56 * (size_t)load->dual->d;
         load->most = bytes > load->most ? bytes : load->most;
+        load->most = box->swept_bytes > load->most ? box->swept_bytes : load->most; /* not at the same time */
     }
     if (status == UZ_OK)
         status = solve_stepwise(x, &cg, r, g, active, err);
@@ -273,8 +292,9 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
 #define STEPS           6.0
 #define STEP_CYCLES     30.0
 #define CHANGE_CYCLES   6.0
-/* As UZ_COST_VECTORS, with conjugate gradients. */
-#define VECTORS 62.0
+/* As UZ_COST_VECTORS, with conjugate gradients; not all of them at the time of what a guess of bounds takes. */
+#define VECTORS        62.0
+#define BOUNDS_VECTORS 50.0
 
 static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
                      const uz_cost_rates *rates)
@@ -288,8 +308,10 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     cost->setup_s += setup * cycle;
     cost->case_s += load * cycle;
     cost->flops += (setup + load) * CYCLE_PASSES * 4.0 * (double)size->k_entries;
-    cost->bytes += (size->bounds ? 2.0 : 1.0) * levels;
-    cost->bytes += 8.0 * VECTORS * (double)size->d;
+    /* beside it another multigrid, for the free dofs, or before it the dofs that are swept, with both triangles of K */
+    const double swept = 32.0 * (double)size->k_entries + 52.0 * (double)size->d;
+    cost->bytes += levels + (size->bounds ? fmax(levels, swept) : 0.0);
+    cost->bytes += 8.0 * (size->bounds ? BOUNDS_VECTORS : VECTORS) * (double)size->d;
 }
 
 const uz_dual_form uz_dual_matrix_free = {
@@ -304,7 +326,7 @@ const uz_dual_form uz_dual_matrix_free = {
     .aim = aim_at,
     .probe = probe,
     .apply = apply,
-    .correct = correct,
+    .correct = uz_sparse_correct,
     .recover = uz_sparse_recover,
     .solve_active = solve_active,
     .guess_active = uz_sparse_guess_active,

@@ -13,7 +13,7 @@
 
 #include "dual/sparse.h"
 
-/* See uz_dual_load_solve_active. *end stays as it is where rows are too dense for S, contradict each other, or it had
+/* See uz_active_end. *end stays as it is where rows are too dense for S, contradict each other, or it had
  * to stop. */
 uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_active_end *end, double *r, double *g,
                                const bool *active, uz_error *err);

@@ -82,12 +82,17 @@ uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err)
 
 void uz_sparse_unload(uz_sparse_load *x)
 {
-    free(x->base);
-    free(x->response);
-    free(x->work);
-    free(x->work2);
-    free(x->weight);
-    uz_bounded_free(x->box);
+    uz_bounded *box = x->box;
+    void *room[] = {x->base, x->response, x->work, x->work2, x->weight};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    if (!box)
+        return;
+    void *of_box[] = {box->p,     box->top, box->bottom, box->u,     box->force,  box->size,
+                      box->point, box->r,   box->upper,  box->lower, box->holder, box->fixed};
+    for (size_t k = 0; k < sizeof of_box / sizeof of_box[0]; k++)
+        free(of_box[k]);
+    free(box);
 }
 
 enum { MAX_SWEEPS = 60 };
@@ -103,9 +108,9 @@ static double column_dot(const uz_csc *Nt, int64_t i, const double *x)
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
  * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957); no bound where rows are left that penetrate by more than
  * rounding. */
-uz_status uz_sparse_correct(uz_sparse_load *x, double *bound2, double slack, const double *r, const double *g,
-                            const bool *close)
+uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
 {
+    uz_sparse_load *x = (uz_sparse_load *)load;
     const uz_dual *dual = x->load.dual;
     const uz_csc *Nt = &dual->Nt;
     double *c = x->load.correction, *Nc = x->work, *Kc = x->work2, square = 0.0, complementarity = 0.0, scale = 0.0;
@@ -142,7 +147,7 @@ uz_status uz_sparse_correct(uz_sparse_load *x, double *bound2, double slack, con
     uz_csc_symv(Kc, x->load.K, 1.0, c);
     for (int64_t j = 0; j < dual->d; j++)
         square += c[j] * Kc[j];
-    double distance = sqrt(fmax(0.0, square)) + slack;
+    double distance = sqrt(fmax(0.0, square)) + x->slack;
     *bound2 = distance * distance + 2.0 * complementarity;
     return UZ_OK;
 }

@@ -25,6 +25,7 @@ typedef struct {
     double *force, *size;   /* d: a residual of equilibrium and what its rounding is in proportion to */
     double *point;          /* d: where the sweeps ended; energy INFINITY before the first */
     double point_energy;
+    size_t swept_bytes; /* what the dofs that were swept last took, until the sweeps ended */
 } uz_bounded;
 
 typedef struct {
@@ -39,6 +40,7 @@ typedef struct {
     double *response;     /* d: K^-1 N'r of the last apply */
     double *work, *work2; /* max(d, m) each */
     double *weight;       /* d: 1 / K_ii: the metric in which penetrating rows are lifted */
+    double slack;         /* how far u(r) is from what the last apply or solve_active left, in the energy norm */
     uz_bounded *box;      /* with bounds, else NULL */
 } uz_sparse_load;
 
@@ -48,15 +50,12 @@ void uz_sparse_clear(uz_dual *dual);
 uz_status uz_sparse_load_begin(uz_sparse_load *x, uz_error *err);
 uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err);
 void uz_sparse_unload(uz_sparse_load *x);
-/* slack: how far u(r) is from what the last apply left, in the energy norm. */
-uz_status uz_sparse_correct(uz_sparse_load *x, double *bound2, double slack, const double *r, const double *g,
-                            const bool *close);
+uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
 uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err);
 bool uz_sparse_guess_active(uz_dual_load *load, bool *active);
 
 /* x->box, once base, h and g0 are there. */
 uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const double *p, uz_error *err);
-void uz_bounded_free(uz_bounded *box);
 
 /* Steps of solve_active: holds the dofs of the active rows at their bounds, the others at 0 or where they were (keep);
  * false: the bounds contradict each other. force = K u - p and size = |K| |u| + |p|, what its rounding is in proportion

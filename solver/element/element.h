@@ -42,16 +42,11 @@ double uz_stress_zz(uz_model model, uz_lame lame, const double *stress, double f
 
 /* --------------------------------------------------------- reference element */
 
-/* Reference coordinates of the element's nodes: [node][3]. */
-const double (*uz_element_local_nodes(uz_element_kind kind))[3];
-
 /* Values of the shape functions at a local point; N has one per node. */
 void uz_element_shape(double *N, uz_element_kind kind, const double point[3]);
 
-/* Gauss rule of the stiffness: how many points, and the g-th of them with its weight (the reference volume is their
- * sum). */
-int uz_element_gauss_count(uz_element_kind kind, uz_model model);
-double uz_element_gauss(double point[3], uz_element_kind kind, uz_model model, int g);
+/* Gauss rule of the stiffness; the reference volume is the sum of its weights. */
+const uz_gauss_rule *uz_element_rule(uz_element_kind kind, uz_model model);
 
 /* ------------------------------------------------------------------ element */
 

@@ -45,11 +45,6 @@ bool uz_element_parse(uz_element_kind *out, const char *name)
     return false;
 }
 
-int uz_element_dim(uz_element_kind kind)
-{
-    return uz_element_types[kind]->dim;
-}
-
 int uz_element_node_count(uz_element_kind kind)
 {
     return uz_element_types[kind]->nodes;

@@ -8,32 +8,22 @@
 #ifndef UZ_ELEMENT_ELEMENT_TYPE_H
 #define UZ_ELEMENT_ELEMENT_TYPE_H
 
+#include "element/sizes.h"
 #include "uzawa.h"
-
-enum {
-    UZ_ELEMENT_NODES = 20,   /* most nodes of an element */
-    UZ_ELEMENT_DOFS = 60,    /* most displacements */
-    UZ_ELEMENT_CORNERS = 8,  /* most corners */
-    UZ_ELEMENT_SIDES = 6,    /* most sides */
-    UZ_ELEMENT_PARTS = 6,    /* most elements of a cell of a box */
-    UZ_ELEMENT_GAUSS = 27,   /* most integration points */
-    UZ_ELEMENT_SAMPLES = 8,  /* most points that its stress is recovered from */
-    UZ_ELEMENT_STRESSES = 6, /* most components of stress */
-    UZ_ELEMENT_INTERNAL = 9, /* most internal parameters (incompatible modes) */
-    UZ_SIDE_NODES = 8,       /* most nodes of a side */
-    UZ_SIDE_GAUSS = 9        /* most integration points of a side */
-};
 
 typedef struct {
     int nodes, corners, node[UZ_SIDE_NODES]; /* local nodes: corners, then middles; see uz_side for the sense */
 } uz_element_side;
 
 typedef struct {
+    double at[3], weight;
+} uz_gauss_point;
+typedef struct {
     int count;
-    double (*point)(double point[3], int g); /* the g-th point; returns its weight */
+    const uz_gauss_point *point;
 } uz_gauss_rule;
 
-typedef struct {
+typedef struct uz_element_type {
     const char *name;        /* in requests and messages: "hex20" */
     int dim, nodes, corners; /* nodes in VTK's order: corners come first */
     int sides;
@@ -44,7 +34,7 @@ typedef struct {
     const double (*local)[3]; /* nodes: local coordinates */
     double centre[3];
     /* Shape functions at a point: N[node] their values, slope[node][axis] their derivatives; each may be NULL. */
-    void (*shape)(double *N, double (*slope)[3], const double point[3]);
+    void (*shape)(const struct uz_element_type *type, double *N, double (*slope)[3], const double point[3]);
     uz_gauss_rule rule, ring; /* of the stiffness: the fewest points that leave no deformation without stiffness; `ring`
                                * is that of axisymmetric bodies, count 0: the same */
     uz_gauss_rule energy;     /* of the error estimate, which squares what is linear (quadratic types: quadratic) in an

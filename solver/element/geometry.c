@@ -11,30 +11,16 @@
 /* The sine of the least angle, in the sense of Hadamard's inequality, that is more than rounding. */
 #define FLAT (64 * DBL_EPSILON)
 
-const double (*uz_element_local_nodes(uz_element_kind kind))[3]
-{
-    return uz_element_type_of(kind)->local;
-}
-
 void uz_element_shape(double *N, uz_element_kind kind, const double point[3])
 {
-    uz_element_type_of(kind)->shape(N, NULL, point);
+    const uz_element_type *type = uz_element_type_of(kind);
+    type->shape(type, N, NULL, point);
 }
 
-static const uz_gauss_rule *rule_of(uz_element_kind kind, uz_model model)
+const uz_gauss_rule *uz_element_rule(uz_element_kind kind, uz_model model)
 {
     const uz_element_type *type = uz_element_type_of(kind);
     return model == UZ_AXISYMMETRIC && type->ring.count > 0 ? &type->ring : &type->rule;
-}
-
-int uz_element_gauss_count(uz_element_kind kind, uz_model model)
-{
-    return rule_of(kind, model)->count;
-}
-
-double uz_element_gauss(double point[3], uz_element_kind kind, uz_model model, int g)
-{
-    return rule_of(kind, model)->point(point, g);
 }
 
 /* Positions are taken from the first node, so that an element far from the origin keeps its digits. Inlined for each
@@ -53,7 +39,7 @@ void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEM
 {
     double sum[3][3] = {{0}};
     const int nodes = uz_element_node_count(element->kind);
-    if (uz_element_dim(element->kind) == 2)
+    if (uz_element_type_of(element->kind)->dim == 2)
         add_nodes(sum, element->xyz, local, nodes, 2);
     else
         add_nodes(sum, element->xyz, local, nodes, 3);
@@ -89,8 +75,9 @@ double uz_invert_jacobian(double inverse[3][3], double J[3][3], int dim)
 double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3])
 {
     double local[UZ_ELEMENT_NODES][3], J[3][3], inverse[3][3];
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
-    uz_element_type_of(element->kind)->shape(NULL, local, point);
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
+    const uz_element_type *type = uz_element_type_of(element->kind);
+    type->shape(type, NULL, local, point);
     uz_jacobian(J, element, local);
     const double det = uz_invert_jacobian(inverse, J, dim);
     for (int a = 0; a < nodes; a++)
@@ -117,9 +104,10 @@ double uz_ring_radius(double *largest, const uz_element *element, const double *
 void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g)
 {
     double largest;
-    const double weight = uz_element_gauss(state->point, element->kind, element->model, g);
+    const uz_gauss_point *at = &uz_element_rule(element->kind, element->model)->point[g];
+    memcpy(state->point, at->at, sizeof at->at);
     state->det = uz_element_gradients(state->grad, element, state->point);
-    state->volume = weight * state->det;
+    state->volume = at->weight * state->det;
     if (element->model == UZ_AXISYMMETRIC) {
         uz_element_shape(state->N, element->kind, state->point);
         state->radius = uz_ring_radius(&largest, element, state->N);
@@ -132,7 +120,7 @@ void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g)
 double uz_element_volume(const uz_element *element)
 {
     double volume = 0;
-    const int count = uz_element_gauss_count(element->kind, element->model);
+    const int count = uz_element_rule(element->kind, element->model)->count;
     for (int g = 0; g < count; g++) {
         uz_gauss_state state;
         uz_gauss_state_at(&state, element, g);
@@ -144,8 +132,8 @@ double uz_element_volume(const uz_element *element)
 double uz_mean_gradients(double mean[UZ_ELEMENT_NODES][3], const uz_element *element)
 {
     double volume = 0;
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
-    const int count = uz_element_gauss_count(element->kind, element->model);
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_rule(element->kind, element->model)->count;
     for (int a = 0; a < nodes; a++)
         mean[a][0] = mean[a][1] = mean[a][2] = 0;
     for (int g = 0; g < count; g++) {
@@ -169,9 +157,10 @@ double uz_centre_jacobian(double inverse[3][3], const uz_element *element)
 {
     static const double CENTRE[3] = {0, 0, 0};
     double local[UZ_ELEMENT_NODES][3], J[3][3];
-    uz_element_type_of(element->kind)->shape(NULL, local, CENTRE);
+    const uz_element_type *type = uz_element_type_of(element->kind);
+    type->shape(type, NULL, local, CENTRE);
     uz_jacobian(J, element, local);
-    return uz_invert_jacobian(inverse, J, uz_element_dim(element->kind));
+    return uz_invert_jacobian(inverse, J, uz_element_type_of(element->kind)->dim);
 }
 
 void uz_mode_gradients(double grad[3][3], double centre[3][3], double centre_det, int dim, const double point[3],
@@ -186,8 +175,8 @@ void uz_mode_gradients(double grad[3][3], double centre[3][3], double centre_det
 
 void uz_element_add_body_force(double *f, const uz_element *element, const double *b)
 {
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
-    const int count = uz_element_gauss_count(element->kind, element->model);
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_rule(element->kind, element->model)->count;
     for (int g = 0; g < count; g++) {
         uz_gauss_state state;
         uz_gauss_state_at(&state, element, g);
@@ -203,8 +192,8 @@ void uz_element_add_body_force(double *f, const uz_element *element, const doubl
 void uz_element_add_thermal_load(double *f, const uz_element *element, const double *thermal_strain)
 {
     double s[UZ_ELEMENT_STRESSES];
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
-    const int count = uz_element_gauss_count(element->kind, element->model);
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_rule(element->kind, element->model)->count;
     uz_elastic_stress(s, element->model, element->lame, thermal_strain);
     const bool ring = element->model == UZ_AXISYMMETRIC;
     const double shear = ring ? s[3] : s[2];
@@ -237,15 +226,15 @@ static uz_shape_fault check_jacobian(const uz_element *element)
     const int dim = type->dim, nodes = type->jacobian == UZ_JACOBIAN_CONSTANT ? 1 : type->nodes;
     const int points = type->jacobian == UZ_JACOBIAN_CONSTANT || type->jacobian == UZ_JACOBIAN_LINEAR
                            ? nodes
-                           : nodes + uz_element_gauss_count(element->kind, element->model);
+                           : nodes + uz_element_rule(element->kind, element->model)->count;
     uz_shape_fault fault = UZ_SHAPE_GOOD;
     for (int k = 0; k < points; k++) {
         double local[UZ_ELEMENT_NODES][3], J[3][3], point[3], lengths = 1;
         if (k < nodes)
             memcpy(point, type->local[k], sizeof point);
         else
-            uz_element_gauss(point, element->kind, element->model, k - nodes);
-        type->shape(NULL, local, point);
+            memcpy(point, uz_element_rule(element->kind, element->model)->point[k - nodes].at, sizeof point);
+        type->shape(type, NULL, local, point);
         uz_jacobian(J, element, local);
         for (int i = 0; i < dim; i++)
             lengths *= sqrt(J[i][0] * J[i][0] + J[i][1] * J[i][1] + (dim == 3 ? J[i][2] * J[i][2] : 0));
@@ -271,13 +260,13 @@ uz_shape_fault uz_element_check(const uz_element *element)
         return UZ_SHAPE_GOOD;
     /* A node on the axis may have a rounding error of a mesh's generator for a radius. Between good nodes the quadratic
      * radius of a curved side may still be negative. */
-    const int points = type->nodes + uz_element_gauss_count(kind, element->model);
+    const int points = type->nodes + uz_element_rule(kind, element->model)->count;
     for (int k = 0; k < points; k++) {
         double N[UZ_ELEMENT_NODES], point[3], largest;
         if (k < type->nodes)
             memcpy(point, type->local[k], sizeof point);
         else
-            uz_element_gauss(point, kind, element->model, k - type->nodes);
+            memcpy(point, uz_element_rule(kind, element->model)->point[k - type->nodes].at, sizeof point);
         uz_element_shape(N, kind, point);
         const double radius = uz_ring_radius(&largest, element, N);
         if (k < type->nodes ? radius < -UZ_AXIS * largest : radius <= 0)

@@ -13,10 +13,39 @@ static const int EDGE[12][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6},
                                 {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
 static const int GMSH[20] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15};
 
+static const uz_gauss_point GAUSS[27] = {{{-UZ_GAUSS3, -UZ_GAUSS3, -UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{0, -UZ_GAUSS3, -UZ_GAUSS3}, UZ_INNER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{UZ_GAUSS3, -UZ_GAUSS3, -UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{-UZ_GAUSS3, 0, -UZ_GAUSS3}, UZ_OUTER3 *UZ_INNER3 *UZ_OUTER3},
+                                         {{0, 0, -UZ_GAUSS3}, UZ_INNER3 *UZ_INNER3 *UZ_OUTER3},
+                                         {{UZ_GAUSS3, 0, -UZ_GAUSS3}, UZ_OUTER3 *UZ_INNER3 *UZ_OUTER3},
+                                         {{-UZ_GAUSS3, UZ_GAUSS3, -UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{0, UZ_GAUSS3, -UZ_GAUSS3}, UZ_INNER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{UZ_GAUSS3, UZ_GAUSS3, -UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{-UZ_GAUSS3, -UZ_GAUSS3, 0}, UZ_OUTER3 *UZ_OUTER3 *UZ_INNER3},
+                                         {{0, -UZ_GAUSS3, 0}, UZ_INNER3 *UZ_OUTER3 *UZ_INNER3},
+                                         {{UZ_GAUSS3, -UZ_GAUSS3, 0}, UZ_OUTER3 *UZ_OUTER3 *UZ_INNER3},
+                                         {{-UZ_GAUSS3, 0, 0}, UZ_OUTER3 *UZ_INNER3 *UZ_INNER3},
+                                         {{0, 0, 0}, UZ_INNER3 *UZ_INNER3 *UZ_INNER3},
+                                         {{UZ_GAUSS3, 0, 0}, UZ_OUTER3 *UZ_INNER3 *UZ_INNER3},
+                                         {{-UZ_GAUSS3, UZ_GAUSS3, 0}, UZ_OUTER3 *UZ_OUTER3 *UZ_INNER3},
+                                         {{0, UZ_GAUSS3, 0}, UZ_INNER3 *UZ_OUTER3 *UZ_INNER3},
+                                         {{UZ_GAUSS3, UZ_GAUSS3, 0}, UZ_OUTER3 *UZ_OUTER3 *UZ_INNER3},
+                                         {{-UZ_GAUSS3, -UZ_GAUSS3, UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{0, -UZ_GAUSS3, UZ_GAUSS3}, UZ_INNER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{UZ_GAUSS3, -UZ_GAUSS3, UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{-UZ_GAUSS3, 0, UZ_GAUSS3}, UZ_OUTER3 *UZ_INNER3 *UZ_OUTER3},
+                                         {{0, 0, UZ_GAUSS3}, UZ_INNER3 *UZ_INNER3 *UZ_OUTER3},
+                                         {{UZ_GAUSS3, 0, UZ_GAUSS3}, UZ_OUTER3 *UZ_INNER3 *UZ_OUTER3},
+                                         {{-UZ_GAUSS3, UZ_GAUSS3, UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{0, UZ_GAUSS3, UZ_GAUSS3}, UZ_INNER3 *UZ_OUTER3 *UZ_OUTER3},
+                                         {{UZ_GAUSS3, UZ_GAUSS3, UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3 *UZ_OUTER3}};
+
 /* Corners: product of (1 + p_i x_i) / 8 times (sum of p_i x_i - 2); middles: (1 - x_k^2) / 4 times that of the other
  * two axes, k being the one along which p_k = 0. */
-static void shape(double *N, double (*slope)[3], const double point[3])
+static void shape(const uz_element_type *type, double *N, double (*slope)[3], const double point[3])
 {
+    (void)type;
     for (int a = 0; a < 20; a++) {
         double factor[3], product = a < 8 ? 0.125 : 0.25, sum = -2;
         for (int i = 0; i < 3; i++) {
@@ -32,11 +61,6 @@ static void shape(double *N, double (*slope)[3], const double point[3])
             slope[a][i] = a < 8 ? 0.125 * p * others * (sum + factor[i]) : 0.25 * others * (p == 0 ? -2 * point[i] : p);
         }
     }
-}
-
-static double gauss(double point[3], int g)
-{
-    return uz_gauss_line3(&point[0], g % 3) * uz_gauss_line3(&point[1], g / 3 % 3) * uz_gauss_line3(&point[2], g / 9);
 }
 
 const uz_element_type uz_type_hex20 = {
@@ -55,7 +79,7 @@ const uz_element_type uz_type_hex20 = {
     .linear = UZ_HEX8,
     .local = LOCAL,
     .shape = shape,
-    .rule = {27, gauss},
+    .rule = {27, GAUSS},
     .recover = uz_recover_box,
     .vtk = 25,
     .gmsh = 17,

@@ -6,8 +6,16 @@ static const double LOCAL[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1
 static const int NEXT[8][3] = {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7}, {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}};
 static const int PART[1][UZ_ELEMENT_CORNERS] = {{0, 1, 2, 3, 4, 5, 6, 7}};
 
-static void shape(double *N, double (*slope)[3], const double point[3])
+/* Product of the rule of two points. */
+static const uz_gauss_point GAUSS[8] = {
+    {{-UZ_GAUSS2, -UZ_GAUSS2, -UZ_GAUSS2}, 1}, {{UZ_GAUSS2, -UZ_GAUSS2, -UZ_GAUSS2}, 1},
+    {{UZ_GAUSS2, UZ_GAUSS2, -UZ_GAUSS2}, 1},   {{-UZ_GAUSS2, UZ_GAUSS2, -UZ_GAUSS2}, 1},
+    {{-UZ_GAUSS2, -UZ_GAUSS2, UZ_GAUSS2}, 1},  {{UZ_GAUSS2, -UZ_GAUSS2, UZ_GAUSS2}, 1},
+    {{UZ_GAUSS2, UZ_GAUSS2, UZ_GAUSS2}, 1},    {{-UZ_GAUSS2, UZ_GAUSS2, UZ_GAUSS2}, 1}};
+
+static void shape(const uz_element_type *type, double *N, double (*slope)[3], const double point[3])
 {
+    (void)type;
     for (int a = 0; a < 8; a++) {
         const double *at = LOCAL[a];
         const double x = 1 + at[0] * point[0], y = 1 + at[1] * point[1], z = 1 + at[2] * point[2];
@@ -19,13 +27,6 @@ static void shape(double *N, double (*slope)[3], const double point[3])
             slope[a][2] = 0.125 * at[2] * x * y;
         }
     }
-}
-
-static double gauss(double point[3], int g)
-{
-    for (int i = 0; i < 3; i++)
-        point[i] = UZ_GAUSS2 * LOCAL[g][i];
-    return 1;
 }
 
 const uz_element_type uz_type_hex8 = {
@@ -43,7 +44,7 @@ const uz_element_type uz_type_hex8 = {
     .linear = UZ_HEX8,
     .local = LOCAL,
     .shape = shape,
-    .rule = {8, gauss},
+    .rule = {8, GAUSS},
     .bbar = true,
     .incompatible = true,
     .recover = uz_recover_box,

@@ -10,7 +10,7 @@ void uz_element_move(uz_element_motion *motion, const uz_element *element, const
     motion->u = u;
     if (element->formulation == UZ_FORMULATION_BBAR) {
         double mean[UZ_ELEMENT_NODES][3];
-        const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+        const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
         uz_mean_gradients(mean, element);
         for (int a = 0; a < nodes; a++)
             for (int c = 0; c < dim; c++)
@@ -34,7 +34,7 @@ void uz_element_strain(double *strain, const uz_element_motion *motion, const do
 {
     double grad[UZ_ELEMENT_NODES][3], H[3][3] = {{0}};
     const uz_element *element = motion->element;
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
     const double det = uz_element_gradients(grad, element, point);
     add_gradient(H, grad, motion->u, nodes, dim);
     if (element->formulation == UZ_FORMULATION_INCOMPATIBLE) {

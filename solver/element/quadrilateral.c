@@ -6,8 +6,25 @@ static const int EDGE[4][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}};
 static const int NEXT[4][3] = {{1, 3}, {2, 0}, {3, 1}, {0, 2}};
 static const int PART[1][UZ_ELEMENT_CORNERS] = {{0, 1, 2, 3}};
 
-static void shape4(double *N, double (*slope)[3], const double point[3])
+/* Products of the rules of two and of three points. */
+static const uz_gauss_point FOUR[4] = {{{-UZ_GAUSS2, -UZ_GAUSS2}, 1},
+                                       {{UZ_GAUSS2, -UZ_GAUSS2}, 1},
+                                       {{UZ_GAUSS2, UZ_GAUSS2}, 1},
+                                       {{-UZ_GAUSS2, UZ_GAUSS2}, 1}};
+
+static const uz_gauss_point NINE[9] = {{{-UZ_GAUSS3, -UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3},
+                                       {{0, -UZ_GAUSS3}, UZ_INNER3 *UZ_OUTER3},
+                                       {{UZ_GAUSS3, -UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3},
+                                       {{-UZ_GAUSS3, 0}, UZ_OUTER3 *UZ_INNER3},
+                                       {{0, 0}, UZ_INNER3 *UZ_INNER3},
+                                       {{UZ_GAUSS3, 0}, UZ_OUTER3 *UZ_INNER3},
+                                       {{-UZ_GAUSS3, UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3},
+                                       {{0, UZ_GAUSS3}, UZ_INNER3 *UZ_OUTER3},
+                                       {{UZ_GAUSS3, UZ_GAUSS3}, UZ_OUTER3 *UZ_OUTER3}};
+
+static void shape4(const uz_element_type *type, double *N, double (*slope)[3], const double point[3])
 {
+    (void)type;
     const double x = point[0], y = point[1];
     for (int a = 0; a < 4; a++) {
         const double p = LOCAL[a][0], q = LOCAL[a][1];
@@ -20,16 +37,9 @@ static void shape4(double *N, double (*slope)[3], const double point[3])
     }
 }
 
-static double gauss4(double point[3], int g)
+static void shape8(const uz_element_type *type, double *N, double (*slope)[3], const double point[3])
 {
-    point[0] = UZ_GAUSS2 * LOCAL[g][0];
-    point[1] = UZ_GAUSS2 * LOCAL[g][1];
-    point[2] = 0;
-    return 1;
-}
-
-static void shape8(double *N, double (*slope)[3], const double point[3])
-{
+    (void)type;
     const double x = point[0], y = point[1];
     for (int a = 0; a < 8; a++) {
         const double p = LOCAL[a][0], q = LOCAL[a][1];
@@ -50,12 +60,6 @@ static void shape8(double *N, double (*slope)[3], const double point[3])
     }
 }
 
-static double gauss9(double point[3], int g)
-{
-    point[2] = 0;
-    return uz_gauss_line3(&point[0], g % 3) * uz_gauss_line3(&point[1], g / 3);
-}
-
 const uz_element_type uz_type_quad4 = {
     .name = "quad4",
     .dim = 2,
@@ -66,7 +70,7 @@ const uz_element_type uz_type_quad4 = {
     .linear = UZ_QUAD4,
     .local = LOCAL,
     .shape = shape4,
-    .rule = {4, gauss4},
+    .rule = {4, FOUR},
     .jacobian = UZ_JACOBIAN_LINEAR,
     .bbar = true,
     .incompatible = true,
@@ -91,7 +95,7 @@ const uz_element_type uz_type_quad8 = {
     .linear = UZ_QUAD4,
     .local = LOCAL,
     .shape = shape8,
-    .rule = {9, gauss9},
+    .rule = {9, NINE},
     .recover = uz_recover_box,
     .vtk = 23,
     .gmsh = 16,

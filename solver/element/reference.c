@@ -20,10 +20,10 @@ double uz_barycentric_slope(int a, int i)
     return a == 0 ? -1 : a == i + 1;
 }
 
-void uz_simplex_shape(double *N, double (*slope)[3], int dim, int nodes, const double point[3])
+void uz_simplex_shape(const uz_element_type *type, double *N, double (*slope)[3], const double point[3])
 {
     double L[4];
-    const int corners = dim + 1;
+    const int dim = type->dim, nodes = type->nodes, corners = type->corners;
     uz_barycentric(L, dim, point);
     for (int a = 0; a < corners; a++) {
         if (N)
@@ -42,39 +42,27 @@ void uz_simplex_shape(double *N, double (*slope)[3], int dim, int nodes, const d
 
 /* ------------------------------------------------------------- Gauss rules */
 
-double uz_gauss_line3(double *at, int g)
-{
-    static const double AT[3] = {-UZ_GAUSS3, 0, UZ_GAUSS3}, WEIGHT[3] = {5. / 9, 8. / 9, 5. / 9};
-    *at = AT[g];
-    return WEIGHT[g];
-}
-
-double uz_gauss_triangle1(double point[3], int g)
-{
-    (void)g;
-    point[0] = point[1] = 1. / 3;
-    point[2] = 0;
-    return 1. / 2;
-}
-
 /* Strang and Fix, "An Analysis of the Finite Element Method", section 4.3. */
-double uz_gauss_triangle3(double point[3], int g)
-{
-    static const double AT[3][3] = {{1. / 6, 1. / 6}, {2. / 3, 1. / 6}, {1. / 6, 2. / 3}};
-    memcpy(point, AT[g], sizeof AT[g]);
-    return 1. / 2 / 3;
-}
+const uz_gauss_point uz_gauss_triangle3[3] = {
+    {{1. / 6, 1. / 6}, 1. / 2 / 3}, {{2. / 3, 1. / 6}, 1. / 2 / 3}, {{1. / 6, 2. / 3}, 1. / 2 / 3}};
 
-/* Degree 4 (G. Cowper, "Gaussian quadrature formulas for triangles", Int. J. Numer. Meth. Engng 7 (1973) 405-408). */
-double uz_gauss_triangle6(double point[3], int g)
-{
-    const double sign = g < 3 ? 1 : -1, off = sqrt(38 - 44 * sqrt(0.4));
-    const double near = (8 - sqrt(10) + sign * off) / 18;
-    point[0] = g % 3 == 1 ? 1 - 2 * near : near;
-    point[1] = g % 3 == 2 ? 1 - 2 * near : near;
-    point[2] = 0;
-    return (620 + sign * sqrt(213125 - 53320 * sqrt(10))) / 3720 / 2;
-}
+/* G. Cowper, "Gaussian quadrature formulas for triangles", Int. J. Numer. Meth. Engng 7 (1973) 405-408: rings of three
+ * at a = (8 - sqrt(10) +- sqrt(38 - 44 sqrt(0.4))) / 18 and 1 - 2 a, with (620 +- sqrt(213125 - 53320 sqrt(10))) / 3720
+ * for a triangle of area 1. */
+#define A 0.44594849091596483
+#define B 0.10810301816807033
+#define C 0.09157621350977073
+#define D 0.8168475729804585
+#define V 0.11169079483900572
+#define W 0.054975871827660935
+const uz_gauss_point uz_gauss_triangle6[6] = {{{A, A}, V}, {{B, A}, V}, {{A, B}, V},
+                                              {{C, C}, W}, {{D, C}, W}, {{C, D}, W}};
+#undef A
+#undef B
+#undef C
+#undef D
+#undef V
+#undef W
 
 /* ---------------------------------------------------------------- recovery */
 

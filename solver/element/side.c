@@ -32,7 +32,8 @@ void uz_side_gradients(double *N, double slope[][3], const uz_side *side, const 
     const double s = point[0];
     if (side->dim == 3) {
         const double at[3] = {point[0], point[1]};
-        uz_face_type(side->nodes)->shape(N, slope, at);
+        const uz_element_type *type = uz_face_type(side->nodes);
+        type->shape(type, N, slope, at);
     } else if (side->nodes == 2) {
         N[0] = 0.5 * (1 - s);
         N[1] = 0.5 * (1 + s);
@@ -79,10 +80,9 @@ double uz_side_gauss(double point[2], const uz_side *side, int g)
         point[1] = g % 3 == 2 && !centre ? 1 - 2 * each : each;
         return 0.5 * (centre ? 9. / 40 : nodes == 3 ? 1. / 3 : outer ? WEIGHT_A : WEIGHT_B);
     }
-    double place[3];
-    const double weight = uz_face_type(side->nodes)->rule.point(place, g);
-    memcpy(point, place, 2 * sizeof *point);
-    return weight;
+    const uz_gauss_point *inside = &uz_face_type(side->nodes)->rule.point[g];
+    memcpy(point, inside->at, 2 * sizeof *point);
+    return inside->weight;
 }
 
 /* ------------------------------------------------------------------- areas */

@@ -90,8 +90,8 @@ static int flatten(double *v, double grad[][3], int count, int dim)
 static int integrate(double *K, const uz_element *element)
 {
     double S[MOST * MOST], centre[3][3], mode[3][3], v[MOST], centre_det = 1;
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
-    const int count = uz_element_gauss_count(element->kind, element->model), dofs = nodes * dim;
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_rule(element->kind, element->model)->count, dofs = nodes * dim;
     const bool modes = element->formulation == UZ_FORMULATION_INCOMPATIBLE;
     const bool mean = element->formulation == UZ_FORMULATION_BBAR, ring = element->model == UZ_AXISYMMETRIC;
     const int size = dofs + (modes ? dim * dim : 0);
@@ -145,7 +145,7 @@ static int integrate(double *K, const uz_element *element)
 void uz_internal_parameters(double internal[UZ_ELEMENT_INTERNAL], const uz_element *element, const double *u)
 {
     double K[MOST * MOST];
-    const int dim = uz_element_dim(element->kind), dofs = uz_element_node_count(element->kind) * dim;
+    const int dim = uz_element_type_of(element->kind)->dim, dofs = uz_element_node_count(element->kind) * dim;
     const int size = integrate(K, element), count = size - dofs;
     for (int i = 0; i < count; i++) { /* L y = - coupling u */
         const double *row = K + (dofs + i) * MOST;
@@ -166,7 +166,7 @@ void uz_internal_parameters(double internal[UZ_ELEMENT_INTERNAL], const uz_eleme
 uz_shape_fault uz_element_stiffness(double *ke, const uz_element *element)
 {
     double K[MOST * MOST];
-    const int dofs = uz_element_node_count(element->kind) * uz_element_dim(element->kind);
+    const int dofs = uz_element_node_count(element->kind) * uz_element_type_of(element->kind)->dim;
     memset(ke, 0, (size_t)(dofs * dofs) * sizeof *ke);
     const uz_shape_fault fault = uz_element_check(element);
     if (fault != UZ_SHAPE_GOOD)

@@ -19,41 +19,36 @@ static void add_point(uz_strain_rule *rule, const double point[3], double weight
     const int g = rule->points++;
     memcpy(rule->point[g], point, sizeof rule->point[g]);
     rule->weight[g] = weight;
-    uz_element_type_of(rule->kind)->shape(rule->N[g], rule->slope[g], rule->point[g]);
+    const uz_element_type *type = uz_element_type_of(rule->kind);
+    type->shape(type, rule->N[g], rule->slope[g], rule->point[g]);
 }
 
 void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation,
                        const double point[][3], const double *weight, int count)
 {
     static const double ORIGIN[3] = {0};
-    double gauss[3], volume = 0;
-    const int gauss_count = uz_element_gauss_count(kind, model);
+    const uz_element_type *type = uz_element_type_of(kind);
+    const uz_gauss_rule *gauss = uz_element_rule(kind, model);
+    double volume = 0;
     memset(rule, 0, sizeof *rule);
     rule->kind = kind;
     rule->model = model;
     rule->formulation = formulation;
-    rule->dim = uz_element_dim(kind);
+    rule->dim = uz_element_type_of(kind)->dim;
     rule->nodes = uz_element_node_count(kind);
     rule->stresses = uz_stress_count(model);
     rule->direct = rule->stresses == 3 ? 2 : 3;
-    rule->asked = count > 0 ? count : gauss_count;
+    rule->asked = count > 0 ? count : gauss->count;
     rule->averaged = count;
-    uz_element_type_of(kind)->shape(NULL, rule->centre, ORIGIN);
-    for (int g = 0; g < gauss_count; g++)
-        volume += uz_element_gauss(gauss, kind, model, g);
+    type->shape(type, NULL, rule->centre, ORIGIN);
+    for (int g = 0; g < gauss->count; g++)
+        volume += gauss->point[g].weight;
     for (int k = 0; k < count; k++)
         add_point(rule, point[k], weight ? weight[k] : volume / count);
     if (count > 0 && formulation == UZ_FORMULATION_STANDARD)
         return;
-    for (int g = 0; g < gauss_count; g++) {
-        const double part = uz_element_gauss(gauss, kind, model, g);
-        add_point(rule, gauss, part);
-    }
-}
-
-void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
-{
-    uz_strain_rule_at(rule, kind, model, formulation, NULL, NULL, 0);
+    for (int g = 0; g < gauss->count; g++)
+        add_point(rule, gauss->point[g].at, gauss->point[g].weight);
 }
 
 /* ---- shape */

@@ -24,12 +24,9 @@ typedef struct {
     double N[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES], slope[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES][3];
     double centre[UZ_ELEMENT_NODES][3]; /* slope at the origin */
 } uz_strain_rule;
-/* At the Gauss points. */
-void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation);
-
-/* At `count` other points of these weights; NULL: equal parts of the reference volume. The Gauss points follow them
- * where the formulation averages over the element, as all but the standard one do: UZ_ELEMENT_GAUSS bounds both
- * together. */
+/* At `count` points of these weights; NULL: equal parts of the reference volume. The Gauss points follow them where the
+ * formulation averages over the element, as all but the standard one do: UZ_ELEMENT_GAUSS bounds both together. count
+ * 0: at the Gauss points alone. */
 void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation,
                        const double point[][3], const double *weight, int count);
 

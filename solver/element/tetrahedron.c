@@ -5,8 +5,6 @@
  * "Simplizialzerlegungen von beschraenkter Flachheit", 1942). */
 #include "element/reference.h"
 
-#include <string.h>
-
 static const double LOCAL[10][3] = {{0, 0, 0},     {1, 0, 0},   {0, 1, 0},   {0, 0, 1},     {0.5, 0, 0},
                                     {0.5, 0.5, 0}, {0, 0.5, 0}, {0, 0, 0.5}, {0.5, 0, 0.5}, {0, 0.5, 0.5}};
 static const int EDGE[6][2] = {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}};
@@ -15,34 +13,14 @@ static const int PART[6][UZ_ELEMENT_CORNERS] = {{0, 1, 2, 6}, {0, 5, 1, 6}, {0, 
                                                 {0, 2, 3, 6}, {0, 4, 5, 6}, {0, 7, 4, 6}};
 static const int GMSH10[10] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8};
 
-static void shape4(double *N, double (*slope)[3], const double point[3])
-{
-    uz_simplex_shape(N, slope, 3, 4, point);
-}
-
-static double gauss1(double point[3], int g)
-{
-    (void)g;
-    point[0] = point[1] = point[2] = 1. / 4;
-    return 1. / 6;
-}
-
-static void shape10(double *N, double (*slope)[3], const double point[3])
-{
-    uz_simplex_shape(N, slope, 3, 10, point);
-}
-
+static const uz_gauss_point CENTRE[1] = {{{1. / 4, 1. / 4, 1. / 4}, 1. / 6}};
 /* Degree 2: Keast, Comput. Methods Appl. Mech. Engrg 55 (1986). */
-static double gauss4(double point[3], int g)
-{
 #define A 0.13819660112501051518 /* (5 - sqrt(5)) / 20 */
 #define B 0.58541019662496845446 /* (5 + 3 sqrt(5)) / 20 */
-    static const double AT[4][3] = {{A, A, A}, {B, A, A}, {A, B, A}, {A, A, B}};
+static const uz_gauss_point FOUR[4] = {
+    {{A, A, A}, 1. / 6 / 4}, {{B, A, A}, 1. / 6 / 4}, {{A, B, A}, 1. / 6 / 4}, {{A, A, B}, 1. / 6 / 4}};
 #undef A
 #undef B
-    memcpy(point, AT[g], sizeof AT[g]);
-    return 1. / 6 / 4;
-}
 
 const uz_element_type uz_type_tet4 = {
     .name = "tet4",
@@ -54,9 +32,9 @@ const uz_element_type uz_type_tet4 = {
     .linear = UZ_TET4,
     .local = LOCAL,
     .centre = {0.25, 0.25, 0.25},
-    .shape = shape4,
-    .rule = {1, gauss1},
-    .energy = {4, gauss4},
+    .shape = uz_simplex_shape,
+    .rule = {1, CENTRE},
+    .energy = {4, FOUR},
     .jacobian = UZ_JACOBIAN_CONSTANT,
     .recover = uz_recover_centre,
     .next = NEXT,
@@ -83,8 +61,8 @@ const uz_element_type uz_type_tet10 = {
     .linear = UZ_TET4,
     .local = LOCAL,
     .centre = {0.25, 0.25, 0.25},
-    .shape = shape10,
-    .rule = {4, gauss4},
+    .shape = uz_simplex_shape,
+    .rule = {4, FOUR},
     .recover = uz_recover_simplex,
     .vtk = 24,
     .gmsh = 11,

@@ -6,15 +6,7 @@ static const int EDGE[3][2] = {{0, 1}, {1, 2}, {2, 0}};
 static const int NEXT[3][3] = {{1, 2}, {2, 0}, {0, 1}};
 static const int PART[2][UZ_ELEMENT_CORNERS] = {{0, 1, 2}, {0, 2, 3}};
 
-static void shape3(double *N, double (*slope)[3], const double point[3])
-{
-    uz_simplex_shape(N, slope, 2, 3, point);
-}
-
-static void shape6(double *N, double (*slope)[3], const double point[3])
-{
-    uz_simplex_shape(N, slope, 2, 6, point);
-}
+static const uz_gauss_point CENTRE[1] = {{{1. / 3, 1. / 3}, 1. / 2}};
 
 /* A ring needs three points where a plane needs one: N / r is not constant. */
 const uz_element_type uz_type_tri3 = {
@@ -27,8 +19,8 @@ const uz_element_type uz_type_tri3 = {
     .linear = UZ_TRI3,
     .local = LOCAL,
     .centre = {1.0 / 3, 1.0 / 3},
-    .shape = shape3,
-    .rule = {1, uz_gauss_triangle1},
+    .shape = uz_simplex_shape,
+    .rule = {1, CENTRE},
     .ring = {3, uz_gauss_triangle3},
     .energy = {3, uz_gauss_triangle3},
     .jacobian = UZ_JACOBIAN_CONSTANT,
@@ -53,7 +45,7 @@ const uz_element_type uz_type_tri6 = {
     .linear = UZ_TRI3,
     .local = LOCAL,
     .centre = {1.0 / 3, 1.0 / 3},
-    .shape = shape6,
+    .shape = uz_simplex_shape,
     .rule = {3, uz_gauss_triangle3},
     .ring = {6, uz_gauss_triangle6}, /* with curved edges a constant stress does work of degree 4, as r has 2 */
     .energy = {6, uz_gauss_triangle6},

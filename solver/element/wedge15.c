@@ -5,6 +5,8 @@
  * Its stress is most accurate where the rules of one order less have their points: three times two. */
 #include "element/reference.h"
 
+#include <string.h>
+
 static const double LOCAL[15][3] = {{0, 0, -1},    {0, 1, -1},   {1, 0, -1},     {0, 0, 1},    {0, 1, 1},
                                     {1, 0, 1},     {0, 0.5, -1}, {0.5, 0.5, -1}, {0.5, 0, -1}, {0, 0.5, 1},
                                     {0.5, 0.5, 1}, {0.5, 0, 1},  {0, 0, 0},      {0, 1, 0},    {1, 0, 0}};
@@ -14,10 +16,18 @@ static const int CORNER[6] = {0, 2, 1, 0, 2, 1};
 static const int GMSH[15] = {0, 2, 1, 3, 5, 4, 7, 9, 6, 13, 14, 12, 8, 11, 10};
 static const int ABAQUS[15] = {0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13};
 
+static const uz_gauss_point GAUSS[9] = {
+    {{1. / 6, 1. / 6, -UZ_GAUSS3}, 1. / 2 / 3 * UZ_OUTER3}, {{2. / 3, 1. / 6, -UZ_GAUSS3}, 1. / 2 / 3 * UZ_OUTER3},
+    {{1. / 6, 2. / 3, -UZ_GAUSS3}, 1. / 2 / 3 * UZ_OUTER3}, {{1. / 6, 1. / 6, 0}, 1. / 2 / 3 * UZ_INNER3},
+    {{2. / 3, 1. / 6, 0}, 1. / 2 / 3 * UZ_INNER3},          {{1. / 6, 2. / 3, 0}, 1. / 2 / 3 * UZ_INNER3},
+    {{1. / 6, 1. / 6, UZ_GAUSS3}, 1. / 2 / 3 * UZ_OUTER3},  {{2. / 3, 1. / 6, UZ_GAUSS3}, 1. / 2 / 3 * UZ_OUTER3},
+    {{1. / 6, 2. / 3, UZ_GAUSS3}, 1. / 2 / 3 * UZ_OUTER3}};
+
 /* With z along the line: corners L_a ((2 L_a - 1)(1 + z_a z) - (1 - z^2)) / 2, middles of the triangles' edges
  * 2 L_a L_b (1 + z_a z), those between the triangles L_a (1 - z^2). */
-static void shape(double *N, double (*slope)[3], const double point[3])
+static void shape(const uz_element_type *type, double *N, double (*slope)[3], const double point[3])
 {
+    (void)type;
     double L[4];
     const double z = point[2], bubble = (1 - z) * (1 + z);
     uz_barycentric(L, 2, point);
@@ -51,19 +61,13 @@ static void shape(double *N, double (*slope)[3], const double point[3])
     }
 }
 
-static double gauss(double point[3], int g)
-{
-    const double weight = uz_gauss_triangle3(point, g % 3);
-    return weight * uz_gauss_line3(&point[2], g / 3);
-}
-
 /* What is linear over the triangle times what is linear along the line. */
 static int recover(double point[UZ_ELEMENT_SAMPLES][3], double share[UZ_ELEMENT_NODES][UZ_ELEMENT_SAMPLES],
                    uz_element_kind kind)
 {
     (void)kind;
     for (int k = 0; k < 6; k++) {
-        uz_gauss_triangle3(point[k], k % 3);
+        memcpy(point[k], uz_gauss_triangle3[k % 3].at, sizeof point[k]);
         point[k][2] = k < 3 ? -UZ_GAUSS2 : UZ_GAUSS2;
     }
     for (int a = 0; a < 15; a++) {
@@ -91,7 +95,7 @@ const uz_element_type uz_type_wedge15 = {
     .local = LOCAL,
     .centre = {1.0 / 3, 1.0 / 3, 0},
     .shape = shape,
-    .rule = {9, gauss},
+    .rule = {9, GAUSS},
     .recover = recover,
     .vtk = 26,
     .gmsh = 18,

@@ -12,8 +12,14 @@ static const int NEXT[6][3] = {{2, 1, 3}, {0, 2, 4}, {1, 0, 5}, {4, 5, 0}, {5, 3
 static const int PART[2][UZ_ELEMENT_CORNERS] = {{0, 2, 1, 4, 6, 5}, {0, 3, 2, 4, 7, 6}};
 static const int GMSH[6] = {0, 2, 1, 3, 5, 4};
 
-static void shape(double *N, double (*slope)[3], const double point[3])
+static const uz_gauss_point GAUSS[6] = {
+    {{1. / 6, 1. / 6, -UZ_GAUSS2}, 1. / 2 / 3}, {{2. / 3, 1. / 6, -UZ_GAUSS2}, 1. / 2 / 3},
+    {{1. / 6, 2. / 3, -UZ_GAUSS2}, 1. / 2 / 3}, {{1. / 6, 1. / 6, UZ_GAUSS2}, 1. / 2 / 3},
+    {{2. / 3, 1. / 6, UZ_GAUSS2}, 1. / 2 / 3},  {{1. / 6, 2. / 3, UZ_GAUSS2}, 1. / 2 / 3}};
+
+static void shape(const uz_element_type *type, double *N, double (*slope)[3], const double point[3])
 {
+    (void)type;
     double L[4];
     uz_barycentric(L, 2, point);
     for (int a = 0; a < 6; a++) {
@@ -28,13 +34,6 @@ static void shape(double *N, double (*slope)[3], const double point[3])
     }
 }
 
-static double gauss(double point[3], int g)
-{
-    const double weight = uz_gauss_triangle3(point, g % 3);
-    point[2] = g < 3 ? -UZ_GAUSS2 : UZ_GAUSS2;
-    return weight;
-}
-
 const uz_element_type uz_type_wedge6 = {
     .name = "wedge6",
     .dim = 3,
@@ -46,7 +45,7 @@ const uz_element_type uz_type_wedge6 = {
     .local = LOCAL,
     .centre = {1.0 / 3, 1.0 / 3, 0},
     .shape = shape,
-    .rule = {6, gauss},
+    .rule = {6, GAUSS},
     .recover = uz_recover_centre,
     .next = NEXT,
     .mirrored = "its first three nodes must run clockwise seen from the side of the other three: swap the threes",

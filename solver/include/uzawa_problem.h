@@ -102,7 +102,6 @@ uz_settings uz_settings_default(void);
 /* Names as in the HTTP interface ("accelerated_restart"); never NULL. uz_method_parse: false if the name is unknown. */
 const char *uz_method_name(uz_method);
 bool uz_method_parse(uz_method *out, const char *name);
-const char *uz_operator_name(uz_operator);
 /* The same of any enumeration of these: the name of a value ("unknown": it has none), the value of a name (-1: none).
  */
 typedef enum {

@@ -29,7 +29,6 @@ typedef enum {
     UZ_MOVING_GEOMETRY /* gaps and normals taken where the answer moves the surfaces to did not settle; the last answer
                         */
 } uz_outcome;
-const char *uz_outcome_name(uz_outcome);
 
 /* KKT residual of the paper, section 4: e1 = Ku - p - N'r, e2 = min(g, 0), e3 = max(r, 0), e4 = -g.r; 2-norms. */
 typedef struct {

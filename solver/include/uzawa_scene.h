@@ -38,7 +38,6 @@ typedef enum {
 } uz_element_kind;
 const char *uz_element_name(uz_element_kind kind); /* "quad4"; never NULL */
 bool uz_element_parse(uz_element_kind *out, const char *name);
-int uz_element_dim(uz_element_kind kind);        /* 2 or 3 */
 int uz_element_node_count(uz_element_kind kind); /* 3 to 20 */
 
 /* A rectangle or a cuboid in cells along the axes. Its sides are the groups left and right (x), bottom and top (y),

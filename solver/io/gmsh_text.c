@@ -73,22 +73,19 @@ uz_status gmsh_int_text(gmsh_text *text, int64_t *value, const char *what)
     return UZ_OK;
 }
 
-static uz_status not_finite(const gmsh_text *text)
-{
-    return gmsh_fail(text, UZ_ERR_NOT_FINITE, "a coordinate is not a finite number");
-}
+#define NOT_FINITE "a coordinate is not a finite number"
 
 uz_status gmsh_real_text(gmsh_text *text, double *value)
 {
     skip_space(text);
     const size_t used = uz_parse_double(value, text->at, (size_t)(text->end - text->at));
     const char *at = text->at + (text->at < text->end && (*text->at == '-' || *text->at == '+'));
-    if (used == 0 && text->end - at >= 3 && ((at[0] | 32) == 'n' || (at[0] | 32) == 'i') && (at[1] | 32) != 'o')
-        return not_finite(text);
-    if (used == 0 || !word_ends(text->at + used, text))
+    const bool named = used == 0 && text->end - at >= 3 && ((at[0] | 32) == 'n' || (at[0] | 32) == 'i') &&
+                       (at[1] | 32) != 'o'; /* nan, inf */
+    if (!named && (used == 0 || !word_ends(text->at + used, text)))
         return fail_word(text, "a number");
-    if (!isfinite(*value))
-        return not_finite(text);
+    if (named || !isfinite(*value))
+        return gmsh_fail(text, UZ_ERR_NOT_FINITE, NOT_FINITE);
     text->at += used;
     return UZ_OK;
 }
@@ -158,7 +155,7 @@ uz_status gmsh_reals(gmsh_text *text, int count, double *xyz)
         double *to = xyz ? &xyz[i] : &value;
         status = text->binary ? take_bytes(text, to, sizeof *to, "a coordinate") : gmsh_real_text(text, to);
         if (status == UZ_OK && !isfinite(*to))
-            status = not_finite(&before);
+            status = gmsh_fail(&before, UZ_ERR_NOT_FINITE, NOT_FINITE);
     }
     return status;
 }

@@ -105,14 +105,6 @@ int64_t mm_long_count(mm_text *text)
     return text->at == start ? -1 : value;
 }
 
-static uz_status not_finite(mm_text *text)
-{
-    char word[SHOWN + 4];
-    copy_word(word, text);
-    return uz_fail_line(text->err, UZ_ERR_NOT_FINITE, text->line,
-                        "\"%s\" is not a finite double; every value must be a number below 1.8e308 in size", word);
-}
-
 uz_status mm_read_value(mm_text *text, bool integer, double *value)
 {
     const char *start = text->at;
@@ -121,12 +113,9 @@ uz_status mm_read_value(mm_text *text, bool integer, double *value)
     for (size_t k = integer && used > 0 && (*start == '-' || *start == '+'); integer && k < used; k++)
         whole = whole && mm_is_digit(start[k]);
     text->at += used;
-    if (used > 0 && mm_word_ends(text) && whole) {
-        if (isfinite(*value))
-            return UZ_OK;
-        text->at = start;
-        return not_finite(text);
-    }
+    const bool number = used > 0 && mm_word_ends(text) && whole;
+    if (number && isfinite(*value))
+        return UZ_OK;
     text->at = start;
     /* What C programs print for values that are no numbers: a sign, then nan, nan(...), inf or infinity. */
     mm_text end = *text;
@@ -136,9 +125,12 @@ uz_status mm_read_value(mm_text *text, bool integer, double *value)
     while (!mm_word_ends(&end))
         end.at++;
     const size_t length = (size_t)(end.at - word);
-    if ((length == 3 && (strncasecmp(word, "nan", 3) == 0 || strncasecmp(word, "inf", 3) == 0)) ||
+    char shown[SHOWN + 4];
+    copy_word(shown, text);
+    if (number || (length == 3 && (strncasecmp(word, "nan", 3) == 0 || strncasecmp(word, "inf", 3) == 0)) ||
         (length == 8 && strncasecmp(word, "infinity", 8) == 0) || (length > 4 && strncasecmp(word, "nan(", 4) == 0))
-        return not_finite(text);
+        return uz_fail_line(text->err, UZ_ERR_NOT_FINITE, text->line,
+                            "\"%s\" is not a finite double; every value must be a number below 1.8e308 in size", shown);
     return mm_fail(text, integer ? "a whole number was expected" : "a number was expected",
                    integer ? "write digits only, or say real in the banner" : "write it like -1.5e-3");
 }

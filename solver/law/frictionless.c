@@ -1,5 +1,5 @@
 /* frictionless.c: contact without friction, the sign rule of sign.h for whole vectors. One row per contact. */
-#include "law/laws.h"
+#include "law/law.h"
 #include "law/sign.h"
 
 #include <math.h>
@@ -93,7 +93,7 @@ static void reach(const uz_law *law, double *out, const double *r, const double 
         out[i] = d[i] > 0.0 ? (uz_reaction_presses(r[i]) ? -r[i] : 0.0) / d[i] : INFINITY;
 }
 
-const uz_law_kind uz_frictionless = {
+static const uz_law_kind kind = {
     .name = "frictionless",
     .rows = 1,
     .one_sided = true,
@@ -107,3 +107,5 @@ const uz_law_kind uz_frictionless = {
     .refute = refute,
     .reach = reach,
 };
+
+const uz_law uz_law_frictionless = {.kind = &kind};

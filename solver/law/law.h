@@ -59,7 +59,4 @@ struct uz_law {
 /* No friction: what a problem has that does not ask for another law. */
 extern const uz_law uz_law_frictionless;
 
-/* The kinds there are, one after the other; NULL: no more. */
-const uz_law_kind *uz_law_kind_at(int i);
-
 #endif

@@ -38,6 +38,7 @@ typedef enum { GUESS, EXCHANGE, N_MOVES } move;
 
 typedef struct {
     bool *active;  /* m: the current guess */
+    bool *held;    /* m: the last one, as its solution left it */
     bool *refuted; /* m: rows whose part of it is wrong */
     uz_active_end solved;
     double *r;                             /* m: its solution, signs unchecked */
@@ -47,6 +48,9 @@ typedef struct {
     double rate[N_MOVES];                  /* wrong rows after the last move of each kind over those before */
     int64_t before;                        /* wrong rows before it, 0: there was none */
     bool from_inside;                      /* an interior point was asked */
+    uint64_t tried[MAX_STEPS];             /* digests of the guesses so far, n_tried of them */
+    int n_tried;
+    bool circles; /* the operator came back to a guess that was wrong already */
 } pivoting;
 
 /* From the start: the operator's own guess, where it has one. Else the rows that a projected gradient step would leave
@@ -66,9 +70,18 @@ static void guess(pivoting *p, const uz_iterate *it, uz_dual_load *load)
         p->active[i] = p->active[i] ? it->close[i] : p->r[i] > 0.0;
 }
 
+/* Which rows a guess has (FNV-1a). Two that are taken for one cost time, and no more. */
+static uint64_t digest(const bool *active, int64_t m)
+{
+    uint64_t value = 0xcbf29ce484222325u;
+    for (int64_t i = 0; i < m; i++)
+        value = (value ^ (active[i] ? (uint64_t)i + 1 : 0)) * 0x100000001b3u;
+    return value;
+}
+
 /* The next guess: all wrong rows change places, or the operator makes a guess of its own, whichever has done better.
  * Where only single exchanges are left, the operator's guesses come first, and one exchange after each that was in
- * vain.
+ * vain, as is the guess that has just been found wrong.
  */
 static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
 {
@@ -82,9 +95,18 @@ static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
     p->move = EXCHANGE;
     if (better)
         p->fewest = p->wrong;
+    if (ask)
+        memcpy(p->held, p->active, (size_t)m * sizeof *p->held);
     if (ask && uz_dual_load_guess_active(load, p->active)) {
-        p->move = GUESS;
-        return;
+        const uint64_t guessed = digest(p->active, m);
+        if (guessed != p->tried[p->n_tried - 1]) {
+            for (int k = 0; k < p->n_tried; k++)
+                p->circles = p->circles || guessed == p->tried[k];
+            p->move = GUESS;
+            return;
+        }
+        memcpy(p->active, p->held, (size_t)m * sizeof *p->held);
+        p->rate[GUESS] = 1.0;
     }
     for (int64_t i = m - 1; i >= 0; i--) {
         if (!p->refuted[i])
@@ -166,6 +188,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
 {
     const int64_t m = it->m;
     pivoting p = {.active = uz_alloc_zero(m, sizeof(bool)),
+                  .held = uz_alloc_zero(m, sizeof(bool)),
                   .refuted = uz_alloc_zero(m, sizeof(bool)),
                   .r = uz_alloc_zero(m, sizeof(double)),
                   .g = uz_alloc_zero(m, sizeof(double)),
@@ -175,7 +198,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
     int extra = load->dual->can->cheap_steps ? EXTRA_STEPS : 0;
     bool over = false; /* no guess can be solved; too little time is found by whoever goes on */
     uz_status status = it->begun ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
-    if (!p.active || !p.refuted || !p.r || !p.g)
+    if (!p.active || !p.held || !p.refuted || !p.r || !p.g)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an active set of %lld rows", (long long)m);
     if (status != UZ_OK)
         goto done;
@@ -184,9 +207,15 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
     if (*end == UZ_END_TARGET)
         goto done;
     for (int k = 0; k < MAX_STEPS && !over; k++) {
+        bool found = false;
         if (uz_should_stop(end, it, options))
             goto done;
-        status = uz_dual_load_solve_active(load, &p.solved, p.r, p.g, p.active, err);
+        if (p.circles && !is_nearly_right(&p, load, options))
+            status = look_from_inside(&p, &found, it, load, err);
+        p.circles = found = false;
+        p.tried[p.n_tried++] = digest(p.active, m);
+        if (status == UZ_OK)
+            status = uz_dual_load_solve_active(load, &p.solved, p.r, p.g, p.active, err);
         over = p.solved != UZ_ACTIVE_SOLVED;
         if (status == UZ_OK && !over) {
             p.wrong = it->law->kind->refute(it->law, p.refuted, p.active, p.r, p.g, it->m);
@@ -200,16 +229,14 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
         }
         if (status != UZ_OK || *end == UZ_END_SOLVED || (*end == UZ_END_TARGET && (over || extra-- == 0)))
             goto done;
-        bool found = false;
         if ((over && !uz_should_stop(end, it, options)) ||
             (!over && is_stuck(&p) && (p.move != GUESS || p.idle >= CIRCLES) && !is_nearly_right(&p, load, options)))
             status = look_from_inside(&p, &found, it, load, err);
         if (status != UZ_OK)
             goto done;
-        if (found) {
-            over = false;
+        over = over && !found;
+        if (found)
             continue;
-        }
         if (is_stuck(&p) && may_exchange(it, load)) {
             status = solve_by_exchange(&p, end, it, load, options, history, err);
             goto done;
@@ -223,19 +250,15 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
     }
     if (uz_should_stop(end, it, options))
         goto done;
-    if (over && p.solved == UZ_ACTIVE_RAY) {
+    *end = over && p.solved == UZ_ACTIVE_RAY ? UZ_END_RAY : over ? UZ_END_UNSOLVED : UZ_END_STALLED;
+    if (*end == UZ_END_RAY)
         memcpy(it->ray, p.r, (size_t)it->m * sizeof *it->ray);
-        *end = UZ_END_RAY;
-    } else if (may_exchange(it, load)) {
+    else if (may_exchange(it, load))
         status = solve_by_exchange(&p, end, it, load, options, history, err);
-    } else {
-        *end = over ? UZ_END_UNSOLVED : UZ_END_STALLED;
-    }
-done:
-    free(p.active);
-    free(p.refuted);
-    free(p.r);
-    free(p.g);
+done:;
+    void *room[] = {p.active, p.held, p.refuted, p.r, p.g};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
     return status;
 }
 

@@ -12,6 +12,7 @@
  * a direction's curvature is less than what the inner iterations leave, and conjugate steps go astray. */
 #include "methods/iterate.h"
 #include "methods/kinds.h"
+#include "methods/turns.h"
 
 #include <math.h>
 
@@ -28,7 +29,8 @@ enum { FIRST_GUESS, WARMING_UP, SECOND_GUESS, ITERATING, FIRST_EXCHANGE, TURNS }
 #define UNBOUNDED  16.0
 
 typedef struct {
-    bool guess, exchange; /* else it iterates */
+    bool guess, exchange; /* else it iterates, */
+    bool limited;         /* up to it->phase_end */
     double length;        /* FIRST_TURN at first, longer with each turn of both */
     int32_t next;
 } phase_kind;
@@ -36,13 +38,16 @@ typedef struct {
 static phase_kind kind_of(int32_t phase, bool exchanges)
 {
     const int32_t turns = phase < TURNS ? 0 : (phase - TURNS) / 2 + 1;
+    const bool guess = phase == FIRST_GUESS || phase == SECOND_GUESS,
+               exchange = phase == FIRST_EXCHANGE || (phase >= TURNS && (phase - TURNS) % 2 == 0);
     const int32_t after[] = {[FIRST_GUESS] = exchanges ? FIRST_EXCHANGE : WARMING_UP,
                              [WARMING_UP] = SECOND_GUESS,
                              [SECOND_GUESS] = ITERATING,
                              [ITERATING] = TURNS,
                              [FIRST_EXCHANGE] = WARMING_UP};
-    return (phase_kind){.guess = phase == FIRST_GUESS || phase == SECOND_GUESS,
-                        .exchange = phase == FIRST_EXCHANGE || (phase >= TURNS && (phase - TURNS) % 2 == 0),
+    return (phase_kind){.guess = guess,
+                        .exchange = exchange,
+                        .limited = !guess && !exchange && (phase == WARMING_UP || exchanges),
                         .length = FIRST_TURN * pow(LONGER, turns),
                         .next = phase < TURNS ? after[phase] : phase + 1};
 }
@@ -56,47 +61,49 @@ static void begin_phase(uz_iterate *it, int32_t phase, bool exchanges)
         it->phase_end = it->iteration + (int64_t)most;
 }
 
-static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
-                     uz_history *history, uz_error *err)
+bool uz_method_next(uz_method_turn *turn, uz_end *end, uz_iterate *it, const uz_dual_load *load,
+                    const uz_method_kind *asked, const uz_method_options *options)
 {
-    uz_method_options part = *options;
-    part.method = UZ_METHOD_ACCELERATED_RESTART;
-    if (options->stopping != UZ_STOP_CERTIFIED || !it->law->kind->one_sided)
-        return uz_steps_run(end, it, load, &part, history, err);
-    const bool exchanges = load->dual->can->exact;
-    if (exchanges || !uz_method_conjugate.exact)
-        part.method = UZ_METHOD_CONJUGATE;
-    part.yields = exchanges;
-    if (options->again)
+    const bool first = !turn->kind, exchanges = load->dual->can->exact,
+               several = !asked->run && options->stopping == UZ_STOP_CERTIFIED && it->law->kind->one_sided;
+    if (first) {
+        const bool conjugate = several && (exchanges || !uz_method_conjugate.exact);
+        turn->kind = asked->run ? asked : conjugate ? &uz_method_conjugate : &uz_method_accelerated_restart;
+        turn->options = *options;
+        turn->options.method = turn->kind->method;
+        turn->options.yields = several && exchanges;
+    }
+    if (!several)
+        return first;
+    if (first && options->again) {
         begin_phase(it, WARMING_UP, exchanges);
-    else if (it->phase == FIRST_EXCHANGE) /* what was handed over was not good enough */
+    } else if (first && it->phase == FIRST_EXCHANGE) { /* what was handed over was not good enough */
         uz_iterate_go_back(it);
-    for (bool stalled = false;;) {
-        const int32_t phase = it->phase;
-        const phase_kind kind = kind_of(phase, exchanges);
-        const bool guess = kind.guess, exchange = kind.exchange,
-                   limited = !guess && !exchange && (phase == WARMING_UP || exchanges);
-        const double unbounded = phase >= TURNS && isinf(it->best_relative) ? UNBOUNDED : 1.0;
-        part.max_iterations =
-            limited && it->phase_end < options->max_iterations ? it->phase_end : options->max_iterations;
-        part.work = unbounded * kind.length * uz_dual_load_column_work(load);
-        uz_status status = guess      ? uz_method_active_set.run(end, it, load, &part, history, err)
-                           : exchange ? uz_method_dual_active_set.run(end, it, load, &part, history, err)
-                                      : uz_steps_run(end, it, load, &part, history, err);
+    } else if (!first) {
+        const int32_t over = it->phase;
+        const phase_kind ran = kind_of(over, exchanges);
         const bool gave_up = *end == UZ_END_STALLED || *end == UZ_END_UNSOLVED,
                    at_limit = *end == UZ_END_ITERATIONS && it->iteration < options->max_iterations;
-        if (status != UZ_OK || stalled ||
-            !(at_limit || (gave_up && (guess || exchange || (limited && phase > WARMING_UP)))))
-            return status;
-        stalled = gave_up && !guess && !exchange; /* iterations do no better: the exchanges' turn is the last */
-        begin_phase(it, kind.next, exchanges);
-        if (phase == FIRST_GUESS && exchanges && it->iteration > 0 && *end == UZ_END_STALLED) {
+        if (turn->last || !(at_limit || (gave_up && (ran.guess || ran.exchange || (ran.limited && over > WARMING_UP)))))
+            return false;
+        turn->last = gave_up && !ran.guess && !ran.exchange; /* iterations do no better: only exchanges are left */
+        begin_phase(it, ran.next, exchanges);
+        if (over == FIRST_GUESS && exchanges && it->iteration > 0 && *end == UZ_END_STALLED) {
             *end = UZ_END_NEXT;
-            return UZ_OK;
+            return false;
         }
-        if (guess) /* guesses that came to nothing leave r at the best that was found */
+        if (ran.guess) /* guesses that came to nothing leave r at the best that was found */
             uz_iterate_go_back(it);
     }
+    const phase_kind kind = kind_of(it->phase, exchanges);
+    const double unbounded = it->phase >= TURNS && isinf(it->best_relative) ? UNBOUNDED : 1.0;
+    turn->kind = kind.guess      ? &uz_method_active_set
+                 : kind.exchange ? &uz_method_dual_active_set
+                                 : uz_method_kind_of(turn->options.method);
+    turn->options.max_iterations =
+        kind.limited && it->phase_end < options->max_iterations ? it->phase_end : options->max_iterations;
+    turn->options.work = unbounded * kind.length * uz_dual_load_column_work(load);
+    return true;
 }
 
-const uz_method_kind uz_method_auto = {.method = UZ_METHOD_AUTO, .name = "auto", .run = run};
+const uz_method_kind uz_method_auto = {.method = UZ_METHOD_AUTO, .name = "auto"};

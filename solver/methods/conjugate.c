@@ -17,6 +17,7 @@
  * (2000) (D r made again now and then). */
 #include "methods/iterate.h"
 #include "methods/kinds.h"
+#include "methods/steps.h"
 
 #include <math.h>
 #include <string.h>
@@ -76,23 +77,12 @@ static double make_direction(uz_iterate *it)
     return gradient;
 }
 
-/* Along d by the length that maximizes psi; *restart: it goes beyond `bound`, where the first row stops to press. Along
+/* Along d by the length that maximizes psi; true: it goes beyond `bound`, where the first row stops to press. Along
  * what is flat the step goes beyond the bound, unless what curvature there is says less; without a bound it goes as far
  * as a plain one: rise / curvature would be the quotient of two roundings. */
-static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *load, uz_error *err)
+static bool take_direction(uz_iterate *it, double rise)
 {
     const double *d = it->r_next, *Dd = it->Dr_next;
-    const double rise = make_direction(it);
-    /* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near
-     * r, a plain step's length away. Where D is exact the difference of two points would only lose digits. */
-    const bool exact = load->dual->can->exact;
-    for (int64_t i = 0; !exact && i < it->m; i++)
-        it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
-    uz_status status = uz_dual_load_apply(load, it->Dr_next, exact ? it->r_next : it->gamma, err);
-    if (status != UZ_OK)
-        return status;
-    for (int64_t i = 0; !exact && i < it->m; i++)
-        it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
     double curvature = 0.0, square = 0.0, bound = INFINITY, *reach = it->gamma; /* how far each row can go */
     it->law->kind->reach(it->law, reach, it->r, d, it->m);
     for (int64_t i = 0; i < it->m; i++) {
@@ -111,32 +101,25 @@ static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *loa
     else if (isinf(bound))
         length = it->alpha;
     const double taken = fmin(length, bound);
-    *restart = length > bound;
+    const bool beyond = length > bound;
     for (int64_t i = 0; i < it->m; i++) {
         double r = it->r[i], Dr = it->Dr[i];
-        bool stops = *restart && reach[i] <= bound;
+        bool stops = beyond && reach[i] <= bound;
         it->r[i] = stops ? 0.0 : r + taken * d[i];
         it->Dr[i] = Dr + taken * Dd[i];
-        it->rho[i] = *restart ? r + length * d[i] : r;
-        it->Drho[i] = *restart ? Dr + length * Dd[i] : Dr;
+        it->rho[i] = beyond ? r + length * d[i] : r;
+        it->Drho[i] = beyond ? Dr + length * Dd[i] : Dr;
     }
     it->law->kind->project(it->law, it->r, it->m);
-    it->tau = *restart ? 1.0 : 2.0;
-    return UZ_OK;
+    it->tau = beyond ? 1.0 : 2.0;
+    return beyond;
 }
 
-/* Not taken where it is too long, or where it led down. */
-static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *load, uz_error *err)
+/* The step to r_next, plain or to rho: not taken, true, where it is too long, or where it led down. */
+static bool leave_projection(uz_iterate *it, const uz_dual_load *load, bool plain)
 {
     const double *g0 = load->g0;
     double gain = 0.0; /* psi(r_next) - psi(r) */
-    bool plain = memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
-    for (int64_t i = 0; i < it->m; i++)
-        it->r_next[i] = it->rho[i] + (plain ? it->step[i] * it->gamma[i] : 0.0);
-    it->law->kind->project(it->law, it->r_next, it->m);
-    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
-    if (status != UZ_OK)
-        return status;
     for (int64_t i = 0; i < it->m; i++)
         gain += (it->r_next[i] - it->r[i]) * (g0[i] - 0.5 * (it->Dr_next[i] + it->Dr[i]));
     bool taken = plain ? !uz_iterate_shorten(it, load) : gain >= 0.0;
@@ -146,8 +129,7 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
     }
     forget(it);
     it->tau = taken ? 2.0 : 1.0;
-    *restart = *restart || !taken;
-    return UZ_OK;
+    return !taken;
 }
 
 /* *step_norm: ||r - P(r + alpha g)|| at the new r, in the caller's forces: the paper's ||rho - r|| where rho is r.
@@ -175,7 +157,22 @@ static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load,
     }
     if (*restart)
         forget(it);
-    uz_status status = it->tau > 1.0 ? conjugate_step(restart, it, load, err) : projected_step(restart, it, load, err);
+    const bool along = it->tau > 1.0, plain = !along && memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
+    /* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near
+     * r, a plain step's length away. Where D is exact the difference of two points would only lose digits. */
+    const bool near = along && !load->dual->can->exact;
+    const double rise = along ? make_direction(it) : 0.0;
+    for (int64_t i = 0; !along && i < it->m; i++)
+        it->r_next[i] = it->rho[i] + (plain ? it->step[i] * it->gamma[i] : 0.0);
+    if (!along)
+        it->law->kind->project(it->law, it->r_next, it->m);
+    for (int64_t i = 0; near && i < it->m; i++)
+        it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
+    uz_status status = uz_dual_load_apply(load, it->Dr_next, near ? it->gamma : it->r_next, err);
+    for (int64_t i = 0; near && status == UZ_OK && i < it->m; i++)
+        it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
+    if (status == UZ_OK)
+        *restart = (along ? take_direction(it, rise) : leave_projection(it, load, plain)) || *restart;
     it->iteration++;
     it->restarts += *restart;
     make_gaps(it, load);

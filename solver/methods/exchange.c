@@ -209,6 +209,12 @@ static void let_go(uz_exchange *x, int64_t k)
     x->steps++;
 }
 
+/* The reaction of the k-th row in contact. */
+static double reaction(const uz_exchange *x, int64_t k)
+{
+    return x->base[x->rows[k]] + x->s[x->rows[k]];
+}
+
 /* g -= M w for weights w (count) by place; size (m, NULL: not wanted) += |M| |w|. Several columns in one pass of g: the
  * columns come from memory, once. */
 static void subtract_columns(uz_exchange *x, double *g, double *size, const double *w)
@@ -269,7 +275,7 @@ static void settle(uz_exchange *x)
             measure(x);
         }
         for (int64_t k = x->count - 1; k >= 0 && !uz_stop_is_due(x->stop); k--) {
-            const double of_row = x->base[x->rows[k]] + x->s[x->rows[k]];
+            const double of_row = reaction(x, k);
             if (!x->law->kind->admissible(x->law, &of_row, 1)) {
                 let_go(x, k);
                 pulls = true;
@@ -315,7 +321,7 @@ static uz_status admit(uz_exchange *x, int64_t q, bool *likely, double *ray, uz_
         for (int64_t k = 0; dependent && k < x->count; k++)
             least = fmax(least, PULL_NOISE * fabs(x->w[k]));
         for (int64_t k = 0; k < x->count; k++) {
-            double reach = INFINITY, r = x->base[x->rows[k]] + x->s[x->rows[k]];
+            double reach = INFINITY, r = reaction(x, k);
             if (x->w[k] > least)
                 x->law->kind->reach(x->law, &reach, &r, &x->w[k], 1);
             if (reach < step || (gone < 0 && isfinite(reach) && reach <= step)) {

@@ -4,6 +4,7 @@
  * D is applied once per iteration, to r(k+1); D rho follows from D r(k+1) and D r(k), rho being their combination. */
 #include "methods/iterate.h"
 #include "methods/kinds.h"
+#include "methods/steps.h"
 
 #include <math.h>
 

@@ -1,5 +1,6 @@
 /* method.h: a method of iteration on the dual problem: it maximizes psi(r) over the r that the contact law allows
- * (law/law.h), and sees the body through dual/dual.h only. How to add one: docs/architecture/method.md. */
+ * (law/law.h), and sees the body through dual/dual.h only. steps.h: a method that makes steps; turns.h: which one runs
+ * when. How to add one: docs/architecture/method.md. */
 #ifndef UZ_METHOD_H
 #define UZ_METHOD_H
 
@@ -42,31 +43,15 @@ typedef struct {
 typedef uz_status uz_method_runner(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                                    uz_history *history, uz_error *err);
 
-/* A method whose iterations are steps with one application of D each fills these and runs by uz_steps_run: the loop
- * with its bounds, its limits and its search for rays is there. */
-typedef struct uz_steps {
-    /* One iteration: r, D r, rho, D rho and tau become the next ones. *step_norm: ||rho - r||, in the caller's forces,
-     * NAN: no step was taken. *restart: what was carried along was given up. steps: these. */
-    uz_status (*step)(const struct uz_steps *steps, uz_iterate *it, uz_dual_load *load, double *step_norm,
-                      bool *restart, uz_error *err);
-    /* After a step; due: a bound is. NULL: nothing to do. Else D r is carried along and gathers rounding: made again
-     * here where it is time, and for the last bound of a run. */
-    uz_status (*settle)(uz_iterate *it, uz_dual_load *load, bool due, uz_error *err);
-    bool rho_is_r;           /* what is recorded is (u(r), r): rho is none of which there was a displacement */
-    bool momentum, restarts; /* of gradient steps */
-} uz_steps;
-
 typedef struct {
     uz_method method;
-    const char *name; /* as in the HTTP interface */
-    bool one_sided;   /* needs a law that is (law.h); refused with another */
-    bool as_given;    /* by itself it steps on the caller's rows without scaling: the published methods */
-    bool exact;       /* wants D applied without inner iterations; auto looks for another method elsewhere */
-    uz_method_runner *run;
-    const uz_steps *steps; /* of uz_steps_run, else NULL */
+    const char *name;      /* as in the HTTP interface */
+    bool one_sided;        /* needs a law that is (law.h); refused with another */
+    bool as_given;         /* by itself it steps on the caller's rows without scaling: the published methods */
+    bool exact;            /* wants D applied without inner iterations; auto looks for another method elsewhere */
+    uz_method_runner *run; /* NULL: several by turns, as uz_method_next tells */
+    const struct uz_steps *steps; /* steps.h: of uz_steps_run, else NULL */
 } uz_method_kind;
-
-uz_method_runner uz_steps_run;
 
 /* NULL: there is none of that name to run. */
 const uz_method_kind *uz_method_kind_of(uz_method method);

@@ -34,9 +34,14 @@ void uz_milestones_resume(uz_milestones *d, double spent_s)
     d->since = uz_seconds();
 }
 
+static double seconds_now(const uz_milestones *d)
+{
+    return d->base + (uz_seconds() - d->since);
+}
+
 void uz_milestones_pause(uz_milestones *d)
 {
-    d->trade.iterated_s = d->base + (uz_seconds() - d->since);
+    d->trade.iterated_s = seconds_now(d);
 }
 
 void uz_milestones_drop(uz_milestones *d, double bound)
@@ -58,7 +63,7 @@ void uz_milestones_note(uz_milestones *d, uz_milestone_of of, double bound, int6
         return; /* the clock is read only where something is reached for the first time */
     const uz_trade_step step = {.iterations = iterations,
                                 .applications = applications,
-                                .seconds = d->base + (uz_seconds() - d->since),
+                                .seconds = seconds_now(d),
                                 .by_certificate = of != UZ_MILESTONE_OF_ITERATION && !d->partial};
     while (d->reached < UZ_TRADE_STEPS && sure <= uz_trade_error(d->reached))
         d->trade.step[d->reached++] = step;

@@ -1,6 +1,7 @@
 /* steps.c: the loop around the steps of a method that applies D once per iteration: where bounds are due, when it ends,
  * and the search for rays. */
 #include "methods/iterate.h"
+#include "methods/steps.h"
 
 #include "certificate/infeasible.h"
 #include "dual/ray.h"
@@ -81,8 +82,8 @@ static uz_status finish(uz_iterate *it, uz_dual_load *load, const uz_method_opti
 /* A start with reactions may be the solution: it is bounded before anything is prepared. alpha = 1 / lambda_max(D)
  * where the user gave none. A run that is told to stop before lambda_max is known has no alpha: who goes on with it
  * chooses. */
-static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
-                       uz_error *err)
+uz_status uz_steps_begin(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
+                         uz_error *err)
 {
     const uz_stop stop = {options->hooks, options->deadline};
     double lambda = 0.0;
@@ -93,7 +94,9 @@ static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_optio
             return UZ_OK;
     }
     if (status == UZ_OK)
-        status = uz_dual_load_prepare(load, it->alpha > 0.0 ? NULL : &lambda, it->weight != NULL, err);
+        status = uz_dual_load_prepare(load, err);
+    if (status == UZ_OK && !(it->alpha > 0.0))
+        status = uz_dual_load_lambda_max(load, &lambda, it->weight != NULL, err);
     if (status == UZ_OK && it->alpha <= 0.0 && (lambda > 0.0 || !uz_stop_is_due(&stop)))
         uz_iterate_set_alpha(it, lambda > 0.0 ? 1.0 / lambda : 1.0);
     if (status == UZ_OK && !it->begun)
@@ -129,7 +132,7 @@ uz_status uz_steps_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz
     const uz_steps *steps = uz_method_kind_of(options->method)->steps;
     bool restart = false, ray = false;
     double *rho, *Drho;
-    uz_status status = begin(it, load, options, history, err);
+    uz_status status = UZ_OK;
     it->before.kept = false;
     while (status == UZ_OK && !ray && !should_end(end, it, load, options, it->step_norm)) {
         it->fresh = false;

@@ -56,19 +56,3 @@ uz_status uz_obstacle_check_lists(const uz_obstacle_subject *s, int64_t least, c
         return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, key, -1), "too many numbers");
     return UZ_OK;
 }
-
-uz_status uz_obstacle_check(const uz_contact *contact, int64_t index, uz_model model, uz_error *err)
-{
-    const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
-    const uz_obstacle_subject s = {shape, contact, index, model == UZ_SOLID ? 3 : 2, err};
-    char where[UZ_OBSTACLE_POINTER];
-    if (contact->kind == UZ_OBSTACLE_BODY)
-        return UZ_OK;
-    if (!shape) {
-        snprintf(where, sizeof where, "/contacts/%lld/obstacle", (long long)index);
-        return uz_fail(err, UZ_ERR_ARGUMENT, where, "unknown kind of obstacle");
-    }
-    if (shape->refused[s.dim - 2])
-        return uz_fail(err, UZ_ERR_SCENE, uz_obstacle_pointer(where, &s, "", -1), "%s", shape->refused[s.dim - 2]);
-    return shape->check(&s);
-}

@@ -95,7 +95,7 @@ static void surface_at(double x[3], double *N, double T[2][3], const surface *f,
     double values[UZ_FACE_NODES], slope[UZ_FACE_NODES][3];
     const double point[3] = {at[0], at[1], 0};
     N = N ? N : values;
-    f->type->shape(N, T ? slope : NULL, point);
+    f->type->shape(f->type, N, T ? slope : NULL, point);
     for (int c = 0; c < 3; c++) {
         x[c] = 0;
         for (int i = 0; i < f->type->nodes; i++)

@@ -78,22 +78,11 @@ static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
                        : uz_table_init(o->own, c, o->scale, err);
 }
 
-static void clear(uz_obstacle *o)
-{
-    if (o->own && o->dim == 2)
-        uz_line_clear(o->own);
-    else if (o->own)
-        uz_table_clear(o->own);
-    free(o->own);
-}
-
 static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
 {
-    (void)err;
     if (o->dim == 2)
-        uz_line_gap(out, o->own, x);
-    else
-        uz_table_gap(out, o->own, x);
+        return uz_line_gap(out, o, x, err);
+    uz_table_gap(out, o->own, x);
     return UZ_OK;
 }
 
@@ -102,16 +91,6 @@ static void lists(int64_t n[3], const uz_contact *contact)
     n[0] = contact->n_x;
     n[1] = contact->n_y;
     n[2] = contact->n_x * (contact->n_y > 0 ? contact->n_y : 1);
-}
-
-static int64_t outline(double x[2], double way[2], const uz_contact *contact, int64_t i)
-{
-    const int64_t n = contact->n_x, near = i == 0 ? 1 : n - 2;
-    x[0] = contact->x[i];
-    x[1] = contact->z[i];
-    way[0] = contact->x[i] - contact->x[near];
-    way[1] = 0;
-    return n;
 }
 
 /* Where a value lies in an ascending list, which goes on flat: between i and i + 1, at *t of the way. */
@@ -144,8 +123,8 @@ const uz_obstacle_shape uz_shape_height = {.name = {"height", "height"},
                                            .has_edges = true,
                                            .check = check,
                                            .init = init,
-                                           .clear = clear,
+                                           .clear = uz_pieces_clear,
                                            .gap = gap,
                                            .lists = lists,
-                                           .outline = outline,
+                                           .outline = uz_line_outline,
                                            .surface = surface};

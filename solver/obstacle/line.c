@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/vector3.h"
 #include "obstacle/pieces.h"
+#include "obstacle/shape.h"
 
 #include <float.h>
 #include <math.h>
@@ -66,19 +67,21 @@ static void gap_to_piece(uz_gap *out, const uz_line *line, int64_t i, const doub
     out->curvature = 0;
 }
 
-void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
+uz_status uz_line_gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
 {
+    const uz_line *line = o->own;
+    (void)err;
     const int64_t item = uz_box_tree_nearest(&line->tree, x, INFINITY, distance_to, line);
     const int64_t i = item + line->closed;
     if (item < 0) {
         out->gap = NAN;
-        return;
+        return UZ_OK;
     }
     const int64_t corner = closest(out->foot, line, i, x);
     out->foot[2] = out->normal[2] = 0;
     if (corner < 0) {
         gap_to_piece(out, line, i, x);
-        return;
+        return UZ_OK;
     }
     /* the pieces that meet at the corner */
     const int64_t before = line->closed && corner == 0 ? line->n - 1 : corner;
@@ -86,7 +89,7 @@ void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
     const double *a = line->tangent + 2 * before, *b = line->tangent + 2 * after, turn = uz_cross2(a, b);
     if (fabs(turn) <= UZ_SAME_DIRECTION) {
         gap_to_piece(out, line, before, x);
-        return;
+        return UZ_OK;
     }
     /* inside or outside by the sum of both normals, which is on the outer side of any corner */
     const double *at = line->point + 2 * corner;
@@ -98,6 +101,7 @@ void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
         out->normal[c] = on ? mean[c] / length : sign * off[c] / distance;
     out->gap = on ? uz_dot2(off, out->normal) : sign * distance;
     out->curvature = on ? (turn < 0 ? INFINITY : -INFINITY) : sign / distance;
+    return UZ_OK;
 }
 
 static void box_of(double box[4], const uz_line *line, int64_t i)
@@ -153,23 +157,6 @@ void uz_line_clear(uz_line *line)
     memset(line, 0, sizeof *line);
 }
 
-static bool meet(const uz_line *line, int64_t i, int64_t j)
-{
-    const piece a = piece_of(line, i), b = piece_of(line, j);
-    const double between[2] = {b.origin[0] - a.origin[0], b.origin[1] - a.origin[1]};
-    const double turn = uz_cross2(a.tangent, b.tangent);
-    if (j == i + 1 || (line->closed && i == 1 && j == line->n - 1)) /* they share a point, and may only fold back */
-        return uz_dot2(a.tangent, b.tangent) < 0 && fabs(turn) <= UZ_SAME_DIRECTION;
-    if (fabs(turn) <= UZ_SAME_DIRECTION) { /* parallel pieces: where they lie on one another */
-        const double sign = uz_dot2(a.tangent, b.tangent) < 0 ? -1 : 1, from = uz_dot2(between, a.tangent);
-        const double low = from + (sign > 0 ? b.first : -b.last), high = from + (sign > 0 ? b.last : -b.first);
-        return fabs(uz_cross2(between, a.tangent)) <= UZ_SAME_DIRECTION * hypot(between[0], between[1]) &&
-               low <= a.last && high >= a.first;
-    }
-    const double s = uz_cross2(between, b.tangent) / turn, t = uz_cross2(between, a.tangent) / turn;
-    return s >= a.first && s <= a.last && t >= b.first && t <= b.last;
-}
-
 typedef struct {
     const uz_line *line;
     int64_t i, found;
@@ -179,15 +166,29 @@ typedef struct {
 static bool visit_pair(void *ctx, int64_t item)
 {
     crossing *search = ctx;
-    const int64_t j = item + search->line->closed;
-    if (j <= search->i)
+    const uz_line *line = search->line;
+    const int64_t i = search->i, j = item + line->closed;
+    bool meet;
+    if (j <= i)
         return false;
     if (search->left-- <= 0)
         return true;
-    if (!meet(search->line, search->i, j))
-        return false;
-    search->found = j;
-    return true;
+    const piece a = piece_of(line, i), b = piece_of(line, j);
+    const double between[2] = {b.origin[0] - a.origin[0], b.origin[1] - a.origin[1]};
+    const double turn = uz_cross2(a.tangent, b.tangent);
+    if (j == i + 1 || (line->closed && i == 1 && j == line->n - 1)) { /* they share a point, and may only fold back */
+        meet = uz_dot2(a.tangent, b.tangent) < 0 && fabs(turn) <= UZ_SAME_DIRECTION;
+    } else if (fabs(turn) <= UZ_SAME_DIRECTION) { /* parallel pieces: where they lie on one another */
+        const double sign = uz_dot2(a.tangent, b.tangent) < 0 ? -1 : 1, from = uz_dot2(between, a.tangent);
+        const double low = from + (sign > 0 ? b.first : -b.last), high = from + (sign > 0 ? b.last : -b.first);
+        meet = fabs(uz_cross2(between, a.tangent)) <= UZ_SAME_DIRECTION * hypot(between[0], between[1]) &&
+               low <= a.last && high >= a.first;
+    } else {
+        const double s = uz_cross2(between, b.tangent) / turn, t = uz_cross2(between, a.tangent) / turn;
+        meet = s >= a.first && s <= a.last && t >= b.first && t <= b.last;
+    }
+    search->found = meet ? j : search->found;
+    return meet;
 }
 
 bool uz_line_crosses(int64_t pair[2], const uz_line *line)
@@ -204,4 +205,25 @@ bool uz_line_crosses(int64_t pair[2], const uz_line *line)
         }
     }
     return false;
+}
+
+int64_t uz_line_outline(double x[2], double way[2], const uz_contact *contact, int64_t i)
+{
+    const bool heights = contact->kind == UZ_OBSTACLE_HEIGHT;
+    const double *y = heights ? contact->z : contact->y;
+    const int64_t n = contact->n_x, near = i == 0 ? 1 : n - 2;
+    x[0] = contact->x[i];
+    x[1] = y[i];
+    way[0] = contact->x[i] - contact->x[near];
+    way[1] = heights ? 0 : y[i] - y[near];
+    return n;
+}
+
+void uz_pieces_clear(uz_obstacle *o)
+{
+    if (o->own && o->dim == 2)
+        uz_line_clear(o->own);
+    else if (o->own)
+        uz_table_clear(o->own);
+    free(o->own);
 }

@@ -40,17 +40,26 @@ static double largest(double most, const double *v, int64_t n)
 
 uz_status uz_obstacle_new(uz_obstacle **out, const uz_contact *contact, int64_t index, uz_model model, uz_error *err)
 {
+    const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
+    const uz_obstacle_subject s = {shape, contact, index, model == UZ_SOLID ? 3 : 2, err};
+    char where[UZ_OBSTACLE_POINTER];
     *out = NULL;
-    uz_status status = uz_obstacle_check(contact, index, model, err);
-    if (status != UZ_OK)
-        return status;
     if (contact->kind == UZ_OBSTACLE_BODY)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "a body of the mesh is no rigid obstacle");
+    if (!shape) {
+        snprintf(where, sizeof where, "/contacts/%lld/obstacle", (long long)index);
+        return uz_fail(err, UZ_ERR_ARGUMENT, where, "unknown kind of obstacle");
+    }
+    if (shape->refused[s.dim - 2])
+        return uz_fail(err, UZ_ERR_SCENE, uz_obstacle_pointer(where, &s, "", -1), "%s", shape->refused[s.dim - 2]);
+    uz_status status = shape->check(&s);
+    if (status != UZ_OK)
+        return status;
     uz_obstacle *o = uz_alloc_zero(1, sizeof *o);
     if (!o)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an obstacle");
-    o->shape = uz_obstacle_shape_of(contact->kind);
-    o->dim = model == UZ_SOLID ? 3 : 2;
+        return uz_no_memory(err, "an obstacle");
+    o->shape = shape;
+    o->dim = s.dim;
     o->index = index;
     o->inside = contact->inside;
     /* The power of two that brings numbers up to `most` to 1/2..1. */

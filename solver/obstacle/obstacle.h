@@ -41,14 +41,10 @@ typedef struct {
     double foot[3];   /* the closest point of the obstacle's surface */
 } uz_gap;
 
-/* Refuses what is not an obstacle for this model; `index` is the contact's place in the scene, for pointers such as
- * "/contacts/2/obstacle/circle/radius". Groups are not looked at; UZ_OBSTACLE_BODY has nothing to check here.
- * Errors: UZ_ERR_SCENE, _NOT_FINITE. */
-uz_status uz_obstacle_check(const uz_contact *contact, int64_t index, uz_model model, uz_error *err);
-
-/* Checks as above, and refuses lines that cross or touch themselves, too (they have no right side). Keeps copies:
- * *contact may go. O(n log n) for n points of a line or a table. UZ_OBSTACLE_BODY is UZ_ERR_ARGUMENT: see projection.h.
- * Errors: UZ_ERR_SCENE, _NOT_FINITE, _MEMORY, _ARGUMENT. The caller frees *out. */
+/* Refuses what is not an obstacle for this model, lines that cross or touch themselves too (they have no right side);
+ * `index` is the contact's place in the scene, for pointers such as "/contacts/2/obstacle/circle/radius". Groups are
+ * not looked at. Keeps copies: *contact may go. O(n log n) for n points of a line or a table. UZ_OBSTACLE_BODY is
+ * UZ_ERR_ARGUMENT: see projection.h. Errors: UZ_ERR_SCENE, _NOT_FINITE, _MEMORY, _ARGUMENT. The caller frees *out. */
 uz_status uz_obstacle_new(uz_obstacle **out, const uz_contact *contact, int64_t index, uz_model model, uz_error *err);
 void uz_obstacle_free(uz_obstacle *obstacle);
 

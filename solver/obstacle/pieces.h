@@ -24,8 +24,10 @@ typedef struct {
 uz_status uz_line_init(uz_line *out, int64_t n, const double *x, const double *y, const double *ends, double scale,
                        uz_error *err);
 void uz_line_clear(uz_line *line);
-/* The gap is NaN where squares of distances overflow. */
-void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2]);
+/* `gap` of an obstacle whose own is a uz_line. The gap is NaN where squares of distances overflow. */
+uz_status uz_line_gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err);
+/* `outline` of a polyline, which goes on straight beyond its ends, and of heights over x, which go on flat. */
+int64_t uz_line_outline(double x[2], double way[2], const uz_contact *contact, int64_t i);
 /* A pair of pieces that cross, touch, or fold back on one another; false: there is none. Looks at no more pairs than
  * UZ_LINE_PAIRS per point: long segments side by side may all be near one another. */
 #define UZ_LINE_PAIRS 1000
@@ -40,5 +42,8 @@ typedef struct {
 uz_status uz_table_init(uz_table *out, const uz_contact *contact, double scale, uz_error *err);
 void uz_table_clear(uz_table *table);
 void uz_table_gap(uz_gap *out, const uz_table *table, const double x[3]);
+
+/* `clear` of an obstacle whose own is a uz_line in the plane and a uz_table in space, or NULL. */
+void uz_pieces_clear(uz_obstacle *o);
 
 #endif

@@ -56,34 +56,9 @@ static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
         of[0], of[1]);
 }
 
-static void clear(uz_obstacle *o)
-{
-    if (o->own)
-        uz_line_clear(o->own);
-    free(o->own);
-}
-
-static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
-{
-    (void)err;
-    uz_line_gap(out, o->own, x);
-    return UZ_OK;
-}
-
 static void lists(int64_t n[3], const uz_contact *contact)
 {
     n[0] = n[1] = n[2] = contact->n_x;
-}
-
-/* Beyond its ends the line goes on straight. */
-static int64_t outline(double x[2], double way[2], const uz_contact *contact, int64_t i)
-{
-    const int64_t n = contact->n_x, near = i == 0 ? 1 : n - 2;
-    x[0] = contact->x[i];
-    x[1] = contact->y[i];
-    way[0] = contact->x[i] - contact->x[near];
-    way[1] = contact->y[i] - contact->y[near];
-    return n;
 }
 
 const uz_obstacle_shape uz_shape_polyline = {
@@ -92,7 +67,7 @@ const uz_obstacle_shape uz_shape_polyline = {
     .has_edges = true,
     .check = check,
     .init = init,
-    .clear = clear,
-    .gap = gap,
+    .clear = uz_pieces_clear,
+    .gap = uz_line_gap,
     .lists = lists,
-    .outline = outline};
+    .outline = uz_line_outline};

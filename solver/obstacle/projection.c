@@ -158,10 +158,7 @@ static double distance_to(const void *ctx, int64_t item, const double *x, double
                : foot.distance2;
 }
 
-static uz_status out_of_memory(uz_error *err)
-{
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two bodies");
-}
+#define OF_BODIES "contact between two bodies"
 
 /* ---------------------------------------------------------------- the border */
 
@@ -359,7 +356,7 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
         return UZ_OK;
     /* Bodies that have nodes in common hang together there, unless the surface is to touch itself. */
     unsigned char *of_master = uz_alloc_zero(mesh->n_nodes, 1);
-    uz_status status = of_master ? UZ_OK : out_of_memory(err);
+    uz_status status = of_master ? UZ_OK : uz_no_memory(err, OF_BODIES);
     for (int64_t f = 0; f < with->n_faces && status == UZ_OK; f++) {
         int64_t node[UZ_FACE_NODES];
         const int count = uz_mesh_face(node, mesh, with->face[f]);
@@ -373,7 +370,7 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
             continue;
         itself = uz_groups_share_face(mesh, on, with);
         if (itself < 0)
-            status = out_of_memory(err);
+            status = uz_no_memory(err, OF_BODIES);
         else if (itself == 0)
             status = uz_fail(err, UZ_ERR_SCENE, where,
                              "node %lld is in \"%.63s\" and on the faces of \"%.63s\"; the two bodies must have nodes "
@@ -400,13 +397,13 @@ static uz_status prepare(master *m, const uz_mesh *mesh, const uz_group *group, 
         double xyz[3 * UZ_FACE_NODES], *box = uz_alloc(group->n_faces, 6 * sizeof *box);
         for (int64_t i = 0; box && i < group->n_faces; i++)
             box_of(box + 2 * mesh->dim * i, xyz, mesh->dim, gather(xyz, node, m, i, (const double[3]){0}));
-        status = box ? uz_box_tree_init(&m->tree, group->n_faces, mesh->dim, box, err) : out_of_memory(err);
+        status = box ? uz_box_tree_init(&m->tree, group->n_faces, mesh->dim, box, err) : uz_no_memory(err, OF_BODIES);
         free(box);
     }
     m->first = uz_alloc_zero(mesh->n_nodes + 1, sizeof *m->first);
     m->around = uz_alloc(group->n_faces, UZ_FACE_NODES * sizeof *m->around);
     if (status == UZ_OK && (!m->first || !m->around))
-        status = out_of_memory(err);
+        status = uz_no_memory(err, OF_BODIES);
     /* counted, summed, placed: filling from the end leaves first[i] at the beginning of its list */
     for (int pass = 0; pass < 2 && status == UZ_OK; pass++) {
         for (int64_t f = group->n_faces - 1; f >= 0; f--) {
@@ -436,7 +433,7 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
     if (status != UZ_OK)
         return status;
     row = uz_alloc(uz_group_node_count(mesh, on), sizeof *row);
-    status = row ? prepare(&m, mesh, with, false, true, err) : out_of_memory(err);
+    status = row ? prepare(&m, mesh, with, false, true, err) : uz_no_memory(err, OF_BODIES);
     if (status == UZ_OK)
         status = prepare(&slave, mesh, on, true, false, err);
     if (status == UZ_OK)
@@ -468,7 +465,7 @@ uz_status uz_faces_new(uz_faces **out, const uz_mesh *mesh, const uz_group *grou
 {
     uz_faces *faces = uz_alloc_zero(1, sizeof *faces);
     *out = NULL;
-    const uz_status status = faces ? prepare(faces, mesh, group, false, true, err) : out_of_memory(err);
+    const uz_status status = faces ? prepare(faces, mesh, group, false, true, err) : uz_no_memory(err, OF_BODIES);
     if (status == UZ_OK)
         *out = faces;
     else

@@ -57,7 +57,7 @@ static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *e
     s->displacement = uz_alloc_zero(3 * s->n_vertices, sizeof *s->displacement);
     s->node = renumbered ? uz_alloc(s->n_vertices, sizeof *s->node) : NULL;
     if (!s->position || !s->displacement || (renumbered && !s->node))
-        return uz_skin_no_memory(s->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     /* The middle of the body and the size of what is drawn. */
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
@@ -101,12 +101,11 @@ static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *e
 }
 
 /* value[place[i]], or value[i]; NaN becomes -unit. */
-static uz_status draw_values(uz_drawn *out, const uz_surface *s, const double *value, const int64_t *place,
-                             int64_t count, uz_error *err)
+static uz_status draw_values(uz_drawn *out, const double *value, const int64_t *place, int64_t count, uz_error *err)
 {
     out->x = uz_alloc(count, sizeof *out->x);
     if (!out->x)
-        return uz_skin_no_memory(s->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     double low = INFINITY, high = -INFINITY;
     for (int64_t i = 0; i < count; i++) {
         low = fmin(low, value[place ? place[i] : i]); /* of two numbers of which one is NaN: the other */
@@ -131,7 +130,7 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
     /* A group between two elements has nodes within the body: their rows are left out. */
     w->drawn = uz_alloc(m, sizeof *w->drawn);
     if (!w->drawn)
-        return uz_skin_no_memory(s->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     for (int64_t i = 0; i < m; i++)
         if (w->vertex_of[info->contact_node[i]] >= 0)
             w->drawn[s->n_rows++] = i;
@@ -139,7 +138,7 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
     s->row_contact = uz_alloc(s->n_rows, sizeof *s->row_contact);
     s->row_normal = uz_alloc_zero(3 * s->n_rows, sizeof *s->row_normal);
     if (!s->row_vertex || !s->row_contact || !s->row_normal)
-        return uz_skin_no_memory(s->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     for (int64_t i = 0; i < s->n_rows; i++) {
         const int64_t row = w->drawn[i];
         s->row_vertex[i] = (unsigned)w->vertex_of[info->contact_node[row]];
@@ -147,22 +146,22 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
         for (int c = 0; c < s->dim; c++)
             s->row_normal[3 * i + c] = (float)info->contact_normal[row * s->dim + c];
     }
-    uz_status status = draw_values(&s->reaction, s, w->answer->r, w->drawn, s->n_rows, err);
+    uz_status status = draw_values(&s->reaction, w->answer->r, w->drawn, s->n_rows, err);
     if (status == UZ_OK && w->answer->g)
-        status = draw_values(&s->gap, s, w->answer->g, w->drawn, s->n_rows, err);
+        status = draw_values(&s->gap, w->answer->g, w->drawn, s->n_rows, err);
     if (status == UZ_OK && w->fields.pressure)
-        status = draw_values(&s->pressure, s, w->fields.pressure, w->drawn, s->n_rows, err);
+        status = draw_values(&s->pressure, w->fields.pressure, w->drawn, s->n_rows, err);
     if (status != UZ_OK || s->dim != 2)
         return status;
     w->arc = uz_alloc(m, sizeof *w->arc);
     w->part = uz_alloc(m, sizeof *w->part);
     s->row_part = uz_alloc(s->n_rows, sizeof *s->row_part);
     if (!w->arc || !w->part || !s->row_part)
-        return uz_skin_no_memory(s->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     status = uz_contact_arc(w->arc, w->part, w->model, w->scene, err);
     for (int64_t i = 0; status == UZ_OK && i < s->n_rows; i++)
         s->row_part[i] = w->part[w->drawn[i]];
-    return status == UZ_OK ? draw_values(&s->arc, s, w->arc, w->drawn, s->n_rows, err) : status;
+    return status == UZ_OK ? draw_values(&s->arc, w->arc, w->drawn, s->n_rows, err) : status;
 }
 
 /* ------------------------------------------------------------------- whole */
@@ -192,7 +191,7 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
     /* The nodes that are drawn are numbered. */
     w->vertex_of = uz_alloc_zero(s->n_nodes, sizeof *w->vertex_of);
     if (!w->vertex_of)
-        return uz_skin_no_memory(s->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     for (int64_t i = 0; i < skin->first[skin->n_cells]; i++)
         w->vertex_of[skin->point[i]] = 1;
     for (int64_t a = 0; a < s->n_nodes; a++)
@@ -217,7 +216,7 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
     s->outline = as_vertices(w, w->edges.outline, 2 * s->n_outline);
     s->triangle = uz_alloc(3 * s->n_triangles, sizeof *s->triangle);
     if (!s->line || !s->outline || !s->triangle)
-        return uz_skin_no_memory(s->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     for (int64_t i = 0, n = 0; i < skin->n_cells; i++) {
         const int64_t *point = skin->point + skin->first[i];
         const int count = uz_cell_triangles(&triangle, (int)(skin->first[i + 1] - skin->first[i]));
@@ -230,19 +229,19 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
         if (w->vertex_of[a] >= 0) /* moves only to the front: vertices are numbered like nodes */
             stress[w->vertex_of[a]] = stress[a];
     if (status == UZ_OK && stress)
-        status = draw_values(&s->von_mises, s, stress, NULL, s->n_vertices, err);
+        status = draw_values(&s->von_mises, stress, NULL, s->n_vertices, err);
     bool pair = false; /* else rows say it all */
     for (int64_t k = 0; k < w->scene->n_contacts; k++)
         pair = pair || w->scene->contacts[k].kind == UZ_OBSTACLE_BODY;
     if (status == UZ_OK && w->fields.pressure && pair) {
         double *touch = uz_alloc(s->n_nodes, sizeof *touch);
         status = touch ? uz_nodal_pressure(touch, w->model, w->scene, w->fields.pressure, err)
-                       : uz_skin_no_memory(s->n_elements, err);
+                       : uz_no_memory(err, UZ_OF_SKIN);
         for (int64_t a = 0; status == UZ_OK && a < s->n_nodes; a++)
             if (w->vertex_of[a] >= 0)
                 touch[w->vertex_of[a]] = touch[a];
         if (status == UZ_OK)
-            status = draw_values(&s->touch, s, touch, NULL, s->n_vertices, err);
+            status = draw_values(&s->touch, touch, NULL, s->n_vertices, err);
         free(touch);
     }
     return status == UZ_OK ? fill_rows(s, w, err) : status;

@@ -42,15 +42,6 @@ static uz_status make_values(double **out, uz_scenery *scenery, const uz_field_b
     return status;
 }
 
-static uz_status put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err)
-{
-    uz_buffer_print(svg, "<image width=\"%d\" height=\"%d\" href=\"data:image/png;base64,", raster->width,
-                    raster->height);
-    uz_status status = uz_raster_put_png(svg, raster, err);
-    uz_buffer_print(svg, "\"/>\n");
-    return status;
-}
-
 /* From back to front: obstacles of a solid, the outline before the deformation, the body. */
 static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
                           uz_error *err)
@@ -58,7 +49,7 @@ static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_sk
     uz_raster raster;
     uz_status status = uz_raster_init(&raster, scenery->width, scenery->height, err);
     if (status == UZ_OK && uz_scenery_paint_obstacles(&raster, scenery)) {
-        status = put_image(svg, &raster, err);
+        status = uz_raster_put_image(svg, &raster, err);
         uz_raster_wipe(&raster);
     }
     if (status == UZ_OK)
@@ -68,7 +59,7 @@ static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_sk
     if (status == UZ_OK && scenery->contacts_only)
         status = uz_scenery_paint_contacts(&raster, scenery, err);
     if (status == UZ_OK)
-        status = put_image(svg, &raster, err);
+        status = uz_raster_put_image(svg, &raster, err);
     uz_raster_clear(&raster);
     return status;
 }

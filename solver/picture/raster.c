@@ -115,7 +115,7 @@ void uz_raster_line(uz_raster *raster, const uz_raster_point *a, const uz_raster
     }
 }
 
-uz_status uz_raster_put_png(uz_buffer *buffer, const uz_raster *raster, uz_error *err)
+uz_status uz_raster_put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err)
 {
     png_alloc_size_t len = 0;
     unsigned char *file = NULL;
@@ -129,8 +129,11 @@ uz_status uz_raster_put_png(uz_buffer *buffer, const uz_raster *raster, uz_error
         !(file = uz_alloc((int64_t)len, 1)) || !png_image_write_to_memory(&image, file, &len, 0, raster->rgba, 0, NULL))
         status =
             uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a picture of %d x %d pixels", raster->width, raster->height);
+    uz_buffer_print(svg, "<image width=\"%d\" height=\"%d\" href=\"data:image/png;base64,", raster->width,
+                    raster->height);
     if (status == UZ_OK)
-        uz_buffer_put_base64(buffer, file, len);
+        uz_buffer_put_base64(svg, file, len);
+    uz_buffer_print(svg, "\"/>\n");
     png_image_free(&image);
     free(file);
     return status;

@@ -30,7 +30,7 @@ void uz_raster_line(uz_raster *raster, const uz_raster_point *a, const uz_raster
 /* Colour of a value in [0, 1], red, green, blue. */
 void uz_colour(unsigned char rgb[3], double value);
 
-/* Appends the pixels as base64 of a PNG file. UZ_ERR_MEMORY. */
-uz_status uz_raster_put_png(uz_buffer *buffer, const uz_raster *raster, uz_error *err);
+/* Appends the pixels as an <image>, in base64 of a PNG file. UZ_ERR_MEMORY. */
+uz_status uz_raster_put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err);
 
 #endif

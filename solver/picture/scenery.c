@@ -308,45 +308,38 @@ static void border_to(border *b, uz_raster_point p)
     b->started = true;
 }
 
-/* The obstacle's outline, going on well beyond the picture at its ends. */
-static void put_border(border *b, const uz_scenery *scenery, const uz_contact *contact)
-{
-    const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
-    const double far = 10 * scenery->extent;
-    double at[2], way[2];
-    const int64_t n = shape->outline(at, way, contact, 0);
-    if (n == 1) {
-        /* A line: the part of it that is nearest to the middle of the picture. */
-        const uz_raster_point p = uz_scenery_point(scenery, at);
-        const double length = hypot(way[0], way[1]), reach = 2.0 * (scenery->width + scenery->height);
-        const double dx = way[0] / length, dy = -way[1] / length;
-        const double along = (0.5 * scenery->width - p.x) * dx + (0.5 * scenery->height - p.y) * dy;
-        for (int side = -1; side <= 1; side += 2)
-            border_to(b, (uz_raster_point){.x = p.x + (along + side * reach / 2) * dx,
-                                           .y = p.y + (along + side * reach / 2) * dy});
-        return;
-    }
-    for (int64_t i = -1; i <= n; i++) {
-        const int64_t k = i < 0 ? 0 : i < n ? i : n - 1;
-        shape->outline(at, way, contact, k);
-        const double length = hypot(way[0], way[1]);
-        if (k != i && !(length > 0))
-            continue;
-        for (int c = 0; k != i && c < 2; c++)
-            at[c] += far * way[c] / length;
-        border_to(b, uz_scenery_point(scenery, at));
-    }
-}
-
+/* Each obstacle's outline, going on well beyond the picture at its ends. */
 void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
 {
+    const double far = 10 * scenery->extent;
     for (int64_t k = 0; scenery->model->mesh.dim == 2 && k < scenery->scene->n_contacts; k++) {
         const uz_contact *contact = &scenery->scene->contacts[k];
+        const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
         border b = {.svg = svg};
-        if (!uz_obstacle_shape_of(contact->kind))
+        double at[2], way[2];
+        if (!shape)
             continue;
         uz_buffer_print(svg, "<path class=\"obstacle\" d=\"");
-        put_border(&b, scenery, contact);
+        const int64_t n = shape->outline(at, way, contact, 0);
+        if (n == 1) { /* a line: the part of it that is nearest to the middle of the picture */
+            const uz_raster_point p = uz_scenery_point(scenery, at);
+            const double length = hypot(way[0], way[1]), reach = 2.0 * (scenery->width + scenery->height);
+            const double dx = way[0] / length, dy = -way[1] / length;
+            const double along = (0.5 * scenery->width - p.x) * dx + (0.5 * scenery->height - p.y) * dy;
+            for (int side = -1; side <= 1; side += 2)
+                border_to(&b, (uz_raster_point){.x = p.x + (along + side * reach / 2) * dx,
+                                                .y = p.y + (along + side * reach / 2) * dy});
+        }
+        for (int64_t i = n == 1 ? n + 1 : -1; i <= n; i++) {
+            const int64_t point = i < 0 ? 0 : i < n ? i : n - 1;
+            shape->outline(at, way, contact, point);
+            const double length = hypot(way[0], way[1]);
+            if (point != i && !(length > 0))
+                continue;
+            for (int c = 0; point != i && c < 2; c++)
+                at[c] += far * way[c] / length;
+            border_to(&b, uz_scenery_point(scenery, at));
+        }
         uz_buffer_print(svg, "\"/><path class=\"ticks\" d=\"");
         uz_buffer_put(svg, b.ticks.data, b.ticks.len);
         svg->failed = svg->failed || b.ticks.failed;

@@ -11,11 +11,6 @@
 
 /* -------------------------------------------------------------------- cells */
 
-uz_status uz_skin_no_memory(int64_t elements, uz_error *err)
-{
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the surface of %lld elements", (long long)elements);
-}
-
 /* Appends one cell whose nodes come corners first. Room is there. */
 static void add_cell(uz_skin *skin, const int64_t *node, int corners, int count)
 {
@@ -45,7 +40,7 @@ uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks
         out->first = uz_alloc_zero(cells + 1, sizeof *out->first);
         out->point = uz_alloc(solid ? UZ_CELL_POINTS * cells : mesh->first[cells], sizeof *out->point);
         if (!out->first || !out->point)
-            status = uz_skin_no_memory(mesh->n_elements, err);
+            status = uz_no_memory(err, UZ_OF_SKIN);
     }
     for (int64_t e = 0; status == UZ_OK && !solid && e < mesh->n_elements; e++) {
         int count;
@@ -122,30 +117,12 @@ static int compare_halves(const void *a, const void *b)
     return (x->cell > y->cell) - (x->cell < y->cell);
 }
 
-/* Area vector of a cell by Newell's sum over its corners (I. Sutherland et al., ACM Computing Surveys 6 (1974) 1). */
-static void cell_normal(double normal[3], const int64_t *point, int n, const double *xyz)
-{
-    double length = 0;
-    memset(normal, 0, 3 * sizeof *normal);
-    for (int k = 0, step = n > 4 ? 2 : 1; k < n; k += step) {
-        const double *o = xyz + 3 * point[0], *p = xyz + 3 * point[k], *q = xyz + 3 * point[(k + step) % n];
-        for (int c = 0; c < 3; c++) {
-            const int d = (c + 1) % 3, e = (c + 2) % 3;
-            normal[c] += (p[d] - o[d]) * (q[e] - o[e]) - (p[e] - o[e]) * (q[d] - o[d]);
-        }
-    }
-    for (int c = 0; c < 3; c++)
-        length = hypot(length, normal[c]);
-    for (int c = 0; c < 3 && length > 0; c++)
-        normal[c] /= length;
-}
-
 static uz_status prepare_edges(edge_work *w, const uz_mesh *mesh, uz_error *err)
 {
     enum { FEW = 16 };
     w->start = uz_alloc_zero(mesh->n_nodes + 1, sizeof *w->start);
     if (!w->start)
-        return uz_skin_no_memory(mesh->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     walk_edges(w, false);
     for (int64_t i = 0; i < mesh->n_nodes; i++)
         w->start[i + 1] += w->start[i];
@@ -153,7 +130,7 @@ static uz_status prepare_edges(edge_work *w, const uz_mesh *mesh, uz_error *err)
     w->half = uz_alloc(w->count, sizeof *w->half);
     w->normal = mesh->dim == 3 ? uz_alloc(3 * w->skin->n_cells, sizeof *w->normal) : NULL;
     if (!w->half || (mesh->dim == 3 && !w->normal))
-        return uz_skin_no_memory(mesh->n_elements, err);
+        return uz_no_memory(err, UZ_OF_SKIN);
     walk_edges(w, true);
     memmove(w->start + 1, w->start, (size_t)mesh->n_nodes * sizeof *w->start); /* placing moved each on */
     w->start[0] = 0;
@@ -171,9 +148,23 @@ static uz_status prepare_edges(edge_work *w, const uz_mesh *mesh, uz_error *err)
             half[j] = moved;
         }
     }
-    for (int64_t i = 0; w->normal && i < w->skin->n_cells; i++)
-        cell_normal(w->normal + 3 * i, w->skin->point + w->skin->first[i],
-                    (int)(w->skin->first[i + 1] - w->skin->first[i]), mesh->xyz);
+    /* Normals of cells by Newell's sum over their corners (I. Sutherland et al., ACM Computing Surveys 6 (1974) 1). */
+    for (int64_t i = 0; w->normal && i < w->skin->n_cells; i++) {
+        const int64_t *point = w->skin->point + w->skin->first[i], n = w->skin->first[i + 1] - w->skin->first[i];
+        double *normal = memset(w->normal + 3 * i, 0, 3 * sizeof *normal), length = 0;
+        for (int64_t k = 0, step = n > 4 ? 2 : 1; k < n; k += step) {
+            const double *o = mesh->xyz + 3 * point[0], *p = mesh->xyz + 3 * point[k],
+                         *q = mesh->xyz + 3 * point[(k + step) % n];
+            for (int c = 0; c < 3; c++) {
+                const int d = (c + 1) % 3, e = (c + 2) % 3;
+                normal[c] += (p[d] - o[d]) * (q[e] - o[e]) - (p[e] - o[e]) * (q[d] - o[d]);
+            }
+        }
+        for (int c = 0; c < 3; c++)
+            length = hypot(length, normal[c]);
+        for (int c = 0; c < 3 && length > 0; c++)
+            normal[c] /= length;
+    }
     return UZ_OK;
 }
 
@@ -219,7 +210,7 @@ uz_status uz_skin_edges_build(uz_skin_edges *out, const uz_skin *skin, const uz_
         out->line = uz_alloc(2 * out->n_lines, sizeof *out->line);
         out->outline = uz_alloc(2 * out->n_outline, sizeof *out->outline);
         if (!out->line || !out->outline)
-            status = uz_skin_no_memory(mesh->n_elements, err);
+            status = uz_no_memory(err, UZ_OF_SKIN);
         else
             collect_edges(out, &w, mesh->n_nodes);
     }

@@ -34,7 +34,7 @@ typedef struct {
 uz_status uz_skin_edges_build(uz_skin_edges *out, const uz_skin *skin, const uz_mesh *mesh, uz_error *err);
 void uz_skin_edges_clear(uz_skin_edges *edges);
 
-/* UZ_ERR_MEMORY for the surface of so many elements. */
-uz_status uz_skin_no_memory(int64_t elements, uz_error *err);
+/* What there may be no memory for. */
+#define UZ_OF_SKIN "the surface of a body"
 
 #endif

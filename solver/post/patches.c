@@ -154,30 +154,24 @@ static int recover_material(double value[MOST_VALUES], double *volume, patches *
     return fit(value, p, x) ? FITTED : UNKNOWN;
 }
 
-/* Which materials there are around a node; 0 where some element is not plain, or there are too many. */
-static int list_materials(int32_t list[MOST_MATERIALS], const patches *p, int64_t node)
-{
-    int count = 0;
-    for (int64_t i = p->first[node]; i < p->first[node + 1]; i++) {
-        const int32_t material = material_of(p, p->around[i]);
-        int k = 0;
-        while (k < count && list[k] != material)
-            k++;
-        if (!p->plain[p->around[i]] || k == MOST_MATERIALS)
-            return 0;
-        list[k] = material;
-        count += k == count;
-    }
-    return count;
-}
-
 /* *done false: no slope can be told, and nothing is written. False: no memory. */
 static bool recover_node(double *stress, double *strain, unsigned char *done, patches *p, int64_t node)
 {
     const int components = p->values / 2;
     double sum[MOST_VALUES] = {0}, total = 0, value[MOST_VALUES], volume;
-    int32_t list[MOST_MATERIALS];
-    const int count = list_materials(list, p, node);
+    int32_t list[MOST_MATERIALS]; /* the materials around the node: none where some element is not plain */
+    int count = 0;
+    bool plain = true;
+    for (int64_t i = p->first[node]; plain && i < p->first[node + 1]; i++) {
+        const int32_t material = material_of(p, p->around[i]);
+        int k = 0;
+        while (k < count && list[k] != material)
+            k++;
+        plain = p->plain[p->around[i]] && k < MOST_MATERIALS; /* nor where there are too many */
+        if (plain && k == count)
+            list[count++] = material;
+    }
+    count = plain ? count : 0;
     for (int k = 0; k < count; k++) {
         const int how = recover_material(value, &volume, p, node, list[k]);
         if (how == NO_MEMORY || how == UNKNOWN)
@@ -196,10 +190,7 @@ static bool recover_node(double *stress, double *strain, unsigned char *done, pa
     return true;
 }
 
-static uz_status no_memory(uz_error *err)
-{
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at nodes");
-}
+#define STRESS "the stress at nodes"
 
 static uz_status take_samples(patches *p, uz_field_points *middle, const double *u, const uz_hooks *hooks,
                               uz_error *err)
@@ -251,7 +242,7 @@ uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *do
     uz_field_points *middle = NULL;
     bool any = false;
     p.plain = uz_alloc(mesh->n_elements, 1);
-    uz_status status = p.plain ? UZ_OK : no_memory(err);
+    uz_status status = p.plain ? UZ_OK : uz_no_memory(err, STRESS);
     /* Incompatible modes have the whole slope, quadratic elements too: their own points serve better. */
     for (int64_t e = 0; p.plain && e < mesh->n_elements; e++) {
         const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
@@ -267,14 +258,14 @@ uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *do
         p.seen = uz_alloc_zero(mesh->n_elements, sizeof *p.seen);
         if (p.first && p.around)
             uz_mesh_list_around(p.first, p.around, mesh);
-        status =
-            p.of && middle && p.first && p.around && p.seen ? take_samples(&p, middle, u, hooks, err) : no_memory(err);
+        status = p.of && middle && p.first && p.around && p.seen ? take_samples(&p, middle, u, hooks, err)
+                                                                 : uz_no_memory(err, STRESS);
     }
     for (int64_t a = 0; any && status == UZ_OK && a < mesh->n_nodes; a++) {
         if (a % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
         else if (!recover_node(stress, strain, &done[a], &p, a))
-            status = no_memory(err);
+            status = uz_no_memory(err, STRESS);
     }
     free(middle);
     free(p.of);

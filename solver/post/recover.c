@@ -83,7 +83,7 @@ int64_t uz_field_gauss_count(const uz_field_body *body)
     const uz_mesh *mesh = &body->model->mesh;
     int64_t count = 0;
     for (int64_t e = 0; e < mesh->n_elements; e++)
-        count += uz_element_gauss_count((uz_element_kind)mesh->kind[e], body->scene->model);
+        count += uz_element_rule((uz_element_kind)mesh->kind[e], body->scene->model)->count;
     return count;
 }
 
@@ -113,9 +113,10 @@ uz_status uz_field_gauss(double *element, double *point, double *stress, const u
             break;
         }
         if (!own->known) {
-            own->points.count = uz_element_gauss_count(kind, body->scene->model);
+            const uz_gauss_rule *rule = uz_element_rule(kind, body->scene->model);
+            own->points.count = rule->count;
             for (int g = 0; g < own->points.count; g++) {
-                uz_element_gauss(own->points.point[g], kind, body->scene->model, g);
+                memcpy(own->points.point[g], rule->point[g].at, sizeof own->points.point[g]);
                 uz_element_shape(own->N[g], kind, own->points.point[g]);
             }
             uz_field_points_init(&own->points, body, u);

@@ -61,35 +61,26 @@ __attribute__((format(printf, 4, 5))) static void warn(uz_evaluation *out, const
 
 /* ---- strain and rotation */
 
-/* At most how steep u is where all elements are equal boxes with nodes at their corners only: the range of u over the
- * shortest edge. INFINITY: not such a mesh. */
-static double slope_by_range(const doubts *d)
-{
-    const uz_mesh *mesh = &d->model->mesh;
-    const int dim = mesh->dim;
-    double range2 = 0, shortest = INFINITY;
-    if (!mesh->uniform)
-        return INFINITY;
-    for (int c = 0; c < dim; c++) {
-        double least = d->u[c], most = d->u[c];
-        for (int64_t i = c; i < mesh->n_nodes * dim; i += dim) {
-            least = d->u[i] < least ? d->u[i] : least;
-            most = d->u[i] > most ? d->u[i] : most;
-        }
-        range2 += (most - least) * (most - least);
-        shortest = fmin(shortest, mesh->cell[c]);
-    }
-    return sqrt(range2) / shortest;
-}
-
-/* The largest change of u over a distance between an element's first node and the others: every strain and rotation
- * shows in it, if not in full. */
-static double largest_slope(const doubts *d)
+/* Does u change by more than `slope` over some distance between an element's first node and the others? Every strain
+ * and rotation shows in that, if not in full. Where all elements are equal boxes with nodes at their corners only the
+ * range of u over the shortest edge may tell that it does not. */
+static bool is_steep(const doubts *d, double slope)
 {
     const uz_mesh *mesh = &d->model->mesh;
     const int dim = mesh->dim;
     const double *x = mesh->xyz, *u = d->u;
-    double largest = 0;
+    double range2 = 0, shortest = INFINITY, largest = 0;
+    for (int c = 0; c < dim && mesh->uniform; c++) {
+        double least = u[c], most = u[c];
+        for (int64_t i = c; i < mesh->n_nodes * dim; i += dim) {
+            least = u[i] < least ? u[i] : least;
+            most = u[i] > most ? u[i] : most;
+        }
+        range2 += (most - least) * (most - least);
+        shortest = fmin(shortest, mesh->cell[c]);
+    }
+    if (mesh->uniform && sqrt(range2) / shortest < 0.99 * slope)
+        return false;
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         const int64_t first = mesh->node[mesh->first[e]] * dim;
         for (int64_t k = mesh->first[e] + 1; k < mesh->first[e + 1]; k++) {
@@ -99,7 +90,7 @@ static double largest_slope(const doubts *d)
                 largest = du / dx;
         }
     }
-    return sqrt(largest);
+    return sqrt(largest) > slope;
 }
 
 /* The largest principal strain, in absolute value, and the rotation in an element's middle. */
@@ -454,8 +445,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     const uz_summary *s = &result->summary;
     const doubts d = {
         model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
-    const double noticed = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
-    if (!(slope_by_range(&d) < 0.99 * noticed) && largest_slope(&d) > noticed)
+    if (is_steep(&d, 0.25 * fmin(MOST_STRAIN, MOST_ROTATION)))
         look_at_elements(&d);
     look_at_mesh(&d);
     look_at_surfaces(&d);

@@ -51,7 +51,8 @@ static uz_status inverse_norms(void *ctx, double squares[UZ_LANES], double *E, u
     return status;
 }
 
-uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *problem, int64_t blocks, uz_error *err)
+uz_status uz_block_create(uz_block **out, uz_run **runs, uz_setup *setup, const uz_problem *problem, int64_t blocks,
+                          uz_error *err)
 {
     *out = NULL;
     uz_block *block = uz_alloc_zero(1, sizeof *block);
@@ -61,7 +62,7 @@ uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *pro
     block->K = uz_setup_K(setup, problem);
     block->d = block->K->cols;
     block->width = blocks * UZ_LANES;
-    block->runs = uz_alloc_zero(block->width, sizeof *block->runs);
+    block->runs = *runs = uz_alloc_zero(block->width, sizeof *block->runs);
     block->cases = uz_alloc_zero(block->width, sizeof(uz_dual_load *));
     block->r = uz_alloc_zero(block->width, sizeof(double *));
     block->corrected = uz_alloc_zero(block->width, sizeof(bool));
@@ -100,11 +101,6 @@ void uz_block_free(uz_block *block)
     free(block->corrected);
     free(block->permuted);
     free(block);
-}
-
-uz_run *uz_block_runs(uz_block *block)
-{
-    return block->runs;
 }
 
 enum { TILE = 512 }; /* rows at a time: what is read and written by turns stays in the first cache */
@@ -161,10 +157,12 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
     }
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
         const double *scale = runs[k].work.dual->dual->row_scale;
-        double whole_norm;
+        const uz_load_vectors *load = &runs[k].load;
+        double whole_norm = 0.0;
         for (int64_t i = 0; i < runs[k].m; i++)
             runs[k].answer.r[i] = scale[i] * block->r[first + k][i];
-        status = uz_run_whole_norm(&whole_norm, &runs[k], runs[k].answer.u, err);
+        if (load->moved)
+            status = uz_whole_norm(&whole_norm, &block->setup->model, runs[k].answer.u, load->prescribed, err);
         answers[k] = (uz_lane_answer){.r = runs[k].answer.r,
                                       .g = runs[k].answer.g,
                                       .h = runs[k].load.h,

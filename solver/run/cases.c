@@ -1,9 +1,7 @@
-/* cases.c: all load cases of a problem on a mesh that is given: together, as far as supports hold the body, and one by
- * one where only the obstacle does. */
+/* cases.c: what load cases ask for once they were solved together, as far as supports hold the body: one by one where
+ * only the obstacle does, contacts found where the body has gone, bounds on the whole error. */
 #include "run/solve.h"
 
-#include "core/alloc.h"
-#include "core/clock.h"
 #include "core/error.h"
 #include "methods/iterate.h"
 #include "run/moving.h"
@@ -11,7 +9,6 @@
 #include "run/results.h"
 #include "run/semicoercive.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 /* Without supports a body had no iteration to go on from a start; the start is checked all the same. */
@@ -38,21 +35,15 @@ static void name_case(uz_error *err, const uz_problem *problem, int64_t i)
         uz_error_name_case(err, i);
 }
 
-uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
-                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_problem *problem, const uz_settings *settings,
+                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, double started,
+                          uz_error *err)
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
-    const double started = uz_seconds();
-    *out = NULL;
-    uz_error_reset(err);
-    uz_result **results = uz_alloc_zero(n, sizeof(uz_result *));
-    if (!results)
-        return uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for the results of %lld cases", (long long)n);
-    const uz_status regular = uz_solve_rounds(results, problem, settings, starts, NULL, cache, hooks, err);
-    uz_status status = regular;
+    uz_status status = rounds;
     for (int64_t i = 0; i < n; i++) { /* those refused or not certified, because only the obstacle holds the body */
         uz_problem one = uz_problem_of_case(problem, i);
-        if (!uz_may_be_semicoercive(regular, results[i], &one, settings))
+        if (!uz_may_be_semicoercive(rounds, results[i], &one, settings))
             continue;
         if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_MOVING) {
             uz_error_reset(err); /* in place of the refusal */
@@ -65,7 +56,7 @@ uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz
             hooks->begins(hooks->ctx, i);
         status = starts && starts[i] ? check_start(starts[i], &one, err) : UZ_OK;
         if (status == UZ_OK)
-            status = uz_solve_semicoercive(&results[i], &one, settings, cache, hooks, regular, started, err);
+            status = uz_solve_semicoercive(&results[i], &one, settings, cache, hooks, rounds, started, err);
         if (status == UZ_OK)
             continue;
         name_case(err, problem, i);
@@ -81,9 +72,5 @@ uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz
             name_case(err, problem, i);
         }
     }
-    if (status == UZ_OK)
-        *out = results;
-    else
-        uz_results_free(results, n);
     return status;
 }

@@ -1,5 +1,6 @@
 /* certify.c: the certificate of what a run has: its input, answers from reactions, and proofs that there is none. */
 #include "run/run.h"
+#include "dual/form.h"
 
 #include "certificate/infeasible.h"
 #include "core/alloc.h"
@@ -12,28 +13,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The certificate looks at K, N and loads, the estimate of the mesh's error at each element: they don't need each
- * other. Loads in other units are left out: u is not yet what is told. */
-static void look_ahead(uz_run *run)
-{
-    const uz_request *asked = run->asked;
-    uz_ahead_free(run->work.ahead);
-    run->work.ahead = NULL;
-    if (!asked->setup->is_scene || asked->in_block || run->load.exponent != 0)
-        return;
-    const uz_scene scene = uz_scene_of_case(asked->problem, asked->index);
-    run->work.ahead = uz_ahead_start(&asked->setup->model, &scene, run->answer.u, run->load.prescribed);
-}
-
-uz_status uz_run_certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_correction, uz_error *err)
+uz_status uz_run_recover(uz_run *run, uz_answer *answer, const double *r, bool with_correction, uz_error *err)
 {
     const double *scale = run->work.dual->dual->row_scale;
     uz_status status = uz_dual_load_recover(run->work.dual, answer->u, r, with_correction, err);
     for (int64_t i = 0; i < answer->m; i++)
         answer->r[i] = scale[i] * r[i];
-    if (status == UZ_OK && answer == &run->answer)
-        look_ahead(run);
-    return status == UZ_OK ? uz_run_certify_answer(run, answer, err) : status;
+    if (status == UZ_OK && answer == &run->answer) {
+        /* The certificate looks at K, N and loads, the estimate of the mesh's error at each element: they don't need
+         * each other. Loads in other units are left out: u is not yet what is told. */
+        const uz_request *asked = run->asked;
+        const uz_scene scene = uz_scene_of_case(asked->problem, asked->index);
+        const bool may = asked->setup->is_scene && !asked->in_block && run->load.exponent == 0;
+        uz_ahead_free(run->work.ahead);
+        run->work.ahead =
+            may ? uz_ahead_start(&asked->setup->model, &scene, run->answer.u, run->load.prescribed) : NULL;
+    }
+    return status;
 }
 
 uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
@@ -45,13 +41,11 @@ uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
     return status;
 }
 
-/* e'K^-1 e = ||L^-1 P e||^2: half a linear solve. */
+/* e'K^-1 e = ||L^-1 P e||^2: half a linear solve. Without a factor it is the operator's affair. */
 static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
 {
     uz_run *run = ctx;
     const uz_factor *factor = run->asked->setup->factor;
-    if (!factor)
-        return uz_dual_load_inverse_norm(run->work.dual, value, e, err);
     double *x = run->work.scratch;
     uz_factor_permute(factor, x, e);
     uz_status status = uz_factor_solve_one(factor, run->work.ws, x, true, err);
@@ -68,12 +62,6 @@ static uz_status measure_doubt(void *ctx, double *doubt, uz_error *err)
     return uz_setup_doubt(asked->setup, doubt, uz_setup_K(asked->setup, asked->problem), &stop, err);
 }
 
-uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz_error *err)
-{
-    *norm = 0.0;
-    return run->load.moved ? uz_whole_norm(norm, &run->asked->setup->model, u, run->load.prescribed, err) : UZ_OK;
-}
-
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_answer *answer, uz_error *err)
 {
     const uz_request *asked = run->asked;
@@ -88,7 +76,8 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         work->scratch = uz_alloc(run->d, sizeof(double));
     if (!work->ws || !work->scratch)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
-    uz_status status = uz_run_whole_norm(&whole_norm, run, answer->u, err);
+    const uz_status status =
+        run->load.moved ? uz_whole_norm(&whole_norm, &setup->model, answer->u, run->load.prescribed, err) : UZ_OK;
     if (status != UZ_OK)
         return status;
     *input = (uz_certify_input){
@@ -96,9 +85,9 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .N = all_rows ? uz_setup_all_rows(setup, asked->problem) : uz_setup_N(setup, asked->problem),
         .p = run->load.p,
         .h = all_rows ? run->load.h_all : run->load.h,
-        .inverse_norm = inverse_norm,
+        .inverse_norm = setup->factor ? inverse_norm : setup->dual->form->inverse_norm,
         .measure_doubt = setup->factor ? measure_doubt : NULL,
-        .ctx = run,
+        .ctx = setup->factor ? (void *)run : (void *)work->dual,
         .terms = setup->terms,
         .rcond = run->result->summary.rcond,
         .inverse_bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY,

@@ -1,7 +1,7 @@
 /* cost.c: predicted seconds and bytes, and the choice that follows. */
 #include "run/cost.h"
+#include "dual/form.h"
 
-#include "core/alloc.h"
 #include "linalg/blas.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -10,6 +10,7 @@
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <sys/mman.h>
 
 /* ----------------------------------------------------------------- the machine */
 
@@ -22,42 +23,45 @@ static const uz_cost_rates ASSUMED = {3e-11, 1e-9};
 
 static uz_cost_rates measured; /* written once, under the guard */
 
+/* In pages that go back to the system: ten megabytes that lie free in the heap would hide what the first body takes. */
 static void measure(void)
 {
-    uz_csc A = {0};
-    double *room = uz_alloc_zero(2 * (DENSE * DENSE + SPARSE), sizeof *room), dense = INFINITY, sparse = INFINITY;
+    enum { ROOM = 2 * (DENSE * DENSE + SPARSE), ENTRIES = SPARSE * BAND };
+    const size_t bytes = (ROOM + ENTRIES) * sizeof(double) + (SPARSE + 1 + ENTRIES) * sizeof(int64_t);
+    double *room = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    double dense = INFINITY, sparse = INFINITY;
     measured = ASSUMED;
-    if (room) {
-        for (int64_t i = 0; i < DENSE * DENSE; i++)
-            room[i] = 1.0 / (double)(1 + i % 7);
-        for (int k = 0; k < REPEATS; k++) {
-            double start = uz_thread_seconds();
-            uz_syrk_lower_t_while(DENSE, DENSE, room, room + DENSE * DENSE, NULL);
-            dense = fmin(dense, uz_thread_seconds() - start);
-        }
-        measured.flop_s = dense / ((double)DENSE * DENSE * DENSE);
+    if (room == MAP_FAILED)
+        return;
+    uz_csc A = {.rows = SPARSE, .cols = SPARSE, .val = room + ROOM};
+    A.ptr = (int64_t *)(void *)(A.val + ENTRIES);
+    A.idx = A.ptr + SPARSE + 1;
+    for (int64_t i = 0; i < DENSE * DENSE; i++)
+        room[i] = 1.0 / (double)(1 + i % 7);
+    for (int k = 0; k < REPEATS; k++) {
+        double start = uz_thread_seconds();
+        uz_syrk_lower_t_while(DENSE, DENSE, room, room + DENSE * DENSE, NULL);
+        dense = fmin(dense, uz_thread_seconds() - start);
     }
-    if (room && uz_csc_init(&A, SPARSE, SPARSE, (int64_t)SPARSE * BAND, NULL) == UZ_OK) {
-        /* a lower triangle with BAND entries in a column, far enough apart to be read as those of a mesh are */
-        int64_t at = 0;
-        for (int64_t j = 0; j < SPARSE; j++) {
-            A.ptr[j] = at;
-            for (int64_t k = 0; k < BAND && j + k / 4 * 200 + k < SPARSE; k++) {
-                A.idx[at] = j + k / 4 * 200 + k;
-                A.val[at++] = 1.0;
-            }
+    measured.flop_s = dense / ((double)DENSE * DENSE * DENSE);
+    /* a lower triangle with BAND entries in a column, far enough apart to be read as those of a mesh are */
+    int64_t at = 0;
+    for (int64_t j = 0; j < SPARSE; j++) {
+        A.ptr[j] = at;
+        for (int64_t k = 0; k < BAND && j + k / 4 * 200 + k < SPARSE; k++) {
+            A.idx[at] = j + k / 4 * 200 + k;
+            A.val[at++] = 1.0;
         }
-        A.ptr[SPARSE] = at;
-        const double begun = uz_thread_seconds();
-        for (int k = 0; k < REPEATS && (k == 0 || uz_thread_seconds() - begun < ENOUGH_S); k++) {
-            double start = uz_thread_seconds();
-            uz_csc_symv(room + 2 * DENSE * DENSE, &A, 1.0, room);
-            sparse = fmin(sparse, uz_thread_seconds() - start);
-        }
-        measured.entry_s = sparse / (double)A.ptr[SPARSE];
     }
-    uz_csc_clear(&A);
-    free(room);
+    A.ptr[SPARSE] = at;
+    const double begun = uz_thread_seconds();
+    for (int k = 0; k < REPEATS && (k == 0 || uz_thread_seconds() - begun < ENOUGH_S); k++) {
+        double start = uz_thread_seconds();
+        uz_csc_symv(room + 2 * DENSE * DENSE, &A, 1.0, room);
+        sparse = fmin(sparse, uz_thread_seconds() - start);
+    }
+    measured.entry_s = sparse / (double)A.ptr[SPARSE];
+    munmap(room, bytes);
 }
 
 /* -------------------------------------------------------------------- the model */
@@ -87,7 +91,7 @@ static uz_cost_estimate estimate(const uz_dual_abilities *can, const uz_cost_siz
     out.bytes = matrix_bytes(size);
     out.case_s = (CASE_PASSES * (double)size->k_entries + CASE_NUMBERS * (double)size->d) * rates->entry_s;
     if (predicted) {
-        bool last = can->contact_last, was_last = uz_dual_abilities_of(of)->contact_last;
+        bool last = can->contact_last, was_last = uz_dual_form_of(of)->can.contact_last;
         double entries = last == was_last ? 1.0 : last ? LAST_ENTRIES : 1.0 / LAST_ENTRIES;
         L = *predicted;
         L.flops *= last == was_last ? 1.0 : last ? LAST_FLOPS : 1.0 / LAST_FLOPS;
@@ -98,7 +102,7 @@ static uz_cost_estimate estimate(const uz_dual_abilities *can, const uz_cost_siz
         out.setup_s = L.order_s + UZ_COST_FACTOR_FLOPS * L.flops * rates->flop_s +
                       UZ_COST_FACTOR_PASSES * (double)L.nnz * rates->entry_s;
     }
-    uz_dual_add_cost(&out, size, predicted ? &L : NULL, rates);
+    uz_dual_form_of(out.op)->add_cost(&out, size, predicted ? &L : NULL, rates);
     return out;
 }
 
@@ -149,9 +153,9 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
     pthread_once(&guard, measure);
     plan->count = 0;
     if (factor)
-        plan->form[plan->count++] = estimate(uz_dual_abilities_of(direct), size, factor, direct, &measured);
+        plan->form[plan->count++] = estimate(&uz_dual_form_of(direct)->can, size, factor, direct, &measured);
     for (int k = 0; k < UZ_DUAL_FORMS; k++) {
-        const uz_dual_abilities *can = uz_dual_abilities_at(k);
+        const uz_dual_abilities *can = &uz_dual_forms[k]->can;
         if (!can->needs_factor || (factor && can->op != direct))
             plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, &measured);
     }
@@ -163,7 +167,7 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
         if (!allowed || !form->fits)
             continue;
         const double before = plan->chosen >= 0 ? total(&plan->form[plan->chosen], size) : INFINITY;
-        if (plan->chosen < 0 || (!uz_dual_abilities_of(form->op)->needs_factor && before > WORTH_S &&
+        if (plan->chosen < 0 || (!uz_dual_form_of(form->op)->can.needs_factor && before > WORTH_S &&
                                  MUCH_CHEAPER * total(form, size) < before))
             plan->chosen = k;
     }
@@ -175,7 +179,7 @@ static double least_bytes(const uz_cost_plan *plan, bool with_factor, uz_operato
     double least = INFINITY;
     for (int k = 0; k < plan->count; k++) {
         const uz_cost_estimate *form = &plan->form[k];
-        bool counts = uz_dual_abilities_of(form->op)->needs_factor == with_factor &&
+        bool counts = uz_dual_form_of(form->op)->can.needs_factor == with_factor &&
                       (asked == UZ_OPERATOR_AUTO || asked == form->op);
         if (!counts || !(form->bytes < least))
             continue;
@@ -187,7 +191,7 @@ static double least_bytes(const uz_cost_plan *plan, bool with_factor, uz_operato
 
 uz_status uz_cost_refuse(const uz_cost_plan *plan, uz_operator asked, size_t memory_limit, uz_error *err)
 {
-    const bool any = asked == UZ_OPERATOR_AUTO, by_factor = any || uz_dual_abilities_of(asked)->needs_factor;
+    const bool any = asked == UZ_OPERATOR_AUTO, by_factor = any || uz_dual_form_of(asked)->can.needs_factor;
     uz_operator op = asked;
     char with_factor[80] = "the symbolic analysis of a factor alone passes it";
     double direct = least_bytes(plan, true, by_factor ? asked : UZ_OPERATOR_AUTO, &op),
@@ -199,7 +203,7 @@ uz_status uz_cost_refuse(const uz_cost_plan *plan, uz_operator asked, size_t mem
                        free, memory_limit);
     char advice[80] = "raise the limit";
     if (!any && free <= (double)memory_limit)
-        snprintf(advice, sizeof advice, "ask for the operator %s or auto", uz_operator_name(op));
+        snprintf(advice, sizeof advice, "ask for the operator %s or auto", uz_choice_name(UZ_CHOICE_OPERATOR, op));
     return uz_fail(err, UZ_ERR_LIMIT, "K", "%s, as %s %.0f bytes, and the limit is %zu: %s", with_factor,
-                   uz_operator_name(op), free, memory_limit, advice);
+                   uz_choice_name(UZ_CHOICE_OPERATOR, op), free, memory_limit, advice);
 }

@@ -88,7 +88,7 @@ static void choose_next(grid *next, search *g);
 static bool choose_between(grid *next, const search *g);
 static uz_status publish(search *g, uz_error *err);
 
-uz_status uz_solve_grid_sequence(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
+uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                                  const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     const uz_scene *scene = &problem->scene;
@@ -106,8 +106,6 @@ uz_status uz_solve_grid_sequence(uz_result ***out, const uz_problem *problem, co
                 .grids = {.most_dofs = MOST_DOFS},
                 .sequence = {.dim = uz_scene_dim(scene), .refined = scene->refine}};
     grid next = {.box = scene->box};
-    *out = NULL;
-    uz_error_reset(err);
     uz_status status = check(&g, starts, err);
     if (status == UZ_OK && chosen) {
         g.grids = uz_grids_of_box(&scene->box, MOST_DOFS);
@@ -129,10 +127,9 @@ uz_status uz_solve_grid_sequence(uz_result ***out, const uz_problem *problem, co
         status = publish(&g, err);
     free(g.spent);
     free(g.bisected);
-    if (status == UZ_OK)
-        *out = g.best.results;
-    else
-        uz_results_free(g.best.results, g.best.results ? g.n_cases : 0);
+    for (int64_t i = 0; g.best.results && i < g.n_cases; i++)
+        results[i] = g.best.results[i];
+    free(g.best.results);
     return status;
 }
 
@@ -163,21 +160,6 @@ static double share_done(const search *g, double error)
 static double number_of(const search *g, const grid *on)
 {
     return g->refines ? pow(on->dofs, 1.0 / g->sequence.dim) : (double)on->n;
-}
-
-static void tell(const search *g, const grid *next)
-{
-    const int count = g->sequence.count;
-    double from = 0.0, to = 0.2;
-    if (!g->hooks || !g->hooks->grid)
-        return;
-    if (count > 0) {
-        const uz_tried *last = &g->tried[count - 1];
-        const double rate = count > 1 ? uz_observed_rate(last - 1, last, g->order) : g->order;
-        from = share_done(g, last->error);
-        to = share_done(g, last->error * pow(last->n / number_of(g, next), rate));
-    }
-    g->hooks->grid(g->hooks->ctx, from, fmax(from, to));
 }
 
 /* Factoring takes d^1.5 operations in the plane and d^2 in space (George and Liu, Computer Solution of Large Sparse
@@ -248,10 +230,15 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, const search *g, 
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
     for (int64_t i = 0; status == UZ_OK && g->best.results && i < g->n_cases; i++)
         status = uz_transfer_start(&starts[i], g->best.results[i], g->refines ? NULL : &g->best.on.box, outline, err);
-    settings.time_limit_s = fmax(0.0, g->deadline - uz_seconds());
-    if (status == UZ_OK)
-        status =
-            uz_solve_on_mesh(&x->results, problem, &settings, (const uz_state *const *)starts, g->cache, g->hooks, err);
+    const uz_state *const *from = (const uz_state *const *)starts;
+    const double started = uz_seconds();
+    settings.time_limit_s = fmax(0.0, g->deadline - started);
+    if (status == UZ_OK && !(x->results = uz_alloc_zero(g->n_cases, sizeof(uz_result *))))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the results of %lld cases", (long long)g->n_cases);
+    if (status == UZ_OK) {
+        status = uz_solve_rounds(x->results, problem, &settings, from, NULL, g->cache, g->hooks, err);
+        status = uz_settle_cases(x->results, status, problem, &settings, from, g->cache, g->hooks, started, err);
+    }
     for (int64_t i = 0; starts && i < g->n_cases; i++)
         uz_state_free(starts[i]);
     free(starts);
@@ -297,7 +284,15 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
     if (late)
         g->stop = STOP_TIME;
     if (status == UZ_OK && !late) {
-        tell(g, &x->on);
+        double from = 0.0, to = 0.2; /* what the grid is of the way to the error asked for */
+        if (g->sequence.count > 0) {
+            const uz_tried *last = &g->tried[g->sequence.count - 1];
+            const double rate = g->sequence.count > 1 ? uz_observed_rate(last - 1, last, g->order) : g->order;
+            from = share_done(g, last->error);
+            to = share_done(g, last->error * pow(last->n / number_of(g, &x->on), rate));
+        }
+        if (g->hooks && g->hooks->grid)
+            g->hooks->grid(g->hooks->ctx, from, fmax(from, to));
         status = solve_cases(x, level, g, &problem, &outline, err);
     }
     if (status == UZ_OK && x->results && g->refines && x->error > g->requested)

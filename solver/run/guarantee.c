@@ -30,14 +30,16 @@ static uz_status solve(uz_result **out, const guarantee *g, const uz_qp *qp, uz_
 {
     const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = *qp};
     uz_settings settings = uz_settings_default();
-    uz_result **results = NULL;
+    const double started = uz_seconds();
     settings.memory_limit = g->settings->memory_limit;
-    settings.time_limit_s = fmax(0.0, g->stop.deadline - uz_seconds());
+    settings.time_limit_s = fmax(0.0, g->stop.deadline - started);
     *out = NULL;
-    const uz_status status = uz_solve_on_mesh(&results, &problem, &settings, NULL, g->cache, &g->hooks, err);
-    if (status == UZ_OK)
-        *out = results[0];
-    free(results);
+    uz_status status = uz_solve_rounds(out, &problem, &settings, NULL, NULL, g->cache, &g->hooks, err);
+    status = uz_settle_cases(out, status, &problem, &settings, NULL, g->cache, &g->hooks, started, err);
+    if (status != UZ_OK) {
+        uz_result_free(*out);
+        *out = NULL;
+    }
     return status;
 }
 

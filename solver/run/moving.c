@@ -122,20 +122,6 @@ static double change_by(moving *m, const uz_result *result)
     return square > 0.0 ? sqrt(square) / (least > 0.0 ? least : fmax(before, m->norm)) : 0.0;
 }
 
-/* w that would have brought the last difference to zero, were all of them along one line; Kv: K times the last. */
-static double next_step(moving *m)
-{
-    const int64_t d = m->base->model.d;
-    double along = uz_dot(d, m->before, m->Kv), square = uz_dot(d, m->v, m->Kv) - 2.0 * along;
-    /* before' K (v - before) and |v - before|^2 in K's product; K before takes the place of K v */
-    memset(m->Kv, 0, (size_t)d * sizeof *m->Kv);
-    uz_csc_symv(m->Kv, &m->base->model.K, 1.0, m->before);
-    const double own = uz_dot(d, m->before, m->Kv);
-    along -= own;
-    square += own;
-    return square > 0.0 ? fmin(MOST_STEP, fmax(LEAST_STEP, -m->step * along / square)) : m->step;
-}
-
 /* The next answer takes the place of the last, with the time that both took. Whoever goes on from it begins where
  * nothing has moved, with the rows that there are; without memory for their reactions nobody can. */
 static void replace(uz_result **result, uz_result *next, const moving *m)
@@ -178,8 +164,18 @@ static uz_status judge(bool *settled, moving *m, uz_result *result, uz_error *er
     s->geometry.left = change > 0.0 ? left : 0.0;
     *settled = !(s->geometry.left > s->requested_error) || change <= noise;
     const bool creeps = m->ratio[0] > CREEPING && fabs(m->ratio[0] - m->ratio[1]) < STEADY * m->ratio[0];
-    if (m->ratio[0] >= SLOW || creeps || m->step != 1.0)
-        m->step = next_step(m);
+    if (m->ratio[0] >= SLOW || creeps || m->step != 1.0) {
+        /* w that would have brought the last difference to zero, were all of them along one line; Kv: K times the last.
+         * before' K (v - before) and |v - before|^2 in K's product; K before takes the place of K v. */
+        const int64_t d = m->base->model.d;
+        double along = uz_dot(d, m->before, m->Kv), square = uz_dot(d, m->v, m->Kv) - 2.0 * along;
+        memset(m->Kv, 0, (size_t)d * sizeof *m->Kv);
+        uz_csc_symv(m->Kv, &m->base->model.K, 1.0, m->before);
+        const double own = uz_dot(d, m->before, m->Kv);
+        along -= own;
+        square += own;
+        m->step = square > 0.0 ? fmin(MOST_STEP, fmax(LEAST_STEP, -m->step * along / square)) : m->step;
+    }
     memcpy(m->before, m->v, (size_t)m->base->model.d * sizeof *m->v);
     for (int64_t i = 0; i < m->n; i++)
         m->place[i] += m->step * (result->u[i] - m->place[i]);

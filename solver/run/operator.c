@@ -1,8 +1,10 @@
 /* operator.c: which form of the operator a setup gets, and the making of it: a factor, or a multigrid in its place. */
 #include "run/setup.h"
+#include "dual/form.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -138,7 +140,7 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
         return uz_cost_refuse(&setup->plan, settings->op, settings->memory_limit, err);
     /* the factor is there: where only a form without one seems to fit, the one that needs least beside it does */
     const uz_operator op = setup->plan.form[chosen].op;
-    return make_dual(&m, uz_dual_abilities_of(op)->needs_factor ? op : UZ_OPERATOR_FACTORED, err);
+    return make_dual(&m, uz_dual_form_of(op)->can.needs_factor ? op : UZ_OPERATOR_FACTORED, err);
 }
 
 /* The form that was asked for, or the one that the plan chooses once the analysis of a factor has shown its size. */
@@ -158,7 +160,7 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
     if (status != UZ_OK)
         return status;
     m.size = uz_cost_size_of(m.K, m.N, n_b, setup->is_scene ? setup->model.mesh.dim : 0, problem->n_cases, settings);
-    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor,
+    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor,
                no_factor = free_asked || (limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit);
     m.direct = uz_dual_choose(m.N, n_b, free_asked ? UZ_OPERATOR_AUTO : settings->op);
     bool done = false;
@@ -167,7 +169,7 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
         if (no_factor) {
             uz_cost_decide(plan, &m.size, NULL, m.direct, settings->op, limit);
         } else {
-            int64_t n_dofs = uz_dual_abilities_of(m.direct)->contact_last ? n_b : 0;
+            int64_t n_dofs = uz_dual_form_of(m.direct)->can.contact_last ? n_b : 0;
             int64_t rows = uz_cost_is_one_to_one(m.N, n_dofs) ? 0 : m.N->rows;
             status = uz_shared_factor_get(&setup->shared, cache, key, m.K, dofs, n_dofs, rows, settings->ordering,
                                           accept_factor, &m, hooks, err);
@@ -180,7 +182,7 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
         }
         if (status != UZ_OK || done || plan->chosen < 0)
             break;
-        if (!uz_dual_abilities_of(plan->form[plan->chosen].op)->needs_factor) {
+        if (!uz_dual_form_of(plan->form[plan->chosen].op)->can.needs_factor) {
             bool regretted;
             status = precondition(&m, &regretted, err);
             done = !regretted;
@@ -192,5 +194,15 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
     if (status == UZ_OK && !done)
         status = uz_cost_refuse(plan, settings->op, limit, err);
     free(dofs);
-    return status;
+    if (status != UZ_OK)
+        return status;
+    const size_t form = setup->amg ? setup->amg->info.bytes : uz_factor_describe(setup->factor).bytes;
+    setup->bytes = sizeof *setup + (setup->shared.item ? 0 : form) + setup->dual->bytes;
+    if (setup->is_scene)
+        setup->bytes += uz_body_model_bytes(&setup->model);
+    if (setup->rows.in)
+        setup->bytes += (size_t)setup->rows.m + uz_csc_bytes(&setup->N_in);
+    setup->reused.ordering = setup->shared.analysis_reused;
+    setup->reused.factor = setup->shared.factor_reused;
+    return UZ_OK;
 }

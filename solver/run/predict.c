@@ -1,5 +1,6 @@
 /* predict.c: what a solve will take, from the pattern of its matrices: nothing is factored. */
 #include "core/error.h"
+#include "dual/form.h"
 #include "run/cost.h"
 #include "dual/dual.h"
 #include "factor/factor.h"
@@ -14,7 +15,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, i
                          const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
     const size_t limit = settings->memory_limit;
-    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor;
+    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor;
     uz_cost_plan plan = {.chosen = -1};
     uz_analysis *analysis = NULL;
     int64_t *dofs = NULL, n_b = 0;
@@ -27,7 +28,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, i
     if (no_factor) {
         uz_cost_decide(&plan, &size, NULL, form, settings->op, limit);
     } else {
-        int64_t last = uz_dual_abilities_of(form)->contact_last ? n_b : 0;
+        int64_t last = uz_dual_form_of(form)->can.contact_last ? n_b : 0;
         int64_t rows = uz_cost_is_one_to_one(N, last) ? 0 : N->rows;
         status = uz_analysis_create(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
         if (status == UZ_OK) {
@@ -45,7 +46,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, i
     out->op = e->op;
     out->bytes = e->bytes;
     out->seconds = e->setup_s + (double)(cases > 0 ? cases : 1) * e->case_s;
-    if (!uz_dual_abilities_of(out->op)->needs_factor)
+    if (!uz_dual_form_of(out->op)->can.needs_factor)
         out->factor_nnz = 0;
     return UZ_OK;
 }

@@ -44,22 +44,6 @@ typedef struct {
     bool contradictory;   /* the rows of the last correction are, `ray` says why */
 } refinement;
 
-static uz_status begin(refinement *x, uz_run *run, uz_error *err)
-{
-    x->run = run;
-    double **of_d[] = {&x->res.e, &x->res.e_u, &x->res.Ku, &x->res.Kc, &x->zero, &x->e, &x->c};
-    double **of_m[] = {&x->f, &x->s, &x->r, &x->g, &x->ray};
-    bool ok = true;
-    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
-        ok = (*of_d[k] = uz_alloc_zero(run->d, sizeof(double))) && ok;
-    for (size_t k = 0; k < sizeof of_m / sizeof of_m[0]; k++)
-        ok = (*of_m[k] = uz_alloc_zero(run->m, sizeof(double))) && ok;
-    x->active = uz_alloc_zero(run->m, sizeof *x->active);
-    if (!ok || !x->active)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld dofs", (long long)run->d);
-    return uz_csc_transpose(&x->Nt, uz_setup_N(run->asked->setup, run->asked->problem), err);
-}
-
 /* c and s for e and f. */
 static uz_status correct(refinement *x, uz_error *err)
 {
@@ -144,11 +128,22 @@ static bool is_worth_it(const uz_run *run)
 
 uz_status uz_run_refine(uz_run *run, uz_error *err)
 {
-    refinement x = {0};
+    refinement x = {.run = run};
+    double **of_d[] = {&x.res.e, &x.res.e_u, &x.res.Ku, &x.res.Kc, &x.zero, &x.e, &x.c};
+    double **of_m[] = {&x.f, &x.s, &x.r, &x.g, &x.ray};
+    bool ok = true;
     uz_answer latest = {0};
     if (!is_worth_it(run))
         return UZ_OK;
-    uz_status status = begin(&x, run, err);
+    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
+        ok = (*of_d[k] = uz_alloc_zero(run->d, sizeof(double))) && ok;
+    for (size_t k = 0; k < sizeof of_m / sizeof of_m[0]; k++)
+        ok = (*of_m[k] = uz_alloc_zero(run->m, sizeof(double))) && ok;
+    x.active = uz_alloc_zero(run->m, sizeof *x.active);
+    uz_status status =
+        ok && x.active ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld dofs", (long long)run->d);
+    if (status == UZ_OK)
+        status = uz_csc_transpose(&x.Nt, uz_setup_N(run->asked->setup, run->asked->problem), err);
     if (status == UZ_OK)
         status = uz_answer_allocate(&latest, run->d, run->m, err);
     if (status == UZ_OK)
@@ -170,9 +165,10 @@ uz_status uz_run_refine(uz_run *run, uz_error *err)
         memcpy(run->work.it.ray, x.ray, (size_t)run->m * sizeof *x.ray);
         run->work.end = UZ_END_RAY; /* to be proved by the original data */
     }
-    double *room[] = {x.res.e, x.res.e_u, x.res.Ku, x.res.Kc, x.zero, x.e, x.c, x.f, x.s, x.r, x.g, x.ray};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
+        free(*of_d[k]);
+    for (size_t k = 0; k < sizeof of_m / sizeof of_m[0]; k++)
+        free(*of_m[k]);
     free(x.active);
     uz_csc_clear(&x.Nt);
     uz_answer_clear(&latest);

@@ -155,7 +155,7 @@ uz_status uz_report_answer(uz_run *run, uz_error *err)
     result->r = run->answer.r;
     result->g = run->answer.g;
     run->answer.r = run->answer.g = NULL;
-    const uz_law *law = uz_setup_law(run->asked->setup);
+    const uz_law *law = run->asked->setup->law;
     summary->active += law->kind->active(law, NULL, result->r, run->answer.m);
     for (int64_t i = 0; i < run->answer.m; i++) {
         summary->reaction_sum += result->r[i];

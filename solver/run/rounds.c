@@ -184,18 +184,18 @@ static uz_request request_of(const batch *b, int64_t place, bool in_block)
 static uz_status solve_in_blocks(batch *b, uz_error *err)
 {
     uz_block *block = NULL;
+    uz_run *runs = NULL;
     const int64_t width = b->blocks * UZ_LANES;
     uz_request *asked = uz_alloc_zero(width, sizeof *asked);
     uz_status status = asked ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     if (status == UZ_OK)
-        status = uz_block_create(&block, b->setup, b->problem, b->blocks, err);
+        status = uz_block_create(&block, &runs, b->setup, b->problem, b->blocks, err);
     for (int64_t first = 0; status == UZ_OK && first < b->n_todo; first += width) {
         const int64_t count = b->n_todo - first < width ? b->n_todo - first : width;
         int64_t failed = 0;
         for (int64_t k = 0; k < count; k++)
             asked[k] = request_of(b, first + k, true);
         status = uz_block_solve(block, asked, count, &failed, err);
-        uz_run *runs = uz_block_runs(block);
         if (status != UZ_OK && b->problem->n_cases > 0)
             uz_error_name_case(err, asked[failed].index);
         for (int64_t k = 0; k < count; k++) {

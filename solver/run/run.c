@@ -14,6 +14,8 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "methods/steps.h"
+#include "methods/turns.h"
 #include "run/problem.h"
 #include "run/rows.h"
 #include "run/settings.h"
@@ -103,8 +105,7 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     if (status == UZ_OK)
         status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
-        status =
-            uz_iterate_init(&work->it, uz_setup_law(asked->setup), asked->setup->dual, as_given, settings->alpha, err);
+        status = uz_iterate_init(&work->it, asked->setup->law, asked->setup->dual, as_given, settings->alpha, err);
     /* bounds of iterations are relative to another norm where supports move the body */
     work->it.milestones = run->load.moved ? NULL : &work->milestones;
     uz_milestones_resume(&work->milestones, uz_run_time(run));
@@ -144,13 +145,18 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
     uz_milestones_resume(&work->milestones, uz_run_time(run));
     double start = uz_seconds();
     const uz_method_kind *method;
+    uz_method_turn turn = {.kind = NULL};
     /* The counts of the paper's rule are those of the exact operator. */
     const double aim = options.stopping == UZ_STOP_PAPER ? 0.0 : work->target;
     uz_status status = uz_dual_load_aim(work->dual, aim, &stop, err);
     if (status == UZ_OK)
         status = uz_method_find(&method, options.method, work->it.law, err);
-    if (status == UZ_OK)
-        status = method->run(&work->end, &work->it, work->dual, &options, &run->result->history, err);
+    while (status == UZ_OK && uz_method_next(&turn, &work->end, &work->it, work->dual, method, &options)) {
+        if (turn.kind->steps)
+            status = uz_steps_begin(&work->it, work->dual, &turn.options, &run->result->history, err);
+        if (status == UZ_OK)
+            status = turn.kind->run(&work->end, &work->it, work->dual, &turn.options, &run->result->history, err);
+    }
     run->result->summary.timings.iterate += uz_seconds() - start;
     uz_milestones_pause(&work->milestones);
     return status == UZ_OK && work->end == UZ_END_RAY ? uz_run_check_ray(run, err) : status;
@@ -159,8 +165,14 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
 uz_status uz_run_certify(uz_run *run, uz_error *err)
 {
     const uz_iterate *it = &run->work.it;
+    uz_answer *answer = &run->answer;
+    uz_certify_input input;
     double start = uz_seconds();
-    uz_status status = uz_run_certify_reactions(run, &run->answer, it->best_r, isfinite(it->best_bound), err);
+    uz_status status = uz_run_recover(run, answer, it->best_r, isfinite(it->best_bound), err);
+    if (status == UZ_OK)
+        status = uz_run_certify_input(&input, run, answer, err);
+    if (status == UZ_OK)
+        status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
     run->result->summary.timings.certify += uz_seconds() - start;
     return status;
 }
@@ -188,7 +200,9 @@ static uz_status improve(uz_run *run, uz_error *err)
         uz_answer last = {0};
         status = uz_answer_allocate(&last, run->d, run->m, err);
         if (status == UZ_OK)
-            status = uz_run_certify_reactions(run, &last, run->work.it.r, false, err);
+            status = uz_run_recover(run, &last, run->work.it.r, false, err);
+        if (status == UZ_OK)
+            status = uz_run_certify_answer(run, &last, err);
         const bool exact =
             (end == UZ_END_SOLVED || end == UZ_END_UNDECIDED) && isinf(run->answer.certificate.relative_error);
         if (status == UZ_OK && (exact || last.certificate.relative_error < run->answer.certificate.relative_error)) {

@@ -118,14 +118,10 @@ const uz_hooks *uz_run_hooks(uz_scaled_hooks *room, const uz_run *run);
 
 /* What a certificate of the answer's u and rows starts from; needs the load. */
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_answer *answer, uz_error *err);
-/* What a certificate of u says relative errors are relative to, where supports move the body; else 0. */
-uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz_error *err);
 /* Fills answer->certificate and answer->g from answer->u and answer->r (caller's rows), from the original data. */
 uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err);
-/* The answer that r (m, scaled rows) gives, with the feasible correction that was kept or without, and its certificate.
- */
-uz_status uz_run_certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_correction,
-                                   uz_error *err);
+/* The answer that r (m, scaled rows) gives, with the feasible correction that was kept or without: its u and r. */
+uz_status uz_run_recover(uz_run *run, uz_answer *answer, const double *r, bool with_correction, uz_error *err);
 /* UZ_END_RAY: the rows that seem to contradict each other along it->ray, checked on the original data. */
 uz_status uz_run_check_ray(uz_run *run, uz_error *err);
 /* What y (m, <= 0, caller's rows) proves: result->ray where no u is feasible, else work.far where it reaches further

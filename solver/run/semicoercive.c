@@ -1,4 +1,5 @@
 #include "run/semicoercive.h"
+#include "dual/form.h"
 
 #include "run/setup_cache.h"
 #include "core/alloc.h"
@@ -72,7 +73,7 @@ static uz_status prepare(uz_semi *s, uz_error *err)
         return status;
     s->d = s->of.K->cols;
     s->m = s->of.N->rows;
-    if (s->with_factor.op == UZ_OPERATOR_AUTO || !uz_dual_abilities_of(s->with_factor.op)->needs_factor) {
+    if (s->with_factor.op == UZ_OPERATOR_AUTO || !uz_dual_form_of(s->with_factor.op)->can.needs_factor) {
         /* null spaces and the noise of augmented matrices are bounded with a factor: nothing else will do */
         int64_t *dofs = NULL, n_b = 0;
         status = uz_dual_contact_dofs(&dofs, &n_b, s->of.N, err);
@@ -200,28 +201,6 @@ static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
     return status;
 }
 
-/* A bound on W^1/2 K_R^-1 W^-1/2's norm for the last augmented problem, W as in uz_row_stiffness: K_R's diagonal is at
- * least that of K. */
-static uz_status bound_inverse(const uz_semi *s, double *bound, uz_error *err)
-{
-    uz_problem augmented;
-    uz_setup *setup = NULL;
-    uz_reuse reused;
-    uz_status status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
-    if (status == UZ_OK)
-        status = uz_setup_acquire(&setup, &reused, s->cache, &augmented, NULL, s->settings, s->hooks, err);
-    if (status == UZ_OK) {
-        double most = 1.0;
-        const uz_csc *K = &augmented.qp.K;
-        for (int64_t j = 0; j < s->d; j++)
-            most = fmax(most, 1.0 / (s->inverse[j] * K->val[K->ptr[j]]));
-        *bound = most * uz_setup_inverse_bound(setup, K, NULL);
-    }
-    uz_setup_release(s->cache, setup);
-    uz_augmented_clear(&augmented);
-    return status;
-}
-
 /* Is the answer of the augmented problem one of the problem itself, and how far is it from the exact one? */
 static uz_status judge_exact(uz_semi *s, uz_contact_verdict *verdict, double *relative, uz_error *err)
 {
@@ -238,8 +217,23 @@ static uz_status judge_exact(uz_semi *s, uz_contact_verdict *verdict, double *re
     uz_contact_claim claim = {&s->of, &s->Nt, s->inverse, s->weight, s->last->u, s->last->r, s->absolute, INFINITY};
     status = uz_prove_contact(verdict, s->provable, &claim, err);
     if (status == UZ_OK && *verdict == UZ_CONTACT_NO_WITNESS) {
-        /* rows that share dofs with others need to know which of these are surely open: only then is that bound made */
-        status = bound_inverse(s, &claim.inverse_bound, err);
+        /* Rows that share dofs with others need to know which of these are surely open: only then a bound is made on
+         * W^1/2 K_R^-1 W^-1/2's norm for the last augmented problem, W as in uz_row_stiffness: K_R's diagonal is at
+         * least that of K. */
+        uz_problem problem;
+        uz_setup *setup = NULL;
+        uz_reuse reused;
+        double most = 1.0;
+        status = uz_augment(&problem, &s->of, &s->Nt, s->weight, s->target, err);
+        if (status == UZ_OK)
+            status = uz_setup_acquire(&setup, &reused, s->cache, &problem, NULL, s->settings, s->hooks, err);
+        const uz_csc *K = &problem.qp.K;
+        for (int64_t j = 0; status == UZ_OK && j < s->d; j++)
+            most = fmax(most, 1.0 / (s->inverse[j] * K->val[K->ptr[j]]));
+        if (status == UZ_OK)
+            claim.inverse_bound = most * uz_setup_inverse_bound(setup, K, NULL);
+        uz_setup_release(s->cache, setup);
+        uz_augmented_clear(&problem);
         if (status == UZ_OK)
             status = uz_prove_contact(verdict, s->provable, &claim, err);
     }

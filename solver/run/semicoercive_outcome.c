@@ -64,17 +64,27 @@ static void name_dofs(char *text, size_t size, const double *z, int64_t d)
     }
 }
 
-static uz_status refuse(const uz_semi *s, uz_pressing how, const double *y, uz_error *err)
+uz_status uz_semi_check_pressed(const uz_semi *s, bool strict, uz_error *err)
 {
-    char dofs[200];
-    double *z = uz_alloc_zero(s->d, sizeof *z);
-    if (!z)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)s->d);
-    for (int64_t c = 0; c < s->k; c++)
-        for (int64_t j = 0; j < s->d; j++)
-            z[j] += y[c] * s->Z[c * s->d + j];
-    name_dofs(dofs, sizeof dofs, z, s->d);
+    uz_pressing how = UZ_PRESSED_ON;
+    char dofs[200] = "";
+    if (s->is_scene)
+        return uz_check_pressed(&s->model, s->of.p, err);
+    if (!s->Z)
+        return UZ_OK;
+    double *y = uz_alloc_zero(s->k, sizeof *y), *z = uz_alloc_zero(s->d, sizeof *z);
+    uz_status status = y && z ? uz_load_on_modes(&how, y, s->Z, s->k, s->of.N, s->of.p, BALANCED, strict, err)
+                              : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld null vectors", (long long)s->k);
+    if (status == UZ_OK && how != UZ_PRESSED_ON) {
+        for (int64_t c = 0; c < s->k; c++)
+            for (int64_t j = 0; j < s->d; j++)
+                z[j] += y[c] * s->Z[c * s->d + j];
+        name_dofs(dofs, sizeof dofs, z, s->d);
+    }
+    free(y);
     free(z);
+    if (status != UZ_OK || how == UZ_PRESSED_ON)
+        return status;
     if (how == UZ_PUSHED_AWAY)
         return uz_fail(err, UZ_ERR_FREE_BODY, "p",
                        "K is singular and the load pushes a part of the body away along a motion without stiffness "
@@ -87,23 +97,6 @@ static uz_status refuse(const uz_semi *s, uz_pressing how, const double *y, uz_e
         "stands in the way of costs nothing; it moves most: %s. Support it there, or add a row of N or a load "
         "that stops this motion.",
         dofs);
-}
-
-uz_status uz_semi_check_pressed(const uz_semi *s, bool strict, uz_error *err)
-{
-    uz_pressing how = UZ_PRESSED_ON;
-    if (s->is_scene)
-        return uz_check_pressed(&s->model, s->of.p, err);
-    if (!s->Z)
-        return UZ_OK;
-    double *y = uz_alloc_zero(s->k, sizeof *y);
-    if (!y)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld null vectors", (long long)s->k);
-    uz_status status = uz_load_on_modes(&how, y, s->Z, s->k, s->of.N, s->of.p, BALANCED, strict, err);
-    if (status == UZ_OK && how != UZ_PRESSED_ON)
-        status = refuse(s, how, y, err);
-    free(y);
-    return status;
 }
 
 /* The singular K bounds nothing by its inverse. */

@@ -80,16 +80,6 @@ int uz_choice_find(uz_choice of, const char *name)
     return -1;
 }
 
-const char *uz_operator_name(uz_operator value)
-{
-    return uz_choice_name(UZ_CHOICE_OPERATOR, (unsigned)value);
-}
-
-const char *uz_outcome_name(uz_outcome value)
-{
-    return uz_choice_name(UZ_CHOICE_OUTCOME, (unsigned)value);
-}
-
 uz_settings uz_settings_default(void)
 {
     uz_settings settings = {

@@ -63,11 +63,6 @@ const uz_csc *uz_setup_K(const uz_setup *setup, const uz_problem *problem)
     return setup->is_scene ? &setup->model.K : &problem->qp.K;
 }
 
-const uz_law *uz_setup_law(const uz_setup *setup)
-{
-    return setup->is_scene ? setup->model.law : &uz_law_frictionless;
-}
-
 const uz_csc *uz_setup_N(const uz_setup *setup, const uz_problem *problem)
 {
     return setup->rows.in ? &setup->N_in : uz_setup_all_rows(setup, problem);
@@ -131,11 +126,9 @@ static uz_status choose_rows(uz_setup *setup, const uz_scene *scene, const uz_ca
 }
 
 uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_candidates *wanted,
-                          const uz_setup_key *key, const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks,
-                          uz_error *err)
+                          const uz_settings *settings, uz_error *err)
 {
     const double start = uz_seconds();
-    uz_matrix_key K_key;
     uz_status status = UZ_OK;
     *out = NULL;
     uz_setup *setup = uz_alloc_zero(1, sizeof *setup);
@@ -150,31 +143,17 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
         status = uz_body_model_build(&setup->model, &problem->scene, UZ_BODY_SUPPORTED, err);
     else if (status == UZ_OK && problem->qp.N.rows == 0) /* N may come as a zeroed struct */
         status = uz_csc_init(&setup->no_rows, 0, problem->qp.K.cols, 0, err);
+    setup->law = setup->is_scene ? setup->model.law : &uz_law_frictionless;
     if (status == UZ_OK)
         setup->terms = uz_most_terms(uz_setup_K(setup, problem), uz_setup_all_rows(setup, problem));
     setup->assemble_s = uz_seconds() - start;
     if (status == UZ_OK && setup->is_scene && uz_may_omit_rows(problem))
         status = choose_rows(setup, &problem->scene, wanted, err);
-    if (status == UZ_OK && key && setup->is_scene)
-        status = uz_matrix_digest(&K_key, &setup->model.K, err);
-    else if (key)
-        K_key = key->K;
     if (status == UZ_OK)
-        status = uz_setup_make_operator(setup, problem, &K_key, settings, cache, hooks, err);
-    if (status != UZ_OK) {
+        *out = setup;
+    else
         uz_setup_free(setup);
-        return status;
-    }
-    size_t form = setup->amg ? setup->amg->info.bytes : uz_factor_describe(setup->factor).bytes;
-    setup->bytes = sizeof *setup + (setup->shared.item ? 0 : form) + setup->dual->bytes;
-    if (setup->is_scene)
-        setup->bytes += uz_body_model_bytes(&setup->model);
-    if (setup->rows.in)
-        setup->bytes += (size_t)setup->rows.m + uz_csc_bytes(&setup->N_in);
-    setup->reused.ordering = setup->shared.analysis_reused;
-    setup->reused.factor = setup->shared.factor_reused;
-    *out = setup;
-    return UZ_OK;
+    return status;
 }
 
 uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *problem, const uz_candidates *wanted,
@@ -192,6 +171,7 @@ uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *proble
     setup->doubt = base->doubt;
     pthread_mutex_unlock(&base->mutex);
     uz_status status = uz_body_model_move(&setup->model, &base->model, &problem->scene, err);
+    setup->law = setup->is_scene ? setup->model.law : &uz_law_frictionless;
     if (status == UZ_OK)
         setup->terms = uz_most_terms(uz_setup_K(setup, problem), uz_setup_all_rows(setup, problem));
     setup->assemble_s = uz_seconds() - start;

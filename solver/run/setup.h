@@ -22,6 +22,7 @@ typedef struct uz_setup {
     uz_candidates rows;    /* which of the model's rows it is solved with (rows.h); in NULL: all */
     uz_csc N_in;           /* these, where some are left out */
     uz_shared_factor shared;
+    const uz_law *law;       /* of its contacts */
     const uz_factor *factor; /* shared.factor; NULL: matrix_free */
     uz_amg *amg;             /* matrix_free, else NULL */
     uz_dual *dual;
@@ -44,18 +45,16 @@ typedef struct {
 uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz_candidates *wanted,
                           const uz_settings *settings, uz_error *err);
 
-/* Assembles (scenes), chooses rows (`wanted` among them; NULL: none in particular), factors and condenses; with a cache
- * the factor and its analysis are found or kept there, and key is that of uz_setup_digest. */
+/* Assembles (scenes) and chooses rows (`wanted` among them; NULL: none in particular): all but the operator. */
 uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_candidates *wanted,
-                          const uz_setup_key *key, const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks,
-                          uz_error *err);
-/* The same for a scene at a place: contact rows and dual operator are new, all else is that of `base`, the setup of the
- * scene at no place, which has to outlive *out. Neither has a key: nobody asks for a place again. */
+                          const uz_settings *settings, uz_error *err);
+/* A whole setup for a scene at a place: contact rows and dual operator are new, all else is that of `base`, the setup
+ * of the scene at no place, which has to outlive *out. Neither has a key: nobody asks for a place again. */
 uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *problem, const uz_candidates *wanted,
                         const uz_settings *settings, const uz_hooks *hooks, uz_error *err);
-/* The part of uz_setup_create that follows the assembly: the form of the operator by predicted cost and memory, and
- * what it needs. key: of K; read only where there is a cache. UZ_ERR_LIMIT with the predicted bytes where no form fits.
- */
+/* What follows uz_setup_create: the form of the operator by predicted cost and memory, and what it needs; with a cache
+ * the factor and its analysis are found or kept there. key: of K; read only where there is a cache. UZ_ERR_LIMIT with
+ * the predicted bytes where no form fits. */
 uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, const uz_matrix_key *key,
                                  const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 /* The same on the factor or the multigrid of setup->base. */
@@ -74,7 +73,5 @@ uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, const 
 const uz_csc *uz_setup_K(const uz_setup *setup, const uz_problem *problem);
 const uz_csc *uz_setup_N(const uz_setup *setup, const uz_problem *problem);
 const uz_csc *uz_setup_all_rows(const uz_setup *setup, const uz_problem *problem);
-/* The law of its contacts. */
-const uz_law *uz_setup_law(const uz_setup *setup);
 
 #endif

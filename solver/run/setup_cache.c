@@ -21,40 +21,51 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
     uz_setup_key key;
     uz_item *item = NULL;
     bool create = true;
+    uz_status status = UZ_OK;
     *setup = NULL;
     *reused = nothing;
     if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.place) { /* made on that at no place, which it keeps */
         uz_problem rest = *problem;
         uz_setup *base;
         rest.scene.place = NULL;
-        uz_status moved = uz_setup_acquire(&base, reused, cache, &rest, NULL, settings, hooks, err);
-        if (moved != UZ_OK)
-            return moved;
-        moved = uz_setup_move(setup, base, problem, wanted, settings, hooks, err);
-        if (moved == UZ_OK)
+        status = uz_setup_acquire(&base, reused, cache, &rest, NULL, settings, hooks, err);
+        if (status != UZ_OK)
+            return status;
+        status = uz_setup_move(setup, base, problem, wanted, settings, hooks, err);
+        if (status == UZ_OK)
             *reused = (*setup)->reused;
         else
             uz_setup_release(cache, base);
-        return moved;
+        return status;
     }
-    if (!cache)
-        return uz_setup_create(setup, problem, wanted, NULL, settings, NULL, hooks, err);
-    uz_status status = uz_setup_digest(&key, problem, wanted, settings, err);
-    if (status == UZ_OK)
+    if (cache)
+        status = uz_setup_digest(&key, problem, wanted, settings, err);
+    if (cache && status == UZ_OK)
         status = uz_table_acquire(&item, &create, cache, UZ_ITEM_SETUP, key.digest, hooks, err);
     if (status != UZ_OK)
         return status;
-    if (create) {
-        status = uz_setup_create(setup, problem, wanted, &key, settings, cache, hooks, err);
-        if (status != UZ_OK) {
-            uz_table_abandon(cache, item);
-            return status;
-        }
-        (*setup)->item = item;
-        uz_table_publish(cache, item, *setup, (*setup)->bytes, destroy_setup);
+    if (!create) {
+        *setup = uz_item_object(item);
+        *reused = everything;
+        return UZ_OK;
     }
-    *setup = uz_item_object(item);
-    *reused = create ? (*setup)->reused : everything;
+    uz_setup *made;
+    status = uz_setup_create(&made, problem, wanted, settings, err);
+    if (status == UZ_OK && cache && made->is_scene)
+        status = uz_matrix_digest(&key.K, uz_setup_K(made, problem), err);
+    if (status == UZ_OK)
+        status = uz_setup_make_operator(made, problem, &key.K, settings, cache, hooks, err);
+    if (status != UZ_OK) {
+        uz_setup_free(made);
+        if (item)
+            uz_table_abandon(cache, item);
+        return status;
+    }
+    made->item = item;
+    if (item)
+        uz_table_publish(cache, item, made, made->bytes, destroy_setup);
+    *setup = made;
+    *reused = made->reused;
     return UZ_OK;
 }
 

@@ -1,9 +1,9 @@
 /* solve.h: the layers between a call of the library and the solve of one load. Each calls only those below it:
  *
- *     uz_solve, uz_solve_cases    solve.c          which of the two that follow
+ *     uz_solve, uz_solve_cases    solve.c          grids, or rounds and what settles their answers
  *     uz_solve_grid_sequence      grid_sequence.c  grid after grid, where the mesh is chosen
- *     uz_solve_on_mesh            cases.c          all load cases; those that only the obstacle holds by themselves
- *     uz_judge_whole_error        guarantee.c      a bound on one answer, by problems that the layers below solve
+ *     uz_settle_cases             cases.c          what answers ask for: those that only the obstacle holds, or that
+ * move uz_judge_whole_error        guarantee.c      a bound on one answer, by problems that the layers below solve
  *     uz_solve_semicoercive       semicoercive.c   one of these, by problems that the next layer solves
  *     uz_solve_rounds             rounds.c         all load cases on one setup, in rounds of contact rows
  *     uz_block_solve              block.c          several loads at once
@@ -13,11 +13,18 @@
 
 #include "uzawa.h"
 
-/* Grid sequence and mesh have the contract of uz_solve_cases. */
-typedef uz_status uz_solver(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
-                            const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
-uz_solver uz_solve_grid_sequence; /* for meshes that are made finer until the total error is what was asked for */
-uz_solver uz_solve_on_mesh;
+/* uz_solve_cases for meshes that are made finer until the total error is what was asked for. results: as those of
+ * uz_solve_rounds. */
+uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                                 const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+
+/* What is left to do when the rounds on a mesh are over: cases that were refused or not certified because only the
+ * obstacle holds the body are solved for one by one; then contacts that move, the whole error and quantities are
+ * judged. results, starts  as handed to uz_solve_rounds rounds           how those ended, with what they left in *err
+ *   started          uz_seconds() */
+uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_problem *problem, const uz_settings *settings,
+                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, double started,
+                          uz_error *err);
 
 /* Where settings ask for it, a guaranteed bound on the whole error of an answer, or why there is none (uz_guarantee);
  * and an answer that converged becomes UZ_MESH_LIMIT where the whole error is not settings->total_error. */

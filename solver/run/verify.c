@@ -12,13 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static uz_status check_given(const double *x, int64_t n, const char *name, uz_error *err)
-{
-    if (n > 0 && !x)
-        return uz_fail(err, UZ_ERR_ARGUMENT, name, "there is no %s to verify", name);
-    return uz_check_finite(x, n, name, err);
-}
-
 /* The free dofs of a nodal u. Supported ones must be where the scene holds them: the error that is bounded is one among
  * displacements that meet the supports, and no other has an energy that could be compared. */
 static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
@@ -52,10 +45,13 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     uz_status status = uz_run_load(run, err);
     if (status == UZ_OK)
         status = uz_answer_allocate(answer, run->d, run->all, err);
+    const int64_t n_u = setup->is_scene ? mesh->n_nodes * mesh->dim : run->d;
+    if (status == UZ_OK && ((n_u > 0 && !u) || (run->all > 0 && !r)))
+        status = uz_fail(err, UZ_ERR_ARGUMENT, u ? "r" : "u", "there is no %s to verify", u ? "r" : "u");
     if (status == UZ_OK)
-        status = check_given(u, setup->is_scene ? mesh->n_nodes * mesh->dim : run->d, "u", err);
+        status = uz_check_finite(u, n_u, "u", err);
     if (status == UZ_OK)
-        status = check_given(r, run->all, "r", err);
+        status = uz_check_finite(r, run->all, "r", err);
     if (status == UZ_OK && setup->is_scene)
         status = take_nodal(run, u, err);
     else if (status == UZ_OK)

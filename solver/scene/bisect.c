@@ -516,15 +516,22 @@ static bool refine_items(uz_group *out, const bisection *x, const uz_mesh *fine,
     return true;
 }
 
-/* Nodes of the refined mesh that lie amid nodes of a group join it. An edge through the body from one side to another
- * is none of a group that has whole sides of the boundary: its middle joins only where an end lies inside. outer: nodes
- * of the boundary; in: nodes of the group. */
-static void refine_nodes(unsigned char *in, const bisection *x, const uz_mesh *fine, const uz_corner_table *sides,
-                         const unsigned char *outer)
+/* Nodes of the refined mesh that lie amid nodes of a group of nodes join it. An edge through the body from one side to
+ * another is none of a group that has whole sides of the boundary: its middle joins only where an end lies inside.
+ * outer: nodes of the boundary. */
+static bool refine_group(uz_group *group, const bisection *x, const uz_mesh *fine, unsigned char *has,
+                         const uz_corner_table *sides, const unsigned char *outer)
 {
+    unsigned char *in = uz_alloc_zero(fine->n_nodes, 1); /* nodes of the group */
+    uz_group out = {.kind = group->kind, .n_inner = group->n_inner};
+    memcpy(out.name, group->name, sizeof out.name);
     const int64_t old = x->mesh->n_nodes;
-    bool whole = false;
-    for (int pass = 0; pass < 1 + whole; pass++) {
+    bool room = in != NULL, whole = false;
+    for (int64_t i = 0; i < group->n_nodes && room; i++)
+        in[group->node[i]] = 1;
+    if (room && group->kind != UZ_GROUP_NODES)
+        room = refine_items(&out, x, fine, group, has, in);
+    for (int pass = 0; room && group->kind == UZ_GROUP_NODES && pass < 1 + whole; pass++) {
         for (int64_t i = old; i < fine->n_nodes; i++) {
             const int64_t *from = x->from + (i - old) * FROM;
             in[i] = pass == 0 || outer[i] || !outer[from[0]] || !outer[from[1]];
@@ -538,21 +545,6 @@ static void refine_nodes(unsigned char *in, const bisection *x, const uz_mesh *f
                 whole = whole && in[node[k - 1]];
         }
     }
-}
-
-static bool refine_group(uz_group *group, const bisection *x, const uz_mesh *fine, unsigned char *has,
-                         const uz_corner_table *sides, const unsigned char *outer)
-{
-    unsigned char *in = uz_alloc_zero(fine->n_nodes, 1);
-    uz_group out = {.kind = group->kind, .n_inner = group->n_inner};
-    memcpy(out.name, group->name, sizeof out.name);
-    bool room = in != NULL;
-    for (int64_t i = 0; i < group->n_nodes && room; i++)
-        in[group->node[i]] = 1;
-    if (room && group->kind != UZ_GROUP_NODES)
-        room = refine_items(&out, x, fine, group, has, in);
-    else if (room)
-        refine_nodes(in, x, fine, sides, outer);
     for (int64_t i = 0; i < fine->n_nodes && room; i++)
         out.n_nodes += in[i];
     out.node = room ? uz_alloc(out.n_nodes, sizeof *out.node) : NULL;

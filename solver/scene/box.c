@@ -26,7 +26,7 @@ static uz_status check_element(const uz_box *box, uz_error *err)
     size_t used = 0;
     int count = 0;
     memcpy(name, box->element, sizeof box->element);
-    if (uz_element_parse(&kind, name) && uz_element_dim(kind) == box->dim)
+    if (uz_element_parse(&kind, name) && uz_element_type_of(kind)->dim == box->dim)
         return UZ_OK;
     for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
         const uz_element_type *type = uz_element_types[k];

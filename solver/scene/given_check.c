@@ -36,11 +36,11 @@ static uz_status check_element(const uz_given_mesh *given, int64_t e, uz_error *
     if (kind >= UZ_ELEMENT_KINDS || count != uz_element_node_count(kind))
         return uz_fail(err, UZ_ERR_ARGUMENT, "/mesh/elements", "element %lld has no kind, or not the nodes of its kind",
                        (long long)e);
-    if (uz_element_dim(kind) != given->dim) {
+    if (uz_element_type_of(kind)->dim != given->dim) {
         snprintf(text, sizeof text, "/mesh/elements/%s", uz_element_name(kind));
         return uz_fail(err, UZ_ERR_SCENE, text,
                        "%s is an element of bodies in %d dimensions, but the nodes of this mesh have %d coordinates",
-                       uz_element_name(kind), uz_element_dim(kind), given->dim);
+                       uz_element_name(kind), uz_element_type_of(kind)->dim, given->dim);
     }
     for (int64_t i = 0; i < count; i++) {
         if (node[i] < 0 || node[i] >= given->n_nodes) {

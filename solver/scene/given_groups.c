@@ -24,10 +24,7 @@ typedef struct {
     int64_t *value, count, room;
 } number_list;
 
-static uz_status no_memory(const group_work *work)
-{
-    return uz_fail(work->err, UZ_ERR_MEMORY, "", "no memory for the groups of a mesh");
-}
+#define GROUPS "the groups of a mesh"
 
 static bool append(number_list *list, int64_t value)
 {
@@ -141,7 +138,7 @@ static uz_status collect_face(named_parts *parts, const group_work *work, const 
             return refuse_face(work, group, i, "has other nodes in the middle of its edges than the element there");
     }
     parts->n_inner += work->sides.same[place + 1];
-    return append_face(parts, work, work->sides.item[place]) ? UZ_OK : no_memory(work);
+    return append_face(parts, work, work->sides.item[place]) ? UZ_OK : uz_no_memory(work->err, GROUPS);
 }
 
 /* Of a face that occurs again, which happens where groups of one name overlap, the first one stays. code: a number
@@ -186,7 +183,7 @@ static uz_status collect(named_parts *parts, const group_work *work, const uz_gi
                            (long long)given, (long long)n_nodes - 1);
         }
         if (work->new_node[given] >= 0 && !append(&parts->nodes, work->new_node[given]))
-            return no_memory(work);
+            return uz_no_memory(work->err, GROUPS);
     }
     for (int64_t i = 0; i < group->n_faces && status == UZ_OK; i++)
         status = collect_face(parts, work, group, i);
@@ -204,7 +201,7 @@ static uz_status collect(named_parts *parts, const group_work *work, const uz_gi
         for (int k = 0; k < count && room; k++)
             room = append(&parts->nodes, node[k]);
         if (!room)
-            return no_memory(work);
+            return uz_no_memory(work->err, GROUPS);
     }
     return status;
 }
@@ -232,7 +229,7 @@ static uz_status finish_group(const group_work *work, const char *name, named_pa
                 out->face[out->n_faces++] =
                     (uz_face){parts->faces.value[i] / UZ_SIDE_STEP, (int)(parts->faces.value[i] % UZ_SIDE_STEP)};
             if (!out->face || !drop_repeated(out, &parts->faces))
-                status = no_memory(work);
+                status = uz_no_memory(work->err, GROUPS);
         }
     }
     free(parts->nodes.value);
@@ -255,7 +252,7 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
     }
     mesh->groups = uz_alloc_zero(given->n_groups + 2, sizeof *mesh->groups);
     if (!mesh->groups)
-        return no_memory(&work);
+        return uz_no_memory(work.err, GROUPS);
     uz_status status = uz_corner_table_build(&work.sides, mesh, true, err);
     for (int64_t i = 0; i < given->n_groups && status == UZ_OK;
          i++) { /* all of its name, unless an earlier one has it */
@@ -272,7 +269,7 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
         named_parts parts = {0};
         for (int64_t i = 0; i < work.sides.count && status == UZ_OK; i++)
             if (!work.sides.same[i] && !work.sides.same[i + 1] && !append_face(&parts, &work, work.sides.item[i]))
-                status = no_memory(&work);
+                status = uz_no_memory(work.err, GROUPS);
         sort_unique(&parts.faces);
         status = finish_group(&work, "boundary", &parts, status);
     }

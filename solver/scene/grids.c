@@ -98,21 +98,6 @@ static double expect(const uz_tried *from, double rate, double requested)
     return from->n * pow(from->error / (AIM * requested), 1.0 / rate);
 }
 
-/* The rate that no later grid is expected to exceed. An error that hardly falls is that of a contact or a corner
- * smaller than a cell, and falls with the order of the elements once the grid sees it; it may stay so for a few grids.
- */
-static double hope(const uz_tried *tried, int count, int order)
-{
-    int idle = 0;
-    while (idle + 1 < count &&
-           uz_observed_rate(&tried[count - idle - 2], &tried[count - idle - 1], order) <= HARDLY_FALLS)
-        idle++;
-    const uz_tried *last = &tried[count - 1];
-    const double rate = uz_observed_rate(last - 1, last, order);
-    const bool steady = idle == 0 && fabs(rate - uz_observed_rate(last - 2, last - 1, order)) < STEADY;
-    return steady || idle >= MOST_IDLE ? rate : order;
-}
-
 int64_t uz_next_grid(const uz_grids *grids, const uz_tried *tried, int count, double requested)
 {
     const uz_tried *last = &tried[count - 1];
@@ -131,8 +116,17 @@ int64_t uz_next_grid(const uz_grids *grids, const uz_tried *tried, int count, do
         else
             beyond = middle;
     }
-    if ((double)top <= last->n ||
-        (count > 2 && expect(last, hope(tried, count, grids->order), requested) > 2.0 * (double)top))
+    /* The rate that no later grid is expected to exceed. An error that hardly falls is that of a contact or a corner
+     * smaller than a cell, and falls with the order of the elements once the grid sees it; it may stay so for a few
+     * grids. */
+    int idle = 0;
+    while (idle + 1 < count &&
+           uz_observed_rate(&tried[count - idle - 2], &tried[count - idle - 1], grids->order) <= HARDLY_FALLS)
+        idle++;
+    const bool steady =
+        count > 2 && idle == 0 && fabs(rate - uz_observed_rate(last - 2, last - 1, grids->order)) < STEADY;
+    const double hope = steady || idle >= MOST_IDLE ? rate : grids->order;
+    if ((double)top <= last->n || (count > 2 && expect(last, hope, requested) > 2.0 * (double)top))
         return 0;
     const double next = fmin(fmin(ceil(wanted), ceil(growth * last->n)), (double)top);
     return next > last->n ? (int64_t)next : (int64_t)last->n + 1;

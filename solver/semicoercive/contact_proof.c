@@ -25,28 +25,23 @@ typedef struct {
     uz_row_move move;
 } prover;
 
-/* 1: row k says no more than row i; -1: it points the other way; 0: neither, as far as doubles can tell. */
-static int side_of(const prover *x, int64_t k, int64_t i)
+/* Whatever z does to row k, it does no harm to a proof for row i: it is open, or says no more than row i, or points the
+ * other way. false: it may, as far as doubles can tell. */
+static bool is_harmless(const prover *x, int64_t k, int64_t i)
 {
     const uz_csc *Nt = x->claim->Nt;
     const double *h = x->claim->of->h;
     const int64_t a = Nt->ptr[k], b = Nt->ptr[i], n = Nt->ptr[i + 1] - b;
+    if (k == i || x->open[k])
+        return k != i;
     if (Nt->ptr[k + 1] - a != n || n == 0)
-        return 0;
+        return false;
     const double ratio = Nt->val[a] / Nt->val[b];
     for (int64_t q = 0; q < n; q++)
         if (Nt->idx[a + q] != Nt->idx[b + q] || (n > 1 && Nt->val[a + q] != ratio * Nt->val[b + q]))
-            return 0;
-    if (ratio < 0.0)
-        return -1;
-    double margin = ratio == 1.0 ? 0.0 : 4.0 * DBL_EPSILON * ratio * fabs(h[i]);
-    return ratio > 0.0 && h[k] - ratio * h[i] >= margin ? 1 : 0;
-}
-
-/* Whatever z does to row k, it does no harm to a proof for row i. */
-static bool is_harmless(const prover *x, int64_t k, int64_t i)
-{
-    return k != i && (x->open[k] || side_of(x, k, i) != 0);
+            return false;
+    const double margin = ratio == 1.0 ? 0.0 : 4.0 * DBL_EPSILON * ratio * fabs(h[i]);
+    return ratio < 0.0 || (ratio > 0.0 && h[k] - ratio * h[i] >= margin);
 }
 
 static uz_status prepare(prover *x, const uz_contact_claim *claim, uz_error *err)

@@ -32,6 +32,13 @@ SCHEMAS = ROOT / "schemas"
 # A daemon with a sanitizer takes five to twenty times as long: tests give it smaller bodies then.
 INSTRUMENTED = len(sys.argv) > 1 and pathlib.Path(sys.argv[1]).name in ("asan", "tsan")
 
+
+def some(cases, every=3):
+    """All of many like cases; with a sanitizer, which looks at the code and not at the answers, each third of them."""
+    return list(cases)[::every if INSTRUMENTED else 1]
+
+
+
 try:
     import jsonschema
 except ImportError:  # then replies are only parsed

@@ -6,7 +6,7 @@ import pathlib
 import sys
 
 import service
-from service import check
+from service import check, some
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
 import generated_obstacles  # noqa: after its place is known
@@ -16,20 +16,20 @@ SHARED = True  # one service for all tests
 
 def test_nodes_on_ridges_and_corners(s):
     """Scenes whose answer was that of one flank, as rounding had it: another one mirrored or in other units."""
-    found = generated_obstacles.run(s, [82, 205, 210, 213, 260, 355, 381, 405, 424, 535], lambda *said, **_: None, refine=False)
+    found = generated_obstacles.run(s, some([82, 205, 210, 213, 260, 355, 381, 405, 424, 535]), lambda *said, **_: None, refine=False)
     check(not found["failures"], found["failures"])
 
 
 def test_places_inside_sides_in_space(s):
     """Scenes whose rows inside sides were at places that followed from the order of corners, and nodes in grooves with one flank."""
-    found = generated_obstacles.run(s, [113, 131, 155, 173, 257, 494, 5231], lambda *said, **_: None, refine=False)
+    found = generated_obstacles.run(s, some([113, 131, 155, 173, 257, 494, 5231]), lambda *said, **_: None, refine=False)
     check(not found["failures"], found["failures"])
 
 
 def test_passes_that_went_back_and_forth_or_crept(s):
     """Scenes that did not settle in 30 passes."""
     daemon = generated_obstacles.contacts.Daemon(s)
-    for number, how in ((30, "auto"), (334, "auto"), (470, "auto"), (575, "auto"), (300179, "auto"), (200316, "moving")):
+    for number, how in some(((30, "auto"), (334, "auto"), (470, "auto"), (575, "auto"), (300179, "auto"), (200316, "moving"))):
         answer, why = daemon.answer(generated_obstacles.Scene(number).request(0, kinematics=how))
         check(answer, number, why)
         check(answer["summary"]["contact"]["geometry"]["passes"] < 30, answer["summary"]["contact"]["geometry"])
@@ -52,7 +52,7 @@ def test_a_ridge_that_slides_along_a_side(s):
                             "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "top", "ux": 0, "uy": 0}],
                             "kinematics": how, "contacts": [{"on": "bottom", "obstacle": {"polyline": {"points": line}}}]}}
     daemon = generated_obstacles.contacts.Daemon(s)
-    for element, n, slope in (("quad4", 16, 1), ("quad4", 32, 3), ("quad8", 8, 3), ("quad8", 16, 3), ("quad8", 32, 1)):
+    for element, n, slope in some((("quad4", 16, 1), ("quad4", 32, 3), ("quad8", 8, 3), ("quad8", 16, 3), ("quad8", 32, 1))):
         forces = []
         for how in ("fixed", "moving"):
             answer, why = daemon.answer(scene(element, n, slope, how))
@@ -71,7 +71,7 @@ def test_a_crest_beside_a_node(s):
                             "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "top", "ux": 0, "uy": 0}],
                             "kinematics": how, "contacts": [{"on": "bottom", "obstacle": {"polyline": {"points": line}}}]}}
     daemon = generated_obstacles.contacts.Daemon(s)
-    for element, n, off in (("quad4", 8, 0.25), ("quad4", 16, 0.5), ("quad4", 32, 0.4), ("quad8", 8, 0.4), ("quad8", 16, 0.25)):
+    for element, n, off in some((("quad4", 8, 0.25), ("quad4", 16, 0.5), ("quad4", 32, 0.4), ("quad8", 8, 0.4), ("quad8", 16, 0.25))):
         forces = []
         for slope, how in ((1, "fixed"), (1, "moving"), (3, "moving")):
             answer, why = daemon.answer(scene(element, n, slope, off, how))

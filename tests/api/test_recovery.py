@@ -35,7 +35,7 @@ MIX += [(scene((30, 10), method="accelerated_restart", operator="factored"), -3.
 
 
 # A daemon with a sanitizer is killed in the same ways, with fewer of them.
-JOBS, SLOW, KILLS = (20, 8, 4) if INSTRUMENTED else (50, 12, 8)
+JOBS, SLOW, KILLS = (10, 5, 3) if INSTRUMENTED else (50, 12, 8)
 
 
 # ---------------------------------------------------------------- helpers
@@ -273,7 +273,7 @@ def test_drain_leaves_the_rest_for_the_next_start(s):
     endless = [s.post(ENDLESS).json["id"] for _ in range(2)]
     for job_id in endless:
         s.wait_status(job_id, "running")
-    acknowledged = submit(s, 20)
+    acknowledged = submit(s, JOBS // 2)
     started = time.monotonic()
     check(s.restart(signal.SIGTERM) == 0, s.log()[-2000:])
     check(time.monotonic() - started < 10, "the drain took", time.monotonic() - started)
@@ -290,7 +290,7 @@ def test_drain_leaves_the_rest_for_the_next_start(s):
 
 @options("--workers", "2", "--drain-s", "60")
 def test_drain_finishes_what_runs(s):
-    acknowledged = submit(s, 30)
+    acknowledged = submit(s, JOBS // 2)
     before = counts(s)
     check(before["running"] > 0 and before["accepted"] > 0, before)
     check(s.restart(signal.SIGTERM) == 0, s.log()[-2000:])
@@ -303,7 +303,7 @@ def test_drain_finishes_what_runs(s):
 @options("--workers", "2", "--drain-s", "0.1")
 def test_terminated_while_metis_orders(s):
     """METIS takes SIGTERM for itself while it runs. The daemon must end in order all the same, each time."""
-    ids, delays = [], (0.0, 0.02, 0.04, 0.06, 0.1, 0.14, 0.18, 0.25)[::2 if INSTRUMENTED else 1]
+    ids, delays = [], (0.0, 0.02, 0.04, 0.06, 0.1, 0.14, 0.18, 0.25)[::3 if INSTRUMENTED else 1]
     for round_, delay in enumerate(delays):
         # Other meshes each time, so that nothing is cached and both workers order.
         ids += [s.post(scene(((120 if INSTRUMENTED else 240) + 2 * round_ + i, 80), ordering="metis")).json["id"] for i in range(2)]

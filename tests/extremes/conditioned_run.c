@@ -18,7 +18,7 @@ static void report(void *ctx, uint64_t seed, const big_truth *exact, const uz_re
     add_row(ctx, "100 digits",
             name_of(name, sizeof name, "seed %d, d = %d, 1e%.1f", (int)seed, (int)exact->d, log10(exact->condition)),
             result ? uz_method_name(result->summary.method) : "",
-            result ? uz_outcome_name(result->summary.outcome) : "error", &j, false);
+            result ? uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome) : "error", &j, false);
 }
 
 static void run_many(suite *all, const char *name, bool ranged)

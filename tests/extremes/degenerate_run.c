@@ -11,7 +11,7 @@ static void report(void *ctx, uint64_t seed, const uz_qp *qp, const uz_summary *
     add_row(ctx, "degenerate",
             name_of(name, sizeof name, "seed %d, %s, d = %d, m = %d", (int)seed,
                     DEGENERATE_NAMES[seed % DEGENERATE_KINDS], (int)qp->K.cols, (int)qp->N.rows),
-            "default", uz_outcome_name(s->outcome), j, false);
+            "default", uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), j, false);
 }
 
 void run_degenerate_problems(suite *all)

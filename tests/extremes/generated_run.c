@@ -10,7 +10,7 @@ static void report(void *ctx, uint64_t seed, const uz_qp *qp, const uz_summary *
     char name[64];
     add_row(ctx, "generated",
             name_of(name, sizeof name, "seed %d, d = %d, m = %d", (int)seed, (int)qp->K.cols, (int)qp->N.rows),
-            uz_method_name(s->method), uz_outcome_name(s->outcome), j, false);
+            uz_method_name(s->method), uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), j, false);
 }
 
 void run_generated_problems(suite *all)

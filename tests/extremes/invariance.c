@@ -126,8 +126,8 @@ static void compare(suite *all, const char *name, const twins *t, uz_method meth
         if (!(j.error <= j.certified + rounding))
             j = condemn(j, "two certified answers differ by more than their bounds");
     } else if (a && b) {
-        snprintf(j.why, sizeof j.why, "%s and %s", uz_outcome_name(a->summary.outcome),
-                 uz_outcome_name(b->summary.outcome));
+        snprintf(j.why, sizeof j.why, "%s and %s", uz_choice_name(UZ_CHOICE_OUTCOME, a->summary.outcome),
+                 uz_choice_name(UZ_CHOICE_OUTCOME, b->summary.outcome));
     }
     add_row(all, "invariance", name, uz_method_name(method), both ? "converged" : "one did not converge", &j, !same);
     uz_result_free(a);

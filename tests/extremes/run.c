@@ -36,7 +36,7 @@ static const char *describe(char *room, size_t size, uz_status status, const uz_
 {
     if (status != UZ_OK)
         return name_of(room, size, "error %s", uz_status_name(status));
-    return uz_outcome_name(result->summary.outcome);
+    return uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome);
 }
 
 static bool is_missed(owed what, way how, uz_status status, const uz_result *result)

@@ -138,7 +138,7 @@ static void write_way(json *out, const way *w, double alpha, const figure_run *r
     json_text(out, "rule", w->paper_rule ? "paper" : "certified");
     if (run->result) {
         const uz_summary *s = &run->result->summary;
-        json_text(out, "outcome", run->limited ? "time_limit" : uz_outcome_name(s->outcome));
+        json_text(out, "outcome", run->limited ? "time_limit" : uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome));
         json_number(out, "alpha", alpha > 0 ? alpha : s->alpha);
         json_integer(out, "iterations", s->iterations);
         json_integer(out, "restarts", s->restarts);

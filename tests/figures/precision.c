@@ -86,14 +86,15 @@ static void write_run(json *out, const figure_problem *problem, const reference 
 {
     json_open(out, NULL, '{');
     json_text(out, "method", uz_method_name(s.method));
-    json_text(out, "operator", uz_operator_name(s.op));
+    json_text(out, "operator", uz_choice_name(UZ_CHOICE_OPERATOR, s.op));
     json_text(out, "level", l->name);
     json_text(out, "start", cached ? "cached" : "cold");
     if (run->status != UZ_OK) {
         json_text(out, "outcome", run->limited ? "time_limit" : uz_status_name(run->status));
     } else {
-        json_text(out, "outcome", run->limited ? "time_limit" : uz_outcome_name(run->result->summary.outcome));
-        json_text(out, "operator_used", uz_operator_name(run->result->summary.op));
+        json_text(out, "outcome",
+                  run->limited ? "time_limit" : uz_choice_name(UZ_CHOICE_OUTCOME, run->result->summary.outcome));
+        json_text(out, "operator_used", uz_choice_name(UZ_CHOICE_OPERATOR, run->result->summary.op));
         figure_write_times(out, run);
         write_work(out, run);
         write_errors(out, problem, exact, run->result);
@@ -106,7 +107,7 @@ static void write_missing(json *out, series s, const level *l, bool cached)
 {
     json_open(out, NULL, '{');
     json_text(out, "method", uz_method_name(s.method));
-    json_text(out, "operator", uz_operator_name(s.op));
+    json_text(out, "operator", uz_choice_name(UZ_CHOICE_OPERATOR, s.op));
     json_text(out, "level", l->name);
     json_text(out, "start", cached ? "cached" : "cold");
     json_text(out, "outcome", "not_run");

@@ -36,7 +36,7 @@ static void demand_valid(const uz_given_mesh *mesh)
         demand(isfinite(mesh->xyz[i]));
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
-        demand(kind < UZ_ELEMENT_KINDS && uz_element_dim(kind) == mesh->dim);
+        demand(kind < UZ_ELEMENT_KINDS && uz_element_type_of(kind)->dim == mesh->dim);
         demand(mesh->first[e + 1] - mesh->first[e] == uz_element_node_count(kind));
     }
     for (int64_t q = 0; q < mesh->first[mesh->n_elements]; q++)

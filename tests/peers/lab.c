@@ -28,7 +28,8 @@ typedef struct {
 static void take_result(peer_answer *answer, const lab *x, uz_status status, const uz_result *result)
 {
     if (status != UZ_OK || result->summary.outcome != UZ_CONVERGED) {
-        peer_fail(answer, status != UZ_OK ? uz_status_name(status) : uz_outcome_name(result->summary.outcome));
+        peer_fail(answer, status != UZ_OK ? uz_status_name(status)
+                                          : uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome));
         return;
     }
     memcpy(answer->r, result->r, (size_t)x->matrices.qp.N.rows * sizeof *answer->r);
@@ -65,7 +66,8 @@ static void solve_scene(peer_answer *answer, const lab *x, double relative_error
     uz_status status = uz_solve(&result, &x->scene, &settings, x->cache, NULL, NULL);
     answer->seconds = peer_seconds() - start;
     if (status != UZ_OK || result->summary.outcome != UZ_CONVERGED) {
-        peer_fail(answer, status != UZ_OK ? uz_status_name(status) : uz_outcome_name(result->summary.outcome));
+        peer_fail(answer, status != UZ_OK ? uz_status_name(status)
+                                          : uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome));
     } else {
         memcpy(answer->r, result->r, (size_t)result->m * sizeof *answer->r);
         take_free_dofs(answer->u, result);

@@ -115,8 +115,8 @@ static inline uz_result *body_solve(const uz_scene *scene, double accuracy)
     CHECK_MSG(status == UZ_OK, "%s: %s", err.where, err.message);
     if (!result)
         exit(1);
-    CHECK_MSG(result->summary.outcome == UZ_CONVERGED, "%s %s", uz_outcome_name(result->summary.outcome),
-              result->summary.message);
+    CHECK_MSG(result->summary.outcome == UZ_CONVERGED, "%s %s",
+              uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), result->summary.message);
     return result;
 }
 

@@ -68,7 +68,7 @@ static inline void exact_gradient(double H[3][3], const double *x, int dim)
 static inline void exact_strain(double *strain, const uz_element *element, const double *x)
 {
     double H[3][3];
-    const int dim = uz_element_dim(element->kind);
+    const int dim = uz_element_type_of(element->kind)->dim;
     exact_gradient(H, x, dim);
     strain[0] = H[0][0];
     strain[1] = H[1][1];
@@ -83,7 +83,7 @@ static inline void exact_strain(double *strain, const uz_element *element, const
 /* - div stress: second derivatives are - k_i k_j u_c. */
 static inline void exact_force(double *b, const uz_element *element, const double *x)
 {
-    const int dim = uz_element_dim(element->kind);
+    const int dim = uz_element_type_of(element->kind)->dim;
     const double lambda = element->lame.lambda, mu = element->lame.mu;
     double value[3];
     for (int c = 0; c < dim; c++) {
@@ -108,7 +108,7 @@ static inline void exact_force(double *b, const uz_element *element, const doubl
 static inline void place(double x[3], const uz_element *element, const double at[3])
 {
     double N[UZ_ELEMENT_NODES];
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
     uz_element_shape(N, element->kind, at);
     for (int c = 0; c < dim; c++) {
         x[c] = 0;
@@ -131,7 +131,7 @@ static inline double energy(const uz_element *element, const double *strain)
 static inline void add_error(double *error2, double *energy2, const uz_element *element, const double *ue)
 {
     const int nodes = uz_element_node_count(element->kind);
-    const double(*local)[3] = uz_element_local_nodes(element->kind);
+    const double(*local)[3] = uz_element_type_of(element->kind)->local;
     uz_element_motion motion;
     uz_element_move(&motion, element, ue);
     for (int a = 0; a < nodes; a++) {
@@ -167,10 +167,12 @@ static inline double energy_error(const small_mesh *mesh, const double *u)
 static inline void add_exact_force(double *f, const small_mesh *mesh)
 {
     for (int e = 0; e < mesh->n_elements; e++) {
-        double xe[UZ_ELEMENT_DOFS], N[UZ_ELEMENT_NODES], grad[UZ_ELEMENT_NODES][3], b[3], at[3], x[3];
+        double xe[UZ_ELEMENT_DOFS], N[UZ_ELEMENT_NODES], grad[UZ_ELEMENT_NODES][3], b[3], x[3];
         const uz_element element = take_element(xe, NULL, mesh, NULL, e);
-        for (int g = 0; g < uz_element_gauss_count(element.kind, element.model); g++) {
-            double weight = uz_element_gauss(at, element.kind, element.model, g);
+        const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
+        for (int g = 0; g < rule->count; g++) {
+            const double *at = rule->point[g].at;
+            double weight = rule->point[g].weight;
             weight *= element_measure(&element, at, uz_element_gradients(grad, &element, at));
             place(x, &element, at);
             exact_force(b, &element, x);

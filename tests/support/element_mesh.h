@@ -129,7 +129,7 @@ static inline void add_small_element(small_mesh *mesh, int *number, const int *c
 /* The unit square or cube in n[0] x n[1] [x n[2]] cells. Elements of `element` but for xyz. */
 static inline small_mesh small_grid(uz_element element, int n_x, int n_y, int n_z)
 {
-    small_mesh mesh = {.element = element, .dim = uz_element_dim(element.kind)};
+    small_mesh mesh = {.element = element, .dim = uz_element_type_of(element.kind)->dim};
     const int n[3] = {n_x, n_y, mesh.dim == 3 ? n_z : 1}, layers = mesh.dim == 3 ? n_z : 1;
     const size_t lattice = (size_t)((2 * n[0] + 1) * (2 * n[1] + 1) * (2 * n[2] + 1));
     int corner[UZ_ELEMENT_PARTS][UZ_ELEMENT_CORNERS], *number = zeros(lattice, sizeof *number),
@@ -354,7 +354,7 @@ static inline bool each_element(uz_element *element, int i, double poisson)
                 const uz_element_kind k = (uz_element_kind)kind;
                 const uz_model m = (uz_model)model;
                 const uz_formulation f = (uz_formulation)way;
-                if ((uz_element_dim(k) == 3) != (m == UZ_SOLID) || uz_resolve_formulation(f, k, m, 0) != f ||
+                if ((uz_element_type_of(k)->dim == 3) != (m == UZ_SOLID) || uz_resolve_formulation(f, k, m, 0) != f ||
                     count++ != i)
                     continue;
                 *element = (uz_element){k, m, f, uz_lame_of(m, 70, poisson), 0.75, NULL};
@@ -367,12 +367,12 @@ static inline bool each_element(uz_element *element, int i, double poisson)
 static inline uz_element bent(double *xe, uz_element element, double scale)
 {
     uint64_t seed = 7;
-    const int dim = uz_element_dim(element.kind), nodes = uz_element_node_count(element.kind);
+    const int dim = uz_element_type_of(element.kind)->dim, nodes = uz_element_node_count(element.kind);
     const int corners = corner_count(element.kind);
     const int(*edge)[2] = edges_of(element.kind);
     for (int a = 0; a < nodes; a++)
         for (int c = 0; c < dim; c++) {
-            const double at = uz_element_local_nodes(element.kind)[a][c] + 0.15 * shake(&seed);
+            const double at = uz_element_type_of(element.kind)->local[a][c] + 0.15 * shake(&seed);
             xe[a * dim + c] = a < corners
                                   ? scale * ((c == 1 ? 0.7 : 1.0) * at + (c == 0 ? 3 : 0.4))
                                   : 0.5 * (xe[edge[a - corners][0] * dim + c] + xe[edge[a - corners][1] * dim + c]);

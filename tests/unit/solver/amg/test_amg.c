@@ -2,7 +2,7 @@
 #include "brick.h"
 #include "factor_fixture.h"
 #include "harness.h"
-#include "amg/amg.h"
+#include "dual/form.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 
@@ -151,13 +151,24 @@ static void check_bound(pair *p, double slack)
 static void check_norm(pair *p)
 {
     int64_t n = p->K.cols;
-    double *e = random_vector(n, 4), *w = vector(n), value = 0.0;
+    double *e = random_vector(n, 4), *w = vector(n), *no_load = vector(n), none = 0.0, value = 0.0;
     uz_error err = {0};
+    uz_csc no_rows;
+    uz_dual *dual = NULL;
+    uz_dual_load *load = NULL;
+    CHECK(uz_csc_init(&no_rows, 0, n, 0, &err) == UZ_OK);
+    const uz_dual_source source = {UZ_OPERATOR_MATRIX_FREE, &no_rows, NULL, p->amg};
+    CHECK(uz_dual_create(&dual, &source, NULL, &err) == UZ_OK);
+    CHECK(uz_dual_load_create(&load, dual, &p->K, no_load, &none, &err) == UZ_OK);
     memcpy(w, e, (size_t)n * sizeof *w);
     solve_exactly(p, w);
     double exact = dot(e, w, n);
-    CHECK(uz_amg_inverse_norm(&value, e, p->amg, &p->cg, &p->K, NULL, INFINITY, &err) == UZ_OK);
+    CHECK(dual->form->inverse_norm(load, &value, e, &err) == UZ_OK);
     CHECK_MSG(value >= exact * (1.0 - 1e-12) && value <= 1.02 * exact, "%.17g for %.17g", value, exact);
+    uz_dual_load_free(load);
+    uz_dual_free(dual);
+    uz_csc_clear(&no_rows);
+    free(no_load);
     free(e);
     free(w);
 }

@@ -25,8 +25,8 @@ typedef struct {
 
 static void make_four(four_elements *f, uz_element_kind kind, uz_model model, uz_formulation asked, qp_random *rng)
 {
-    const double(*local)[3] = uz_element_local_nodes(kind);
-    const int dim = uz_element_dim(kind), count = uz_element_node_count(kind) * dim;
+    const double(*local)[3] = uz_element_type_of(kind)->local;
+    const int dim = uz_element_type_of(kind)->dim, count = uz_element_node_count(kind) * dim;
     for (int l = 0; l < LANES; l++) {
         const double size = pow(10, 2 * random_signed(rng)), poisson = 0.1 * (l + 1);
         const bool ring = model == UZ_AXISYMMETRIC;
@@ -60,9 +60,10 @@ static void compare_lane(const four_elements *f, const uz_strain_rule *rule, con
     const uz_element *element = &f->element[l];
     uz_element_move(&motion, element, f->u[l]);
     for (int g = 0; g < rule->points; g++) {
-        double point[3], grad[NODES][3], want[STRESSES], size = 0;
-        const double weight = uz_element_gauss(point, rule->kind, rule->model, g);
-        const double volume = weight * element_measure(element, point, uz_element_gradients(grad, element, point));
+        double grad[NODES][3], want[STRESSES], size = 0;
+        const uz_gauss_point *at = &uz_element_rule(rule->kind, rule->model)->point[g];
+        const double *point = at->at;
+        const double volume = at->weight * element_measure(element, point, uz_element_gradients(grad, element, point));
         uz_element_strain(want, &motion, point);
         for (int c = 0; c < rule->stresses; c++)
             size = fmax(size, fabs(want[c]));
@@ -84,9 +85,9 @@ TEST(strains_in_lanes_are_those_of_single_elements)
             four_elements f;
             uz_strain_rule rule;
             uz_lane_shape shape;
-            make_four(&f, (uz_element_kind)kind, MODELS[uz_element_dim((uz_element_kind)kind) == 3][k / 3],
+            make_four(&f, (uz_element_kind)kind, MODELS[uz_element_type_of((uz_element_kind)kind)->dim == 3][k / 3],
                       ASKED[k % 3], &rng);
-            uz_strain_rule_init(&rule, f.element[0].kind, f.element[0].model, f.element[0].formulation);
+            uz_strain_rule_at(&rule, f.element[0].kind, f.element[0].model, f.element[0].formulation, NULL, NULL, 0);
             uz_lane_shape_of(&shape, &rule, f.x, f.element[0].thickness);
             uz_lane_strains(strain, &rule, &shape, &f.material, f.displacement);
             for (int l = 0; l < LANES; l++)
@@ -108,7 +109,7 @@ TEST(strains_in_lanes_at_other_points_are_those_of_single_elements)
             four_elements f;
             uz_strain_rule rule;
             uz_lane_shape shape;
-            make_four(&f, (uz_element_kind)kind, MODELS[uz_element_dim((uz_element_kind)kind) == 3][k / 3],
+            make_four(&f, (uz_element_kind)kind, MODELS[uz_element_type_of((uz_element_kind)kind)->dim == 3][k / 3],
                       ASKED[k % 3], &rng);
             const int count = type->recover(at, share, (uz_element_kind)kind);
             memcpy(at[count], type->centre, sizeof at[count]);
@@ -156,12 +157,13 @@ typedef enum { GAUSS, ENERGY, SAMPLES } which_points;
 static int list_points(double at[POINTS][3], double *weight, const uz_element *element, which_points which)
 {
     const uz_element_type *type = uz_element_type_of(element->kind);
-    const bool energy = which == ENERGY && type->energy.count > 0;
-    const int gauss = uz_element_gauss_count(element->kind, element->model);
-    const int count = energy ? type->energy.count : gauss;
+    const uz_gauss_rule *gauss = uz_element_rule(element->kind, element->model);
+    const uz_gauss_rule *rule = which == ENERGY && type->energy.count > 0 ? &type->energy : gauss;
+    const int count = rule->count;
     double share[NODES][UZ_ELEMENT_SAMPLES], volume = 0;
     for (int g = 0; g < count; g++) {
-        weight[g] = energy ? type->energy.point(at[g], g) : uz_element_gauss(at[g], element->kind, element->model, g);
+        memcpy(at[g], rule->point[g].at, sizeof at[g]);
+        weight[g] = rule->point[g].weight;
         volume += weight[g];
     }
     if (which != SAMPLES)
@@ -211,7 +213,7 @@ static double *average_at(const plain *x, int64_t e, int64_t node)
  * value. A small system by elimination with the largest pivot. */
 static double fit_at(const plain_element *s, const double *x, int c)
 {
-    const int dim = uz_element_dim(s->element.kind), n = s->points == 1 ? 1 : dim + 1;
+    const int dim = uz_element_type_of(s->element.kind)->dim, n = s->points == 1 ? 1 : dim + 1;
     double A[4][5] = {{0}}, scale = 0;
     for (int i = 0; i < dim; i++)
         scale = fmax(scale, fabs(s->xyz[dim + i] - s->xyz[i]));
@@ -391,7 +393,7 @@ TEST(estimate_of_boxes_is_that_of_single_elements)
     for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
         for (int way = 0; way < 12; way++) {
             const char *name = uz_element_name((uz_element_kind)k);
-            const uz_model model = MODELS[uz_element_dim((uz_element_kind)k) == 3][way % 3];
+            const uz_model model = MODELS[uz_element_type_of((uz_element_kind)k)->dim == 3][way % 3];
             uz_scene s = body_scene(model, name, (double[3]){5, 3, 2}, (int64_t[3]){5, 3, 1 + way % 2});
             s.formulation = k == UZ_QUAD4 || k == UZ_HEX8 ? ASKED[way / 4] : UZ_FORMULATION_AUTO;
             s.box.grading[0] = way % 4 == 3 ? 1.7 : 1;

@@ -1,5 +1,6 @@
 /* The dense operator from a factor with the contact last and from one with the contact anywhere: the same numbers. */
 #include "dual/dual.h"
+#include "dual/form.h"
 #include "factor_fixture.h"
 #include "harness.h"
 #include "hex8.h"
@@ -89,8 +90,10 @@ static void compare(const uz_qp *qp)
         close[i] = r[i] < 0;
     }
     check_close(any.load->g0, last.load->g0, m, 1e-12, "g0");
-    CHECK(uz_dual_load_prepare(last.load, &lambda[0], false, &err) == UZ_OK);
-    CHECK(uz_dual_load_prepare(any.load, &lambda[1], false, &err) == UZ_OK);
+    CHECK(uz_dual_load_prepare(last.load, &err) == UZ_OK &&
+          uz_dual_load_lambda_max(last.load, &lambda[0], false, &err) == UZ_OK);
+    CHECK(uz_dual_load_prepare(any.load, &err) == UZ_OK &&
+          uz_dual_load_lambda_max(any.load, &lambda[1], false, &err) == UZ_OK);
     CHECK_REL(lambda[1], lambda[0], 1e-6);
     CHECK(uz_dual_load_apply(last.load, Dr, r, &err) == UZ_OK && uz_dual_load_apply(any.load, other, r, &err) == UZ_OK);
     check_close(other, Dr, m, 1e-12, "D r");

@@ -21,7 +21,7 @@ static void open_subject(subject *s, const uz_qp *qp, int k)
 {
     uz_error err = {0};
     uz_modes modes = {0};
-    *s = (subject){.qp = qp, .can = uz_dual_abilities_at(k)};
+    *s = (subject){.qp = qp, .can = &uz_dual_forms[k]->can};
     s->tolerance = s->can->exact ? 1e-10 : 1e-6;
     if (s->can->needs_factor) {
         int64_t *dofs = NULL, count = 0;
@@ -64,8 +64,8 @@ static void check_close(const subject *s, const double *a, const double *b, int6
         worst = fmax(worst, fabs(a[i] - b[i]));
         size = fmax(size, fabs(b[i]));
     }
-    CHECK_MSG(worst <= s->tolerance * size, "%s, %s: differ by %g of %g", uz_operator_name(s->can->op), what, worst,
-              size);
+    CHECK_MSG(worst <= s->tolerance * size, "%s, %s: differ by %g of %g",
+              uz_choice_name(UZ_CHOICE_OPERATOR, s->can->op), what, worst, size);
 }
 
 /* K u = p + N'r, relative to what is added up. */
@@ -94,7 +94,7 @@ static void check_operator(subject *s, subject *first, const double *x, const do
     check_close(s, s->load->g0, first->load->g0, m, "g0");
     double scale = sqrt(dot(x, Dx, m) * dot(y, Dy, m));
     CHECK_MSG(scale > 0 && fabs(dot(y, Dx, m) - dot(x, Dy, m)) <= s->tolerance * scale, "%s: not symmetric",
-              uz_operator_name(s->can->op));
+              uz_choice_name(UZ_CHOICE_OPERATOR, s->can->op));
     for (int64_t i = 0; i < m; i += 5) {
         unit[i] = 1;
         CHECK_INT(uz_dual_load_column(s->load, column, i, &err), UZ_OK);
@@ -111,10 +111,11 @@ static void check_operator(subject *s, subject *first, const double *x, const do
     }
     int64_t applied = s->load->applications;
     double lambda = NAN;
-    CHECK_INT(uz_dual_load_prepare(s->load, &lambda, false, &err), UZ_OK);
+    CHECK_INT(uz_dual_load_prepare(s->load, &err), UZ_OK);
+    CHECK_INT(uz_dual_load_lambda_max(s->load, &lambda, false, &err), UZ_OK);
     CHECK(lambda > 0 && s->load->applications > applied && s->dual->lazy->lambda_max[0] == lambda);
     CHECK_MSG(dot(x, Dx, m) <= lambda * dot(x, x, m) * (1 + s->tolerance), "%s: lambda_max",
-              uz_operator_name(s->can->op));
+              uz_choice_name(UZ_CHOICE_OPERATOR, s->can->op));
     CHECK_INT(uz_dual_load_apply(s->load, other, x, &err), UZ_OK); /* by what was prepared */
     check_close(s, other, Dx, m, "D x after preparing");
     free(Dx);
@@ -151,12 +152,12 @@ static void check_recovery(subject *s, const double *r)
     memset(K, 0, (size_t)d * sizeof *K);
     uz_csc_symv(K, &s->qp->K, 1, u);
     CHECK_MSG(sqrt(dot(u, K, d)) <= 2 * bound * (1 + s->tolerance), "%s: the correction is larger than its bound",
-              uz_operator_name(s->can->op));
+              uz_choice_name(UZ_CHOICE_OPERATOR, s->can->op));
     memcpy(g, s->load->h, (size_t)m * sizeof *g);
     uz_csc_gaxpy(g, &s->dual->N, -1, v);
     for (int64_t i = 0; i < m; i++)
-        CHECK_MSG(g[i] >= -1e-9 && (!close[i] || g[i] <= 1e-9), "%s: gap %g of row %d", uz_operator_name(s->can->op),
-                  g[i], (int)i);
+        CHECK_MSG(g[i] >= -1e-9 && (!close[i] || g[i] <= 1e-9), "%s: gap %g of row %d",
+                  uz_choice_name(UZ_CHOICE_OPERATOR, s->can->op), g[i], (int)i);
     free(Dr);
     free(g);
     free(u);
@@ -180,7 +181,7 @@ static void check_active(subject *s, bool bounds)
     for (int64_t i = 0; i < m; i++)
         count += active[i];
     CHECK(count > 1 && count < m);
-    CHECK_INT(uz_dual_load_prepare(s->load, NULL, false, &err), UZ_OK);
+    CHECK_INT(uz_dual_load_prepare(s->load, &err), UZ_OK);
     CHECK_INT(uz_dual_load_solve_active(s->load, &end, r, g, active, &err), UZ_OK);
     CHECK(end == UZ_ACTIVE_SOLVED || (end == UZ_ACTIVE_UNSOLVED && !bounds && !s->can->cheap_steps));
     if (end == UZ_ACTIVE_SOLVED) {
@@ -192,7 +193,7 @@ static void check_active(subject *s, bool bounds)
         }
         for (int64_t i = 0; i < m; i++)
             CHECK_MSG(fabs(gap[i] - g[i]) <= s->tolerance * fabs(s->load->g0[i]) + 1e-2 * s->tolerance,
-                      "%s: row %d (%s) has the gap %g, not %g", uz_operator_name(s->can->op), (int)i,
+                      "%s: row %d (%s) has the gap %g, not %g", uz_choice_name(UZ_CHOICE_OPERATOR, s->can->op), (int)i,
                       active[i] ? "active" : "free", gap[i], g[i]);
         CHECK_INT(uz_dual_load_recover(s->load, u, r, false, &err), UZ_OK);
         check_equilibrium(s, u, r, "with given rows");
@@ -213,7 +214,7 @@ static void check_inverse_norm(subject *s, const double *r)
     uz_error err = {0};
     uz_csc_gaxpy_t(right, &s->dual->N, 1, r);
     memcpy(e, right, (size_t)d * sizeof *e);
-    CHECK_INT(uz_dual_load_inverse_norm(s->load, &value, e, &err), UZ_OK);
+    CHECK_INT(s->load->dual->form->inverse_norm(s->load, &value, e, &err), UZ_OK);
     CHECK(value >= dot(e, right, d) * (1 - 1e-2) && value <= dot(e, right, d) * 1.1);
     free(e);
     free(right);
@@ -343,10 +344,10 @@ TEST(bounds_that_cross)
 TEST(the_table_is_complete)
 {
     for (int k = 0; k < UZ_DUAL_FORMS; k++) {
-        const uz_dual_abilities *can = uz_dual_abilities_at(k);
+        const uz_dual_abilities *can = &uz_dual_forms[k]->can;
         const uz_dual_form *form = uz_dual_form_of(can->op);
-        CHECK(can->op != UZ_OPERATOR_AUTO && can == &form->can && uz_dual_abilities_of(can->op) == can);
-        CHECK_INT(uz_choice_find(UZ_CHOICE_OPERATOR, uz_operator_name(can->op)), can->op);
+        CHECK(can->op != UZ_OPERATOR_AUTO && can == &form->can && &uz_dual_form_of(can->op)->can == can);
+        CHECK_INT(uz_choice_find(UZ_CHOICE_OPERATOR, uz_choice_name(UZ_CHOICE_OPERATOR, can->op)), can->op);
         CHECK(form->dual_size >= sizeof(uz_dual) && form->load_size >= sizeof(uz_dual_load));
         CHECK(form->create && form->clear && form->load && form->unload && form->apply && form->correct);
         CHECK(form->recover && form->solve_active && form->add_cost);

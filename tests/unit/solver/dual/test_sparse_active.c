@@ -119,8 +119,8 @@ static void check_exact(const uz_problem *problem, const quad_exact *exact, uz_m
         return;
     const uz_summary *s = &result->summary;
     double error = fmax(quad_error(exact, result->u), quad_error_of_reactions(exact, result->r));
-    CHECK_MSG(s->outcome == UZ_CONVERGED, "%s, %s: %s, %g", what, uz_method_name(method), uz_outcome_name(s->outcome),
-              s->certificate.relative_error);
+    CHECK_MSG(s->outcome == UZ_CONVERGED, "%s, %s: %s, %g", what, uz_method_name(method),
+              uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), s->certificate.relative_error);
     CHECK_MSG(s->certificate.absolute_error >= error - 1e-25 * s->certificate.energy_norm, "%s: bound %g, error %g",
               what, s->certificate.absolute_error, error);
     CHECK_MSG(s->iterations <= most_steps, "%s, %s: %lld steps", what, uz_method_name(method),
@@ -395,8 +395,8 @@ static void check_obstacle(const uz_problem *problem, double objective, int64_t 
     if (!result)
         return;
     const uz_summary *s = &result->summary;
-    CHECK_STR(uz_outcome_name(s->outcome), "converged");
-    CHECK_STR(uz_operator_name(s->op), "factored");
+    CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), "converged");
+    CHECK_STR(uz_choice_name(UZ_CHOICE_OPERATOR, s->op), "factored");
     CHECK_REL(s->certificate.energy_primal, objective, 1e-10);
     CHECK_INT(s->active, active);
     CHECK_MSG(s->iterations <= most_steps, "%lld steps", (long long)s->iterations);
@@ -498,7 +498,7 @@ TEST(floors_by_every_form)
                 CHECK_INT(got->summary.active, exact->summary.active);
                 CHECK_MSG(fabs(a->energy_primal - b->energy_primal) <= 1e-9 * fabs(b->energy_primal),
                           "%s %g by %s: %.12g, condensed %.12g", plate ? "plate" : "membrane", sink,
-                          uz_operator_name(ops[o]), a->energy_primal, b->energy_primal);
+                          uz_choice_name(UZ_CHOICE_OPERATOR, ops[o]), a->energy_primal, b->energy_primal);
             }
             uz_result_free(got);
         }

@@ -13,15 +13,15 @@ TEST(shape_functions_are_one_at_their_node_and_sum_to_one)
         const int nodes = uz_element_node_count(k);
         double N[UZ_ELEMENT_NODES], sum = 0;
         for (int a = 0; a < nodes; a++) {
-            uz_element_shape(N, k, uz_element_local_nodes(k)[a]);
+            uz_element_shape(N, k, uz_element_type_of(k)->local[a]);
             for (int b = 0; b < nodes; b++)
                 CHECK(N[b] == (a == b));
         }
         for (int m = uz_element_type_of(k)->corners; m < nodes; m++)
-            for (int c = 0; c < uz_element_dim(k); c++) {
+            for (int c = 0; c < uz_element_type_of(k)->dim; c++) {
                 const int *end = uz_element_type_of(k)->edge[m - uz_element_type_of(k)->corners];
-                CHECK(uz_element_local_nodes(k)[m][c] ==
-                      0.5 * (uz_element_local_nodes(k)[end[0]][c] + uz_element_local_nodes(k)[end[1]][c]));
+                CHECK(uz_element_type_of(k)->local[m][c] ==
+                      0.5 * (uz_element_type_of(k)->local[end[0]][c] + uz_element_type_of(k)->local[end[1]][c]));
             }
         uz_element_shape(N, k, (const double[3]){0.3, 0.21, 0.4});
         for (int a = 0; a < nodes; a++)
@@ -37,11 +37,11 @@ TEST(gradients_are_the_shape_functions_derivatives)
     const double point[3] = {0.3, 0.21, 0.17}, h = 1e-4;
     for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++) {
         uz_element element = {.kind = (uz_element_kind)kind};
-        const int nodes = uz_element_node_count(element.kind), dim = uz_element_dim(element.kind);
+        const int nodes = uz_element_node_count(element.kind), dim = uz_element_type_of(element.kind)->dim;
         double xe[UZ_ELEMENT_DOFS], grad[UZ_ELEMENT_NODES][3], up[UZ_ELEMENT_NODES], down[UZ_ELEMENT_NODES];
         for (int a = 0; a < nodes; a++)
             for (int c = 0; c < dim; c++)
-                xe[a * dim + c] = uz_element_local_nodes(element.kind)[a][c];
+                xe[a * dim + c] = uz_element_type_of(element.kind)->local[a][c];
         element.xyz = xe;
         CHECK_REL(uz_element_gradients(grad, &element, point), 1.0, 1e-14);
         for (int c = 0; c < dim; c++) {
@@ -59,7 +59,7 @@ TEST(gradients_are_the_shape_functions_derivatives)
 /* Integral of x^p y^q z^r over the reference element. */
 static double monomial(uz_element_kind kind, int p, int q, int r)
 {
-    const int dim = uz_element_dim(kind);
+    const int dim = uz_element_type_of(kind)->dim;
     if (corner_count(kind) == dim + 1) /* p! q! r! / (p + q + r + dim)! */
         return tgamma(p + 1) * tgamma(q + 1) * tgamma(r + 1) / tgamma(p + q + r + dim + 1);
     const bool wedge = corner_count(kind) == 6; /* a triangle times a line */
@@ -79,18 +79,17 @@ TEST(gauss_rules_have_their_degree)
         for (int ring = 0; ring < 2; ring++) {
             const uz_element_kind k = (uz_element_kind)kind;
             const uz_model model = ring ? UZ_AXISYMMETRIC : UZ_PLANE_STRESS;
-            const int degree = k == UZ_TRI3 && ring ? 2 : DEGREE[k], dim = uz_element_dim(k);
+            const int degree = k == UZ_TRI3 && ring ? 2 : DEGREE[k], dim = uz_element_type_of(k)->dim;
             for (int p = 0; p <= degree; p++)
                 for (int q = 0; p + q <= degree; q++)
                     for (int r = 0; p + q + r <= degree && (dim == 3 || r == 0); r++) {
                         double sum = 0;
-                        for (int g = 0; g < uz_element_gauss_count(k, model); g++) {
-                            double at[3];
-                            const double weight = uz_element_gauss(at, k, model, g);
-                            sum += weight * pow(at[0], p) * pow(at[1], q) * pow(at[2], r);
+                        const uz_gauss_rule *rule = uz_element_rule(k, model);
+                        for (int g = 0; g < rule->count; g++) {
+                            const double *at = rule->point[g].at;
+                            sum += rule->point[g].weight * pow(at[0], p) * pow(at[1], q) * pow(at[2], r);
                         }
-                        CHECK(fabs(sum - monomial(k, p, q, r)) <
-                              (uz_element_gauss_count(k, model) > 9 ? 4e-15 : 1e-15));
+                        CHECK(fabs(sum - monomial(k, p, q, r)) < (rule->count > 9 ? 4e-15 : 1e-15));
                     }
         }
 }
@@ -123,7 +122,7 @@ static void eigenvalues(double *value, double *A, int n)
 static void check_null_space(const uz_element *element)
 {
     double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], value[UZ_ELEMENT_DOFS], largest = 0;
-    const int n = uz_element_node_count(element->kind) * uz_element_dim(element->kind);
+    const int n = uz_element_node_count(element->kind) * uz_element_type_of(element->kind)->dim;
     const int rigid = element->model == UZ_SOLID ? 6 : element->model == UZ_AXISYMMETRIC ? 1 : 3;
     int none = 0, soft = 0;
     CHECK(uz_element_stiffness(ke, element) == UZ_SHAPE_GOOD);
@@ -147,7 +146,7 @@ TEST(only_rigid_motions_have_no_energy)
     uint64_t seed = 17;
     for (int i = 0; each_element(&element, i, 0.3); i++) {
         double xe[UZ_ELEMENT_DOFS];
-        const int dim = uz_element_dim(element.kind), n = uz_element_node_count(element.kind) * dim;
+        const int dim = uz_element_type_of(element.kind)->dim, n = uz_element_node_count(element.kind) * dim;
         element = bent(xe, element, 1);
         check_null_space(&element);
         for (int k = corner_count(element.kind) * dim; k < n; k++) /* curved */
@@ -169,7 +168,7 @@ TEST(stiffness_is_the_strain_energy)
     for (int i = 0; each_element(&element, i, 0.3); i++) {
         double xe[UZ_ELEMENT_DOFS], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], u[UZ_ELEMENT_DOFS], v[UZ_ELEMENT_DOFS];
         element = bent(xe, element, 1);
-        const int n = uz_element_node_count(element.kind) * uz_element_dim(element.kind);
+        const int n = uz_element_node_count(element.kind) * uz_element_type_of(element.kind)->dim;
         CHECK(uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD);
         random_motion(u, n, 3);
         random_motion(v, n, 4);
@@ -177,9 +176,10 @@ TEST(stiffness_is_the_strain_energy)
         uz_element_move(&of_u, &element, u);
         uz_element_move(&of_v, &element, v);
         double work = 0, form = 0, size = 0;
-        for (int g = 0; g < uz_element_gauss_count(element.kind, element.model); g++) {
-            double at[3], grad[UZ_ELEMENT_NODES][3], strain[6], stress[6];
-            const double weight = uz_element_gauss(at, element.kind, element.model, g);
+        const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
+        for (int g = 0; g < rule->count; g++) {
+            double grad[UZ_ELEMENT_NODES][3], strain[6], stress[6];
+            const double *at = rule->point[g].at, weight = rule->point[g].weight;
             const double measure = element_measure(&element, at, uz_element_gradients(grad, &element, at));
             uz_element_strain(strain, &of_u, at);
             uz_element_strain(stress, &of_v, at);
@@ -200,7 +200,7 @@ TEST(stiffness_is_the_strain_energy)
 /* A field x -> H x, and its strain in the element's model. */
 static void linear_field(double *u, double *strain, const uz_element *element, double H[3][3])
 {
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
     const bool ring = element->model == UZ_AXISYMMETRIC, solid = element->model == UZ_SOLID;
     for (int a = 0; a < nodes; a++)
         for (int c = 0; c < dim; c++) {
@@ -229,7 +229,7 @@ TEST(linear_fields_have_their_strain)
         linear_field(u, want, &element, H);
         uz_element_move(&motion, &element, u);
         for (int a = 0; a < uz_element_node_count(element.kind); a++) {
-            uz_element_strain(got, &motion, uz_element_local_nodes(element.kind)[a]);
+            uz_element_strain(got, &motion, uz_element_type_of(element.kind)->local[a]);
             for (int s = 0; s < uz_stress_count(element.model); s++)
                 CHECK_MSG(fabs(got[s] - want[s]) < 1e-13, "%s: strain %d at node %d is %.17g, want %.17g",
                           element_words(&element), s, a, got[s], want[s]);
@@ -246,7 +246,7 @@ TEST(constant_stress_has_its_forces)
         double xe[UZ_ELEMENT_DOFS], u[UZ_ELEMENT_DOFS], strain[6], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS];
         double f[UZ_ELEMENT_DOFS] = {0}, largest = 0;
         element = bent(xe, element, 1);
-        const int n = uz_element_node_count(element.kind) * uz_element_dim(element.kind);
+        const int n = uz_element_node_count(element.kind) * uz_element_type_of(element.kind)->dim;
         H[0][1] = element.model == UZ_AXISYMMETRIC ? 0 : -0.7;
         linear_field(u, strain, &element, H);
         CHECK(uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD);
@@ -270,7 +270,7 @@ TEST(quadratic_elements_have_quadratic_fields)
     for (int i = 0; each_element(&element, i, 0.3); i++) {
         double xe[UZ_ELEMENT_DOFS], u[UZ_ELEMENT_DOFS], got[6], N[UZ_ELEMENT_NODES], x[3] = {0};
         const double point[3] = {0.3, 0.2, 0.1};
-        const int dim = uz_element_dim(element.kind), nodes = uz_element_node_count(element.kind);
+        const int dim = uz_element_type_of(element.kind)->dim, nodes = uz_element_node_count(element.kind);
         uz_element_motion motion;
         if (nodes == corner_count(element.kind) || corner_count(element.kind) > dim + 1)
             continue; /* but for simplices only on parallelograms */
@@ -310,7 +310,7 @@ TEST(a_ring_may_reach_the_axis)
     for (int i = 0; i < 64; i++)
         CHECK(isfinite(ke[i]));
     uz_element_move(&motion, &element, u);
-    uz_element_strain(got, &motion, uz_element_local_nodes(UZ_QUAD4)[3]);
+    uz_element_strain(got, &motion, uz_element_type_of(UZ_QUAD4)->local[3]);
     CHECK(got[0] == 0.25 && got[2] == 0.25);
     CHECK_REL(uz_element_volume(&element), TAU / 2 * 4, 1e-15);
 }
@@ -327,7 +327,7 @@ TEST(turning_an_element_turns_its_stiffness)
         if (element.model == UZ_AXISYMMETRIC)
             continue;
         element = bent(xe, element, 1);
-        const int dim = uz_element_dim(element.kind), n = uz_element_node_count(element.kind) * dim;
+        const int dim = uz_element_type_of(element.kind)->dim, n = uz_element_node_count(element.kind) * dim;
         const double(*Q)[3] = dim == 3 ? Q3 : Q2;
         for (int k = 0; k < n; k++)
             for (int j = 0; j < dim; j++)
@@ -358,7 +358,7 @@ TEST(units_of_length_change_no_digit)
             double xe[UZ_ELEMENT_DOFS], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], ks[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS];
             double largest = 0, worst = 0;
             element = bent(xe, element, 1);
-            const int n = uz_element_node_count(element.kind) * uz_element_dim(element.kind);
+            const int n = uz_element_node_count(element.kind) * uz_element_type_of(element.kind)->dim;
             CHECK(uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD);
             element = bent(xe, element, scale);
             CHECK(uz_element_stiffness(ks, &element) == UZ_SHAPE_GOOD);
@@ -380,7 +380,7 @@ TEST(cube_has_the_stiffness_of_the_matrices_of_strains)
     for (int a = 0; a < 8; a++) {
         bits[a] = 0;
         for (int c = 0; c < 3; c++) {
-            const bool upper = uz_element_local_nodes(UZ_HEX8)[a][c] > 0;
+            const bool upper = uz_element_type_of(UZ_HEX8)->local[a][c] > 0;
             xe[3 * a + c] = upper ? h : 0;
             bits[a] |= upper << c;
         }
@@ -440,13 +440,13 @@ TEST(bad_solid_elements_are_refused)
     CHECK(fault_of(UZ_TET4, s, tet) == UZ_SHAPE_DEGENERATE);
     for (int a = 0; a < 10; a++)
         for (int c = 0; c < 3; c++)
-            tet[3 * a + c] = uz_element_local_nodes(UZ_TET10)[a][c];
+            tet[3 * a + c] = uz_element_type_of(UZ_TET10)->local[a][c];
     CHECK(fault_of(UZ_TET10, s, tet) == UZ_SHAPE_GOOD);
     tet[3 * 9 + 1] = 0.85; /* beyond a quarter of its edge */
     tet[3 * 9 + 2] = 0.15;
     CHECK(fault_of(UZ_TET10, s, tet) == UZ_SHAPE_MIDDLES);
     for (int i = 0; i < 24; i++)
-        cube[i] = 1 + 1e-3 * uz_element_local_nodes(UZ_HEX8)[i / 3][i % 3];
+        cube[i] = 1 + 1e-3 * uz_element_type_of(UZ_HEX8)->local[i / 3][i % 3];
     CHECK(uz_element_stiffness(ke, &small) == UZ_SHAPE_GOOD);
     cube[0] = cube[1] = cube[2] = 1 + 1e-3; /* a corner at the opposite one */
     CHECK(uz_element_stiffness(ke, &small) == UZ_SHAPE_INVERTED);
@@ -464,7 +464,7 @@ TEST(elements_inverted_inside_are_refused)
         const uz_element element = {kind, UZ_PLANE_STRESS, UZ_FORMULATION_STANDARD, {1, 1}, 1, xyz[k]};
         double grad[UZ_ELEMENT_NODES][3];
         for (int a = 0; a < uz_element_node_count(kind); a++)
-            CHECK(uz_element_gradients(grad, &element, uz_element_local_nodes(kind)[a]) > 1e-3);
+            CHECK(uz_element_gradients(grad, &element, uz_element_type_of(kind)->local[a]) > 1e-3);
         CHECK(fault_of(kind, k ? UZ_SOLID : UZ_PLANE_STRESS, xyz[k]) == (k ? UZ_SHAPE_INVERTED : UZ_SHAPE_MIDDLES));
     }
 }

@@ -7,7 +7,7 @@ static const double TAU = 6.283185307179586;
 
 static uz_side side_of(double *xs, const uz_element *element, int number)
 {
-    const int dim = uz_element_dim(element->kind);
+    const int dim = uz_element_type_of(element->kind)->dim;
     const uz_element_side *at = &uz_element_type_of(element->kind)->side[number];
     const uz_side side = {dim, at->nodes, element->model, element->thickness, xs};
     for (int a = 0; a < side.nodes; a++)
@@ -105,7 +105,7 @@ TEST(body_force_is_force_times_volume)
     for (int i = 0; each_element(&element, i, 0.3); i++) {
         double xe[UZ_ELEMENT_DOFS], f[UZ_ELEMENT_DOFS] = {0}, sum[3] = {0};
         element = bent(xe, element, 1);
-        const int dim = uz_element_dim(element.kind), n = uz_element_node_count(element.kind) * dim;
+        const int dim = uz_element_type_of(element.kind)->dim, n = uz_element_node_count(element.kind) * dim;
         uz_element_add_body_force(f, &element, b);
         for (int k = 0; k < n; k++)
             sum[k % dim] += f[k];
@@ -123,7 +123,7 @@ TEST(free_expansion_has_no_stress)
         double f[UZ_ELEMENT_DOFS] = {0}, largest = 0;
         uz_element_motion motion;
         element = bent(xe, element, 1);
-        const int n = uz_element_node_count(element.kind) * uz_element_dim(element.kind);
+        const int n = uz_element_node_count(element.kind) * uz_element_type_of(element.kind)->dim;
         uz_thermal_strain(thermal, element.model, element.lame, 2e-3);
         CHECK_REL(thermal[0], element.model == UZ_PLANE_STRAIN ? 1.3 * 2e-3 : 2e-3, 1e-14);
         for (int k = 0; k < n; k++)
@@ -140,7 +140,7 @@ TEST(free_expansion_has_no_stress)
                       largest);
         }
         uz_element_move(&motion, &element, u);
-        uz_element_strain(strain, &motion, uz_element_local_nodes(element.kind)[1]);
+        uz_element_strain(strain, &motion, uz_element_type_of(element.kind)->local[1]);
         for (int s = 0; s < uz_stress_count(element.model); s++)
             CHECK(fabs(strain[s] - thermal[s]) < 1e-16);
     }
@@ -154,7 +154,7 @@ TEST(pressure_all_round_is_the_volume)
     for (int i = 0; each_element(&element, i, 0.3); i++) {
         double xe[UZ_ELEMENT_DOFS], work = 0, sum[3] = {0}, area = 0;
         element = bent(xe, element, 1);
-        const int dim = uz_element_dim(element.kind);
+        const int dim = uz_element_type_of(element.kind)->dim;
         for (int s = 0; s < uz_element_type_of(element.kind)->sides; s++) {
             double xs[3 * UZ_SIDE_NODES], f[3 * UZ_SIDE_NODES] = {0}, pressure[UZ_SIDE_NODES];
             const uz_side side = side_of(xs, &element, s);
@@ -274,7 +274,7 @@ TEST(sides_are_their_elements_sides)
             uz_side_shape(N, &side, (const double[2]){0.3, 0.2});
             for (int a = 0; a < side.nodes; a++)
                 for (int c = 0; c < 3; c++)
-                    at[c] += N[a] * uz_element_local_nodes(element.kind)[local[a]][c];
+                    at[c] += N[a] * uz_element_type_of(element.kind)->local[local[a]][c];
             uz_element_shape(Ne, element.kind, at);
             for (int a = 0; a < side.nodes; a++) {
                 CHECK(fabs(Ne[local[a]] - N[a]) < 1e-15);

@@ -86,11 +86,13 @@ static void check_solutions(const uz_law *law, int64_t n, qp_random *rng)
     CHECK(solves == (law->kind->residual(law, s, g, one, NULL, n) <= 8 * DBL_EPSILON));
 }
 
-TEST(laws_of_the_table)
+/* Every law there is. */
+static const uz_law *const LAWS[] = {&uz_law_frictionless};
+
+TEST(laws_are_what_they_say)
 {
-    CHECK(uz_law_kind_at(0) != NULL && uz_law_kind_at(-1) == NULL);
-    for (int k = 0; uz_law_kind_at(k); k++) {
-        const uz_law law = {uz_law_kind_at(k), coefficient};
+    for (size_t k = 0; k < sizeof LAWS / sizeof LAWS[0]; k++) {
+        const uz_law law = {LAWS[k]->kind, coefficient};
         const int64_t n = (int64_t)law.kind->rows * BLOCKS;
         qp_random rng = {17};
         CHECK(n <= MOST);
@@ -103,8 +105,8 @@ TEST(laws_of_the_table)
 
 TEST(one_sided_laws_tell_rows_apart)
 {
-    for (int k = 0; uz_law_kind_at(k); k++) {
-        const uz_law law = {uz_law_kind_at(k), coefficient};
+    for (size_t k = 0; k < sizeof LAWS / sizeof LAWS[0]; k++) {
+        const uz_law law = {LAWS[k]->kind, coefficient};
         const double r[4] = {-1, 0, 2, -3}, g[4] = {0, 1, -2, 0.5}, d[4] = {2, -1, 1, -1}, step[4] = {8, 8, 8, 5};
         const bool guess[4] = {true, false, true, true};
         bool in[4], wrong[4];

@@ -110,7 +110,7 @@ TEST(generated_beams_are_solved)
 }
 
 /* Rows of slender bodies that come to touch or come off one by one are found by an interior point, at once: held at one
- * end, and between two planes. */
+ * end, and between two planes. Guesses that come back to one that was wrong are not solved again (eight steps). */
 TEST(long_beams_take_few_steps)
 {
     static const beam beams[] = {{"quad4", 1000, 1e-3, 0.01, 800, 2, false},
@@ -124,7 +124,7 @@ TEST(long_beams_take_few_steps)
         if (result) {
             const uz_summary *s = &result->summary;
             CHECK_MSG(s->outcome == UZ_CONVERGED, "beam %d: %s", (int)k, s->message);
-            CHECK_MSG(s->iterations <= 20, "beam %d took %lld steps", (int)k, (long long)s->iterations);
+            CHECK_MSG(s->iterations <= 6, "beam %d took %lld steps", (int)k, (long long)s->iterations);
         }
         uz_result_free(result);
         uz_problem_clear(&problem);

@@ -28,11 +28,12 @@ static void check_solved(const uz_problem *problem, const char *what, uz_outcome
             continue;
         const uz_summary *s = &result->summary;
         judgement j = judge(&t, &problem->qp, result, result->u);
-        CHECK_MSG(s->outcome == expected, "%s, %s: %s, certified %g, true %g: %s", what, uz_operator_name(s->op),
-                  uz_outcome_name(s->outcome), j.certified, j.error, s->message);
-        CHECK_MSG(j.verdict != JUDGED_WRONG, "%s, %s: %s", what, uz_operator_name(s->op), j.why);
-        CHECK_MSG(s->iterations <= most_iterations, "%s, %s: %lld steps", what, uz_operator_name(s->op),
-                  (long long)s->iterations);
+        CHECK_MSG(s->outcome == expected, "%s, %s: %s, certified %g, true %g: %s", what,
+                  uz_choice_name(UZ_CHOICE_OPERATOR, s->op), uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), j.certified,
+                  j.error, s->message);
+        CHECK_MSG(j.verdict != JUDGED_WRONG, "%s, %s: %s", what, uz_choice_name(UZ_CHOICE_OPERATOR, s->op), j.why);
+        CHECK_MSG(s->iterations <= most_iterations, "%s, %s: %lld steps", what,
+                  uz_choice_name(UZ_CHOICE_OPERATOR, s->op), (long long)s->iterations);
         uz_result_free(result);
     }
     truth_clear(&t);

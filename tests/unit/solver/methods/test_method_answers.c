@@ -77,7 +77,7 @@ static void check_bounds_of_rows(const uz_problem *problem, uz_method method, uz
         double bound = result->history.rows[result->history.count - 1].error_bound;
         double error = fmax(quad_error(&exact, result->u), quad_error_of_reactions(&exact, result->r));
         CHECK_MSG(bound * (1 + 1e-9) >= error * (1 - 1e-9) - 1e-13, "%s, %s, after %lld: bound %g, error %g",
-                  uz_method_name(method), uz_operator_name(op), (long long)limit, bound, error);
+                  uz_method_name(method), uz_choice_name(UZ_CHOICE_OPERATOR, op), (long long)limit, bound, error);
         CHECK(result->summary.certificate.absolute_error >= error * (1 - 1e-12));
         uz_result_free(result);
     }
@@ -132,7 +132,7 @@ static void check_exact(const uz_problem *problem, uz_method method, double accu
         CHECK_MSG(error <= accuracy, "d %d m %d: error %g after %lld", (int)exact.d, (int)exact.m, error,
                   (long long)s->iterations);
         CHECK_MSG(s->outcome == UZ_CONVERGED, "d %d m %d: %s, certified %g", (int)exact.d, (int)exact.m,
-                  uz_outcome_name(s->outcome), s->certificate.relative_error);
+                  uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), s->certificate.relative_error);
         CHECK_MSG(s->iterations <= steps, "d %d m %d: %lld steps", (int)exact.d, (int)exact.m,
                   (long long)s->iterations);
         for (int64_t i = 0; i < exact.m; i++) /* rows far from degenerate are on the right side */

@@ -38,8 +38,8 @@ static void check_result(const uz_result *result, const quad_exact *exact, const
 {
     const uz_summary *s = &result->summary;
     CHECK_MSG(s->outcome == UZ_CONVERGED, "%s, %s, %s: %s, %g after %lld", what, uz_method_name(s->method),
-              uz_operator_name(s->op), uz_outcome_name(s->outcome), s->certificate.relative_error,
-              (long long)s->iterations);
+              uz_choice_name(UZ_CHOICE_OPERATOR, s->op), uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome),
+              s->certificate.relative_error, (long long)s->iterations);
     check_bounds(result, exact, what);
 }
 
@@ -266,7 +266,7 @@ TEST(time_limit)
         settings.time_limit_s = 0;
         uz_result *result = solve_problem(&problem, &settings);
         if (result) {
-            CHECK_STR(uz_outcome_name(result->summary.outcome), "time_limit");
+            CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "time_limit");
             CHECK_INT(result->summary.iterations, 0);
             CHECK(isfinite(result->summary.certificate.absolute_error));
         }
@@ -331,7 +331,7 @@ TEST(cancel)
         CHECK((status == UZ_OK) == (result != NULL));
         if (result) {
             dismissed++;
-            CHECK_STR(uz_outcome_name(result->summary.outcome), "dismissed");
+            CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "dismissed");
             CHECK(isfinite(result->summary.certificate.absolute_error));
         } else {
             errors++;

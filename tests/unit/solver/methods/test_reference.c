@@ -25,7 +25,7 @@ static void check_answer(const uz_result *result, const body_reference *want, uz
     if (!result)
         return;
     const uz_summary *s = &result->summary;
-    CHECK_STR(uz_outcome_name(s->outcome), uz_outcome_name(outcome));
+    CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), uz_choice_name(UZ_CHOICE_OUTCOME, outcome));
     CHECK_INT(s->m, want->nx);
     CHECK_INT(s->d, 2 * want->nx * (want->ny + 1));
     CHECK_INT(s->active, want->contacts);

@@ -285,8 +285,8 @@ TEST(the_solution_itself_takes_no_iteration)
                 uz_result *warm = solve_from(&problem, &settings, &start, NULL);
                 CHECK_INT(warm->summary.outcome, cold->summary.outcome);
                 CHECK_MSG(cold->summary.outcome != UZ_CONVERGED || warm->summary.iterations == 0,
-                          "%s %s %g: %lld iterations", uz_method_name(methods[mo]), uz_operator_name(ops[op]),
-                          errors[e], (long long)warm->summary.iterations);
+                          "%s %s %g: %lld iterations", uz_method_name(methods[mo]),
+                          uz_choice_name(UZ_CHOICE_OPERATOR, ops[op]), errors[e], (long long)warm->summary.iterations);
                 CHECK_INT(warm->history.rows[0].iteration, 0);
                 uz_result_free(cold);
                 uz_result_free(warm);

@@ -6,7 +6,7 @@ enum { N_ELEMENTS = UZ_ELEMENT_KINDS };
 
 static bool is_solid(int element)
 {
-    return uz_element_dim((uz_element_kind)element) == 3;
+    return uz_element_type_of((uz_element_kind)element)->dim == 3;
 }
 
 static void clear(uz_scene *scene, uz_result *result)

@@ -30,8 +30,8 @@ static void shake(double *xyz, uz_element_kind kind, uz_model model, double size
     static const double SHIFT[UZ_ELEMENT_NODES][3] = {
         {0.03, -0.05, 0.02}, {-0.06, 0.04, 0.05}, {0.07, 0.02, -0.03}, {0.01, 0.06, 0.04}, {-0.02, 0.03, 0.05},
         {0.05, -0.04, 0.01}, {0.02, 0.05, -0.06}, {-0.03, 0.01, 0.02}, {0.02, 0.02, 0.01}, {0.01, -0.02, 0.03}};
-    const int dim = uz_element_dim(kind), nodes = uz_element_node_count(kind);
-    const double(*local)[3] = uz_element_local_nodes(kind);
+    const int dim = uz_element_type_of(kind)->dim, nodes = uz_element_node_count(kind);
+    const double(*local)[3] = uz_element_type_of(kind)->local;
     for (int a = 0; a < nodes; a++)
         for (int c = 0; c < dim; c++)
             xyz[a * dim + c] = size * (local[a][c] + 0.3 * SHIFT[a][c]) + (model == UZ_AXISYMMETRIC && c == 0 ? 3 : 0);
@@ -42,7 +42,7 @@ static void loose_init(loose_body *b, uz_element_kind kind, uz_model model, doub
     memset(b, 0, sizeof *b);
     uz_mesh *mesh = &b->model.mesh;
     const int nodes = uz_element_node_count(kind);
-    mesh->dim = uz_element_dim(kind);
+    mesh->dim = uz_element_type_of(kind)->dim;
     mesh->n_nodes = nodes;
     mesh->n_elements = 1;
     mesh->xyz = zeros(nodes * mesh->dim);
@@ -122,7 +122,7 @@ TEST(uniform_stress_is_exact_in_every_element)
 {
     for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
         for (double size = 1e-3; size < 1e4; size *= 1e3) {
-            if (uz_element_dim((uz_element_kind)kind) == 3) {
+            if (uz_element_type_of((uz_element_kind)kind)->dim == 3) {
                 check_uniform((uz_element_kind)kind, UZ_SOLID, size);
             } else {
                 check_uniform((uz_element_kind)kind, UZ_PLANE_STRESS, size);
@@ -161,9 +161,9 @@ TEST(linear_stress_is_exact_in_quadratic_elements)
         const uz_element_kind kind = (uz_element_kind)i;
         if (uz_element_type_of(kind)->nodes == uz_element_type_of(kind)->corners)
             continue;
-        loose_init(&b, kind, uz_element_dim(kind) == 3 ? UZ_SOLID : UZ_PLANE_STRAIN, 2);
+        loose_init(&b, kind, uz_element_type_of(kind)->dim == 3 ? UZ_SOLID : UZ_PLANE_STRAIN, 2);
         const int dim = b.model.mesh.dim, nodes = (int)b.model.mesh.n_nodes, k = b.body.components;
-        const double(*local)[3] = uz_element_local_nodes(kind);
+        const double(*local)[3] = uz_element_type_of(kind)->local;
         double *u = zeros(nodes * dim), *got = zeros(nodes * k), stress[6];
         for (int a = 0; a < nodes; a++) { /* straight sides: the reference element itself */
             for (int c = 0; c < dim; c++)
@@ -251,7 +251,7 @@ TEST(gauss_points_carry_the_elements_own_stress)
 {
     for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++) {
         loose_body b;
-        const bool solid = uz_element_dim((uz_element_kind)kind) == 3;
+        const bool solid = uz_element_type_of((uz_element_kind)kind)->dim == 3;
         loose_init(&b, (uz_element_kind)kind, solid ? UZ_SOLID : UZ_PLANE_STRAIN, 1);
         static const double PLANE[4] = {1e-3, 0, 0, 0}, SPACE[9] = {1e-3};
         double *u = linear_motion(&b.model.mesh, solid ? SPACE : PLANE), stress[6];
@@ -259,7 +259,7 @@ TEST(gauss_points_carry_the_elements_own_stress)
         const int k = b.body.components, dim = b.model.mesh.dim;
         double *element = zeros(n), *point = zeros(n * dim), *got = zeros(n * k);
         hooke(stress, (double[6]){1e-3}, 200e3, 0.3);
-        CHECK_INT(n, uz_element_gauss_count((uz_element_kind)kind, b.scene.model));
+        CHECK_INT(n, uz_element_rule((uz_element_kind)kind, b.scene.model)->count);
         CHECK(uz_field_gauss(element, point, got, &b.body, u, NULL, NULL) == UZ_OK);
         for (int64_t g = 0; g < n; g++) {
             CHECK(element[g] == 0 && fabs(point[g * dim]) < 1.2);

@@ -44,7 +44,7 @@ static void rise(double u[3], const double x[3])
 
 static bool is_solid(int element)
 {
-    return uz_element_dim((uz_element_kind)element) == 3;
+    return uz_element_type_of((uz_element_kind)element)->dim == 3;
 }
 
 /* A block 4 x 1 [x 4] of 4 cells over an obstacle under its bottom. */

@@ -154,7 +154,7 @@ static uz_result *run(const known *k, uz_method method, int64_t iterations, doub
     if (result) {
         check_honest(k, result);
         printf("# %-15s %-19s %s after %lld, relative error %.2g (true %.2g)\n", k->name, uz_method_name(method),
-               uz_outcome_name(result->summary.outcome), (long long)result->summary.iterations,
+               uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), (long long)result->summary.iterations,
                result->summary.certificate.relative_error, true_error(k, result->u) / k->energy_norm);
     }
     return result;
@@ -166,7 +166,7 @@ static void check_auto(const known *k)
     if (!result)
         return;
     const uz_summary *s = &result->summary;
-    CHECK_STR(uz_outcome_name(s->outcome), "converged");
+    CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), "converged");
     CHECK(s->certificate.relative_error <= 1e-8);
     CHECK_REL(s->certificate.energy_primal, k->objective, 1e-9);
     CHECK_REL(s->certificate.energy_dual, k->objective, 1e-9);

@@ -9,8 +9,8 @@ static void tell(void *ctx, uint64_t seed, const uz_qp *qp, const uz_summary *s,
 {
     (void)ctx;
     printf("# seed %d (%s), d %d, m %d, %s: certified %.3g, true %.3g %s\n", (int)seed,
-           DEGENERATE_NAMES[seed % DEGENERATE_KINDS], (int)qp->K.cols, (int)qp->N.rows, uz_outcome_name(s->outcome),
-           s->certificate.relative_error, j->error, j->why);
+           DEGENERATE_NAMES[seed % DEGENERATE_KINDS], (int)qp->K.cols, (int)qp->N.rows,
+           uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), s->certificate.relative_error, j->error, j->why);
     CHECK(j->verdict != JUDGED_WRONG);
 }
 

@@ -120,7 +120,8 @@ static void judge_result(interplay *all, const loaded_body *body, int64_t i, con
     all->verified += s->outcome == UZ_VERIFIED;
     all->uncertain += j.verdict == JUDGED_UNCERTAIN;
     CHECK_MSG(j.verdict != JUDGED_WRONG, "%s, seed %llu, case %lld, %s by %s: %s", what, (unsigned long long)seed,
-              (long long)i, uz_outcome_name(s->outcome), uz_operator_name(s->op), j.why);
+              (long long)i, uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), uz_choice_name(UZ_CHOICE_OPERATOR, s->op),
+              j.why);
 }
 
 static void verify_result(interplay *all, qp_random *rng, const loaded_body *body, int64_t i, const uz_result *x,

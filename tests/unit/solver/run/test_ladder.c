@@ -13,8 +13,8 @@ TEST(dofs_of_a_grid_are_those_of_its_mesh)
         const uz_element_kind kind = (uz_element_kind)k;
         const double size[3] = {3, 1.3, 1.1};
         const int64_t cells[3] = {0};
-        const uz_scene s =
-            body_scene(uz_element_dim(kind) == 3 ? UZ_SOLID : UZ_PLANE_STRAIN, uz_element_name(kind), size, cells);
+        const uz_scene s = body_scene(uz_element_type_of(kind)->dim == 3 ? UZ_SOLID : UZ_PLANE_STRAIN,
+                                      uz_element_name(kind), size, cells);
         const uz_grids grids = uz_grids_of_box(&s.box, 0);
         for (int64_t n = grids.first; n < grids.first + 4; n++) {
             const uz_box box = uz_grid(&grids, n);

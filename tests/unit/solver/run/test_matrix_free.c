@@ -401,8 +401,8 @@ TEST(predicted_bytes_cover_what_is_used)
             uz_result *result = solve_problem(&problem, &s);
             const uz_cost *cost = &result->summary.cost;
             CHECK_MSG(cost->bytes >= cost->actual_bytes && cost->bytes <= 2.5 * cost->actual_bytes,
-                      "%s at %lld: %g predicted, %g counted", uz_operator_name(forms[k]), (long long)nx, cost->bytes,
-                      cost->actual_bytes);
+                      "%s at %lld: %g predicted, %g counted", uz_choice_name(UZ_CHOICE_OPERATOR, forms[k]),
+                      (long long)nx, cost->bytes, cost->actual_bytes);
             CHECK(cost->seconds > 0.0 && cost->flops > 0.0 && cost->actual_seconds > 0.0);
             CHECK_INT(cost->n_considered, forms[k] == UZ_OPERATOR_MATRIX_FREE ? 1 : 3);
             uz_result_free(result);
@@ -433,7 +433,7 @@ TEST(units_do_not_decide)
             settings.max_iterations = 3000;
             uz_result *result = solve_problem(&problem, &settings);
             CHECK_MSG(result && result->summary.outcome == UZ_CONVERGED, "K times %g, u times %g: %s", stiffer[k],
-                      larger[l], result ? uz_outcome_name(result->summary.outcome) : "refused");
+                      larger[l], result ? uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome) : "refused");
             if (result)
                 CHECK_REL(result->summary.lambda_max * stiffer[k], 6.4352550088, 1e-4);
             uz_result_free(result);

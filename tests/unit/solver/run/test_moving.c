@@ -236,8 +236,8 @@ TEST(what_does_not_settle_is_said)
     uz_scene s = on_bump(-5, 2, 0.4, 0.6);
     uz_result *result = solve(&s, UZ_KINEMATICS_MOVING, 1e-10, NULL);
     const uz_summary *x = &result->summary;
-    CHECK_MSG(x->outcome == UZ_MOVING_GEOMETRY, "%s %g %g %lld", uz_outcome_name(x->outcome), x->geometry.change,
-              x->geometry.left, (long long)x->geometry.passes);
+    CHECK_MSG(x->outcome == UZ_MOVING_GEOMETRY, "%s %g %g %lld", uz_choice_name(UZ_CHOICE_OUTCOME, x->outcome),
+              x->geometry.change, x->geometry.left, (long long)x->geometry.passes);
     CHECK_INT(x->geometry.passes, 30);
     CHECK(x->geometry.left > 1e-10 && strstr(x->message, "30") && x->certificate.relative_error <= 1e-10);
     uz_result_free(result);

@@ -10,8 +10,8 @@ static void fail(void *ctx, uint64_t seed, const uz_qp *qp, const uz_summary *s,
     (void)ctx;
     if (j->verdict == JUDGED_WRONG)
         test_fail(__FILE__, __LINE__, "seed %d, d %d, m %d, %s by %s: %s (certified %.17g, true %.17g)", (int)seed,
-                  (int)qp->K.cols, (int)qp->N.rows, uz_outcome_name(s->outcome), uz_method_name(s->method), j->why,
-                  j->certified, j->error);
+                  (int)qp->K.cols, (int)qp->N.rows, uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome),
+                  uz_method_name(s->method), j->why, j->certified, j->error);
 }
 
 TEST(claims_on_generated_problems_are_true)

@@ -50,7 +50,7 @@ static void clear(uz_scene *scene, uz_result *result)
 TEST(a_bar_under_tension_is_exact)
 {
     for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
-        const bool solid = uz_element_dim((uz_element_kind)k) == 3;
+        const bool solid = uz_element_type_of((uz_element_kind)k)->dim == 3;
         uz_scene s = body_scene(solid ? UZ_SOLID : UZ_PLANE_STRESS, uz_element_name((uz_element_kind)k),
                                 (double[3]){3, 1, 1}, (int64_t[3]){3, 2, 2});
         quantities asked = {.n = 0};

@@ -42,7 +42,7 @@ static uz_result *solve(uz_cache *cache, uz_qp qp, const uz_settings *settings)
     uz_result *result = NULL;
     uz_error err = {0};
     CHECK_MSG(uz_solve(&result, &problem, settings, cache, NULL, &err) == UZ_OK, "%s", err.message);
-    CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+    CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "converged");
     uz_problem_clear(&problem);
     return result;
 }
@@ -254,7 +254,7 @@ TEST(certificates_of_a_large_body)
         CHECK_INT(uz_solve(&result, &problem, &settings, cache, NULL, NULL), UZ_OK);
         const double error = result->summary.certificate.relative_error;
         first = k == 0 ? error : first;
-        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "converged");
         CHECK_MSG(error == first && result->d >= UZ_CERTIFY_SPARES, "%g, at first %g", error, first);
         uz_result_free(result);
     }

@@ -34,7 +34,7 @@ static void check_uniform(double gap, uz_operator op)
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
         const uz_summary *s = &result->summary;
-        CHECK_STR(uz_outcome_name(s->outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), "converged");
         CHECK(s->certificate.relative_error <= 1e-8);
         CHECK_REL(s->certificate.energy_norm * s->certificate.energy_norm, q * q * 6000 / young, 1e-7);
         CHECK_REL(s->certificate.energy_primal, -0.5 * q * q * 6000 / young - 15 * gap, 1e-7);
@@ -87,7 +87,7 @@ TEST(corner_holds_a_block_without_supports)
     uz_settings settings = uz_settings_default();
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
-        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "converged");
         CHECK_INT(result->summary.semicoercive.free_modes, 3);
         CHECK_REL(result->summary.force[0], 10.0, 1e-7);
         CHECK_REL(result->summary.force[1], 15.0, 1e-7);
@@ -114,7 +114,7 @@ TEST(tilted_body_is_that_of_the_exhaustive_search)
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
         const uz_certificate *c = &result->summary.certificate;
-        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "converged");
         CHECK_INT(result->summary.active, __builtin_popcount(exact.set));
         double *u = vector(model.d);
         for (int64_t k = 0; k < 2 * result->n_nodes; k++)
@@ -142,7 +142,7 @@ TEST(balanced_accuracy_is_a_share_of_the_mesh_error)
     settings.balanced = true;
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
-        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "converged");
         CHECK(result->summary.discretization_error > 0.01);
         CHECK_REL(result->summary.requested_error, 0.1 * result->summary.discretization_error, 1e-3);
     }
@@ -195,7 +195,7 @@ TEST(oblique_plane_holds)
     settings.relative_error = 1e-6;
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
-        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "converged");
         CHECK_REL(result->summary.force[0], 50.0, 1e-5);
         CHECK_REL(result->summary.force[1], 100.0, 1e-5);
     }
@@ -209,13 +209,13 @@ TEST(no_time_and_no_iterations_are_outcomes)
     uz_settings settings = uz_settings_default();
     settings.time_limit_s = 0;
     uz_result *result = solve_problem(&problem, &settings);
-    CHECK_STR(result ? uz_outcome_name(result->summary.outcome) : "", "time_limit");
+    CHECK_STR(result ? uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome) : "", "time_limit");
     CHECK(result && result->n_nodes == 21 && isinf(result->summary.certificate.relative_error));
     uz_result_free(result);
     settings = uz_settings_default();
     settings.max_iterations = 0;
     result = solve_problem(&problem, &settings);
-    CHECK_STR(result ? uz_outcome_name(result->summary.outcome) : "", "iteration_limit");
+    CHECK_STR(result ? uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome) : "", "iteration_limit");
     uz_result_free(result);
     uz_problem_clear(&problem);
 }
@@ -232,7 +232,7 @@ TEST(every_method_gives_the_certified_answer)
         settings.method = methods[k];
         settings.relative_error = 1e-6;
         uz_result *result = solve_problem(&problem, &settings);
-        CHECK_STR(result ? uz_outcome_name(result->summary.outcome) : "", "converged");
+        CHECK_STR(result ? uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome) : "", "converged");
         CHECK_INT(result ? result->summary.method : 0, methods[k]);
         uz_result_free(result);
         uz_problem_clear(&problem);
@@ -268,7 +268,7 @@ TEST(load_cases_of_a_floating_block)
         problem.cases[k] = pushing(k == 0 ? "a" : k == 1 ? "b" : "c", -1.0 - k);
     CHECK_MSG(uz_solve_cases(&results, &problem, &settings, NULL, NULL, NULL, &err) == UZ_OK, "%s", err.message);
     for (int64_t k = 0; results && k < 3; k++) {
-        CHECK_STR(uz_outcome_name(results[k]->summary.outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, results[k]->summary.outcome), "converged");
         CHECK_REL(results[k]->summary.force[1], 300.0 * (double)(k + 1), 1e-7);
     }
     uz_results_free(results, 3);

@@ -16,7 +16,7 @@ TEST(two_floating_blocks_are_solved_when_both_are_pressed)
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
         const uz_summary *s = &result->summary;
-        CHECK_STR(uz_outcome_name(s->outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome), "converged");
         CHECK_INT(s->semicoercive.free_modes, 6);
         /* uniform pressure on both: q^2 (1 - nu) / E times the volume, twice */
         CHECK_REL(s->certificate.energy_norm * s->certificate.energy_norm, 30 * (1 + 1e-4) * 2 * 0.7 / 200e3, 1e-7);
@@ -84,8 +84,8 @@ static bool check_against_all(const uz_problem *problem, uint64_t seed, bool *ex
     if (exact.strict && stiff)
         CHECK_MSG(result && result->summary.certificate.absolute_error < 1e-10, "seed %d: no bound", (int)seed);
     if (exact.strict && !stiff)
-        CHECK_MSG(converged, "seed %d: %s %s", (int)seed, result ? uz_outcome_name(result->summary.outcome) : "error",
-                  err.message);
+        CHECK_MSG(converged, "seed %d: %s %s", (int)seed,
+                  result ? uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome) : "error", err.message);
     if (converged) {
         CHECK_MSG(exact.exists, "seed %d: converged where there is no solution", (int)seed);
         double error = exact.exists ? error_of(&exact, result->u) : 0,
@@ -175,7 +175,7 @@ TEST(contradicting_rows_of_a_floating_body_are_infeasible)
     settings.semidefinite = true;
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
-        CHECK_STR(uz_outcome_name(result->summary.outcome), "infeasible");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "infeasible");
         CHECK(result->ray && isnan(result->u[0]) && isnan(result->r[0]));
     }
     uz_result_free(result);
@@ -221,7 +221,7 @@ TEST(cancel_is_honoured_in_every_phase)
             dismissed++;
             CHECK(result->summary.certificate.relative_error > settings.relative_error);
         } else if (result) {
-            CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+            CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "converged");
         }
         uz_result_free(result);
     } while (left < 0 && calls < 1000);

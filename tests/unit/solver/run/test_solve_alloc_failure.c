@@ -43,7 +43,7 @@ static void attempt(const scenario *s, long n)
         CHECK_INT(err.status, status);
         if (status == UZ_OK)
             CHECK_MSG(result->summary.outcome == UZ_CONVERGED, "%s: allocation %ld: %s", s->name, n,
-                      uz_outcome_name(result->summary.outcome));
+                      uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome));
         uz_result_free(result);
     }
     uz_cache_free(cache);
@@ -326,7 +326,7 @@ static void check_cases(uz_operator op, uz_method method, int64_t count)
         attempt_cases(&problem, &settings, starts, n);
         more = end_watching("cases", n);
     }
-    printf("# %lld cases, %s: %ld allocations\n", (long long)count, uz_operator_name(op), n);
+    printf("# %lld cases, %s: %ld allocations\n", (long long)count, uz_choice_name(UZ_CHOICE_OPERATOR, op), n);
     CHECK(n > 100 && n < MOST_ALLOCATIONS);
     uz_result_free(earlier);
     uz_problem_clear(&problem);

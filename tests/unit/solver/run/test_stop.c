@@ -132,7 +132,7 @@ static void stop_at(const route *r, const uz_problem *problem, uz_result *const 
     for (int64_t i = 0; status == UZ_OK && i < count_results(problem); i++) {
         uz_outcome outcome = results[i]->summary.outcome;
         CHECK_MSG(outcome == UZ_DISMISSED || outcome == UZ_CONVERGED, "%s, stopped at %lld: %s", r->name, (long long)at,
-                  uz_outcome_name(outcome));
+                  uz_choice_name(UZ_CHOICE_OUTCOME, outcome));
         check_bound(r->name, at, &problem->qp.K, results[i], exact[i]);
     }
     uz_results_free(results, count_results(problem));
@@ -151,7 +151,7 @@ static void stop_everywhere(const route *r)
     CHECK_MSG(status == UZ_OK, "%s: %s", r->name, err.message);
     for (int64_t i = 0; status == UZ_OK && i < count_results(&problem); i++)
         CHECK_MSG(exact[i]->summary.outcome == UZ_CONVERGED, "%s: %s", r->name,
-                  uz_outcome_name(exact[i]->summary.outcome));
+                  uz_choice_name(UZ_CHOICE_OUTCOME, exact[i]->summary.outcome));
     printf("# %s: %lld questions\n", r->name, (long long)whole.asked);
     int64_t step = whole.asked / (SANITIZED ? STOPS / 5 : STOPS) + 1;
     for (int64_t at = 0; status == UZ_OK && at < whole.asked; at += step)
@@ -181,7 +181,7 @@ TEST(without_time_there_is_a_certified_answer)
         CHECK_MSG(status == UZ_OK, "%s: %s", routes[k].name, err.message);
         for (int64_t i = 0; status == UZ_OK && i < count_results(&problem); i++) {
             CHECK_MSG(results[i]->summary.outcome == UZ_TIME_LIMIT, "%s: %s", routes[k].name,
-                      uz_outcome_name(results[i]->summary.outcome));
+                      uz_choice_name(UZ_CHOICE_OUTCOME, results[i]->summary.outcome));
             CHECK(!isnan(results[i]->summary.certificate.relative_error));
         }
         uz_results_free(results, count_results(&problem));
@@ -267,7 +267,8 @@ static void continue_from(const route *r, int64_t at)
         settings.max_iterations = 2000;
         status = uz_solve_cases(&next, &problem, &settings, &start, NULL, NULL, &err);
         CHECK_MSG(status == UZ_OK && next[0]->summary.outcome == UZ_CONVERGED, "%s, stopped at %lld, goes on to: %s",
-                  r->name, (long long)at, next ? uz_outcome_name(next[0]->summary.outcome) : err.message);
+                  r->name, (long long)at,
+                  next ? uz_choice_name(UZ_CHOICE_OUTCOME, next[0]->summary.outcome) : err.message);
     }
     uz_results_free(stopped, 1);
     uz_results_free(next, 1);

@@ -313,7 +313,7 @@ TEST(an_energy_beyond_double_bounds_nothing)
         uz_problem problem = problem_of(qp);
         CHECK_INT(uz_verify(&result, &problem, &u, &r, &settings, NULL, NULL, &err), UZ_OK);
         if (result && k) {
-            CHECK_STR(uz_outcome_name(result->summary.outcome), "not_verified");
+            CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "not_verified");
             CHECK(result->summary.certificate.relative_error > 1e-2);
         }
         uz_result_free(result);
@@ -336,7 +336,7 @@ TEST(relative_residuals_of_a_body_that_touches_everywhere)
     uz_problem problem = problem_of(qp);
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
-        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), "converged");
         CHECK_INT(result->summary.active, 2);
         CHECK_MSG(result->summary.certificate.relative_residual.total < 1e-12, "relative residual %g",
                   result->summary.certificate.relative_residual.total);

@@ -466,8 +466,8 @@ static void play(tally *t, uint64_t seed)
     } else if (x->summary.outcome != UZ_CONVERGED) {
         t->other++;
         if (getenv("SEEDS"))
-            printf("# seed %llu %s: %s\n", (unsigned long long)seed, uz_outcome_name(x->summary.outcome),
-                   x->summary.message);
+            printf("# seed %llu %s: %s\n", (unsigned long long)seed,
+                   uz_choice_name(UZ_CHOICE_OUTCOME, x->summary.outcome), x->summary.message);
     } else {
         t->converged++;
         t->semicoercive += x->summary.semicoercive.free_modes > 0;
