@@ -60,6 +60,8 @@ uz_status uz_state_check(const uz_state *s, int64_t m, uz_error *err)
 /* How far what another problem's state says may be from what this problem gives: far above rounding, as D r made by the
  * active set is g0 - g, and far below what another load or body makes of it. */
 #define SAME 1e-5
+/* A bound, relative to the answer's energy norm, that may be rounding alone: 3e-11 was seen on a slender column. */
+#define ROUNDING 1e-9
 
 static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const uz_state *s, uz_error *err)
 {
@@ -88,17 +90,21 @@ static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const u
     }
     *same = status == UZ_OK && difference <= SAME * size;
     /* A state does not have the correction of its best answer: it is made again, and its bound with it. What rounding
-     * alone leaves of a bound is another number each time. */
-    if (*same && !isinf(s->best_bound)) {
+     * alone leaves of a bound is another number each time: the larger one is kept, so that a state of nearly the same
+     * load never passes for the answer. */
+    double bound = s->best_bound, relative = s->best_relative;
+    if (*same && !isinf(bound)) {
         it->made_by = s->made_by;
         status = uz_iterate_bound_best(it, load, err);
-        *same = (it->best_bound <= (1.0 + 1e-3) * s->best_bound && s->best_bound <= (1.0 + 1e-3) * it->best_bound) ||
-                (it->best_relative <= 1e-11 && s->best_relative <= 1e-11);
+        const bool equal = it->best_bound <= (1.0 + 1e-3) * bound && bound <= (1.0 + 1e-3) * it->best_bound;
+        *same = equal || (it->best_relative <= ROUNDING && relative <= ROUNDING);
+        bound = equal ? bound : fmax(bound, it->best_bound);
+        relative = equal ? relative : fmax(relative, it->best_relative);
     }
     if (status != UZ_OK || !*same)
         return status;
-    it->best_bound = s->best_bound;
-    it->best_relative = s->best_relative;
+    it->best_bound = bound;
+    it->best_relative = relative;
     it->best_iteration = s->best_iteration;
     it->made_by = s->made_by;
     it->begun = it->fresh = it->resumed = true;
