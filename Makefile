@@ -265,7 +265,7 @@ sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that say
 # "not under ThreadSanitizer", or "not under sanitizers" at all.
 without_tsan = $(shell grep -L 'not under \(ThreadSanitizer\|sanitizers\)' $(1))
-TSAN_UNIT = $(notdir $(basename $(call without_tsan,$(shell grep -lE 'pthread_create|include "(http|base/log|store|work)' $(UNIT_SRC)))))
+TSAN_UNIT = $(notdir $(basename $(call without_tsan,$(shell grep -lE 'pthread_create|include "(http|base/log|store|work|core/aside)' $(UNIT_SRC)))))
 TSAN_API  = $(notdir $(basename $(call without_tsan,$(wildcard tests/api/test_*.py))))
 ASAN_RUNS = $(UNIT_SRC) $(shell grep -L 'not under sanitizers' tests/api/test_*.py)
 

@@ -68,6 +68,8 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
     free(group);
     for (int64_t k = 0; status == UZ_OK && k < K->cols; k++)
         analysis->position[((const SuiteSparse_long *)analysis->L->Perm)[k]] = k;
+    if (status == UZ_OK && !(analysis->share = uz_share_tree(analysis->L)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld dofs", (long long)K->cols);
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     cholmod_l_finish(&common);
@@ -90,6 +92,7 @@ void uz_analysis_free(uz_analysis *analysis)
     }
     free(analysis->last);
     free(analysis->position);
+    free(analysis->share);
     free(analysis);
 }
 
@@ -114,9 +117,10 @@ uz_factor_info uz_analysis_describe(const uz_analysis *analysis)
     return info;
 }
 
-/* Perm, ColCount and position; super, pi and px; the row indices. */
+/* Perm, ColCount and position; super, pi, px and shares; the row indices. */
 size_t uz_analysis_bytes(const uz_analysis *analysis)
 {
     const cholmod_factor *L = analysis->L;
-    return sizeof *analysis + sizeof *L + 8 * (3 * L->n + 3 * (L->nsuper + 1) + L->ssize + (size_t)analysis->n_last);
+    return sizeof *analysis + sizeof *L + L->nsuper +
+           8 * (3 * L->n + 3 * (L->nsuper + 1) + L->ssize + (size_t)analysis->n_last);
 }

@@ -133,29 +133,97 @@ static void scatter_rows(double *to, const double *from, const SuiteSparse_long 
         memcpy(to + rows[i] * UZ_LANES, from + i * UZ_LANES, UZ_LANES * sizeof *to);
 }
 
-uz_status uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err)
+/* A substitution under way. */
+typedef struct {
+    const uz_factor *factor;
+    bool forward;
+    int64_t blocks;
+    double *X[UZ_SHARES], *room[UZ_SHARES]; /* of each share; X: blocks x n x UZ_LANES */
+} substitution;
+
+/* The largest number of rows of a supernode, whose lanes room has to hold. */
+static int64_t most_rows(const cholmod_factor *L)
 {
-    const cholmod_factor *L = &factor->L;
+    const SuiteSparse_long *pi = L->pi;
+    int64_t most = 0;
+    for (size_t k = 0; k < L->nsuper; k++)
+        most = pi[k + 1] - pi[k] > most ? pi[k + 1] - pi[k] : most;
+    return most;
+}
+
+/* By the supernodes of a share, `all`: by all of them. */
+static void substitute(const substitution *x, int share, bool all)
+{
+    const cholmod_factor *L = &x->factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
-    int64_t most = 0, count = (int64_t)L->nsuper;
+    const int64_t count = (int64_t)L->nsuper;
     const bool fused = uz_cpu_has_avx2_fma();
     const panel_step step =
-        forward ? (fused ? eliminate_fused : eliminate) : (fused ? substitute_back_fused : substitute_back);
-    for (int64_t k = 0; k < count; k++)
-        most = pi[k + 1] - pi[k] > most ? pi[k + 1] - pi[k] : most;
-    double *room = uz_alloc(most, UZ_LANES * sizeof *room);
-    if (!room)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution with %d columns", UZ_LANES);
+        x->forward ? (fused ? eliminate_fused : eliminate) : (fused ? substitute_back_fused : substitute_back);
+    double *const room = x->room[share];
     for (int64_t at = 0; at < count; at++) {
-        int64_t k = forward ? at : count - 1 - at;
+        const int64_t k = x->forward ? at : count - 1 - at;
+        if (!all && x->factor->analysis->share[k] != share)
+            continue;
         const SuiteSparse_long *rows = s + pi[k];
         panel_of panel = {(const double *)L->x + px[k], pi[k + 1] - pi[k], super[k + 1] - super[k], (lanes *)room};
-        for (int64_t block = 0; block < blocks; block++) { /* while this part of L is in the processor's cache */
-            double *x = X + block * factor->n * UZ_LANES;
-            gather_rows(room, x, rows, panel.rows);
+        for (int64_t block = 0; block < x->blocks; block++) { /* while this part of L is in the processor's cache */
+            double *X = x->X[share] + block * x->factor->n * UZ_LANES;
+            gather_rows(room, X, rows, panel.rows);
             step(&panel);
-            scatter_rows(x, room, rows, forward ? panel.rows : panel.cols);
+            scatter_rows(X, room, rows, x->forward ? panel.rows : panel.cols);
         }
+    }
+}
+
+static void substitute_share(void *ctx, int share)
+{
+    substitute(ctx, share, false);
+}
+
+uz_status uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err)
+{
+    double *room = uz_alloc(most_rows(&factor->L), UZ_LANES * sizeof *room);
+    if (!room)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution with %d columns", UZ_LANES);
+    const substitution x = {factor, forward, blocks, {X}, {room}};
+    substitute(&x, 0, true);
+    free(room);
+    return UZ_OK;
+}
+
+/* Between the columns of share 1, of which Y has copies, and X, which the other share works at: before it (begin) Y
+ * gets them and has 0 elsewhere; after it X gets them back, and the rest what both took from it. */
+static void trade_columns(const uz_factor *factor, double *X, double *Y, bool begin)
+{
+    const SuiteSparse_long *super = factor->L.super;
+    const unsigned char *share = factor->analysis->share;
+    if (begin)
+        memset(Y, 0, (size_t)factor->n * UZ_LANES * sizeof *Y);
+    for (size_t k = 0; k < factor->L.nsuper; k++) {
+        const int64_t from = super[k] * UZ_LANES, count = (super[k + 1] - super[k]) * UZ_LANES;
+        if (share[k] == 1)
+            memcpy((begin ? Y : X) + from, (begin ? X : Y) + from, (size_t)count * sizeof *X);
+        for (int64_t i = from; share[k] == UZ_REST && !begin && i < from + count; i++)
+            X[i] += Y[i];
+    }
+}
+
+uz_status uz_factor_solve_shares(const uz_factor *factor, double *X, double *Y, bool forward, uz_error *err)
+{
+    const int64_t most = most_rows(&factor->L) * UZ_LANES;
+    double *room = uz_alloc(2 * most, sizeof *room);
+    if (!room)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution with %d columns", UZ_LANES);
+    substitution x = {factor, forward, 1, {X, forward ? Y : X, X}, {room, room + most, room}};
+    if (forward)
+        trade_columns(factor, X, Y, true);
+    else
+        substitute(&x, UZ_REST, false);
+    uz_run_shares(substitute_share, &x);
+    if (forward) {
+        trade_columns(factor, X, Y, false);
+        substitute(&x, UZ_REST, false);
     }
     free(room);
     return UZ_OK;

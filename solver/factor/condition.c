@@ -60,7 +60,8 @@ uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *
     /* The pivots alone may be short by any factor (Kahan's matrix). */
     uint64_t state = 0x9E3779B97F4A7C15u;
     double half[UZ_LANES], whole[UZ_LANES], *root = uz_alloc(n, sizeof *root);
-    double *X = cholmod_l_malloc((size_t)(n * UZ_LANES), sizeof *X, common); /* where factors have their memory */
+    const size_t entries = (size_t)(n * UZ_LANES);
+    double *X = cholmod_l_malloc(2 * entries, sizeof *X, common); /* where factors have their memory */
     uz_status status =
         X && root ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
     for (int64_t k = 0; status == UZ_OK && k < n; k++) {
@@ -69,10 +70,10 @@ uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *
             X[k * UZ_LANES + l] = root[k] * (2.0 * uz_uniform(&state) - 1.0);
     }
     if (status == UZ_OK)
-        status = uz_factor_solve_lanes(factor, X, 1, true, err);
+        status = uz_factor_solve_shares(factor, X, X + entries, true, err);
     if (status == UZ_OK) {
         add_squares(half, X, n); /* x'B x */
-        status = uz_factor_solve_lanes(factor, X, 1, false, err);
+        status = uz_factor_solve_shares(factor, X, X + entries, false, err);
     }
     for (int64_t k = 0; status == UZ_OK && k < n; k++)
         for (int l = 0; l < UZ_LANES; l++)
@@ -84,7 +85,7 @@ uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *
             if (half[l] / whole[l] < factor->info.rcond)
                 factor->info.rcond = half[l] / whole[l];
     }
-    cholmod_l_free((size_t)(n * UZ_LANES), sizeof *X, X, common);
+    cholmod_l_free(2 * entries, sizeof *X, X, common);
     free(root);
     return status;
 }

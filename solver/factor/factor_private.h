@@ -12,12 +12,25 @@ struct uz_analysis {
     cholmod_factor *L;  /* symbolic, supernodal */
     int64_t n, nnz;     /* of K */
     int64_t n_last;
-    int64_t *last;     /* n_last dofs, ascending */
-    int64_t *position; /* n: inverse of L->Perm */
+    int64_t *last;        /* n_last dofs, ascending */
+    int64_t *position;    /* n: inverse of L->Perm */
+    unsigned char *share; /* nsuper: see uz_share_tree */
     uz_order_choice chosen, considered[UZ_CHOICES];
     int n_considered;
     double seconds;
 };
+
+/* Whose a supernode is: of two shares, none of which needs the other, or of the rest, which comes after both where L is
+ * made or solved with, and before them where L' is. */
+enum { UZ_REST = 2, UZ_SHARES };
+/* nsuper: the share of each; all are of the rest where two threads would gain little. NULL: no memory. */
+unsigned char *uz_share_tree(const cholmod_factor *L);
+/* run(ctx, 0) and run(ctx, 1): on two threads, where the process has an idle one (core/aside.h). */
+void uz_run_shares(void (*run)(void *ctx, int share), void *ctx);
+
+/* As uz_factor_solve_lanes of one block, by the shares: what both take from the rest is added up in another order. X
+ * and Y: n x UZ_LANES; Y is room. */
+uz_status uz_factor_solve_shares(const uz_factor *factor, double *X, double *Y, bool forward, uz_error *err);
 
 /* What making the numbers of a factor again takes (refill.c). */
 typedef struct uz_refill uz_refill;

@@ -2,7 +2,8 @@
  *
  * Factors of bodies in the plane, and of slender ones, consist of supernodes of a few columns: CHOLMOD spends most of
  * its time there between calls of dense kernels, each of which also opens a parallel region. Here supernodes are made
- * one after the other, each from the columns of K and what those before it take from it (left-looking, Ng and Peyton,
+ * one after the other, in two shares at a time (shares.c), each from the columns of K and what those before it take
+ * from it (left-looking, Ng and Peyton,
  * SIAM J. Sci. Comput. 14 (1993)), by products of small blocks in registers; only large ones are left to BLAS. Compiled
  * with contraction to fused multiply-add allowed (see the Makefile): here it only saves roundings. */
 #include "factor/factor_private.h"
@@ -28,11 +29,16 @@ struct uz_refill {
     cholmod_sparse *K; /* the last one, in the factor's order, lower triangle */
     int64_t *place;    /* of its entries there; NULL: for once */
     int64_t *owner;    /* n: the supernode of each column */
-    int64_t *local;    /* n: a row's place in the current supernode */
-    int64_t *head;     /* nsuper: the first one that takes from it next; -1: none */
     int64_t *next;     /* nsuper: the one after it in the list that it is in */
     int64_t *from;     /* nsuper: its first row that has not taken its part yet */
-    double *room;      /* n_room + TILE: the largest product */
+    struct {
+        int64_t *local; /* n: a row's place in the current supernode; the rest's is that of share 0, and its room */
+        int64_t *head;  /* nsuper: the first one of this share that it takes from next; -1: none */
+        double *room;   /* the largest product */
+        bool positive;  /* all pivots so far */
+    } of[UZ_SHARES];
+    cholmod_factor *L;
+    const unsigned char *share; /* of each supernode */
 };
 
 void uz_refill_free(uz_refill *x)
@@ -44,9 +50,16 @@ void uz_refill_free(uz_refill *x)
         cholmod_l_free_sparse(&x->K, &common);
         cholmod_l_finish(&common);
     }
-    void *room[] = {x->place, x->owner, x->local, x->head, x->next, x->from, x->room};
+    void *room[] = {x->place, x->owner, x->next, x->from};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
+    for (int k = 0; k < UZ_SHARES; k++) {
+        free(x->of[k].head);
+        if (k != UZ_REST) {
+            free(x->of[k].local);
+            free(x->of[k].room);
+        }
+    }
     free(x);
 }
 
@@ -201,8 +214,11 @@ static bool factor_plain(double *block, int64_t columns, int64_t rows)
 }
 
 /* What the columns of supernode s take from supernode d, which goes on to the next one that takes something. */
-static void take(uz_refill *x, const cholmod_factor *L, int64_t s, int64_t d, const kernels *by)
+static void take(uz_refill *x, int share, int64_t s, int64_t d, const kernels *by)
 {
+    const cholmod_factor *L = x->L;
+    int64_t *const local = x->of[share].local, *const head = x->of[share].head;
+    double *const room = x->of[share].room;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *row = (const SuiteSparse_long *)L->s + pi[d];
     const int64_t height = pi[s + 1] - pi[s], ld = pi[d + 1] - pi[d], depth = super[d + 1] - super[d],
                   begin = x->from[d];
@@ -212,22 +228,22 @@ static void take(uz_refill *x, const cholmod_factor *L, int64_t s, int64_t d, co
     const int64_t rest = ld - begin, width = end - begin;
     const double *from = (const double *)L->x + px[d] + begin;
     const bool many = rest * width * depth > MANY;
-    const product p = {rest, width, depth, from, from, ld, x->room, many ? rest : pitch_of(rest)};
+    const product p = {rest, width, depth, from, from, ld, room, many ? rest : pitch_of(rest)};
     if (many)
-        uz_block_outer(rest, width, depth, from, ld, x->room);
+        uz_block_outer(rest, width, depth, from, ld, room);
     else
         by->multiply(&p);
     for (int64_t c = 0; c < width; c++) {
-        double *to = (double *)L->x + px[s] + x->local[row[begin + c]] * height;
-        const double *of_c = x->room + c * p.pitch;
+        double *to = (double *)L->x + px[s] + local[row[begin + c]] * height;
+        const double *of_c = room + c * p.pitch;
         for (int64_t i = c; i < rest; i++)
-            to[x->local[row[begin + i]]] -= of_c[i];
+            to[local[row[begin + i]]] -= of_c[i];
     }
     x->from[d] = end;
     if (end < ld) {
         const int64_t to = x->owner[row[end]];
-        x->next[d] = x->head[to];
-        x->head[to] = d;
+        x->next[d] = head[to];
+        head[to] = d;
     }
 }
 
@@ -243,13 +259,10 @@ static uz_status begin(uz_refill **out, const uz_factor *factor, const uz_csc *K
     if (x) {
         x->place = once ? NULL : uz_alloc(K->ptr[K->cols], sizeof *x->place);
         x->owner = uz_alloc(n, sizeof *x->owner);
-        x->local = uz_alloc(n, sizeof *x->local);
-        x->head = uz_alloc(count, sizeof *x->head);
         x->next = uz_alloc(count, sizeof *x->next);
         x->from = uz_alloc(count, sizeof *x->from);
     }
-    bool ok =
-        x && (once || x->place) && x->owner && x->local && x->head && x->next && x->from && uz_cholmod_start(&common);
+    bool ok = x && (once || x->place) && x->owner && x->next && x->from && uz_cholmod_start(&common);
     if (ok) {
         x->K = uz_permute(K, factor->analysis->position, x->place, &common);
         cholmod_l_finish(&common);
@@ -266,7 +279,13 @@ static uz_status begin(uz_refill **out, const uz_factor *factor, const uz_csc *K
             most = size > most ? size : most;
         }
     }
-    ok = ok && x->K && (x->room = uz_alloc(most, sizeof *x->room));
+    ok = ok && x->K;
+    for (int k = 0; ok && k < UZ_SHARES; k++) {
+        x->of[k].head = uz_alloc(count, sizeof *x->of[k].head);
+        x->of[k].local = k == UZ_REST ? x->of[0].local : uz_alloc(n, sizeof *x->of[k].local);
+        x->of[k].room = k == UZ_REST ? x->of[0].room : uz_alloc(most, sizeof *x->of[k].room);
+        ok = x->of[k].head && x->of[k].local && x->of[k].room;
+    }
     if (ok) {
         *out = x;
         return UZ_OK;
@@ -275,40 +294,58 @@ static uz_status begin(uz_refill **out, const uz_factor *factor, const uz_csc *K
     return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
 }
 
-/* All supernodes, from x->K. */
-static bool fill(uz_refill *x, cholmod_factor *L)
+/* The supernodes of a share, from x->K: until a pivot is not positive. */
+static void fill_share(void *ctx, int share)
 {
+    uz_refill *x = ctx;
+    const cholmod_factor *L = x->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *row = L->s, *ptr = x->K->p, *index = x->K->i;
     const kernels by =
         uz_cpu_has_avx2_fma() ? (kernels){multiply_fused, factor_fused} : (kernels){multiply_plain, factor_plain};
     const int64_t count = (int64_t)L->nsuper;
     const double *value = x->K->x;
+    int64_t *const local = x->of[share].local;
+    x->of[share].positive = true;
     for (int64_t s = 0; s < count; s++)
-        x->head[s] = -1;
-    for (int64_t s = 0; s < count; s++) {
+        x->of[share].head[s] = -1;
+    for (int64_t s = 0; s < count && x->of[share].positive; s++) {
+        if (x->share[s] != share)
+            continue;
         const int64_t columns = super[s + 1] - super[s], rows = pi[s + 1] - pi[s];
         double *block = (double *)L->x + px[s];
         memset(block, 0, (size_t)(columns * rows) * sizeof *block);
         for (int64_t i = 0; i < rows; i++)
-            x->local[row[pi[s] + i]] = i;
+            local[row[pi[s] + i]] = i;
         for (int64_t c = 0; c < columns; c++)
             for (int64_t e = ptr[super[s] + c]; e < ptr[super[s] + c + 1]; e++)
-                block[x->local[index[e]] + c * rows] = value[e];
-        for (int64_t d = x->head[s], after; d >= 0; d = after) {
-            after = x->next[d];
-            take(x, L, s, d, &by);
-        }
+                block[local[index[e]] + c * rows] = value[e];
+        for (int k = share == UZ_REST ? 0 : share; k <= share; k++) /* the rest takes from all */
+            for (int64_t d = x->of[k].head[s], after; d >= 0; d = after) {
+                after = x->next[d];
+                take(x, share, s, d, &by);
+            }
         const bool many = columns * columns * rows > MANY;
-        if (!(many ? uz_block_factor(columns, rows - columns, block, rows) : by.factor(block, columns, rows)))
-            return false;
+        x->of[share].positive =
+            many ? uz_block_factor(columns, rows - columns, block, rows) : by.factor(block, columns, rows);
         x->from[s] = columns;
         if (rows > columns) {
             const int64_t to = x->owner[row[pi[s] + columns]];
-            x->next[s] = x->head[to];
-            x->head[to] = s;
+            x->next[s] = x->of[share].head[to];
+            x->of[share].head[to] = s;
         }
     }
-    return true;
+}
+
+/* All supernodes; false: at a pivot that is not positive. */
+static bool fill(uz_refill *x, uz_factor *factor)
+{
+    x->L = &factor->L;
+    x->share = factor->analysis->share;
+    uz_run_shares(fill_share, x);
+    const bool positive = x->of[0].positive && x->of[1].positive;
+    if (positive)
+        fill_share(x, UZ_REST);
+    return positive && x->of[UZ_REST].positive;
 }
 
 /* The memory of the factor's numbers: some entries behind the last column are read with it. */
@@ -329,7 +366,7 @@ uz_status uz_fill(bool *positive, uz_factor *factor, const uz_csc *K, uz_error *
     uz_status status = begin(&x, factor, K, true, err);
     if (status == UZ_OK)
         status = make_room(&factor->L, err);
-    *positive = status == UZ_OK && fill(x, &factor->L);
+    *positive = status == UZ_OK && fill(x, factor);
     uz_refill_free(x);
     return status;
 }
@@ -350,7 +387,7 @@ uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
             value[factor->refill->place[k]] = K->val[k];
     }
     uz_status status = make_room(L, err);
-    if (status != UZ_OK || fill(factor->refill, L))
+    if (status != UZ_OK || fill(factor->refill, factor))
         return status;
     return uz_fail(err, UZ_ERR_NOT_SPD, "K", "K is not positive definite to working precision");
 }
