@@ -118,8 +118,11 @@ static void *work_loop(void *arg)
             call_worker(w, false);
         seen = w->submitted - 1;
     }
+    /* A process dies with the thread that began it, and another worker may have it now: all leave together. */
     if (--w->alive == 0)
         pthread_cond_broadcast(&w->idle);
+    while (w->alive > 0)
+        pthread_cond_wait(&w->idle, &w->lock);
     pthread_mutex_unlock(&w->lock);
     return NULL;
 }
