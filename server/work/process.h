@@ -1,5 +1,5 @@
-/* process.h: a process that solves, as the daemon has it: it is started when there is a job for it, lives on with its
- * cache, may be killed at any time, and is started again for the next one.
+/* process.h: a process that solves, as the daemon has it: it is started when there is a job for it (the first one
+ * before), lives on with its cache, may be killed at any time, and is started again for the next one.
  *
  * A process belongs to whoever took it from the pool (work_take_process); nothing here is locked. */
 #ifndef SERVER_WORK_PROCESS_H

@@ -42,7 +42,7 @@ typedef struct {
     size_t cache_bytes;
     live_writer live;
     size_t names; /* bytes at the begin of the outbox */
-    bool fresh;   /* a job has ended since memory was made ready last */
+    bool fresh;   /* a job has ended since memory was made ready last, or none was solved yet */
 } solver;
 
 /* ---- what the solver asks and tells */
@@ -181,7 +181,7 @@ static void serve(solver *s)
 {
     struct pollfd socket = {.fd = s->socket, .events = POLLIN};
     packet m;
-    for (int wait = -1;;) {
+    for (int wait = SETTLE_MS;;) {
         if (poll(&socket, 1, wait) == 0) {
             wait = make_ready(s);
             continue;
@@ -211,7 +211,7 @@ static void serve(solver *s)
 int solver_process(int argc, char **argv)
 {
     char why[128];
-    solver s = {.socket = SOLVER_SOCKET};
+    solver s = {.socket = SOLVER_SOCKET, .fresh = true};
     int kind = 0;
     socklen_t len = sizeof kind;
     struct rlimit limit;

@@ -68,6 +68,12 @@ static void *work_loop(void *arg)
     worker *me = arg;
     work *w = me->w;
     bool store_failed = false;
+    if (me == w->workers) { /* the first job finds a process */
+        uint64_t body;
+        process *first = work_take_process(w, false, NULL, 0, &body);
+        process_begin(first);
+        work_give_process(w, first, 0, NULL);
+    }
     pthread_mutex_lock(&w->lock);
     for (uint64_t seen = w->submitted - 1;;) { /* of w->submitted before the last look at the store */
         job claimed;

@@ -52,6 +52,7 @@ uz_reserve *uz_reserve_new(size_t most, size_t ready)
         return NULL;
     reserve->most = most;
     reserve->ready = ready < most ? ready : most;
+    reserve->largest = reserve->ready; /* the first block may be large, and finds nothing else that is kept */
     pthread_mutex_init(&reserve->mutex, NULL);
     pthread_cond_init(&reserve->news, NULL);
     return reserve;
