@@ -95,36 +95,57 @@ static void solve(double A[PARAMETERS][PARAMETERS], double b[PARAMETERS])
     }
 }
 
+/* The directions in which a shape's parameters move it: away from the axis, or the centre, to one of the points, across
+ * that, and along the axis. Returns which point. */
+static int64_t set_frame(double e[3][3], const uz_smooth_shape *s, const double *xyz, int64_t n)
+{
+    const bool round = s->kind == UZ_SMOOTH_SPHERE;
+    double most = 0;
+    int64_t which = 0;
+    memset(e, 0, 9 * sizeof e[0][0]);
+    for (int64_t i = 0; i < n; i += 1 + n / 16) {
+        const double off[3] = {xyz[3 * i] - s->point[0], xyz[3 * i + 1] - s->point[1], xyz[3 * i + 2] - s->point[2]};
+        double arm[3];
+        uz_cross3(arm, s->axis, off);
+        const double size = round ? uz_dot3(off, off) : uz_dot3(arm, arm);
+        if (!(size > 1.01 * most))
+            continue;
+        most = size;
+        which = i;
+        memcpy(e[0], off, sizeof off);
+    }
+    if (round)
+        uz_unit3(e[0]);
+    const double *known = round ? e[0] : s->axis;
+    const double other[3] = {fabs(known[0]) < 0.6, fabs(known[0]) >= 0.6, 0};
+    uz_cross3(e[1], known, !round && most > 0 ? e[0] : other);
+    uz_unit3(e[1]);
+    if (round) {
+        uz_cross3(e[2], e[0], e[1]);
+        return which;
+    }
+    uz_cross3(e[0], e[1], s->axis);
+    memcpy(e[2], s->axis, sizeof e[2]);
+    return which;
+}
+
 /* One damped step towards the least squares of the distances: a point's changes by -out . (what the shape moves there).
  * Of the points `some` are looked at; returns the sum of their squares before. */
 static double step_towards(uz_smooth_shape *s, const double *xyz, int64_t n, int64_t some, double damping)
 {
     double squares = 0;
     double A[PARAMETERS][PARAMETERS] = {{0}}, b[PARAMETERS] = {0};
-    double e[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, turn[2][3];
-    if (s->kind != UZ_SMOOTH_SPHERE) { /* two directions across the axis, and the axis: turned as the points are */
-        double across[3] = {0}, most = 0;
-        for (int64_t i = 0; i < n; i += 1 + n / 16) {
-            const double off[3] = {xyz[3 * i] - s->point[0], xyz[3 * i + 1] - s->point[1],
-                                   xyz[3 * i + 2] - s->point[2]};
-            double arm[3];
-            uz_cross3(arm, s->axis, off);
-            if (!(uz_dot3(arm, arm) > 1.01 * most))
-                continue;
-            most = uz_dot3(arm, arm);
-            memcpy(across, off, sizeof across);
-        }
-        const int least = fabs(s->axis[0]) < 0.6 ? 0 : 1;
-        uz_cross3(e[1], s->axis, most > 0 ? across : e[least]);
-        uz_unit3(e[1]);
-        uz_cross3(e[0], e[1], s->axis);
-        memcpy(e[2], s->axis, sizeof e[2]);
-    }
+    const bool torus = s->kind == UZ_SMOOTH_TORUS;
+    const double cosine = 1 / sqrt(1 + s->slope * s->slope), foot = s->radius * cosine;
+    double e[3][3], turn[2][3], m[3], out[3], radial[3], off[3], along;
+    const int64_t which = set_frame(e, s, xyz, n);
+    distance_from(m, radial, off, &along, s, xyz + 3 * which);
+    const double *grows = torus ? e[0] : m;
     for (int k = 0; k < 2; k++)
         uz_cross3(turn[k], e[2], e[k]);
     for (int64_t k = 0; k < some; k++) {
         const int64_t i = some < n ? (int64_t)((uint64_t)k * 2654435761U % (uint64_t)n) : k; /* no grid's rhythm */
-        double out[3], radial[3], off[3], along, J[PARAMETERS], moved[3];
+        double J[PARAMETERS], moved[3];
         const double distance = distance_from(out, radial, off, &along, s, xyz + 3 * i);
         for (int c = 0; c < 3; c++)
             J[c] = -uz_dot3(out, e[c]);
@@ -132,8 +153,11 @@ static double step_towards(uz_smooth_shape *s, const double *xyz, int64_t n, int
             uz_cross3(moved, turn[c], off);
             J[TILT + c] = -uz_dot3(out, moved);
         }
-        J[RADIUS] = -uz_dot3(out, radial);
-        J[SLOPE] = along * J[RADIUS];
+        /* A larger radius shifts the part that the points are on, and a larger slope tilts it; on a flat part that is
+         * all but a small share. So these two keep the shape's place and normal at one of the points: the parameters
+         * are far from being each other's double, and the way to a cone's is not along a bent valley. */
+        J[RADIUS] = uz_dot3(out, grows) - (torus ? uz_dot3(out, radial) : 1);
+        J[SLOPE] = -J[TILT] - along / cosine - s->slope * foot;
         J[TUBE] = -1;
         for (int j = 0; j < PARAMETERS; j++) {
             J[j] *= VARIES[s->kind][j];
@@ -146,13 +170,15 @@ static double step_towards(uz_smooth_shape *s, const double *xyz, int64_t n, int
     for (int j = 0; j < PARAMETERS; j++)
         A[j][j] *= 1 + damping;
     solve(A, b);
+    const double before = atan(s->slope),
+                 angle = fmin(fmax(before + b[SLOPE], fmax(before - 0.5, -1.57)), fmin(before + 0.5, 1.57));
     for (int c = 0; c < 3; c++) {
-        s->point[c] += b[0] * e[0][c] + b[1] * e[1][c] + b[2] * e[2][c];
-        s->axis[c] += b[TILT] * e[0][c] + b[TILT + 1] * e[1][c];
+        s->point[c] += b[0] * e[0][c] - b[RADIUS] * grows[c] + b[1] * e[1][c] + b[2] * e[2][c];
+        s->axis[c] += (b[TILT] - tan(angle - before)) * e[0][c] + b[TILT + 1] * e[1][c];
     }
     uz_unit3(s->axis);
-    s->radius += b[RADIUS];
-    s->slope += b[SLOPE];
+    s->slope = tan(angle);
+    s->radius = (foot + b[RADIUS]) / cos(angle);
     s->tube += b[TUBE];
     return squares;
 }
@@ -161,11 +187,11 @@ static double step_towards(uz_smooth_shape *s, const double *xyz, int64_t n, int
  * Marquardt, J. SIAM 11 (1963) 431-441)? size: of the surface. Of many points some are stepped with, all looked at. */
 static bool fits(uz_smooth_shape *s, const double *xyz, int64_t n, double size)
 {
-    enum { STEPS = 400, SOME = 300 }; /* cones of few faces lie at the end of a long bent valley */
+    enum { STEPS = 400, SOME = 300 }; /* small parts of tori lie at the end of a long bent valley */
     double most = 0, least = INFINITY, damping = 1e-3;
     uz_smooth_shape next = *s;
     const int64_t some = n < SOME ? n : SOME;
-    for (int k = 0; k < STEPS && damping < 1e3; k++) {
+    for (int k = 0; k < STEPS && damping < 1e6; k++) {
         const uz_smooth_shape here = next;
         const double squares = step_towards(&next, xyz, n, some, damping);
         if (squares < least) {
@@ -332,11 +358,12 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
         s.point[c] = xyz[c] - radius * normal[c];
     if (fits(&s, xyz, n, size))
         take_if_nearer(&found, &apart, &s, xyz, normal, n);
-    /* The axis is across all normals of a cylinder, and across the differences of those of a cone; of a slender one
-     * with few faces the former is nearer, as means of the faces' normals differ at random. */
-    for (int k = 0; k < 3; k++) {
+    /* The axis is across all normals of a cylinder, and across the differences of those of a cone; to a slender or flat
+     * one with few faces the cylinder through the points is nearer, as means of the faces' normals differ at random. */
+    uz_smooth_shape cylinder = {.kind = UZ_SMOOTH_NONE};
+    for (int k = 0; k < 2; k++) {
         best = 0;
-        for (int64_t i = 0; i < n && k < 2; i++) {
+        for (int64_t i = 0; i < n; i++) {
             double other[3], at[3];
             for (int c = 0; c < 3; c++)
                 other[c] = k == 0 ? normal[3 * i + c] : normal[3 * i + c] - normal[c];
@@ -348,9 +375,9 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
             }
         }
         s = (uz_smooth_shape){.kind = k == 0 ? UZ_SMOOTH_CYLINDER : UZ_SMOOTH_CONE, .radius = fabs(radius)};
-        if (!(uz_unit3(axis[k % 2]) > 0))
+        if (!(uz_unit3(axis[k]) > 0))
             continue;
-        memcpy(s.axis, axis[k % 2], sizeof s.axis);
+        memcpy(s.axis, axis[k], sizeof s.axis);
         for (int c = 0; c < 3; c++) /* opposite the normal, at the height of the points' mean */
             s.point[c] = xyz[c] - radius * normal[c];
         double up = 0;
@@ -360,7 +387,12 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
             s.point[c] += up * s.axis[c];
         if (fits(&s, xyz, n, size))
             take_if_nearer(&found, &apart, &s, xyz, normal, n);
+        cylinder = k == 0 ? s : cylinder;
     }
+    s = cylinder;
+    s.kind = UZ_SMOOTH_CONE;
+    if (cylinder.kind != UZ_SMOOTH_NONE && fits(&s, xyz, n, size))
+        take_if_nearer(&found, &apart, &s, xyz, normal, n);
     if (found.kind == UZ_SMOOTH_NONE && n >= ENOUGH_FOR_A_TORUS && find_torus(&s, xyz, normal, n, mean, size))
         return s;
     return found;

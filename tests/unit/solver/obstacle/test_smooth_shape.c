@@ -121,6 +121,35 @@ TEST(few_faces_of_a_cone_are_enough)
     }
 }
 
+/* Three nodes by four on a part that turns by little, whichever of them is the first: a larger radius is all but a
+ * shift there, and a larger slope a tilt. */
+TEST(flat_parts_are_found_in_any_numbering)
+{
+    enum { COLUMNS = 3, ROWS = 4, ALL = COLUMNS * ROWS };
+    static const uz_smooth_kind kinds[] = {UZ_SMOOTH_SPHERE, UZ_SMOOTH_CYLINDER, UZ_SMOOTH_CONE};
+    static const double ARC[] = {0.01, 0.03, 0.1}, AT[COLUMNS] = {0, 0.55, 1}, SLOPE = 0.4;
+    for (int k = 0; k < 3; k++)
+        for (int j = 0; j < 3 * ALL; j++) {
+            const double arc = ARC[j / ALL];
+            double xyz[3 * ALL], normal[3 * ALL];
+            for (int i = 0; i < ALL; i++) {
+                const int node = (i + j) % ALL, row = node / COLUMNS;
+                const double a = arc * AT[node % COLUMNS], z = 0.5 * arc * row,
+                             up = kinds[k] == UZ_SMOOTH_SPHERE ? z : 0;
+                const double slope = kinds[k] == UZ_SMOOTH_CONE ? SLOPE : 0, r = 1 - slope * z;
+                const double out[3] = {cos(a) * cos(up), sin(a) * cos(up), slope + sin(up)};
+                const double at[3] = {r * out[0], r * out[1], kinds[k] == UZ_SMOOTH_SPHERE ? sin(up) : z};
+                double rough[3];
+                for (int c = 0; c < 3; c++) /* as means of facets are */
+                    rough[c] = out[c] / sqrt(1 + slope * slope) + 0.1 * arc * sin(7.3 * node + 2.1 * c);
+                place(xyz + 3 * i, at, 1);
+                place(normal + 3 * i, rough, 0);
+            }
+            const uz_smooth_shape s = uz_smooth_shape_of(xyz, normal, ALL);
+            CHECK_MSG(s.kind == kinds[k], "shape %d, arc %g, from node %d: found %d", k, arc, j % ALL, (int)s.kind);
+        }
+}
+
 TEST(offsets_lead_to_the_nearest_point)
 {
     const uz_smooth_shape cone = {UZ_SMOOTH_CONE, {0, 0, 0}, {0, 0, 1}, 2, 0.75, 0};
