@@ -24,6 +24,14 @@ def scene(name, **contact):
     return request
 
 
+def gallery(name, **contact):
+    """A request of the gallery, alike."""
+    request = json.loads((service.ROOT / "client" / "examples" / "gallery" / f"{name}.json").read_text(encoding="utf-8"))
+    for one in request["problem"]["contacts"]:
+        one.update(contact)
+    return request
+
+
 def stacked(**contact):
     """A block on another whose mesh does not match, under a pressure of 1."""
     return body(["quad4", "quad4"], [(5, 3), (7, 4)], [lambda x, y: (10 * x, 5 * y), lambda x, y: (10 * x, 5 + 5 * y)],
@@ -65,6 +73,10 @@ def test_no_wrong_contact_is_silent(s):
     for request, code, least in ((stacked(**nodes), "nodes_against_faces", 0.2),
                                  (scene("faceted_press_fit", **nodes), "facets", 0.5),
                                  (scene("faceted_press_fit", smooth=False), "facets", 1),
+                                 (scene("faceted_press_fit", feature_angle=5), "feature_angle", 0.1),
+                                 (gallery("press_fit", **nodes), "nodes_against_faces", 0.4),
+                                 (gallery("press_fit", smooth=False), "facets", 0.07),
+                                 (gallery("press_fit", feature_angle=1), "feature_angle", 0.02),
                                  (scene("coarse_side_on", **nodes), "overlap", 0.3),
                                  (ellipse_in_hole("tet4", smooth=False), "facets", 0.5)):
         found = warned(summary_of(s, request))
@@ -78,7 +90,8 @@ def test_no_wrong_contact_is_silent(s):
 
 
 def test_what_is_right_is_not_warned_of(s):
-    for request in (stacked(), stacked(smooth=False), scene("faceted_press_fit"), scene("coarse_side_on")):
+    for request in (stacked(), stacked(smooth=False), scene("faceted_press_fit"), scene("coarse_side_on"),
+                    gallery("press_fit")):
         summary = summary_of(s, request)
         contact = summary["contact"]
         check(contact["geometric_penetration"] < 0.01 * contact["approach"], contact)
