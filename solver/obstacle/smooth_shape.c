@@ -323,7 +323,7 @@ static bool find_torus(uz_smooth_shape *s, const double *xyz, const double *norm
 
 uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int64_t n)
 {
-    enum { FEW = 6, ENOUGH_FOR_A_TORUS = 12 };
+    enum { FEW = 6, ENOUGH_FOR_A_CONE = 7, ENOUGH_FOR_A_TORUS = 12 }; /* all six points are on a cone */
     double size = 0, turn = 0, best = 0, apart = INFINITY, mean[3] = {0}, axis[2][3] = {{0}};
     int64_t far = 0;
     for (int64_t i = 0; i < n; i++) {
@@ -361,7 +361,7 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
     /* The axis is across all normals of a cylinder, and across the differences of those of a cone; to a slender or flat
      * one with few faces the cylinder through the points is nearer, as means of the faces' normals differ at random. */
     uz_smooth_shape cylinder = {.kind = UZ_SMOOTH_NONE};
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < (n < ENOUGH_FOR_A_CONE ? 1 : 2); k++) {
         best = 0;
         for (int64_t i = 0; i < n; i++) {
             double other[3], at[3];
@@ -391,7 +391,7 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
     }
     s = cylinder;
     s.kind = UZ_SMOOTH_CONE;
-    if (cylinder.kind != UZ_SMOOTH_NONE && fits(&s, xyz, n, size))
+    if (n >= ENOUGH_FOR_A_CONE && cylinder.kind != UZ_SMOOTH_NONE && fits(&s, xyz, n, size))
         take_if_nearer(&found, &apart, &s, xyz, normal, n);
     if (found.kind == UZ_SMOOTH_NONE && n >= ENOUGH_FOR_A_TORUS && find_torus(&s, xyz, normal, n, mean, size))
         return s;

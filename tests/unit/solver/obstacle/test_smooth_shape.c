@@ -209,6 +209,23 @@ TEST(patches_lie_on_an_ellipsoid)
     CHECK(!uz_smooth_patch_fit(&patch, xyz, exact, xyz + 3, 4));
 }
 
+/* Cones have six parameters: any six points are on one, whose normals may be anywhere. */
+TEST(six_nodes_tell_no_cone)
+{
+    for (int i = 0; i < 20; i++) {
+        double xyz[18], normal[18];
+        for (int k = 0; k < 6; k++) {
+            const double x = k / 3 ? 1 : -1, y = k % 3 - 1 + 0.1 * sin(3.0 * i + k), bend = 0.1 + 0.02 * i;
+            const double slope[2] = {bend * (x + y), bend * (x - y)},
+                         length = sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]);
+            memcpy(xyz + 3 * k, (double[3]){x, y, 0.5 * bend * (x * x + 2 * x * y - y * y)}, 3 * sizeof x);
+            memcpy(normal + 3 * k, (double[3]){-slope[0] / length, -slope[1] / length, 1 / length}, 3 * sizeof x);
+        }
+        const uz_smooth_shape s = uz_smooth_shape_of(xyz, normal, 6);
+        CHECK_MSG(s.kind == UZ_SMOOTH_NONE, "surface %d: found %d", i, (int)s.kind);
+    }
+}
+
 TEST(other_surfaces_are_none)
 {
     cloud plane, saddle, bent = points_of(UZ_SMOOTH_CYLINDER, 1, 0, 2, 0, 1, 0);
