@@ -221,19 +221,30 @@ def test_cylinders_and_cones_are_recognised(s):
 
 
 def test_flat_cells_press_evenly(s):
-    """But at the free end, where coarse linear elements of two rings bulge: there meshes that match are as far off, 7 %."""
+    """But at the free end, where flat plain bricks bulge by Poisson's ratio: there meshes that match are as far off, 7 %."""
     def ring(inner, outer):
         return lambda x, y, z: ((inner + (outer - inner) * x) * math.cos(math.pi / 2 * y), (inner + (outer - inner) * x) * math.sin(math.pi / 2 * y), 2 * z)
+
+    def pressures(facets, **more):
+        request = fit_in_space("hex8", ring(10, 20.005), ring(20, 40), ((4, 15, 6), (6, facets, 6 if facets == 15 else 8)))
+        request["problem"].update(more)
+        answer, nodes = answer_of(s, request), request["problem"]["mesh"]["nodes"]
+        found = {w["code"]: w for w in answer["summary"].get("warnings", [])}
+        return [(nodes[k][2], p / lame(0.005)) for k, p in zip(answer["contact_nodes"], answer["pressure"])], found
     ends = []
     for facets in (11, 15):  # warned of where the peak is 7 % off
-        request = fit_in_space("hex8", ring(10, 20.005), ring(20, 40), ((4, 15, 6), (6, facets, 6 if facets == 15 else 8)))
-        answer, nodes = answer_of(s, request), request["problem"]["mesh"]["nodes"]
-        pressures = [(nodes[k][2], p / lame(0.005)) for k, p in zip(answer["contact_nodes"], answer["pressure"])]
-        check(all(abs(p - 1) < 0.011 for z, p in pressures if z < 1.99), facets, pressures)
-        ends.append(max(p for _, p in pressures))
-        found = {w["code"]: w["value"] for w in answer["summary"]["warnings"]}
-        check(0.03 < found.get("pressure_peak", 0) < 0.04, facets, found)  # which is half of what it is off by
+        places, found = pressures(facets)
+        check(all(abs(p - 1) < 0.011 for z, p in places if z < 1.99), facets, places)
+        ends.append(max(p for _, p in places))
+        peak = found.get("pressure_peak", {"value": 0})
+        check(0.03 < peak["value"] < 0.04 and "incompatible_modes" in peak["message"], facets, found)  # half of what it is off by
     check(abs(ends[0] - ends[1]) < 0.011 and max(ends) < 1.08, ends)
+    for formulation, off in (("incompatible_modes", 0.032), ("bbar", 0.015)):
+        places, found = pressures(11, formulation=formulation)
+        check(max(p for _, p in places) < 1 + off and not found, formulation, found, places)
+    steel = {"on": "all", "young": 210000, "poisson": 0}
+    places, found = pressures(15, materials=[steel])
+    check(all(abs(p - 1) < 2e-3 for _, p in places) and not found, found, places)
 
 
 def test_free_forms_are_fitted(s):
@@ -279,8 +290,22 @@ def test_surfaces_are_told(s):
     surfaces, warnings = surfaces_and_warnings(stacked(("quad4", "quad8"), 0.3, "low"))
     check([one["shape"] for one in surfaces] == ["straight"] * 2 and not warnings, surfaces, warnings)
     (shaft, hub), warnings = surfaces_and_warnings(fit_in_space("hex8", ring(10, 20.005), ring(20, 40)))
-    check(shaft["shape"] == hub["shape"] == "cylinder" and abs(shaft["radius"] - 20.005) < 1e-9 and not warnings, shaft)
+    check(shaft["shape"] == hub["shape"] == "cylinder" and abs(shaft["radius"] - 20.005) < 1e-9, shaft)
+    check(set(warnings) == {"pressure_peak"} and 0.02 < warnings["pressure_peak"] < 0.03, warnings)  # 4 % at the free end
     check(abs(abs(hub["axis"][2]) - 1) < 1e-12 and abs(hub["radius"] - 20) < 1e-9, hub)
+
+    def tube(inner, outer):  # half of one, bent around an axis that is 60 from its middle
+        def place(x, y, z):
+            r = inner + (outer - inner) * x
+            off, sector = 60 + r * math.cos(math.pi * y), 0.5 * z
+            return off * math.cos(sector), -off * math.sin(sector), r * math.sin(math.pi * y)
+        return place
+    request = fit_in_space("hex8", tube(10, 20.005), tube(20, 30), ((2, 18, 3), (2, 13, 4)))
+    request["problem"]["supports"] = [{"on": "y0", "uz": 0}, {"on": "y1", "uz": 0}, {"on": "z0", "uy": 0},
+                                      {"on": "z1", "normal": [math.sin(0.5), math.cos(0.5), 0], "u": 0}]
+    for one, radius in zip(surfaces_and_warnings(request)[0], (20.005, 20)):
+        check(one["shape"] == "torus" and abs(one["tube"] - radius) < 1e-9 and abs(one["radius"] - 60) < 1e-9, one)
+        check(abs(abs(one["axis"][2]) - 1) < 1e-12 and max(abs(t) for t in one["point"]) < 1e-9, one)
     _, warnings = surfaces_and_warnings(fit_in_space("hex8", ring(10, 20.005), ring(20, 40), feature_angle=3))
     check(warnings["feature_angle"] > math.radians(5.99), warnings)
     surfaces, warnings = surfaces_and_warnings(fit_in_space("hex8", ring(10, 20.005, 0.1), ring(20, 40, 0.1)))
