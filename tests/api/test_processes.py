@@ -134,6 +134,8 @@ def test_ready_is_asked_of_a_process(s):
 @options("--workers", "2")
 def test_memory_ends_in_a_factorization(s):
     """The job fails with memory_limit, at once; its process lives, and the job beside it does not notice."""
+    while not s.solvers():  # the process for the first job
+        time.sleep(0.01)
     other = s.post(ENDLESS).json["id"]
     s.wait_status(other, "running")
     first = set(s.solvers())
