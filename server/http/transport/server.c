@@ -44,6 +44,9 @@ static void warn_of_crowd(transport *server, const struct sockaddr *from)
     server->cut = server->refused = 0;
 }
 
+/* So long the next connection waits at most until one that was cut has gone. */
+static const double CUT_S = 0.2;
+
 /* Where there are as many connections as may be, one goes that waits for a request: those of which a header block has
  * begun and not ended first, since nobody loses anything by them. libmicrohttpd's own limits know only the connections
  * that it still has. */
@@ -53,7 +56,7 @@ static enum MHD_Result on_accept(void *ctx, const struct sockaddr *address, sock
     const transport_options *options = &server->options;
     struct sockaddr_storage from;
     (void)len;
-    const size_t count = peers_count(&server->peers, NULL);
+    size_t count = peers_count(&server->peers, NULL);
     server->next_is_spare = false;
     if (options->max_client_connections > 0 &&
         peers_count(&server->peers, address) >= options->max_client_connections) {
@@ -65,7 +68,12 @@ static enum MHD_Result on_accept(void *ctx, const struct sockaddr *address, sock
         return MHD_YES;
     bool spare = true;
     const bool made = deadlines_make_room(server->deadlines, &from, &spare);
-    /* one that was cut is still counted for a moment */
+    /* One that was cut is counted until its thread has seen it, which takes a while where the processors are busy. */
+    const double until = clock_seconds(CLOCK_MONOTONIC) + CUT_S;
+    while (made && count >= options->max_connections + SPARE_CONNECTIONS && clock_seconds(CLOCK_MONOTONIC) < until) {
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+        count = peers_count(&server->peers, NULL);
+    }
     const bool room = count < options->max_connections + SPARE_CONNECTIONS;
     server->next_is_spare = spare;
     server->cut += made;
