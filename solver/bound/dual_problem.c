@@ -152,7 +152,13 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
             status = fail_at(stop, e, err);
             break;
         }
-        uz_block_outer(m->outer, m->outer, m->kept, m->A + m->kept, m->kept + m->outer, K);
+        uz_block_outer(&(uz_outer){.rows = m->outer,
+                                   .n = m->outer,
+                                   .k = m->kept,
+                                   .A = m->A + m->kept,
+                                   .ld = m->kept + m->outer,
+                                   .C = K,
+                                   .ldc = m->outer});
         number(dof_of, value, m, dof);
         for (int i = 0; i < m->outer; i++) {
             p[i] = -m->rest[i];

@@ -53,16 +53,16 @@ static int blas_threads =
 /* A tenth of a second: threads cost the milliseconds that they spin afterwards. */
 #define LARGE_FLOPS 5e9
 
-/* For each entry of L: where supernodes are small two threads take as long as one, and where other programs run too
- * they wait for each other at each of very many calls: of a plane body (200 flops) ten seconds in place of one. On a
- * quiet machine, one thread and two: plane bodies of 240,000 and 540,000 dofs 0.53 and 0.56 s, 1.52 and 1.55 s; a cube
- * of 19,000 dofs (620 flops) 0.32 and 0.24 s. */
+/* For each entry of L: where supernodes are small BLAS's threads take as long as one. */
 #define DENSE_FLOPS 400.0
 
-/* Few flops for each entry of L: the kernels of refill.c take two thirds of CHOLMOD's time. */
-static bool has_small_supernodes(const uz_factor *factor)
+/* The two threads of refill.c take less time than two of BLAS (a cube of 104,544 dofs: 3.9 s and 4.9, one thread 7.2),
+ * and where other programs run too those wait for each other at each of very many calls: 45 s, and 7. Only where more
+ * are idle is a factor of large supernodes left to them. */
+static bool is_for_many_threads(const uz_factor *factor)
 {
-    return factor->info.flops <= DENSE_FLOPS * (double)factor->info.nnz;
+    return blas_threads > 2 && factor->info.flops > LARGE_FLOPS &&
+           factor->info.flops > DENSE_FLOPS * (double)factor->info.nnz;
 }
 
 void uz_factor_use_threads(int threads)
@@ -77,7 +77,7 @@ static uz_status factorize(uz_factor *factor, cholmod_sparse *S, cholmod_common 
     bool ok = S != NULL;
     if (S) {
         int ordering = factor->L.ordering;
-        const bool threads = blas_threads > 1 && factor->info.flops > LARGE_FLOPS && !has_small_supernodes(factor);
+        const bool threads = is_for_many_threads(factor);
         factor->L.ordering = CHOLMOD_NATURAL;
         if (threads)
             openblas_set_num_threads(blas_threads);
@@ -139,7 +139,7 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     bool filled = false;
-    if (status == UZ_OK && has_small_supernodes(factor))
+    if (status == UZ_OK && !is_for_many_threads(factor))
         status = uz_fill(&filled, factor, K, err);
     if (status == UZ_OK && !filled) { /* it names a pivot that is not positive */
         SuiteSparse_free(factor->L.x);

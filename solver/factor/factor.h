@@ -136,8 +136,8 @@ bool uz_group_dofs(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);
-/* BLAS may use so many threads in a large factorization of large supernodes, one at a time; elsewhere it has one.
- * Process-wide: called once at most, by uz_process_init. */
+/* BLAS may use so many threads, where they are more than two, in a large factorization of large supernodes, one at a
+ * time; elsewhere it has one. Process-wide: called once at most, by uz_process_init. */
 void uz_factor_use_threads(int threads);
 /* The big blocks, which are the factor's above all, come from the reserve from now on. Process-wide: called once at
  * most, after uz_factor_use_huge_pages and before anything is factored; the reserve outlives every factor. */

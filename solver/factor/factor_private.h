@@ -25,6 +25,8 @@ struct uz_analysis {
 enum { UZ_REST = 2, UZ_SHARES };
 /* nsuper: the share of each; all are of the rest where two threads would gain little. NULL: no memory. */
 unsigned char *uz_share_tree(const cholmod_factor *L);
+/* Worth two threads' time for itself. */
+bool uz_is_large(int64_t columns, int64_t rows);
 /* run(ctx, 0) and run(ctx, 1): on two threads, where the process has an idle one (core/aside.h). */
 void uz_run_shares(void (*run)(void *ctx, int share), void *ctx);
 
@@ -35,7 +37,7 @@ uz_status uz_factor_solve_shares(const uz_factor *factor, double *X, double *Y, 
 /* What making the numbers of a factor again takes (refill.c). */
 typedef struct uz_refill uz_refill;
 void uz_refill_free(uz_refill *x);
-/* The numbers of a factor that has none, by its kernels for small supernodes; *positive false: at a pivot that is not,
+/* The numbers of a factor that has none; *positive false: at a pivot that is not,
  * with memory to be given back. UZ_ERR_MEMORY. */
 uz_status uz_fill(bool *positive, uz_factor *factor, const uz_csc *K, uz_error *err);
 

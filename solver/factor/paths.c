@@ -216,7 +216,13 @@ static uz_status make(bool *positive, uz_paths *x, int64_t s, uz_error *err)
         if (x->idle[d])
             continue;
         if (!few)
-            uz_block_outer(rest, width, own_columns, L_d + from->begin, ld, x->room);
+            uz_block_outer(&(uz_outer){.rows = rest,
+                                       .n = width,
+                                       .k = own_columns,
+                                       .A = L_d + from->begin,
+                                       .ld = ld,
+                                       .C = x->room,
+                                       .ldc = rest});
         for (int64_t c = from->begin; c < from->end; c++) {
             double *to = block + x->local[row_of_d[c]] * height;
             const double *product = x->room + (c - from->begin) * rest;

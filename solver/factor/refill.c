@@ -1,11 +1,12 @@
-/* refill.c: the numbers of a factor whose supernodes are small, and of any made again for K with other values.
+/* refill.c: the numbers of a factor, also of one made again for K with other values.
  *
  * Factors of bodies in the plane, and of slender ones, consist of supernodes of a few columns: CHOLMOD spends most of
  * its time there between calls of dense kernels, each of which also opens a parallel region. Here supernodes are made
  * one after the other, in two shares at a time (shares.c), each from the columns of K and what those before it take
- * from it (left-looking, Ng and Peyton,
- * SIAM J. Sci. Comput. 14 (1993)), by products of small blocks in registers; only large ones are left to BLAS. Compiled
- * with contraction to fused multiply-add allowed (see the Makefile): here it only saves roundings. */
+ * from it (left-looking, Ng and Peyton, SIAM J. Sci. Comput. 14 (1993)), by products of small blocks in registers; only
+ * large ones are left to BLAS. Large supernodes that come after the shares are made by two threads, each of which has a
+ * band of their rows. Compiled with contraction to fused multiply-add allowed (see the Makefile): here it only saves
+ * roundings. */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
@@ -25,6 +26,12 @@ enum { TILE = 4 };
 /* Multiplications of a product of blocks from which on BLAS is worth its calls. */
 enum { MANY = 1 << 15 };
 
+/* Entries of a product at a time: 8 MB. */
+enum { ROOM = 1 << 20 };
+
+/* Columns of a large supernode that are made at a time. */
+enum { PANEL = 192 };
+
 struct uz_refill {
     cholmod_sparse *K; /* the last one, in the factor's order, lower triangle */
     int64_t *place;    /* of its entries there; NULL: for once */
@@ -34,9 +41,10 @@ struct uz_refill {
     struct {
         int64_t *local; /* n: a row's place in the current supernode; the rest's is that of share 0, and its room */
         int64_t *head;  /* nsuper: the first one of this share that it takes from next; -1: none */
-        double *room;   /* the largest product */
+        double *room;   /* for the largest product, or parts of it */
         bool positive;  /* all pivots so far */
     } of[UZ_SHARES];
+    int64_t room; /* entries of it */
     cholmod_factor *L;
     const unsigned char *share; /* of each supernode */
 };
@@ -63,76 +71,72 @@ void uz_refill_free(uz_refill *x)
     free(x);
 }
 
-/* C (rows x width, leading dimension `pitch`) = A B', A (rows x depth) and B (width x depth) with leading dimension ld,
- * of columns c the entries from row c on. Up to three entries behind A's columns are read, and rows of C up to a
- * multiple of TILE written. */
-typedef struct {
-    int64_t rows, width, depth;
-    const double *A, *B;
-    int64_t ld;
-    double *C;
-    int64_t pitch;
-} product;
-
-static inline __attribute__((always_inline)) void multiply_tile(const product *p, int64_t i, int64_t c, int columns)
+/* uz_block_outer by small tiles. Up to three entries behind A's columns are read, and rows of C up to a multiple of
+ * TILE written. */
+static inline __attribute__((always_inline)) void multiply_tile(const uz_outer *p, int64_t i, int64_t c, int columns)
 {
     four sum[TILE] = {{0}};
-    for (int64_t q = 0; q < p->depth; q++) {
+    for (int64_t q = 0; q < p->k; q++) {
         const four a = *(const four *)(p->A + i + q * p->ld);
-        const double *b = p->B + c + q * p->ld;
+        const double *b = p->A - p->skip + c + q * p->ld;
         for (int k = 0; k < columns; k++)
             sum[k] += a * b[k];
     }
     for (int k = 0; k < columns; k++)
-        *(four *)(p->C + i + (c + k) * p->pitch) = sum[k];
+        *(four *)(p->C + i + (c + k) * p->ldc) = sum[k];
 }
 
 /* Two tiles, one below the other: sums enough that none waits for the last one's. */
-static inline __attribute__((always_inline)) void multiply_two(const product *p, int64_t i, int64_t c)
+static inline __attribute__((always_inline)) void multiply_two(const uz_outer *p, int64_t i, int64_t c)
 {
     four low[TILE] = {{0}}, high[TILE] = {{0}};
-    for (int64_t q = 0; q < p->depth; q++) {
+    for (int64_t q = 0; q < p->k; q++) {
         const four a = *(const four *)(p->A + i + q * p->ld), e = *(const four *)(p->A + i + TILE + q * p->ld);
-        const double *b = p->B + c + q * p->ld;
+        const double *b = p->A - p->skip + c + q * p->ld;
         for (int k = 0; k < TILE; k++) {
             low[k] += a * b[k];
             high[k] += e * b[k];
         }
     }
     for (int k = 0; k < TILE; k++) {
-        *(four *)(p->C + i + (c + k) * p->pitch) = low[k];
-        *(four *)(p->C + i + TILE + (c + k) * p->pitch) = high[k];
+        *(four *)(p->C + i + (c + k) * p->ldc) = low[k];
+        *(four *)(p->C + i + TILE + (c + k) * p->ldc) = high[k];
     }
 }
 
-static inline __attribute__((always_inline)) void multiply(const product *p)
+static inline int64_t first_row(const uz_outer *p, int64_t column)
+{
+    return column > p->skip ? (column - p->skip) / TILE * TILE : 0;
+}
+
+static inline __attribute__((always_inline)) void multiply(const uz_outer *p)
 {
     int64_t c = 0;
-    for (; c + TILE <= p->width; c += TILE) {
-        int64_t i = c;
+    for (; c + TILE <= p->n; c += TILE) {
+        int64_t i = first_row(p, c);
         for (; i + TILE < p->rows; i += 2 * TILE)
             multiply_two(p, i, c);
         if (i < p->rows)
             multiply_tile(p, i, c, TILE);
     }
-    for (; c < p->width; c++)
-        for (int64_t i = c / TILE * TILE; i < p->rows; i += TILE)
+    for (; c < p->n; c++)
+        for (int64_t i = first_row(p, c); i < p->rows; i += TILE)
             multiply_tile(p, i, c, 1);
 }
 
-UZ_AVX2_FMA static void multiply_fused(const product *p)
+UZ_AVX2_FMA static void multiply_fused(const uz_outer *p)
 {
     multiply(p);
 }
 
-static void multiply_plain(const product *p)
+static void multiply_plain(const uz_outer *p)
 {
     multiply(p);
 }
 
 /* The kernels that the processor has. */
 typedef struct {
-    void (*multiply)(const product *p);
+    void (*multiply)(const uz_outer *p);
     bool (*factor)(double *block, int64_t columns, int64_t rows);
 } kernels;
 
@@ -213,37 +217,76 @@ static bool factor_plain(double *block, int64_t columns, int64_t rows)
     return factor_columns(block, columns, rows);
 }
 
-/* What the columns of supernode s take from supernode d, which goes on to the next one that takes something. */
-static void take(uz_refill *x, int share, int64_t s, int64_t d, const kernels *by)
+static kernels kernels_here(void)
 {
+    return uz_cpu_has_avx2_fma() ? (kernels){multiply_fused, factor_fused} : (kernels){multiply_plain, factor_plain};
+}
+
+/* A part of supernode s: its rows from `low` to `high`, both numbers in it, by a thread that has room. */
+typedef struct {
+    uz_refill *x;
+    const kernels *by;
+    int64_t s, low, high;
+    const int64_t *local;
+    double *room;
+} band;
+
+/* What the band takes from supernode d, in pieces of columns that fit in the room. */
+static void take(const band *of, int64_t d)
+{
+    const uz_refill *x = of->x;
     const cholmod_factor *L = x->L;
-    int64_t *const local = x->of[share].local, *const head = x->of[share].head;
-    double *const room = x->of[share].room;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *row = (const SuiteSparse_long *)L->s + pi[d];
-    const int64_t height = pi[s + 1] - pi[s], ld = pi[d + 1] - pi[d], depth = super[d + 1] - super[d],
-                  begin = x->from[d];
-    int64_t end = begin;
+    const int64_t s = of->s, height = pi[s + 1] - pi[s], ld = pi[d + 1] - pi[d], depth = super[d + 1] - super[d];
+    int64_t first = x->from[d], last = ld, end = first;
     while (end < ld && row[end] < super[s + 1])
         end++;
-    const int64_t rest = ld - begin, width = end - begin;
-    const double *from = (const double *)L->x + px[d] + begin;
-    const bool many = rest * width * depth > MANY;
-    const product p = {rest, width, depth, from, from, ld, room, many ? rest : pitch_of(rest)};
-    if (many)
-        uz_block_outer(rest, width, depth, from, ld, room);
-    else
-        by->multiply(&p);
-    for (int64_t c = 0; c < width; c++) {
-        double *to = (double *)L->x + px[s] + local[row[begin + c]] * height;
-        const double *of_c = room + c * p.pitch;
-        for (int64_t i = c; i < rest; i++)
-            to[local[row[begin + i]]] -= of_c[i];
+    while (of->low > 0 && first < last && of->local[row[first]] < of->low)
+        first++;
+    while (of->high < height && last > first && of->local[row[last - 1]] >= of->high)
+        last--;
+    end = first == last ? x->from[d] : end < last ? end : last;
+    const double *numbers = (const double *)L->x + px[d];
+    for (int64_t begin = x->from[d], after; begin < end; begin = after) {
+        const int64_t top = first > begin ? first : begin, rest = last - top;
+        const int64_t fits = x->room / pitch_of(rest);
+        after = end - begin > fits ? begin + fits : end;
+        const bool many = rest * (after - begin) * depth > MANY;
+        const uz_outer p = {.skip = top - begin,
+                            .rows = rest,
+                            .n = after - begin,
+                            .k = depth,
+                            .A = numbers + top,
+                            .ld = ld,
+                            .C = of->room,
+                            .ldc = many ? rest : pitch_of(rest)};
+        if (many)
+            uz_block_outer(&p);
+        else
+            of->by->multiply(&p);
+        for (int64_t c = begin; c < after; c++) {
+            double *to = (double *)L->x + px[s] + of->local[row[c]] * height;
+            const double *of_c = of->room + (c - begin) * p.ldc;
+            for (int64_t i = c > top ? c - top : 0; i < rest; i++)
+                to[of->local[row[top + i]]] -= of_c[i];
+        }
     }
+}
+
+/* Supernode d has given to s, and goes on to the next one that takes something. */
+static void pass_on(uz_refill *x, int share, int64_t s, int64_t d)
+{
+    const cholmod_factor *L = x->L;
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *row = (const SuiteSparse_long *)L->s + pi[d];
+    const int64_t ld = pi[d + 1] - pi[d];
+    int64_t end = x->from[d];
+    while (end < ld && row[end] < super[s + 1])
+        end++;
     x->from[d] = end;
     if (end < ld) {
         const int64_t to = x->owner[row[end]];
-        x->next[d] = head[to];
-        head[to] = d;
+        x->next[d] = x->of[share].head[to];
+        x->of[share].head[to] = d;
     }
 }
 
@@ -253,7 +296,7 @@ static uz_status begin(uz_refill **out, const uz_factor *factor, const uz_csc *K
     const SuiteSparse_long *super = L->super, *pi = L->pi, *row = L->s;
     const int64_t n = factor->n, count = (int64_t)L->nsuper;
     cholmod_common common;
-    int64_t most = 0; /* entries of a product */
+    int64_t longest = 0; /* column of a product */
     uz_refill *x = uz_alloc_zero(1, sizeof *x);
     *out = NULL;
     if (x) {
@@ -275,15 +318,18 @@ static uz_status begin(uz_refill **out, const uz_factor *factor, const uz_csc *K
         for (int64_t at = pi[d] + super[d + 1] - super[d], end; at < last; at = end) {
             for (end = at + 1; end < last && x->owner[row[end]] == x->owner[row[at]];)
                 end++;
-            const int64_t size = pitch_of(last - at) * (end - at);
-            most = size > most ? size : most;
+            const int64_t column = pitch_of(last - at), size = column * (end - at);
+            x->room = size > x->room ? size : x->room;
+            longest = column > longest ? column : longest;
         }
     }
+    if (ok && x->room > ROOM)
+        x->room = longest > ROOM ? longest : ROOM;
     ok = ok && x->K;
     for (int k = 0; ok && k < UZ_SHARES; k++) {
         x->of[k].head = uz_alloc(count, sizeof *x->of[k].head);
         x->of[k].local = k == UZ_REST ? x->of[0].local : uz_alloc(n, sizeof *x->of[k].local);
-        x->of[k].room = k == UZ_REST ? x->of[0].room : uz_alloc(most, sizeof *x->of[k].room);
+        x->of[k].room = k == UZ_REST ? x->of[0].room : uz_alloc(x->room, sizeof *x->of[k].room);
         ok = x->of[k].head && x->of[k].local && x->of[k].room;
     }
     if (ok) {
@@ -294,14 +340,86 @@ static uz_status begin(uz_refill **out, const uz_factor *factor, const uz_csc *K
     return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
 }
 
+/* ---- supernodes that two threads make together */
+
+/* A supernode's rows in two bands: what they take, or of a panel of its columns what they take from those before it, or
+ * what they are once its diagonal block is. */
+typedef struct {
+    uz_refill *x;
+    int64_t s, rows, middle; /* middle: the second band's first row */
+    int64_t begin, end;      /* of the panel */
+    double *block;
+} pair;
+
+static void take_band(void *ctx, int half)
+{
+    const pair *p = ctx;
+    uz_refill *x = p->x;
+    const kernels by = kernels_here();
+    const band of = {.x = x,
+                     .by = &by,
+                     .s = p->s,
+                     .low = half == 0 ? 0 : p->middle,
+                     .high = half == 0 ? p->middle : p->rows,
+                     .local = x->of[UZ_REST].local,
+                     .room = x->of[half].room};
+    for (int k = 0; k < UZ_SHARES; k++)
+        for (int64_t d = x->of[k].head[p->s]; d >= 0; d = x->next[d])
+            take(&of, d);
+}
+
+static void update_band(void *ctx, int half)
+{
+    const pair *p = ctx;
+    const int64_t low = half == 0 ? p->begin : p->middle, high = half == 0 ? p->middle : p->rows;
+    const uz_outer of = {.skip = low - p->begin,
+                         .rows = high - low,
+                         .n = p->end - p->begin,
+                         .k = p->begin,
+                         .A = p->block + low,
+                         .ld = p->rows,
+                         .C = p->block + low + p->begin * p->rows,
+                         .ldc = p->rows,
+                         .subtract = true};
+    uz_block_outer(&of);
+}
+
+static void divide_band(void *ctx, int half)
+{
+    const pair *p = ctx;
+    const int64_t low = half == 0 ? p->end : p->middle, high = half == 0 ? p->middle : p->rows;
+    uz_block_divide(p->end - p->begin, high - low, p->block + p->begin * (p->rows + 1),
+                    p->block + low + p->begin * p->rows, p->rows);
+}
+
+/* From what a supernode has of K to its columns of the factor; false: a pivot is not positive. */
+static bool make_together(pair *p, int64_t columns)
+{
+    const double c = (double)columns, r = (double)p->rows, half = (c * r - c * c / 2) / 2;
+    p->middle = half > c * c / 2 ? (int64_t)(half / c + c / 2) : (int64_t)sqrt(2 * half); /* of its entries */
+    uz_run_shares(take_band, p);
+    for (p->begin = 0; p->begin < columns; p->begin = p->end) {
+        p->end = columns - p->begin > PANEL ? p->begin + PANEL : columns;
+        p->middle = p->end > (p->begin + p->rows) / 2 ? p->end : (p->begin + p->rows) / 2;
+        if (p->begin > 0)
+            uz_run_shares(update_band, p);
+        if (!uz_block_factor(p->end - p->begin, 0, p->block + p->begin * (p->rows + 1), p->rows))
+            return false;
+        p->middle = (p->end + p->rows) / 2;
+        uz_run_shares(divide_band, p);
+    }
+    return true;
+}
+
+/* ---- all of them */
+
 /* The supernodes of a share, from x->K: until a pivot is not positive. */
 static void fill_share(void *ctx, int share)
 {
     uz_refill *x = ctx;
     const cholmod_factor *L = x->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *row = L->s, *ptr = x->K->p, *index = x->K->i;
-    const kernels by =
-        uz_cpu_has_avx2_fma() ? (kernels){multiply_fused, factor_fused} : (kernels){multiply_plain, factor_plain};
+    const kernels by = kernels_here();
     const int64_t count = (int64_t)L->nsuper;
     const double *value = x->K->x;
     int64_t *const local = x->of[share].local;
@@ -312,21 +430,29 @@ static void fill_share(void *ctx, int share)
         if (x->share[s] != share)
             continue;
         const int64_t columns = super[s + 1] - super[s], rows = pi[s + 1] - pi[s];
+        const bool together = share == UZ_REST && uz_is_large(columns, rows);
         double *block = (double *)L->x + px[s];
+        const band whole = {.x = x, .by = &by, .s = s, .high = rows, .local = local, .room = x->of[share].room};
+        pair halves = {.x = x, .s = s, .rows = rows, .block = block};
         memset(block, 0, (size_t)(columns * rows) * sizeof *block);
         for (int64_t i = 0; i < rows; i++)
             local[row[pi[s] + i]] = i;
         for (int64_t c = 0; c < columns; c++)
             for (int64_t e = ptr[super[s] + c]; e < ptr[super[s] + c + 1]; e++)
                 block[local[index[e]] + c * rows] = value[e];
+        if (together)
+            x->of[share].positive = make_together(&halves, columns);
         for (int k = share == UZ_REST ? 0 : share; k <= share; k++) /* the rest takes from all */
             for (int64_t d = x->of[k].head[s], after; d >= 0; d = after) {
                 after = x->next[d];
-                take(x, share, s, d, &by);
+                if (!together)
+                    take(&whole, d);
+                pass_on(x, share, s, d);
             }
-        const bool many = columns * columns * rows > MANY;
-        x->of[share].positive =
-            many ? uz_block_factor(columns, rows - columns, block, rows) : by.factor(block, columns, rows);
+        if (!together)
+            x->of[share].positive = columns * columns * rows > MANY
+                                        ? uz_block_factor(columns, rows - columns, block, rows)
+                                        : by.factor(block, columns, rows);
         x->from[s] = columns;
         if (rows > columns) {
             const int64_t to = x->owner[row[pi[s] + columns]];

@@ -14,6 +14,9 @@
 
 /* Less is not worth waking a thread. */
 #define LEAST_FLOPS 1e7
+/* A supernode with more is made by two threads, if no share has it: then it costs so much of its flops. */
+#define LARGE_FLOPS 2e7
+#define TOGETHER    0.55
 /* Of all flops, as the longer share and the rest: a cut that leaves more is none. */
 #define MOST_SHARE 0.9
 /* Cuts, and subtrees that are shared out, at most. */
@@ -23,6 +26,17 @@ typedef struct {
     int64_t *parent, *child, *next; /* nsuper: -1: none; a node's first child, and a node's next sibling */
     double *work;                   /* nsuper: flops of the subtree */
 } tree;
+
+/* Sum of (r - j)^2, j below c. */
+static double flops_of(double c, double r)
+{
+    return c * r * r - c * (c - 1.0) * r + c * (c - 1.0) * (2.0 * c - 1.0) / 6.0;
+}
+
+bool uz_is_large(int64_t columns, int64_t rows)
+{
+    return flops_of((double)columns, (double)rows) > LARGE_FLOPS;
+}
 
 /* The heavier trees first, each to the side that has less so far. Returns the flops of the longer side. */
 static double share_out(unsigned char *side, const tree *t, int64_t *root, int64_t count)
@@ -72,7 +86,7 @@ static void cut(unsigned char *share, const tree *t, int64_t count)
             if (fits)
                 root[n++] = c;
         }
-        rest += own;
+        rest += own > LARGE_FLOPS ? TOGETHER * own : own;
     }
     if (all < LEAST_FLOPS || least > MOST_SHARE * all)
         return;
@@ -99,8 +113,7 @@ unsigned char *uz_share_tree(const cholmod_factor *L)
     }
     for (int64_t s = 0; ok && s < count; s++) {
         const int64_t columns = super[s + 1] - super[s], rows = pi[s + 1] - pi[s];
-        const double c = (double)columns, r = (double)rows;
-        t.work[s] += c * r * r - c * (c - 1.0) * r + c * (c - 1.0) * (2.0 * c - 1.0) / 6.0; /* sum of (r - j)^2 */
+        t.work[s] += flops_of((double)columns, (double)rows);
         t.parent[s] = rows > columns ? owner[row[pi[s] + columns]] : -1;
         if (t.parent[s] >= 0) {
             t.work[t.parent[s]] += t.work[s];

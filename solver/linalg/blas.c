@@ -73,18 +73,32 @@ bool uz_block_factor(int64_t n, int64_t rows, double *A, int64_t ld)
 {
     if (LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', (int)n, A, (int)ld) != 0)
         return false;
-    if (rows > 0)
-        cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)rows, (int)n, 1.0, A, (int)ld,
-                    A + n, (int)ld);
+    uz_block_divide(n, rows, A, A + n, ld);
     return true;
 }
 
-void uz_block_outer(int64_t rows, int64_t n, int64_t k, const double *A, int64_t ld, double *C)
+void uz_block_divide(int64_t n, int64_t rows, const double *L, double *B, int64_t ld)
 {
-    cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, (int)n, (int)k, 1.0, A, (int)ld, 0.0, C, (int)rows);
-    if (rows > n)
-        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, (int)(rows - n), (int)n, (int)k, 1.0, A + n, (int)ld, A,
-                    (int)ld, 0.0, C + n, (int)rows);
+    if (rows > 0)
+        cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)rows, (int)n, 1.0, L, (int)ld,
+                    B, (int)ld);
+}
+
+void uz_block_outer(const uz_outer *p)
+{
+    const double alpha = p->subtract ? -1.0 : 1.0, beta = p->subtract ? 1.0 : 0.0;
+    const int64_t above = p->skip < p->n ? p->skip : p->n,
+                  own = p->n - above; /* B's rows above A's first, and A's own */
+    double *C = p->C + above * p->ldc;
+    if (above > 0 && p->rows > 0)
+        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, (int)p->rows, (int)above, (int)p->k, alpha, p->A,
+                    (int)p->ld, p->A - p->skip, (int)p->ld, beta, p->C, (int)p->ldc);
+    if (own > 0)
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, (int)own, (int)p->k, alpha, p->A, (int)p->ld, beta, C,
+                    (int)p->ldc);
+    if (own > 0 && p->rows > own)
+        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, (int)(p->rows - own), (int)own, (int)p->k, alpha,
+                    p->A + own, (int)p->ld, p->A, (int)p->ld, beta, C + own, (int)p->ldc);
 }
 
 void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *C)

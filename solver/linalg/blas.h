@@ -44,8 +44,19 @@ void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *
 /* [L; B] = [chol(A); B L'^-1] in place of [A; B] (n + rows by n, ld), A symmetric, lower; false: a pivot is not
  * positive. */
 bool uz_block_factor(int64_t n, int64_t rows, double *A, int64_t ld);
-/* C (rows x n) = A A_n' on and below its diagonal, A rows x k (ld), A_n its first n <= rows rows. */
-void uz_block_outer(int64_t rows, int64_t n, int64_t k, const double *A, int64_t ld, double *C);
+/* B (rows x n, ld) = B L'^-1. */
+void uz_block_divide(int64_t n, int64_t rows, const double *L, double *B, int64_t ld);
+/* C (rows x n, ldc) = A B', or C - A B': A rows x k (ld), B the n rows that begin `skip` >= 0 rows above A. Of column c
+ * the entries from row c - skip on: those on and below the diagonal of an array with B's rows and A's. */
+typedef struct {
+    int64_t skip, rows, n, k;
+    const double *A;
+    int64_t ld;
+    double *C;
+    int64_t ldc;
+    bool subtract;
+} uz_outer;
+void uz_block_outer(const uz_outer *p);
 /* C (n x n) = Z'Z with Z k x n. */
 void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *C);
 /* Eigenvalues of the symmetric tridiagonal matrix (d, n; e, n - 1), ascending in d; with vectors in V (n x n). */

@@ -36,8 +36,9 @@ void uz_process_threads(int threads)
 void uz_process_warm(void)
 {
     enum { N = 512, K = 128 };
+    const int threads = openblas_get_num_procs();
     double *Z = uz_alloc_zero(N * K, sizeof *Z), *C = uz_alloc_zero(N * N, sizeof *C);
-    openblas_set_num_threads(openblas_get_num_procs());
+    openblas_set_num_threads(threads > 2 ? threads : 1); /* of two one is the thread aside */
     if (Z && C)
         uz_block_syrk_t(N, K, Z, K, C);
     openblas_set_num_threads(1);

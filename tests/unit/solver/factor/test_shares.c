@@ -3,6 +3,7 @@
 #include "factor/factor_private.h"
 #include "factor_fixture.h"
 #include "harness.h"
+#include "hex8.h"
 #include "scene_fixture.h"
 
 enum { CELLS = 90 };
@@ -88,38 +89,86 @@ static uz_factor *factor_with(const uz_csc *K, const uz_analysis *analysis, bool
     return factor;
 }
 
-TEST(two_threads_give_the_same_bits)
+static void check_same_bits(uz_csc *K)
 {
-    uz_thread_init();
-    uz_qp qp = paper_qp(CELLS, 1.0);
-    const int64_t n = qp.K.cols;
     uz_analysis *analysis;
     uz_error err;
-    CHECK_INT(uz_analysis_create(&analysis, &qp.K, NULL, 0, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
+    CHECK_INT(uz_analysis_create(&analysis, K, NULL, 0, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
     for (int again = 0; again < 2; again++)
         for (int turn = 0; turn < 3; turn++) {
-            uz_factor *one = factor_with(&qp.K, analysis, false, again, UZ_OK),
-                      *two = factor_with(&qp.K, analysis, true, again, UZ_OK);
+            uz_factor *one = factor_with(K, analysis, false, again, UZ_OK),
+                      *two = factor_with(K, analysis, true, again, UZ_OK);
             CHECK(memcmp(one->L.x, two->L.x, one->L.xsize * sizeof(double)) == 0);
             CHECK(one->info.rcond == two->info.rcond && one->info.inverse_bound == two->info.inverse_bound);
             uz_factor_free(one);
             uz_factor_free(two);
         }
-    /* K that is not positive: in one share, in the other, in what comes after both */
-    for (int share = 0; share < UZ_SHARES; share++) {
-        size_t s = 0;
-        while (analysis->share[s] != share)
-            s++;
-        double *pivot = &qp.K.val[qp.K.ptr[(
-            (const SuiteSparse_long *)analysis->L->Perm)[((SuiteSparse_long *)analysis->L->super)[s]]]];
+    /* K that is not positive: in one share, in the other, in what comes after both; its first column and its last */
+    for (int part = 0; part < 2 * UZ_SHARES; part++) {
+        const SuiteSparse_long *perm = analysis->L->Perm, *super = analysis->L->super;
+        size_t s = part % 2 == 0 ? 0 : analysis->L->nsuper - 1;
+        while (analysis->share[s] != part / 2)
+            s += part % 2 == 0 ? 1 : -(size_t)1;
+        double *pivot = &K->val[K->ptr[perm[part % 2 == 0 ? super[s] : super[s + 1] - 1]]];
         *pivot = -*pivot;
         for (int again = 0; again < 2; again++)
-            uz_factor_free(factor_with(&qp.K, analysis, true, again, UZ_ERR_NOT_SPD));
+            uz_factor_free(factor_with(K, analysis, true, again, UZ_ERR_NOT_SPD));
         *pivot = -*pivot;
     }
-    CHECK_INT(n, analysis->n);
     uz_analysis_free(analysis);
+}
+
+TEST(two_threads_give_the_same_bits)
+{
+    uz_thread_init();
+    uz_qp qp = paper_qp(CELLS, 1.0);
+    check_same_bits(&qp.K);
     uz_qp_clear(&qp);
+}
+
+/* Of a cube the last supernodes are large: both threads make them together, in panels. */
+TEST(large_supernodes_are_made_together)
+{
+    uz_thread_init();
+    uz_csc K;
+    uz_factor *factor;
+    uz_error err;
+    CHECK(hex8_stiffness(&K, 13, &err) == UZ_OK);
+    CHECK_INT(factor_by(&factor, &K, NULL, 0, UZ_ORDERING_METIS, 0, &err), UZ_OK);
+    const cholmod_factor *L = &factor->L;
+    const SuiteSparse_long *super = L->super, *pi = L->pi;
+    int64_t large = 0, widest = 0;
+    for (int64_t s = 0; s < (int64_t)L->nsuper; s++)
+        if (factor->analysis->share[s] == UZ_REST && uz_is_large(super[s + 1] - super[s], pi[s + 1] - pi[s])) {
+            large++;
+            widest = super[s + 1] - super[s] > widest ? super[s + 1] - super[s] : widest;
+        }
+    CHECK_MSG(large > 2 && widest > 400, "%lld large ones, the widest of %lld columns", (long long)large,
+              (long long)widest);
+    /* L L' is K, in each of its entries: K x and L L' x for vectors that see one column each, and many */
+    double *x = vector(K.cols), *f = vector(K.cols), *room = vector(K.cols);
+    uz_factor_workspace *ws = uz_factor_workspace_new();
+    qp_random rng = {7};
+    for (int turn = 0; turn < 20; turn++) {
+        double size = 0, off = 0;
+        for (int64_t i = 0; i < K.cols; i++)
+            x[i] = turn < 10 ? random_signed(&rng) : i == (K.cols - 1) * (turn - 10) / 9;
+        memset(f, 0, (size_t)K.cols * sizeof *f);
+        uz_csc_symv(f, &K, 1, x);
+        CHECK_INT(uz_factor_solve(factor, ws, f, f, room, &err), UZ_OK);
+        for (int64_t i = 0; i < K.cols; i++) {
+            size = fmax(size, fabs(x[i]));
+            off = fmax(off, fabs(f[i] - x[i]));
+        }
+        CHECK_MSG(off <= 1e-11 * size, "%d: %g", turn, off);
+    }
+    uz_factor_workspace_free(ws);
+    uz_factor_free(factor);
+    check_same_bits(&K);
+    uz_csc_clear(&K);
+    free(x);
+    free(f);
+    free(room);
 }
 
 /* By the shares as by one supernode after the other, but for the order of sums. */
