@@ -326,14 +326,15 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
     enum { FEW = 6, ENOUGH_FOR_A_CONE = 7, ENOUGH_FOR_A_TORUS = 12 }; /* all six points are on a cone */
     double size = 0, turn = 0, best = 0, apart = INFINITY, mean[3] = {0}, axis[2][3] = {{0}};
     int64_t far = 0;
+    for (int64_t i = 0; i < 3 * n; i++)
+        mean[i % 3] += xyz[i] / (double)n;
     for (int64_t i = 0; i < n; i++) {
         double d[3], t[3];
         for (int c = 0; c < 3; c++) {
-            mean[c] += xyz[3 * i + c] / (double)n;
-            d[c] = xyz[3 * i + c] - xyz[c];
+            d[c] = xyz[3 * i + c] - mean[c];
             t[c] = normal[3 * i + c] - normal[c];
         }
-        size = fmax(size, sqrt(uz_dot3(d, d)));
+        size = fmax(size, 2 * sqrt(uz_dot3(d, d))); /* whichever node is the first */
         if (sqrt(uz_dot3(t, t)) > turn) {
             turn = sqrt(uz_dot3(t, t));
             far = i;

@@ -150,6 +150,35 @@ TEST(flat_parts_are_found_in_any_numbering)
         }
 }
 
+/* What is a sphere to all but the last of the digits that count is one in any numbering, or in none. */
+TEST(what_is_nearly_a_shape_is_one_in_any_numbering)
+{
+    enum { COLUMNS = 5, ROWS = 4, ALL = COLUMNS * ROWS };
+    int some = 0;
+    for (int k = 0; k < 40; k++) { /* paraboloids, which are farther and farther from a sphere */
+        const double bend = 0.002 + 0.0002 * k;
+        int found = 0;
+        for (int j = 0; j < ALL; j++) {
+            double xyz[3 * ALL], normal[3 * ALL];
+            for (int i = 0; i < ALL; i++) {
+                const int node = (i + j) % ALL;
+                const double x = node % COLUMNS - 1.8, y = 0.9 * (node / COLUMNS) - 1,
+                             slope[2] = {2 * bend * x, 2 * bend * y};
+                const double at[3] = {x, y, -bend * (x * x + y * y)},
+                             steep = sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]);
+                for (int c = 0; c < 3; c++) {
+                    xyz[3 * i + c] = at[c];
+                    normal[3 * i + c] = (c == 2 ? 1 : slope[c]) / steep;
+                }
+            }
+            found += uz_smooth_shape_of(xyz, normal, ALL).kind == UZ_SMOOTH_SPHERE;
+        }
+        CHECK_MSG(found == 0 || found == ALL, "bend %g: %d of %d", bend, found, ALL);
+        some += found;
+    }
+    CHECK(some > 0 && some < 40 * ALL);
+}
+
 TEST(offsets_lead_to_the_nearest_point)
 {
     const uz_smooth_shape cone = {UZ_SMOOTH_CONE, {0, 0, 0}, {0, 0, 1}, 2, 0.75, 0};
