@@ -65,6 +65,7 @@ typedef struct {
     uz_own_body *own;                /* NULL: no part of the body may touch itself */
     uz_mortar_points points;         /* of the side that was looked at last */
     int64_t n_near, *near;           /* the sides that it may touch, ascending */
+    bool rough;                      /* fewer points in each piece: to see what faces what */
     bool layered;                    /* several of them may be above each other: only the nearest counts */
     double *ball;                    /* of each side: the middle of its nodes, and how far they are from it at most */
     int64_t *way;                    /* of each side: uz_way + 3 * (1 + i), to it from side i; 0: nobody asked */

@@ -572,9 +572,11 @@ uz_status uz_mortar_choose_slaves(uz_contact_sites *sites, uz_mortar_pair *pair,
         return uz_no_memory(err, UZ_OF_SURFACES);
     sites->n_sides = n;
     if (!before) {
+        pair->rough = true;
         int64_t n_zones = number_zones(sites->zone, pair);
         const bool good = n_zones >= 0 && divide_zones(sites->zone, &n_zones, pair) && rank_zones(sites, pair, n_zones);
         sites->n_zones = n_zones;
+        pair->rough = false;
         return good ? UZ_OK : uz_no_memory(err, UZ_OF_SURFACES);
     }
     sites->rank = uz_alloc(2 * before->n_ranks, sizeof *sites->rank);

@@ -540,7 +540,8 @@ static bool points(uz_mortar_pair *pair, int64_t i)
     for (int64_t k = 0; k < pair->n_near && room; k++) {
         const uz_mortar_side *other = &pair->surface.side[pair->near[k]];
         const bool affine = is_affine(side) && is_affine(other);
-        const int n_its = project(its, other, &on), rule = !affine ? 5 : side->nodes > 4 || other->nodes > 4 ? 4 : 3;
+        const int n_its = project(its, other, &on);
+        const int rule = pair->rough ? 3 : !affine ? 5 : side->nodes > 4 || other->nodes > 4 ? 4 : 3;
         for (int q = 0; q < n_its && room; q++) {
             turn_over(&its[q]); /* it looks at the slave: from there it runs clockwise */
             if (twice_area(&its[q]) <= 0)
