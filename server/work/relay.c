@@ -35,15 +35,34 @@ static bool gather(void *ctx, const result_piece *piece)
     return true;
 }
 
-void relay_answer(packet *answer, int *fd, store *s, const char *of_job, const packet *ask, segment *inbox, size_t at)
+void relay_find_start(char start[33], const char *request, size_t len)
+{
+    static const char KEY[] = "\"job\"", BLANKS[] = " \t\r\n";
+    start[0] = '\0';
+    for (const char *at = request, *end = request + len; (at = memmem(at, (size_t)(end - at), KEY, sizeof KEY - 1));) {
+        at += sizeof KEY - 1;
+        for (int part = 0; part < 2 && at < end; part++) { /* the colon, and the quotation mark */
+            while (at < end && strchr(BLANKS, *at))
+                at++;
+            at += at < end && *at == ":\""[part];
+        }
+        if (end - at > 32 && at[-1] == '"' && at[32] == '"' && strspn(at, "0123456789abcdef") == 32)
+            snprintf(start, 33, "%.32s", at);
+    }
+}
+
+void relay_answer(packet *answer, int *fd, store *s, const relay_rights *of, const packet *ask, segment *inbox,
+                  size_t at)
 {
     char id[sizeof ask->u.ask.id], name[CASE_NAME];
     snprintf(id, sizeof id, "%.*s", (int)sizeof id - 1, ask->u.ask.id);
     snprintf(name, sizeof name, "%.*s", (int)sizeof name - 1, ask->u.ask.name);
     *answer = (packet){.kind = MESSAGE_ANSWER, .status = STORE_ERROR, .u.answer = {.at = at}};
     *fd = -1;
-    if (ask->u.ask.what == ASK_UPLOAD) {
-        answer->status = (int32_t)store_upload_descriptor(s, id, of_job, fd, &answer->u.answer.value);
+    if (ask->u.ask.what != ASK_UPLOAD && strcmp(id, of->start) != 0) {
+        answer->status = STORE_NOT_FOUND;
+    } else if (ask->u.ask.what == ASK_UPLOAD) {
+        answer->status = (int32_t)store_upload_descriptor(s, id, of->job, fd, &answer->u.answer.value);
     } else if (ask->u.ask.what == ASK_BLOB) {
         gathered g = {inbox, at, at, false};
         const result_key key = {id, ask->u.ask.number, ask->u.ask.named ? name : NULL};

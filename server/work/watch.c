@@ -27,6 +27,7 @@ typedef struct {
     worker *me;
     process *p;
     const job *job;
+    relay_rights rights;
     size_t body_len;
     double told_at, stop_at, due_at, grown_at; /* on CLOCK_MONOTONIC */
     double limit_s;
@@ -51,7 +52,7 @@ static bool hear(watch *w, const packet *m, double now)
     if (m->kind == MESSAGE_ASK) {
         packet reply;
         int fd;
-        relay_answer(&reply, &fd, me->w->store, w->job->id, m, &w->p->inbox, (w->body_len + 7) / 8 * 8);
+        relay_answer(&reply, &fd, me->w->store, &w->rights, m, &w->p->inbox, (w->body_len + 7) / 8 * 8);
         const bool sent = message_send(w->p->socket, &reply, fd);
         if (fd >= 0)
             close(fd);
@@ -129,7 +130,15 @@ watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len,
      */
     const int busy = work_busy(all);
     const int threads = busy < o->workers ? all->processors - (busy - 1) : all->processors / o->workers;
-    watch w = {.me = me, .p = p, .job = claimed, .body_len = body_len, .told = -1, .limit_s = o->max_solve_s};
+    watch w = {.me = me,
+               .p = p,
+               .job = claimed,
+               .rights = {.job = claimed->id},
+               .body_len = body_len,
+               .told = -1,
+               .limit_s = o->max_solve_s};
+    if (body) /* before it is where the process writes, too */
+        relay_find_start(w.rights.start, body, body_len);
     *out = (watch_report){.status = 0};
     packet m = {.kind = MESSAGE_JOB,
                 .u.job = {.damaged = !body,
