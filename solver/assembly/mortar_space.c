@@ -354,13 +354,29 @@ static void turn_over(polygon *p)
 
 /* ---- points */
 
-/* The point of a face above y on the plane, by Newton's method from where `local` is: shape functions, area vector per
- * reference area, height over the plane. False: there is none. */
-static bool lift(double *N, double area[3], double *height, double local[2], const uz_mortar_side *side,
-                 const uz_side *shape, const plane *on, const double y[2])
+/* Where on a face the last point was: its place there and on the plane, and how the one follows the other. All zero but
+ * for `local` before the first. */
+typedef struct {
+    double local[2], y[2], follows[2][2];
+} foot;
+
+/* So small a step is the last one: what it changes is linear in it to rounding, and of the area's direction nothing. */
+#define LAST_STEP 1e-9
+
+/* The point of a face above y on the plane, by Newton's method from where `at` leads to: shape functions, area vector
+ * per reference area, height over the plane. False: there is none. */
+static bool lift(double *N, double area[3], double *height, foot *at, const uz_mortar_side *side, const uz_side *shape,
+                 const plane *on, const double y[2])
 {
+    double *local = at->local;
+    double step[2];
+    for (int c = 0; c < 2; c++)
+        step[c] = at->follows[c][0] * (at->y[0] - y[0]) + at->follows[c][1] * (at->y[1] - y[1]);
+    memcpy(at->y, y, sizeof at->y);
     for (int k = 0; k < 30; k++) {
         double slope[UZ_FACE_NODES][3], x[3] = {0}, T[2][3] = {{0}};
+        for (int c = 0; c < 2; c++)
+            local[c] = fmin(fmax(local[c] - step[c], -4), 4);
         uz_side_gradients(N, slope, shape, local);
         for (int c = 0; c < 3; c++) {
             for (int a = 0; a < side->nodes; a++)
@@ -373,15 +389,24 @@ static bool lift(double *N, double area[3], double *height, double local[2], con
         const double J[2][2] = {{uz_dot3(T[0], on->t[0]), uz_dot3(T[1], on->t[0])},
                                 {uz_dot3(T[0], on->t[1]), uz_dot3(T[1], on->t[1])}};
         const double det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
-        const double step[2] = {(J[1][1] * f[0] - J[0][1] * f[1]) / det, (J[0][0] * f[1] - J[1][0] * f[0]) / det};
+        for (int c = 0; c < 2; c++) {
+            at->follows[c][c] = J[1 - c][1 - c] / det;
+            at->follows[c][1 - c] = -J[c][1 - c] / det;
+        }
+        for (int c = 0; c < 2; c++)
+            step[c] = at->follows[c][0] * f[0] + at->follows[c][1] * f[1];
         *height = uz_dot3(x, on->n);
         uz_cross3(area, T[0], T[1]);
-        if (!isfinite(step[0] + step[1]))
+        if (!isfinite(step[0] + step[1])) {
+            memset(at->follows, 0, sizeof at->follows);
             return false;
-        if (fabs(step[0]) + fabs(step[1]) < 1e-14)
-            return true;
-        for (int c = 0; c < 2; c++)
-            local[c] = fmin(fmax(local[c] - step[c], -4), 4);
+        }
+        if (fabs(step[0]) + fabs(step[1]) > LAST_STEP)
+            continue;
+        for (int a = 0; a < side->nodes; a++)
+            N[a] -= slope[a][0] * step[0] + slope[a][1] * step[1];
+        *height -= uz_dot3(T[0], on->n) * step[0] + uz_dot3(T[1], on->n) * step[1];
+        return true;
     }
     return true; /* as near as rounding lets it come */
 }
@@ -450,9 +475,10 @@ static bool is_covered(uz_mortar_pair *pair, int64_t i, int64_t j, const plane *
                 within = (to[0] - from[0]) * (y[1] - from[1]) >= (to[1] - from[1]) * (y[0] - from[0]);
             }
         }
-        double N[UZ_FACE_NODES], area[3], local[2], there[2] = {height[0], 0};
-        memcpy(local, centre_of(other), sizeof local);
-        if (!within || !lift(N, area, &there[1], local, other, &shape, on, y) ||
+        double N[UZ_FACE_NODES], area[3], there[2] = {height[0], 0};
+        foot at = {.y = {0}};
+        memcpy(at.local, centre_of(other), sizeof at.local);
+        if (!within || !lift(N, area, &there[1], &at, other, &shape, on, y) ||
             !(fabs(there[1] - there[0]) < (1 - 1e-9) * fabs(height[1] - height[0])))
             continue;
         const uz_way way = way_to(pair, i, pair->near[k], on, y, there);
@@ -471,10 +497,11 @@ static bool add_piece(uz_mortar_pair *pair, const polygon *piece, int64_t i_side
     const uz_mortar_surface *surface = &pair->surface;
     const uz_mortar_side *side = &surface->side[i_side], *other = &surface->side[master];
     const uz_side mine = uz_mortar_side_of(side, in->model), its = uz_mortar_side_of(other, in->model);
-    double at[5], weight[5], local[2][2];
+    double at[5], weight[5];
+    foot feet[2] = {{.y = {0}}, {.y = {0}}};
     bool room = true;
-    memcpy(local[0], centre_of(side), sizeof local[0]);
-    memcpy(local[1], centre_of(other), sizeof local[1]);
+    memcpy(feet[0].local, centre_of(side), sizeof feet[0].local);
+    memcpy(feet[1].local, centre_of(other), sizeof feet[1].local);
     gauss_line(at, weight, n);
     for (int i = 1; i + 1 < piece->n; i++) {
         const polygon triangle = {.x = {{piece->x[0][0], piece->x[0][1]},
@@ -488,8 +515,8 @@ static bool add_piece(uz_mortar_pair *pair, const polygon *piece, int64_t i_side
             double y[2], area[3], ignored[3], height[2], normal[3] = {0};
             for (int c = 0; c < 2; c++)
                 y[c] = (1 - r - s) * triangle.x[0][c] + r * triangle.x[1][c] + s * triangle.x[2][c];
-            if (!lift(p.N, area, &height[0], local[0], side, &mine, on, y) ||
-                !lift(p.M, ignored, &height[1], local[1], other, &its, on, y) ||
+            if (!lift(p.N, area, &height[0], &feet[0], side, &mine, on, y) ||
+                !lift(p.M, ignored, &height[1], &feet[1], other, &its, on, y) ||
                 way_to(pair, i_side, master, on, y, height) != UZ_WAY_OVERLAP ||
                 is_covered(pair, i_side, master, on, y, height))
                 continue;
