@@ -242,21 +242,27 @@ static void take_unrotated(double *d, const uz_mesh *mesh, const int64_t *node, 
             d[a * dim + c] -= w[(c + 1) % 3] * x[a][(c + 2) % 3] - w[(c + 2) % 3] * x[a][(c + 1) % 3];
 }
 
-/* d'ke d of one element, by one triangle of the symmetric ke; the rows do not wait for each other. */
-static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e, bool carried)
+/* Displacements of an element's nodes against those of the first: a translation strains nothing, and what it would
+ * leave by rounding grows with it. Not along the radius. Returns how many. */
+static int take_nodal(double d[DOFS], const uz_body_model *model, const double *nodal, int64_t e, bool carried)
 {
-    double d[DOFS], sum = 0;
     int count;
     const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
     const bool rings = model->kind == UZ_AXISYMMETRIC;
-    const int dim = model->mesh.dim, n = count * dim;
-    /* Against those of the first node: a translation strains nothing, and what it would leave by rounding grows with
-     * it. Not along the radius. */
+    const int dim = model->mesh.dim;
     for (int a = 0; a < count; a++)
         for (int c = 0; c < dim; c++)
             d[a * dim + c] = nodal[node[a] * dim + c] - (rings && c == 0 ? 0 : nodal[node[0] * dim + c]);
     if (carried && !rings)
         take_unrotated(d, &model->mesh, node, count);
+    return count * dim;
+}
+
+/* d'ke d of one element, by one triangle of the symmetric ke; the rows do not wait for each other. */
+static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e, bool carried)
+{
+    double d[DOFS], sum = 0;
+    const int n = take_nodal(d, model, nodal, e, carried);
     for (int i = 0; i < n; i++) {
         double row = 0;
         for (int j = 0; j < i; j++)
@@ -307,6 +313,14 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
     double twice = 0;
     uz_status status = source_init(&source, model, err);
     for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++) {
+        if (!source.shared) { /* a matrix of its own would be made for it alone */
+            uz_element element;
+            double d[DOFS], xyz[3 * UZ_ELEMENT_NODES];
+            take_nodal(d, model, nodal, e, carried);
+            uz_body_element(&element, xyz, model, e);
+            twice += 2 * uz_element_strain_energy(&element, d);
+            continue;
+        }
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
             twice += mesh->kind[e] == UZ_QUAD4 && !carried ? of_quad4(model, ke, nodal, e)

@@ -113,6 +113,8 @@ void uz_element_move(uz_element_motion *motion, const uz_element *element, const
  * strain' C strain. On the axis of a ring, where the hoop strain u_r / r has no value, it is that of rr. The stress is
  * uz_elastic_stress of the strain less the thermal strain. */
 void uz_element_strain(double *strain, const uz_element_motion *motion, const double point[3]);
+/* u' K u / 2 from the strains at the Gauss points: a tenth of the time that K takes. */
+double uz_element_strain_energy(const uz_element *element, const double *u);
 
 /* -------------------------------------------------------------------- sides */
 

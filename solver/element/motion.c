@@ -69,3 +69,22 @@ void uz_element_strain(double *strain, const uz_element_motion *motion, const do
     for (int i = 0; i < n; i++)
         strain[i] += (motion->dilatation - own) / n;
 }
+
+double uz_element_strain_energy(const uz_element *element, const double *u)
+{
+    const int count = uz_element_rule(element->kind, element->model)->count, n = uz_stress_count(element->model);
+    uz_element_motion motion;
+    double sum = 0;
+    uz_element_move(&motion, element, u);
+    for (int g = 0; g < count; g++) {
+        uz_gauss_state state;
+        double strain[UZ_ELEMENT_STRESSES], stress[UZ_ELEMENT_STRESSES], density = 0;
+        uz_gauss_state_at(&state, element, g);
+        uz_element_strain(strain, &motion, state.point);
+        uz_elastic_stress(stress, element->model, element->lame, strain);
+        for (int i = 0; i < n; i++)
+            density += stress[i] * strain[i];
+        sum += 0.5 * state.volume * density;
+    }
+    return sum;
+}
