@@ -166,6 +166,9 @@ static void write_counted(const metrics *m, FILE *out)
         [METRIC_SUBMITTED] = {"jobs_submitted_total", "Jobs that were stored."},
         [METRIC_CHANGES] = {"store_changes_total", "Changes of the store; several may share a commit."},
         [METRIC_REQUEUED] = {"jobs_requeued_total", "Jobs put back to be run again."},
+        [METRIC_LANE] = {"lane_jobs_total", "Jobs that a lane for small ones took, past large ones."},
+        [METRIC_LANE_RETURNED] = {"lane_jobs_returned_total",
+                                  "Jobs in a lane that were larger than they seemed, and were put back."},
         [METRIC_DELETED] = {"jobs_deleted_total", "Ended jobs that were deleted for their age, number or size."},
         [METRIC_UPLOADS] = {"uploads_total", "Uploads that were stored, or sent again."},
         [METRIC_WEBHOOK_TOLD] = {"webhooks_told_total", "Ends of jobs that webhooks were told."},
@@ -217,8 +220,11 @@ static void write_now(const metrics *m, const metrics_now *now, FILE *out)
     write_head(out, "jobs", "gauge", "Jobs in the store by status.");
     for (size_t i = 0; i < 5 && now->jobs[i] >= 0; i++)
         fprintf(out, "uzawad_jobs{status=\"%s\"} %" PRId64 "\n", now->job_names[i], now->jobs[i]);
-    if (now->jobs[0] >= 0)
+    if (now->jobs[0] >= 0) {
         write_gauge(out, "queue_depth", "Jobs that wait for a worker.", (double)now->jobs[0]);
+        write_gauge(out, "queue_clients", "Owners of tokens, or addresses, whose jobs wait: who takes turns.",
+                    (double)now->clients);
+    }
     write_gauge(out, "workers", "Solver threads.", now->workers);
     write_gauge(out, "workers_busy", "Solver threads that run a job.", now->workers_busy);
     write_gauge(out, "cache_bytes", "Bytes that cached factors take.", (double)now->cache_bytes);

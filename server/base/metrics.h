@@ -38,6 +38,8 @@ typedef enum {
     METRIC_SUBMITTED,      /* jobs stored; repeated ones are not */
     METRIC_CHANGES,        /* of the store; several may share a commit */
     METRIC_REQUEUED,       /* jobs put back, by the end of a drain or after the end of a process */
+    METRIC_LANE,           /* jobs that a lane took */
+    METRIC_LANE_RETURNED,  /* those of them that were larger than they seemed, and put back */
     METRIC_DELETED,        /* ended jobs that were kept long enough */
     METRIC_UPLOADS,        /* uploads stored, or sent again */
     METRIC_WEBHOOK_TOLD,   /* ends of jobs that were told */
@@ -56,6 +58,7 @@ void metrics_request(metrics *m, const char *method, const char *route, int stat
 /* What is only known when somebody asks. */
 typedef struct {
     int64_t jobs[5]; /* by job_status; -1: the store did not answer */
+    int64_t clients; /* that have jobs which wait */
     const char *job_names[5];
     int workers, workers_busy;
     size_t cache_bytes, cache_max_bytes, cache_entries, body_bytes;

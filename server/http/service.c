@@ -67,7 +67,11 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
         reply_refuse(reply, 404, "not_found", "Not found", "this server keeps no metrics");
         return;
     }
-    if (store_counts(context->store, now.jobs) != STORE_OK)
+    int64_t stored[STORE_COUNTS];
+    const bool answered = store_counts(context->store, stored) == STORE_OK;
+    memcpy(now.jobs, stored, sizeof now.jobs);
+    now.clients = stored[STORE_SHARES_WAITING];
+    if (!answered)
         now.jobs[0] = -1;
     for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++)
         now.job_names[i] = job_status_name((job_status)i);
@@ -81,7 +85,7 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
  * store that does not answer only shows in the counts. */
 void service_health(api *context, http_request *rq, http_reply *reply)
 {
-    int64_t counts[5] = {0};
+    int64_t counts[STORE_COUNTS] = {0};
     (void)rq;
     bool answered = store_counts(context->store, counts) == STORE_OK;
     reply_json(
@@ -93,7 +97,7 @@ static const double READY_FOR_S = 1.0; /* so often at most it is tried, however 
 
 void service_ready(api *context, http_request *rq, http_reply *reply)
 {
-    int64_t counts[5] = {0};
+    int64_t counts[STORE_COUNTS] = {0};
     char why[64] = "";
     (void)rq;
     reply->retry_after_s = 5;

@@ -40,7 +40,7 @@ typedef struct {
     store_status (*get_body)(store *s, const char *id, char **body, size_t *len);
     store_status (*get_cases)(store *s, const char *id, const char *name, store_case **cases, size_t *count);
     const result_blobs *results; /* vectors and histories */
-    store_status (*counts)(store *s, int64_t counts[5]);
+    store_status (*counts)(store *s, int64_t counts[STORE_COUNTS]);
     store_status (*webhook_next)(store *s, const char *const *except, size_t n, webhook_due *out);
     store_status (*webhooks_open)(store *s, bool *any);
     store_status (*webhook_attempted)(store *s, const webhook_due *due, webhook_end end, double delay_s,

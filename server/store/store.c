@@ -269,9 +269,9 @@ store_status store_get_cases(store *s, const char *id, const char *name, store_c
     return status;
 }
 
-store_status store_counts(store *s, int64_t counts[5])
+store_status store_counts(store *s, int64_t counts[STORE_COUNTS])
 {
-    memset(counts, 0, 5 * sizeof counts[0]);
+    memset(counts, 0, STORE_COUNTS * sizeof counts[0]);
     return s->engine->counts(s, counts);
 }
 

@@ -247,8 +247,9 @@ store_status store_get_history(store *s, const char *id, int64_t number, int64_t
 /* Writes something that changes nothing, all the way to the disk: what a submission would meet now. */
 store_status store_try_write(store *s);
 
-/* Jobs in each status, indexed by job_status. */
-store_status store_counts(store *s, int64_t counts[5]);
+/* Jobs in each status, indexed by job_status, then how many shares of the workers have jobs that wait. */
+enum { STORE_SHARES_WAITING = 5, STORE_COUNTS };
+store_status store_counts(store *s, int64_t counts[STORE_COUNTS]);
 
 /* What a check found. */
 typedef struct {

@@ -279,6 +279,8 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
         log_store_failure(&r, LOG_ERROR, "release_failed");
     if (what != END_FINISH) {
         metrics_add(w->options.metrics, METRIC_REQUEUED, what != END_DROP);
+        metrics_add(w->options.metrics, METRIC_LANE_RETURNED,
+                    what == END_RELEASE && me->lane && !atomic_load(&w->interrupt));
         log_write(w->log, LOG_INFO, EVENTS[what], (log_field[]){LOG_S("job", claimed->id), {0}});
     } else if (store_outcome_of(&r)) {
         count_job(&r);

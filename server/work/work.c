@@ -107,6 +107,7 @@ static void *work_loop(void *arg)
         pthread_mutex_lock(&w->lock);
         if (status != STORE_OK)
             continue;
+        metrics_add(w->options.metrics, METRIC_LANE, me->lane);
         w->busy += !me->lane;
         if (w->busy == w->options.workers)
             pthread_cond_signal(&w->crowd);

@@ -146,6 +146,7 @@ def test_one_job_beside_ten_thousand_by_address(s):
             job = ask_from(s, "127.0.0.2", "GET", f"/v1/jobs/{job['id']}")
         check_turn(s, job)
     check(s.get(f"/v1/jobs/{mine['id']}").json["status"] == "accepted")  # behind the others of its address
+    check("\nuzawad_queue_clients 1\n" in s.get("/metrics").body.decode(), [x for x in s.get("/metrics").body.decode().splitlines() if "queue" in x])
 
 
 @options("--token-file", str(TOKEN_FILE), "--workers", "1")
@@ -181,6 +182,8 @@ def test_small_jobs_have_a_lane(s):
     s.request("DELETE", f"/v1/jobs/{seemed}")
     s.wait_status(seemed, "dismissed")
     check(s.get(f"/v1/jobs/{seemed}").json["attempts"] == 1)
+    told = s.get("/metrics").body.decode()
+    check("\nuzawad_lane_jobs_total 3\n" in told and "\nuzawad_lane_jobs_returned_total 1\n" in told, told)
 
 
 def test_bad_values(s):

@@ -187,7 +187,7 @@ static inline void check_counts(store *s, int64_t accepted, int64_t running, int
                                 int64_t dismissed)
 {
     const int64_t want[5] = {accepted, running, successful, failed, dismissed};
-    int64_t have[5];
+    int64_t have[STORE_COUNTS];
     store_findings found;
     CHECK_INT(store_counts(s, have), STORE_OK);
     for (int i = 0; i < 5; i++)

@@ -151,7 +151,8 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_IDLE_UPLOAD] = "SELECT id, bytes FROM upload WHERE used < ?1"
                           " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = id) ORDER BY used LIMIT 1",
     [QUERY_UPLOAD_BYTES] = "SELECT coalesce(sum(bytes), 0) FROM upload",
-    [QUERY_COUNTS] = "SELECT status, jobs FROM tally",
+    [QUERY_COUNTS] = "SELECT status, jobs FROM tally WHERE status < 5 UNION ALL"
+                     " SELECT 5, count(DISTINCT name) FROM share WHERE waiting > 0",
     [QUERY_NUMBER] = "UPDATE tally SET jobs = ?1 WHERE status = -1",
     [QUERY_COUNT_ONE_MORE] = "UPDATE tally SET jobs = jobs + 1 WHERE status = 0",
     [QUERY_COUNT_ONE_LESS] = "UPDATE tally SET jobs = jobs - 1 WHERE status = 0",

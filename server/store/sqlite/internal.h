@@ -125,7 +125,7 @@ store_status sqlite_get(store *s, const char *id, job *out);
 store_status sqlite_list(store *s, const store_query *query, job *jobs, size_t *count);
 store_status sqlite_get_body(store *s, const char *id, char **body, size_t *len);
 store_status sqlite_get_cases(store *s, const char *id, const char *name, store_case **cases, size_t *count);
-store_status sqlite_counts(store *s, int64_t counts[5]);
+store_status sqlite_counts(store *s, int64_t counts[STORE_COUNTS]);
 store_status sqlite_webhook_next(store *s, const char *const *except, size_t n, webhook_due *out);
 store_status sqlite_webhooks_open(store *s, bool *any);
 store_status sqlite_webhook_attempted(store *s, const webhook_due *due, webhook_end end, double delay_s,

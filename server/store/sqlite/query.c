@@ -123,14 +123,14 @@ store_status sqlite_get_cases(store *base, const char *id, const char *name, sto
     return sqlite_give_reader(s, c, statement_end(&st, status));
 }
 
-store_status sqlite_counts(store *base, int64_t counts[5])
+store_status sqlite_counts(store *base, int64_t counts[STORE_COUNTS])
 {
     sqlite_store *s = sqlite_of(base);
     connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_COUNTS);
     while (statement_row(&st)) {
         int status = sqlite3_column_int(st.stmt, 0);
-        if (status >= 0 && status < 5)
+        if (status >= 0 && status < STORE_COUNTS)
             counts[status] = sqlite3_column_int64(st.stmt, 1);
     }
     return sqlite_give_reader(s, c, statement_end(&st, STORE_OK));

@@ -394,7 +394,7 @@ STORE_TEST(list_with_cursor_status_and_tag)
     CHECK_INT(list_ids(p.s, both, got, &more), 3);
     CHECK_INT(list_ids(p.s, (store_query){.limit = 10, .tag = "re"}, got, &more), 0);
     CHECK_INT(list_ids(p.s, (store_query){.limit = 0}, got, &more), 1); /* limits are clamped */
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     CHECK_INT(store_counts(p.s, counts), STORE_OK);
     CHECK(counts[JOB_ACCEPTED] == 9 && counts[JOB_RUNNING] == 1 && counts[JOB_SUCCESSFUL] == 0);
     place_end(&p);

@@ -636,7 +636,7 @@ STORE_TEST(each_job_is_claimed_once)
     qsort(all, RACE_JOBS, sizeof all[0], compare_ids);
     for (int i = 1; i < RACE_JOBS; i++)
         CHECK(strcmp(all[i - 1], all[i]) != 0);
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     CHECK_INT(store_counts(p.s, counts), STORE_OK);
     CHECK_INT(counts[JOB_SUCCESSFUL], RACE_JOBS);
     place_end(&p);
@@ -663,7 +663,7 @@ STORE_TEST(concurrent_repeats_make_one_job_each)
     place p;
     pthread_t threads[6];
     repeater repeaters[6];
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     if (!place_begin(&p))
         return;
     for (int i = 0; i < 6; i++) {

@@ -97,7 +97,7 @@ STORE_TEST(an_upload_in_use_stays)
     upload_info info;
     bool known, repeated;
     job j = {0};
-    int64_t count, counts[5];
+    int64_t count, counts[STORE_COUNTS];
     job_status was;
     if (!place_begin(&p))
         return;

@@ -232,7 +232,7 @@ TEST(every_job_of_many_ends)
     service v;
     char id[JOBS][33];
     work_options four = TWO_WORKERS;
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     four.workers = 4;
     if (!service_begin(&v) || !service_start(&v, &four))
         return;

@@ -128,7 +128,7 @@ TEST(a_full_database_is_reported_and_changes_nothing)
     job_status was;
     static const char body[1u << 20];
     static const double x[131072];
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     job j = {0};
     bool repeated = false;
     int accepted = 0;
@@ -202,7 +202,7 @@ TEST(a_failing_write_is_reported_as_full)
     CHECK(WIFEXITED(status));
     CHECK_INT(WEXITSTATUS(status), 0);
     if (place_open(&p)) {
-        int64_t counts[5];
+        int64_t counts[STORE_COUNTS];
         CHECK_INT(store_counts(p.s, counts), STORE_OK);
         CHECK_INT(counts[JOB_ACCEPTED], 2);
     }
@@ -243,7 +243,7 @@ static int delete_on_a_full_disk(const char *folder)
         if (store_dismiss(s, ids[i % n], &was) != STORE_OK)
             return 10 + i;
     }
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     if (store_counts(s, counts) != STORE_OK || counts[JOB_ACCEPTED] + counts[JOB_DISMISSED] != 0)
         return 3;
     store_close(s);
@@ -293,7 +293,7 @@ TEST(a_write_is_tried)
 {
     place p;
     char id[33];
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     if (!place_begin(&p))
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);

@@ -94,7 +94,7 @@ TEST(bad_tags_are_an_error_and_leave_nothing)
 {
     place p;
     char id[33];
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     if (!place_begin(&p))
         return;
     CHECK_INT(submit_text(p.s, "{}", "[\"open", NULL, id), STORE_ERROR);

@@ -390,7 +390,7 @@ static void use(store *s)
     job *jobs = NULL;
     size_t count = 0;
     bool more;
-    int64_t counts[5];
+    int64_t counts[STORE_COUNTS];
     store_findings found = {0};
     told t = {.count = 0};
     store_counts(s, counts);
