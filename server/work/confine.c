@@ -50,9 +50,10 @@ static const int ALLOWED[] = {
     SYS_times,         SYS_sysinfo,         SYS_getpid,
     SYS_gettid,        SYS_getcpu,          SYS_getrandom,
     SYS_rt_sigaction,  SYS_rt_sigprocmask,  SYS_rt_sigreturn,
-    SYS_sigaltstack,   SYS_restart_syscall, SYS_exit,
-    SYS_exit_group,    SYS_ppoll,           SYS_recvmsg,
-    SYS_sendmsg,       SYS_set_robust_list, SYS_membarrier,
+    SYS_rt_sigpending, SYS_restart_syscall, SYS_exit,
+    SYS_sigaltstack,   SYS_exit_group,      SYS_ppoll,
+    SYS_recvmsg,       SYS_sendmsg,         SYS_set_robust_list,
+    SYS_membarrier,
 #ifdef SYS_rseq
     SYS_rseq,
 #endif

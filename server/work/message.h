@@ -19,9 +19,10 @@
 
 /* In shared memory, written while a job runs. */
 typedef struct {
-    atomic_bool stop;  /* by the daemon: the job is to end with its best answer so far */
-    atomic_bool heard; /* by the process: it has seen that, and makes its answer */
-    live live;         /* by the process */
+    atomic_bool stop;    /* by the daemon: the job is to end with its best answer so far */
+    atomic_bool heard;   /* by the process: it has seen that, and makes its answer */
+    atomic_bool starved; /* by the process: it dies because there was no memory */
+    live live;           /* by the process */
 } board;
 
 typedef enum {

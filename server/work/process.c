@@ -127,6 +127,7 @@ bool process_begin(process *p)
         error = errno;
     } else {
         p->oom_kills = count_oom_kills();
+        atomic_store(&p->board->starved, false);
         error = spawn(p, ends[1]);
         close(ends[1]);
         p->socket = ends[0];
@@ -155,7 +156,9 @@ int process_reap(process *p, bool *out_of_memory)
     if (p->pid > 0) {
         while (waitpid(p->pid, &status, 0) < 0 && errno == EINTR)
             ;
-        *out_of_memory = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL && count_oom_kills() > p->oom_kills;
+        const int killer = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+        *out_of_memory = (killer == SIGKILL && count_oom_kills() > p->oom_kills) ||
+                         (killer == SIGSEGV && atomic_load(&p->board->starved));
     }
     p->pid = 0;
     forget(p);

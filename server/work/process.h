@@ -44,7 +44,7 @@ bool process_begin(process *p);
 /* Ends it at once, in the middle of whatever it does; process_reap is still to be called. */
 void process_kill(process *p);
 /* Waits for its end, after it was killed or its socket closed: its status as waitpid has it. *out_of_memory: the
- * machine or the control group killed it for want of memory. */
+ * machine or the control group killed it for want of memory, or it knew of none when it died. */
 int process_reap(process *p, bool *out_of_memory);
 
 /* What stands for the body of a job's text: the same for texts whose problems differ in loads only. */

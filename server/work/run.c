@@ -190,8 +190,8 @@ static run_end judge_death(run *r, const watch_report *seen, const char *told)
                             {0}});
     if (seen->out_of_memory)
         problem_fill(&problem, 503, "memory_limit", "Out of memory",
-                     "The system ended the process that solved this job, for want of memory: take a coarser mesh, or "
-                     "a service with more.%s",
+                     "The process that solved this job ended for want of memory: take a coarser mesh, or a service "
+                     "with more.%s",
                      told);
     else if (r->job->attempts >= r->me->w->options.max_attempts)
         problem_fill(&problem, 500, "process_died", "The process that solved this job died",

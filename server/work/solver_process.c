@@ -5,11 +5,13 @@
 #include "work/solver_process.h"
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/sanitized.h"
 #include "work/confine.h"
 #include "work/message.h"
 #include "work/parcel.h"
 #include "work/relay.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <malloc.h>
 #include <poll.h>
@@ -208,6 +210,19 @@ static void serve(solver *s)
 
 /* ---- beginning and end */
 
+static atomic_bool *starved; /* on the board: a handler of signals has no context */
+
+/* Not every library looks at what it was given. METIS raises SIGABRT where memory has ended, which is blocked here
+ * (uz_thread_init), and goes on. */
+static void note_fault(int number)
+{
+    const int error = errno;
+    sigset_t pending;
+    if (error == ENOMEM || (sigpending(&pending) == 0 && sigismember(&pending, SIGABRT)))
+        atomic_store(starved, true);
+    raise(number); /* once more, and now it ends the process */
+}
+
 int solver_process(int argc, char **argv)
 {
     char why[128];
@@ -248,6 +263,9 @@ int solver_process(int argc, char **argv)
     if (made) {
         uz_process_reserve(s.reserve);
         s.board = (board *)(void *)s.board_memory.at;
+        starved = &s.board->starved;
+        if (!SANITIZED)
+            sigaction(SIGSEGV, &(struct sigaction){.sa_handler = note_fault, .sa_flags = (int)SA_RESETHAND}, NULL);
         segment_rest(&s.inbox, SEGMENT_KEPT, false);
         segment_rest(&s.outbox, SEGMENT_KEPT, false);
         if (solve_bytes > 0 && solve_bytes < (SIZE_MAX - LIMIT_ROOM - s.cache_bytes) / 2)

@@ -18,7 +18,7 @@ typedef struct {
     double time_limit_s; /* OVERDUE: that was over */
     bool began;          /* OVERDUE: it had begun to iterate */
     int status;          /* DIED: as waitpid has it */
-    bool out_of_memory;  /* DIED: the system killed it for that */
+    bool out_of_memory;  /* DIED: of that */
 } watch_report;
 
 /* From the text to its end. body: freed; NULL: damaged. */

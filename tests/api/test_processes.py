@@ -153,6 +153,20 @@ def test_memory_ends_in_a_factorization(s):
     s.wait_status(other, "dismissed")
 
 
+@options("--workers", "1", "--log-level", "warn")
+def test_memory_ends_anywhere(s):
+    """Also where a library does not look at what it was given, as METIS while it orders: one attempt, memory_limit."""
+    for megabytes in (20, 50, 80, *range(104, 153, 4), 160):
+        s.restart()
+        check(s.solve(MATRICES)["status"] == "successful")
+        pid = s.solvers()[0]
+        status = pathlib.Path(f"/proc/{pid}/status").read_text()
+        room = 1024 * int(status.split("VmSize:")[1].split()[0]) + (megabytes << 20)
+        resource.prlimit(pid, resource.RLIMIT_AS, (room, room))
+        job = s.solve(cube(24))
+        check(job["status"] == "failed" and job["error"]["code"] == "memory_limit" and job["attempts"] == 1, megabytes, job)
+
+
 @options("--workers", "1")
 def test_an_idle_process_may_go(s):
     for _ in range(3):
