@@ -27,6 +27,15 @@
 #define OF_ESTIMATE 0.5
 #define OF_DEPTH    0.5
 #define OF_END      0.2
+/* ... of forces of contacts, whose rows in contact the adjoint takes for known: what a finer mesh changes of them is of
+ * second order, and on coarse meshes a part of all the rest; where temperature presses the body into its obstacles it
+ * is more than that; of all other quantities. */
+#define OF_CONTACT 1.6
+#define OF_HEAT    2.5
+#define OF_OTHER   1.3
+/* ... and of the value times the square of the mesh's error: of a force that balance alone makes all but known, the
+ * rest is of second order. */
+#define OF_SECOND 1e-2
 
 /* Solves that are not exact go on to this part of the adjoint's norm. */
 #define SOLVED 1e-6
@@ -227,6 +236,18 @@ static double end_error(const adjoint *x)
     return sum;
 }
 
+/* No row presses, and the nearest obstacle is no farther than displacements may be off: is there contact? */
+static bool is_about_to_touch(const adjoint *x, double mesh_error)
+{
+    const uz_body_model *model = x->work->model;
+    double nearest = INFINITY, farthest = 0;
+    for (int64_t i = 0; i < model->m; i++)
+        nearest = fmin(nearest, x->answer->g[i]);
+    for (int64_t i = 0; i < model->mesh.n_nodes * model->mesh.dim; i++)
+        farthest = fmax(farthest, fabs(x->answer->u[i]));
+    return x->answer->summary.active == 0 && nearest <= mesh_error * farthest;
+}
+
 static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functional *of, uz_error *err)
 {
     const uz_body_model *model = x->work->model;
@@ -234,6 +255,9 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     const double *u = x->answer->u;
     double norm = 0, strain = 0, length = 0, both[2] = {0};
     bool solved = false;
+    const bool pressed =
+        x->work->scene->n_contacts > 0 && (out->kind == UZ_QUANTITY_CONTACT_FORCE ||
+                                           out->kind == UZ_QUANTITY_REACTION || out->kind == UZ_QUANTITY_MEAN_PRESSURE);
     uz_status status = solve(x, &solved, of, err);
     if (status != UZ_OK)
         return status;
@@ -252,13 +276,23 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     }
     if (status != UZ_OK)
         return status;
+    const double share = strain > 0 ? fmin(1, x->own_error / strain) : 0; /* the square of the mesh's error, about */
+    if (pressed && is_about_to_touch(x, sqrt(share))) {
+        snprintf(out->why, sizeof out->why, "no row presses, and the mesh can't tell whether one of them should");
+        return UZ_OK;
+    }
     for (int64_t i = 0; i < n; i++)
         length = hypot(length, x->z[i]);
     const double depth = depth_shift(x, of, x->depth), bulge = depth_shift(x, of, x->bulge);
     const double shift = (both[0] - both[1]) / (4 * scale),
                  square = fmax(0, 0.5 * (both[0] + both[1]) - x->own_error) / (scale * scale);
+    const double times = !pressed ? OF_OTHER : x->free_strain ? OF_HEAT : OF_CONTACT;
     out->mesh = OF_ESTIMATE * fabs(shift) + x->of_product * sqrt(x->own_error * square) + OF_DEPTH * fabs(depth) +
                 fabs(bulge) + OF_END * end_error(x) + of->blur;
+    double whole = fabs(out->found); /* a reaction may be what large forces leave of each other */
+    for (int64_t i = 0; i < model->m && out->kind == UZ_QUANTITY_REACTION; i++)
+        whole += fabs(x->answer->r[i]);
+    out->mesh = times * out->mesh + OF_SECOND * share * whole;
     /* where z is a rigid motion, of forces that are in balance, the residual at free nodes is what is left */
     out->equations = sqrt(2 * fmax(0, norm)) * x->answer->summary.certificate.absolute_error +
                      length * x->answer->summary.certificate.residual.e1;
