@@ -161,9 +161,8 @@ TEST(what_is_nearly_a_shape_is_one_in_any_numbering)
         for (int j = 0; j < ALL; j++) {
             double xyz[3 * ALL], normal[3 * ALL];
             for (int i = 0; i < ALL; i++) {
-                const int node = (i + j) % ALL;
-                const double x = node % COLUMNS - 1.8, y = 0.9 * (node / COLUMNS) - 1,
-                             slope[2] = {2 * bend * x, 2 * bend * y};
+                const int node = (i + j) % ALL, row = node / COLUMNS;
+                const double x = node % COLUMNS - 1.8, y = 0.9 * row - 1, slope[2] = {2 * bend * x, 2 * bend * y};
                 const double at[3] = {x, y, -bend * (x * x + y * y)},
                              steep = sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]);
                 for (int c = 0; c < 3; c++) {
