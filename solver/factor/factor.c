@@ -139,8 +139,13 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     bool filled = false;
-    if (status == UZ_OK && !is_for_many_threads(factor))
-        status = uz_fill(&filled, factor, K, err);
+    if (status == UZ_OK && !is_for_many_threads(factor)) {
+        uz_refill *numbers;
+        status = uz_refill_new(&numbers, factor, K, true, err);
+        if (status == UZ_OK)
+            status = uz_refill_run(&filled, numbers, factor, err);
+        uz_refill_free(numbers);
+    }
     if (status == UZ_OK && !filled) { /* it names a pivot that is not positive */
         SuiteSparse_free(factor->L.x);
         factor->L = *analysis->L;

@@ -34,12 +34,12 @@ void uz_run_shares(void (*run)(void *ctx, int share), void *ctx);
  * and Y: n x UZ_LANES; Y is room. */
 uz_status uz_factor_solve_shares(const uz_factor *factor, double *X, double *Y, bool forward, uz_error *err);
 
-/* What making the numbers of a factor again takes (refill.c). */
+/* What making the numbers of a factor takes (refill.c). once: for these of K alone. UZ_ERR_MEMORY. */
 typedef struct uz_refill uz_refill;
+uz_status uz_refill_new(uz_refill **out, const uz_factor *factor, const uz_csc *K, bool once, uz_error *err);
 void uz_refill_free(uz_refill *x);
-/* The numbers of a factor that has none; *positive false: at a pivot that is not,
- * with memory to be given back. UZ_ERR_MEMORY. */
-uz_status uz_fill(bool *positive, uz_factor *factor, const uz_csc *K, uz_error *err);
+/* *positive false: it met a pivot that is not, with memory to be given back. UZ_ERR_MEMORY. */
+uz_status uz_refill_run(bool *positive, uz_refill *x, uz_factor *factor, uz_error *err);
 
 struct uz_factor {
     uz_analysis *analysis;

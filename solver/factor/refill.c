@@ -232,7 +232,7 @@ typedef struct {
 } band;
 
 /* What the band takes from supernode d, in pieces of columns that fit in the room. */
-static void take(const band *of, int64_t d)
+static inline __attribute__((always_inline)) void take(const band *of, int64_t d)
 {
     const uz_refill *x = of->x;
     const cholmod_factor *L = x->L;
@@ -290,7 +290,7 @@ static void pass_on(uz_refill *x, int share, int64_t s, int64_t d)
     }
 }
 
-static uz_status begin(uz_refill **out, const uz_factor *factor, const uz_csc *K, bool once, uz_error *err)
+uz_status uz_refill_new(uz_refill **out, const uz_factor *factor, const uz_csc *K, bool once, uz_error *err)
 {
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *row = L->s;
@@ -393,7 +393,7 @@ static void divide_band(void *ctx, int half)
 }
 
 /* From what a supernode has of K to its columns of the factor; false: a pivot is not positive. */
-static bool make_together(pair *p, int64_t columns)
+static inline __attribute__((always_inline)) bool make_together(pair *p, int64_t columns)
 {
     const double c = (double)columns, r = (double)p->rows, half = (c * r - c * c / 2) / 2;
     p->middle = half > c * c / 2 ? (int64_t)(half / c + c / 2) : (int64_t)sqrt(2 * half); /* of its entries */
@@ -413,65 +413,60 @@ static bool make_together(pair *p, int64_t columns)
 
 /* ---- all of them */
 
-/* The supernodes of a share, from x->K: until a pivot is not positive. */
-static void fill_share(void *ctx, int share)
+/* A supernode of a share, from x->K. */
+static inline __attribute__((always_inline)) void make(uz_refill *x, int share, int64_t s, const kernels *by)
 {
-    uz_refill *x = ctx;
     const cholmod_factor *L = x->L;
-    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *row = L->s, *ptr = x->K->p, *index = x->K->i;
-    const kernels by = kernels_here();
-    const int64_t count = (int64_t)L->nsuper;
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *row = L->s, *ptr = x->K->p, *index = x->K->i;
     const double *value = x->K->x;
+    const int64_t columns = super[s + 1] - super[s], rows = pi[s + 1] - pi[s];
+    const bool together = share == UZ_REST && uz_is_large(columns, rows);
     int64_t *const local = x->of[share].local;
-    x->of[share].positive = true;
-    for (int64_t s = 0; s < count; s++)
-        x->of[share].head[s] = -1;
-    for (int64_t s = 0; s < count && x->of[share].positive; s++) {
-        if (x->share[s] != share)
-            continue;
-        const int64_t columns = super[s + 1] - super[s], rows = pi[s + 1] - pi[s];
-        const bool together = share == UZ_REST && uz_is_large(columns, rows);
-        double *block = (double *)L->x + px[s];
-        const band whole = {.x = x, .by = &by, .s = s, .high = rows, .local = local, .room = x->of[share].room};
-        pair halves = {.x = x, .s = s, .rows = rows, .block = block};
-        memset(block, 0, (size_t)(columns * rows) * sizeof *block);
-        for (int64_t i = 0; i < rows; i++)
-            local[row[pi[s] + i]] = i;
-        for (int64_t c = 0; c < columns; c++)
-            for (int64_t e = ptr[super[s] + c]; e < ptr[super[s] + c + 1]; e++)
-                block[local[index[e]] + c * rows] = value[e];
-        if (together)
-            x->of[share].positive = make_together(&halves, columns);
-        for (int k = share == UZ_REST ? 0 : share; k <= share; k++) /* the rest takes from all */
-            for (int64_t d = x->of[k].head[s], after; d >= 0; d = after) {
-                after = x->next[d];
-                if (!together)
-                    take(&whole, d);
-                pass_on(x, share, s, d);
-            }
-        if (!together)
-            x->of[share].positive = columns * columns * rows > MANY
-                                        ? uz_block_factor(columns, rows - columns, block, rows)
-                                        : by.factor(block, columns, rows);
-        x->from[s] = columns;
-        if (rows > columns) {
-            const int64_t to = x->owner[row[pi[s] + columns]];
-            x->next[s] = x->of[share].head[to];
-            x->of[share].head[to] = s;
+    double *block = (double *)L->x + ((const SuiteSparse_long *)L->px)[s];
+    const band whole = {.x = x, .by = by, .s = s, .high = rows, .local = local, .room = x->of[share].room};
+    pair halves = {.x = x, .s = s, .rows = rows, .block = block};
+    memset(block, 0, (size_t)(columns * rows) * sizeof *block);
+    for (int64_t i = 0; i < rows; i++)
+        local[row[pi[s] + i]] = i;
+    for (int64_t c = 0; c < columns; c++)
+        for (int64_t e = ptr[super[s] + c]; e < ptr[super[s] + c + 1]; e++)
+            block[local[index[e]] + c * rows] = value[e];
+    if (together)
+        x->of[share].positive = make_together(&halves, columns);
+    for (int k = share == UZ_REST ? 0 : share; k <= share; k++) /* the rest takes from all */
+        for (int64_t d = x->of[k].head[s], after; d >= 0; d = after) {
+            after = x->next[d];
+            if (!together)
+                take(&whole, d);
+            pass_on(x, share, s, d);
         }
+    if (!together)
+        x->of[share].positive = columns * columns * rows > MANY ? uz_block_factor(columns, rows - columns, block, rows)
+                                                                : by->factor(block, columns, rows);
+    x->from[s] = columns;
+    if (rows > columns) {
+        const int64_t to = x->owner[row[pi[s] + columns]];
+        x->next[s] = x->of[share].head[to];
+        x->of[share].head[to] = s;
     }
 }
 
-/* All supernodes; false: at a pivot that is not positive. */
-static bool fill(uz_refill *x, uz_factor *factor)
+/* The supernodes of a share: until a pivot is not positive. */
+static inline __attribute__((always_inline)) void make_all(uz_refill *x, int share)
 {
-    x->L = &factor->L;
-    x->share = factor->analysis->share;
-    uz_run_shares(fill_share, x);
-    const bool positive = x->of[0].positive && x->of[1].positive;
-    if (positive)
-        fill_share(x, UZ_REST);
-    return positive && x->of[UZ_REST].positive;
+    const kernels by = kernels_here();
+    const int64_t count = (int64_t)x->L->nsuper;
+    x->of[share].positive = true;
+    for (int64_t s = 0; s < count; s++)
+        x->of[share].head[s] = -1;
+    for (int64_t s = 0; s < count && x->of[share].positive; s++)
+        if (x->share[s] == share)
+            make(x, share, s, &by);
+}
+
+static void fill_share(void *ctx, int share)
+{
+    make_all(ctx, share);
 }
 
 /* The memory of the factor's numbers: some entries behind the last column are read with it. */
@@ -486,25 +481,29 @@ static uz_status make_room(cholmod_factor *L, uz_error *err)
     return UZ_OK;
 }
 
-uz_status uz_fill(bool *positive, uz_factor *factor, const uz_csc *K, uz_error *err)
+uz_status uz_refill_run(bool *positive, uz_refill *x, uz_factor *factor, uz_error *err)
 {
-    uz_refill *x;
-    uz_status status = begin(&x, factor, K, true, err);
-    if (status == UZ_OK)
-        status = make_room(&factor->L, err);
-    *positive = status == UZ_OK && fill(x, factor);
-    uz_refill_free(x);
-    return status;
+    uz_status status = make_room(&factor->L, err);
+    *positive = false;
+    if (status != UZ_OK)
+        return status;
+    x->L = &factor->L;
+    x->share = factor->analysis->share;
+    uz_run_shares(fill_share, x);
+    if (x->of[0].positive && x->of[1].positive) {
+        make_all(x, UZ_REST);
+        *positive = x->of[UZ_REST].positive;
+    }
+    return UZ_OK;
 }
 
 uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
 {
     const int64_t count = K->ptr[K->cols];
-    cholmod_factor *L = &factor->L;
     if (K->cols != factor->n || count != factor->analysis->nnz)
         return uz_fail(err, UZ_ERR_ARGUMENT, "K", "K is not of the pattern that was analysed");
     if (!factor->refill) {
-        uz_status status = begin(&factor->refill, factor, K, false, err);
+        uz_status status = uz_refill_new(&factor->refill, factor, K, false, err);
         if (status != UZ_OK)
             return status;
     } else {
@@ -512,8 +511,9 @@ uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
         for (int64_t k = 0; k < count; k++)
             value[factor->refill->place[k]] = K->val[k];
     }
-    uz_status status = make_room(L, err);
-    if (status != UZ_OK || fill(factor->refill, factor))
+    bool positive;
+    uz_status status = uz_refill_run(&positive, factor->refill, factor, err);
+    if (status != UZ_OK || positive)
         return status;
     return uz_fail(err, UZ_ERR_NOT_SPD, "K", "K is not positive definite to working precision");
 }
