@@ -20,11 +20,12 @@ trap 'rm -rf "$work"' EXIT
 export TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp ${TSAN_OPTIONS:-}"
 export LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp print_suppressions=0 ${LSAN_OPTIONS:-}"
 export UBSAN_OPTIONS="print_stacktrace=1 ${UBSAN_OPTIONS:-}"
-# A locale with a decimal comma, for the C tests that numbers are read and written without it.
-locale=()
+# As in the service, one thread of BLAS (a program that wants more says so): four programs run at a time. And a locale
+# with a decimal comma, for the C tests that numbers are read and written without it.
+unit_env=(env OPENBLAS_NUM_THREADS=1)
 if [[ " $kinds " == *" unit "* ]] && { [ -d "$build/locale/de_DE.UTF-8" ] || { mkdir -p "$build/locale" &&
     localedef -i de_DE -f UTF-8 "$work/de_DE.UTF-8" >/dev/null 2>&1 && mv "$work/de_DE.UTF-8" "$build/locale/"; }; }; then
-    locale=(env "LOCPATH=$(realpath "$build")/locale")
+    unit_env+=("LOCPATH=$(realpath "$build")/locale")
 fi
 
 run_one() { # KIND NAME COMMAND...
@@ -63,7 +64,7 @@ list_kind() { # KIND: a line "KIND NAME" for each of its programs
 run_program() { # KIND NAME
     local kind=$1 name=$2
     case $kind in
-    unit) run_one "$kind" "$name" "${locale[@]}" "$build/tests/$name" $filter ;;
+    unit) run_one "$kind" "$name" "${unit_env[@]}" "$build/tests/$name" $filter ;;
     api | browser) run_one "$kind" "$name" /usr/bin/python3 -B "tests/$kind/$name.py" "$build" $filter ;;
     guard) run_one "$kind" guard /usr/bin/python3 -B tests/guard/guard.py "$build" ;;
     hygiene) run_one "$kind" lint tests/lint.sh ;;
