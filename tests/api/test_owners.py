@@ -204,9 +204,9 @@ def test_quotas(s):
     while ask(s, BOSS, "GET", f"/v1/jobs/{running}").json["status"] != "dismissed":
         check(time.monotonic() < end)
         time.sleep(0.02)
+    expect(ask(s, NEW, "GET", f"/v1/jobs/{waiting[1]}", Prefer="wait=30"), 200)  # none, or one, waits from here on
     reply = expect(ask(s, BOSS, "POST", "/v1/jobs", MATRICES), 429, "quota_exceeded")
     check("--client-seconds" in reply.json["detail"], reply)
-    expect(ask(s, NEW, "GET", f"/v1/jobs/{waiting[1]}", Prefer="wait=30"), 200)
     check(s.end() == 0)
     s.sql("UPDATE client SET day = day - 1")
     s.start()

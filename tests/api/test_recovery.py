@@ -35,7 +35,7 @@ MIX += [(scene((30, 10), method="accelerated_restart", operator="factored"), -3.
 
 
 # A daemon with a sanitizer is killed in the same ways, with fewer of them.
-JOBS, SLOW, KILLS = (10, 5, 3) if INSTRUMENTED else (50, 12, 8)
+JOBS, SLOW, KILLS = (10, 12, 3) if INSTRUMENTED else (50, 12, 8)
 
 
 # ---------------------------------------------------------------- helpers
