@@ -195,7 +195,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
                                  .nonzeros = (int64_t)options->max_nonzeros};
     if (!codec_init(&limits, message, size))
         return false;
-    uz_process_init(options->workers + 1); /* what is solved or predicted here is small */
+    uz_process_init(options->workers + 1); /* fields of results are computed here */
     if (!read_secrets(s, options, message, size))
         return false;
     /* The port is taken before any job runs, so that a second daemon fails without a trace; and before the privileges

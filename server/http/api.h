@@ -36,14 +36,13 @@ typedef struct api {
     rate rate;                /* per_s 0: no limit */
     http_options options;
     transport *server;
-    sem_t turns;                  /* so many replies may be computed at a time, the others wait: fields.c */
-    pthread_mutex_t told_lock;    /* the next; taken before the store's and the workers' own */
-    told_text told[TOLD_TEXTS];   /* of change n at n % TOLD_TEXTS */
-    char run[17];                 /* a random name of this run of the daemon */
-    pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
-    pthread_mutex_t ready_lock;   /* the next two */
-    double ready_until;           /* on CLOCK_MONOTONIC: until then ready_why is what /readyz says */
-    char ready_why[64];           /* "": ready */
+    sem_t turns;                /* so many replies may be computed at a time, the others wait: fields.c */
+    pthread_mutex_t told_lock;  /* the next; taken before the store's and the workers' own */
+    told_text told[TOLD_TEXTS]; /* of change n at n % TOLD_TEXTS */
+    char run[17];               /* a random name of this run of the daemon */
+    pthread_mutex_t ready_lock; /* the next two */
+    double ready_until;         /* on CLOCK_MONOTONIC: until then ready_why is what /readyz says */
+    char ready_why[64];         /* "": ready */
 } api;
 
 /* The daemon is about to end: nothing is waited for. */

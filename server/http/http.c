@@ -79,7 +79,6 @@ static void free_context(api *context)
         free(context->told[i].data);
     pthread_mutex_destroy(&context->told_lock);
     pthread_mutex_destroy(&context->rate.lock);
-    pthread_mutex_destroy(&context->predict_lock);
     pthread_mutex_destroy(&context->ready_lock);
     free(context);
 }
@@ -103,7 +102,6 @@ bool http_start(http_server *out, int listen_fd, const http_parts *parts, const 
     context->metrics = parts->metrics;
     context->auth = parts->auth;
     context->options = *options;
-    pthread_mutex_init(&context->predict_lock, NULL);
     pthread_mutex_init(&context->ready_lock, NULL);
     pthread_mutex_init(&context->told_lock, NULL);
     sem_init(&context->turns, 0, (unsigned)work_settings(parts->work)->workers);

@@ -239,14 +239,9 @@ static bool check_start(api *context, const codec_request *request, const http_r
 
 /* ---- POST /v1/jobs */
 
-/* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */
-#define ASSEMBLY_BYTES 1000.0
-/* Beyond it a prediction takes minutes. */
-#define PREDICTED_MOST 4e6
-
 void jobs_submit(api *context, http_request *rq, http_reply *reply)
 {
-    problem_details problem = {0}, ignored;
+    problem_details problem = {0};
     codec_request request = {0};
     job j = {0};
     char *key = NULL;
@@ -267,23 +262,16 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         else
             jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
     } else if (validate_only) {
-        /* One prediction at a time: it takes memory and a processor that are counted for the workers. */
         uz_prediction predicted;
-        uz_error err = {.status = UZ_OK};
         api_asker asker = {context, rq};
-        const uz_hooks hooks = {.ctx = &asker, .cancelled = api_is_over};
-        const size_t limit = request.settings.memory_limit = work_settings(context->work)->solve_bytes;
-        int64_t m, n_u;
-        bool known = false;
-        if (!request.settings.semidefinite && !request.problem.scene.refine &&
-            codec_request_sizes(&request, &m, &n_u, &ignored) && (double)n_u < PREDICTED_MOST &&
-            (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit)) {
-            pthread_mutex_lock(&context->predict_lock);
-            uz_thread_init();
-            known = !api_is_over(&asker) &&
-                    uz_predict(&predicted, &request.problem, &request.settings, &hooks, &err) == UZ_OK;
-            pthread_mutex_unlock(&context->predict_lock);
-        }
+        codec_request_strip(&request); /* the process decodes again, as a worker's below */
+        const work_request asked = {.text = rq->body,
+                                    .len = rq->body_len,
+                                    .uploads = (const char(*)[65])request.uploads,
+                                    .n_uploads = request.n_uploads,
+                                    .is_over = api_is_over,
+                                    .asker = &asker};
+        const bool known = work_predict(context->work, &asked, &predicted);
         reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
     } else {
         codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */

@@ -45,6 +45,7 @@ struct work {
     pthread_mutex_t pool_lock; /* of each process what its header says; taken alone */
     pthread_cond_t pool_idle;  /* one was given back */
     process *processes;        /* n of them: the workers' first, then those of the lanes */
+    bool predicting;           /* a process of its own does */
 
     pthread_mutex_t lock;  /* everything down to drain_until */
     pthread_cond_t wake;   /* submitted or stopping */

@@ -9,6 +9,7 @@
  *     <- ASK     -> ANSWER          an upload, or a part of an earlier job; as often as it likes
  *     <- READ                       the text was read; names of the cases are in the outbox
  *     <- DONE                       the outcome is in the outbox
+ *     -> PREDICT <- PREDICTED       a text in the inbox whose cost is asked for; it may ASK meanwhile
  *     -> LIST    <- LISTED          between jobs: what its cache has, in the outbox */
 #ifndef SERVER_WORK_MESSAGE_H
 #define SERVER_WORK_MESSAGE_H
@@ -33,7 +34,9 @@ typedef enum {
     MESSAGE_READ,
     MESSAGE_DONE,
     MESSAGE_LIST,
-    MESSAGE_LISTED
+    MESSAGE_LISTED,
+    MESSAGE_PREDICT,
+    MESSAGE_PREDICTED
 } message_kind;
 typedef enum { ASK_UPLOAD, ASK_BLOB, ASK_CASE } ask_kind;
 
@@ -52,7 +55,7 @@ typedef struct {
             double queue_s, max_solve_s;
             uint64_t memory;
             int32_t threads; /* that a large factorization may take */
-        } job;
+        } job;               /* of PREDICT the size and the memory */
         struct {
             ask_kind what;
             char id[65]; /* of the upload, or of the job */
@@ -78,6 +81,10 @@ typedef struct {
         struct {
             uint64_t count; /* entries from the begin of the outbox on */
         } listed;
+        struct {
+            bool known; /* else nothing tells it but the solve */
+            uz_prediction cost;
+        } predicted;
     } u;
 } packet;
 

@@ -59,7 +59,10 @@ void relay_answer(packet *answer, int *fd, store *s, const relay_rights *of, con
     snprintf(name, sizeof name, "%.*s", (int)sizeof name - 1, ask->u.ask.name);
     *answer = (packet){.kind = MESSAGE_ANSWER, .status = STORE_ERROR, .u.answer = {.at = at}};
     *fd = -1;
-    if (ask->u.ask.what != ASK_UPLOAD && strcmp(id, of->start) != 0) {
+    bool allowed = ask->u.ask.what == ASK_UPLOAD ? of->job != NULL : strcmp(id, of->start) == 0;
+    for (size_t i = 0; i < of->n_uploads && ask->u.ask.what == ASK_UPLOAD; i++)
+        allowed = allowed || strcmp(id, of->uploads[i]) == 0;
+    if (!allowed) {
         answer->status = STORE_NOT_FOUND;
     } else if (ask->u.ask.what == ASK_UPLOAD) {
         answer->status = (int32_t)store_upload_descriptor(s, id, of->job, fd, &answer->u.answer.value);

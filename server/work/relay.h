@@ -11,16 +11,19 @@
  * operation. Socket and inbox must outlive it; closed with store_close. NULL: no memory. */
 store *relay_open(int socket, segment *inbox);
 
-/* What a job may have: the uploads that its request names, and parts of the job that it starts from. */
+/* What a process may have: the uploads that the request of its job names, and parts of the job that this starts from.
+ * Without a job: these uploads. */
 typedef struct {
-    const char *job;
-    char start[33]; /* "": it starts from none */
+    const char *job;           /* may be NULL */
+    char start[33];            /* "": it starts from none */
+    const char (*uploads)[65]; /* n_uploads */
+    size_t n_uploads;
 } relay_rights;
 
 /* start: what the text of a request names by the key "job", which nothing else in it has; "" where that is no id. */
 void relay_find_start(char start[33], const char *request, size_t len);
 
-/* The daemon's side: fills the ANSWER to an ASK of the process that runs a job with these rights; what is large goes
+/* The daemon's side: fills the ANSWER to an ASK of the process that has these rights; what is large goes
  * into the inbox from `at` on. *fd: a descriptor that goes with it, which the caller closes; -1: none. */
 void relay_answer(packet *answer, int *fd, store *s, const relay_rights *of, const packet *ask, segment *inbox,
                   size_t at);

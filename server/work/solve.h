@@ -48,6 +48,10 @@ typedef struct {
 void solve_job(solution *out, const solve_with *with, const char *id, char *body, size_t body_len);
 void solution_clear(solution *s);
 
+/* What a request will take, of `with` the source, the memory limit and the hooks. False: nothing can tell, or it would
+ * take too long. body: freed once it was read. */
+bool solve_predict(uz_prediction *out, const solve_with *with, char *body, size_t body_len);
+
 /* Makes the outcome a failure: its error is `encoded`, which the solution then owns, or, where that is NULL, that there
  * was no memory. */
 void solution_fail(solution *s, char *encoded);

@@ -92,6 +92,28 @@ static void note_request(void *ctx, const codec_request *request)
 
 /* ---- messages */
 
+/* The text that came with a message; NULL: there is none, or no memory. */
+static char *take_text(solver *s, const packet *m)
+{
+    const size_t size = (size_t)m->u.job.size;
+    char *text = !m->u.job.damaged && segment_reach(&s->inbox, size, false) ? malloc(size + 1) : NULL;
+    if (text) {
+        memcpy(text, s->inbox.at, size);
+        text[size] = '\0';
+    }
+    return text;
+}
+
+static void run_prediction(solver *s, const packet *m)
+{
+    const uz_hooks hooks = {.ctx = s, .cancelled = is_stopped};
+    const solve_with with = {.source = s->source, .hooks = &hooks, .memory_limit = (size_t)m->u.job.memory};
+    packet reply = {.kind = MESSAGE_PREDICTED};
+    char *text = take_text(s, m);
+    reply.u.predicted.known = text && solve_predict(&reply.u.predicted.cost, &with, text, (size_t)m->u.job.size);
+    message_send(s->socket, &reply, -1);
+}
+
 static void run_job(solver *s, const packet *m)
 {
     const uz_hooks hooks = {
@@ -103,18 +125,13 @@ static void run_job(solver *s, const packet *m)
                              .max_solve_s = m->u.job.max_solve_s,
                              .queue_s = m->u.job.queue_s,
                              .read = note_request};
-    const size_t size = (size_t)m->u.job.size;
     packet done = {.kind = MESSAGE_DONE};
     solution solved;
-    char *body = NULL;
+    char *body = take_text(s, m);
     s->names = 0;
     uz_process_threads(m->u.job.threads);
-    if (!m->u.job.damaged && segment_reach(&s->inbox, size, false) && (body = malloc(size + 1))) {
-        memcpy(body, s->inbox.at, size);
-        body[size] = '\0';
-    }
     if (body || m->u.job.damaged) {
-        solve_job(&solved, &with, m->u.job.id, body, size);
+        solve_job(&solved, &with, m->u.job.id, body, (size_t)m->u.job.size);
     } else {
         solved = (solution){.n = 0};
         solution_fail(&solved, NULL);
@@ -192,6 +209,8 @@ static void serve(solver *s)
             return;
         if (m.kind == MESSAGE_JOB)
             run_job(s, &m);
+        if (m.kind == MESSAGE_PREDICT)
+            run_prediction(s, &m);
         if (m.kind == MESSAGE_LIST) {
             packet listed = {.kind = MESSAGE_LISTED};
             uz_cache_entry *entries = NULL;

@@ -79,6 +79,19 @@ bool work_factors(work *w, uz_cache_entry **entries, size_t *count);
 void work_cached(work *w, size_t *entries, size_t *bytes);
 const work_options *work_settings(const work *w); /* as they are in force */
 int work_busy(work *w);                           /* workers, without the lanes, that run a job */
+/* What a request that is no job will take (uz_predict), found in a process of its own, which ends with the call: it may
+ * take minutes and much memory, or die. One at a time. */
+typedef struct {
+    const char *text;
+    size_t len;
+    const char (*uploads)[65]; /* n_uploads, which it may read */
+    size_t n_uploads;
+    bool (*is_over)(void *asker); /* nobody waits for it any more; asked some times a second */
+    void *asker;
+} work_request;
+/* False: nothing can tell, or it is over. */
+bool work_predict(work *w, const work_request *request, uz_prediction *out);
+
 /* A small problem is solved rightly by a worker that is idle; true too where all are at work. One thread asks. */
 bool work_solves(work *w);
 

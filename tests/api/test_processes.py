@@ -1,7 +1,9 @@
 """Solves in processes of their own: they obey in any phase, a death is one job's alone, and they can do nothing but solve.
 usage: test_processes.py BUILD_DIR [FILTER]"""
 # not under sanitizers: about times, and about a filter that a sanitizer does not get through
+import concurrent.futures
 import copy
+import json
 import os
 import pathlib
 import resource
@@ -179,6 +181,42 @@ def test_an_idle_process_may_go(s):
         os.kill(s.solvers()[0], signal.SIGKILL)
     check(s.solve(MATRICES)["attempts"] == 1)
     check(s.events("process_died") == [])
+
+
+@options("--workers", "1")
+def test_a_prediction_is_nobodys_danger(s):
+    """It has a process of its own: one that dies leaves an answer, one that nobody waits for ends, and so does the next."""
+    s.solve(MATRICES)
+    own = s.solvers()
+
+    def predictor():
+        end = time.monotonic() + 10
+        while not (found := [pid for pid in s.solvers() if pid not in own]):
+            check(time.monotonic() < end, "no process predicts")
+            time.sleep(0.005)
+        return found[0]
+
+    with concurrent.futures.ThreadPoolExecutor(1) as aside:
+        reply = aside.submit(s.post, LONG, query="?validate=true")
+        time.sleep(0.1)
+        os.kill(predictor(), signal.SIGKILL)
+        check(expect(reply.result(), 200).json == {"valid": True, "predicted": None}, reply.result())
+    check(len(s.events("prediction_died")) == 1)
+    body = json.dumps(LONG).encode()
+    for leaves in (False, True):  # another one waits for its turn meanwhile, and leaves too
+        callers = [s.connect(timeout=5) for _ in range(1 + leaves)]
+        for caller in callers:
+            caller.sendall(b"POST /v1/jobs?validate=true HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n"
+                           b"Content-Length: %d\r\n\r\n" % len(body) + body)
+        predictor()
+        for caller in reversed(callers):
+            caller.close()
+        end = time.monotonic() + 1.5
+        while s.solvers() != own:
+            check(time.monotonic() < end, "it goes on for nobody")
+            time.sleep(0.01)
+    check(len(s.events("prediction_died")) == 1)
+    check(expect(s.post(SCENE, query="?validate=true"), 200).json["predicted"]["d"] == 660 and s.solvers() == own)
 
 
 @options("--workers", "1")

@@ -2,6 +2,8 @@
 #include "store_place.h"
 #include "work/relay.h"
 
+#include <unistd.h>
+
 #define ID    "0123456789abcdef0123456789abcdef"
 #define OTHER "fedcba9876543210fedcba9876543210"
 
@@ -69,5 +71,41 @@ TEST(parts_of_other_jobs_are_not_given)
         }
     }
     segment_close(&inbox);
+    place_end(&p);
+}
+
+/* Without a job it may have the uploads that it was told, and nothing else. */
+TEST(uploads_of_a_request_that_is_no_job)
+{
+    char known[2][65], folder[128];
+    place p;
+    segment inbox = {.fd = -1};
+    CHECK(place_begin(&p) && segment_make(&inbox, 0));
+    for (int i = 0; i < 2; i++) {
+        upload_status status;
+        upload_info info = {.bytes = 0};
+        bool before;
+        upload_writer *w = store_upload_begin(p.s, NULL, false, &status);
+        CHECK(w && store_upload_write(w, &i, sizeof i) == UPLOAD_OK &&
+              store_upload_end(w, &info, &before) == UPLOAD_OK);
+        memcpy(known[i], info.id, sizeof known[i]);
+    }
+    for (size_t n = 0; n < 3; n++)
+        for (int i = 0; i < 2; i++) {
+            const relay_rights rights = {.uploads = (const char(*)[65])known, .n_uploads = n};
+            packet ask = {.kind = MESSAGE_ASK, .u.ask = {.what = ASK_UPLOAD}}, answer;
+            int fd;
+            memcpy(ask.u.ask.id, known[i], sizeof ask.u.ask.id);
+            relay_answer(&answer, &fd, p.s, &rights, &ask, &inbox, 0);
+            CHECK_INT(answer.status, (size_t)i < n ? STORE_OK : STORE_NOT_FOUND);
+            CHECK((fd >= 0) == ((size_t)i < n));
+            if (fd >= 0)
+                close(fd);
+        }
+    segment_close(&inbox);
+    for (int i = 0; i < 2; i++)
+        CHECK_INT(store_upload_delete(p.s, known[i], NULL), STORE_OK);
+    snprintf(folder, sizeof folder, "%s-uploads", p.path);
+    CHECK_INT(rmdir(folder), 0);
     place_end(&p);
 }
