@@ -221,23 +221,26 @@ static bool fits(uz_smooth_shape *s, const double *xyz, int64_t n, double size)
            largest < FLAT * size;
 }
 
-/* Takes s where its normals are clearly nearer to those of the points than those of the shape found so far: two
- * circles, as of one layer of elements, are on a sphere and on a cone as well. apart: mean square of the sines between
- * them. */
-static void take_if_nearer(uz_smooth_shape *found, double *apart, const uz_smooth_shape *s, const double *xyz,
-                           const double *normal, int64_t n)
+/* Takes s where the normals of the points are nearer to its own than to those of the shape found so far: two circles,
+ * as of one layer of elements, are on a sphere and on a cone as well. What facets turn along the circles is many times
+ * what tells these two apart, and is off both alike: the difference of the squares has none of it. It is the squared
+ * angle between the shapes where the points have the normals of s, and less that where they have the other's. */
+static void take_if_nearer(uz_smooth_shape *found, const uz_smooth_shape *s, const double *xyz, const double *normal,
+                           int64_t n)
 {
-    double sum = 0;
-    for (int64_t i = 0; i < n; i++) {
-        double offset[3], there[3], across[3];
-        uz_smooth_nearest(offset, there, s, xyz + 3 * i);
-        uz_cross3(across, there, normal + 3 * i);
-        sum += uz_dot3(across, across) / (double)n;
+    double nearer = 0, between = 0;
+    for (int64_t i = 0; i < n && found->kind != UZ_SMOOTH_NONE; i++) {
+        double offset[3], mine[3], its[3], off[3][3];
+        uz_smooth_nearest(offset, mine, s, xyz + 3 * i);
+        uz_smooth_nearest(offset, its, found, xyz + 3 * i);
+        uz_cross3(off[0], its, normal + 3 * i);
+        uz_cross3(off[1], mine, normal + 3 * i);
+        uz_cross3(off[2], mine, its);
+        nearer += (uz_dot3(off[0], off[0]) - uz_dot3(off[1], off[1])) / (double)n;
+        between += uz_dot3(off[2], off[2]) / (double)n;
     }
-    if (!(sum + 1e-9 < 0.5 * *apart))
-        return;
-    *found = *s;
-    *apart = sum;
+    if (found->kind == UZ_SMOOTH_NONE || nearer > 0.5 * between + 1e-9)
+        *found = *s;
 }
 
 /* ---- what normals say */
@@ -324,7 +327,7 @@ static bool find_torus(uz_smooth_shape *s, const double *xyz, const double *norm
 uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int64_t n)
 {
     enum { FEW = 6, ENOUGH_FOR_A_CONE = 7, ENOUGH_FOR_A_TORUS = 12 }; /* all six points are on a cone */
-    double size = 0, turn = 0, best = 0, apart = INFINITY, mean[3] = {0}, axis[2][3] = {{0}};
+    double size = 0, turn = 0, best = 0, mean[3] = {0}, axis[2][3] = {{0}};
     int64_t far = 0;
     for (int64_t i = 0; i < 3 * n; i++)
         mean[i % 3] += xyz[i] / (double)n;
@@ -358,7 +361,7 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
     for (int c = 0; c < 3; c++)
         s.point[c] = xyz[c] - radius * normal[c];
     if (fits(&s, xyz, n, size))
-        take_if_nearer(&found, &apart, &s, xyz, normal, n);
+        take_if_nearer(&found, &s, xyz, normal, n);
     /* The axis is across all normals of a cylinder, and across the differences of those of a cone; to a slender or flat
      * one with few faces the cylinder through the points is nearer, as means of the faces' normals differ at random. */
     uz_smooth_shape cylinder = {.kind = UZ_SMOOTH_NONE};
@@ -387,13 +390,13 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
         for (int c = 0; c < 3; c++)
             s.point[c] += up * s.axis[c];
         if (fits(&s, xyz, n, size))
-            take_if_nearer(&found, &apart, &s, xyz, normal, n);
+            take_if_nearer(&found, &s, xyz, normal, n);
         cylinder = k == 0 ? s : cylinder;
     }
     s = cylinder;
     s.kind = UZ_SMOOTH_CONE;
     if (n >= ENOUGH_FOR_A_CONE && cylinder.kind != UZ_SMOOTH_NONE && fits(&s, xyz, n, size))
-        take_if_nearer(&found, &apart, &s, xyz, normal, n);
+        take_if_nearer(&found, &s, xyz, normal, n);
     if (found.kind == UZ_SMOOTH_NONE && n >= ENOUGH_FOR_A_TORUS && find_torus(&s, xyz, normal, n, mean, size))
         return s;
     return found;

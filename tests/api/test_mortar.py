@@ -220,6 +220,15 @@ def test_cylinders_and_cones_are_recognised(s):
     check(-sum(answer_of(s, request)["reactions"]) > 3 * lame(0.005) * 20 * math.pi / 2 * 2)
 
 
+def test_one_layer_around_a_cylinder(s):
+    """Its nodes lie on two circles, and so on a sphere: a press fit on that had no force."""
+    def ring(inner, outer):
+        return lambda x, y, z: ((inner + (outer - inner) * x) * math.cos(math.pi / 2 * y), (inner + (outer - inner) * x) * math.sin(math.pi / 2 * y), 2 * z)
+    for kind, facets in service.some(itertools.product(("tet4", "hex8", "wedge6", "tet10"), ((9, 7), (5, 6), (15, 13)))):
+        summary = answer_of(s, fit_in_space(kind, ring(10, 20.005), ring(20, 40), ((2, facets[0], 1), (2, facets[1], 1))))["summary"]
+        check([one["shape"] for one in summary["contact"]["surfaces"]] == ["cylinder"] * 2, kind, facets, summary["contact"]["surfaces"])
+
+
 def test_flat_cells_press_evenly(s):
     """But at the free end, where flat plain bricks bulge by Poisson's ratio: there meshes that match are as far off, 7 %."""
     def ring(inner, outer):
