@@ -403,12 +403,24 @@ static int64_t take_samples(sample **out, uz_mortar_pair *pair, const int64_t *z
     return good ? n : -1;
 }
 
+/* Twice the distance of the farthest node from the mean of all, which is the same however the body is turned. */
+static double size_of(const uz_mesh *mesh)
+{
+    double mean[3] = {0}, most = 0;
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
+        mean[i % mesh->dim] += mesh->xyz[i] / (double)mesh->n_nodes;
+    for (int64_t i = 0; i < mesh->n_nodes; i++)
+        most = fmax(most, uz_distance2(mesh->xyz + i * mesh->dim, mean, mesh->dim));
+    return 2 * sqrt(most);
+}
+
 /* The finer of two zones where they face each other is the slave. Looked at only where the two are hardly farther from
  * each other than at their nearest: what is farther away touches late or never, however fine it is. */
 static bool rank_zones(uz_contact_sites *sites, uz_mortar_pair *pair, int64_t n_zones)
 {
     sample *s = NULL;
     const int64_t n = take_samples(&s, pair, sites->zone, n_zones);
+    const double reach = UZ_CANDIDATES_REACH * size_of(&pair->in->model->mesh);
     int64_t pairs = 0;
     if (n > 0)
         qsort(s, (size_t)n, sizeof *s, by_zones);
@@ -420,7 +432,7 @@ static bool rank_zones(uz_contact_sites *sites, uz_mortar_pair *pair, int64_t n_
         const bool from_hi = s[first].from_hi; /* those seen from the lower zone, if there are any */
         for (end = first; end < n && s[end].lo == s[first].lo && s[end].hi == s[first].hi; end++)
             least = s[end].from_hi == from_hi ? fmin(least, s[end].gap) : least;
-        const double most = fmax(least, 0) + UZ_CANDIDATES_REACH * pair->in->model->mesh.extent;
+        const double most = fmax(least, 0) + reach;
         for (int64_t k = first; k < end; k++)
             for (int j = 0; j < 2 && s[k].from_hi == from_hi && s[k].gap <= most; j++)
                 fine[j] += s[k].fine[j];
