@@ -165,7 +165,7 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
 
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err)
 {
-    static const char format[] = "uzawa body 5";
+    static const char format[] = "uzawa body 6";
     uz_buffer key = {0};
     char *text = NULL;
     const int dim = uz_scene_dim(scene);

@@ -121,6 +121,8 @@ uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_bo
     memset(model, 0, sizeof *model);
     uz_status status = uz_mesh_from_scene(&model->mesh, scene, err);
     if (status == UZ_OK)
+        status = uz_smooth_refined(&model->mesh, scene, err);
+    if (status == UZ_OK)
         status = uz_scene_check_body(scene, &model->mesh, err);
     if (status != UZ_OK) {
         uz_body_model_clear(model);

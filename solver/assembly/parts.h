@@ -7,6 +7,11 @@
 /* Unit vectors that differ less from the span of others add nothing to it. */
 #define UZ_DEPENDENT 1e-9
 
+/* Moves the nodes of a refined mesh that bisection has put on sides of contacts between surfaces, which are not
+ * told to be faceted, to the smooth surfaces that the sides stood for as they were given; but where an element would
+ * lose most of its size. */
+uz_status uz_smooth_refined(uz_mesh *mesh, const uz_scene *scene, uz_error *err);
+
 /* Scene -> kind, formulation, thickness, materials, material_of. UZ_ERR_SCENE names an element without material. */
 uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_error *err);
 

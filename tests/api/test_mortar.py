@@ -175,6 +175,44 @@ def test_press_fit_of_facets_is_lames(s):
             check(abs(mean - 1) < mean_off and abs(most - 1) < most_off, kind, facets, interference, mean, most)
 
 
+def test_refined_facets_stay_a_press_fit(s):
+    """Bisected facets that stayed flat stood in each other: 230 times Lame's pressure on the finest mesh, and "converged"."""
+    for kind, total, most_off in (("tri3", 0.03, 0.08), ("quad4", 0.03, 0.15), ("quad8", 0.01, 0.01)):
+        for smooth in (True, False) if kind == "quad4" else (True,):
+            request = press_fit(kind, (7, 5), 0.005, **({} if smooth else {"smooth": False}))
+            given = len(request["problem"]["mesh"]["nodes"])
+            request["problem"]["mesh"]["refine"] = "auto"
+            job = expect(s.post({**request, "solver": {"accuracy": {"total": total if smooth else 0.1}}}, WAIT), 200).json
+            answer = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=pressure,reactions,nodes"), 200).json
+            off = [min(abs(math.hypot(*answer["nodes"][k]) - r) for r in (20, 20.005)) for k in answer["contact_nodes"] if k >= given]
+            check(len(off) >= 4 and len(answer["nodes"]) < 20000, kind, len(off), len(answer["nodes"]))
+            if not smooth:  # facets as they are stay so
+                check(max(off) > 0.05, max(off))
+                continue
+            check(job["summary"]["outcome"] == "converged" and max(off) < 1e-4, kind, max(off), job["summary"]["message"])
+            mean = -sum(answer["reactions"]) / (20 * math.pi / 2) / lame(0.005)
+            check(abs(mean - 1) < 5e-3, kind, mean)
+            for p in answer["pressure"]:
+                check(abs(p / lame(0.005) - 1) < most_off, kind, p / lame(0.005))
+
+
+def test_refined_faces_stay_round(s):
+    """In space, of a recognised cylinder."""
+    def ring(inner, outer):
+        return lambda x, y, z: ((inner + (outer - inner) * x) * math.cos(math.pi / 2 * y), (inner + (outer - inner) * x) * math.sin(math.pi / 2 * y), 2 * z)
+    request = fit_in_space("tet4", ring(10, 20.005), ring(20, 40), ((3, 9, 1), (3, 7, 1)))
+    given = len(request["problem"]["mesh"]["nodes"])
+    request["problem"]["mesh"]["refine"] = "auto"
+    job = expect(s.post({**request, "solver": {"accuracy": {"total": 0.1}}}, WAIT), 200).json
+    answer = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=reactions,nodes"), 200).json
+    new = [k for k in answer["contact_nodes"] if k >= given]
+    check(job["summary"]["outcome"] == "converged" and len(new) > 10, len(new), job["summary"])
+    off = [min(abs(math.hypot(*answer["nodes"][k][:2]) - r) for r in (20, 20.005)) for k in new]
+    check(max(off) < 1e-9, max(off))
+    mean = -sum(answer["reactions"]) / (20 * math.pi / 2 * 2) / lame(0.005)
+    check(abs(mean - 1) < 0.03, mean)
+
+
 def test_linear_and_quadratic_sides_press_evenly(s):
     """A quadratic slave on a linear master zigzags, by 18 % where cells are as here; so the linear one is the slave."""
     def ring(inner, outer):
