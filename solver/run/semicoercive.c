@@ -32,6 +32,11 @@ static const double HARD[] = {0.25, 1e-2, 1e-4};
 /* A pivot this many d eps large may be what rounding left of a zero. */
 static const double DOUBTFUL = 1e3;
 
+static bool is_doubtful(const uz_result *result)
+{
+    return result->summary.rcond < DOUBTFUL * DBL_EPSILON * (double)result->d;
+}
+
 bool uz_may_be_semicoercive(uz_status refused, const uz_result *result, const uz_problem *problem,
                             const uz_settings *settings)
 {
@@ -41,8 +46,7 @@ bool uz_may_be_semicoercive(uz_status refused, const uz_result *result, const uz
         return false;
     if (problem->qp.N.rows < 1 || refused != UZ_OK)
         return refused == UZ_ERR_NOT_SPD && problem->qp.N.rows > 0;
-    const uz_summary *s = &result->summary;
-    return s->outcome == UZ_PRECISION_LIMIT && s->rcond < DOUBTFUL * DBL_EPSILON * (double)result->d;
+    return result->summary.outcome == UZ_PRECISION_LIMIT && is_doubtful(result);
 }
 
 static uz_status build_scene(uz_semi *s, uz_error *err)
@@ -275,7 +279,8 @@ static uz_status solve_exact(uz_semi *s, bool *done, uz_contact_verdict *verdict
 /* Phase 2, with more rows until they hold the body and are proved to be in contact. */
 static uz_status try_exact(uz_semi *s, bool *done, uz_error *err)
 {
-    int64_t before = 0;
+    const size_t levels = sizeof HARD / sizeof HARD[0];
+    int64_t before = 0, most = 0;
     double hardest = 0.0;
     bool held = false;
     double *press = uz_alloc_zero(s->m, sizeof *press);
@@ -286,7 +291,9 @@ static uz_status try_exact(uz_semi *s, bool *done, uz_error *err)
             press[i] = -s->last->r[i] / sqrt(s->stiffness[i]);
     for (int64_t i = 0; status == UZ_OK && i < s->m; i++)
         hardest = fmax(hardest, press[i]);
-    for (size_t level = 0; level < sizeof HARD / sizeof HARD[0] && status == UZ_OK && !*done; level++) {
+    for (int64_t i = 0; i < s->m && status == UZ_OK; i++)
+        most += press[i] > 0.0 && press[i] >= HARD[levels - 1] * hardest;
+    for (size_t level = 0; level < levels && status == UZ_OK && !*done; level++) {
         uz_contact_verdict verdict = UZ_CONTACT_DENIED;
         uz_error refusal = {0};
         int64_t count = 0;
@@ -302,7 +309,9 @@ static uz_status try_exact(uz_semi *s, bool *done, uz_error *err)
         uz_status tried = solve_exact(s, done, &verdict, &refusal);
         if (tried == UZ_OK) {
             held = true;
-            if (verdict >= UZ_CONTACT_DENIED)
+            if (is_doubtful(s->last) && count < most && !is_over(s))
+                *done = false; /* rounding left a pivot of what these rows do not hold */
+            else if (verdict >= UZ_CONTACT_DENIED)
                 break;
         } else if (tried != UZ_ERR_NOT_SPD) {
             status = uz_fail(err, tried, refusal.where, "%s", refusal.message);

@@ -23,6 +23,13 @@ def test_a_slender_cone_of_few_faces(s):
     check(not found["failures"], found["failures"])
 
 
+def test_rows_that_seem_to_hold_a_body(s):
+    """Of plates on each other the rows that press hardest were all between two of them, and K with these was factored with a
+    pivot that rounding had left: precision_limit, by the order of the nodes."""
+    found = generated_contacts.run(s, [930052], lambda *said, **_: None, refine=False)
+    check(not found["failures"], found["failures"])
+
+
 def test_a_nearly_flat_cylinder(s):
     """A radius of ninety times its width was found, or taken for a free form, by which node came first."""
     found = generated_contacts.run(s, [512072], lambda *said, **_: None, refine=False)
