@@ -82,10 +82,9 @@ class Mutator:
         target = chance.choice(list(self.posts))
         body = copy.deepcopy(chance.choice(self.posts[target]))
         for _ in range(chance.choice((1, 1, 1, 2, 5))):
-            before = copy.deepcopy(body)
             body = self._changed(body, chance)
             if next(itertools.islice(_places(body), MOST_PLACES, None), None):  # lists of lists, each some thousand times
-                body = before
+                return self.document(chance)
         text = json.dumps(body, ensure_ascii=chance.random() < 0.5)
         for name, raw in RAW.items():
             text = text.replace(f'"{name}"', raw)
