@@ -1,6 +1,8 @@
 /* refined_surfaces.c: nodes that bisection has put on the facets of a surface go to the smooth surface that the facets
  * stand for. A contact between two surfaces takes that for the shape of the body; nodes that stayed on the facets would
- * make those the shape, the more the finer the mesh. New nodes within the body follow those that they lie amid. */
+ * make those the shape, the more the finer the mesh. Before an obstacle facets are what they are, unless their nodes
+ * are on a circle, a sphere, a cylinder, a cone or a torus: no fine mesh of a polygon has the contact of a roller. New
+ * nodes within the body follow those that they lie amid. */
 #include "assembly/mortar.h"
 #include "assembly/parts.h"
 #include "core/alloc.h"
@@ -15,6 +17,10 @@
 
 /* An element that keeps less than this part of its size is not left so. */
 #define LEAST_SIZE 0.3
+
+/* Nodes that are no farther from a circle than this part of its radius are on it; fewer are on many. */
+#define ON_CIRCLE 1e-6
+enum { FEWEST = 6 };
 
 /* Offsets below this part of the mesh's size are rounding. */
 #define ROUNDING 1e-13
@@ -57,6 +63,68 @@ static const entry *find_entry(const refined *x, int64_t node, const entry *of)
         if (x->item[k].surface == of->surface && x->item[k].side == of->side)
             return &x->item[k];
     return NULL;
+}
+
+/* Which parts of a surface in the plane are circles. round: n_places, by uz_mortar_find_parts. */
+static void find_circles(bool *round, const int64_t *part, const uz_mortar_surface *surface, const uz_mesh *mesh)
+{
+    for (int64_t first = 0; first < surface->n_places; first++) {
+        const double *at[3] = {mesh->xyz + 2 * surface->node[first], NULL, NULL};
+        double far[2] = {0, 0}, most = 0;
+        int64_t count = 0;
+        if (part[first] != first)
+            continue;
+        /* the one farthest from the first, then the one farthest from the line between these two */
+        for (int turn = 0; turn < 2; turn++)
+            for (int64_t p = 0; p < surface->n_places; p++) {
+                const double *x = mesh->xyz + 2 * surface->node[p];
+                const double off[2] = {x[0] - at[0][0], x[1] - at[0][1]};
+                const double size = turn == 0 ? uz_dot2(off, off)
+                                    : at[1] ? fabs(uz_cross2(off, (double[]){at[1][0] - at[0][0], at[1][1] - at[0][1]}))
+                                            : 0;
+                if (part[p] != first || !(size > far[turn]))
+                    continue;
+                far[turn] = size;
+                at[turn + 1] = x;
+            }
+        if (!at[2])
+            continue;
+        const double b[2] = {at[1][0] - at[0][0], at[1][1] - at[0][1]},
+                     c[2] = {at[2][0] - at[0][0], at[2][1] - at[0][1]};
+        const double twice = 2 * uz_cross2(b, c), bb = uz_dot2(b, b), cc = uz_dot2(c, c);
+        const double centre[2] = {(c[1] * bb - b[1] * cc) / twice, (b[0] * cc - c[0] * bb) / twice};
+        const double radius = hypot(centre[0], centre[1]);
+        for (int64_t p = 0; p < surface->n_places; p++) {
+            const double *x = mesh->xyz + 2 * surface->node[p];
+            if (part[p] != first)
+                continue;
+            most = fmax(most, fabs(hypot(x[0] - at[0][0] - centre[0], x[1] - at[0][1] - centre[1]) - radius));
+            count++;
+        }
+        round[first] = count >= FEWEST && most <= ON_CIRCLE * radius && radius < sqrt(far[0]) / sqrt(ON_CIRCLE);
+    }
+}
+
+/* Leaves those sides of a surface before an obstacle that are on no round shape as they are: without nodes. */
+static bool keep_round(uz_mortar_surface *surface, const uz_mesh *mesh)
+{
+    int64_t *part = uz_alloc(surface->n_places, sizeof *part);
+    bool *round = uz_alloc_zero(surface->n_places, sizeof *round);
+    const bool room = part && round;
+    if (room)
+        uz_mortar_find_parts(part, surface);
+    if (room && mesh->dim == 2)
+        find_circles(round, part, surface, mesh);
+    for (int64_t i = 0; i < surface->n && room; i++) {
+        uz_mortar_side *side = &surface->side[i];
+        const uz_smooth_kind kind = side->shape.kind;
+        const bool kept =
+            mesh->dim == 2 ? round[part[side->place[0]]] : kind != UZ_SMOOTH_NONE && kind != UZ_SMOOTH_PLANE;
+        side->nodes = kept ? side->nodes : 0;
+    }
+    free(part);
+    free(round);
+    return room;
 }
 
 /* Which nodes are on which sides: those of the sides, then, in their order, those that lie amid such of one side only.
@@ -162,9 +230,10 @@ static bool hold_elements(refined *x)
     return more;
 }
 
+/* Nodes against faces take facets as they are. */
 static bool is_smooth(const uz_contact *contact)
 {
-    return uz_discretization_of(contact) == &uz_surface_to_surface && !contact->faceted;
+    return uz_discretization_of(contact) != &uz_node_to_face && !contact->faceted;
 }
 
 uz_status uz_smooth_refined(uz_mesh *mesh, const uz_scene *scene, uz_error *err)
@@ -188,11 +257,17 @@ uz_status uz_smooth_refined(uz_mesh *mesh, const uz_scene *scene, uz_error *err)
         status = uz_mesh_from_scene(&x.given.mesh, &whole, err);
     for (int64_t k = 0; k < 2 * scene->n_contacts && status == UZ_OK; k++) {
         uz_contact_input in;
-        if (!is_smooth(&scene->contacts[k / 2]))
+        const uz_contact *contact = &scene->contacts[k / 2];
+        const bool obstacle = contact->kind != UZ_OBSTACLE_BODY;
+        if (!is_smooth(contact) || (obstacle && k % 2))
             continue;
         status = uz_contact_input_of(&in, &x.given, scene, k / 2, err);
+        if (status == UZ_OK && in.on->n_faces == 0)
+            continue;
         if (status == UZ_OK)
             status = uz_mortar_surface_make(&x.surface[k], &in, k % 2 ? in.with : in.on, err);
+        if (status == UZ_OK && obstacle && !keep_round(&x.surface[k], &x.given.mesh))
+            status = uz_no_memory(err, "the surfaces of a refined mesh");
     }
     if (status == UZ_OK) {
         for (int64_t i = 0; i < mesh->n_nodes; i++)

@@ -213,6 +213,22 @@ def test_refined_faces_stay_round(s):
     check(abs(mean - 1) < 0.03, mean)
 
 
+def test_refined_rollers_stay_round(s):
+    """Polygons of 10 degrees a side pressed 27 % less on a plane, the finer the surer; now it is the roller's 58.31, on facets
+    at the hole still."""
+    def sector(x, y):
+        angle, radius = math.pi / 3 * (2 * x - 1), 10 - 6 * y
+        return radius * math.sin(angle), 10 - radius * math.cos(angle)
+    for kind, smooth in (("tri3", True), ("quad4", True), ("quad4", False)):
+        request = body([kind], [(12, 6)], [sector], {"round": [(0, "bottom")], "lid": [(0, "top")]}, model="plane_strain",
+                       materials=[{"on": "all", "young": 1000, "poisson": 0.3}], supports=[{"on": "lid", "ux": 0, "uy": -0.1}],
+                       contacts=[{"on": "round", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}, "smooth": smooth}])
+        request["problem"]["mesh"]["refine"] = "auto"
+        job = expect(s.post({**request, "solver": {"accuracy": {"total": 0.04}}}, WAIT), 200).json
+        force = -job["summary"]["contact"]["reaction_sum"]
+        check(abs(force / (58.31 if smooth else 42.4) - 1) < 0.01, kind, smooth, force)
+
+
 def test_linear_and_quadratic_sides_press_evenly(s):
     """A quadratic slave on a linear master zigzags, by 18 % where cells are as here; so the linear one is the slave."""
     def ring(inner, outer):
@@ -396,7 +412,7 @@ def test_refusals_name_the_place(s):
     refused(lambda p: p["contacts"][0].update({"feature_angle": 0}), "/contacts/0/feature_angle")
     refused(lambda p: p["contacts"][0].update({"obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}),
             "/contacts/0", "obstacle")
-    refused(lambda p: p["contacts"].append({"on": "high", "smooth": False,
+    refused(lambda p: p["contacts"].append({"on": "high", "feature_angle": 30,
                                             "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}),
             "/contacts/1", "with")
 

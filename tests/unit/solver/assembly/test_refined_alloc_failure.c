@@ -104,6 +104,35 @@ TEST(new_nodes_are_where_the_smooth_surface_is)
         }
 }
 
+/* Twice as wide as high. */
+static void flatten(double x[3])
+{
+    bend(x);
+    x[1] *= 0.5;
+}
+
+TEST(what_is_round_before_an_obstacle_stays_so)
+{
+    static const char *const ELEMENTS[] = {"tri3", "quad4", "tet4"};
+    for (size_t k = 0; k < sizeof ELEMENTS / sizeof ELEMENTS[0]; k++)
+        for (int oval = 0; oval < 2; oval++) {
+            uz_scene s = ring(ELEMENTS[k], 8, oval ? flatten : bend), still;
+            s.contacts[0] = (uz_contact){.kind = UZ_OBSTACLE_PLANE, .on = "top", .normal = {0, 1, 0}};
+            uz_mesh mesh = refined(&s, 1);
+            still = s;
+            still.n_contacts = 0;
+            uz_mesh facets = refined(&still, 1);
+            const size_t size = (size_t)(mesh.n_nodes * mesh.dim) * sizeof *mesh.xyz;
+            CHECK_INT(mesh.n_nodes, facets.n_nodes);
+            CHECK((memcmp(mesh.xyz, facets.xyz, size) == 0) == oval);
+            CHECK(oval || off_circle(&mesh, "top", RADIUS) < 1e-5);
+            CHECK(oval || off_circle(&mesh, "bottom", INNER) > 1e-3); /* which touches nothing */
+            uz_mesh_clear(&mesh);
+            uz_mesh_clear(&facets);
+            uz_scene_clear(&s);
+        }
+}
+
 /* The inner side goes into elements that are thinner than its sagitta; new nodes within follow, or all stays. */
 TEST(elements_stay_sound)
 {
