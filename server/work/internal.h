@@ -82,12 +82,14 @@ bool work_is_stopping(work *w);
 /* Of the load case i of the job that it runs, once that was read. */
 void work_case_name(const process *p, int64_t i, char name[CASE_NAME]);
 
-/* A process for a job with this text, that is: one that has its body, else the first one; of the lanes' for a lane.
- * There are as many as workers; still there may be a moment in which one more is asked what it has. */
+/* A process for a job with this text, that is: one that has its body, even if it is to be waited for while an
+ * outcome is stored, else the first one; of the lanes' for a lane. *body: for work_answered; 0: not to be told. There
+ * are as many as workers; still there may be a moment in which one more is asked what it has. */
 process *work_take_process(work *w, bool lane, const char *text, size_t len, uint64_t *body);
-/* body: of the text that it has solved, as taking said; 0: nothing. done: what it said at the end; NULL: it has ended.
- */
-void work_give_process(work *w, process *p, uint64_t body, const packet *done);
+/* It has solved this body and only its outcome is still to be stored. */
+void work_answered(work *w, process *p, uint64_t body);
+/* done: what it said at the end; NULL: it has ended. */
+void work_give_process(work *w, process *p, const packet *done);
 /* Those that nobody has had for a while give back the memory of texts and answers. */
 void work_rest_processes(work *w);
 

@@ -13,30 +13,48 @@
 
 static bool has_body(const process *p, uint64_t body)
 {
-    for (int i = 0; i < PROCESS_BODIES; i++)
+    for (int i = 0; body && i < PROCESS_BODIES; i++)
         if (p->bodies[i] == body)
             return true;
     return false;
 }
 
+/* The better of two for a job, or NULL for none yet: one that has its body, even if it still has to store an outcome.
+ * Whoever asks for the next one as soon as a job has ended would otherwise find its process taken. */
+static process *better(process *a, process *b, uint64_t body)
+{
+    const bool has = has_body(b, body);
+    if (b->taken && !(has && b->answered))
+        return a;
+    return !a || (has && (!has_body(a, body) || (a->taken && !b->taken))) ? b : a;
+}
+
 process *work_take_process(work *w, bool lane, const char *text, size_t len, uint64_t *body)
 {
     const int first = lane ? w->options.workers : 0, end = lane ? w->n : w->options.workers;
-    process *found = NULL;
+    process *found;
     *body = text && end - first > 1 && len <= TEXT_MOST ? process_body(text, len) : 0;
     pthread_mutex_lock(&w->pool_lock);
-    while (!found) {
-        for (int i = first; i < end; i++) {
-            process *p = &w->processes[i];
-            if (!p->taken && (!found || (*body && !has_body(found, *body) && has_body(p, *body))))
-                found = p;
-        }
-        if (!found)
-            pthread_cond_wait(&w->pool_idle, &w->pool_lock);
+    for (;;) {
+        found = NULL;
+        for (int i = first; i < end; i++)
+            found = better(found, &w->processes[i], *body);
+        if (found && !found->taken)
+            break;
+        pthread_cond_wait(&w->pool_idle, &w->pool_lock);
     }
     found->taken = true;
     pthread_mutex_unlock(&w->pool_lock);
     return found;
+}
+
+void work_answered(work *w, process *p, uint64_t body)
+{
+    pthread_mutex_lock(&w->pool_lock);
+    p->answered = true;
+    if (body && !has_body(p, body))
+        p->bodies[p->next_body++ % PROCESS_BODIES] = body;
+    pthread_mutex_unlock(&w->pool_lock);
 }
 
 static void rest_process(process *p, size_t most)
@@ -57,7 +75,7 @@ void work_rest_processes(work *w)
     pthread_mutex_unlock(&w->pool_lock);
 }
 
-void work_give_process(work *w, process *p, uint64_t body, const packet *done)
+void work_give_process(work *w, process *p, const packet *done)
 {
     rest_process(p, SEGMENT_WARM);
     pthread_mutex_lock(&w->pool_lock);
@@ -69,9 +87,7 @@ void work_give_process(work *w, process *p, uint64_t body, const packet *done)
         p->held_entries = done->u.done.cached;
         p->held_bytes = done->u.done.held;
     }
-    if (body && !has_body(p, body))
-        p->bodies[p->next_body++ % PROCESS_BODIES] = body;
-    p->taken = false;
+    p->taken = p->answered = false;
     pthread_cond_broadcast(&w->pool_idle); /* who waits may want another kind */
     pthread_mutex_unlock(&w->pool_lock);
 }

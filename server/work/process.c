@@ -171,7 +171,7 @@ int process_reap(process *p, bool *out_of_memory)
 
 uint64_t process_body(const char *text, size_t len)
 {
-    static const char *const OTHER[] = {"loads", "p", "h"};
+    static const char *const OTHER[] = {"loads", "p", "h", "N", "contacts", "candidates", "kinematics"};
     uint64_t hash = 0xcbf29ce484222325u; /* FNV-1a */
     size_t begin = 0, end = 0;           /* of the last string */
     int depth = 0;

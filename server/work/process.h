@@ -26,9 +26,9 @@ typedef struct {
     board *board;
 
     /* For who chooses a process for a job; under the pool's lock. */
-    bool taken;
+    bool taken, answered;            /* answered: its job's outcome is being stored, and it is free soon */
     double given;                    /* back to the pool, on CLOCK_MONOTONIC */
-    uint64_t bodies[PROCESS_BODIES]; /* that it solved last; 0: none */
+    uint64_t bodies[PROCESS_BODIES]; /* that it solved last, its job's own among them; 0: none */
     int next_body;
     uz_cache_entry *entries; /* n_entries, as it listed them last */
     size_t n_entries, held_entries, held_bytes;
@@ -47,7 +47,8 @@ void process_kill(process *p);
  * machine or the control group killed it for want of memory, or it knew of none when it died. */
 int process_reap(process *p, bool *out_of_memory);
 
-/* What stands for the body of a job's text: the same for texts whose problems differ in loads only. */
+/* What stands for the body of a job's text: the same for texts whose problems differ only in
+ * what leaves its stiffness as it is: loads, obstacles, how contact moves. */
 uint64_t process_body(const char *text, size_t len);
 
 #endif

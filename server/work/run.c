@@ -273,6 +273,8 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     const watch_end end = watch_job(me, claimed, body, body_len, r.queue_s, &seen);
     if (end == WATCH_DONE && seen.done.u.done.start_lost)
         log_store_failure(&r, LOG_WARN, "start_not_read");
+    if (end == WATCH_DONE)
+        work_answered(w, p, key);
     const run_end what = judge_end(&r, end, &seen);
     if ((what == END_RELEASE || what == END_RETRY) &&
         store_release(w->store, &me->lease, what == END_RETRY) != STORE_OK)
@@ -292,7 +294,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     free(r.error);
     free(r.rows);
     job_clear(claimed);
-    work_give_process(w, p, end == WATCH_DONE ? key : 0, end == WATCH_DONE ? &seen.done : NULL);
+    work_give_process(w, p, end == WATCH_DONE ? &seen.done : NULL);
 }
 
 /* ---- does anybody solve */
@@ -328,6 +330,6 @@ bool work_probe(worker *me)
     me->process = NULL;
     pthread_mutex_unlock(&me->lock);
     parcel_clear(&r.parcel);
-    work_give_process(me->w, p, 0, end == WATCH_DONE ? &seen.done : NULL);
+    work_give_process(me->w, p, end == WATCH_DONE ? &seen.done : NULL);
     return good;
 }

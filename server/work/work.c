@@ -72,7 +72,7 @@ static void *work_loop(void *arg)
         uint64_t body;
         process *first = work_take_process(w, false, NULL, 0, &body);
         process_begin(first);
-        work_give_process(w, first, 0, NULL);
+        work_give_process(w, first, NULL);
     }
     pthread_mutex_lock(&w->lock);
     for (uint64_t seen = w->submitted - 1;;) { /* of w->submitted before the last look at the store */

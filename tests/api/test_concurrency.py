@@ -116,6 +116,27 @@ def test_one_factorization_of_matrices(s):
     check(1 <= fresh <= WORKERS, fresh)
 
 
+@options("--workers", "2")
+def test_a_body_goes_where_it_was(s):
+    """Two bodies, most likely in two processes; under other obstacles each finds its factor, also right after the last job."""
+    def body(cells, depth, kinematics):
+        request = scaled_scene(1, cells)
+        obstacle = {"plane": {"point": [0, -depth], "normal": [0, 1]}}
+        request["problem"].update(contacts=[{"on": "bottom", "obstacle": obstacle}], kinematics=kinematics)
+        return request
+
+    sizes = [(40, 12), (42, 12)]
+    jobs = [s.post(body(cells, 0.001, "fixed")).json["id"] for cells in sizes]
+    for job in jobs:
+        s.wait_status(job, "successful")
+    for i in range(1, 6):
+        for cells in sizes:
+            job = s.post(body(cells, 0.001 * i, ("fixed", "moving")[i % 2])).json["id"]
+            factor = s.wait_status(job, "successful")["summary"]["factor"]
+            check(factor["reused"]["factor"], i, cells, factor)
+
+
+@options("--workers", "1")
 def test_bodies_that_are_alike_share(s):
     """Another material has the pattern, other stops have K: the summary says what was there already."""
     def reused(K, N, h):
