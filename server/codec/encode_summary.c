@@ -115,9 +115,9 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
                             {"mesh", q->mesh},
                             {"equations", q->equations}},
                   6);
-        text_string(t, "kind", "estimated");
-        if (q->why[0])
-            text_string(t, "why", q->why);
+        text_string(t, "kind", q->guaranteed ? "guaranteed" : "estimated");
+        if (q->why[0] || q->unproved[0])
+            text_string(t, "why", q->why[0] ? q->why : q->unproved);
         text_close(t, '}');
     }
     text_close(t, ']');

@@ -85,6 +85,9 @@ void uz_bound_axes(double axis[2][2], const uz_bound_body *body, int64_t edge, i
 uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop,
                                 uz_error *err);
 
+/* Has the edge's a-th moment a row there? They come by edges and moments. */
+bool uz_bound_has_row(const uz_bound_body *body, const int64_t *dof, int64_t edge, int a);
+
 /* The stress that belongs to the unknowns v: xx, yy, xy at the corners, of degree 2 also in the middles of the edges
  * 01, 12, 20, of each part of an element: n_elements x UZ_BOUND_PARTS x UZ_BOUND_POINTS x 3. Part k has the corners
  * k, k + 1 of the element and its centre (uz_bound_centre). */
@@ -106,13 +109,21 @@ typedef struct {
     double defect;    /* what the residual works on u_h: J - D + defect is the gap but for the last two terms */
     double inside;    /* bound on the norm of what equilibrium within elements lacks: rounding */
     double turning;   /* the same of tractions that are not along a normal that turns, but for their moments */
-    double *residual; /* as many as unknowns: what edges lack of equilibrium; the caller frees it */
+    double least;     /* int |sigma_h - C eps(u_h)|^2, from below */
+    double *residual; /* as many as unknowns: what edges lack of equilibrium */
+    double *lifted;   /* n_nodes x 2: u_h with what takes its nodes out of the obstacle */
+    double *pressure; /* n_edges x moments: r_h, as resultants */
     char fault[160];  /* what is wrong, a clause: nothing is proved; "" */
 } uz_bound_check_result;
 
-/* u: n_nodes x 2. scene: with the loads of the case. UZ_ERR_MEMORY. */
+/* u: n_nodes x 2. lift: n_nodes x 2, zero at supports: what is to take u out of round obstacles; NULL: the check finds
+ * something by itself, which it does for what this leaves in them, too, and has larger norms. scene: with the loads of
+ * the case. The caller clears *out. UZ_ERR_MEMORY. */
 uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
-                         const int64_t *dof, int64_t n_dofs, const double *u, const double *stress, uz_error *err);
+                         const int64_t *dof, int64_t n_dofs, const double *u, const double *lift, const double *stress,
+                         uz_error *err);
+
+void uz_bound_check_clear(uz_bound_check_result *result);
 
 /* Bound on the norm of all that equilibrium lacks, with that of the residual in the norm of K^-1. */
 double uz_bound_lacking(const uz_bound_check_result *checked, double residual_norm);

@@ -9,9 +9,10 @@
  * is J(u_h) - D(sigma_h) + R(u_h): both are evaluated, by different sums, and have to agree. The stress's work on
  * eps(u_h) is that of its tractions on the sides of each element and of the force within.
  *
- * Where u_h enters the obstacle by s_h^- (quadratic elements do between nodes), let a displacement w, zero at supports,
- * take it out: w_n >= s_h^-. The pressure r of the solution does at most the work int r w_n = int r_h w_n +
- * int (sigma_h - sigma) : eps(w) - R(w), and with 1/2 |e_u|^2 + 1/2 |e_sigma|^2 = G - int r s_h - int r_h s + R(e_u)
+ * Where u_h enters the obstacle (quadratic elements do between nodes), let a displacement w, zero at supports, take it
+ * out: s_h + w_n >= 0. The pressure r of the solution has int r s_h >= -int r w_n, and that is int r_h w_n +
+ * int (sigma_h - sigma) : eps(w) - R(w), so that with 1/2 |e_u|^2 + 1/2 |e_sigma|^2 = G - int r s_h - int r_h s +
+ * R(e_u)
  *
  *     1/2 |e_u|^2 <= G + int r_h w_n + |e_sigma| |w| - 1/2 |e_sigma|^2 + rho (|e_u| + |w|)
  *      |e_u|      <= rho + sqrt(2 (G + int r_h w_n) + (|w| + rho)^2),        rho = sup R(w) / |w|.
@@ -28,29 +29,24 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Relative to the energies and works of the elements: rounding of their sums, taken into the bound; how far the two
- * evaluations of G may differ; and residuals within elements, relative to the stress. */
-#define SUM_ROUNDING 1e-14
-#define AGREE        1e-9
-#define INSIDE       1e-9
+/* Relative to the energies and works of the elements: how far the two evaluations of G may differ; and residuals within
+ * elements, relative to the stress. */
+#define AGREE  1e-9
+#define INSIDE 1e-9
 
 enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 };
 
-static void examine_element(examination *x, const double *u, const double *stress, int64_t e);
-static double energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e);
 static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i);
-static double spring_energy(const examination *x, const double *u);
 static void examine_springs(examination *x, const double *u, int64_t i, int k);
 static void settle_motions(examination *x, const double *u, const int64_t *dof);
 static void look_at_lift(examination *x, const double *u, int64_t i);
-static double work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status,
-                            uz_error *err);
 
 uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
-                         const int64_t *dof, int64_t n_dofs, const double *u, const double *stress, uz_error *err)
+                         const int64_t *dof, int64_t n_dofs, const double *u, const double *lift, const double *stress,
+                         uz_error *err)
 {
     const uz_mesh *mesh = &body->model->mesh;
-    examination x = {.out = out, .body = body, .mesh = mesh, .moments = body->degree + 1};
+    examination x = {.out = out, .body = body, .mesh = mesh, .moments = body->degree + 1, .given = lift};
     uz_status status = UZ_OK;
     *out = (uz_bound_check_result){.gap = 0};
     out->residual = uz_alloc_zero(n_dofs, sizeof *out->residual);
@@ -59,51 +55,55 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     x.lift = uz_alloc_zero(2 * mesh->n_nodes, sizeof *x.lift);
     x.moved = uz_alloc_zero(2 * mesh->n_nodes, sizeof *x.moved);
     x.gap = uz_alloc_zero(mesh->n_elements, sizeof *x.gap);
-    if (!out->residual || !x.resultant || !x.pressure || !x.lift || !x.moved || !x.gap)
+    out->lifted = uz_alloc(2 * mesh->n_nodes, sizeof *out->lifted);
+    if (!out->residual || !x.resultant || !x.pressure || !x.lift || !x.moved || !x.gap || !out->lifted)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check the stress of %lld elements",
                          (long long)mesh->n_elements);
     for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
         x.farthest = fmax(x.farthest, fabs(u[i]));
     for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++)
-        examine_element(&x, u, stress + e * STRESSES, e);
-    double load = status == UZ_OK ? work_of_loads(&x, scene, u, &status, err) : 0;
+        uz_examine_element(&x, u, stress + e * STRESSES, e);
+    double load = status == UZ_OK ? uz_work_of_loads(&x, scene, u, &status, err) : 0;
     if (status == UZ_OK) {
         out->primal = x.strain - load;
         out->dual = -x.complementary;
-        out->gap = x.margin + SUM_ROUNDING * x.scale;
+        out->gap = x.margin + UZ_SUM_ROUNDING * x.scale;
         const double rounding = out->gap;
         for (int64_t i = 0; i < body->n_edges; i++)
             examine_edge(&x, u, dof, i);
         settle_motions(&x, u, dof);
-        const double ground = spring_energy(&x, u), scale = x.scale + fabs(load) + ground;
+        for (int64_t i = 0; i < 2 * mesh->n_nodes && lift; i++)
+            x.lift[i] += lift[i];
+        const double ground = uz_spring_energy(&x, u), scale = x.scale + fabs(load) + ground;
         x.sum += x.springs + ground;
+        out->least = 2 * fmax(0, x.sum - rounding - 4 * UZ_SUM_ROUNDING * ground);
         x.strain += ground;
         out->primal += ground;
         const double apart = out->primal - out->dual + out->defect - (out->gap - rounding) - x.sum;
-        out->gap += x.sum + 4 * SUM_ROUNDING * ground;
+        out->gap += x.sum + 4 * UZ_SUM_ROUNDING * ground;
         for (int64_t i = 0; i < body->n_edges; i++)
             look_at_lift(&x, u, i);
+        for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
+            out->lifted[i] = u[i] + x.lift[i];
         double lifted = 0, margin = 0, strain = x.strain;
         for (int64_t e = 0; e < mesh->n_elements; e++)
-            lifted += 2 * energy_of(&margin, &x, x.lift, false, e);
-        lifted += 2 * spring_energy(&x, x.lift);
+            lifted += 2 * uz_energy_of(&margin, &x, x.lift, false, e);
+        lifted += 2 * uz_spring_energy(&x, x.lift);
         const double by_nodes = sqrt(lifted + 2 * margin);
         out->lift = by_nodes + sqrt(x.bulge);
         out->turning = sqrt(x.turning);
         out->norm = sqrt(2 * fmax(0, x.strain - x.margin));
         if (lifted > 0) { /* of u_h + w: an admissible one has the larger energy than the minimum */
             strain = x.margin = 0;
-            for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
-                x.lift[i] += u[i];
             for (int64_t e = 0; e < mesh->n_elements; e++)
-                strain += energy_of(&x.margin, &x, x.lift, true, e);
-            strain += spring_energy(&x, x.lift);
-            load = work_of_loads(&x, scene, x.lift, &status, err);
+                strain += uz_energy_of(&x.margin, &x, out->lifted, true, e);
+            strain += uz_spring_energy(&x, out->lifted);
+            load = uz_work_of_loads(&x, scene, out->lifted, &status, err);
         }
-        out->primal = strain + x.margin - load + SUM_ROUNDING * (scale + strain + fabs(load));
+        out->primal = strain + x.margin - load + UZ_SUM_ROUNDING * (scale + strain + fabs(load));
         /* a(u_h + w, b) - f(b) of the bulges b: of the stress it is their work, and the rest is by Schwarz */
         out->primal += x.bulge_work + (sqrt(2 * x.bulged) + by_nodes) * sqrt(x.bulge) + x.bulge / 2;
-        out->dual -= SUM_ROUNDING * scale;
+        out->dual -= UZ_SUM_ROUNDING * scale;
         out->inside = 100 * x.inside * sqrt(2 * fabs(x.complementary));
         if (!*out->fault && !(x.inside <= INSIDE))
             snprintf(out->fault, sizeof out->fault, "the stress is not in equilibrium within elements, by %.1e of it",
@@ -112,16 +112,22 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
             snprintf(out->fault, sizeof out->fault, "two ways to evaluate the gap, %.9e, differ by %.1e", out->gap,
                      apart);
     }
+    out->pressure = x.pressure;
     free(x.resultant);
-    free(x.pressure);
     free(x.lift);
     free(x.moved);
     free(x.gap);
-    if (status != UZ_OK) {
-        free(out->residual);
-        out->residual = NULL;
-    }
+    if (status != UZ_OK)
+        uz_bound_check_clear(out);
     return status;
+}
+
+void uz_bound_check_clear(uz_bound_check_result *result)
+{
+    free(result->residual);
+    free(result->lifted);
+    free(result->pressure);
+    result->residual = result->lifted = result->pressure = NULL;
 }
 
 double uz_bound_lacking(const uz_bound_check_result *c, double residual_norm)
@@ -184,6 +190,16 @@ void uz_lift_node(examination *x, int64_t node, const double normal[2], double b
             x->lift[2 * node + c] = by * way[c] / share;
 }
 
+void uz_add_given(double b[3], const examination *x, const uz_bound_edge *edge, const double n[2])
+{
+    double more[3];
+    if (!x->given)
+        return;
+    uz_along_edge(more, x->given, edge->node, n);
+    for (int a = 0; a < 3; a++)
+        b[a] += more[a];
+}
+
 /* The work of the gap that u_h leaves, and w where it is not >= 0 all along: its nodes are taken out, and the middle
  * one as far as makes the middle coefficient -sqrt(s_0 s_2), from where on the polynomial has no negative value. */
 static void examine_contact(examination *x, const double *u, const uz_bound_edge *edge, const double *pressure)
@@ -194,6 +210,12 @@ static void examine_contact(examination *x, const double *u, const uz_bound_edge
     uz_edge_means(m, s, x->moments);
     for (int a = 0; a < x->moments; a++)
         out->gap += pressure[a] * m[a];
+    uz_along_edge(none, u, edge->node, edge->normal); /* from here on with what was given to take it out */
+    for (int a = 0; a < 3; a++)
+        s[a] += none[a];
+    uz_add_given(none, x, edge, edge->normal);
+    for (int a = 0; a < 3; a++)
+        s[a] -= none[a];
     for (int a = 0; a < 3; a++)
         up[a] = fmax(0, -s[a] - (a == 1 ? sqrt(fmax(0, s[0]) * fmax(0, s[2])) : 0));
     const double nodal[3] = {up[0], up[2], (up[0] + 2 * fmax(up[1], (up[0] + up[2]) / 2) + up[2]) / 4};
@@ -235,13 +257,12 @@ static void look_at_lift(examination *x, const double *u, int64_t i)
     for (int a = 0; a < 3; a++)
         s[a] += lift[a] + tolerance;
     const bool out_of_it = s[0] >= 0 && s[2] >= 0 && s[1] >= -sqrt(s[0] * s[2]) - tolerance;
-    const bool outward = lift[0] >= -tolerance && lift[1] >= -tolerance && lift[2] >= -tolerance;
-    if (!*x->out->fault && !(out_of_it && outward))
+    if (!*x->out->fault && !out_of_it)
         snprintf(x->out->fault, sizeof x->out->fault, "the answer is in the obstacle where supports keep it there");
 }
 
 /* 1/2 int k |u|^2 of the springs along the edges. */
-static double spring_energy(const examination *x, const double *u)
+double uz_spring_energy(const examination *x, const double *u)
 {
     double sum = 0, b[3], at[3], weight[3];
     uz_gauss(at, weight, 3);
@@ -284,16 +305,18 @@ static void examine_springs(examination *x, const double *u, int64_t i, int k)
     x->scale += own + fabs(work);
 }
 
-/* What the edge lacks of equilibrium, and what supports and obstacle do there. A pressure below zero is none: it is
- * what is missing. */
-static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i)
+double uz_admit_pressure(const examination *x, int64_t moment, double pressure)
 {
-    uz_bound_check_result *out = x->out;
+    return x->limit ? fmax(-x->limit[moment], fmin(x->limit[moment], pressure)) : fmax(0, pressure);
+}
+
+/* A pressure that may not be is none: it is what is missing. */
+void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, const double *u, int64_t i)
+{
     const uz_bound_edge *edge = &x->body->edge[i];
     const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
     const double each = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness / x->moments;
-    double *pressure = x->pressure + i * x->moments, share[2], b[3], m[UZ_BOUND_MOMENTS];
-    double turned[UZ_BOUND_MOMENTS][2] = {{0}};
+    double *pressure = x->pressure + i * x->moments, share[2], turned[UZ_BOUND_MOMENTS][2] = {{0}};
     for (int a = 0; a < x->moments; a++) /* less the load */
         for (int c = 0; c < 2; c++)
             x->resultant[(i * x->moments + a) * 2 + c] -= each * edge->traction[c];
@@ -308,29 +331,43 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
                       axis[k][1] * x->resultant[(i * x->moments + a) * 2 + 1];
             share[k] = normal[0] * axis[k][0] + normal[1] * axis[k][1];
         }
-        const bool free0 = !edge->held[0];
-        if (uz_bound_pressed(x->body, i, a) >= 0)
+        const bool pressed = uz_bound_pressed(x->body, i, a) >= 0;
+        if (pressed)
             pressure[a] = -acts[0];
-        else if (edge->contact >= 0 && free0 &&
+        else if (edge->contact >= 0 && !edge->held[0] &&
                  !edge->round) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
-            pressure[a] = fmax(0, -(acts[0] * share[0] + acts[1] * share[1]));
+            pressure[a] = uz_admit_pressure(x, i * x->moments + a, -(acts[0] * share[0] + acts[1] * share[1]));
         else if (edge->contact >= 0 && !edge->held[1] && fabs(share[1]) > 1e-9)
-            pressure[a] = fmax(0, -acts[1] / share[1]);
+            pressure[a] = uz_admit_pressure(x, i * x->moments + a, -acts[1] / share[1]);
+        for (int k = 0; k < 2; k++) /* of what is pressed until settle_motions nothing: the pressure is what acts */
+            missing[a][k] =
+                (k == 0 && pressed) || edge->spring[k] > 0
+                    ? 0
+                    : -pressure[a] * share[k] - acts[k] + turned[a][0] * axis[k][0] + turned[a][1] * axis[k][1];
+    }
+}
+
+/* What the edge lacks of equilibrium, and what supports and obstacle do there. */
+static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i)
+{
+    uz_bound_check_result *out = x->out;
+    const uz_bound_edge *edge = &x->body->edge[i];
+    const double *pressure = x->pressure + i * x->moments;
+    double b[3], m[UZ_BOUND_MOMENTS], missing[UZ_BOUND_MOMENTS][2];
+    uz_examine_tractions(missing, x, u, i);
+    for (int a = 0; a < x->moments; a++) {
+        double axis[2][2];
+        uz_bound_axes(axis, x->body, i, a);
         for (int k = 0; k < 2; k++) {
-            if (k == 0 && uz_bound_pressed(x->body, i, a) >= 0)
-                continue; /* as the pressure is what acts, until settle_motions */
-            if (edge->spring[k] > 0)
-                continue; /* springs take whatever acts, at their price */
-            const double missing =
-                -pressure[a] * share[k] - acts[k] + turned[a][0] * axis[k][0] + turned[a][1] * axis[k][1];
+            const int64_t at = dof[(i * x->moments + a) * 2 + k];
             if (edge->held[k]) {
-                out->dual -= missing * edge->value[k];
-                x->scale += fabs(missing * edge->value[k]);
-            } else {
+                out->dual -= missing[a][k] * edge->value[k];
+                x->scale += fabs(missing[a][k] * edge->value[k]);
+            } else if (at >= 0) {
                 uz_along_edge(b, u, edge->node, axis[k]);
                 uz_edge_means(m, b, x->moments);
-                out->defect += missing * m[a];
-                out->residual[dof[(i * x->moments + a) * 2 + k]] = missing;
+                out->defect += missing[a][k] * m[a];
+                out->residual[at] = missing[a][k];
             }
         }
         if (edge->contact >= 0 && !edge->round)
@@ -434,6 +471,14 @@ static void without_motion(double v[2 * UZ_ELEMENT_NODES], const uz_element *ele
     }
 }
 
+double uz_expansion_work(const double *s, int points, const double expansion[3], double volume)
+{
+    double sum = 0;
+    for (int i = points == 3 ? 0 : 3; i < points; i++)
+        sum += volume / 3 * (s[3 * i] * expansion[0] + s[3 * i + 1] * expansion[1]);
+    return sum;
+}
+
 /* int sigma : C^-1 : sigma / 2 + sigma : expansion over a part, and what its equilibrium lacks: div sigma + force. */
 static double examine_part(examination *x, const double corner[3][2], const double *s, const double expansion[3],
                            double largest, int64_t e)
@@ -453,8 +498,7 @@ static double examine_part(examination *x, const double corner[3][2], const doub
                                    (a[0] + a[1]) * (b[0] + b[1]) / (4 * (lame.lambda + lame.mu));
             sum += volume / 2 * (points == 3 ? (i == j ? 2. : 1.) / 12 : SIXTH[i][j] / 180) * product;
         }
-    for (int i = points == 3 ? 0 : 3; i < points; i++)
-        sum += volume / 3 * (s[3 * i] * expansion[0] + s[3 * i + 1] * expansion[1]);
+    sum += uz_expansion_work(s, points, expansion, volume);
     for (int i = 0; i < 3; i++) { /* gradients of the coordinates of the triangle */
         const double *p = corner[(i + 1) % 3], *q = corner[(i + 2) % 3];
         slope[i][0] = (p[1] - q[1]) / area2;
@@ -500,7 +544,7 @@ static void tractions(double t[UZ_BOUND_MOMENTS][2], const examination *x, const
     }
 }
 
-static void examine_element(examination *x, const double *u, const double *stress, int64_t e)
+void uz_examine_element(examination *x, const double *u, const double *stress, int64_t e)
 {
     const uz_body_model *model = x->body->model;
     uz_element element;
@@ -557,9 +601,9 @@ static void examine_element(examination *x, const double *u, const double *stres
         for (int i = 0; i < 2 * count; i++)
             work += volume * N[i / 2] * v[i] * x->body->force[2 * e + i % 2];
     }
-    const double strain = energy_of(&margin, x, u, true, e);
+    const double strain = uz_energy_of(&margin, x, u, true, e);
     x->gap[e] =
-        margin + fmax(0, strain + complementary - work) + SUM_ROUNDING * (strain + fabs(complementary) + fabs(work));
+        margin + fmax(0, strain + complementary - work) + UZ_SUM_ROUNDING * (strain + fabs(complementary) + fabs(work));
     x->sum += strain + complementary - work;
     x->margin += margin;
     x->scale += strain + fabs(complementary) + fabs(work);
@@ -593,7 +637,7 @@ void uz_gauss(double *at, double *weight, int n)
 /* Strain energy of the displacement between its nodes, whatever the formulation of the answer. On quadrilaterals that
  * are no parallelograms the integrand has det J below the line: analytic in each coordinate but for a pole at z > 1, so
  * that n points are off by some q^2n, q = 1 / (z + sqrt(z^2 - 1)), a bound on which is the margin. */
-static double energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e)
+double uz_energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e)
 {
     enum { MOST_POINTS = 24 };
     const uz_body_model *model = x->body->model;
@@ -654,8 +698,7 @@ static double energy_of(double *margin, const examination *x, const double *u, b
 }
 
 /* Of the loads but temperature, as the discrete problem has them: the edges have to agree with that. */
-static double work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status,
-                            uz_error *err)
+double uz_work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status, uz_error *err)
 {
     uz_scene loaded = *scene;
     double work = 0;

@@ -9,26 +9,50 @@ typedef struct {
     const uz_bound_body *body;
     const uz_mesh *mesh;
     int moments;
-    double *resultant; /* n_edges x moments x 2: of the stress's tractions on the elements beside the edge */
-    double *pressure;  /* n_edges x moments: r_h, as resultants */
-    double *moved;     /* n_nodes x 2: room */
-    double *lift;      /* n_nodes x 2: w, as far as it is of the nodes */
-    double *gap;       /* n_elements: int 1/2 |sigma_h - C eps(u_h)|^2, from above */
-    double sum, scale; /* of elements: int 1/2 |sigma_h - C eps(u_h)|^2; of the sizes of what it is made of */
-    double margin;     /* of the strain energy: what its integration may be off by */
-    double springs;    /* of the gap: int 1/2 |t + k u_h|^2 / k, t the traction where springs hold */
+    double *resultant;   /* n_edges x moments x 2: of the stress's tractions on the elements beside the edge */
+    double *pressure;    /* n_edges x moments: r_h, as resultants */
+    double *moved;       /* n_nodes x 2: room */
+    double *lift;        /* n_nodes x 2: w, as far as it is of the nodes */
+    const double *given; /* ... the part of it that came with the answer; NULL: none */
+    double *gap;         /* n_elements: int 1/2 |sigma_h - C eps(u_h)|^2, from above */
+    double sum, scale;   /* of elements: int 1/2 |sigma_h - C eps(u_h)|^2; of the sizes of what it is made of */
+    double margin;       /* of the strain energy: what its integration may be off by */
+    double springs;      /* of the gap: int 1/2 |t + k u_h|^2 / k, t the traction where springs hold */
     double strain, complementary, inside, farthest; /* farthest: the largest displacement along an axis */
     double turning;                                 /* square of the result's */
     /* Of bulges, the part of w that is zero at all nodes: square of their norm, the gap of their elements, and the work
      * that the tractions do on them. */
     double bulge, bulged, bulge_work;
+    const double *limit; /* n_edges x moments: what presses may pull as well, by so much at most; NULL: it may not, and
+                          * presses by what it likes */
 } examination;
+
+/* Of the energies and works of elements: rounding of their sums. */
+#define UZ_SUM_ROUNDING 1e-14
+
+/* An element's part of the sums, and the resultants of its tractions. */
+void uz_examine_element(examination *x, const double *u, const double *stress, int64_t e);
+/* The resultants less the edge's load, its pressure, and what is missing of equilibrium, by the axes of its moments: of
+ * supports minus what they do. Springs take whatever acts: nothing is missing there. */
+void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, const double *u, int64_t i);
+/* The part of a pressure that may be there. */
+double uz_admit_pressure(const examination *x, int64_t moment, double pressure);
+/* int sigma : expansion over a part, from the values at its points. */
+double uz_expansion_work(const double *s, int points, const double expansion[3], double volume);
+/* 2 x the strain energy of the displacement between its nodes; *margin: what its integration may be off by. */
+double uz_energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e);
+/* 1/2 int k |u|^2 of the springs along the edges. */
+double uz_spring_energy(const examination *x, const double *u);
+/* Of the loads but temperature, as the discrete problem has them: the edges have to agree with that. */
+double uz_work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status, uz_error *err);
 
 /* Means of a quadratic polynomial over an edge with the Bernstein polynomials of degree `moments` - 1 as weights. */
 void uz_edge_means(double m[UZ_BOUND_MOMENTS], const double b[3], int moments);
 /* A displacement (n_nodes x 2) along n on an edge: the Bernstein coefficients of a quadratic polynomial, from its
  * values at the ends and, where there is a node, in the middle. */
 void uz_along_edge(double b[3], const double *u, const int64_t node[3], const double n[2]);
+/* What was given to take the answer out of the obstacle, added to Bernstein coefficients along n. */
+void uz_add_given(double b[3], const examination *x, const uz_bound_edge *edge, const double n[2]);
 /* Gauss's rule of n points on [-1, 1]. */
 void uz_gauss(double *at, double *weight, int n);
 
@@ -43,5 +67,9 @@ void uz_lift_node(examination *x, int64_t node, const double normal[2], double b
  * it. */
 void uz_examine_round(double turned[UZ_BOUND_MOMENTS][2], examination *x, const double *u, int64_t edge);
 void uz_look_at_round(examination *x, const double *u, int64_t edge);
+/* Along such an edge: bulges out what |n . w - om| is more than m s, where s is the gap that u leaves and not below
+ * zero: their norm, and the work of the pressure on them. */
+void uz_bulge_excess(examination *x, const double *u, const double *w, double om, double m, const double *pressure,
+                     int64_t edge);
 
 #endif

@@ -78,7 +78,8 @@ void uz_examine_round(double turned[MOMENTS][2], examination *x, const double *u
     for (int a = 0; a < moments; a++) {
         const double *acts = x->resultant + (i * moments + a) * 2;
         uz_bound_gap(own[a], x->body, i, (double)a / x->body->degree);
-        x->pressure[i * moments + a] = fmax(0, -(acts[0] * own[a][0] + acts[1] * own[a][1]));
+        x->pressure[i * moments + a] =
+            uz_admit_pressure(x, i * moments + a, -(acts[0] * own[a][0] + acts[1] * own[a][1]));
         r[a] = x->pressure[i * moments + a] * moments / (length * thickness);
     }
     for (int g = 0; g < POINTS; g++) {
@@ -120,7 +121,9 @@ void uz_examine_round(double turned[MOMENTS][2], examination *x, const double *u
     for (int a = 0; a < (edge->node[2] < 0 ? 2 : 3); a++) {
         double n[2];
         const double q = a == 2 ? 0.5 : a, h = uz_bound_gap(n, x->body, i, q);
-        const double s = h - n[0] * value(along[0], q) - n[1] * value(along[1], q);
+        double more[3] = {0};
+        uz_add_given(more, x, edge, n);
+        const double s = h - n[0] * value(along[0], q) - n[1] * value(along[1], q) - value(more, q);
         uz_lift_node(x, edge->node[a], n, fmax(0, -s));
     }
 }
@@ -191,9 +194,21 @@ static double bulge_energy(double corner[3][2], double area2, uz_lame lame, doub
     return sum;
 }
 
-/* A bulge b = -B 4 q (1 - q) n(1/2) on the triangle at the edge leaves s + 4 B q (1 - q) n(1/2) . n >= 0. Within a
- * piece s is above the line between its ends by no less than -bend (x - x_j)(x_j+1 - x) / 2; in those at the edge's
- * ends, where the bulge goes to zero, that is taken in parts of the way. */
+/* The B with s + 4 B q (1 - q) >= 0 in the j-th piece. There s is above the line between its ends by no less than
+ * -bend (x - x_j)(x_j+1 - x) / 2; in those at the edge's ends, where the bulge goes to zero, that is taken in parts of
+ * the way. */
+static double bulge_needed(const double s[PIECES + 1], const double bend[PIECES], double piece, int j)
+{
+    const double q0 = (double)j / PIECES, q1 = (j + 1.) / PIECES;
+    if (j == 0 || j == PIECES - 1) /* per part of the way from the edge's end */
+        return (fmax(0, -(j == 0 ? s[1] : s[j])) / piece + piece / 2 * bend[j]) * piece * PIECES /
+               (4 * (1 - 1. / PIECES));
+    if (fmin(s[j], s[j + 1]) >= piece * piece / 8 * bend[j])
+        return 0;
+    return (fmax(0, -fmin(s[j], s[j + 1])) + piece * piece / 8 * bend[j]) / (4 * fmin(q0 - q0 * q0, q1 - q1 * q1));
+}
+
+/* A bulge b = -B 4 q (1 - q) n(1/2) on the triangle at the edge leaves s + 4 B q (1 - q) n(1/2) . n >= 0. */
 void uz_look_at_round(examination *x, const double *u, int64_t i)
 {
     const uz_bound_edge *edge = &x->body->edge[i];
@@ -217,18 +232,8 @@ void uz_look_at_round(examination *x, const double *u, int64_t i)
         s[j] += tolerance;
     if (!*x->out->fault && !(s[0] >= 0 && s[PIECES] >= 0 && cosine > 0.5))
         snprintf(x->out->fault, sizeof x->out->fault, "the answer is in the obstacle where supports keep it there");
-    for (int j = 0; j < PIECES; j++) {
-        const double q0 = (double)j / PIECES, q1 = (j + 1.) / PIECES;
-        double need = fmax(0, -fmin(s[j], s[j + 1])) + piece * piece / 8 * bend[j],
-               room = 4 * fmin(q0 - q0 * q0, q1 - q1 * q1);
-        if (j == 0 || j == PIECES - 1) { /* per part of the way from the edge's end */
-            need = (fmax(0, -(j == 0 ? s[1] : s[j])) / piece + piece / 2 * bend[j]) * length;
-            room = 4 * (1 - 1. / PIECES);
-        } else if (fmin(s[j], s[j + 1]) >= piece * piece / 8 * bend[j]) {
-            continue;
-        }
-        by = fmax(by, need / (room * cosine));
-    }
+    for (int j = 0; j < PIECES; j++)
+        by = fmax(by, bulge_needed(s, bend, piece, j) / cosine);
     /* what the pressure does on nodes and bulge, which the gap has to make up for */
     double at[POINTS], weight[POINTS], work = 0;
     uz_gauss(at, weight, POINTS);
@@ -258,4 +263,60 @@ void uz_look_at_round(examination *x, const double *u, int64_t i)
     for (int a = 0; a < x->moments; a++)
         for (int c = 0; c < 2; c++)
             x->bulge_work -= x->resultant[(i * x->moments + a) * 2 + c] * n[1][c] * m[a];
+}
+
+/* Along an edge, and s its bends in pieces: k u . n and a constant, what is left of k gaps; gaps and all else of about
+ * one size. */
+static void combine(double s[PIECES + 1], double bend[PIECES], examination *x, double k, const double *u, double sign,
+                    const double *w, double constant, int64_t i)
+{
+    const uz_bound_edge *edge = &x->body->edge[i];
+    for (int a = 0; a < 6; a++)
+        if (edge->node[a / 2] >= 0) {
+            const int64_t at = 2 * edge->node[a / 2] + a % 2;
+            x->moved[at] = (u ? u[at] : 0) - sign / k * w[at];
+        }
+    gap_left(s, bend, x, x->moved, i);
+    for (int j = 0; j <= PIECES; j++)
+        s[j] = k * s[j] + constant;
+    for (int j = 0; j < PIECES; j++)
+        bend[j] *= k;
+}
+
+void uz_bulge_excess(examination *x, const double *u, const double *w, double om, double m, const double *pressure,
+                     int64_t i)
+{
+    const uz_bound_edge *edge = &x->body->edge[i];
+    const uz_lame lame = uz_element_material(x->body->model, edge->element[0])->lame;
+    double corner[3][2], n[3][2], s[2][PIECES + 1], bend[2][PIECES], by = 0, size = fabs(om), widest = edge->radius;
+    const double area2 = triangle(corner, x, edge);
+    const double piece = hypot(corner[1][0] - corner[0][0], corner[1][1] - corner[0][1]) / PIECES;
+    for (int a = 0; a < 6; a++)
+        size = edge->node[a / 2] < 0 ? size : fmax(size, fabs(w[2 * edge->node[a / 2] + a % 2]));
+    for (int a = 0; a < 3; a++)
+        widest = fmax(widest, fabs(uz_bound_gap(n[a], x->body, i, a == 0 ? 0 : a == 1 ? 0.5 : 1)));
+    const double cosine = fmin(n[0][0] * n[1][0] + n[0][1] * n[1][1], n[2][0] * n[1][0] + n[2][1] * n[1][1]);
+    for (int sign = 1; sign >= -1 && size > 0; sign -= 2) {
+        combine(s[0], bend[0], x, m, u, sign, w, -sign * om, i);
+        combine(s[1], bend[1], x, 1e-13 * size / widest, NULL, sign, w, -sign * om, i); /* gaps are rounding there */
+        for (int j = 0; j <= PIECES; j++) {
+            s[0][j] += 1e-12 * (size + m * x->farthest);
+            s[1][j] += 1e-12 * size;
+        }
+        for (int j = 0; j < PIECES; j++)
+            by = fmax(by, fmin(bulge_needed(s[0], bend[0], piece, j), bulge_needed(s[1], bend[1], piece, j)));
+        for (int k = 0; k < PIECES + 1; k += PIECES)
+            if (!*x->out->fault && !(fmax(s[0][k], s[1][k]) >= 0 && cosine > 0.5))
+                snprintf(x->out->fault, sizeof x->out->fault,
+                         "the contact meets supports, where what presses has no bound");
+    }
+    by /= cosine;
+    if (!(by > 0))
+        return;
+    const double b[3] = {0, 2 * by, 0}, d[2] = {by * n[1][0], by * n[1][1]};
+    double mean[MOMENTS];
+    uz_edge_means(mean, b, x->moments);
+    x->bulge += bulge_energy(corner, area2, lame, x->body->model->thickness, d);
+    for (int a = 0; a < x->moments; a++)
+        x->bulge_work += pressure[i * x->moments + a] * mean[a];
 }

@@ -328,15 +328,24 @@ static void take_springs(survey *x)
     }
 }
 
+static double volume_of(const uz_body_model *model, int64_t e)
+{
+    uz_element element;
+    double xyz[3 * UZ_ELEMENT_NODES];
+    uz_body_element(&element, xyz, model, e);
+    return uz_element_volume(&element);
+}
+
 static void take_loads(survey *x)
 {
     uz_bound_body *body = x->body;
     for (int64_t k = 0; k < x->scene->n_loads; k++) {
         const uz_load *load = &x->scene->loads[k];
-        const bool on_edges =
-            load->kind == UZ_LOAD_TRACTION || load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_FORCE;
         const uz_group *group = load->kind == UZ_LOAD_NODE_FORCE ? NULL : uz_mesh_group(x->mesh, load->on, "", NULL);
-        double area = 0;
+        const bool in_elements = load->kind == UZ_LOAD_FORCE && group && group->kind == UZ_GROUP_ELEMENTS;
+        const bool on_edges = load->kind == UZ_LOAD_TRACTION || load->kind == UZ_LOAD_PRESSURE ||
+                              (load->kind == UZ_LOAD_FORCE && !in_elements);
+        double area = 0, volume = 0;
         if (load->kind == UZ_LOAD_NODE_FORCE || (on_edges && (!group || group->kind != UZ_GROUP_FACES))) {
             refuse(body, "a force on single nodes does infinite work in the continuum", "");
             return;
@@ -356,10 +365,14 @@ static void take_loads(survey *x)
                                          : load->kind == UZ_LOAD_PRESSURE ? -load->value * n[c]
                                                                           : load->v[c] / area;
             }
+        for (int64_t i = 0; in_elements && i < uz_group_element_count(x->mesh, group); i++)
+            volume += volume_of(body->model, uz_group_element_at(group, i));
         for (int64_t i = 0;
              !on_edges && load->kind != UZ_LOAD_TEMPERATURE && i < uz_group_element_count(x->mesh, group); i++) {
             const int64_t e = uz_group_element_at(group, i);
-            const double times = load->kind == UZ_LOAD_GRAVITY ? uz_element_material(body->model, e)->density : 1;
+            const double times = in_elements                     ? 1 / volume
+                                 : load->kind == UZ_LOAD_GRAVITY ? uz_element_material(body->model, e)->density
+                                                                 : 1;
             for (int c = 0; c < 2; c++)
                 body->force[2 * e + c] += times * load->v[c];
         }

@@ -212,6 +212,18 @@ static double mean_gap(double normal[2], const uz_bound_body *body, int64_t i, i
     return sum;
 }
 
+bool uz_bound_has_row(const uz_bound_body *body, const int64_t *dof, int64_t edge, int a)
+{
+    double axis[2][2], normal[2];
+    bool has = false;
+    uz_bound_axes(axis, body, edge, a);
+    uz_bound_gap(normal, body, edge, (double)a / body->degree);
+    for (int k = 0; k < 2; k++)
+        has = has || (dof[(edge * (body->degree + 1) + a) * 2 + k] >= 0 &&
+                      fabs(normal[0] * axis[k][0] + normal[1] * axis[k][1]) > 1e-9);
+    return has && body->edge[edge].contact >= 0;
+}
+
 /* Rows of the edges before obstacles. */
 static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const int64_t *dof, uz_error *err)
 {
@@ -236,7 +248,7 @@ static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const
                 const int64_t at = dof[(i * moments + a) * 2 + k];
                 if (at < 0)
                     gap -= share * given(body, i, a, k);
-                else if (fabs(share) > 1e-9) {
+                else if (uz_bound_has_row(body, dof, i, a) && fabs(share) > 1e-9) {
                     row[count] = m;
                     col[count] = at;
                     val[count++] = share;

@@ -163,6 +163,8 @@ typedef struct {
     double value, low, high; /* the middle of the interval, and its ends; value alone where the others are NaN */
     double mesh, equations;  /* parts of half its width: what the mesh loses by estimate, what the solve leaves */
     char why[96];            /* why there is no interval; else "" */
+    bool guaranteed;         /* the interval is proved (uz_settings.guaranteed); mesh is then half of it */
+    char unproved[96];       /* asked for and not proved: a clause; else "" */
 } uz_quantity_found;
 
 /* Scenes: what the answer comes to. */

@@ -371,7 +371,7 @@ static void conclude(const search *g, uz_summary *s)
     if (uz_has_no_answer(s) || s->outcome == UZ_LOOSE || s->outcome == UZ_MOVING_GEOMETRY)
         return;
     const double total = uz_asked_error(s);
-    if (total <= g->requested && s->outcome == UZ_MESH_LIMIT && s->guarantee.asked && !s->guarantee.proved)
+    if (total <= g->requested && s->outcome == UZ_MESH_LIMIT && uz_is_unproved(s))
         return; /* a bound was asked for, and an estimate is none */
     if (total <= g->requested) {
         s->outcome = UZ_CONVERGED;

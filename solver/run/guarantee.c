@@ -1,38 +1,31 @@
 /* guarantee.c: a guaranteed bound on the whole error of answers on a mesh, where it is asked for: the dual problem is
  * one in matrices, which is solved as any other, and so is the norm of what its stress lacks of equilibrium. */
-#include "run/solve.h"
+#include "run/guarantee.h"
 
-#include "bound/bound.h"
+#include "run/solve.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
-#include "run/problem.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct {
-    const uz_settings *settings;
-    uz_cache *cache;
-    uz_hooks hooks; /* whether to go on, and nothing else: rows are of the answer */
-    uz_stop stop;
-    uz_bound_body body;
-    uz_qp qp;
-    int64_t *dof;
-    double *stress;
-    uz_bound_check_result checked;
-} guarantee;
+uz_settings uz_guarantee_settings(const uz_guaranteed *g, double now)
+{
+    uz_settings settings = uz_settings_default();
+    settings.memory_limit = g->settings->memory_limit;
+    settings.time_limit_s = fmax(0.0, g->stop.deadline - now);
+    return settings;
+}
 
 /* The dual problem, or the residual's: the library's own solve, with what is left of the time. */
-static uz_status solve(uz_result **out, const guarantee *g, const uz_qp *qp, uz_error *err)
+static uz_status solve(uz_result **out, const uz_guaranteed *g, const uz_qp *qp, uz_error *err)
 {
     const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = *qp};
-    uz_settings settings = uz_settings_default();
     const double started = uz_seconds();
-    settings.memory_limit = g->settings->memory_limit;
-    settings.time_limit_s = fmax(0.0, g->stop.deadline - started);
+    const uz_settings settings = uz_guarantee_settings(g, started);
     *out = NULL;
     uz_status status = uz_solve_rounds(out, &problem, &settings, NULL, NULL, g->cache, &g->hooks, err);
     status = uz_settle_cases(out, status, &problem, &settings, NULL, g->cache, &g->hooks, started, err);
@@ -43,10 +36,9 @@ static uz_status solve(uz_result **out, const guarantee *g, const uz_qp *qp, uz_
     return status;
 }
 
-/* |residual| in the norm of K^-1, from above; INFINITY where that was not found. */
-static uz_status measure_residual(double *norm, const guarantee *g, uz_error *err)
+uz_status uz_measure_residual(double *norm, const uz_guaranteed *g, double *residual, uz_error *err)
 {
-    uz_qp qp = {.K = g->qp.K, .p = g->checked.residual};
+    uz_qp qp = {.K = g->qp.K, .p = residual};
     uz_result *result = NULL;
     double largest = 0, no_gaps = 0;
     *norm = 0;
@@ -67,7 +59,7 @@ static uz_status measure_residual(double *norm, const guarantee *g, uz_error *er
 }
 
 /* A body that only obstacles hold, where its answer presses on them. */
-static uz_status hold(guarantee *g, const uz_result *result, uz_error *err)
+static uz_status hold(uz_guaranteed *g, const uz_result *result, uz_error *err)
 {
     const uz_mesh_info *mesh = &result->mesh;
     double *pressure = uz_alloc_zero(result->n_nodes, sizeof *pressure);
@@ -82,13 +74,28 @@ static uz_status hold(guarantee *g, const uz_result *result, uz_error *err)
     return UZ_OK;
 }
 
+/* With what takes the answer out of obstacles, and without it: the check finds something by itself, too. */
+static uz_status check(uz_guaranteed *g, const double *u, const uz_scene *scene, uz_error *err)
+{
+    uz_bound_check_result alone;
+    uz_status status = uz_bound_check(&alone, &g->body, scene, g->dof, g->qp.K.cols, u, NULL, g->stress, err);
+    if (status == UZ_OK && g->lift)
+        status = uz_bound_check(&g->checked, &g->body, scene, g->dof, g->qp.K.cols, u, g->lift, g->stress, err);
+    if (status == UZ_OK && g->lift && uz_bound_error(&g->checked, 0) < uz_bound_error(&alone, 0)) {
+        uz_bound_check_clear(&alone);
+        return status;
+    }
+    uz_bound_check_clear(&g->checked);
+    g->checked = alone;
+    return status;
+}
+
 /* -> summary.guarantee, but for its time and reasons that are errors. */
-static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *model, const uz_scene *scene,
+static uz_status prove(uz_result *result, uz_guaranteed *g, const uz_body_model *model, const uz_scene *scene,
                        uz_error *err)
 {
     uz_guarantee *out = &result->summary.guarantee;
     uz_result *dual = NULL;
-    double rho = INFINITY;
     uz_status status = uz_bound_body_make(&g->body, model, scene, err);
     for (int64_t i = 0; i < g->body.n_edges && result->place && status == UZ_OK && !*g->body.why; i++)
         if (g->body.edge[i].round)
@@ -117,13 +124,15 @@ static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *mod
     }
     uz_result_free(dual);
     if (status == UZ_OK)
-        status = uz_bound_check(&g->checked, &g->body, scene, g->dof, g->qp.K.cols, result->u, g->stress, err);
+        status = uz_lift_out(g, result, err);
     if (status == UZ_OK)
-        status = measure_residual(&rho, g, err);
+        status = check(g, result->u, scene, err);
+    if (status == UZ_OK)
+        status = uz_measure_residual(&g->rho, g, g->checked.residual, err);
     if (status != UZ_OK)
         return status;
     const uz_bound_check_result *c = &g->checked;
-    const double bound = uz_bound_error(c, rho);
+    const double bound = uz_bound_error(c, g->rho);
     if (!isfinite(bound)) {
         snprintf(out->why, sizeof out->why, "%s",
                  *c->fault ? c->fault : "what the stress lacks of equilibrium could not be bounded");
@@ -133,7 +142,7 @@ static uz_status prove(uz_result *result, guarantee *g, const uz_body_model *mod
     out->bound = bound;
     out->relative = !(bound > 0) ? 0 : c->norm > bound ? bound / (c->norm - bound) : (double)INFINITY;
     out->primal = c->primal;
-    out->dual = c->dual - fabs(c->defect) - uz_bound_lacking(c, rho) * bound;
+    out->dual = c->dual - fabs(c->defect) - uz_bound_lacking(c, g->rho) * bound;
     return UZ_OK;
 }
 
@@ -145,7 +154,7 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
     uz_guarantee *out = &s->guarantee;
     uz_body_model model = {.d = 0};
     uz_error err = {0};
-    guarantee g = {.settings = settings, .cache = cache};
+    uz_guaranteed g = {.problem = problem, .settings = settings, .cache = cache, .rho = INFINITY};
     g.hooks.ctx = hooks ? hooks->ctx : NULL;
     g.hooks.cancelled = hooks ? hooks->cancelled : NULL;
     g.stop = (uz_stop){&g.hooks, started + settings->time_limit_s};
@@ -159,16 +168,26 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
     uz_status status = uz_body_model_build(&model, &problem->scene, UZ_BODY_OUTLINE, &err);
     if (status == UZ_OK)
         status = prove(result, &g, &model, &problem->scene, &err);
+    if (status == UZ_OK && out->proved)
+        status = uz_prove_quantities(result, &g, &err);
     uz_bound_body_clear(&g.body);
     uz_body_model_clear(&model);
     uz_qp_clear(&g.qp);
     uz_cache_free(own_cache);
     free(g.dof);
     free(g.stress);
-    free(g.checked.residual);
+    free(g.lift);
+    uz_bound_check_clear(&g.checked);
     if (status != UZ_OK) /* the answer is there, and stays */
         snprintf(out->why, sizeof out->why, "%.150s",
                  uz_stop_is_due(&g.stop) ? "it was stopped before the bound was made" : err.message);
+    for (int64_t i = 0; i < result->evaluation->n_quantities; i++) {
+        uz_quantity_found *q = &result->evaluation->quantities[i];
+        if (!q->guaranteed && !*q->unproved)
+            snprintf(q->unproved, sizeof q->unproved, "%s",
+                     out->proved ? "there was no time for it, or no memory"
+                                 : "the whole error is not guaranteed (error.why)");
+    }
     out->seconds = uz_seconds() - began;
     s->timings.total += out->seconds;
     s->timings.certify += out->seconds;

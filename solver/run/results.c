@@ -72,18 +72,30 @@ double uz_asked_error(const uz_summary *s)
     return half <= 0.0 ? 0.0 : isfinite(half) && q->value != 0.0 ? half / fabs(q->value) : (double)INFINITY;
 }
 
+bool uz_is_unproved(const uz_summary *s)
+{
+    const uz_evaluation *e = s->evaluation;
+    const bool quantity = e && e->asked > 0.0 && e->n_quantities > 0;
+    return s->guarantee.asked && !(quantity ? e->quantities[0].guaranteed : s->guarantee.proved);
+}
+
 void uz_judge_quantity(uz_result *result)
 {
     uz_summary *s = &result->summary;
     const uz_evaluation *e = s->evaluation;
     const double error = uz_asked_error(s);
-    if (!e || !(e->asked > 0.0) || e->n_quantities == 0 || s->outcome != UZ_CONVERGED || error <= e->asked)
+    if (!e || !(e->asked > 0.0) || e->n_quantities == 0 || s->outcome != UZ_CONVERGED ||
+        (error <= e->asked && !uz_is_unproved(s)))
         return;
     const uz_quantity_found *q = &e->quantities[0];
     s->outcome = UZ_MESH_LIMIT;
-    snprintf(s->message, sizeof s->message,
-             "%.40s is known within %.3g of itself on this mesh, asked for %.3g%s%.60s. %s.", q->name, error, e->asked,
-             q->why[0] ? ": " : "", q->why, "Use a finer mesh, or a box with \"cells\": \"auto\"");
+    if (error <= e->asked)
+        snprintf(s->message, sizeof s->message,
+                 "%.40s, known within %.3g of itself by estimate, is not guaranteed: %s.", q->name, error, q->unproved);
+    else
+        snprintf(s->message, sizeof s->message,
+                 "%.40s is known within %.3g of itself on this mesh, asked for %.3g%s%.60s. %s.", q->name, error,
+                 e->asked, q->why[0] ? ": " : "", q->why, "Use a finer mesh, or a box with \"cells\": \"auto\"");
 }
 
 /* The rows with a share in the contradiction: exactly, or by more than a ray's rounding. */

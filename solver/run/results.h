@@ -20,6 +20,8 @@ void uz_blank_answer(uz_result *result);
 /* An answer that converged, but on a mesh that leaves the first quantity a wider interval than was asked for, ends as
  * UZ_MESH_LIMIT. */
 void uz_judge_quantity(uz_result *result);
+/* Was a guarantee asked for, of the quantity that the accuracy is about, else of the whole error, and not found? */
+bool uz_is_unproved(const uz_summary *s);
 /* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */
 void uz_explain_outcome(uz_result *result, uz_end end);
 

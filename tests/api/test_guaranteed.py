@@ -1,6 +1,9 @@
 """The guaranteed bound on the whole error, through the service. usage: test_guaranteed.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
 import copy
+import json
+import subprocess
+import tempfile
 
 import service
 from service import SCENE, check, expect
@@ -77,6 +80,69 @@ def test_cases_and_chosen_cells(s):
     summary = summary_of(s, request)
     check(summary["outcome"] == "converged" and summary["error"]["total"] <= 0.03, summary)
     check(summary["error"]["kind"] == "guaranteed" and summary["requested_error"] == 0.03, summary["error"])
+
+
+BLOCK = {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"size": [1, 1], "cells": [24, 24], "element": "quad8"}},
+         "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "loads": [],
+         "supports": [{"on": "top", "uy": -0.01}, {"on": "left", "ux": 0}],
+         "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [0, -2], "radius": 2}}}]}
+ASKED = [{"quantity": "contact.force", "on": "bottom", "name": "force"}, {"quantity": "strain_energy"},
+         {"quantity": "reaction", "on": "top", "direction": [0, 1], "name": "reaction"},
+         {"quantity": "displacement", "on": "right", "direction": [1, 0], "name": "right"},
+         {"quantity": "displacement", "on": "all", "direction": [0, 1], "name": "down"}]
+
+
+def test_quantities(s):
+    """On a circle: 2.8434, -2.8422, 1.1127e-3 by a mesh of 64 x 64 quad8 cells, a little more by theirs."""
+    summary = summary_of(s, {"problem": BLOCK, "quantities": ASKED, "solver": {"accuracy": {"guaranteed": True}}})
+    found = {one["name"]: one for one in summary["quantities"]}
+    check(all(one["kind"] == "guaranteed" and "why" not in one for one in found.values()), found)
+    for name, true in (("force", 2.8445), ("reaction", -2.8433), ("right", 1.1131e-3), ("strain_energy", 0.013046)):
+        one = found[name]
+        check(one["low"] < true < one["high"] and one["high"] - one["low"] < 0.08 * abs(true), one)
+        check(abs(one["value"] - true) < 3e-3 * abs(true), one)
+    check(found["down"]["low"] < found["down"]["on_this_mesh"] < found["down"]["high"] < 0, found["down"])
+
+
+def test_quantities_that_are_not_proved(s):
+    """The paper's body touches its obstacle at a support: no displacement is 1 on the one and 0 at the other."""
+    request = asked({"guaranteed": True})
+    request["quantities"] = [{"quantity": "contact.force"}, {"quantity": "displacement", "on": "right", "direction": [0, 1]},
+                             {"quantity": "mean_pressure", "window": {"min": [20, -1], "max": [40, 1]}}]
+    force, displacement, pressure = summary_of(s, request)["quantities"]
+    check(force["kind"] == "estimated" and "meets supports" in force["why"] and force["low"] < force["high"], force)
+    check(displacement["kind"] == "guaranteed" and displacement["low"] < displacement["high"] < 0, displacement)
+    check(pressure["kind"] == "estimated" and "window" in pressure["why"], pressure)
+    del request["quantities"]  # as the accuracy
+    request["solver"]["accuracy"] = {"quantity": "contact.force", "relative": 1, "guaranteed": True}
+    summary = summary_of(s, request)
+    check(summary["outcome"] == "mesh_limit" and "is not guaranteed" in summary["message"], summary)
+    request["solver"]["accuracy"] = {"quantity": "displacement", "on": "right", "direction": [0, 1], "relative": 0.1, "guaranteed": True}
+    summary = summary_of(s, request)
+    check(summary["outcome"] == "converged" and summary["quantities"][0]["kind"] == "guaranteed", summary)
+    refused = s.post({**request, "quantities": [{"quantity": "contact.force", "guaranteed": True}]})
+    expect(refused, 422, "not_allowed")
+
+
+def test_a_force_within_two_percent(s):
+    """Proved, on a mesh that is refined for it, in the words of the client, too."""
+    problem = copy.deepcopy(BLOCK)
+    problem["mesh"] = {"box": {"size": [1, 1], "cells": [8, 8], "element": "tri6"}, "refine": "auto"}
+    request = {"problem": problem, "solver": {"accuracy": {"quantity": "contact.force", "on": "bottom", "relative": 0.02, "guaranteed": True}},
+               "assert": [{"quantity": "quantities.contact_force_bottom", "min": 2.7, "max": 3}]}
+    summary = summary_of(s, request)
+    force = summary["quantities"][0]
+    check(summary["outcome"] == "converged" and force["kind"] == "guaranteed", summary["message"], force)
+    check(force["low"] < 2.8445 < force["high"] and force["high"] - force["low"] < 0.0401 * force["value"], force)
+    with tempfile.TemporaryDirectory() as folder:
+        path, report = f"{folder}/force.json", f"{folder}/report.xml"
+        with open(path, "w", encoding="utf-8") as to:
+            json.dump(request, to)
+        done = subprocess.run([str(s.build / "uzawa"), "--server", f"http://{s.host}:{s.port}", "submit", path, "--wait", "--junit", report],
+                              capture_output=True, text=True, check=False)
+        check(done.returncode == 0 and ", guaranteed; " in done.stdout and "by estimate" not in done.stdout, done.stdout, done.stderr)
+        with open(report, encoding="utf-8") as written:
+            check("guaranteed within" in written.read(), path)
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ PHRASES = {
     "| 120 x 40 | 3.625e-3 | 3161 | -3.9624809230e-3 | -10.54546589 | 88 |": reference(("-3.9624809230e-3", "-10.54546589")),
     "SIAM J. Imaging Sciences 2, 2009": None, "Foundations of Computational Mathematics 15, 2015": None, "Methods in Engineering 24, 1987": None,
     "Applied Mathematics 5, 1947": None, "SIAM J. Scientific Computing 23, 2001": None, "Equilibrium Finite Element Formulations, 2017": None,
-    "in ordinary precision, with 1e-14 of what they add up": constant(1e-14, r"#define SUM_ROUNDING +([\d.e-]+)"),
+    "in ordinary precision, with 1e-14 of what they add up": constant(1e-14, r"#define UZ_SUM_ROUNDING +([\d.e-]+)"),
     "Computing 56, 1996": None, "SIAM J. Numerical Analysis 33, 1996": None, "Computing 22, 2000": None, "Contact Mechanics, 1985": None, "Acta Numerica 10, 2001": None, "SIAM J. Numerical Analysis 38, 2000": None,
     "Int. J. Numerical Methods in Engineering 83, 2010": None, "Applied Mechanics and Engineering 193, 2004": None,
     "Applied Mechanics and Engineering 200, 2011": None,

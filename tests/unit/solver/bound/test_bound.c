@@ -254,7 +254,7 @@ TEST(check_trusts_nobody)
     double *stress = zeros(entries);
     CHECK(uz_solve(&dual, &problem, &settings, NULL, NULL, &err) == UZ_OK);
     CHECK(uz_bound_stress(stress, &body, dof, dual->u, NULL, &err) == UZ_OK);
-    CHECK(uz_bound_check(&good, &body, &scene, dof, n, result->u, stress, &err) == UZ_OK);
+    CHECK(uz_bound_check(&good, &body, &scene, dof, n, result->u, NULL, stress, &err) == UZ_OK);
     CHECK_STR(good.fault, "");
     CHECK(uz_bound_error(&good, 0) > 0 && isfinite(uz_bound_error(&good, 0)));
     CHECK(uz_norm(n, good.residual) < 1e-9 * uz_norm(n, qp.p));
@@ -275,7 +275,7 @@ TEST(check_trusts_nobody)
         if (wrong == 4) /* another answer */
             for (int64_t i = 0; i < 2 * model.mesh.n_nodes; i++)
                 u[i] *= 0.9;
-        CHECK(uz_bound_check(&bad, &body, &scene, dof, n, u, s, &err) == UZ_OK);
+        CHECK(uz_bound_check(&bad, &body, &scene, dof, n, u, NULL, s, &err) == UZ_OK);
         if (wrong == 0 || wrong == 3)
             CHECK_MSG(*bad.fault && isinf(uz_bound_error(&bad, 0)), "%d", wrong);
         if (wrong == 1)
@@ -284,11 +284,11 @@ TEST(check_trusts_nobody)
             CHECK(!*bad.fault && bad.lift > 0);
         if (wrong == 2 || wrong == 4)
             CHECK(uz_bound_error(&bad, 0) > 1.01 * uz_bound_error(&good, 0));
-        free(bad.residual);
+        uz_bound_check_clear(&bad);
         free(u);
         free(s);
     }
-    free(good.residual);
+    uz_bound_check_clear(&good);
     free(stress);
     free(dof);
     uz_result_free(dual);
@@ -344,13 +344,13 @@ TEST(what_only_obstacles_hold)
             for (int64_t i = 0; i < 2 * model.mesh.n_nodes; i++)
                 u[i] = result->u[i] + (i % 2 == 1 ? 0.125 : 0);
             CHECK(uz_bound_stress(stress, &body, dof, v->u, NULL, &err) == UZ_OK);
-            CHECK(uz_bound_check(&good, &body, &scene, dof, qp.K.cols, result->u, stress, &err) == UZ_OK);
-            CHECK(uz_bound_check(&off, &body, &scene, dof, qp.K.cols, u, stress, &err) == UZ_OK);
+            CHECK(uz_bound_check(&good, &body, &scene, dof, qp.K.cols, result->u, NULL, stress, &err) == UZ_OK);
+            CHECK(uz_bound_check(&off, &body, &scene, dof, qp.K.cols, u, NULL, stress, &err) == UZ_OK);
             CHECK_STR(good.fault, "");
             CHECK((uz_norm(qp.K.cols, good.residual) > 1) == (wrong == 1));
             CHECK_REL(off.gap - good.gap, 0.125 * 2 * 60 * 20 * scene.thickness, 1e-9);
-            free(good.residual);
-            free(off.residual);
+            uz_bound_check_clear(&good);
+            uz_bound_check_clear(&off);
         }
         free(press);
         free(stress);
@@ -395,12 +395,12 @@ TEST(what_leaves_the_obstacle_keeps_to_the_supports)
     for (int64_t i = 0; i < 2 * model.mesh.n_nodes; i++)
         u[i] = result->u[i] + bump[i];
     CHECK(fabs(result->u[2 * middle]) < 1e-12 && fabs(result->u[2 * middle + 1]) < 1e-12);
-    CHECK(uz_bound_check(&alone, &body, &scene, dof, qp.K.cols, bump, stress, &err) == UZ_OK);
-    CHECK(uz_bound_check(&moved, &body, &scene, dof, qp.K.cols, u, stress, &err) == UZ_OK);
+    CHECK(uz_bound_check(&alone, &body, &scene, dof, qp.K.cols, bump, NULL, stress, &err) == UZ_OK);
+    CHECK(uz_bound_check(&moved, &body, &scene, dof, qp.K.cols, u, NULL, stress, &err) == UZ_OK);
     CHECK_STR(moved.fault, "");
     CHECK_REL(moved.lift, alone.norm, 1e-6);
-    free(moved.residual);
-    free(alone.residual);
+    uz_bound_check_clear(&moved);
+    uz_bound_check_clear(&alone);
     free(stress);
     free(bump);
     free(u);

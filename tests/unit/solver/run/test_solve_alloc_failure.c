@@ -121,6 +121,21 @@ static uz_problem asking_problem(void)
     return problem;
 }
 
+/* A block on a ball, which it stands in between its nodes. */
+static uz_problem block_problem(void)
+{
+    uz_problem problem = asking_problem();
+    uz_scene *scene = &problem.scene;
+    uz_scene_clear(scene);
+    *scene = box_scene(4, 2, 4, 2);
+    add_support(scene, "left", 0, NAN);
+    add_support(scene, "top", NAN, -0.05);
+    add_plane(scene, "bottom", 2, -5, 0, 1);
+    scene->contacts[0].kind = UZ_OBSTACLE_ROUND;
+    scene->contacts[0].radius = 5;
+    return problem;
+}
+
 static uz_problem obstacle_problem(void)
 {
     qp_random rng = {3};
@@ -193,6 +208,14 @@ TEST(guaranteed_bound)
     scenario s = {"guaranteed", scene_problem(), uz_settings_default(), false, 1};
     s.settings.guaranteed = true;
     CHECK(fail_each(&s) > 200);
+    uz_problem_clear(&s.problem);
+}
+
+TEST(guaranteed_intervals)
+{
+    scenario s = {"intervals", block_problem(), uz_settings_default(), false, 1};
+    s.settings.guaranteed = true;
+    CHECK(fail_each(&s) > 400);
     uz_problem_clear(&s.problem);
 }
 

@@ -1,0 +1,433 @@
+/* interval.c: what a pair of displacement and stress proves of a quantity, whatever it was made by: sums over elements
+ * and edges by the same code that looks at the answer (check.c). Products of two pairs are from squares,
+ *
+ *     (sigma_h + C eps(u_h)) : C^-1 (C eps(w) - tau)  from  |sigma_h + t tau - C eps(t w - u_h)|^2, and with -t
+ *
+ * where t makes both of one size. */
+#include "bound/interval.h"
+
+#include "bound/check.h"
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* By so much of its own size w may be off at obstacles: what brings it to where it may be is rounding. */
+#define PLACES 1e-12
+
+enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, MOMENTS = UZ_BOUND_MOMENTS };
+
+typedef struct {
+    const uz_bound_pair *pair;
+    const uz_bound_body *body;
+    const uz_scene *scene;
+    const double *u, *stress;
+    const uz_bound_check_result *checked;
+    uz_bound_check_result scratch;
+    examination x;         /* of the pair */
+    double *acts[2];       /* resultants less the loads, of the answer's stress and of the pair's */
+    double *v, *tractions; /* n_nodes x 2, n_elements x STRESSES: room */
+    double *force, *free_strain;
+} weighing;
+
+static uz_status begin(weighing *y, int64_t n_dofs, uz_error *err)
+{
+    const uz_mesh *mesh = &y->pair->adjoint->model->mesh;
+    const int moments = y->pair->adjoint->degree + 1;
+    const int64_t n_moments = y->pair->adjoint->n_edges * moments;
+    y->x = (examination){.out = &y->scratch, .body = y->pair->adjoint, .mesh = mesh, .moments = moments};
+    y->scratch.residual = uz_alloc_zero(n_dofs, sizeof(double));
+    y->x.resultant = uz_alloc_zero(2 * n_moments, sizeof(double));
+    y->x.pressure = uz_alloc_zero(n_moments, sizeof(double));
+    y->x.lift = uz_alloc_zero(2 * mesh->n_nodes, sizeof(double));
+    y->x.moved = uz_alloc_zero(2 * mesh->n_nodes, sizeof(double));
+    y->x.gap = uz_alloc_zero(mesh->n_elements, sizeof(double));
+    y->acts[0] = uz_alloc_zero(2 * n_moments, sizeof(double));
+    y->acts[1] = uz_alloc_zero(2 * n_moments, sizeof(double));
+    y->v = uz_alloc(2 * mesh->n_nodes, sizeof(double));
+    y->tractions = uz_alloc(mesh->n_elements * STRESSES, sizeof(double));
+    y->force = uz_alloc(2 * mesh->n_elements, sizeof(double));
+    y->free_strain = uz_alloc(mesh->n_elements, sizeof(double));
+    return y->scratch.residual && y->x.resultant && y->x.pressure && y->x.lift && y->x.moved && y->x.gap &&
+                   y->acts[0] && y->acts[1] && y->v && y->tractions && y->force && y->free_strain
+               ? UZ_OK
+               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a quantity of %lld elements",
+                         (long long)mesh->n_elements);
+}
+
+static void end(weighing *y)
+{
+    void *room[] = {y->scratch.residual, y->x.resultant, y->x.pressure, y->x.lift,    y->x.moved, y->x.gap,
+                    y->acts[0],          y->acts[1],     y->v,          y->tractions, y->force,   y->free_strain};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+}
+
+/* ---- sums over elements */
+
+/* x's sums of 1/2 |tau - C eps(v)|^2 but for springs, and its resultants, from nothing. */
+static void add_up(examination *x, const double *v, const double *stress)
+{
+    const int64_t n_moments = x->body->n_edges * x->moments;
+    memset(x->resultant, 0, (size_t)(2 * n_moments) * sizeof *x->resultant);
+    x->sum = x->scale = x->margin = x->strain = x->complementary = x->inside = 0;
+    for (int64_t e = 0; e < x->mesh->n_elements; e++)
+        uz_examine_element(x, v, stress + e * STRESSES, e);
+}
+
+/* Resultants less the loads. */
+static void less_loads(double *acts, const examination *x, const uz_bound_body *body, double times)
+{
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        const uz_bound_edge *edge = &body->edge[i];
+        const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+        const double each = hypot(to[0] - from[0], to[1] - from[1]) * body->model->thickness / x->moments;
+        for (int a = 0; a < 2 * x->moments; a++)
+            acts[2 * i * x->moments + a] = times * acts[2 * i * x->moments + a] - each * edge->traction[a % 2];
+    }
+}
+
+/* int (t + k u)(s + k v) / k of the springs, t and s as resultants; *scale: the sizes of what it is the sum of. */
+static double spring_product(double *scale, const examination *x, const double *t, const double *u, double of_u,
+                             const double *s, const double *v)
+{
+    double sum = 0, at[3], weight[3];
+    uz_gauss(at, weight, 3);
+    for (int64_t i = 0; i < x->body->n_edges; i++)
+        for (int c = 0; c < 2; c++) {
+            const uz_bound_edge *edge = &x->body->edge[i];
+            const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+            const double area = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness;
+            double b[2][3];
+            if (!(edge->spring[c] > 0))
+                continue;
+            uz_along_edge(b[0], u, edge->node, (const double[2]){c == 0, c == 1});
+            uz_along_edge(b[1], v, edge->node, (const double[2]){c == 0, c == 1});
+            for (int g = 0; g < 3; g++) {
+                const double q = (1 + at[g]) / 2, p = 1 - q;
+                const double bernstein[2][3] = {{p, q, 0}, {p * p, 2 * p * q, q * q}};
+                double traction[2] = {0}, moved[2];
+                for (int a = 0; a < x->moments; a++) {
+                    const int64_t k = (i * x->moments + a) * 2 + c;
+                    traction[0] += bernstein[x->moments - 2][a] * t[k] * x->moments / area;
+                    traction[1] += bernstein[x->moments - 2][a] * s[k] * x->moments / area;
+                }
+                for (int k = 0; k < 2; k++)
+                    moved[k] = b[k][0] * p * p + 2 * b[k][1] * p * q + b[k][2] * q * q;
+                moved[0] *= of_u;
+                const double k = edge->spring[c];
+                sum += weight[g] / 2 * area * (traction[0] + k * moved[0]) * (traction[1] + k * moved[1]) / k;
+                *scale += weight[g] / 2 * area * (fabs(traction[0]) + k * fabs(moved[0])) *
+                          (fabs(traction[1]) + k * fabs(moved[1])) / k;
+            }
+        }
+    return sum;
+}
+
+/* |d|^2 from above, or as it is; the pair's resultants less its load -> acts[1]. */
+static double square_apart(weighing *y, bool bounded)
+{
+    examination *x = &y->x;
+    double scale = 0;
+    add_up(x, y->pair->w, y->pair->stress);
+    memcpy(y->acts[1], x->resultant, (size_t)(2 * x->body->n_edges * x->moments) * sizeof(double));
+    less_loads(y->acts[1], x, x->body, 1);
+    const double springs = spring_product(&scale, x, y->acts[1], y->pair->w, 1, y->acts[1], y->pair->w);
+    return fmax(0, 2 * x->sum + springs) + (bounded ? 2 * x->margin + UZ_SUM_ROUNDING * (2 * x->scale + scale) : 0);
+}
+
+uz_status uz_bound_apart(double *apart, const uz_bound_pair *pair, uz_error *err)
+{
+    weighing y = {.pair = pair};
+    uz_status status = begin(&y, 1, err);
+    *apart = status == UZ_OK ? sqrt(square_apart(&y, false)) : 0;
+    end(&y);
+    return status;
+}
+
+/* int sigma_m : d, and what rounding and integration may make of it. The answer's resultants -> acts[0]. */
+static double work_apart(weighing *y, double apart, double *rounding)
+{
+    const uz_mesh *mesh = y->x.mesh;
+    const int64_t n_moments = y->body->n_edges * y->x.moments;
+    uz_bound_body both = *y->body; /* as far as elements ask */
+    const double own = y->checked->norm + sqrt(2 * fmax(0, y->checked->gap)),
+                 t = own > 0 && apart > 0 ? fmin(1e100, fmax(1e-100, own / apart)) : 1;
+    examination x = y->x;
+    double sum = 0, scale = 0;
+    both.force = y->force;
+    both.free_strain = y->body->free_strain ? y->free_strain : NULL;
+    x.body = &both;
+    for (int sign = 1; sign >= -1; sign -= 2) {
+        for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
+            y->v[i] = sign * t * y->pair->w[i] - y->u[i];
+        for (int64_t i = 0; i < mesh->n_elements * STRESSES; i++)
+            y->tractions[i] = y->stress[i] + sign * t * y->pair->stress[i];
+        for (int64_t i = 0; i < 2 * mesh->n_elements; i++)
+            y->force[i] = y->body->force[i] + sign * t * y->pair->adjoint->force[i];
+        for (int64_t e = 0; e < mesh->n_elements && both.free_strain; e++)
+            y->free_strain[e] = -y->body->free_strain[e];
+        add_up(&x, y->v, y->tractions);
+        sum -= sign * x.sum / (4 * t);
+        *rounding += (x.margin + UZ_SUM_ROUNDING * x.scale) / (4 * t);
+        for (int64_t k = 0; k < 2 * n_moments; k++)
+            y->acts[0][k] += x.resultant[k] / 2;
+    }
+    less_loads(y->acts[0], &x, y->body, 1);
+    sum -= spring_product(&scale, &y->x, y->acts[0], y->u, -1, y->acts[1], y->pair->w) / 2;
+    *rounding += UZ_SUM_ROUNDING * scale;
+    return sum;
+}
+
+/* int tau : expansion. */
+static double expansion_work(const weighing *y, double *rounding)
+{
+    double sum = 0;
+    for (int64_t e = 0; e < y->x.mesh->n_elements && y->body->free_strain; e++) {
+        const uz_body_model *model = y->body->model;
+        int count;
+        const int64_t *node = uz_mesh_element(y->x.mesh, e, &count);
+        const int parts = uz_element_type_of((uz_element_kind)y->x.mesh->kind[e])->corners;
+        double centre[2], expansion[3] = {0};
+        uz_bound_centre(centre, y->body, e);
+        uz_thermal_strain(expansion, model->kind, uz_element_material(model, e)->lame, y->body->free_strain[e]);
+        for (int k = 0; k < parts; k++) {
+            const double *a = y->x.mesh->xyz + 2 * node[k], *b = y->x.mesh->xyz + 2 * node[(k + 1) % parts];
+            const double area2 = (b[0] - a[0]) * (centre[1] - a[1]) - (b[1] - a[1]) * (centre[0] - a[0]);
+            const double part = uz_expansion_work(y->pair->stress + e * STRESSES + k * UZ_BOUND_POINTS * 3,
+                                                  y->x.moments == 2 ? 3 : 6, expansion, area2 / 2 * model->thickness);
+            sum += part;
+            *rounding += UZ_SUM_ROUNDING * fabs(part);
+        }
+    }
+    return sum;
+}
+
+/* ---- along edges */
+
+/* With these widths at the nodes polynomials between them keep to s along the whole edge, but for normals that turn: s
+ * bends away from its chord by h^2 / 8R; a quadratic polynomial is at most 1.25 times its nodes', and its middle
+ * coefficient twice the middle less half the ends'. */
+void uz_bound_openings(double *open, const uz_bound_body *body, const uz_bound_check_result *checked)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    for (int64_t i = 0; i < mesh->n_nodes; i++)
+        open[i] = INFINITY;
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        static const double PART[3] = {0, 1, 0.5};
+        const uz_bound_edge *edge = &body->edge[i];
+        const double *from = mesh->xyz + 2 * edge->node[0], *to = mesh->xyz + 2 * edge->node[1];
+        const double length2 = (to[0] - from[0]) * (to[0] - from[0]) + (to[1] - from[1]) * (to[1] - from[1]);
+        const double bends = edge->round ? length2 / (2 * edge->radius) : 0;
+        double s[3] = {0};
+        for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++) {
+            double n[2];
+            const double *at = checked->lifted + 2 * edge->node[a];
+            s[a] = uz_bound_gap(n, body, i, PART[a]) - n[0] * at[0] - n[1] * at[1];
+        }
+        for (int a = 0; a < 3; a++)
+            s[a] -= bends;
+        if (edge->node[2] >= 0) { /* all alike, or by the coefficients of s: half of it at an end that is wide open */
+            const double middle = 2 * s[2] - (s[0] + s[1]) / 2, least = fmin(fmin(s[0], s[1]), middle) / 1.25;
+            const double ends = fmax(0, s[0]) + fmax(0, s[1]), part = fmax(0, fmin(0.5, 2 * middle / ends));
+            const bool alike = !(part * fmax(s[0], s[1]) > least);
+            s[0] = alike ? least : part * s[0];
+            s[1] = alike ? least : part * s[1];
+            s[2] = alike ? least : fmin(part * s[2], (middle - (fmax(0, s[0]) + fmax(0, s[1])) / 2) / 2);
+        }
+        for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++)
+            open[edge->node[a]] = fmax(0, fmin(open[edge->node[a]], s[a]));
+    }
+}
+
+/* Brings w's nodes to where they may be. */
+static void bring_nodes(weighing *y)
+{
+    static const double AXIS[2][2] = {{1, 0}, {0, 1}}, PART[3] = {0, 1, 0.5};
+    const uz_bound_body *body = y->body;
+    const uz_body_model *model = body->model;
+    double *open = y->v; /* n_nodes of it */
+    uz_bound_openings(open, body, y->checked);
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        const uz_bound_edge *edge = &body->edge[i];
+        for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++) {
+            const int64_t node = edge->node[a];
+            double n[2], way[2] = {0}, share = 0, *w = y->pair->w + 2 * node;
+            uz_bound_gap(n, body, i, PART[a]);
+            const double moved = n[0] * w[0] + n[1] * w[1], om = y->pair->wanted[edge->contact];
+            const double most = y->pair->share * open[node], by = fmax(om - most, fmin(om + most, moved)) - moved;
+            for (int k = 0; k < 2; k++) {
+                const double part = model->dof[2 * node + k] < 0 ? 0 : uz_along_dof(model, node, k, n);
+                for (int c = 0; c < 2; c++)
+                    way[c] += part * uz_along_dof(model, node, k, AXIS[c]);
+                share += part * part;
+            }
+            for (int c = 0; c < 2 && share > 1e-6; c++)
+                w[c] += by * way[c] / share;
+        }
+    }
+}
+
+/* A bound on minus the least value of a quadratic polynomial, from its Bernstein coefficients. */
+static double below_zero(const double b[3])
+{
+    return fmax(fmax(-b[0], -b[2]), -b[1] - sqrt(fmax(0, b[0]) * fmax(0, b[2])));
+}
+
+/* Is w_n nowhere farther from om than m s_h along an edge? */
+static void look_at_edge(weighing *y, int64_t i)
+{
+    const uz_bound_edge *edge = &y->body->edge[i];
+    const double m = y->pair->share, om = y->pair->wanted[edge->contact];
+    double s[3], moved[3], most = 0, size = fabs(om) + m * y->x.farthest;
+    if (edge->round) {
+        uz_bulge_excess(&y->x, y->checked->lifted, y->pair->w, om, m, y->checked->pressure, i);
+        return;
+    }
+    uz_along_edge(s, y->checked->lifted, edge->node, edge->normal);
+    uz_along_edge(moved, y->pair->w, edge->node, edge->normal);
+    for (int a = 0; a < 3; a++) {
+        const double gap = a == 0 ? edge->gap[0] : a == 2 ? edge->gap[1] : (edge->gap[0] + edge->gap[1]) / 2;
+        for (int c = 0; c < 2 && edge->node[a] >= 0; c++)
+            size = fmax(size, fabs(y->pair->w[2 * edge->node[a] + c]));
+        s[a] = m * (gap - s[a]);
+        moved[a] -= om;
+    }
+    for (int k = 0; k < 2; k++) {
+        double b[3];
+        for (int a = 0; a < 3; a++)
+            b[a] = s[a] + (k == 0 ? moved[a] : -moved[a]);
+        most = fmax(most, below_zero(b));
+    }
+    if (!*y->scratch.fault && !(most <= PLACES * size))
+        snprintf(y->scratch.fault, sizeof y->scratch.fault,
+                 "the contact meets supports, where what presses has no bound");
+}
+
+/* Of the pair's tractions: its pressure's work on gaps and its work at supports -> middle, what is missing -> residual
+ * and R(u_h) -> middle. */
+static void weigh_edges(weighing *y, uz_bound_interval *out, const int64_t *dof)
+{
+    examination *x = &y->x;
+    for (int64_t i = 0; i < y->body->n_edges; i++) {
+        const uz_bound_edge *edge = &y->body->edge[i];
+        double missing[MOMENTS][2], b[3], m[MOMENTS];
+        uz_examine_tractions(missing, x, y->pair->w, i);
+        for (int a = 0; a < x->moments; a++) {
+            double axis[2][2], term;
+            uz_bound_axes(axis, y->body, i, a);
+            for (int k = 0; k < 2; k++) {
+                const int64_t at = dof[(i * x->moments + a) * 2 + k];
+                if (edge->held[k]) {
+                    term = missing[a][k] * edge->value[k];
+                } else {
+                    uz_along_edge(b, y->u, edge->node, axis[k]);
+                    uz_edge_means(m, b, x->moments);
+                    term = missing[a][k] * m[a];
+                    if (at >= 0)
+                        out->residual[at] = missing[a][k];
+                }
+                out->middle += term;
+                out->rounding += UZ_SUM_ROUNDING * fabs(term);
+            }
+            if (edge->contact >= 0 && !edge->round) {
+                term = x->pressure[i * x->moments + a] *
+                       (edge->gap[0] + (edge->gap[1] - edge->gap[0]) * (a + 1) / (x->moments + 1));
+                out->middle += term;
+                out->rounding += UZ_SUM_ROUNDING * fabs(term);
+            }
+        }
+    }
+    out->middle -= y->scratch.dual; /* of round obstacles */
+    out->rounding += UZ_SUM_ROUNDING * fabs(y->scratch.dual);
+}
+
+/* w has to be what the adjoint body says of supports. */
+static void look_at_supports(const weighing *y, uz_bound_interval *out)
+{
+    double b[3], size = 0;
+    for (int64_t i = 0; i < 2 * y->x.mesh->n_nodes; i++)
+        size = fmax(size, fabs(y->pair->w[i]));
+    for (int64_t i = 0; i < y->body->n_edges && !*out->fault; i++)
+        for (int k = 0; k < 2; k++) {
+            const uz_bound_edge *edge = &y->pair->adjoint->edge[i];
+            uz_along_edge(b, y->pair->w, edge->node, edge->axis[k]);
+            for (int a = 0; a < 3 && edge->held[k]; a++)
+                if (!(fabs(b[a] - edge->value[k]) <= 1e-12 * size))
+                    snprintf(out->fault, sizeof out->fault, "the supports that it is about meet others");
+        }
+}
+
+uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, const uz_bound_body *body,
+                         const uz_scene *scene, const int64_t *dof, int64_t n_dofs, const double *u,
+                         const double *stress, const uz_bound_check_result *checked, uz_error *err)
+{
+    weighing y = {.pair = pair, .body = body, .scene = scene, .u = u, .stress = stress, .checked = checked};
+    uz_status status = begin(&y, n_dofs, err);
+    double *limit = uz_alloc(body->n_edges * (body->degree + 1), sizeof *limit);
+    *out = (uz_bound_interval){.share = pair->share};
+    if (status == UZ_OK && !limit)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure of a quantity");
+    if (status == UZ_OK) {
+        for (int64_t k = 0; k < body->n_edges * (body->degree + 1); k++)
+            limit[k] = pair->share * fmax(0, checked->pressure[k]);
+        y.x.limit = limit;
+        bring_nodes(&y);
+        look_at_supports(&y, out);
+        out->apart = sqrt(square_apart(&y, true));
+        out->lacking = 100 * y.x.inside * sqrt(2 * fabs(y.x.complementary));
+        const double work = uz_work_of_loads(&y.x, scene, pair->w, &status, err);
+        for (int64_t i = 0; i < 2 * body->model->mesh.n_nodes; i++)
+            y.x.farthest = fmax(y.x.farthest, fabs(checked->lifted[i]));
+        for (int64_t i = 0; i < body->n_edges; i++)
+            if (body->edge[i].contact >= 0)
+                look_at_edge(&y, i);
+        out->bulge = sqrt(y.x.bulge);
+        out->pressed = y.x.bulge_work;
+        if (!*out->fault)
+            snprintf(out->fault, sizeof out->fault, "%.90s", y.scratch.fault);
+        out->residual = y.scratch.residual;
+        weigh_edges(&y, out, dof);
+        y.scratch.residual = NULL;
+        out->lacking += sqrt(y.x.turning);
+        out->middle += work - work_apart(&y, out->apart, &out->rounding) + expansion_work(&y, &out->rounding);
+        out->rounding += UZ_SUM_ROUNDING * fabs(work);
+    }
+    free(limit);
+    end(&y);
+    return status;
+}
+
+/* ---- the interval */
+
+/* Bounds on a = |e_u| and b = |e_sigma|, X = |sigma_h - C eps(u_h)| apart from each other: a^2 / 2 + b^2 / 2 + P is at
+ * most F + b |w|, with F the gap and what is lacking (check.c), so that b is largest where it is a + X. */
+static double stress_error(const uz_bound_check_result *c, double residual_norm, double *F)
+{
+    const double rho = uz_bound_lacking(c, residual_norm), w = c->lift, X = sqrt(2 * fmax(0, c->gap));
+    *F = c->gap + rho * (uz_bound_error(c, residual_norm) + w);
+    const double half = (X - w) / 2, square = half * half + *F + w * X - X * X / 2;
+    const double apart = X + fmax(0, -half + sqrt(fmax(0, square))), alone = w + sqrt(w * w + 2 * *F);
+    return fmin(alone, apart);
+}
+
+double uz_bound_ball(const uz_bound_check_result *c, double residual_norm)
+{
+    double F;
+    const double b = stress_error(c, residual_norm, &F);
+    return fmax(0, F + b * c->lift - c->least / 4);
+}
+
+double uz_bound_half(const uz_bound_interval *q, const uz_bound_check_result *c, double residual_norm, double own_norm)
+{
+    const double H = uz_bound_ball(c, residual_norm), A = q->apart, m = q->share;
+    const double half = 2 * m * sqrt(H) <= A ? A * sqrt(H) : m * H + A * A / (4 * m);
+    double F;
+    const double bulged = stress_error(c, residual_norm, &F) + uz_bound_lacking(c, residual_norm);
+    return *q->fault ? (double)INFINITY
+                     : half + (own_norm + q->lacking) * uz_bound_error(c, residual_norm) + q->rounding + q->pressed +
+                           q->bulge * bulged;
+}

@@ -1,0 +1,35 @@
+/* guarantee.h: what is proved of an answer on a mesh, and what the intervals of its quantities are made from. */
+#ifndef UZ_GUARANTEE_H
+#define UZ_GUARANTEE_H
+
+#include "bound/bound.h"
+#include "run/problem.h"
+
+typedef struct {
+    const uz_problem *problem; /* of one case */
+    const uz_settings *settings;
+    uz_cache *cache;
+    uz_hooks hooks; /* whether to go on, and nothing else: rows are of the answer */
+    uz_stop stop;
+    uz_bound_body body;
+    uz_qp qp; /* the dual problem, and its unknowns by moments of edges */
+    int64_t *dof;
+    double *stress;
+    double *lift; /* n_nodes x 2: takes the answer out of round obstacles; NULL: not asked for */
+    uz_bound_check_result checked;
+    double rho; /* norm of what the stress lacks of equilibrium, from above */
+} uz_guaranteed;
+
+/* The library's settings for problems in matrices, with what is left of the time. */
+uz_settings uz_guarantee_settings(const uz_guaranteed *g, double now);
+/* |residual| in the norm of the inverse of the dual problem's K, from above; INFINITY where that was not found. */
+uz_status uz_measure_residual(double *norm, const uz_guaranteed *g, double *residual, uz_error *err);
+
+/* intervals.c: the displacement of least norm that takes the answer out of round obstacles, where it stands in them
+ * between its nodes: g->lift. Nothing is proved of it. UZ_ERR_MEMORY, _CANCELLED. */
+uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err);
+/* ... guaranteed intervals for the quantities, once the whole error is proved; what has none keeps its
+ * estimate, and says why. UZ_ERR_MEMORY, _CANCELLED and what problems in matrices fail with. */
+uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_error *err);
+
+#endif

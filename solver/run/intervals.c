@@ -1,0 +1,597 @@
+/* intervals.c: guaranteed intervals for quantities, from pairs of a displacement and a stress (bound/interval.h).
+ *
+ *     functional -> w of the answer's own K, v of the dual problem's K, both on factors that are there
+ *     first with rows that press held, others free: |d|, and from it the share m = |d| / 2 sqrt(H)
+ *     then w_n within m s_h of where it is to be, tau's pressure within m r_h, by active sets
+ *     what the pair proves (bound/interval.c) and how far its equilibrium is off, as of the answer
+ *
+ * Nothing depends on these solves but how wide the interval is. */
+#include "run/guarantee.h"
+
+#include "bound/interval.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "post/functional.h"
+#include "run/setup_cache.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_STEPS = 40, MOST_SHARES = 7 };
+
+/* Shares are looked for by steps of this factor, and between two that are farther apart than the other one. */
+#define STEP  2.5
+#define APART 2.0
+
+/* What takes an answer out of an obstacle goes a little farther than it stands in there, at points. */
+#define DEEPER 1.02
+
+/* min 1/2 x'Kx - p'x with conditions on y = N x, which are active sets of one dual operator. */
+typedef struct {
+    uz_setup *setup;
+    uz_problem problem; /* what the setup is of */
+    const uz_csc *K, *N;
+    const uz_stop *stop;
+    int64_t d, m;
+    double *p, *load, *x, *y, *r; /* d, d, d, m, m: r reactions of K x = p + N'r */
+    double *target, *width;       /* where y is to be; how far it may be off, or how much r may be at most */
+    double *h, *reaction, *gap;
+    int *state;
+    bool *held;
+} rows_problem;
+
+typedef struct {
+    uz_result *result;
+    const uz_guaranteed *g;
+    rows_problem primal, dual;
+    uz_bound_body adjoint;
+    double *w, *stress;    /* n_nodes x 2; as uz_bound_stress */
+    double *wanted, *open; /* n_contacts; n_nodes (uz_bound_openings) */
+    double ball;           /* sqrt(H) */
+} proving;
+
+static uz_status begin_rows(rows_problem *x, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                            const uz_hooks *hooks, const uz_stop *stop, uz_error *err)
+{
+    uz_reuse reused;
+    x->problem = *problem;
+    x->problem.n_cases = 0;
+    x->stop = stop;
+    uz_status status = uz_setup_acquire(&x->setup, &reused, cache, &x->problem, NULL, settings, hooks, err);
+    if (status != UZ_OK)
+        return status;
+    x->K = uz_setup_K(x->setup, &x->problem);
+    x->N = uz_setup_N(x->setup, &x->problem);
+    x->d = x->K->cols;
+    x->m = x->N->rows;
+    double **vectors[] = {&x->p, &x->load, &x->x},
+           **by_row[] = {&x->y, &x->r, &x->target, &x->width, &x->h, &x->reaction, &x->gap};
+    bool room = true;
+    for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++)
+        room = (*vectors[k] = uz_alloc_zero(x->d, sizeof(double))) != NULL && room;
+    for (size_t k = 0; k < sizeof by_row / sizeof by_row[0]; k++)
+        room = (*by_row[k] = uz_alloc_zero(x->m, sizeof(double))) != NULL && room;
+    x->state = uz_alloc_zero(x->m, sizeof *x->state);
+    x->held = uz_alloc_zero(x->m, sizeof *x->held);
+    return room && x->state && x->held
+               ? UZ_OK
+               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld unknowns", (long long)x->d);
+}
+
+static void end_rows(rows_problem *x, uz_cache *cache)
+{
+    void *room[] = {x->p, x->load, x->x, x->y, x->r, x->target, x->width, x->h, x->reaction, x->gap, x->state, x->held};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    uz_setup_release(cache, x->setup);
+}
+
+/* x, y, r with the rows `held` at h and the others under x->reaction. *solved false: it can't be told. */
+static uz_status solve_held(rows_problem *x, bool *solved, uz_error *err)
+{
+    const uz_dual *dual = x->setup->dual;
+    uz_dual_load *load = NULL;
+    uz_active_end ended = UZ_ACTIVE_SOLVED;
+    bool any = false, *held = uz_alloc(x->m, sizeof *held);
+    *solved = false;
+    if (!held)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)x->m);
+    for (int64_t i = 0; i < x->m; i++) {
+        held[i] = x->held[i];
+        any = any || held[i];
+        x->r[i] = 0;
+    }
+    memcpy(x->load, x->p, (size_t)x->d * sizeof *x->load);
+    uz_csc_gaxpy_t(x->load, x->N, 1, x->reaction);
+    uz_status status = uz_dual_load_create(&load, dual, x->K, x->load, x->h, err);
+    if (status == UZ_OK)
+        status = uz_dual_load_aim(load, NAN, x->stop, err);
+    if (status == UZ_OK && any)
+        status = uz_dual_load_solve_active(load, &ended, x->r, x->gap, held, err);
+    if (status == UZ_OK && ended == UZ_ACTIVE_SOLVED)
+        status = uz_dual_load_recover(load, x->x, x->r, false, err);
+    *solved = status == UZ_OK && ended == UZ_ACTIVE_SOLVED;
+    for (int64_t i = 0; i < x->m && *solved; i++) {
+        x->r[i] *= dual->row_scale[i];
+        x->y[i] = 0;
+    }
+    if (*solved)
+        uz_csc_gaxpy(x->y, x->N, 1, x->x);
+    uz_dual_load_free(load);
+    free(held);
+    return status;
+}
+
+/* With rows whose width is zero held at their target, others free; or the other way round. */
+static uz_status solve_open(rows_problem *x, bool *solved, bool held_where_zero, uz_error *err)
+{
+    for (int64_t i = 0; i < x->m; i++) {
+        x->held[i] = (x->width[i] > 0) != held_where_zero;
+        x->h[i] = x->held[i] ? x->target[i] : (double)INFINITY;
+        x->reaction[i] = 0;
+        x->state[i] = 0;
+    }
+    return solve_held(x, solved, err);
+}
+
+/* |y - target| <= times width. */
+static uz_status solve_within(rows_problem *x, bool *solved, double times, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    bool changed = true;
+    *solved = true;
+    for (int64_t i = 0; i < x->m; i++)
+        x->reaction[i] = 0;
+    for (int step = 0; step < MOST_STEPS && changed && *solved && status == UZ_OK; step++) {
+        changed = false;
+        for (int64_t i = 0; i < x->m; i++) {
+            const double most = times * x->width[i], off = x->y[i] - x->target[i];
+            int next = x->state[i];
+            if (!(most > 0))
+                next = 1;
+            else if (next == 0)
+                next = off > most ? 1 : off < -most ? -1 : 0;
+            else if (x->r[i] * next > 0) /* it would have to be pushed outward */
+                next = 0;
+            changed = changed || next != x->state[i] || step == 0;
+            x->state[i] = next;
+            x->held[i] = next != 0;
+            x->h[i] = next != 0 ? x->target[i] + next * most : (double)INFINITY;
+        }
+        if (changed)
+            status = solve_held(x, solved, err);
+    }
+    return status;
+}
+
+/* |r| <= times width, and y off its target only where r is as large as it may be, against it. */
+static uz_status solve_sliding(rows_problem *x, bool *solved, double times, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    bool changed = true;
+    *solved = true;
+    for (int step = 0; step < MOST_STEPS && changed && *solved && status == UZ_OK; step++) {
+        changed = false;
+        for (int64_t i = 0; i < x->m; i++) {
+            const double most = times * x->width[i];
+            int next = x->state[i];
+            if (!(most > 0))
+                next = 1;
+            else if (next == 0)
+                next = x->r[i] < -most ? 1 : x->r[i] > most ? -1 : 0;
+            else if ((x->y[i] - x->target[i]) * next < 0)
+                next = 0;
+            changed = changed || next != x->state[i] || step == 0;
+            x->state[i] = next;
+            x->held[i] = next == 0;
+            x->h[i] = next == 0 ? x->target[i] : (double)INFINITY;
+            x->reaction[i] = -next * most;
+        }
+        if (changed)
+            status = solve_held(x, solved, err);
+    }
+    return status;
+}
+
+/* ---- what is asked for */
+
+static bool is_asked_of(const uz_quantity *quantity, const char *on)
+{
+    return !*quantity->on || strcmp(quantity->on, on) == 0;
+}
+
+/* The quantity's load on edges and elements of the adjoint body; false: it has none in the continuum. */
+static bool take_load(proving *v, const uz_quantity *quantity, uz_error *err)
+{
+    const uz_bound_body *body = &v->g->body;
+    const uz_scene *own = &v->g->problem->scene;
+    uz_load load = {.kind = UZ_LOAD_FORCE};
+    uz_scene scene = *own;
+    uz_bound_body loaded;
+    memcpy(load.on, quantity->on, sizeof load.on);
+    memcpy(load.v, quantity->direction, sizeof load.v);
+    scene.loads = &load;
+    scene.n_loads = 1;
+    if (uz_bound_body_make(&loaded, body->model, &scene, err) != UZ_OK)
+        return false;
+    const bool can = !*loaded.why;
+    for (int64_t i = 0; i < body->n_edges && can; i++)
+        memcpy(v->adjoint.edge[i].traction, loaded.edge[i].traction, sizeof loaded.edge[i].traction);
+    for (int64_t i = 0; i < 2 * body->model->mesh.n_elements && can; i++)
+        v->adjoint.force[i] = loaded.force[i];
+    uz_bound_body_clear(&loaded);
+    return can;
+}
+
+/* The force of springs on the body along a direction: minus k times a displacement. */
+static bool take_springs(proving *v, const uz_quantity *quantity)
+{
+    const uz_scene *scene = &v->g->problem->scene;
+    bool any = false, others = false;
+    for (int64_t k = 0; k < scene->n_supports; k++) {
+        const bool asked = strcmp(scene->supports[k].on, quantity->on) == 0;
+        any = any || (asked && scene->supports[k].kind == UZ_SUPPORT_SPRING);
+        others = others || (!asked && scene->supports[k].kind == UZ_SUPPORT_SPRING);
+    }
+    for (int64_t i = 0; i < v->adjoint.n_edges && any && !others; i++)
+        for (int c = 0; c < 2; c++)
+            v->adjoint.edge[i].traction[c] = -v->adjoint.edge[i].spring[c] * quantity->direction[c];
+    return !any || !others;
+}
+
+/* The adjoint body: edges as they are, but for loads, and values at supports as z has them, gaps as w is wanted. */
+static const char *make_adjoint(proving *v, const uz_quantity *quantity, const double *z, uz_error *err)
+{
+    const uz_bound_body *body = &v->g->body;
+    uz_bound_body *to = &v->adjoint;
+    for (int64_t k = 0; k < v->g->problem->scene.n_contacts; k++)
+        v->wanted[k] =
+            quantity->kind == UZ_QUANTITY_CONTACT_FORCE && is_asked_of(quantity, v->g->problem->scene.contacts[k].on);
+    memcpy(to->edge, body->edge, (size_t)body->n_edges * sizeof *to->edge);
+    memset(to->force, 0, (size_t)(2 * body->model->mesh.n_elements) * sizeof *to->force);
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        uz_bound_edge *edge = &to->edge[i];
+        for (int c = 0; c < 2; c++) {
+            const double *at = z + 2 * edge->node[0];
+            edge->traction[c] = 0;
+            edge->value[c] = edge->held[c] ? edge->axis[c][0] * at[0] + edge->axis[c][1] * at[1] : 0;
+            if (edge->contact >= 0)
+                edge->gap[c] = v->wanted[edge->contact];
+        }
+    }
+    if (quantity->kind == UZ_QUANTITY_STRAIN_ENERGY) { /* the loads' own work */
+        for (int64_t i = 0; i < body->n_edges; i++)
+            memcpy(to->edge[i].traction, body->edge[i].traction, sizeof body->edge[i].traction);
+        memcpy(to->force, body->force, (size_t)(2 * body->model->mesh.n_elements) * sizeof *to->force);
+    }
+    if (quantity->kind == UZ_QUANTITY_DISPLACEMENT && !take_load(v, quantity, err))
+        return "the continuum has no mean of single nodes";
+    if (quantity->kind == UZ_QUANTITY_REACTION && !take_springs(v, quantity))
+        return "other springs hold the body, too";
+    return NULL;
+}
+
+/* Rows of the dual problem: where they are to be, and the pressure that the answer's stress has there. */
+static uz_status make_dual_rows(proving *v, uz_error *err)
+{
+    const uz_bound_body *body = &v->adjoint;
+    const int moments = body->degree + 1;
+    uz_qp qp = {.p = NULL};
+    int64_t *dof = NULL;
+    uz_status status = uz_bound_dual_problem(&qp, &dof, body, &v->g->stop, err);
+    if (status == UZ_OK)
+        memcpy(v->dual.p, qp.p, (size_t)v->dual.d * sizeof *qp.p);
+    for (int64_t i = 0, row = 0; i < body->n_edges && status == UZ_OK; i++)
+        for (int a = 0; a < moments; a++)
+            if (uz_bound_has_row(body, dof, i, a)) {
+                v->dual.target[row] = body->edge[i].round ? v->wanted[body->edge[i].contact] : qp.h[row];
+                v->dual.width[row++] = fmax(0, v->g->checked.pressure[i * moments + a]);
+            }
+    uz_qp_clear(&qp);
+    free(dof);
+    return status;
+}
+
+/* ---- pairs */
+
+static void take_displacement(proving *v, const uz_functional *of)
+{
+    const uz_body_model *model = &v->primal.setup->model;
+    uz_recover_nodal(v->w, model, v->primal.x, of->held);
+    for (int64_t i = 0; i < 2 * model->mesh.n_nodes; i++)
+        v->w[i] *= of->times;
+}
+
+static uz_status take_stress(proving *v, uz_error *err)
+{
+    return uz_bound_stress(v->stress, &v->adjoint, v->g->dof, v->dual.x, &v->g->stop, err);
+}
+
+/* Why there is no proof. */
+static void say(uz_quantity_found *out, const char *why)
+{
+    snprintf(out->unproved, sizeof out->unproved, "%s", why);
+}
+
+/* Half the interval that the pair at hand proves; the middle -> *middle. */
+static uz_status weigh(proving *v, uz_quantity_found *out, double *middle, double *half, double *apart, double share,
+                       uz_error *err)
+{
+    const uz_guaranteed *g = v->g;
+    uz_bound_interval interval;
+    double own = INFINITY;
+    const uz_bound_pair pair = {&v->adjoint, v->w, v->stress, v->wanted, share};
+    uz_status status = uz_bound_weigh(&interval, &pair, &g->body, &g->problem->scene, g->dof, g->qp.K.cols,
+                                      v->result->u, g->stress, &g->checked, err);
+    if (status == UZ_OK)
+        status = uz_measure_residual(&own, g, interval.residual, err);
+    free(interval.residual);
+    *middle = interval.middle;
+    *apart = interval.apart;
+    *half = status == UZ_OK ? uz_bound_half(&interval, &g->checked, g->rho, own) : (double)INFINITY;
+    if (!isfinite(*half))
+        say(out, *interval.fault ? interval.fault : "what the stress lacks of equilibrium could not be bounded");
+    return status;
+}
+
+/* Shares that were tried, ascending, and half the intervals that they left. */
+typedef struct {
+    int n;
+    double share[MOST_SHARES], half[MOST_SHARES];
+} attempts;
+
+/* The share to try next, 0: none. The last one left `half`; `suits` is what its pair suggests. |d| gets smaller with a
+ * larger one, by leaps where what the answer presses with has to be in balance with much else. */
+static double next_share(attempts *a, double last, double half, double suits)
+{
+    int at = a->n, best = 0;
+    for (; at > 0 && a->share[at - 1] > last; at--) {
+        a->share[at] = a->share[at - 1];
+        a->half[at] = a->half[at - 1];
+    }
+    a->share[at] = last;
+    a->half[at] = half;
+    if (++a->n == MOST_SHARES || !(suits > 0))
+        return 0;
+    if (a->n == 1)
+        return fabs(suits - last) > 0.2 * last ? suits : STEP * last;
+    for (int k = 1; k < a->n; k++)
+        best = a->half[k] < a->half[best] ? k : best;
+    if (best == a->n - 1 || best == 0)
+        return best == 0 ? a->share[0] / STEP : STEP * a->share[best];
+    const double below = a->share[best] / a->share[best - 1], above = a->share[best + 1] / a->share[best];
+    return fmax(below, above) < APART ? 0 : a->share[best] * (above > below ? sqrt(above) : 1 / sqrt(below));
+}
+
+static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity *quantity, const uz_functional *of,
+                           uz_error *err)
+{
+    rows_problem *primal = &v->primal, *dual = &v->dual;
+    const uz_setup *setup = primal->setup;
+    const uz_candidates *rows = setup->rows.in ? &setup->rows : NULL;
+    const uz_body_model *model = &setup->model;
+    bool solved = true;
+    double apart = 0, best = INFINITY;
+    memset(primal->x, 0, (size_t)primal->d * sizeof *primal->x);
+    take_displacement(v, of);
+    const char *why = make_adjoint(v, quantity, v->w, err);
+    if (why) {
+        say(out, why);
+        return UZ_OK;
+    }
+    uz_status status = make_dual_rows(v, err);
+    for (int64_t i = 0, k = 0; i < model->m; i++) {
+        if (rows && !rows->in[i])
+            continue;
+        primal->target[k] = of->gap[i];
+        primal->width[k++] =
+            fmin(v->result->r[i] < 0 ? 0 : fmax(0, v->result->g[i]), v->open[model->info.contact_node[i]]);
+    }
+    uz_restrict_nodal(primal->p, model, of->load);
+    uz_csc_gaxpy(primal->p, &model->K_fixed, -1, of->held);
+    if (status == UZ_OK)
+        status = solve_open(primal, &solved, true, err);
+    if (status == UZ_OK && solved)
+        status = solve_open(dual, &solved, false, err);
+    if (status == UZ_OK && solved)
+        status = take_stress(v, err);
+    if (status != UZ_OK || !solved) {
+        say(out, "the rows in contact could not be held for its adjoint problem");
+        return status;
+    }
+    take_displacement(v, of);
+    status = uz_bound_apart(&apart, &(uz_bound_pair){&v->adjoint, v->w, v->stress, v->wanted, 1}, err);
+    attempts tried = {.n = 0};
+    double share = apart > 0 && v->ball > 0 ? apart / (2 * v->ball) : 1;
+    while (share > 0 && status == UZ_OK && solved) {
+        double middle = NAN, half = INFINITY;
+        status = solve_within(primal, &solved, share, err);
+        if (status == UZ_OK && solved)
+            status = solve_sliding(dual, &solved, share, err);
+        if (status == UZ_OK && solved)
+            status = take_stress(v, err);
+        if (status != UZ_OK || !solved)
+            break;
+        take_displacement(v, of);
+        status = weigh(v, out, &middle, &half, &apart, share, err);
+        if (status == UZ_OK && half < best) {
+            best = half;
+            out->value = middle;
+            out->low = middle - half;
+            out->high = middle + half;
+            out->mesh = half;
+            out->equations = 0;
+            out->guaranteed = true;
+            out->why[0] = '\0';
+        }
+        share = primal->m == 0 ? 0 : next_share(&tried, share, half, v->ball > 0 ? apart / (2 * v->ball) : 0);
+    }
+    return status;
+}
+
+/* The strain energy is the potential energy, which two energies enclose, and the work f(u) of the loads. */
+static void prove_energy(uz_quantity_found *out, const uz_guarantee *energies)
+{
+    out->low += energies->dual;
+    out->high += energies->primal;
+    out->value = (out->low + out->high) / 2;
+    out->mesh = (out->high - out->low) / 2;
+}
+
+/* The loads but temperature as a functional. */
+static uz_status take_work(uz_functional *of, const proving *v, uz_error *err)
+{
+    const uz_body_model *model = &v->primal.setup->model;
+    uz_scene scene = v->g->problem->scene;
+    uz_load *loads = uz_alloc(scene.n_loads, sizeof *loads);
+    *of = (uz_functional){.times = 1};
+    of->load = uz_alloc_zero(model->mesh.n_nodes * model->mesh.dim, sizeof *of->load);
+    of->held = uz_alloc_zero(model->n_fixed, sizeof *of->held);
+    of->gap = uz_alloc_zero(model->m, sizeof *of->gap);
+    uz_status status =
+        loads && of->load && of->held && of->gap
+            ? UZ_OK
+            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the work of %lld loads", (long long)scene.n_loads);
+    int64_t n = 0;
+    for (int64_t i = 0; i < scene.n_loads && loads; i++)
+        if (scene.loads[i].kind != UZ_LOAD_TEMPERATURE)
+            loads[n++] = scene.loads[i];
+    scene.loads = loads;
+    scene.n_loads = n;
+    if (status == UZ_OK)
+        status = uz_nodal_loads(of->load, model, &scene, err);
+    free(loads);
+    return status;
+}
+
+static uz_status begin(proving *v, uz_error *err)
+{
+    const uz_guaranteed *g = v->g;
+    const uz_bound_body *body = &g->body;
+    const uz_mesh *mesh = &body->model->mesh;
+    const uz_settings settings = uz_guarantee_settings(g, uz_seconds());
+    const uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES, .qp = g->qp};
+    v->adjoint = *body;
+    v->adjoint.free_strain = NULL;
+    v->adjoint.motion = NULL;
+    v->adjoint.edge = uz_alloc(body->n_edges, sizeof *body->edge);
+    v->adjoint.force = uz_alloc(2 * mesh->n_elements, sizeof *body->force);
+    v->w = uz_alloc_zero(2 * mesh->n_nodes, sizeof *v->w);
+    v->wanted = uz_alloc_zero(g->problem->scene.n_contacts, sizeof *v->wanted);
+    v->stress = uz_alloc(mesh->n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, sizeof *v->stress);
+    v->open = uz_alloc(mesh->n_nodes, sizeof *v->open);
+    v->ball = sqrt(uz_bound_ball(&g->checked, g->rho));
+    if (!v->adjoint.edge || !v->adjoint.force || !v->w || !v->wanted || !v->open || !v->stress)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes", (long long)mesh->n_nodes);
+    uz_bound_openings(v->open, body, &g->checked);
+    uz_status status = begin_rows(&v->primal, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
+    if (status == UZ_OK)
+        status = begin_rows(&v->dual, &matrices, &settings, g->cache, &g->hooks, &g->stop, err);
+    return status;
+}
+
+/* How deep an answer stands in a round obstacle along an edge, at most of some points. */
+static double depth_along(const uz_bound_body *body, int64_t i, const double *u)
+{
+    enum { POINTS = 16 };
+    const uz_bound_edge *edge = &body->edge[i];
+    double deepest = 0;
+    for (int k = 0; k <= POINTS; k++) {
+        const double q = (double)k / POINTS, p = 1 - q;
+        const double shape[3] = {edge->node[2] < 0 ? p : p * (1 - 2 * q), edge->node[2] < 0 ? q : q * (2 * q - 1),
+                                 4 * p * q};
+        double n[2], s = uz_bound_gap(n, body, i, q);
+        for (int a = 0; a < 3 && edge->node[a] >= 0; a++)
+            s -= shape[a] * (n[0] * u[2 * edge->node[a]] + n[1] * u[2 * edge->node[a] + 1]);
+        deepest = fmax(deepest, -s);
+    }
+    return deepest;
+}
+
+uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err)
+{
+    const uz_bound_body *body = &g->body;
+    const int64_t n = body->model->mesh.n_nodes;
+    double *depth = uz_alloc_zero(n, sizeof *depth);
+    rows_problem x = {.setup = NULL};
+    bool any = false, solved = false;
+    if (!depth)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the depth of %lld nodes", (long long)n);
+    for (int64_t i = 0; i < body->n_edges && body->n_loose == 0; i++)
+        for (int a = 0; a < 3 && body->edge[i].round; a++)
+            if (body->edge[i].node[a] >= 0) {
+                double *at = &depth[body->edge[i].node[a]];
+                *at = fmax(*at, depth_along(body, i, result->u));
+                any = any || *at > 0;
+            }
+    uz_status status = UZ_OK;
+    if (any)
+        status = begin_rows(&x, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
+    if (any && status == UZ_OK) {
+        const uz_body_model *model = &x.setup->model;
+        const uz_candidates *rows = x.setup->rows.in ? &x.setup->rows : NULL;
+        for (int64_t i = 0, k = 0; i < model->m; i++)
+            if (!rows || rows->in[i]) {
+                x.held[k] = depth[model->info.contact_node[i]] > 0 && !uz_row_inner(model, i);
+                x.h[k] = x.held[k] ? -DEEPER * depth[model->info.contact_node[i]] : (double)INFINITY;
+                k++;
+            }
+        status = solve_held(&x, &solved, err);
+        g->lift = status == UZ_OK && solved ? uz_alloc(2 * n, sizeof *g->lift) : NULL;
+        if (g->lift)
+            uz_recover_nodal(g->lift, model, x.x, NULL);
+    }
+    end_rows(&x, g->cache);
+    free(depth);
+    return status;
+}
+
+uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_error *err)
+{
+    uz_evaluation *e = result->evaluation;
+    proving v = {.result = result, .g = g};
+    const char *all = g->body.n_loose > 0 ? "only obstacles hold the body" : NULL;
+    bool any = false;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < e->n_quantities; i++)
+        any = any || g->problem->quantities[i].kind != UZ_QUANTITY_MEAN_PRESSURE;
+    if (any && !all)
+        status = begin(&v, err);
+    for (int64_t i = 0; i < e->n_quantities && status == UZ_OK; i++) {
+        const uz_quantity *asked = &g->problem->quantities[i];
+        uz_quantity_found *out = &e->quantities[i];
+        const char *why = all;
+        if (asked->kind == UZ_QUANTITY_MEAN_PRESSURE)
+            why = "no displacement leaps at the ends of a window";
+        if (!why) {
+            uz_functional of = {.found = 0};
+            char where[UZ_QUANTITY_POINTER];
+            uz_quantity_place(where, g->problem, i, "on");
+            status = asked->kind == UZ_QUANTITY_STRAIN_ENERGY
+                         ? take_work(&of, &v, err)
+                         : uz_functional_make(&of, asked, where, &v.primal.setup->model, &g->problem->scene, result,
+                                              NULL, NULL, err);
+            why = of.why[0] ? "supports of both kinds, springs and others, hold this group" : NULL;
+            if (status == UZ_OK && !why)
+                status = prove_one(&v, out, asked, &of, err);
+            if (out->guaranteed && asked->kind == UZ_QUANTITY_STRAIN_ENERGY)
+                prove_energy(out, &result->summary.guarantee);
+            uz_functional_clear(&of);
+        }
+        if (!out->guaranteed && (why || !*out->unproved))
+            say(out, why ? why : "its interval could not be made");
+    }
+    end_rows(&v.primal, g->cache);
+    end_rows(&v.dual, g->cache);
+    void *room[] = {v.open,
+                    v.w,
+                    v.stress,
+                    v.wanted,
+                    v.g && v.adjoint.edge != g->body.edge ? v.adjoint.edge : NULL,
+                    v.adjoint.force != g->body.force ? v.adjoint.force : NULL};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    return status;
+}
