@@ -64,10 +64,11 @@ function assertions_of(summary) {
 
 function quantities_of(summary) {
   if (!summary.quantities?.length) return null;
-  return h("table", { class: "assertions", id: "quantities" }, h("caption", null, "Quantities, by estimate"),
+  return h("table", { class: "assertions", id: "quantities" }, h("caption", null, "Quantities"),
     h("thead", null, h("tr", null, ["Name", "Value", "On this mesh"].map((name) => h("th", { scope: "col" }, name)))),
     h("tbody", null, summary.quantities.map((one) => h("tr", null, h("td", null, one.name),
-      h("td", null, number(one.value, 6), Number.isFinite(one.low) ? ` ± ${number((one.high - one.low) / 2, 2)}` : h("div", { class: "muted" }, one.why)),
+      h("td", null, number(one.value, 6), Number.isFinite(one.low) ? ` ± ${number((one.high - one.low) / 2, 2)}, ${one.kind === "guaranteed" ? "guaranteed" : "by estimate"}` : null,
+        one.why ? h("div", { class: "muted" }, one.why) : null),
       h("td", null, number(one.on_this_mesh, 6))))));
 }
 

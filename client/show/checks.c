@@ -92,6 +92,20 @@ void client_checks_outcome(client_checks *to, const json_t *job)
 
 /* ---- assertions */
 
+/* "the exact one within ...", or of a quantity's interval how that is known. */
+static const char *how_known(const json_t *summary, const json_t *line)
+{
+    const char *name = client_json_text(line, "quantity");
+    const json_t *quantity;
+    size_t i;
+    if (strncmp(name, "quantities.", 11) != 0)
+        return "the exact one";
+    json_array_foreach(json_object_get(summary, "quantities"), i,
+                       quantity) if (strcmp(client_json_text(quantity, "name"), name + 11) == 0 &&
+                                     strcmp(client_json_text(quantity, "kind"), "guaranteed") == 0) return "guaranteed";
+    return "by estimate";
+}
+
 void client_checks_assertions(client_checks *to, const json_t *summary, const char *group)
 {
     static const char *const LIMITS[][2] = {{"min", "at least"}, {"max", "at most"}, {"near", "near"}};
@@ -118,9 +132,8 @@ void client_checks_assertions(client_checks *to, const json_t *summary, const ch
         const double open = client_json_number(line, "cases.uncertain");
         const char *reason = client_json_text(line, "reason"), *of = client_json_text(line, "case");
         int used = snprintf(text, sizeof text, "%s", reason);
-        const bool estimated = strncmp(client_json_text(line, "quantity"), "quantities.", 11) == 0;
         if (!*reason && error > 0)
-            used = snprintf(text, sizeof text, "%.9g, %s within %s", found, estimated ? "by estimate" : "the exact one",
+            used = snprintf(text, sizeof text, "%.9g, %s within %s", found, how_known(summary, line),
                             client_format_bound(bound, error));
         else if (!*reason)
             used = snprintf(text, sizeof text, "%.9g", found);

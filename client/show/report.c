@@ -100,12 +100,14 @@ const char *client_format_quantity(char buffer[CLIENT_QUANTITY], const json_t *q
     const char *name = client_json_text(quantity, "name"), *why = client_json_text(quantity, "why");
     const double value = client_json_number(quantity, "value"), low = client_json_number(quantity, "low"),
                  high = client_json_number(quantity, "high"), half = 0.5 * (high - low);
+    const bool proved = strcmp(client_json_text(quantity, "kind"), "guaranteed") == 0;
     char within[32], relative[32] = "";
     if (isfinite(half) && value != 0)
         snprintf(relative, sizeof relative, " (%.2g %%)", 100 * half / fabs(value));
     if (isfinite(half))
-        snprintf(buffer, CLIENT_QUANTITY, "%s %.6g within %s%s, by estimate; %.6g on this mesh", name, value,
-                 client_format_bound(within, half), relative, client_json_number(quantity, "on_this_mesh"));
+        snprintf(buffer, CLIENT_QUANTITY, "%s %.6g within %s%s, %s%s%s%s; %.6g on this mesh", name, value,
+                 client_format_bound(within, half), relative, proved ? "guaranteed" : "by estimate", *why ? " (" : "",
+                 why, *why ? ")" : "", client_json_number(quantity, "on_this_mesh"));
     else
         snprintf(buffer, CLIENT_QUANTITY, "%s %.6g on this mesh, without an interval%s%s", name, value,
                  *why ? ": " : "", why);
