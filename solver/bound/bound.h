@@ -46,6 +46,8 @@ typedef struct {
     int64_t *edge_of;    /* n_elements x 4: by the element's sides */
     double *force;       /* n_elements x 2: force per volume */
     double *free_strain; /* n_elements; NULL: no temperature */
+    double *map;         /* uz_bound_keep_maps: of each element, its stress's values by its unknowns; NULL: none kept */
+    int64_t *map_at;     /* n_elements: where an element's map is */
     int n_loose;         /* motions that only obstacles hold */
     double *motion;      /* n_loose x n_nodes x 2 */
     int n_pressed; /* of uz_bound_hold: n_loose moments that the obstacle is to hold, as edge x (degree + 1) + a */
@@ -84,6 +86,8 @@ void uz_bound_axes(double axis[2][2], const uz_bound_body *body, int64_t edge, i
  * UZ_ERR_SCENE (an element too distorted), _CANCELLED, _MEMORY. */
 uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop,
                                 uz_error *err);
+/* The same without K, which stays empty: for another load on the same body. */
+uz_status uz_bound_dual_load(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop, uz_error *err);
 
 /* Has the edge's a-th moment a row there? They come by edges and moments. */
 bool uz_bound_has_row(const uz_bound_body *body, const int64_t *dof, int64_t edge, int a);
@@ -93,6 +97,9 @@ bool uz_bound_has_row(const uz_bound_body *body, const int64_t *dof, int64_t edg
  * k, k + 1 of the element and its centre (uz_bound_centre). */
 uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64_t *dof, const double *v,
                           const uz_stop *stop, uz_error *err);
+/* Keeps what uz_bound_stress finds of each element by itself, which is most of its time, where that is not too large:
+ * for bodies that it is called for many times. Errors as there. */
+uz_status uz_bound_keep_maps(uz_bound_body *body, const uz_stop *stop, uz_error *err);
 /* The point that parts an element: of a triangle the mean of its corners, of a quadrilateral the intersection of its
  * diagonals, where the conditions between the parts depend on each other; elsewhere there would be stresses of degree 1
  * in equilibrium too few, and an edge unknown without stiffness. */

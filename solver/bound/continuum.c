@@ -87,6 +87,8 @@ void uz_bound_body_clear(uz_bound_body *body)
     free(body->force);
     free(body->free_strain);
     free(body->motion);
+    free(body->map);
+    free(body->map_at);
     *body = (uz_bound_body){.model = NULL};
 }
 

@@ -28,6 +28,7 @@ enum {
     KEY = 32,
     MADE = 4 /* elements that are kept: meshes have many alike */
 };
+#define MOST_KEPT ((int64_t)256 << 20)                                     /* bytes of maps */
 static const double STATIONS[2][UZ_BOUND_MOMENTS] = {{0, 1}, {0, 0.5, 1}}; /* along an edge, by degree */
 
 typedef struct {
@@ -129,8 +130,25 @@ static uz_status fail_at(const uz_stop *stop, int64_t element, uz_error *err)
                          (long long)element);
 }
 
-static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const int64_t *dof, const uz_stop *stop,
-                          uz_error *err)
+/* Does an element have a load of its own, force or expansion, or values that its unknowns are given? */
+static bool has_force(const uz_bound_body *body, int64_t e)
+{
+    return fabs(body->force[2 * e]) > 0 || fabs(body->force[2 * e + 1]) > 0 ||
+           (body->free_strain && fabs(body->free_strain[e]) > 0);
+}
+
+static bool has_values(const uz_bound_body *body, int64_t e)
+{
+    const int sides = uz_element_type_of((uz_element_kind)body->model->mesh.kind[e])->corners;
+    bool has = body->n_pressed > 0;
+    for (int i = 0; i < 2 * sides; i++)
+        has = has || fabs(body->edge[body->edge_of[4 * e + i / 2]].value[i % 2]) > 0;
+    return has;
+}
+
+/* K, if it is wanted, and what elements add to p. */
+static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const int64_t *dof, bool stiffness,
+                          const uz_stop *stop, uz_error *err)
 {
     const int64_t n = body->model->mesh.n_elements;
     const int most = OUTER * (OUTER + 1) / 2;
@@ -141,7 +159,9 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     for (int64_t e = 0; e < n && status == UZ_OK; e++) {
         int64_t dof_of[OUTER];
         double value[OUTER], p[OUTER], K[OUTER * OUTER];
-        if (count + most > room) {
+        if (!stiffness && !has_force(body, e) && !has_values(body, e))
+            continue;
+        if (stiffness && count + most > room) {
             room = e == 0 ? 16 * most : count * n / e + count / 8 + 16 * most;
             if (!uz_triplets_grow(&row, &col, &val, room)) {
                 status = UZ_ERR_MEMORY;
@@ -172,7 +192,7 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
                 const double entry = i >= j ? K[i + m->outer * j] : K[j + m->outer * i];
                 if (dof_of[j] < 0)
                     p[i] -= entry * value[j];
-                else if (dof_of[i] >= dof_of[j]) {
+                else if (stiffness && dof_of[i] >= dof_of[j]) {
                     row[count] = dof_of[i];
                     col[count] = dof_of[j];
                     val[count++] = entry;
@@ -266,7 +286,8 @@ static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     return status;
 }
 
-uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop, uz_error *err)
+static uz_status make_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, bool stiffness, const uz_stop *stop,
+                              uz_error *err)
 {
     const int moments = body->degree + 1;
     int64_t d = 0;
@@ -281,7 +302,7 @@ uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *b
                         ? -1
                         : d++;
     qp->p = uz_alloc_zero(d, sizeof *qp->p);
-    uz_status status = qp->p ? assemble(qp, d, body, *dof, stop, err)
+    uz_status status = qp->p ? assemble(qp, d, body, *dof, stiffness, stop, err)
                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld unknowns", (long long)d);
     for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) { /* a constant traction is shared equally */
         const uz_bound_edge *edge = &body->edge[i];
@@ -305,19 +326,93 @@ uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *b
     return status;
 }
 
+uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop, uz_error *err)
+{
+    return make_problem(qp, dof, body, true, stop, err);
+}
+
+uz_status uz_bound_dual_load(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop, uz_error *err)
+{
+    return make_problem(qp, dof, body, false, stop, err);
+}
+
+/* ---- stresses */
+
+static int values_of(int parts, int degree)
+{
+    return parts * (degree == 1 ? 3 : 6) * 3;
+}
+
+/* The k-th of an element's values that are not zero anyway, in its part of the stress. */
+static int place_of_value(int k, int degree)
+{
+    const int of_part = (degree == 1 ? 3 : 6) * 3;
+    return k / of_part * UZ_BOUND_POINTS * 3 + k % of_part;
+}
+
+uz_status uz_bound_keep_maps(uz_bound_body *body, const uz_stop *stop, uz_error *err)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    const int64_t n = mesh->n_elements;
+    uz_bound_body plain = *body; /* without loads */
+    int64_t total = 0;
+    plain.free_strain = NULL;
+    body->map_at = uz_alloc(n, sizeof *body->map_at);
+    for (int64_t e = 0; e < n && body->map_at; e++) {
+        const int parts = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
+        body->map_at[e] = total;
+        total += (int64_t)values_of(parts, body->degree) * parts * (body->degree + 1) * 2;
+    }
+    if (body->map_at && total * (int64_t)sizeof(double) > MOST_KEPT)
+        return UZ_OK;
+    macro *kept = uz_alloc_zero(MADE, sizeof *kept), *m = NULL;
+    plain.force = uz_alloc_zero(2 * n, sizeof *plain.force);
+    body->map = body->map_at ? uz_alloc(total, sizeof *body->map) : NULL;
+    uz_status status =
+        kept && plain.force && body->map
+            ? UZ_OK
+            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stresses of %lld elements", (long long)n);
+    for (int64_t e = 0; e < n && status == UZ_OK; e++) {
+        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, &plain, e))) {
+            status = fail_at(stop, e, err);
+            break;
+        }
+        const int values = values_of(m->parts, m->degree);
+        for (int j = 0; j < m->outer; j++) {
+            double v[OUTER] = {0}, s[UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3] = {0};
+            v[j] = 1;
+            spread(m, s, v);
+            for (int k = 0; k < values; k++)
+                body->map[body->map_at[e] + (int64_t)j * values + k] = s[place_of_value(k, m->degree)];
+        }
+    }
+    free(plain.force);
+    free(kept);
+    return status;
+}
+
 uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64_t *dof, const double *v,
                           const uz_stop *stop, uz_error *err)
 {
     const int64_t n = body->model->mesh.n_elements;
     uz_status status = UZ_OK;
-    macro *kept = uz_alloc_zero(MADE, sizeof *kept), *m = NULL;
+    macro *kept = uz_alloc_zero(MADE + 1, sizeof *kept), *m = NULL;
     if (!kept)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of an element");
     memset(stress, 0, (size_t)n * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 * sizeof *stress);
     for (int64_t e = 0; e < n && status == UZ_OK; e++) {
         int64_t dof_of[OUTER];
         double value[OUTER];
-        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, body, e))) {
+        const bool mapped = body->map && !has_force(body, e);
+        if (mapped) { /* the element's place alone */
+            m = &kept[MADE];
+            m->body = body;
+            m->element = e;
+            m->degree = body->degree;
+            m->parts = uz_element_type_of((uz_element_kind)body->model->mesh.kind[e])->corners;
+            m->outer = 2 * m->parts * (m->degree + 1);
+        }
+        if ((e % 256 == 0 && uz_stop_is_due(stop)) || (!mapped && !(m = make(kept, body, e)))) {
             status = fail_at(stop, e, err);
             break;
         }
@@ -326,7 +421,17 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
             if (dof_of[i] >= 0)
                 value[i] = v[dof_of[i]];
         turn(NULL, value, m, true);
-        spread(m, stress + e * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, value);
+        double *to = stress + e * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3;
+        if (!mapped) {
+            spread(m, to, value);
+            continue;
+        }
+        const int values = values_of(m->parts, m->degree);
+        double sum[UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3] = {0};
+        for (int j = 0; j < m->outer; j++)
+            add(values, value[j], body->map + body->map_at[e] + (int64_t)j * values, sum);
+        for (int k = 0; k < values; k++)
+            to[place_of_value(k, m->degree)] = sum[k];
     }
     free(kept);
     return status;

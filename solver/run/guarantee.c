@@ -168,6 +168,8 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
     uz_status status = uz_body_model_build(&model, &problem->scene, UZ_BODY_OUTLINE, &err);
     if (status == UZ_OK)
         status = prove(result, &g, &model, &problem->scene, &err);
+    if (status == UZ_OK && out->proved && result->evaluation->n_quantities > 0)
+        status = uz_bound_keep_maps(&g.body, &g.stop, &err);
     if (status == UZ_OK && out->proved)
         status = uz_prove_quantities(result, &g, &err);
     uz_bound_body_clear(&g.body);

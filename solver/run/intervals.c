@@ -280,7 +280,7 @@ static uz_status make_dual_rows(proving *v, uz_error *err)
     const int moments = body->degree + 1;
     uz_qp qp = {.p = NULL};
     int64_t *dof = NULL;
-    uz_status status = uz_bound_dual_problem(&qp, &dof, body, &v->g->stop, err);
+    uz_status status = uz_bound_dual_load(&qp, &dof, body, &v->g->stop, err);
     if (status == UZ_OK)
         memcpy(v->dual.p, qp.p, (size_t)v->dual.d * sizeof *qp.p);
     for (int64_t i = 0, row = 0; i < body->n_edges && status == UZ_OK; i++)

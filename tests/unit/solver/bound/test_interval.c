@@ -1,6 +1,7 @@
 /* Guaranteed intervals of quantities: what any pair of displacement and stress proves of them. */
 #include "bound/interval.h"
 #include "bound_scenes.h"
+#include "linalg/blas.h"
 #include "run/guarantee.h"
 #include "scene_fixture.h"
 
@@ -214,6 +215,55 @@ TEST(pairs_are_trusted_in_nothing)
         close_lab(&l);
         uz_result_free(reference);
         uz_scene_clear(&fine);
+    }
+}
+
+/* Stresses by what was kept of the elements, and loads without a matrix, are those of the elements themselves. */
+TEST(what_is_kept_of_elements_changes_nothing)
+{
+    qp_random random = {3};
+    uz_error err = {0};
+    for (int k = 0; k < 4 * OBSTACLES; k++) {
+        lab l;
+        open_lab(&l, BOUND_ELEMENTS[k % 4], 3, (obstacle)(k / 4));
+        const int64_t d = l.g.qp.K.cols, n = l.model.mesh.n_elements * STRESSES;
+        double *v = zeros(d), *own = zeros(n), *kept = zeros(n), most = 0;
+        for (int64_t i = 0; i < d; i++)
+            v[i] = random_unit(&random) - 0.5;
+        for (int quantity = 0; quantity < 3; quantity++) { /* of the second one supports have values */
+            int64_t *dof[2];
+            uz_qp whole, load;
+            take_adjoint(&l, quantity);
+            l.adjoint.force[2] = quantity == 2 ? 1 : 0;
+            l.adjoint.map = NULL;
+            CHECK(uz_bound_stress(own, &l.adjoint, l.g.dof, v, NULL, &err) == UZ_OK);
+            if (!l.g.body.map)
+                CHECK(uz_bound_keep_maps(&l.g.body, NULL, &err) == UZ_OK);
+            l.adjoint.map = l.g.body.map;
+            l.adjoint.map_at = l.g.body.map_at;
+            CHECK(l.adjoint.map != NULL);
+            CHECK(uz_bound_stress(kept, &l.adjoint, l.g.dof, v, NULL, &err) == UZ_OK);
+            for (int64_t i = 0; i < n; i++)
+                most = fmax(most, fabs(own[i]));
+            for (int64_t i = 0; i < n; i++)
+                CHECK_MSG(fabs(own[i] - kept[i]) <= 1e-11 * most, "%d: %g, %g", k, own[i], kept[i]);
+            CHECK(uz_bound_dual_problem(&whole, &dof[0], &l.adjoint, NULL, &err) == UZ_OK);
+            CHECK(uz_bound_dual_load(&load, &dof[1], &l.adjoint, NULL, &err) == UZ_OK);
+            CHECK_INT(load.K.ptr[load.K.cols], 0);
+            const double size = uz_norm(d, whole.p);
+            for (int64_t i = 0; i < d; i++) /* elements that are alike are made from the first of them */
+                CHECK_MSG(fabs(whole.p[i] - load.p[i]) <= 1e-13 * size, "%d %d: %g, %g", k, quantity, whole.p[i],
+                          load.p[i]);
+            CHECK(memcmp(whole.h, load.h, (size_t)whole.N.rows * sizeof *load.h) == 0);
+            uz_qp_clear(&whole);
+            uz_qp_clear(&load);
+            free(dof[0]);
+            free(dof[1]);
+        }
+        free(v);
+        free(own);
+        free(kept);
+        close_lab(&l);
     }
 }
 
