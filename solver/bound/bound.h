@@ -105,6 +105,9 @@ uz_status uz_bound_keep_maps(uz_bound_body *body, const uz_stop *stop, uz_error 
  * in equilibrium too few, and an edge unknown without stiffness. */
 void uz_bound_centre(double centre[2], const uz_bound_body *body, int64_t element);
 
+/* Nodal forces (n_nodes x 2) of the scene's loads but temperature. UZ_ERR_SCENE, _MEMORY. */
+uz_status uz_bound_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+
 /* What check.c found, in energies: force times length. */
 typedef struct {
     double gap;       /* int 1/2 |sigma_h - C eps(u_h)|^2 + int r_h s_h, with the terms of the violations and a

@@ -174,20 +174,30 @@ static void gap_along(double s[3], double lift[3], const examination *x, const d
     }
 }
 
-void uz_lift_node(examination *x, int64_t node, const double normal[2], double by)
+bool uz_way_along(double way[2], const uz_body_model *model, int64_t node, const double normal[2])
 {
     static const double AXIS[2][2] = {{1, 0}, {0, 1}};
-    const uz_body_model *model = x->body->model;
-    double way[2] = {0}, share = 0; /* the part of the normal along free dofs, and its square */
-    for (int k = 0; k < 2 && node >= 0 && by > 0; k++) {
-        const double part = model->dof[2 * node + k] < 0 ? 0 : -uz_along_dof(model, node, k, normal);
+    double share = 0; /* of the normal along free dofs, its square */
+    way[0] = way[1] = 0;
+    for (int k = 0; k < 2; k++) {
+        const double part = model->dof[2 * node + k] < 0 ? 0 : uz_along_dof(model, node, k, normal);
         for (int c = 0; c < 2; c++)
             way[c] += part * uz_along_dof(model, node, k, AXIS[c]);
         share += part * part;
     }
-    for (int c = 0; c < 2 && share > 1e-6; c++)
-        if (fabs(by * way[c] / share) > fabs(x->lift[2 * node + c]))
-            x->lift[2 * node + c] = by * way[c] / share;
+    for (int c = 0; c < 2; c++)
+        way[c] /= fmax(share, 1e-6);
+    return share > 1e-6;
+}
+
+void uz_lift_node(examination *x, int64_t node, const double normal[2], double by)
+{
+    double way[2];
+    if (node < 0 || !(by > 0) || !uz_way_along(way, x->body->model, node, normal))
+        return;
+    for (int c = 0; c < 2; c++)
+        if (fabs(by * way[c]) > fabs(x->lift[2 * node + c]))
+            x->lift[2 * node + c] = -by * way[c];
 }
 
 void uz_add_given(double b[3], const examination *x, const uz_bound_edge *edge, const double n[2])
@@ -205,17 +215,14 @@ void uz_add_given(double b[3], const examination *x, const uz_bound_edge *edge, 
 static void examine_contact(examination *x, const double *u, const uz_bound_edge *edge, const double *pressure)
 {
     uz_bound_check_result *out = x->out;
-    double s[3], m[UZ_BOUND_MOMENTS], up[3], none[3];
+    double s[3], m[UZ_BOUND_MOMENTS], up[3], none[3], more[3] = {0};
     gap_along(s, none, x, u, edge);
     uz_edge_means(m, s, x->moments);
     for (int a = 0; a < x->moments; a++)
         out->gap += pressure[a] * m[a];
-    uz_along_edge(none, u, edge->node, edge->normal); /* from here on with what was given to take it out */
+    uz_add_given(more, x, edge, edge->normal); /* what was given to take it out */
     for (int a = 0; a < 3; a++)
-        s[a] += none[a];
-    uz_add_given(none, x, edge, edge->normal);
-    for (int a = 0; a < 3; a++)
-        s[a] -= none[a];
+        s[a] -= more[a];
     for (int a = 0; a < 3; a++)
         up[a] = fmax(0, -s[a] - (a == 1 ? sqrt(fmax(0, s[0]) * fmax(0, s[2])) : 0));
     const double nodal[3] = {up[0], up[2], (up[0] + 2 * fmax(up[1], (up[0] + up[2]) / 2) + up[2]) / 4};
@@ -310,16 +317,20 @@ double uz_admit_pressure(const examination *x, int64_t moment, double pressure)
     return x->limit ? fmax(-x->limit[moment], fmin(x->limit[moment], pressure)) : fmax(0, pressure);
 }
 
+void uz_less_load(double *resultant, const examination *x, const uz_bound_edge *edge, int64_t i)
+{
+    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+    const double each = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness / x->moments;
+    for (int a = 0; a < 2 * x->moments; a++)
+        resultant[2 * i * x->moments + a] -= each * edge->traction[a % 2];
+}
+
 /* A pressure that may not be is none: it is what is missing. */
 void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, const double *u, int64_t i)
 {
     const uz_bound_edge *edge = &x->body->edge[i];
-    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
-    const double each = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness / x->moments;
     double *pressure = x->pressure + i * x->moments, share[2], turned[UZ_BOUND_MOMENTS][2] = {{0}};
-    for (int a = 0; a < x->moments; a++) /* less the load */
-        for (int c = 0; c < 2; c++)
-            x->resultant[(i * x->moments + a) * 2 + c] -= each * edge->traction[c];
+    uz_less_load(x->resultant, x, edge, i);
     if (edge->round)
         uz_examine_round(turned, x, u, i);
     for (int a = 0; a < x->moments; a++) {
@@ -700,22 +711,26 @@ double uz_energy_of(double *margin, const examination *x, const double *u, bool 
 /* Of the loads but temperature, as the discrete problem has them: the edges have to agree with that. */
 double uz_work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status, uz_error *err)
 {
-    uz_scene loaded = *scene;
-    double work = 0;
-    double *f = uz_alloc(2 * x->mesh->n_nodes, sizeof *f);
-    loaded.loads = uz_alloc(scene->n_loads, sizeof *loaded.loads);
-    loaded.n_loads = 0;
-    if (!f || !loaded.loads) {
-        *status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)x->mesh->n_nodes);
-    } else {
-        for (int64_t i = 0; i < scene->n_loads; i++)
-            if (scene->loads[i].kind != UZ_LOAD_TEMPERATURE)
-                loaded.loads[loaded.n_loads++] = scene->loads[i];
-        *status = uz_nodal_loads(f, x->body->model, &loaded, err);
-        for (int64_t i = 0; i < 2 * x->mesh->n_nodes && *status == UZ_OK; i++)
-            work += f[i] * u[i];
-    }
-    free(loaded.loads);
+    double work = 0, *f = uz_alloc(2 * x->mesh->n_nodes, sizeof *f);
+    *status = f ? uz_bound_loads(f, x->body->model, scene, err)
+                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)x->mesh->n_nodes);
+    for (int64_t i = 0; i < 2 * x->mesh->n_nodes && *status == UZ_OK; i++)
+        work += f[i] * u[i];
     free(f);
     return work;
+}
+
+uz_status uz_bound_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    uz_scene loaded = *scene;
+    loaded.loads = uz_alloc(scene->n_loads, sizeof *loaded.loads);
+    loaded.n_loads = 0;
+    if (!loaded.loads)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld loads", (long long)scene->n_loads);
+    for (int64_t i = 0; i < scene->n_loads; i++)
+        if (scene->loads[i].kind != UZ_LOAD_TEMPERATURE)
+            loaded.loads[loaded.n_loads++] = scene->loads[i];
+    const uz_status status = uz_nodal_loads(f, model, &loaded, err);
+    free(loaded.loads);
+    return status;
 }

@@ -39,7 +39,7 @@ void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, c
 double uz_admit_pressure(const examination *x, int64_t moment, double pressure);
 /* int sigma : expansion over a part, from the values at its points. */
 double uz_expansion_work(const double *s, int points, const double expansion[3], double volume);
-/* 2 x the strain energy of the displacement between its nodes; *margin: what its integration may be off by. */
+/* The strain energy of the displacement between its nodes; *margin: what its integration may be off by. */
 double uz_energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e);
 /* 1/2 int k |u|^2 of the springs along the edges. */
 double uz_spring_energy(const examination *x, const double *u);
@@ -58,6 +58,10 @@ void uz_gauss(double *at, double *weight, int n);
 
 /* What rounding of places may be, as far as that is nothing to the displacements: a length. */
 double uz_place_rounding(const examination *x);
+/* The displacement of a node along what supports leave to it that is 1 along a normal; false: there is none. */
+bool uz_way_along(double way[2], const uz_body_model *model, int64_t node, const double normal[2]);
+/* Takes the load of an edge, the i-th, from the resultants of tractions. */
+void uz_less_load(double *resultant, const examination *x, const uz_bound_edge *edge, int64_t i);
 /* Makes w at a node (-1: none) at least `by` against the normal into the obstacle, along what supports leave to it. */
 void uz_lift_node(examination *x, int64_t node, const double normal[2], double by);
 

@@ -23,7 +23,6 @@ enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, MOMENTS = UZ_BOUND_MOMEN
 typedef struct {
     const uz_bound_pair *pair;
     const uz_bound_body *body;
-    const uz_scene *scene;
     const double *u, *stress;
     const uz_bound_check_result *checked;
     uz_bound_check_result scratch;
@@ -78,16 +77,11 @@ static void add_up(examination *x, const double *v, const double *stress)
         uz_examine_element(x, v, stress + e * STRESSES, e);
 }
 
-/* Resultants less the loads. */
-static void less_loads(double *acts, const examination *x, const uz_bound_body *body, double times)
+/* Resultants less the loads of a body. */
+static void less_loads(double *acts, const examination *x, const uz_bound_body *body)
 {
-    for (int64_t i = 0; i < body->n_edges; i++) {
-        const uz_bound_edge *edge = &body->edge[i];
-        const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
-        const double each = hypot(to[0] - from[0], to[1] - from[1]) * body->model->thickness / x->moments;
-        for (int a = 0; a < 2 * x->moments; a++)
-            acts[2 * i * x->moments + a] = times * acts[2 * i * x->moments + a] - each * edge->traction[a % 2];
-    }
+    for (int64_t i = 0; i < body->n_edges; i++)
+        uz_less_load(acts, x, &body->edge[i], i);
 }
 
 /* int (t + k u)(s + k v) / k of the springs, t and s as resultants; *scale: the sizes of what it is the sum of. */
@@ -134,7 +128,7 @@ static double square_apart(weighing *y, bool bounded)
     double scale = 0;
     add_up(x, y->pair->w, y->pair->stress);
     memcpy(y->acts[1], x->resultant, (size_t)(2 * x->body->n_edges * x->moments) * sizeof(double));
-    less_loads(y->acts[1], x, x->body, 1);
+    less_loads(y->acts[1], x, x->body);
     const double springs = spring_product(&scale, x, y->acts[1], y->pair->w, 1, y->acts[1], y->pair->w);
     return fmax(0, 2 * x->sum + springs) + (bounded ? 2 * x->margin + UZ_SUM_ROUNDING * (2 * x->scale + scale) : 0);
 }
@@ -176,7 +170,7 @@ static double work_apart(weighing *y, double apart, double *rounding)
         for (int64_t k = 0; k < 2 * n_moments; k++)
             y->acts[0][k] += x.resultant[k] / 2;
     }
-    less_loads(y->acts[0], &x, y->body, 1);
+    less_loads(y->acts[0], &x, y->body);
     sum -= spring_product(&scale, &y->x, y->acts[0], y->u, -1, y->acts[1], y->pair->w) / 2;
     *rounding += UZ_SUM_ROUNDING * scale;
     return sum;
@@ -246,27 +240,21 @@ void uz_bound_openings(double *open, const uz_bound_body *body, const uz_bound_c
 /* Brings w's nodes to where they may be. */
 static void bring_nodes(weighing *y)
 {
-    static const double AXIS[2][2] = {{1, 0}, {0, 1}}, PART[3] = {0, 1, 0.5};
+    static const double PART[3] = {0, 1, 0.5};
     const uz_bound_body *body = y->body;
-    const uz_body_model *model = body->model;
     double *open = y->v; /* n_nodes of it */
     uz_bound_openings(open, body, y->checked);
     for (int64_t i = 0; i < body->n_edges; i++) {
         const uz_bound_edge *edge = &body->edge[i];
         for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++) {
             const int64_t node = edge->node[a];
-            double n[2], way[2] = {0}, share = 0, *w = y->pair->w + 2 * node;
+            double n[2], way[2], *w = y->pair->w + 2 * node;
             uz_bound_gap(n, body, i, PART[a]);
+            const bool free_along = uz_way_along(way, body->model, node, n);
             const double moved = n[0] * w[0] + n[1] * w[1], om = y->pair->wanted[edge->contact];
             const double most = y->pair->share * open[node], by = fmax(om - most, fmin(om + most, moved)) - moved;
-            for (int k = 0; k < 2; k++) {
-                const double part = model->dof[2 * node + k] < 0 ? 0 : uz_along_dof(model, node, k, n);
-                for (int c = 0; c < 2; c++)
-                    way[c] += part * uz_along_dof(model, node, k, AXIS[c]);
-                share += part * part;
-            }
-            for (int c = 0; c < 2 && share > 1e-6; c++)
-                w[c] += by * way[c] / share;
+            for (int c = 0; c < 2 && free_along; c++)
+                w[c] += by * way[c];
         }
     }
 }
@@ -365,7 +353,7 @@ uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, cons
                          const uz_scene *scene, const int64_t *dof, int64_t n_dofs, const double *u,
                          const double *stress, const uz_bound_check_result *checked, uz_error *err)
 {
-    weighing y = {.pair = pair, .body = body, .scene = scene, .u = u, .stress = stress, .checked = checked};
+    weighing y = {.pair = pair, .body = body, .u = u, .stress = stress, .checked = checked};
     uz_status status = begin(&y, n_dofs, err);
     double *limit = uz_alloc(body->n_edges * (body->degree + 1), sizeof *limit);
     *out = (uz_bound_interval){.share = pair->share};

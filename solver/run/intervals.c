@@ -444,26 +444,14 @@ static void prove_energy(uz_quantity_found *out, const uz_guarantee *energies)
 static uz_status take_work(uz_functional *of, const proving *v, uz_error *err)
 {
     const uz_body_model *model = &v->primal.setup->model;
-    uz_scene scene = v->g->problem->scene;
-    uz_load *loads = uz_alloc(scene.n_loads, sizeof *loads);
     *of = (uz_functional){.times = 1};
     of->load = uz_alloc_zero(model->mesh.n_nodes * model->mesh.dim, sizeof *of->load);
     of->held = uz_alloc_zero(model->n_fixed, sizeof *of->held);
     of->gap = uz_alloc_zero(model->m, sizeof *of->gap);
-    uz_status status =
-        loads && of->load && of->held && of->gap
-            ? UZ_OK
-            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the work of %lld loads", (long long)scene.n_loads);
-    int64_t n = 0;
-    for (int64_t i = 0; i < scene.n_loads && loads; i++)
-        if (scene.loads[i].kind != UZ_LOAD_TEMPERATURE)
-            loads[n++] = scene.loads[i];
-    scene.loads = loads;
-    scene.n_loads = n;
-    if (status == UZ_OK)
-        status = uz_nodal_loads(of->load, model, &scene, err);
-    free(loads);
-    return status;
+    if (!of->load || !of->held || !of->gap)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the work of loads on %lld nodes",
+                       (long long)model->mesh.n_nodes);
+    return uz_bound_loads(of->load, model, &v->g->problem->scene, err);
 }
 
 static uz_status begin(proving *v, uz_error *err)
@@ -519,13 +507,12 @@ uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err)
     bool any = false, solved = false;
     if (!depth)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the depth of %lld nodes", (long long)n);
-    for (int64_t i = 0; i < body->n_edges && body->n_loose == 0; i++)
-        for (int a = 0; a < 3 && body->edge[i].round; a++)
-            if (body->edge[i].node[a] >= 0) {
-                double *at = &depth[body->edge[i].node[a]];
-                *at = fmax(*at, depth_along(body, i, result->u));
-                any = any || *at > 0;
-            }
+    for (int64_t i = 0; i < body->n_edges && body->n_loose == 0; i++) {
+        const double deep = body->edge[i].round ? depth_along(body, i, result->u) : 0;
+        any = any || deep > 0;
+        for (int a = 0; a < 3 && body->edge[i].node[a] >= 0; a++)
+            depth[body->edge[i].node[a]] = fmax(depth[body->edge[i].node[a]], deep);
+    }
     uz_status status = UZ_OK;
     if (any)
         status = begin_rows(&x, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
@@ -585,12 +572,7 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
     }
     end_rows(&v.primal, g->cache);
     end_rows(&v.dual, g->cache);
-    void *room[] = {v.open,
-                    v.w,
-                    v.stress,
-                    v.wanted,
-                    v.g && v.adjoint.edge != g->body.edge ? v.adjoint.edge : NULL,
-                    v.adjoint.force != g->body.force ? v.adjoint.force : NULL};
+    void *room[] = {v.open, v.w, v.stress, v.wanted, v.adjoint.edge, v.adjoint.force};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return status;

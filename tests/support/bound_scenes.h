@@ -10,6 +10,19 @@
 
 static const char *const BOUND_ELEMENTS[] = {"tri3", "quad4", "tri6", "quad8"};
 
+static inline uz_result *bound_answer(const uz_problem *problem, bool guaranteed)
+{
+    uz_settings settings = uz_settings_default();
+    uz_result *result = NULL;
+    uz_error err = {0};
+    settings.guaranteed = guaranteed;
+    const uz_status status = uz_solve(&result, problem, &settings, NULL, NULL, &err);
+    CHECK_MSG(status == UZ_OK, "%s: %s", err.where, err.message);
+    if (status != UZ_OK)
+        exit(1);
+    return result;
+}
+
 typedef struct {
     int answers, proved;
     double highest, lowest; /* of the energies that are below and above the body's; apart: nothing is wrong */

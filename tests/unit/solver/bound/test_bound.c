@@ -16,16 +16,7 @@ static void shuffle(double *x)
 
 static uz_result *answer(const uz_scene *scene, bool guaranteed)
 {
-    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *scene};
-    uz_settings settings = uz_settings_default();
-    uz_result *result = NULL;
-    uz_error err = {0};
-    settings.guaranteed = guaranteed;
-    const uz_status status = uz_solve(&result, &problem, &settings, NULL, NULL, &err);
-    CHECK_MSG(status == UZ_OK, "%s: %s", err.where, err.message);
-    if (status != UZ_OK)
-        exit(1);
-    return result;
+    return bound_answer(&(uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = *scene}, guaranteed);
 }
 
 static uz_guarantee bound_of(const uz_scene *scene)
