@@ -194,18 +194,26 @@ static double bulge_energy(double corner[3][2], double area2, uz_lame lame, doub
     return sum;
 }
 
+/* The least of a line from a to b over a piece, less bend (x - x_j)(x_j+1 - x) / 2. */
+static double least_of(double a, double b, double bend, double piece)
+{
+    const double sag = bend * piece * piece / 2; /* its slope at the ends, times the piece */
+    return !(fabs(b - a) < sag) ? fmin(a, b) : (a + b) / 2 - sag / 4 - (b - a) * (b - a) / (4 * sag);
+}
+
 /* The B with s + 4 B q (1 - q) >= 0 in the j-th piece. There s is above the line between its ends by no less than
- * -bend (x - x_j)(x_j+1 - x) / 2; in those at the edge's ends, where the bulge goes to zero, that is taken in parts of
- * the way. */
+ * -bend (x - x_j)(x_j+1 - x) / 2; in those at the edge's ends, where the bulge goes to zero and s may not be negative,
+ * what s has too little is taken in parts of the way from there. */
 static double bulge_needed(const double s[PIECES + 1], const double bend[PIECES], double piece, int j)
 {
-    const double q0 = (double)j / PIECES, q1 = (j + 1.) / PIECES;
-    if (j == 0 || j == PIECES - 1) /* per part of the way from the edge's end */
-        return (fmax(0, -(j == 0 ? s[1] : s[j])) / piece + piece / 2 * bend[j]) * piece * PIECES /
-               (4 * (1 - 1. / PIECES));
-    if (fmin(s[j], s[j + 1]) >= piece * piece / 8 * bend[j])
+    const double q0 = (double)j / PIECES, q1 = (j + 1.) / PIECES, least = least_of(s[j], s[j + 1], bend[j], piece);
+    if (least >= 0)
         return 0;
-    return (fmax(0, -fmin(s[j], s[j + 1])) + piece * piece / 8 * bend[j]) / (4 * fmin(q0 - q0 * q0, q1 - q1 * q1));
+    if (j == 0 || j == PIECES - 1)
+        return s[j == 0 ? 0 : PIECES] < 0
+                   ? (double)INFINITY
+                   : fmax(0, piece * piece / 2 * bend[j] - (j == 0 ? s[1] : s[j])) * PIECES / (4 * (1 - 1. / PIECES));
+    return -least / (4 * fmin(q0 - q0 * q0, q1 - q1 * q1));
 }
 
 /* A bulge b = -B 4 q (1 - q) n(1/2) on the triangle at the edge leaves s + 4 B q (1 - q) n(1/2) . n >= 0. */

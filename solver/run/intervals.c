@@ -19,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_STEPS = 40, MOST_SHARES = 7 };
+enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 4 };
 
 /* Shares are looked for by steps of this factor, and between two that are farther apart than the other one. */
 #define STEP  2.5
@@ -498,40 +498,69 @@ static double depth_along(const uz_bound_body *body, int64_t i, const double *u)
     return deepest;
 }
 
-uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err)
+/* What nodes have to be taken out by: more where u + lift stands in the obstacle. Does it? */
+static bool look_for_depth(double *depth, double *more, double *at, const uz_bound_body *body, const double *u,
+                           const double *lift)
 {
-    const uz_bound_body *body = &g->body;
     const int64_t n = body->model->mesh.n_nodes;
-    double *depth = uz_alloc_zero(n, sizeof *depth);
-    rows_problem x = {.setup = NULL};
-    bool any = false, solved = false;
-    if (!depth)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the depth of %lld nodes", (long long)n);
-    for (int64_t i = 0; i < body->n_edges && body->n_loose == 0; i++) {
-        const double deep = body->edge[i].round ? depth_along(body, i, result->u) : 0;
+    bool any = false;
+    for (int64_t i = 0; i < n; i++) {
+        more[i] = 0;
+        for (int c = 0; c < 2; c++)
+            at[2 * i + c] = u[2 * i + c] + lift[2 * i + c];
+    }
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        const double deep = body->edge[i].round ? DEEPER * depth_along(body, i, at) : 0;
         any = any || deep > 0;
         for (int a = 0; a < 3 && body->edge[i].node[a] >= 0; a++)
-            depth[body->edge[i].node[a]] = fmax(depth[body->edge[i].node[a]], deep);
+            more[body->edge[i].node[a]] = fmax(more[body->edge[i].node[a]], deep);
     }
-    uz_status status = UZ_OK;
-    if (any)
-        status = begin_rows(&x, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
-    if (any && status == UZ_OK) {
-        const uz_body_model *model = &x.setup->model;
-        const uz_candidates *rows = x.setup->rows.in ? &x.setup->rows : NULL;
-        for (int64_t i = 0, k = 0; i < model->m; i++)
-            if (!rows || rows->in[i]) {
-                x.held[k] = depth[model->info.contact_node[i]] > 0 && !uz_row_inner(model, i);
-                x.h[k] = x.held[k] ? -DEEPER * depth[model->info.contact_node[i]] : (double)INFINITY;
-                k++;
-            }
-        status = solve_held(&x, &solved, err);
-        g->lift = status == UZ_OK && solved ? uz_alloc(2 * n, sizeof *g->lift) : NULL;
-        if (g->lift)
-            uz_recover_nodal(g->lift, model, x.x, NULL);
+    for (int64_t i = 0; i < n; i++)
+        depth[i] += more[i];
+    return any;
+}
+
+/* The displacement of least norm that takes nodes out by their depth. */
+static uz_status lift_nodes(double *lift, rows_problem *x, const double *depth, bool *solved, uz_error *err)
+{
+    const uz_body_model *model = &x->setup->model;
+    const uz_candidates *rows = x->setup->rows.in ? &x->setup->rows : NULL;
+    for (int64_t i = 0, k = 0; i < model->m; i++)
+        if (!rows || rows->in[i]) {
+            x->held[k] = depth[model->info.contact_node[i]] > 0 && !uz_row_inner(model, i);
+            x->h[k] = x->held[k] ? -depth[model->info.contact_node[i]] : (double)INFINITY;
+            k++;
+        }
+    uz_status status = solve_held(x, solved, err);
+    if (status == UZ_OK && *solved)
+        uz_recover_nodal(lift, model, x->x, NULL);
+    return status;
+}
+
+uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err)
+{
+    const int64_t n = g->body.model->mesh.n_nodes;
+    double *depth = uz_alloc_zero(4 * n, sizeof *depth), *lift = uz_alloc_zero(2 * n, sizeof *lift);
+    rows_problem x = {.setup = NULL};
+    bool solved = depth && lift && g->body.n_loose == 0;
+    uz_status status =
+        depth && lift ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to take %lld nodes out", (long long)n);
+    int steps = 0;
+    for (; steps < MOST_LIFTS && solved && status == UZ_OK &&
+           look_for_depth(depth, depth + n, depth + 2 * n, &g->body, result->u, lift);
+         steps++) {
+        if (steps == 0)
+            status = begin_rows(&x, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
+        if (status == UZ_OK)
+            status = lift_nodes(lift, &x, depth, &solved, err);
+    }
+    if (status == UZ_OK && (steps > 1 || (steps == 1 && solved))) {
+        g->lift = lift;
+        lift = NULL;
     }
     end_rows(&x, g->cache);
     free(depth);
+    free(lift);
     return status;
 }
 

@@ -145,5 +145,25 @@ def test_a_force_within_two_percent(s):
             check("guaranteed within" in written.read(), path)
 
 
+def test_a_round_obstacle(s):
+    """Half a block under a disc, refined until quantities are proved: the answer stands in the disc between nodes only
+    where its contact ends, and what takes it out costs little there. The force is 53.695."""
+    problem = copy.deepcopy(BLOCK)
+    problem["mesh"] = {"box": {"size": [20, 40], "cells": [4, 8], "element": "tri6"}, "refine": "auto"}
+    problem["materials"] = [{"on": "all", "young": 1000, "poisson": 0.3}]
+    problem["supports"] = [{"on": "bottom", "uy": 0}, {"on": "left", "ux": 0}]
+    problem["loads"] = []
+    problem["contacts"] = [{"on": "top", "obstacle": {"circle": {"center": [0, 69.75], "radius": 30}}}]
+    problem.update(model="plane_strain", thickness=1)
+    for quantity, within, unknowns in (({"quantity": "contact.force", "on": "top"}, 0.02, 1100),
+                                       ({"quantity": "contact.force", "on": "top"}, 0.003, 4200),
+                                       ({"quantity": "displacement", "on": "right", "direction": [1, 0]}, 0.002, 4200)):
+        summary = summary_of(s, {"problem": problem, "solver": {"accuracy": {**quantity, "relative": within, "guaranteed": True}}})
+        found = summary["quantities"][0]
+        check(summary["outcome"] == "converged" and found["kind"] == "guaranteed", summary["message"], found)
+        check(summary["problem"]["d"] < unknowns and found["high"] - found["low"] <= 2.001 * within * found["value"], summary["problem"], found)
+        check(found["low"] < (0.020968 if "direction" in quantity else 53.695) < found["high"], found)
+
+
 if __name__ == "__main__":
     service.main(globals())

@@ -200,7 +200,7 @@ TEST(never_below_the_truth_before_round_obstacles)
             for (int i = 0; i < x.count[k]; i++, count++)
                 most = fmax(most, x.effect[k][i]);
     }
-    CHECK_MSG(count == 24 && most < 8, "%d: %g", count, most);
+    CHECK_MSG(count == 24 && most < 4, "%d: %g", count, most);
 }
 
 /* A disc of 10,000 lengths is a plane, and presses on nodes as that does. */
