@@ -230,7 +230,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers peers-contact extremes theory roller figures numbers collect page-size
+        bench-size bench-deps peers peers-contact extremes theory roller trade figures numbers collect page-size
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
 	@tests/run.sh $(BUILD)
@@ -352,6 +352,9 @@ theory: deps ## stress and contact pressure against theory on finer and finer me
 roller: $(BUILD)/uzawad ## a roller pushed into a block, graded meshes, from either side: the force that contact that moves converges to; minutes
 	@$(PYTHON) -B tests/theory/roller.py $(BUILD)
 
+trade: $(BUILD)/uzawad ## what a whole error of 10, 5, 2 and 1 % costs, by estimate and guaranteed: a table and build/trade.json; minutes; FILTER=words: bodies by their names
+	@$(call measured,trade $(if $(FILTER),--part)) $(PYTHON) -B tests/figures/trade.py $(BUILD) $(BUILD)/trade.json $(FILTER)
+
 page-size: $(BUILD)/gen/page.c
 	@$(call measured,page) $(PYTHON) -B tests/figures/page_size.py $(BUILD)/gen/page $(BUILD)/page.json
 
@@ -365,7 +368,7 @@ collect: ## docs/numbers.md and what other pages cite of it, from what was measu
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
 numbers: ## measure everything that docs/numbers.md shows (hours: soak is one of it), then write them; SPARED="soak" leaves some out
-	@for part in $(filter-out $(SPARED),theory gallery extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
+	@for part in $(filter-out $(SPARED),theory gallery trade extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
 	    $(MAKE) --no-print-directory $$part || exit 1; done
 
 ##@ Style

@@ -88,7 +88,7 @@ def alone(make):
 
 
 KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": bench_size, "extremes": alone(extremes),
-         "theory": alone(dict), "soak": renewed_rows("rows"), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
+         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": renewed_rows("rows"), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
 
 
 def dump(value):

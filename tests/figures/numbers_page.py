@@ -24,12 +24,12 @@ import tables  # noqa: E402
 
 ROOT = pathlib.Path(os.environ.get("NUMBERS_ROOT") or pathlib.Path(__file__).resolve().parent.parent.parent)
 WIDTH = 119
-COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "extremes": "make extremes",
+COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "extremes": "make extremes", "trade": "make trade",
             "theory": "make theory", "soak": "make soak", "peers": "make peers", "gallery": "make gallery", "page": "make figures (the page)"}
-ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems"}  # what is measured by parts
+ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems", "trade": "rows"}  # what is measured by parts
 
 
-TIMED = ("figures", "bench", "bench_size", "soak", "peers")  # what other programs on the machine can change
+TIMED = ("figures", "bench", "bench_size", "soak", "peers", "trade")  # what other programs on the machine can change
 
 
 def timed(lines, data, name, key=None, shown=("",)):
@@ -169,6 +169,12 @@ from the reported area, which on these meshes (a node at the edge of the contact
 ELEMENTS = """What a formulation buys: Cook's membrane, tip displacement (converged 23.96), and a rubber tube at Poisson's ratio 0.4999; then the patch test and the order of
 convergence of every element. The stiffness of CalculiX's tetrahedra is reproduced to rounding."""
 
+TRADE = """Unknowns of the last mesh and seconds of the whole job, all its meshes and proofs included, until the whole error is small enough (`make trade`): refined where it is
+(`refine`: `auto`) and everywhere, each side halved again and again, with what a target takes interpolated between two meshes. `~`: extrapolated by the order of the last two,
+or what there was when the time or the mesh's limit came. Linear elements are triangles where they are refined, else as the first mesh has them; all sides are straight. The
+order is that of the error in unknowns: 0.5 and 1 are the best that linear and quadratic elements can do in the plane. The press fit has no guarantee, as bodies press on each
+other; the cylinder's first mesh is graded towards its contact by hand."""
+
 SERVICE = "What was done to the service (`make soak`), and what came of it; below, the figures as they are."
 
 
@@ -212,6 +218,7 @@ def page(data, files):
                               *tables.failures(data), "", "[CSV of all runs](figures/peers.csv)"],
             f"On the same matrices, each asked until the same external certificate holds, processor seconds of one thread, {limit} s for each run (`make peers`). "
             f"The paper's body is certified to 1e-6. Means are shifted geometric ones over all problems, where a failure costs the limit. {packages}.")
+    add("What the whole error costs", timed(tables.trade(data), data, "trade", "rows"), TRADE)
     add("Claims at the extremes", tables.extremes(data), EXTREMES)
     add("Against theory", tables.theory(data), THEORY)
     add("Elements", tables.elements(data), ELEMENTS)

@@ -329,6 +329,21 @@ def theory(data):
     return table(["body", "quantity", "cells", "error, %"], rows)
 
 
+def trade(data):
+    """What a whole error costs: unknowns and seconds, refined where the error is and everywhere."""
+    if not data.get("trade"):
+        return None
+
+    def cost(one):
+        return NONE if not one else f"{'' if one['reached'] else '~'}{sig(one['d'], 3)} ({duration(one['seconds'])})"
+
+    measured, rows = data["trade"]["rows"], []
+    for row in measured:
+        rows += [[row["body"], row["elements"], row["way"], "where it is"] + [cost(one) for one in row["adaptive"]] + [sig(row["order_adaptive"])],
+                 ["", "", "", "everywhere"] + [cost(one) for one in row["uniform"]] + [sig(row["order_uniform"])]]
+    return table(["body", "elements", "error", "refined"] + [f"{sig(100 * t)} %" for t in measured[0]["targets"]] + ["order"], rows)
+
+
 FORMULATIONS = (("quad4", "standard"), ("quad4", "incompatible_modes"), ("quad4", "bbar"), ("quad8", "standard"))
 
 
