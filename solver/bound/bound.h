@@ -20,6 +20,10 @@
 
 enum { UZ_BOUND_PARTS = 4, UZ_BOUND_POINTS = 6, UZ_BOUND_MOMENTS = 3, UZ_BOUND_LOOSE = 3 };
 
+/* Does an edge face another one of the body (pairs.c)? What presses on a slave's edge does on the master's before it;
+ * on one that is covered partly nothing may. */
+typedef enum { UZ_BOUND_ALONE, UZ_BOUND_SLAVE, UZ_BOUND_PARTLY, UZ_BOUND_MASTER } uz_bound_facing;
+
 /* A straight side of one or two elements, and what happens there. */
 typedef struct {
     int64_t node[3];    /* its ends, the first element on the left; its middle, -1: none */
@@ -33,9 +37,17 @@ typedef struct {
     double gap[2];      /* at the ends: normal . u <= gap, which is linear between them */
     bool round, inside; /* the obstacle is a disc, or all but one: neither its gap nor its normal are those two then */
     double centre[2], radius;
-    double spring[2];   /* stiffness of the ground along x and y, force per length and area; 0: none */
-    double traction[2]; /* of the loads, force per area, along x and y */
+    uz_bound_facing facing; /* the normal is the slave's then, of both */
+    double spring[2];       /* stiffness of the ground along x and y, force per length and area; 0: none */
+    double traction[2];     /* of the loads, force per area, along x and y */
 } uz_bound_edge;
+
+/* A part of a slave's edge, and the part of a master's that is before it. */
+typedef struct {
+    int64_t slave, master; /* edges */
+    double part[2], on[2]; /* of each the same two places, 0 to 1 along it */
+    double gap;            /* along the slave's normal */
+} uz_bound_segment;
 
 /* A body as the continuum has it: what is between nodes, too. */
 typedef struct {
@@ -43,14 +55,16 @@ typedef struct {
     int degree;                 /* of the stresses: 1, with quadratic elements 2 */
     int64_t n_edges;
     uz_bound_edge *edge;
-    int64_t *edge_of;    /* n_elements x 4: by the element's sides */
-    double *force;       /* n_elements x 2: force per volume */
-    double *free_strain; /* n_elements; NULL: no temperature */
-    double *map;         /* uz_bound_keep_maps: of each element, its stress's values by its unknowns; NULL: none kept */
-    int64_t *map_at;     /* n_elements: where an element's map is */
-    int n_loose;         /* motions that only obstacles hold */
-    double *motion;      /* n_loose x n_nodes x 2 */
-    int n_pressed; /* of uz_bound_hold: n_loose moments that the obstacle is to hold, as edge x (degree + 1) + a */
+    int64_t *edge_of; /* n_elements x 4: by the element's sides */
+    int64_t n_segments;
+    uz_bound_segment *segment; /* by slaves */
+    double *force;             /* n_elements x 2: force per volume */
+    double *free_strain;       /* n_elements; NULL: no temperature */
+    double *map;     /* uz_bound_keep_maps: of each element, its stress's values by its unknowns; NULL: none kept */
+    int64_t *map_at; /* n_elements: where an element's map is */
+    int n_loose;     /* motions that only obstacles hold */
+    double *motion;  /* n_loose x n_nodes x 2 */
+    int n_pressed;   /* of uz_bound_hold: n_loose moments that the obstacle is to hold, as edge x (degree + 1) + a */
     int64_t pressed[UZ_BOUND_LOOSE];
     char why[160]; /* what of the scene is outside of what is proved, a clause; "": nothing */
 } uz_bound_body;
@@ -59,6 +73,14 @@ typedef struct {
  * what it is, and nothing else of *out means anything. UZ_ERR_MEMORY. */
 uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 void uz_bound_body_clear(uz_bound_body *body);
+
+/* Part of uz_bound_body_make: a contact of straight surfaces of the body. What is not is in body->why. UZ_ERR_MEMORY.
+ */
+uz_status uz_bound_take_pair(uz_bound_body *body, const uz_contact *contact, uz_error *err);
+/* W[a][b]: what of the b-th moment of a displacement along the master's edge there is in the a-th moment along the
+ * slave's, over the segment. */
+void uz_bound_segment_weights(double W[UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS], const uz_bound_body *body,
+                              const uz_bound_segment *segment);
 
 /* Of a body that only obstacles hold in some motions: chooses what holds it in the dual problem. pressure: n_nodes,
  * that of the answer on obstacles, 0 elsewhere. body->why where there is too little of it. */
@@ -74,6 +96,8 @@ uz_status uz_bound_loose_motions(uz_bound_body *body, uz_error *err);
  */
 extern const double uz_bound_product[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS]; /* by degree - 1 */
 extern const double uz_bound_product_inverse[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS];
+/* The Bernstein polynomials that are weights, at a part of the way. */
+void uz_bound_bernstein(double phi[UZ_BOUND_MOMENTS], int moments, double part);
 /* The obstacle before an edge, at a part of the way along it, 0 to 1: its gap, and the unit normal into it. */
 double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part);
 /* Directions of the unknowns of an edge's a-th moments: its axes, but before a round obstacle, where the first is the

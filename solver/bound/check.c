@@ -72,6 +72,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         for (int64_t i = 0; i < body->n_edges; i++)
             examine_edge(&x, u, dof, i);
         settle_motions(&x, u, dof);
+        const uz_status pairs = uz_examine_pairs(&x, u, dof, err);
         for (int64_t i = 0; i < 2 * mesh->n_nodes && lift; i++)
             x.lift[i] += lift[i];
         const double ground = uz_spring_energy(&x, u), scale = x.scale + fabs(load) + ground;
@@ -83,6 +84,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         out->gap += x.sum + 4 * UZ_SUM_ROUNDING * ground;
         for (int64_t i = 0; i < body->n_edges; i++)
             look_at_lift(&x, u, i);
+        uz_look_at_pairs(&x, u);
         for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
             out->lifted[i] = u[i] + x.lift[i];
         double lifted = 0, margin = 0, strain = x.strain;
@@ -103,6 +105,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         out->primal = strain + x.margin - load + UZ_SUM_ROUNDING * (scale + strain + fabs(load));
         /* a(u_h + w, b) - f(b) of the bulges b: of the stress it is their work, and the rest is by Schwarz */
         out->primal += x.bulge_work + (sqrt(2 * x.bulged) + by_nodes) * sqrt(x.bulge) + x.bulge / 2;
+        status = pairs != UZ_OK ? pairs : status;
         out->dual -= UZ_SUM_ROUNDING * scale;
         out->inside = 100 * x.inside * sqrt(2 * fabs(x.complementary));
         if (!*out->fault && !(x.inside <= INSIDE))
@@ -345,7 +348,7 @@ void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, c
         const bool pressed = uz_bound_pressed(x->body, i, a) >= 0;
         if (pressed)
             pressure[a] = -acts[0];
-        else if (edge->contact >= 0 && !edge->held[0] &&
+        else if ((edge->contact >= 0 || edge->facing == UZ_BOUND_SLAVE) && !edge->held[0] &&
                  !edge->round) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
             pressure[a] = uz_admit_pressure(x, i * x->moments + a, -(acts[0] * share[0] + acts[1] * share[1]));
         else if (edge->contact >= 0 && !edge->held[1] && fabs(share[1]) > 1e-9)

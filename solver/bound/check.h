@@ -65,12 +65,20 @@ void uz_less_load(double *resultant, const examination *x, const uz_bound_edge *
 /* Makes w at a node (-1: none) at least `by` against the normal into the obstacle, along what supports leave to it. */
 void uz_lift_node(examination *x, int64_t node, const double normal[2], double by);
 
+/* Edges that face each other, check_pairs.c, once the tractions are known: what presses, on the masters too, and w
+ * where surfaces are in each other; UZ_ERR_MEMORY. The second, once w is known at all nodes. */
+uz_status uz_examine_pairs(examination *x, const double *u, const int64_t *dof, uz_error *err);
+void uz_look_at_pairs(examination *x, const double *u);
+
 /* Edges before round obstacles, check_round.c. The first looks at the stress's tractions and where u_h leaves its
  * nodes: pressure, gap, w at the nodes and what is not along the normal, of which turned (moments x 2) are the
  * resultants that are missing. The second, once w is known at all nodes, bulges what is still in the obstacle out of
  * it. */
 void uz_examine_round(double turned[UZ_BOUND_MOMENTS][2], examination *x, const double *u, int64_t edge);
 void uz_look_at_round(examination *x, const double *u, int64_t edge);
+/* Tractions that are missing on an edge and orthogonal to the polynomials of the degree there: int |delta|^2 along it.
+ */
+void uz_count_turning(examination *x, const uz_bound_edge *edge, double left);
 /* Along such an edge: bulges out what |n . w - om| is more than m s, where s is the gap that u leaves and not below
  * zero: their norm, and the work of the pressure on them. */
 void uz_bulge_excess(examination *x, const double *u, const double *w, double om, double m, const double *pressure,

@@ -62,16 +62,24 @@ static double shape_factor(double corner[3][2], double area2, double length)
     return large2 / (det * det) * large2 * large2 * length / det;
 }
 
+void uz_count_turning(examination *x, const uz_bound_edge *edge, double left)
+{
+    double corner[3][2];
+    const double area2 = triangle(corner, x, edge);
+    const double length = hypot(corner[1][0] - corner[0][0], corner[1][1] - corner[0][1]);
+    x->turning += x->body->model->thickness * left * TRACE2 * shape_factor(corner, area2, length) /
+                  (2 * uz_element_material(x->body->model, edge->element[0])->lame.mu);
+}
+
 void uz_examine_round(double turned[MOMENTS][2], examination *x, const double *u, int64_t i)
 {
     const uz_bound_edge *edge = &x->body->edge[i];
-    const uz_lame lame = uz_element_material(x->body->model, edge->element[0])->lame;
     const int moments = x->moments;
     const double thickness = x->body->model->thickness;
-    double at[POINTS], weight[POINTS], own[MOMENTS][2], r[MOMENTS], off[POINTS][2], along[2][3], corner[3][2];
+    double at[POINTS], weight[POINTS], own[MOMENTS][2], r[MOMENTS], off[POINTS][2], along[2][3];
     double integral[MOMENTS][2] = {{0}}, coefficient[MOMENTS][2] = {{0}}, gap = 0, left = 0;
-    const double area2 = triangle(corner, x, edge);
-    const double length = hypot(corner[1][0] - corner[0][0], corner[1][1] - corner[0][1]);
+    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
+    const double length = hypot(to[0] - from[0], to[1] - from[1]);
     uz_gauss(at, weight, POINTS);
     for (int c = 0; c < 2; c++)
         uz_along_edge(along[c], u, edge->node, (const double[2]){c == 0, c == 1});
@@ -117,7 +125,7 @@ void uz_examine_round(double turned[MOMENTS][2], examination *x, const double *u
             left += weight[g] / 2 * length * delta * delta;
         }
     }
-    x->turning += thickness * left * TRACE2 * shape_factor(corner, area2, length) / (2 * lame.mu);
+    uz_count_turning(x, edge, left);
     for (int a = 0; a < (edge->node[2] < 0 ? 2 : 3); a++) {
         double n[2];
         const double q = a == 2 ? 0.5 : a, h = uz_bound_gap(n, x->body, i, q);

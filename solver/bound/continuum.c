@@ -33,7 +33,7 @@ typedef struct {
 static uz_status find_edges(survey *x, uz_error *err);
 static bool has_straight_sides(const survey *x);
 static void take_supports(survey *x);
-static void take_contacts(survey *x);
+static uz_status take_contacts(survey *x, uz_error *err);
 static void take_springs(survey *x);
 static void take_loads(survey *x);
 
@@ -66,10 +66,11 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
                                                         (long long)mesh->n_nodes);
     if (status == UZ_OK && has_straight_sides(&x)) {
         take_supports(&x);
-        take_contacts(&x);
+        status = take_contacts(&x, err);
         take_springs(&x);
         take_loads(&x);
-        status = uz_free_strains(&out->free_strain, model, scene, err);
+        if (status == UZ_OK)
+            status = uz_free_strains(&out->free_strain, model, scene, err);
         if (status == UZ_OK)
             status = uz_bound_loose_motions(out, err);
     }
@@ -84,6 +85,7 @@ void uz_bound_body_clear(uz_bound_body *body)
 {
     free(body->edge);
     free(body->edge_of);
+    free(body->segment);
     free(body->force);
     free(body->free_strain);
     free(body->motion);
@@ -263,7 +265,7 @@ static void take_round(survey *x, uz_bound_edge *edge, const uz_contact *contact
     edge->axis[1][0] = -n[1];
 }
 
-static void take_contacts(survey *x)
+static uz_status take_contacts(survey *x, uz_error *err)
 {
     const uz_bound_body *body = x->body;
     for (int64_t k = 0; k < x->scene->n_contacts; k++) {
@@ -271,20 +273,22 @@ static void take_contacts(survey *x)
         const uz_group *group = uz_mesh_group(x->mesh, contact->on, "", NULL);
         double n[3];
         const bool round = contact->kind == UZ_OBSTACLE_ROUND;
+        if (contact->kind == UZ_OBSTACLE_BODY) {
+            const uz_status status = uz_bound_take_pair(x->body, contact, err);
+            if (status != UZ_OK || *x->body->why)
+                return status;
+            continue;
+        }
         if (contact->kind != UZ_OBSTACLE_PLANE && !round)
-            refuse(x->body,
-                   contact->kind == UZ_OBSTACLE_BODY
-                       ? "the contact of \"%s\" is with another part of the body, whose gap no polynomials close"
-                       : "the obstacle of \"%s\" has corners, where its normal leaps",
-                   contact->on);
+            refuse(x->body, "the obstacle of \"%s\" has corners, where its normal leaps", contact->on);
         else if (!group || group->kind != UZ_GROUP_FACES || group->n_inner > 0 ||
                  (!round && !uz_unit_normal(n, contact->normal, 2)) || !find_group(x, contact->on))
             refuse(x->body, "the contact's group \"%s\" is not made of edges of the border", contact->on);
         if (*x->body->why)
-            return;
+            return UZ_OK;
         for (int64_t i = 0; i < x->n_found; i++) {
             uz_bound_edge *edge = &body->edge[x->found[i]];
-            if (edge->contact >= 0)
+            if (edge->contact >= 0 || edge->facing != UZ_BOUND_ALONE)
                 refuse(x->body, "an edge of \"%s\" has two obstacles before it", contact->on);
             edge->contact = k;
             if (round) {
@@ -304,6 +308,7 @@ static void take_contacts(survey *x)
             }
         }
     }
+    return UZ_OK;
 }
 
 /* The stiffness of a group is its total. */
@@ -321,7 +326,7 @@ static void take_springs(survey *x)
             for (int64_t i = 0; i < x->n_found && !*x->body->why; i++) {
                 uz_bound_edge *edge = &x->body->edge[x->found[i]];
                 const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
-                if (edge->held[0] || edge->contact >= 0)
+                if (edge->held[0] || edge->contact >= 0 || edge->facing != UZ_BOUND_ALONE)
                     refuse(x->body, "supports or obstacles hold edges of \"%s\", which springs hold too", support->on);
                 area += pass == 0 ? hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness : 0;
                 for (int c = 0; c < 2 && pass == 1; c++)
@@ -379,6 +384,12 @@ static void take_loads(survey *x)
                 body->force[2 * e + c] += times * load->v[c];
         }
     }
+}
+
+void uz_bound_bernstein(double phi[UZ_BOUND_MOMENTS], int moments, double part)
+{
+    for (int a = 0; a < moments; a++)
+        phi[a] = (a == 1 && moments == 3 ? 2 : 1) * pow(1 - part, moments - 1 - a) * pow(part, a);
 }
 
 double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part)

@@ -244,45 +244,83 @@ bool uz_bound_has_row(const uz_bound_body *body, const int64_t *dof, int64_t edg
     return has && body->edge[edge].contact >= 0;
 }
 
-/* Rows of the edges before obstacles. */
+typedef struct {
+    int64_t m, count, *row, *col; /* rows, entries */
+    double *val, *h;
+} row_list;
+
+static void add_entry(row_list *N, int64_t at, double value)
+{
+    N->row[N->count] = N->m;
+    N->col[N->count] = at;
+    N->val[N->count++] = value;
+}
+
+/* Of an edge before an obstacle. */
+static void add_edge_rows(row_list *N, const uz_bound_body *body, const int64_t *dof, int64_t i)
+{
+    const int moments = body->degree + 1;
+    for (int a = 0; a < moments; a++) {
+        double axis[2][2], normal[2], gap = mean_gap(normal, body, i, a);
+        const int64_t before = N->count;
+        uz_bound_axes(axis, body, i, a);
+        for (int k = 0; k < 2; k++) {
+            const double share = normal[0] * axis[k][0] + normal[1] * axis[k][1];
+            const int64_t at = dof[(i * moments + a) * 2 + k];
+            if (at < 0)
+                gap -= share * given(body, i, a, k);
+            else if (fabs(share) > 1e-9) /* uz_bound_has_row */
+                add_entry(N, at, share);
+        }
+        if (N->count > before)
+            N->h[N->m++] = gap;
+    }
+}
+
+/* Of a slave's edge, which begins with segment k, and the masters before it. */
+static void add_pair_rows(row_list *N, const uz_bound_body *body, const int64_t *dof, int64_t k)
+{
+    const int moments = body->degree + 1;
+    const int64_t slave = body->segment[k].slave;
+    for (int a = 0; a < moments; a++) {
+        add_entry(N, dof[(slave * moments + a) * 2], 1);
+        for (int64_t j = k; j < body->n_segments && body->segment[j].slave == slave; j++) {
+            double W[UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS];
+            uz_bound_segment_weights(W, body, &body->segment[j]);
+            for (int b = 0; b < moments; b++)
+                add_entry(N, dof[(body->segment[j].master * moments + b) * 2], -W[a][b]);
+        }
+        N->h[N->m++] = body->segment[k].gap;
+    }
+}
+
+/* Rows of the edges before obstacles, and of those that face others. */
 static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const int64_t *dof, uz_error *err)
 {
     const int moments = body->degree + 1;
-    int64_t count = 0, m = 0, edges = 0;
+    int64_t edges = 0;
     for (int64_t i = 0; i < body->n_edges; i++)
-        edges += body->edge[i].contact >= 0;
-    int64_t *row = uz_alloc(2 * moments * edges, sizeof *row), *col = uz_alloc(2 * moments * edges, sizeof *col);
-    double *val = uz_alloc(2 * moments * edges, sizeof *val);
-    qp->h = uz_alloc(moments * edges, sizeof *qp->h);
-    uz_status status = row && col && val && qp->h ? UZ_OK
-                                                  : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows",
-                                                            (long long)(moments * edges));
-    for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) {
-        const uz_bound_edge *edge = &body->edge[i];
-        for (int a = 0; a < moments && edge->contact >= 0; a++) {
-            double axis[2][2], normal[2], gap = mean_gap(normal, body, i, a);
-            const int64_t before = count;
-            uz_bound_axes(axis, body, i, a);
-            for (int k = 0; k < 2; k++) {
-                const double share = normal[0] * axis[k][0] + normal[1] * axis[k][1];
-                const int64_t at = dof[(i * moments + a) * 2 + k];
-                if (at < 0)
-                    gap -= share * given(body, i, a, k);
-                else if (fabs(share) > 1e-9) { /* uz_bound_has_row */
-                    row[count] = m;
-                    col[count] = at;
-                    val[count++] = share;
-                }
-            }
-            if (count > before)
-                qp->h[m++] = gap;
-        }
-    }
+        edges += body->edge[i].contact >= 0 || body->edge[i].facing == UZ_BOUND_SLAVE;
+    const int64_t room = moments * (2 * edges + moments * body->n_segments);
+    row_list N = {.row = uz_alloc(room, sizeof(int64_t)), .col = uz_alloc(room, sizeof(int64_t))};
+    N.val = uz_alloc(room, sizeof *N.val);
+    N.h = qp->h = uz_alloc(moments * edges, sizeof *qp->h);
+    uz_status status =
+        N.row && N.col && N.val && N.h
+            ? UZ_OK
+            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)(moments * edges));
+    for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++)
+        if (body->edge[i].contact >= 0)
+            add_edge_rows(&N, body, dof, i);
+    for (int64_t k = 0; k < body->n_segments && status == UZ_OK; k++)
+        if (body->edge[body->segment[k].slave].facing == UZ_BOUND_SLAVE &&
+            (k == 0 || body->segment[k - 1].slave != body->segment[k].slave))
+            add_pair_rows(&N, body, dof, k);
     if (status == UZ_OK)
-        status = uz_csc_from_triplets(&qp->N, m, d, count, row, col, val, err);
-    free(row);
-    free(col);
-    free(val);
+        status = uz_csc_from_triplets(&qp->N, N.m, d, N.count, N.row, N.col, N.val, err);
+    free(N.row);
+    free(N.col);
+    free(N.val);
     return status;
 }
 

@@ -568,7 +568,9 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
 {
     uz_evaluation *e = result->evaluation;
     proving v = {.result = result, .g = g};
-    const char *all = g->body.n_loose > 0 ? "only obstacles hold the body" : NULL;
+    const char *all = g->body.n_loose > 0      ? "only obstacles hold the body"
+                      : g->body.n_segments > 0 ? "parts of the body press on each other"
+                                               : NULL;
     bool any = false;
     uz_status status = UZ_OK;
     for (int64_t i = 0; i < e->n_quantities; i++)

@@ -7,6 +7,7 @@ import tempfile
 
 import service
 from service import SCENE, check, expect
+from two_bodies import body
 
 SHARED = True  # one service for all tests
 
@@ -163,6 +164,61 @@ def test_a_round_obstacle(s):
         check(summary["outcome"] == "converged" and found["kind"] == "guaranteed", summary["message"], found)
         check(summary["problem"]["d"] < unknowns and found["high"] - found["low"] <= 2.001 * within * found["value"], summary["problem"], found)
         check(found["low"] < (0.020968 if "direction" in quantity else 53.695) < found["high"], found)
+
+
+def blocks(element, cells, wide=30, gap=0, exchanged=False, **accuracy):
+    """A block of that width on the middle of one of 60 x 20, pushed down by 0.1."""
+    left = (60 - wide) / 2
+    scene = body([element] * 2, cells, [lambda x, y: (60 * x, 20 * y), lambda x, y: (left + wide * x, 20 + gap + 18 * y)],
+                 {"base": [(0, "bottom")], "top": [(0, "top")], "foot": [(1, "bottom")], "lid": [(1, "top")], "sides": [(0, "left"), (1, "left")]},
+                 model="plane_strain", kinematics="fixed", materials=[{"on": "all", "young": 1000, "poisson": 0.3}], loads=[],
+                 supports=[{"on": "base", "ux": 0, "uy": 0}, {"on": "lid", "ux": 0, "uy": -0.1 - gap}],
+                 contacts=[{"on": "top", "with": "foot"} if exchanged else {"on": "foot", "with": "top"}])
+    return {**scene, "solver": {"accuracy": {"guaranteed": True, **accuracy}}}
+
+
+def test_bodies_on_each_other(s):
+    """Meshes that meet in nodes and such that do not, of all elements: what is proved from below never is above what is proved from
+    above, whichever surface is named first. The energy is 5.123."""
+    for gap in (0, 0.01, -0.01):
+        low, high = [], []
+        for element, cells in (("quad4", ((12, 4), (6, 4))), ("quad8", ((12, 4), (6, 4))), ("tri6", ((24, 8), (12, 8))), ("tri3", ((24, 8), (16, 8))),
+                               ("quad4", ((28, 8), (8, 8))), ("quad8", ((24, 8), (16, 8))), ("tri6", ((12, 4), (8, 4)))):
+            errors = [summary_of(s, blocks(element, cells, gap=gap, exchanged=exchanged))["error"] for exchanged in (False, True)]
+            check(all(e["kind"] == "guaranteed" for e in errors), errors)
+            check(abs(errors[0]["total"] - errors[1]["total"]) < 1e-6 * errors[0]["total"], errors)
+            check(errors[0]["total"] < (2.4 if (cells[0][0] / 2) % cells[1][0] == 0 else 5) * errors[0]["estimated_mesh"], element, cells, errors)
+            low.append(errors[0]["energy_low"])
+            high.append(errors[0]["energy_high"])
+        check(max(low) <= 5.1233 <= min(high) and min(high) - max(low) < 0.012, gap, low, high)
+    refined = blocks("tri6", ((12, 4), (6, 4)), total=0.02)
+    refined["problem"]["mesh"]["refine"] = "auto"
+    summary = summary_of(s, refined)
+    check(summary["outcome"] == "converged" and summary["error"]["kind"] == "guaranteed" and summary["problem"]["d"] < 4000, summary["error"])
+
+
+def test_uniform_pressure_between_bodies(s):
+    """Blocks of one width on each other, free to spread: no mesh has an error."""
+    for element, cells in (("quad4", ((6, 4), (6, 3))), ("quad4", ((7, 4), (4, 3))), ("tri6", ((5, 2), (3, 2)))):
+        request = blocks(element, cells, wide=60)
+        request["problem"]["supports"] = [{"on": "base", "uy": 0}, {"on": "lid", "uy": -0.1}, {"on": "left", "ux": 0}]
+        request["problem"]["mesh"]["groups"]["left"] = {"edges": request["problem"]["mesh"]["groups"].pop("sides")["edges"]}
+        error = summary_of(s, request)["error"]
+        check(error["kind"] == "guaranteed" and error["total"] < 1e-6, element, cells, error)
+
+
+def test_bodies_that_nothing_is_proved_for(s):
+    """Surfaces that are not straight, and a block that only the other one holds."""
+    bent = blocks("quad4", ((12, 4), (6, 4)))
+    foot = bent["problem"]["mesh"]["groups"]["foot"]["edges"]
+    bent["problem"]["mesh"]["nodes"][foot[2][0]][1] += 0.01
+    loose = blocks("quad4", ((12, 4), (6, 4)))
+    loose["problem"]["supports"].pop()
+    loose["problem"]["supports"].append({"on": "lid", "ux": 0})
+    loose["problem"]["loads"] = [{"on": "lid", "traction": [0, -1]}]
+    for request, words in ((bent, "not straight and parallel"), (loose, "only obstacles hold the body")):
+        error = summary_of(s, request)["error"]
+        check(error["kind"] == "estimated" and words in error["why"], error)
 
 
 if __name__ == "__main__":
