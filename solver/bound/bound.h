@@ -44,9 +44,9 @@ typedef struct {
 
 /* A part of a slave's edge, and the part of a master's that is before it. */
 typedef struct {
-    int64_t slave, master; /* edges */
-    double part[2], on[2]; /* of each the same two places, 0 to 1 along it */
-    double gap;            /* along the slave's normal */
+    int64_t slave, master, contact; /* edges; of the scene */
+    double part[2], on[2];          /* of each the same two places, 0 to 1 along it */
+    double gap;                     /* along the slave's normal */
 } uz_bound_segment;
 
 /* A body as the continuum has it: what is between nodes, too. */
@@ -76,7 +76,7 @@ void uz_bound_body_clear(uz_bound_body *body);
 
 /* Part of uz_bound_body_make: a contact of straight surfaces of the body. What is not is in body->why. UZ_ERR_MEMORY.
  */
-uz_status uz_bound_take_pair(uz_bound_body *body, const uz_contact *contact, uz_error *err);
+uz_status uz_bound_take_pair(uz_bound_body *body, const uz_scene *scene, int64_t contact, uz_error *err);
 /* W[a][b]: what of the b-th moment of a displacement along the master's edge there is in the a-th moment along the
  * slave's, over the segment. */
 void uz_bound_segment_weights(double W[UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS], const uz_bound_body *body,

@@ -72,7 +72,8 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         for (int64_t i = 0; i < body->n_edges; i++)
             examine_edge(&x, u, dof, i);
         settle_motions(&x, u, dof);
-        const uz_status pairs = uz_examine_pairs(&x, u, dof, err);
+        const uz_status pairs = uz_press_masters(&x, u, dof, err);
+        uz_take_pairs_apart(&x, u);
         for (int64_t i = 0; i < 2 * mesh->n_nodes && lift; i++)
             x.lift[i] += lift[i];
         const double ground = uz_spring_energy(&x, u), scale = x.scale + fabs(load) + ground;

@@ -65,10 +65,20 @@ void uz_less_load(double *resultant, const examination *x, const uz_bound_edge *
 /* Makes w at a node (-1: none) at least `by` against the normal into the obstacle, along what supports leave to it. */
 void uz_lift_node(examination *x, int64_t node, const double normal[2], double by);
 
-/* Edges that face each other, check_pairs.c, once the tractions are known: what presses, on the masters too, and w
- * where surfaces are in each other; UZ_ERR_MEMORY. The second, once w is known at all nodes. */
-uz_status uz_examine_pairs(examination *x, const double *u, const int64_t *dof, uz_error *err);
+/* Edges that face each other, check_pairs.c, once the tractions are known: what presses does on the masters, too; its
+ * work is in the gap and in D, that of what they lack in the defect; UZ_ERR_MEMORY. Then w, where surfaces are in each
+ * other; and what that comes to, once it is known at all nodes. */
+uz_status uz_press_masters(examination *x, const double *u, const int64_t *dof, uz_error *err);
+void uz_take_pairs_apart(examination *x, const double *u);
 void uz_look_at_pairs(examination *x, const double *u);
+/* Middles of slaves' edges go as the ends of w leave them straight. */
+void uz_middle_slaves(examination *x);
+/* What a displacement v (n_nodes x 2) does along a segment: the slave's less the master's, along the normal, as
+ * uz_along_edge. */
+void uz_along_segment(double b[3], const examination *x, const uz_bound_segment *segment, const double *v);
+/* The work of a pressure (n_edges x moments, resultants) on such a polynomial. */
+double uz_segment_work(const examination *x, const uz_bound_segment *segment, const double *pressure,
+                       const double b[3]);
 
 /* Edges before round obstacles, check_round.c. The first looks at the stress's tractions and where u_h leaves its
  * nodes: pressure, gap, w at the nodes and what is not along the normal, of which turned (moments x 2) are the

@@ -58,12 +58,12 @@ static double pressure_at(const double *resultant, int moments, double area, dou
     return sum;
 }
 
-/* (v_slave - v_master) . n as Bernstein's coefficients along a segment. */
-static void leap_along(double b[3], const uz_bound_segment *s, const stretch *t, const double *v)
+void uz_along_segment(double b[3], const examination *x, const uz_bound_segment *s, const double *v)
 {
+    const uz_bound_edge *slave = &x->body->edge[s->slave], *master = &x->body->edge[s->master];
     double mine[3], its[3], at[3];
-    uz_along_edge(mine, v, t->slave->node, t->slave->normal);
-    uz_along_edge(its, v, t->master->node, t->slave->normal);
+    uz_along_edge(mine, v, slave->node, slave->normal);
+    uz_along_edge(its, v, master->node, slave->normal);
     for (int k = 0; k < 3; k++)
         at[k] = value(mine, s->part[0] + k * (s->part[1] - s->part[0]) / 2) -
                 value(its, s->on[0] + k * (s->on[1] - s->on[0]) / 2);
@@ -72,25 +72,40 @@ static void leap_along(double b[3], const uz_bound_segment *s, const stretch *t,
     b[2] = at[2];
 }
 
+double uz_segment_work(const examination *x, const uz_bound_segment *s, const double *pressure, const double b[3])
+{
+    const stretch t = stretch_of(x, s);
+    double work = 0;
+    for (int g = 0; g < POINTS; g++)
+        work += t.weight[g] * t.area * pressure_at(pressure + s->slave * x->moments, x->moments, t.area, t.at[g]) *
+                value(b, (t.at[g] - s->part[0]) / (s->part[1] - s->part[0]));
+    return work;
+}
+
+static bool presses(const examination *x, const uz_bound_segment *s)
+{
+    return x->body->edge[s->slave].facing == UZ_BOUND_SLAVE;
+}
+
 /* ---- what presses on the master */
 
 /* The pressure's work, and the master's share of it: `acting`, resultants by edges and moments, as integrals yet. */
 static void press(examination *x, double *acting, const uz_bound_segment *s, const double *u)
 {
     const stretch t = stretch_of(x, s);
+    const double open[3] = {s->gap, s->gap, s->gap};
     double leap[3];
-    leap_along(leap, s, &t, u);
+    uz_along_segment(leap, x, s, u);
+    const double on_gap = uz_segment_work(x, s, x->pressure, open), moved = uz_segment_work(x, s, x->pressure, leap);
+    x->out->gap += on_gap - moved;
+    x->out->dual -= on_gap;
+    x->scale += fabs(on_gap) + fabs(moved);
     for (int g = 0; g < POINTS; g++) {
         double phi[MOMENTS];
-        const double q = (t.at[g] - s->part[0]) / (s->part[1] - s->part[0]);
         const double r = pressure_at(x->pressure + s->slave * x->moments, x->moments, t.area, t.at[g]);
-        const double force = t.weight[g] * t.area * r, moved = value(leap, q);
-        x->out->gap += force * (s->gap - moved);
-        x->out->dual -= force * s->gap;
-        x->scale += fabs(force) * (fabs(s->gap) + fabs(moved));
         uz_bound_bernstein(phi, x->moments, t.on[g]);
         for (int a = 0; a < x->moments; a++)
-            acting[s->master * x->moments + a] += force * phi[a];
+            acting[s->master * x->moments + a] += t.weight[g] * t.area * r * phi[a];
     }
 }
 
@@ -112,6 +127,7 @@ static void project(examination *x, double *acting, const double *u, const int64
         const int64_t at = dof[(i * x->moments + a) * 2];
         x->out->residual[at] += to[a];
         x->out->defect += to[a] * m[a];
+        x->scale += fabs(to[a] * m[a]);
     }
 }
 
@@ -141,9 +157,7 @@ static double uncovered(const examination *x, const double *acting, int64_t i)
     return sum * x->moments * x->moments / (area * area) * length;
 }
 
-static void take_out(examination *x, const double *u);
-
-uz_status uz_examine_pairs(examination *x, const double *u, const int64_t *dof, uz_error *err)
+uz_status uz_press_masters(examination *x, const double *u, const int64_t *dof, uz_error *err)
 {
     const uz_bound_body *body = x->body;
     if (body->n_segments == 0)
@@ -156,43 +170,47 @@ uz_status uz_examine_pairs(examination *x, const double *u, const int64_t *dof, 
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for what presses on %lld edges", (long long)body->n_edges);
     }
     for (int64_t k = 0; k < body->n_segments; k++)
-        if (body->edge[body->segment[k].slave].facing == UZ_BOUND_SLAVE)
+        if (presses(x, &body->segment[k]))
             press(x, acting, &body->segment[k], u);
     for (int64_t i = 0; i < body->n_edges; i++)
         if (body->edge[i].facing == UZ_BOUND_MASTER)
             project(x, acting, u, dof, i);
     for (int64_t k = 0; k < body->n_segments; k++)
-        if (body->edge[body->segment[k].slave].facing == UZ_BOUND_SLAVE)
+        if (presses(x, &body->segment[k]))
             compare(x, left, covered, acting, &body->segment[k]);
     for (int64_t i = 0; i < body->n_edges; i++)
         if (body->edge[i].facing == UZ_BOUND_MASTER)
             uz_count_turning(x, &body->edge[i], left[i] + (covered[i] < 1 - 1e-10 ? uncovered(x, acting, i) : 0));
     free(acting);
     free(left);
-    take_out(x, u);
     return UZ_OK;
 }
 
 /* ---- what is in the other body */
 
 /* The nodes of a slave's edge go by as much as any of its segments needs, after what was given. */
-static void take_out(examination *x, const double *u)
+void uz_take_pairs_apart(examination *x, const double *u)
 {
     for (int64_t k = 0; k < x->body->n_segments; k++) {
         const uz_bound_segment *s = &x->body->segment[k];
-        const stretch t = stretch_of(x, s);
+        const uz_bound_edge *slave = &x->body->edge[s->slave];
         double leap[3], given[3] = {0}, left[3], by = 0;
-        leap_along(leap, s, &t, u);
+        uz_along_segment(leap, x, s, u);
         if (x->given)
-            leap_along(given, s, &t, x->given);
+            uz_along_segment(given, x, s, x->given);
         for (int a = 0; a < 3; a++)
             left[a] = s->gap - leap[a] - given[a];
         for (int a = 0; a < 3; a++)
             by = fmax(by, -left[a] - (a == 1 ? sqrt(fmax(0, left[0]) * fmax(0, left[2])) : 0));
         for (int a = 0; a < 2; a++)
-            uz_lift_node(x, t.slave->node[a], t.slave->normal, by);
+            uz_lift_node(x, slave->node[a], slave->normal, by);
     }
-    for (int64_t i = 0; i < x->body->n_edges; i++) { /* middles, as straight as the ends leave them */
+    uz_middle_slaves(x);
+}
+
+void uz_middle_slaves(examination *x)
+{
+    for (int64_t i = 0; i < x->body->n_edges; i++) {
         const uz_bound_edge *edge = &x->body->edge[i];
         if ((edge->facing != UZ_BOUND_SLAVE && edge->facing != UZ_BOUND_PARTLY) || edge->node[2] < 0)
             continue;
@@ -205,14 +223,10 @@ void uz_look_at_pairs(examination *x, const double *u)
 {
     for (int64_t k = 0; k < x->body->n_segments; k++) {
         const uz_bound_segment *s = &x->body->segment[k];
-        const stretch t = stretch_of(x, s);
         double leap[3], lift[3], left[3], tolerance = uz_place_rounding(x);
-        leap_along(leap, s, &t, u);
-        leap_along(lift, s, &t, x->lift);
-        for (int g = 0; g < POINTS && t.slave->facing == UZ_BOUND_SLAVE; g++)
-            x->out->gap -= t.weight[g] * t.area *
-                           pressure_at(x->pressure + s->slave * x->moments, x->moments, t.area, t.at[g]) *
-                           value(lift, (t.at[g] - s->part[0]) / (s->part[1] - s->part[0]));
+        uz_along_segment(leap, x, s, u);
+        uz_along_segment(lift, x, s, x->lift);
+        x->out->gap -= presses(x, s) ? uz_segment_work(x, s, x->pressure, lift) : 0;
         for (int a = 0; a < 3; a++)
             tolerance = fmax(tolerance, 1e-12 * (fabs(leap[a]) + fabs(s->gap)));
         for (int a = 0; a < 3; a++)

@@ -274,7 +274,7 @@ static uz_status take_contacts(survey *x, uz_error *err)
         double n[3];
         const bool round = contact->kind == UZ_OBSTACLE_ROUND;
         if (contact->kind == UZ_OBSTACLE_BODY) {
-            const uz_status status = uz_bound_take_pair(x->body, contact, err);
+            const uz_status status = uz_bound_take_pair(x->body, x->scene, k, err);
             if (status != UZ_OK || *x->body->why)
                 return status;
             continue;

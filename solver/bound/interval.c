@@ -30,6 +30,7 @@ typedef struct {
     double *acts[2];       /* resultants less the loads, of the answer's stress and of the pair's */
     double *v, *tractions; /* n_nodes x 2, n_elements x STRESSES: room */
     double *force, *free_strain;
+    double nodal; /* norm of what slaves' nodes have to go by */
 } weighing;
 
 static uz_status begin(weighing *y, int64_t n_dofs, uz_error *err)
@@ -202,6 +203,12 @@ static double expansion_work(const weighing *y, double *rounding)
 
 /* ---- along edges */
 
+/* A bound on minus the least value of a quadratic polynomial, from its Bernstein coefficients. */
+static double below_zero(const double b[3])
+{
+    return fmax(fmax(-b[0], -b[2]), -b[1] - sqrt(fmax(0, b[0]) * fmax(0, b[2])));
+}
+
 /* With these widths at the nodes polynomials between them keep to s along the whole edge, but for normals that turn: s
  * bends away from its chord by h^2 / 8R; a quadratic polynomial is at most 1.25 times its nodes', and its middle
  * coefficient twice the middle less half the ends'. */
@@ -235,6 +242,19 @@ void uz_bound_openings(double *open, const uz_bound_body *body, const uz_bound_c
         for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++)
             open[edge->node[a]] = fmax(0, fmin(open[edge->node[a]], s[a]));
     }
+    for (int64_t k = 0; k < body->n_segments; k++) { /* between bodies the least along each segment */
+        const examination x = {.body = body};
+        const uz_bound_segment *segment = &body->segment[k];
+        double s[3];
+        uz_along_segment(s, &x, segment, checked->lifted);
+        for (int a = 0; a < 3; a++)
+            s[a] = segment->gap - s[a];
+        for (int a = 0; a < 6; a++) {
+            const int64_t node = body->edge[a < 3 ? segment->slave : segment->master].node[a % 3];
+            if (node >= 0)
+                open[node] = fmax(0, fmin(open[node], -below_zero(s)));
+        }
+    }
 }
 
 /* Brings w's nodes to where they may be. */
@@ -257,12 +277,6 @@ static void bring_nodes(weighing *y)
                 w[c] += by * way[c];
         }
     }
-}
-
-/* A bound on minus the least value of a quadratic polynomial, from its Bernstein coefficients. */
-static double below_zero(const double b[3])
-{
-    return fmax(fmax(-b[0], -b[2]), -b[1] - sqrt(fmax(0, b[0]) * fmax(0, b[2])));
 }
 
 /* Is w_n nowhere farther from om than m s_h along an edge? */
@@ -293,6 +307,49 @@ static void look_at_edge(weighing *y, int64_t i)
     if (!*y->scratch.fault && !(most <= PLACES * size))
         snprintf(y->scratch.fault, sizeof y->scratch.fault,
                  "the contact meets supports, where what presses has no bound");
+}
+
+/* Where surfaces of the body face each other nodes of two meshes say where w_n is: along a slave's edge its ends go by
+ * as much as w_n is beyond m s_h there, as a displacement on its own (bulge), not added to w. */
+static void look_at_pairs(weighing *y)
+{
+    const uz_bound_body *body = y->body;
+    examination *x = &y->x;
+    double margin = 0, square = 0, *by = x->lift;
+    memset(by, 0, (size_t)(2 * x->mesh->n_nodes) * sizeof *by);
+    for (int64_t k = 0; k < body->n_segments; k++) {
+        const uz_bound_segment *segment = &body->segment[k];
+        const uz_bound_edge *slave = &body->edge[segment->slave];
+        const double m = y->pair->share, om = y->pair->wanted[segment->contact];
+        double s[3], moved[3], most = 0, size = fabs(om) + m * (fabs(segment->gap) + x->farthest), way[2];
+        uz_along_segment(s, x, segment, y->checked->lifted);
+        uz_along_segment(moved, x, segment, y->pair->w);
+        for (int sign = 1; sign >= -1; sign -= 2) {
+            double b[3];
+            for (int a = 0; a < 3; a++)
+                b[a] = m * (segment->gap - s[a]) + sign * (moved[a] - om);
+            most = fmax(most, below_zero(b));
+        }
+        for (int a = 0; a < 2 && most > PLACES * size; a++) {
+            const int64_t node = slave->node[a];
+            if (!uz_way_along(way, body->model, node, slave->normal) && !*y->scratch.fault)
+                snprintf(y->scratch.fault, sizeof y->scratch.fault,
+                         "the contact meets supports, where what presses has no bound");
+            for (int c = 0; c < 2; c++)
+                if (fabs(most * way[c]) > fabs(by[2 * node + c]))
+                    by[2 * node + c] = most * way[c];
+        }
+    }
+    uz_middle_slaves(x);
+    for (int64_t e = 0; e < x->mesh->n_elements; e++)
+        square += 2 * uz_energy_of(&margin, x, by, false, e);
+    for (int64_t k = 0; k < body->n_segments; k++) {
+        double b[3];
+        uz_along_segment(b, x, &body->segment[k], by);
+        if (body->edge[body->segment[k].slave].facing == UZ_BOUND_SLAVE)
+            x->bulge_work += uz_segment_work(x, &body->segment[k], y->checked->pressure, b);
+    }
+    y->nodal = sqrt(square + 2 * margin + 2 * uz_spring_energy(x, by));
 }
 
 /* Of the pair's tractions: its pressure's work on gaps and its work at supports -> middle, what is missing -> residual
@@ -331,6 +388,16 @@ static void weigh_edges(weighing *y, uz_bound_interval *out, const int64_t *dof)
     }
     out->middle -= y->scratch.dual; /* of round obstacles */
     out->rounding += UZ_SUM_ROUNDING * fabs(y->scratch.dual);
+}
+
+/* The same of masters, which the slaves' pressure acts on. */
+static uz_status weigh_masters(weighing *y, uz_bound_interval *out, const int64_t *dof, uz_error *err)
+{
+    y->scratch.dual = y->scratch.defect = y->x.scale = 0;
+    const uz_status status = uz_press_masters(&y->x, y->u, dof, err);
+    out->middle += y->scratch.defect - y->scratch.dual;
+    out->rounding += UZ_SUM_ROUNDING * y->x.scale;
+    return status;
 }
 
 /* w has to be what the adjoint body says of supports. */
@@ -373,12 +440,14 @@ uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, cons
         for (int64_t i = 0; i < body->n_edges; i++)
             if (body->edge[i].contact >= 0)
                 look_at_edge(&y, i);
-        out->bulge = sqrt(y.x.bulge);
+        look_at_pairs(&y);
+        out->bulge = sqrt(y.x.bulge) + y.nodal;
         out->pressed = y.x.bulge_work;
         if (!*out->fault)
             snprintf(out->fault, sizeof out->fault, "%.90s", y.scratch.fault);
         out->residual = y.scratch.residual;
         weigh_edges(&y, out, dof);
+        status = status == UZ_OK ? weigh_masters(&y, out, dof, err) : status;
         y.scratch.residual = NULL;
         out->lacking += sqrt(y.x.turning);
         out->middle += work - work_apart(&y, out->apart, &out->rounding) + expansion_work(&y, &out->rounding);

@@ -92,7 +92,11 @@ static int64_t face(uz_bound_segment *segment, int64_t *covered, const surface *
             const double low = fmax(mine->low, other->edges[j].low), high = fmin(mine->high, other->edges[j].high);
             if (!(high - low > ROUNDING * (mine->high - mine->low)))
                 continue;
-            segment[n++] = (uz_bound_segment){mine->edge, other->edges[j].edge, {low, high}, {low, high}, gap};
+            segment[n++] = (uz_bound_segment){.slave = mine->edge,
+                                              .master = other->edges[j].edge,
+                                              .part = {low, high},
+                                              .on = {low, high},
+                                              .gap = gap};
             sum += high - low;
         }
         *covered += sum >= (1 - ROUNDING) * (mine->high - mine->low);
@@ -129,13 +133,14 @@ static void take_edge(uz_bound_body *body, int64_t i, uz_bound_facing facing, co
 
 /* The segments, by slaves; both sides' edges learn what they are. */
 static void take_segments(uz_bound_body *body, int64_t n, const surface *slave, const double way[2],
-                          const uz_contact *contact)
+                          const uz_contact *contact, int64_t number)
 {
     uz_bound_segment *segment = body->segment + body->n_segments;
     for (int64_t i = 0, next = 0; i < n; i = next) {
         double sum = 0;
         for (next = i; next < n && segment[next].slave == segment[i].slave; next++) {
             take_parts(&segment[next], body, way);
+            segment[next].contact = number;
             sum += fabs(segment[next].part[1] - segment[next].part[0]);
         }
         const bool all = sum >= 1 - ROUNDING;
@@ -146,8 +151,9 @@ static void take_segments(uz_bound_body *body, int64_t n, const surface *slave, 
     body->n_segments += n;
 }
 
-uz_status uz_bound_take_pair(uz_bound_body *body, const uz_contact *contact, uz_error *err)
+uz_status uz_bound_take_pair(uz_bound_body *body, const uz_scene *scene, int64_t number, uz_error *err)
 {
+    const uz_contact *contact = &scene->contacts[number];
     const uz_mesh *mesh = &body->model->mesh;
     surface s[2] = {{.group = uz_mesh_group(mesh, contact->on, "", NULL)},
                     {.group = uz_mesh_group(mesh, contact->with, "", NULL)}};
@@ -186,7 +192,7 @@ uz_status uz_bound_take_pair(uz_bound_body *body, const uz_contact *contact, uz_
     const double share[2] = {(double)covered[0] / (double)s[0].group->n_faces,
                              (double)covered[1] / (double)s[1].group->n_faces};
     const int slave = share[1] > share[0] || (!(share[1] < share[0]) && s[1].group->n_faces > s[0].group->n_faces);
-    take_segments(body, face(segment, &covered[slave], &s[slave], &s[1 - slave], own), &s[slave], way, contact);
+    take_segments(body, face(segment, &covered[slave], &s[slave], &s[1 - slave], own), &s[slave], way, contact, number);
     free(s[0].edges);
     return UZ_OK;
 }

@@ -283,12 +283,21 @@ static uz_status make_dual_rows(proving *v, uz_error *err)
     uz_status status = uz_bound_dual_load(&qp, &dof, body, &v->g->stop, err);
     if (status == UZ_OK)
         memcpy(v->dual.p, qp.p, (size_t)v->dual.d * sizeof *qp.p);
-    for (int64_t i = 0, row = 0; i < body->n_edges && status == UZ_OK; i++)
+    int64_t row = 0;
+    for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++)
         for (int a = 0; a < moments; a++)
             if (uz_bound_has_row(body, dof, i, a)) {
                 v->dual.target[row] = body->edge[i].round ? v->wanted[body->edge[i].contact] : qp.h[row];
                 v->dual.width[row++] = fmax(0, v->g->checked.pressure[i * moments + a]);
             }
+    for (int64_t k = 0; k < body->n_segments && status == UZ_OK; k++) {
+        const uz_bound_segment *segment = &body->segment[k];
+        const bool first = k == 0 || body->segment[k - 1].slave != segment->slave;
+        for (int a = 0; a < moments && first && body->edge[segment->slave].facing == UZ_BOUND_SLAVE; a++) {
+            v->dual.target[row] = v->wanted[segment->contact];
+            v->dual.width[row++] = fmax(0, v->g->checked.pressure[segment->slave * moments + a]);
+        }
+    }
     uz_qp_clear(&qp);
     free(dof);
     return status;
@@ -568,9 +577,7 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
 {
     uz_evaluation *e = result->evaluation;
     proving v = {.result = result, .g = g};
-    const char *all = g->body.n_loose > 0      ? "only obstacles hold the body"
-                      : g->body.n_segments > 0 ? "parts of the body press on each other"
-                                               : NULL;
+    const char *all = g->body.n_loose > 0 ? "only obstacles hold the body" : NULL;
     bool any = false;
     uz_status status = UZ_OK;
     for (int64_t i = 0; i < e->n_quantities; i++)

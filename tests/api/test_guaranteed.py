@@ -197,6 +197,22 @@ def test_bodies_on_each_other(s):
     check(summary["outcome"] == "converged" and summary["error"]["kind"] == "guaranteed" and summary["problem"]["d"] < 4000, summary["error"])
 
 
+def test_quantities_of_bodies_on_each_other(s):
+    """The intervals of all meshes have something in common; a force is known far better than the displacement as a whole."""
+    asked = [{"quantity": "contact.force", "name": "force"}, {"quantity": "strain_energy"}, {"quantity": "displacement", "on": "sides", "direction": [1, 0]},
+             {"quantity": "reaction", "on": "lid", "direction": [0, 1], "name": "reaction"}]
+    low, high = {}, {}
+    for element, cells, within in (("quad4", ((12, 4), (6, 4)), 0.012), ("tri6", ((24, 8), (12, 8)), 0.0012), ("quad8", ((24, 8), (16, 8)), 0.004),
+                                   ("tri3", ((28, 8), (8, 8)), 0.034), ("quad8", ((48, 16), (24, 16)), 0.0004)):
+        found = {one["name"]: one for one in summary_of(s, {**blocks(element, cells), "quantities": asked})["quantities"]}
+        check(len(found) == 4 and all(one["kind"] == "guaranteed" for one in found.values()), found)
+        check(found["force"]["high"] - found["force"]["low"] < 2 * within * found["force"]["value"], element, cells, found["force"])
+        for name, one in found.items():
+            low[name], high[name] = max(low.get(name, -1e9), one["low"]), min(high.get(name, 1e9), one["high"])
+    check(all(low[name] <= high[name] for name in low), low, high)
+    check(low["force"] < 102.45 < high["force"] and abs(low["force"] + high["reaction"]) < 0.01 and abs(high["force"] + low["reaction"]) < 0.01, low, high)
+
+
 def test_uniform_pressure_between_bodies(s):
     """Blocks of one width on each other, free to spread: no mesh has an error."""
     for element, cells in (("quad4", ((6, 4), (6, 3))), ("quad4", ((7, 4), (4, 3))), ("tri6", ((5, 2), (3, 2)))):
