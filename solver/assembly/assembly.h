@@ -151,6 +151,8 @@ void uz_restrict_nodal(double *u, const uz_body_model *model, const double *noda
 
 /* The component of a vector at a node (dim) along its dof c; "x", "y", "z" or "its normal". */
 double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v);
+/* Does the node stand on the axis of revolution? */
+bool uz_is_on_axis(const uz_body_model *model, int64_t node);
 const char *uz_dof_name(const uz_body_model *model, int64_t node, int c);
 
 /* The place of a row that stands inside a side; NULL: it is at a node. Such a row is told by the node nearest to it in

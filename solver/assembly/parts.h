@@ -22,8 +22,6 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
 void uz_support_values(double u[3], const uz_support *support, int dim);
 /* Is it along a normal that is no axis? n becomes the unit normal. */
 bool uz_support_is_inclined(double n[3], const uz_support *support, int dim);
-/* Does the node stand on the axis of revolution? */
-bool uz_is_on_axis(const uz_body_model *model, int64_t node);
 /* n_fixed values; two supports that contradict each other: UZ_ERR_SCENE. */
 uz_status uz_prescribed_values(double *value, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 

@@ -1,4 +1,5 @@
-/* bound.h: a guaranteed bound on the whole error of a plane body's answer, from a stress in equilibrium.
+/* bound.h: a guaranteed bound on the whole error of an answer for a plane body or one of revolution, from a stress in
+ * equilibrium.
  *
  * For a displacement u_h that supports and obstacle admit, and a stress sigma_h in equilibrium with the loads whose
  * pressure r_h on the obstacle is not negative, with the gap s_h that u_h leaves (Prager and Synge, "Approximations in
@@ -40,6 +41,7 @@ typedef struct {
     uz_bound_facing facing; /* the normal is the slave's then, of both */
     double spring[2];       /* stiffness of the ground along x and y, force per length and area; 0: none */
     double traction[2];     /* of the loads, force per area, along x and y */
+    double weight[2]; /* at the ends, linear between them: of rings their radius, which is 0 on the axis; else 1 */
 } uz_bound_edge;
 
 /* A part of a slave's edge, and the part of a master's that is before it. */
@@ -52,7 +54,9 @@ typedef struct {
 /* A body as the continuum has it: what is between nodes, too. */
 typedef struct {
     const uz_body_model *model; /* borrowed */
-    int degree;                 /* of the stresses: 1, with quadratic elements 2 */
+    int degree;   /* of the stresses: 1, with quadratic elements, and rings with axial forces in them, 2 */
+    bool rings;   /* stresses, tractions and pressures are times the radius, as integrals need them */
+    double depth; /* integrals are over the plane, with this and the weight: thickness, or 2 pi */
     int64_t n_edges;
     uz_bound_edge *edge;
     int64_t *edge_of; /* n_elements x 4: by the element's sides */
@@ -92,12 +96,22 @@ double uz_bound_moved(const uz_bound_body *body, int motion, int64_t edge, int a
 /* Part of uz_bound_body_make: n_loose and motion. */
 uz_status uz_bound_loose_motions(uz_bound_body *body, uz_error *err);
 
-/* Of the products of the Bernstein polynomials that are an edge's weights the integrals over 0 to 1, and the inverse.
- */
-extern const double uz_bound_product[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS]; /* by degree - 1 */
+/* Of the integrals over 0 to 1 of the products of the Bernstein polynomials that are an edge's weights the inverse, by
+ * degree - 1. */
 extern const double uz_bound_product_inverse[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS];
-/* The Bernstein polynomials that are weights, at a part of the way. */
+/* The a-th Bernstein coefficient of the weight along an edge, of degree `body->degree`: what multiplies a constant
+ * traction or stiffness. Where it is 0, at the axis, the traction is 0 for whatever stress: such moments of the
+ * displacement are no unknowns. */
+double uz_bound_weight(const uz_bound_body *body, int64_t edge, int a);
+/* Length times depth: what means of the a-th moments are over. With the mean radius it is the area of a ring's side. */
+double uz_bound_measure(const uz_bound_body *body, int64_t edge);
+/* Coordinates of a node: on the axis of rings the radius is 0, whatever rounding made of it. */
+void uz_bound_place(double at[2], const uz_bound_body *body, int64_t node);
+/* The Bernstein polynomials of degree `moments` - 1 at a part of the way, 0 to 1. */
 void uz_bound_bernstein(double phi[UZ_BOUND_MOMENTS], int moments, double part);
+/* S: of a displacement whose moments along an edge are v, int |u|^2 times the weight is at least v'Sv, moments at the
+ * axis apart. */
+void uz_bound_springs(double S[UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS], const uz_bound_body *body, int64_t edge);
 /* The obstacle before an edge, at a part of the way along it, 0 to 1: its gap, and the unit normal into it. */
 double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part);
 /* Directions of the unknowns of an edge's a-th moments: its axes, but before a round obstacle, where the first is the
@@ -106,8 +120,8 @@ void uz_bound_axes(double axis[2][2], const uz_bound_body *body, int64_t edge, i
 
 /* The dual problem as min 1/2 v'Kv - p'v, h - Nv >= 0. An unknown is a mean of the displacement over an edge with one
  * of degree + 1 Bernstein polynomials as weight, along one of its axes (uz_bound_axes); -N'r are the resultants of the
- * pressure. dof   out: n_edges x (degree + 1) x 2: number of each unknown, -1: held. The caller frees it Errors:
- * UZ_ERR_SCENE (an element too distorted), _CANCELLED, _MEMORY. */
+ * pressure. dof   out: n_edges x (degree + 1) x 2: number of each unknown, -1: held, or at the axis. The caller frees
+ * it Errors: UZ_ERR_SCENE (an element too distorted), _CANCELLED, _MEMORY. */
 uz_status uz_bound_dual_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *body, const uz_stop *stop,
                                 uz_error *err);
 /* The same without K, which stays empty: for another load on the same body. */
@@ -116,9 +130,10 @@ uz_status uz_bound_dual_load(uz_qp *qp, int64_t **dof, const uz_bound_body *body
 /* Has the edge's a-th moment a row there? They come by edges and moments. */
 bool uz_bound_has_row(const uz_bound_body *body, const int64_t *dof, int64_t edge, int a);
 
-/* The stress that belongs to the unknowns v: xx, yy, xy at the corners, of degree 2 also in the middles of the edges
- * 01, 12, 20, of each part of an element: n_elements x UZ_BOUND_PARTS x UZ_BOUND_POINTS x 3. Part k has the corners
- * k, k + 1 of the element and its centre (uz_bound_centre). */
+/* The stress that belongs to the unknowns v, of rings times the radius: xx, yy, xy at the corners, of degree 2 also in
+ * the middles of the edges 01, 12, 20, of each part of an element: n_elements x UZ_BOUND_PARTS x UZ_BOUND_POINTS x 3.
+ * Part k has the corners k, k + 1 of the element and its centre (uz_bound_centre). The hoop stress is what radial
+ * equilibrium makes it. On the axis all are 0, exactly: elsewhere of the stress itself energies would not be finite. */
 uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64_t *dof, const double *v,
                           const uz_stop *stop, uz_error *err);
 /* Keeps what uz_bound_stress finds of each element by itself, which is most of its time, where that is not too large:

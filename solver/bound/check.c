@@ -40,6 +40,7 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
 static void examine_springs(examination *x, const double *u, int64_t i, int k);
 static void settle_motions(examination *x, const double *u, const int64_t *dof);
 static void look_at_lift(examination *x, const double *u, int64_t i);
+static const uz_check_of *check_of(const examination *x);
 
 uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
                          const int64_t *dof, int64_t n_dofs, const double *u, const double *lift, const double *stress,
@@ -66,8 +67,8 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     double load = status == UZ_OK ? uz_work_of_loads(&x, scene, u, &status, err) : 0;
     if (status == UZ_OK) {
         out->primal = x.strain - load;
-        out->dual = -x.complementary;
-        out->gap = x.margin + UZ_SUM_ROUNDING * x.scale;
+        out->dual = -x.complementary - x.own_margin;
+        out->gap = x.margin + x.own_margin + UZ_SUM_ROUNDING * x.scale;
         const double rounding = out->gap;
         for (int64_t i = 0; i < body->n_edges; i++)
             examine_edge(&x, u, dof, i);
@@ -280,14 +281,13 @@ double uz_spring_energy(const examination *x, const double *u)
     for (int64_t i = 0; i < x->body->n_edges; i++)
         for (int c = 0; c < 2; c++) {
             const uz_bound_edge *edge = &x->body->edge[i];
-            const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
             if (!(edge->spring[c] > 0))
                 continue;
             uz_along_edge(b, u, edge->node, (const double[2]){c == 0, c == 1});
             for (int g = 0; g < 3; g++) {
                 const double q = (1 + at[g]) / 2, v = b[0] * (1 - q) * (1 - q) + 2 * b[1] * q * (1 - q) + b[2] * q * q;
-                sum += weight[g] / 4 * hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness *
-                       edge->spring[c] * v * v;
+                sum += weight[g] / 4 * uz_bound_measure(x->body, i) *
+                       (edge->weight[0] + q * (edge->weight[1] - edge->weight[0])) * edge->spring[c] * v * v;
             }
         }
     return sum;
@@ -297,20 +297,22 @@ double uz_spring_energy(const examination *x, const double *u)
 static void examine_springs(examination *x, const double *u, int64_t i, int k)
 {
     const uz_bound_edge *edge = &x->body->edge[i];
-    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
-    const double area = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness;
-    double b[3], m[UZ_BOUND_MOMENTS], own = 0, work = 0;
+    const double area = uz_bound_measure(x->body, i);
+    double b[3], m[UZ_BOUND_MOMENTS], own = 0, work = 0, q, share;
     if (!(edge->spring[k] > 0))
         return;
     uz_along_edge(b, u, edge->node, (const double[2]){k == 0, k == 1});
     uz_edge_means(m, b, x->moments);
-    for (int a = 0; a < x->moments; a++) {
-        const double acts = x->resultant[(i * x->moments + a) * 2 + k];
-        for (int c = 0; c < x->moments; c++)
-            own += acts * x->resultant[(i * x->moments + c) * 2 + k] * x->moments * x->moments / area *
-                   uz_bound_product[x->moments - 2][a][c] / (2 * edge->spring[k]);
-        work += acts * m[a];
+    for (uz_line_walk walk = uz_line_begin(edge->weight[0], edge->weight[1]); uz_line_next(&walk, &q, &share);) {
+        double phi[UZ_BOUND_MOMENTS], traction = 0;
+        uz_bound_bernstein(phi, x->moments, q);
+        for (int a = 0; a < x->moments; a++)
+            traction += x->resultant[(i * x->moments + a) * 2 + k] * x->moments / area * phi[a];
+        own += share * area * traction * traction /
+               (2 * edge->spring[k] * (edge->weight[0] + q * (edge->weight[1] - edge->weight[0])));
     }
+    for (int a = 0; a < x->moments; a++)
+        work += x->resultant[(i * x->moments + a) * 2 + k] * m[a];
     x->out->dual -= own;
     x->springs += own + work; /* with 1/2 int k |u_h|^2 for the square */
     x->scale += own + fabs(work);
@@ -323,10 +325,9 @@ double uz_admit_pressure(const examination *x, int64_t moment, double pressure)
 
 void uz_less_load(double *resultant, const examination *x, const uz_bound_edge *edge, int64_t i)
 {
-    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
-    const double each = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness / x->moments;
+    const double each = uz_bound_measure(x->body, i) / x->moments;
     for (int a = 0; a < 2 * x->moments; a++)
-        resultant[2 * i * x->moments + a] -= each * edge->traction[a % 2];
+        resultant[2 * i * x->moments + a] -= each * uz_bound_weight(x->body, i, a / 2) * edge->traction[a % 2];
 }
 
 /* A pressure that may not be is none: it is what is missing. */
@@ -459,17 +460,17 @@ static void settle_motions(examination *x, const double *u, const int64_t *dof)
 /* ---- in an element */
 
 /* With its own coordinates: those of equal boxes are one box's. */
-static void take_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], const examination *x, int64_t e)
+void uz_take_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], const examination *x, int64_t e)
 {
     int count;
     const int64_t *node = uz_mesh_element(x->mesh, e, &count);
     uz_body_element(element, xyz, x->body->model, e);
-    for (int i = 0; i < 2 * count; i++)
-        xyz[i] = x->mesh->xyz[2 * node[i / 2] + i % 2];
+    for (int i = 0; i < count; i++)
+        uz_bound_place(xyz + 2 * i, x->body, node[i]);
 }
 
 /* u less the rigid motion of the element's first node and of its middle, which no stress in equilibrium works on. */
-static void without_motion(double v[2 * UZ_ELEMENT_NODES], const uz_element *element, int nodes)
+static void less_motion(double v[2 * UZ_ELEMENT_NODES], const uz_element *element, int nodes)
 {
     const double *xyz = element->xyz;
     double first[2] = {v[0], v[1]}, turn = 0, size = 0;
@@ -486,26 +487,42 @@ static void without_motion(double v[2 * UZ_ELEMENT_NODES], const uz_element *ele
     }
 }
 
-double uz_expansion_work(const double *s, int points, const double expansion[3], double volume)
+static double expand_part(const examination *x, double corner[3][2], const double *s, double free_strain, int64_t e)
 {
-    double sum = 0;
+    const uz_lame lame = uz_element_material(x->body->model, e)->lame;
+    const int points = x->moments == 2 ? 3 : 6;
+    double sum = 0, expansion[3];
+    uz_thermal_strain(expansion, x->body->model->kind, lame, free_strain);
     for (int i = points == 3 ? 0 : 3; i < points; i++)
-        sum += volume / 3 * (s[3 * i] * expansion[0] + s[3 * i + 1] * expansion[1]);
+        sum += uz_twice_area(corner) / 6 * x->body->depth * (s[3 * i] * expansion[0] + s[3 * i + 1] * expansion[1]);
     return sum;
 }
 
-/* int sigma : C^-1 : sigma / 2 + sigma : expansion over a part, and what its equilibrium lacks: div sigma + force. */
-static double examine_part(examination *x, const double corner[3][2], const double *s, const double expansion[3],
-                           double largest, int64_t e)
+double uz_twice_area(double corner[3][2])
+{
+    return (corner[1][0] - corner[0][0]) * (corner[2][1] - corner[0][1]) -
+           (corner[1][1] - corner[0][1]) * (corner[2][0] - corner[0][0]);
+}
+
+void uz_triangle_slopes(double slope[3][2], double corner[3][2])
+{
+    for (int i = 0; i < 3; i++) {
+        const double *p = corner[(i + 1) % 3], *q = corner[(i + 2) % 3];
+        slope[i][0] = (p[1] - q[1]) / uz_twice_area(corner);
+        slope[i][1] = (q[0] - p[0]) / uz_twice_area(corner);
+    }
+}
+
+static double examine_part(double lacks[3][2], double *margin, const examination *x, double corner[3][2],
+                           const double *s, int64_t e)
 {
     static const double SIXTH[6][6] = {{6, -1, -1, 0, -4, 0},  {-1, 6, -1, 0, 0, -4},  {-1, -1, 6, -4, 0, 0},
                                        {0, 0, -4, 32, 16, 16}, {-4, 0, 0, 16, 32, 16}, {0, -4, 0, 16, 16, 32}};
     const uz_lame lame = uz_element_material(x->body->model, e)->lame;
     const int points = x->moments == 2 ? 3 : 6;
-    const double area2 = (corner[1][0] - corner[0][0]) * (corner[2][1] - corner[0][1]) -
-                         (corner[1][1] - corner[0][1]) * (corner[2][0] - corner[0][0]);
-    const double volume = area2 / 2 * x->body->model->thickness;
+    const double volume = uz_twice_area(corner) / 2 * x->body->depth;
     double sum = 0, slope[3][2];
+    (void)margin; /* it is exact */
     for (int i = 0; i < points; i++)
         for (int j = 0; j < points; j++) {
             const double *a = s + 3 * i, *b = s + 3 * j; /* a : C^-1 : b */
@@ -513,14 +530,10 @@ static double examine_part(examination *x, const double corner[3][2], const doub
                                    (a[0] + a[1]) * (b[0] + b[1]) / (4 * (lame.lambda + lame.mu));
             sum += volume / 2 * (points == 3 ? (i == j ? 2. : 1.) / 12 : SIXTH[i][j] / 180) * product;
         }
-    sum += uz_expansion_work(s, points, expansion, volume);
-    for (int i = 0; i < 3; i++) { /* gradients of the coordinates of the triangle */
-        const double *p = corner[(i + 1) % 3], *q = corner[(i + 2) % 3];
-        slope[i][0] = (p[1] - q[1]) / area2;
-        slope[i][1] = (q[0] - p[0]) / area2;
-    }
-    for (int at = 0; at < 3; at++) { /* at each corner: the divergence is linear at most */
-        double lacks[2] = {x->body->force[2 * e], x->body->force[2 * e + 1]};
+    uz_triangle_slopes(slope, corner);
+    for (int at = 0; at < 3; at++) {
+        lacks[at][0] = x->body->force[2 * e];
+        lacks[at][1] = x->body->force[2 * e + 1];
         for (int i = 0; i < points; i++) {
             double grad[2] = {0};
             for (int c = 0; c < 2; c++)
@@ -529,23 +542,21 @@ static double examine_part(examination *x, const double corner[3][2], const doub
                     : i < 3
                         ? (i == at ? 3 : -1) * slope[i][c]
                         : 4 * ((at == i - 3 ? slope[(i + 1) % 3][c] : 0) + (at == (i + 1) % 3 ? slope[i - 3][c] : 0));
-            lacks[0] += grad[0] * s[3 * i] + grad[1] * s[3 * i + 2];
-            lacks[1] += grad[0] * s[3 * i + 2] + grad[1] * s[3 * i + 1];
+            lacks[at][0] += grad[0] * s[3 * i] + grad[1] * s[3 * i + 2];
+            lacks[at][1] += grad[0] * s[3 * i + 2] + grad[1] * s[3 * i + 1];
         }
-        const double size = sqrt(area2) * hypot(lacks[0], lacks[1]);
-        x->inside = size > 0 ? fmax(x->inside, size / fmax(largest, DBL_MIN)) : x->inside;
     }
     return sum;
 }
 
 /* Bernstein coefficients of the traction along a straight side of a part, times the side's length over the number of
  * moments: from its corner `from` to the next. */
-static void tractions(double t[UZ_BOUND_MOMENTS][2], const examination *x, const double corner[3][2], const double *s,
+static void tractions(double t[UZ_BOUND_MOMENTS][2], const examination *x, double corner[3][2], const double *s,
                       int from)
 {
     const int to = (from + 1) % 3;
     const double way[2] = {corner[to][0] - corner[from][0], corner[to][1] - corner[from][1]};
-    const double times = x->body->model->thickness / x->moments;
+    const double times = x->body->depth / x->moments;
     for (int c = 0; c < 2; c++) {
         double at[3];
         for (int a = 0; a < 3; a++) {
@@ -559,38 +570,71 @@ static void tractions(double t[UZ_BOUND_MOMENTS][2], const examination *x, const
     }
 }
 
+/* The force's work on a displacement of the nodes: polynomials that all rules integrate. */
+static double force_work(const examination *x, const uz_element *element, const double *v, int64_t e)
+{
+    const uz_gauss_rule *rule = uz_element_rule(element->kind, element->model);
+    const int nodes = uz_element_type_of(element->kind)->nodes;
+    double work = 0;
+    for (int g = 0; g < rule->count; g++) {
+        double grad[UZ_ELEMENT_NODES][3], N[UZ_ELEMENT_NODES], radius = x->body->rings ? 0 : 1;
+        const double *point = rule->point[g].at;
+        uz_element_shape(N, element->kind, point);
+        for (int i = 0; i < nodes; i++)
+            radius += x->body->rings ? N[i] * element->xyz[2 * i] : 0;
+        const double volume =
+            rule->point[g].weight * uz_element_gradients(grad, element, point) * x->body->depth * radius;
+        for (int i = 0; i < 2 * nodes; i++)
+            work += volume * N[i / 2] * v[i] * x->body->force[2 * e + i % 2];
+    }
+    return work;
+}
+
 void uz_examine_element(examination *x, const double *u, const double *stress, int64_t e)
 {
-    const uz_body_model *model = x->body->model;
     uz_element element;
     int count;
     const int64_t *node = uz_mesh_element(x->mesh, e, &count);
-    double xyz[3 * UZ_ELEMENT_NODES], v[2 * UZ_ELEMENT_NODES] = {0}, centre[2], expansion[3] = {0};
-    double work = 0, complementary = 0, margin = 0, inner[UZ_BOUND_PARTS][2][UZ_BOUND_MOMENTS][2];
-    take_element(&element, xyz, x, e);
+    const uz_check_of *of = check_of(x);
+    double xyz[3 * UZ_ELEMENT_NODES], v[2 * UZ_ELEMENT_NODES] = {0}, centre[2], size = 0, widest = 1;
+    double work = 0, complementary = 0, margin = 0, own_margin = 0, inner[UZ_BOUND_PARTS][2][UZ_BOUND_MOMENTS][2];
+    double corner[UZ_BOUND_PARTS][3][2];
+    uz_take_element(&element, xyz, x, e);
     const int parts = uz_element_type_of(element.kind)->corners;
     for (int i = 0; i < 2 * count; i++)
         v[i] = u[2 * node[i / 2] + i % 2];
-    without_motion(v, &element, count);
-    const double size = sqrt(uz_element_volume(&element) / model->thickness);
-    double largest = size * hypot(x->body->force[2 * e], x->body->force[2 * e + 1]);
+    of->less_motion(v, &element, count);
+    uz_bound_centre(centre, x->body, e);
+    for (int k = 0; k < parts; k++) {
+        memcpy(corner[k][0], xyz + 2 * k, sizeof corner[k][0]);
+        memcpy(corner[k][1], xyz + 2 * ((k + 1) % parts), sizeof corner[k][1]);
+        memcpy(corner[k][2], centre, sizeof corner[k][2]);
+        size += uz_twice_area(corner[k]) / 2;
+        widest = x->body->rings ? fmax(k == 0 ? 0 : widest, xyz[2 * k]) : 1;
+    }
+    size = sqrt(size);
+    double largest = size * widest * hypot(x->body->force[2 * e], x->body->force[2 * e + 1]);
     for (int i = 0; i < STRESSES; i++)
         largest = fmax(largest, fabs(stress[i]));
-    uz_bound_centre(centre, x->body, e);
-    if (x->body->free_strain)
-        uz_thermal_strain(expansion, model->kind, element.lame, x->body->free_strain[e]);
+    if (x->body->rings && !*x->out->fault && !uz_is_finite_at_axis(x, u, stress, e))
+        snprintf(x->out->fault, sizeof x->out->fault, "on the axis there is a stress without a finite energy");
     for (int k = 0; k < parts; k++) {
         const int next = (k + 1) % parts;
-        const double corner[3][2] = {
-            {xyz[2 * k], xyz[2 * k + 1]}, {xyz[2 * next], xyz[2 * next + 1]}, {centre[0], centre[1]}};
+        double lacks[3][2];
         const double *s = stress + k * UZ_BOUND_POINTS * 3;
         const int64_t local[3] = {k, next, count > parts ? parts + k : -1}, at = x->body->edge_of[4 * e + k];
         const bool reversed = x->body->edge[at].node[0] != node[k];
         double t[UZ_BOUND_MOMENTS][2], b[3], m[UZ_BOUND_MOMENTS];
-        complementary += examine_part(x, corner, s, expansion, largest, e);
-        tractions(t, x, corner, s, 0);
-        tractions(inner[next][0], x, corner, s, 1);
-        tractions(inner[k][1], x, corner, s, 2);
+        complementary += of->part(lacks, &own_margin, x, corner[k], s, e);
+        if (x->body->free_strain)
+            complementary += of->expansion(x, corner[k], s, x->body->free_strain[e], e);
+        for (int a = 0; a < 3; a++) {
+            const double off = size * hypot(lacks[a][0], lacks[a][1]);
+            x->inside = off > 0 ? fmax(x->inside, off / fmax(largest, DBL_MIN)) : x->inside;
+        }
+        tractions(t, x, corner[k], s, 0);
+        tractions(inner[next][0], x, corner[k], s, 1);
+        tractions(inner[k][1], x, corner[k], s, 2);
         for (int c = 0; c < 2; c++) {
             uz_along_edge(b, v, local, (const double[2]){c == 0, c == 1});
             uz_edge_means(m, b, x->moments);
@@ -605,69 +649,33 @@ void uz_examine_element(examination *x, const double *u, const double *stress, i
             for (int c = 0; c < 2; c++) {
                 const double jump = fabs(inner[k][0][a][c] + inner[k][1][x->moments - 1 - a][c]);
                 x->inside =
-                    jump > 0 ? fmax(x->inside, jump / fmax(largest * size * model->thickness, DBL_MIN)) : x->inside;
+                    jump > 0 ? fmax(x->inside, jump / fmax(largest * size * x->body->depth, DBL_MIN)) : x->inside;
             }
-    const uz_gauss_rule rule = uz_element_type_of(element.kind)->rule;
-    for (int g = 0; g < rule.count; g++) { /* the force's work: polynomials that all rules integrate */
-        double grad[UZ_ELEMENT_NODES][3], N[UZ_ELEMENT_NODES];
-        const double *point = rule.point[g].at;
-        const double volume = rule.point[g].weight * uz_element_gradients(grad, &element, point) * model->thickness;
-        uz_element_shape(N, element.kind, point);
-        for (int i = 0; i < 2 * count; i++)
-            work += volume * N[i / 2] * v[i] * x->body->force[2 * e + i % 2];
-    }
+    work += force_work(x, &element, v, e);
     const double strain = uz_energy_of(&margin, x, u, true, e);
-    x->gap[e] =
-        margin + fmax(0, strain + complementary - work) + UZ_SUM_ROUNDING * (strain + fabs(complementary) + fabs(work));
+    x->gap[e] = margin + own_margin + fmax(0, strain + complementary - work) +
+                UZ_SUM_ROUNDING * (strain + fabs(complementary) + fabs(work));
     x->sum += strain + complementary - work;
     x->margin += margin;
+    x->own_margin += own_margin;
     x->scale += strain + fabs(complementary) + fabs(work);
     x->strain += strain;
     x->complementary += complementary;
 }
 
-/* Gauss's rule of n points on [-1, 1], by Newton's method on Legendre's polynomial. */
-void uz_gauss(double *at, double *weight, int n)
-{
-    for (int i = 0; i < n; i++) {
-        double z = cos(3.14159265358979323846 * (i + 0.75) / (n + 0.5)), slope = 1;
-        for (int step = 0; step < 20; step++) {
-            double p = 1, before = 0;
-            for (int k = 1; k <= n; k++) {
-                const double next = ((2 * k - 1) * z * p - (k - 1) * before) / k;
-                before = p;
-                p = next;
-            }
-            slope = n * (z * p - before) / (z * z - 1);
-            const double change = p / slope;
-            z -= change;
-            if (fabs(change) < DBL_EPSILON)
-                break;
-        }
-        at[i] = z;
-        weight[i] = 2 / ((1 - z * z) * slope * slope);
-    }
-}
-
 /* Strain energy of the displacement between its nodes, whatever the formulation of the answer. On quadrilaterals that
  * are no parallelograms the integrand has det J below the line: analytic in each coordinate but for a pole at z > 1, so
  * that n points are off by some q^2n, q = 1 / (z + sqrt(z^2 - 1)), a bound on which is the margin. */
-double uz_energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e)
+static double energy_of(double *margin, const examination *x, const double *u, double free_strain, int64_t e)
 {
     enum { MOST_POINTS = 24 };
     const uz_body_model *model = x->body->model;
     uz_element element;
     int count;
     const int64_t *node = uz_mesh_element(x->mesh, e, &count);
-    double xyz[3 * UZ_ELEMENT_NODES], expansion[3] = {0}, at[MOST_POINTS], weight[MOST_POINTS], sum = 0, off = 0;
-    bool zero = !with_expansion;
-    for (int i = 0; i < 2 * count && zero; i++)
-        zero = !(fabs(u[2 * node[i / 2] + i % 2]) > 0);
-    if (zero)
-        return 0;
-    take_element(&element, xyz, x, e);
-    if (x->body->free_strain && with_expansion)
-        uz_thermal_strain(expansion, model->kind, element.lame, x->body->free_strain[e]);
+    double xyz[3 * UZ_ELEMENT_NODES], expansion[3], at[MOST_POINTS], weight[MOST_POINTS], sum = 0, off = 0;
+    uz_take_element(&element, xyz, x, e);
+    uz_thermal_strain(expansion, model->kind, element.lame, free_strain);
     const uz_gauss_rule own = uz_element_type_of(UZ_TRI6)->rule;
     const bool triangle = uz_element_type_of(element.kind)->corners == 3;
     int n = count > 4 ? 3 : 2;
@@ -695,7 +703,7 @@ double uz_energy_of(double *margin, const examination *x, const double *u, bool 
             point[1] = at[g / n];
             w = weight[g % n] * weight[g / n];
         }
-        w *= uz_element_gradients(grad, &element, point) * model->thickness;
+        w *= uz_element_gradients(grad, &element, point) * x->body->depth;
         for (int a = 0; a < count; a++) {
             const double ux = u[2 * node[a]] - u[2 * node[0]], uy = u[2 * node[a] + 1] - u[2 * node[0] + 1];
             strain[0] += grad[a][0] * ux;
@@ -710,6 +718,29 @@ double uz_energy_of(double *margin, const examination *x, const double *u, bool 
     }
     *margin += off * sum;
     return sum;
+}
+
+static const uz_check_of check_of_planes = {examine_part, expand_part, energy_of, less_motion};
+
+static const uz_check_of *check_of(const examination *x)
+{
+    return x->body->rings ? &uz_check_of_rings : &check_of_planes;
+}
+
+double uz_energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e)
+{
+    int count;
+    const int64_t *node = uz_mesh_element(x->mesh, e, &count);
+    const double free_strain = x->body->free_strain && with_expansion ? x->body->free_strain[e] : 0;
+    bool zero = !(fabs(free_strain) > 0);
+    for (int i = 0; i < 2 * count && zero; i++)
+        zero = !(fabs(u[2 * node[i / 2] + i % 2]) > 0);
+    return zero ? 0 : check_of(x)->energy(margin, x, u, free_strain, e);
+}
+
+double uz_expansion_work(const examination *x, double corner[3][2], const double *s, double free_strain, int64_t e)
+{
+    return check_of(x)->expansion(x, corner, s, free_strain, e);
 }
 
 /* Of the loads but temperature, as the discrete problem has them: the edges have to agree with that. */

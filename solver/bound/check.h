@@ -3,6 +3,7 @@
 #define UZ_BOUND_CHECK_H
 
 #include "bound/bound.h"
+#include "bound/walk.h"
 
 typedef struct {
     uz_bound_check_result *out;
@@ -17,6 +18,7 @@ typedef struct {
     double *gap;         /* n_elements: int 1/2 |sigma_h - C eps(u_h)|^2, from above */
     double sum, scale;   /* of elements: int 1/2 |sigma_h - C eps(u_h)|^2; of the sizes of what it is made of */
     double margin;       /* of the strain energy: what its integration may be off by */
+    double own_margin;   /* of the complementary energy */
     double springs;      /* of the gap: int 1/2 |t + k u_h|^2 / k, t the traction where springs hold */
     double strain, complementary, inside, farthest; /* farthest: the largest displacement along an axis */
     double turning;                                 /* square of the result's */
@@ -30,6 +32,30 @@ typedef struct {
 /* Of the energies and works of elements: rounding of their sums. */
 #define UZ_SUM_ROUNDING 1e-14
 
+/* What depends on whether bodies are plane or of rings. A part is given by its corners and the values at its points; *
+ * margin: what integration may be off by is added. */
+typedef struct {
+    /* int sigma : C^-1 : sigma / 2 over a part. lacks: what its equilibrium lacks at each corner, div sigma + force,
+     * linear between them; of rings r times that, along the axis. */
+    double (*part)(double lacks[3][2], double *margin, const examination *x, double corner[3][2], const double *s,
+                   int64_t e);
+    double (*expansion)(const examination *x, double corner[3][2], const double *s, double free_strain, int64_t e);
+    /* int (eps(u) - expansion) : C : (eps(u) - expansion) / 2 over an element */
+    double (*energy)(double *margin, const examination *x, const double *u, double free_strain, int64_t e);
+    /* u of the element's nodes less a rigid motion, which no stress in equilibrium works on */
+    void (*less_motion)(double v[2 * UZ_ELEMENT_NODES], const uz_element *element, int nodes);
+} uz_check_of;
+
+extern const uz_check_of uz_check_of_rings; /* check_ring.c */
+
+/* Rings: is u zero along the radius, and the stress, wherever an element is on the axis? */
+bool uz_is_finite_at_axis(const examination *x, const double *u, const double *stress, int64_t e);
+/* An element with its own coordinates: those of equal boxes are one box's. */
+void uz_take_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], const examination *x, int64_t e);
+double uz_twice_area(double corner[3][2]);
+/* Gradients of the coordinates that are 1 at a corner. */
+void uz_triangle_slopes(double slope[3][2], double corner[3][2]);
+
 /* An element's part of the sums, and the resultants of its tractions. */
 void uz_examine_element(examination *x, const double *u, const double *stress, int64_t e);
 /* The resultants less the edge's load, its pressure, and what is missing of equilibrium, by the axes of its moments: of
@@ -38,7 +64,7 @@ void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, c
 /* The part of a pressure that may be there. */
 double uz_admit_pressure(const examination *x, int64_t moment, double pressure);
 /* int sigma : expansion over a part, from the values at its points. */
-double uz_expansion_work(const double *s, int points, const double expansion[3], double volume);
+double uz_expansion_work(const examination *x, double corner[3][2], const double *s, double free_strain, int64_t e);
 /* The strain energy of the displacement between its nodes; *margin: what its integration may be off by. */
 double uz_energy_of(double *margin, const examination *x, const double *u, bool with_expansion, int64_t e);
 /* 1/2 int k |u|^2 of the springs along the edges. */
@@ -53,8 +79,6 @@ void uz_edge_means(double m[UZ_BOUND_MOMENTS], const double b[3], int moments);
 void uz_along_edge(double b[3], const double *u, const int64_t node[3], const double n[2]);
 /* What was given to take the answer out of the obstacle, added to Bernstein coefficients along n. */
 void uz_add_given(double b[3], const examination *x, const uz_bound_edge *edge, const double n[2]);
-/* Gauss's rule of n points on [-1, 1]. */
-void uz_gauss(double *at, double *weight, int n);
 
 /* What rounding of places may be, as far as that is nothing to the displacements: a length. */
 double uz_place_rounding(const examination *x);

@@ -33,7 +33,7 @@ static stretch stretch_of(const examination *x, const uz_bound_segment *s)
     double point[POINTS], weight[POINTS];
     uz_gauss(point, weight, POINTS);
     t.length = length_of(x, t.slave);
-    t.area = t.length * x->body->model->thickness;
+    t.area = t.length * x->body->depth;
     for (int g = 0; g < POINTS; g++) {
         const double q = (1 + point[g]) / 2;
         t.at[g] = s->part[0] + q * (s->part[1] - s->part[0]);
@@ -136,7 +136,7 @@ static void compare(const examination *x, double *left, double *covered, const d
                     const uz_bound_segment *s)
 {
     const stretch t = stretch_of(x, s);
-    const double area = length_of(x, t.master) * x->body->model->thickness;
+    const double area = length_of(x, t.master) * x->body->depth;
     for (int g = 0; g < POINTS; g++) {
         const double off = pressure_at(x->pressure + s->slave * x->moments, x->moments, t.area, t.at[g]) -
                            pressure_at(acting + s->master * x->moments, x->moments, area, t.on[g]);
@@ -145,16 +145,17 @@ static void compare(const examination *x, double *left, double *covered, const d
     covered[s->master] += fabs(s->on[1] - s->on[0]);
 }
 
-/* ... of the parts before which there is nothing: all of T less what segments had. */
+/* ... of the parts before which there is nothing: no more than of the whole edge. */
 static double uncovered(const examination *x, const double *acting, int64_t i)
 {
-    const uz_bound_body *body = x->body;
-    const double length = length_of(x, &body->edge[i]), area = length * body->model->thickness;
-    double sum = 0;
-    for (int a = 0; a < x->moments; a++)
-        for (int b = 0; b < x->moments; b++)
-            sum += acting[i * x->moments + a] * acting[i * x->moments + b] * uz_bound_product[x->moments - 2][a][b];
-    return sum * x->moments * x->moments / (area * area) * length;
+    const double length = length_of(x, &x->body->edge[i]), area = length * x->body->depth;
+    double at[POINTS], weight[POINTS], sum = 0;
+    uz_gauss(at, weight, POINTS);
+    for (int g = 0; g < POINTS; g++) {
+        const double t = pressure_at(acting + i * x->moments, x->moments, area, (1 + at[g]) / 2);
+        sum += weight[g] / 2 * length * t * t;
+    }
+    return sum;
 }
 
 uz_status uz_press_masters(examination *x, const double *u, const int64_t *dof, uz_error *err)

@@ -29,12 +29,6 @@
 
 enum { POINTS = 16, PIECES = 32, MOMENTS = UZ_BOUND_MOMENTS };
 
-static void weights(double phi[MOMENTS], int moments, double q)
-{
-    for (int a = 0; a < moments; a++)
-        phi[a] = (a == 1 && moments == 3 ? 2 : 1) * pow(1 - q, moments - 1 - a) * pow(q, a);
-}
-
 static double value(const double b[3], double q)
 {
     return b[0] * (1 - q) * (1 - q) + 2 * b[1] * q * (1 - q) + b[2] * q * q;
@@ -93,7 +87,7 @@ void uz_examine_round(double turned[MOMENTS][2], examination *x, const double *u
     for (int g = 0; g < POINTS; g++) {
         double phi[MOMENTS], n[2], sum[2] = {0};
         const double q = (at[g] + 1) / 2, w = weight[g] / 2, h = uz_bound_gap(n, x->body, i, q);
-        weights(phi, moments, q);
+        uz_bound_bernstein(phi, moments, q);
         for (int a = 0; a < moments; a++)
             for (int c = 0; c < 2; c++)
                 sum[c] += r[a] * phi[a] * own[a][c];
@@ -117,7 +111,7 @@ void uz_examine_round(double turned[MOMENTS][2], examination *x, const double *u
         }
     for (int g = 0; g < POINTS; g++) {
         double phi[MOMENTS];
-        weights(phi, moments, (at[g] + 1) / 2);
+        uz_bound_bernstein(phi, moments, (at[g] + 1) / 2);
         for (int c = 0; c < 2; c++) {
             double delta = off[g][c];
             for (int a = 0; a < moments; a++)
@@ -259,7 +253,7 @@ void uz_look_at_round(examination *x, const double *u, int64_t i)
         double phi[MOMENTS], here[2], pressure = 0;
         const double q = (at[g] + 1) / 2;
         uz_bound_gap(here, x->body, i, q);
-        weights(phi, x->moments, q);
+        uz_bound_bernstein(phi, x->moments, q);
         for (int a = 0; a < x->moments; a++) {
             double own[2];
             uz_bound_gap(own, x->body, i, (double)a / x->body->degree);

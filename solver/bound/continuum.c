@@ -15,9 +15,8 @@
  * it touches: displacements may be small, too. */
 #define ROUNDING 1e-13
 #define TOUCHING (16 * DBL_EPSILON)
+#define PI       3.14159265358979323846
 
-const double uz_bound_product[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS] = {
-    {{1. / 3, 1. / 6}, {1. / 6, 1. / 3}}, {{0.2, 0.1, 1. / 30}, {0.1, 2. / 15, 0.1}, {1. / 30, 0.1, 0.2}}};
 const double uz_bound_product_inverse[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS] = {{{4, -2}, {-2, 4}},
                                                                                 {{9, -9, 3}, {-9, 21, -9}, {3, -9, 9}}};
 
@@ -36,6 +35,7 @@ static void take_supports(survey *x);
 static uz_status take_contacts(survey *x, uz_error *err);
 static void take_springs(survey *x);
 static void take_loads(survey *x);
+static void look_at_rings(uz_bound_body *body);
 
 /* The first reason stays. */
 static void refuse(uz_bound_body *body, const char *why, const char *name)
@@ -48,11 +48,10 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
 {
     const uz_mesh *mesh = &model->mesh;
     survey x = {.body = out, .mesh = mesh, .scene = scene};
-    *out = (uz_bound_body){.model = model, .degree = 1};
+    *out = (uz_bound_body){.model = model, .degree = 1, .rings = model->kind == UZ_AXISYMMETRIC};
+    out->depth = out->rings ? 2 * PI : model->thickness;
     if (model->kind == UZ_SOLID)
         refuse(out, "in three dimensions there are no equilibrium elements here", "");
-    if (model->kind == UZ_AXISYMMETRIC)
-        refuse(out, "for bodies of revolution there are no equilibrium elements here", "");
     for (int64_t e = 0; e < mesh->n_elements && !*out->why; e++)
         if (uz_element_type_of((uz_element_kind)mesh->kind[e])->nodes >
             uz_element_type_of((uz_element_kind)mesh->kind[e])->corners)
@@ -69,6 +68,7 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
         status = take_contacts(&x, err);
         take_springs(&x);
         take_loads(&x);
+        look_at_rings(out);
         if (status == UZ_OK)
             status = uz_free_strains(&out->free_strain, model, scene, err);
         if (status == UZ_OK)
@@ -146,7 +146,13 @@ static uz_status find_edges(survey *x, uz_error *err)
                                 .element = {half[i].element, -1},
                                 .side = {half[i].side, -1},
                                 .axis = {{1, 0}, {0, 1}},
-                                .contact = -1};
+                                .contact = -1,
+                                .weight = {1, 1}};
+        for (int a = 0; a < 2 && body->rings; a++) {
+            double at[2];
+            uz_bound_place(at, body, node[a]);
+            edge->weight[a] = at[0];
+        }
         body->n_edges++;
     }
     free(half);
@@ -311,6 +317,11 @@ static uz_status take_contacts(survey *x, uz_error *err)
     return UZ_OK;
 }
 
+static double area_of(const uz_bound_body *body, int64_t edge)
+{
+    return uz_bound_measure(body, edge) * (body->edge[edge].weight[0] + body->edge[edge].weight[1]) / 2;
+}
+
 /* The stiffness of a group is its total. */
 static void take_springs(survey *x)
 {
@@ -325,10 +336,9 @@ static void take_springs(survey *x)
         for (int pass = 0; pass < 2; pass++)
             for (int64_t i = 0; i < x->n_found && !*x->body->why; i++) {
                 uz_bound_edge *edge = &x->body->edge[x->found[i]];
-                const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
                 if (edge->held[0] || edge->contact >= 0 || edge->facing != UZ_BOUND_ALONE)
                     refuse(x->body, "supports or obstacles hold edges of \"%s\", which springs hold too", support->on);
-                area += pass == 0 ? hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness : 0;
+                area += pass == 0 ? area_of(x->body, x->found[i]) : 0;
                 for (int c = 0; c < 2 && pass == 1; c++)
                     edge->spring[c] += fmax(0, support->spring[c]) / area;
             }
@@ -366,7 +376,7 @@ static void take_loads(survey *x)
                 const double length = hypot(to[0] - from[0], to[1] - from[1]);
                 const double n[2] = {(to[1] - from[1]) / length, (from[0] - to[0]) / length};
                 if (pass == 0)
-                    area += length * body->model->thickness;
+                    area += area_of(body, x->found[i]);
                 for (int c = 0; c < 2 && pass == 1; c++)
                     edge->traction[c] += load->kind == UZ_LOAD_TRACTION   ? load->v[c]
                                          : load->kind == UZ_LOAD_PRESSURE ? -load->value * n[c]
@@ -386,10 +396,52 @@ static void take_loads(survey *x)
     }
 }
 
-void uz_bound_bernstein(double phi[UZ_BOUND_MOMENTS], int moments, double part)
+/* The radius times an axial force is balanced by stresses of degree 2. The axis is no side, but for the radial support
+ * that it is anyway. */
+static void look_at_rings(uz_bound_body *body)
 {
-    for (int a = 0; a < moments; a++)
-        phi[a] = (a == 1 && moments == 3 ? 2 : 1) * pow(1 - part, moments - 1 - a) * pow(part, a);
+    for (int64_t e = 0; e < body->model->mesh.n_elements && body->rings; e++)
+        if (fabs(body->force[2 * e + 1]) > 0)
+            body->degree = 2;
+    for (int64_t i = 0; i < body->n_edges && body->rings; i++) {
+        const uz_bound_edge *edge = &body->edge[i];
+        const bool held = edge->held[1] || (edge->held[0] && (fabs(edge->axis[0][1]) > 0 || fabs(edge->value[0]) > 0));
+        if (edge->facing != UZ_BOUND_ALONE)
+            refuse(body, "parts of a body of revolution press on each other", "");
+        if (edge->round)
+            refuse(body, "a body of revolution is before a round obstacle, where no tractions of rings turn", "");
+        if (!(edge->weight[0] + edge->weight[1] > 0) &&
+            (held || edge->contact >= 0 || edge->spring[0] > 0 || edge->spring[1] > 0))
+            refuse(body, "something holds the axis of revolution, which the continuum does not feel", "");
+    }
+}
+
+double uz_bound_weight(const uz_bound_body *body, int64_t edge, int a)
+{
+    const double *weight = body->edge[edge].weight;
+    return weight[0] + (weight[1] - weight[0]) * a / body->degree;
+}
+
+double uz_bound_measure(const uz_bound_body *body, int64_t edge)
+{
+    const int64_t *node = body->edge[edge].node;
+    const double *from = body->model->mesh.xyz + 2 * node[0], *to = body->model->mesh.xyz + 2 * node[1];
+    return hypot(to[0] - from[0], to[1] - from[1]) * body->depth;
+}
+
+void uz_bound_place(double at[2], const uz_bound_body *body, int64_t node)
+{
+    memcpy(at, body->model->mesh.xyz + 2 * node, 2 * sizeof *at);
+    if (body->rings && uz_is_on_axis(body->model, node))
+        at[0] = 0;
+}
+
+void uz_bound_bernstein(double phi[UZ_BOUND_MOMENTS], int moments, double q)
+{
+    const double p = 1 - q;
+    phi[0] = moments == 2 ? p : p * p;
+    phi[1] = moments == 2 ? q : 2 * p * q;
+    phi[2] = moments == 2 ? 0 : q * q;
 }
 
 double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part)

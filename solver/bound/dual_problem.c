@@ -10,7 +10,8 @@
  *
  * K has the rank of all moments less three. Almeida and Maunder, "Equilibrium Finite Element Formulations", 2017, ch. 5
  * (hybrid elements) and 6 (macro elements without spurious modes). */
-#include "bound/bound.h"
+#include "bound/macro.h"
+#include "bound/walk.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
@@ -22,28 +23,16 @@
 #include <string.h>
 
 enum {
-    AIRY = 12,                                     /* most functions of a part: of degree 2 */
-    MOST = UZ_BOUND_PARTS * AIRY,                  /* of an element */
-    OUTER = UZ_BOUND_PARTS * UZ_BOUND_MOMENTS * 2, /* moments of its sides */
-    KEY = 32,
+    MOST = UZ_MACRO_FUNCTIONS * UZ_BOUND_PARTS, /* functions of an element */
+    OUTER = UZ_MACRO_OUTER,
+    INNER = OUTER + UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, /* conditions within */
+    KEY = UZ_MACRO_KEY,
     MADE = 4 /* elements that are kept: meshes have many alike */
 };
 #define MOST_KEPT ((int64_t)256 << 20)                                     /* bytes of maps */
 static const double STATIONS[2][UZ_BOUND_MOMENTS] = {{0, 1}, {0, 0.5, 1}}; /* along an edge, by degree */
 
-typedef struct {
-    const uz_bound_body *body;
-    int64_t element;
-    int parts, degree, airy, all, outer, kept; /* functions of a part, of all; moments; columns of Z */
-    double corner[UZ_BOUND_PARTS][2], centre[2];
-    double local[2][2], times[AIRY]; /* derivatives of local coordinates; scales the functions to stresses of about 1 */
-    double Z[MOST * MOST];           /* all x kept */
-    double A[(MOST + OUTER) * MOST]; /* kept + outer rows: [L; B] */
-    double y[MOST], rest[OUTER];     /* L^-1 Z'f; D_0 */
-    double key[KEY];                 /* what these follow from: its first 6 numbers are the shape */
-    bool made;
-    int64_t last; /* element that it was used for */
-} macro;
+typedef uz_macro macro;
 
 static double mean_gap(double normal[2], const uz_bound_body *body, int64_t i, int a);
 static macro *make(macro *kept, const uz_bound_body *body, int64_t element);
@@ -104,21 +93,49 @@ static void turn(double *K, double x[OUTER], const macro *m, bool back)
     }
 }
 
+void uz_bound_springs(double S[UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS], const uz_bound_body *body, int64_t edge)
+{
+    const int moments = body->degree + 1;
+    const double *weight = body->edge[edge].weight, times = uz_bound_measure(body, edge) / (moments * moments);
+    double M[UZ_BOUND_MOMENTS][2 * UZ_BOUND_MOMENTS] = {{0}}, q,
+                                   share; /* products over the weight, and what inverts them */
+    for (uz_line_walk walk = uz_line_begin(weight[0], weight[1]); uz_line_next(&walk, &q, &share);) {
+        double phi[UZ_BOUND_MOMENTS];
+        uz_bound_bernstein(phi, moments, q);
+        for (int a = 0; a < moments; a++)
+            for (int b = 0; b < moments && uz_bound_weight(body, edge, a) > 0; b++)
+                if (uz_bound_weight(body, edge, b) > 0)
+                    M[a][b] += share * phi[a] * phi[b] / (weight[0] + q * (weight[1] - weight[0]));
+    }
+    for (int a = 0; a < moments; a++) {
+        const bool none = !(M[a][a] > 0);
+        M[a][moments + a] = none ? 0 : times;
+        M[a][a] = none ? 1 : M[a][a];
+    }
+    for (int k = 0; k < moments; k++)
+        for (int a = 0; a < moments; a++)
+            for (int b = 2 * moments - 1; b >= k && a != k; b--)
+                M[a][b] -= M[a][k] / M[k][k] * M[k][b];
+    for (int a = 0; a < moments; a++)
+        for (int b = 0; b < moments; b++)
+            S[a][b] = M[a][moments + b] / M[a][a];
+}
+
 /* Springs along an edge are of its first element: a displacement with moments v has 1/2 int k |u|^2 of 1/2 v'Sv at
- * least, S = k A / moments^2 times the inverse of the weights' products. */
+ * least. */
 static void add_springs(double *K, const macro *m)
 {
     const int moments = m->degree + 1, n = m->outer;
     for (int i = 0; i < n; i++) {
+        double S[UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS];
         const int64_t at = m->body->edge_of[4 * m->element + i / (2 * moments)];
         const uz_bound_edge *edge = &m->body->edge[at];
-        const double *from = m->body->model->mesh.xyz + 2 * edge->node[0],
-                     *to = m->body->model->mesh.xyz + 2 * edge->node[1];
-        const double area = hypot(to[0] - from[0], to[1] - from[1]) * m->body->model->thickness;
         const int first = i - i % (2 * moments), a = i % (2 * moments) / 2;
-        for (int b = 0; b < moments && edge->element[0] == m->element; b++)
-            K[i + n * (first + 2 * b + i % 2)] +=
-                edge->spring[i % 2] * area / (moments * moments) * uz_bound_product_inverse[m->degree - 1][a][b];
+        if (!(edge->spring[i % 2] > 0) || edge->element[0] != m->element)
+            continue;
+        uz_bound_springs(S, m->body, at);
+        for (int b = 0; b < moments; b++)
+            K[i + n * (first + 2 * b + i % 2)] += edge->spring[i % 2] * S[a][b];
     }
 }
 
@@ -336,18 +353,18 @@ static uz_status make_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *bod
                        (long long)body->n_edges);
     for (int64_t i = 0; i < body->n_edges * 2 * moments; i++)
         (*dof)[i] = body->edge[i / (2 * moments)].held[i % 2] ||
+                            !(uz_bound_weight(body, i / (2 * moments), (int)(i % (2 * moments) / 2)) > 0) ||
                             (i % 2 == 0 && uz_bound_pressed(body, i / (2 * moments), (int)(i % (2 * moments) / 2)) >= 0)
                         ? -1
                         : d++;
     qp->p = uz_alloc_zero(d, sizeof *qp->p);
     uz_status status = qp->p ? assemble(qp, d, body, *dof, stiffness, stop, err)
                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld unknowns", (long long)d);
-    for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) { /* a constant traction is shared equally */
+    for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) { /* a constant traction is shared by weights */
         const uz_bound_edge *edge = &body->edge[i];
-        const double *from = body->model->mesh.xyz + 2 * edge->node[0], *to = body->model->mesh.xyz + 2 * edge->node[1];
-        const double each = hypot(to[0] - from[0], to[1] - from[1]) * body->model->thickness / moments;
         for (int a = 0; a < 2 * moments; a++) {
             const int64_t at = (*dof)[i * 2 * moments + a];
+            const double each = uz_bound_measure(body, i) / moments * uz_bound_weight(body, i, a / 2);
             double axis[2][2];
             uz_bound_axes(axis, body, i, a / 2);
             if (at >= 0)
@@ -491,38 +508,6 @@ static inline void add(int n, double alpha, const double *x, double *y)
         y[i] += alpha * x[i];
 }
 
-/* The stresses of the Airy functions at a point: S[component][function]. They are polynomials in coordinates that the
- * element's shape is about a square in, however thin it is. */
-static void airy(double S[3][AIRY], const macro *m, const double at[2])
-{
-    const double(*g)[2] = m->local;
-    double x[5] = {1}, y[5] = {1};
-    int b = 0;
-    for (int k = 1; k < 5; k++) {
-        x[k] = x[k - 1] * (g[0][0] * (at[0] - m->centre[0]) + g[0][1] * (at[1] - m->centre[1]));
-        y[k] = y[k - 1] * (g[1][0] * (at[0] - m->centre[0]) + g[1][1] * (at[1] - m->centre[1]));
-    }
-    for (int k = 2; k <= m->degree + 2; k++)
-        for (int i = 0; i <= k; i++, b++) {
-            const int j = k - i;
-            const double xx = i >= 2 ? i * (i - 1) * x[i - 2] * y[j] : 0,
-                         yy = j >= 2 ? j * (j - 1) * x[i] * y[j - 2] : 0;
-            const double xy = i >= 1 && j >= 1 ? i * j * x[i - 1] * y[j - 1] : 0, t = m->times[b];
-            S[0][b] = t * (g[0][1] * g[0][1] * xx + 2 * g[0][1] * g[1][1] * xy + g[1][1] * g[1][1] * yy);
-            S[1][b] = t * (g[0][0] * g[0][0] * xx + 2 * g[0][0] * g[1][0] * xy + g[1][0] * g[1][0] * yy);
-            S[2][b] =
-                -t * (g[0][0] * g[0][1] * xx + (g[0][0] * g[1][1] + g[0][1] * g[1][0]) * xy + g[1][0] * g[1][1] * yy);
-        }
-}
-
-/* The stress that balances the element's force. */
-static void balance(double s[3], const macro *m, const double at[2])
-{
-    for (int c = 0; c < 2; c++)
-        s[c] = -m->body->force[2 * m->element + c] * (at[c] - m->centre[c]);
-    s[2] = 0;
-}
-
 /* Resultants of the tractions of a part on the edge from `from` to `to`, which has the part on its left, along the two
  * axes: rows (2 per moment) of `all` columns, and those of the balancing stress (NULL: not wanted). Coefficients of
  * Bernstein polynomials, from values at the edge's stations. */
@@ -535,18 +520,15 @@ static void add_tractions(double *rows, double *rest, const macro *m, int part, 
         const double s = STATIONS[m->degree - 1][a];
         const double at[2] = {from[0] + s * t[0], from[1] + s * t[1]};
         const int place = reversed ? moments - 1 - a : a;
-        double S[3][AIRY], own[3];
-        airy(S, m, at);
-        balance(own, m, at);
+        double S[4][UZ_MACRO_FUNCTIONS + 1];
+        m->of->stresses(S, m, at);
         for (int k = 0; k < 2; k++) {
             /* normal times length: (t_y, -t_x); a middle station's value is (b_0 + 2 b_1 + b_2) / 4 */
             const double xx = axis[k][0] * t[1], yy = -axis[k][1] * t[0], xy = axis[k][1] * t[1] - axis[k][0] * t[0];
-            for (int b = 0; b <= m->airy; b++) {
-                const bool last = b == m->airy;
-                const double value =
-                    (last ? xx * own[0] + yy * own[1] + xy * own[2] : xx * S[0][b] + yy * S[1][b] + xy * S[2][b]) *
-                    m->body->model->thickness / moments;
-                double *to_row = last ? rest + k : rows + k * m->all + part * m->airy + b;
+            for (int b = 0; b <= m->functions; b++) {
+                const bool last = b == m->functions;
+                const double value = (xx * S[0][b] + yy * S[1][b] + xy * S[2][b]) * m->body->depth / moments;
+                double *to_row = last ? rest + k : rows + k * m->all + part * m->functions + b;
                 const int step = last ? 2 : 2 * m->all;
                 if (last && !rest)
                     continue;
@@ -559,11 +541,12 @@ static void add_tractions(double *rows, double *rest, const macro *m, int part, 
 }
 
 /* Z (n x (n - rank)), orthonormal: what all columns of M (n x columns, overwritten) are orthogonal to, by Householder's
- * reflections with pivoting. False: the rank is another one. */
-static bool span_null_space(double *Z, double *M, int n, int columns, int rank)
+ * reflections with pivoting. Returns the rank; -1: it can't be told from rounding. */
+static int span_null_space(double *Z, double *M, int n, int columns)
 {
     double first = 0, largest = 0, v[MOST];
-    for (int j = 0; j <= rank && j < columns; j++) {
+    int rank = 0;
+    for (int j = 0; j < columns && j < n; j++) {
         int best = j;
         largest = -1;
         for (int c = j; c < columns; c++) {
@@ -572,10 +555,11 @@ static bool span_null_space(double *Z, double *M, int n, int columns, int rank)
             largest = fmax(largest, size);
         }
         first = j == 0 ? largest : first;
-        if (j == rank)
+        if (!(largest > 1e-11 * first))
             break;
         if (!(largest > 1e-8 * first))
-            return false;
+            return -1;
+        rank = j + 1;
         for (int i = 0; i < n; i++) {
             const double held = M[i + n * best];
             M[i + n * best] = M[i + n * j];
@@ -588,11 +572,7 @@ static bool span_null_space(double *Z, double *M, int n, int columns, int rank)
             h[i] /= size;
         for (int c = j + 1; c < columns; c++)
             add(n - j, -2 * dot(n - j, h + j, M + j + n * c), h + j, M + j + n * c);
-        if (j + 1 == rank && rank == columns)
-            largest = 0;
     }
-    if (largest > 1e-11 * first)
-        return false;
     for (int c = rank; c < n; c++) {
         memset(v, 0, sizeof v);
         v[c] = 1;
@@ -600,43 +580,65 @@ static bool span_null_space(double *Z, double *M, int n, int columns, int rank)
             add(n - j, -2 * dot(n - j, M + j + n * j, v + j), M + j + n * j, v + j);
         memcpy(Z + n * (c - rank), v, (size_t)n * sizeof *v);
     }
-    return true;
+    return rank;
 }
 
-/* The compliance of a part, airy x airy, and what the balancing stress and free expansion make of it. */
-static void comply(double F[AIRY * AIRY], double f[AIRY], const macro *m, int part)
+void uz_macro_part(double corner[3][2], const uz_macro *m, int part)
+{
+    memcpy(corner[0], m->corner[part], sizeof corner[0]);
+    memcpy(corner[1], m->corner[(part + 1) % m->parts], sizeof corner[1]);
+    memcpy(corner[2], m->centre, sizeof corner[2]);
+}
+
+/* Rows (of `all` columns) of stresses at the places of the element's sides that are on the axis of rings; how many. */
+static int vanish_at_axis(double *rows, const macro *m)
+{
+    const int places = m->degree == 1 ? 2 : 3;
+    int count = 0;
+    for (int part = 0; part < m->parts && m->body->rings; part++) {
+        double corner[3][2];
+        uz_macro_part(corner, m, part);
+        for (int i = 0; i < places; i++) {
+            const double *a = corner[i < 2 ? i : 0], *b = corner[i < 2 ? i : 1];
+            const double at[2] = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
+            double S[4][UZ_MACRO_FUNCTIONS + 1];
+            if (at[0] > 0)
+                continue;
+            m->of->stresses(S, m, at);
+            for (int c = 0; c < 3; c++, count++)
+                memcpy(rows + count * m->all + part * m->functions, S[c], (size_t)m->functions * sizeof(double));
+        }
+    }
+    return count;
+}
+
+/* The compliance of a part, functions x functions, and what the balancing stress and free expansion make of it. */
+static void comply(double *F, double *f, const macro *m, int part)
 {
     const uz_body_model *model = m->body->model;
     const uz_lame lame = uz_element_material(model, m->element)->lame;
-    const uz_element_type *triangle = uz_element_type_of(UZ_TRI6);
-    const uz_gauss_rule rule = m->degree == 1 ? triangle->rule : triangle->energy; /* of degree 2 and 4 */
-    const double *p = m->corner[part], *q = m->corner[(part + 1) % m->parts], *c = m->centre;
-    const double area2 = (q[0] - p[0]) * (c[1] - p[1]) - (q[1] - p[1]) * (c[0] - p[0]);
-    double expansion[3] = {0};
-    if (m->body->free_strain)
-        uz_thermal_strain(expansion, model->kind, lame, m->body->free_strain[m->element]);
-    memset(F, 0, AIRY * AIRY * sizeof *F);
-    memset(f, 0, AIRY * sizeof *f);
-    for (int g = 0; g < rule.count; g++) {
-        double at[2], S[3][AIRY], own[3], strain[3][AIRY + 1];
-        const double *point = rule.point[g].at, weight = rule.point[g].weight * area2 * model->thickness;
-        for (int i = 0; i < 2; i++)
-            at[i] = p[i] + point[0] * (q[i] - p[i]) + point[1] * (c[i] - p[i]);
-        airy(S, m, at);
-        balance(own, m, at);
-        for (int b = 0; b <= m->airy; b++) { /* Hooke's law, its deviator and trace apart */
-            const double s[3] = {b < m->airy ? S[0][b] : own[0], b < m->airy ? S[1][b] : own[1],
-                                 b < m->airy ? S[2][b] : own[2]};
-            const double mean = (s[0] + s[1]) / (4 * (lame.lambda + lame.mu)), half = (s[0] - s[1]) / (4 * lame.mu);
-            strain[0][b] = mean + half + (b == m->airy ? expansion[0] : 0);
-            strain[1][b] = mean - half + (b == m->airy ? expansion[1] : 0);
-            strain[2][b] = s[2] / lame.mu;
+    const int n = m->functions, components = m->of->components;
+    double corner[3][2], at[2], weight;
+    uz_macro_part(corner, m, part);
+    memset(F, 0, (size_t)(n * n) * sizeof *F);
+    memset(f, 0, (size_t)n * sizeof *f);
+    for (uz_walk walk = uz_walk_begin(corner, m->body->rings, m->degree); uz_walk_next(&walk, at, &weight);) {
+        double S[4][UZ_MACRO_FUNCTIONS + 1], strain[4][UZ_MACRO_FUNCTIONS + 1];
+        m->of->stresses(S, m, at);
+        weight *= m->body->depth;
+        for (int b = 0; b <= n; b++) {
+            double e[4];
+            const double s[4] = {S[0][b], S[1][b], S[2][b], components > 3 ? S[3][b] : 0};
+            const bool last = b == n && m->body->free_strain;
+            m->of->strain(e, s, lame, last ? m->body->free_strain[m->element] : 0, model->kind, at[0]);
+            for (int i = 0; i < components; i++)
+                strain[i][b] = e[i];
         }
-        for (int b = 0; b < m->airy; b++)
-            for (int i = 0; i < 3; i++) {
-                f[b] += weight * S[i][b] * strain[i][m->airy];
-                for (int a = 0; a < m->airy; a++)
-                    F[a + m->airy * b] += weight * S[i][a] * strain[i][b];
+        for (int b = 0; b < n; b++)
+            for (int i = 0; i < components; i++) {
+                f[b] += weight * S[i][b] * strain[i][n];
+                for (int a = 0; a < n; a++)
+                    F[a + n * b] += weight * S[i][a] * strain[i][b];
             }
     }
 }
@@ -645,7 +647,7 @@ static void comply(double F[AIRY * AIRY], double f[AIRY], const macro *m, int pa
 static void scale(macro *m)
 {
     const double(*p)[2] = m->corner;
-    double a[2], b[2], S[3][AIRY], largest[AIRY] = {0};
+    double a[2], b[2], S[4][UZ_MACRO_FUNCTIONS + 1], largest[UZ_MACRO_FUNCTIONS] = {0};
     for (int c = 0; c < 2; c++) {
         a[c] = m->parts == 3 ? p[1][c] - p[0][c] : (p[1][c] + p[2][c] - p[0][c] - p[3][c]) / 4;
         b[c] = m->parts == 3 ? p[2][c] - p[0][c] : (p[2][c] + p[3][c] - p[0][c] - p[1][c]) / 4;
@@ -655,14 +657,17 @@ static void scale(macro *m)
     m->local[0][1] = -b[0] / det;
     m->local[1][0] = -a[1] / det;
     m->local[1][1] = a[0] / det;
-    for (int i = 0; i < m->airy; i++)
+    for (int i = 0; i < m->functions; i++)
         m->times[i] = 1;
     for (int k = 0; k < m->parts; k++) {
-        airy(S, m, p[k]);
-        for (int i = 0; i < m->airy; i++)
+        m->of->stresses(S, m, p[k]);
+        for (int i = 0; i < m->functions; i++) {
             largest[i] = fmax(largest[i], fmax(fabs(S[2][i]), fmax(fabs(S[0][i]), fabs(S[1][i]))));
+            if (m->of->components > 3)
+                largest[i] = fmax(largest[i], m->centre[0] * fabs(S[3][i]));
+        }
     }
-    for (int i = 0; i < m->airy; i++)
+    for (int i = 0; i < m->functions; i++)
         m->times[i] = 1 / largest[i];
 }
 
@@ -680,13 +685,14 @@ static bool place(double key_of[KEY], macro *m, const uz_bound_body *body, int64
     m->element = element;
     m->degree = body->degree;
     m->parts = uz_element_type_of((uz_element_kind)mesh->kind[element])->corners;
-    m->airy = m->degree == 1 ? 7 : 12;
-    m->all = m->parts * m->airy;
+    m->of = body->rings ? &uz_ring_stresses : &uz_plane_stresses;
+    m->functions = m->of->functions[m->degree - 1];
+    m->all = m->parts * m->functions;
     m->outer = m->parts * 2 * (m->degree + 1);
     uz_bound_centre(m->centre, body, element);
     for (int k = 0; k < m->parts; k++) {
         const uz_bound_edge *edge = &body->edge[body->edge_of[4 * element + k]];
-        memcpy(m->corner[k], mesh->xyz + 2 * node[k], sizeof m->corner[k]);
+        uz_bound_place(m->corner[k], body, node[k]);
         for (int c = 0; c < 2 && k > 0; c++) {
             key[2 * (k - 1) + c] = m->corner[k][c] - m->corner[0][c];
             size = fmax(size, fabs(key[2 * (k - 1) + c]));
@@ -695,13 +701,14 @@ static bool place(double key_of[KEY], macro *m, const uz_bound_body *body, int64
         memcpy(key + at, edge->axis, sizeof edge->axis);
         at += 4;
     }
-    const double rest[] = {m->parts,
+    const double rest[] = {body->rings ? m->corner[0][0] : 0, /* rings have elements alike at one radius alone */
+                           m->parts,
                            lame.lambda,
                            lame.mu,
                            body->force[2 * element],
                            body->force[2 * element + 1],
                            body->free_strain ? body->free_strain[element] : 0};
-    memcpy(key + KEY - 6, rest, sizeof rest);
+    memcpy(key + KEY - sizeof rest / sizeof rest[0], rest, sizeof rest);
     for (int i = 0; i < KEY && same; i++)
         same = fabs(key[i] - m->key[i]) <= (i < 6 ? 1e-13 * size : 0);
     if (!same)
@@ -718,7 +725,8 @@ static macro *make(macro *kept, const uz_bound_body *body, int64_t element)
     const int64_t *node = uz_mesh_element(mesh, element, &count);
     double key[KEY];
     macro *m = kept;
-    double inner[OUTER * MOST] = {0}, outer[OUTER * MOST] = {0}, F[AIRY * AIRY], f[AIRY];
+    double inner[INNER * MOST] = {0}, outer[OUTER * MOST] = {0};
+    double F[UZ_MACRO_FUNCTIONS * UZ_MACRO_FUNCTIONS], f[UZ_MACRO_FUNCTIONS];
     for (int i = 0; i < MADE; i++) {
         if (place(key, &kept[i], body, element)) {
             kept[i].last = element;
@@ -740,23 +748,24 @@ static macro *make(macro *kept, const uz_bound_body *body, int64_t element)
         add_tractions(inner + next * rows * m->all, NULL, m, k, m->corner[next], m->centre, AXES, false);
         add_tractions(inner + k * rows * m->all, NULL, m, k, m->centre, m->corner[k], AXES, true);
     }
-    const int rank = m->outer - (m->parts == 4 ? 1 : 0);
-    m->kept = m->all - rank;
-    if (!span_null_space(m->Z, inner, m->all, m->outer, rank))
+    const int at_axis = vanish_at_axis(inner + m->outer * m->all, m);
+    const int rank = span_null_space(m->Z, inner, m->all, m->outer + at_axis);
+    if (rank < 0 || (at_axis == 0 && rank != m->outer - (m->parts == 4 ? 1 : 0)))
         return NULL;
+    m->kept = m->all - rank;
     const int ld = m->kept + m->outer;
     memset(m->A, 0, sizeof m->A);
     memset(m->y, 0, sizeof m->y);
     for (int part = 0; part < m->parts; part++) {
         comply(F, f, m, part);
         for (int j = 0; j < m->kept; j++) {
-            const double *z = m->Z + m->all * j + part * m->airy;
-            double Fz[AIRY] = {0};
-            for (int b = 0; b < m->airy; b++)
-                add(m->airy, z[b], F + m->airy * b, Fz);
+            const double *z = m->Z + m->all * j + part * m->functions;
+            double Fz[UZ_MACRO_FUNCTIONS] = {0};
+            for (int b = 0; b < m->functions; b++)
+                add(m->functions, z[b], F + m->functions * b, Fz);
             for (int i = j; i < m->kept; i++)
-                m->A[i + ld * j] += dot(m->airy, m->Z + m->all * i + part * m->airy, Fz);
-            m->y[j] += dot(m->airy, z, f);
+                m->A[i + ld * j] += dot(m->functions, m->Z + m->all * i + part * m->functions, Fz);
+            m->y[j] += dot(m->functions, z, f);
         }
     }
     for (int j = 0; j < m->kept; j++)
@@ -779,15 +788,17 @@ static void spread(macro *m, double *stress, const double *v)
     for (int k = 0; k < m->kept; k++)
         add(m->all, z[k], m->Z + m->all * k, s);
     for (int part = 0; part < m->parts; part++) {
-        const double *corner[3] = {m->corner[part], m->corner[(part + 1) % m->parts], m->centre};
+        double corner[3][2];
+        uz_macro_part(corner, m, part);
         for (int i = 0; i < points; i++) {
             const double *a = corner[i % 3], *b = corner[i < 3 ? i : (i + 1) % 3];
             const double at[2] = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
-            double S[3][AIRY], *to = stress + (part * UZ_BOUND_POINTS + i) * 3;
-            airy(S, m, at);
-            balance(to, m, at);
+            double S[4][UZ_MACRO_FUNCTIONS + 1], *to = stress + (part * UZ_BOUND_POINTS + i) * 3;
+            m->of->stresses(S, m, at);
             for (int c = 0; c < 3; c++)
-                to[c] += dot(m->airy, S[c], s + part * m->airy);
+                to[c] = m->body->rings && !(at[0] > 0) /* at the axis, but for rounding */
+                            ? 0
+                            : S[c][m->functions] + dot(m->functions, S[c], s + part * m->functions);
         }
     }
 }

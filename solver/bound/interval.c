@@ -73,7 +73,7 @@ static void add_up(examination *x, const double *v, const double *stress)
 {
     const int64_t n_moments = x->body->n_edges * x->moments;
     memset(x->resultant, 0, (size_t)(2 * n_moments) * sizeof *x->resultant);
-    x->sum = x->scale = x->margin = x->strain = x->complementary = x->inside = 0;
+    x->sum = x->scale = x->margin = x->own_margin = x->strain = x->complementary = x->inside = 0;
     for (int64_t e = 0; e < x->mesh->n_elements; e++)
         uz_examine_element(x, v, stress + e * STRESSES, e);
 }
@@ -89,33 +89,31 @@ static void less_loads(double *acts, const examination *x, const uz_bound_body *
 static double spring_product(double *scale, const examination *x, const double *t, const double *u, double of_u,
                              const double *s, const double *v)
 {
-    double sum = 0, at[3], weight[3];
-    uz_gauss(at, weight, 3);
+    double sum = 0;
     for (int64_t i = 0; i < x->body->n_edges; i++)
         for (int c = 0; c < 2; c++) {
             const uz_bound_edge *edge = &x->body->edge[i];
-            const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
-            const double area = hypot(to[0] - from[0], to[1] - from[1]) * x->body->model->thickness;
-            double b[2][3];
+            const double area = uz_bound_measure(x->body, i);
+            double b[2][3], q, weight;
             if (!(edge->spring[c] > 0))
                 continue;
             uz_along_edge(b[0], u, edge->node, (const double[2]){c == 0, c == 1});
             uz_along_edge(b[1], v, edge->node, (const double[2]){c == 0, c == 1});
-            for (int g = 0; g < 3; g++) {
-                const double q = (1 + at[g]) / 2, p = 1 - q;
-                const double bernstein[2][3] = {{p, q, 0}, {p * p, 2 * p * q, q * q}};
-                double traction[2] = {0}, moved[2];
+            for (uz_line_walk walk = uz_line_begin(edge->weight[0], edge->weight[1]);
+                 uz_line_next(&walk, &q, &weight);) {
+                const double p = 1 - q, k = edge->spring[c] * (p * edge->weight[0] + q * edge->weight[1]);
+                double phi[MOMENTS], traction[2] = {0}, moved[2];
+                uz_bound_bernstein(phi, x->moments, q);
                 for (int a = 0; a < x->moments; a++) {
-                    const int64_t k = (i * x->moments + a) * 2 + c;
-                    traction[0] += bernstein[x->moments - 2][a] * t[k] * x->moments / area;
-                    traction[1] += bernstein[x->moments - 2][a] * s[k] * x->moments / area;
+                    const int64_t at = (i * x->moments + a) * 2 + c;
+                    traction[0] += phi[a] * t[at] * x->moments / area;
+                    traction[1] += phi[a] * s[at] * x->moments / area;
                 }
-                for (int k = 0; k < 2; k++)
-                    moved[k] = b[k][0] * p * p + 2 * b[k][1] * p * q + b[k][2] * q * q;
+                for (int a = 0; a < 2; a++)
+                    moved[a] = b[a][0] * p * p + 2 * b[a][1] * p * q + b[a][2] * q * q;
                 moved[0] *= of_u;
-                const double k = edge->spring[c];
-                sum += weight[g] / 2 * area * (traction[0] + k * moved[0]) * (traction[1] + k * moved[1]) / k;
-                *scale += weight[g] / 2 * area * (fabs(traction[0]) + k * fabs(moved[0])) *
+                sum += weight * area * (traction[0] + k * moved[0]) * (traction[1] + k * moved[1]) / k;
+                *scale += weight * area * (fabs(traction[0]) + k * fabs(moved[0])) *
                           (fabs(traction[1]) + k * fabs(moved[1])) / k;
             }
         }
@@ -131,7 +129,8 @@ static double square_apart(weighing *y, bool bounded)
     memcpy(y->acts[1], x->resultant, (size_t)(2 * x->body->n_edges * x->moments) * sizeof(double));
     less_loads(y->acts[1], x, x->body);
     const double springs = spring_product(&scale, x, y->acts[1], y->pair->w, 1, y->acts[1], y->pair->w);
-    return fmax(0, 2 * x->sum + springs) + (bounded ? 2 * x->margin + UZ_SUM_ROUNDING * (2 * x->scale + scale) : 0);
+    return fmax(0, 2 * x->sum + springs) +
+           (bounded ? 2 * (x->margin + x->own_margin) + UZ_SUM_ROUNDING * (2 * x->scale + scale) : 0);
 }
 
 uz_status uz_bound_apart(double *apart, const uz_bound_pair *pair, uz_error *err)
@@ -167,7 +166,7 @@ static double work_apart(weighing *y, double apart, double *rounding)
             y->free_strain[e] = -y->body->free_strain[e];
         add_up(&x, y->v, y->tractions);
         sum -= sign * x.sum / (4 * t);
-        *rounding += (x.margin + UZ_SUM_ROUNDING * x.scale) / (4 * t);
+        *rounding += (x.margin + x.own_margin + UZ_SUM_ROUNDING * x.scale) / (4 * t);
         for (int64_t k = 0; k < 2 * n_moments; k++)
             y->acts[0][k] += x.resultant[k] / 2;
     }
@@ -182,18 +181,16 @@ static double expansion_work(const weighing *y, double *rounding)
 {
     double sum = 0;
     for (int64_t e = 0; e < y->x.mesh->n_elements && y->body->free_strain; e++) {
-        const uz_body_model *model = y->body->model;
         int count;
         const int64_t *node = uz_mesh_element(y->x.mesh, e, &count);
         const int parts = uz_element_type_of((uz_element_kind)y->x.mesh->kind[e])->corners;
-        double centre[2], expansion[3] = {0};
-        uz_bound_centre(centre, y->body, e);
-        uz_thermal_strain(expansion, model->kind, uz_element_material(model, e)->lame, y->body->free_strain[e]);
+        double corner[3][2];
+        uz_bound_centre(corner[2], y->body, e);
         for (int k = 0; k < parts; k++) {
-            const double *a = y->x.mesh->xyz + 2 * node[k], *b = y->x.mesh->xyz + 2 * node[(k + 1) % parts];
-            const double area2 = (b[0] - a[0]) * (centre[1] - a[1]) - (b[1] - a[1]) * (centre[0] - a[0]);
-            const double part = uz_expansion_work(y->pair->stress + e * STRESSES + k * UZ_BOUND_POINTS * 3,
-                                                  y->x.moments == 2 ? 3 : 6, expansion, area2 / 2 * model->thickness);
+            uz_bound_place(corner[0], y->body, node[k]);
+            uz_bound_place(corner[1], y->body, node[(k + 1) % parts]);
+            const double part = uz_expansion_work(
+                &y->x, corner, y->pair->stress + e * STRESSES + k * UZ_BOUND_POINTS * 3, y->body->free_strain[e], e);
             sum += part;
             *rounding += UZ_SUM_ROUNDING * fabs(part);
         }

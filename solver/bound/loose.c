@@ -74,7 +74,7 @@ void uz_bound_hold(uz_bound_body *body, const double *pressure)
             if (edge->contact < 0 || edge->held[0] || edge->round || !(p > PRESSED * hardest))
                 continue;
             for (int a = 0; a < moments; a++) {
-                const double size = sqrt(p) * new_part(by, body, i, a, chosen, count);
+                const double size = sqrt(p * uz_bound_weight(body, i, a)) * new_part(by, body, i, a, chosen, count);
                 if (size > best) {
                     best = size;
                     body->pressed[count] = i * moments + a;

@@ -58,4 +58,5 @@ void run_guarantees(suite *all)
     run_kind(all, BOUND_ROUND, "round");
     run_kind(all, BOUND_RESTING, "resting");
     run_kind(all, BOUND_SPRINGS, "springs");
+    run_kind(all, BOUND_RINGS, "ring");
 }

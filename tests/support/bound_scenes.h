@@ -56,7 +56,7 @@ static inline uz_load *bound_load(uz_scene *scene, uz_load_kind kind, const char
     return &scene->loads[scene->n_loads - 1];
 }
 
-typedef enum { BOUND_STRAIGHT, BOUND_ROUND, BOUND_RESTING, BOUND_SPRINGS } bound_kind;
+typedef enum { BOUND_STRAIGHT, BOUND_ROUND, BOUND_RESTING, BOUND_SPRINGS, BOUND_RINGS } bound_kind;
 
 /* Makes the scene before a plane one of its kind. */
 static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, double stress, qp_random *rng)
@@ -84,6 +84,33 @@ static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, do
             add_support(scene, "left", 0, NAN);
         scene->supports[scene->n_supports++] =
             (uz_support){.kind = UZ_SUPPORT_SPRING, .on = "top", .spring = {slides ? 0 : k * random_unit(rng), k}};
+    }
+    if (kind == BOUND_RINGS) { /* held or pressed on top, on springs, or resting; around a hole or not */
+        const int64_t how = random_int(rng, 0, 4);
+        const bool hole = random_chance(rng, 0.6);
+        const double k = scene->materials[0].young / height * random_power(rng, -1.5, 1.5);
+        scene->model = UZ_AXISYMMETRIC;
+        scene->box.origin[0] = hole ? height * random_power(rng, -1.5, 1) : 0;
+        scene->n_supports = 0;
+        if (scene->loads[0].kind == UZ_LOAD_TRACTION && how == 3)
+            scene->loads[0].v[1] = -fabs(scene->loads[0].v[1]);
+        if (how == 0)
+            add_support(scene, "top", NAN, -1e-3 * height * random_unit(rng));
+        if (how == 1)
+            add_support(scene, "top", 1e-3 * height * random_unit(rng) * (hole ? 1 : 0),
+                        -1e-3 * height * random_unit(rng));
+        if (how == 2)
+            scene->supports[scene->n_supports++] =
+                (uz_support){.kind = UZ_SUPPORT_SPRING,
+                             .on = "top",
+                             .spring = {random_chance(rng, 0.5) ? k : 0, k * 3 * width * width}};
+        if (how == 3) {
+            bound_load(scene, UZ_LOAD_PRESSURE, "top", stress * (0.5 + random_unit(rng)), 0);
+            scene->contacts[0].point[1] = x[1] - gap;
+            scene->contacts[0].normal[0] = 0;
+        }
+        if (hole && random_chance(rng, 0.5))
+            bound_load(scene, UZ_LOAD_PRESSURE, "left", stress * random_unit(rng), 0);
     }
     if (kind == BOUND_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
         uz_contact *c = &scene->contacts[0];

@@ -19,7 +19,7 @@ static inline uz_scene box_scene(double width, double height, int64_t nx, int64_
     scene.box = (uz_box){.size = {width, height}, .cells = {nx, ny}, .element = "quad4", .dim = 2};
     scene.materials = calloc(4, sizeof *scene.materials);
     scene.supports = calloc(4, sizeof *scene.supports);
-    scene.loads = calloc(4, sizeof *scene.loads);
+    scene.loads = calloc(8, sizeof *scene.loads);
     scene.contacts = calloc(4, sizeof *scene.contacts);
     scene.materials[0] = (uz_material){.on = "all", .young = 200e3, .poisson = 0.3};
     scene.n_materials = 1;

@@ -1,0 +1,175 @@
+/* The guaranteed bound on the whole error of bodies of revolution: elements, and what it proves. */
+#include "bound/bound.h"
+#include "bound_scenes.h"
+#include "linalg/blas.h"
+#include "scene_fixture.h"
+
+enum { RINGS = 12 };
+#define PI 3.14159265358979323846
+
+static qp_random shuffled = {1};
+
+static uz_guarantee bound_of(const uz_scene *scene)
+{
+    uz_result *result = bound_answer(&(uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = *scene}, true);
+    const uz_guarantee g = result->summary.guarantee;
+    uz_result_free(result);
+    return g;
+}
+
+/* A ring of the radii `inner` to `inner` + 1, one high, of n x n cells. */
+static uz_scene ring_scene(double inner, int64_t n, const char *element)
+{
+    uz_scene scene = box_scene(1, 1, n, n);
+    snprintf(scene.box.element, sizeof scene.box.element, "%s", element);
+    scene.box.origin[0] = inner;
+    scene.model = UZ_AXISYMMETRIC;
+    scene.materials[0].young = 1000;
+    scene.materials[0].poisson = 0.3;
+    return scene;
+}
+
+/* Moves corners within a ring of a hole of 0 or 1 by up to a fifth of a cell of 1 / 6. */
+static void shuffle(double *x)
+{
+    const double r = x[0] - floor(x[0]);
+    const bool inside = r > 0.01 && r < 0.99 && x[1] > 0.01 && x[1] < 0.99;
+    for (int c = 0; c < 2 && inside; c++)
+        x[c] += 0.06 * (random_unit(&shuffled) - 0.5);
+}
+
+/* But for the one along the axis no motion is without stiffness, wherever the element is; tractions at the axis are
+ * none, and no unknowns. */
+TEST(elements_leave_no_moment_without_stiffness)
+{
+    static const struct {
+        int corners, at_axis; /* moments there, of degree 1 */
+        double xy[8];
+    } SHAPES[] = {{3, 0, {2, 0, 3, .2, 2.3, .9}},          {3, 4, {0, 0, 1, .2, 0, .9}},
+                  {3, 2, {0, 0, 1, .2, .8, .9}},           {3, 2, {1, 0, 2, 0, 0, 1}},
+                  {4, 0, {2, 0, 3, 0, 3, 1, 2, 1}},        {4, 0, {2, 0, 3, 0, 3.1, 1.3, 2.2, .8}},
+                  {4, 4, {0, 0, 1, 0, 1, 1, 0, 1}},        {4, 4, {0, 0, 1, 0, 1.2, 1.1, 0, 1}},
+                  {4, 2, {0, 0, 1, -.5, 1.5, .5, .5, .8}}, {4, 0, {1000, 0, 1001, 0, 1001, 1, 1000, 1}}};
+    for (size_t shape = 0; shape < sizeof SHAPES / sizeof *SHAPES; shape++)
+        for (int degree = 1; degree <= 2; degree++) {
+            const int corners = SHAPES[shape].corners, at_axis = SHAPES[shape].at_axis;
+            const uz_element_kind kind =
+                degree == 1 ? (corners == 3 ? UZ_TRI3 : UZ_QUAD4) : (corners == 3 ? UZ_TRI6 : UZ_QUAD8);
+            double xyz[16], A[24 * 24] = {0};
+            int64_t first[] = {0, degree * corners}, node[] = {0, 1, 2, 3, 4, 5, 6, 7}, pivot[24], *dof;
+            unsigned char kinds[] = {(unsigned char)kind};
+            uz_material material = {.on = "all", .young = 1, .poisson = 0.3};
+            uz_scene scene = {.model = UZ_AXISYMMETRIC, .thickness = 1, .source = UZ_MESH_GIVEN, .n_materials = 1};
+            uz_body_model model = {.kind = UZ_AXISYMMETRIC, .thickness = 1};
+            uz_body_material own = {.lame = uz_lame_of(UZ_AXISYMMETRIC, 1, 0.3)};
+            uz_bound_body body;
+            uz_qp qp;
+            uz_error err = {0};
+            memcpy(xyz, SHAPES[shape].xy, sizeof SHAPES[shape].xy);
+            for (int k = 0; k < corners; k++)
+                for (int c = 0; c < 2; c++)
+                    xyz[2 * (corners + k) + c] = (xyz[2 * k + c] + xyz[2 * ((k + 1) % corners) + c]) / 2;
+            scene.materials = &material;
+            model.mesh = (uz_mesh){.dim = 2,
+                                   .n_nodes = degree * corners,
+                                   .n_elements = 1,
+                                   .xyz = xyz,
+                                   .kind = kinds,
+                                   .first = first,
+                                   .node = node,
+                                   .extent = 10};
+            model.materials = &own;
+            CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
+            CHECK_STR(body.why, "");
+            CHECK_MSG(uz_bound_dual_problem(&qp, &dof, &body, NULL, &err) == UZ_OK, "%s", err.message);
+            const int64_t n = qp.K.cols, axis = at_axis == 4 ? 2 * (degree + 3) : 2 * at_axis;
+            CHECK_INT(n, corners * 2 * (degree + 1) - axis);
+            for (int64_t j = 0; j < n; j++)
+                for (int64_t k = qp.K.ptr[j]; k < qp.K.ptr[j + 1]; k++)
+                    A[qp.K.idx[k] + n * j] = qp.K.val[k];
+            CHECK_INT(uz_pstrf_lower_while(n, A, pivot, 1e-11, NULL), n - 1);
+            uz_qp_clear(&qp);
+            free(dof);
+            uz_bound_body_clear(&body);
+        }
+}
+
+/* A rod that is pulled, one that gets warm where it is pulled, and one of no contraction that stands: polynomials of
+ * the spaces, with a hole and without one. */
+TEST(nothing_is_lost_where_the_answer_is_exact)
+{
+    for (int k = 0; k < 24; k++) {
+        const int state = k / 8;
+        uz_scene scene = ring_scene(k / 4 % 2, 6, BOUND_ELEMENTS[k % 4]);
+        if (state < 2 || k % 4 == 2) /* a distorted quad8 has no polynomials of degree 2 */
+            body_give_mesh(&scene, shuffle);
+        else
+            body_give_mesh(&scene, NULL);
+        body_straighten(&scene);
+        add_support(&scene, "bottom", NAN, 0);
+        if (state == 0)
+            add_load(&scene, "top", 0, 3);
+        if (state == 1) {
+            scene.materials[0].expansion = 1e-3;
+            add_support(&scene, "top", NAN, 0.02);
+            bound_load(&scene, UZ_LOAD_TEMPERATURE, "all", 10, 0);
+        }
+        if (state == 2) {
+            scene.materials[0].poisson = 0;
+            bound_load(&scene, UZ_LOAD_BODY_FORCE, "all", 0, -2);
+        }
+        const uz_guarantee g = bound_of(&scene);
+        if (state == 2 && k % 4 < 2) /* of degree 1 the answer, but not the stress, which is exact */
+            CHECK_MSG(g.proved && fabs(g.dual + 2. * 2 * (k / 4 % 2 ? 3 : 1) * PI / 6000) < 1e-9, "%g %s", g.dual,
+                      g.why);
+        else
+            CHECK_MSG(g.proved && g.relative < 3e-6, "%s, %d: %g %s", scene.box.element, k, g.relative, g.why);
+        uz_scene_clear(&scene);
+    }
+}
+
+/* Lame's thick tube, between smooth plates: the energy is half of what the pressure works. */
+TEST(thick_tube)
+{
+    for (int k = 0; k < 8; k++) {
+        const double a = 1, b = 2, p = 10, E = 1000, nu = 0.3;
+        const double C = p * a * a / (b * b - a * a), moved = (1 + nu) / E * C * ((1 - 2 * nu) * a + b * b / a);
+        const double least = -0.5 * p * moved * 2 * PI * a;
+        uz_scene scene = ring_scene(1, k < 4 ? 4 : 8, BOUND_ELEMENTS[k % 4]);
+        if (k < 4) {
+            body_give_mesh(&scene, shuffle);
+            body_straighten(&scene);
+        }
+        add_support(&scene, "bottom", NAN, 0);
+        add_support(&scene, "top", NAN, 0);
+        bound_load(&scene, UZ_LOAD_PRESSURE, "left", p, 0);
+        const uz_guarantee g = bound_of(&scene);
+        const double error = sqrt(2 * (g.primal - least));
+        CHECK_MSG(g.proved && g.dual <= least && least <= g.primal, "%.12g %.12g %.12g %s", g.dual, least, g.primal,
+                  g.why);
+        CHECK_MSG(g.bound >= error && g.bound < 1.09 * error, "%s: %g of %g", scene.box.element, g.bound, error);
+        uz_scene_clear(&scene);
+    }
+}
+
+/* Some of the rings that `make extremes FILTER=guaranteed` goes through. */
+TEST(never_below_the_truth)
+{
+    double least = INFINITY, sum[2] = {0};
+    int count[2] = {0};
+    for (uint64_t seed = 1; seed <= RINGS; seed++) {
+        const bound_sweep x = sweep_bounds(seed, BOUND_RINGS, 2, 8);
+        CHECK_MSG(x.answers == 9 && x.proved == 9, "seed %d: %d of %d %s", (int)seed, x.proved, x.answers, x.why);
+        CHECK_MSG(x.highest <= x.lowest + 1e-12 * x.size, "seed %d: %.10e above %.10e", (int)seed, x.highest, x.lowest);
+        for (int k = 0; k < 2; k++)
+            for (int i = 0; i < x.count[k]; i++) {
+                least = fmin(least, x.effect[k][i]);
+                sum[k] += log(x.effect[k][i]);
+                count[k]++;
+            }
+    }
+    CHECK_MSG(least >= 1, "%g", least);
+    for (int k = 0; k < 2; k++)
+        CHECK_MSG(count[k] > 40 && exp(sum[k] / count[k]) < (k == 0 ? 1.15 : 1.3), "%d: %g", count[k],
+                  exp(sum[k] / count[k]));
+}
