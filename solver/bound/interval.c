@@ -413,6 +413,14 @@ static void look_at_supports(const weighing *y, uz_bound_interval *out)
         }
 }
 
+static double norm_of(const examination *x, const double *u)
+{
+    double sum = 0, margin = 0;
+    for (int64_t e = 0; e < x->mesh->n_elements; e++)
+        sum += uz_energy_of(&margin, x, u, false, e);
+    return sqrt(2 * (sum + margin));
+}
+
 uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, const uz_bound_body *body,
                          const uz_scene *scene, const int64_t *dof, int64_t n_dofs, const double *u,
                          const double *stress, const uz_bound_check_result *checked, uz_error *err)
@@ -431,6 +439,7 @@ uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, cons
         look_at_supports(&y, out);
         out->apart = sqrt(square_apart(&y, true));
         out->lacking = 100 * y.x.inside * sqrt(2 * fabs(y.x.complementary));
+        out->rounding = out->lacking * norm_of(&y.x, u); /* what is missing within elements works on u_h, too */
         const double work = uz_work_of_loads(&y.x, scene, pair->w, &status, err);
         for (int64_t i = 0; i < 2 * body->model->mesh.n_nodes; i++)
             y.x.farthest = fmax(y.x.farthest, fabs(checked->lifted[i]));
