@@ -202,8 +202,8 @@ static bool is_asked_of(const uz_quantity *quantity, const char *on)
     return !*quantity->on || strcmp(quantity->on, on) == 0;
 }
 
-/* The quantity's load on edges and elements of the adjoint body; false: it has none in the continuum. */
-static bool take_load(proving *v, const uz_quantity *quantity, uz_error *err)
+/* The quantity's load on edges and elements of the adjoint body; or why there is none. */
+static const char *take_load(proving *v, const uz_quantity *quantity, uz_error *err)
 {
     const uz_bound_body *body = &v->g->body;
     const uz_scene *own = &v->g->problem->scene;
@@ -215,14 +215,16 @@ static bool take_load(proving *v, const uz_quantity *quantity, uz_error *err)
     scene.loads = &load;
     scene.n_loads = 1;
     if (uz_bound_body_make(&loaded, body->model, &scene, err) != UZ_OK)
-        return false;
-    const bool can = !*loaded.why;
-    for (int64_t i = 0; i < body->n_edges && can; i++)
+        return "its load could not be made";
+    const char *why = *loaded.why                    ? "the continuum has no mean of single nodes"
+                      : loaded.degree > body->degree ? "forces along the axis of rings need quadratic elements"
+                                                     : NULL;
+    for (int64_t i = 0; i < body->n_edges && !why; i++)
         memcpy(v->adjoint.edge[i].traction, loaded.edge[i].traction, sizeof loaded.edge[i].traction);
-    for (int64_t i = 0; i < 2 * body->model->mesh.n_elements && can; i++)
+    for (int64_t i = 0; i < 2 * body->model->mesh.n_elements && !why; i++)
         v->adjoint.force[i] = loaded.force[i];
     uz_bound_body_clear(&loaded);
-    return can;
+    return why;
 }
 
 /* The force of springs on the body along a direction: minus k times a displacement. */
@@ -266,8 +268,8 @@ static const char *make_adjoint(proving *v, const uz_quantity *quantity, const d
             memcpy(to->edge[i].traction, body->edge[i].traction, sizeof body->edge[i].traction);
         memcpy(to->force, body->force, (size_t)(2 * body->model->mesh.n_elements) * sizeof *to->force);
     }
-    if (quantity->kind == UZ_QUANTITY_DISPLACEMENT && !take_load(v, quantity, err))
-        return "the continuum has no mean of single nodes";
+    if (quantity->kind == UZ_QUANTITY_DISPLACEMENT)
+        return take_load(v, quantity, err);
     if (quantity->kind == UZ_QUANTITY_REACTION && !take_springs(v, quantity))
         return "other springs hold the body, too";
     return NULL;

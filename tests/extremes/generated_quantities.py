@@ -147,7 +147,8 @@ class Scene:
         self.displacement("top", self.down(1))
 
     def may_be_proved(self):
-        return self.dim == 2 and self.model != "axisymmetric" and all("plane" in c["obstacle"] or "circle" in c["obstacle"] for c in self.contacts)
+        shapes = ("plane",) if self.model == "axisymmetric" else ("plane", "circle")
+        return self.dim == 2 and all(any(shape in c["obstacle"] for shape in shapes) for c in self.contacts)
 
     def request(self, fine=False, finest=None):
         n = self.n if not fine else max(min(12 * self.n, finest or FINEST[self.dim]), 2 * self.n)

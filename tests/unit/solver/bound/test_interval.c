@@ -7,8 +7,8 @@
 
 enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, QUANTITIES = 4 };
 
-/* A block that a support presses on what is below it: flat, round, or a hollow. */
-typedef enum { FLAT, ROUND, HOLLOW, OBSTACLES } obstacle;
+/* A block that a support presses on what is below it: flat, round, a hollow, or flat and a cylinder. */
+typedef enum { FLAT, ROUND, HOLLOW, RING, OBSTACLES } obstacle;
 
 static uz_scene block(const char *element, int cells, obstacle below)
 {
@@ -16,10 +16,11 @@ static uz_scene block(const char *element, int cells, obstacle below)
     snprintf(scene.box.element, sizeof scene.box.element, "%s", element);
     scene.materials[0].young = 1000;
     add_support(&scene, "left", 0, NAN);
-    add_support(&scene, "top", below == FLAT ? 0 : NAN, -0.01);
+    add_support(&scene, "top", below == FLAT || below == RING ? 0 : NAN, -0.01);
     add_plane(&scene, "bottom", 0, 0, 0, 1);
     uz_contact *contact = &scene.contacts[0];
-    if (below != FLAT) {
+    scene.model = below == RING ? UZ_AXISYMMETRIC : scene.model;
+    if (below == ROUND || below == HOLLOW) {
         *contact = (uz_contact){.kind = UZ_OBSTACLE_ROUND, .on = "bottom", .radius = 5, .inside = below == HOLLOW};
         contact->point[0] = below == ROUND ? 0 : 0.5;
         contact->point[1] = below == ROUND ? -5 : sqrt(25 - 0.25);
@@ -157,7 +158,9 @@ static void take_adjoint(lab *l, int quantity)
         const bool top = a[1] > 0.99 && b[1] > 0.99, right = a[0] > 0.99 && b[0] > 0.99;
         for (int k = 0; k < 2; k++) {
             edge->value[k] = edge->held[k] && top && quantity == 1 ? -edge->axis[k][1] : 0;
-            edge->traction[k] = k == 0 && right && quantity == 2 ? 1 / l->scene.thickness : 0;
+            edge->traction[k] = k == 0 && right && quantity == 2
+                                    ? 1 / (l->g.body.rings ? 2 * 3.14159265358979323846 : l->scene.thickness)
+                                    : 0;
         }
     }
 }
@@ -183,7 +186,9 @@ TEST(pairs_are_trusted_in_nothing)
             take_adjoint(&l, quantity);
             for (int64_t a = 0; a < n; a++) { /* 1 along the normal into what is below, or minus 1 at the top */
                 const double *at = l.model.mesh.xyz + 2 * a;
-                w[2 * a] = at[0] > 1e-9 && (k >= 4 || at[1] < 0.999) ? noise * (random_unit(&random) - 0.5) : 0;
+                w[2 * a] = at[0] > 1e-9 && (k / 4 == ROUND || k / 4 == HOLLOW || at[1] < 0.999)
+                               ? noise * (random_unit(&random) - 0.5)
+                               : 0;
                 w[2 * a + 1] = quantity == 0 ? -wanted * (1 - at[1]) : quantity == 1 ? -at[1] : 0;
                 w[2 * a + 1] += at[1] < 0.999 ? noise * (random_unit(&random) - 0.5) : 0;
             }

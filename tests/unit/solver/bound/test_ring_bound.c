@@ -152,6 +152,87 @@ TEST(thick_tube)
     }
 }
 
+/* A disc and a ring, pressed on a plane from which the rim of a body with a slope on its bottom lifts. The least energy
+ * is that of a mesh many times finer. */
+TEST(pressed_on_a_plane)
+{
+    for (int k = 0; k < 4; k++) {
+        uz_guarantee g[5];
+        for (int i = 0; i < 5; i++) {
+            uz_scene scene = ring_scene(k % 2, i == 4 ? 32 : 6, BOUND_ELEMENTS[i == 4 ? 3 : i]);
+            add_support(&scene, "top", k < 2 ? 0 : NAN, -0.02);
+            if (k >= 2)
+                bound_load(&scene, UZ_LOAD_TRACTION, "right", 20, 10);
+            add_plane(&scene, "bottom", k % 2, 0, 0.01, 1);
+            g[i] = bound_of(&scene);
+            CHECK_MSG(g[i].proved, "%d %d: %s", k, i, g[i].why);
+            uz_scene_clear(&scene);
+        }
+        for (int i = 0; i < 4; i++) {
+            const double error = sqrt(2 * (g[i].primal - g[4].primal)), least = sqrt(2 * (g[i].primal - g[4].dual));
+            CHECK_MSG(g[i].dual <= g[4].primal && g[i].bound >= error && g[i].bound < 1.5 * least,
+                      "%d %d: %g of %g .. %g", k, i, g[i].bound, error, least);
+        }
+    }
+}
+
+/* A ring of a large radius is a strip of that circumference; its hoop stress is of one degree less than the others. */
+TEST(a_large_ring_is_a_strip)
+{
+    for (int k = 0; k < 4; k++) {
+        uz_guarantee g[2];
+        for (int i = 0; i < 2; i++) {
+            const double radius = 1e5;
+            uz_scene scene = ring_scene(radius, 4, BOUND_ELEMENTS[k]);
+            scene.model = i == 0 ? UZ_PLANE_STRAIN : UZ_AXISYMMETRIC;
+            scene.thickness = 2 * PI * radius;
+            add_support(&scene, "left", 0, NAN);
+            add_support(&scene, "top", NAN, -0.01);
+            add_load(&scene, "right", 3, 1);
+            add_plane(&scene, "bottom", radius, 0, 0.01, 1);
+            g[i] = bound_of(&scene);
+            CHECK_MSG(g[i].proved, "%s", g[i].why);
+            uz_scene_clear(&scene);
+        }
+        CHECK_REL(g[1].bound, g[0].bound, 3e-2);
+        CHECK_REL(g[1].dual, g[0].dual, 2e-3);
+    }
+}
+
+static void lean(double *x)
+{
+    x[0] += 0.5 * x[1];
+}
+
+static void lean_and_shuffle(double *x)
+{
+    shuffle(x);
+    lean(x);
+}
+
+/* With a corner on the axis alone, where a quadrilateral's energy has a pole that no coordinate takes out, two sums
+ * over all elements still agree to rounding. */
+TEST(a_corner_on_the_axis)
+{
+    for (int k = 0; k < 8; k++) {
+        double lowest = INFINITY, highest = -INFINITY;
+        for (int n = 1; n <= 8; n *= 2) {
+            uz_scene scene = ring_scene(0, n, BOUND_ELEMENTS[k % 4]);
+            body_give_mesh(&scene, k < 4 ? lean : lean_and_shuffle);
+            body_straighten(&scene);
+            add_support(&scene, "top", NAN, 0);
+            add_load(&scene, "right", 1, 1);
+            add_load(&scene, "bottom", 0.5, 2);
+            const uz_guarantee g = bound_of(&scene);
+            CHECK_MSG(g.proved, "%d %d: %s", k, n, g.why);
+            lowest = fmin(lowest, g.primal);
+            highest = fmax(highest, g.dual);
+            uz_scene_clear(&scene);
+        }
+        CHECK_MSG(highest <= lowest && highest > 1.02 * lowest, "%d: %.12g %.12g", k, highest, lowest);
+    }
+}
+
 /* Some of the rings that `make extremes FILTER=guaranteed` goes through. */
 TEST(never_below_the_truth)
 {
