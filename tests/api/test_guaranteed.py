@@ -2,6 +2,7 @@
 # not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
+import math
 import subprocess
 import tempfile
 
@@ -103,6 +104,70 @@ def test_quantities(s):
         check(one["low"] < true < one["high"] and one["high"] - one["low"] < 0.08 * abs(true), one)
         check(abs(one["value"] - true) < 3e-3 * abs(true), one)
     check(found["down"]["low"] < found["down"]["on_this_mesh"] < found["down"]["high"] < 0, found["down"])
+
+
+TUBE = {"kind": "scene", "model": "axisymmetric", "mesh": {"box": {"origin": [1, 0], "size": [1, 1], "cells": [16, 4], "element": "quad4"}},
+        "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "bottom", "uy": 0}, {"on": "top", "uy": 0}],
+        "loads": [{"on": "left", "pressure": 10}], "contacts": []}
+
+
+def test_a_thick_tube(s):
+    """Lame's, between smooth plates: what its radii move by, the force on the plates, and half the work of the pressure."""
+    ratio, inner = 10 * 1 / (4 - 1), 1.3 / 1000 * 10 / 3 * (0.4 + 4)
+    outer, plate = 1.3 / 1000 * ratio * (0.4 * 2 + 4 / 2), -0.3 * 2 * ratio * math.pi * 3
+    asked = [{"quantity": "displacement", "on": "left", "direction": [1, 0], "name": "inner"}, {"quantity": "strain_energy"},
+             {"quantity": "displacement", "on": "right", "direction": [1, 0], "name": "outer"},
+             {"quantity": "reaction", "on": "bottom", "direction": [0, 1], "name": "plate"}]
+    energy = 0.5 * 10 * inner * 2 * math.pi
+    for element, within in (("tri3", 0.1), ("quad4", 0.1), ("tri6", 0.01), ("quad8", 0.01)):
+        problem = copy.deepcopy(TUBE)
+        problem["mesh"]["box"]["element"] = element
+        summary = summary_of(s, {"problem": problem, "quantities": asked, "solver": {"accuracy": {"guaranteed": True}}})
+        error = summary["error"]
+        check(error["kind"] == "guaranteed" and error["energy_low"] <= -energy <= error["energy_high"], error)
+        check(error["total"] < within, error)
+        for one in summary["quantities"]:
+            true = {"inner": inner, "outer": outer, "plate": plate, "strain_energy": energy}[one["name"]]
+            check(one["kind"] == "guaranteed" and one["low"] <= true <= one["high"], element, one, true)
+            check(one["high"] - one["low"] < within ** 2 * abs(true) * 4, element, one, true)
+
+
+def test_a_disc_on_a_plane(s):
+    """To the axis, pressed by a plate it sticks to. A finer mesh is proved to be near what the coarse one is told to be."""
+    found = []
+    for cells in ([8, 8], [32, 32]):
+        problem = copy.deepcopy(TUBE)
+        problem["mesh"]["box"].update({"origin": [0, 0], "cells": cells, "element": "quad8"})
+        problem["supports"] = [{"on": "left", "ux": 0}, {"on": "top", "ux": 0, "uy": -0.01}]
+        problem["loads"] = [{"on": "right", "traction": [5, 3]}]
+        problem["contacts"] = [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0.01, 1]}}}]
+        request = {"problem": problem, "solver": {"accuracy": {"guaranteed": True}},
+                   "quantities": [{"quantity": "contact.force", "on": "bottom"}, {"quantity": "strain_energy"}]}
+        found.append(summary_of(s, request))
+    errors = [one["error"] for one in found]
+    check(all(error["kind"] == "guaranteed" and "why" not in error for error in errors), errors)
+    low, high = errors[1]["energy_low"], errors[1]["energy_high"]
+    check(errors[0]["energy_low"] <= low <= high <= errors[0]["energy_high"], errors)
+    check(errors[1]["total"] < 0.4 * errors[0]["total"] < 0.05, errors)
+    for coarse, fine in zip(*[one["quantities"] for one in found]):
+        check(coarse["kind"] == fine["kind"] == "guaranteed", coarse, fine)
+        check(max(coarse["low"], fine["low"]) <= min(coarse["high"], fine["high"]), coarse, fine)
+        check(fine["high"] - fine["low"] < 0.3 * (coarse["high"] - coarse["low"]), coarse, fine)
+
+
+def test_rings_that_are_not_proved(s):
+    """A ball below a disc, and an axis that is to hold it."""
+    problem = copy.deepcopy(TUBE)
+    problem["mesh"]["box"]["origin"] = [0, 0]
+    problem["loads"] = []
+    problem["supports"] = [{"on": "top", "uy": -0.01}]
+    problem["contacts"] = [{"on": "bottom", "obstacle": {"circle": {"center": [0, -2], "radius": 2}}}]
+    error = summary_of(s, {"problem": problem, "solver": {"accuracy": {"guaranteed": True}}})["error"]
+    check(error["kind"] == "estimated" and "round obstacle" in error["why"], error)
+    problem["contacts"] = []
+    problem["supports"].append({"on": "left", "uy": -0.01})
+    error = summary_of(s, {"problem": problem, "solver": {"accuracy": {"guaranteed": True}}})["error"]
+    check(error["kind"] == "estimated" and "axis of revolution" in error["why"], error)
 
 
 def test_quantities_that_are_not_proved(s):
