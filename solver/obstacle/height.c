@@ -125,6 +125,7 @@ const uz_obstacle_shape uz_shape_height = {.name = {"height", "height"},
                                            .init = init,
                                            .clear = uz_pieces_clear,
                                            .gap = gap,
+                                           .along = uz_line_along,
                                            .lists = lists,
                                            .outline = uz_line_outline,
                                            .surface = surface};

@@ -10,26 +10,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where piece i begins and ends, in lengths along its tangent from `origin`. */
-typedef struct {
-    const double *origin, *tangent;
-    double first, last;
-} piece;
-
-static piece piece_of(const uz_line *line, int64_t i)
+uz_line_piece uz_line_piece_of(const uz_line *line, int64_t i)
 {
     const double *p = line->point + 2 * (i > 0 ? i - 1 : 0), *t = line->tangent + 2 * i;
     if (i == 0)
-        return (piece){p, t, -INFINITY, 0};
+        return (uz_line_piece){p, t, -INFINITY, 0};
     if (i == line->n)
-        return (piece){p, t, 0, INFINITY};
-    return (piece){p, t, 0, hypot(p[2] - p[0], p[3] - p[1])};
+        return (uz_line_piece){p, t, 0, INFINITY};
+    return (uz_line_piece){p, t, 0, hypot(p[2] - p[0], p[3] - p[1])};
 }
 
 /* The closest point of a piece: the number of a point of the line, or -1 within the piece. */
 static int64_t closest(double foot[2], const uz_line *line, int64_t i, const double x[2])
 {
-    const piece p = piece_of(line, i);
+    const uz_line_piece p = uz_line_piece_of(line, i);
     const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]}, along = uz_dot2(off, p.tangent);
     const double rounding = 4 * DBL_EPSILON * (fabs(x[0]) + fabs(x[1]));
     int64_t corner = -1;
@@ -42,24 +36,29 @@ static int64_t closest(double foot[2], const uz_line *line, int64_t i, const dou
     return corner;
 }
 
-/* An item of the tree is piece item + closed: a closed line has no half line at its beginning. */
-static double distance_to(const void *ctx, int64_t item, const double *x, double best)
+double uz_line_distance(const void *ctx, int64_t item, const double *x, double best)
 {
     (void)best;
     const uz_line *line = ctx;
     const int64_t i = item + line->closed;
     double foot[2];
     if (closest(foot, line, i, x) < 0) {
-        const piece p = piece_of(line, i);
+        const uz_line_piece p = uz_line_piece_of(line, i);
         const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]}, height = uz_cross2(p.tangent, off);
         return height * height;
     }
     return (x[0] - foot[0]) * (x[0] - foot[0]) + (x[1] - foot[1]) * (x[1] - foot[1]);
 }
 
+void uz_line_meet(int64_t meet[2], const uz_line *line, int64_t corner)
+{
+    meet[0] = line->closed && corner == 0 ? line->n - 1 : corner;
+    meet[1] = line->closed && corner == line->n - 1 ? 1 : corner + 1;
+}
+
 static void gap_to_piece(uz_gap *out, const uz_line *line, int64_t i, const double x[2])
 {
-    const piece p = piece_of(line, i);
+    const uz_line_piece p = uz_line_piece_of(line, i);
     out->normal[0] = -p.tangent[1];
     out->normal[1] = p.tangent[0];
     const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]};
@@ -71,7 +70,7 @@ uz_status uz_line_gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_e
 {
     const uz_line *line = o->own;
     (void)err;
-    const int64_t item = uz_box_tree_nearest(&line->tree, x, INFINITY, distance_to, line);
+    const int64_t item = uz_box_tree_nearest(&line->tree, x, INFINITY, uz_line_distance, line);
     const int64_t i = item + line->closed;
     if (item < 0) {
         out->gap = NAN;
@@ -83,12 +82,11 @@ uz_status uz_line_gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_e
         gap_to_piece(out, line, i, x);
         return UZ_OK;
     }
-    /* the pieces that meet at the corner */
-    const int64_t before = line->closed && corner == 0 ? line->n - 1 : corner;
-    const int64_t after = line->closed && corner == line->n - 1 ? 1 : corner + 1;
-    const double *a = line->tangent + 2 * before, *b = line->tangent + 2 * after, turn = uz_cross2(a, b);
+    int64_t meet[2];
+    uz_line_meet(meet, line, corner);
+    const double *a = line->tangent + 2 * meet[0], *b = line->tangent + 2 * meet[1], turn = uz_cross2(a, b);
     if (fabs(turn) <= UZ_SAME_DIRECTION) {
-        gap_to_piece(out, line, before, x);
+        gap_to_piece(out, line, meet[0], x);
         return UZ_OK;
     }
     /* inside or outside by the sum of both normals, which is on the outer side of any corner */
@@ -106,7 +104,7 @@ uz_status uz_line_gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_e
 
 static void box_of(double box[4], const uz_line *line, int64_t i)
 {
-    const piece p = piece_of(line, i);
+    const uz_line_piece p = uz_line_piece_of(line, i);
     for (int c = 0; c < 2; c++) {
         const double a = p.tangent[c] == 0 ? p.origin[c] : p.origin[c] + p.first * p.tangent[c];
         const double b = p.tangent[c] == 0 ? p.origin[c] : p.origin[c] + p.last * p.tangent[c];
@@ -173,7 +171,7 @@ static bool visit_pair(void *ctx, int64_t item)
         return false;
     if (search->left-- <= 0)
         return true;
-    const piece a = piece_of(line, i), b = piece_of(line, j);
+    const uz_line_piece a = uz_line_piece_of(line, i), b = uz_line_piece_of(line, j);
     const double between[2] = {b.origin[0] - a.origin[0], b.origin[1] - a.origin[1]};
     const double turn = uz_cross2(a.tangent, b.tangent);
     if (j == i + 1 || (line->closed && i == 1 && j == line->n - 1)) { /* they share a point, and may only fold back */

@@ -26,6 +26,18 @@ static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_er
     return UZ_OK;
 }
 
+static uz_status along(uz_obstacle_pieces *out, const uz_obstacle *o, const double a[2], const double b[2],
+                       uz_error *err)
+{
+    uz_obstacle_piece piece = {.end = 1};
+    for (int c = 0; c < 2; c++) {
+        piece.normal[c] = -o->direction[c];
+        piece.gap[0] += (a[c] - o->point[c]) * o->direction[c];
+        piece.gap[1] += (b[c] - o->point[c]) * o->direction[c];
+    }
+    return uz_obstacle_piece_add(out, &piece, err);
+}
+
 static int64_t outline(double x[2], double way[2], const uz_contact *contact, int64_t i)
 {
     (void)i;
@@ -59,6 +71,7 @@ const uz_obstacle_shape uz_shape_plane = {.name = {"plane", "plane"},
                                           .has_direction = true,
                                           .check = check,
                                           .gap = gap,
+                                          .along = along,
                                           .outline = outline,
                                           .place = place,
                                           .surface = surface};

@@ -69,5 +69,6 @@ const uz_obstacle_shape uz_shape_polyline = {
     .init = init,
     .clear = uz_pieces_clear,
     .gap = uz_line_gap,
+    .along = uz_line_along,
     .lists = lists,
     .outline = uz_line_outline};

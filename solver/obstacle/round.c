@@ -68,6 +68,15 @@ static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_er
     return UZ_OK;
 }
 
+static uz_status along(uz_obstacle_pieces *out, const uz_obstacle *o, const double a[2], const double b[2],
+                       uz_error *err)
+{
+    (void)a, (void)b;
+    const uz_obstacle_piece piece = {
+        .end = 1, .round = true, .inside = o->inside, .centre = {o->point[0], o->point[1]}, .radius = o->radius};
+    return uz_obstacle_piece_add(out, &piece, err);
+}
+
 static int64_t outline_circle(double x[2], double way[2], const uz_contact *contact, int64_t i)
 {
     enum { STEPS = 720 };
@@ -128,6 +137,7 @@ static void cylinder_surface(double x[3], const uz_obstacle_patch *p, double s, 
 const uz_obstacle_shape uz_shape_round = {.name = {"circle", "sphere"},
                                           .check = check,
                                           .gap = gap,
+                                          .along = along,
                                           .outline = outline_circle,
                                           .place = place_sphere,
                                           .surface = sphere_surface};

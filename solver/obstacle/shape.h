@@ -5,7 +5,7 @@
 #ifndef UZ_OBSTACLE_SHAPE_H
 #define UZ_OBSTACLE_SHAPE_H
 
-#include "obstacle/obstacle.h"
+#include "obstacle/along.h"
 
 typedef struct uz_obstacle_shape uz_obstacle_shape;
 
@@ -49,6 +49,10 @@ struct uz_obstacle_shape {
     void (*clear)(uz_obstacle *o);
     /* All of out, which is zero. */
     uz_status (*gap)(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err);
+    /* Appends what is before the way from a to b, in scaled coordinates, to out (uz_obstacle_piece_add). NULL: of
+     * bodies before it no whole error is proved. */
+    uz_status (*along)(uz_obstacle_pieces *out, const uz_obstacle *o, const double a[2], const double b[2],
+                       uz_error *err);
     /* How many numbers of x, y and z belong to it, for its scale and the body's key; NULL: none. */
     void (*lists)(int64_t n[3], const uz_contact *contact);
     /* The border in the plane, the obstacle on its right: its i-th point, and the way (any length) in which it goes on
