@@ -17,6 +17,7 @@
 
 #include "assembly/assembly.h"
 #include "core/hooks.h"
+#include "obstacle/along.h"
 #include "uzawa.h"
 
 enum { UZ_BOUND_PARTS = 4, UZ_BOUND_POINTS = 6, UZ_BOUND_MOMENTS = 3, UZ_BOUND_LOOSE = 3 };
@@ -27,21 +28,22 @@ typedef enum { UZ_BOUND_ALONE, UZ_BOUND_SLAVE, UZ_BOUND_PARTLY, UZ_BOUND_MASTER 
 
 /* A straight side of one or two elements, and what happens there. */
 typedef struct {
-    int64_t node[3];    /* its ends, the first element on the left; its middle, -1: none */
-    int64_t element[2]; /* the second -1: on the border */
-    int side[2];        /* number in the element */
-    double axis[2][2];  /* directions of its unknowns, orthonormal */
-    bool held[2];       /* along these: */
-    double value[2];    /* given displacement; 0 where free */
-    int64_t contact;    /* of the scene; -1: none */
-    double normal[2];   /* unit, into the obstacle */
-    double gap[2];      /* at the ends: normal . u <= gap, which is linear between them */
-    bool round, inside; /* the obstacle is a disc, or all but one: neither its gap nor its normal are those two then */
-    double centre[2], radius;
-    uz_bound_facing facing; /* the normal is the slave's then, of both */
-    double spring[2];       /* stiffness of the ground along x and y, force per length and area; 0: none */
-    double traction[2];     /* of the loads, force per area, along x and y */
-    double weight[2]; /* at the ends, linear between them: of rings their radius, which is 0 on the axis; else 1 */
+    int64_t node[3];                   /* its ends, the first element on the left; its middle, -1: none */
+    int64_t element[2];                /* the second -1: on the border */
+    int side[2];                       /* number in the element */
+    double axis[2][2];                 /* directions of its unknowns, orthonormal */
+    bool held[2];                      /* along these: */
+    double value[2];                   /* given displacement; 0 where free */
+    int64_t contact;                   /* of the scene; -1: none */
+    int64_t before, pieces;            /* what is before it: of body->before the first, how many; normal . u <= gap */
+    bool turns;                        /* these are not one line: the normal turns along the edge, or leaps */
+    bool presses;                      /* in the dual problem, which may leave out what is before an edge */
+    double along[UZ_BOUND_MOMENTS][2]; /* where it turns: unit directions of the moments of what presses */
+    double normal[2];                  /* of a slave and its masters: out of the slave */
+    uz_bound_facing facing;
+    double spring[2];   /* stiffness of the ground along x and y, force per length and area; 0: none */
+    double traction[2]; /* of the loads, force per area, along x and y */
+    double weight[2];   /* at the ends, linear between them: of rings their radius, which is 0 on the axis; else 1 */
 } uz_bound_edge;
 
 /* A part of a slave's edge, and the part of a master's that is before it. */
@@ -64,6 +66,8 @@ typedef struct {
     uz_bound_segment *segment; /* by slaves */
     double *force;             /* n_elements x 2: force per volume */
     double *free_strain;       /* n_elements; NULL: no temperature */
+    uz_obstacle_pieces before; /* of all edges before obstacles */
+    bool corners;              /* are there any among these obstacles? */
     double *map;     /* uz_bound_keep_maps: of each element, its stress's values by its unknowns; NULL: none kept */
     int64_t *map_at; /* n_elements: where an element's map is */
     int n_loose;     /* motions that only obstacles hold */
@@ -114,9 +118,23 @@ void uz_bound_bernstein(double phi[UZ_BOUND_MOMENTS], int moments, double part);
 void uz_bound_springs(double S[UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS], const uz_bound_body *body, int64_t edge);
 /* The obstacle before an edge, at a part of the way along it, 0 to 1: its gap, and the unit normal into it. */
 double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part);
-/* Directions of the unknowns of an edge's a-th moments: its axes, but before a round obstacle, where the first is the
- * normal at a / degree of the way: so a traction along them, with coefficients that press, is nowhere against it. */
+/* The same by one of the pieces before it, of body->before. */
+double uz_bound_piece_gap(double normal[2], const uz_bound_body *body, int64_t edge, int64_t piece, double part);
+/* The line before an edge along which the normal does not turn. */
+static inline const uz_obstacle_piece *uz_bound_line(const uz_bound_body *body, const uz_bound_edge *edge)
+{
+    return &body->before.at[edge->before];
+}
+/* The direction of the a-th moment of what presses: where the normal turns that of the polynomial next to it, so that a
+ * traction along them, with coefficients that press, is nowhere against the normal. */
+void uz_bound_normal(double normal[2], const uz_bound_body *body, int64_t edge, int a);
+/* Directions of the unknowns of an edge's a-th moments: its axes, but where the normal turns and something presses,
+ * where the first is that of uz_bound_normal. */
 void uz_bound_axes(double axis[2][2], const uz_bound_body *body, int64_t edge, int a);
+/* Part of uz_bound_body_make: what is before an edge, the i-th, of a contact; body->why where that is outside of what
+ * is proved. UZ_ERR_MEMORY. */
+uz_status uz_bound_take_obstacle(uz_bound_body *body, int64_t i, const uz_obstacle *obstacle, const char *on,
+                                 uz_error *err);
 
 /* The dual problem as min 1/2 v'Kv - p'v, h - Nv >= 0. An unknown is a mean of the displacement over an edge with one
  * of degree + 1 Bernstein polynomials as weight, along one of its axes (uz_bound_axes); -N'r are the resultants of the
@@ -165,9 +183,9 @@ typedef struct {
     char fault[160];  /* what is wrong, a clause: nothing is proved; "" */
 } uz_bound_check_result;
 
-/* u: n_nodes x 2. lift: n_nodes x 2, zero at supports: what is to take u out of round obstacles; NULL: the check finds
- * something by itself, which it does for what this leaves in them, too, and has larger norms. scene: with the loads of
- * the case. The caller clears *out. UZ_ERR_MEMORY. */
+/* u: n_nodes x 2. lift: n_nodes x 2, zero at supports: what is to take u out of obstacles whose normal turns; NULL: the
+ * check finds something by itself, which it does for what this leaves in them, too, and has larger norms. scene: with
+ * the loads of the case. The caller clears *out. UZ_ERR_MEMORY. */
 uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
                          const int64_t *dof, int64_t n_dofs, const double *u, const double *lift, const double *stress,
                          uz_error *err);

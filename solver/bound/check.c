@@ -39,6 +39,7 @@ enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 };
 static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i);
 static void examine_springs(examination *x, const double *u, int64_t i, int k);
 static void settle_motions(examination *x, const double *u, const int64_t *dof);
+static void lift_on(examination *x, const double *u);
 static void look_at_lift(examination *x, const double *u, int64_t i);
 static const uz_check_of *check_of(const examination *x);
 
@@ -77,6 +78,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         uz_take_pairs_apart(&x, u);
         for (int64_t i = 0; i < 2 * mesh->n_nodes && lift; i++)
             x.lift[i] += lift[i];
+        lift_on(&x, u);
         const double ground = uz_spring_energy(&x, u), scale = x.scale + fabs(load) + ground;
         x.sum += x.springs + ground;
         out->least = 2 * fmax(0, x.sum - rounding - 4 * UZ_SUM_ROUNDING * ground);
@@ -171,10 +173,11 @@ void uz_along_edge(double b[3], const double *u, const int64_t node[3], const do
 /* s: the gap that u_h leaves, as uz_along_edge; lift: by how much w widens it. */
 static void gap_along(double s[3], double lift[3], const examination *x, const double *u, const uz_bound_edge *edge)
 {
-    uz_along_edge(s, u, edge->node, edge->normal);
-    uz_along_edge(lift, x->lift, edge->node, edge->normal);
+    const uz_obstacle_piece *line = uz_bound_line(x->body, edge);
+    uz_along_edge(s, u, edge->node, line->normal);
+    uz_along_edge(lift, x->lift, edge->node, line->normal);
     for (int a = 0; a < 3; a++) {
-        s[a] = (a == 0 ? edge->gap[0] : a == 2 ? edge->gap[1] : (edge->gap[0] + edge->gap[1]) / 2) - s[a];
+        s[a] = (a == 0 ? line->gap[0] : a == 2 ? line->gap[1] : (line->gap[0] + line->gap[1]) / 2) - s[a];
         lift[a] = -lift[a];
     }
 }
@@ -205,6 +208,16 @@ void uz_lift_node(examination *x, int64_t node, const double normal[2], double b
             x->lift[2 * node + c] = -by * way[c];
 }
 
+bool uz_lift_more(examination *x, int64_t node, const double normal[2], double by)
+{
+    double way[2];
+    if (node < 0 || !(by > 0) || !uz_way_along(way, x->body->model, node, normal))
+        return false;
+    for (int c = 0; c < 2; c++)
+        x->lift[2 * node + c] -= by * way[c];
+    return true;
+}
+
 void uz_add_given(double b[3], const examination *x, const uz_bound_edge *edge, const double n[2])
 {
     double more[3];
@@ -215,24 +228,61 @@ void uz_add_given(double b[3], const examination *x, const uz_bound_edge *edge, 
         b[a] += more[a];
 }
 
-/* The work of the gap that u_h leaves, and w where it is not >= 0 all along: its nodes are taken out, and the middle
- * one as far as makes the middle coefficient -sqrt(s_0 s_2), from where on the polynomial has no negative value. */
+/* By how much the nodes have to be taken out, the middle one as far as makes the middle coefficient -sqrt(s_0 s_2),
+ * from where on the polynomial has no negative value. */
+static void needed_lift(double nodal[3], const double s[3])
+{
+    double up[3];
+    for (int a = 0; a < 3; a++)
+        up[a] = fmax(0, -s[a] - (a == 1 ? sqrt(fmax(0, s[0]) * fmax(0, s[2])) : 0));
+    nodal[0] = up[0];
+    nodal[1] = up[2];
+    nodal[2] = (up[0] + 2 * fmax(up[1], (up[0] + up[2]) / 2) + up[2]) / 4;
+}
+
+/* The work of the gap that u_h leaves, and w where it is not >= 0 all along. */
 static void examine_contact(examination *x, const double *u, const uz_bound_edge *edge, const double *pressure)
 {
     uz_bound_check_result *out = x->out;
-    double s[3], m[UZ_BOUND_MOMENTS], up[3], none[3], more[3] = {0};
+    double s[3], m[UZ_BOUND_MOMENTS], nodal[3], none[3], more[3] = {0};
     gap_along(s, none, x, u, edge);
     uz_edge_means(m, s, x->moments);
     for (int a = 0; a < x->moments; a++)
         out->gap += pressure[a] * m[a];
-    uz_add_given(more, x, edge, edge->normal); /* what was given to take it out */
+    uz_add_given(more, x, edge, uz_bound_line(x->body, edge)->normal); /* what was given to take it out */
     for (int a = 0; a < 3; a++)
         s[a] -= more[a];
+    needed_lift(nodal, s);
     for (int a = 0; a < 3; a++)
-        up[a] = fmax(0, -s[a] - (a == 1 ? sqrt(fmax(0, s[0]) * fmax(0, s[2])) : 0));
-    const double nodal[3] = {up[0], up[2], (up[0] + 2 * fmax(up[1], (up[0] + up[2]) / 2) + up[2]) / 4};
-    for (int a = 0; a < 3; a++)
-        uz_lift_node(x, edge->node[a], edge->normal, nodal[a]);
+        uz_lift_node(x, edge->node[a], uz_bound_line(x->body, edge)->normal, nodal[a]);
+}
+
+/* Where normals leap from edge to edge, what takes a node out of one's obstacle may leave it in the other's: it goes on
+ * from there, until it is out of both. */
+static void lift_on(examination *x, const double *u)
+{
+    enum { PASSES = 20 };
+    bool lifted = x->body->corners;
+    for (int pass = 0; pass < PASSES && lifted; pass++) {
+        lifted = false;
+        for (int64_t i = 0; i < x->body->n_edges; i++) {
+            const uz_bound_edge *edge = &x->body->edge[i];
+            double s[3], more[3], nodal[3], size = 0;
+            if (edge->turns)
+                lifted = uz_lift_turning(x, u, i) || lifted;
+            if (edge->turns || edge->contact < 0)
+                continue;
+            gap_along(s, more, x, u, edge);
+            for (int a = 0; a < 3; a++) {
+                size = fmax(size, fabs(s[a]));
+                s[a] += more[a];
+            }
+            needed_lift(nodal, s);
+            for (int a = 0; a < 3; a++)
+                if (nodal[a] > uz_place_rounding(x) && nodal[a] > 1e-13 * size)
+                    lifted = uz_lift_more(x, edge->node[a], uz_bound_line(x->body, edge)->normal, nodal[a]) || lifted;
+        }
+    }
 }
 
 double uz_place_rounding(const examination *x)
@@ -256,16 +306,17 @@ static void look_at_lift(examination *x, const double *u, int64_t i)
     }
     if (!*x->out->fault && !held)
         snprintf(x->out->fault, sizeof x->out->fault, "what takes the answer out of the obstacle moves a support");
-    if (edge->round)
-        uz_look_at_round(x, u, i);
-    if (edge->contact < 0 || edge->round)
+    if (edge->turns)
+        uz_look_at_turning(x, u, i);
+    if (edge->contact < 0 || edge->turns)
         return;
+    const uz_obstacle_piece *line = uz_bound_line(x->body, edge);
     gap_along(s, lift, x, u, edge);
     uz_edge_means(m, lift, x->moments);
     for (int a = 0; a < x->moments; a++)
         x->out->gap += x->pressure[i * x->moments + a] * m[a];
     for (int a = 0; a < 3; a++)
-        tolerance = fmax(tolerance, 1e-12 * (fabs(s[a]) + fabs(edge->gap[0]) + fabs(edge->gap[1])));
+        tolerance = fmax(tolerance, 1e-12 * (fabs(s[a]) + fabs(line->gap[0]) + fabs(line->gap[1])));
     for (int a = 0; a < 3; a++)
         s[a] += lift[a] + tolerance;
     const bool out_of_it = s[0] >= 0 && s[2] >= 0 && s[1] >= -sqrt(s[0] * s[2]) - tolerance;
@@ -336,12 +387,12 @@ void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, c
     const uz_bound_edge *edge = &x->body->edge[i];
     double *pressure = x->pressure + i * x->moments, share[2], turned[UZ_BOUND_MOMENTS][2] = {{0}};
     uz_less_load(x->resultant, x, edge, i);
-    if (edge->round)
-        uz_examine_round(turned, x, u, i);
+    if (edge->turns)
+        uz_examine_turning(turned, x, u, i);
     for (int a = 0; a < x->moments; a++) {
         double acts[2], axis[2][2], normal[2]; /* acts: of the stress, along the axes of these moments */
         uz_bound_axes(axis, x->body, i, a);
-        uz_bound_gap(normal, x->body, i, (double)a / x->body->degree);
+        uz_bound_normal(normal, x->body, i, a);
         for (int k = 0; k < 2; k++) {
             acts[k] = axis[k][0] * x->resultant[(i * x->moments + a) * 2] +
                       axis[k][1] * x->resultant[(i * x->moments + a) * 2 + 1];
@@ -351,9 +402,9 @@ void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, c
         if (pressed)
             pressure[a] = -acts[0];
         else if ((edge->contact >= 0 || edge->facing == UZ_BOUND_SLAVE) && !edge->held[0] &&
-                 !edge->round) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
+                 !edge->turns) /* nothing held: share[0] is 1 and share[1] is 0, but for rounding */
             pressure[a] = uz_admit_pressure(x, i * x->moments + a, -(acts[0] * share[0] + acts[1] * share[1]));
-        else if (edge->contact >= 0 && !edge->held[1] && fabs(share[1]) > 1e-9)
+        else if (edge->contact >= 0 && !edge->held[1] && !edge->turns && fabs(share[1]) > 1e-9)
             pressure[a] = uz_admit_pressure(x, i * x->moments + a, -acts[1] / share[1]);
         for (int k = 0; k < 2; k++) /* of what is pressed until settle_motions nothing: the pressure is what acts */
             missing[a][k] =
@@ -386,8 +437,10 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
                 out->residual[at] = missing[a][k];
             }
         }
-        if (edge->contact >= 0 && !edge->round)
-            out->dual -= pressure[a] * (edge->gap[0] + (edge->gap[1] - edge->gap[0]) * (a + 1) / (x->moments + 1));
+        if (edge->contact >= 0 && !edge->turns) {
+            const double *gap = uz_bound_line(x->body, edge)->gap;
+            out->dual -= pressure[a] * (gap[0] + (gap[1] - gap[0]) * (a + 1) / (x->moments + 1));
+        }
     }
     for (int k = 0; k < 2; k++)
         examine_springs(x, u, i, k);
@@ -401,7 +454,7 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
                 snprintf(out->fault, sizeof out->fault, "at a support the displacement is %.9e in place of %.9e", b[a],
                          edge->value[k]);
     }
-    if (edge->contact >= 0 && !edge->round)
+    if (edge->contact >= 0 && !edge->turns)
         examine_contact(x, u, edge, pressure);
 }
 
@@ -424,7 +477,7 @@ static void settle_motions(examination *x, const double *u, const int64_t *dof)
                 }
                 const int held = uz_bound_pressed(body, i, a);
                 if (held >= 0)
-                    A[k][held] = uz_bound_moved(body, k, i, a, body->edge[i].normal);
+                    A[k][held] = uz_bound_moved(body, k, i, a, uz_bound_line(body, &body->edge[i])->normal);
             }
     for (int k = 0; k < n; k++) {
         int best = k;
@@ -446,7 +499,7 @@ static void settle_motions(examination *x, const double *u, const int64_t *dof)
         const double missing = A[k][n] / A[k][k];
         double b[3], moved[UZ_BOUND_MOMENTS], none[2], *pressure = &x->pressure[body->pressed[k]];
         const double gap = uz_bound_gap(none, body, i, (a + 1.) / (x->moments + 1));
-        uz_along_edge(b, u, edge->node, edge->normal);
+        uz_along_edge(b, u, edge->node, uz_bound_line(body, edge)->normal);
         uz_edge_means(moved, b, x->moments);
         *pressure -= missing;
         x->out->dual += missing * gap;

@@ -104,12 +104,16 @@ void uz_along_segment(double b[3], const examination *x, const uz_bound_segment 
 double uz_segment_work(const examination *x, const uz_bound_segment *segment, const double *pressure,
                        const double b[3]);
 
-/* Edges before round obstacles, check_round.c. The first looks at the stress's tractions and where u_h leaves its
- * nodes: pressure, gap, w at the nodes and what is not along the normal, of which turned (moments x 2) are the
- * resultants that are missing. The second, once w is known at all nodes, bulges what is still in the obstacle out of
- * it. */
-void uz_examine_round(double turned[UZ_BOUND_MOMENTS][2], examination *x, const double *u, int64_t edge);
-void uz_look_at_round(examination *x, const double *u, int64_t edge);
+/* Makes w at a node (-1: none) go on by so much against the normal; false: supports leave no way. */
+bool uz_lift_more(examination *x, int64_t node, const double normal[2], double by);
+
+/* Edges along which the normal turns, check_turning.c. The first looks at the stress's tractions and where u_h leaves
+ * its nodes: pressure, gap, w at the nodes and what is not along the normal, of which turned (moments x 2) are the
+ * resultants that are missing. The second takes nodes on where corners are still in them: did it? The third, once w is
+ * known at all nodes, bulges what is still in the obstacle out of it. */
+void uz_examine_turning(double turned[UZ_BOUND_MOMENTS][2], examination *x, const double *u, int64_t edge);
+bool uz_lift_turning(examination *x, const double *u, int64_t edge);
+void uz_look_at_turning(examination *x, const double *u, int64_t edge);
 /* Tractions that are missing on an edge and orthogonal to the polynomials of the degree there: int |delta|^2 along it.
  */
 void uz_count_turning(examination *x, const uz_bound_edge *edge, double left);

@@ -5,16 +5,13 @@
 #include "core/error.h"
 #include "scene/scene.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Relative to the body's extent: how far a middle may be off the middle of its side, and a point from an obstacle that
- * it touches: displacements may be small, too. */
+/* Relative to the body's extent: how far a middle may be off the middle of its side. */
 #define ROUNDING 1e-13
-#define TOUCHING (16 * DBL_EPSILON)
 #define PI       3.14159265358979323846
 
 const double uz_bound_product_inverse[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS] = {{{4, -2}, {-2, 4}},
@@ -86,6 +83,7 @@ void uz_bound_body_clear(uz_bound_body *body)
     free(body->edge);
     free(body->edge_of);
     free(body->segment);
+    free(body->before.at);
     free(body->force);
     free(body->free_strain);
     free(body->motion);
@@ -248,73 +246,34 @@ static void take_supports(survey *x)
     }
 }
 
-/* Gap and normal are those of every point of the edge. They turn by less than an angle of 1 along it, and are analytic
- * as far around it as it is long: sums over points integrate them to rounding (check_round.c). */
-static void take_round(survey *x, uz_bound_edge *edge, const uz_contact *contact)
-{
-    const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
-    const double way[2] = {to[0] - from[0], to[1] - from[1]}, length = hypot(way[0], way[1]);
-    const double off[2] = {contact->point[0] - from[0], contact->point[1] - from[1]};
-    const double part = fmin(1, fmax(0, (off[0] * way[0] + off[1] * way[1]) / (length * length)));
-    double n[2];
-    if (hypot(off[0] - part * way[0], off[1] - part * way[1]) < length)
-        refuse(x->body, "edges of \"%s\" are longer than they are away from the obstacle's centre", contact->on);
-    if (edge->held[0])
-        refuse(x->body, "supports hold edges of \"%s\" before a round obstacle", contact->on);
-    edge->round = true;
-    edge->inside = contact->inside;
-    edge->radius = contact->radius;
-    memcpy(edge->centre, contact->point, sizeof edge->centre);
-    uz_bound_gap(n, x->body, edge - x->body->edge, 0.5);
-    edge->axis[0][0] = edge->axis[1][1] = n[0];
-    edge->axis[0][1] = n[1];
-    edge->axis[1][0] = -n[1];
-}
-
 static uz_status take_contacts(survey *x, uz_error *err)
 {
     const uz_bound_body *body = x->body;
-    for (int64_t k = 0; k < x->scene->n_contacts; k++) {
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; k < x->scene->n_contacts && status == UZ_OK; k++) {
         const uz_contact *contact = &x->scene->contacts[k];
         const uz_group *group = uz_mesh_group(x->mesh, contact->on, "", NULL);
-        double n[3];
-        const bool round = contact->kind == UZ_OBSTACLE_ROUND;
+        uz_obstacle *obstacle = NULL;
         if (contact->kind == UZ_OBSTACLE_BODY) {
-            const uz_status status = uz_bound_take_pair(x->body, x->scene, k, err);
-            if (status != UZ_OK || *x->body->why)
-                return status;
+            status = uz_bound_take_pair(x->body, x->scene, k, err);
+            if (*x->body->why)
+                break;
             continue;
         }
-        if (contact->kind != UZ_OBSTACLE_PLANE && !round)
-            refuse(x->body, "the obstacle of \"%s\" has corners, where its normal leaps", contact->on);
-        else if (!group || group->kind != UZ_GROUP_FACES || group->n_inner > 0 ||
-                 (!round && !uz_unit_normal(n, contact->normal, 2)) || !find_group(x, contact->on))
+        if (!group || group->kind != UZ_GROUP_FACES || group->n_inner > 0 || !find_group(x, contact->on))
             refuse(x->body, "the contact's group \"%s\" is not made of edges of the border", contact->on);
         if (*x->body->why)
-            return UZ_OK;
-        for (int64_t i = 0; i < x->n_found; i++) {
-            uz_bound_edge *edge = &body->edge[x->found[i]];
-            if (edge->contact >= 0 || edge->facing != UZ_BOUND_ALONE)
+            break;
+        status = uz_obstacle_new(&obstacle, contact, k, body->model->kind, err);
+        for (int64_t i = 0; i < x->n_found && status == UZ_OK && !*body->why; i++) {
+            if (body->edge[x->found[i]].contact >= 0 || body->edge[x->found[i]].facing != UZ_BOUND_ALONE)
                 refuse(x->body, "an edge of \"%s\" has two obstacles before it", contact->on);
-            edge->contact = k;
-            if (round) {
-                take_round(x, edge, contact);
-                continue;
-            }
-            for (int a = 0; a < 2; a++) {
-                const double *at = x->mesh->xyz + 2 * edge->node[a];
-                const double gap = (at[0] - contact->point[0]) * n[0] + (at[1] - contact->point[1]) * n[1];
-                edge->normal[a] = -n[a];
-                edge->gap[a] = fabs(gap) < TOUCHING * x->mesh->extent ? 0 : gap;
-            }
-            if (!edge->held[0]) { /* one unknown along the normal makes a row of one entry */
-                edge->axis[0][0] = edge->axis[1][1] = -n[0];
-                edge->axis[0][1] = -n[1];
-                edge->axis[1][0] = n[1];
-            }
+            body->edge[x->found[i]].contact = k;
+            status = uz_bound_take_obstacle(x->body, x->found[i], obstacle, contact->on, err);
         }
+        uz_obstacle_free(obstacle);
     }
-    return UZ_OK;
+    return status;
 }
 
 static double area_of(const uz_bound_body *body, int64_t edge)
@@ -408,8 +367,11 @@ static void look_at_rings(uz_bound_body *body)
         const bool held = edge->held[1] || (edge->held[0] && (fabs(edge->axis[0][1]) > 0 || fabs(edge->value[0]) > 0));
         if (edge->facing != UZ_BOUND_ALONE)
             refuse(body, "parts of a body of revolution press on each other", "");
-        if (edge->round)
-            refuse(body, "a body of revolution is before a round obstacle, where no tractions of rings turn", "");
+        if (edge->turns)
+            refuse(
+                body,
+                "a body of revolution is before an obstacle along which normals turn, where no tractions of rings turn",
+                "");
         if (!(edge->weight[0] + edge->weight[1] > 0) &&
             (held || edge->contact >= 0 || edge->spring[0] > 0 || edge->spring[1] > 0))
             refuse(body, "something holds the axis of revolution, which the continuum does not feel", "");
@@ -442,34 +404,6 @@ void uz_bound_bernstein(double phi[UZ_BOUND_MOMENTS], int moments, double q)
     phi[0] = moments == 2 ? p : p * p;
     phi[1] = moments == 2 ? q : 2 * p * q;
     phi[2] = moments == 2 ? 0 : q * q;
-}
-
-double uz_bound_gap(double normal[2], const uz_bound_body *body, int64_t edge, double part)
-{
-    const uz_bound_edge *at = &body->edge[edge];
-    const double *from = body->model->mesh.xyz + 2 * at->node[0], *to = body->model->mesh.xyz + 2 * at->node[1];
-    double off[2];
-    memcpy(normal, at->normal, sizeof at->normal);
-    if (!at->round)
-        return at->gap[0] + part * (at->gap[1] - at->gap[0]);
-    for (int c = 0; c < 2; c++)
-        off[c] = from[c] - at->centre[c] + part * (to[c] - from[c]);
-    const double distance = hypot(off[0], off[1]), sign = at->inside ? 1 : -1;
-    for (int c = 0; c < 2; c++)
-        normal[c] = sign * off[c] / distance;
-    return sign * (at->radius - distance);
-}
-
-void uz_bound_axes(double axis[2][2], const uz_bound_body *body, int64_t edge, int a)
-{
-    double n[2];
-    memcpy(axis, body->edge[edge].axis, sizeof body->edge[edge].axis);
-    if (!body->edge[edge].round)
-        return;
-    uz_bound_gap(n, body, edge, (double)a / body->degree);
-    axis[0][0] = axis[1][1] = n[0];
-    axis[0][1] = n[1];
-    axis[1][0] = -n[1];
 }
 
 void uz_bound_centre(double centre[2], const uz_bound_body *body, int64_t element)

@@ -60,7 +60,7 @@ static void number(int64_t dof_of[OUTER], double value[OUTER], const macro *m, c
     }
 }
 
-/* From the edges' axes to those of their moments, which differ before round obstacles: x, and K (outer x outer, the
+/* From the edges' axes to those of their moments, which differ where the normal turns: x, and K (outer x outer, the
  * lower triangle is given; NULL: none); or back. */
 static void turn(double *K, double x[OUTER], const macro *m, bool back)
 {
@@ -70,7 +70,7 @@ static void turn(double *K, double x[OUTER], const macro *m, bool back)
         const int64_t at = m->body->edge_of[4 * m->element + i / (2 * moments)];
         const uz_bound_edge *edge = &m->body->edge[at];
         double axis[2][2], R[2][2];
-        if (!edge->round)
+        if (!edge->turns)
             continue;
         for (int c = 0; c < n && !mirrored; c++)
             for (int r = 0; r < c; r++)
@@ -230,21 +230,25 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     return status;
 }
 
-/* The mean of the gap with the a-th weight, along the normal of the a-th moments: that of a line is its value at
- * (a + 1) / (degree + 2) of its length; before round obstacles by Simpson's rule, as nothing is proved here. */
+/* The mean of the gap with the a-th weight, along the direction of the a-th moments: that of a line is its value at
+ * (a + 1) / (degree + 2) of its length; where the normal turns by Simpson's rule, as nothing is proved here. */
 static double mean_gap(double normal[2], const uz_bound_body *body, int64_t i, int a)
 {
-    enum { STEPS = 16 };
-    const int moments = body->degree + 1;
-    double n[2], sum = 0;
-    if (!body->edge[i].round)
+    const uz_bound_edge *edge = &body->edge[i];
+    const int moments = body->degree + 1, steps = edge->pieces > 4 ? 4 : 16;
+    double n[2], sum = 0, from = 0;
+    if (!edge->turns)
         return uz_bound_gap(normal, body, i, (a + 1.) / (moments + 1));
-    uz_bound_gap(normal, body, i, (double)a / body->degree);
-    for (int k = 0; k <= STEPS; k++) {
-        const double t = (double)k / STEPS, gap = uz_bound_gap(n, body, i, t);
-        const double weight = (k == 0 || k == STEPS ? 1. : k % 2 ? 4. : 2.) / (3 * STEPS);
-        const double phi = (a == 1 && moments == 3 ? 2 : 1) * pow(1 - t, moments - 1 - a) * pow(t, a);
-        sum += moments * weight * phi * (normal[0] * n[0] + normal[1] * n[1]) * gap;
+    uz_bound_normal(normal, body, i, a);
+    for (int64_t piece = edge->before; piece < edge->before + edge->pieces; piece++) {
+        const double end = body->before.at[piece].end;
+        for (int k = 0; k <= steps; k++) {
+            const double t = from + (end - from) * k / steps, gap = uz_bound_piece_gap(n, body, i, piece, t);
+            const double weight = (end - from) * (k % steps == 0 ? 1. : k % 2 ? 4. : 2.) / (3 * steps);
+            const double phi = (a == 1 && moments == 3 ? 2 : 1) * pow(1 - t, moments - 1 - a) * pow(t, a);
+            sum += moments * weight * phi * (normal[0] * n[0] + normal[1] * n[1]) * gap;
+        }
+        from = end;
     }
     return sum;
 }
@@ -254,11 +258,11 @@ bool uz_bound_has_row(const uz_bound_body *body, const int64_t *dof, int64_t edg
     double axis[2][2], normal[2];
     bool has = false;
     uz_bound_axes(axis, body, edge, a);
-    uz_bound_gap(normal, body, edge, (double)a / body->degree);
+    uz_bound_normal(normal, body, edge, a);
     for (int k = 0; k < 2; k++)
         has = has || (dof[(edge * (body->degree + 1) + a) * 2 + k] >= 0 &&
                       fabs(normal[0] * axis[k][0] + normal[1] * axis[k][1]) > 1e-9);
-    return has && body->edge[edge].contact >= 0;
+    return has && body->edge[edge].presses;
 }
 
 typedef struct {
@@ -317,7 +321,7 @@ static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     const int moments = body->degree + 1;
     int64_t edges = 0;
     for (int64_t i = 0; i < body->n_edges; i++)
-        edges += body->edge[i].contact >= 0 || body->edge[i].facing == UZ_BOUND_SLAVE;
+        edges += body->edge[i].presses || body->edge[i].facing == UZ_BOUND_SLAVE;
     const int64_t room = moments * (2 * edges + moments * body->n_segments);
     row_list N = {.row = uz_alloc(room, sizeof(int64_t)), .col = uz_alloc(room, sizeof(int64_t))};
     N.val = uz_alloc(room, sizeof *N.val);
@@ -327,7 +331,7 @@ static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const
             ? UZ_OK
             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)(moments * edges));
     for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++)
-        if (body->edge[i].contact >= 0)
+        if (body->edge[i].presses)
             add_edge_rows(&N, body, dof, i);
     for (int64_t k = 0; k < body->n_segments && status == UZ_OK; k++)
         if (body->edge[body->segment[k].slave].facing == UZ_BOUND_SLAVE &&

@@ -206,6 +206,23 @@ static double below_zero(const double b[3])
     return fmax(fmax(-b[0], -b[2]), -b[1] - sqrt(fmax(0, b[0]) * fmax(0, b[2])));
 }
 
+/* By how much s is below its chord along an edge: before a circle four times that, as normals turn, too. */
+static double bends_away(const uz_bound_body *body, int64_t i, const double *u)
+{
+    const uz_bound_edge *edge = &body->edge[i];
+    const uz_obstacle_piece *piece = &body->before.at[edge->before];
+    double s[4], b[3], n[2], below = 0;
+    for (int64_t k = 0; k < edge->pieces; k++)
+        for (int j = 0; j < 4; j++) { /* both ends, and the middle and the end of the piece */
+            const double q = j < 2 ? j : j == 2 ? ((k > 0 ? piece[k - 1].end : 0) + piece[k].end) / 2 : piece[k].end;
+            s[j] = uz_bound_gap(n, body, i, q);
+            uz_along_edge(b, u, edge->node, n);
+            s[j] -= b[0] * (1 - q) * (1 - q) + 2 * b[1] * q * (1 - q) + b[2] * q * q;
+            below = j < 2 ? below : fmax(below, (1 - q) * s[0] + q * s[1] - s[j]);
+        }
+    return below;
+}
+
 /* With these widths at the nodes polynomials between them keep to s along the whole edge, but for normals that turn: s
  * bends away from its chord by h^2 / 8R; a quadratic polynomial is at most 1.25 times its nodes', and its middle
  * coefficient twice the middle less half the ends'. */
@@ -217,9 +234,7 @@ void uz_bound_openings(double *open, const uz_bound_body *body, const uz_bound_c
     for (int64_t i = 0; i < body->n_edges; i++) {
         static const double PART[3] = {0, 1, 0.5};
         const uz_bound_edge *edge = &body->edge[i];
-        const double *from = mesh->xyz + 2 * edge->node[0], *to = mesh->xyz + 2 * edge->node[1];
-        const double length2 = (to[0] - from[0]) * (to[0] - from[0]) + (to[1] - from[1]) * (to[1] - from[1]);
-        const double bends = edge->round ? length2 / (2 * edge->radius) : 0;
+        const double bends = edge->turns ? bends_away(body, i, checked->lifted) : 0;
         double s[3] = {0};
         for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++) {
             double n[2];
@@ -259,19 +274,26 @@ static void bring_nodes(weighing *y)
 {
     static const double PART[3] = {0, 1, 0.5};
     const uz_bound_body *body = y->body;
+    enum { PASSES = 60 };
+    bool changed = true;
     double *open = y->v; /* n_nodes of it */
     uz_bound_openings(open, body, y->checked);
-    for (int64_t i = 0; i < body->n_edges; i++) {
-        const uz_bound_edge *edge = &body->edge[i];
-        for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++) {
-            const int64_t node = edge->node[a];
-            double n[2], way[2], *w = y->pair->w + 2 * node;
-            uz_bound_gap(n, body, i, PART[a]);
-            const bool free_along = uz_way_along(way, body->model, node, n);
-            const double moved = n[0] * w[0] + n[1] * w[1], om = y->pair->wanted[edge->contact];
-            const double most = y->pair->share * open[node], by = fmax(om - most, fmin(om + most, moved)) - moved;
-            for (int c = 0; c < 2 && free_along; c++)
-                w[c] += by * way[c];
+    for (int pass = 0; pass < (body->corners ? PASSES : 1) && changed; pass++) { /* normals leap at corners */
+        changed = false;
+        for (int64_t i = 0; i < body->n_edges; i++) {
+            const uz_bound_edge *edge = &body->edge[i];
+            for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++) {
+                const int64_t node = edge->node[a];
+                double n[2], way[2], *w = y->pair->w + 2 * node;
+                uz_bound_gap(n, body, i, PART[a]);
+                const bool free_along = uz_way_along(way, body->model, node, n);
+                const double moved = n[0] * w[0] + n[1] * w[1], om = y->pair->wanted[edge->contact];
+                const double most = y->pair->share * open[node], by = fmax(om - most, fmin(om + most, moved)) - moved;
+                const bool off = pass == 0 || fabs(by) > PLACES / 10 * (fabs(om) + fabs(w[0]) + fabs(w[1]));
+                for (int c = 0; c < 2 && free_along && off; c++)
+                    w[c] += by * way[c];
+                changed = changed || (free_along && off);
+            }
         }
     }
 }
@@ -282,14 +304,15 @@ static void look_at_edge(weighing *y, int64_t i)
     const uz_bound_edge *edge = &y->body->edge[i];
     const double m = y->pair->share, om = y->pair->wanted[edge->contact];
     double s[3], moved[3], most = 0, size = fabs(om) + m * y->x.farthest;
-    if (edge->round) {
+    if (edge->turns) {
         uz_bulge_excess(&y->x, y->checked->lifted, y->pair->w, om, m, y->checked->pressure, i);
         return;
     }
-    uz_along_edge(s, y->checked->lifted, edge->node, edge->normal);
-    uz_along_edge(moved, y->pair->w, edge->node, edge->normal);
+    const uz_obstacle_piece *line = uz_bound_line(y->body, edge);
+    uz_along_edge(s, y->checked->lifted, edge->node, line->normal);
+    uz_along_edge(moved, y->pair->w, edge->node, line->normal);
     for (int a = 0; a < 3; a++) {
-        const double gap = a == 0 ? edge->gap[0] : a == 2 ? edge->gap[1] : (edge->gap[0] + edge->gap[1]) / 2;
+        const double gap = a == 0 ? line->gap[0] : a == 2 ? line->gap[1] : (line->gap[0] + line->gap[1]) / 2;
         for (int c = 0; c < 2 && edge->node[a] >= 0; c++)
             size = fmax(size, fabs(y->pair->w[2 * edge->node[a] + c]));
         s[a] = m * (gap - s[a]);
@@ -303,7 +326,8 @@ static void look_at_edge(weighing *y, int64_t i)
     }
     if (!*y->scratch.fault && !(most <= PLACES * size))
         snprintf(y->scratch.fault, sizeof y->scratch.fault,
-                 "the contact meets supports, where what presses has no bound");
+                 "the contact meets supports%s, where what presses has no bound",
+                 y->body->corners ? " or a corner" : "");
 }
 
 /* Where surfaces of the body face each other nodes of two meshes say where w_n is: along a slave's edge its ends go by
@@ -375,15 +399,15 @@ static void weigh_edges(weighing *y, uz_bound_interval *out, const int64_t *dof)
                 out->middle += term;
                 out->rounding += UZ_SUM_ROUNDING * fabs(term);
             }
-            if (edge->contact >= 0 && !edge->round) {
-                term = x->pressure[i * x->moments + a] *
-                       (edge->gap[0] + (edge->gap[1] - edge->gap[0]) * (a + 1) / (x->moments + 1));
+            if (edge->contact >= 0 && !edge->turns) {
+                const double *gap = uz_bound_line(y->body, edge)->gap;
+                term = x->pressure[i * x->moments + a] * (gap[0] + (gap[1] - gap[0]) * (a + 1) / (x->moments + 1));
                 out->middle += term;
                 out->rounding += UZ_SUM_ROUNDING * fabs(term);
             }
         }
     }
-    out->middle -= y->scratch.dual; /* of round obstacles */
+    out->middle -= y->scratch.dual; /* where normals turn */
     out->rounding += UZ_SUM_ROUNDING * fabs(y->scratch.dual);
 }
 

@@ -47,7 +47,7 @@ static double new_part(double by[UZ_BOUND_LOOSE], const uz_bound_body *body, int
 {
     double size = 0;
     for (int k = 0; k < body->n_loose; k++)
-        by[k] = uz_bound_moved(body, k, edge, a, body->edge[edge].normal);
+        by[k] = uz_bound_moved(body, k, edge, a, uz_bound_line(body, &body->edge[edge])->normal);
     for (int i = 0; i < count; i++) {
         double along = 0;
         for (int k = 0; k < body->n_loose; k++)
@@ -71,7 +71,7 @@ void uz_bound_hold(uz_bound_body *body, const double *pressure)
         for (int64_t i = 0; i < body->n_edges; i++) {
             const uz_bound_edge *edge = &body->edge[i];
             const double p = fmin(pressure[edge->node[0]], pressure[edge->node[1]]);
-            if (edge->contact < 0 || edge->held[0] || edge->round || !(p > PRESSED * hardest))
+            if (edge->contact < 0 || edge->held[0] || edge->turns || !(p > PRESSED * hardest))
                 continue;
             for (int a = 0; a < moments; a++) {
                 const double size = sqrt(p * uz_bound_weight(body, i, a)) * new_part(by, body, i, a, chosen, count);

@@ -97,8 +97,8 @@ static uz_status prove(uz_result *result, uz_guaranteed *g, const uz_body_model 
     uz_guarantee *out = &result->summary.guarantee;
     uz_result *dual = NULL;
     uz_status status = uz_bound_body_make(&g->body, model, scene, err);
-    for (int64_t i = 0; i < g->body.n_edges && result->place && status == UZ_OK && !*g->body.why; i++)
-        if (g->body.edge[i].round || g->body.edge[i].facing != UZ_BOUND_ALONE)
+    for (int64_t k = 0; k < scene->n_contacts && result->place && status == UZ_OK && !*g->body.why; k++)
+        if (scene->contacts[k].kind != UZ_OBSTACLE_PLANE)
             snprintf(g->body.why, sizeof g->body.why,
                      "gaps of the answer are those where the body has gone; they are proved with fixed kinematics");
     if (status == UZ_OK && g->body.n_loose > 0)

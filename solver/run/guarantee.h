@@ -15,7 +15,7 @@ typedef struct {
     uz_qp qp; /* the dual problem, and its unknowns by moments of edges */
     int64_t *dof;
     double *stress;
-    double *lift; /* n_nodes x 2: takes the answer out of round obstacles; NULL: not asked for */
+    double *lift; /* n_nodes x 2: takes the answer out of obstacles; NULL: not asked for */
     uz_bound_check_result checked;
     double rho; /* norm of what the stress lacks of equilibrium, from above */
 } uz_guaranteed;
@@ -25,8 +25,8 @@ uz_settings uz_guarantee_settings(const uz_guaranteed *g, double now);
 /* |residual| in the norm of the inverse of the dual problem's K, from above; INFINITY where that was not found. */
 uz_status uz_measure_residual(double *norm, const uz_guaranteed *g, double *residual, uz_error *err);
 
-/* intervals.c: the displacement of least norm that takes the answer out of round obstacles, where it stands in them
- * between its nodes: g->lift. Nothing is proved of it. UZ_ERR_MEMORY, _CANCELLED. */
+/* intervals.c: the displacement of least norm that takes the answer out of obstacles whose normal turns, where it
+ * stands in them between its nodes: g->lift. Nothing is proved of it. UZ_ERR_MEMORY, _CANCELLED. */
 uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err);
 /* ... guaranteed intervals for the quantities, once the whole error is proved; what has none keeps its
  * estimate, and says why. UZ_ERR_MEMORY, _CANCELLED and what problems in matrices fail with. */

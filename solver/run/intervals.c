@@ -252,6 +252,7 @@ static const char *make_adjoint(proving *v, const uz_quantity *quantity, const d
         v->wanted[k] =
             quantity->kind == UZ_QUANTITY_CONTACT_FORCE && is_asked_of(quantity, v->g->problem->scene.contacts[k].on);
     memcpy(to->edge, body->edge, (size_t)body->n_edges * sizeof *to->edge);
+    memcpy(to->before.at, body->before.at, (size_t)body->before.n * sizeof *to->before.at);
     memset(to->force, 0, (size_t)(2 * body->model->mesh.n_elements) * sizeof *to->force);
     for (int64_t i = 0; i < body->n_edges; i++) {
         uz_bound_edge *edge = &to->edge[i];
@@ -259,9 +260,9 @@ static const char *make_adjoint(proving *v, const uz_quantity *quantity, const d
             const double *at = z + 2 * edge->node[0];
             edge->traction[c] = 0;
             edge->value[c] = edge->held[c] ? edge->axis[c][0] * at[0] + edge->axis[c][1] * at[1] : 0;
-            if (edge->contact >= 0)
-                edge->gap[c] = v->wanted[edge->contact];
         }
+        for (int c = 0; c < 2 && edge->contact >= 0 && !edge->turns; c++) /* of a line: for uz_bound_dual_load */
+            to->before.at[edge->before].gap[c] = v->wanted[edge->contact];
     }
     if (quantity->kind == UZ_QUANTITY_STRAIN_ENERGY) { /* the loads' own work */
         for (int64_t i = 0; i < body->n_edges; i++)
@@ -289,7 +290,7 @@ static uz_status make_dual_rows(proving *v, uz_error *err)
     for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++)
         for (int a = 0; a < moments; a++)
             if (uz_bound_has_row(body, dof, i, a)) {
-                v->dual.target[row] = body->edge[i].round ? v->wanted[body->edge[i].contact] : qp.h[row];
+                v->dual.target[row] = body->edge[i].turns ? v->wanted[body->edge[i].contact] : qp.h[row];
                 v->dual.width[row++] = fmax(0, v->g->checked.pressure[i * moments + a]);
             }
     for (int64_t k = 0; k < body->n_segments && status == UZ_OK; k++) {
@@ -476,13 +477,14 @@ static uz_status begin(proving *v, uz_error *err)
     v->adjoint.free_strain = NULL;
     v->adjoint.motion = NULL;
     v->adjoint.edge = uz_alloc(body->n_edges, sizeof *body->edge);
+    v->adjoint.before.at = uz_alloc(body->before.n, sizeof *body->before.at);
     v->adjoint.force = uz_alloc(2 * mesh->n_elements, sizeof *body->force);
     v->w = uz_alloc_zero(2 * mesh->n_nodes, sizeof *v->w);
     v->wanted = uz_alloc_zero(g->problem->scene.n_contacts, sizeof *v->wanted);
     v->stress = uz_alloc(mesh->n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, sizeof *v->stress);
     v->open = uz_alloc(mesh->n_nodes, sizeof *v->open);
     v->ball = sqrt(uz_bound_ball(&g->checked, g->rho));
-    if (!v->adjoint.edge || !v->adjoint.force || !v->w || !v->wanted || !v->open || !v->stress)
+    if (!v->adjoint.edge || !v->adjoint.before.at || !v->adjoint.force || !v->w || !v->wanted || !v->open || !v->stress)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes", (long long)mesh->n_nodes);
     uz_bound_openings(v->open, body, &g->checked);
     uz_status status = begin_rows(&v->primal, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
@@ -491,20 +493,25 @@ static uz_status begin(proving *v, uz_error *err)
     return status;
 }
 
-/* How deep an answer stands in a round obstacle along an edge, at most of some points. */
+/* How deep an answer stands in an obstacle along an edge, at most of some points of each piece before it. */
 static double depth_along(const uz_bound_body *body, int64_t i, const double *u)
 {
     enum { POINTS = 16 };
     const uz_bound_edge *edge = &body->edge[i];
-    double deepest = 0;
-    for (int k = 0; k <= POINTS; k++) {
-        const double q = (double)k / POINTS, p = 1 - q;
-        const double shape[3] = {edge->node[2] < 0 ? p : p * (1 - 2 * q), edge->node[2] < 0 ? q : q * (2 * q - 1),
-                                 4 * p * q};
-        double n[2], s = uz_bound_gap(n, body, i, q);
-        for (int a = 0; a < 3 && edge->node[a] >= 0; a++)
-            s -= shape[a] * (n[0] * u[2 * edge->node[a]] + n[1] * u[2 * edge->node[a] + 1]);
-        deepest = fmax(deepest, -s);
+    double deepest = 0, from = 0;
+    for (int64_t piece = edge->before; piece < edge->before + edge->pieces; piece++) {
+        const double part = body->before.at[piece].end - from;
+        const int points = (int)fmax(1, ceil(POINTS * part));
+        for (int k = 0; k <= points; k++) {
+            const double q = from + part * k / points, p = 1 - q;
+            const double shape[3] = {edge->node[2] < 0 ? p : p * (1 - 2 * q), edge->node[2] < 0 ? q : q * (2 * q - 1),
+                                     4 * p * q};
+            double n[2], s = uz_bound_piece_gap(n, body, i, piece, q);
+            for (int a = 0; a < 3 && edge->node[a] >= 0; a++)
+                s -= shape[a] * (n[0] * u[2 * edge->node[a]] + n[1] * u[2 * edge->node[a] + 1]);
+            deepest = fmax(deepest, -s);
+        }
+        from = body->before.at[piece].end;
     }
     return deepest;
 }
@@ -521,7 +528,7 @@ static bool look_for_depth(double *depth, double *more, double *at, const uz_bou
             at[2 * i + c] = u[2 * i + c] + lift[2 * i + c];
     }
     for (int64_t i = 0; i < body->n_edges; i++) {
-        const double deep = body->edge[i].round ? DEEPER * depth_along(body, i, at) : 0;
+        const double deep = body->edge[i].turns ? DEEPER * depth_along(body, i, at) : 0;
         any = any || deep > 0;
         for (int a = 0; a < 3 && body->edge[i].node[a] >= 0; a++)
             more[body->edge[i].node[a]] = fmax(more[body->edge[i].node[a]], deep);
@@ -612,7 +619,7 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
     }
     end_rows(&v.primal, g->cache);
     end_rows(&v.dual, g->cache);
-    void *room[] = {v.open, v.w, v.stress, v.wanted, v.adjoint.edge, v.adjoint.force};
+    void *room[] = {v.open, v.w, v.stress, v.wanted, v.adjoint.edge, v.adjoint.before.at, v.adjoint.force};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return status;

@@ -445,8 +445,8 @@ TEST(nodes_hold_the_border_that_they_are_on)
 
 TEST(what_is_not_proved_is_named)
 {
-    static const char *const WHY[] = {"springs hold too", "node",       "corners",
-                                      "single nodes",     "revolution", "longer than"};
+    static const char *const WHY[] = {"springs hold too", "node",       "no way out",
+                                      "single nodes",     "revolution", "normal turns"};
     for (int k = 0; k < 6; k++) {
         uz_scene scene = paper_scene(6, 2);
         if (k == 0)
@@ -457,17 +457,20 @@ TEST(what_is_not_proved_is_named)
         if (k == 2) {
             uz_contact *c = &scene.contacts[0];
             c->kind = UZ_OBSTACLE_HEIGHT;
-            c->n_x = 2;
-            c->x = calloc(2, sizeof *c->x);
-            c->z = calloc(2, sizeof *c->z);
-            c->x[1] = 60;
-            c->z[0] = -1;
+            c->n_x = 3;
+            c->x = calloc(3, sizeof *c->x);
+            c->z = calloc(3, sizeof *c->z);
+            for (int i = 0; i < 3; i++) { /* the body stands in a ridge */
+                c->x[i] = 25 + 5 * i;
+                c->z[i] = i == 1 ? 2 : -5;
+            }
         }
         if (k == 5) {
             scene.contacts[0].kind = UZ_OBSTACLE_ROUND;
             scene.contacts[0].point[0] = 30;
             scene.contacts[0].point[1] = -9;
             scene.contacts[0].radius = 9;
+            add_support(&scene, "bottom", 0, NAN);
         }
         if (k == 3) {
             int64_t *node = calloc(1, sizeof *node);
