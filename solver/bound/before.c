@@ -12,9 +12,9 @@
 /* Relative to the body's extent: how far a point may be from an obstacle that it touches: displacements may be small,
  * too. */
 #define TOUCHING (16 * DBL_EPSILON)
-/* Where normals along an edge are farther apart (rad) nothing presses on it in the dual problem: what is not along the
- * normal would cost more than that. */
-#define MOST_TURN 0.5
+/* Where normals along an edge are farther apart (rad) nothing presses on it in the dual problem: what of that is not
+ * along the normal would cost more, on ridges from 0.2 to 0.6 on. */
+#define MOST_TURN 0.3
 /* Rows of nodes in an obstacle are along the way out of the body, which is that of the closest point but for angles
  * (rad) up to this. */
 #define OTHER_WAY 0.1

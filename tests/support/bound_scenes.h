@@ -1,4 +1,4 @@
-/* bound_scenes.h: generated plane bodies before straight obstacles, and what is proved of their whole error on some
+/* bound_scenes.h: generated plane bodies before obstacles, and what is proved of their whole error on some
  * meshes against each other: all that is below a body's energy is below all that is above it. */
 #ifndef TESTS_BOUND_SCENES_H
 #define TESTS_BOUND_SCENES_H
@@ -56,7 +56,41 @@ static inline uz_load *bound_load(uz_scene *scene, uz_load_kind kind, const char
     return &scene->loads[scene->n_loads - 1];
 }
 
-typedef enum { BOUND_STRAIGHT, BOUND_ROUND, BOUND_RESTING, BOUND_SPRINGS, BOUND_RINGS } bound_kind;
+typedef enum { BOUND_STRAIGHT, BOUND_ROUND, BOUND_RESTING, BOUND_SPRINGS, BOUND_RINGS, BOUND_LINES } bound_kind;
+
+/* A polyline or a table below the bottom, `gap` away: flat, a hill or a hollow, with teeth or without, of few pieces or
+ * many. */
+static inline void bound_lines(uz_scene *scene, double gap, qp_random *rng)
+{
+    enum { MOST = 60 };
+    uz_contact *c = &scene->contacts[0];
+    const double *x = scene->box.origin, width = scene->box.size[0];
+    const int shape = (int)random_int(rng, -1, 2), n = (int)random_power(rng, 0.7, 1.7);
+    const bool table = random_chance(rng, 0.4);
+    const double bend = shape * random_power(rng, -1.5, -0.5), middle = 0.1 + 0.8 * random_unit(rng);
+    const double teeth = random_chance(rng, 0.5) ? random_power(rng, -3, 0) / n : 0;
+    double highest = -INFINITY;
+    free(c->x);
+    *c = (uz_contact){.kind = table ? UZ_OBSTACLE_HEIGHT : UZ_OBSTACLE_POLYLINE, .on = "bottom", .n_x = n};
+    c->x = malloc(MOST * sizeof *c->x);
+    double *y = malloc(MOST * sizeof *y);
+    for (int i = 0; i < n; i++) {
+        const double at = -0.3 + 1.6 * (i + 0.6 * (random_unit(rng) - 0.5)) / (n - 1);
+        c->x[i] = x[0] + width * at;
+        y[i] = width * (bend * (at - middle) * (at - middle) + teeth * (random_unit(rng) - 0.5));
+    }
+    for (int i = 0; i < n; i++) /* of what is below the body, at its ends and corners */
+        for (int k = 0; k < 3; k++) {
+            const double end = k < 2 ? x[0] + k * width : c->x[i];
+            const int j = i + 1 < n ? i : i - 1;
+            if (end >= x[0] && end <= x[0] + width && (k == 2 || (end >= c->x[j] && end <= c->x[j + 1])))
+                highest =
+                    fmax(highest, k == 2 ? y[i] : y[j] + (end - c->x[j]) / (c->x[j + 1] - c->x[j]) * (y[j + 1] - y[j]));
+        }
+    for (int i = 0; i < n; i++)
+        y[i] += x[1] - gap - highest;
+    *(table ? &c->z : &c->y) = y;
+}
 
 /* Makes the scene before a plane one of its kind. */
 static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, double stress, qp_random *rng)
@@ -112,6 +146,8 @@ static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, do
         if (hole && random_chance(rng, 0.5))
             bound_load(scene, UZ_LOAD_PRESSURE, "left", stress * random_unit(rng), 0);
     }
+    if (kind == BOUND_LINES)
+        bound_lines(scene, gap, rng);
     if (kind == BOUND_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
         uz_contact *c = &scene->contacts[0];
         c->kind = UZ_OBSTACLE_ROUND;

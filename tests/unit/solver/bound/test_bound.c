@@ -203,6 +203,91 @@ TEST(never_below_the_truth_before_round_obstacles)
     CHECK_MSG(count == 24 && most < 4, "%d: %g", count, most);
 }
 
+/* Polylines and tables, flat and not, with teeth and without. */
+TEST(never_below_the_truth_before_lines)
+{
+    int count = 0;
+    for (uint64_t seed = 1; seed <= 12; seed++) {
+        const bound_sweep x = sweep_differences(seed, BOUND_LINES, 3, 12);
+        CHECK_MSG(x.answers == 10 && x.proved == 10, "seed %d: %s", (int)seed, x.why);
+        CHECK_MSG(x.highest <= x.lowest + 1e-12 * x.size, "seed %d: %.10e above %.10e", (int)seed, x.highest, x.lowest);
+        CHECK_MSG(x.least >= 1, "seed %d: %g", (int)seed, x.least);
+        count += x.count[0] + x.count[1];
+    }
+    CHECK_INT(count, 12 * 8);
+}
+
+/* A block that a support presses on what is below its bottom. */
+static uz_guarantee pressed_block(const char *element, int64_t cells, const uz_contact *below)
+{
+    uz_scene scene = box_scene(1, 1, cells, cells);
+    snprintf(scene.box.element, sizeof scene.box.element, "%s", element);
+    scene.kinematics = UZ_KINEMATICS_FIXED;
+    scene.materials[0].young = 1000;
+    add_support(&scene, "left", 0, NAN);
+    add_support(&scene, "top", NAN, -0.01);
+    scene.contacts[0] = *below;
+    scene.n_contacts = 1;
+    snprintf(scene.contacts[0].on, sizeof scene.contacts[0].on, "bottom");
+    const uz_guarantee g = bound_of(&scene);
+    scene.contacts[0] = (uz_contact){.kind = UZ_OBSTACLE_PLANE}; /* its lists are the caller's */
+    uz_scene_clear(&scene);
+    return g;
+}
+
+/* One segment, or flat values, however many points it has. */
+TEST(a_line_of_one_direction_is_a_plane)
+{
+    double x[] = {-1, 0.3, 0.52, 3}, y[] = {0, 0, 0, 0};
+    for (int i = 0; i < 4; i++)
+        y[i] = -0.007 * x[i];
+    for (int k = 0; k < 4; k++) {
+        const uz_contact plane = {.kind = UZ_OBSTACLE_PLANE, .normal = {0.007, 1}};
+        const uz_contact line = {.kind = UZ_OBSTACLE_POLYLINE, .n_x = 4, .x = x, .y = y};
+        const uz_contact table = {.kind = UZ_OBSTACLE_HEIGHT, .n_x = 4, .x = x, .z = y};
+        const uz_guarantee of = pressed_block(BOUND_ELEMENTS[k], 6, &plane);
+        const uz_guarantee by[] = {pressed_block(BOUND_ELEMENTS[k], 6, &line),
+                                   pressed_block(BOUND_ELEMENTS[k], 6, &table)};
+        CHECK_MSG(of.proved && by[0].proved && by[1].proved, "%s %s", by[0].why, by[1].why);
+        for (int i = 0; i < 2; i++) {
+            CHECK_REL(by[i].bound, of.bound, 1e-6);
+            CHECK_REL(by[i].primal, of.primal, 1e-11);
+            CHECK_REL(by[i].dual, of.dual, 1e-11);
+        }
+    }
+}
+
+/* Tangents of a circle, or chords of a hole: the more there are the nearer is the bound to that of the circle. */
+TEST(a_line_of_many_segments_is_a_circle)
+{
+    enum { MOST = 3001 };
+    static double x[MOST], y[MOST];
+    for (int k = 0; k < 8; k++) {
+        const bool inside = k >= 4;
+        const uz_contact circle = {.kind = UZ_OBSTACLE_ROUND,
+                                   .point = {0.4, inside ? sqrt(16 - 0.36) : -2},
+                                   .radius = inside ? 4 : 2,
+                                   .inside = inside};
+        const uz_guarantee of = pressed_block(BOUND_ELEMENTS[k % 4], 8, &circle);
+        double off[2];
+        for (int fine = 0; fine < 2; fine++) {
+            const int n = fine ? MOST : 301;
+            const double r = inside ? 4 : 2 / cos(0.45 / (n - 1));
+            for (int i = 0; i < n; i++) {
+                const double angle = 0.9 * ((double)i / (n - 1) - 0.5);
+                x[i] = circle.point[0] + r * sin(angle);
+                y[i] = circle.point[1] + (inside ? -r : r) * cos(angle);
+            }
+            const uz_guarantee by = pressed_block(
+                BOUND_ELEMENTS[k % 4], 8, &(uz_contact){.kind = UZ_OBSTACLE_POLYLINE, .n_x = n, .x = x, .y = y});
+            CHECK_MSG(of.proved && by.proved, "%s %s", of.why, by.why);
+            off[fine] = fabs(by.dual - of.dual) / fabs(of.dual);
+            CHECK_MSG(fabs(by.bound / of.bound - 1) < 0.3, "%d %d: %g, %g", k, fine, by.bound, of.bound);
+        }
+        CHECK_MSG(off[0] < 0.02 && off[1] < 0.005, "%d: %g %g", k, off[0], off[1]);
+    }
+}
+
 /* A disc of 10,000 lengths is a plane, and presses on nodes as that does. */
 TEST(a_large_disc_is_a_plane)
 {
