@@ -440,6 +440,8 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
         }
         share = primal->m == 0 ? 0 : next_share(&tried, share, half, v->ball > 0 ? apart / (2 * v->ball) : 0);
     }
+    if (out->guaranteed) /* by one share, whatever another one could not */
+        *out->unproved = '\0';
     return status;
 }
 
