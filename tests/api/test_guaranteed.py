@@ -60,6 +60,32 @@ def test_what_is_not_proved(s):
         check(summary["outcome"] == "mesh_limit" and "not guaranteed" in summary["message"], summary)
 
 
+def test_lines_and_tables(s):
+    """A block on a ridge, in a groove, on teeth, on a polygon: bounds and intervals of all meshes have something in common, and get
+    smaller with the cells."""
+    points = [[-1, -0.03], [0.17, -0.0005], [0.41, 0], [0.83, -0.004], [2, -0.05]]
+    shapes = {"ridge": {"polyline": {"points": [[-1, -0.05], [0.4, 0], [2, -0.06]]}},
+              "groove": {"polyline": {"points": [[-1, 0.014], [0.4, 0], [2, 0.016]]}},
+              "table": {"height": {"x": [x for x, _ in points], "z": [z for _, z in points]}},
+              "polygon": {"polyline": {"points": [[-0.3, -0.5], [-0.3, -0.02], [0.6, 0], [1.4, -0.01], [1.4, -0.5], [-0.3, -0.5]]}}}
+    for name, shape in shapes.items():
+        contacts = [{"on": "bottom", "obstacle": shape}]
+        bounds, low, high = [], {}, {}
+        for cells in (6, 12, 24):
+            problem = {**BLOCK, "kinematics": "fixed", "contacts": contacts, "mesh": {"box": {"size": [1, 1], "cells": [cells, cells], "element": "quad8"}}}
+            summary = summary_of(s, {"problem": problem, "quantities": ASKED, "solver": {"accuracy": {"guaranteed": True}}})
+            error = summary["error"]
+            check(error["kind"] == "guaranteed" and "why" not in error, name, error)
+            bounds.append(error["bound"])
+            for one in [*summary["quantities"], {"name": "energy", "kind": "guaranteed", "low": error["energy_low"], "high": error["energy_high"]}]:
+                check(one["kind"] == "estimated" or "why" not in one, one)
+                if one["kind"] == "guaranteed":
+                    low[one["name"]] = max(low.get(one["name"], one["low"]), one["low"])
+                    high[one["name"]] = min(high.get(one["name"], one["high"]), one["high"])
+        check(len(low) == 6 and all(low[key] <= high[key] for key in low), name, low, high)
+        check(bounds[2] < bounds[0] / 2, name, bounds)
+
+
 def test_nothing_to_be_relative_to(s):
     for cells in ([30, 10], "auto"):  # nothing happens, and nothing is off
         request = asked({"total": 0.01, "guaranteed": True}, loads=[])

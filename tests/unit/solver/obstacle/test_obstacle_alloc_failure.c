@@ -2,6 +2,7 @@
  * keep nothing. Linked with the heap wrapped. */
 #include "failing_heap.h"
 #include "harness.h"
+#include "obstacle/along.h"
 #include "obstacle/candidates.h"
 #include "obstacle/obstacle.h"
 #include "obstacle/projection.h"
@@ -42,6 +43,26 @@ static double X[] = {0, 1, 2}, Y[] = {0, 1, 0}, Z[9] = {0};
 static void make_line(void)
 {
     make(&(uz_contact){.kind = UZ_OBSTACLE_POLYLINE, .n_x = 3, .x = X, .y = Y}, UZ_PLANE_STRAIN);
+}
+
+/* Lines, an arc that is parted, and corners. */
+static void make_along(void)
+{
+    const uz_contact of[] = {{.kind = UZ_OBSTACLE_POLYLINE, .n_x = 3, .x = X, .y = Y},
+                             {.kind = UZ_OBSTACLE_ROUND, .point = {1, -1}, .radius = 1}};
+    for (int k = 0; k < 2 && !heap.failed; k++) {
+        uz_obstacle *o;
+        uz_obstacle_pieces pieces = {.n = 0};
+        uz_error err = {0};
+        if (uz_obstacle_new(&o, &of[k], 0, UZ_PLANE_STRAIN, &err) != UZ_OK)
+            return;
+        const double a[2] = {-30, 1.1}, b[2] = {30, 1.2};
+        const uz_status status = uz_obstacle_along(&pieces, o, a, b, &err);
+        CHECK_INT(status, heap.failed ? UZ_ERR_MEMORY : UZ_OK);
+        CHECK(heap.failed || pieces.n > 2);
+        free(pieces.at);
+        uz_obstacle_free(o);
+    }
 }
 
 static void make_table(void)
@@ -90,6 +111,7 @@ static void choose(void)
 TEST(every_allocation_may_fail)
 {
     CHECK_INT(fail_each(make_line), 7);
+    CHECK_INT(fail_each(make_along), 12);
     CHECK_INT(fail_each(make_table), 8);
     CHECK_INT(fail_each(make_pairs), 9);
     CHECK_INT(fail_each(choose), 5);
