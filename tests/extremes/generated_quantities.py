@@ -230,7 +230,7 @@ def run(s, numbers, say=print):
                 continue
             rows.append({"number": number, "family": scene.family, "element": scene.element, "model": scene.model, "dim": scene.dim, **a,
                          "true": b["value"], "own": b["on_this_mesh"], "reference": abs(b["value"] - b["on_this_mesh"])})
-        for which in [scene, *([scene.on_lines()] if scene.contacts else [])] if scene.may_be_proved() else []:
+        for which in [scene, *([scene.on_lines()] if scene.contacts and scene.model != "axisymmetric" else [])] if scene.may_be_proved() else []:
             false, of = prove(daemon, which)
             proved += of
             for one in false:
