@@ -641,10 +641,12 @@ static void comply(double *F, double *f, const macro *m, int part)
         for (int b = 0; b < n; b++)
             for (int i = 0; i < components; i++) {
                 f[b] += weight * S[i][b] * strain[i][n];
-                for (int a = 0; a < n; a++)
-                    F[a + n * b] += weight * S[i][a] * strain[i][b];
+                add(n - b, weight * strain[i][b], S[i] + b, F + b + n * b);
             }
     }
+    for (int b = 0; b < n; b++)
+        for (int a = 0; a < b; a++)
+            F[a + n * b] = F[b + n * a];
 }
 
 /* Local coordinates along two edges of a triangle, between the middles of opposite edges of a quadrilateral. */
