@@ -18,8 +18,8 @@ static void run_kind(suite *all, bound_kind kind, const char *what)
     static const char *const KINDS[] = {"linear", "quadratic"};
     static double effect[2][8 * BODIES];
     int count[2] = {0}, unproved = 0;
-    const bool differences = kind == BOUND_ROUND || kind == BOUND_RESTING ||
-                             kind == BOUND_LINES; /* quadratic sides rise between nodes, too */
+    /* quadratic sides rise between nodes, too */
+    const bool differences = kind != BOUND_STRAIGHT && kind != BOUND_SPRINGS;
     const int wanted = differences ? 10 : 9;
     for (uint64_t seed = 1; seed <= BODIES; seed++) {
         const bound_sweep x = differences ? sweep_differences(seed, kind, 4, 16) : sweep_bounds(seed, kind, 3, 14);
