@@ -8,7 +8,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
-#include "scene/bisect.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -131,34 +130,29 @@ static bool keep_round(uz_mortar_surface *surface, const uz_mesh *mesh)
  * False: no memory. */
 static bool list_nodes(refined *x, int64_t surfaces)
 {
-    static const double LOCAL[2][6][2] = {{{-1, 0}, {1, 0}, {0, 0}},
-                                          {{0, 0}, {1, 0}, {0, 1}, {0.5, 0}, {0.5, 0.5}, {0, 0.5}}};
     const uz_mesh *mesh = x->mesh;
     bool room = true;
     for (int64_t k = 0; k < surfaces; k++)
         for (int64_t i = 0; i < x->surface[k].n; i++) {
             const uz_mortar_side *side = &x->surface[k].side[i];
-            const bool bisected = mesh->dim == 2 || side->nodes % 3 == 0;
-            for (int a = 0; a < side->nodes && bisected && room; a++)
-                room = put(x, side->node[a], k, i, LOCAL[mesh->dim - 2][a]);
+            const uz_side shape = {.dim = mesh->dim, .nodes = side->nodes};
+            for (int a = 0; a < side->nodes && room; a++)
+                room = put(x, side->node[a], k, i, uz_side_local_nodes(&shape)[a]);
         }
     for (int64_t i = mesh->n_given; i < mesh->n_nodes && room; i++) {
-        const int64_t *from = mesh->from + (i - mesh->n_given) * UZ_BISECT_FROM;
+        const int64_t *from;
+        const double *share;
+        const int count = uz_mesh_amid(&from, &share, mesh, i);
         for (int64_t k = x->last[from[0]]; k >= 0 && room; k = x->item[k].next) {
             const entry first = x->item[k];
-            double all[2 * UZ_BISECT_FROM] = {0}, local[2];
-            int64_t number[UZ_BISECT_FROM];
+            double local[2] = {0, 0};
             bool here = true;
-            for (int p = 0; p < UZ_BISECT_FROM; p++)
-                number[p] = from[p] >= 0 ? p : -1;
-            for (int p = 0; p < UZ_BISECT_FROM && from[p] >= 0 && here; p++) {
+            for (int p = 0; p < count && here; p++) {
                 const entry *its = find_entry(x, from[p], &first);
                 here = its != NULL;
-                if (here)
-                    memcpy(all + 2 * p, its->local, sizeof its->local);
+                for (int c = 0; c < 2 && here; c++)
+                    local[c] += share[p] * its->local[c];
             }
-            for (int c = 0; c < 2; c++)
-                local[c] = uz_bisected_value(number, all + c, 2);
             room = !here || put(x, i, first.surface, first.side, local);
         }
     }
@@ -171,11 +165,11 @@ static void find_ways(refined *x)
     const uz_mesh *mesh = x->mesh;
     const int dim = mesh->dim;
     for (int64_t i = mesh->n_given; i < mesh->n_nodes; i++) {
-        const int64_t *from = mesh->from + (i - mesh->n_given) * UZ_BISECT_FROM;
         double sum[3] = {0}, at[3] = {0};
         int count = 0;
         memcpy(at, mesh->xyz + i * dim, (size_t)dim * sizeof *at);
-        for (int64_t k = x->on_facet[i] ? -1 : x->last[i]; k >= 0; k = x->item[k].next, count++) {
+        const bool follows = x->on_facet[i] || uz_mesh_hangs(mesh, i); /* those that it lies amid */
+        for (int64_t k = follows ? -1 : x->last[i]; k >= 0; k = x->item[k].next, count++) {
             const uz_mortar_surface *surface = &x->surface[x->item[k].surface];
             double offset[3];
             uz_mortar_geometry_of(dim)->offset(offset, surface, &surface->side[x->item[k].side], x->item[k].local, at);
@@ -183,7 +177,7 @@ static void find_ways(refined *x)
                 sum[c] += offset[c];
         }
         for (int c = 0; c < dim; c++) {
-            const double way = count > 0 ? sum[c] / count : uz_bisected_value(from, x->way + c, dim);
+            const double way = count > 0 ? sum[c] / count : uz_mesh_value_amid(mesh, i, x->way + c, dim);
             x->way[i * dim + c] = fabs(way) > ROUNDING * mesh->extent ? way : 0;
         }
     }
@@ -193,11 +187,14 @@ static void find_ways(refined *x)
 static double span_at(const refined *x, int64_t e, int a, bool moved)
 {
     const uz_mesh *mesh = x->mesh;
-    const int dim = mesh->dim, n = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+    const int dim = mesh->dim, n = type->corners;
     const int64_t *node = mesh->node + mesh->first[e];
     double edge[3][3] = {{0}}, across[3];
     for (int k = 0; k < dim; k++) {
-        const int other = n == dim + 1 ? (a + 1 + k) % n : (a + (k == 0 ? 1 : n - 1)) % n;
+        const int other = n == dim + 1 ? (a + 1 + k) % n
+                          : dim == 2   ? (a + (k == 0 ? 1 : n - 1)) % n
+                                       : uz_element_type_of(type->linear)->next[a][k];
         for (int c = 0; c < dim; c++) {
             const int64_t from = node[a] * dim + c, to = node[other] * dim + c;
             edge[k][c] = mesh->xyz[to] - mesh->xyz[from] + (moved ? x->way[to] - x->way[from] : 0);

@@ -42,7 +42,7 @@ uz_status uz_spread_over_group(double *share, const uz_body_model *model, const 
 {
     const uz_mesh *mesh = &model->mesh;
     const bool nodes = group->kind == UZ_GROUP_NODES;
-    const int64_t most = mesh->from ? mesh->n_given : mesh->n_nodes, items = nodes ? group->n_nodes
+    const int64_t most = mesh->from_first ? mesh->n_given : mesh->n_nodes, items = nodes ? group->n_nodes
                                                                              : group->kind == UZ_GROUP_FACES
                                                                                  ? group->n_faces
                                                                                  : uz_group_element_count(mesh, group);

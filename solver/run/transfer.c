@@ -2,7 +2,6 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "scene/bisect.h"
 #include "scene/box.h"
 
 #include <math.h>
@@ -63,7 +62,7 @@ static void spread(field *f, const uz_result *result, int64_t contact, bool put)
         if (result->mesh.contact_of[i] == contact)
             f->pressure[result->mesh.contact_node[i]] = put ? result->pressure[i] : 0.0;
     for (int64_t i = result->n_nodes; f->fine && i < f->fine->n_nodes; i++)
-        f->pressure[i] = uz_bisected_value(f->fine->from + (i - f->fine->n_given) * UZ_BISECT_FROM, f->pressure, 1);
+        f->pressure[i] = uz_mesh_value_amid(f->fine, i, f->pressure, 1);
 }
 
 uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_body_model *fine,

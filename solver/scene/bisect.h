@@ -19,8 +19,4 @@ uz_status uz_mesh_check_bisection(const uz_mesh *mesh, uz_error *err);
  * already, can then only be cleared. */
 uz_status uz_mesh_bisect(uz_mesh *mesh, const int64_t *marked, int64_t n, uz_error *err);
 
-/* The value at a new node of what is linear (quadratic in elements with nodes amid their edges) between the nodes that
- * it was made from: of: UZ_BISECT_FROM nodes of mesh->from; value: of each node, `stride` apart. */
-double uz_bisected_value(const int64_t *of, const double *value, int stride);
-
 #endif

@@ -108,7 +108,7 @@ uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_err
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                        "unknown formulation; use auto, standard, bbar or incompatible_modes");
     bool fits = formulation == UZ_FORMULATION_AUTO || formulation == UZ_FORMULATION_STANDARD ||
-                mesh->from; /* what was given had some, and they may all be bisected */
+                mesh->from_first; /* what was given had some, and they may all be bisected */
     for (int64_t e = 0; e < mesh->n_elements && !fits; e++) {
         const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
         fits = type->bbar || type->incompatible;

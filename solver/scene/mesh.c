@@ -21,7 +21,11 @@ void uz_mesh_clear(uz_mesh *mesh)
     free(mesh->kind);
     free(mesh->first);
     free(mesh->node);
+    free(mesh->from_first);
     free(mesh->from);
+    free(mesh->from_share);
+    free(mesh->hangs);
+    free(mesh->inside);
     memset(mesh, 0, sizeof *mesh);
 }
 
@@ -69,6 +73,24 @@ int64_t uz_group_element_count(const uz_mesh *mesh, const uz_group *group)
 int64_t uz_group_element_at(const uz_group *group, int64_t i)
 {
     return group->everything ? i : group->element[i];
+}
+
+int uz_mesh_amid(const int64_t **from, const double **share, const uz_mesh *mesh, int64_t node)
+{
+    const int64_t *first = mesh->from_first + (node - mesh->n_given);
+    *from = mesh->from + first[0];
+    *share = mesh->from_share + first[0];
+    return (int)(first[1] - first[0]);
+}
+
+double uz_mesh_value_amid(const uz_mesh *mesh, int64_t node, const double *value, int stride)
+{
+    const int64_t *from;
+    const double *share;
+    double sum = 0;
+    for (int k = uz_mesh_amid(&from, &share, mesh, node) - 1; k >= 0; k--)
+        sum += share[k] * value[from[k] * stride];
+    return sum;
 }
 
 const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count)

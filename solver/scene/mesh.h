@@ -30,8 +30,6 @@ typedef struct {
     int64_t n_elements, *element; /* elements only, ascending */
 } uz_group;
 
-enum { UZ_BISECT_FROM = 8 };
-
 typedef struct {
     int dim;
     int64_t n_nodes, n_elements;
@@ -42,9 +40,15 @@ typedef struct {
     bool uniform; /* every element is a box of size `cell` and of one kind: they share one stiffness matrix */
     double cell[3];
     double extent;    /* diagonal of the bounding box */
-    int64_t n_given;  /* refined (bisect.h): nodes from this one on lie amid others, ... */
-    int64_t *from;    /* ... node i amid from[(i - n_given) * UZ_BISECT_FROM + k], up to k = 7 or a -1 */
     int64_t n_unused; /* nodes of a file that no element uses: left out, and the others numbered anew in their order */
+    int64_t n_given;  /* refined (bisect.h, subdivide.h): nodes from this one on lie amid others, ... */
+    int64_t *from_first; /* ... node i amid those at from_first[i - n_given] to before from_first[i - n_given + 1] of */
+    int64_t *from;
+    double *from_share; /* and each of these, whose shape function is this there; the sum is 1 */
+    /* Subdivided: n_nodes, nodes that an element which has the edge or face that they lie amid does not have. They go
+     * where that goes, and none of those that they lie amid hangs itself. NULL: there are none. */
+    unsigned char *hangs;
+    unsigned char *inside; /* with `hangs`: n_elements, bits of its sides that lie within the body */
     uz_group *groups;
     int64_t n_groups;
 } uz_mesh;
@@ -73,6 +77,16 @@ uz_status uz_mesh_join_groups(uz_mesh *mesh, const uz_scene *scene, uz_error *er
 /* The mesh of a scene, whatever it comes from, with the groups that its contacts name together. */
 uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err);
 void uz_mesh_clear(uz_mesh *mesh);
+
+/* What a new node of a refined mesh lies amid: how many nodes, and the shape function of each there. */
+int uz_mesh_amid(const int64_t **from, const double **share, const uz_mesh *mesh, int64_t node);
+/* The value there of what is between nodes as their shape functions are; value: by node, `stride` apart. */
+double uz_mesh_value_amid(const uz_mesh *mesh, int64_t node, const double *value, int stride);
+/* Does the node hang? */
+static inline bool uz_mesh_hangs(const uz_mesh *mesh, int64_t node)
+{
+    return mesh->hangs && mesh->hangs[node];
+}
 
 /* The nodes of an element; *count of them. */
 const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count);
