@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "scene/bisect.h"
 #include "scene/corner_table.h"
+#include "scene/subdivide.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -111,7 +112,8 @@ uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
     if (status == UZ_OK && scene->refine)
         status = uz_mesh_check_bisection(out, err);
     if (status == UZ_OK && scene->n_bisected > 0)
-        status = uz_mesh_bisect(out, scene->bisected, scene->n_bisected, err);
+        status = (scene->bisected[0] == UZ_SUBDIVIDED ? uz_mesh_subdivide : uz_mesh_bisect)(out, scene->bisected,
+                                                                                            scene->n_bisected, err);
     if (status == UZ_OK)
         status = uz_mesh_join_groups(out, scene, err);
     if (status != UZ_OK)

@@ -4,6 +4,7 @@
 #include "gmsh_text.h"
 #include "harness.h"
 #include "scene/mesh.h"
+#include "scene/subdivide.h"
 
 /* Runs with the 1st, 2nd, ... allocation failing until it succeeds. Returns how many could fail. */
 static long fail_each(uz_status (*run)(uz_error *err))
@@ -90,4 +91,21 @@ static uz_status refine_box(uz_error *err)
 TEST(refined_boxes)
 {
     CHECK(fail_each(refine_box) > 30);
+}
+
+static uz_status subdivide_box(uz_error *err)
+{
+    static const int64_t MARKED[] = {UZ_SUBDIVIDED, 1, 0, 2, 0, 5};
+    const uz_box box = {.size = {1, 1, 1}, .cells = {2, 1, 1}, .element = "hex20", .dim = 3};
+    uz_mesh mesh;
+    uz_status status = uz_mesh_from_box(&mesh, &box, err);
+    if (status == UZ_OK)
+        status = uz_mesh_subdivide(&mesh, MARKED, 6, err);
+    uz_mesh_clear(&mesh);
+    return status;
+}
+
+TEST(subdivided_boxes)
+{
+    CHECK(fail_each(subdivide_box) > 30);
 }
