@@ -12,7 +12,11 @@
  * are the axes, but where a support holds an inclined direction, which is then a dof, and at a node whose first contact
  * row has a normal with a share in several free dofs: there one dof is along that normal, the others across, so that an
  * obstacle's row has one entry. K, N and p are in these dofs; uz_recover_nodal and uz_restrict_nodal lead to x, y, z
- * and back. */
+ * and back.
+ *
+ * A hanging node of a refined mesh has no dofs: u_nodal = T u, with a row of T for each displacement at a node, and for
+ * those of a hanging one the shares of the nodes that it lies amid. K = T'K_nodal T, element by element; N and p
+ * likewise. */
 #ifndef UZ_ASSEMBLY_H
 #define UZ_ASSEMBLY_H
 
@@ -41,6 +45,9 @@ typedef struct {
     double size;                 /* the longest distance between nodes of the side, halved on quadratic ones */
     double part;                 /* of what rows inside the side have of its area: one over their number */
 } uz_inner_place;
+
+/* In the place of the number of a dof. */
+#define UZ_NO_DOF INT64_MIN
 
 /* A side may be of both surfaces of a contact. */
 enum { UZ_SLAVE_ON = 1, UZ_SLAVE_WITH = 2, UZ_MASTER_ON = 4 };
@@ -76,7 +83,7 @@ typedef struct {
     uz_csc K;       /* d x d, lower triangle */
     uz_csc N;       /* m x d */
     uz_csc K_fixed; /* d x n_fixed: what supported dofs do to free ones; p loses K_fixed times the prescribed values */
-    int64_t *dof;   /* n_nodes x dim: number of a free dof, or -1 - k for supported dof k */
+    int64_t *dof;   /* n_nodes x dim: number of a free dof, -1 - k for supported dof k, UZ_NO_DOF at hanging nodes */
     int64_t *frame_of; /* n_nodes: 1 + place in info.rotated_node, <= 0: along the axes. NULL: all of them are */
     uz_mesh mesh;
     uz_mesh_info info; /* as uz_scene_to_qp gives it; its xyz is the mesh's own array */
@@ -143,11 +150,17 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
 /* f (m): what each row's node gets of the reactions r (m): r itself but around eight-node faces. */
 void uz_row_forces(double *f, const uz_body_model *model, const double *r);
 
+/* gap (m) of each row's node becomes that of the row: itself but around eight-node faces. */
+void uz_blend_rows(double *gap, const uz_body_model *model);
+
 /* nodal (n_nodes x dim) from the free dofs u (d) and the prescribed values (n_fixed; NULL: all zero). */
 void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u, const double *prescribed);
 
-/* The reverse: the free dofs u (d) of a displacement by node; what it says of supported dofs is left out. */
+/* The reverse: the free dofs u (d) of a displacement by node; what it says of supported dofs and hanging nodes is left
+ * out. */
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal);
+/* p (d): what forces by node are on the free dofs, T'f; those of hanging nodes are on the nodes that these lie amid. */
+void uz_gather_nodal(double *p, const uz_body_model *model, const double *f);
 
 /* The component of a vector at a node (dim) along its dof c; "x", "y", "z" or "its normal". */
 double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v);
@@ -178,10 +191,11 @@ bool uz_is_moved(const uz_body_model *model, const double *prescribed);
 uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *u, const double *prescribed,
                         uz_error *err);
 
-/* What turning a vector at a node from its dofs to the axes may round in each component: 0 where they are the same. */
-double uz_turning_error(const uz_body_model *model, int64_t node, const double *v);
+/* What turning displacements (nodal, n_nodes x dim) at a node from its dofs to the axes may round in each component,
+ * and of a hanging node what its shares may: 0 where they are the same. */
+double uz_turning_error(const uz_body_model *model, int64_t node, const double *nodal);
 /* A bound on delta' K delta, over all dofs, for the errors delta that turning leaves in nodal (n_nodes x dim): the sum
- * of |delta|'|ke||delta| over the elements with rotated nodes, springs included. */
+ * of |delta|'|ke||delta| over the elements with rotated or hanging nodes, springs included. */
 uz_status uz_turning_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err);
 
 /* Copies what a result shows of the mesh: not the frames, as a result speaks of x and y only. */

@@ -206,7 +206,7 @@ uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_
     if (status == UZ_OK)
         status = uz_nodal_loads(f, model, scene, err);
     if (status == UZ_OK) {
-        uz_restrict_nodal(p, model, f);
+        uz_gather_nodal(p, model, f);
         uz_csc_gaxpy(p, &model->K_fixed, -1, prescribed);
         status = check_finite(p, model->d, "/loads", err);
     }

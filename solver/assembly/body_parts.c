@@ -108,7 +108,7 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
         const int64_t a = i / mesh->dim, c = i % mesh->dim;
         const double *Q = uz_node_frame(model, a);
-        if (model->dof[i] < 0)
+        if (model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF)
             uz_hold_part(parts, mesh, a, Q ? Q + c * mesh->dim : axis[c]);
         if (model->spring && model->spring[i] > 0)
             uz_hold_part(parts, mesh, a, axis[c]);

@@ -5,7 +5,8 @@
  * not carry it. So the row of a middle between a and b is (g_i - s (g_a + g_b)) / (1 - 2 s), s = UZ_MIDDLE_SHARE: g as
  * the sum of transformed shape functions whose integrals are positive (see uz_side_positive_weights). What is linear
  * along the edge keeps its value, so that resultants and contact_pressure.c read a reaction as a force at its node. A
- * middle of which an end has no row keeps the row of its own gap. */
+ * middle of which an end has no row keeps the row of its own gap. In a refined mesh an end may be such a middle itself,
+ * of a larger face; g_a then is its gap, not its row. */
 #include "assembly/discretization.h"
 #include "assembly/parts.h"
 
@@ -24,6 +25,11 @@ bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double no
 {
     const int dim = model->mesh.dim;
     double share[3];
+    const int64_t *from;
+    const double *of;
+    for (int k = uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &of, &model->mesh, node) : 0; k > 0; k--)
+        if (uz_is_contact_row(model, from[k - 1], normal))
+            return true;
     uz_free_shares(share, model, node, normal);
     for (int c = 0; c < dim; c++)
         if (fabs(share[c]) > UZ_DEPENDENT)
@@ -41,6 +47,14 @@ static bool moves_something(const uz_body_model *model, const uz_contact_row *ro
         if (uz_is_contact_row(model, row->master[j], row->normal))
             return true;
     return false;
+}
+
+/* At most so many entries has a node. */
+static int64_t count_entries(const uz_body_model *model, int64_t node)
+{
+    const int64_t *from;
+    const double *share;
+    return model->mesh.dim * (uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &share, &model->mesh, node) : 1);
 }
 
 /* How many rows, and at most how many entries. */
@@ -61,7 +75,8 @@ static uz_status count_rows(int64_t *entries, int64_t *most_places, uz_body_mode
                 continue;
             model->m++;
             model->n_pair_rows += row.masters > 0 || row.slaves > 1;
-            *entries += (int64_t)model->mesh.dim * (row.slaves + row.masters);
+            for (int j = 0; j < row.slaves + row.masters; j++)
+                *entries += count_entries(model, j < row.slaves ? row.slave[j] : row.master[j - row.slaves]);
         }
         if (model->m > UZ_SCENE_MAX_DOFS)
             return uz_fail(err, UZ_ERR_SCENE, "/contacts", "more than %d contact candidates; use fewer contacts",
@@ -82,6 +97,10 @@ static void add_entries(row_work *work, const uz_body_model *model, int64_t row,
 {
     const int dim = model->mesh.dim;
     double share[3];
+    const int64_t *from;
+    const double *of;
+    for (int k = uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &of, &model->mesh, node) : 0; k > 0; k--)
+        add_entries(work, model, row, from[k - 1], normal, factor * of[k - 1]);
     uz_free_shares(share, model, node, normal);
     for (int c = 0; c < dim; c++) {
         if (share[c] == 0 || factor == 0)
@@ -104,7 +123,8 @@ static uz_status add_contact(uz_body_model *model, row_work *work, int64_t *row,
         return status;
     const uz_contact_discretization *discretization = uz_discretization_of(in.contact);
     in.room = work->room;
-    discretization->areas(work->area, &in);
+    if (!discretization->areas(work->area, &in))
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the areas of %lld nodes", (long long)model->mesh.n_nodes);
     for (int64_t i = 0; i < discretization->places(&in); i++) {
         if (!uz_contact_row_at(&r, &in, i) || !moves_something(model, &r))
             continue;
@@ -248,10 +268,11 @@ static bool blend_entries(row_work *work, const uz_body_model *model)
     for (int64_t i = 0; i < model->m && room; i++)
         for (int k = 0; k < 2 && model->row_ends[2 * i] >= 0; k++) {
             const int64_t end = model->row_ends[2 * i + k];
+            const double plain = model->row_ends[2 * end] >= 0 ? 1 : scale; /* a middle's own entries are scaled */
             for (int64_t q = start[end]; q < start[end + 1]; q++) {
                 work->row[work->count] = i;
                 work->col[work->count] = work->col[q];
-                work->val[work->count++] = -UZ_MIDDLE_SHARE * scale * work->val[q];
+                work->val[work->count++] = -UZ_MIDDLE_SHARE * plain * work->val[q];
             }
         }
     free(start);
@@ -262,10 +283,21 @@ void uz_row_forces(double *f, const uz_body_model *model, const double *r)
 {
     memcpy(f, r, (size_t)model->m * sizeof *f);
     for (int64_t i = 0; i < model->m && model->row_ends; i++)
-        if (model->row_ends[2 * i] >= 0) {
+        if (model->row_ends[2 * i] >= 0)
             f[i] = r[i] / (1 - 2 * UZ_MIDDLE_SHARE);
-            f[model->row_ends[2 * i]] -= UZ_MIDDLE_SHARE * f[i];
-            f[model->row_ends[2 * i + 1]] -= UZ_MIDDLE_SHARE * f[i];
+    for (int64_t i = 0; i < model->m && model->row_ends; i++)
+        for (int k = 0; k < 2 && model->row_ends[2 * i] >= 0; k++)
+            f[model->row_ends[2 * i + k]] -= UZ_MIDDLE_SHARE * (r[i] / (1 - 2 * UZ_MIDDLE_SHARE));
+}
+
+void uz_blend_rows(double *gap, const uz_body_model *model)
+{
+    const int64_t *ends = model->row_ends;
+    for (int pass = 0; pass < 2; pass++) /* first those of which an end is such a middle itself */
+        for (int64_t i = 0; i < model->m && ends; i++) {
+            if (ends[2 * i] < 0 || (ends[2 * ends[2 * i]] >= 0 || ends[2 * ends[2 * i + 1]] >= 0) != (pass == 0))
+                continue;
+            gap[i] = (gap[i] - UZ_MIDDLE_SHARE * (gap[ends[2 * i]] + gap[ends[2 * i + 1]])) / (1 - 2 * UZ_MIDDLE_SHARE);
         }
 }
 
@@ -316,11 +348,19 @@ static void prescribed_at(double u[3], const uz_body_model *model, const uz_cont
                           const double *prescribed)
 {
     const int dim = model->mesh.dim;
+    const int64_t *from;
+    const double *share;
     for (int c = 0; c < dim; c++) {
         const int64_t dof = model->dof[node * dim + c];
-        u[c] = dof < 0 ? prescribed[-1 - dof] : 0;
+        u[c] = dof < 0 && dof != UZ_NO_DOF ? prescribed[-1 - dof] : 0;
     }
     uz_from_frame(u, model, node);
+    for (int k = uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &share, &model->mesh, node) : 0; k > 0; k--) {
+        double at[3];
+        prescribed_at(at, model, &(uz_contact_row){.place = NULL}, from[k - 1], prescribed);
+        for (int c = 0; c < dim; c++)
+            u[c] += share[k - 1] * at[c];
+    }
     for (int c = 0; c < dim && row->place; c++)
         u[c] -= row->place[node * dim + c];
 }
@@ -404,9 +444,7 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
     }
     if (status == UZ_OK && row != model->m)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", OTHER_BODY);
-    for (int64_t i = 0; status == UZ_OK && i < model->m && model->row_ends; i++)
-        if (model->row_ends[2 * i] >= 0)
-            h[i] = (h[i] - UZ_MIDDLE_SHARE * (h[model->row_ends[2 * i]] + h[model->row_ends[2 * i + 1]])) /
-                   (1 - 2 * UZ_MIDDLE_SHARE);
+    if (status == UZ_OK)
+        uz_blend_rows(h, model);
     return status;
 }

@@ -39,7 +39,7 @@ bool uz_contact_row_at(uz_contact_row *row, const uz_contact_input *in, int64_t 
     const uz_contact_sites *sites = &in->model->sites[in->index];
     const bool found = uz_discretization_of(in->contact)->row(row, in, sites, place);
     row->place = sites->n > 0 ? in->model->place : NULL; /* a plane's row is the same everywhere */
-    return found;
+    return found && !(row->slaves == 1 && uz_mesh_hangs(&in->model->mesh, row->slave[0]));
 }
 
 const uz_inner_place *uz_row_inner(const uz_body_model *model, int64_t row)
@@ -119,23 +119,72 @@ int64_t uz_places_of_nodes(const uz_contact_input *in)
     return uz_group_node_count(&in->model->mesh, in->on);
 }
 
+/* What each node of eight-node faces has (room) of a constant pressure becomes what reactions that act as the rows of
+ * contact_rows.c are have of it: an edge's ends take over a share of its middle's. A middle beside smaller faces is a
+ * corner of theirs, and comes after their own middles. */
+static bool share_middles(double *room, const uz_contact_input *in)
+{
+    const uz_mesh *mesh = &in->model->mesh;
+    unsigned char *corner = uz_alloc_zero(mesh->n_nodes, 1), *done = uz_alloc_zero(mesh->n_nodes, 1);
+    for (int pass = -1; pass < 2 && corner && done; pass++)
+        for (int64_t e = 0; e < in->on->n_faces; e++) {
+            int64_t node[UZ_FACE_NODES];
+            const int count = uz_mesh_face(node, mesh, in->on->face[e]);
+            for (int j = 0; j < 4 && pass < 0 && count == 8; j++)
+                corner[node[j]] = 1;
+            for (int j = 0; j < 4 && pass >= 0 && count == 8; j++) {
+                const int64_t middle = node[4 + j];
+                if (done[middle] || corner[middle] != pass || uz_mesh_hangs(mesh, middle))
+                    continue;
+                const double share = UZ_MIDDLE_SHARE * room[middle];
+                room[node[j]] += share;
+                room[node[(j + 1) % 4]] += share;
+                room[middle] -= 2 * share;
+                done[middle] = 1;
+            }
+        }
+    const bool known = corner && done;
+    free(corner);
+    free(done);
+    return known;
+}
+
+void uz_leave_hanging(double *value, const uz_mesh *mesh)
+{
+    for (int64_t i = mesh->n_given; i < mesh->n_nodes && mesh->hangs; i++) {
+        const int64_t *from;
+        const double *share;
+        const int count = mesh->hangs[i] && value[i] != 0 ? uz_mesh_amid(&from, &share, mesh, i) : 0;
+        for (int k = 0; k < count; k++)
+            value[from[k]] += share[k] * value[i];
+        value[i] = mesh->hangs[i] ? 0 : value[i];
+    }
+}
+
 /* What a consistent constant pressure gives each node of a face: nothing to the corners of a flat tri6 face, where it
  * must not be what rounding leaves, as reactions are divided by it. */
-void uz_areas_of_nodes(double *area, const uz_contact_input *in)
+bool uz_areas_of_nodes(double *area, const uz_contact_input *in)
 {
     const int64_t count = uz_places_of_nodes(in);
+    const bool hangs = in->model->mesh.hangs != NULL;
+    bool known = true;
     for (int64_t e = 0; e < in->on->n_faces; e++) {
         uz_side side;
         int64_t node[UZ_FACE_NODES];
         double xyz[3 * UZ_FACE_NODES], w[UZ_FACE_NODES];
         uz_body_side(&side, xyz, node, in->model, in->on->face[e]);
-        uz_side_positive_weights(w, &side);
+        (hangs ? uz_side_weights : uz_side_positive_weights)(w, &side);
         const double whole = uz_side_area(&side);
         for (int a = 0; a < side.nodes; a++)
             in->room[node[a]] += fabs(w[a]) > 1e-12 * whole ? w[a] : 0;
+    }
+    if (hangs) {
+        uz_leave_hanging(in->room, &in->model->mesh);
+        known = share_middles(in->room, in);
     }
     for (int64_t i = 0; i < count; i++)
         area[i] = in->room[uz_group_node_at(in->on, i)];
     for (int64_t i = 0; i < count; i++)
         in->room[uz_group_node_at(in->on, i)] = 0;
+    return known;
 }

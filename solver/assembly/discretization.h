@@ -45,10 +45,11 @@ typedef struct {
     /* Once per body and place: fills the sites (zeroed), from which rows follow. On failure they are cleared by the
      * caller. */
     uz_status (*find)(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err);
-    /* The row of a place, for the contact of this load; false: there is none. */
+    /* The row of a place, for the contact of this load; false: there is none. One at a hanging node is taken for none.
+     */
     bool (*row)(uz_contact_row *row, const uz_contact_input *in, const uz_contact_sites *sites, int64_t place);
-    /* area (places): the part of the surface that the reaction of each place acts on. */
-    void (*areas)(double *area, const uz_contact_input *in);
+    /* area (places): the part of the surface that the reaction of each place acts on. False: no memory. */
+    bool (*areas)(double *area, const uz_contact_input *in);
 } uz_contact_discretization;
 
 /* The one that a contact asks for. */
@@ -57,7 +58,8 @@ const uz_contact_discretization *uz_discretization_of(const uz_contact *contact)
 /* Its input but for `room`. UZ_ERR_SCENE: the groups are not there. */
 uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, const uz_scene *scene, int64_t index,
                               uz_error *err);
-/* uz_contact_discretization.row of the contact's own discretization, of a model whose sites are found. */
+/* uz_contact_discretization.row of the contact's own discretization, of a model whose sites are found. A hanging node
+ * has none: it goes where those go that it lies amid, and so do gap and reaction. */
 bool uz_contact_row_at(uz_contact_row *row, const uz_contact_input *in, int64_t place);
 
 extern const uz_contact_discretization uz_node_to_obstacle, uz_node_to_face, uz_surface_to_surface;
@@ -70,6 +72,8 @@ bool uz_row_of_sites(uz_contact_row *row, const uz_contact_input *in, const uz_c
 uz_status uz_sites_of_nodes(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err);
 void uz_put_normal(uz_contact_sites *sites, int64_t i, const double normal[3], int dim);
 int64_t uz_places_of_nodes(const uz_contact_input *in);
-void uz_areas_of_nodes(double *area, const uz_contact_input *in);
+bool uz_areas_of_nodes(double *area, const uz_contact_input *in);
+/* What hanging nodes have of a value (n_nodes), as of an area, goes to those that they lie amid. */
+void uz_leave_hanging(double *value, const uz_mesh *mesh);
 
 #endif

@@ -72,7 +72,7 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
                 status = uz_reserve_frames(model, count, err);
                 for (int64_t i = 0; i < count && status == UZ_OK; i++) { /* turned so that one of their dofs is held */
                     const int64_t node = uz_group_node_at(group, i);
-                    const int held = uz_hold_direction(model, node, n);
+                    const int held = uz_mesh_hangs(mesh, node) ? -1 : uz_hold_direction(model, node, n);
                     if (held >= 0) /* else it is already */
                         model->dof[node * mesh->dim + held] = -1;
                 }
@@ -88,7 +88,10 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
     const int64_t total = mesh->n_nodes * mesh->dim;
     model->d = model->n_fixed = 0;
     for (int64_t i = 0; i < total; i++)
-        model->dof[i] = model->dof[i] < 0 ? -1 - model->n_fixed++ : model->d++;
+        if (uz_mesh_hangs(mesh, i / mesh->dim)) /* one of a group that is held lies amid nodes of it */
+            model->dof[i] = UZ_NO_DOF;
+        else
+            model->dof[i] = model->dof[i] < 0 ? -1 - model->n_fixed++ : model->d++;
     if (model->d == 0)
         return uz_fail(err, UZ_ERR_SCENE, "/supports", "the supports hold every node: nothing is left to move");
     return UZ_OK;

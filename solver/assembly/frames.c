@@ -75,23 +75,19 @@ static void turn_lines(double *ke, int lines, int line, int step, const double *
     }
 }
 
-bool uz_is_rotated_element(const uz_body_model *model, int64_t element)
+bool uz_are_rotated(const uz_body_model *model, const int64_t *node, int count)
 {
-    int corners;
-    const int64_t *corner = uz_mesh_element(&model->mesh, element, &corners);
     bool turned = false;
-    for (int a = 0; model->frame_of && a < corners; a++)
-        turned = turned || model->frame_of[corner[a]] > 0;
+    for (int a = 0; model->frame_of && a < count; a++)
+        turned = turned || model->frame_of[node[a]] > 0;
     return turned;
 }
 
-void uz_turn_element(double *ke, const uz_body_model *model, int64_t element)
+void uz_turn_stiffness(double *ke, const uz_body_model *model, const int64_t *node, int count)
 {
-    int corners;
-    const int64_t *corner = uz_mesh_element(&model->mesh, element, &corners);
-    const int dim = model->mesh.dim, n = dim * corners;
-    for (int a = 0; a < corners; a++) {
-        const double *Q = uz_node_frame(model, corner[a]);
+    const int dim = model->mesh.dim, n = dim * count;
+    for (int a = 0; a < count; a++) {
+        const double *Q = uz_node_frame(model, node[a]);
         if (!Q)
             continue;
         turn_lines(ke + a * dim * n, n, 1, n, Q, dim);

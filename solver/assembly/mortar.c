@@ -462,10 +462,11 @@ static int64_t places(const uz_contact_input *in)
     return in->model->sites[in->index].n;
 }
 
-static void areas(double *area, const uz_contact_input *in)
+static bool areas(double *area, const uz_contact_input *in)
 {
     const uz_contact_sites *sites = &in->model->sites[in->index];
     memcpy(area, sites->area, (size_t)sites->n * sizeof *area);
+    return true;
 }
 
 const uz_contact_discretization uz_surface_to_surface = {

@@ -76,6 +76,28 @@ static void add_group(void *ctx, const uz_strain_group *group)
                        shared ? (const double(*)[UZ_ELEMENT_SAMPLES])r->share[group->rule.kind] : NULL);
 }
 
+/* At hanging nodes what those make of it that they lie amid: an average over the elements that have a hanging node
+ * would be one of one side of it alone, and off by as much as the strain changes along half of an element. head, next:
+ * as of number_places. */
+static void follow(uz_nodal_strains *out, const uz_mesh *mesh, const int64_t *head, const int64_t *next)
+{
+    for (int64_t i = 0; i < out->count; i++) {
+        const int64_t node = out->of ? out->node[i] : i, *from;
+        const double *share;
+        double *row = out->rows + i * out->size;
+        const int count = uz_mesh_hangs(mesh, node) ? uz_mesh_amid(&from, &share, mesh, node) : 0;
+        for (int c = 0; c < out->size && count > 0; c++)
+            row[c] = c == out->strains ? row[c] : 0;
+        for (int k = 0; k < count; k++) {
+            int64_t at = out->of ? head[from[k]] : from[k]; /* elements of one material around both have its place */
+            while (out->of && at >= 0 && out->material[at] != out->material[i])
+                at = next[at];
+            for (int c = 0; c < out->size && at >= 0; c++)
+                row[c] += c == out->strains ? 0 : share[k] * out->rows[at * out->size + c];
+        }
+    }
+}
+
 uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source *from, uz_continuation how,
                                    const uz_hooks *hooks, uz_error *err)
 {
@@ -97,11 +119,13 @@ uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source
         ok = out->of && out->node && out->material && head && next;
         if (ok)
             number_places(out, model, head, next);
-        free(head);
-        free(next);
     }
     out->rows = ok ? uz_alloc_zero(out->count * out->size, sizeof *out->rows) : NULL;
     recovery *r = out->rows ? uz_alloc(1, sizeof *r) : NULL;
+    if (!r) {
+        free(head);
+        free(next);
+    }
     if (!r)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the strain at %lld nodes", (long long)mesh->n_nodes);
     r->out = out;
@@ -116,6 +140,10 @@ uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source
         for (int c = 0; c < out->size; c++)
             row[c] *= c == out->strains ? 1 : scale;
     }
+    if (status == UZ_OK && mesh->hangs)
+        follow(out, mesh, head, next);
+    free(head);
+    free(next);
     return status;
 }
 

@@ -797,11 +797,11 @@ static bool row(uz_contact_row *row, const uz_contact_input *in, const uz_contac
 }
 
 /* What a row inside a side has, its nodes have no more; the flanks that hold a node have equal parts of it. */
-static void areas(double *area, const uz_contact_input *in)
+static bool areas(double *area, const uz_contact_input *in)
 {
     const uz_contact_sites *sites = &in->model->sites[in->index];
     const int64_t nodes = uz_places_of_nodes(in), others = nodes + sites->n_flanks;
-    uz_areas_of_nodes(area, in);
+    const bool known = uz_areas_of_nodes(area, in);
     for (int64_t i = 0; i < sites->n_inner; i++) {
         uz_side side;
         int64_t node[UZ_FACE_NODES];
@@ -814,6 +814,8 @@ static void areas(double *area, const uz_contact_input *in)
         for (int a = 0; a < side.nodes && row; a++)
             in->room[node[a]] += part * w[a];
     }
+    if (sites->n_inner > 0)
+        uz_leave_hanging(in->room, &in->model->mesh);
     for (int64_t i = 0; i < nodes && sites->n_inner > 0; i++) {
         const int64_t node = uz_group_node_at(in->on, i);
         area[i] = fmax(0, area[i] - in->room[node]);
@@ -830,6 +832,7 @@ static void areas(double *area, const uz_contact_input *in)
         area[nodes + i] = in->room[sites->flank[i]];
     for (int64_t i = 0; i < sites->n_flanks; i++)
         in->room[sites->flank[i]] = 0;
+    return known;
 }
 
 const uz_contact_discretization uz_node_to_obstacle = {

@@ -54,9 +54,22 @@ void uz_from_frame(double v[3], const uz_body_model *model, int64_t node);
 /* A unit vector along the free dofs of a node: 0 for held ones, and where a rotated dof has a share by rounding only.
  */
 void uz_free_shares(double share[3], const uz_body_model *model, int64_t node, const double n[3]);
-/* Has the element a node with rotated dofs? Its stiffness ke (full, square) then becomes T ke T'. */
-bool uz_is_rotated_element(const uz_body_model *model, int64_t element);
-void uz_turn_element(double *ke, const uz_body_model *model, int64_t element);
+/* Is one of these nodes rotated? A stiffness ke (full, square) of their displacements then becomes T ke T'. */
+bool uz_are_rotated(const uz_body_model *model, const int64_t *node, int count);
+void uz_turn_stiffness(double *ke, const uz_body_model *model, const int64_t *node, int count);
+
+/* The nodes whose displacements make those of some nodes: themselves, but in the place of hanging ones those that they
+ * lie amid, each once. */
+typedef struct {
+    bool hangs; /* is one of them hanging? */
+    int own, count;
+    int64_t node[UZ_ELEMENT_NODES];
+    double share[UZ_ELEMENT_NODES][UZ_ELEMENT_NODES]; /* [own][count]; not filled where none hangs */
+} uz_ties;
+/* Of an element, which has no more of them than nodes (subdivide.h). */
+void uz_tie_nodes(uz_ties *ties, const uz_mesh *mesh, const int64_t *node, int count);
+/* out (count x dim, square) = the stiffness ke (own x dim) as one of theirs: S' ke S. */
+void uz_tie_stiffness(double *out, const uz_ties *ties, const double *ke, int dim);
 
 /* mesh -> sites, by each contact's discretization (discretization.h). rest: not NULL for those at model->place: the
  * same body with its sites before anything moves. */

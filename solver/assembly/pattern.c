@@ -11,10 +11,12 @@
 /* Elements around each node, and a scratch list of the nodes around one node. */
 typedef struct {
     const uz_body_model *model;
-    int64_t *start;  /* n_nodes + 1, into around */
-    int64_t *around; /* as many as the elements have nodes */
-    int64_t *seen;   /* n_nodes: 1 + the last node whose neighbours it was counted among */
-    int64_t *near;   /* neighbours of the node at hand, itself included, ascending; most_near of them */
+    uz_mesh tied;          /* the mesh, but for hanging nodes: elements have those in their place that these lie amid */
+    int64_t *first, *node; /* its own of these; NULL: there are no hanging nodes */
+    int64_t *start;        /* n_nodes + 1, into around */
+    int64_t *around;       /* as many as the elements have nodes */
+    int64_t *seen;         /* n_nodes: 1 + the last node whose neighbours it was counted among */
+    int64_t *near;         /* neighbours of the node at hand, itself included, ascending; most_near of them */
     int64_t n_near;
 } neighbours;
 
@@ -43,7 +45,7 @@ static void walk_columns(uz_body_model *model, neighbours *n, int64_t *ptr, int6
     const int dim = model->mesh.dim;
     memset(n->seen, 0, (size_t)model->mesh.n_nodes * sizeof *n->seen);
     for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-        const uz_mesh *mesh = &n->model->mesh;
+        const uz_mesh *mesh = &n->tied;
         n->n_near = 0;
         for (int64_t i = n->start[a]; i < n->start[a + 1]; i++)
             for (int64_t k = mesh->first[n->around[i]]; k < mesh->first[n->around[i] + 1]; k++) {
@@ -58,6 +60,8 @@ static void walk_columns(uz_body_model *model, neighbours *n, int64_t *ptr, int6
             }
         for (int c = 0; c < dim; c++) {
             const int64_t column = model->dof[a * dim + c], fixed = -1 - column;
+            if (column == UZ_NO_DOF)
+                continue;
             if (ptr)
                 *(column >= 0 ? &ptr[column + 1] : &ptr_fixed[fixed + 1]) = free_rows(NULL, n, column);
             else
@@ -77,6 +81,30 @@ static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, int64_t *ptr
     return status;
 }
 
+/* n->tied. False: no memory. */
+static bool tie(neighbours *n)
+{
+    const uz_mesh *mesh = &n->model->mesh;
+    uz_ties ties;
+    n->tied = *mesh;
+    if (!mesh->hangs)
+        return true;
+    n->first = uz_alloc_zero(mesh->n_elements + 1, sizeof *n->first);
+    n->node = uz_alloc(mesh->n_elements * UZ_ELEMENT_NODES, sizeof *n->node);
+    if (!n->first || !n->node)
+        return false;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        uz_tie_nodes(&ties, mesh, node, count);
+        memcpy(n->node + n->first[e], ties.node, (size_t)ties.count * sizeof *n->node);
+        n->first[e + 1] = n->first[e] + ties.count;
+    }
+    n->tied.first = n->first;
+    n->tied.node = n->node;
+    return true;
+}
+
 uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
@@ -87,8 +115,8 @@ uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
     uz_status status = UZ_ERR_MEMORY;
     int64_t *ptr = uz_alloc_zero(model->d + 1, sizeof *ptr), most = 0;
     int64_t *ptr_fixed = uz_alloc_zero(model->n_fixed + 1, sizeof *ptr_fixed);
-    if (n.start && n.around && n.seen) {
-        uz_mesh_list_around(n.start, n.around, mesh);
+    if (tie(&n) && n.start && n.around && n.seen) {
+        uz_mesh_list_around(n.start, n.around, &n.tied);
         for (int64_t a = 0; a < mesh->n_nodes; a++)
             most = n.start[a + 1] - n.start[a] > most ? n.start[a + 1] - n.start[a] : most;
         n.near = uz_alloc(most * UZ_ELEMENT_NODES + 1, sizeof *n.near); /* each counted for every element it shares */
@@ -106,6 +134,8 @@ uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
 done:
     free(ptr);
     free(ptr_fixed);
+    free(n.first);
+    free(n.node);
     free(n.start);
     free(n.around);
     free(n.seen);

@@ -27,6 +27,8 @@ typedef struct {
 static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c, double value, uz_error *err)
 {
     const int64_t dof = p->model->dof[node * p->model->mesh.dim + c];
+    if (dof == UZ_NO_DOF)
+        return UZ_OK;
     if (dof >= 0)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/supports", OTHER_BODY);
     const int64_t fixed = -1 - dof;
@@ -59,6 +61,8 @@ static uz_status prescribe_along(prescription *p, int64_t support, int64_t node,
     const int64_t *dof = p->model->dof + node * p->model->mesh.dim;
     double known = 0, size = 0, share[3]; /* what the dofs given so far make of n . u */
     int own = -1;                         /* the held dof that n has its own share in */
+    if (uz_mesh_hangs(&p->model->mesh, node))
+        return UZ_OK;
     uz_to_frame(share, p->model, node, n);
     for (int c = 0; c < p->model->mesh.dim; c++) {
         if (dof[c] < 0 && (p->source[-1 - dof[c]] || (c == 0 && uz_is_on_axis(p->model, node)))) {

@@ -17,10 +17,13 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
         if (dof >= 0)
             nodal[i] = u[dof];
         else
-            nodal[i] = prescribed ? prescribed[-1 - dof] : 0;
+            nodal[i] = prescribed && dof != UZ_NO_DOF ? prescribed[-1 - dof] : 0;
     }
     for (int64_t i = 0; i < model->info.n_rotated; i++)
         uz_from_frame(nodal + model->info.rotated_node[i] * dim, model, model->info.rotated_node[i]);
+    for (int64_t i = model->mesh.n_given * dim; i < total && model->mesh.hangs; i++)
+        if (model->dof[i] == UZ_NO_DOF)
+            nodal[i] = uz_mesh_value_amid(&model->mesh, i / dim, nodal + i % dim, dim);
 }
 
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal)
@@ -39,6 +42,25 @@ void uz_restrict_nodal(double *u, const uz_body_model *model, const double *noda
     }
 }
 
+void uz_gather_nodal(double *p, const uz_body_model *model, const double *f)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const int dim = mesh->dim;
+    uz_restrict_nodal(p, model, f);
+    for (int64_t i = mesh->n_given; i < mesh->n_nodes && mesh->hangs; i++) {
+        const int64_t *from;
+        const double *share;
+        const int count = mesh->hangs[i] ? uz_mesh_amid(&from, &share, mesh, i) : 0;
+        for (int k = 0; k < count; k++) {
+            double local[3];
+            uz_to_frame(local, model, from[k], f + i * dim);
+            for (int c = 0; c < dim; c++)
+                if (model->dof[from[k] * dim + c] >= 0)
+                    p[model->dof[from[k] * dim + c]] += share[k] * local[c];
+        }
+    }
+}
+
 double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v)
 {
     double local[3];
@@ -54,12 +76,18 @@ const char *uz_dof_name(const uz_body_model *model, int64_t node, int c)
     return !Q || Q[c * model->mesh.dim + c] == 1 ? axes[c] : "the normal of its support";
 }
 
-double uz_turning_error(const uz_body_model *model, int64_t node, const double *v)
+double uz_turning_error(const uz_body_model *model, int64_t node, const double *nodal)
 {
+    const int dim = model->mesh.dim;
+    const bool hangs = uz_mesh_hangs(&model->mesh, node);
+    const int64_t *from = &node;
+    const double whole = 1, *share = &whole;
+    const int count = hangs ? uz_mesh_amid(&from, &share, &model->mesh, node) : 1;
     double size = 0;
-    for (int c = 0; c < model->mesh.dim; c++)
-        size += fabs(v[c]);
-    return uz_node_frame(model, node) ? 4 * DBL_EPSILON * size : 0;
+    for (int k = 0; k < count; k++)
+        for (int c = 0; c < dim && (hangs || uz_node_frame(model, node)); c++)
+            size += fabs(share[k] * nodal[from[k] * dim + c]);
+    return (hangs ? 4 + count : 4) * DBL_EPSILON * size;
 }
 
 static void *duplicate(const void *from, int64_t count, size_t size)

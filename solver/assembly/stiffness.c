@@ -120,18 +120,27 @@ uz_status uz_check_elements(const uz_body_model *model, uz_error *err)
 
 /* ---------------------------------------------------------------- adding up */
 
-/* The rows of a node stand together in every column, at a place that the column of another's first free dof tells: each
- * following one lacks the rows of that node before its diagonal. */
-static void add_element(uz_body_model *model, const double *ke, int64_t element)
+/* A stiffness of displacements at nodes. The rows of a node stand together in every column, at a place that the column
+ * of another's first free dof tells: each following one lacks the rows of that node before its diagonal. */
+static void add_stiffness(uz_body_model *model, const double *ke, const int64_t *node, int count)
 {
-    double turned[DOFS * DOFS];
-    int count;
-    const int64_t *node = uz_mesh_element(&model->mesh, element, &count), *dof[UZ_ELEMENT_NODES];
-    const int dim = model->mesh.dim, n = count * dim;
+    double turned[DOFS * DOFS], tied[DOFS * DOFS];
+    uz_ties ties;
+    const int64_t *dof[UZ_ELEMENT_NODES];
     uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
-    if (uz_is_rotated_element(model, element)) {
+    const int dim = model->mesh.dim;
+    if (model->mesh.hangs)
+        uz_tie_nodes(&ties, &model->mesh, node, count);
+    if (model->mesh.hangs && ties.hangs) {
+        uz_tie_stiffness(tied, &ties, ke, dim);
+        ke = tied;
+        node = ties.node;
+        count = ties.count;
+    }
+    const int n = count * dim;
+    if (uz_are_rotated(model, node, count)) {
         memcpy(turned, ke, (size_t)(n * n) * sizeof *ke);
-        uz_turn_element(turned, model, element);
+        uz_turn_stiffness(turned, model, node, count);
         ke = turned;
     }
     for (int a = 0; a < count; a++)
@@ -179,15 +188,22 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
     if (status == UZ_OK)
         status = uz_build_pattern(model, err);
     for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK; e++) {
+        int count;
+        const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
-            add_element(model, ke, e);
+            add_stiffness(model, ke, node, count);
     }
     /* the springs of a node as a matrix of its dofs: Q diag(k) Q' */
     for (int64_t a = 0; a < model->mesh.n_nodes && status == UZ_OK && model->spring; a++) {
         const double *k = model->spring + a * dim, *Q = uz_node_frame(model, a);
         const int64_t *dof = model->dof + a * dim;
-        for (int j = 0; j < dim; j++)
+        double own[9] = {0};
+        for (int c = 0; c < dim; c++)
+            own[c * dim + c] = k[c];
+        if (uz_mesh_hangs(&model->mesh, a))
+            add_stiffness(model, own, &a, 1);
+        for (int j = 0; j < dim && !uz_mesh_hangs(&model->mesh, a); j++)
             for (int i = 0; i < dim; i++) {
                 double value = Q || i != j ? 0 : k[i];
                 for (int c = 0; Q && c < dim; c++)
@@ -347,21 +363,23 @@ uz_status uz_turning_energy(double *energy, const uz_body_model *model, const do
         double delta[DOFS];
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
-        if (!uz_is_rotated_element(model, e))
+        bool turned = uz_are_rotated(model, node, count);
+        for (int a = 0; a < count; a++)
+            turned = turned || uz_mesh_hangs(mesh, node[a]);
+        if (!turned)
             continue;
         status = source_get(&ke, &source, e, err);
         for (int a = 0; a < count; a++)
             for (int c = 0; c < dim; c++)
-                delta[a * dim + c] = uz_turning_error(model, node[a], nodal + node[a] * dim);
+                delta[a * dim + c] = uz_turning_error(model, node[a], nodal);
         double sum = 0; /* |delta|'|ke||delta| */
         for (int i = 0; i < count * dim && status == UZ_OK; i++)
             for (int j = 0; j < count * dim; j++)
                 sum += fabs(ke[i * count * dim + j]) * fabs(delta[i]) * fabs(delta[j]);
         *energy += sum;
     }
-    for (int64_t t = 0; t < model->info.n_rotated && model->spring; t++) {
-        const int64_t a = model->info.rotated_node[t];
-        const double delta = uz_turning_error(model, a, nodal + a * dim);
+    for (int64_t a = 0; a < mesh->n_nodes && model->spring; a++) {
+        const double delta = uz_turning_error(model, a, nodal);
         for (int c = 0; c < dim; c++)
             *energy += model->spring[a * dim + c] * delta * delta;
     }

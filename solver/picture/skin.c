@@ -25,6 +25,13 @@ static void add_cell(uz_skin *skin, const int64_t *node, int corners, int count)
     skin->n_cells++;
 }
 
+/* A side of one element only. */
+static bool is_outside(const uz_mesh *mesh, const uz_corner_table *sides, int64_t i)
+{
+    const uz_face side = sides->item[i];
+    return !sides->same[i] && !sides->same[i + 1] && !(mesh->inside && mesh->inside[side.element] >> side.side & 1);
+}
+
 uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks, uz_error *err)
 {
     const bool solid = mesh->dim == 3;
@@ -32,8 +39,8 @@ uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks
     int64_t cells = solid ? 0 : mesh->n_elements;
     memset(out, 0, sizeof *out);
     uz_status status = solid ? uz_corner_table_build(&sides, mesh, true, err) : UZ_OK;
-    for (int64_t i = 0; i < sides.count; i++) /* sides of one element only */
-        cells += !sides.same[i] && !sides.same[i + 1];
+    for (int64_t i = 0; i < sides.count; i++)
+        cells += is_outside(mesh, &sides, i);
     if (status == UZ_OK && solid && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the surface was found");
     if (status == UZ_OK) {
@@ -49,7 +56,7 @@ uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks
     }
     for (int64_t i = 0; status == UZ_OK && i < sides.count; i++) {
         int64_t node[UZ_FACE_NODES];
-        if (sides.same[i] || sides.same[i + 1])
+        if (!is_outside(mesh, &sides, i))
             continue;
         const int count = uz_mesh_face(node, mesh, sides.item[i]);
         const uz_element_kind kind = (uz_element_kind)mesh->kind[sides.item[i].element];

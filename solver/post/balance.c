@@ -146,7 +146,7 @@ static bool list_supports(balance *b)
     return true;
 }
 
-/* f_int at held nodes, of the elements that touch one. */
+/* f_int at held nodes, of the elements that touch one, and at hanging nodes. */
 static void add_elements(balance *b)
 {
     const uz_body_model *model = b->model;
@@ -160,7 +160,7 @@ static void add_elements(balance *b)
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         bool touches = false;
         for (int a = 0; a < count; a++)
-            touches = touches || b->held[node[a]];
+            touches = touches || b->held[node[a]] || uz_mesh_hangs(mesh, node[a]);
         if (!touches)
             continue;
         if (!alike || made != uz_element_material(model, e)) {
@@ -171,12 +171,30 @@ static void add_elements(balance *b)
         const int dim = b->dim, n = count * dim;
         for (int i = 0; i < n; i++) {
             double sum = 0;
-            if (!b->held[node[i / dim]])
+            if (!b->held[node[i / dim]] && !uz_mesh_hangs(mesh, node[i / dim]))
                 continue;
             for (int j = 0; j < n; j++)
                 sum += ke[i * n + j] * b->u[node[j / dim] * dim + j % dim];
             b->inner[node[i / dim] * dim + i % dim] += sum;
             b->size += fabs(sum);
+        }
+    }
+}
+
+/* Forces at hanging nodes go to those that they lie amid, in what is left to supports by node. */
+static void leave_hanging(balance *b)
+{
+    const uz_mesh *mesh = &b->model->mesh;
+    for (int64_t a = mesh->n_given; a < mesh->n_nodes && mesh->hangs; a++) {
+        const int64_t *from;
+        const double *share;
+        const int count = mesh->hangs[a] ? uz_mesh_amid(&from, &share, mesh, a) : 0;
+        for (int k = 0; k < count * b->dim; k++) {
+            const int64_t own = a * b->dim + k % b->dim, to = from[k / b->dim] * b->dim + k % b->dim;
+            const double spring = b->model->spring ? b->model->spring[own] * b->u[own] : 0;
+            b->inner[to] += share[k / b->dim] * (b->inner[own] + spring);
+            b->load[to] += share[k / b->dim] * b->load[own];
+            b->contact[to] += share[k / b->dim] * b->contact[own];
         }
     }
 }
@@ -322,10 +340,12 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     }
     if (status == UZ_OK && !list_supports(&b))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
-    if (status == UZ_OK)
+    if (status == UZ_OK) {
         add_elements(&b);
+        leave_hanging(&b);
+    }
     for (int64_t a = 0; a < n && status == UZ_OK; a++)
-        if (b.held[a])
+        if (b.held[a] && !uz_mesh_hangs(&model->mesh, a))
             add_reaction(&b, a);
     if (status == UZ_OK)
         status = add_springs(&b, err);
@@ -335,7 +355,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         /* Supports move the body, or do not hold it: then most of u may be rigid motion. */
         bool carried = model->n_modes > 0;
         for (int64_t i = 0; i < n * dim && !carried; i++)
-            carried = model->dof[i] < 0 && u[i] != 0;
+            carried = model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF && u[i] != 0;
         status = uz_strain_energy(&energy, model, u, carried, err);
     }
     out->strain_energy = energy - expanding + expanded;

@@ -142,6 +142,14 @@ static void look_at_sides(contact_sides *on)
         on->active[at] = on->active[at] || model->law->kind->active(model->law, NULL, &on->r[row], 1) > 0;
         row++;
     }
+    for (int64_t a = model->mesh.n_given; a < model->mesh.n_nodes && model->mesh.hangs; a++) { /* nodes without rows */
+        const int64_t *from;
+        const double *share;
+        const int amid = model->mesh.hangs[a] ? uz_mesh_amid(&from, &share, &model->mesh, a) : 0;
+        on->active[a] = on->active[a] || amid > 0;
+        for (int k = 0; k < amid; k++)
+            on->active[a] = on->active[a] && on->active[from[k]];
+    }
     for (int64_t f = 0; f < on->group->n_faces; f++) {
         const int count = nodes_of(node, &corners, on, f);
         bool all = true, inside = false;

@@ -9,7 +9,7 @@
  * ends. So a uniform pressure is found exactly, the total force is kept, reactions <= 0 give pressures >= 0, and
  * neither the corners of six-node triangles, which carry nothing, nor the 1 : 4 : 1 of a three-node edge make p jump. A
  * reaction at a place x inside a side counts for its corners by psi_a(x), and the pressure there lies between theirs.
- */
+ * A corner that hangs, or is the middle of a larger side's edge, is none of these: psi_a is linear there, too. */
 #include "post/parts.h"
 
 #include "assembly/discretization.h"
@@ -25,7 +25,37 @@ typedef struct {
     double *area, *force; /* of corners */
     int64_t *end;         /* 2 by node: 1 + the ends of the edge of which it is the middle; NULL: there is none */
     bool *has_row;
+    const uz_mesh *mesh;
 } pressure_work;
+
+/* The corners between which a node that is none stands, at equal shares; returns how many: 0, it is a corner. */
+static int stands_amid(int64_t corner[4], const pressure_work *w, int64_t node)
+{
+    const int64_t *from;
+    const double *share;
+    const bool middle = w->end && w->end[2 * node] > 0;
+    for (int k = 0; k < 2 && middle; k++)
+        corner[k] = w->end[2 * node + k] - 1;
+    if (middle || !uz_mesh_hangs(w->mesh, node))
+        return middle ? 2 : 0;
+    const int count = uz_mesh_amid(&from, &share, w->mesh, node), corners = count < 4 ? 2 : 4;
+    memcpy(corner, from, (size_t)corners * sizeof *corner);
+    return corners;
+}
+
+/* Of a refined mesh: what is at nodes that are no corners goes to corners. Those that a new node stands amid were there
+ * before it. */
+static void leave_middles(double *value, const pressure_work *w, const uz_group *group)
+{
+    for (int64_t i = group->n_nodes - 1; i >= 0 && w->mesh->hangs; i--) {
+        const int64_t node = group->node[i];
+        int64_t corner[4];
+        const int count = stands_amid(corner, w, node);
+        for (int k = 0; k < count; k++)
+            value[corner[k]] += value[node] / count;
+        value[node] = count > 0 ? 0 : value[node];
+    }
+}
 
 static bool add_sides(pressure_work *w, const uz_body_model *model, const uz_group *group)
 {
@@ -52,16 +82,25 @@ static bool add_sides(pressure_work *w, const uz_body_model *model, const uz_gro
     return true;
 }
 
-/* An end that a support holds has no row, and what it carries went into the support. */
+/* A corner that a support holds has no row, and what it carries went into the support. */
 static double pressure_at(const pressure_work *w, int64_t node)
 {
-    const bool middle = w->end && w->end[2 * node] > 0;
-    const int64_t a = middle ? w->end[2 * node] - 1 : node, b = middle ? w->end[2 * node + 1] - 1 : node;
-    const double first = w->area[a] > 0 ? w->force[a] / w->area[a] : NAN;
-    const double second = w->area[b] > 0 ? w->force[b] / w->area[b] : NAN;
-    if (!middle || w->has_row[a] != w->has_row[b])
-        return !middle || w->has_row[a] ? first : second;
-    return 0.5 * (first + second);
+    int64_t corner[4];
+    const int corners = stands_amid(corner, w, node);
+    double sum = 0;
+    int count = 0;
+    bool some = false;
+    for (int k = 0; k < corners; k++)
+        some = some || w->has_row[corner[k]];
+    for (int k = 0; k < corners; k++) {
+        if (some && !w->has_row[corner[k]])
+            continue;
+        sum += pressure_at(w, corner[k]);
+        count++;
+    }
+    if (corners > 0)
+        return sum / count;
+    return w->area[node] > 0 ? w->force[node] / w->area[node] : NAN;
 }
 
 /* Corners that a support holds have no row. */
@@ -69,13 +108,23 @@ static double pressure_inside(const pressure_work *w, const uz_inner_place *inne
 {
     double sum = 0, shares = 0;
     for (int a = 0; a < inner->corners; a++) {
-        const int64_t node = inner->node[a];
-        if (!w->has_row[node] || !(w->area[node] > 0))
+        const double there = w->has_row[inner->node[a]] ? pressure_at(w, inner->node[a]) : NAN;
+        if (isnan(there))
             continue;
-        sum += inner->linear[a] * w->force[node] / w->area[node];
+        sum += inner->linear[a] * there;
         shares += inner->linear[a];
     }
     return shares > 0 ? sum / shares : (double)NAN;
+}
+
+/* Do those have rows that a hanging node goes with? */
+static void hang_rows(pressure_work *w, const uz_group *group)
+{
+    for (int64_t i = 0; i < group->n_nodes && w->mesh->hangs; i++) {
+        int64_t corner[4];
+        for (int k = w->mesh->hangs[group->node[i]] ? stands_amid(corner, w, group->node[i]) : 0; k > 0; k--)
+            w->has_row[group->node[i]] = w->has_row[group->node[i]] || w->has_row[corner[k - 1]];
+    }
 }
 
 uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, const uz_scene *scene, const double *r,
@@ -83,7 +132,7 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
 {
     const int64_t m = model->m, n_nodes = model->mesh.n_nodes;
     pressure_work w = {uz_alloc_zero(n_nodes, sizeof *w.area), uz_alloc_zero(n_nodes, sizeof *w.force), NULL,
-                       uz_alloc_zero(n_nodes, sizeof *w.has_row)};
+                       uz_alloc_zero(n_nodes, sizeof *w.has_row), &model->mesh};
     const int64_t *contact = model->info.contact_of;
     bool done = w.area && w.force && w.has_row;
     for (int64_t first = 0, last; done && first < m; first = last) {
@@ -113,6 +162,11 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
             if (!middle)
                 w.force[node] -= r[i];
         }
+        if (done) {
+            leave_middles(w.area, &w, group);
+            leave_middles(w.force, &w, group);
+            hang_rows(&w, group);
+        }
         for (int64_t i = first; done && i < last; i++)
             pressure[i] = uz_row_inner(model, i) ? pressure_inside(&w, uz_row_inner(model, i))
                                                  : pressure_at(&w, model->info.contact_node[i]);
@@ -129,6 +183,18 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
     free(w.end);
     free(w.has_row);
     return done ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)m);
+}
+
+/* At a hanging node: linear between the corners that it lies amid. NAN where one has none. */
+static double pressure_amid(const double *nodal, const uz_mesh *mesh, int64_t node)
+{
+    const int64_t *from;
+    const double *share;
+    const int count = uz_mesh_amid(&from, &share, mesh, node), corners = count < 4 ? 2 : 4;
+    double sum = 0;
+    for (int k = 0; k < corners; k++)
+        sum += nodal[from[k]] / corners;
+    return sum;
 }
 
 uz_status uz_nodal_pressure(double *nodal, const uz_body_model *model, const uz_scene *scene, const double *pressure,
@@ -157,9 +223,12 @@ uz_status uz_nodal_pressure(double *nodal, const uz_body_model *model, const uz_
             sum[row.master[k]] += fabs(row.master_share[k]) * area * pressure[i];
         }
     }
-    for (int64_t a = 0; status == UZ_OK && a < n_nodes; a++)
+    for (int64_t a = 0; status == UZ_OK && a < n_nodes; a++) {
         if (weight[a] > 0)
             nodal[a] = fmax(nodal[a], sum[a] / weight[a]);
+        if (uz_mesh_hangs(&model->mesh, a))
+            nodal[a] = pressure_amid(nodal, &model->mesh, a);
+    }
     free(weight);
     free(sum);
     return status;

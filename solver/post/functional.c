@@ -131,15 +131,6 @@ static double find_window(double *share, double *whole, const making *k, uz_erro
     return window;
 }
 
-/* Gaps of rows as the nodes have them become those of rows at the middles of eight-node faces (contact_rows.c). */
-static void blend_rows(double *gap, const uz_body_model *model)
-{
-    for (int64_t i = 0; i < model->m && model->row_ends; i++)
-        if (model->row_ends[2 * i] >= 0)
-            gap[i] = (gap[i] - UZ_MIDDLE_SHARE * (gap[model->row_ends[2 * i]] + gap[model->row_ends[2 * i + 1]])) /
-                     (1 - 2 * UZ_MIDDLE_SHARE);
-}
-
 /* Force of contacts, or its part in a window over that part's area. */
 static uz_status take_contacts(const making *k, uz_error *err)
 {
@@ -168,7 +159,7 @@ static uz_status take_contacts(const making *k, uz_error *err)
         k->out->gap[i] = -part / area;
     }
     if (status == UZ_OK)
-        blend_rows(k->out->gap, model);
+        uz_blend_rows(k->out->gap, model);
     k->out->times = -1;
     free(share);
     free(whole);
@@ -278,6 +269,14 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
             presses[model->info.contact_node[i]] =
                 presses[model->info.contact_node[i]] ||
                 (model->info.contact_of[i] == k && answer->r[i] < 0 && !uz_row_inner(model, i));
+        for (int64_t a = mesh->n_given; a < mesh->n_nodes && mesh->hangs; a++) { /* nodes without rows */
+            const int64_t *from;
+            const double *share;
+            const int amid = mesh->hangs[a] ? uz_mesh_amid(&from, &share, mesh, a) : 0;
+            presses[a] = presses[a] || amid > 0;
+            for (int j = 0; j < amid; j++)
+                presses[a] = presses[a] && presses[from[j]];
+        }
         for (int64_t f = 0; f < group->n_faces && status == UZ_OK; f++) {
             uz_side side;
             double xyz[3 * UZ_FACE_NODES];
@@ -305,8 +304,8 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
         uz_obstacle_free(obstacle);
     }
     if (status == UZ_OK) {
-        blend_rows(depth, model);
-        blend_rows(bulge, model);
+        uz_blend_rows(depth, model);
+        uz_blend_rows(bulge, model);
     }
     free(sum);
     free(normal);
@@ -328,7 +327,7 @@ static void take_directions(const making *k, const uz_support *support, const uz
         const int64_t node = uz_group_node_at(group, i / (dim * dim)), dof = k->model->dof[node * dim + i / dim % dim];
         const int c = (int)(i % dim), of = (int)(i / dim % dim);
         double e[DIM] = {c == 0, c == 1, c == 2}, along, value = 0;
-        if (dof >= 0 || taken[-1 - dof] || (inclined ? c > 0 : isnan(u[c])))
+        if (dof >= 0 || dof == UZ_NO_DOF || taken[-1 - dof] || (inclined ? c > 0 : isnan(u[c])))
             continue;
         along = uz_along_dof(k->model, node, of, inclined ? n : e);
         if (fabs(along) < 0.7) /* it is another support's */
@@ -369,7 +368,7 @@ static uz_status keep_contacts(const making *k, uz_error *err)
     if (!room)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
                        (long long)model->mesh.n_nodes);
-    blend_rows(k->out->gap, model);
+    uz_blend_rows(k->out->gap, model);
     return UZ_OK;
 }
 

@@ -71,6 +71,15 @@ uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *
             average_materials(stress, strain, volume, done, &recovered, body);
         uz_nodal_strains_clear(&recovered);
     }
+    for (int64_t a = 0; a < n_nodes && status == UZ_OK; a++) /* as the sides that they hang on */
+        for (int c = 0; c < body->components && uz_mesh_hangs(&body->model->mesh, a); c++) {
+            if (stress)
+                stress[a * body->components + c] =
+                    uz_mesh_value_amid(&body->model->mesh, a, stress + c, body->components);
+            if (strain)
+                strain[a * body->components + c] =
+                    uz_mesh_value_amid(&body->model->mesh, a, strain + c, body->components);
+        }
     free(volume);
     free(done);
     return status;

@@ -21,6 +21,7 @@
 #include "run/settings.h"
 #include "run/transfer.h"
 #include "scene/grids.h"
+#include "scene/subdivide.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -297,7 +298,7 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
     }
     if (status == UZ_OK && x->results && g->refines && x->error > g->requested)
         status = uz_mark_elements(&g->bisected, &g->n_bisected, &outline, &problem, x->results, g->requested / x->error,
-                                  err);
+                                  uz_mesh_can_subdivide(&outline.mesh) && !g->settings->guaranteed, err);
     uz_body_model_clear(&outline);
     level->seconds = uz_seconds() - start;
     if (status != UZ_OK) {

@@ -401,7 +401,7 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
         primal->width[k++] =
             fmin(v->result->r[i] < 0 ? 0 : fmax(0, v->result->g[i]), v->open[model->info.contact_node[i]]);
     }
-    uz_restrict_nodal(primal->p, model, of->load);
+    uz_gather_nodal(primal->p, model, of->load);
     uz_csc_gaxpy(primal->p, &model->K_fixed, -1, of->held);
     if (status == UZ_OK)
         status = solve_open(primal, &solved, true, err);

@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "run/problem.h"
 #include "run/results.h"
+#include "scene/subdivide.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -44,6 +45,11 @@ static void add_contact(double *eta2, double *room, const uz_body_model *body, c
                 pressure[node] = fmax(pressure[node], result->pressure[i]);
                 gap[node] = fmax(gap[node], result->g[i]);
             }
+        for (int64_t i = body->mesh.n_given; i < body->mesh.n_nodes && group && body->mesh.hangs; i++)
+            if (body->mesh.hangs[i]) { /* nodes without rows */
+                pressure[i] = fmax(0, uz_mesh_value_amid(&body->mesh, i, pressure, 1));
+                gap[i] = fmax(0, uz_mesh_value_amid(&body->mesh, i, gap, 1));
+            }
         for (int64_t f = 0; group && f < group->n_faces; f++) {
             uz_side side;
             double xyz[3 * UZ_FACE_NODES], sum[2] = {0}, same = 0;
@@ -60,11 +66,13 @@ static void add_contact(double *eta2, double *room, const uz_body_model *body, c
         }
         for (int64_t i = 0; i < result->m && group; i++)
             pressure[rows->contact_node[i]] = gap[rows->contact_node[i]] = 0;
+        for (int64_t i = 0; i < body->mesh.n_nodes && body->mesh.hangs; i++)
+            pressure[i] = gap[i] = 0;
     }
 }
 
 uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body, const uz_problem *problem,
-                           uz_result *const *results, double left, uz_error *err)
+                           uz_result *const *results, double left, bool subdivided, uz_error *err)
 {
     const int64_t n_elements = body->mesh.n_elements, n_cases = problem->n_cases > 0 ? problem->n_cases : 1;
     const uz_element_type *type = uz_element_type_of((uz_element_kind)body->mesh.kind[0]);
@@ -98,9 +106,11 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
                  bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
     while (done && count < n_elements && part < bulk && all[count].share > 0)
         part += all[count++].share;
-    int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 1 + count, sizeof *grown) : NULL;
+    int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 2 + count, sizeof *grown) : NULL;
     if (grown) {
         *list = grown;
+        if (*n == 0 && subdivided)
+            grown[(*n)++] = UZ_SUBDIVIDED;
         grown[(*n)++] = count;
         for (int64_t i = 0; i < count; i++)
             grown[(*n)++] = all[i].element;

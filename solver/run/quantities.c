@@ -155,7 +155,7 @@ static uz_status solve(adjoint *x, bool *solved, const uz_functional *of, uz_err
         count += x->pressing[i];
         k++;
     }
-    uz_restrict_nodal(x->p, model, of->load);
+    uz_gather_nodal(x->p, model, of->load);
     uz_csc_gaxpy(x->p, &model->K_fixed, -1, of->held);
     if (work->weight) { /* springs that the rows in contact leave without force */
         for (int64_t i = 0; i < model->m; i++)

@@ -12,8 +12,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The free dofs of a nodal u. Supported ones must be where the scene holds them: the error that is bounded is one among
- * displacements that meet the supports, and no other has an energy that could be compared. */
+/* The free dofs of a nodal u. Supported ones must be where the scene holds them, and hanging nodes where those are that
+ * they lie amid: the error that is bounded is one among displacements that do so, and no other has an energy that could
+ * be compared. */
 static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
 {
     const uz_body_model *model = &run->asked->setup->model;
@@ -22,8 +23,14 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
     for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++) {
         int64_t dof = model->dof[i], node = i / dim;
         double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
-        double rounding = 2 * uz_turning_error(model, node, u + node * dim); /* there and back */
-        const double held = dof < 0 ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent) : given;
+        double rounding = 2 * uz_turning_error(model, node, u); /* there and back */
+        const double held = dof == UZ_NO_DOF ? uz_mesh_value_amid(&model->mesh, node, u + i % dim, dim)
+                            : dof < 0        ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent)
+                                             : given;
+        if (!(fabs(given - held) <= rounding) && dof == UZ_NO_DOF)
+            return uz_fail(err, UZ_ERR_SCENE, "u",
+                           "node %lld hangs amid others: its displacement along %s must be %.17g, it is given as %.17g",
+                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), held, given);
         if (!(fabs(given - held) <= rounding))
             return uz_fail(err, UZ_ERR_SCENE, "u",
                            "node %lld is supported: its displacement along %s must be %.17g, it is given as %.17g",

@@ -105,12 +105,27 @@ uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, 
     return status;
 }
 
+/* Can the mesh be refined? */
+static uz_status check_refinement(const uz_mesh *mesh, const uz_scene *scene, uz_error *err)
+{
+    if (!uz_mesh_can_subdivide(mesh))
+        return uz_mesh_check_bisection(mesh, err);
+    for (int64_t k = 0; k < scene->n_contacts && mesh->dim == 3; k++)
+        if (scene->contacts[k].kind == UZ_OBSTACLE_BODY && scene->contacts[k].between == UZ_CONTACT_SURFACES)
+            return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
+                           "%s elements can't be refined where two surfaces touch in the mean (contact %lld); mesh the "
+                           "body with %s, or leave out \"refine\"",
+                           uz_element_name((uz_element_kind)mesh->kind[0]), (long long)k,
+                           uz_element_type_of((uz_element_kind)mesh->kind[0])->nodes > 8 ? "tet10" : "tet4 or tet10");
+    return UZ_OK;
+}
+
 uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
 {
     uz_status status = scene->source == UZ_MESH_GIVEN ? uz_mesh_from_given(out, &scene->given, uz_scene_dim(scene), err)
                                                       : uz_mesh_from_box(out, &scene->box, err);
     if (status == UZ_OK && scene->refine)
-        status = uz_mesh_check_bisection(out, err);
+        status = check_refinement(out, scene, err);
     if (status == UZ_OK && scene->n_bisected > 0)
         status = (scene->bisected[0] == UZ_SUBDIVIDED ? uz_mesh_subdivide : uz_mesh_bisect)(out, scene->bisected,
                                                                                             scene->n_bisected, err);

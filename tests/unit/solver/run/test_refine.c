@@ -204,7 +204,7 @@ TEST(marks_have_half_of_the_error)
     CHECK_REL(error, result->summary.discretization_error, 1e-12);
     for (int e = 0; e < 6; e++)
         sum += eta2[e];
-    CHECK_INT(uz_mark_elements(&list, &n, &body, &problem, &result, 1e-9, NULL), UZ_OK);
+    CHECK_INT(uz_mark_elements(&list, &n, &body, &problem, &result, 1e-9, false, NULL), UZ_OK);
     CHECK(n > 1 && list[0] == n - 1);
     for (int64_t i = 1; i < n; i++) {
         marked += eta2[list[i]];
@@ -212,7 +212,7 @@ TEST(marks_have_half_of_the_error)
     }
     CHECK_MSG(marked >= 0.5 * sum && marked - least < 0.5 * sum, "%g of %g", marked, sum);
     const int64_t before = n;
-    CHECK_INT(uz_mark_elements(&list, &n, &body, &problem, &result, 0.97, NULL), UZ_OK);
+    CHECK_INT(uz_mark_elements(&list, &n, &body, &problem, &result, 0.97, false, NULL), UZ_OK);
     CHECK(n - before > 0 && n - before < before); /* not much is missing */
     free(list);
     uz_body_model_clear(&body);
@@ -230,7 +230,7 @@ TEST(starts_are_interpolated)
     uz_state *start = NULL;
     int64_t *list = NULL, n = 0;
     CHECK_INT(uz_body_model_build(&outline, &s, UZ_BODY_OUTLINE, NULL), UZ_OK);
-    CHECK_INT(uz_mark_elements(&list, &n, &outline, &problem, &coarse, 1e-3, NULL), UZ_OK);
+    CHECK_INT(uz_mark_elements(&list, &n, &outline, &problem, &coarse, 1e-3, false, NULL), UZ_OK);
     uz_body_model_clear(&outline);
     s.bisected = list;
     s.n_bisected = n;
@@ -319,16 +319,24 @@ TEST(limits_end_it_with_the_best_answer)
     uz_scene_clear(&s);
 }
 
+/* A prism of two triangles on each other; and hexahedra, whose surfaces with hanging nodes no mortar rows know. */
 TEST(other_elements_are_refused_with_a_remedy)
 {
-    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){1, 1, 1}, (int64_t[3]){1, 1, 1});
-    s.refine = true;
+    uz_scene prism = body_scene(UZ_SOLID, "wedge6", (double[3]){1, 1, 1}, (int64_t[3]){1, 1, 1});
+    uz_scene pair = body_scene(UZ_SOLID, "hex8", (double[3]){1, 1, 1}, (int64_t[3]){1, 1, 1});
+    uz_contact *contact = body_plane(&pair, "top", (double[3]){0}, (double[3]){0});
+    contact->kind = UZ_OBSTACLE_BODY;
+    strcpy(contact->with, "bottom");
     const uz_settings settings = asking(0.05);
-    const uz_problem problem = problem_of_scene(&s);
-    uz_result *result = NULL;
-    uz_error err = {0};
-    CHECK_INT(uz_scene_check(&s, &err), UZ_ERR_SCENE);
-    CHECK(strcmp(err.where, "/mesh/refine") == 0 && strstr(err.message, "tet4"));
-    CHECK_INT(uz_solve(&result, &problem, &settings, NULL, NULL, &err), UZ_ERR_SCENE);
-    uz_scene_clear(&s);
+    for (int k = 0; k < 2; k++) {
+        uz_scene *s = k == 0 ? &prism : &pair;
+        s->refine = true;
+        const uz_problem problem = problem_of_scene(s);
+        uz_result *result = NULL;
+        uz_error err = {0};
+        CHECK_INT(uz_scene_check(s, &err), UZ_ERR_SCENE);
+        CHECK(strcmp(err.where, "/mesh/refine") == 0 && strstr(err.message, "tet4"));
+        CHECK_INT(uz_solve(&result, &problem, &settings, NULL, NULL, &err), UZ_ERR_SCENE);
+        uz_scene_clear(s);
+    }
 }
