@@ -122,7 +122,7 @@ def refused(s, request, code, pointer):
 
 def test_what_can_not_be_refined_is_refused(s):
     solid = {"problem": {"kind": "scene", "model": "solid", "materials": SCENE["problem"]["materials"],
-                         "mesh": {"box": {"size": [1, 1, 1], "cells": [1, 1, 1]}, "refine": "auto"},
+                         "mesh": {"box": {"size": [1, 1, 1], "cells": [1, 1, 1], "element": "wedge6"}, "refine": "auto"},
                          "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}]}}
     error = expect(s.post(solid, WAIT), 200).json["error"]
     check(error["pointer"] == "/problem/mesh/refine" and "tet4" in error["detail"], error)
