@@ -173,7 +173,10 @@ bool uz_areas_of_nodes(double *area, const uz_contact_input *in)
         int64_t node[UZ_FACE_NODES];
         double xyz[3 * UZ_FACE_NODES], w[UZ_FACE_NODES];
         uz_body_side(&side, xyz, node, in->model, in->on->face[e]);
-        (hangs ? uz_side_weights : uz_side_positive_weights)(w, &side);
+        if (hangs)
+            uz_side_weights(w, &side);
+        else
+            uz_side_positive_weights(w, &side);
         const double whole = uz_side_area(&side);
         for (int a = 0; a < side.nodes; a++)
             in->room[node[a]] += fabs(w[a]) > 1e-12 * whole ? w[a] : 0;

@@ -42,10 +42,10 @@ uz_status uz_spread_over_group(double *share, const uz_body_model *model, const 
 {
     const uz_mesh *mesh = &model->mesh;
     const bool nodes = group->kind == UZ_GROUP_NODES;
-    const int64_t most = mesh->from_first ? mesh->n_given : mesh->n_nodes, items = nodes ? group->n_nodes
-                                                                             : group->kind == UZ_GROUP_FACES
-                                                                                 ? group->n_faces
-                                                                                 : uz_group_element_count(mesh, group);
+    const int64_t most = mesh->from_first ? mesh->n_given : mesh->n_nodes,
+                  items = nodes                           ? group->n_nodes
+                          : group->kind == UZ_GROUP_FACES ? group->n_faces
+                                                          : uz_group_element_count(mesh, group);
     double total = 0, w[UZ_ELEMENT_NODES] = {1};
     int64_t node[UZ_ELEMENT_NODES];
     for (int pass = 0; pass < 2; pass++) /* the whole first, then its shares */

@@ -225,7 +225,8 @@ typedef struct {
     int64_t n_elements;
     bool refined;
     int64_t n_bisected, *bisected; /* refined: makes its mesh, by uz_scene.bisected, from that which was given; round
-                                    * after round how many elements, then which of them are to be bisected */
+                                    * after round how many elements, then which of them are to be bisected; those that
+                                    * become 4 or 8 of their kind are told by -1 before all rounds */
 } uz_grid_sequence;
 
 typedef struct {

@@ -177,7 +177,7 @@ typedef struct {
     uz_mesh_source source;
     uz_box box;
     uz_given_mesh given;
-    bool refine; /* triangles, tetrahedra: uz_solve and uz_solve_cases bisect elements where the error is */
+    bool refine; /* no wedges: uz_solve and uz_solve_cases divide elements where the error is */
     /* n_bisected, borrowed: the mesh is refined by this list (uz_grid_sequence.bisected). NULL: not yet. The functions
      * that refine make lists themselves and take none. */
     const int64_t *bisected;
