@@ -50,6 +50,10 @@ uz_status uz_obstacle_along(uz_obstacle_pieces *out, const uz_obstacle *o, const
     uz_obstacle_pieces found = {.n = 0};
     const double from[2] = {a[0] * o->scale, a[1] * o->scale}, to[2] = {b[0] * o->scale, b[1] * o->scale};
     const double length = hypot(b[0] - a[0], b[1] - a[1]), way[2] = {(b[0] - a[0]) / length, (b[1] - a[1]) / length};
+    if (!o->shape->along) {
+        out->why = "is before an obstacle that is not of lines and arcs";
+        return UZ_OK;
+    }
     uz_status status = o->shape->along(&found, o, from, to, err);
     out->why = found.why ? found.why : out->why;
     double end = 0;
