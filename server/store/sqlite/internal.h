@@ -4,6 +4,7 @@
 
 #include "store/sqlite/connection.h"
 #include "store/sqlite/trail.h"
+#include "store/batch.h"
 #include "store/engine_base.h"
 
 #include <pthread.h>
@@ -11,8 +12,6 @@
 #define STORE_READERS 4
 
 /* Lock order: none of these is taken while another is held, except message and sync under writer_lock. */
-typedef struct pending pending;
-
 typedef struct {
     store base;
     pthread_mutex_t writer_lock; /* writer, last_ms, sequence, claims */
@@ -21,9 +20,7 @@ typedef struct {
     unsigned sequence;
     uint64_t claims; /* the token of the last one; begins at the time of opening, past those of earlier processes */
 
-    pthread_mutex_t queue_lock; /* everything down to leading; write.c */
-    pending *queue, **queue_end;
-    bool leading; /* somebody carries out changes */
+    batch changes; /* that wait for the writer; write.c */
 
     pthread_mutex_t readers_lock; /* readers_free */
     pthread_cond_t reader_free;
@@ -73,6 +70,8 @@ typedef enum {
                    after a crash undoes by itself: claims and leases */
 } write_durability;
 store_status sqlite_write(sqlite_store *s, write_durability durability, store_change change, void *args);
+/* Carries out what waits in sqlite_store.changes. */
+void sqlite_run_batch(void *ctx, batch_change *first);
 /* Takes the spare room, if there is any to take. Before other threads, or under writer_lock. */
 void sqlite_take_spare(sqlite_store *s);
 

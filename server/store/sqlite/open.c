@@ -94,13 +94,12 @@ store *sqlite_open(const char *path, char *message, size_t size)
     }
     store_base_begin(&s->base, &STORE_SQLITE);
     pthread_mutex_init(&s->writer_lock, NULL);
-    pthread_mutex_init(&s->queue_lock, NULL);
+    batch_begin(&s->changes, sqlite_run_batch, s);
     pthread_mutex_init(&s->readers_lock, NULL);
     pthread_cond_init(&s->reader_free, NULL);
     pthread_mutex_init(&s->sync_lock, NULL);
     pthread_cond_init(&s->sync_asked, NULL);
     pthread_cond_init(&s->sync_ended, NULL);
-    s->queue_end = &s->queue;
     s->trail.fd = s->spare = -1;
     s->claims = (uint64_t)(clock_seconds(CLOCK_REALTIME) * 1e6);
     /* The file is locked against a second daemon by flock, not by a file beside it: that follows links, ends with the
@@ -146,7 +145,7 @@ void sqlite_close(store *base)
     pthread_mutex_destroy(&s->sync_lock);
     pthread_cond_destroy(&s->reader_free);
     pthread_mutex_destroy(&s->readers_lock);
-    pthread_mutex_destroy(&s->queue_lock);
+    batch_end(&s->changes);
     pthread_mutex_destroy(&s->writer_lock);
     if (s->trail.fd >= 0)
         close(s->trail.fd);

@@ -1,27 +1,27 @@
 /* write.c: changes as transactions.
  *
- * While one change is under way others come, and wait. Whoever is first among them then carries out all of them in one
- * transaction, each in a savepoint of its own, so that one that fails takes nothing with it. What many changes touch
- * alike (the ends of tables and indexes) is so written once for all. What they wait for next is the disk: sync.c. */
+ * Changes that wait together (store/batch.h) are one transaction, each in a savepoint of its own, so that one that
+ * fails takes nothing with it. What many changes touch alike (the ends of tables and indexes) is so written once for
+ * all. What they wait for next is the disk: sync.c. */
 #include "store/sqlite/internal.h"
 
 #include <fcntl.h>
 #include <string.h>
 #include <unistd.h>
 
-#define BATCH_MOST 32 /* so that the first of them does not wait for ever */
-
-/* A change that waits for its turn; on its caller's stack. */
-struct pending {
+typedef struct {
+    batch_change base;
     store_change change;
     void *args;
     bool frees; /* WRITE_FREES */
     store_status status;
     uint64_t number; /* of its commit */
-    bool done;
-    pthread_cond_t turn; /* done, or first in the queue with nobody at work */
-    struct pending *next;
-};
+} pending;
+
+static pending *next_of(const pending *p)
+{
+    return (pending *)p->base.next;
+}
 
 static store_status run_query(connection *c, query_id q)
 {
@@ -92,7 +92,7 @@ static bool run_together(sqlite_store *s, pending *list)
     uint64_t number = 0;
     s->trail.noted.len = 0;
     bool good = run_query(c, QUERY_BEGIN) == STORE_OK;
-    for (pending *p = list; p && good; p = p->next) {
+    for (pending *p = list; p && good; p = next_of(p)) {
         good = run_query(c, QUERY_SAVEPOINT) == STORE_OK;
         if (!good)
             break;
@@ -103,31 +103,20 @@ static bool run_together(sqlite_store *s, pending *list)
     }
     good = good && sqlite_commit(s, &number) == STORE_OK;
     roll_back(c);
-    for (pending *p = list; p && good; p = p->next)
+    for (pending *p = list; p && good; p = next_of(p))
         p->number = number;
     return good;
 }
 
-/* ------------------------------------------------------------------- queue */
-
-/* Under queue_lock, which it gives up meanwhile: carries out the first ones of the queue, which begins with the
- * caller's own. */
-static void lead(sqlite_store *s)
+void sqlite_run_batch(void *ctx, batch_change *first)
 {
-    pending *list = s->queue, *last = list, *next;
+    sqlite_store *s = ctx;
+    pending *list = (pending *)first;
     int count = 0;
     bool locked = false; /* that was waited for once (busy_timeout): not again for each */
-    for (int n = 1; n < BATCH_MOST && last->next; n++)
-        last = last->next;
-    s->queue = last->next;
-    if (!s->queue)
-        s->queue_end = &s->queue;
-    last->next = NULL;
-    s->leading = true;
-    pthread_mutex_unlock(&s->queue_lock);
     pthread_mutex_lock(&s->writer_lock);
-    if (!list->next || !run_together(s, list))
-        for (pending *p = list; p; p = p->next) {
+    if (!next_of(list) || !run_together(s, list))
+        for (pending *p = list; p; p = next_of(p)) {
             if (locked)
                 p->status = STORE_LOCKED;
             else
@@ -135,35 +124,15 @@ static void lead(sqlite_store *s)
             locked = p->status == STORE_LOCKED;
         }
     pthread_mutex_unlock(&s->writer_lock);
-    for (pending *p = list; p; p = p->next)
+    for (pending *p = list; p; p = next_of(p))
         count += p->status == STORE_OK;
     metrics_add(s->base.settings.metrics, METRIC_CHANGES, count);
-    pthread_mutex_lock(&s->queue_lock);
-    s->leading = false;
-    for (; list; list = next) {
-        next = list->next; /* its owner may go as soon as it is done */
-        list->done = true;
-        pthread_cond_signal(&list->turn);
-    }
-    if (s->queue)
-        pthread_cond_signal(&s->queue->turn);
 }
 
 store_status sqlite_write(sqlite_store *s, write_durability durability, store_change change, void *args)
 {
     pending me = {.change = change, .args = args, .frees = durability == WRITE_FREES};
-    pthread_cond_init(&me.turn, NULL);
-    pthread_mutex_lock(&s->queue_lock);
-    *s->queue_end = &me;
-    s->queue_end = &me.next; /* cppcheck-suppress autoVariables ; it leaves the queue before this returns */
-    while (!me.done) {
-        if (!s->leading && s->queue == &me)
-            lead(s);
-        else
-            pthread_cond_wait(&me.turn, &s->queue_lock);
-    }
-    pthread_mutex_unlock(&s->queue_lock);
-    pthread_cond_destroy(&me.turn);
+    batch_do(&s->changes, &me.base);
     if (me.status != STORE_OK || durability == WRITE_LAZY)
         return me.status;
     return sqlite_sync(s, me.number, durability != WRITE_SOON);
