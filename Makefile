@@ -15,9 +15,10 @@ PREFIX ?= /usr/local
 PYTHON ?= /usr/bin/python3
 
 PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
-            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libdeflate-dev libpng-dev libgmp-dev
+            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libdeflate-dev libpng-dev libgmp-dev \
+            libpq-dev
 TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev valgrind \
-                 python3-yaml nodejs git mandoc librsvg2-bin libgmp-dev
+                 postgresql python3-yaml nodejs git mandoc librsvg2-bin libgmp-dev
 
 # The web page's bundler and libraries; the browser that tests it.
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
@@ -32,9 +33,9 @@ INC  := -Isolver/include -Isolver -Iserver -Iclient -I$(BUILD)/gen
 
 # Package flags are asked for once, when first needed, so that `make deps` works on a bare machine.
 pkg = $(shell pkg-config $(1) 2>/dev/null)
-SERVER_CFLAGS = $(call pkg,--cflags libmicrohttpd jansson sqlite3 libcurl gnutls)
+SERVER_CFLAGS = $(call pkg,--cflags libmicrohttpd jansson sqlite3 libcurl gnutls libpq)
 SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp -lsuitesparseconfig $(call pkg,--libs gnutls) -lgmp -lpng -ldeflate -lz -lm
-SERVER_LIBS   = $(call pkg,--libs libmicrohttpd sqlite3 libcurl) $(SOLVER_LIBS) -lpthread
+SERVER_LIBS   = $(call pkg,--libs libmicrohttpd sqlite3 libcurl libpq) $(SOLVER_LIBS) -lpthread
 CLIENT_LIBS   = $(call pkg,--libs libcurl jansson gnutls) -lm
 CFLAGS_ALL    = $(STD) $(OPT) $(WARN) $(SAN) -fno-omit-frame-pointer -pthread -MMD -MP $(INC) $(SERVER_CFLAGS) $(CFLAGS)
 # The gold linker, where it is: binutils has it, and it links the test programs in an eighth of the time. Not with clang,
@@ -154,6 +155,9 @@ $(call obj,solver/factor/single.c solver/methods/exchange.c solver/assembly/stif
 $(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS)
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS_ALL) -c -o $@ $<
+
+# Read by the assembler as they stand.
+$(call obj,server/store/postgresql/schema.c): $(wildcard server/store/postgresql/*.sql)
 
 # The web page, bundled and put into the daemon.
 $(BUILD)/obj/gen/page.o: $(BUILD)/gen/page.c

@@ -77,6 +77,7 @@ check function_length long_functions
 check shell shell_syntax
 check cholmod_only_in_factor only_in 'cholmod' '^solver/factor/'
 check sqlite_only_in_its_engine only_in 'sqlite3' '^server/store/sqlite/'
+check libpq_only_in_its_engine only_in 'libpq' '^server/store/postgresql/'
 check microhttpd_only_in_transport only_in 'microhttpd' '^server/http/transport/'
 check jansson_only_in_client only_in 'jansson' '^client/'
 exit $status

@@ -28,7 +28,9 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
         {STORE_FULL, 507, 60, "storage_full", "The disk is full",
          "nothing was stored: delete ended jobs or free disk space, then try again"},
         {STORE_LOCKED, 503, 5, "store_locked", "The store is in use",
-         "another program holds the database file: nothing was changed; try again later"},
+         "another program holds the database: nothing was changed; try again later"},
+        {STORE_AWAY, 503, 5, "store_unavailable", "The store does not answer",
+         "the database can't be reached now: try again later, a submission with its Idempotency-Key"},
         {STORE_BUSY, 503, 10, "queue_full", "Too many jobs wait",
          "as many jobs wait as this server lets (its option --max-queue): try again later"},
         {STORE_QUOTA, 429, 60, "quota_exceeded", "The owner has as much as it may", NULL},
@@ -38,8 +40,9 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
     char cause[512];
     problem_details problem;
     store_message(context->store, cause, sizeof cause);
-    if (status == STORE_LOCKED)
-        log_write(context->log, LOG_ERROR, "store_locked", (log_field[]){LOG_S("cause", cause), {0}});
+    if (status == STORE_LOCKED || status == STORE_AWAY)
+        log_write(context->log, LOG_ERROR, status == STORE_LOCKED ? "store_locked" : "store_unavailable",
+                  (log_field[]){LOG_S("cause", cause), {0}});
     for (size_t i = 0; i < sizeof FAILURES / sizeof FAILURES[0]; i++)
         if (FAILURES[i].status == status) {
             reply->retry_after_s = FAILURES[i].retry_after_s ? FAILURES[i].retry_after_s : reply->retry_after_s;

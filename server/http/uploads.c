@@ -26,6 +26,10 @@ static bool refuse(api *context, http_request *rq, upload_status status, problem
         rq->reply.retry_after_s = 60;
         return problem_fill(problem, 507, "storage_full", "The disk is full",
                             "nothing was stored: delete uploads or ended jobs or free disk space, then try again");
+    case UPLOAD_AWAY:
+        rq->reply.retry_after_s = 5;
+        return problem_fill(problem, 503, "store_unavailable", "The store does not answer",
+                            "the database can't be reached now: send the upload again later");
     case UPLOAD_BAD_GZIP:
         return problem_fill(problem, 400, "bad_gzip", "The body is not what its Content-Encoding says",
                             "it is no gzip stream (RFC 1952), or it ends too early");

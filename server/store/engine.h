@@ -6,7 +6,7 @@
  *   - STORE_OK means: durable, but for claim and renew, which recover makes good for. What may still be lost is not
  *     read either: get, list and find_repeat return an end or a job only once it is durable.
  *   - Outputs are never NULL, zeroed before the call, and freed after one that failed. claim sets the lease's token.
- *   - Before STORE_FULL, STORE_LOCKED, STORE_DAMAGED and STORE_ERROR: store_set_message with the cause.
+ *   - Before STORE_FULL, STORE_LOCKED, STORE_DAMAGED, STORE_AWAY and STORE_ERROR: store_set_message with the cause.
  *   - store_tell after the commit of every change that the job's owner did not make, without a lock held. */
 #ifndef SERVER_STORE_ENGINE_H
 #define SERVER_STORE_ENGINE_H
@@ -18,6 +18,7 @@
 typedef struct {
     enum { LEASE_RENEW, LEASE_FINISH, LEASE_RELEASE } what;
     int progress;                 /* renew */
+    bool *end;                    /* renew: store.h; false before the call, and stays where there is one process */
     const store_outcome *outcome; /* finish */
     bool counted;                 /* release: the attempt */
 } lease_use;

@@ -30,4 +30,15 @@ void store_tell(const store *s, const char *id, bool waits, const char *gone);
  * last_ms and sequence are those of the newest id, so that ids ascend when the clock does not. */
 void store_next_id(uint64_t *last_ms, unsigned *sequence, char id[33]);
 
+/* An idempotency key as engines keep it, the only one of the store: behind its client's name, where that has one. Keys
+ * have printable characters only. */
+typedef struct {
+    char text[STORE_CLIENT + 260];
+} kept_key;
+kept_key store_kept_key(const store_request *request);
+
+/* What a client has as many of as it may, in words; for STORE_QUOTA. */
+typedef enum { QUOTA_WAITING, QUOTA_BYTES, QUOTA_SECONDS } quota;
+void store_say_quota(char *message, size_t size, const char *client, quota what);
+
 #endif

@@ -97,6 +97,26 @@ void store_next_id(uint64_t *last_ms, unsigned *sequence, char id[33])
     snprintf(id, 33, "%012llx%04x%016llx", (unsigned long long)*last_ms, *sequence, (unsigned long long)random);
 }
 
+/* ---- what a submission is checked by */
+
+kept_key store_kept_key(const store_request *request)
+{
+    kept_key key;
+    const char *client = request->client ? request->client : "";
+    snprintf(key.text, sizeof key.text, "%s%s%s", client, client[0] ? "\x1f" : "",
+             request->idempotency_key ? request->idempotency_key : "");
+    return key;
+}
+
+void store_say_quota(char *message, size_t size, const char *client, quota what)
+{
+    static const char *const WHAT[] = {
+        [QUOTA_WAITING] = "jobs that wait as one owner may (--client-queue): try again when one of them has begun",
+        [QUOTA_BYTES] = "bytes of requests, results and uploads as one owner may (--client-bytes): delete some",
+        [QUOTA_SECONDS] = "seconds of workers today as one owner may (--client-seconds): try again tomorrow, in UTC"};
+    snprintf(message, size, "\"%s\" has as many %s", client, WHAT[what]);
+}
+
 /* ---- the life of a job */
 
 /* `out` and *repeated as a submission leaves them. */
@@ -140,9 +160,15 @@ store_status store_claim(store *s, const char *owner, double lease_s, bool small
     return status;
 }
 
-store_status store_renew(store *s, const store_lease *lease, int progress)
+store_status store_renew(store *s, const store_lease *lease, int progress, bool *end)
 {
-    const lease_use use = {.what = LEASE_RENEW, .progress = progress < 0 ? 0 : progress > 100 ? 100 : progress};
+    bool unused;
+    const lease_use use = {.what = LEASE_RENEW,
+                           .progress = progress < 0     ? 0
+                                       : progress > 100 ? 100
+                                                        : progress,
+                           .end = end ? end : &unused};
+    *use.end = false;
     return s->engine->use_lease(s, lease, &use);
 }
 

@@ -22,8 +22,9 @@ typedef enum {
     STORE_BUSY,      /* as many jobs wait as may */
     STORE_QUOTA,     /* its client has what it may: store_message says of what */
     STORE_FULL,      /* the disk is full; nothing was changed */
-    STORE_LOCKED,    /* another program holds the file; nothing was changed */
+    STORE_LOCKED,    /* another program holds what is to be changed; nothing was */
     STORE_DAMAGED,   /* what is stored of this job is not what was written: store_message names the job */
+    STORE_AWAY,      /* the database does not answer now; whether anything was changed shows when it does again */
     STORE_ERROR      /* anything else: store_message says what */
 } store_status;
 
@@ -84,10 +85,10 @@ int64_t store_free_bytes(store *s);
 /* ---- notification: who waits learns of changes: the member `changed` of the store (engine.h) is called with
  * changed_ctx after every change of a job was committed that anybody but its owner made (submitted, dismissed, expired,
  * deleted), without a lock, by the thread that made it or by one of the engine's. What owners do (claim, finish,
- * release) they tell themselves; an engine of several processes tells what owners in the others do. waits: the job now
- * waits to be claimed. gone: the job was deleted, and this client's it was; else NULL. id NULL: changes may have been
- * missed, everybody is to look again. NULL: nobody is told. It is set before other threads use the store, and after
- * they did. */
+ * release) they tell themselves; an engine of several processes tells what owners in the others do, and that a job
+ * which runs here is to end (store_renew says so). waits: the job now waits to be claimed. gone: the job was deleted,
+ * and this client's it was; else NULL. id NULL: changes may have been missed, everybody is to look again. NULL: nobody
+ * is told. It is set before other threads use the store, and after they did. */
 typedef void store_listener(void *ctx, const char *id, bool waits, const char *gone);
 
 /* What is submitted. */
@@ -138,8 +139,9 @@ typedef struct {
  * STORE_CONFLICT and changes nothing. */
 store_status store_claim(store *s, const char *owner, double lease_s, bool small, store_lease *lease, job *out,
                          char **body, size_t *body_len);
-/* Extends the lease to its seconds from now; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
-store_status store_renew(store *s, const store_lease *lease, int progress);
+/* Extends the lease to its seconds from now; progress 0..100. STORE_CONFLICT when the job is no longer ours. *end (may
+ * be NULL): another process was told that the job is to end (store_dismiss). */
+store_status store_renew(store *s, const store_lease *lease, int progress, bool *end);
 
 /* A named vector of doubles in a result: "reactions", "gaps", "displacements", "nodes", "contact_nodes", ...
  * On disk: little-endian IEEE 754 binary64, version in the row. */

@@ -148,6 +148,7 @@ static upload_status status_of(store_status status)
     return status == STORE_OK      ? UPLOAD_OK
            : status == STORE_FULL  ? UPLOAD_DISK_FULL
            : status == STORE_QUOTA ? UPLOAD_QUOTA
+           : status == STORE_AWAY  ? UPLOAD_AWAY
                                    : UPLOAD_FAILED;
 }
 

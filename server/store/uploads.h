@@ -27,6 +27,7 @@ typedef enum {
     UPLOAD_NO_ROOM,   /* beyond the limit of all, and nothing can go */
     UPLOAD_QUOTA,     /* beyond what its client may have */
     UPLOAD_DISK_FULL, /* */
+    UPLOAD_AWAY,      /* the database does not answer now, or another program holds it */
     UPLOAD_BAD_GZIP,  /* the bytes are not a gzip stream, or not a whole one */
     UPLOAD_FAILED     /* anything else: store_message says what */
 } upload_status;

@@ -52,7 +52,7 @@ struct work {
     pthread_cond_t probed; /* probe, or busy while one is asked for */
     pthread_cond_t crowd;  /* for the lanes: the same, or all workers are busy */
     pthread_cond_t idle;   /* alive became 0, the drain was shortened, or stopped */
-    pthread_cond_t tick;   /* finished */
+    pthread_cond_t tick;   /* finished, or keep_now */
     uint64_t
         submitted; /* times that the store told of a job that waits: a worker that saw none waits for another number */
     int busy;      /* workers with a job, but for the lanes */
@@ -60,6 +60,7 @@ struct work {
     enum { PROBE_NONE, PROBE_ASKED, PROBE_RUNS, PROBE_GOOD, PROBE_BAD } probe;
     bool stopping;      /* no more claims */
     bool finished;      /* the keeper shall stop */
+    bool keep_now;      /* it shall renew at once */
     bool stopped;       /* every thread was joined */
     double drain_until; /* on CLOCK_MONOTONIC */
 

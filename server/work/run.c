@@ -57,7 +57,8 @@ static bool is_settled(store_status status)
 }
 
 /* Tries to store the outcome for as long as there is hope, or until the service must end. Room may come back, and so
- * may a file that another program holds: that is worth a while, unless nobody wants the result any more. */
+ * may a file that another program holds: that is worth a while, unless nobody wants the result any more. A database
+ * that is away comes back, and until then nobody else has the job either. */
 static store_status try_to_store(const run *r, bool for_ever)
 {
     work *w = r->me->w;
@@ -68,8 +69,9 @@ static store_status try_to_store(const run *r, bool for_ever)
             return status;
         if (attempt < FINISH_ATTEMPTS)
             log_store_failure(r, LOG_WARN, "store_failed");
-        bool may_pass = (status == STORE_FULL || status == STORE_LOCKED) && !atomic_load(&r->me->cancel) &&
-                        clock_seconds(CLOCK_MONOTONIC) - begun < w->options.room_wait_s;
+        bool may_pass =
+            status == STORE_AWAY || ((status == STORE_FULL || status == STORE_LOCKED) && !atomic_load(&r->me->cancel) &&
+                                     clock_seconds(CLOCK_MONOTONIC) - begun < w->options.room_wait_s);
         if (atomic_load(&w->interrupt) || !(for_ever || may_pass || attempt + 1 < FINISH_ATTEMPTS))
             return status;
         /* Longer each time, 0.05 s to 3.2 s, but not at all once the service must end. */

@@ -150,8 +150,12 @@ static void *keep_loop(void *arg)
     work *w = arg;
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {
-        if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + w->options.lease_s / 3.0))
-            continue;
+        const double until = clock_seconds(CLOCK_MONOTONIC) + w->options.lease_s / 3.0;
+        while (!w->finished && !w->keep_now && clock_wait(&w->tick, &w->lock, until))
+            ;
+        if (w->finished)
+            break;
+        w->keep_now = false;
         pthread_mutex_unlock(&w->lock);
         for (int i = 0; i < w->n; i++) {
             worker *me = &w->workers[i];
@@ -163,12 +167,13 @@ static void *keep_loop(void *arg)
             pthread_mutex_unlock(&me->lock);
             if (!lease.job[0])
                 continue;
-            const store_status status = store_renew(w->store, &lease, progress);
-            if (status != STORE_CONFLICT && status != STORE_NOT_FOUND)
+            bool end;
+            const store_status status = store_renew(w->store, &lease, progress, &end);
+            if (status != STORE_CONFLICT && status != STORE_NOT_FOUND && !end)
                 continue; /* a store that fails now may work before the lease ends */
             pthread_mutex_lock(&me->lock);
             if (me->lease.token == lease.token && strcmp(me->id, lease.job) == 0) /* else it ended meanwhile */
-                stop_job(me, &me->lost);
+                stop_job(me, end ? &me->cancel : &me->lost);
             pthread_mutex_unlock(&me->lock);
         }
         pthread_mutex_lock(&w->lock);
@@ -246,7 +251,20 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     return w;
 }
 
-/* What the store tells (store_listener): a job that waits is for one of the workers. */
+/* The worker that runs the job, with its lock held; NULL: none. */
+static worker *find_worker(work *w, const char *id)
+{
+    for (int i = 0; id[0] && i < w->n; i++) {
+        pthread_mutex_lock(&w->workers[i].lock);
+        if (strcmp(w->workers[i].id, id) == 0)
+            return &w->workers[i];
+        pthread_mutex_unlock(&w->workers[i].lock);
+    }
+    return NULL;
+}
+
+/* What the store tells (store_listener): a job that waits is for one of the workers. One that runs here was changed by
+ * another process: the keeper asks what that was. */
 static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
 {
     work *w = ctx;
@@ -254,10 +272,18 @@ static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
         feed_changed(w->feed, id, gone);
     else
         feed_wake_all(w->feed);
-    if (!waits && id)
+    worker *runs = id && !waits && !gone ? find_worker(w, id) : NULL;
+    if (runs)
+        pthread_mutex_unlock(&runs->lock);
+    if (!waits && id && !runs)
         return;
     pthread_mutex_lock(&w->lock);
-    call_worker(w, !id);
+    if (runs) {
+        w->keep_now = true;
+        pthread_cond_broadcast(&w->tick);
+    } else {
+        call_worker(w, !id);
+    }
     pthread_mutex_unlock(&w->lock);
 }
 
@@ -394,18 +420,6 @@ void work_free(work *w)
 }
 
 /* ---- what the rest of the server asks */
-
-/* The worker that runs the job, with its lock held; NULL: none. */
-static worker *find_worker(work *w, const char *id)
-{
-    for (int i = 0; id[0] && i < w->n; i++) {
-        pthread_mutex_lock(&w->workers[i].lock);
-        if (strcmp(w->workers[i].id, id) == 0)
-            return &w->workers[i];
-        pthread_mutex_unlock(&w->workers[i].lock);
-    }
-    return NULL;
-}
 
 bool work_cancel(work *w, const char *id)
 {

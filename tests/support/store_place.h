@@ -2,11 +2,12 @@
  *
  * STORE_TEST(name) { ... } is a TEST that runs once for every engine of the store (engines/engines.h): what it shows is
  * the contract that they all keep. Its places have the engine that it runs for; those of a plain TEST have the engine
- * of files. An engine whose stores are no files of a folder gets its addresses in place_address. */
+ * of files. An engine whose stores are no files of a folder gets its addresses in place_begin. */
 #ifndef TESTS_STORE_PLACE_H
 #define TESTS_STORE_PLACE_H
 
 #include "harness.h"
+#include "postgresql_place.h"
 #include "store/engines/engines.h"
 
 #include <unistd.h>
@@ -14,22 +15,24 @@
 /* ---- a store in a folder of its own */
 
 typedef struct {
-    char folder[64], path[96];
+    char folder[64], path[96], address[192];
+    char database[32]; /* of an engine of databases, else "" */
     store *s;
 } place;
 
 static const store_engine *place_engine; /* NULL: the engine of files */
 
-/* Of a store of the engine that lies at p->path, or has nothing to do with it. */
-static inline void place_address(const place *p, char out[160])
-{
-    snprintf(out, 160, "%s%s", place_engine ? place_engine->scheme : "", p->path);
-}
-
 static inline void run_on_each_engine(void (*run)(void))
 {
     for (size_t i = 0; STORE_ENGINES[i]; i++) {
+        static bool told;
         place_engine = STORE_ENGINES[i];
+        if (place_engine->scheme[0] && !postgresql_there()) {
+            if (!told)
+                printf("skip %s: no server of PostgreSQL (Debian: postgresql)\n", place_engine->scheme);
+            told = true;
+            continue;
+        }
         if (place_engine->scheme[0])
             printf("# with %s\n", place_engine->scheme);
         run();
@@ -47,9 +50,12 @@ static inline void run_on_each_engine(void (*run)(void))
 
 static inline bool place_open(place *p)
 {
-    char message[400] = "", address[160];
-    place_address(p, address);
-    p->s = store_open(address, message, sizeof message);
+    char message[400] = "";
+    if (p->database[0])
+        postgresql_address(p->database, p->address, sizeof p->address);
+    else
+        snprintf(p->address, sizeof p->address, "%s", p->path);
+    p->s = store_open(p->address, message, sizeof message);
     CHECK_MSG(p->s, "%s", message);
     return p->s != NULL;
 }
@@ -59,6 +65,9 @@ static inline bool place_begin(place *p)
     strcpy(p->folder, "/tmp/test-store-XXXXXX");
     CHECK(mkdtemp(p->folder));
     snprintf(p->path, sizeof p->path, "%s/jobs.db", p->folder);
+    p->database[0] = '\0';
+    if (place_engine && place_engine->scheme[0])
+        postgresql_database(p->database);
     return place_open(p);
 }
 
@@ -136,7 +145,7 @@ static inline store_status finish_as(store *s, const char *id, const char *owner
 static inline store_status renew_as(store *s, const char *id, const char *owner, int progress)
 {
     const store_lease lease = lease_of(id, owner);
-    return store_renew(s, &lease, progress);
+    return store_renew(s, &lease, progress, NULL);
 }
 
 static inline store_status release_as(store *s, const char *id, const char *owner)

@@ -20,12 +20,15 @@ static inline upload_status send(store *s, const void *data, size_t len, size_t 
     return w ? store_upload_end(w, info, known) : status;
 }
 
-/* Files in the folder of uploads, -1: there is no folder. */
+/* Files in the folder of uploads, -1: there is no folder; or blobs in the database. */
 static inline int files_in(const place *p)
 {
     char folder[128];
     int count = 0;
     struct dirent *entry;
+    int64_t blobs = -1;
+    if (p->database[0])
+        return postgresql_run(p->database, "SELECT count(*) FROM uzawa.blob", &blobs) ? (int)blobs : -1;
     snprintf(folder, sizeof folder, "%s-uploads", p->path);
     DIR *dir = opendir(folder);
     while (dir && (entry = readdir(dir)))

@@ -1,11 +1,12 @@
 #include "store/engines/engines.h"
+#include "store/postgresql/postgresql.h"
 #include "store/sqlite/sqlite.h"
 
 #include <stdio.h>
 #include <string.h>
 
 /* A new engine is one more row here, before the one that takes every address. */
-const store_engine *const STORE_ENGINES[] = {&STORE_SQLITE, NULL};
+const store_engine *const STORE_ENGINES[] = {&STORE_POSTGRESQL, &STORE_SQLITE, NULL};
 
 const store_engine *store_engine_of(const char *address)
 {

@@ -14,27 +14,12 @@ typedef struct {
     bool repeated;
 } submit_args;
 
-/* An idempotency key as the column has it, in which it is the only one: behind its client's name, where that has one.
- * Keys have printable characters only. */
-typedef struct {
-    char text[STORE_CLIENT + 260];
-} kept_key;
-
-static kept_key key_of(const store_request *request)
-{
-    kept_key key;
-    const char *client = request->client ? request->client : "";
-    snprintf(key.text, sizeof key.text, "%s%s%s", client, client[0] ? "\x1f" : "",
-             request->idempotency_key ? request->idempotency_key : "");
-    return key;
-}
-
 /* The job that came with this key before: STORE_NOT_FOUND, STORE_CONFLICT if its body was another one. Bodies are
  * compared byte by byte: nothing has to be stored or computed for the many requests that are never repeated. */
 static store_status find_key(connection *c, submit_args *a)
 {
     store_status status = STORE_NOT_FOUND;
-    const kept_key key = key_of(a->request);
+    const kept_key key = store_kept_key(a->request);
     statement st = statement_begin(c, QUERY_FIND_KEY);
     bind_text(&st, 1, key.text);
     bind_integer(&st, 2, (int64_t)a->request->body_len);
@@ -50,7 +35,7 @@ static store_status insert_job(connection *c, const store_request *r, const char
     const char *tags = r->tags ? r->tags : "[]";
     const char *client = r->client ? r->client : "";
     const double now = clock_seconds(CLOCK_REALTIME);
-    const kept_key key = key_of(r);
+    const kept_key key = store_kept_key(r);
     statement st = statement_begin(c, QUERY_INSERT_JOB);
     bind_text(&st, 1, id);
     bind_real(&st, 2, now);
@@ -113,23 +98,23 @@ static store_status read_by_id(connection *c, const char *id, job *out)
 store_status sqlite_check_quota(const sqlite_store *s, connection *c, const char *client, int64_t more, bool submits)
 {
     const client_quotas *most = &s->base.settings.quotas;
-    const char *what = NULL;
+    bool over[3] = {false};
     if (!client || !client[0] || (most->waiting <= 0 && most->bytes <= 0 && most->seconds <= 0.0))
         return STORE_OK;
     statement st = statement_begin(c, QUERY_CLIENT);
     bind_text(&st, 1, client);
     bind_integer(&st, 2, (int64_t)(clock_seconds(CLOCK_REALTIME) / 86400.0));
     if (statement_row(&st)) {
-        if (submits && most->waiting > 0 && sqlite3_column_int64(st.stmt, 0) >= most->waiting)
-            what = "jobs that wait as one owner may (--client-queue): try again when one of them has begun";
-        else if (most->bytes > 0 && sqlite3_column_int64(st.stmt, 1) + more > most->bytes)
-            what = "bytes of requests, results and uploads as one owner may (--client-bytes): delete some";
-        else if (submits && most->seconds > 0.0 && sqlite3_column_double(st.stmt, 2) >= most->seconds)
-            what = "seconds of workers today as one owner may (--client-seconds): try again tomorrow, in UTC";
+        over[QUOTA_WAITING] = submits && most->waiting > 0 && sqlite3_column_int64(st.stmt, 0) >= most->waiting;
+        over[QUOTA_BYTES] = most->bytes > 0 && sqlite3_column_int64(st.stmt, 1) + more > most->bytes;
+        over[QUOTA_SECONDS] = submits && most->seconds > 0.0 && sqlite3_column_double(st.stmt, 2) >= most->seconds;
     }
-    const store_status status = statement_end(&st, what ? STORE_QUOTA : STORE_OK);
+    const store_status status = statement_end(&st, over[0] || over[1] || over[2] ? STORE_QUOTA : STORE_OK);
     if (status == STORE_QUOTA)
-        snprintf(c->message, sizeof c->message, "\"%s\" has as many %s", client, what);
+        store_say_quota(c->message, sizeof c->message, client,
+                        over[QUOTA_WAITING] ? QUOTA_WAITING
+                        : over[QUOTA_BYTES] ? QUOTA_BYTES
+                                            : QUOTA_SECONDS);
     return status;
 }
 

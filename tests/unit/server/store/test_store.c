@@ -33,7 +33,7 @@ STORE_TEST(submit_claim_finish)
     CHECK(j.status == JOB_RUNNING && j.attempts == 1 && j.started >= j.created);
     CHECK(len == 8 && body && strcmp(body, "{\"a\": 1}") == 0);
     free(body);
-    CHECK_INT(store_renew(p.s, &lease, 42), STORE_OK);
+    CHECK_INT(store_renew(p.s, &lease, 42, NULL), STORE_OK);
     CHECK_INT(store_finish(p.s, &lease, &PLAIN_SUCCESS), STORE_OK);
     char id[33];
     strcpy(id, j.id);
@@ -94,15 +94,15 @@ STORE_TEST(an_earlier_lease_is_fenced_off)
     CHECK_INT(store_claim(p.s, "a", 0.0, false, &first, &j, &body, &len), STORE_OK);
     job_clear(&j);
     free(body);
-    CHECK_INT(store_renew(p.s, &first, 10), STORE_OK); /* it has run out, but nobody else has the job */
+    CHECK_INT(store_renew(p.s, &first, 10, NULL), STORE_OK); /* it has run out, but nobody else has the job */
     CHECK_INT(store_release(p.s, &first, false), STORE_OK);
-    CHECK_INT(store_renew(p.s, &first, 20), STORE_CONFLICT);
+    CHECK_INT(store_renew(p.s, &first, 20, NULL), STORE_CONFLICT);
     CHECK_INT(store_claim(p.s, "a", 30.0, false, &second, &j, &body, &len), STORE_OK);
     job_clear(&j);
     free(body);
     CHECK_STR(second.job, first.job);
     CHECK(second.token != first.token);
-    CHECK_INT(store_renew(p.s, &first, 30), STORE_CONFLICT);
+    CHECK_INT(store_renew(p.s, &first, 30, NULL), STORE_CONFLICT);
     CHECK_INT(store_finish(p.s, &first, &PLAIN_SUCCESS), STORE_CONFLICT);
     CHECK_INT(store_release(p.s, &first, false), STORE_CONFLICT);
     CHECK_INT(store_get(p.s, id, &j), STORE_OK);
@@ -134,7 +134,7 @@ STORE_TEST(a_lease_ends_with_its_process)
         if (i == 0)
             CHECK_INT(store_recover(p.s, 3, "{}", NULL, NULL), STORE_OK);
     }
-    CHECK_INT(store_renew(p.s, &leases[0], 50), STORE_CONFLICT);
+    CHECK_INT(store_renew(p.s, &leases[0], 50, NULL), STORE_CONFLICT);
     CHECK_INT(store_finish(p.s, &leases[0], &PLAIN_SUCCESS), STORE_CONFLICT);
     CHECK_INT(store_finish(p.s, &leases[1], &PLAIN_SUCCESS), STORE_OK);
     place_end(&p);

@@ -1,0 +1,66 @@
+#include "store/postgresql/schema.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The steps as they stand in their files. */
+__asm__(".section .rodata\nschema_1: .incbin \"server/store/postgresql/schema_1.sql\"\n.byte 0\n.text");
+extern const char schema_1[];
+static const char *const STEPS[SCHEMA_VERSION + 1] = {NULL, schema_1};
+
+/* A database of another encoding could not keep every text. */
+#define LEAST_SERVER 150000
+
+static int refuse(link_to *l, const char *cause)
+{
+    snprintf(l->message, sizeof l->message, "%s", cause);
+    return -1;
+}
+
+int schema_version(link_to *l)
+{
+    if (PQserverVersion(l->pg) < LEAST_SERVER)
+        return refuse(l, "the server is older than PostgreSQL 15: give a database of a newer one");
+    link_begin(l, LINK_READ);
+    link_send(l, &(call){.sql = "SELECT current_setting('server_encoding'), to_regnamespace('uzawa') IS NOT NULL,"
+                                " to_regclass('uzawa.format') IS NOT NULL"});
+    if (link_end(l) != STORE_OK)
+        return -1;
+    if (strcmp(PQgetvalue(l->answers[0], 0, 0), "UTF8") != 0)
+        return refuse(l, "the database's encoding is not UTF8: make one with CREATE DATABASE ... ENCODING 'UTF8'");
+    if (!cell_integer(l->answers[0], 0, 1))
+        return 0;
+    if (!cell_integer(l->answers[0], 0, 2))
+        return refuse(l, "the schema \"uzawa\" of the database is another program's, or this role may not use it: give "
+                         "another database, or GRANT USAGE");
+    link_begin(l, LINK_READ);
+    link_send(l, &(call){.sql = "SELECT max(version) FROM uzawa.format"});
+    if (link_end(l) != STORE_OK)
+        return -1;
+    const int version = (int)cell_integer(l->answers[0], 0, 0);
+    return version >= 1 && version <= SCHEMA_VERSION + 1
+               ? version
+               : refuse(l, "the database has a version that this program does not know: take a newer program");
+}
+
+bool schema_bring(link_to *l)
+{
+    int version = schema_version(l);
+    if (version < 0 || version >= SCHEMA_VERSION)
+        return version >= 0;
+    /* Once more under the lock: another daemon may have done it meanwhile. */
+    char cause[LINK_CAUSE];
+    bool good = link_script(l, "BEGIN; SET LOCAL lock_timeout = '60s'; SELECT pg_advisory_xact_lock(1970954615, 1)") ==
+                STORE_OK;
+    version = good ? schema_version(l) : -1;
+    for (good = version >= 0; good && version < SCHEMA_VERSION; version++)
+        good = link_script(l, STEPS[version + 1]) == STORE_OK;
+    good = good && link_script(l, "COMMIT") == STORE_OK;
+    if (good)
+        return true;
+    snprintf(cause, sizeof cause, "cannot make the tables: %.200s", l->message);
+    link_script(l, "ROLLBACK");
+    refuse(l, cause);
+    return false;
+}
