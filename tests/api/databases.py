@@ -1,0 +1,70 @@
+"""A PostgreSQL server of the package (tests/postgresql.sh) on a socket in a temporary folder, and databases there."""
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+
+from service import Skip, check
+
+SCRIPT = pathlib.Path(__file__).resolve().parent.parent / "postgresql.sh"
+
+
+class Server:
+    """settings: of the server, "name=value". It syncs nothing to the disk unless they say so."""
+
+    def __init__(self, *settings):
+        self.folder = tempfile.mkdtemp(prefix="test-postgresql-")
+        self.settings = settings or ("fsync=off",)
+        self.made = 0
+        self.start()
+
+    def start(self):
+        os.chmod(self.folder, 0o711)
+        with open(os.path.join(self.folder, "log"), "ab") as log:
+            self.process = subprocess.Popen([SCRIPT, self.folder, *self.settings], stdout=log, stderr=log)
+        end = time.monotonic() + 60
+        while self.process.poll() is None and time.monotonic() < end:
+            if os.path.exists(os.path.join(self.folder, ".s.PGSQL.5432")) and self.try_sql("postgres", "SELECT 1")[0]:
+                return
+            time.sleep(0.05)
+        status = self.process.poll()
+        with open(os.path.join(self.folder, "log"), encoding="utf-8", errors="replace") as log:
+            told = log.read()
+        self.end()
+        if status == 77:
+            raise Skip("no server of PostgreSQL (Debian: postgresql)")
+        raise AssertionError(f"PostgreSQL did not start: {told}")
+
+    def stop(self, number=signal.SIGQUIT):
+        """SIGQUIT: at once, as after a power loss."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        self.process.wait(timeout=60)
+
+    def end(self):
+        self.stop()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def database(self):
+        """The name of a new, empty one."""
+        self.made += 1
+        self.sql("postgres", f"CREATE DATABASE test{self.made} TEMPLATE template0")
+        return f"test{self.made}"
+
+    def address(self, database):
+        return f"postgresql://postgres@/{database}?host={self.folder}"
+
+    def try_sql(self, database, statement):
+        """Did it go well, and what was printed."""
+        told = subprocess.run(["psql", "-X", "-q", "-A", "-t", "-F", "|", "-v", "ON_ERROR_STOP=1", "-d",
+                               self.address(database), "-c", statement], capture_output=True, text=True, check=False)
+        return told.returncode == 0, told.stdout + told.stderr
+
+    def sql(self, database, statement):
+        """The rows, each a list of texts."""
+        good, told = self.try_sql(database, statement)
+        check(good, statement, told)
+        return [line.split("|") for line in told.splitlines()]

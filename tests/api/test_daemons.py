@@ -1,0 +1,193 @@
+"""Several daemons on one database: any of them serves any request; one that is killed, stopped or cut off loses nothing
+and writes nothing that is another's."""
+import collections
+import concurrent.futures
+import contextlib
+import json
+import signal
+import time
+
+import databases
+import service
+from service import ENDLESS, MATRICES, SCENE, Service, check, expect, wait_until
+
+SERVER = None  # one for all tests, made by the first
+
+
+@contextlib.contextmanager
+def daemons(build, n, *options):
+    """n daemons on a new database, and its name."""
+    global SERVER
+    SERVER = SERVER or databases.Server()
+    name = SERVER.database()
+    some = [Service(build, "--workers", "1", *options, db=SERVER.address(name)) for _ in range(n)]
+    try:
+        for one in some:
+            one.start()
+        yield some, name
+        for one in some:
+            if one.process.poll() is None:
+                check(one.end() == 0, one.log())
+    finally:
+        for one in some:
+            if one.process and one.process.poll() is None:
+                one.process.send_signal(signal.SIGCONT)
+            one.stop()
+
+
+def end_leases(name, daemon):
+    """Of the jobs that this daemon runs: as if the time were over."""
+    SERVER.sql(name, f"UPDATE uzawa.job SET lease = uzawa.moment() - 1 WHERE status = 1 AND node IN"
+                     f" (SELECT id FROM uzawa.node WHERE pid = {daemon.process.pid})")
+
+
+def numbered(i):
+    """A problem of its own for each number, with a known answer: the force is 1 + i / 1000."""
+    problem = json.loads(json.dumps(MATRICES))
+    problem["problem"]["p"] = [2 + i / 1000, 2]
+    return {**problem, "tags": [f"n{i}"]}
+
+
+def force_of(daemon, job):
+    return daemon.get(f"/v1/jobs/{job}/result").json["summary"]["contact"]["reaction_sum"]
+
+
+def check_all(daemon, name, posted):
+    """Each job that was acknowledged is there, ended well, with the answer of its own problem, once."""
+    for job, i in posted.items():
+        check(daemon.wait_status(job, "successful", "failed", seconds=60)["status"] == "successful", job)
+        check(abs(abs(force_of(daemon, job)) - (1 + i / 1000)) < 1e-6, job, i, force_of(daemon, job))
+    counts = dict(SERVER.sql(name, "SELECT status, jobs FROM uzawa.counted"))
+    check(counts["0"] == counts["1"] == "0" and int(counts["2"]) >= len(posted), counts)
+    twice = SERVER.sql(name, "SELECT job FROM (SELECT job, name, count(DISTINCT token) AS n FROM uzawa.piece"
+                             " GROUP BY 1, 2) AS each WHERE n > 1")
+    check(not twice, "two results:", twice)
+    check(daemon.request("POST", "/v1/admin/check").json["whole"], "the database is not whole")
+
+
+def test_any_daemon_serves_any_request(s):
+    with daemons(s.build, 2) as ((a, b), name):
+        posted = {a.post(numbered(i)).json["id"]: i for i in range(40)}
+        check_all(b, name, posted)
+        by = SERVER.sql(name, "SELECT count(*) FROM uzawa.node")
+        check(by == [["2"]], by)
+        check(b.events("job_ended") and a.events("job_ended"), "one of them did nothing")
+        upload = a.request("POST", "/v1/uploads", MATRICES["problem"]["K"].encode()).json["id"]
+        job = b.solve({"problem": {**MATRICES["problem"], "K": {"upload": upload}}})
+        check(job["status"] == "successful", job)
+        expect(a.request("DELETE", f"/v1/uploads/{upload}"), 409)
+
+
+def test_one_key_is_one_job_wherever_it_comes(s):
+    with daemons(s.build, 2) as (both, name), concurrent.futures.ThreadPoolExecutor(8) as pool:
+        def post(i):
+            return both[i % 2].post(numbered(i // 8), {"Idempotency-Key": f"k{i // 8}"})
+        replies = list(pool.map(post, range(80)))
+        check(all(reply.status in (200, 201, 202) for reply in replies), replies)
+        check(len({reply.json["id"] for reply in replies}) == 10, "keys made more than one job")
+        check(SERVER.sql(name, "SELECT count(*) FROM uzawa.job") == [["10"]])
+
+
+def test_a_wait_at_another_daemon_ends_with_the_job(s):
+    with daemons(s.build, 2) as ((a, b), _):
+        long = a.post(ENDLESS).json["id"]
+        a.wait_status(long, "running")
+        runs_at_a = bool(a.events("job_started"))
+        here, other = (a, b) if runs_at_a else (b, a)
+        with concurrent.futures.ThreadPoolExecutor(1) as pool:
+            waits = pool.submit(other.get, f"/v1/jobs/{long}", Prefer="wait=60")
+            time.sleep(0.5)
+            begun = time.monotonic()
+            # told to end at the one that does not run it
+            check(other.request("DELETE", f"/v1/jobs/{long}").status in (200, 202))
+            job = waits.result().json
+        check(job["status"] == "dismissed" and time.monotonic() - begun < 10, job, time.monotonic() - begun)
+        check(here.get(f"/v1/jobs/{long}").json["status"] == "dismissed")
+
+
+def test_one_is_killed(s):
+    with daemons(s.build, 2) as ((a, b), name):
+        posted = {}
+        for i in range(60):
+            posted[a.post(numbered(i)).json["id"]] = i
+        a.process.kill()
+        a.process.wait()
+        end_leases(name, a)
+        check_all(b, name, posted)
+
+
+def test_one_is_stopped_past_its_lease(s):
+    with daemons(s.build, 2) as ((a, b), name):
+        slow = {**SCENE, "problem": {**SCENE["problem"], "mesh": {"box": {"size": [60, 20], "cells": [300, 100],
+                                                                         "element": "quad4"}}}}
+        job = a.post(slow).json["id"]
+        a.wait_status(job, "running")
+        stopped, other = (a, b) if a.events("job_started") else (b, a)
+        stopped.process.send_signal(signal.SIGSTOP)
+        end_leases(name, stopped)
+        found = other.wait_status(job, "successful", "failed", seconds=90)
+        check(found["status"] == "successful" and found["attempts"] == 2, found)
+        before = other.get(f"/v1/jobs/{job}/result").body
+        stopped.process.send_signal(signal.SIGCONT)
+        wait_until(lambda: stopped.events("result_not_wanted") or stopped.events("job_taken_over"), seconds=90)
+        check(other.get(f"/v1/jobs/{job}/result").body == before, "an owner whose lease was over wrote")
+        check(not stopped.events("job_ended"), stopped.events("job_ended"))
+        check(SERVER.sql(name, f"SELECT count(DISTINCT token) FROM uzawa.piece WHERE job = '{job}'") == [["1"]])
+        check(stopped.solve(numbered(1))["status"] == "successful", "it serves on")
+
+
+def test_the_database_is_away_for_a_while(s):
+    with daemons(s.build, 1) as ((a,), name):
+        posted = {a.post(numbered(i)).json["id"]: i for i in range(5)}
+        slow = {**SCENE, "problem": {**SCENE["problem"], "mesh": {"box": {"size": [60, 20], "cells": [300, 100],
+                                                                         "element": "quad4"}}}}
+        job = a.post(slow).json["id"]
+        a.wait_status(job, "running")
+        SERVER.stop()
+        refused = expect(a.get(f"/v1/jobs/{job}"), 503, "store_unavailable")
+        check(int(refused.headers["retry-after"]) > 0)
+        expect(a.post(numbered(9), {"Idempotency-Key": "later"}), 503, "store_unavailable")
+        expect(a.get("/readyz"), 503, "store_unavailable")
+        time.sleep(3)
+        SERVER.start()
+        wait_until(lambda: a.get(f"/v1/jobs/{job}").status == 200)
+        found = a.wait_status(job, "successful", "failed", seconds=90)
+        check(found["status"] == "successful" and found["attempts"] == 1, found)
+        last = a.post(numbered(9), {"Idempotency-Key": "later"}).json["id"]
+        check_all(a, name, {**posted, last: 9})
+
+
+def test_connections_that_are_cut_lose_nothing(s):
+    with daemons(s.build, 2) as ((a, b), name), concurrent.futures.ThreadPoolExecutor(4) as pool:
+        outcomes = collections.Counter()
+
+        def post(i):
+            for attempt in range(40):
+                reply = (a, b)[i % 2].post(numbered(i), {"Idempotency-Key": f"cut{i}"})
+                outcomes[reply.status] += 1
+                if reply.status < 300:
+                    return reply.json["id"], i
+                check(reply.status == 503, reply)
+                time.sleep(0.05 * (attempt + 1))
+            raise AssertionError(f"{i} was never taken")
+        ends = pool.submit(lambda: [time.sleep(0.1) or SERVER.sql(
+            "postgres", f"SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE datname = '{name}'")
+            for _ in range(20)])
+        posted = dict(pool.map(post, range(60)))
+        ends.result()
+        check(len(posted) == 60, len(posted), outcomes)
+        # one whose claim was cut off waits for the end of a lease that nobody knows of
+        for one in (a, b):
+            if SERVER.sql(name, "SELECT 1 FROM uzawa.job WHERE status = 1"):
+                time.sleep(2)
+                end_leases(name, one)
+        check_all(a, name, posted)
+        check(SERVER.sql(name, "SELECT count(*) FROM uzawa.job") == [["60"]], "a submission was carried out twice")
+
+
+if __name__ == "__main__":
+    try:
+        service.main(globals())
+    finally:
+        if SERVER:
+            SERVER.end()
