@@ -33,7 +33,8 @@ static const uz_option ROWS[] = {
             .about = "HOST:PORT to listen on; [::1]:0 works too, port 0 takes a free one. An address that others can "
                      "reach needs a token-file"),
     SETTING("db", TEXT, db, .value = "FILE", .normal = "./contact.db",
-            .about = "jobs and results are kept in this file"),
+            .about = "jobs and results are kept in this file, or in a PostgreSQL database that several daemons share: "
+                     "postgresql://USER@HOST/NAME"),
     SETTING("config", TEXT, config, .value = "FILE", .normal = "",
             .about = "file with lines \"name = value\" for all options but this one"),
     SETTING("token-file", TEXT, token_file, .value = "FILE", .normal = "",

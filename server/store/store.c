@@ -162,7 +162,7 @@ store_status store_claim(store *s, const char *owner, double lease_s, bool small
 
 store_status store_renew(store *s, const store_lease *lease, int progress, bool *end)
 {
-    bool unused;
+    bool unused = false;
     const lease_use use = {.what = LEASE_RENEW,
                            .progress = progress < 0     ? 0
                                        : progress > 100 ? 100

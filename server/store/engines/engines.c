@@ -19,9 +19,10 @@ const store_engine *store_engine_of(const char *address)
 store *store_open(const char *address, char *message, size_t size)
 {
     char why[300] = "";
-    store *s = store_engine_of(address)->open(address, why, sizeof why);
-    if (!s)
-        snprintf(message, size, "%s: %s", address, why);
+    const store_engine *engine = store_engine_of(address);
+    store *s = engine->open(address, why, sizeof why);
+    if (!s) /* an address that is not the name of a file may have a secret in it */
+        snprintf(message, size, "%s: %s", engine->scheme[0] ? "the database of --db" : address, why);
     return s;
 }
 

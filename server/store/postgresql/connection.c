@@ -12,6 +12,24 @@
 
 /* ---- opening */
 
+bool link_address_fits(const char *address, char *message, size_t size)
+{
+    char *cause = NULL;
+    bool secret = false;
+    PQconninfoOption *options = PQconninfoParse(address, &cause);
+    const bool read = options != NULL;
+    for (PQconninfoOption *o = options; o && o->keyword; o++)
+        secret = secret || (o->val && o->val[0] && strstr(o->keyword, "password"));
+    if (!read)
+        snprintf(message, size, "it is no address of a database: %.150s", cause ? cause : "no memory");
+    else if (secret)
+        snprintf(message, size, "a password does not belong into an address: give it in ~/.pgpass or PGPASSFILE");
+    message[strcspn(message, "\n")] = '\0';
+    PQconninfoFree(options);
+    PQfreemem(cause);
+    return read && !secret;
+}
+
 bool link_open(link_to *l, const char *address)
 {
     /* Before what the address says: after so many seconds without a sign from the other machine it is gone. */

@@ -25,6 +25,10 @@ typedef struct {
     char message[LINK_CAUSE];
 } link_to;
 
+/* An address with a password in it is refused: others can read it, in the list of processes and in the log. The caller
+ * does not show it then. */
+bool link_address_fits(const char *address, char *message, size_t size);
+
 /* NULL in pg on failure, and the cause with a remedy in message. Takes 5 s at most for each address. */
 bool link_open(link_to *l, const char *address);
 void link_close(link_to *l);

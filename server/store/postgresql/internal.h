@@ -53,7 +53,7 @@ typedef store_status answer_reader(link_to *l, const PGresult *answer, void *ctx
 store_status postgresql_do(postgresql_store *s, link_kind kind, bool repeat, const call *c, answer_reader *read,
                            void *ctx);
 
-/* The columns of a job, in the order that postgresql_read_job expects, of a row called job. */
+/* The columns of a row called job, in the order that postgresql_read_job expects (uzawa.shown). */
 #define JOB_COLUMNS                                                                                                    \
     "job.id, job.status, job.progress, job.attempts, job.created, job.started, job.finished, job.tags, job.summary,"   \
     " job.error, job.refines, job.priority, job.client, job.summary IS NULL OR"                                        \
@@ -71,11 +71,22 @@ void postgresql_tell(postgresql_store *s, const char *id, tell_what what, const 
 bool postgresql_tell_begin(postgresql_store *s);
 void postgresql_tell_end(postgresql_store *s);
 
-/* Pieces of a result, in the transaction that ends its job. */
+/* Pieces of a result, in the transaction that ends its job: many small ones are one call. */
+enum { PIECES_AT_ONCE = 64, PLACE_ROOM = RESULT_PIECE };
+typedef struct {
+    char name[32];
+    int64_t number, part, encoding, header, size;
+    double last;
+} kept_piece;
 typedef struct {
     link_to *link;
+    const char *job;
     uint64_t token;
+    size_t n, len;
+    kept_piece kept[PIECES_AT_ONCE];
+    char *bytes; /* PLACE_ROOM of them, len in use; freed by who made the place */
 } result_place;
+store_status postgresql_send_pieces(result_place *place); /* those that are kept */
 extern const result_blobs POSTGRESQL_RESULTS;
 
 /* Bytes of uploads in the database. NULL: no memory. */

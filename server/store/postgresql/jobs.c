@@ -133,7 +133,7 @@ static store_status read_verdict(link_to *l, change *c)
 static void send_end(link_to *l, change *c)
 {
     const store_outcome *o = c->outcome;
-    result_place place = {l, c->lease->token};
+    result_place place = {.link = l, .job = c->lease->job, .token = c->lease->token};
     int64_t bytes = 0;
     char *contents = NULL;
     for (size_t i = 0; i < o->n_cases; i++) { /* the job's own is in its row */
@@ -148,7 +148,10 @@ static void send_end(link_to *l, change *c)
         link_send(l, &q);
     }
     char cause[256] = "";
-    const store_status put = result_blobs_put(&POSTGRESQL_RESULTS, &place, c->lease->job, o, &bytes, &contents, cause);
+    store_status put = result_blobs_put(&POSTGRESQL_RESULTS, &place, c->lease->job, o, &bytes, &contents, cause);
+    if (put == STORE_OK)
+        put = postgresql_send_pieces(&place);
+    free(place.bytes);
     if (put != STORE_OK && l->status == STORE_OK) {
         l->status = put;
         snprintf(l->message, sizeof l->message, "%.200s", cause);
@@ -223,9 +226,9 @@ static int compare(const void *left, const void *right)
 /* False: nothing of it may be taken for done, and each is to be tried alone. */
 static bool run_together(postgresql_store *s, change *list)
 {
-    change *all[BATCH_MOST];
-    size_t n = 0;
-    for (change *c = list; c; c = next_of(c))
+    change *all[BATCH_MOST] = {list};
+    size_t n = 1;
+    for (change *c = next_of(list); c; c = next_of(c))
         all[n++] = c;
     qsort(all, n, sizeof *all, compare);
     link_to *l = postgresql_take(s);
@@ -318,8 +321,6 @@ store_status postgresql_find_repeat(store *base, const store_request *request, j
 
 /* ---- claim */
 
-#define BODY_WITH_CLAIM "65536" /* the body of one that has no more comes with the claim */
-
 typedef struct {
     store_lease *lease;
     job *out;
@@ -331,19 +332,32 @@ static store_status read_claim(link_to *l, const PGresult *r, void *ctx)
 {
     claim_args *a = ctx;
     unsigned char digest[32];
+    job *j = a->out;
+    bool ok = true;
     if (PQntuples(r) == 0)
         return STORE_NOT_FOUND;
-    a->lease->token = (uint64_t)cell_integer(r, 0, 14);
-    const store_status status = postgresql_read_job(l, r, 0, a->out);
-    if (status != STORE_OK || PQgetisnull(r, 0, 15))
-        return status;
-    const size_t len = (size_t)PQgetlength(r, 0, 15);
-    if (gnutls_hash_fast(GNUTLS_DIG_SHA256, PQgetvalue(r, 0, 15), len, digest) == 0 &&
-        PQgetlength(r, 0, 16) == sizeof digest && memcmp(digest, PQgetvalue(r, 0, 16), sizeof digest) == 0)
+    job_clear(j);
+    ok = cell_write(j->id, sizeof j->id, r, 0, 0);
+    j->status = JOB_RUNNING;
+    j->attempts = (int)cell_integer(r, 0, 1);
+    j->created = cell_real(r, 0, 2);
+    j->started = cell_real(r, 0, 3);
+    j->tags = cell_copy(r, 0, 4, &ok);
+    j->priority = (int)cell_integer(r, 0, 6);
+    ok = cell_write(j->refines, sizeof j->refines, r, 0, 5) && ok;
+    ok = cell_write(j->client, sizeof j->client, r, 0, 7) && ok;
+    a->lease->token = (uint64_t)cell_integer(r, 0, 8);
+    if (!ok) {
+        strcpy(l->message, "a job's row is damaged, or there is no memory for it");
+        return STORE_ERROR;
+    }
+    const size_t len = (size_t)PQgetlength(r, 0, 9);
+    if (!PQgetisnull(r, 0, 9) && gnutls_hash_fast(GNUTLS_DIG_SHA256, PQgetvalue(r, 0, 9), len, digest) == 0 &&
+        PQgetlength(r, 0, 10) == sizeof digest && memcmp(digest, PQgetvalue(r, 0, 10), sizeof digest) == 0)
         *a->body = malloc(len + 1);
     if (!*a->body)
-        return STORE_OK; /* looked for once more below */
-    memcpy(*a->body, PQgetvalue(r, 0, 15), len);
+        return STORE_OK; /* it is asked for, which also tells what is wrong with it */
+    memcpy(*a->body, PQgetvalue(r, 0, 9), len);
     (*a->body)[len] = '\0';
     *a->len = len;
     return STORE_OK;
@@ -354,8 +368,7 @@ store_status postgresql_claim(store *base, store_lease *lease, double lease_s, b
 {
     postgresql_store *s = postgresql_of(base);
     claim_args a = {lease, out, body, len};
-    call c = {.sql = "SELECT " JOB_COLUMNS ", job.token, r.body, r.digest FROM uzawa.claim($1, $2, $3, $4) AS job"
-                     " LEFT JOIN uzawa.request AS r ON r.job = job.id AND length(r.body) <= " BODY_WITH_CLAIM};
+    call c = {.sql = "SELECT * FROM uzawa.claim($1, $2, $3, $4)"};
     lease->seconds = lease_s;
     call_text(&c, s->node);
     call_text(&c, lease->owner);

@@ -97,6 +97,8 @@ bool postgresql_check_file(const char *address, store_findings *out, char *messa
 {
     link_to l = {.pg = NULL};
     *out = (store_findings){.findings = NULL};
+    if (!link_address_fits(address, message, size))
+        return false;
     bool good = link_open(&l, address);
     const int version = good ? schema_version(&l) : -1;
     if (version == 0)

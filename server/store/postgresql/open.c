@@ -120,6 +120,8 @@ static bool enter(link_to *l, postgresql_store *s)
 
 store *postgresql_open(const char *address, char *message, size_t size)
 {
+    if (!link_address_fits(address, message, size))
+        return NULL;
     postgresql_store *s = calloc(1, sizeof *s);
     if (!s) {
         snprintf(message, size, "no memory");

@@ -43,7 +43,7 @@ static store_status read_one(link_to *l, const PGresult *r, void *out)
 
 store_status postgresql_get(store *base, const char *id, job *out)
 {
-    call c = {.sql = "SELECT " JOB_COLUMNS " FROM uzawa.job WHERE job.id = $1"};
+    call c = {.sql = "SELECT * FROM uzawa.get_job($1)"};
     call_text(&c, id);
     return postgresql_do(postgresql_of(base), LINK_READ, true, &c, read_one, out);
 }

@@ -2,30 +2,80 @@
 #include "store/postgresql/internal.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define HISTORY "/" /* no vector has this name (result_blobs.h) */
 
-/* Failures show at the end of the transaction. */
+/* One element of the text of an array. */
+#define ELEMENT(text, format, value) fprintf(text, "%s" format, i > 0 ? "," : "{", value)
+
+store_status postgresql_send_pieces(result_place *place)
+{
+    char *text[7] = {NULL};
+    size_t len[7];
+    bool good = true;
+    call c = {.sql = "SELECT uzawa.put_pieces($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)"};
+    if (place->n == 0 || place->link->status != STORE_OK)
+        return place->link->status;
+    call_text(&c, place->job);
+    call_integer(&c, (int64_t)place->token);
+    for (int k = 0; k < 7; k++) {
+        FILE *out = open_memstream(&text[k], &len[k]);
+        for (size_t i = 0; out && i < place->n; i++) {
+            const kept_piece *p = &place->kept[i];
+            const int64_t integers[] = {p->number, 0, p->part, p->encoding, p->header, 0, p->size};
+            if (k == 1) /* names are words of the solver's */
+                ELEMENT(out, "\"%s\"", p->name);
+            else if (k == 5)
+                ELEMENT(out, "%.17g", p->last);
+            else
+                ELEMENT(out, "%lld", (long long)integers[k]);
+        }
+        good = out && fputc('}', out) != EOF && fclose(out) == 0 && good;
+        call_text(&c, text[k]);
+    }
+    call_bytes(&c, place->bytes, place->len);
+    if (good) {
+        link_send(place->link, &c);
+    } else {
+        place->link->status = STORE_ERROR;
+        strcpy(place->link->message, "no memory for a result");
+    }
+    for (int k = 0; k < 7; k++)
+        free(text[k]);
+    place->n = place->len = 0;
+    return place->link->status;
+}
+
+/* Kept until there is a call's worth of them. Failures of the database show at the end of the transaction. */
 static store_status put(void *transaction, const result_key *key, const result_piece *piece)
 {
-    const result_place *place = transaction;
-    call c = {.sql = "INSERT INTO uzawa.piece(job, token, number, name, part, encoding, header, last, data, sum)"
-                     " SELECT $1::text, $2::bigint, $3::bigint, $4::text, $5::bigint, $6::bigint, $7::bigint,"
-                     " $8::float8, $9::bytea, uzawa.sum_of(uzawa.piece_keys(ROW($1::text, $2::bigint, $3::bigint,"
-                     " $4::text, $5::bigint, $6::bigint, $7::bigint, $8::float8, NULL, NULL)::uzawa.piece),"
-                     " $9::bytea)"};
-    call_text(&c, key->job);
-    call_integer(&c, (int64_t)place->token);
-    call_integer(&c, key->number);
-    call_text(&c, key->name ? key->name : HISTORY);
-    call_integer(&c, piece->part);
-    call_integer(&c, piece->encoding);
-    call_integer(&c, piece->header);
-    call_real(&c, piece->last);
-    call_bytes(&c, piece->data, (size_t)piece->size);
-    link_send(place->link, &c);
-    return place->link->status;
+    result_place *place = transaction;
+    if (place->n == PIECES_AT_ONCE || place->len + (size_t)piece->size > PLACE_ROOM) {
+        const store_status status = postgresql_send_pieces(place);
+        if (status != STORE_OK)
+            return status;
+    }
+    if (!place->bytes)
+        place->bytes = malloc(PLACE_ROOM);
+    if (!place->bytes) {
+        place->link->status = STORE_ERROR;
+        strcpy(place->link->message, "no memory for a result");
+        return STORE_ERROR;
+    }
+    kept_piece *p = &place->kept[place->n++];
+    *p = (kept_piece){.number = key->number,
+                      .part = piece->part,
+                      .encoding = piece->encoding,
+                      .header = piece->header,
+                      .size = piece->size,
+                      .last = piece->last};
+    snprintf(p->name, sizeof p->name, "%s", key->name ? key->name : HISTORY);
+    if (piece->size > 0)
+        memcpy(place->bytes + place->len, piece->data, (size_t)piece->size);
+    place->len += (size_t)piece->size;
+    return STORE_OK;
 }
 
 typedef struct {

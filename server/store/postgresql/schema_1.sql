@@ -142,6 +142,20 @@ CREATE FUNCTION keys_of(a text, b text) RETURNS text LANGUAGE sql IMMUTABLE RETU
 CREATE FUNCTION piece_keys(p piece) RETURNS text LANGUAGE sql STABLE
     RETURN concat_ws(E'\x1f', p.job, p.number, p.name, p.part, p.encoding, p.header, p.last);
 
+-- A job as it is read; good: its summary is what was written.
+CREATE TYPE shown AS (
+    id text, status smallint, progress smallint, attempts integer, created float8, started float8, finished float8,
+    tags text, summary text, error text, refines text, priority smallint, client text, good boolean
+);
+-- The one with this id. Its plan is kept, which is worth it for what everybody asks.
+CREATE FUNCTION get_job(p_id text) RETURNS SETOF shown LANGUAGE plpgsql ROWS 1
+    SET search_path = uzawa SET plan_cache_mode = force_generic_plan AS $$
+BEGIN
+    RETURN QUERY SELECT id, status, progress, attempts, created, started, finished, tags, summary, error, refines,
+        priority, client, summary IS NULL OR summary_sum = sum_of(keys_of(id, status::text), summary)
+        FROM job WHERE id = p_id;
+END $$;
+
 CREATE FUNCTION note_job() RETURNS trigger LANGUAGE plpgsql SET search_path = uzawa AS $$
 DECLARE
     j job := coalesce(NEW, OLD);
@@ -328,7 +342,11 @@ BEGIN
     verdict := 'new';
 END $$;
 
-CREATE FUNCTION claim(p_node text, p_owner text, p_lease float8, p_small boolean) RETURNS SETOF job LANGUAGE plpgsql ROWS 1
+-- What a claim gives; the body where it is short.
+CREATE TYPE claimed AS (id text, attempts integer, created float8, started float8, tags text, refines text,
+                        priority smallint, client text, token bigint, body bytea, digest bytea);
+CREATE FUNCTION claim(p_node text, p_owner text, p_lease float8, p_small boolean) RETURNS SETOF claimed
+    LANGUAGE plpgsql ROWS 1
     SET search_path = uzawa SET jit = off SET enable_seqscan = off SET enable_bitmapscan = off
     SET plan_cache_mode = force_generic_plan
     AS $$
@@ -356,9 +374,13 @@ BEGIN
             EXIT WHEN FOUND;
         END LOOP;
     END IF;
-    RETURN QUERY UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = now, finished = 0,
-        node = p_node, owner = p_owner, token = nextval('token'), lease = now + p_lease, lease_s = p_lease
-        WHERE id = chosen RETURNING job.*;
+    IF chosen IS NULL THEN
+        RETURN;
+    END IF;
+    UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = now, finished = 0, node = p_node,
+        owner = p_owner, token = nextval('token'), lease = now + p_lease, lease_s = p_lease WHERE id = chosen;
+    RETURN QUERY SELECT j.id, j.attempts, j.created, j.started, j.tags, j.refines, j.priority, j.client, j.token, r.body,
+        r.digest FROM job AS j LEFT JOIN request AS r ON r.job = j.id AND length(r.body) <= 65536 WHERE j.id = chosen;
 END $$;
 
 -- Raises what says that a lease is no good: the transaction is taken back with all that was written before.
@@ -398,6 +420,23 @@ BEGIN
     IF NOT FOUND THEN
         PERFORM refuse_lease(p_job);
     END IF;
+END $$;
+
+-- Pieces of the result of a job; their bytes one after another in p_data.
+CREATE FUNCTION put_pieces(p_job text, p_token bigint, p_numbers bigint[], p_names text[], p_parts bigint[],
+    p_encodings bigint[], p_headers bigint[], p_lasts float8[], p_sizes bigint[], p_data bytea) RETURNS void
+    LANGUAGE plpgsql SET search_path = uzawa SET plan_cache_mode = force_generic_plan AS $$
+DECLARE
+    p piece;
+    at integer := 1;
+BEGIN
+    FOR i IN 1 .. array_length(p_numbers, 1) LOOP
+        p := ROW(p_job, p_token, p_numbers[i], p_names[i], p_parts[i], p_encodings[i], p_headers[i], p_lasts[i],
+                 substring(p_data FROM at FOR p_sizes[i]::integer), NULL);
+        p.sum := sum_of(piece_keys(p), p.data);
+        INSERT INTO piece VALUES (p.*);
+        at := at + p_sizes[i];
+    END LOOP;
 END $$;
 
 -- The last statement of its transaction: the job's row is locked no longer than that. p_again: it was tried before and
