@@ -1,4 +1,5 @@
 """A PostgreSQL server of the package (tests/postgresql.sh) on a socket in a temporary folder, and databases there."""
+import atexit
 import os
 import pathlib
 import shutil
@@ -68,3 +69,14 @@ class Server:
         good, told = self.try_sql(database, statement)
         check(good, statement, told)
         return [line.split("|") for line in told.splitlines()]
+
+
+SHARED = []
+
+
+def address_of_new():
+    """Of a new database of a server that all tests of this program have."""
+    if not SHARED:
+        SHARED.append(Server())
+        atexit.register(SHARED[0].end)
+    return SHARED[0].address(SHARED[0].database())

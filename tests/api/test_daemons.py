@@ -65,6 +65,22 @@ def check_all(daemon, name, posted):
     check(daemon.request("POST", "/v1/admin/check").json["whole"], "the database is not whole")
 
 
+def test_a_role_with_the_rights_of_the_documents(s):
+    with daemons(s.build, 1) as (_, name):
+        SERVER.sql(name, "CREATE ROLE daemon LOGIN; GRANT USAGE ON SCHEMA uzawa TO daemon; GRANT SELECT, INSERT, UPDATE,"
+                         " DELETE ON ALL TABLES IN SCHEMA uzawa TO daemon;"
+                         " GRANT USAGE ON ALL SEQUENCES IN SCHEMA uzawa TO daemon")
+        other = Service(s.build, "--workers", "1", db=SERVER.address(name).replace("postgres@", "daemon@"))
+        try:
+            posted = {other.start().post(numbered(i)).json["id"]: i for i in range(5)}
+            check_all(other, name, posted)
+            job = next(iter(posted))
+            expect(other.request("DELETE", f"/v1/jobs/{job}"), 204)
+            check(not SERVER.sql(name, f"SELECT 1 FROM uzawa.piece WHERE job = '{job}'"), "a result is left")
+        finally:
+            other.stop()
+
+
 def test_any_daemon_serves_any_request(s):
     with daemons(s.build, 2) as ((a, b), name):
         posted = {a.post(numbered(i)).json["id"]: i for i in range(40)}
