@@ -92,6 +92,10 @@ def test_any_daemon_serves_any_request(s):
         job = b.solve({"problem": {**MATRICES["problem"], "K": {"upload": upload}}})
         check(job["status"] == "successful", job)
         expect(a.request("DELETE", f"/v1/uploads/{upload}"), 409)
+        # in chunks, which are followed while they are read: what libpq reads meanwhile is none of them
+        for size in (1000, 1 << 20):
+            sent = a.request("POST", "/v1/uploads", iter([bytes(size), b"x"]))
+            check(expect(sent, 201).json["bytes"] == size + 1, sent)
 
 
 def test_one_key_is_one_job_wherever_it_comes(s):

@@ -4,7 +4,8 @@
  * its callbacks get the data alone, and what it has read ahead is gone from the socket. Its calls of recv(2), and over
  * TLS of gnutls_record_recv, therefore come here first (the program's own symbol goes before that of a library) and go
  * on to recvfrom(2) and gnutls_record_recv_seq, which do the same. Each connection has a thread of its own, and what is
- * known of its reading is that thread's: other threads, libcurl's for one, are passed through. */
+ * known of its reading is that thread's, and of the socket that it read first: other threads, libcurl's for one, and
+ * other sockets, libpq's, are passed through. */
 #ifndef SERVER_HTTP_READING_H
 #define SERVER_HTTP_READING_H
 
