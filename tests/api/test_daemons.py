@@ -72,7 +72,8 @@ def test_a_role_with_the_rights_of_the_documents(s):
                          " GRANT USAGE ON ALL SEQUENCES IN SCHEMA uzawa TO daemon")
         other = Service(s.build, "--workers", "1", db=SERVER.address(name).replace("postgres@", "daemon@"))
         try:
-            posted = {other.start().post(numbered(i)).json["id"]: i for i in range(5)}
+            other.start()
+            posted = {other.post(numbered(i)).json["id"]: i for i in range(5)}
             check_all(other, name, posted)
             job = next(iter(posted))
             expect(other.request("DELETE", f"/v1/jobs/{job}"), 204)
