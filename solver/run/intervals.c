@@ -252,7 +252,8 @@ static const char *make_adjoint(proving *v, const uz_quantity *quantity, const d
         v->wanted[k] =
             quantity->kind == UZ_QUANTITY_CONTACT_FORCE && is_asked_of(quantity, v->g->problem->scene.contacts[k].on);
     memcpy(to->edge, body->edge, (size_t)body->n_edges * sizeof *to->edge);
-    memcpy(to->before.at, body->before.at, (size_t)body->before.n * sizeof *to->before.at);
+    if (body->before.n > 0)
+        memcpy(to->before.at, body->before.at, (size_t)body->before.n * sizeof *to->before.at);
     memset(to->force, 0, (size_t)(2 * body->model->mesh.n_elements) * sizeof *to->force);
     for (int64_t i = 0; i < body->n_edges; i++) {
         uz_bound_edge *edge = &to->edge[i];
