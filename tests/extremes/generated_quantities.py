@@ -5,13 +5,14 @@ usage: generated_quantities.py BUILD_DIR OUTPUT.json [SCENES [FIRST]]
 Bodies are boxes of every element and model: bars, blocks on planes, in holes, on circles, tables and lines, on springs and symmetric
 halves, pushed by loads, supports and heat. The reference is quad8 or hex20, with cells of a quarter to a twelfth of the size, in space of a half to a quarter. Plane bodies are
 solved with guaranteed intervals as well, on two grids, which have to have something in common: on their own obstacle, and on a polyline or a
-table in its place, a hill, a hollow, or flat, with teeth or without, of few pieces or many."""
+table in its place, a hill, a hollow, or flat, with teeth or without, of few pieces or many; and so are blocks on each other."""
 import copy
 import random
 import statistics
 import sys
 
 import generated_contacts as contacts
+from two_bodies import body
 
 PLANE = ("quad4", "quad4", "quad8", "tri3", "tri6")
 SOLID = ("hex8", "hex8", "tet4", "hex20", "tet10")
@@ -186,6 +187,40 @@ class Scene:
         return {"problem": scene, "quantities": self.quantities}
 
 
+class Blocks:
+    """A block pressed on another, with room between them or too little, whose nodes meet or not: as Scene."""
+
+    def __init__(self, number):
+        rng = random.Random(f"blocks {number}")
+        self.number, self.family = number, "blocks on each other"
+        self.element, self.finer = rng.choice(PLANE), rng.choice((2, 3, 3))
+        width, high = [rng.uniform(2, 4), rng.uniform(0.6, 3)], [rng.uniform(0.6, 2) for _ in range(2)]
+        left = rng.uniform(-0.2, 1) * (width[0] - width[1]) if rng.random() < 0.7 else 0.5 * (width[0] - width[1])
+        gap = rng.choice((0, 0, rng.uniform(-2e-3, 5e-3)))
+        self.cells = [[rng.randint(2, 7), rng.randint(2, 3)] for _ in range(2)]
+        if rng.random() < 0.3:  # nodes meet
+            left, width[1] = width[0] / self.cells[0][0], width[0] / self.cells[0][0] * max(1, self.cells[0][0] - 2)
+            self.cells[1][0] = max(1, self.cells[0][0] - 2) * rng.choice((1, 2))
+        self.places = [lambda x, y: [width[0] * x, high[0] * y], lambda x, y: [left + width[1] * x, high[0] + gap + high[1] * y]]
+        names = rng.choice((("foot", "floor"), ("floor", "foot")))
+        push = -gap - rng.uniform(1e-3, 2e-2) * high[1]
+        held = rng.choice(([{"on": "lid", "ux": 0, "uy": push}], [{"on": "lid", "uy": push}, {"on": "aside", "ux": 0}]))
+        loads = [{"on": rng.choice(("rights", "aside")), "traction": [rng.uniform(-3, 3), rng.uniform(-3, 3)]}, {"on": "all", "body_force": [0, rng.uniform(-2, 0)]},
+                 {"on": "all", "temperature": rng.uniform(-5, 5)}]
+        self.scene = {"model": rng.choice(("plane_strain", "plane_stress")), "kinematics": "fixed",
+                      "materials": [{"on": "all", "young": 1000, "poisson": rng.choice((0, 0.3, 0.45)), "expansion": 1e-3}],
+                      "supports": [{"on": "base", "ux": 0, "uy": 0}, *held], "loads": [one for one in loads if rng.random() < 0.4],
+                      "contacts": [{"on": names[0], "with": names[1]}]}
+        self.quantities = [{"quantity": "strain_energy"}, {"quantity": "contact.force", "name": "force"}, {"quantity": "reaction", "on": "lid", "direction": [0, 1]},
+                           {"quantity": "displacement", "on": "rights", "direction": [1, 0], "name": "aside"}]
+
+    def request(self, fine=False, _finest=None):
+        cells = [[n * (self.finer if fine else 1) for n in part] for part in self.cells]
+        groups = {"base": [(0, "bottom")], "floor": [(0, "top")], "foot": [(1, "bottom")], "lid": [(1, "top")], "aside": [(1, "left")],
+                  "rights": [(0, "right"), (1, "right")]}
+        return {**body(["quad8" if fine else self.element] * 2, cells, self.places, groups, **self.scene), "quantities": self.quantities}
+
+
 def prove(daemon, scene):
     """Two grids, the intervals and energies of both guaranteed: what of them has nothing in common, and rows of the coarse grid's."""
     summaries, false, rows = [], [], []
@@ -230,7 +265,8 @@ def run(s, numbers, say=print):
                 continue
             rows.append({"number": number, "family": scene.family, "element": scene.element, "model": scene.model, "dim": scene.dim, **a,
                          "true": b["value"], "own": b["on_this_mesh"], "reference": abs(b["value"] - b["on_this_mesh"])})
-        for which in [scene, *([scene.on_lines()] if scene.contacts and scene.model != "axisymmetric" else [])] if scene.may_be_proved() else []:
+        proofs = [scene, *([scene.on_lines()] if scene.contacts and scene.model != "axisymmetric" else [])] if scene.may_be_proved() else []
+        for which in [*proofs, Blocks(number)]:
             false, of = prove(daemon, which)
             proved += of
             for one in false:
@@ -257,9 +293,9 @@ def tell(rows):
 
 def look(s, numbers):
     found = run(s, numbers)
-    for lines in (False, True):
-        ratios = [row["half"] / row["error"] for row in found["proved"] if row["family"].endswith("on lines") == lines]
-        print(f"guaranteed     {len(ratios)}{' on lines' if lines else ''} whose error the fine mesh tells, half width over error of the mesh's value "
+    for where in ("", " on lines", " on each other"):
+        ratios = [row["half"] / row["error"] for row in found["proved"] if row["family"].endswith(where or row["family"].split(" ")[0])]
+        print(f"guaranteed     {len(ratios)}{where} whose error the fine mesh tells, half width over error of the mesh's value "
               f"{statistics.median(ratios or [0]):5.2f}")
     if tell(found["rows"]) < 0.95:
         found["failures"].append("fewer than 95 of 100 values are in their intervals")
