@@ -171,7 +171,7 @@ convergence of every element. The stiffness of CalculiX's tetrahedra is reproduc
 
 TRADE = """Unknowns of the last mesh and seconds of the whole job, all its meshes and proofs included, until the whole error is small enough (`make trade`): refined where it is
 (`refine`: `auto`) and everywhere, each side halved again and again, with what a target takes interpolated between two meshes. `~`: extrapolated by the order of the last two,
-or what there was when the time or the mesh's limit came. Linear elements are triangles where they are refined, else as the first mesh has them; all sides are straight. The
+or what there was when the time or the mesh's limit came. Elements are quadrilaterals with straight sides, of which a guaranteed refinement makes triangles. The
 order is that of the error in unknowns: 0.5 and 1 are the best that linear and quadratic elements can do in the plane. The press fit has no guarantee, as bodies press on each
 other; the cylinder's first mesh is graded towards its contact by hand."""
 

@@ -57,12 +57,6 @@ class Mesh:
         edges = {name: [half for a, b in pairs for half in ([a, middle(a, b)], [middle(a, b), b])] for name, pairs in self.edges.items()}
         return Mesh(nodes, elements, edges, {name: [4 * e + k for e in part for k in range(4)] for name, part in self.parts.items()}, self.arcs)
 
-    def triangles(self):
-        if len(self.elements[0]) == 3:
-            return self
-        return Mesh(self.nodes, [half for a, b, c, d in self.elements for half in ([a, b, c], [a, c, d])], self.edges,
-                    {name: [2 * e + k for e in part for k in range(2)] for name, part in self.parts.items()}, self.arcs)
-
     def json(self, quadratic):
         nodes, middle = self.amid(False)  # sides stay straight
         corners = len(self.elements[0])
@@ -186,7 +180,7 @@ def main():
                     uniform = everywhere(s, problem, mesh, kind == "quadratic", way)
                     if not uniform:
                         continue
-                    first = {**mesh.triangles().json(kind == "quadratic"), "refine": "auto"}
+                    first = {**mesh.json(kind == "quadratic"), "refine": "auto"}
                     adaptive = [ask(s, problem, {"total": t, "guaranteed": way == "guaranteed"}, first) for t in TARGETS]
                     reached = [one for one in adaptive if one and one["reached"]]
                     row = {"name": f"{name}, {kind}, {way}", "body": name, "elements": kind, "way": way, "targets": list(TARGETS),
