@@ -42,22 +42,42 @@ void uz_modes_clear(uz_modes *modes);
 /* ---------------------------------------------------------------- multigrid */
 
 typedef struct uz_multigrid uz_multigrid;           /* immutable after creation */
-typedef struct uz_multigrid_room uz_multigrid_room; /* one per thread */
+typedef struct uz_multigrid_room uz_multigrid_room; /* one per thread; each kind has its own */
 
-/* A symmetric positive definite V-cycle for K (lower triangle), or for K_FF where held (n, NULL: none) marks the dofs
- * that are not in F: vectors are then n long, and what they hold at held dofs is ignored and returned as 0.
- * Errors: NOT_SPD where a diagonal entry or the coarsest matrix shows it; LIMIT where memory_limit (0: none) would be
- * passed; CANCELLED where it had to stop (stop NULL: never). */
-uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
-                              size_t memory_limit, const uz_stop *stop, uz_error *err);
-void uz_multigrid_free(uz_multigrid *mg);
+/* What a kind of multigrid does. M^-1 is symmetric and positive definite, also with dofs held. */
 typedef struct {
+    /* z = M^-1 r (n); z and r do not overlap. */
+    uz_status (*apply)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
+                       uz_error *err);
+    /* y = K x in double precision; y and x do not overlap. */
+    void (*multiply)(const uz_multigrid *mg, const uz_csc *K, double *y, const double *x);
+    /* What a thread needs to apply it, *bytes of it; NULL: no memory. */
+    uz_multigrid_room *(*room)(const uz_multigrid *mg, size_t *bytes);
+    void (*free_room)(uz_multigrid_room *room); /* NULL and half-built ones too */
+    /* From now on, in this room, M stands for K_FF, where held (n, to be kept until the next call; NULL: none) marks
+     * the dofs that are not in F: what r has at held dofs is ignored, z is 0 there. *bytes: what the room has grown by
+     * since it was made. CANCELLED where it had to stop; the room may then only be freed, or told again. */
+    uz_status (*hold)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, const bool *held, size_t *bytes,
+                      const uz_stop *stop, uz_error *err);
+    void (*free)(uz_multigrid *mg);
+} uz_multigrid_kind;
+
+/* What every kind begins with. */
+struct uz_multigrid {
+    const uz_multigrid_kind *kind;
+    int64_t n;
     int levels;
     size_t bytes;
     double most; /* a bound on lambda_max(diag(K)^-1 M) */
-} uz_multigrid_info;
-uz_multigrid_info uz_multigrid_describe(const uz_multigrid *mg);
-/* z = M^-1 r (n); z and r do not overlap. room: of a uz_cg. */
+};
+
+/* A V-cycle on smoothed aggregates for K (lower triangle).
+ * Errors: NOT_SPD where a diagonal entry or the coarsest matrix shows it; LIMIT where memory_limit (0: none) would be
+ * passed; CANCELLED where it had to stop (stop NULL: never). */
+uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
+                              const uz_stop *stop, uz_error *err);
+void uz_multigrid_free(uz_multigrid *mg);
+/* kind->apply. */
 uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,
                              const double *r, uz_error *err);
 
@@ -66,12 +86,15 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
 /* The room of a solve; made for one multigrid, used by one thread. */
 typedef struct {
     const uz_multigrid *mg;
-    const bool *held; /* as the multigrid's */
+    const bool *held; /* of uz_cg_hold */
     uz_multigrid_room *room;
     int64_t n;
+    size_t bytes, grown;   /* of all this; what holding dofs adds */
     double *r, *z, *p, *q; /* n each */
 } uz_cg;
-uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, const bool *held, int64_t n, uz_error *err);
+uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, uz_error *err);
+/* Solves from now on are for K_FF: see uz_multigrid_kind. */
+uz_status uz_cg_hold(uz_cg *cg, const uz_csc *K, const bool *held, const uz_stop *stop, uz_error *err);
 void uz_cg_clear(uz_cg *cg);
 
 typedef struct {
@@ -106,13 +129,14 @@ typedef struct {
 
 /* Immutable after creation: shared by any number of threads. */
 typedef struct {
-    uz_modes modes;
     uz_multigrid *mg;
     uz_amg_info info;
 } uz_amg;
 
-/* Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD also where K is singular to
- * working precision. */
+/* Of any multigrid for K, which is taken, also on failure. NOT_SPD where K is singular to working precision. */
+uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
+/* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD as
+ * uz_amg_of. */
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
                         uz_error *err);
 void uz_amg_free(uz_amg *amg);

@@ -1,5 +1,5 @@
 /* cg.c: preconditioned conjugate gradients (Hestenes and Stiefel 1952). */
-#include "amg/multigrid_private.h"
+#include "amg/amg.h"
 
 #include "core/alloc.h"
 #include "linalg/blas.h"
@@ -14,35 +14,28 @@
 
 enum { RESTARTS_MOST = 4 };
 
-uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, const bool *held, int64_t n, uz_error *err)
+uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, uz_error *err)
 {
-    uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
     double **vectors[] = {&cg->r, &cg->z, &cg->p, &cg->q};
-    *cg = (uz_cg){.mg = mg, .held = held, .n = n, .room = room};
-    bool ok = room && (room->ws = uz_factor_workspace_new());
-    for (int l = 0; ok && l < mg->levels; l++) {
-        const int64_t of_level = mg->level[l].n;
-        room->t[l] = uz_alloc(of_level, sizeof(double));
-        room->x[l] = uz_alloc(l > 0 ? of_level : 0, sizeof(double));
-        room->b[l] = uz_alloc(l > 0 ? of_level : 0, sizeof(double));
-        ok = room->t[l] && room->x[l] && room->b[l];
-    }
+    *cg = (uz_cg){.mg = mg, .n = mg->n};
+    cg->room = mg->kind->room(mg, &cg->bytes);
+    bool ok = cg->room != NULL;
     for (int k = 0; k < 4; k++)
-        ok = (*vectors[k] = uz_alloc(n, sizeof(double))) && ok;
-    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to solve for %lld dofs", (long long)n);
+        ok = (*vectors[k] = uz_alloc(mg->n, sizeof(double))) && ok;
+    cg->bytes += 32 * (size_t)mg->n;
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to solve for %lld dofs", (long long)mg->n);
+}
+
+uz_status uz_cg_hold(uz_cg *cg, const uz_csc *K, const bool *held, const uz_stop *stop, uz_error *err)
+{
+    cg->held = held;
+    return cg->mg->kind->hold(cg->mg, K, cg->room, held, &cg->grown, stop, err);
 }
 
 void uz_cg_clear(uz_cg *cg)
 {
-    uz_multigrid_room *room = cg->room;
-    if (room)
-        uz_factor_workspace_free(room->ws);
-    for (int l = 0; room && l < UZ_LEVELS_MOST; l++) {
-        free(room->t[l]);
-        free(room->x[l]);
-        free(room->b[l]);
-    }
-    free(room);
+    if (cg->mg)
+        cg->mg->kind->free_room(cg->room);
     free(cg->r);
     free(cg->z);
     free(cg->p);
@@ -71,10 +64,11 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
     memset(info, 0, sizeof *info);
     for (int k = 0;; k++) {
         /* r = b - K x on the free dofs, z = M^-1 r; x at held dofs counts as 0 */
-        memcpy(cg->q, x, (size_t)n * sizeof *x);
-        clear_held(cg->q, cg);
-        memcpy(cg->r, b, (size_t)n * sizeof *b);
-        uz_csc_symv(cg->r, K, -1.0, cg->q);
+        memcpy(cg->p, x, (size_t)n * sizeof *x);
+        clear_held(cg->p, cg);
+        cg->mg->kind->multiply(cg->mg, K, cg->q, cg->p);
+        for (int64_t j = 0; j < n; j++)
+            cg->r[j] = b[j] - cg->q[j];
         clear_held(cg->r, cg);
         uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
         double square = uz_dot(n, cg->r, cg->z);
@@ -90,8 +84,7 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
         before = info->last;
         memcpy(cg->p, cg->z, (size_t)n * sizeof *cg->p);
         while (square > goal * goal && !should_stop(info, stop)) {
-            memset(cg->q, 0, (size_t)n * sizeof *cg->q);
-            uz_csc_symv(cg->q, K, 1.0, cg->p);
+            cg->mg->kind->multiply(cg->mg, K, cg->q, cg->p);
             clear_held(cg->q, cg);
             const double curvature = uz_dot(n, cg->p, cg->q), alpha = square / curvature, last = square;
             if (fabs(curvature) < DBL_MIN) /* underflow: there is no more to gain */

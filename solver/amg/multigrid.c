@@ -19,7 +19,7 @@ enum { COARSEST = 1200, POWER_STEPS = 8 };
 /* A level that keeps more than this share of the dofs is not worth having. */
 #define LEAST_GAIN 0.7
 
-static uz_status invert_diagonal(uz_level *level, const uz_csc *A, const bool *held, uz_error *err)
+static uz_status invert_diagonal(uz_level *level, const uz_csc *A, uz_error *err)
 {
     level->n = A->cols;
     level->inverse = uz_alloc(level->n, sizeof *level->inverse);
@@ -28,12 +28,12 @@ static uz_status invert_diagonal(uz_level *level, const uz_csc *A, const bool *h
     for (int64_t j = 0; j < level->n; j++) {
         int64_t k = A->ptr[j];
         bool positive = k < A->ptr[j + 1] && A->idx[k] == j && A->val[k] > 0.0;
-        if (!positive && !(held && held[j]))
+        if (!positive)
             return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                            "K is not positive definite: its diagonal entry of dof %lld (numbered from 0) is not "
                            "positive. Support the body so that it can't move freely, or check the signs of K.",
                            (long long)j);
-        level->inverse[j] = held && held[j] ? 0.0 : 1.0 / A->val[k];
+        level->inverse[j] = 1.0 / A->val[k];
     }
     return UZ_OK;
 }
@@ -65,8 +65,8 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
     bool gain = status == UZ_OK && level->aggregates > 0 && (double)(level->aggregates * k) < LEAST_GAIN * (double)n;
     if (gain) {
         *coarse = uz_alloc(level->aggregates * k * k, sizeof **coarse);
-        for (int64_t i = 0; i < n; i++) /* dofs that are held are in none */
-            of[i] = level->inverse[i] > 0.0 ? aggregate[from->node[i]] : -1;
+        for (int64_t i = 0; i < n; i++)
+            of[i] = aggregate[from->node[i]];
         if (uz_stop_is_due(stop))
             status = uz_fail_stopped(err);
         else if (!*coarse)
@@ -75,7 +75,7 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
             status = uz_tentative(basis, *coarse, from->modes, of, n, level->aggregates, k, err);
         uint64_t state = 1;
         for (int64_t i = 0; status == UZ_OK && i < n; i++)
-            x[i] = level->inverse[i] > 0.0 ? uz_uniform(&state) - 0.5 : 0.0;
+            x[i] = uz_uniform(&state) - 0.5;
         for (int step = 0; status == UZ_OK && step < POWER_STEPS; step++) {
             const double before = uz_norm(n, x);
             memset(y, 0, (size_t)n * sizeof *y);
@@ -101,10 +101,10 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
 }
 
 /* All so far; what the limit is compared with on the way. */
-static size_t count_bytes(const uz_multigrid *mg)
+static size_t count_bytes(const uz_aggregates *mg)
 {
     size_t bytes = sizeof *mg;
-    for (int l = 0; l < mg->levels; l++) {
+    for (int l = 0; l < mg->base.levels; l++) {
         const uz_level *level = &mg->level[l];
         const size_t n = (size_t)level->n;
         bytes += 8 * n;
@@ -141,10 +141,10 @@ static uz_status bound_by_diagonal(double *bound, const uz_level *level, const u
 }
 
 /* Level l + 1 from level l; *done: level l is the coarsest. */
-static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_csc *K, size_t memory_limit,
+static uz_status coarsen(uz_aggregates *mg, bool *done, sources *from, const uz_csc *K, size_t memory_limit,
                          const uz_stop *stop, uz_error *err)
 {
-    int l = mg->levels - 1;
+    int l = mg->base.levels - 1;
     uz_level *level = &mg->level[l], *next = level + 1;
     const uz_csc *A = l == 0 ? K : &mg->level[l].A;
     float *modes = NULL;
@@ -159,8 +159,8 @@ static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_c
     }
     status = uz_galerkin(&next->A, level, A, mg->k, stop, err);
     if (status == UZ_OK) {
-        status = invert_diagonal(next, &next->A, NULL, err);
-        mg->levels++;
+        status = invert_diagonal(next, &next->A, err);
+        mg->base.levels++;
     }
     if (status == UZ_OK && memory_limit > 0 && count_bytes(mg) > memory_limit)
         status =
@@ -176,15 +176,26 @@ static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_c
     return status;
 }
 
-uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
-                              size_t memory_limit, const uz_stop *stop, uz_error *err)
+uz_status uz_factor_coarsest(uz_factor **out, const uz_csc *A, size_t memory_limit, const uz_hooks *hooks,
+                             uz_error *err)
+{
+    uz_analysis *analysis = NULL;
+    uz_status status = uz_analysis_create(&analysis, A, NULL, 0, 0, UZ_ORDERING_AMD, hooks, err);
+    if (status == UZ_OK)
+        status = uz_factor_create(out, A, analysis, memory_limit, hooks, err);
+    uz_analysis_free(analysis);
+    return status;
+}
+
+uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
+                              const uz_stop *stop, uz_error *err)
 {
     const int64_t n = K->cols, k = modes->count;
     *out = NULL;
     if (n >= INT32_MAX)
         return uz_fail(err, UZ_ERR_UNSUPPORTED, "K", "matrix_free holds up to 2^31 - 2 dofs, these are %lld",
                        (long long)n);
-    uz_multigrid *mg = uz_alloc_zero(1, sizeof *mg);
+    uz_aggregates *mg = uz_alloc_zero(1, sizeof *mg);
     sources from = {uz_alloc(n, sizeof *from.node), modes->n_nodes, uz_alloc(n * k, sizeof *from.modes), modes->strong};
     uz_status status = UZ_OK;
     bool done = false;
@@ -192,38 +203,22 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid on %lld dofs", (long long)n);
     } else {
         mg->k = modes->count;
-        mg->levels = 1;
+        mg->base = (uz_multigrid){.kind = &uz_aggregates_kind, .n = n, .levels = 1};
         memcpy(from.node, modes->node, (size_t)n * sizeof *from.node);
         memcpy(from.modes, modes->value, (size_t)(n * k) * sizeof *from.modes);
-        status = invert_diagonal(&mg->level[0], K, held, err);
+        status = invert_diagonal(&mg->level[0], K, err);
     }
     while (status == UZ_OK && !done)
         status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarsen(mg, &done, &from, K, memory_limit, stop, err);
     free(from.node);
     free(from.modes);
     if (status == UZ_OK)
-        status = bound_by_diagonal(&mg->most, &mg->level[0], K, err);
+        status = bound_by_diagonal(&mg->base.most, &mg->level[0], K, err);
     if (status == UZ_OK) { /* the factor of the coarsest level */
-        const int last = mg->levels - 1;
-        uz_csc alone = {0};
+        const int last = mg->base.levels - 1;
         uz_error inner = {0};
-        if (last == 0)
-            status = uz_csc_copy(&alone, K, err);
-        /* a matrix that is small enough to be the coarsest: rows of held dofs become those of the unit matrix */
-        for (int64_t j = 0; status == UZ_OK && last == 0 && held && j < n; j++)
-            for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
-                if (held[j] || held[K->idx[q]])
-                    alone.val[q] = K->idx[q] == j ? 1.0 : 0.0;
-        const uz_csc *A = last == 0 ? &alone : &mg->level[last].A;
-        const uz_hooks *hooks = stop ? stop->hooks : NULL;
-        uz_error *into = last == 0 ? err : &inner;
-        uz_analysis *analysis = NULL;
-        if (status == UZ_OK)
-            status = uz_analysis_create(&analysis, A, NULL, 0, 0, UZ_ORDERING_AMD, hooks, into);
-        if (status == UZ_OK)
-            status = uz_factor_create(&mg->coarsest, A, analysis, memory_limit, hooks, into);
-        uz_analysis_free(analysis);
-        uz_csc_clear(&alone);
+        status = uz_factor_coarsest(&mg->coarsest, last == 0 ? K : &mg->level[last].A, memory_limit,
+                                    stop ? stop->hooks : NULL, last == 0 ? err : &inner);
         if (last > 0 && status == UZ_ERR_NOT_SPD)
             uz_fail(err, status, "K",
                     "K is not positive definite to working precision: on smooth displacements it resists too little. "
@@ -232,30 +227,16 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
             uz_fail(err, status, inner.where, "%s", inner.message);
     }
     if (status == UZ_OK) {
-        mg->bytes = count_bytes(mg);
-        *out = mg;
-    } else {
-        uz_multigrid_free(mg);
+        mg->base.bytes = count_bytes(mg);
+        *out = &mg->base;
+    } else if (mg) {
+        uz_aggregates_kind.free(&mg->base);
     }
     return status;
 }
 
-uz_multigrid_info uz_multigrid_describe(const uz_multigrid *mg)
-{
-    return (uz_multigrid_info){mg->levels, mg->bytes, mg->most};
-}
-
 void uz_multigrid_free(uz_multigrid *mg)
 {
-    if (!mg)
-        return;
-    for (int l = 0; l < UZ_LEVELS_MOST; l++) {
-        uz_csc_clear(&mg->level[l].A);
-        free(mg->level[l].inverse);
-        free(mg->level[l].ptr);
-        free(mg->level[l].block);
-        free(mg->level[l].value);
-    }
-    uz_factor_free(mg->coarsest);
-    free(mg);
+    if (mg)
+        mg->kind->free(mg);
 }

@@ -11,7 +11,7 @@
 typedef struct {
     int64_t n;
     uz_csc A;        /* lower triangle; level 0: empty, it is the caller's K */
-    double *inverse; /* n: 1 / a_jj, 0 at held dofs: what makes them vanish from every sweep */
+    double *inverse; /* n: 1 / a_jj */
     int64_t *ptr;    /* n + 1: the blocks of each row of the prolongation */
     int32_t *block;  /* ptr[n]: aggregate of each block */
     float *value;    /* ptr[n] x k */
@@ -20,18 +20,24 @@ typedef struct {
 
 enum { UZ_LEVELS_MOST = 24 };
 
-struct uz_multigrid {
-    int levels, k;
+/* Multigrid on smoothed aggregates. */
+typedef struct {
+    uz_multigrid base;
+    int k;
     uz_level level[UZ_LEVELS_MOST]; /* the last one has no prolongation, only n */
     uz_factor *coarsest;
-    double most;
-    size_t bytes;
-};
+} uz_aggregates;
+extern const uz_multigrid_kind uz_aggregates_kind;
 
 struct uz_multigrid_room {
     uz_factor_workspace *ws;
     double *x[UZ_LEVELS_MOST], *b[UZ_LEVELS_MOST], *t[UZ_LEVELS_MOST]; /* n each; x and b from level 1 on */
+    double *inverse;   /* level 0's where dofs are held: 0 there, which makes them vanish from every sweep; else NULL */
+    uz_factor *coarse; /* K_FF where there is one level only; else NULL */
 };
+/* Of a matrix that is small enough; limit: of memory. */
+uz_status uz_factor_coarsest(uz_factor **out, const uz_csc *A, size_t memory_limit, const uz_hooks *hooks,
+                             uz_error *err);
 
 /* Rows of a symmetric matrix of which only columns of the lower triangle are stored, in ascending order: a column waits
  * in the list of the row of its next entry. */

@@ -79,7 +79,7 @@ static void random_residual(uz_cg *cg, const uz_csc *K)
 static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, const uz_csc *K, const uz_hooks *hooks,
                              uz_error *err)
 {
-    double share = LEAST_SHARE / sqrt(uz_multigrid_describe(cg->mg).most), before = 0.0;
+    double share = LEAST_SHARE / sqrt(cg->mg->most), before = 0.0;
     info->lambda = 0.0;
     random_residual(cg, K);
     uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
@@ -89,8 +89,7 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
         if (uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
         /* a step of conjugate gradients without the solution */
-        memset(cg->q, 0, (size_t)cg->n * sizeof *cg->q);
-        uz_csc_symv(cg->q, K, 1.0, cg->p);
+        cg->mg->kind->multiply(cg->mg, K, cg->q, cg->p);
         const double curvature = uz_dot(cg->n, cg->p, cg->q), last = square;
         if (!(curvature > 0.0))
             return uz_fail(err, UZ_ERR_NOT_SPD, "K",
@@ -150,6 +149,35 @@ static uz_status find_rcond(uz_amg_info *info, uz_cg *cg, const uz_csc *K, uz_er
                    info->rcond, (long long)info->iterations);
 }
 
+uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, const uz_hooks *hooks, uz_error *err)
+{
+    const double start = uz_seconds();
+    uz_amg *amg = uz_alloc_zero(1, sizeof *amg);
+    coefficients *c = uz_alloc_zero(1, sizeof *c);
+    uz_cg cg = {0};
+    *out = NULL;
+    uz_status status =
+        amg && c ? uz_cg_init(&cg, mg, err) : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
+    if (status == UZ_OK) {
+        amg->info.levels = mg->levels;
+        amg->info.bytes = mg->bytes;
+        status = bound_below(&amg->info, c, &cg, K, hooks, err);
+    }
+    if (status == UZ_OK)
+        status = find_rcond(&amg->info, &cg, K, err);
+    uz_cg_clear(&cg);
+    free(c);
+    if (status == UZ_OK) {
+        amg->mg = mg;
+        amg->info.spectrum_s = uz_seconds() - start;
+        *out = amg;
+        return UZ_OK;
+    }
+    uz_multigrid_free(mg);
+    free(amg);
+    return status;
+}
+
 /* Bilinear elements of aspect 10 to 1 couple as strongly along their long sides, in absolute value, as square ones do
  * across a corner: a threshold that sees the difference makes coarse levels fuller, so it is tried only where the usual
  * one does badly. Measured at aspect 15 to 1: lambda 0.29 instead of 0.02, for 4 times the bytes. */
@@ -157,61 +185,53 @@ static uz_status find_rcond(uz_amg_info *info, uz_cg *cg, const uz_csc *K, uz_er
 #define BAD_LAMBDA    0.02
 #define WORTH_LAMBDA  3.0
 
+/* *levels: of the multigrid, also where K is refused for what iterations showed; 0: it was not made. */
+static uz_status try_threshold(uz_amg **out, int *levels, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
+                               const uz_hooks *hooks, uz_error *err)
+{
+    const uz_stop stop = {hooks, INFINITY};
+    const double start = uz_seconds();
+    uz_multigrid *mg = NULL;
+    *out = NULL;
+    *levels = 0;
+    uz_status status = uz_multigrid_create(&mg, K, modes, memory_limit, &stop, err);
+    const double create_s = uz_seconds() - start;
+    if (status != UZ_OK)
+        return status;
+    *levels = mg->levels;
+    status = uz_amg_of(out, mg, K, hooks, err);
+    if (status == UZ_OK)
+        (*out)->info.create_s = create_s;
+    return status;
+}
+
 /* The better of two thresholds; the first one's failure stands where the second fails too. */
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
                         uz_error *err)
 {
-    const uz_stop stop = {hooks, INFINITY};
-    uz_amg *amg = uz_alloc_zero(1, sizeof *amg), tried[2] = {{.modes = *modes}};
-    coefficients *c = uz_alloc_zero(1, sizeof *c);
+    uz_amg *tried[2] = {NULL, NULL};
     uz_error failure[2] = {{.status = UZ_OK}};
     uz_status end[2] = {UZ_OK, UZ_ERR_INTERNAL}; /* the second: not tried */
-    *out = NULL;
-    memset(modes, 0, sizeof *modes);
-    if (!amg || !c)
-        end[0] = uz_fail(&failure[0], UZ_ERR_MEMORY, "", "no memory for a multigrid");
-    for (int k = 0; amg && c && k < 2; k++) {
-        uz_amg *x = &tried[k];
-        uz_cg cg = {0};
-        double start = uz_seconds();
-        end[k] = uz_multigrid_create(&x->mg, K, &x->modes, NULL, memory_limit, &stop, &failure[k]);
-        x->info.create_s += uz_seconds() - start;
-        start = uz_seconds();
-        if (end[k] == UZ_OK) {
-            const uz_multigrid_info made = uz_multigrid_describe(x->mg);
-            x->info.levels = made.levels;
-            x->info.bytes = made.bytes + (size_t)K->cols * (4 + 4 * (size_t)x->modes.count);
-            end[k] = uz_cg_init(&cg, x->mg, NULL, K->cols, &failure[k]);
-        }
-        if (end[k] == UZ_OK)
-            end[k] = bound_below(&x->info, c, &cg, K, hooks, &failure[k]);
-        if (end[k] == UZ_OK)
-            end[k] = find_rcond(&x->info, &cg, K, &failure[k]);
-        uz_cg_clear(&cg);
-        x->info.spectrum_s += uz_seconds() - start;
-        const bool may_improve = end[k] == UZ_OK ? x->info.levels > 1 && x->info.lambda < BAD_LAMBDA
-                                                 : end[k] == UZ_ERR_NOT_SPD && x->mg && x->info.iterations > 0;
-        if (k == 1 || !may_improve)
-            break;
-        tried[1] = (uz_amg){.modes = x->modes, .info = x->info};
-        tried[1].modes.strong = SECOND_STRONG;
-        tried[1].info.lambda = 0.0;
+    int levels = 0, ignored;
+    end[0] = try_threshold(&tried[0], &levels, K, modes, memory_limit, hooks, &failure[0]);
+    if (levels > 1 && (end[0] == UZ_OK ? tried[0]->info.lambda < BAD_LAMBDA : end[0] == UZ_ERR_NOT_SPD)) {
+        modes->strong = SECOND_STRONG;
+        end[1] = try_threshold(&tried[1], &ignored, K, modes, memory_limit, hooks, &failure[1]);
     }
+    uz_modes_clear(modes);
     const bool better =
-        end[1] == UZ_OK && (end[0] != UZ_OK || tried[1].info.lambda > WORTH_LAMBDA * tried[0].info.lambda);
+        end[1] == UZ_OK && (end[0] != UZ_OK || tried[1]->info.lambda > WORTH_LAMBDA * tried[0]->info.lambda);
     const int told = better || end[1] == UZ_ERR_CANCELLED || (end[1] == UZ_ERR_MEMORY && end[0] != UZ_OK);
-    const bool made = end[told] == UZ_OK;
-    uz_multigrid_free(made && told == 0 ? NULL : tried[0].mg);
-    uz_multigrid_free(made && told == 1 ? NULL : tried[1].mg);
-    free(c);
-    if (made) {
-        *amg = tried[told];
-        *out = amg;
-        return UZ_OK;
+    *out = end[told] == UZ_OK ? tried[told] : NULL;
+    for (int k = 0; k < 2; k++) {
+        if (*out && tried[k] && k != told) {
+            (*out)->info.create_s += tried[k]->info.create_s;
+            (*out)->info.spectrum_s += tried[k]->info.spectrum_s;
+        }
+        if (tried[k] != *out)
+            uz_amg_free(tried[k]);
     }
-    uz_modes_clear(&tried[0].modes);
-    free(amg);
-    if (err)
+    if (!*out && err)
         *err = failure[told];
     return end[told];
 }
@@ -220,7 +240,6 @@ void uz_amg_free(uz_amg *amg)
 {
     if (!amg)
         return;
-    uz_modes_clear(&amg->modes);
     uz_multigrid_free(amg->mg);
     free(amg);
 }

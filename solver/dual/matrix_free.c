@@ -11,8 +11,8 @@
  * by CHANGE_KEPT, unless a FLOOR of the aim is reached before. Where the iterations are to be those of the exact
  * operator (an aim of 0) the share is EXACT_CHANGE, which no test of a step or its direction can tell from 0.
  *
- * Given rows as equations, where each row bounds a single dof: conjugate gradients on the dofs that are free, with a
- * multigrid of their own. */
+ * Given rows as equations, where each row bounds a single dof: conjugate gradients on the dofs that are free, with the
+ * others held in the multigrid of the whole body. */
 #include "dual/sparse.h"
 
 #include "core/alloc.h"
@@ -92,11 +92,11 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     x->tight = CHANGE_KEPT;
     x->p = uz_alloc(d, sizeof *x->p);
     x->right = uz_alloc(d, sizeof *x->right);
-    load->bytes += 8 * 8 * (size_t)d;
-    status = x->p && x->right ? uz_cg_init(&x->cg, load->dual->amg->mg, NULL, d, err)
+    status = x->p && x->right ? uz_cg_init(&x->cg, load->dual->amg->mg, err)
                               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
     if (status != UZ_OK)
         return status;
+    load->bytes += 16 * (size_t)d + x->cg.bytes;
     memcpy(x->p, p, (size_t)d * sizeof *p);
     status = solve_base(x, BASE_FLOOR * x->aim, err);
     return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, err) : status;
@@ -203,16 +203,17 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err
 
 /* u, r, g and active: at the coarse tolerance of the energy norm, and, while the guess still looks right, at the one
  * that is as good as exact. */
-static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, bool *active, uz_error *err)
+static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active, uz_error *err)
 {
-    const uz_dual_load *load = &x->sparse.load;
+    uz_cg *cg = &x->cg;
+    uz_dual_load *load = &x->sparse.load;
     const int64_t d = load->dual->d, m = load->dual->m;
     uz_bounded *box = x->sparse.box;
     const uz_bounds *bounds = box->bounds;
     const double least = ACTIVE_FLOOR * x->aim, root = sqrt(load->dual->amg->info.lambda),
                  most = uz_root(-2.0 * load->psi0);
     double tolerance = fmax(least, x->coarse), *held = x->cg.p, *e = x->cg.r;
-    uz_status status = UZ_OK;
+    uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
     for (int64_t j = 0; j < d; j++)
         held[j] = box->fixed[j] ? box->u[j] : 0.0;
     memcpy(x->right, x->p, (size_t)d * sizeof *x->right);
@@ -236,6 +237,10 @@ static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, b
     }
     memcpy(r, box->r, (size_t)m * sizeof *r);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
+    load->most = cg->grown > load->most ? cg->grown : load->most;
+    load->most = box->swept_bytes > load->most ? box->swept_bytes : load->most; /* not at the same time */
+    const uz_status freed = uz_cg_hold(cg, load->K, NULL, NULL, status == UZ_OK ? err : NULL);
+    status = status == UZ_OK ? freed : status;
     if (status != UZ_OK)
         return status;
     /* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears.
@@ -252,9 +257,6 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
 {
     free_load *x = (free_load *)load;
     uz_bounded *box = x->sparse.box;
-    const uz_amg *amg = load->dual->amg;
-    uz_multigrid *mg = NULL;
-    uz_cg cg = {0};
     if (!box)
         return UZ_OK;
     if (!uz_bounded_hold(&x->sparse, active, true)) {
@@ -263,18 +265,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     }
     if (x->coarse <= 0.0)
         x->coarse = FIRST_TOLERANCE;
-    uz_status status = uz_multigrid_create(&mg, load->K, &amg->modes, box->fixed, 0, &x->stop, err);
-    if (status == UZ_OK)
-        status = uz_cg_init(&cg, mg, box->fixed, load->dual->d, err);
-    if (status == UZ_OK) {
-        const size_t bytes = uz_multigrid_describe(mg).bytes + 56 * (size_t)load->dual->d;
-        load->most = bytes > load->most ? bytes : load->most;
-        load->most = box->swept_bytes > load->most ? box->swept_bytes : load->most; /* not at the same time */
-    }
-    if (status == UZ_OK)
-        status = solve_stepwise(x, &cg, r, g, active, err);
-    uz_cg_clear(&cg);
-    uz_multigrid_free(mg);
+    const uz_status status = solve_stepwise(x, r, g, active, err);
     box->has_exact = status == UZ_OK;
     *end = status == UZ_OK ? UZ_ACTIVE_SOLVED : UZ_ACTIVE_UNSOLVED;
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
@@ -283,8 +274,8 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
 /* ------------------------------------------------------------- its price */
 
 /* A cycle and a product: 5 passes of K and what the coarse levels add. The other numbers are cycles: making a
- * multigrid, bounding the spectrum, solving once, a step of the active set (with a multigrid of its own), an iteration
- * that starts at the last one's answer. Plane bodies and obstacles. */
+ * multigrid, bounding the spectrum, solving once, a step of the active set, an iteration that starts at the last one's
+ * answer. Plane bodies and obstacles. */
 #define CYCLE_PASSES    6.5
 #define CREATE_CYCLES   16.0
 #define SPECTRUM_CYCLES 55.0
@@ -308,9 +299,9 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     cost->setup_s += setup * cycle;
     cost->case_s += load * cycle;
     cost->flops += (setup + load) * CYCLE_PASSES * 4.0 * (double)size->k_entries;
-    /* beside it another multigrid, for the free dofs, or before it the dofs that are swept, with both triangles of K */
+    /* beside it the dofs that are swept, with both triangles of K */
     const double swept = 32.0 * (double)size->k_entries + 52.0 * (double)size->d;
-    cost->bytes += levels + (size->bounds ? fmax(levels, swept) : 0.0);
+    cost->bytes += levels + (size->bounds ? swept : 0.0);
     cost->bytes += 8.0 * (size->bounds ? BOUNDS_VECTORS : VECTORS) * (double)size->d;
 }
 

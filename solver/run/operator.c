@@ -85,19 +85,19 @@ static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_er
 /* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
 #define LAMBDA_LEAST 1e-3
 
-/* A multigrid in the factor's place. What it may take so that the whole stays within the limit: a load with bounds has
- * a second one. *regretted: nothing was made, as the plan took matrix_free for its price only, and the matrix is one of
- * those that it is not cheap for, or that tell more to a factorization. */
+/* A multigrid in the factor's place, and what it may take so that the whole stays within the limit. *regretted: nothing
+ * was made, as the plan took matrix_free for its price only, and the matrix is one of those that it is not cheap for,
+ * or that tell more to a factorization. */
 static uz_status precondition(making *m, bool *regretted, uz_error *err)
 {
     uz_setup *setup = m->setup;
     const uz_cost_plan *plan = &setup->plan;
     const bool choice = m->asked == UZ_OPERATOR_AUTO && plan->count > 1 && plan->form[0].fits;
-    double limit = (double)m->settings->memory_limit, copies = m->size.bounds ? 2.0 : 1.0, budget = 0.0;
+    double limit = (double)m->settings->memory_limit, budget = 0.0;
     uz_modes modes;
     if (m->settings->memory_limit > 0)
         budget = uz_amg_predict_bytes(m->size.d, m->size.k_entries, m->size.modes) +
-                 fmax(0.0, limit - plan->form[plan->chosen].bytes) / copies;
+                 fmax(0.0, limit - plan->form[plan->chosen].bytes);
     uz_status status = find_modes(&modes, setup, m->K, err);
     if (status == UZ_OK)
         status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, m->hooks, err);
