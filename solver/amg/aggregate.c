@@ -11,15 +11,9 @@
 
 /* Strong neighbours of each node, both ways. */
 typedef struct {
-    int64_t *ptr;  /* n_nodes + 1 */
-    int32_t *node; /* ptr[n_nodes] */
+    int64_t *ptr;  /* nodes + 1 */
+    int32_t *node; /* ptr[nodes] */
 } graph;
-
-/* The dofs of each node. */
-typedef struct {
-    int64_t *ptr; /* n_nodes + 1 */
-    int32_t *dof; /* n */
-} members;
 
 void uz_list_members(int64_t *start, int32_t *member, const int32_t *of, int64_t n, int64_t groups)
 {
@@ -33,61 +27,43 @@ void uz_list_members(int64_t *start, int32_t *member, const int32_t *of, int64_t
             member[start[of[i] + 1]++] = (int32_t)i;
 }
 
-/* What is needed to visit the strong neighbours of a node in the lower triangle once each. */
-typedef struct {
-    const uz_csc *A;
-    const double *inverse;
-    const int32_t *node;
-    const members *list;
-    int32_t *seen; /* n_nodes: the last node from which it was met, plus 1 */
-    double square; /* threshold squared: strong is a_ij^2 > square a_ii a_jj for some pair of their dofs */
-} visit;
-
-/* Lists in `found` the nodes that a's columns reach strongly, a itself left out; their number. */
-static int64_t strong_below(int32_t *found, const visit *v, int32_t a)
+/* a_ij^2 > square a_ii a_jj for some pair of dofs of the two nodes. */
+static bool is_strong(const uz_blocks *A, const float *inverse, double square, int64_t i, int64_t e)
 {
-    int64_t count = 0;
-    for (int64_t q = v->list->ptr[a]; q < v->list->ptr[a + 1]; q++) {
-        int32_t j = v->list->dof[q];
-        for (int64_t k = v->A->ptr[j] + 1; k < v->A->ptr[j + 1]; k++) {
-            int64_t i = v->A->idx[k];
-            int32_t b = v->node[i];
-            double value = v->A->val[k];
-            if (b == a || v->seen[b] == a + 1 || value * v->inverse[i] * (value * v->inverse[j]) <= v->square)
-                continue;
-            v->seen[b] = a + 1;
-            found[count++] = b;
+    const int b = A->b;
+    const double *block = A->off + e * b * b;
+    const float *of_row = inverse + i * b, *of_column = inverse + (int64_t)A->idx[e] * b;
+    for (int r = 0; r < b; r++)
+        for (int c = 0; c < b; c++) {
+            const double value = block[r * b + c];
+            if (value * (double)of_row[r] * (value * (double)of_column[c]) > square)
+                return true;
         }
-    }
-    return count;
+    return false;
 }
 
-/* Both ways; a pair may occur twice where dofs of two nodes are numbered in turns, which does no harm. */
-static bool build_graph(graph *g, visit *v, int32_t *found, int64_t n_nodes)
+static bool build_graph(graph *g, const uz_blocks *A, const uz_below *below, const float *inverse, double square)
 {
-    g->ptr = uz_alloc_zero(n_nodes + 2, sizeof *g->ptr);
-    if (!g->ptr)
-        return false;
-    for (int64_t a = 0; a < n_nodes; a++) {
-        int64_t count = strong_below(found, v, (int32_t)a);
-        g->ptr[a + 2] += count;
-        for (int64_t k = 0; k < count; k++)
-            g->ptr[found[k] + 2]++;
+    const int64_t count = A->ptr[A->nodes];
+    bool *strong = uz_alloc(count, sizeof *strong);
+    int64_t links = 0;
+    g->ptr = uz_alloc_zero(A->nodes + 1, sizeof *g->ptr);
+    for (int64_t i = 0; strong && g->ptr && i < A->nodes; i++)
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+            links += strong[e] = is_strong(A, inverse, square, i, e);
+    g->node = strong ? uz_alloc(2 * links, sizeof *g->node) : NULL;
+    int64_t at = 0;
+    for (int64_t i = 0; g->node && g->ptr && i < A->nodes; i++) {
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+            if (strong[e])
+                g->node[at++] = A->idx[e];
+        for (int64_t e = below->ptr[i]; e < below->ptr[i + 1]; e++)
+            if (strong[below->at[e]])
+                g->node[at++] = below->node[e];
+        g->ptr[i + 1] = at;
     }
-    for (int64_t a = 0; a <= n_nodes; a++)
-        g->ptr[a + 1] += g->ptr[a];
-    g->node = uz_alloc(g->ptr[n_nodes + 1], sizeof *g->node);
-    if (!g->node)
-        return false;
-    memset(v->seen, 0, (size_t)n_nodes * sizeof *v->seen);
-    for (int64_t a = 0; a < n_nodes; a++) {
-        int64_t count = strong_below(found, v, (int32_t)a);
-        for (int64_t k = 0; k < count; k++) {
-            g->node[g->ptr[a + 1]++] = found[k];
-            g->node[g->ptr[found[k] + 1]++] = (int32_t)a;
-        }
-    }
-    return true;
+    free(strong);
+    return g->node && g->ptr;
 }
 
 enum { NONE = -1, ALONE = -2 };
@@ -100,17 +76,12 @@ static void take_free_neighbours(const graph *g, int32_t *aggregate, int64_t a, 
             aggregate[g->node[k]] = number;
 }
 
-uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_csc *A, const double *inverse, const int32_t *node,
-                       int64_t n_nodes, double threshold, uz_error *err)
+uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_blocks *A, const uz_below *below,
+                       const float *inverse, double threshold, uz_error *err)
 {
-    members list = {uz_alloc_zero(n_nodes + 2, sizeof *list.ptr), uz_alloc(A->cols, sizeof *list.dof)};
+    const int64_t n_nodes = A->nodes;
     graph g = {0};
-    int32_t *found = uz_alloc(n_nodes, sizeof *found), *seen = uz_alloc_zero(n_nodes, sizeof *seen);
-    visit v = {A, inverse, node, &list, seen, threshold * threshold};
-    bool ok = found && seen && list.ptr && list.dof;
-    if (ok)
-        uz_list_members(list.ptr, list.dof, node, A->cols, n_nodes);
-    ok = ok && build_graph(&g, &v, found, n_nodes);
+    const bool ok = build_graph(&g, A, below, inverse, threshold * threshold);
     /* whole neighbourhoods first; then what is left joins a neighbour's aggregate; what has none forms its own */
     int32_t number = 0;
     for (int64_t a = 0; ok && a < n_nodes; a++)
@@ -137,11 +108,7 @@ uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_csc *A, cons
     for (int64_t a = 0; ok && a < n_nodes; a++)
         aggregate[a] = aggregate[a] == ALONE ? -1 : aggregate[a];
     *count = number;
-    free(found);
-    free(seen);
-    free(list.ptr);
-    free(list.dof);
     free(g.ptr);
     free(g.node);
-    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)A->cols);
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)(n_nodes * A->b));
 }

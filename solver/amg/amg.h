@@ -50,7 +50,7 @@ typedef struct {
     uz_status (*apply)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
                        uz_error *err);
     /* y = K x in double precision; y and x do not overlap. */
-    void (*multiply)(const uz_multigrid *mg, const uz_csc *K, double *y, const double *x);
+    void (*multiply)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x);
     /* What a thread needs to apply it, *bytes of it; NULL: no memory. */
     uz_multigrid_room *(*room)(const uz_multigrid *mg, size_t *bytes);
     void (*free_room)(uz_multigrid_room *room); /* NULL and half-built ones too */

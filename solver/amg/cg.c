@@ -66,7 +66,7 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
         /* r = b - K x on the free dofs, z = M^-1 r; x at held dofs counts as 0 */
         memcpy(cg->p, x, (size_t)n * sizeof *x);
         clear_held(cg->p, cg);
-        cg->mg->kind->multiply(cg->mg, K, cg->q, cg->p);
+        cg->mg->kind->multiply(cg->mg, K, cg->room, cg->q, cg->p);
         for (int64_t j = 0; j < n; j++)
             cg->r[j] = b[j] - cg->q[j];
         clear_held(cg->r, cg);
@@ -84,7 +84,7 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
         before = info->last;
         memcpy(cg->p, cg->z, (size_t)n * sizeof *cg->p);
         while (square > goal * goal && !should_stop(info, stop)) {
-            cg->mg->kind->multiply(cg->mg, K, cg->q, cg->p);
+            cg->mg->kind->multiply(cg->mg, K, cg->room, cg->q, cg->p);
             clear_held(cg->q, cg);
             const double curvature = uz_dot(n, cg->p, cg->q), alpha = square / curvature, last = square;
             if (fabs(curvature) < DBL_MIN) /* underflow: there is no more to gain */

@@ -1,93 +1,290 @@
-/* cycle.c: one V-cycle on smoothed aggregates, with some dofs held. */
+/* cycle.c: one V-cycle on smoothed aggregates, with some dofs held.
+ *
+ * A sweep of Gauss-Seidel forwards before the coarse correction and one backwards after it: so the cycle is symmetric,
+ * and positive definite whatever the matrices are, as long as their diagonals are positive. Each sweep reads the blocks
+ * left of the diagonal once. On the way down a node takes what those before it have left of its right-hand side, and
+ * the residual of those before it takes what the node, now known, exerts on them. On the way up a node takes the same
+ * from those before it, as they are, and has been told by those after it what they exert, as they have become. */
 #include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
+#include "core/cpu.h"
 #include "core/error.h"
 #include "core/hooks.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Downwards: one sweep from 0, x = (D + L)^-1 b, then the residual to the next level, coarse = P'(b - A x). All of the
- * residual but -L'x is 0. A dof whose inverse is 0 stays at 0. t: room. */
-static void descend(double *x, double *coarse, double *t, const uz_level *level, const double *inverse, const uz_csc *A,
-                    const double *b, int k)
+struct uz_multigrid_room {
+    uz_factor_workspace *ws;
+    float *x[UZ_LEVELS_MOST], *b[UZ_LEVELS_MOST], *t[UZ_LEVELS_MOST]; /* nodes x width each */
+    double *coarse, *permuted;                                        /* of the coarsest level */
+    double *to, *from;                                                /* vectors of a product with level 0: nodes x 4 */
+    float *inverse; /* level 0's where dofs are held: 0 there; else NULL */
+    const bool *held;
+    uz_factor *alone; /* of K_FF where there is one level only; else NULL */
+};
+
+typedef float four __attribute__((vector_size(16), aligned(4), may_alias));
+
+/* Rows of blocks are read four numbers at a time. What is read beyond them counts for nothing, as the surplus numbers
+ * of a node are 0 in x, and are not read in b and t. */
+enum { ROWS_MOST = 6, PARTS_MOST = 2 };
+
+/* s = b - t - (blocks left of the diagonal) x. */
+static inline __attribute__((always_inline)) void gather(float *s, const uz_level *level, const float *x, int64_t i,
+                                                         int b)
 {
-    memcpy(t, b, (size_t)A->cols * sizeof *t);
-    for (int64_t j = 0; j < A->cols; j++) {
-        double value = x[j] = inverse[j] * t[j];
-        for (int64_t q = A->ptr[j] + 1; q < A->ptr[j + 1]; q++)
-            t[A->idx[q]] -= A->val[q] * value;
+    const int parts = b > 4 ? 2 : 1;
+    const uz_blocks *A = &level->A;
+    four sum[ROWS_MOST] = {{0}};
+    for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+        const float *block = level->off + e * b * b, *of = x + (int64_t)A->idx[e] * 4 * parts;
+        for (int q = 0; q < parts; q++) {
+            const four value = *(const four *)(of + 4 * q);
+            for (int r = 0; r < b; r++)
+                sum[r] += *(const four *)(block + r * b + 4 * q) * value;
+        }
     }
-    for (int64_t j = 0; j < A->cols; j++) {
-        double sum = 0.0;
-        for (int64_t q = A->ptr[j] + 1; q < A->ptr[j + 1]; q++)
-            sum += A->val[q] * x[A->idx[q]];
-        t[j] = -sum;
+    for (int r = 0; r < b; r++)
+        s[r] -= (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
+}
+
+/* t += (the same blocks)' value. */
+static inline __attribute__((always_inline)) void scatter(float *t, const uz_level *level, const float *value,
+                                                          int64_t i, int b)
+{
+    const int parts = b > 4 ? 2 : 1;
+    const uz_blocks *A = &level->A;
+    for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+        const float *block = level->off + e * b * b;
+        float *to = t + (int64_t)A->idx[e] * 4 * parts;
+        for (int q = 0; q < parts; q++) {
+            four sum = *(four *)(to + 4 * q);
+            for (int r = 0; r < b; r++)
+                sum += *(const four *)(block + r * b + 4 * q) * value[r];
+            *(four *)(to + 4 * q) = sum;
+        }
     }
-    memset(coarse, 0, (size_t)(level->aggregates * k) * sizeof *coarse);
-    for (int64_t i = 0; i < level->n; i++)
-        for (int64_t e = level->ptr[i]; inverse[i] > 0.0 && e < level->ptr[i + 1]; e++) {
-            double *to = coarse + (int64_t)level->block[e] * k;
-            const float *value = level->value + e * k;
-            for (int c = 0; c < k; c++)
-                to[c] += t[i] * (double)value[c];
+}
+
+/* x = (D + L)^-1 b, t = b - A x, of which L'x alone is not 0. */
+static inline __attribute__((always_inline)) void sweep_down(float *x, float *t, const uz_level *level,
+                                                             const float *inverse, const float *rhs, int b)
+{
+    const int width = uz_width(b);
+    for (int64_t i = 0; i < level->A.nodes; i++) {
+        const float *own = level->diag + i * b * b;
+        float s[ROWS_MOST] = {0}, value[ROWS_MOST] = {0}, left[ROWS_MOST] = {0};
+        for (int r = 0; r < b; r++)
+            s[r] = rhs[i * width + r];
+        gather(s, level, x, i, b);
+        for (int r = 0; r < b; r++) {
+            for (int c = 0; c < r; c++)
+                s[r] -= own[r * b + c] * value[c];
+            value[r] = inverse[i * b + r] * s[r];
+        }
+        for (int r = 0; r < b; r++) {
+            left[r] = 0.0F;
+            for (int c = r + 1; c < b; c++)
+                left[r] -= own[r * b + c] * value[c];
+        }
+        for (int r = 0; r < width; r++) {
+            x[i * width + r] = r < b ? value[r] : 0.0F;
+            t[i * width + r] = r < b ? left[r] : 0.0F;
+        }
+        for (int r = 0; r < b; r++)
+            value[r] = -value[r];
+        scatter(t, level, value, i, b);
+    }
+}
+
+/* x = (D + L')^-1 (b - L x). t: zeros at entry. */
+static inline __attribute__((always_inline)) void sweep_up(float *x, float *t, const uz_level *level,
+                                                           const float *inverse, const float *rhs, int b)
+{
+    const int width = uz_width(b);
+    for (int64_t i = level->A.nodes - 1; i >= 0; i--) {
+        const float *own = level->diag + i * b * b;
+        float s[ROWS_MOST] = {0}, value[ROWS_MOST] = {0};
+        for (int r = 0; r < b; r++) {
+            s[r] = rhs[i * width + r] - t[i * width + r];
+            value[r] = x[i * width + r];
+        }
+        gather(s, level, x, i, b);
+        for (int r = b - 1; r >= 0; r--) {
+            for (int c = 0; c < b; c++)
+                s[r] -= c == r ? 0.0F : own[r * b + c] * value[c];
+            value[r] = inverse[i * b + r] * s[r];
+        }
+        for (int r = 0; r < b; r++)
+            x[i * width + r] = value[r];
+        scatter(t, level, value, i, b);
+    }
+}
+
+/* coarse = P't, but for rows of held dofs. */
+static inline __attribute__((always_inline)) void restrict_to(float *coarse, const uz_level *level,
+                                                              const float *inverse, const float *t, int b, int k)
+{
+    const int width = uz_width(b), parts = k > 4 ? 2 : 1;
+    memset(coarse, 0, (size_t)(level->aggregates * uz_width(k)) * sizeof *coarse);
+    for (int64_t i = 0; i < level->A.nodes; i++)
+        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
+            const float *P = level->value + e * b * k;
+            float *to = coarse + (int64_t)level->block[e] * 4 * parts;
+            for (int q = 0; q < parts; q++) {
+                four sum = *(four *)(to + 4 * q);
+                for (int r = 0; r < b; r++)
+                    sum += *(const four *)(P + r * k + 4 * q) * (inverse[i * b + r] > 0.0F ? t[i * width + r] : 0.0F);
+                *(four *)(to + 4 * q) = sum;
+            }
         }
 }
 
-/* Upwards: x += P coarse, then a sweep backwards, x = (D + L')^-1 (b - L x). t: room. */
-static void ascend(double *x, const double *coarse, double *t, const uz_level *level, const double *inverse,
-                   const uz_csc *A, const double *b, int k)
+/* x += P coarse, but at held dofs. */
+static inline __attribute__((always_inline)) void prolong_from(float *x, const uz_level *level, const float *inverse,
+                                                               const float *coarse, int b, int k)
 {
-    for (int64_t i = 0; i < level->n; i++) {
-        double sum = 0.0;
-        for (int64_t e = level->ptr[i]; inverse[i] > 0.0 && e < level->ptr[i + 1]; e++) {
-            const double *from = coarse + (int64_t)level->block[e] * k;
-            const float *value = level->value + e * k;
-            for (int c = 0; c < k; c++)
-                sum += from[c] * (double)value[c];
+    const int width = uz_width(b), parts = k > 4 ? 2 : 1;
+    for (int64_t i = 0; i < level->A.nodes; i++) {
+        four sum[ROWS_MOST] = {{0}};
+        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
+            const float *P = level->value + e * b * k, *from = coarse + (int64_t)level->block[e] * 4 * parts;
+            for (int q = 0; q < parts; q++) {
+                const four value = *(const four *)(from + 4 * q);
+                for (int r = 0; r < b; r++)
+                    sum[r] += *(const four *)(P + r * k + 4 * q) * value;
+            }
         }
-        x[i] += sum;
+        for (int r = 0; r < b; r++)
+            if (inverse[i * b + r] > 0.0F)
+                x[i * width + r] += (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
     }
-    memcpy(t, b, (size_t)A->cols * sizeof *t);
-    for (int64_t j = 0; j < A->cols; j++) {
-        double value = x[j];
-        for (int64_t q = A->ptr[j] + 1; q < A->ptr[j + 1]; q++)
-            t[A->idx[q]] -= A->val[q] * value;
-    }
-    for (int64_t j = A->cols - 1; j >= 0; j--) {
-        double sum = t[j];
-        for (int64_t q = A->ptr[j] + 1; q < A->ptr[j + 1]; q++)
-            sum -= A->val[q] * x[A->idx[q]];
-        x[j] = inverse[j] * sum;
-    }
+}
+
+/* One level of a cycle. */
+typedef struct {
+    const uz_level *level;
+    const float *inverse, *b;
+    float *x, *t, *coarse; /* coarse: the next level's right-hand side on the way down, its answer on the way up */
+    int k;
+} step;
+
+static inline __attribute__((always_inline)) void down(const step *s, int b, int k)
+{
+    sweep_down(s->x, s->t, s->level, s->inverse, s->b, b);
+    restrict_to(s->coarse, s->level, s->inverse, s->t, b, k);
+}
+
+static inline __attribute__((always_inline)) void up(const step *s, int b, int k)
+{
+    prolong_from(s->x, s->level, s->inverse, s->coarse, b, k);
+    memset(s->t, 0, (size_t)(s->level->A.nodes * uz_width(b)) * sizeof *s->t);
+    sweep_up(s->x, s->t, s->level, s->inverse, s->b, b);
+}
+
+/* For each size of blocks its own loops. */
+static inline __attribute__((always_inline)) void pass(const step *s, bool downwards)
+{
+    const int b = s->level->A.b, k = s->k;
+    if (b == 3 && k == 6)
+        downwards ? down(s, 3, 6) : up(s, 3, 6);
+    else if (b == 6)
+        downwards ? down(s, 6, 6) : up(s, 6, 6);
+    else if (b == 2 && k == 3)
+        downwards ? down(s, 2, 3) : up(s, 2, 3);
+    else if (b == 3 && k == 3)
+        downwards ? down(s, 3, 3) : up(s, 3, 3);
+    else if (b == 2)
+        downwards ? down(s, 2, 2) : up(s, 2, 2);
+    else
+        downwards ? down(s, b, k) : up(s, b, k);
+}
+
+UZ_AVX2_FMA static void pass_fused(const step *s, bool downwards)
+{
+    pass(s, downwards);
+}
+
+static void pass_plain(const step *s, bool downwards)
+{
+    pass(s, downwards);
+}
+
+static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room, float *x, const float *b,
+                                uz_error *err)
+{
+    const uz_level *level = &mg->level[mg->base.levels - 1];
+    const int of_node = level->A.b, width = uz_width(of_node);
+    for (int64_t i = 0; i < level->A.nodes; i++)
+        for (int r = 0; r < of_node; r++)
+            room->coarse[i * of_node + r] = level->inverse[i * of_node + r] > 0.0F ? (double)b[i * width + r] : 0.0;
+    uz_factor_permute(mg->coarsest, room->permuted, room->coarse);
+    uz_status status = uz_factor_solve_one(mg->coarsest, room->ws, room->permuted, true, err);
+    if (status == UZ_OK)
+        status = uz_factor_solve_one(mg->coarsest, room->ws, room->permuted, false, err);
+    uz_factor_unpermute(mg->coarsest, room->coarse, room->permuted);
+    for (int64_t i = 0; i < level->A.nodes; i++)
+        for (int r = 0; r < width; r++)
+            x[i * width + r] = r < of_node ? (float)room->coarse[i * of_node + r] : 0.0F;
+    return status;
+}
+
+static uz_status apply_alone(const uz_aggregates *mg, uz_multigrid_room *room, double *z, const double *r,
+                             uz_error *err)
+{
+    const uz_factor *factor = room->alone ? room->alone : mg->coarsest;
+    uz_factor_permute(factor, room->permuted, r);
+    uz_status status = uz_factor_solve_one(factor, room->ws, room->permuted, true, err);
+    if (status == UZ_OK)
+        status = uz_factor_solve_one(factor, room->ws, room->permuted, false, err);
+    uz_factor_unpermute(factor, z, room->permuted);
+    for (int64_t j = 0; room->held && j < mg->base.n; j++)
+        z[j] = room->held[j] ? 0.0 : z[j];
+    return status;
 }
 
 static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
                        uz_error *err)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
-    const int last = base->levels - 1;
-    for (int l = 0; l < last; l++) {
-        const uz_level *level = &mg->level[l];
-        const double *inverse = l == 0 && room->inverse ? room->inverse : level->inverse;
-        double *x = l == 0 ? z : room->x[l];
-        descend(x, room->b[l + 1], room->t[l], level, inverse, l == 0 ? K : &level->A, l == 0 ? r : room->b[l], mg->k);
+    const int last = base->levels - 1, width = uz_width(mg->level[0].A.b), b = mg->level[0].A.b;
+    void (*const run)(const step *, bool) = uz_cpu_has_avx2_fma() ? pass_fused : pass_plain;
+    (void)K;
+    if (last == 0)
+        return apply_alone(mg, room, z, r, err);
+    /* by the power of two above the largest, single precision holds them all */
+    double largest = 0.0;
+    for (int64_t j = 0; j < base->n; j++)
+        largest = fmax(largest, fabs(mg->scale[j] * r[j]));
+    if (!(largest > 0.0) || isinf(largest)) {
+        for (int64_t j = 0; j < base->n; j++)
+            z[j] = largest > 0.0 ? NAN : 0.0;
+        return UZ_OK;
     }
-    const uz_factor *coarsest = room->coarse ? room->coarse : mg->coarsest;
-    double *coarse = room->t[last];
-    uz_factor_permute(coarsest, coarse, last == 0 ? r : room->b[last]);
-    uz_status status = uz_factor_solve_one(coarsest, room->ws, coarse, true, err);
-    if (status == UZ_OK)
-        status = uz_factor_solve_one(coarsest, room->ws, coarse, false, err);
-    uz_factor_unpermute(coarsest, last == 0 ? z : room->x[last], coarse);
-    for (int64_t j = 0; last == 0 && room->inverse && j < base->n; j++)
-        z[j] = room->inverse[j] > 0.0 ? z[j] : 0.0;
+    int exponent;
+    (void)frexp(largest, &exponent);
+    const double unit = ldexp(1.0, exponent);
+    for (int64_t j = 0; j < base->n; j++) {
+        const int64_t s = mg->slot[j];
+        room->b[0][s / b * width + s % b] = (float)(mg->scale[j] * r[j] / unit);
+    }
+    step at[UZ_LEVELS_MOST];
+    for (int l = 0; l < last; l++) {
+        const float *inverse = l == 0 && room->inverse ? room->inverse : mg->level[l].inverse;
+        at[l] = (step){&mg->level[l], inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k};
+        run(&at[l], true);
+    }
+    const uz_status status = solve_coarsest(mg, room, room->x[last], room->b[last], err);
     for (int l = last - 1; l >= 0; l--) {
-        const uz_level *level = &mg->level[l];
-        const double *inverse = l == 0 && room->inverse ? room->inverse : level->inverse;
-        double *x = l == 0 ? z : room->x[l];
-        ascend(x, room->x[l + 1], room->t[l], level, inverse, l == 0 ? K : &level->A, l == 0 ? r : room->b[l], mg->k);
+        at[l].coarse = room->x[l + 1];
+        run(&at[l], false);
+    }
+    for (int64_t j = 0; j < base->n; j++) {
+        const int64_t s = mg->slot[j];
+        z[j] = mg->scale[j] * (double)room->x[0][s / b * width + s % b] * unit;
     }
     return status;
 }
@@ -98,10 +295,21 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
     return mg->kind->apply(mg, K, room, z, r, err);
 }
 
-static void multiply(const uz_multigrid *mg, const uz_csc *K, double *y, const double *x)
+/* K x = S^-1 (S K S) S^-1 x: powers of two. */
+static void multiply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x)
 {
-    memset(y, 0, (size_t)mg->n * sizeof *y);
-    uz_csc_symv(y, K, 1.0, x);
+    const uz_aggregates *mg = (const uz_aggregates *)base;
+    const int b = mg->level[0].A.b;
+    if (base->levels == 1) {
+        memset(y, 0, (size_t)base->n * sizeof *y);
+        uz_csc_symv(y, K, 1.0, x);
+        return;
+    }
+    for (int64_t j = 0; j < base->n; j++)
+        room->from[mg->slot[j] / b * 4 + mg->slot[j] % b] = x[j] / mg->scale[j];
+    uz_blocks_multiply(room->to, &mg->level[0].A, room->from);
+    for (int64_t j = 0; j < base->n; j++)
+        y[j] = room->to[mg->slot[j] / b * 4 + mg->slot[j] % b] / mg->scale[j];
 }
 
 static void free_room(uz_multigrid_room *room)
@@ -114,24 +322,31 @@ static void free_room(uz_multigrid_room *room)
         free(room->x[l]);
         free(room->b[l]);
     }
-    free(room->inverse);
-    uz_factor_free(room->coarse);
+    void *rest[] = {room->coarse, room->permuted, room->to, room->from, room->inverse};
+    for (size_t k = 0; k < sizeof rest / sizeof rest[0]; k++)
+        free(rest[k]);
+    uz_factor_free(room->alone);
     free(room);
 }
 
 static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
+    const uz_level *last = &mg->level[base->levels - 1];
+    const int64_t coarsest = base->levels == 1 ? base->n : last->A.nodes * last->A.b, finest = mg->level[0].A.nodes * 4;
     uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
-    bool ok = room && (room->ws = uz_factor_workspace_new());
-    *bytes = sizeof *room;
-    for (int l = 0; ok && l < base->levels; l++) {
-        const int64_t n = mg->level[l].n;
-        room->t[l] = uz_alloc(n, sizeof(double));
-        room->x[l] = uz_alloc(l > 0 ? n : 0, sizeof(double));
-        room->b[l] = uz_alloc(l > 0 ? n : 0, sizeof(double));
+    bool ok = room && (room->ws = uz_factor_workspace_new()) && (room->coarse = uz_alloc(coarsest, sizeof(double))) &&
+              (room->permuted = uz_alloc(coarsest, sizeof(double))) &&
+              (room->to = uz_alloc_zero(finest, sizeof(double))) &&
+              (room->from = uz_alloc_zero(finest, sizeof(double)));
+    *bytes = sizeof *room + 16 * (size_t)(coarsest + finest);
+    for (int l = 0; ok && base->levels > 1 && l < base->levels; l++) {
+        const int64_t size = mg->level[l].A.nodes * uz_width(mg->level[l].A.b);
+        room->t[l] = uz_alloc_zero(size, sizeof(float));
+        room->x[l] = uz_alloc_zero(size, sizeof(float));
+        room->b[l] = uz_alloc_zero(size, sizeof(float));
         ok = room->t[l] && room->x[l] && room->b[l];
-        *bytes += (l > 0 ? 24 : 8) * (size_t)n;
+        *bytes += 12 * (size_t)size;
     }
     if (ok)
         return room;
@@ -139,51 +354,64 @@ static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
     return NULL;
 }
 
-static uz_status hold(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, const bool *held,
-                      size_t *bytes, const uz_stop *stop, uz_error *err)
+/* Where K itself is the coarsest matrix: held dofs become rows of the unit matrix. */
+static uz_status hold_alone(uz_multigrid_room *room, const uz_csc *K, const bool *held, const uz_stop *stop,
+                            uz_error *err)
 {
-    const uz_level *level = &((const uz_aggregates *)base)->level[0];
-    free(room->inverse);
-    uz_factor_free(room->coarse);
-    room->inverse = NULL;
-    room->coarse = NULL;
-    *bytes = 0;
-    if (!held)
-        return UZ_OK;
-    room->inverse = uz_alloc(level->n, sizeof *room->inverse);
-    if (!room->inverse)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)level->n);
-    *bytes = 8 * (size_t)level->n;
-    for (int64_t j = 0; j < level->n; j++)
-        room->inverse[j] = held[j] ? 0.0 : level->inverse[j];
-    if (base->levels > 1)
-        return UZ_OK;
-    /* Where K itself is the coarsest matrix: held dofs become rows of the unit matrix. */
     uz_csc alone = {0};
     uz_status status = uz_csc_copy(&alone, K, err);
-    for (int64_t j = 0; status == UZ_OK && j < level->n; j++)
+    for (int64_t j = 0; status == UZ_OK && j < K->cols; j++)
         for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
             if (held[j] || held[K->idx[q]])
                 alone.val[q] = K->idx[q] == j ? 1.0 : 0.0;
     if (status == UZ_OK)
-        status = uz_factor_coarsest(&room->coarse, &alone, 0, stop ? stop->hooks : NULL, err);
-    if (status == UZ_OK)
-        *bytes += uz_factor_describe(room->coarse).bytes;
+        status = uz_factor_coarsest(&room->alone, &alone, 0, stop ? stop->hooks : NULL, err);
     uz_csc_clear(&alone);
     return status;
+}
+
+static uz_status hold(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, const bool *held,
+                      size_t *bytes, const uz_stop *stop, uz_error *err)
+{
+    const uz_aggregates *mg = (const uz_aggregates *)base;
+    const int64_t slots = mg->level[0].A.nodes * mg->level[0].A.b;
+    free(room->inverse);
+    uz_factor_free(room->alone);
+    room->inverse = NULL;
+    room->alone = NULL;
+    room->held = held;
+    *bytes = 0;
+    if (!held)
+        return UZ_OK;
+    if (base->levels == 1) {
+        const uz_status status = hold_alone(room, K, held, stop, err);
+        *bytes = status == UZ_OK ? uz_factor_describe(room->alone).bytes : 0;
+        return status;
+    }
+    room->inverse = uz_alloc(slots, sizeof *room->inverse);
+    if (!room->inverse)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)base->n);
+    *bytes = 4 * (size_t)slots;
+    memcpy(room->inverse, mg->level[0].inverse, (size_t)slots * sizeof *room->inverse);
+    for (int64_t j = 0; j < base->n; j++)
+        if (held[j])
+            room->inverse[mg->slot[j]] = 0.0F;
+    return UZ_OK;
 }
 
 static void free_aggregates(uz_multigrid *base)
 {
     uz_aggregates *mg = (uz_aggregates *)base;
     for (int l = 0; l < UZ_LEVELS_MOST; l++) {
-        uz_csc_clear(&mg->level[l].A);
-        free(mg->level[l].inverse);
-        free(mg->level[l].ptr);
-        free(mg->level[l].block);
-        free(mg->level[l].value);
+        uz_level *level = &mg->level[l];
+        void *own[] = {level->off, level->diag, level->inverse, level->ptr, level->block, level->value};
+        uz_blocks_clear(&level->A);
+        for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
+            free(own[k]);
     }
     uz_factor_free(mg->coarsest);
+    free(mg->slot);
+    free(mg->scale);
     free(mg);
 }
 

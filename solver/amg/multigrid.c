@@ -1,7 +1,7 @@
-/* multigrid.c: levels by smoothed aggregation, and the V-cycle on them.
+/* multigrid.c: levels by smoothed aggregation (Vanek, Mandel, Brezina 1996).
  *
- * The cycle smooths by one Gauss-Seidel sweep forwards before the coarse correction and one backwards after it, so it
- * is symmetric, and positive definite because every coarse matrix is P'A P with the very P that is used. */
+ * Every coarse matrix is P'A P with the very P that is used, summed in double precision: rigid-body modes of large
+ * aggregates have energies that single precision could not tell from 0. Sweeps and prolongation are in single. */
 #include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
@@ -14,166 +14,162 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { COARSEST = 1200, POWER_STEPS = 8 };
+/* Alone: a matrix that is factored as it is. Coarsest: reading the factor of this many dofs takes a tenth of a cycle
+ * where there are a hundred thousand. */
+enum { ALONE = 1200, COARSEST = 500, POWER_STEPS = 8 };
 
 /* A level that keeps more than this share of the dofs is not worth having. */
 #define LEAST_GAIN 0.7
 
-static uz_status invert_diagonal(uz_level *level, const uz_csc *A, uz_error *err)
+static uz_status fail_memory(int64_t dofs, uz_error *err)
 {
-    level->n = A->cols;
-    level->inverse = uz_alloc(level->n, sizeof *level->inverse);
-    if (!level->inverse)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)level->n);
-    for (int64_t j = 0; j < level->n; j++) {
-        int64_t k = A->ptr[j];
-        bool positive = k < A->ptr[j + 1] && A->idx[k] == j && A->val[k] > 0.0;
-        if (!positive)
-            return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                           "K is not positive definite: its diagonal entry of dof %lld (numbered from 0) is not "
-                           "positive. Support the body so that it can't move freely, or check the signs of K.",
-                           (long long)j);
-        level->inverse[j] = 1.0 / A->val[k];
+    return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid on %lld dofs", (long long)dofs);
+}
+
+static uz_status fail_soft(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                   "K is not positive definite to working precision: on smooth displacements it resists too little. "
+                   "Support the body so that it can't move freely, or check the signs of K.");
+}
+
+/* The level's matrix in single precision. */
+static uz_status round_level(uz_level *level, uz_error *err)
+{
+    const uz_blocks *A = &level->A;
+    const int b = A->b;
+    const int64_t size = (int64_t)b * b, count = A->ptr[A->nodes] * size;
+    level->off = uz_alloc(count + 8, sizeof *level->off);
+    level->diag = uz_alloc(A->nodes * size + 8, sizeof *level->diag);
+    level->inverse = uz_alloc(A->nodes * b, sizeof *level->inverse);
+    if (!level->off || !level->diag || !level->inverse)
+        return fail_memory(A->nodes * b, err);
+    for (int64_t e = 0; e < count; e++)
+        level->off[e] = (float)A->off[e];
+    for (int64_t e = 0; e < A->nodes * size; e++)
+        level->diag[e] = (float)A->diag[e];
+    memset(level->off + count, 0, 8 * sizeof *level->off);
+    memset(level->diag + A->nodes * size, 0, 8 * sizeof *level->diag);
+    for (int64_t i = 0; i < A->nodes * b; i++) {
+        const double value = A->diag[i / b * size + i % b * b + i % b];
+        if (!(value >= 0.0))
+            return fail_soft(err);
+        level->inverse[i] = value > 0.0 ? (float)(1.0 / value) : 0.0F;
     }
     return UZ_OK;
 }
 
-/* What a level is made of; the modes and nodes of level 0 are the caller's. */
-typedef struct {
-    int32_t *node;
-    int64_t n_nodes;
-    float *modes;
-    double strong;
-} sources;
-
-/* The prolongation of the level and the modes of the next. coarse NULL on success: the level can't be coarsened. */
-static uz_status build_prolongation(uz_level *level, float **coarse, const uz_csc *A, const sources *from,
-                                    double threshold, int k, const uz_stop *stop, uz_error *err)
+/* *range: lambda_max(D^-1 A), a little too large: powers reach it within some per cent from below. */
+static uz_status find_range(double *range, const uz_level *level, const uz_below *below, uz_error *err)
 {
-    int64_t n = level->n;
-    int32_t *aggregate = uz_alloc(from->n_nodes, sizeof *aggregate), *of = uz_alloc(n, sizeof *of);
-    float *basis = uz_alloc(n * k, sizeof *basis);
+    const uz_blocks *A = &level->A;
+    const int b = A->b;
+    const int64_t n = A->nodes * b, size = (int64_t)b * b;
     double *x = uz_alloc(n, sizeof *x), *y = uz_alloc(n, sizeof *y);
-    double range = 1.0; /* lambda_max(D^-1 A), a little too large: powers reach it within some per cent from below */
-    uz_status status = UZ_OK;
-    *coarse = NULL;
-    if (!aggregate || !of || !basis || !x || !y)
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
-    if (status == UZ_OK)
-        status =
-            uz_aggregate(aggregate, &level->aggregates, A, level->inverse, from->node, from->n_nodes, threshold, err);
-    bool gain = status == UZ_OK && level->aggregates > 0 && (double)(level->aggregates * k) < LEAST_GAIN * (double)n;
-    if (gain) {
-        *coarse = uz_alloc(level->aggregates * k * k, sizeof **coarse);
+    uint64_t state = 1;
+    (void)below;
+    *range = 1.0;
+    for (int64_t i = 0; x && i < n; i++)
+        x[i] = level->inverse[i] > 0.0F ? uz_uniform(&state) - 0.5 : 0.0;
+    for (int step = 0; x && y && step < POWER_STEPS; step++) {
+        memset(y, 0, (size_t)n * sizeof *y);
+        for (int64_t i = 0; i < A->nodes; i++)
+            for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
+                const bool own = e < A->ptr[i];
+                const double *block = own ? A->diag + i * size : A->off + e * size;
+                const int64_t j = own ? i : A->idx[e];
+                for (int r = 0; r < b; r++)
+                    for (int c = 0; c < b; c++) {
+                        y[i * b + r] += block[r * b + c] * x[j * b + c];
+                        y[j * b + c] += own ? 0.0 : block[r * b + c] * x[i * b + r];
+                    }
+            }
         for (int64_t i = 0; i < n; i++)
-            of[i] = aggregate[from->node[i]];
-        if (uz_stop_is_due(stop))
-            status = uz_fail_stopped(err);
-        else if (!*coarse)
-            status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
-        else
-            status = uz_tentative(basis, *coarse, from->modes, of, n, level->aggregates, k, err);
-        uint64_t state = 1;
-        for (int64_t i = 0; status == UZ_OK && i < n; i++)
-            x[i] = uz_uniform(&state) - 0.5;
-        for (int step = 0; status == UZ_OK && step < POWER_STEPS; step++) {
-            const double before = uz_norm(n, x);
-            memset(y, 0, (size_t)n * sizeof *y);
-            uz_csc_symv(y, A, 1.0, x);
-            for (int64_t i = 0; i < n; i++)
-                y[i] *= level->inverse[i];
-            const double after = uz_norm(n, y);
-            range = before > 0.0 && after > 0.0 ? 1.1 * (after / before) : 1.0;
-            if (!(before > 0.0) || !(after > 0.0))
-                break;
-            for (int64_t i = 0; i < n; i++)
-                x[i] = y[i] / after;
-        }
-        if (status == UZ_OK)
-            status = uz_prolong_smoothed(level, A, basis, of, 4.0 / 3.0 / range, k, stop, err);
+            y[i] *= (double)level->inverse[i];
+        const double before = uz_norm(n, x), after = uz_norm(n, y);
+        *range = before > 0.0 && after > 0.0 ? 1.1 * (after / before) : 1.0;
+        if (!(before > 0.0) || !(after > 0.0))
+            break;
+        for (int64_t i = 0; i < n; i++)
+            x[i] = y[i] / after;
     }
-    free(aggregate);
-    free(of);
-    free(basis);
+    const bool ok = x && y;
     free(x);
     free(y);
+    return ok ? UZ_OK : fail_memory(n, err);
+}
+
+/* The prolongation of the level, the next matrix, and *modes, which become its own. *done: it can't be coarsened. */
+static uz_status coarsen(uz_level *level, bool *done, float **modes, double threshold, int k, const uz_stop *stop,
+                         uz_error *err)
+{
+    const uz_blocks *A = &level->A;
+    const int64_t n = A->nodes * A->b;
+    int32_t *aggregate = uz_alloc(A->nodes, sizeof *aggregate);
+    float *basis = uz_alloc(n * k, sizeof *basis), *coarse = NULL;
+    uz_below below;
+    double range = 1.0;
+    uz_status status = uz_below_init(&below, A) && aggregate && basis ? UZ_OK : fail_memory(n, err);
+    if (status == UZ_OK)
+        status = uz_aggregate(aggregate, &level->aggregates, A, &below, level->inverse, threshold, err);
+    *done = status == UZ_OK && (level->aggregates == 0 || (double)(level->aggregates * k) > LEAST_GAIN * (double)n);
+    if (status == UZ_OK && !*done) {
+        coarse = uz_alloc(level->aggregates * k * k, sizeof *coarse);
+        status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarse ? UZ_OK : fail_memory(n, err);
+        if (status == UZ_OK)
+            status = uz_tentative(basis, coarse, *modes, aggregate, A->nodes, A->b, level->aggregates, k, err);
+        if (status == UZ_OK)
+            status = find_range(&range, level, &below, err);
+        if (status == UZ_OK)
+            status = uz_prolong_smoothed(level, &below, basis, aggregate, 4.0 / 3.0 / range, k, stop, err);
+        if (status == UZ_OK)
+            status = uz_galerkin(&level[1].A, level, &below, k, stop, err);
+        if (status == UZ_OK)
+            status = round_level(level + 1, err);
+        free(*modes);
+        *modes = coarse;
+    }
+    uz_below_clear(&below);
+    free(aggregate);
+    free(basis);
     return status;
 }
 
 /* All so far; what the limit is compared with on the way. */
 static size_t count_bytes(const uz_aggregates *mg)
 {
-    size_t bytes = sizeof *mg;
-    for (int l = 0; l < mg->base.levels; l++) {
+    size_t bytes = sizeof *mg + (mg->slot ? 16 * (size_t)mg->base.n : 0);
+    for (int l = 0; mg->slot && l < mg->base.levels; l++) {
         const uz_level *level = &mg->level[l];
-        const size_t n = (size_t)level->n;
-        bytes += 8 * n;
-        if (level->A.ptr)
-            bytes += 8 * n + 16 * (size_t)level->A.ptr[n];
+        const size_t nodes = (size_t)level->A.nodes, b = (size_t)level->A.b, blocks = (size_t)level->A.ptr[nodes];
+        bytes += nodes * (8 + 4 * b + 4 * b * b) + blocks * (4 + 4 * b * b);
+        if (level->A.off)
+            bytes += 8 * b * b * (nodes + blocks);
         if (level->ptr)
-            bytes += 8 * n + (size_t)level->ptr[n] * (4 + 4 * (size_t)mg->k);
+            bytes += 8 * nodes + (size_t)level->ptr[nodes] * (4 + 4 * b * (size_t)mg->k);
     }
     return bytes + (mg->coarsest ? uz_factor_describe(mg->coarsest).bytes : 0);
 }
 
 /* M <= (D + L) D^-1 (D + L') for a cycle that smooths so, and for K itself; the norm of D^-1/2 L D^-1/2 is at most the
- * root of its largest row sum times its largest column sum. */
-static uz_status bound_by_diagonal(double *bound, const uz_level *level, const uz_csc *K, uz_error *err)
+ * root of its largest row sum times its largest column sum. In any order of the dofs: all of K's entries count. */
+static uz_status bound_by_diagonal(double *bound, const uz_csc *K, uz_error *err)
 {
-    double by_row = 0.0, by_column = 0.0, *row = uz_alloc_zero(level->n, sizeof *row);
+    double most = 0.0, *row = uz_alloc_zero(K->cols, sizeof *row);
     if (!row)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)level->n);
-    for (int64_t j = 0; j < level->n; j++) {
-        double sum = 0.0;
+        return fail_memory(K->cols, err);
+    for (int64_t j = 0; j < K->cols; j++)
         for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
-            double scaled = fabs(K->val[k]) * sqrt(level->inverse[j]) * sqrt(level->inverse[K->idx[k]]);
-            sum += scaled;
-            row[K->idx[k]] += scaled;
+            const int64_t i = K->idx[k];
+            const double scaled = fabs(K->val[k]) / sqrt(K->val[K->ptr[j]]) / sqrt(K->val[K->ptr[i]]);
+            row[j] += scaled;
+            row[i] += scaled;
         }
-        by_column = fmax(by_column, sum);
-    }
-    for (int64_t j = 0; j < level->n; j++)
-        by_row = fmax(by_row, row[j]);
-    double norm = 1.0 + sqrt(by_row * by_column);
-    *bound = norm * norm;
+    for (int64_t j = 0; j < K->cols; j++)
+        most = fmax(most, row[j]);
+    *bound = (1.0 + most) * (1.0 + most);
     free(row);
     return UZ_OK;
-}
-
-/* Level l + 1 from level l; *done: level l is the coarsest. */
-static uz_status coarsen(uz_aggregates *mg, bool *done, sources *from, const uz_csc *K, size_t memory_limit,
-                         const uz_stop *stop, uz_error *err)
-{
-    int l = mg->base.levels - 1;
-    uz_level *level = &mg->level[l], *next = level + 1;
-    const uz_csc *A = l == 0 ? K : &mg->level[l].A;
-    float *modes = NULL;
-    *done = level->n <= COARSEST || l + 1 == UZ_LEVELS_MOST;
-    if (*done)
-        return UZ_OK;
-    uz_status status = build_prolongation(level, &modes, A, from, from->strong * ldexp(1.0, -l), mg->k, stop, err);
-    *done = status == UZ_OK && !modes;
-    if (status != UZ_OK || *done) {
-        free(modes);
-        return status;
-    }
-    status = uz_galerkin(&next->A, level, A, mg->k, stop, err);
-    if (status == UZ_OK) {
-        status = invert_diagonal(next, &next->A, err);
-        mg->base.levels++;
-    }
-    if (status == UZ_OK && memory_limit > 0 && count_bytes(mg) > memory_limit)
-        status =
-            uz_fail(err, UZ_ERR_LIMIT, "K", "the coarse levels take more than the %zu bytes allowed", memory_limit);
-    const int64_t count = level->aggregates * mg->k;
-    free(from->node);
-    free(from->modes);
-    *from = (sources){uz_alloc(count, sizeof *from->node), level->aggregates, modes, from->strong};
-    for (int64_t i = 0; from->node && i < count; i++)
-        from->node[i] = (int32_t)(i / mg->k);
-    if (status == UZ_OK && !from->node)
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld aggregates", (long long)level->aggregates);
-    return status;
 }
 
 uz_status uz_factor_coarsest(uz_factor **out, const uz_csc *A, size_t memory_limit, const uz_hooks *hooks,
@@ -187,49 +183,127 @@ uz_status uz_factor_coarsest(uz_factor **out, const uz_csc *A, size_t memory_lim
     return status;
 }
 
+/* Column by column, lower triangle; dofs that are not there become those of the unit matrix. */
+static uz_status to_columns(uz_csc *out, const uz_blocks *A, const float *inverse, uz_error *err)
+{
+    const int b = A->b;
+    const int64_t size = (int64_t)b * b;
+    uz_below below;
+    int64_t at = 0;
+    uz_status status = uz_below_init(&below, A) ? UZ_OK : fail_memory(A->nodes * b, err);
+    if (status == UZ_OK)
+        status = uz_csc_init(out, A->nodes * b, A->nodes * b, A->nodes * (size + b) / 2 + A->ptr[A->nodes] * size, err);
+    for (int64_t j = 0; status == UZ_OK && j < A->nodes; j++)
+        for (int c = 0; c < b; c++) {
+            for (int r = c; r < b; r++) {
+                const bool unit = r == c && !(inverse[j * b + c] > 0.0F);
+                out->idx[at] = j * b + r;
+                out->val[at++] = unit ? 1.0 : A->diag[j * size + r * b + c];
+            }
+            for (int64_t e = below.ptr[j]; e < below.ptr[j + 1]; e++)
+                for (int r = 0; r < b; r++) {
+                    out->idx[at] = below.node[e] * (int64_t)b + r;
+                    out->val[at++] = A->off[below.at[e] * size + r * b + c];
+                }
+            out->ptr[j * b + c + 1] = at;
+        }
+    uz_below_clear(&below);
+    return status;
+}
+
+static uz_status factor_last(uz_aggregates *mg, const uz_csc *K, size_t memory_limit, const uz_stop *stop,
+                             uz_error *err)
+{
+    const uz_hooks *hooks = stop ? stop->hooks : NULL;
+    const int last = mg->base.levels - 1;
+    if (last == 0)
+        return uz_factor_coarsest(&mg->coarsest, K, memory_limit, hooks, err);
+    uz_csc A = {0};
+    uz_error inner = {0};
+    uz_status status = to_columns(&A, &mg->level[last].A, mg->level[last].inverse, err);
+    if (status == UZ_OK) {
+        status = uz_factor_coarsest(&mg->coarsest, &A, memory_limit, hooks, &inner);
+        if (status == UZ_ERR_NOT_SPD)
+            fail_soft(err);
+        else if (status != UZ_OK)
+            uz_fail(err, status, inner.where, "%s", inner.message);
+    }
+    uz_csc_clear(&A);
+    return status;
+}
+
+/* The modes of level 0: those of S K S are S^-1 times K's, here times the least of S, so that none overflows. */
+static float *scale_modes(const uz_aggregates *mg, const uz_modes *modes)
+{
+    const int k = mg->k;
+    float *scaled = uz_alloc_zero(mg->level[0].A.nodes * mg->level[0].A.b * k, sizeof *scaled);
+    double least = INFINITY;
+    for (int64_t j = 0; j < mg->base.n; j++)
+        least = fmin(least, mg->scale[j]);
+    for (int64_t j = 0; scaled && j < mg->base.n; j++)
+        for (int c = 0; c < k; c++)
+            scaled[mg->slot[j] * k + c] = (float)(least / mg->scale[j] * (double)modes->value[j * k + c]);
+    return scaled;
+}
+
+static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
+                       const uz_stop *stop, uz_error *err)
+{
+    int32_t *node_of_group = uz_alloc(modes->n_nodes, sizeof *node_of_group);
+    float *of_level = NULL;
+    bool done = false;
+    uz_status status =
+        node_of_group ? uz_blocks_of_matrix(mg, node_of_group, K, modes, err) : fail_memory(K->cols, err);
+    free(node_of_group);
+    if (status == UZ_OK)
+        status = round_level(&mg->level[0], err);
+    if (status == UZ_OK && !(of_level = scale_modes(mg, modes)))
+        status = fail_memory(K->cols, err);
+    while (status == UZ_OK && !done) {
+        const int l = mg->base.levels - 1;
+        uz_level *level = &mg->level[l];
+        done = l + 1 == UZ_LEVELS_MOST || (l > 0 && level->A.nodes * level->A.b <= COARSEST);
+        if (done)
+            break;
+        status = uz_stop_is_due(stop)
+                     ? uz_fail_stopped(err)
+                     : coarsen(level, &done, &of_level, modes->strong * ldexp(1.0, -l), mg->k, stop, err);
+        mg->base.levels += level[1].A.ptr != NULL && level[1].inverse != NULL;
+        if (status == UZ_OK && memory_limit > 0 && count_bytes(mg) > memory_limit)
+            status = uz_fail(err, UZ_ERR_LIMIT, "K", "the levels of the multigrid take more than the %zu bytes allowed",
+                             memory_limit);
+    }
+    free(of_level);
+    return status;
+}
+
 uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
                               const uz_stop *stop, uz_error *err)
 {
-    const int64_t n = K->cols, k = modes->count;
+    const int64_t n = K->cols;
     *out = NULL;
     if (n >= INT32_MAX)
         return uz_fail(err, UZ_ERR_UNSUPPORTED, "K", "matrix_free holds up to 2^31 - 2 dofs, these are %lld",
                        (long long)n);
     uz_aggregates *mg = uz_alloc_zero(1, sizeof *mg);
-    sources from = {uz_alloc(n, sizeof *from.node), modes->n_nodes, uz_alloc(n * k, sizeof *from.modes), modes->strong};
-    uz_status status = UZ_OK;
-    bool done = false;
-    if (!mg || !from.node || !from.modes) {
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid on %lld dofs", (long long)n);
-    } else {
-        mg->k = modes->count;
-        mg->base = (uz_multigrid){.kind = &uz_aggregates_kind, .n = n, .levels = 1};
-        memcpy(from.node, modes->node, (size_t)n * sizeof *from.node);
-        memcpy(from.modes, modes->value, (size_t)(n * k) * sizeof *from.modes);
-        status = invert_diagonal(&mg->level[0], K, err);
-    }
-    while (status == UZ_OK && !done)
-        status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarsen(mg, &done, &from, K, memory_limit, stop, err);
-    free(from.node);
-    free(from.modes);
+    if (!mg)
+        return fail_memory(n, err);
+    mg->k = modes->count;
+    mg->base = (uz_multigrid){.kind = &uz_aggregates_kind, .n = n, .levels = 1};
+    uz_status status = n > ALONE ? build(mg, K, modes, memory_limit, stop, err) : UZ_OK;
     if (status == UZ_OK)
-        status = bound_by_diagonal(&mg->base.most, &mg->level[0], K, err);
-    if (status == UZ_OK) { /* the factor of the coarsest level */
-        const int last = mg->base.levels - 1;
-        uz_error inner = {0};
-        status = uz_factor_coarsest(&mg->coarsest, last == 0 ? K : &mg->level[last].A, memory_limit,
-                                    stop ? stop->hooks : NULL, last == 0 ? err : &inner);
-        if (last > 0 && status == UZ_ERR_NOT_SPD)
-            uz_fail(err, status, "K",
-                    "K is not positive definite to working precision: on smooth displacements it resists too little. "
-                    "Support the body so that it can't move freely, or check the signs of K.");
-        else if (last > 0 && status != UZ_OK)
-            uz_fail(err, status, inner.where, "%s", inner.message);
+        status = factor_last(mg, K, memory_limit, stop, err);
+    for (int l = 1; l < UZ_LEVELS_MOST; l++) { /* only products with K need them again */
+        free(mg->level[l].A.off);
+        free(mg->level[l].A.diag);
+        mg->level[l].A.off = mg->level[l].A.diag = NULL;
     }
+    if (status == UZ_OK)
+        status = bound_by_diagonal(&mg->base.most, K, err);
     if (status == UZ_OK) {
         mg->base.bytes = count_bytes(mg);
         *out = &mg->base;
-    } else if (mg) {
+    } else {
         uz_aggregates_kind.free(&mg->base);
     }
     return status;

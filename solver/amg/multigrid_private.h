@@ -5,77 +5,93 @@
 #include "factor/factor.h"
 #include "amg/amg.h"
 
-/* One level and the way to the next, coarser one. A coarse level has k = number of modes dofs for each aggregate of the
- * finer one, in a row; where an aggregate has fewer independent modes, those left over are 0 everywhere and their
- * diagonal is 1. */
+/* A symmetric matrix in blocks of b x b, row by row within each: what nodes exert on nodes. b is 1, 2, 3 or 6. */
 typedef struct {
-    int64_t n;
-    uz_csc A;        /* lower triangle; level 0: empty, it is the caller's K */
-    double *inverse; /* n: 1 / a_jj */
-    int64_t *ptr;    /* n + 1: the blocks of each row of the prolongation */
-    int32_t *block;  /* ptr[n]: aggregate of each block */
-    float *value;    /* ptr[n] x k */
+    int64_t nodes;
+    int b;
+    int64_t *ptr;       /* nodes + 1 */
+    int32_t *idx;       /* ptr[nodes]: the columns left of the diagonal, ascending */
+    double *off, *diag; /* ptr[nodes] x b x b, nodes x b x b */
+} uz_blocks;
+void uz_blocks_clear(uz_blocks *A);
+/* Where in A->idx the column is, which must be there. */
+int64_t uz_blocks_find(const uz_blocks *A, int64_t row, int32_t column);
+/* y = A x, vectors with four numbers for each node, the surplus ones 0 in x and anything in y. b <= 3. */
+void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x);
+
+/* Which blocks stand below the diagonal in each column. */
+typedef struct {
+    int64_t *ptr;  /* nodes + 1 */
+    int32_t *node; /* ptr[nodes]: their rows, ascending */
+    int64_t *at;   /* where they are in A->idx */
+} uz_below;
+bool uz_below_init(uz_below *below, const uz_blocks *A); /* false: no memory; clear it all the same */
+void uz_below_clear(uz_below *below);
+
+/* One level and the way to the next, coarser one. A coarse level has a node for each aggregate of the finer one, with a
+ * dof for each mode; where an aggregate has fewer independent modes, those left over are 0 everywhere. Dofs that are
+ * not there have rows of zeros. Sweeps are made in single precision: the cycle is positive definite whatever their
+ * rounding is, as it is that of the rounded matrices. */
+typedef struct {
+    uz_blocks A;       /* level 0: kept for products; else without numbers, once the next level is made */
+    float *off, *diag; /* the same in single precision */
+    float *inverse;    /* nodes x b: 1 / a_jj, 0 where a dof is not there, which makes it vanish from every sweep */
+    int64_t *ptr;      /* nodes + 1: the blocks of each node's rows of the prolongation */
+    int32_t *block;    /* ptr[nodes]: the aggregate of each, ascending */
+    float *value;      /* ptr[nodes] x b x k */
     int64_t aggregates;
 } uz_level;
 
 enum { UZ_LEVELS_MOST = 24 };
 
-/* Multigrid on smoothed aggregates. */
+/* Multigrid on smoothed aggregates. Level 0 is S K S with powers of two that make its diagonal about 1. */
 typedef struct {
     uz_multigrid base;
     int k;
-    uz_level level[UZ_LEVELS_MOST]; /* the last one has no prolongation, only n */
+    int64_t *slot;                  /* n: where each dof stands: node x b + place */
+    double *scale;                  /* n: S */
+    uz_level level[UZ_LEVELS_MOST]; /* the last one has no prolongation; one level only: K itself, none is filled */
     uz_factor *coarsest;
 } uz_aggregates;
 extern const uz_multigrid_kind uz_aggregates_kind;
 
-struct uz_multigrid_room {
-    uz_factor_workspace *ws;
-    double *x[UZ_LEVELS_MOST], *b[UZ_LEVELS_MOST], *t[UZ_LEVELS_MOST]; /* n each; x and b from level 1 on */
-    double *inverse;   /* level 0's where dofs are held: 0 there, which makes them vanish from every sweep; else NULL */
-    uz_factor *coarse; /* K_FF where there is one level only; else NULL */
-};
-/* Of a matrix that is small enough; limit: of memory. */
-uz_status uz_factor_coarsest(uz_factor **out, const uz_csc *A, size_t memory_limit, const uz_hooks *hooks,
-                             uz_error *err);
+/* Vectors of a level have `width` numbers for each node. */
+static inline int uz_width(int b)
+{
+    return b > 4 ? 8 : 4;
+}
 
-/* Rows of a symmetric matrix of which only columns of the lower triangle are stored, in ascending order: a column waits
- * in the list of the row of its next entry. */
-typedef struct {
-    const uz_csc *A;
-    int32_t *first, *next; /* n: list of waiting columns by row */
-    int64_t *at;           /* n: next entry of each column */
-    int32_t *column;       /* the row that was read: longest row */
-    double *value;
-    int64_t count;
-} uz_row_walk;
-bool uz_row_walk_init(uz_row_walk *walk, const uz_csc *A); /* false: no memory; clear it all the same */
-void uz_row_walk_clear(uz_row_walk *walk);
-void uz_row_walk_read(uz_row_walk *walk, int64_t i); /* i = 0, 1, 2, ... */
+/* Takes K apart into level 0: slot, scale, level[0].A; *node_of_group (modes->n_nodes): where its nodes went, -1:
+ * nowhere. Errors: NOT_SPD where a diagonal entry or a pair of dofs shows it. */
+uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes,
+                              uz_error *err);
 
 /* start (groups + 2, zero), member (n): those of 0..n-1 that are in each group, by of (n; -1: in none). Afterwards
  * start[g]..start[g + 1] are group g's. */
 void uz_list_members(int64_t *start, int32_t *member, const int32_t *of, int64_t n, int64_t groups);
 
-/* aggregate (n_nodes): the aggregate of each node, -1 for nodes that hang on no other strongly. node (n): the node of
- * each dof; inverse (n): as in uz_level. *count: aggregates. */
-uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_csc *A, const double *inverse, const int32_t *node,
-                       int64_t n_nodes, double threshold, uz_error *err);
+/* aggregate (nodes): the aggregate of each node, -1 for nodes that hang on no other strongly. *count: aggregates. */
+uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_blocks *A, const uz_below *below,
+                       const float *inverse, double threshold, uz_error *err);
 
-/* basis (n x k): the modes of each aggregate made orthonormal, 0 where there are none; coarse (aggregates x k x k): the
- * modes in that basis, row by row: those of the coarse level. of (n): the aggregate of each dof, -1: none. */
-uz_status uz_tentative(float *basis, float *coarse, const float *modes, const int32_t *of, int64_t n,
+/* basis (nodes b x k): the modes of each aggregate made orthonormal, 0 where there are none; coarse (aggregates x k x
+ * k): the modes in that basis, row by row: those of the coarse level. */
+uz_status uz_tentative(float *basis, float *coarse, const float *modes, const int32_t *aggregate, int64_t nodes, int b,
                        int64_t aggregates, int k, uz_error *err);
 /* Fills the prolongation (I - omega D^-1 A) basis of the level. */
-uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *basis, const int32_t *of, double omega,
-                              int k, const uz_stop *stop, uz_error *err);
-/* coarse = P'A P, lower triangle. */
-uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, int k, const uz_stop *stop,
+uz_status uz_prolong_smoothed(uz_level *level, const uz_below *below, const float *basis, const int32_t *aggregate,
+                              double omega, int k, const uz_stop *stop, uz_error *err);
+/* coarse = P'A P. */
+uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_stop *stop,
                       uz_error *err);
 
-/* Rows between two questions whether to go on: a millisecond or so. */
-enum { UZ_ROWS_AT_ONCE = 1024 };
-/* Both functions above, and uz_multigrid_create, where it had to stop: UZ_ERR_CANCELLED. */
+/* Nodes between two questions whether to go on: a millisecond or so. */
+enum { UZ_ROWS_AT_ONCE = 512 };
+/* The functions above, and uz_multigrid_create, where it had to stop: UZ_ERR_CANCELLED. */
 uz_status uz_fail_stopped(uz_error *err);
+
+/* Of a matrix that is small enough; limit: of memory. */
+uz_status uz_factor_coarsest(uz_factor **out, const uz_csc *A, size_t memory_limit, const uz_hooks *hooks,
+                             uz_error *err);
 
 #endif

@@ -1,0 +1,259 @@
+/* blocks.c: a symmetric matrix as blocks, of which those left of the diagonal are stored. */
+#include "amg/multigrid_private.h"
+
+#include "core/alloc.h"
+#include "core/cpu.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void uz_blocks_clear(uz_blocks *A)
+{
+    free(A->ptr);
+    free(A->idx);
+    free(A->off);
+    free(A->diag);
+    memset(A, 0, sizeof *A);
+}
+
+int64_t uz_blocks_find(const uz_blocks *A, int64_t row, int32_t column)
+{
+    int64_t low = A->ptr[row], high = A->ptr[row + 1] - 1;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (A->idx[middle] < column)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+bool uz_below_init(uz_below *below, const uz_blocks *A)
+{
+    const int64_t count = A->ptr[A->nodes];
+    *below = (uz_below){uz_alloc_zero(A->nodes + 2, sizeof *below->ptr), uz_alloc(count, sizeof *below->node),
+                        uz_alloc(count, sizeof *below->at)};
+    if (!below->ptr || !below->node || !below->at)
+        return false;
+    for (int64_t e = 0; e < count; e++)
+        below->ptr[A->idx[e] + 2]++;
+    for (int64_t j = 0; j < A->nodes; j++)
+        below->ptr[j + 2] += below->ptr[j + 1];
+    for (int64_t i = 0; i < A->nodes; i++)
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+            const int64_t place = below->ptr[A->idx[e] + 1]++;
+            below->node[place] = (int32_t)i;
+            below->at[place] = e;
+        }
+    return true;
+}
+
+void uz_below_clear(uz_below *below)
+{
+    free(below->ptr);
+    free(below->node);
+    free(below->at);
+    memset(below, 0, sizeof *below);
+}
+
+/* ------------------------------------------------------------------ from a matrix */
+
+/* The nodes that have dofs, in the order of their first ones, and the place of each dof. false: no memory. */
+static bool number_slots(uz_aggregates *mg, int32_t *node_of_group, const uz_modes *modes)
+{
+    uz_blocks *A = &mg->level[0].A;
+    int32_t *places = uz_alloc_zero(modes->n_nodes, sizeof *places);
+    if (!places)
+        return false;
+    for (int64_t g = 0; g < modes->n_nodes; g++)
+        node_of_group[g] = -1;
+    for (int64_t j = 0; j < mg->base.n; j++) {
+        const int32_t group = modes->node[j];
+        node_of_group[group] = places[group] == 0 ? (int32_t)A->nodes++ : node_of_group[group];
+        mg->slot[j] = places[group]++;
+        A->b = places[group] > A->b ? places[group] : A->b;
+    }
+    for (int64_t j = 0; j < mg->base.n; j++)
+        mg->slot[j] += (int64_t)node_of_group[modes->node[j]] * A->b;
+    free(places);
+    return true;
+}
+
+static int compare_columns(const void *a, const void *b)
+{
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* A->ptr and idx. */
+static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
+{
+    uz_blocks *A = &mg->level[0].A;
+    int32_t *seen = uz_alloc(A->nodes, sizeof *seen);
+    A->ptr = uz_alloc_zero(A->nodes + 2, sizeof *A->ptr);
+    bool ok = seen && A->ptr;
+    /* pairs of nodes, once for each column that knows them: counted, then listed */
+    for (int pass = 0; ok && pass < 2; pass++) {
+        for (int64_t i = 0; i < A->nodes; i++)
+            seen[i] = -1;
+        for (int64_t j = 0; j < K->cols; j++) {
+            const int32_t J = (int32_t)(mg->slot[j] / A->b);
+            for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
+                const int32_t I = (int32_t)(mg->slot[K->idx[q]] / A->b);
+                if (I == J || seen[I] == J)
+                    continue;
+                seen[I] = J;
+                if (pass == 0)
+                    A->ptr[(I > J ? I : J) + 2]++;
+                else
+                    A->idx[A->ptr[(I > J ? I : J) + 1]++] = I > J ? J : I;
+            }
+        }
+        for (int64_t i = 0; pass == 0 && i < A->nodes; i++)
+            A->ptr[i + 2] += A->ptr[i + 1];
+        if (pass == 0)
+            ok = (A->idx = uz_alloc(A->ptr[A->nodes + 1], sizeof *A->idx)) != NULL;
+    }
+    free(seen);
+    int64_t count = 0, from = 0;
+    for (int64_t i = 0; ok && i < A->nodes; i++) { /* sorted, each once */
+        const int64_t to = A->ptr[i + 1];
+        bool ascends = true;
+        for (int64_t e = from + 1; e < to; e++)
+            ascends = ascends && A->idx[e] > A->idx[e - 1];
+        if (!ascends)
+            qsort(A->idx + from, (size_t)(to - from), sizeof *A->idx, compare_columns);
+        A->ptr[i] = count;
+        for (int64_t e = from; e < to; e++)
+            if (e == from || A->idx[e] != A->idx[e - 1])
+                A->idx[count++] = A->idx[e];
+        from = to;
+    }
+    if (ok)
+        A->ptr[A->nodes] = count;
+    return ok;
+}
+
+/* S: the diagonal becomes 1/2 to 4. */
+static uz_status find_scale(uz_aggregates *mg, const uz_csc *K, uz_error *err)
+{
+    for (int64_t j = 0; j < K->cols; j++) {
+        const int64_t q = K->ptr[j];
+        if (!(q < K->ptr[j + 1] && K->idx[q] == j && K->val[q] > 0.0))
+            return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                           "K is not positive definite: its diagonal entry of dof %lld (numbered from 0) is not "
+                           "positive. Support the body so that it can't move freely, or check the signs of K.",
+                           (long long)j);
+        mg->scale[j] = ldexp(1.0, -ilogb(K->val[q]) / 2);
+    }
+    return UZ_OK;
+}
+
+/* Entries of a positive definite matrix are smaller than the diagonal's: 4, scaled. */
+#define ENTRY_MOST 4.0
+
+static uz_status fill(uz_aggregates *mg, const uz_csc *K, uz_error *err)
+{
+    uz_blocks *A = &mg->level[0].A;
+    const int b = A->b;
+    for (int64_t j = 0; j < K->cols; j++) {
+        const int64_t J = mg->slot[j] / b, c = mg->slot[j] % b;
+        int64_t known = -1, at = 0; /* the place of the block of the last row */
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
+            const int64_t i = K->idx[q], I = mg->slot[i] / b, r = mg->slot[i] % b;
+            const double value = mg->scale[i] * K->val[q] * mg->scale[j];
+            if (!(fabs(value) <= ENTRY_MOST))
+                return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                               "K is not positive definite: its entry of the dofs %lld and %lld (numbered from 0) is "
+                               "larger than their diagonal entries allow. Check the signs and units of K.",
+                               (long long)i, (long long)j);
+            if (I == J) {
+                A->diag[(I * b + r) * b + c] = A->diag[(I * b + c) * b + r] = value;
+                continue;
+            }
+            if (I != known)
+                at = I > J ? uz_blocks_find(A, I, (int32_t)J) : uz_blocks_find(A, J, (int32_t)I);
+            known = I;
+            A->off[at * b * b + (I > J ? r * b + c : c * b + r)] = value;
+        }
+    }
+    return UZ_OK;
+}
+
+uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes,
+                              uz_error *err)
+{
+    uz_blocks *A = &mg->level[0].A;
+    mg->slot = uz_alloc(K->cols, sizeof *mg->slot);
+    mg->scale = uz_alloc(K->cols, sizeof *mg->scale);
+    bool ok = mg->slot && mg->scale && number_slots(mg, node_of_group, modes) && find_pattern(mg, K);
+    if (ok) {
+        const int64_t size = (int64_t)A->b * A->b;
+        A->off = uz_alloc_zero(A->ptr[A->nodes] * size + 4, sizeof *A->off);
+        A->diag = uz_alloc_zero(A->nodes * size + 4, sizeof *A->diag);
+        ok = A->off && A->diag;
+    }
+    if (!ok)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid on %lld dofs", (long long)K->cols);
+    const uz_status status = find_scale(mg, K, err);
+    return status == UZ_OK ? fill(mg, K, err) : status;
+}
+
+/* ------------------------------------------------------------------- product */
+
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+
+/* Each block is read once, for both triangles. Rows of a block are read as four numbers: what follows them counts for
+ * nothing, as the fourth number of a node is 0. */
+static inline __attribute__((always_inline)) void multiply(double *y, const uz_blocks *A, const double *x, int b)
+{
+    for (int64_t i = 0; i < A->nodes; i++) {
+        const double *own = A->diag + i * b * b;
+        const four xi = *(const four *)(x + 4 * i);
+        four sum[3], back = {0};
+        for (int r = 0; r < b; r++)
+            sum[r] = *(const four *)(own + r * b) * xi;
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+            const double *block = A->off + e * b * b;
+            const four xj = *(const four *)(x + 4 * (int64_t)A->idx[e]);
+            four *to = (four *)(y + 4 * (int64_t)A->idx[e]), value = *to;
+            for (int r = 0; r < b; r++) {
+                const four row = *(const four *)(block + r * b);
+                sum[r] += row * xj;
+                value += row * xi[r];
+            }
+            *to = value;
+        }
+        for (int r = 0; r < b; r++)
+            back[r] = (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
+        *(four *)(y + 4 * i) = back;
+    }
+}
+
+static inline __attribute__((always_inline)) void multiply_any(double *y, const uz_blocks *A, const double *x)
+{
+    if (A->b == 3)
+        multiply(y, A, x, 3);
+    else if (A->b == 2)
+        multiply(y, A, x, 2);
+    else
+        multiply(y, A, x, 1);
+}
+
+UZ_AVX2_FMA static void multiply_fused(double *y, const uz_blocks *A, const double *x)
+{
+    multiply_any(y, A, x);
+}
+
+static void multiply_plain(double *y, const uz_blocks *A, const double *x)
+{
+    multiply_any(y, A, x);
+}
+
+void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x)
+{
+    (uz_cpu_has_avx2_fma() ? multiply_fused : multiply_plain)(y, A, x);
+}

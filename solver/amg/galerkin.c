@@ -1,0 +1,237 @@
+/* galerkin.c: the matrix of the next level, P'A P, in blocks whose places are known before their numbers. */
+#include "amg/multigrid_private.h"
+
+#include "core/alloc.h"
+#include "core/cpu.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Columns of A P for each node, ascending. */
+typedef struct {
+    int64_t *ptr;    /* nodes + 1 */
+    int32_t *column; /* ptr[nodes] */
+} columns;
+
+static int compare(const void *a, const void *b)
+{
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void sort(int32_t *list, int64_t count)
+{
+    if (count > 32) {
+        qsort(list, (size_t)count, sizeof *list, compare);
+        return;
+    }
+    for (int64_t s = 1; s < count; s++) {
+        const int32_t value = list[s];
+        int64_t t = s;
+        for (; t > 0 && list[t - 1] > value; t--)
+            list[t] = list[t - 1];
+        list[t] = value;
+    }
+}
+
+static bool grow(int32_t **list, int64_t *room, int64_t need)
+{
+    if (need <= *room)
+        return true;
+    *room = need + need / 2 + 1024;
+    int32_t *larger = uz_realloc(*list, *room, sizeof **list);
+    *list = larger ? larger : *list;
+    return larger != NULL;
+}
+
+/* Adds the columns of j's rows of P that were not yet seen by i. */
+static int64_t add_columns(int32_t *list, int64_t count, int32_t *seen, const uz_level *level, int64_t j, int32_t i)
+{
+    for (int64_t e = level->ptr[j]; e < level->ptr[j + 1]; e++)
+        if (seen[level->block[e]] != i) {
+            seen[level->block[e]] = i;
+            list[count++] = level->block[e];
+        }
+    return count;
+}
+
+static bool find_columns(columns *AP, int32_t *seen, const uz_level *level, const uz_below *below)
+{
+    const uz_blocks *A = &level->A;
+    int64_t room = 0, count = 0;
+    AP->ptr = uz_alloc_zero(A->nodes + 1, sizeof *AP->ptr);
+    bool ok = AP->ptr && grow(&AP->column, &room, 8 * A->nodes);
+    for (int64_t c = 0; c < level->aggregates; c++)
+        seen[c] = -1;
+    for (int64_t i = 0; ok && i < A->nodes; i++) {
+        int64_t most = level->ptr[i + 1] - level->ptr[i];
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+            most += level->ptr[A->idx[e] + 1] - level->ptr[A->idx[e]];
+        for (int64_t e = below->ptr[i]; e < below->ptr[i + 1]; e++)
+            most += level->ptr[below->node[e] + 1] - level->ptr[below->node[e]];
+        ok = grow(&AP->column, &room, count + (most < level->aggregates ? most : level->aggregates));
+        if (!ok)
+            break;
+        const int64_t from = count;
+        count = add_columns(AP->column, count, seen, level, i, (int32_t)i);
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+            count = add_columns(AP->column, count, seen, level, A->idx[e], (int32_t)i);
+        for (int64_t e = below->ptr[i]; e < below->ptr[i + 1]; e++)
+            count = add_columns(AP->column, count, seen, level, below->node[e], (int32_t)i);
+        sort(AP->column + from, count - from);
+        AP->ptr[i + 1] = count;
+    }
+    return ok;
+}
+
+/* coarse->ptr and idx: of an aggregate all that stands left of it in the rows of A P that its modes reach. */
+static bool find_pattern(uz_blocks *coarse, int32_t *seen, const uz_level *level, const columns *AP)
+{
+    const int64_t nodes = level->A.nodes, entries = level->ptr[nodes];
+    int64_t *start = uz_alloc_zero(level->aggregates + 2, sizeof *start), room = 0, count = 0;
+    int32_t *reached = uz_alloc(entries, sizeof *reached); /* nodes of each aggregate's column of P */
+    coarse->ptr = uz_alloc_zero(level->aggregates + 1, sizeof *coarse->ptr);
+    bool ok = start && reached && coarse->ptr && grow(&coarse->idx, &room, 16 * level->aggregates);
+    for (int64_t e = 0; ok && e < entries; e++)
+        start[level->block[e] + 2]++;
+    for (int64_t a = 0; ok && a < level->aggregates; a++)
+        start[a + 2] += start[a + 1];
+    for (int64_t i = 0; ok && i < nodes; i++)
+        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++)
+            reached[start[level->block[e] + 1]++] = (int32_t)i;
+    for (int64_t c = 0; ok && c < level->aggregates; c++)
+        seen[c] = -1;
+    for (int64_t a = 0; ok && a < level->aggregates; a++) {
+        const int64_t from = count;
+        ok = grow(&coarse->idx, &room, count + a);
+        for (int64_t q = start[a]; ok && q < start[a + 1]; q++)
+            for (int64_t e = AP->ptr[reached[q]]; e < AP->ptr[reached[q] + 1] && AP->column[e] < a; e++)
+                if (seen[AP->column[e]] != a) {
+                    seen[AP->column[e]] = (int32_t)a;
+                    coarse->idx[count++] = AP->column[e];
+                }
+        if (ok)
+            sort(coarse->idx + from, count - from);
+        coarse->ptr[a + 1] = count;
+    }
+    free(start);
+    free(reached);
+    return ok;
+}
+
+/* What the numbers of a node's rows are made with. */
+typedef struct {
+    uz_blocks *coarse;
+    const uz_level *level;
+    const uz_below *below;
+    const columns *AP;
+    int32_t *place; /* aggregates: where its columns stand in row */
+    double *row;    /* the node's rows of A P: a block for each of its columns */
+} product;
+
+/* to += block P_j, a column of blocks after the other; or with the block transposed. */
+static inline __attribute__((always_inline)) void add_product(const product *x, const double *A, bool transposed,
+                                                              int64_t j, int b, int k)
+{
+    const uz_level *level = x->level;
+    for (int64_t e = level->ptr[j]; e < level->ptr[j + 1]; e++) {
+        double *to = x->row + (int64_t)x->place[level->block[e]] * b * k;
+        const float *P = level->value + e * b * k;
+        for (int s = 0; s < b; s++)
+            for (int r = 0; r < b; r++) {
+                const double factor = transposed ? A[s * b + r] : A[r * b + s];
+                for (int c = 0; c < k; c++)
+                    to[r * k + c] += factor * (double)P[s * k + c];
+            }
+    }
+}
+
+static inline __attribute__((always_inline)) void add_node(const product *x, int64_t i, int b, int k)
+{
+    const uz_level *level = x->level;
+    const uz_blocks *A = &level->A;
+    const int32_t *column = x->AP->column + x->AP->ptr[i];
+    const int64_t count = x->AP->ptr[i + 1] - x->AP->ptr[i], square = (int64_t)b * b;
+    for (int64_t s = 0; s < count; s++)
+        x->place[column[s]] = (int32_t)s;
+    memset(x->row, 0, (size_t)(count * b * k) * sizeof *x->row);
+    add_product(x, A->diag + i * square, false, i, b, k);
+    for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+        add_product(x, A->off + e * square, false, A->idx[e], b, k);
+    for (int64_t e = x->below->ptr[i]; e < x->below->ptr[i + 1]; e++)
+        add_product(x, A->off + x->below->at[e] * square, true, x->below->node[e], b, k);
+    for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) { /* coarse += (rows of P)' rows of A P */
+        const int32_t a = level->block[e];
+        const float *P = level->value + e * b * k;
+        for (int64_t s = 0; s < count && column[s] <= a; s++) {
+            double *to = column[s] == a ? x->coarse->diag + (int64_t)a * k * k
+                                        : x->coarse->off + uz_blocks_find(x->coarse, a, column[s]) * k * k;
+            const double *row = x->row + s * b * k;
+            for (int p = 0; p < k; p++)
+                for (int r = 0; r < b; r++)
+                    for (int c = 0; c < k; c++)
+                        to[p * k + c] += (double)P[r * k + p] * row[r * k + c];
+        }
+    }
+}
+
+static inline __attribute__((always_inline)) void add_any(const product *x, int64_t i, int k)
+{
+    const int b = x->level->A.b;
+    if (b == 3 && k == 6)
+        add_node(x, i, 3, 6);
+    else if (b == 6 && k == 6)
+        add_node(x, i, 6, 6);
+    else if (b == 2 && k == 3)
+        add_node(x, i, 2, 3);
+    else if (b == 3 && k == 3)
+        add_node(x, i, 3, 3);
+    else
+        add_node(x, i, b, k);
+}
+
+UZ_AVX2_FMA static void add_fused(const product *x, int64_t i, int k)
+{
+    add_any(x, i, k);
+}
+
+static void add_plain(const product *x, int64_t i, int k)
+{
+    add_any(x, i, k);
+}
+
+uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_stop *stop,
+                      uz_error *err)
+{
+    const int64_t nodes = level->A.nodes, aggregates = level->aggregates;
+    columns AP = {0};
+    product x = {.coarse = coarse, .level = level, .below = below, .AP = &AP};
+    bool over = false;
+    *coarse = (uz_blocks){.nodes = aggregates, .b = k};
+    x.place = uz_alloc(aggregates, sizeof *x.place);
+    bool ok = x.place && find_columns(&AP, x.place, level, below) && find_pattern(coarse, x.place, level, &AP);
+    if (ok) {
+        int64_t longest = 1;
+        for (int64_t i = 0; i < nodes; i++)
+            longest = AP.ptr[i + 1] - AP.ptr[i] > longest ? AP.ptr[i + 1] - AP.ptr[i] : longest;
+        int32_t *idx = uz_realloc(coarse->idx, coarse->ptr[aggregates], sizeof *idx);
+        coarse->idx = idx ? idx : coarse->idx;
+        x.row = uz_alloc(longest * level->A.b * k, sizeof *x.row);
+        coarse->off = uz_alloc_zero(coarse->ptr[aggregates] * k * k + 4, sizeof *coarse->off);
+        coarse->diag = uz_alloc_zero(aggregates * k * k + 4, sizeof *coarse->diag);
+        ok = x.row && coarse->off && coarse->diag;
+    }
+    void (*const add)(const product *, int64_t, int) = uz_cpu_has_avx2_fma() ? add_fused : add_plain;
+    for (int64_t i = 0; ok && !(over = i % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop)) && i < nodes; i++)
+        add(&x, i, k);
+    free(AP.ptr);
+    free(AP.column);
+    free(x.place);
+    free(x.row);
+    if (over)
+        return uz_fail_stopped(err);
+    return ok ? UZ_OK
+              : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a coarse matrix of %lld aggregates",
+                        (long long)aggregates);
+}
