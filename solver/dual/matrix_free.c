@@ -27,6 +27,9 @@
 #define FLOOR 1e-3
 /* The base may be far larger than the answer: a body without its obstacle sags much further. */
 #define BASE_FLOOR 1e-5
+/* Where rows are bounds an answer of the active set does not come from the base, which begins it: until D is applied it
+ * stays as rough as that. So it is before anybody has said what it is for. */
+#define BASE_ROUGH 1e-3
 #define FIRST_AIM  1e-10
 /* Share of a change of the response that an application of D may leave unsolved. */
 #define CHANGE_KEPT 0.01
@@ -42,7 +45,10 @@ typedef struct {
     double *p;  /* d */
     double aim; /* relative */
     uz_stop stop;
-    double base_slack; /* of base = K^-1 p */
+    double base_slack; /* of base = K^-1 p, */
+    double base_aim;   /* and what it was solved for */
+    double held_slack; /* of box->u, while box->has_exact */
+    int refused;       /* guesses that were left to steps of the active set */
     double tight;      /* relative accuracy of a change of the response, */
     double probed;     /* and while probing */
     bool probing;      /* r is a vector of any size: the answer's says nothing about how accurate D r must be */
@@ -59,9 +65,11 @@ static uz_cg_stop stop_at(const free_load *x, double relative, double absolute)
                         .deadline = x->stop.deadline};
 }
 
-/* base = K^-1 p to the aim, from where it stands; psi0 and g0 with it. */
+/* base = K^-1 p to the aim, from where it stands, unless it is there; psi0 and g0 with it. */
 static uz_status solve_base(free_load *x, double aim, uz_error *err)
 {
+    if (aim >= x->base_aim)
+        return UZ_OK;
     uz_dual_load *load = &x->sparse.load;
     double *base = x->sparse.base;
     int64_t d = load->dual->d;
@@ -72,6 +80,7 @@ static uz_status solve_base(free_load *x, double aim, uz_error *err)
     uz_status status = uz_cg_solve(&info, base, &x->cg, load->K, x->p, &stop, err);
     if (status != UZ_OK)
         return status;
+    x->base_aim = aim;
     x->base_slack = info.last / root;
     x->sparse.slack = x->base_slack;
     load->psi0 = -0.5 * uz_dot(d, x->p, base);
@@ -90,6 +99,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     x->aim = FIRST_AIM;
     x->stop.deadline = INFINITY;
     x->tight = CHANGE_KEPT;
+    x->base_aim = INFINITY;
     x->p = uz_alloc(d, sizeof *x->p);
     x->right = uz_alloc(d, sizeof *x->right);
     status = x->p && x->right ? uz_cg_init(&x->cg, load->dual->amg->mg, err)
@@ -98,7 +108,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
         return status;
     load->bytes += 16 * (size_t)d + x->cg.bytes;
     memcpy(x->p, p, (size_t)d * sizeof *p);
-    status = solve_base(x, BASE_FLOOR * x->aim, err);
+    status = solve_base(x, BASE_ROUGH, err);
     return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, err) : status;
 }
 
@@ -114,11 +124,10 @@ static void unload(uz_dual_load *load)
 static uz_status aim_at(uz_dual_load *load, double relative_error, uz_error *err)
 {
     free_load *x = (free_load *)load;
-    bool finer = relative_error < x->aim;
     x->tight = relative_error > 0.0 ? CHANGE_KEPT : EXACT_CHANGE;
     x->aim = relative_error > 0.0 ? relative_error : EXACT_AIM;
     x->stop = load->stop;
-    return finer ? solve_base(x, BASE_FLOOR * x->aim, err) : UZ_OK;
+    return x->sparse.box ? UZ_OK : solve_base(x, BASE_FLOOR * x->aim, err);
 }
 
 static void probe(uz_dual_load *load, bool begin, double accuracy)
@@ -130,10 +139,37 @@ static void probe(uz_dual_load *load, bool begin, double accuracy)
     memset(x->sparse.response, 0, (size_t)load->dual->d * sizeof *x->sparse.response);
 }
 
+/* Without a solve: r is 0, or the answer of the last guess of the active rows, whose displacement is there. */
+static bool apply_known(free_load *x, double *Dr, const double *r)
+{
+    uz_dual_load *load = &x->sparse.load;
+    const uz_bounded *box = x->sparse.box;
+    const int64_t d = load->dual->d, m = load->dual->m;
+    bool zero = !x->probing, guessed = !x->probing && box && box->has_exact;
+    for (int64_t i = 0; i < m && (zero || guessed); i++) {
+        zero = zero && r[i] == 0.0;
+        guessed = guessed && r[i] == box->r[i];
+    }
+    if (!zero && !guessed)
+        return false;
+    for (int64_t j = 0; j < d; j++)
+        x->sparse.response[j] = guessed ? box->u[j] - x->sparse.base[j] : 0.0;
+    memset(Dr, 0, (size_t)m * sizeof *Dr);
+    uz_csc_gaxpy(Dr, &load->dual->N, 1.0, x->sparse.response);
+    x->sparse.slack = guessed ? x->held_slack : x->base_slack;
+    load->left = guessed ? x->held_slack + x->base_slack : 0.0;
+    return true;
+}
+
 static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
     free_load *x = (free_load *)load;
     const uz_dual *dual = load->dual;
+    if (apply_known(x, Dr, r))
+        return UZ_OK;
+    uz_status status = solve_base(x, BASE_FLOOR * x->aim, err);
+    if (status != UZ_OK)
+        return status;
     const double root = sqrt(load->dual->amg->info.lambda), base = uz_root(-2.0 * load->psi0);
     double psi, norm2;
     uz_cg_info info;
@@ -144,7 +180,7 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     uz_cg_stop stop = x->probing ? stop_at(x, x->probed, 0.0) : stop_at(x, x->tight, FLOOR * x->aim * norm * root);
     memset(x->right, 0, (size_t)dual->d * sizeof *x->right);
     uz_csc_gaxpy_t(x->right, &dual->N, 1.0, r);
-    uz_status status = uz_cg_solve(&info, x->sparse.response, &x->cg, load->K, x->right, &stop, err);
+    status = uz_cg_solve(&info, x->sparse.response, &x->cg, load->K, x->right, &stop, err);
     memset(Dr, 0, (size_t)dual->m * sizeof *Dr);
     if (status != UZ_OK)
         return status;
@@ -249,7 +285,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     for (int64_t i = 0; i < m; i++)
         e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
     status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
-    x->sparse.slack = uz_root(uz_dot(d, e, x->cg.z) / load->dual->amg->info.lambda);
+    x->sparse.slack = x->held_slack = uz_root(uz_dot(d, e, x->cg.z) / load->dual->amg->info.lambda);
     return status;
 }
 
@@ -269,6 +305,19 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     box->has_exact = status == UZ_OK;
     *end = status == UZ_OK ? UZ_ACTIVE_SOLVED : UZ_ACTIVE_UNSOLVED;
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
+}
+
+/* Where few of the dofs have bounds a step of the active set costs no more than sweeps over them all. */
+#define FEW_BOUNDS 0.125
+enum { REFUSED_MOST = 8 };
+
+static bool guess_active(uz_dual_load *load, bool *active)
+{
+    free_load *x = (free_load *)load;
+    const bool few = (double)load->dual->m < FEW_BOUNDS * (double)load->dual->d;
+    if (x->sparse.box && few && x->refused++ < REFUSED_MOST)
+        return false;
+    return uz_sparse_guess_active(load, active);
 }
 
 /* ------------------------------------------------------------- its price */
@@ -320,6 +369,6 @@ const uz_dual_form uz_dual_matrix_free = {
     .correct = uz_sparse_correct,
     .recover = uz_sparse_recover,
     .solve_active = solve_active,
-    .guess_active = uz_sparse_guess_active,
+    .guess_active = guess_active,
     .inverse_norm = inverse_norm,
 };
