@@ -223,36 +223,69 @@ static double bends_away(const uz_bound_body *body, int64_t i, const double *u)
     return below;
 }
 
-/* With these widths at the nodes polynomials between them keep to s along the whole edge, but for normals that turn: s
- * bends away from its chord by h^2 / 8R; a quadratic polynomial is at most 1.25 times its nodes', and its middle
- * coefficient twice the middle less half the ends'. */
+/* How far the coefficients of a quadratic w_n may be from om, by share: those of s, if none is negative. Where the
+ * middle one is, s is the square of a line and what is left of both ends. Of an s that is no polynomial one that is
+ * below it. */
+static void open_quadratic(double b[3], const uz_bound_body *body, int64_t i, const double *u)
+{
+    enum { SAMPLES = 8 };
+    const uz_bound_edge *edge = &body->edge[i];
+    const uz_obstacle_piece *piece = &body->before.at[edge->before];
+    double s[3], along[3], n[2], above = 0;
+    for (int a = 0; a < 3; a++) {
+        s[a] =
+            uz_bound_gap(n, body, i, a == 2 ? 0.5 : a) - n[0] * u[2 * edge->node[a]] - n[1] * u[2 * edge->node[a] + 1];
+    }
+    b[0] = s[0];
+    b[1] = 2 * s[2] - (s[0] + s[1]) / 2;
+    b[2] = s[1];
+    for (int64_t k = 0; k < edge->pieces && edge->turns; k++)
+        for (int j = 1; j <= SAMPLES; j++) {
+            const double from = k > 0 ? piece[k - 1].end : 0, q = from + (piece[k].end - from) * j / SAMPLES, p = 1 - q;
+            const double gap = uz_bound_gap(n, body, i, q);
+            uz_along_edge(along, u, edge->node, n);
+            above = fmax(above,
+                         (b[0] + along[0]) * p * p + 2 * (b[1] + along[1]) * p * q + (b[2] + along[2]) * q * q - gap);
+        }
+    for (int a = 0; a < 3; a++)
+        b[a] -= above;
+    if (b[1] < 0) {
+        const double part = -b[1] * (1 + 1e-9), both = sqrt(fmax(0, b[0]) * fmax(0, b[2]));
+        b[0] *= both > part ? 1 - part / both : 0;
+        b[2] *= both > part ? 1 - part / both : 0;
+    }
+}
+
+/* Of linear ones: s bends away from its chord by h^2 / 8R. */
+static void open_linear(double s[3], const uz_bound_body *body, int64_t i, const double *u)
+{
+    const uz_bound_edge *edge = &body->edge[i];
+    const double bends = edge->turns ? bends_away(body, i, u) : 0;
+    for (int a = 0; a < 2; a++) {
+        double n[2];
+        s[2 * a] = uz_bound_gap(n, body, i, a) - bends;
+        s[2 * a] -= n[0] * u[2 * edge->node[a]] + n[1] * u[2 * edge->node[a] + 1];
+    }
+    s[1] = INFINITY;
+}
+
 void uz_bound_openings(double *open, const uz_bound_body *body, const uz_bound_check_result *checked)
 {
     const uz_mesh *mesh = &body->model->mesh;
     for (int64_t i = 0; i < mesh->n_nodes; i++)
         open[i] = INFINITY;
     for (int64_t i = 0; i < body->n_edges; i++) {
-        static const double PART[3] = {0, 1, 0.5};
+        static const int AT[3] = {0, 2, 1}; /* of nodes the coefficients */
         const uz_bound_edge *edge = &body->edge[i];
-        const double bends = edge->turns ? bends_away(body, i, checked->lifted) : 0;
-        double s[3] = {0};
-        for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++) {
-            double n[2];
-            const double *at = checked->lifted + 2 * edge->node[a];
-            s[a] = uz_bound_gap(n, body, i, PART[a]) - n[0] * at[0] - n[1] * at[1];
-        }
-        for (int a = 0; a < 3; a++)
-            s[a] -= bends;
-        if (edge->node[2] >= 0) { /* all alike, or by the coefficients of s: half of it at an end that is wide open */
-            const double middle = 2 * s[2] - (s[0] + s[1]) / 2, least = fmin(fmin(s[0], s[1]), middle) / 1.25;
-            const double ends = fmax(0, s[0]) + fmax(0, s[1]), part = fmax(0, fmin(0.5, 2 * middle / ends));
-            const bool alike = !(part * fmax(s[0], s[1]) > least);
-            s[0] = alike ? least : part * s[0];
-            s[1] = alike ? least : part * s[1];
-            s[2] = alike ? least : fmin(part * s[2], (middle - (fmax(0, s[0]) + fmax(0, s[1])) / 2) / 2);
-        }
-        for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++)
-            open[edge->node[a]] = fmax(0, fmin(open[edge->node[a]], s[a]));
+        double s[3];
+        if (edge->contact < 0)
+            continue;
+        if (edge->node[2] >= 0)
+            open_quadratic(s, body, i, checked->lifted);
+        else
+            open_linear(s, body, i, checked->lifted);
+        for (int a = 0; a < 3 && edge->node[a] >= 0; a++)
+            open[edge->node[a]] = fmax(0, fmin(open[edge->node[a]], s[AT[a]]));
     }
     for (int64_t k = 0; k < body->n_segments; k++) { /* between bodies the least along each segment */
         const examination x = {.body = body};
@@ -269,10 +302,35 @@ void uz_bound_openings(double *open, const uz_bound_body *body, const uz_bound_c
     }
 }
 
-/* Brings w's nodes to where they may be. */
-static void bring_nodes(weighing *y)
+/* Brings a node of an edge, of a quadratic one's middle the coefficient, to where it may be. Was it elsewhere? */
+static bool bring_node(const weighing *y, const double *open, int64_t i, int a, bool always)
 {
     static const double PART[3] = {0, 1, 0.5};
+    const uz_bound_body *body = y->body;
+    const uz_bound_edge *edge = &body->edge[i];
+    double n[2], way[2], *w = y->pair->w + 2 * edge->node[a];
+    uz_bound_gap(n, body, i, PART[a]);
+    const bool free_along = uz_way_along(way, body->model, edge->node[a], n);
+    const double om = y->pair->wanted[edge->contact], most = y->pair->share * open[edge->node[a]];
+    const double here = n[0] * w[0] + n[1] * w[1];
+    double moved = here, by = 0;
+    if (a == 2) {
+        double ends = 0;
+        for (int k = 0; k < 2; k++) {
+            uz_bound_gap(n, body, i, PART[k]);
+            ends += n[0] * y->pair->w[2 * edge->node[k]] + n[1] * y->pair->w[2 * edge->node[k] + 1];
+        }
+        moved = 2 * here - ends / 2;
+    }
+    by = (fmax(om - most, fmin(om + most, moved)) - moved) / (a == 2 ? 2 : 1);
+    const bool off = free_along && (always || fabs(by) > PLACES / 10 * (fabs(om) + fabs(w[0]) + fabs(w[1])));
+    for (int c = 0; c < 2 && off; c++)
+        w[c] += by * way[c];
+    return off;
+}
+
+static void bring_nodes(weighing *y)
+{
     const uz_bound_body *body = y->body;
     enum { PASSES = 60 };
     bool changed = true;
@@ -280,21 +338,10 @@ static void bring_nodes(weighing *y)
     uz_bound_openings(open, body, y->checked);
     for (int pass = 0; pass < (body->corners ? PASSES : 1) && changed; pass++) { /* normals leap at corners */
         changed = false;
-        for (int64_t i = 0; i < body->n_edges; i++) {
-            const uz_bound_edge *edge = &body->edge[i];
-            for (int a = 0; a < 3 && edge->contact >= 0 && edge->node[a] >= 0; a++) {
-                const int64_t node = edge->node[a];
-                double n[2], way[2], *w = y->pair->w + 2 * node;
-                uz_bound_gap(n, body, i, PART[a]);
-                const bool free_along = uz_way_along(way, body->model, node, n);
-                const double moved = n[0] * w[0] + n[1] * w[1], om = y->pair->wanted[edge->contact];
-                const double most = y->pair->share * open[node], by = fmax(om - most, fmin(om + most, moved)) - moved;
-                const bool off = pass == 0 || fabs(by) > PLACES / 10 * (fabs(om) + fabs(w[0]) + fabs(w[1]));
-                for (int c = 0; c < 2 && free_along && off; c++)
-                    w[c] += by * way[c];
-                changed = changed || (free_along && off);
-            }
-        }
+        for (int a = 0; a < 3; a++)
+            for (int64_t i = 0; i < body->n_edges; i++)
+                if (body->edge[i].contact >= 0 && body->edge[i].node[a] >= 0)
+                    changed = bring_node(y, open, i, a, pass == 0) || changed;
     }
 }
 

@@ -43,8 +43,8 @@ typedef struct {
     char fault[96];        /* what is wrong, a clause: nothing is proved; "" */
 } uz_bound_interval;
 
-/* open: n_nodes, how far |w_n - om| / m may be from zero at nodes before obstacles, by the gap that the answer leaves;
- * of others INFINITY. */
+/* open: n_nodes, how far |w_n - om| / m may be from zero at nodes before obstacles, by the gap that the answer leaves,
+ * in the middle of a quadratic edge the coefficient of the Bernstein polynomial; of others INFINITY. */
 void uz_bound_openings(double *open, const uz_bound_body *body, const uz_bound_check_result *checked);
 /* |eps(w) - C^-1 tau|, as it is. UZ_ERR_MEMORY. */
 uz_status uz_bound_apart(double *apart, const uz_bound_pair *pair, uz_error *err);

@@ -19,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 4 };
+enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 5 };
 
 /* Shares are looked for by steps of this factor, and between two that are farther apart than the other one. */
 #define STEP  2.5
@@ -27,6 +27,9 @@ enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 4 };
 
 /* What takes an answer out of an obstacle goes a little farther than it stands in there, at points. */
 #define DEEPER 1.02
+
+/* Before an obstacle what is no wider open, of the widest, is closed: rounding. */
+#define CLOSED 1e-10
 
 /* min 1/2 x'Kx - p'x with conditions on y = N x, which are active sets of one dual operator. */
 typedef struct {
@@ -42,15 +45,139 @@ typedef struct {
     bool *held;
 } rows_problem;
 
+/* The answer's rows. Those of the middles of quadratic edges before obstacles are not of nodes but of coefficients of
+ * Bernstein polynomials, which bound all along an edge:  2 g_i - (g_a + g_b) / 2. */
+typedef struct {
+    uz_setup *setup; /* of the scene */
+    const uz_body_model *model;
+    int64_t m;
+    int64_t *row;        /* m: of the model's */
+    int64_t *ends;       /* m x 2: rows of a and b; -1: the row is a node's */
+    const uz_csc *nodal; /* all of nodes */
+    uz_csc N;            /* as they are; empty where all are */
+    bool any;            /* coefficients */
+} contact_rows;
+
 typedef struct {
     uz_result *result;
     const uz_guaranteed *g;
+    contact_rows own;
     rows_problem primal, dual;
     uz_bound_body adjoint;
     double *w, *stress;    /* n_nodes x 2; as uz_bound_stress */
     double *wanted, *open; /* n_contacts; n_nodes (uz_bound_openings) */
-    double ball;           /* sqrt(H) */
+    double ball, widest;   /* sqrt(H); the largest of `open` that is finite */
 } proving;
+
+/* By nodes -> as the rows are. */
+static void to_coefficients(double *out, const contact_rows *rows, const double *by_node)
+{
+    for (int64_t k = 0; k < rows->m; k++) {
+        const int64_t *ends = rows->ends + 2 * k;
+        out[k] = ends[0] < 0 ? by_node[k] : 2 * by_node[k] - (by_node[ends[0]] + by_node[ends[1]]) / 2;
+    }
+}
+
+/* Which rows are of coefficients: of middles that have one row, as both ends have, of the same contact. */
+static uz_status find_coefficients(contact_rows *x, const uz_bound_body *body, uz_error *err)
+{
+    enum { NONE = -1, SEVERAL = -2 };
+    const uz_mesh_info *info = &x->model->info;
+    const int64_t n = body->model->mesh.n_nodes;
+    int64_t *row_of = uz_alloc(n, sizeof *row_of);
+    if (!row_of)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the rows of %lld nodes", (long long)n);
+    for (int64_t i = 0; i < n; i++)
+        row_of[i] = NONE;
+    for (int64_t k = 0; k < x->m; k++) {
+        int64_t *at = &row_of[info->contact_node[x->row[k]]];
+        *at = *at == NONE && !uz_row_inner(x->model, x->row[k]) ? k : SEVERAL;
+        x->ends[2 * k] = x->ends[2 * k + 1] = -1;
+    }
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        const uz_bound_edge *edge = &body->edge[i];
+        int64_t at[3];
+        bool all = edge->contact >= 0 && edge->node[2] >= 0;
+        for (int a = 0; a < 3 && all; a++) {
+            at[a] = row_of[edge->node[a]];
+            all = at[a] >= 0 && info->contact_of[x->row[at[a]]] == edge->contact;
+        }
+        for (int a = 0; a < 2 && all; a++)
+            x->ends[2 * at[2] + a] = at[a];
+        x->any = x->any || all;
+    }
+    free(row_of);
+    return UZ_OK;
+}
+
+/* N of these rows. */
+static uz_status make_coefficients(contact_rows *x, const uz_csc *N, uz_error *err)
+{
+    const int64_t most = 3 * N->ptr[N->cols];
+    int64_t *followers = uz_alloc(2 * x->m, sizeof *followers), *row = uz_alloc(most, sizeof *row),
+            *column = uz_alloc(most, sizeof *column), count = 0;
+    double *value = uz_alloc(most, sizeof *value);
+    uz_status status = followers && row && column && value
+                           ? UZ_OK
+                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)x->m);
+    for (int64_t k = 0; k < 2 * x->m && status == UZ_OK; k++)
+        followers[k] = -1;
+    for (int64_t k = 0; k < x->m && status == UZ_OK; k++)
+        for (int a = 0; a < 2 && x->ends[2 * k] >= 0; a++) {
+            int64_t *at = followers + 2 * x->ends[2 * k + a];
+            at[at[0] >= 0] = k; /* an end has two edges at most */
+        }
+    for (int64_t j = 0; j < N->cols && status == UZ_OK; j++)
+        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++) {
+            const int64_t k = N->idx[q], *more = followers + 2 * k;
+            for (int a = -1; a < 2; a++) {
+                if (a >= 0 && more[a] < 0)
+                    continue;
+                row[count] = a < 0 ? k : more[a];
+                column[count] = j;
+                value[count++] = N->val[q] * (a >= 0 ? -0.5 : x->ends[2 * k] >= 0 ? 2 : 1);
+            }
+        }
+    if (status == UZ_OK)
+        status = uz_csc_from_triplets(&x->N, x->m, N->cols, count, row, column, value, err);
+    free(followers);
+    free(row);
+    free(column);
+    free(value);
+    return status;
+}
+
+static void end_contact_rows(contact_rows *x, uz_cache *cache)
+{
+    uz_csc_clear(&x->N);
+    free(x->row);
+    free(x->ends);
+    uz_setup_release(cache, x->setup);
+}
+
+static uz_status begin_contact_rows(contact_rows *x, const uz_guaranteed *g, uz_error *err)
+{
+    uz_reuse reused;
+    uz_problem problem = *g->problem;
+    problem.n_cases = 0;
+    uz_status status = uz_setup_acquire(&x->setup, &reused, g->cache, &problem, NULL, g->settings, &g->hooks, err);
+    if (status != UZ_OK)
+        return status;
+    const uz_csc *N = uz_setup_N(x->setup, &problem);
+    const uz_candidates *some = x->setup->rows.in ? &x->setup->rows : NULL;
+    x->model = &x->setup->model;
+    x->nodal = N;
+    x->m = N->rows;
+    x->row = uz_alloc(x->m, sizeof *x->row);
+    x->ends = uz_alloc(2 * x->m, sizeof *x->ends);
+    if (!x->row || !x->ends)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)x->m);
+    for (int64_t i = 0, k = 0; i < x->model->m; i++)
+        if (!some || some->in[i])
+            x->row[k++] = i;
+    status = find_coefficients(x, &g->body, err);
+    return status == UZ_OK && x->any ? make_coefficients(x, N, err) : status;
+}
 
 static uz_status begin_rows(rows_problem *x, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
                             const uz_hooks *hooks, const uz_stop *stop, uz_error *err)
@@ -78,6 +205,16 @@ static uz_status begin_rows(rows_problem *x, const uz_problem *problem, const uz
     return room && x->state && x->held
                ? UZ_OK
                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld unknowns", (long long)x->d);
+}
+
+/* Of the answer's K and rows. */
+static uz_status begin_own(rows_problem *x, const contact_rows *own, const uz_guaranteed *g, uz_error *err)
+{
+    const uz_settings settings = uz_guarantee_settings(g, uz_seconds());
+    const uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES,
+                                 .qp = {.K = *uz_setup_K(own->setup, g->problem), .N = own->N}};
+    return own->any ? begin_rows(x, &matrices, &settings, g->cache, &g->hooks, &g->stop, err)
+                    : begin_rows(x, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
 }
 
 static void end_rows(rows_problem *x, uz_cache *cache)
@@ -292,14 +429,14 @@ static uz_status make_dual_rows(proving *v, uz_error *err)
         for (int a = 0; a < moments; a++)
             if (uz_bound_has_row(body, dof, i, a)) {
                 v->dual.target[row] = body->edge[i].turns ? v->wanted[body->edge[i].contact] : qp.h[row];
-                v->dual.width[row++] = fmax(0, v->g->checked.pressure[i * moments + a]);
+                v->dual.width[row++] = fmax(0, v->g->shown->pressure[i * moments + a]);
             }
     for (int64_t k = 0; k < body->n_segments && status == UZ_OK; k++) {
         const uz_bound_segment *segment = &body->segment[k];
         const bool first = k == 0 || body->segment[k - 1].slave != segment->slave;
         for (int a = 0; a < moments && first && body->edge[segment->slave].facing == UZ_BOUND_SLAVE; a++) {
             v->dual.target[row] = v->wanted[segment->contact];
-            v->dual.width[row++] = fmax(0, v->g->checked.pressure[segment->slave * moments + a]);
+            v->dual.width[row++] = fmax(0, v->g->shown->pressure[segment->slave * moments + a]);
         }
     }
     uz_qp_clear(&qp);
@@ -311,7 +448,7 @@ static uz_status make_dual_rows(proving *v, uz_error *err)
 
 static void take_displacement(proving *v, const uz_functional *of)
 {
-    const uz_body_model *model = &v->primal.setup->model;
+    const uz_body_model *model = &v->own.setup->model;
     uz_recover_nodal(v->w, model, v->primal.x, of->held);
     for (int64_t i = 0; i < 2 * model->mesh.n_nodes; i++)
         v->w[i] *= of->times;
@@ -337,13 +474,13 @@ static uz_status weigh(proving *v, uz_quantity_found *out, double *middle, doubl
     double own = INFINITY;
     const uz_bound_pair pair = {&v->adjoint, v->w, v->stress, v->wanted, share};
     uz_status status = uz_bound_weigh(&interval, &pair, &g->body, &g->problem->scene, g->dof, g->qp.K.cols,
-                                      v->result->u, g->stress, &g->checked, err);
+                                      g->admissible ? g->admissible : v->result->u, g->stress, g->shown, err);
     if (status == UZ_OK)
         status = uz_measure_residual(&own, g, interval.residual, err);
     free(interval.residual);
     *middle = interval.middle;
     *apart = interval.apart;
-    *half = status == UZ_OK ? uz_bound_half(&interval, &g->checked, g->rho, own) : (double)INFINITY;
+    *half = status == UZ_OK ? uz_bound_half(&interval, g->shown, g->rho, own) : (double)INFINITY;
     if (!isfinite(*half))
         say(out, *interval.fault ? interval.fault : "what the stress lacks of equilibrium could not be bounded");
     return status;
@@ -382,9 +519,8 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
                            uz_error *err)
 {
     rows_problem *primal = &v->primal, *dual = &v->dual;
-    const uz_setup *setup = primal->setup;
-    const uz_candidates *rows = setup->rows.in ? &setup->rows : NULL;
-    const uz_body_model *model = &setup->model;
+    const contact_rows *own = &v->own;
+    const uz_body_model *model = own->model;
     bool solved = true;
     double apart = 0, best = INFINITY;
     memset(primal->x, 0, (size_t)primal->d * sizeof *primal->x);
@@ -395,12 +531,16 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
         return UZ_OK;
     }
     uz_status status = make_dual_rows(v, err);
-    for (int64_t i = 0, k = 0; i < model->m; i++) {
-        if (rows && !rows->in[i])
-            continue;
-        primal->target[k] = of->gap[i];
-        primal->width[k++] =
-            fmin(v->result->r[i] < 0 ? 0 : fmax(0, v->result->g[i]), v->open[model->info.contact_node[i]]);
+    for (int64_t k = 0; k < own->m; k++)
+        primal->reaction[k] = of->gap[own->row[k]]; /* room */
+    to_coefficients(primal->target, own, primal->reaction);
+    for (int64_t k = 0; k < own->m; k++) {
+        const int64_t i = own->row[k];
+        const double open = v->open[model->info.contact_node[i]];
+        primal->width[k] = v->g->admissible || own->ends[2 * k] >= 0 ? open
+                           : v->result->r[i] < 0                     ? 0
+                                                                     : fmin(fmax(0, v->result->g[i]), open);
+        primal->width[k] = primal->width[k] > CLOSED * v->widest ? primal->width[k] : 0;
     }
     uz_gather_nodal(primal->p, model, of->load);
     uz_csc_gaxpy(primal->p, &model->K_fixed, -1, of->held);
@@ -458,7 +598,7 @@ static void prove_energy(uz_quantity_found *out, const uz_guarantee *energies)
 /* The loads but temperature as a functional. */
 static uz_status take_work(uz_functional *of, const proving *v, uz_error *err)
 {
-    const uz_body_model *model = &v->primal.setup->model;
+    const uz_body_model *model = &v->own.setup->model;
     *of = (uz_functional){.times = 1};
     of->load = uz_alloc_zero(model->mesh.n_nodes * model->mesh.dim, sizeof *of->load);
     of->held = uz_alloc_zero(model->n_fixed, sizeof *of->held);
@@ -486,11 +626,15 @@ static uz_status begin(proving *v, uz_error *err)
     v->wanted = uz_alloc_zero(g->problem->scene.n_contacts, sizeof *v->wanted);
     v->stress = uz_alloc(mesh->n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, sizeof *v->stress);
     v->open = uz_alloc(mesh->n_nodes, sizeof *v->open);
-    v->ball = sqrt(uz_bound_ball(&g->checked, g->rho));
+    v->ball = sqrt(uz_bound_ball(g->shown, g->rho));
     if (!v->adjoint.edge || !v->adjoint.before.at || !v->adjoint.force || !v->w || !v->wanted || !v->open || !v->stress)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes", (long long)mesh->n_nodes);
-    uz_bound_openings(v->open, body, &g->checked);
-    uz_status status = begin_rows(&v->primal, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
+    uz_bound_openings(v->open, body, g->shown);
+    for (int64_t i = 0; i < mesh->n_nodes; i++)
+        v->widest = isfinite(v->open[i]) ? fmax(v->widest, v->open[i]) : v->widest;
+    uz_status status = begin_contact_rows(&v->own, g, err);
+    if (status == UZ_OK)
+        status = begin_own(&v->primal, &v->own, g, err);
     if (status == UZ_OK)
         status = begin_rows(&v->dual, &matrices, &settings, g->cache, &g->hooks, &g->stop, err);
     return status;
@@ -531,7 +675,7 @@ static bool look_for_depth(double *depth, double *more, double *at, const uz_bou
             at[2 * i + c] = u[2 * i + c] + lift[2 * i + c];
     }
     for (int64_t i = 0; i < body->n_edges; i++) {
-        const double deep = body->edge[i].turns ? DEEPER * depth_along(body, i, at) : 0;
+        const double deep = body->edge[i].contact >= 0 ? DEEPER * depth_along(body, i, at) : 0;
         any = any || deep > 0;
         for (int a = 0; a < 3 && body->edge[i].node[a] >= 0; a++)
             more[body->edge[i].node[a]] = fmax(more[body->edge[i].node[a]], deep);
@@ -541,47 +685,106 @@ static bool look_for_depth(double *depth, double *more, double *at, const uz_bou
     return any;
 }
 
-/* The displacement of least norm that takes nodes out by their depth. */
-static uz_status lift_nodes(double *lift, rows_problem *x, const double *depth, bool *solved, uz_error *err)
+/* With the rows `held` at their h, and which are: y -> nodes. */
+static uz_status take_lift(double *lift, rows_problem *x, const contact_rows *own, bool *solved, uz_error *err)
 {
-    const uz_body_model *model = &x->setup->model;
-    const uz_candidates *rows = x->setup->rows.in ? &x->setup->rows : NULL;
-    for (int64_t i = 0, k = 0; i < model->m; i++)
-        if (!rows || rows->in[i]) {
-            x->held[k] = depth[model->info.contact_node[i]] > 0 && !uz_row_inner(model, i);
-            x->h[k] = x->held[k] ? -depth[model->info.contact_node[i]] : (double)INFINITY;
-            k++;
-        }
-    uz_status status = solve_held(x, solved, err);
+    const uz_status status = solve_held(x, solved, err);
     if (status == UZ_OK && *solved)
-        uz_recover_nodal(lift, model, x->x, NULL);
+        uz_recover_nodal(lift, own->model, x->x, NULL);
+    return status;
+}
+
+/* The displacement of least norm that takes nodes out by their depth. */
+static uz_status lift_least(double *lift, rows_problem *x, const contact_rows *own, const uz_result *result,
+                            const double *depth, bool *solved, uz_error *err)
+{
+    (void)result;
+    for (int64_t k = 0; k < x->m; k++) {
+        const double deep = depth[own->model->info.contact_node[own->row[k]]];
+        x->held[k] = deep > 0 && !uz_row_inner(own->model, own->row[k]);
+        x->h[k] = x->held[k] ? -deep : (double)INFINITY;
+    }
+    return take_lift(lift, x, own, solved, err);
+}
+
+/* What makes of the answer the displacement of least energy with its nodes, and coefficients, by their depth out of
+ * obstacles: the answer's reactions are taken off it, and others found by active sets. */
+static uz_status lift_cheaply(double *lift, rows_problem *x, const contact_rows *own, const uz_result *result,
+                              const double *depth, bool *solved, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    bool changed = true;
+    for (int64_t k = 0; k < x->m; k++) {
+        x->held[k] = result->r[own->row[k]] < 0;
+        x->y[k] = result->r[own->row[k]];
+        x->width[k] = result->g[own->row[k]];
+    }
+    memset(x->p, 0, (size_t)x->d * sizeof *x->p);
+    uz_csc_gaxpy_t(x->p, own->nodal, -1, x->y);
+    to_coefficients(x->target, own, x->width);
+    for (int64_t k = 0; k < x->m; k++)
+        if (!uz_row_inner(own->model, own->row[k]))
+            x->target[k] -= depth[own->model->info.contact_node[own->row[k]]];
+    *solved = true;
+    for (int step = 0; step < MOST_STEPS && changed && *solved && status == UZ_OK; step++) {
+        for (int64_t k = 0; k < x->m; k++)
+            x->h[k] = x->held[k] ? x->target[k] : (double)INFINITY;
+        status = take_lift(lift, x, own, solved, err);
+        changed = false;
+        for (int64_t k = 0; k < x->m && *solved; k++) {
+            const bool next = x->held[k] ? x->r[k] < 0 : x->y[k] > x->target[k];
+            changed = changed || next != x->held[k];
+            x->held[k] = next;
+        }
+    }
+    return status;
+}
+
+/* Lifts by greater and greater depths until the answer is out of obstacles. depth: 4 n_nodes, room. */
+static uz_status lift_out(double **out, double *depth, uz_guaranteed *g, rows_problem *x, const contact_rows *own,
+                          const uz_result *result, bool cheaply, uz_error *err)
+{
+    const int64_t n = g->body.model->mesh.n_nodes;
+    double *lift = uz_alloc_zero(2 * n, sizeof *lift);
+    uz_status status = lift ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to take %lld nodes out", (long long)n);
+    bool solved = lift != NULL;
+    int steps = 0;
+    memset(depth, 0, (size_t)n * sizeof *depth);
+    for (; steps < MOST_LIFTS && solved && status == UZ_OK &&
+           look_for_depth(depth, depth + n, depth + 2 * n, &g->body, result->u, lift);
+         steps++) {
+        if (steps == 0 && cheaply && own->any) /* coefficients take it out, but for what is no polynomial */
+            memset(depth, 0, (size_t)n * sizeof *depth);
+        status = (cheaply ? lift_cheaply : lift_least)(lift, x, own, result, depth, &solved, err);
+    }
+    if (status == UZ_OK && steps > 0 && solved)
+        *out = lift;
+    else
+        free(lift);
     return status;
 }
 
 uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err)
 {
     const int64_t n = g->body.model->mesh.n_nodes;
-    double *depth = uz_alloc_zero(4 * n, sizeof *depth), *lift = uz_alloc_zero(2 * n, sizeof *lift);
+    double *depth = uz_alloc_zero(6 * n, sizeof *depth);
+    contact_rows own = {.setup = NULL};
     rows_problem x = {.setup = NULL};
-    bool solved = depth && lift && g->body.n_loose == 0;
     uz_status status =
-        depth && lift ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to take %lld nodes out", (long long)n);
-    int steps = 0;
-    for (; steps < MOST_LIFTS && solved && status == UZ_OK &&
-           look_for_depth(depth, depth + n, depth + 2 * n, &g->body, result->u, lift);
-         steps++) {
-        if (steps == 0)
-            status = begin_rows(&x, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
+        depth ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to take %lld nodes out", (long long)n);
+    if (depth && g->body.n_loose == 0 &&
+        look_for_depth(depth, depth + n, depth + 2 * n, &g->body, result->u, depth + 4 * n)) {
+        status = begin_contact_rows(&own, g, err);
         if (status == UZ_OK)
-            status = lift_nodes(lift, &x, depth, &solved, err);
-    }
-    if (status == UZ_OK && (steps > 1 || (steps == 1 && solved))) {
-        g->lift = lift;
-        lift = NULL;
+            status = begin_own(&x, &own, g, err);
+        if (status == UZ_OK)
+            status = lift_out(&g->lift, depth, g, &x, &own, result, false, err);
+        if (status == UZ_OK)
+            status = lift_out(&g->cheap, depth, g, &x, &own, result, true, err);
     }
     end_rows(&x, g->cache);
+    end_contact_rows(&own, g->cache);
     free(depth);
-    free(lift);
     return status;
 }
 
@@ -608,8 +811,8 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
             uz_quantity_place(where, g->problem, i, "on");
             status = asked->kind == UZ_QUANTITY_STRAIN_ENERGY
                          ? take_work(&of, &v, err)
-                         : uz_functional_make(&of, asked, where, &v.primal.setup->model, &g->problem->scene, result,
-                                              NULL, NULL, err);
+                         : uz_functional_make(&of, asked, where, &v.own.setup->model, &g->problem->scene, result, NULL,
+                                              NULL, err);
             why = of.why[0] ? "supports of both kinds, springs and others, hold this group" : NULL;
             if (status == UZ_OK && !why)
                 status = prove_one(&v, out, asked, &of, err);
@@ -622,6 +825,7 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
     }
     end_rows(&v.primal, g->cache);
     end_rows(&v.dual, g->cache);
+    end_contact_rows(&v.own, g->cache);
     void *room[] = {v.open, v.w, v.stress, v.wanted, v.adjoint.edge, v.adjoint.before.at, v.adjoint.force};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);

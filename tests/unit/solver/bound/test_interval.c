@@ -129,6 +129,7 @@ static void open_lab(lab *l, const char *element, int cells, obstacle below)
                          l->g.stress, &err) == UZ_OK);
     CHECK_STR(l->g.checked.fault, "");
     CHECK(uz_measure_residual(&l->g.rho, &l->g, l->g.checked.residual, &err) == UZ_OK);
+    l->g.shown = &l->g.checked;
     l->adjoint = l->g.body;
     l->adjoint.edge = malloc((size_t)l->g.body.n_edges * sizeof *l->adjoint.edge);
     l->adjoint.force = zeros(2 * l->model.mesh.n_elements);
