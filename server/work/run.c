@@ -317,6 +317,8 @@ bool work_probe(worker *me)
     char *body = strdup(PROBE);
     if (!body)
         return false;
+    atomic_store(&me->cancel, false); /* what was wanted of the job before; nobody knows of this one */
+    atomic_store(&me->lost, false);
     process *p = work_take_process(me->w, me->lane, NULL, 0, &key);
     pthread_mutex_lock(&me->lock);
     me->process = p;

@@ -144,6 +144,8 @@ def test_ready_is_asked_of_a_process(s):
     s.request("DELETE", f"/v1/jobs/{job}")
     s.wait_status(job, "dismissed")
     check(len(s.get("/v1/jobs").json["jobs"]) == 1)
+    time.sleep(1.1)
+    check(s.get("/readyz").status == 200, "that a job was to end is no word to the next question")
 
 
 def seconds_of(pid):
