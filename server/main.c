@@ -10,6 +10,7 @@
 #include "privileges.h"
 #include "store/engine_base.h"
 #include "store/engines/engines.h"
+#include "store/nodes.h"
 #include "uzawa.h"
 #include "work/solver_process.h"
 #include "work/webhook.h"
@@ -33,6 +34,7 @@ static const double LEASE_S = 60;
 typedef struct {
     server_log log, audit; /* audit: who did what; its stream NULL: not kept */
     metrics *metrics;
+    char node[STORE_NODE]; /* the name of this daemon */
     store *store;
     work *work;
     webhooks *webhooks;
@@ -111,18 +113,32 @@ static bool read_secrets(service *s, const server_options *options, char *messag
     return !options->tls_cert[0] || http_tls_read(&s->tls, options->tls_cert, options->tls_key, message, size);
 }
 
+/* --node, or else the host's name and the port that was taken. */
+static void name_node(service *s, const server_options *options, const char *url)
+{
+    char host[STORE_NODE - 8] = "";
+    gethostname(host, sizeof host - 1);
+    if (options->node[0])
+        snprintf(s->node, sizeof s->node, "%.*s", (int)sizeof s->node - 1, options->node);
+    else
+        snprintf(s->node, sizeof s->node, "%s%s", host, strrchr(url, ':') ? strrchr(url, ':') : "");
+}
+
 /* The store and those who work on it. */
 static bool start_work(service *s, const server_options *options, char *message, size_t size)
 {
     const store_settings settings = {.metrics = s->metrics,
                                      .max_queue = options->max_queue,
+                                     .affinity_s = options->affinity_s,
                                      .quotas = {.waiting = options->client_queue,
                                                 .bytes = (int64_t)options->client_bytes,
                                                 .seconds = options->client_seconds},
                                      .uploads = {.one = (int64_t)options->max_upload,
                                                  .all = (int64_t)options->uploads,
                                                  .keep_s = options->upload_days * 86400}};
-    const work_options workers = {.workers = options->workers,
+    const work_options workers = {.node = s->node,
+                                  .version = UZAWAD_VERSION,
+                                  .workers = options->workers,
                                   .lanes = options->lanes,
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
@@ -133,7 +149,7 @@ static bool start_work(service *s, const server_options *options, char *message,
                                   .retention = {.keep_s = options->keep_days * 86400,
                                                 .keep_jobs = options->keep_jobs,
                                                 .keep_bytes = (int64_t)options->keep_bytes}};
-    s->store = store_open(options->db, message, size);
+    s->store = store_open(options_address(options), message, size);
     if (!s->store)
         return false;
     s->store->settings = settings;
@@ -203,6 +219,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     int fd = http_listen(options->listen, s->tls.cert ? "https" : "http", url, url_size, message, size);
     if (fd < 0)
         return false;
+    name_node(s, options, url);
     if (!check_exposure(s, options, fd, message, size) ||
         (options->user[0] && !privileges_drop(options->user, message, size)) ||
         !start_work(s, options, message, size)) {
@@ -291,7 +308,7 @@ static int run(service *s, const server_options *options)
     fflush(stdout);
     log_write(&s->log, LOG_INFO, "started",
               (log_field[]){LOG_S("url", url),
-                            LOG_S("db", options->db),
+                            LOG_S("db", options_address(options)),
                             LOG_I("workers", options->workers),
                             LOG_S("version", UZAWAD_VERSION),
                             {0}});
@@ -389,9 +406,9 @@ int main(int argc, char **argv)
         fprintf(stderr, "uzawad: %s\n%s", message, "usage: uzawad [OPTION]...; uzawad --help lists them\n");
         return EXIT_USAGE;
     case OPTIONS_CHECK_DB:
-        return check_db(options.db);
+        return check_db(options_address(&options));
     case OPTIONS_BACKUP:
-        if (!store_backup_file(options.db, backup, &bytes, message, sizeof message)) {
+        if (!store_backup_file(options_address(&options), backup, &bytes, message, sizeof message)) {
             fprintf(stderr, "uzawad: %s\n", message);
             return EXIT_FAILED;
         }

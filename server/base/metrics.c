@@ -169,6 +169,9 @@ static void write_counted(const metrics *m, FILE *out)
         [METRIC_LANE] = {"lane_jobs_total", "Jobs that a lane for small ones took, past large ones."},
         [METRIC_LANE_RETURNED] = {"lane_jobs_returned_total",
                                   "Jobs in a lane that were larger than they seemed, and were put back."},
+        [METRIC_BODY_HELD] = {"claims_body_held_total", "Jobs claimed whose body this daemon had."},
+        [METRIC_BODY_NEW] = {"claims_body_new_total", "Jobs claimed whose body no daemon had."},
+        [METRIC_BODY_OTHERS] = {"claims_body_others_total", "Jobs claimed whose body only other daemons had."},
         [METRIC_DELETED] = {"jobs_deleted_total", "Ended jobs that were deleted for their age, number or size."},
         [METRIC_UPLOADS] = {"uploads_total", "Uploads that were stored, or sent again."},
         [METRIC_WEBHOOK_TOLD] = {"webhooks_told_total", "Ends of jobs that webhooks were told."},
@@ -230,6 +233,9 @@ static void write_now(const metrics *m, const metrics_now *now, FILE *out)
     write_gauge(out, "cache_bytes", "Bytes that cached factors take.", (double)now->cache_bytes);
     write_gauge(out, "cache_max_bytes", "Bytes that cached factors may take.", (double)now->cache_max_bytes);
     write_gauge(out, "cache_entries", "Cached factors.", (double)now->cache_entries);
+    if (now->nodes >= 0)
+        write_gauge(out, "nodes", "Daemons that share the store and live.", (double)now->nodes);
+    write_gauge(out, "draining", "1: this daemon was told to claim no jobs.", now->draining);
     if (now->store_free_bytes >= 0)
         write_gauge(out, "store_free_bytes", "Bytes that are free on the disk of the database.",
                     (double)now->store_free_bytes);

@@ -6,6 +6,7 @@
 #ifndef SERVER_METRICS_H
 #define SERVER_METRICS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -40,6 +41,9 @@ typedef enum {
     METRIC_REQUEUED,       /* jobs put back, by the end of a drain or after the end of a process */
     METRIC_LANE,           /* jobs that a lane took */
     METRIC_LANE_RETURNED,  /* those of them that were larger than they seemed, and put back */
+    METRIC_BODY_HELD,      /* jobs claimed whose body this daemon had, of several that share a store */
+    METRIC_BODY_NEW,       /* nobody */
+    METRIC_BODY_OTHERS,    /* others, which had no time for them */
     METRIC_DELETED,        /* ended jobs that were kept long enough */
     METRIC_UPLOADS,        /* uploads stored, or sent again */
     METRIC_WEBHOOK_TOLD,   /* ends of jobs that were told */
@@ -59,6 +63,8 @@ void metrics_request(metrics *m, const char *method, const char *route, int stat
 typedef struct {
     int64_t jobs[5]; /* by job_status; -1: the store did not answer */
     int64_t clients; /* that have jobs which wait */
+    int64_t nodes;   /* that share the store, and live; -1: it did not answer */
+    bool draining;   /* this one claims nothing */
     const char *job_names[5];
     int workers, workers_busy;
     size_t cache_bytes, cache_max_bytes, cache_entries, body_bytes;

@@ -8,6 +8,7 @@
 
 #include "base/problem_details.h"
 #include "codec/json.h"
+#include "store/nodes.h"
 #include "store/store.h"
 #include "store/uploads.h"
 #include "uzawa.h"
@@ -149,6 +150,7 @@ char *codec_encode_valid(const uz_prediction *predicted);
 /* The data of a progress event; row: the newest of the history, or NULL. */
 char *codec_encode_progress(int progress, const double *row);
 char *codec_encode_upload(const upload_info *info);
+char *codec_encode_nodes(const store_node *nodes, size_t count);
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers);
 /* A bound that holds for this service. */
 typedef struct {

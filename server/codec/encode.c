@@ -3,6 +3,7 @@
 #include "codec/json.h"
 #include "codec/text.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -154,6 +155,43 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
     text_close(&t, ']');
     text_integer(&t, "bytes", (int64_t)bytes);
     text_integer(&t, "max_bytes", (int64_t)max_bytes);
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_nodes(const store_node *nodes, size_t count)
+{
+    text t = {0};
+    char body[17];
+    text_open(&t, NULL, '{');
+    text_open(&t, "nodes", '[');
+    for (size_t i = 0; i < count; i++) {
+        const store_node *n = &nodes[i];
+        text_open(&t, NULL, '{');
+        text_string(&t, "name", n->name);
+        text_string(&t, "state", !n->alive ? "silent" : n->draining ? "draining" : "active");
+        text_string(&t, "host", n->host);
+        text_integer(&t, "pid", n->pid);
+        text_string(&t, "version", n->version);
+        put_time(&t, "started", n->begun);
+        put_time(&t, "seen", n->seen);
+        text_integer(&t, "workers", n->workers);
+        text_integer(&t, "busy", n->busy);
+        text_integer(&t, "running", n->running);
+        text_open(&t, "cache", '{');
+        text_integer(&t, "factors", n->factors);
+        text_integer(&t, "bytes", n->bytes);
+        text_integer(&t, "max_bytes", n->max_bytes);
+        text_close(&t, '}');
+        text_open(&t, "bodies", '[');
+        for (size_t k = 0; k < n->n_bodies; k++) {
+            snprintf(body, sizeof body, "%016" PRIx64, n->bodies[k]);
+            text_string(&t, NULL, body);
+        }
+        text_close(&t, ']');
+        text_close(&t, '}');
+    }
+    text_close(&t, ']');
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }

@@ -77,7 +77,7 @@ typedef struct route {
 } route;
 
 /* What a token must allow for this route. Whoever adds a route need not think of it: what changes something is for
- * `submit`, what only reads for `read`, /v1/admin/ for `admin`. */
+ * `submit`, what only reads for `read`, /v1/admin/ and what is done to a node for `admin`. */
 auth_scope route_scope(const route *r);
 
 /* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. With rq->reply.cors, OPTIONS is
@@ -102,6 +102,8 @@ void events_get_all(api *context, http_request *rq, http_reply *reply);
 void trade_get(api *context, http_request *rq, http_reply *reply);
 void convergence_get(api *context, http_request *rq, http_reply *reply);
 void service_limits(api *context, http_request *rq, http_reply *reply);
+void nodes_list(api *context, http_request *rq, http_reply *reply);
+void nodes_drain(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);
 void admin_check(api *context, http_request *rq, http_reply *reply);
 void service_metrics(api *context, http_request *rq, http_reply *reply);

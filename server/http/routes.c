@@ -26,6 +26,9 @@ static const route ROUTES[] = {
     {"DELETE", "/v1/uploads/{digest}", NONE, uploads_delete, false},
     {"GET", "/v1/factors", NONE, service_factors, false},
     {"GET", "/v1/limits", NONE, service_limits, false},
+    {"GET", "/v1/nodes", NONE, nodes_list, false},
+    {"POST", "/v1/nodes/{name}/drain", NONE, nodes_drain, false},
+    {"DELETE", "/v1/nodes/{name}/drain", NONE, nodes_drain, false},
     {"POST", "/v1/admin/check", NONE, admin_check, false},
     {"GET", "/metrics", NONE, service_metrics, false},
     {"GET", "/healthz", NONE, service_health, false},
@@ -90,7 +93,7 @@ auth_scope route_scope(const route *r)
     for (size_t i = 0; i < sizeof OPEN / sizeof OPEN[0]; i++)
         if (strcmp(r->pattern, OPEN[i]) == 0 && strcmp(r->method, "GET") == 0)
             return SCOPE_NONE;
-    if (strncmp(r->pattern, "/v1/admin/", 10) == 0)
+    if (strncmp(r->pattern, "/v1/admin/", 10) == 0 || strncmp(r->pattern, "/v1/nodes/", 10) == 0)
         return SCOPE_ADMIN;
     return strcmp(r->method, "GET") == 0 ? SCOPE_READ : SCOPE_SUBMIT;
 }

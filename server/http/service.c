@@ -5,6 +5,7 @@
 #include "http/api.h"
 #include "http/page.h"
 #include "options/options.h"
+#include "store/nodes.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -51,6 +52,19 @@ void service_limits(api *context, http_request *rq, http_reply *reply)
     reply_json(reply, 200, text_finish(&t, NULL));
 }
 
+static int64_t count_alive(store *s)
+{
+    store_node *nodes;
+    size_t count;
+    int64_t alive = 0;
+    if (store_nodes(s, &nodes, &count) != STORE_OK)
+        return -1;
+    for (size_t i = 0; i < count; i++)
+        alive += nodes[i].alive;
+    store_nodes_free(nodes, count);
+    return alive;
+}
+
 void service_metrics(api *context, http_request *rq, http_reply *reply)
 {
     const transport_counts counts = transport_count(context->server);
@@ -75,6 +89,8 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
         now.jobs[0] = -1;
     for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++)
         now.job_names[i] = job_status_name((job_status)i);
+    now.draining = work_draining(context->work);
+    now.nodes = count_alive(context->store);
     work_cached(context->work, &now.cache_entries, &now.cache_bytes);
     now.cache_max_bytes = work_settings(context->work)->cache_bytes;
     char *body = metrics_text(context->metrics, &now, &len);
@@ -103,6 +119,11 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
     reply->retry_after_s = 5;
     if (api_draining(context)) {
         reply_refuse(reply, 503, "draining", "The server is shutting down", "no new work is taken");
+        return;
+    }
+    if (work_draining(context->work)) { /* others take its share */
+        reply_refuse(reply, 503, "draining", "This node is drained",
+                     "it runs no jobs until DELETE /v1/nodes/{name}/drain");
         return;
     }
     pthread_mutex_lock(&context->ready_lock);

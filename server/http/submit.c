@@ -35,8 +35,8 @@ static bool read_key(const http_request *rq, char **key, problem_details *proble
 #define SMALL_ROWS 1000
 
 /* What the store keeps of a decoded request, and of its body and key, which must outlive it. */
-static store_request kept_request(const http_request *rq, const codec_request *request, const char *body, size_t len,
-                                  const char *key)
+static store_request kept_request(const api *context, const http_request *rq, const codec_request *request,
+                                  const char *body, size_t len, const char *key)
 {
     /* Small by its size alone: a prediction proper (uz_predict) takes longer than most jobs that are small. One that
      * iterates for long all the same is found out by who runs it. */
@@ -45,6 +45,7 @@ static store_request kept_request(const http_request *rq, const codec_request *r
     problem_details ignored;
     int64_t m, n_u;
     double cells = 1.0;
+    const uint64_t held = store_is_shared(context->store) ? work_body(body, len) : 0;
     for (int i = 0; p->kind == UZ_PROBLEM_SCENE && i < p->scene.box.dim; i++)
         cells *= (double)p->scene.box.cells[i];
     const bool small = cells <= SMALL_DOFS && codec_request_sizes(request, &m, &n_u, &ignored) &&
@@ -52,6 +53,7 @@ static store_request kept_request(const http_request *rq, const codec_request *r
     return (store_request){.client = rq->client,
                            .share = rq->share,
                            .small = small,
+                           .held_body = held,
                            .any_upload = rq->sees_all,
                            .body = body,
                            .body_len = len,
@@ -275,7 +277,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
     } else {
         codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
-        store_request stored = kept_request(rq, &request, rq->body, rq->body_len, key);
+        store_request stored = kept_request(context, rq, &request, rq->body, rq->body_len, key);
         if (store_job(context, rq, &stored, &j, reply))
             jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
     }
@@ -303,7 +305,7 @@ void verify_submit(api *context, http_request *rq, http_reply *reply)
             reply_problem(reply, &problem);
     } else {
         codec_request_strip(&request);
-        store_request stored = kept_request(rq, &request, rq->body, rq->body_len, key);
+        store_request stored = kept_request(context, rq, &request, rq->body, rq->body_len, key);
         there = store_job(context, rq, &stored, &j, reply);
     }
     if (!there || !jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
@@ -397,7 +399,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
             make_request(context, rq, &old, old_body, old_len, &body, &len, &made, reply);
             free(old_body); /* as large as the new one: not kept while the client waits */
             old_body = NULL;
-            store_request request = kept_request(rq, &made, body, len, key);
+            store_request request = kept_request(context, rq, &made, body, len, key);
             request.refines = old.id;
             job new = {0};
             if (body && store_job(context, rq, &request, &new, reply))

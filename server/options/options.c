@@ -23,6 +23,11 @@ bool options_set(server_options *o, const uz_option *row, const char *text, char
     return false;
 }
 
+const char *options_address(const server_options *o)
+{
+    return o->store[0] ? o->store : o->db;
+}
+
 void options_split(option_words *out, const char *list)
 {
     out->n = 0;
@@ -134,12 +139,17 @@ static bool set_layer(server_options *o, option_source layer, const flags *f, ch
     return true;
 }
 
+static const uz_option *row_of(const char *name)
+{
+    return uz_option_find(DAEMON_OPTIONS, OPTION_SETTING, name, strlen(name));
+}
+
 options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size)
 {
     flags f = {.verdict = OPTIONS_RUN};
     char name[64];
     const uz_option_table table = DAEMON_OPTIONS;
-    const uz_option *config = uz_option_find(table, OPTION_SETTING, "config", strlen("config"));
+    const uz_option *config = row_of("config");
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
     memset(out, 0, sizeof *out);
     for (size_t i = 0; i < table.count; i++)
@@ -156,6 +166,20 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
     if ((path && path[0] && !options_read_file(out, path, message, size)) ||
         !set_layer(out, FROM_ENVIRONMENT, NULL, message, size) || !set_layer(out, FROM_FLAG, &f, message, size))
         return OPTIONS_WRONG;
+    if (out->store[0] && strcmp(out->db, row_of("db")->normal) != 0) {
+        snprintf(message, size, "store and db are both given: jobs are kept in one of them");
+        return OPTIONS_WRONG;
+    }
+    if (out->store[0] && !strstr(out->store, "://")) {
+        snprintf(message, size, "store does not take \"%.100s\": give postgresql://USER@HOST/NAME; a file is for db",
+                 out->store);
+        return OPTIONS_WRONG;
+    }
+    if (strlen(out->node) > 63 || out->node[strcspn(out->node, "/?#% ")]) {
+        snprintf(message, size, "node does not take \"%.100s\": give at most 63 bytes without / ? # %% and spaces",
+                 out->node);
+        return OPTIONS_WRONG;
+    }
     if (!out->tls_cert[0] != !out->tls_key[0]) {
         snprintf(message, size, "tls-cert and tls-key need each other: give both or neither");
         return OPTIONS_WRONG;

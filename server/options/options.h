@@ -25,7 +25,8 @@ typedef enum { FROM_DEFAULT, FROM_FILE, FROM_ENVIRONMENT, FROM_FLAG } option_sou
 
 typedef struct {
     /* where */
-    char listen[OPTION_PATH], db[OPTION_PATH], config[OPTION_PATH];
+    char listen[OPTION_PATH], db[OPTION_PATH], store[OPTION_PATH], node[OPTION_PATH], config[OPTION_PATH];
+    double affinity_s;
     /* who may: "" where there is none */
     char token_file[OPTION_PATH], tls_cert[OPTION_PATH], tls_key[OPTION_PATH], user[OPTION_PATH],
         audit_log[OPTION_PATH];
@@ -77,6 +78,9 @@ typedef enum {
 
 /* Reads argv, the environment and the file. backup (OPTION_PATH bytes, may be NULL) takes the FILE of --backup. */
 options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size);
+
+/* Where jobs are kept: store, or db where that is "". */
+const char *options_address(const server_options *o);
 
 /* The words of a list of words, as options_read leaves it: separated by single spaces. */
 typedef struct {

@@ -33,8 +33,16 @@ static const uz_option ROWS[] = {
             .about = "HOST:PORT to listen on; [::1]:0 works too, port 0 takes a free one. An address that others can "
                      "reach needs a token-file"),
     SETTING("db", TEXT, db, .value = "FILE", .normal = "./contact.db",
-            .about = "jobs and results are kept in this file, or in a PostgreSQL database that several daemons share: "
-                     "postgresql://USER@HOST/NAME"),
+            .about = "jobs and results are kept in this file"),
+    SETTING("store", TEXT, store, .value = "URL", .normal = "",
+            .about = "they are kept in a PostgreSQL database that several daemons share instead: "
+                     "postgresql://USER@HOST/NAME; not together with db"),
+    SETTING("node", TEXT, node, .value = "NAME", .normal = "",
+            .about = "name of this daemon among those that share the store; without it host and port"),
+    SETTING("affinity-s", NUMBER, affinity_s, .value = "S", .most = 3600, .normal = "5", .unit = "seconds",
+            .zero_is_off = true,
+            .about = "with several daemons, a job waits at most so long for the one that has its body's factor, or "
+                     "because jobs of others go before it for that; 0: it does not"),
     SETTING("config", TEXT, config, .value = "FILE", .normal = "",
             .about = "file with lines \"name = value\" for all options but this one"),
     SETTING("token-file", TEXT, token_file, .value = "FILE", .normal = "",

@@ -11,6 +11,7 @@
 #ifndef SERVER_STORE_ENGINE_H
 #define SERVER_STORE_ENGINE_H
 
+#include "store/nodes.h"
 #include "store/result_blobs.h"
 #include "store/uploads.h"
 
@@ -22,6 +23,15 @@ typedef struct {
     const store_outcome *outcome; /* finish */
     bool counted;                 /* release: the attempt */
 } lease_use;
+
+/* What daemons that share a store have of each other (nodes.h). */
+typedef struct {
+    store_status (*report)(store *s, const store_node *now, bool *draining);
+    store_status (*list)(store *s, store_node **nodes, size_t *count);
+    store_status (*drain)(store *s, const char *name, bool drain);
+    store_status (*forget)(store *s, const uint64_t *bodies, size_t n); /* n > 0 */
+    store_status (*rates)(store *s, store_rate *rates, size_t n);       /* n > 0 */
+} store_engine_nodes;
 
 typedef struct {
     const char *scheme; /* how its addresses begin: "postgresql://"; "": it takes all others, as names of files */
@@ -56,6 +66,7 @@ typedef struct {
     store_status (*upload_forget)(store *s, const char *id, const char *client, bool *gone);
     store_status (*upload_idle)(store *s, double before, upload_info *out); /* no job's, longest unused, since before */
     store_status (*upload_total)(store *s, int64_t *bytes);                 /* NULL: nobody sends it any */
+    const store_engine_nodes *nodes;                                        /* NULL: a store has one daemon */
     store_status (*try_write)(store *s);
     int64_t (*free_bytes)(store *s);
     store_status (*check)(store *s, store_findings *out);

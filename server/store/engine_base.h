@@ -16,6 +16,8 @@ struct store {
     store_uploads *uploads;
     age_clock ages; /* of who retains and collects */
     char *missing;  /* what was on disk once and was not any more at opening, in words; NULL: nothing that is known */
+    pthread_mutex_t node_lock;    /* node; nothing is taken under it */
+    store_node node;              /* of an engine of one process: this one */
     pthread_mutex_t message_lock; /* message; taken last */
     char message[256];
 };

@@ -44,12 +44,14 @@ void store_base_begin(store *s, const store_engine *engine)
 {
     *s = (store){.engine = engine};
     pthread_mutex_init(&s->message_lock, NULL);
+    pthread_mutex_init(&s->node_lock, NULL);
 }
 
 void store_base_end(store *s)
 {
     store_uploads_end(s);
     free(s->missing);
+    pthread_mutex_destroy(&s->node_lock);
     pthread_mutex_destroy(&s->message_lock);
 }
 
@@ -150,6 +152,11 @@ store_status store_claim(store *s, const char *owner, double lease_s, bool small
     *out = (job){.progress = 0};
     *body = NULL;
     *body_len = 0;
+    pthread_mutex_lock(&s->node_lock);
+    const bool drains = s->node.draining;
+    pthread_mutex_unlock(&s->node_lock);
+    if (drains)
+        return STORE_NOT_FOUND;
     store_status status = publish_job(s->engine->claim(s, lease, lease_s, small, out, body, body_len), out);
     memcpy(lease->job, out->id, sizeof lease->job);
     if (status == STORE_OK)

@@ -72,6 +72,8 @@ typedef struct {
     int64_t max_queue; /* so many jobs may wait; a submission beyond it is STORE_BUSY; 0: no limit */
     upload_limits uploads;
     client_quotas quotas;
+    double affinity_s; /* with several daemons a job waits at most so long for one that has its body, or because others
+                        * whose body the claimer has go before it; 0: it does not */
 } store_settings;
 /* NULL is fine. */
 void store_close(store *s);
@@ -107,6 +109,7 @@ typedef struct {
     bool small;           /* it is taken to end at once */
     const char *webhook;  /* address to tell of its end, or NULL */
     double queue_limit_s; /* it fails if it has not begun so long after it came; 0: no limit */
+    uint64_t held_body;   /* what stands for its body: the same for jobs that a factor serves; 0: not known */
 } store_request;
 
 /* ---- submit: the job is on disk (fsync) before STORE_OK is returned. When the key is known and came with the same
@@ -123,6 +126,10 @@ typedef struct {
     char job[33], owner[128];
     uint64_t token; /* fencing token: no other claim of this job by this owner has it */
     double seconds; /* that it lasts from its claim, and from each renewal */
+    /* Of the claim, where several daemons share the store: */
+    uint64_t held_body;                         /* as it was submitted */
+    enum { FIT_NEW, FIT_HELD, FIT_OTHERS } fit; /* nobody had the body; this daemon; only others */
+    double later_s; /* nothing was claimed, since jobs wait for who has their body: look again then; 0: nothing waits */
 } store_lease;
 
 /* A priority above this goes before all shares. */

@@ -2,13 +2,16 @@
  * In a thread of its own, so that a long deletion never keeps a lease from being renewed. */
 #include "work/housekeeping.h"
 #include "codec/codec.h"
+#include "store/nodes.h"
 #include "store/uploads.h"
 
 #include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #define ROUND_S   0.5
+#define REPORT_S  2.0
 #define HEAP_FREE ((size_t)16 << 20) /* may lie free */
 
 /* What the jobs are told that have waited too long. */
@@ -19,10 +22,35 @@ static const problem_details WAITED = {
     .detail =
         "It had not begun when its queue_limit_s was over. Submit it again, with more time or a larger priority."};
 
+/* How this daemon is, for who looks at all of them; and whether it is to claim jobs. */
+static void report(work *w)
+{
+    store_node now = {.pid = (int)getpid(), .workers = w->options.workers, .busy = work_busy(w)};
+    size_t entries, bytes;
+    bool draining;
+    work_cached(w, &entries, &bytes);
+    now.factors = (int64_t)entries;
+    now.bytes = (int64_t)bytes;
+    now.max_bytes = (int64_t)w->options.cache_bytes;
+    gethostname(now.host, sizeof now.host - 1);
+    snprintf(now.name, sizeof now.name, "%s", w->options.node ? w->options.node : "");
+    snprintf(now.version, sizeof now.version, "%s", w->options.version ? w->options.version : "");
+    if (store_report(w->store, &now, &draining) != STORE_OK || draining == atomic_load(&w->draining))
+        return;
+    atomic_store(&w->draining, draining);
+    log_write(w->log, LOG_INFO, draining ? "draining" : "drained_no_more", (log_field[]){{0}});
+}
+
+bool work_draining(work *w)
+{
+    return atomic_load(&w->draining);
+}
+
 void *housekeeping_loop(void *arg)
 {
     work *w = arg;
     bool told = false; /* that the clock is not believed */
+    double next_report = 0.0;
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {
         if (clock_wait(&w->tick, &w->lock, clock_seconds(CLOCK_MONOTONIC) + ROUND_S))
@@ -34,6 +62,10 @@ void *housekeeping_loop(void *arg)
         if (heap.fordblks > HEAP_FREE)
             malloc_trim(0);
         work_rest_processes(w);
+        if (clock_seconds(CLOCK_MONOTONIC) >= next_report) {
+            report(w);
+            next_report = clock_seconds(CLOCK_MONOTONIC) + REPORT_S;
+        }
         int64_t expired = 0, total = 0, count = 1;
         bool held;
         char *error = codec_encode_problem(&WAITED);

@@ -46,6 +46,7 @@ struct work {
     pthread_cond_t pool_idle;  /* one was given back */
     process *processes;        /* n of them: the workers' first, then those of the lanes */
     bool predicting;           /* a process of its own does */
+    atomic_bool draining;      /* the store says so: nothing is claimed */
 
     pthread_mutex_t lock;  /* everything down to drain_until */
     pthread_cond_t wake;   /* submitted or stopping */
@@ -84,13 +85,15 @@ bool work_is_stopping(work *w);
 void work_case_name(const process *p, int64_t i, char name[CASE_NAME]);
 
 /* A process for a job with this text, that is: one that has its body, even if it is to be waited for while an
- * outcome is stored, else the first one; of the lanes' for a lane. *body: for work_answered; 0: not to be told. There
- * are as many as workers; still there may be a moment in which one more is asked what it has. */
+ * outcome is stored, else the first one; of the lanes' for a lane. *body: what stands for it, or 0: not known yet; out:
+ * for work_answered; 0: not to be told. There are as many as workers; still there may be a moment in which one more is
+ * asked what it has. */
 process *work_take_process(work *w, bool lane, const char *text, size_t len, uint64_t *body);
 /* It has solved this body and only its outcome is still to be stored. */
 void work_answered(work *w, process *p, uint64_t body);
-/* done: what it said at the end; NULL: it has ended. */
-void work_give_process(work *w, process *p, const packet *done);
+/* done: what it said at the end; NULL: it has ended. body: of its job, 0: not known. What it has no more, and no other
+ * process of the daemon has, the store is told. */
+void work_give_process(work *w, process *p, const packet *done, uint64_t body);
 /* Those that nobody has had for a while give back the memory of texts and answers. */
 void work_rest_processes(work *w);
 

@@ -1,4 +1,5 @@
 /* pool.c: which process a job goes to, and what the caches of all of them have. */
+#include "store/nodes.h"
 #include "work/internal.h"
 
 #include <poll.h>
@@ -13,7 +14,7 @@
 
 static bool has_body(const process *p, uint64_t body)
 {
-    for (int i = 0; body && i < PROCESS_BODIES; i++)
+    for (size_t i = 0; body && i < p->n_bodies; i++)
         if (p->bodies[i] == body)
             return true;
     return false;
@@ -29,11 +30,17 @@ static process *better(process *a, process *b, uint64_t body)
     return !a || (has && (!has_body(a, body) || (a->taken && !b->taken))) ? b : a;
 }
 
+uint64_t work_body(const char *text, size_t len)
+{
+    return len <= TEXT_MOST ? process_body(text, len) : 0;
+}
+
 process *work_take_process(work *w, bool lane, const char *text, size_t len, uint64_t *body)
 {
     const int first = lane ? w->options.workers : 0, end = lane ? w->n : w->options.workers;
     process *found;
-    *body = text && end - first > 1 && len <= TEXT_MOST ? process_body(text, len) : 0;
+    if (!*body && text && end - first > 1)
+        *body = work_body(text, len);
     pthread_mutex_lock(&w->pool_lock);
     for (;;) {
         found = NULL;
@@ -52,8 +59,16 @@ void work_answered(work *w, process *p, uint64_t body)
 {
     pthread_mutex_lock(&w->pool_lock);
     p->answered = true;
-    if (body && !has_body(p, body))
-        p->bodies[p->next_body++ % PROCESS_BODIES] = body;
+    size_t at = 0;
+    while (at < p->n_bodies && p->bodies[at] != body)
+        at++;
+    if (body && at == p->n_bodies && p->n_bodies < PROCESS_BODIES)
+        p->n_bodies++;
+    at = at < PROCESS_BODIES ? at : PROCESS_BODIES - 1;
+    for (; body && at > 0; at--)
+        p->bodies[at] = p->bodies[at - 1];
+    if (body)
+        p->bodies[0] = body;
     pthread_mutex_unlock(&w->pool_lock);
 }
 
@@ -75,21 +90,42 @@ void work_rest_processes(work *w)
     pthread_mutex_unlock(&w->pool_lock);
 }
 
-void work_give_process(work *w, process *p, const packet *done)
+/* Under pool_lock. */
+static bool anybody_has(const work *w, uint64_t body)
 {
+    for (int i = 0; i < w->n; i++)
+        if (has_body(&w->processes[i], body))
+            return true;
+    return false;
+}
+
+void work_give_process(work *w, process *p, const packet *done, uint64_t body)
+{
+    uint64_t gone[PROCESS_BODIES + 1];
+    size_t n = 0, left = 0;
     rest_process(p, SEGMENT_WARM);
     pthread_mutex_lock(&w->pool_lock);
     p->given = clock_seconds(CLOCK_MONOTONIC);
+    const size_t had = p->n_bodies;
     if (!done) {
-        memset(p->bodies, 0, sizeof p->bodies);
-        p->held_entries = p->held_bytes = p->n_entries = 0;
+        p->n_bodies = p->held_entries = p->held_bytes = p->n_entries = 0;
     } else if (done->u.done.listed) {
         p->held_entries = done->u.done.cached;
         p->held_bytes = done->u.done.held;
     }
+    /* The cache lets go of what was used longest ago, and a body has one entry there at least. */
+    p->n_bodies = p->n_bodies < p->held_entries ? p->n_bodies : p->held_entries;
+    for (size_t i = p->n_bodies; i < had; i++)
+        gone[n++] = p->bodies[i];
+    if (body)
+        gone[n++] = body; /* where it has failed nobody knows it */
+    for (size_t i = 0; i < n; i++)
+        if (!anybody_has(w, gone[i]))
+            gone[left++] = gone[i];
     p->taken = p->answered = false;
     pthread_cond_broadcast(&w->pool_idle); /* who waits may want another kind */
     pthread_mutex_unlock(&w->pool_lock);
+    store_forget_bodies(w->store, gone, left); /* of no matter where it fails: a job comes here and finds none */
 }
 
 /* Asks a process that nobody else has; what it says replaces what it said before. */

@@ -11,7 +11,7 @@
 
 #include <sys/types.h>
 
-enum { PROCESS_BODIES = 8 };
+enum { PROCESS_BODIES = 256 };
 
 typedef struct {
     const char *program; /* that is started; NULL: this one, again */
@@ -28,8 +28,8 @@ typedef struct {
     /* For who chooses a process for a job; under the pool's lock. */
     bool taken, answered;            /* answered: its job's outcome is being stored, and it is free soon */
     double given;                    /* back to the pool, on CLOCK_MONOTONIC */
-    uint64_t bodies[PROCESS_BODIES]; /* that it solved last, its job's own among them; 0: none */
-    int next_body;
+    uint64_t bodies[PROCESS_BODIES]; /* n_bodies that it solved and has, the last one first */
+    size_t n_bodies;
     uz_cache_entry *entries; /* n_entries, as it listed them last */
     size_t n_entries, held_entries, held_bytes;
 } process;

@@ -267,7 +267,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     r.queue_s = waited > 0.0 ? waited : 0.0;
     log_write(w->log, LOG_INFO, "job_started",
               (log_field[]){LOG_S("job", claimed->id), LOG_I("attempt", claimed->attempts), {0}});
-    uint64_t key = 0;
+    uint64_t key = me->lease.held_body;
     process *p = work_take_process(w, me->lane, body, body_len, &key);
     pthread_mutex_lock(&me->lock);
     me->process = p;
@@ -296,7 +296,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     free(r.error);
     free(r.rows);
     job_clear(claimed);
-    work_give_process(w, p, end == WATCH_DONE ? &seen.done : NULL);
+    work_give_process(w, p, end == WATCH_DONE ? &seen.done : NULL, key);
 }
 
 /* ---- does anybody solve */
@@ -312,7 +312,7 @@ bool work_probe(worker *me)
     const job probe = {.attempts = 1};
     run r = {.me = me};
     watch_report seen;
-    uint64_t key;
+    uint64_t key = 0;
     double force = 0.0;
     char *body = strdup(PROBE);
     if (!body)
@@ -334,6 +334,6 @@ bool work_probe(worker *me)
     me->process = NULL;
     pthread_mutex_unlock(&me->lock);
     parcel_clear(&r.parcel);
-    work_give_process(me->w, p, end == WATCH_DONE ? &seen.done : NULL);
+    work_give_process(me->w, p, end == WATCH_DONE ? &seen.done : NULL, 0);
     return good;
 }

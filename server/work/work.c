@@ -1,5 +1,6 @@
 /* work.c: the threads: workers that claim, a keeper that renews their leases, and those who wait for a job. */
 #include "store/engine_base.h"
+#include "store/nodes.h"
 #include "work/housekeeping.h"
 #include "work/internal.h"
 
@@ -36,14 +37,22 @@ static void publish(worker *me, const store_lease *lease)
     pthread_mutex_unlock(&me->lock);
 }
 
-static store_status claim(worker *me, job *claimed, char **body, size_t *body_len)
+/* *later_s: nothing was claimed, but something waits that may be claimed then; 0: nothing does. */
+static store_status claim(worker *me, job *claimed, char **body, size_t *body_len, double *later_s)
 {
     work *w = me->w;
     store_lease lease;
     pthread_mutex_lock(&w->claim_lock);
     store_status status =
         store_claim(w->store, me->owner, w->options.lease_s, me->lane, &lease, claimed, body, body_len);
+    *later_s = status == STORE_NOT_FOUND ? lease.later_s : 0.0;
     if (status == STORE_OK) {
+        if (lease.held_body)
+            metrics_add(w->options.metrics,
+                        lease.fit == FIT_HELD     ? METRIC_BODY_HELD
+                        : lease.fit == FIT_OTHERS ? METRIC_BODY_OTHERS
+                                                  : METRIC_BODY_NEW,
+                        1);
         atomic_store(&me->cancel, false);
         atomic_store(&me->lost, false);
         publish(me, &lease);
@@ -68,11 +77,12 @@ static void *work_loop(void *arg)
     worker *me = arg;
     work *w = me->w;
     bool store_failed = false;
+    double later_s = 0.0;
     if (me == w->workers) { /* the first job finds a process */
-        uint64_t body;
+        uint64_t body = 0;
         process *first = work_take_process(w, false, NULL, 0, &body);
         process_begin(first);
-        work_give_process(w, first, NULL);
+        work_give_process(w, first, NULL, 0);
     }
     pthread_mutex_lock(&w->lock);
     for (uint64_t seen = w->submitted - 1;;) { /* of w->submitted before the last look at the store */
@@ -80,8 +90,9 @@ static void *work_loop(void *arg)
         char *body, cause[256];
         size_t body_len;
         /* until something was submitted since, a lane until nobody else is there for it either; after a failure of the
-         * store it is tried again anyway */
-        const double until = store_failed ? clock_seconds(CLOCK_MONOTONIC) + CLAIM_RETRY_S : (double)INFINITY;
+         * store it is tried again anyway, and where a job is left to another daemon for a while */
+        const double pause = store_failed ? CLAIM_RETRY_S : later_s > 0.0 ? later_s : (double)INFINITY;
+        const double until = clock_seconds(CLOCK_MONOTONIC) + pause;
         while (!w->stopping && (store_failed || w->submitted == seen || (me->lane && w->busy < w->options.workers)) &&
                (me->lane || w->probe != PROBE_ASKED) && clock_wait(me->lane ? &w->crowd : &w->wake, &w->lock, until))
             ;
@@ -98,7 +109,7 @@ static void *work_loop(void *arg)
         }
         seen = w->submitted;
         pthread_mutex_unlock(&w->lock);
-        const store_status status = claim(me, &claimed, &body, &body_len);
+        const store_status status = claim(me, &claimed, &body, &body_len, &later_s);
         store_failed = status != STORE_OK && status != STORE_NOT_FOUND;
         if (store_failed) {
             store_message(w->store, cause, sizeof cause);

@@ -33,6 +33,8 @@
 typedef struct work work;
 
 typedef struct {
+    const char *node;    /* the name of this daemon among those that share its store; NULL: "" */
+    const char *version; /* NULL: "" */
     int workers;
     int lanes;           /* workers beside those, which take small jobs only, while all of those are busy */
     const char *program; /* of the processes that solve; NULL: this one. It must call solver_process */
@@ -91,6 +93,12 @@ typedef struct {
 } work_request;
 /* False: nothing can tell, or it is over. */
 bool work_predict(work *w, const work_request *request, uz_prediction *out);
+
+/* What stands for the body of a job's text (store_request.held_body); 0: it is too long to be read for that. */
+uint64_t work_body(const char *text, size_t len);
+
+/* The store says that this daemon is to claim nothing (store_drain). */
+bool work_draining(work *w);
 
 /* A small problem is solved rightly by a worker that is idle; true too where all are at work. One thread asks. */
 bool work_solves(work *w);

@@ -82,7 +82,7 @@ class Reply:
 
 
 # What tells which schema a reply must meet: a member that only this kind of object has.
-KINDS = [("valid", "valid.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("limits", "limits.json"),
+KINDS = [("valid", "valid.json"), ("nodes", "nodes.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("limits", "limits.json"),
          ("whole", "check.json"), ("rows", "history.json"), ("decades", "work-precision.json"), ("code", "problem-details.json"),
          ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json")]
 
@@ -167,12 +167,16 @@ class Service:
     def command(self, *options):
         return [str(self.build / "uzawad"), *options]
 
+    def place(self):
+        """The option that says where jobs are kept."""
+        return "--store" if "://" in self.db else "--db", self.db
+
     def start(self):
         self.close()
         self.log_file = open(os.path.join(self.folder, "log"), "ab")
         suppressions = f"suppressions={ROOT / 'tests' / 'tsan.supp'} {os.environ.get('TSAN_OPTIONS', '')}"
         alone = ("--lanes", "0") if "--workers" in self.options and "--lanes" not in self.options else ()
-        self.process = subprocess.Popen(self.command("--listen", "127.0.0.1:0", "--db", self.db, *alone, *self.options),
+        self.process = subprocess.Popen(self.command("--listen", "127.0.0.1:0", *self.place(), *alone, *self.options),
                                         stdout=subprocess.PIPE, stderr=self.log_file,
                                         env={**os.environ, "TSAN_OPTIONS": suppressions, **self.environment})
         line = self.process.stdout.readline().decode()

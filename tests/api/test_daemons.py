@@ -126,6 +126,80 @@ def test_a_wait_at_another_daemon_ends_with_the_job(s):
         check(here.get(f"/v1/jobs/{long}").json["status"] == "dismissed")
 
 
+def node_named(daemon, name):
+    return next(one for one in daemon.get("/v1/nodes").json["nodes"] if one["name"] == name)
+
+
+def metric(daemon, name):
+    return float(daemon.get("/metrics").body.decode().split(f"\n{name} ")[1].split()[0])
+
+
+def test_nodes_and_the_drain_of_one(s):
+    with daemons(s.build, 2) as ((a, b), _):
+        for one, name in ((a, "left"), (b, "right")):
+            one.terminate()
+            one.options += ("--node", name)
+            one.start()
+        wait_until(lambda: {one["name"] for one in b.get("/v1/nodes").json["nodes"]} == {"left", "right"})
+        check(metric(a, "uzawad_nodes") == 2)
+        expect(a.request("POST", "/v1/nodes/middle/drain"), 404, "not_found")
+        long = a.post(ENDLESS).json["id"]
+        a.wait_status(long, "running")
+        runs, other = (a, b) if a.events("job_started") else (b, a)
+        name = "left" if runs is a else "right"
+        wait_until(lambda: node_named(other, name)["running"] == 1)
+        check(expect(other.request("POST", f"/v1/nodes/{name}/drain"), 200).json["nodes"])
+        wait_until(lambda: runs.get("/readyz").status == 503)
+        expect(runs.get("/readyz"), 503, "draining")
+        check(node_named(other, name)["state"] == "draining" and metric(runs, "uzawad_draining") == 1)
+        started = len(runs.events("job_started"))
+        for i in range(6):  # also those that come to it are run by the other
+            check(runs.solve(numbered(i))["status"] == "successful")
+        check(len(runs.events("job_started")) == started, "a node that is drained claimed a job")
+        check(runs.get(f"/v1/jobs/{long}").json["status"] == "running", "what it runs goes on")
+        runs.request("DELETE", f"/v1/jobs/{long}")
+        runs.wait_status(long, "dismissed")
+        expect(other.request("DELETE", f"/v1/nodes/{name}/drain"), 200)
+        wait_until(lambda: runs.get("/readyz").status == 200)
+        expect(other.request("POST", f"/v1/nodes/{'right' if runs is a else 'left'}/drain"), 200)
+        check(other.solve(numbered(7))["status"] == "successful")
+        check(len(runs.events("job_started")) == started + 1)
+
+
+def body_of(young):
+    """A scene whose factor is its own, and worth to be kept."""
+    problem = json.loads(json.dumps(SCENE))
+    problem["problem"]["mesh"]["box"]["cells"] = [90, 30]
+    problem["problem"]["materials"][0]["young"] = young
+    return problem
+
+
+def test_jobs_go_where_the_factor_of_their_body_is(s):
+    with daemons(s.build, 2) as (both, _):
+        for i in range(48):  # each body eight times, posted to either of them
+            check(both[i % 2].solve(body_of(1e5 + i % 6))["status"] == "successful")
+        missed = sum(metric(one, "uzawad_cache_misses_total") for one in both)
+        held = sum(metric(one, "uzawad_claims_body_held_total") for one in both)
+        check(missed <= 9, missed, "factorizations of 6 bodies; by chance there would be 12")
+        check(held >= 36, held)
+        wait_until(lambda: len({body for one in both[0].get("/v1/nodes").json["nodes"] for body in one["bodies"]}) == 6)
+
+
+def test_a_job_does_not_wait_for_long_for_who_has_its_body(s):
+    with daemons(s.build, 2) as ((a, b), _):
+        check(a.solve(body_of(1e5))["status"] == "successful")
+        holder, other = (a, b) if a.events("job_started") else (b, a)
+        # it has something else to do
+        other_name = next(one["name"] for one in a.get("/v1/nodes").json["nodes"] if one["pid"] == other.process.pid)
+        expect(a.request("POST", f"/v1/nodes/{other_name}/drain"), 200)
+        long = a.post(ENDLESS).json["id"]
+        holder.wait_status(long, "running")
+        expect(a.request("DELETE", f"/v1/nodes/{other_name}/drain"), 200)
+        check(a.solve(body_of(1e5))["status"] == "successful")
+        check(metric(other, "uzawad_claims_body_others_total") == 1)
+        a.request("DELETE", f"/v1/jobs/{long}")
+
+
 def test_one_is_killed(s):
     with daemons(s.build, 2) as ((a, b), name):
         posted = {}

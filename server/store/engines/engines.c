@@ -22,7 +22,7 @@ store *store_open(const char *address, char *message, size_t size)
     const store_engine *engine = store_engine_of(address);
     store *s = engine->open(address, why, sizeof why);
     if (!s) /* an address that is not the name of a file may have a secret in it */
-        snprintf(message, size, "%s: %s", engine->scheme[0] ? "the database of --db" : address, why);
+        snprintf(message, size, "%s: %s", engine->scheme[0] ? "the database of --store" : address, why);
     return s;
 }
 

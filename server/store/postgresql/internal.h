@@ -65,7 +65,7 @@ store_status postgresql_read_job(link_to *l, const PGresult *r, int row, job *ou
 store_status postgresql_over_quota(link_to *l, const char *client, const char *what);
 
 /* Tells the other daemons (tell.c), and here: the listener, for what the owner did not do. client: of one that is gone.
- */
+ * id "": everybody there is to look again. */
 typedef enum { TELL_CHANGED = 'c', TELL_WAITS = 'w', TELL_GONE = 'g' } tell_what;
 void postgresql_tell(postgresql_store *s, const char *id, tell_what what, const char *client, bool here);
 bool postgresql_tell_begin(postgresql_store *s);
@@ -88,6 +88,11 @@ typedef struct {
 } result_place;
 store_status postgresql_send_pieces(result_place *place); /* those that are kept */
 extern const result_blobs POSTGRESQL_RESULTS;
+
+/* The text of an array whose elements are quoted; NULL: no memory. */
+char *postgresql_quoted_array(const char *const *words, size_t n);
+
+extern const store_engine_nodes POSTGRESQL_NODES;
 
 /* Bytes of uploads in the database. NULL: no memory. */
 typedef struct blobs blobs;

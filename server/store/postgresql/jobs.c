@@ -54,8 +54,8 @@ static void send_submission(postgresql_store *s, link_to *l, change *c)
     const client_quotas *most = &s->base.settings.quotas;
     char *uploads = r->n_uploads > 0 ? array_of(r->uploads, r->n_uploads) : NULL;
     call q = {.sql =
-                  "SELECT verdict, job FROM uzawa.submit($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14,"
-                  " $15, $16, $17, $18, $19)"};
+                  "SELECT verdict, job FROM uzawa.submit_2($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14,"
+                  " $15, $16, $17, $18, $19, $20)"};
     call_text(&q, c->id);
     call_real(&q, c->created);
     call_bytes(&q, r->body, r->body_len);
@@ -75,6 +75,10 @@ static void send_submission(postgresql_store *s, link_to *l, change *c)
     call_integer(&q, most->waiting);
     call_integer(&q, most->bytes);
     call_real(&q, most->seconds);
+    if (r->held_body)
+        call_integer(&q, (int64_t)r->held_body);
+    else
+        call_text(&q, NULL);
     c->answer = l->sent;
     if (r->n_uploads > 0 && !uploads) { /* never one that names none */
         l->status = STORE_ERROR;
@@ -336,6 +340,10 @@ static store_status read_claim(link_to *l, const PGresult *r, void *ctx)
     bool ok = true;
     if (PQntuples(r) == 0)
         return STORE_NOT_FOUND;
+    if (PQgetisnull(r, 0, 0)) {
+        a->lease->later_s = cell_real(r, 0, 13);
+        return STORE_NOT_FOUND;
+    }
     job_clear(j);
     ok = cell_write(j->id, sizeof j->id, r, 0, 0);
     j->status = JOB_RUNNING;
@@ -347,6 +355,8 @@ static store_status read_claim(link_to *l, const PGresult *r, void *ctx)
     ok = cell_write(j->refines, sizeof j->refines, r, 0, 5) && ok;
     ok = cell_write(j->client, sizeof j->client, r, 0, 7) && ok;
     a->lease->token = (uint64_t)cell_integer(r, 0, 8);
+    a->lease->held_body = (uint64_t)cell_integer(r, 0, 11);
+    a->lease->fit = cell_integer(r, 0, 12) == 1 ? FIT_HELD : cell_integer(r, 0, 12) == 2 ? FIT_OTHERS : FIT_NEW;
     if (!ok) {
         strcpy(l->message, "a job's row is damaged, or there is no memory for it");
         return STORE_ERROR;
@@ -368,12 +378,13 @@ store_status postgresql_claim(store *base, store_lease *lease, double lease_s, b
 {
     postgresql_store *s = postgresql_of(base);
     claim_args a = {lease, out, body, len};
-    call c = {.sql = "SELECT * FROM uzawa.claim($1, $2, $3, $4)"};
+    call c = {.sql = "SELECT * FROM uzawa.claim_2($1, $2, $3, $4, $5)"};
     lease->seconds = lease_s;
     call_text(&c, s->node);
     call_text(&c, lease->owner);
     call_real(&c, lease_s);
     call_bool(&c, small);
+    call_real(&c, base->settings.affinity_s);
     store_status status = postgresql_do(s, LINK_LAZY, true, &c, read_claim, &a);
     if (status != STORE_OK)
         return status;

@@ -1,16 +1,21 @@
 #include "store/postgresql/schema.h"
+#include "base/clock.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 /* The steps as they stand in their files. */
-__asm__(".section .rodata\nschema_1: .incbin \"server/store/postgresql/schema_1.sql\"\n.byte 0\n.text");
-extern const char schema_1[];
-static const char *const STEPS[SCHEMA_VERSION + 1] = {NULL, schema_1};
+__asm__(".section .rodata\nschema_1: .incbin \"server/store/postgresql/schema_1.sql\"\n.byte 0\n"
+        "schema_2: .incbin \"server/store/postgresql/schema_2.sql\"\n.byte 0\n.text");
+extern const char schema_1[], schema_2[];
+static const char *const STEPS[SCHEMA_VERSION + 1] = {NULL, schema_1, schema_2};
 
 /* A database of another encoding could not keep every text. */
 #define LEAST_SERVER 150000
+
+#define PATIENCE_S 60.0 /* for those who use a table that is to be changed */
 
 static int refuse(link_to *l, const char *cause)
 {
@@ -44,23 +49,38 @@ int schema_version(link_to *l)
                : refuse(l, "the database has a version that this program does not know: take a newer program");
 }
 
+/* Under a lock of their own, in one transaction: another daemon may have made them meanwhile. A step changes tables
+ * that others use. Who waits for such a lock lets nobody else in: so it waits for a moment only, and then lets them all
+ * pass before it tries again. *passing: it was that. */
+static bool take_steps(link_to *l, bool *passing)
+{
+    bool good = link_script(l, "BEGIN; SET LOCAL lock_timeout = '60s'; SELECT pg_advisory_xact_lock(1970954615, 1);"
+                               "SET LOCAL lock_timeout = '500ms'") == STORE_OK;
+    int version = good ? schema_version(l) : -1;
+    *passing = false;
+    for (good = version >= 0; good && version < SCHEMA_VERSION; version++) {
+        good = link_script(l, STEPS[version + 1]) == STORE_OK;
+        *passing = !good && l->status == STORE_LOCKED;
+    }
+    return good && link_script(l, "COMMIT") == STORE_OK;
+}
+
 bool schema_bring(link_to *l)
 {
-    int version = schema_version(l);
+    const int version = schema_version(l);
+    const double until = clock_seconds(CLOCK_MONOTONIC) + PATIENCE_S;
+    char cause[LINK_CAUSE];
+    bool passing = true;
     if (version < 0 || version >= SCHEMA_VERSION)
         return version >= 0;
-    /* Once more under the lock: another daemon may have done it meanwhile. */
-    char cause[LINK_CAUSE];
-    bool good = link_script(l, "BEGIN; SET LOCAL lock_timeout = '60s'; SELECT pg_advisory_xact_lock(1970954615, 1)") ==
-                STORE_OK;
-    version = good ? schema_version(l) : -1;
-    for (good = version >= 0; good && version < SCHEMA_VERSION; version++)
-        good = link_script(l, STEPS[version + 1]) == STORE_OK;
-    good = good && link_script(l, "COMMIT") == STORE_OK;
-    if (good)
-        return true;
-    snprintf(cause, sizeof cause, "cannot make the tables: %.200s", l->message);
-    link_script(l, "ROLLBACK");
+    while (passing) {
+        if (take_steps(l, &passing))
+            return true;
+        snprintf(cause, sizeof cause, "cannot make the tables: %.200s", l->message);
+        link_script(l, "ROLLBACK");
+        passing = passing && clock_seconds(CLOCK_MONOTONIC) < until;
+        nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL);
+    }
     refuse(l, cause);
     return false;
 }

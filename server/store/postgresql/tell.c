@@ -105,7 +105,8 @@ static bool send_message(postgresql_store *s, link_to *l)
     return link_end(l) == STORE_OK;
 }
 
-/* Says that this node lives, and forgets those that have not for a day. */
+/* Says that this node lives, and forgets those that have not for a day, and clients that have asked nothing for an
+ * hour. */
 static bool beat(postgresql_store *s, link_to *l)
 {
     call c = {.sql = "INSERT INTO uzawa.node(id, host, pid, begun, seen) VALUES ($1, '', 0, uzawa.moment(),"
@@ -114,6 +115,7 @@ static bool beat(postgresql_store *s, link_to *l)
     link_begin(l, LINK_LAZY);
     link_send(l, &c);
     link_send(l, &(call){.sql = "DELETE FROM uzawa.node WHERE seen < uzawa.moment() - 86400"});
+    link_send(l, &(call){.sql = "DELETE FROM uzawa.rate WHERE at < uzawa.moment() - 3600"});
     return link_end(l) == STORE_OK;
 }
 

@@ -5,8 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The text of an array whose elements are quoted; NULL: no memory. */
-static char *quoted_array(const char *const *words, size_t n)
+char *postgresql_quoted_array(const char *const *words, size_t n)
 {
     size_t len = 3;
     for (size_t i = 0; i < n; i++)
@@ -43,7 +42,7 @@ static store_status read_due(link_to *l, const PGresult *r, void *ctx)
 
 store_status postgresql_webhook_next(store *base, const char *const *except, size_t n, webhook_due *out)
 {
-    char *places = quoted_array(except, n);
+    char *places = postgresql_quoted_array(except, n);
     call c = {.sql = "SELECT job, url, attempts FROM uzawa.webhook_next($1)"};
     if (!places) {
         store_set_message(base, "no memory for the places that are told already");

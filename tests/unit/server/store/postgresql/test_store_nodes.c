@@ -1,0 +1,247 @@
+/* Several daemons on one database: which of them gets which job, what they say of themselves, which is to claim
+ * nothing, and what clients have asked of all of them. */
+#include "store_place.h"
+#include "store/engine_base.h"
+#include "store/nodes.h"
+
+/* Two daemons: of the place, and another one. */
+typedef struct {
+    place p;
+    store *a, *b;
+} pair;
+
+static bool pair_begin(pair *two, double affinity_s)
+{
+    char message[300] = "";
+    *two = (pair){.b = NULL};
+    if (!postgresql_there()) {
+        printf("skip no server of PostgreSQL (Debian: postgresql)\n");
+        return false;
+    }
+    place_engine = STORE_ENGINES[0];
+    CHECK(place_begin(&two->p));
+    two->a = two->p.s;
+    two->b = store_open(two->p.address, message, sizeof message);
+    CHECK_MSG(two->a && two->b, "%s", message);
+    if (two->a && two->b)
+        two->a->settings.affinity_s = two->b->settings.affinity_s = affinity_s;
+    return two->a && two->b;
+}
+
+static void pair_end(pair *two)
+{
+    store_close(two->b);
+    place_end(&two->p);
+    place_engine = NULL;
+}
+
+static void run_sql(const pair *two, const char *sql)
+{
+    CHECK_MSG(postgresql_run(two->p.database, sql, NULL), "%s", sql);
+}
+
+static void submit_body(store *s, uint64_t body, int priority, char id[33])
+{
+    job j = {0};
+    bool repeated;
+    CHECK_INT(store_submit(s, &(store_request){.body = "{}", .body_len = 2, .held_body = body, .priority = priority},
+                           &j, &repeated),
+              STORE_OK);
+    strcpy(id, j.id);
+    job_clear(&j);
+}
+
+/* The job that a claim gives, "" for none. */
+static store_lease claim_next(store *s)
+{
+    store_lease lease;
+    job j = {0};
+    char *text = NULL;
+    size_t len;
+    const store_status status = store_claim(s, "me", 30.0, false, &lease, &j, &text, &len);
+    CHECK(status == STORE_OK || status == STORE_NOT_FOUND);
+    job_clear(&j);
+    free(text);
+    return lease;
+}
+
+static void check_claim(store *s, const char *id, int fit)
+{
+    const store_lease lease = claim_next(s);
+    CHECK_STR(lease.job, id);
+    CHECK_INT((int)lease.fit, fit);
+    CHECK_INT(store_finish(s, &lease, &PLAIN_SUCCESS), STORE_OK);
+}
+
+TEST(a_job_goes_where_its_body_is)
+{
+    pair two;
+    char id[8][33];
+    if (!pair_begin(&two, 1000.0))
+        return;
+    submit_body(two.a, 1, 0, id[0]);
+    submit_body(two.a, UINT64_MAX, 0, id[1]);
+    check_claim(two.a, id[0], FIT_NEW);
+    check_claim(two.b, id[1], FIT_NEW);
+    /* younger ones that one has the body of go before older ones that nobody has */
+    submit_body(two.a, 3, 0, id[2]);
+    submit_body(two.a, 1, 0, id[3]);
+    submit_body(two.a, UINT64_MAX, 0, id[4]);
+    submit_body(two.a, 0, 0, id[5]);
+    submit_body(two.a, 0, 5, id[6]); /* not before one of a higher priority */
+    check_claim(two.b, id[6], FIT_NEW);
+    check_claim(two.b, id[4], FIT_HELD);
+    check_claim(two.a, id[3], FIT_HELD);
+    check_claim(two.a, id[2], FIT_NEW);
+    check_claim(two.a, id[5], FIT_NEW);
+    /* what one has no more is anybody's */
+    submit_body(two.a, 3, 0, id[0]);
+    CHECK_INT(store_forget_bodies(two.a, &(uint64_t){3}, 1), STORE_OK);
+    check_claim(two.b, id[0], FIT_NEW);
+    pair_end(&two);
+}
+
+TEST(none_waits_for_long_for_who_has_its_body)
+{
+    pair two;
+    char id[4][33];
+    if (!pair_begin(&two, 1000.0))
+        return;
+    submit_body(two.a, 1, 0, id[0]);
+    check_claim(two.a, id[0], FIT_NEW);
+    run_sql(&two, "UPDATE uzawa.holding SET seconds = 100");
+    submit_body(two.a, 1, 0, id[1]);
+    /* left to who has it, for as long as the factor would take */
+    store_lease none = claim_next(two.b);
+    CHECK_STR(none.job, "");
+    CHECK(none.later_s > 90.0 && none.later_s <= 100.0);
+    run_sql(&two, "UPDATE uzawa.job SET passed = passed - 100 WHERE status = 0");
+    check_claim(two.b, id[1], FIT_OTHERS);
+    /* of one that lives no more nobody expects anything; nor of one that drains */
+    submit_body(two.a, 5, 0, id[2]);
+    check_claim(two.a, id[2], FIT_NEW);
+    submit_body(two.a, 5, 0, id[3]);
+    CHECK_STR(claim_next(two.b).job, "");
+    run_sql(&two, "UPDATE uzawa.node SET seen = 0 WHERE id IN (SELECT node FROM uzawa.holding WHERE body = 5)");
+    check_claim(two.b, id[3], FIT_NEW);
+    pair_end(&two);
+}
+
+TEST(others_go_before_one_for_a_while_only)
+{
+    pair two;
+    char id[4][33];
+    if (!pair_begin(&two, 1000.0))
+        return;
+    submit_body(two.a, 1, 0, id[0]);
+    check_claim(two.a, id[0], FIT_NEW);
+    submit_body(two.a, 2, 0, id[1]);
+    submit_body(two.a, 1, 0, id[2]);
+    submit_body(two.a, 1, 0, id[3]);
+    check_claim(two.a, id[2], FIT_HELD);
+    run_sql(&two, "UPDATE uzawa.job SET passed = passed - 1000 WHERE passed > 0 AND status = 0");
+    check_claim(two.a, id[1], FIT_NEW);
+    check_claim(two.a, id[3], FIT_HELD);
+    pair_end(&two);
+    /* without it: in their order, whoever has what */
+    if (!pair_begin(&two, 0.0))
+        return;
+    submit_body(two.a, 1, 0, id[0]);
+    check_claim(two.a, id[0], FIT_NEW);
+    submit_body(two.a, 2, 0, id[1]);
+    submit_body(two.a, 1, 0, id[2]);
+    check_claim(two.a, id[1], FIT_NEW);
+    CHECK_STR(claim_next(two.b).job, id[2]);
+    pair_end(&two);
+}
+
+TEST(nodes_and_the_drain_of_one)
+{
+    pair two;
+    char id[33];
+    bool draining = true;
+    store_node *nodes,
+        now = {.name = "a", .host = "here", .pid = 7, .workers = 3, .busy = 2, .factors = 5, .bytes = 99};
+    size_t n;
+    if (!pair_begin(&two, 5.0))
+        return;
+    CHECK_INT(store_report(two.a, &now, &draining), STORE_OK);
+    CHECK(!draining);
+    strcpy(now.name, "b");
+    CHECK_INT(store_report(two.b, &now, &draining), STORE_OK);
+    submit_body(two.a, 0xfedcba9876543210u, 0, id);
+    CHECK_STR(claim_next(two.a).job, id);
+    CHECK_INT(store_nodes(two.b, &nodes, &n), STORE_OK);
+    CHECK_INT((int)n, 2);
+    CHECK(n == 2 && strcmp(nodes[0].name, "a") == 0 && nodes[0].alive && nodes[0].running == 1 && nodes[0].pid == 7 &&
+          nodes[0].workers == 3 && nodes[0].factors == 5 && nodes[0].n_bodies == 1 &&
+          nodes[0].bodies[0] == 0xfedcba9876543210u && nodes[1].running == 0 && nodes[1].n_bodies == 0);
+    store_nodes_free(nodes, n);
+    /* told by the other one */
+    CHECK_INT(store_drain(two.b, "a", true), STORE_OK);
+    CHECK_INT(store_drain(two.b, "c", true), STORE_NOT_FOUND);
+    submit_body(two.a, 0xfedcba9876543210u, 0, id);
+    CHECK_STR(claim_next(two.a).job, "");
+    strcpy(now.name, "a");
+    CHECK_INT(store_report(two.a, &now, &draining), STORE_OK);
+    CHECK(draining);
+    CHECK_STR(claim_next(two.b).job, id); /* at once: it is not left to one that claims nothing */
+    CHECK_INT(store_drain(two.b, "a", false), STORE_OK);
+    submit_body(two.a, 9, 0, id);
+    CHECK_STR(claim_next(two.a).job, id);
+    pair_end(&two);
+}
+
+TEST(what_clients_ask_of_all)
+{
+    pair two;
+    store_rate a[2] = {{.client = "x \"y\\", .used = 3}, {.client = "z", .used = 1}},
+               b[1] = {{.client = "x \"y\\", .used = 4}};
+    if (!pair_begin(&two, 5.0))
+        return;
+    CHECK_INT(store_exchange_rates(two.a, a, 2), STORE_OK);
+    CHECK_INT(store_exchange_rates(two.b, b, 1), STORE_OK);
+    CHECK_INT((int)a[0].total, 3);
+    CHECK_INT((int)a[1].total, 1);
+    CHECK_INT((int)b[0].total, 7);
+    pair_end(&two);
+}
+
+/* The first one of a version comes while others go on with the one before (schema.h). */
+TEST(a_database_of_version_1_is_brought_to_the_next)
+{
+    char message[300] = "", sql[200];
+    size_t len = 0;
+    char *script = test_read_file("server/store/postgresql/schema_1.sql", &len);
+    pair two;
+    int64_t number = 0;
+    if (!pair_begin(&two, 5.0)) {
+        free(script);
+        return;
+    }
+    store_close(two.b);
+    run_sql(&two, "DROP SCHEMA uzawa CASCADE; CREATE ROLE old_daemon");
+    run_sql(&two, script);
+    run_sql(&two, "GRANT USAGE ON SCHEMA uzawa TO old_daemon;"
+                  "GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA uzawa TO old_daemon");
+    static const char OLD[] = "SELECT verdict FROM uzawa.submit(lpad('%d', 32, '0'), 1, 'a', 'd', '[]', '', 's', NULL,"
+                              "NULL, NULL, true, 0, false, NULL, 0, 0, 0, 0, 0)";
+    snprintf(sql, sizeof sql, OLD, 1);
+    run_sql(&two, sql);
+    two.b = store_open(two.p.address, message, sizeof message);
+    CHECK_MSG(two.b, "%s", message);
+    CHECK(postgresql_run(two.p.database, "SELECT version FROM uzawa.format", &number));
+    CHECK_INT((int)number, 2);
+    snprintf(sql, sizeof sql, OLD, 2); /* one of version 1 goes on */
+    run_sql(&two, sql);
+    CHECK(postgresql_run(two.p.database, "SELECT right(id, 1)::int FROM uzawa.claim('old', 'o', 30, false)", &number));
+    CHECK_INT((int)number, 1);
+    CHECK(two.b && claim_next(two.b).job[31] == '2');
+    /* its role may use what is new, as far as functions that it calls do */
+    CHECK(postgresql_run(two.p.database, "SELECT has_table_privilege('old_daemon', 'uzawa.holding', 'UPDATE')::int",
+                         &number));
+    CHECK_INT((int)number, 1);
+    run_sql(&two, "DROP OWNED BY old_daemon; DROP ROLE old_daemon");
+    free(script);
+    pair_end(&two);
+}
