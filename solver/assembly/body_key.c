@@ -81,7 +81,7 @@ static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
         key->failed = true;
     put_int(key, mesh->dim);
     put_int(key, mesh->n_groups);
-    put_int(key, mesh->from_file);
+    put_int(key, mesh->from_file != NULL);
     uz_buffer_put(key, hex, sizeof hex);
 }
 

@@ -69,7 +69,8 @@ typedef struct {
     int64_t *first, *node; /* nodes of element e: node[first[e]..first[e + 1]); first has n_elements + 1 */
     uz_given_group *groups;
     int64_t n_groups;
-    bool from_file; /* nodes that no element uses (construction points) are left out, not refused */
+    const char *from_file; /* where the file is in a request, as "/mesh/gmsh" (static text); NULL: in numbers. Of a
+                            * file, nodes that no element uses (construction points) are left out, not refused */
 } uz_given_mesh;
 void uz_given_mesh_clear(uz_given_mesh *mesh);
 

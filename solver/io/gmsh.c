@@ -249,7 +249,7 @@ static uz_status to_given(uz_given_mesh *out, gmsh_file *file)
     }
     out->dim = dim;
     out->n_nodes = file->n_nodes;
-    out->from_file = true;
+    out->from_file = "/mesh/gmsh";
     out->xyz = uz_alloc(file->n_nodes * dim, sizeof *out->xyz);
     status = out->xyz ? UZ_OK : gmsh_no_memory(file);
     for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++)

@@ -71,7 +71,7 @@ static uz_status copy_mesh(uz_mesh *mesh, const uz_given_mesh *given, const int6
     }
     if (isfinite(mesh->extent))
         return UZ_OK;
-    return uz_fail(err, UZ_ERR_NOT_FINITE, given->from_file ? "/mesh/gmsh" : "/mesh/nodes",
+    return uz_fail(err, UZ_ERR_NOT_FINITE, given->from_file ? given->from_file : "/mesh/nodes",
                    "the mesh reaches beyond the largest number");
 }
 

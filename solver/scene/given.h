@@ -9,8 +9,8 @@ enum { UZ_POINTER = 96 };
 /* Most groups of a mesh. */
 #define UZ_MESH_MAX_GROUPS 4096
 
-/* Refuses an element: "element 12 (quad4 with nodes 4, 7, 9, 3) WHAT; REMEDY" at "/mesh/elements/quad4/3", or at
- * "/mesh/gmsh". */
+/* Refuses an element: "element 12 (quad4 with nodes 4, 7, 9, 3) WHAT; REMEDY" at "/mesh/elements/quad4/3", or where
+ * the file is. */
 enum { UZ_ELEMENT_TEXT = 160 };
 uz_status uz_given_refuse(const uz_given_mesh *given, int64_t element, const char *what, const char *remedy,
                           uz_error *err);

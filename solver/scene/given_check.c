@@ -23,7 +23,7 @@ uz_status uz_given_refuse(const uz_given_mesh *given, int64_t element, const cha
     for (int64_t e = 0; e < element; e++)
         before += given->kind[e] == given->kind[element];
     snprintf(where, sizeof where, "/mesh/elements/%s/%lld", name, (long long)before);
-    return uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : where, "%s %s; %s", nodes, what, remedy);
+    return uz_fail(err, UZ_ERR_SCENE, given->from_file ? given->from_file : where, "%s %s; %s", nodes, what, remedy);
 }
 
 /* Its kind and its nodes. */
@@ -129,7 +129,7 @@ static uz_status check_shape(const uz_given_mesh *given, int64_t e, uz_error *er
 uz_status uz_given_check(const uz_given_mesh *given, int dim, uz_error *err)
 {
     char where[UZ_POINTER];
-    const char *nodes = given->from_file ? "/mesh/gmsh" : "/mesh/nodes";
+    const char *nodes = given->from_file ? given->from_file : "/mesh/nodes";
     if (given->dim != dim)
         return uz_fail(err, UZ_ERR_SCENE, nodes, "this is a mesh in %d dimensions; its model is %s", given->dim,
                        given->dim == 3 ? "solid" : "plane_stress, plane_strain or axisymmetric");
@@ -141,7 +141,7 @@ uz_status uz_given_check(const uz_given_mesh *given, int dim, uz_error *err)
     for (int64_t i = 0; i < given->n_nodes * dim; i++)
         if (!isfinite(given->xyz[i])) {
             snprintf(where, sizeof where, "/mesh/nodes/%lld/%d", (long long)(i / dim), (int)(i % dim));
-            return uz_fail(err, UZ_ERR_NOT_FINITE, given->from_file ? "/mesh/gmsh" : where,
+            return uz_fail(err, UZ_ERR_NOT_FINITE, given->from_file ? given->from_file : where,
                            "a coordinate of node %lld is not a finite number", (long long)(i / dim));
         }
     uz_status status = UZ_OK;

@@ -77,7 +77,7 @@ static void group_place(char where[UZ_POINTER], const uz_given_mesh *given, cons
         ; /* a character is not cut in two */
     name[used] = '\0';
     if (given->from_file)
-        snprintf(where, UZ_POINTER, "/mesh/gmsh");
+        snprintf(where, UZ_POINTER, "%s", given->from_file);
     else
         snprintf(where, UZ_POINTER, "/mesh/groups/%.*s/%.10s/%lld", LONGEST, name, key, (long long)i);
 }
@@ -242,12 +242,12 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
 {
     group_work work = {.mesh = mesh, .given = given, .new_node = new_node, .err = err};
     if (given->n_groups > UZ_MESH_MAX_GROUPS)
-        return uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : "/mesh/groups",
+        return uz_fail(err, UZ_ERR_SCENE, given->from_file ? given->from_file : "/mesh/groups",
                        "%lld groups; at most %d are allowed", (long long)given->n_groups, UZ_MESH_MAX_GROUPS);
     for (int64_t i = 0; i < given->n_groups; i++) {
         const size_t length = strnlen(given->groups[i].name, sizeof given->groups[i].name);
         if (length == 0 || length == sizeof given->groups[i].name)
-            return uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : "/mesh/groups",
+            return uz_fail(err, UZ_ERR_SCENE, given->from_file ? given->from_file : "/mesh/groups",
                            "the name of a group has 1 to %zu bytes", sizeof given->groups[i].name - 1);
     }
     mesh->groups = uz_alloc_zero(given->n_groups + 2, sizeof *mesh->groups);
@@ -276,7 +276,7 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
     const uz_group *named = uz_mesh_group(mesh, "all", "", NULL);
     uz_group *all = named ? &mesh->groups[named - mesh->groups] : NULL;
     if (status == UZ_OK && all && all->n_elements < mesh->n_elements)
-        status = uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : "/mesh/groups/all",
+        status = uz_fail(err, UZ_ERR_SCENE, given->from_file ? given->from_file : "/mesh/groups/all",
                          "a group called \"all\" is not all elements of the mesh; give it another name");
     if (status == UZ_OK) {
         all = all ? all : &mesh->groups[mesh->n_groups++];

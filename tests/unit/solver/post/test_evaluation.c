@@ -442,7 +442,7 @@ TEST(nodes_of_a_file_that_are_left_out_are_told)
     for (int i = 0; i < 2; i++) {
         uz_scene s = stacked(0);
         uz_error err = {0};
-        s.given.from_file = true;
+        s.given.from_file = "/mesh/gmsh";
         if (i == 1) {
             double *more = body_room((s.given.n_nodes + 2) * 2, sizeof *more);
             memcpy(more, s.given.xyz, (size_t)s.given.n_nodes * 2 * sizeof *more);

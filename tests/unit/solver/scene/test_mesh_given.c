@@ -120,7 +120,7 @@ TEST(numbers_are_checked)
     expect(&m, 3, UZ_ERR_SCENE, "/mesh/nodes", "2 dimensions; its model is plane_stress");
     m.xyz[7] = (double)NAN;
     expect(&m, 2, UZ_ERR_NOT_FINITE, "/mesh/nodes/3/1", "finite");
-    m.mesh.from_file = true;
+    m.mesh.from_file = "/mesh/gmsh";
     expect(&m, 2, UZ_ERR_NOT_FINITE, "/mesh/gmsh", "node 3");
     two_squares(&m);
     m.xyz[4] = 1.7e308;
@@ -137,7 +137,7 @@ TEST(shapes_in_the_plane_are_checked)
     REFUSED((m.xyz[8] = 0.3, m.xyz[9] = 0.3), "/mesh/elements/quad4/0", "twisted at its node 4");
     REFUSED((m.xyz[4] = 1.5, m.xyz[5] = 0.5), "/mesh/elements/tri3/0", "no area at its node 1");
     REFUSED((m.xyz[4] = 1.5, m.xyz[5] = 0.5 + 1e-13), "/mesh/elements/tri3/0", "no area");
-    REFUSED((m.mesh.from_file = true, m.node[0] = 2, m.node[1] = 1), "/mesh/gmsh", "ReverseMesh");
+    REFUSED((m.mesh.from_file = "/mesh/gmsh", m.node[0] = 2, m.node[1] = 1), "/mesh/gmsh", "ReverseMesh");
 }
 
 /* The units of a mesh must not decide whether an element is degenerate. */
@@ -314,7 +314,7 @@ TEST(unused_nodes_of_files_are_left_out)
     small_mesh m;
     memset(&m, 0, sizeof m);
     m.mesh.dim = 2;
-    m.mesh.from_file = true;
+    m.mesh.from_file = "/mesh/gmsh";
     bind(&m);
     add_node(&m, 9, 9, 0);
     add_node(&m, 0, 0, 0);
