@@ -4,6 +4,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #define INLINE_MOST (64u << 10) /* larger files are uploaded: they are sent once, however many jobs name them */
 
@@ -56,6 +57,13 @@ static client_exit put_file(client_session *s, json_t *to, const char *key, cons
     return code;
 }
 
+/* The key of a mesh, by the name of its file; a Gmsh file may have any. */
+static const char *mesh_format(const char *path)
+{
+    const size_t length = strlen(path), end = length - (length > 3 && strcmp(path + length - 3, ".gz") == 0 ? 3 : 0);
+    return end > 4 && strncasecmp(path + end - 4, ".inp", 4) == 0 ? "abaqus" : "gmsh";
+}
+
 client_exit client_build_files(client_session *s, json_t *request)
 {
     const client_options *o = s->options;
@@ -65,7 +73,7 @@ client_exit client_build_files(client_session *s, json_t *request)
     client_exit code = CLIENT_OK;
     if (o->mesh) {
         json_t *problem = problem_of(s, request, "scene"), *mesh = json_object();
-        code = problem && mesh ? put_file(s, mesh, "gmsh", o->mesh) : CLIENT_USAGE;
+        code = problem && mesh ? put_file(s, mesh, mesh_format(o->mesh), o->mesh) : CLIENT_USAGE;
         if (problem)
             json_object_set(problem, "mesh", mesh);
         json_decref(mesh);

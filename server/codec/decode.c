@@ -43,10 +43,18 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
 {
     static const char *const MATRICES[] = {"K", "N", "p", "h"}, *const BESIDE[] = {"/cases", "/solver", "/answer",
                                                                                    "/quantities"};
+    static const struct {
+        const char *where, *syntax, *unsupported;
+    } MESHES[] = {{"/mesh/gmsh", "gmsh_syntax", "gmsh_unsupported"},
+                  {"/mesh/abaqus", "abaqus_syntax", "abaqus_unsupported"}};
     const uz_status status = err->status;
     const char *where = err->where, *code = uz_status_name(status), *within = "/problem";
-    if (strcmp(where, "/mesh/gmsh") == 0) /* the library reads two formats of text and has one status for both */
-        code = status == UZ_ERR_FORMAT ? "gmsh_syntax" : status == UZ_ERR_UNSUPPORTED ? "gmsh_unsupported" : code;
+    /* The library reads several formats of text and has one status for all. */
+    for (size_t i = 0; i < sizeof MESHES / sizeof MESHES[0]; i++)
+        if (strcmp(where, MESHES[i].where) == 0)
+            code = status == UZ_ERR_FORMAT        ? MESHES[i].syntax
+                   : status == UZ_ERR_UNSUPPORTED ? MESHES[i].unsupported
+                                                  : code;
     if (strncmp(where, "/cases/", 7) == 0) {
         /* A load case has loads, p and h; an error about anything else of it is one of the body that all cases share.
          */

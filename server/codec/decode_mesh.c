@@ -1,4 +1,4 @@
-/* decode_mesh.c: a mesh of a scene in numbers, or as a Gmsh file. Whether it is a good one, the solver says. */
+/* decode_mesh.c: a mesh of a scene in numbers, or as a file. Whether it is a good one, the solver says. */
 #include "codec/decode.h"
 #include "codec/problem.h"
 #include "codec/room.h"
@@ -113,28 +113,35 @@ static bool read_faces(uz_given_group *to, decoding *d, const json_value *value,
     return true;
 }
 
+/* ---- files */
+
+/* The bytes of a file, in the request or uploaded before. A binary one can only be uploaded: JSON has no bytes. */
+static bool read_file(uz_given_mesh *to, decoding *d, const char *format, const json_value *value)
+{
+    uz_error err = {.status = UZ_OK};
+    decode_source file;
+    if (!decode_source_open(&file, d, value))
+        return false;
+    const bool good = uz_mesh_read(to, format, file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
+    decode_source_close(&file);
+    snprintf(err.where, sizeof err.where, "/mesh/%s", format);
+    if (!good) {
+        codec_problem_from_error(d->problem, &err, UZ_PROBLEM_SCENE);
+        json_pointer(d->problem->pointer, sizeof d->problem->pointer, value);
+    }
+    return good;
+}
+
 bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh)
 {
-    const json_value *gmsh = json_get(mesh, "gmsh"), *nodes = json_get(mesh, "nodes");
+    static const char *const FORMATS[] = {"gmsh", "abaqus"}; /* names of readers (solver/io/mesh_reader.h) */
+    const json_value *nodes = json_get(mesh, "nodes");
     const int dim = uz_scene_dim(out);
     uz_given_mesh *to = &out->given;
     out->source = UZ_MESH_GIVEN;
-    if (gmsh) {
-        /* The bytes of a Gmsh file, in the request or uploaded before. A binary one can only be uploaded: JSON has no
-         * bytes. */
-        uz_error err = {.status = UZ_OK};
-        decode_source file;
-        if (!decode_source_open(&file, d, gmsh))
-            return false;
-        const bool good = uz_mesh_read(to, "gmsh", file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
-        decode_source_close(&file);
-        snprintf(err.where, sizeof err.where, "/mesh/gmsh");
-        if (!good) {
-            codec_problem_from_error(d->problem, &err, UZ_PROBLEM_SCENE);
-            json_pointer(d->problem->pointer, sizeof d->problem->pointer, gmsh);
-        }
-        return good;
-    }
+    for (size_t i = 0; i < sizeof FORMATS / sizeof FORMATS[0]; i++)
+        if (json_get(mesh, FORMATS[i]))
+            return read_file(to, d, FORMATS[i], json_get(mesh, FORMATS[i]));
     int64_t n = 0;
     int columns = 0;
     if (!decode_points(&to->xyz, &n, &columns, d, nodes))

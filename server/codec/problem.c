@@ -24,6 +24,8 @@ static const struct {
     {"matrix_market_unsupported", "A kind of matrix that is not solved here"},
     {"gmsh_syntax", "A Gmsh file is malformed"},
     {"gmsh_unsupported", "A kind of Gmsh file or element that is not read here"},
+    {"abaqus_syntax", "An input file of Abaqus or CalculiX is malformed"},
+    {"abaqus_unsupported", "Something in an input file of Abaqus or CalculiX that is not read here"},
     {"size_mismatch", "Shapes do not agree"},
     {"not_finite", "A value is not finite"},
     {"not_symmetric", "The stiffness matrix is not symmetric"},

@@ -82,7 +82,14 @@ void uz_given_mesh_clear(uz_given_mesh *mesh);
  * _NOT_FINITE, _LIMIT with the line (of a binary file the message says the byte), _MEMORY.
  * Source: Gmsh reference manual, section "Gmsh file formats". */
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
-/* The same of a file in any format that there is a reader for (io/mesh_reader.h): "gmsh"; NULL: by what it looks like.
+/* Reads the mesh of an input file of Abaqus or CalculiX: *NODE, *ELEMENT, *NSET, *ELSET, *SURFACE; the rest of the deck
+ * is passed over, and what makes or moves nodes and elements refused. Numbering and errors as above. Sets become groups
+ * of nodes and elements, surfaces and sets of elements on sides groups of sides; of one name for several of them, sides
+ * keep it, then nodes, and the others get ".nodes" or ".elements" behind it.
+ * Source: CalculiX CrunchiX user's manual. */
+uz_status uz_abaqus_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
+/* The same of a file in any format that there is a reader for (io/mesh_reader.h): "gmsh", "abaqus"; NULL: by what it
+ * looks like.
  * UZ_ERR_UNSUPPORTED: there is none. */
 uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,
                        uz_error *err);

@@ -19,5 +19,6 @@ typedef struct {
 
 /* Rows of the table. */
 bool uz_gmsh_recognises(const char *text, size_t len);
+bool uz_abaqus_recognises(const char *text, size_t len);
 
 #endif

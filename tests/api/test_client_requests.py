@@ -124,6 +124,53 @@ def test_mesh_from_a_file(server):
     check("/problem/mesh/gmsh" in done.stderr, done.stderr)
 
 
+def test_mesh_of_an_input_file(server):
+    path = os.path.join(server.folder, "part.inp")
+    body = scene()
+    problem = body["problem"]
+    problem["supports"], problem["contacts"] = [{"on": "left", "ux": 0, "uy": 0}], []
+    problem["loads"], problem["materials"][0]["on"] = [{"on": "PULLED", "traction": [0.5, 0]}], "Body"
+    del problem["mesh"]
+    told = []
+    for text in (INPUT_FILE, INPUT_FILE.replace("CPS4R", "CPS4I")):
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        told.append(job(server.url, "-", "--mesh", path, stdin=json.dumps(body))["summary"])
+    problem["mesh"] = {"gmsh": GMSH}
+    problem["loads"][0]["on"], problem["materials"][0]["on"] = "right", "body"
+    same = job(server.url, "-", stdin=json.dumps(body))["summary"]
+    for one in told:
+        check(one["outcome"] == "converged" and abs(one["energy"]["primal"] / same["energy"]["primal"] - 1) < 1e-12, one["energy"], same["energy"])
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(INPUT_FILE + "*INCLUDE, INPUT=more.inp\n")
+    del problem["mesh"]
+    done = run(server.url, "submit", "-", "--mesh", path, stdin=json.dumps(body), code=4)
+    check("*INCLUDE is not read" in done.stderr and "/problem/mesh/abaqus" in done.stderr, done.stderr)
+    problem["mesh"] = {"abaqus": INPUT_FILE + "*NSET, NSET=gone\n77\n"}
+    reply = server.post(body, query="?validate=true")
+    check(reply.status == 422 and reply.json["code"] == "abaqus_syntax" and reply.json["line"] == 20, reply)
+
+
+INPUT_FILE = """*HEADING
+two quadrilaterals
+*NODE
+1, 0, 0
+2, 30, 0
+3, 60, 0
+4, 0, 20
+5, 30, 20
+6, 60, 20
+*ELEMENT, TYPE=CPS4R, ELSET=Body
+10, 1, 2, 5, 4
+20, 2, 3, 6, 5
+*NSET, NSET=left
+1, 4
+*SURFACE, NAME=PULLED
+20, S2
+*MATERIAL, NAME=passed over
+*ELASTIC
+"""
+
 # Two quad4 in a row, with the groups that the scene names.
 GMSH = """$MeshFormat
 2.2 0 8

@@ -1,5 +1,5 @@
-"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/* and OUT/gmsh/*, one seed a file, and OUT/json.dict,
-OUT/mm.dict and OUT/gmsh.dict.
+"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/*, OUT/gmsh/* and OUT/abaqus/*, one seed a file, and
+OUT/json.dict and the same of the others.
 
 Seeds come from tests/data, and from the shared cases where they are there; the words of the JSON dictionary are the
 member names and values that the schemas know.
@@ -20,6 +20,9 @@ MM_WORDS = ["%%MatrixMarket", "matrix", "coordinate", "array", "real", "double",
 GMSH_WORDS = ["$MeshFormat", "$EndMeshFormat", "2.2 0 8", "4.1 0 8", "2.2 1 8", "4.1 1 8", "$PhysicalNames", "$EndPhysicalNames",
               "$Entities", "$EndEntities", "$PartitionedEntities", "$EndPartitionedEntities", "$Nodes", "$EndNodes",
               "$Elements", "$EndElements", "$Periodic", "$EndPeriodic", "\n", "\r\n", '"a"', "1e308", "nan", "99999999999", "-1"]
+ABAQUS_WORDS = ["*NODE", "*ELEMENT", "*NSET", "*ELSET", "*SURFACE", "*PART", "*INSTANCE", ", TYPE=", ", NSET=", ", ELSET=", ", NAME=", ", GENERATE",
+                ", ELSET=E", "CPS3", "CPE8R", "CAX4", "C3D4", "C3D20R", "C3D15", "S4", "T3D2", "S1", "S6", "\n", "\r\n", "**", "1e308", "1D3",
+                "9223372036854775807", '"a b"']
 JSON_WORDS = ["null", "true", "false", "1e400", "-0.0", "1e-320", "9223372036854775808", "[[", "]]", "{}", "\\u0000", "\\ud800"]
 
 
@@ -50,6 +53,14 @@ def gmsh_seeds():
         yield small_gmsh_2(at, kind, True)
         yield small_gmsh_4(at, kind, False)
         yield small_gmsh_4(at, kind, True)
+
+
+def abaqus_seeds():
+    """Small files of some elements with all that is read of a file."""
+    nodes = "*NODE, NSET=N\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n"
+    sets = "*NSET, NSET=A, GENERATE\n1,4,2\n*NSET, NSET=B\nA, 2\n*ELSET, ELSET=A\nE\n*SURFACE, NAME=S\nE, S1\n*SURFACE, NAME=T, TYPE=NODE\nB\n"
+    for kind, of in (("CPS3", "1,2,4"), ("CPE4R", "1,2,3,4"), ("C3D4", "1,2,4,5"), ("C3D8", "1,2,3,4,5,6,7,8"), ("C3D6", "1,2,4,5,6,8")):
+        yield f"** made\n{nodes}*ELEMENT, TYPE={kind}, ELSET=E\n10,{of}\n*ELEMENT, TYPE=T3D2, ELSET=L\n11,1,2\n{sets}*STEP\n*STATIC\n".encode()
 
 
 def gmsh_sections(version, binary, sections):
@@ -124,9 +135,11 @@ def main():
     write_seeds(out / "json", json_seeds())
     write_seeds(out / "mm", mm_seeds())
     write_seeds(out / "gmsh", gmsh_seeds())
+    write_seeds(out / "abaqus", abaqus_seeds())
     write_dictionary(out / "json.dict", [*(f'"{word}"' for word in words(schema)), *JSON_WORDS])
     write_dictionary(out / "mm.dict", MM_WORDS)
     write_dictionary(out / "gmsh.dict", GMSH_WORDS)
+    write_dictionary(out / "abaqus.dict", ABAQUS_WORDS)
 
 
 main()

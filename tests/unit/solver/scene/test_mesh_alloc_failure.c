@@ -61,6 +61,22 @@ TEST(gmsh_files_with_wild_numbers)
     CHECK(fail_each(read_and_mesh) > 15);
 }
 
+static uz_status read_abaqus(uz_error *err)
+{
+    static const char text[] = "*NODE,NSET=N\n9,0,0\n2,1,0\n3,0,1\n*ELEMENT,TYPE=CPS3,ELSET=E\n7,9,2,3\n"
+                               "*ELEMENT,TYPE=T2D2,ELSET=L\n3,9,2\n*NSET,NSET=E\n2\n*SURFACE,NAME=S\nE,S1\n7,S2\n";
+    uz_given_mesh given;
+    const uz_status status = uz_abaqus_read(&given, text, sizeof text - 1, 0, err);
+    CHECK((given.xyz != NULL) == (status == UZ_OK));
+    uz_given_mesh_clear(&given);
+    return status;
+}
+
+TEST(abaqus_files)
+{
+    CHECK(fail_each(read_abaqus) > 25);
+}
+
 static uz_status make_box(uz_error *err)
 {
     uz_mesh mesh;
