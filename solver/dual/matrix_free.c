@@ -167,7 +167,8 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     const uz_dual *dual = load->dual;
     if (apply_known(x, Dr, r))
         return UZ_OK;
-    uz_status status = solve_base(x, BASE_FLOOR * x->aim, err);
+    const bool bounds = x->sparse.box != NULL;
+    uz_status status = bounds ? UZ_OK : solve_base(x, BASE_FLOOR * x->aim, err);
     if (status != UZ_OK)
         return status;
     const double root = sqrt(load->dual->amg->info.lambda), base = uz_root(-2.0 * load->psi0);
@@ -186,8 +187,10 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
         return status;
     uz_csc_gaxpy(Dr, &dual->N, 1.0, x->sparse.response);
     load->left = info.last / root;
+    if (bounds && base > 0.0) /* as well as the response */
+        status = solve_base(x, fmax(BASE_FLOOR * x->aim, 0.5 * load->left / base), err);
     x->sparse.slack = x->base_slack + load->left;
-    return UZ_OK;
+    return status;
 }
 
 /* The residual's share of the value that is sharp enough, as a share of its root. */
