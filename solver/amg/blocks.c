@@ -202,6 +202,38 @@ uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const u
     return status == UZ_OK ? fill(mg, K, err) : status;
 }
 
+/* -------------------------------------------------------------------- to a matrix */
+
+uz_status uz_blocks_to_columns(uz_csc *out, const uz_blocks *A, const float *inverse, uz_error *err)
+{
+    const int b = A->b;
+    const int64_t size = (int64_t)b * b;
+    uz_below below;
+    int64_t at = 0;
+    uz_status status =
+        uz_below_init(&below, A) ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a coarse matrix");
+    if (status == UZ_OK)
+        status = uz_csc_init(out, A->nodes * b, A->nodes * b, A->nodes * (size + b) / 2 + A->ptr[A->nodes] * size, err);
+    for (int64_t j = 0; status == UZ_OK && j < A->nodes; j++)
+        for (int c = 0; c < b; c++) {
+            for (int r = c; r < b; r++) {
+                const bool there = inverse[j * b + c] > 0.0F && inverse[j * b + r] > 0.0F;
+                out->idx[at] = j * b + r;
+                out->val[at++] = there ? A->diag[j * size + r * b + c] : r == c ? 1.0 : 0.0;
+            }
+            for (int64_t e = below.ptr[j]; e < below.ptr[j + 1]; e++)
+                for (int r = 0; r < b; r++) {
+                    const int64_t i = below.node[e] * (int64_t)b + r;
+                    const bool there = inverse[j * b + c] > 0.0F && inverse[i] > 0.0F;
+                    out->idx[at] = i;
+                    out->val[at++] = there ? A->off[below.at[e] * size + r * b + c] : 0.0;
+                }
+            out->ptr[j * b + c + 1] = at;
+        }
+    uz_below_clear(&below);
+    return status;
+}
+
 /* ------------------------------------------------------------------- product */
 
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));

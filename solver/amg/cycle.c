@@ -16,16 +16,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct uz_multigrid_room {
-    uz_factor_workspace *ws;
-    float *x[UZ_LEVELS_MOST], *b[UZ_LEVELS_MOST], *t[UZ_LEVELS_MOST]; /* nodes x width each */
-    double *coarse, *permuted;                                        /* of the coarsest level */
-    double *to, *from;                                                /* vectors of a product with level 0: nodes x 4 */
-    float *inverse; /* level 0's where dofs are held: 0 there; else NULL */
-    const bool *held;
-    uz_factor *alone; /* of K_FF where there is one level only; else NULL */
-};
-
 typedef float four __attribute__((vector_size(16), aligned(4), may_alias));
 
 /* Rows of blocks are read four numbers at a time. What is read beyond them counts for nothing, as the surplus numbers
@@ -216,16 +206,19 @@ static void pass_plain(const step *s, bool downwards)
 static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room, float *x, const float *b,
                                 uz_error *err)
 {
-    const uz_level *level = &mg->level[mg->base.levels - 1];
+    const int last = mg->base.levels - 1;
+    const uz_level *level = &mg->level[last];
+    const uz_factor *factor = room->coarsest ? room->coarsest : mg->coarsest;
+    const float *inverse = room->coarsest ? room->own[last].inverse : level->inverse;
     const int of_node = level->A.b, width = uz_width(of_node);
     for (int64_t i = 0; i < level->A.nodes; i++)
         for (int r = 0; r < of_node; r++)
-            room->coarse[i * of_node + r] = level->inverse[i * of_node + r] > 0.0F ? (double)b[i * width + r] : 0.0;
-    uz_factor_permute(mg->coarsest, room->permuted, room->coarse);
-    uz_status status = uz_factor_solve_one(mg->coarsest, room->ws, room->permuted, true, err);
+            room->coarse[i * of_node + r] = inverse[i * of_node + r] > 0.0F ? (double)b[i * width + r] : 0.0;
+    uz_factor_permute(factor, room->permuted, room->coarse);
+    uz_status status = uz_factor_solve_one(factor, room->ws, room->permuted, true, err);
     if (status == UZ_OK)
-        status = uz_factor_solve_one(mg->coarsest, room->ws, room->permuted, false, err);
-    uz_factor_unpermute(mg->coarsest, room->coarse, room->permuted);
+        status = uz_factor_solve_one(factor, room->ws, room->permuted, false, err);
+    uz_factor_unpermute(factor, room->coarse, room->permuted);
     for (int64_t i = 0; i < level->A.nodes; i++)
         for (int r = 0; r < width; r++)
             x[i * width + r] = r < of_node ? (float)room->coarse[i * of_node + r] : 0.0F;
@@ -235,7 +228,7 @@ static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room
 static uz_status apply_alone(const uz_aggregates *mg, uz_multigrid_room *room, double *z, const double *r,
                              uz_error *err)
 {
-    const uz_factor *factor = room->alone ? room->alone : mg->coarsest;
+    const uz_factor *factor = room->coarsest ? room->coarsest : mg->coarsest;
     uz_factor_permute(factor, room->permuted, r);
     uz_status status = uz_factor_solve_one(factor, room->ws, room->permuted, true, err);
     if (status == UZ_OK)
@@ -272,9 +265,17 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
         room->b[0][s / b * width + s % b] = (float)(mg->scale[j] * r[j] / unit);
     }
     step at[UZ_LEVELS_MOST];
+    uz_level now[UZ_LEVELS_MOST];
     for (int l = 0; l < last; l++) {
-        const float *inverse = l == 0 && room->inverse ? room->inverse : mg->level[l].inverse;
-        at[l] = (step){&mg->level[l], inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k};
+        uz_level *level = &now[l];
+        *level = mg->level[l];
+        if (room->own[l].inverse)
+            level->inverse = room->own[l].inverse;
+        if (room->own[l].off) {
+            level->off = room->own[l].off;
+            level->diag = room->own[l].diag;
+        }
+        at[l] = (step){level, level->inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k};
         run(&at[l], true);
     }
     const uz_status status = solve_coarsest(mg, room, room->x[last], room->b[last], err);
@@ -322,10 +323,10 @@ static void free_room(uz_multigrid_room *room)
         free(room->x[l]);
         free(room->b[l]);
     }
-    void *rest[] = {room->coarse, room->permuted, room->to, room->from, room->inverse};
+    void *rest[] = {room->coarse, room->permuted, room->to, room->from};
     for (size_t k = 0; k < sizeof rest / sizeof rest[0]; k++)
         free(rest[k]);
-    uz_factor_free(room->alone);
+    uz_release_levels(room);
     free(room);
 }
 
@@ -339,6 +340,8 @@ static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
               (room->permuted = uz_alloc(coarsest, sizeof(double))) &&
               (room->to = uz_alloc_zero(finest, sizeof(double))) &&
               (room->from = uz_alloc_zero(finest, sizeof(double)));
+    if (room)
+        room->levels = base->levels;
     *bytes = sizeof *room + 16 * (size_t)(coarsest + finest);
     for (int l = 0; ok && base->levels > 1 && l < base->levels; l++) {
         const int64_t size = mg->level[l].A.nodes * uz_width(mg->level[l].A.b);
@@ -365,7 +368,7 @@ static uz_status hold_alone(uz_multigrid_room *room, const uz_csc *K, const bool
             if (held[j] || held[K->idx[q]])
                 alone.val[q] = K->idx[q] == j ? 1.0 : 0.0;
     if (status == UZ_OK)
-        status = uz_factor_coarsest(&room->alone, &alone, 0, stop ? stop->hooks : NULL, err);
+        status = uz_factor_coarsest(&room->coarsest, &alone, 0, stop ? stop->hooks : NULL, err);
     uz_csc_clear(&alone);
     return status;
 }
@@ -373,30 +376,16 @@ static uz_status hold_alone(uz_multigrid_room *room, const uz_csc *K, const bool
 static uz_status hold(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, const bool *held,
                       size_t *bytes, const uz_stop *stop, uz_error *err)
 {
-    const uz_aggregates *mg = (const uz_aggregates *)base;
-    const int64_t slots = mg->level[0].A.nodes * mg->level[0].A.b;
-    free(room->inverse);
-    uz_factor_free(room->alone);
-    room->inverse = NULL;
-    room->alone = NULL;
+    uz_release_levels(room);
     room->held = held;
     *bytes = 0;
     if (!held)
         return UZ_OK;
-    if (base->levels == 1) {
-        const uz_status status = hold_alone(room, K, held, stop, err);
-        *bytes = status == UZ_OK ? uz_factor_describe(room->alone).bytes : 0;
-        return status;
-    }
-    room->inverse = uz_alloc(slots, sizeof *room->inverse);
-    if (!room->inverse)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)base->n);
-    *bytes = 4 * (size_t)slots;
-    memcpy(room->inverse, mg->level[0].inverse, (size_t)slots * sizeof *room->inverse);
-    for (int64_t j = 0; j < base->n; j++)
-        if (held[j])
-            room->inverse[mg->slot[j]] = 0.0F;
-    return UZ_OK;
+    if (base->levels > 1)
+        return uz_hold_levels(room, (const uz_aggregates *)base, held, bytes, stop, err);
+    const uz_status status = hold_alone(room, K, held, stop, err);
+    *bytes = status == UZ_OK ? uz_factor_describe(room->coarsest).bytes : 0;
+    return status;
 }
 
 static void free_aggregates(uz_multigrid *base)

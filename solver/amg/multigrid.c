@@ -183,34 +183,6 @@ uz_status uz_factor_coarsest(uz_factor **out, const uz_csc *A, size_t memory_lim
     return status;
 }
 
-/* Column by column, lower triangle; dofs that are not there become those of the unit matrix. */
-static uz_status to_columns(uz_csc *out, const uz_blocks *A, const float *inverse, uz_error *err)
-{
-    const int b = A->b;
-    const int64_t size = (int64_t)b * b;
-    uz_below below;
-    int64_t at = 0;
-    uz_status status = uz_below_init(&below, A) ? UZ_OK : fail_memory(A->nodes * b, err);
-    if (status == UZ_OK)
-        status = uz_csc_init(out, A->nodes * b, A->nodes * b, A->nodes * (size + b) / 2 + A->ptr[A->nodes] * size, err);
-    for (int64_t j = 0; status == UZ_OK && j < A->nodes; j++)
-        for (int c = 0; c < b; c++) {
-            for (int r = c; r < b; r++) {
-                const bool unit = r == c && !(inverse[j * b + c] > 0.0F);
-                out->idx[at] = j * b + r;
-                out->val[at++] = unit ? 1.0 : A->diag[j * size + r * b + c];
-            }
-            for (int64_t e = below.ptr[j]; e < below.ptr[j + 1]; e++)
-                for (int r = 0; r < b; r++) {
-                    out->idx[at] = below.node[e] * (int64_t)b + r;
-                    out->val[at++] = A->off[below.at[e] * size + r * b + c];
-                }
-            out->ptr[j * b + c + 1] = at;
-        }
-    uz_below_clear(&below);
-    return status;
-}
-
 static uz_status factor_last(uz_aggregates *mg, const uz_csc *K, size_t memory_limit, const uz_stop *stop,
                              uz_error *err)
 {
@@ -220,7 +192,7 @@ static uz_status factor_last(uz_aggregates *mg, const uz_csc *K, size_t memory_l
         return uz_factor_coarsest(&mg->coarsest, K, memory_limit, hooks, err);
     uz_csc A = {0};
     uz_error inner = {0};
-    uz_status status = to_columns(&A, &mg->level[last].A, mg->level[last].inverse, err);
+    uz_status status = uz_blocks_to_columns(&A, &mg->level[last].A, mg->level[last].inverse, err);
     if (status == UZ_OK) {
         status = uz_factor_coarsest(&mg->coarsest, &A, memory_limit, hooks, &inner);
         if (status == UZ_ERR_NOT_SPD)
@@ -293,7 +265,7 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
     uz_status status = n > ALONE ? build(mg, K, modes, memory_limit, stop, err) : UZ_OK;
     if (status == UZ_OK)
         status = factor_last(mg, K, memory_limit, stop, err);
-    for (int l = 1; l < UZ_LEVELS_MOST; l++) { /* only products with K need them again */
+    for (int l = 1; l + 1 < mg->base.levels; l++) { /* only products with K and the last level need them again */
         free(mg->level[l].A.off);
         free(mg->level[l].A.diag);
         mg->level[l].A.off = mg->level[l].A.diag = NULL;

@@ -33,7 +33,8 @@ void uz_below_clear(uz_below *below);
  * not there have rows of zeros. Sweeps are made in single precision: the cycle is positive definite whatever their
  * rounding is, as it is that of the rounded matrices. */
 typedef struct {
-    uz_blocks A;       /* level 0: kept for products; else without numbers, once the next level is made */
+    uz_blocks A; /* level 0: kept for products, the last one for what holding dofs takes from it; else without numbers,
+                  * once the next level is made */
     float *off, *diag; /* the same in single precision */
     float *inverse;    /* nodes x b: 1 / a_jj, 0 where a dof is not there, which makes it vanish from every sweep */
     int64_t *ptr;      /* nodes + 1: the blocks of each node's rows of the prolongation */
@@ -55,6 +56,23 @@ typedef struct {
 } uz_aggregates;
 extern const uz_multigrid_kind uz_aggregates_kind;
 
+/* One thread's. Levels of its own where dofs are held: off, diag and inverse of each, or NULL for those that are the
+ * multigrid's. */
+struct uz_multigrid_room {
+    int levels;
+    uz_factor_workspace *ws;
+    float *x[UZ_LEVELS_MOST], *b[UZ_LEVELS_MOST], *t[UZ_LEVELS_MOST]; /* nodes x width each */
+    double *coarse, *permuted;                                        /* of the coarsest level */
+    double *to, *from;                                                /* vectors of a product with level 0: nodes x 4 */
+    const bool *held;
+    uz_level own[UZ_LEVELS_MOST];
+    uz_factor *coarsest; /* likewise; of K_FF where there is one level only */
+};
+/* More than one level. *bytes: grows by what they take. */
+uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const bool *held, size_t *bytes,
+                         const uz_stop *stop, uz_error *err);
+void uz_release_levels(uz_multigrid_room *room);
+
 /* Vectors of a level have `width` numbers for each node. */
 static inline int uz_width(int b)
 {
@@ -65,6 +83,9 @@ static inline int uz_width(int b)
  * nowhere. Errors: NOT_SPD where a diagonal entry or a pair of dofs shows it. */
 uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes,
                               uz_error *err);
+
+/* Column by column, lower triangle; dofs without an inverse become those of the unit matrix. */
+uz_status uz_blocks_to_columns(uz_csc *out, const uz_blocks *A, const float *inverse, uz_error *err);
 
 /* start (groups + 2, zero), member (n): those of 0..n-1 that are in each group, by of (n; -1: in none). Afterwards
  * start[g]..start[g + 1] are group g's. */

@@ -1,0 +1,248 @@
+/* hold.c: dofs that are held in a multigrid that was made without them.
+ *
+ * The prolongation loses its rows of held dofs: P_F = P - P_H. Every coarse matrix is to be P_F'A P_F again, or the
+ * correction would count on displacements of held dofs, which are not made. It differs from P'A P by what held dofs
+ * take part in, and only that is computed, at the price of their share of the body:
+ *
+ *     P'A P - P_F'A P_F = G + G',  G = P_H'A (P - P_H / 2),
+ *
+ * and on the levels below by P'(that) P. Truncated basis functions as in Kornhuber and Krause, Comput. Vis. Sci. 4
+ * (2001). */
+#include "amg/multigrid_private.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hooks.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE_MOST = 6 };
+
+/* A function on held dofs but for so much of its energy is left out. */
+#define LOST 1e-5
+
+static uz_status fail_memory(int64_t n, uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to hold dofs of %lld", (long long)n);
+}
+
+/* to += G + G', G one block at (a, c), k x k. */
+static void add_symmetric(uz_blocks *to, int32_t a, int32_t c, const double *G)
+{
+    const int k = to->b;
+    double *block =
+        a == c ? to->diag + (int64_t)a * k * k : to->off + uz_blocks_find(to, a > c ? a : c, a > c ? c : a) * k * k;
+    for (int p = 0; p < k; p++)
+        for (int q = 0; q < k; q++) {
+            if (a >= c)
+                block[p * k + q] += G[p * k + q];
+            if (a <= c)
+                block[q * k + p] += G[p * k + q];
+        }
+}
+
+/* One block of the finer level, the rows and columns that count. */
+typedef struct {
+    const double *A; /* b x b */
+    bool transposed;
+    int64_t i, j;               /* its nodes */
+    const double *left, *right; /* b: weights of its rows and columns */
+} coupling;
+
+/* to += G + G', G = P_i' left A right P_j. */
+static void add_coupling(uz_blocks *to, const uz_level *fine, const coupling *x)
+{
+    const int b = fine->A.b, k = to->b;
+    for (int64_t e = fine->ptr[x->j]; e < fine->ptr[x->j + 1]; e++) {
+        const float *P = fine->value + e * b * k;
+        double AP[SIZE_MOST * SIZE_MOST] = {0};
+        for (int r = 0; r < b; r++)
+            for (int s = 0; s < b && x->left[r] > 0.0; s++) {
+                const double factor = x->left[r] * x->right[s] * (x->transposed ? x->A[s * b + r] : x->A[r * b + s]);
+                for (int c = 0; c < k; c++)
+                    AP[r * k + c] += factor * (double)P[s * k + c];
+            }
+        for (int64_t f = fine->ptr[x->i]; f < fine->ptr[x->i + 1]; f++) {
+            const float *of_row = fine->value + f * b * k;
+            double G[SIZE_MOST * SIZE_MOST] = {0};
+            for (int r = 0; r < b; r++)
+                for (int p = 0; p < k && x->left[r] > 0.0; p++)
+                    for (int c = 0; c < k; c++)
+                        G[p * k + c] += (double)of_row[r * k + p] * AP[r * k + c];
+            add_symmetric(to, fine->block[f], fine->block[e], G);
+        }
+    }
+}
+
+static bool is_any_held(const float *inverse, const float *free, int b)
+{
+    bool any = false;
+    for (int r = 0; r < b; r++)
+        any = any || (free[r] > 0.0F && !(inverse[r] > 0.0F));
+    return any;
+}
+
+/* The weights of a node's dofs: in P_H, and in P - P_H / 2. */
+static void weigh(double *held, double *rest, const float *inverse, int b)
+{
+    for (int r = 0; r < b; r++) {
+        held[r] = inverse[r] > 0.0F ? 0.0 : 1.0;
+        rest[r] = inverse[r] > 0.0F ? 1.0 : 0.5;
+    }
+}
+
+/* What level 1 loses with the dofs of level 0 that have no inverse. */
+static void find_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
+{
+    const uz_blocks *A = &fine->A;
+    const int b = A->b;
+    const int64_t size = (int64_t)b * b;
+    double held_i[SIZE_MOST], rest_i[SIZE_MOST], held_j[SIZE_MOST], rest_j[SIZE_MOST];
+    for (int64_t i = 0; i < A->nodes; i++) {
+        const bool own = is_any_held(inverse + i * b, fine->inverse + i * b, b);
+        weigh(held_i, rest_i, inverse + i * b, b);
+        if (own)
+            add_coupling(loss, fine, &(coupling){A->diag + i * size, false, i, i, held_i, rest_i});
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+            const int64_t j = A->idx[e];
+            const bool other = is_any_held(inverse + j * b, fine->inverse + j * b, b);
+            if (!own && !other)
+                continue;
+            weigh(held_j, rest_j, inverse + j * b, b);
+            if (own)
+                add_coupling(loss, fine, &(coupling){A->off + e * size, false, i, j, held_i, rest_j});
+            if (other)
+                add_coupling(loss, fine, &(coupling){A->off + e * size, true, j, i, held_j, rest_i});
+        }
+    }
+}
+
+static bool is_zero(const double *block, int64_t size)
+{
+    int64_t k = 0;
+    while (k < size && block[k] == 0.0)
+        k++;
+    return k == size;
+}
+
+/* What the next level loses: P'(loss) P. */
+static void pass_on(uz_blocks *next, const uz_blocks *loss, const uz_level *level)
+{
+    static const double all[SIZE_MOST] = {1, 1, 1, 1, 1, 1}, half[SIZE_MOST] = {.5, .5, .5, .5, .5, .5};
+    const int64_t size = (int64_t)loss->b * loss->b;
+    for (int64_t i = 0; i < loss->nodes; i++) {
+        if (!is_zero(loss->diag + i * size, size))
+            add_coupling(next, level, &(coupling){loss->diag + i * size, false, i, i, all, half});
+        for (int64_t e = loss->ptr[i]; e < loss->ptr[i + 1]; e++)
+            if (!is_zero(loss->off + e * size, size))
+                add_coupling(next, level, &(coupling){loss->off + e * size, false, i, loss->idx[e], all, all});
+    }
+}
+
+/* The level without what it loses, in arrays of its own. */
+static bool subtract(uz_level *own, const uz_level *level, const uz_blocks *loss, size_t *bytes)
+{
+    const int b = level->A.b;
+    const int64_t size = (int64_t)b * b, n = level->A.nodes * b, off = level->A.ptr[level->A.nodes] * size,
+                  diag = level->A.nodes * size;
+    own->off = uz_alloc_zero(off + 8, sizeof *own->off);
+    own->diag = uz_alloc_zero(diag + 8, sizeof *own->diag);
+    own->inverse = uz_alloc(n, sizeof *own->inverse);
+    if (!own->off || !own->diag || !own->inverse)
+        return false;
+    for (int64_t e = 0; e < off; e++)
+        own->off[e] = (float)((double)level->off[e] - loss->off[e]);
+    for (int64_t e = 0; e < diag; e++)
+        own->diag[e] = (float)((double)level->diag[e] - loss->diag[e]);
+    for (int64_t i = 0; i < n; i++) {
+        const int64_t at = i / b * size + i % b * b + i % b;
+        own->inverse[i] = own->diag[at] > (float)LOST * level->diag[at] ? 1.0F / own->diag[at] : 0.0F;
+    }
+    *bytes += 4 * (size_t)(off + diag + n);
+    return true;
+}
+
+/* The coarsest level's factor. Where rounding has made it indefinite that of the whole body does. */
+static uz_status factor(uz_multigrid_room *room, const uz_level *last, const uz_blocks *loss, const uz_hooks *hooks,
+                        uz_error *err)
+{
+    const int64_t size = (int64_t)loss->b * loss->b;
+    uz_blocks A = *loss;
+    uz_csc columns = {0};
+    uz_error inner = {0};
+    for (int64_t e = 0; e < loss->ptr[loss->nodes] * size; e++)
+        A.off[e] = last->A.off[e] - loss->off[e];
+    for (int64_t e = 0; e < loss->nodes * size; e++)
+        A.diag[e] = last->A.diag[e] - loss->diag[e];
+    uz_status status = uz_blocks_to_columns(&columns, &A, room->own[room->levels - 1].inverse, err);
+    if (status == UZ_OK) {
+        status = uz_factor_coarsest(&room->coarsest, &columns, 0, hooks, &inner);
+        if (status == UZ_ERR_NOT_SPD)
+            status = UZ_OK;
+        else if (status != UZ_OK)
+            uz_fail(err, status, inner.where, "%s", inner.message);
+    }
+    uz_csc_clear(&columns);
+    return status;
+}
+
+static bool init_loss(uz_blocks *loss, const uz_level *level)
+{
+    const int64_t size = (int64_t)level->A.b * level->A.b;
+    *loss = level->A; /* whose places it shares */
+    loss->off = uz_alloc_zero(level->A.ptr[level->A.nodes] * size, sizeof *loss->off);
+    loss->diag = uz_alloc_zero(level->A.nodes * size, sizeof *loss->diag);
+    return loss->off && loss->diag;
+}
+
+void uz_release_levels(uz_multigrid_room *room)
+{
+    for (int l = 0; l < room->levels; l++) {
+        free(room->own[l].off);
+        free(room->own[l].diag);
+        free(room->own[l].inverse);
+    }
+    memset(room->own, 0, sizeof room->own);
+    uz_factor_free(room->coarsest);
+    room->coarsest = NULL;
+}
+
+uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const bool *held, size_t *bytes,
+                         const uz_stop *stop, uz_error *err)
+{
+    const uz_level *finest = &mg->level[0];
+    const int64_t slots = finest->A.nodes * finest->A.b;
+    uz_blocks loss = {0}, next = {0};
+    float *inverse = room->own[0].inverse = uz_alloc(slots, sizeof *inverse);
+    uz_status status = inverse ? UZ_OK : fail_memory(mg->base.n, err);
+    for (int64_t j = 0; inverse && j < slots; j++)
+        inverse[j] = finest->inverse[j];
+    for (int64_t j = 0; inverse && j < mg->base.n; j++)
+        if (held[j])
+            inverse[mg->slot[j]] = 0.0F;
+    *bytes += 4 * (size_t)slots;
+    for (int l = 1; status == UZ_OK && l < mg->base.levels; l++) {
+        if (!init_loss(&next, &mg->level[l]))
+            status = fail_memory(mg->base.n, err);
+        else if (uz_stop_is_due(stop))
+            status = uz_fail_stopped(err);
+        else if (l == 1)
+            find_loss(&next, finest, inverse);
+        else
+            pass_on(&next, &loss, &mg->level[l - 1]);
+        if (status == UZ_OK && !subtract(&room->own[l], &mg->level[l], &next, bytes))
+            status = fail_memory(mg->base.n, err);
+        free(loss.off);
+        free(loss.diag);
+        loss = next;
+        next = (uz_blocks){0};
+    }
+    if (status == UZ_OK)
+        status = factor(room, &mg->level[mg->base.levels - 1], &loss, stop ? stop->hooks : NULL, err);
+    if (status == UZ_OK && room->coarsest)
+        *bytes += uz_factor_describe(room->coarsest).bytes;
+    free(loss.off);
+    free(loss.diag);
+    return status;
+}
