@@ -7,7 +7,8 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "soak"))
 
-import malformed  # noqa: E402  the path is set above
+import daemons  # noqa: E402  the path is set above
+import malformed  # noqa: E402
 import no_memory  # noqa: E402
 import overhead  # noqa: E402
 import scenarios  # noqa: E402
@@ -44,6 +45,19 @@ def test_workers_killed_under_load(s):
 def test_a_week(s):
     figures = clean(scenarios.week(s.build, 2 if INSTRUMENTED else 4))
     check(figures["jobs"] > 10, figures)
+
+
+@options(None)
+def test_faults_of_daemons_and_database(s):
+    figures = clean(daemons.faults(s.build, 2 if INSTRUMENTED else 5, 4))
+    check(figures["acknowledged"] > 10, figures)
+
+
+@options(None)
+def test_jobs_of_many_bodies(s):
+    """By chance three daemons would factor most bodies two or three times."""
+    run = daemons.mixture(s.build, 5, 60, 10, [60, 20], "256M", clients=6)
+    check(run["errors"] == 0 and run["missed"] <= 1.4 * run["asked"], run)
 
 
 @options(None)

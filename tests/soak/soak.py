@@ -17,7 +17,8 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path[:0] = [str(ROOT / "tests/api"), str(ROOT / "tests/figures")]
 
-import malformed  # noqa: E402  the path is set above
+import daemons  # noqa: E402  the path is set above
+import malformed  # noqa: E402
 import no_memory  # noqa: E402
 import orders  # noqa: E402
 import overhead  # noqa: E402
@@ -42,6 +43,11 @@ RUNS = [
     ("200 x SIGTERM under load", lambda b: scenarios.endings(b, 200, signal.SIGTERM)),
     ("500 x kill -9 of a worker, 16 posting clients", lambda b: scenarios.killed_workers(b, 500)),
     ("a mixed load of ten minutes: kills of workers, dismissals, reloads", lambda b: scenarios.week(b, 600)),
+    ("three daemons and PostgreSQL: 500 faults, 16 posting clients", lambda b: daemons.faults(b, 500)),
+    ("two daemons: one dies", daemons.node_dies),
+    ("three daemons: upgrade from the version before", daemons.upgrade),
+    ("three daemons: 1,500 jobs of 200 bodies", lambda b: daemons.zipf(b, 1500)),
+    ("30 x 10 body, default solver, PostgreSQL", lambda b: daemons.throughput(b, 20, True)),
     ("1,000 power losses, faults at every write, 1,000 damaged files", lambda b: unit(b, "test_store_faults", 10)),
     ("1,000 slow clients, /healthz", lambda b: scenarios.slow_clients(b, 1000, 20)),
     ("2,000 event streams, 1,000 long polls", streams.crowds),
