@@ -98,6 +98,8 @@ static const char *how_known(const json_t *summary, const json_t *line)
     const char *name = client_json_text(line, "quantity");
     const json_t *quantity;
     size_t i;
+    if (strncmp(name, "contact.", 8) == 0)
+        return "by estimate";
     if (strncmp(name, "quantities.", 11) != 0)
         return "the exact one";
     json_array_foreach(json_object_get(summary, "quantities"), i,

@@ -141,7 +141,7 @@ static void print_outcome(FILE *to, const json_t *summary)
 static void print_ladder(FILE *to, const json_t *summary)
 {
     const json_t *ladder = client_json_at(summary, "mesh.ladder"), *level;
-    char d[32], mesh[32], certified[32], iterations[32], seconds[32];
+    char d[32], whole[32], mesh[32], certified[32], iterations[32], seconds[32];
     size_t i;
     if (!json_is_array(ladder))
         return;
@@ -153,11 +153,12 @@ static void print_ladder(FILE *to, const json_t *summary)
         print_cells(to, client_json_at(summary, "mesh.cells"));
     fprintf(to, " %s after %zu grid%s:\n", refined ? "elements, refined" : "cells, chosen", json_array_size(ladder),
             json_array_size(ladder) > 1 ? "s" : "");
-    fprintf(to, "%12s%9s  %10s  %10s  %10s  %s\n", "", "unknowns", "mesh error", "certified", "iterations", "time");
+    fprintf(to, "%12s%9s  %11s  %10s  %10s  %10s  %s\n", "", "unknowns", "whole error", "mesh error", "certified",
+            "iterations", "time");
     json_array_foreach((json_t *)ladder, i, level)
     {
-        fprintf(to, "%12s%9s  %10s  %10s  %10s  %s  ", "", number_in_words(d, level, "d", 9),
-                number_in_words(mesh, level, "discretization_error", 3),
+        fprintf(to, "%12s%9s  %11s  %10s  %10s  %10s  %s  ", "", number_in_words(d, level, "d", 9),
+                number_in_words(whole, level, "error", 3), number_in_words(mesh, level, "discretization_error", 3),
                 number_in_words(certified, level, "certified_error", 2),
                 number_in_words(iterations, level, "iterations", 9),
                 client_format_seconds(seconds, sizeof seconds, client_json_number(level, "seconds")));
@@ -199,6 +200,32 @@ static void print_method(FILE *to, const json_t *summary)
     fputc('\n', to);
 }
 
+/* Where the largest pressure and the area are without a mesh, by what grids tell: a line for each, or what is in the
+ * way.
+ */
+static void print_trends(FILE *to, const json_t *estimates)
+{
+    static const char *const NAMES[][2] = {{"max_pressure", "largest pressure"}, {"area", "area"}};
+    for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0] && json_is_object(estimates); k++) {
+        const json_t *one = client_json_at(estimates, NAMES[k][0]);
+        const double low = client_json_number(one, "low"), high = client_json_number(one, "high"),
+                     value = client_json_number(one, "value"), order = client_json_number(one, "order");
+        char within[32];
+        label(to, k == 0 ? "estimates" : "");
+        fprintf(to, "%s ", NAMES[k][1]);
+        if (isfinite(high))
+            fprintf(to, "%.5g within %s, by estimate: ", value,
+                    client_format_bound(within, fmax(high - value, value - low)));
+        else
+            fputs(isfinite(low) ? "without a limit: " : "none: ", to);
+        if (isfinite(order))
+            fprintf(to, "order %.2g observed on %.0f grids", order, client_json_number(one, "grids"));
+        else
+            client_print_safe(to, client_json_text(one, "why"));
+        fputc('\n', to);
+    }
+}
+
 static void print_contact(FILE *to, const json_t *summary)
 {
     const double candidates = client_json_number(summary, "contact.candidates");
@@ -231,6 +258,7 @@ static void print_contact(FILE *to, const json_t *summary)
         print_vector(to, " at ", client_json_at(summary, "contact.max_pressure_at.x"));
     }
     fputc('\n', to);
+    print_trends(to, client_json_at(summary, "contact.estimates"));
     label(to, "penetration");
     fprintf(to, "%s at most\n", number_in_words(text, summary, "contact.max_penetration", 3));
     /* What facets are taken for: "shaft: cylinder of radius 20, 0.027 off the facets, which turn by 6 degrees". */
@@ -297,7 +325,7 @@ static void print_certificate(FILE *to, const json_t *summary)
         fprintf(to, "the exact %s is within %s of this one, relative, in the energy norm",
                 guaranteed ? "displacement" : "solution of these equations", client_format_bound(absolute, relative));
     if (!guaranteed && isfinite(relative))
-        fprintf(to, "\n%11s", ""); /* what was asked for has a line of its own */
+        fprintf(to, isfinite(total) ? "" : "\n%11s", ""); /* what was asked for has a line of its own */
     else if (relative > 0 && relative < 1 && digits >= 1)
         fprintf(to, ":\n%12s%.0f digit%s %s certain", "", fmin(digits, 15), digits > 1 ? "s" : "",
                 digits > 1 ? "are" : "is");

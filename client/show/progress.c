@@ -41,7 +41,10 @@ client_progress client_progress_new(FILE *to, bool wanted, bool quiet)
                              .iteration = NAN,
                              .bound = NAN,
                              .relative = NAN,
-                             .first = NAN};
+                             .first = NAN,
+                             .grid = NAN,
+                             .grid_error = NAN,
+                             .grid_ends = NAN};
 }
 
 /* -------------------------------------------------------------------- ETA */
@@ -49,6 +52,8 @@ client_progress client_progress_new(FILE *to, bool wanted, bool quiet)
 double client_progress_left(const client_progress *p, double now)
 {
     double share = (p->percent - FIRST_ROW) / (LAST_ROW - FIRST_ROW), rate = 0;
+    if (isfinite(p->grid)) /* iterations on this grid tell nothing of those that follow */
+        return p->grid_ends - now;
     if (!(p->percent >= 2) || now - p->start < 1)
         return NAN;
     /* How fast log(error) falls over the samples that are kept, per second; 0: it does not. */
@@ -82,7 +87,7 @@ __attribute__((format(printf, 3, 4))) static void put(part *to, int rank, const 
     to->rank = to->text[0] ? rank : 0;
 }
 
-enum { PARTS = 7 };
+enum { PARTS = 8 };
 
 /* As many parts as fit into `room` characters, and the first even if it does not. */
 static int compose(char out[ROOM], const client_progress *p, int room)
@@ -102,7 +107,11 @@ static int compose(char out[ROOM], const client_progress *p, int room)
     put(&parts[2], 5, "%s", phase);
     if (isfinite(p->iteration))
         put(&parts[3], 4, "iteration %.0f", p->iteration);
-    if (isfinite(p->relative))
+    if (isfinite(p->grid_error))
+        put(&parts[7], 2, "grid %.0f, %.2g %% of %.2g %%", p->grid, 100 * p->grid_error, 100 * p->grid_asked);
+    else if (isfinite(p->grid))
+        put(&parts[7], 2, "grid %.0f", p->grid);
+    if (isfinite(p->relative) && !isfinite(p->grid))
         put(&parts[4], 2, "error ~%.1e", p->relative);
     if (isfinite(p->bound))
         put(&parts[5], 7, "bound %.2e", p->bound);
@@ -171,9 +180,21 @@ static void say(client_progress *p)
     memcpy(p->last_status, p->status, sizeof p->last_status);
 }
 
+/* Of a job or of an event. */
+static void take_grid(client_progress *p, const json_t *from)
+{
+    if (!json_is_object(client_json_at(from, "grid")))
+        return;
+    p->grid = client_json_number(from, "grid.number");
+    p->grid_error = client_json_number(from, "grid.error");
+    p->grid_asked = client_json_number(from, "grid.asked");
+    p->grid_ends = client_clock() + client_json_number(from, "grid.seconds_left");
+}
+
 void client_progress_show(client_progress *p, const json_t *job)
 {
     double percent = client_json_number(job, "progress");
+    take_grid(p, job);
     snprintf(p->status, sizeof p->status, "%s", client_json_text(job, "status"));
     if (isfinite(percent))
         p->percent = percent;
@@ -186,6 +207,7 @@ void client_progress_row(client_progress *p, const json_t *event)
     /* ||u||_K is near sqrt(2 |psi|): equal where every gap that closes was 0. */
     double scale = sqrt(2 * fabs(client_json_number(event, "dual_objective")));
     double bound = client_json_number(event, "error_bound");
+    take_grid(p, event);
     if (!p->status[0])
         snprintf(p->status, sizeof p->status, "running");
     if (isfinite(percent))

@@ -148,7 +148,7 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
 /* The reply to a request that is only checked; NULL: nothing is predicted. */
 char *codec_encode_valid(const uz_prediction *predicted);
 /* The data of a progress event; row: the newest of the history, or NULL. */
-char *codec_encode_progress(int progress, const double *row);
+char *codec_encode_progress(int progress, const job_grid *grid, const double *row);
 char *codec_encode_upload(const upload_info *info);
 char *codec_encode_nodes(const store_node *nodes, size_t count);
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers);

@@ -64,6 +64,20 @@ static void put_link(text *t, const char *rel, const char *all, const char *id, 
     text_close(t, '}');
 }
 
+/* The grid that is solved, of a job that looks for one; else nothing. */
+static void put_grid(text *t, const job_grid *grid)
+{
+    if (grid->number == 0)
+        return;
+    text_open(t, "grid", '{');
+    text_integer(t, "number", grid->number);
+    text_number(t, "unknowns", grid->unknowns);
+    text_number(t, "error", grid->error);
+    text_number(t, "asked", grid->asked);
+    text_number(t, "seconds_left", grid->seconds_left);
+    text_close(t, '}');
+}
+
 static void put_job(text *t, const job *j)
 {
     size_t len; /* each case has a history of its own, under its name */
@@ -72,6 +86,7 @@ static void put_job(text *t, const job *j)
     text_string(t, "id", j->id);
     text_string(t, "status", job_status_name(j->status));
     text_integer(t, "progress", j->progress);
+    put_grid(t, &j->grid);
     put_time(t, "created", j->created);
     put_time(t, "started", j->started);
     put_time(t, "finished", j->finished);
@@ -219,12 +234,13 @@ char *codec_encode_valid(const uz_prediction *predicted)
     return text_finish(&t, NULL);
 }
 
-char *codec_encode_progress(int progress, const double *row)
+char *codec_encode_progress(int progress, const job_grid *grid, const double *row)
 {
     static const int SHOWN[] = {0, 2, 3, 9, 10}; /* columns of the history */
     text t = {0};
     text_open(&t, NULL, '{');
     text_integer(&t, "progress", progress);
+    put_grid(&t, grid);
     for (size_t i = 0; row && i < sizeof SHOWN / sizeof SHOWN[0]; i++)
         text_number(&t, CODEC_HISTORY_NAMES[SHOWN[i]], row[SHOWN[i]]);
     text_close(&t, '}');

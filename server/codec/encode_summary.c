@@ -123,6 +123,18 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
     text_close(t, ']');
 }
 
+/* Numbers of the contact that nothing bounds, as the grids tell them. */
+static void put_trend(text *t, const char *key, const uz_trend *of)
+{
+    text_open(t, key, '{');
+    put_named(t, NULL, (named[]){{"value", of->value}, {"low", of->low}, {"high", of->high}, {"order", of->order}}, 4);
+    text_integer(t, "grids", of->grids);
+    text_string(t, "kind", "estimated");
+    if (of->why[0])
+        text_string(t, "why", of->why);
+    text_close(t, '}');
+}
+
 static void put_contact(text *t, const uz_summary *s, bool scene)
 {
     const uz_evaluation *e = s->evaluation;
@@ -149,6 +161,10 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
             text_close(t, '}');
         }
         if (e && e->n_contacts > 0) {
+            text_open(t, "estimates", '{');
+            put_trend(t, "max_pressure", &e->peak);
+            put_trend(t, "area", &e->area);
+            text_close(t, '}');
             const uz_geometry *g = &s->geometry;
             const bool moving = g->kind == UZ_KINEMATICS_MOVING;
             text_open(t, "geometry", '{');
@@ -241,8 +257,11 @@ static void put_grids(text *t, const uz_grid_sequence *grids)
         put_named(t, NULL,
                   (named[]){{"discretization_error", level->discretization_error},
                             {"certified_error", level->certified_error},
-                            {"seconds", level->seconds}},
-                  3);
+                            {"error", level->error},
+                            {"seconds", level->seconds},
+                            {"max_pressure", level->max_pressure},
+                            {"contact_area", level->contact_area}},
+                  6);
         text_close(t, '}');
     }
     text_close(t, ']');

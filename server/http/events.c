@@ -32,7 +32,7 @@ typedef struct {
 static void name_state(char *out, size_t size, const job *j, double iteration)
 {
     if (j->status == JOB_RUNNING)
-        snprintf(out, size, "%d.running.%d.%.0f", j->attempts, j->progress, iteration);
+        snprintf(out, size, "%d.running.%d.%" PRId64 ".%.0f", j->attempts, j->progress, j->grid.number, iteration);
     else
         snprintf(out, size, "%d.%s", j->attempts, job_status_name(j->status));
 }
@@ -51,6 +51,7 @@ static bool look_at_job(event_stream *base)
     if (j.status == JOB_RUNNING &&
         work_live(s->context->work, j.id, &progress, NULL, (int64_t)fmax(s->iteration, -1.0), &live)) {
         j.progress = progress;
+        work_grid(s->context->work, j.id, &j.grid);
         if (live.count > 0)
             row = live.rows + (live.count - 1) * CODEC_HISTORY_COLUMNS;
     }
@@ -65,7 +66,7 @@ static bool look_at_job(event_stream *base)
         s->any = true;
         s->base.ended = jobs_ended(&j);
     } else if (!seen && j.status == JOB_RUNNING) {
-        char *data = codec_encode_progress(j.progress, row);
+        char *data = codec_encode_progress(j.progress, &j.grid, row);
         ok = stream_say(&s->base, "progress", s->last, data);
         free(data);
     }

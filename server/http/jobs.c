@@ -181,8 +181,10 @@ void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http
 void jobs_freshen(api *context, job *j)
 {
     int progress;
-    if (j->status == JOB_RUNNING && work_live(context->work, j->id, &progress, NULL, -1, NULL))
+    if (j->status == JOB_RUNNING && work_live(context->work, j->id, &progress, NULL, -1, NULL)) {
         j->progress = progress;
+        work_grid(context->work, j->id, &j->grid);
+    }
 }
 
 static void reply_job(api *context, job *j, http_reply *reply)

@@ -35,11 +35,20 @@ const char *job_status_name(job_status status);
  * one, NULL means that it is of no matter. */
 #define STORE_CLIENT 64
 
+/* The grid that a job's search for one solves on: not stored, told by the worker while it runs. */
+typedef struct {
+    int64_t number;      /* from 1; 0: there is no search */
+    double unknowns;     /* displacements of its nodes */
+    double error, asked; /* of the grid before; NaN where there is none */
+    double seconds_left; /* until the search ends, by estimate; NaN: not known */
+} job_grid;
+
 typedef struct {
     char id[33]; /* 32 hex digits; ids sort in order of creation (millisecond time, counter, random) */
     job_status status;
-    int progress; /* 0..100 */
-    int attempts; /* runs begun */
+    int progress;  /* 0..100 */
+    job_grid grid; /* see there */
+    int attempts;  /* runs begun */
     double created, started, finished;
     char *tags;    /* JSON array of strings, never NULL */
     char *summary; /* JSON object once it ended with an answer, else NULL */

@@ -2,8 +2,9 @@
  *
  * What is asserted is meant of the exact answer, and a summary is of one that is certified to be near it. Where the
  * certificate bounds how far a number is from that of the exact answer, the whole range must meet the limits to pass,
- * and miss them to fail; a quantity's interval is such a range, of the body itself. The other numbers are taken as they
- * are, and `error` says that no bound is known. An answer that is not what was asked for passes nothing. */
+ * and miss them to fail; a quantity's interval is such a range, of the body itself, and so, by estimate, is what
+ * several grids tell of the largest pressure and of the area. The other numbers are taken as they are, and `error` says
+ * that no bound is known. An answer that is not what was asked for passes nothing. */
 #include "work/judge.h"
 #include "codec/quantity.h"
 
@@ -22,9 +23,10 @@ typedef struct {
 typedef struct {
     range in;
     double error;
+    bool estimated; /* not proved */
 } bound;
 
-static const bound UNKNOWN = {{NAN, NAN}, NAN};
+static const bound UNKNOWN = {{NAN, NAN}, NAN, false};
 
 /* ---- how far a number may be from that of the exact answer */
 
@@ -32,6 +34,32 @@ static double number_at(const json_value *summary, const char *name)
 {
     double value = NAN;
     return quantity_read(&value, summary, name) ? value : (double)NAN;
+}
+
+/* Of the quantity of this name. */
+static bool is_proved(const json_value *summary, const char *name)
+{
+    const json_value *list = json_get(summary, "quantities");
+    for (size_t i = 0; i < json_size(list); i++) {
+        json_value room;
+        const json_value *one = json_item(list, i, &room);
+        if (json_text_is(json_get(one, "name"), name))
+            return json_text_is(json_get(one, "kind"), "guaranteed");
+    }
+    return false;
+}
+
+/* What is said by its low and high end; how far the value is from the farther one. */
+static bound interval_at(const json_value *summary, const char *name, double value, bool estimated)
+{
+    char end[160];
+    snprintf(end, sizeof end, "%s.low", name);
+    const double low = number_at(summary, end);
+    snprintf(end, sizeof end, "%s.high", name);
+    double high = number_at(summary, end);
+    if (isnan(high) && !isnan(low)) /* no limit is seen */
+        high = INFINITY;
+    return isnan(low) ? UNKNOWN : (bound){{low, high}, fmax(high - value, value - low), estimated};
 }
 
 /* The minimum of the energy is between the dual and the primal value. The strain energy W is half the square of a
@@ -42,31 +70,32 @@ static bound exact_bound(const json_value *summary, const char *quantity, double
     /* Numbers of the answer, which a finer one would have otherwise; the others are what they are. */
     static const char *const FACTS[] = {"contact.candidates", "contact.kept", "contact.added", "contact.rounds"};
     static const char *const ESTIMATES[] = {"contact.", "energy.", "resultants.", "warnings"};
+    static const char *const TRENDS[][2] = {{"contact.max_pressure", "contact.estimates.max_pressure"},
+                                            {"contact.area", "contact.estimates.area"},
+                                            {"contact.estimates.max_pressure.value", "contact.estimates.max_pressure"},
+                                            {"contact.estimates.area.value", "contact.estimates.area"}};
     const double gap = number_at(summary, "certificate.gap"), e = number_at(summary, "certificate.absolute_error");
     bool estimate = false;
     for (size_t i = 0; i < sizeof ESTIMATES / sizeof ESTIMATES[0]; i++)
         estimate = estimate || strncmp(quantity, ESTIMATES[i], strlen(ESTIMATES[i])) == 0;
     for (size_t i = 0; i < sizeof FACTS / sizeof FACTS[0]; i++)
         estimate = estimate && strcmp(quantity, FACTS[i]) != 0;
-    if (strncmp(quantity, "quantities.", 11) == 0) { /* the interval is of the body itself */
-        char end[160];
-        snprintf(end, sizeof end, "%s.low", quantity);
-        const double low = number_at(summary, end);
-        snprintf(end, sizeof end, "%s.high", quantity);
-        const double high = number_at(summary, end);
-        return isnan(low) || isnan(high) ? UNKNOWN : (bound){{low, high}, 0.5 * (high - low)};
-    }
+    if (strncmp(quantity, "quantities.", 11) == 0) /* the interval is of the body itself */
+        return interval_at(summary, quantity, value, !is_proved(summary, quantity + 11));
+    for (size_t i = 0; i < sizeof TRENDS / sizeof TRENDS[0]; i++)
+        if (strcmp(quantity, TRENDS[i][0]) == 0) /* so is what the grids tell, where there are several */
+            return interval_at(summary, TRENDS[i][1], value, true);
     if (!estimate)
-        return (bound){{value, value}, 0.0};
+        return (bound){{value, value}, 0.0, false};
     if (!isnan(number_at(summary, "contact.geometry.left")))
         return UNKNOWN; /* the certificate is of the last pass, and what others would change is estimated */
     if (strcmp(quantity, "energy.primal") == 0 && !isnan(gap))
-        return (bound){{value - gap, value}, gap};
+        return (bound){{value - gap, value}, gap, false};
     if (strcmp(quantity, "energy.dual") == 0 && !isnan(gap))
-        return (bound){{value, value + gap}, gap};
+        return (bound){{value, value + gap}, gap, false};
     if (strcmp(quantity, "energy.strain") == 0 && value >= 0.0 && !isnan(e)) {
         const double norm = sqrt(2.0 * value), least = fmax(norm - e, 0.0);
-        return (bound){{0.5 * least * least, 0.5 * (norm + e) * (norm + e)}, e * (norm + 0.5 * e)};
+        return (bound){{0.5 * least * least, 0.5 * (norm + e) * (norm + e)}, e * (norm + 0.5 * e), false};
     }
     return UNKNOWN;
 }
@@ -124,8 +153,8 @@ static codec_finding judge_one(const codec_assertion *a, const json_value *summa
     } else if (exact.lo < limits.lo || exact.hi > limits.hi) {
         out.verdict = CODEC_UNCERTAIN;
         snprintf(out.reason, sizeof out.reason,
-                 "the exact value is between %s and %s, so that it may or may not meet the limit",
-                 shown(first, exact.lo), shown(second, exact.hi));
+                 "%sthe exact value is between %s and %s, so that it may or may not meet the limit",
+                 known.estimated ? "by estimate " : "", shown(first, exact.lo), shown(second, exact.hi));
     } else {
         out.verdict = CODEC_PASS;
     }

@@ -56,6 +56,17 @@ void live_restart(live_writer *w, int64_t current, double from, double to)
     publish(w->shared, s);
 }
 
+void live_grid(live_writer *w, const uz_grid_start *grid, double now)
+{
+    live_state *s = &w->state;
+    s->grid = grid->number;
+    s->unknowns = grid->unknowns;
+    s->grid_error = grid->error;
+    s->grid_asked = grid->asked;
+    s->ends = now + grid->seconds_left;
+    live_restart(w, 0, grid->from, grid->to);
+}
+
 void live_add(live_writer *w, const uz_history_row *row)
 {
     live *l = w->shared;
@@ -135,6 +146,14 @@ int live_progress(const live *l, int before)
         now = PROGRESS_FIRST_ROW + (int)((PROGRESS_LAST_ROW - PROGRESS_FIRST_ROW) * share);
     }
     return now > before ? now : before;
+}
+
+job_grid live_job_grid(const live *l, double now)
+{
+    const live_state s = live_read(l);
+    const double left = s.ends - now;
+    /* what has taken longer than was expected has told that the expectation was wrong */
+    return (job_grid){s.grid > 0 ? s.grid : 0, s.unknowns, s.grid_error, s.grid_asked, left > 0.0 ? left : (double)NAN};
 }
 
 bool live_rows(const live *l, int64_t after, double **rows, int64_t *count)

@@ -29,6 +29,10 @@ typedef struct {
     double first, value, target;          /* of the measured error: at the start (0: none yet), now, at the end */
     int64_t max_iterations;
     double from, to; /* shares of the whole that what runs begins and ends with; 0, 0: it is the whole */
+    /* The search for a grid: the one that is solved, from 1 (0: there is no search), its unknowns, the error of the one
+     * before and what is asked for; when it is expected to end, on the monotonic clock (NaN: not known). */
+    int64_t grid;
+    double unknowns, grid_error, grid_asked, ends;
 } live_state;
 
 enum { LIVE_WORDS = sizeof(live_state) / 8 };
@@ -50,6 +54,8 @@ typedef struct {
 void live_begin(live_writer *w, live *shared, const uz_settings *settings, const uz_problem *problem);
 /* A load case begins, of this part of the whole (0, 0: it is the whole): rows are its own from here on. */
 void live_restart(live_writer *w, int64_t current, double from, double to);
+/* Another grid begins, at this time on the monotonic clock. */
+void live_grid(live_writer *w, const uz_grid_start *grid, double now);
 void live_add(live_writer *w, const uz_history_row *row);
 
 /* ---- the reader's side */
@@ -60,6 +66,8 @@ live_state live_read(const live *l);
  * one asked for, or by their share of the largest number allowed where that is more; each of n load cases counts as an
  * nth of that. Never less than `before`. */
 int live_progress(const live *l, int before);
+/* The grid that a search for one solves on; now: on the monotonic clock. */
+job_grid live_job_grid(const live *l, double now);
 /* The kept rows with iteration > after, and the latest; the caller frees. False: no memory. */
 bool live_rows(const live *l, int64_t after, double **rows, int64_t *count);
 

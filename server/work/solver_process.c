@@ -69,9 +69,9 @@ static void note_case(void *ctx, int64_t load_case)
     live_restart(w, load_case, w->state.from, w->state.to);
 }
 
-static void note_grid(void *ctx, double from, double to)
+static void note_grid(void *ctx, const uz_grid_start *grid)
 {
-    live_restart(&((solver *)ctx)->live, 0, from, to);
+    live_grid(&((solver *)ctx)->live, grid, clock_seconds(CLOCK_MONOTONIC));
 }
 
 /* The names come before the news, and the news before the solve. */

@@ -451,6 +451,18 @@ void work_case_name(const process *p, int64_t i, char name[CASE_NAME])
     name[got == CASE_NAME ? CASE_NAME - 1 : 0] = '\0';
 }
 
+bool work_grid(work *w, const char *id, job_grid *out)
+{
+    worker *found = find_worker(w, id);
+    *out = (job_grid){.number = 0};
+    if (!found)
+        return false;
+    if (found->process)
+        *out = live_job_grid(&found->process->board->live, clock_seconds(CLOCK_MONOTONIC));
+    pthread_mutex_unlock(&found->lock);
+    return out->number > 0;
+}
+
 bool work_live(work *w, const char *id, int *progress, const char *case_name, int64_t after, work_history *out)
 {
     bool ok = true;

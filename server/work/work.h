@@ -70,6 +70,8 @@ typedef struct {
     double *rows;       /* of the case that runs now, if it is the one asked for; freed by the caller */
     int64_t count;
 } work_history;
+/* The grid that a job's search for one solves on. False: it does not run here, or is none. */
+bool work_grid(work *w, const char *id, job_grid *out);
 /* False if the job does not run here, or without memory. *progress in percent; *out the rows with iteration > after of
  * the case that is named (NULL: whichever runs). Both may be NULL. */
 bool work_live(work *w, const char *id, int *progress, const char *case_name, int64_t after, work_history *out);

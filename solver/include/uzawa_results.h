@@ -167,6 +167,17 @@ typedef struct {
     char unproved[96];       /* asked for and not proved: a clause; else "" */
 } uz_quantity_found;
 
+/* A number of an answer that nothing bounds: where it goes with finer grids, by those that were solved (post/trend.h).
+ */
+typedef struct {
+    /* by estimate, of the body itself. NaN: no range, and value is that of this mesh; high INFINITY: no limit is seen
+     */
+    double value, low, high;
+    double order;  /* observed: what it is off falls as the size of elements to this power; NaN: none was */
+    int64_t grids; /* that tell it: of different sizes of elements */
+    char why[112]; /* why there is no range, or no order; else "" */
+} uz_trend;
+
 /* Scenes: what the answer comes to. */
 typedef struct {
     double strain_energy;    /* with that of springs */
@@ -175,6 +186,8 @@ typedef struct {
     double contact_area;     /* tributary area of the rows with r < 0 */
     int64_t peak_node;       /* where max_pressure is; -1: no pressure */
     double peak_at[3];
+    double peak_size;    /* of the side there: the root of its row's area in space, the area in the plane */
+    uz_trend peak, area; /* of max_pressure and contact_area */
     int64_t n_contacts, n_supports;
     uz_resultant *contacts,
         *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
@@ -210,8 +223,10 @@ typedef struct {
 typedef struct {
     int64_t cells[3]; /* of a box whose cells are chosen and whose elements are not bisected, else 0 */
     int64_t n_elements, d, iterations;
-    double discretization_error; /* estimated */
-    double certified_error;      /* bound, of what the equations of this grid leave */
+    double discretization_error;       /* estimated */
+    double certified_error;            /* bound, of what the equations of this grid leave */
+    double error;                      /* by which the request is judged (uz_asked_error) */
+    double max_pressure, contact_area; /* of the case at hand; NaN: it has no answer here */
     double seconds;
 } uz_grid_level;
 
@@ -318,15 +333,23 @@ typedef struct {
 } uz_result;
 void uz_result_free(uz_result *result);
 
+/* Where a search for a grid stands, before it solves on the next one. */
+typedef struct {
+    double from, to;     /* shares of the whole, 0 to 1, that this grid begins and ends with, by estimate */
+    int64_t number;      /* its own, from 1 */
+    double unknowns;     /* displacements of its nodes */
+    double error, asked; /* by which the request is judged: of the grid before, NaN for the first; what is asked for */
+    /* Until the request is met, by how cost and error went from grid to grid so far; NaN: they do not tell yet. */
+    double seconds_left;
+} uz_grid_start;
+
 /* Asked between iterations and before every expensive step; from the solving thread. */
 typedef struct {
     void *ctx;
     bool (*cancelled)(void *ctx);                           /* may be NULL */
     void (*progress)(void *ctx, const uz_history_row *row); /* may be NULL; after each iteration */
     void (*begins)(void *ctx, int64_t load_case);           /* may be NULL; before the first iteration of a case */
-    /* may be NULL; cells chosen here: before each grid, the shares of the whole, 0 to 1, that it begins and ends with,
-     * by estimate */
-    void (*grid)(void *ctx, double from, double to);
+    void (*grid)(void *ctx, const uz_grid_start *grid); /* may be NULL; where the mesh is chosen: before each grid */
 } uz_hooks;
 
 #ifdef __cplusplus

@@ -6,6 +6,7 @@
 #include "post/balance.h"
 #include "post/overlap.h"
 #include "post/parts.h"
+#include "post/trend.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -79,10 +80,14 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
             continue;
         summary->max_pressure = result->pressure[i];
         e->peak_node = node;
+        e->peak_size = pow(mesh->contact_area[i], 1.0 / (mesh->dim - 1));
         for (int axis = 0; axis < mesh->dim; axis++)
             e->peak_at[axis] = mesh->xyz[node * mesh->dim + axis];
     }
     free(push);
+    const double size = e->peak_node >= 0 ? 1.0 : 0.0; /* what nothing presses on tells nothing */
+    uz_trend_fit(&e->peak, &(uz_trend_point){size, summary->max_pressure}, 1, summary->max_pressure, 0.0);
+    uz_trend_fit(&e->area, &(uz_trend_point){size, e->contact_area}, 1, e->contact_area, 0.0);
     status = uz_balance_forces(e, model, scene, result->u, result->r, err);
     if (status == UZ_OK)
         status = uz_measure_overlap(e->overlap, model, scene, result->u, err);

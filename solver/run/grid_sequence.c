@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "methods/milestones.h"
+#include "post/trend.h"
 #include "run/marking.h"
 #include "run/problem.h"
 #include "run/results.h"
@@ -62,6 +63,12 @@ typedef struct {
     double error; /* the largest total error of all cases that have an answer */
 } answers;
 
+/* What one grid has of numbers that nothing bounds, of one case. */
+typedef struct {
+    double max_pressure, contact_area;
+    double peak_size, mean_size; /* of sides at the peak, and of all that touch; 0: nothing does */
+} seen;
+
 /* The search for the grid. */
 typedef struct {
     const uz_problem *problem;
@@ -79,6 +86,7 @@ typedef struct {
     double tried_dofs;
     uz_grid_sequence sequence;
     uz_timings *spent; /* n_cases: of the answers that are dropped */
+    seen *seen;        /* n_cases x UZ_GRID_LEVELS */
     stop_kind stop;
     char reason[160];
 } search;
@@ -113,7 +121,9 @@ uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem,
         g.grids.order *= settings->quantity_error > 0.0 ? 2 : 1; /* of a product of two errors in the energy norm */
         next = (grid){.box = uz_grid(&g.grids, g.grids.first), .n = g.grids.first};
     }
-    if (status == UZ_OK && !(g.spent = uz_alloc_zero(g.n_cases, sizeof *g.spent)))
+    g.spent = uz_alloc_zero(g.n_cases, sizeof *g.spent);
+    g.seen = uz_alloc(g.n_cases, UZ_GRID_LEVELS * sizeof *g.seen);
+    if (status == UZ_OK && (!g.spent || !g.seen))
         status = uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for the results of %lld cases", (long long)g.n_cases);
     while (status == UZ_OK && g.stop == STOP_NOT) {
         status = try_grid(&g, next, err);
@@ -127,6 +137,7 @@ uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem,
     if (status == UZ_OK)
         status = publish(&g, err);
     free(g.spent);
+    free(g.seen);
     free(g.bisected);
     for (int64_t i = 0; g.best.results && i < g.n_cases; i++)
         results[i] = g.best.results[i];
@@ -171,6 +182,29 @@ static bool has_time(const search *g, double dofs)
     const double expected =
         g->sequence.level[last].seconds * pow(dofs / g->tried_dofs, g->sequence.dim == 3 ? 2.0 : 1.5);
     return uz_seconds() + expected <= g->deadline;
+}
+
+/* Seconds until the request is met, if grids go on as the last three went: the error by its observed power of the
+ * unknowns, the seconds of a grid by theirs, each grid as much larger as the last ones were. NaN: they do not tell. */
+static double seconds_left(const search *g, double dofs)
+{
+    const int last = g->sequence.count - 1;
+    if (last < 2)
+        return NAN;
+    const uz_grid_level *now = &g->sequence.level[last], *before = &g->sequence.level[last - 2];
+    const double growth = (double)now->d / (double)before->d;
+    const double rate = log(before->error / now->error) / log(growth);
+    const double price = fmin(3.0, fmax(0.0, log(now->seconds / before->seconds) / log(growth)));
+    if (!(growth > 1.1) || !(rate > 0.1) || !(now->seconds > 0.0) || isnan(price))
+        return NAN;
+    const double enough = pow(now->error / g->requested, 1.0 / rate); /* in unknowns of the last grid */
+    double times = dofs / g->tried_dofs, sum = 0.0;
+    for (int k = last + 1; k < UZ_GRID_LEVELS; k++, times *= sqrt(growth)) {
+        sum += now->seconds * pow(times, price);
+        if (times >= enough)
+            return fmin(sum, fmax(0.0, g->deadline - uz_seconds()));
+    }
+    return NAN; /* by then no more grids are tried */
 }
 
 /* The next grid to try, or a reason to stop. */
@@ -218,7 +252,7 @@ static bool choose_between(grid *next, const search *g)
 /* ---- one grid */
 
 /* Solves the cases of a problem on a grid, from the best answers so far. */
-static uz_status solve_cases(answers *x, uz_grid_level *level, const search *g, const uz_problem *problem,
+static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const uz_problem *problem,
                              const uz_body_model *outline, uz_error *err)
 {
     uz_settings settings = *g->settings;
@@ -245,10 +279,16 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, const search *g, 
     free(starts);
     for (int64_t i = 0; status == UZ_OK && i < g->n_cases; i++) {
         const uz_summary *s = &x->results[i]->summary;
+        seen *known = &g->seen[i * UZ_GRID_LEVELS + g->sequence.count];
         level->iterations += s->iterations;
         level->d = s->d;
+        *known = (seen){NAN, NAN, 0.0, 0.0};
         if (uz_has_no_answer(s))
             continue;
+        if (s->evaluation)
+            *known =
+                (seen){s->max_pressure, s->evaluation->contact_area, s->evaluation->peak_size,
+                       s->active > 0 ? pow(s->evaluation->contact_area / (double)s->active, 1.0 / (s->dim - 1)) : 0.0};
         const double error = uz_asked_error(s);
         x->error = fmax(x->error, settings.quantity_error > 0.0 ? fmin(error, NO_INTERVAL) : error);
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
@@ -292,8 +332,16 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
             from = share_done(g, last->error);
             to = share_done(g, last->error * pow(last->n / number_of(g, &x->on), rate));
         }
+        const int count = g->sequence.count;
+        const uz_grid_start begins = {.from = from,
+                                      .to = fmax(from, to),
+                                      .number = count + 1,
+                                      .unknowns = x->on.dofs,
+                                      .error = count > 0 ? g->sequence.level[count - 1].error : (double)NAN,
+                                      .asked = g->requested,
+                                      .seconds_left = seconds_left(g, x->on.dofs)};
         if (g->hooks && g->hooks->grid)
-            g->hooks->grid(g->hooks->ctx, from, fmax(from, to));
+            g->hooks->grid(g->hooks->ctx, &begins);
         status = solve_cases(x, level, g, &problem, &outline, err);
     }
     if (status == UZ_OK && x->results && g->refines && x->error > g->requested)
@@ -336,6 +384,7 @@ static uz_status try_grid(search *g, grid on, uz_error *err)
     if (status == UZ_OK && !x.results)
         return UZ_OK; /* no time */
     if (status == UZ_OK) {
+        g->sequence.level[g->sequence.count].error = x.error;
         g->tried[g->sequence.count++] = (uz_tried){number_of(g, &x.on), x.error};
         g->tried_dofs = x.on.dofs;
         g->stop = x.error <= g->requested ? STOP_MET : STOP_NOT;
@@ -398,6 +447,26 @@ static void conclude(const search *g, uz_summary *s)
                  s->discretization_error, s->certificate.relative_error, g->requested);
 }
 
+/* What the grids tell of the largest pressure and of the area of a case's contact. The area ends within an element: of
+ * a line at two ends, of a surface around it. A grid that does not see the contact tells nothing of it. */
+static void tell_trends(const search *g, uz_result *result, const seen *of)
+{
+    uz_trend_point peak[UZ_GRID_LEVELS], area[UZ_GRID_LEVELS];
+    uz_evaluation *e = result->evaluation;
+    const int count = g->sequence.count, dim = g->sequence.dim;
+    for (int i = 0; i < count; i++) {
+        uz_grid_level *level = &result->grids->level[i];
+        level->max_pressure = of[i].max_pressure;
+        level->contact_area = of[i].contact_area;
+        peak[i] = (uz_trend_point){of[i].peak_size, of[i].max_pressure};
+        area[i] = (uz_trend_point){of[i].mean_size, of[i].contact_area};
+    }
+    const double active = (double)result->summary.active, pi = acos(-1.0);
+    const double grain = active > 0 ? e->contact_area / active * (dim == 2 ? 1.0 : sqrt(pi * active)) : 0.0;
+    uz_trend_fit(&e->peak, peak, count, result->summary.max_pressure, 0.0);
+    uz_trend_fit(&e->area, area, count, e->contact_area, grain);
+}
+
 static uz_status publish(search *g, uz_error *err)
 {
     for (int64_t i = 0; i < g->n_cases; i++) {
@@ -407,6 +476,8 @@ static uz_status publish(search *g, uz_error *err)
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grids that were tried");
         *result->grids = g->sequence;
         result->summary.grids = result->grids;
+        if (result->evaluation)
+            tell_trends(g, result, g->seen + i * UZ_GRID_LEVELS);
         if (g->refines) { /* may be shorter than the search's list: of a grid that was tried later */
             const int64_t n = result->grids->n_bisected = g->best.on.n_bisected;
             int64_t *list = result->grids->bisected = uz_alloc(n, sizeof *list);

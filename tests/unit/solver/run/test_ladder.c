@@ -287,11 +287,14 @@ typedef struct {
     bool back;
 } watcher;
 
-static void note_grid(void *ctx, double from, double to)
+static void note_grid(void *ctx, const uz_grid_start *grid)
 {
     watcher *w = ctx;
-    w->back = w->back || from < 0 || to > 1 || to < from;
-    w->last = to;
+    w->back = w->back || grid->from < 0 || grid->to > 1 || grid->to < grid->from || grid->number != w->grids + 1 ||
+              isnan(grid->error) != (w->grids == 0) || !(grid->unknowns > 0);
+    /* three grids tell how they go on, fewer do not */
+    w->back = w->back || !(w->grids < 3 ? isnan(grid->seconds_left) : grid->seconds_left > 0);
+    w->last = grid->to;
     w->grids++;
 }
 
