@@ -28,7 +28,7 @@ _uzawa() {
     result) options='--format --fields --field --case --output --json --server --timeout --retry --help --version ' ;;
     picture) options='--colour --factor --width --case --output --json --server --timeout --retry --help --version ' ;;
     history) options='--csv --plot --width --height --ascii --case --output --json --server --timeout --retry --help --version ' ;;
-    plot) options='--deformed --trade --x --with --colour --factor --width --ascii --case --output --json --server --timeout --retry --help --version ' ;;
+    plot) options='--deformed --error --trade --x --with --colour --factor --width --ascii --case --output --json --server --timeout --retry --help --version ' ;;
     list) options='--status --tag --limit --quiet --json --server --timeout --retry --help --version ' ;;
     cancel) options='--quiet --json --server --timeout --retry --help --version ' ;;
     delete) options='--quiet --json --server --timeout --retry --help --version ' ;;

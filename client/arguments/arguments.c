@@ -79,13 +79,15 @@ static bool take_words(parser *p, int argc, char *const *argv, bool apply)
 static bool check_plot(parser *p)
 {
     const client_options *o = p->options;
-    const bool convergence = !o->deformed && !o->trade;
-    if (o->deformed && o->trade)
-        return fail(p, "--deformed and --trade are alternatives: choose one");
+    const bool convergence = !o->deformed && !o->trade && !o->whole_error;
+    if (o->deformed + o->trade + o->whole_error > 1)
+        return fail(p, "--deformed, --error and --trade are alternatives: choose one");
     if (!o->deformed && (o->colour || o->factor))
         return fail(p, "--colour and --factor want --deformed");
     if (convergence && o->width >= 0)
-        return fail(p, "--width wants --deformed or --trade");
+        return fail(p, "--width wants --deformed, --error or --trade");
+    if (o->whole_error && o->width >= 0 && o->width < 300)
+        return fail(p, "--width wants an integer from 300 to 4000 with --error, not \"%d\"", o->width);
     if (o->deformed && o->width >= 0 && o->width < 200)
         return fail(p, "--width wants an integer from 200 to 4000 with --deformed, not \"%d\"", o->width);
     if (o->trade && o->width > 400)

@@ -25,7 +25,7 @@ typedef struct {
     const char *junit, *baseline;             /* a file; a job */
     double tolerance;                         /* of the baseline; -1: not given */
     int limit, width, height, max_iterations; /* -1: not given */
-    bool wait, quiet, json, progress, csv, plot, ascii, deformed, trade, help, version;
+    bool wait, quiet, json, progress, csv, plot, ascii, deformed, whole_error, trade, help, version;
 } client_options;
 
 /* Fills *out. env_server: value of UZAWA_SERVER or NULL. False: the command line is wrong and message says how.

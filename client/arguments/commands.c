@@ -54,12 +54,13 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
                         CLIENT_OPERAND_NEEDED, "", NULL},
     [CLIENT_HISTORY] = {"history", "history ID [options]", "fetch or draw the convergence history", "ID",
                         CLIENT_OPERAND_NEEDED, "", NULL},
-    [CLIENT_PLOT] = {"plot", "plot ID [options]", "draw the convergence, the body or the price of digits", "ID",
-                     CLIENT_OPERAND_NEEDED,
-                     "Without --deformed or --trade the convergence is drawn: dual objective, residual and certified "
-                     "bound. A file that ends in .png gets a PNG, by way of rsvg-convert (Debian: librsvg2-bin); any "
-                     "other an SVG.\n",
-                     NULL},
+    [CLIENT_PLOT] =
+        {"plot", "plot ID [options]", "draw the convergence, the body or the price of accuracy", "ID",
+         CLIENT_OPERAND_NEEDED,
+         "Without --deformed, --error or --trade the convergence is drawn: dual objective, residual and certified "
+         "bound. A file that ends in .png gets a PNG, by way of rsvg-convert (Debian: librsvg2-bin); any "
+         "other an SVG.\n",
+         NULL},
     [CLIENT_LIST] = {"list", "list [options]", "list jobs, newest first", NULL, 0, "", NULL},
     [CLIENT_CANCEL] =
         {"cancel", "cancel ID", "dismiss a waiting or running job", "ID", CLIENT_OPERAND_NEEDED,
@@ -137,6 +138,8 @@ static const uz_option OPTIONS[] = {
     OPTION("tolerance", 0, NUMBER, tolerance, STAYING, .value = "T",
            .about = "what the comparison lets pass, relative (default 1e-3)"),
     OPTION("deformed", 0, FLAG, deformed, IN(PLOT), .about = "draw the deformed body of a scene"),
+    OPTION("error", 0, FLAG, whole_error, IN(PLOT),
+           .about = "draw the whole error over time and, where the mesh was chosen, over unknowns"),
     OPTION("trade", 0, FLAG, trade, IN(PLOT),
            .about = "print what each certified digit took, as a table and a drawing"),
     OPTION("x", 0, CHOICE, axis, IN(PLOT), .value = "AXIS", .choices = "iterations seconds",
@@ -154,7 +157,8 @@ static const uz_option OPTIONS[] = {
     OPTION("factor", 0, WORD, factor, IN(PLOT), .value = "X",
            .about = "with --deformed: displacements are drawn X times as large"),
     OPTION("width", 0, INTEGER, width, IN(PLOT), .least = 40, .most = 4000, .value = "N",
-           .about = "with --deformed: of the picture, in pixels; with --trade: of the drawing, in characters"),
+           .about = "with --deformed and --error: of the picture, in pixels; with --trade: of the drawing, in "
+                    "characters"),
     OPTION("csv", 0, FLAG, csv, IN(HISTORY), .about = "as CSV instead of JSON"),
     OPTION("plot", 0, FLAG, plot, IN(HISTORY), .about = "draw it: log10 of the error bound and of the residual"),
     OPTION("width", 0, INTEGER, width, IN(HISTORY), .least = 24, .most = 400, .value = "N",

@@ -121,8 +121,10 @@ client_exit client_plot(client_session *s)
                                      {NULL, NULL}};
     const client_query curves[] = {
         {"case", o->case_name}, {"x", o->axis}, {"with", with.len ? with.data : NULL}, {NULL, NULL}};
-    char *path =
-        client_path_with_query(s, o->deformed ? "/deformed.svg" : "/convergence.svg", o->deformed ? deformed : curves);
+    const client_query errors[] = {{"case", o->case_name}, {"width", o->width < 0 ? NULL : width}, {NULL, NULL}};
+    char *path = o->deformed      ? client_path_with_query(s, "/deformed.svg", deformed)
+                 : o->whole_error ? client_path_with_query(s, "/whole-error.svg", errors)
+                                  : client_path_with_query(s, "/convergence.svg", curves);
     free(with.data);
     if (!path)
         return CLIENT_LOCAL;

@@ -101,6 +101,7 @@ void events_get(api *context, http_request *rq, http_reply *reply);
 void events_get_all(api *context, http_request *rq, http_reply *reply);
 void trade_get(api *context, http_request *rq, http_reply *reply);
 void convergence_get(api *context, http_request *rq, http_reply *reply);
+void whole_error_get(api *context, http_request *rq, http_reply *reply);
 void service_limits(api *context, http_request *rq, http_reply *reply);
 void nodes_list(api *context, http_request *rq, http_reply *reply);
 void nodes_drain(api *context, http_request *rq, http_reply *reply);

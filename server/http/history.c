@@ -166,17 +166,26 @@ static bool read_choice(const http_request *rq, const char *key, const char *con
                                  "%s is one of %s, not \"%.60s\"", key, list, text);
 }
 
-void convergence_get(api *context, http_request *rq, http_reply *reply)
+bool plot_read(uz_plot *out, const http_request *rq, problem_details *problem)
 {
     static const char *const X[] = {"iterations", "seconds"}, *const THEMES[] = {"auto", "light", "dark"};
-    problem_details problem;
     int64_t width = 900;
     int x, theme;
+    const bool good = read_choice(rq, "x", X, 2, &x, problem) && read_choice(rq, "theme", THEMES, 3, &theme, problem) &&
+                      request_integer(rq, "width", 300, 4000, &width, problem);
+    if (good)
+        *out = (uz_plot){.width = (int)width, .x = (uz_plot_x)x, .theme = (uz_theme)theme};
+    return good;
+}
+
+void convergence_get(api *context, http_request *rq, http_reply *reply)
+{
+    problem_details problem;
     curve_list list = {.n = 0};
     job j = {0};
     char title[96];
-    if (!read_choice(rq, "x", X, 2, &x, &problem) || !read_choice(rq, "theme", THEMES, 3, &theme, &problem) ||
-        !request_integer(rq, "width", 300, 4000, &width, &problem)) {
+    uz_plot how;
+    if (!plot_read(&how, rq, &problem)) {
         reply_problem(reply, &problem);
         return;
     }
@@ -184,7 +193,7 @@ void convergence_get(api *context, http_request *rq, http_reply *reply)
     if (jobs_load(context, rq, &j, reply) && add_job(&list, context, &j, target_value(&rq->target, "case"), reply) &&
         add_others(&list, context, rq, target_value(&rq->target, "with"), reply)) {
         snprintf(title, sizeof title, "Convergence of job %s", j.id);
-        const uz_plot how = {.title = title, .width = (int)width, .x = (uz_plot_x)x, .theme = (uz_theme)theme};
+        how.title = title;
         char *svg = NULL;
         size_t len = 0;
         uz_error err = {0};

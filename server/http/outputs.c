@@ -91,6 +91,7 @@ static const char *const PICTURE[] = {"colour", "factor", "width", "case", NULL}
 static const char *const HISTORY[] = {"after", "case", NULL};
 static const char *const OF_CASE[] = {"case", NULL};
 static const char *const CURVES[] = {"case", "x", "with", "theme", "width", NULL};
+static const char *const ERRORS[] = {"case", "theme", "width", NULL};
 
 #define OUTPUT(suffix, parameters, handler)                                                                            \
     {                                                                                                                  \
@@ -110,6 +111,7 @@ const output OUTPUTS[] = {
      write_history_csv, 0, 0, NULL, false},
     {OUTPUT("work-precision", OF_CASE, trade_get), "application/json", OUTPUT_OWN, NULL, 0, 0, NULL, false},
     {OUTPUT("convergence.svg", CURVES, convergence_get), "image/svg+xml", OUTPUT_OWN, NULL, 0, 0, NULL, false},
+    {OUTPUT("whole-error.svg", ERRORS, whole_error_get), "image/svg+xml", OUTPUT_OWN, NULL, 0, 0, NULL, false},
     {.type = NULL},
 };
 

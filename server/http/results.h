@@ -48,5 +48,7 @@ typedef struct {
 /* Rows after iteration `after` of the case that is named (NULL: of the job, or of the case that runs). An accepted job
  * has none. False with a reply. */
 bool history_rows(api *context, const job *j, const char *name, int64_t after, found_rows *out, http_reply *reply);
+/* Width, theme and x of a diagram; false: *problem, a 400. */
+bool plot_read(uz_plot *out, const http_request *rq, problem_details *problem);
 
 #endif

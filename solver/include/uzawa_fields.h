@@ -157,6 +157,20 @@ typedef struct {
 uz_status uz_picture_convergence(char **svg, size_t *len, const uz_curve *curves, int n, const uz_plot *how,
                                  uz_error *err);
 
+/* The whole error of an answer as it fell: from grid to grid, or, on one mesh, while its equations were solved. */
+typedef struct {
+    const double *unknowns, *seconds, *error; /* count each; seconds since the beginning; error relative */
+    int64_t count;
+    double asked, mesh; /* levels: what was asked for, what the mesh of the answer loses; NaN: not drawn */
+    bool grids;         /* false: one mesh, and there is nothing to draw over unknowns */
+    bool guaranteed;    /* proved, not estimated */
+} uz_error_curve;
+
+/* As SVG: over seconds and, of grids, over unknowns; all axes are logarithmic. how->x is not looked at. *svg is
+ * NUL-terminated, the caller frees it. Errors: UZ_ERR_ARGUMENT, _MEMORY. */
+uz_status uz_picture_whole_error(char **svg, size_t *len, const uz_error_curve *curve, const uz_plot *how,
+                                 uz_error *err);
+
 #ifdef __cplusplus
 }
 #endif

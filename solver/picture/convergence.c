@@ -5,24 +5,7 @@
 #include <math.h>
 
 /* Pixels: around the panels, above each, and their heights. */
-enum { WIDTH = 900, LEFT = 66, RIGHT = 24, HEAD = 34, LINE = 17, ABOVE = 28, TALL = 165, LOW = 75, FOOT = 42 };
-
-static const char LIGHT[] = "text{font:12px system-ui,sans-serif;fill:#333}.title{font-weight:600}.paper{fill:#fff}"
-                            ".grid{fill:none;stroke:#e3e6ea}.frame{fill:none;stroke:#9aa0a8}"
-                            ".curve{fill:none;stroke-width:1.5;stroke-linejoin:round;stroke-linecap:round}"
-                            ".curve.c0{stroke:#1864ab}.curve.c1{stroke:#c2255c}.curve.c2{stroke:#2b8a3e}"
-                            ".curve.c3{stroke:#d9480f}.curve.c4{stroke:#6741d9}.curve.c5{stroke:#0b7285}"
-                            ".curve.c6{stroke:#846358}.curve.c7{stroke:#5c636a}"
-                            ".restart.c0{fill:#1864ab}.restart.c1{fill:#c2255c}.restart.c2{fill:#2b8a3e}"
-                            ".restart.c3{fill:#d9480f}.restart.c4{fill:#6741d9}.restart.c5{fill:#0b7285}"
-                            ".restart.c6{fill:#846358}.restart.c7{fill:#5c636a}";
-static const char DARK[] = "text{fill:#d5d9de}.paper{fill:#16181c}.grid{stroke:#2b3036}.frame{stroke:#6b727b}"
-                           ".curve.c0{stroke:#74c0fc}.curve.c1{stroke:#faa2c1}.curve.c2{stroke:#8ce99a}"
-                           ".curve.c3{stroke:#ffc078}.curve.c4{stroke:#b197fc}.curve.c5{stroke:#66d9e8}"
-                           ".curve.c6{stroke:#d0bfa5}.curve.c7{stroke:#adb5bd}"
-                           ".restart.c0{fill:#74c0fc}.restart.c1{fill:#faa2c1}.restart.c2{fill:#8ce99a}"
-                           ".restart.c3{fill:#ffc078}.restart.c4{fill:#b197fc}.restart.c5{fill:#66d9e8}"
-                           ".restart.c6{fill:#d0bfa5}.restart.c7{fill:#adb5bd}";
+enum { LEFT = 66, RIGHT = 24, HEAD = 34, LINE = 17, ABOVE = 28, TALL = 165, LOW = 75, FOOT = 42 };
 
 typedef enum { DUAL, RESIDUAL, BOUND, CONTACTS, PANELS } quantity;
 
@@ -74,26 +57,9 @@ static void put_panel(uz_buffer *svg, const uz_curve *curves, int n, quantity q,
     uz_buffer_print(svg, "</g>\n");
 }
 
-static void put_head(uz_buffer *svg, const uz_curve *curves, int n, const uz_plot *how, int height)
+static void put_legend(uz_buffer *svg, const uz_curve *curves, int n)
 {
-    uz_buffer_print(svg,
-                    "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
-                    "role=\"img\">\n<title>",
-                    how->width, height, how->width, height);
-    uz_buffer_put_escaped(svg, how->title ? how->title : "convergence");
-    uz_buffer_print(svg, "</title>\n");
-    uz_buffer_print(svg, "<style>");
-    uz_buffer_put(svg, LIGHT, sizeof LIGHT - 1);
-    if (how->theme == UZ_THEME_AUTO)
-        uz_buffer_print(svg, "@media(prefers-color-scheme:dark){");
-    if (how->theme != UZ_THEME_LIGHT)
-        uz_buffer_put(svg, DARK, sizeof DARK - 1);
-    uz_buffer_print(svg, "%s</style>\n", how->theme == UZ_THEME_AUTO ? "}" : "");
-    uz_buffer_print(svg, "<rect class=\"paper\" width=\"%d\" height=\"%d\"/>\n<text class=\"title\" x=\"%d\" y=\"22\">",
-                    how->width, height, LEFT);
-    uz_buffer_put_escaped(svg, how->title ? how->title : "convergence");
-    uz_buffer_print(svg, "</text>\n");
-    for (int k = 0; k < n; k++) { /* the legend: a line for each curve */
+    for (int k = 0; k < n; k++) { /* a line for each curve */
         const int y = HEAD + k * LINE + 6;
         uz_buffer_print(svg, "<path class=\"curve c%d\" d=\"M%d %dh22\"/><text x=\"%d\" y=\"%d\">", k, LEFT, y,
                         LEFT + 30, y + 4);
@@ -110,20 +76,20 @@ uz_status uz_picture_convergence(char **svg, size_t *len, const uz_curve *curves
     uz_error_reset(err);
     *svg = NULL;
     *len = 0;
-    if (how->width != 0 && (how->width < 300 || how->width > 4000))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a diagram must lie in 300 to 4000, it is %d",
-                       how->width);
+    if (uz_plot_width(&plot.width, how, err) != UZ_OK)
+        return UZ_ERR_ARGUMENT;
     if (n < 1 || n > UZ_CURVES)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "a diagram has 1 to %d curves, not %d", (int)UZ_CURVES, n);
     for (int k = 0; k < n; k++)
         if (curves[k].count < 0 || curves[k].stride < 1)
             return uz_fail(err, UZ_ERR_ARGUMENT, "", "curve %d has no rows that could be read", k);
-    plot.width = how->width ? how->width : WIDTH;
+    plot.title = how->title ? how->title : "convergence";
     const int first = HEAD + n * LINE;
     int height = first + FOOT;
     for (int q = 0; q < PANELS; q++)
         height += ABOVE + PANEL[q].height;
-    put_head(&text, curves, n, &plot, height);
+    uz_plot_put_head(&text, &plot, height);
+    put_legend(&text, curves, n);
     double top = first;
     for (int q = 0; q < PANELS; q++) {
         put_panel(&text, curves, n, (quantity)q, &plot, top + ABOVE);

@@ -1,0 +1,179 @@
+"""The whole error as a user sees it: grids with their price, estimates of peaks and areas, what is left of a search for a
+mesh, and pictures. usage: test_whole_error.py BUILD_DIR [FILTER]"""
+import copy
+import json
+import math
+import threading
+import time
+import xml.etree.ElementTree
+
+import service
+from service import MATRICES, SCENE, check, expect
+
+SHARED = True
+BLOCK = {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"size": [20, 40], "cells": [4, 8], "element": "quad4"}, "refine": "auto"},
+         "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "bottom", "uy": 0}, {"on": "left", "ux": 0}],
+         "contacts": [{"on": "top", "obstacle": {"circle": {"center": [0, 69.75], "radius": 30}}}]}
+PEAK = 35.15, 35.35  # where the largest pressure is, from tri6 at 0.4 % and quad4 at 1 %
+
+
+def refined(total, **more):
+    return {"problem": copy.deepcopy(BLOCK), "solver": {"accuracy": {"total": total}}, **more}
+
+
+def solved(s, request):
+    job = s.solve(request)
+    check(job["status"] == "successful", job)
+    return job
+
+
+def test_grids_tell_errors_and_seconds(s):
+    summary = solved(s, refined(0.05))["summary"]
+    ladder = summary["mesh"]["ladder"]
+    check(len(ladder) > 4 and all(one["error"] > 0 and one["seconds"] > 0 and one["d"] > 0 for one in ladder), ladder)
+    check(ladder[-1]["error"] == summary["error"]["total"] == summary["total_error"], summary)
+    check(all(one["error"] > 0.05 for one in ladder[:-1]), ladder)
+    check(ladder[-1]["max_pressure"] == summary["contact"]["max_pressure"], ladder)
+    check(ladder[-1]["contact_area"] == summary["contact"]["area"], ladder)
+
+
+def test_guaranteed_grids_are_judged_by_the_bound(s):
+    request = refined(0.1)
+    request["solver"]["accuracy"]["guaranteed"] = True
+    summary = solved(s, request)["summary"]
+    check(summary["error"]["kind"] == "guaranteed", summary["error"])
+    for one in summary["mesh"]["ladder"]:
+        check(one["error"] > 1.01 * one["discretization_error"], one)
+    check(summary["mesh"]["ladder"][-1]["error"] == summary["error"]["total"], summary)
+
+
+def test_peaks_and_areas_are_estimated(s):
+    contact = solved(s, refined(0.03))["summary"]["contact"]
+    for name, value in (("max_pressure", contact["max_pressure"]), ("area", contact["area"])):
+        one = contact["estimates"][name]
+        check(one["kind"] == "estimated" and one["grids"] >= 3, one)
+        check(one["low"] <= one["value"] <= one["high"] and one["low"] <= value * 1.001, one)
+        check((one["order"] is None) == ("why" in one), one)
+    peak = contact["estimates"]["max_pressure"]
+    check(peak["low"] < PEAK[1] and peak["high"] > PEAK[0], peak)
+
+
+def test_a_single_grid_says_that_it_tells_nothing(s):
+    contact = solved(s, SCENE)["summary"]["contact"]
+    for one in contact["estimates"].values():
+        check(one["low"] is one["high"] is one["order"] is None and "one grid" in one["why"], one)
+    check(contact["estimates"]["max_pressure"]["value"] == contact["max_pressure"], contact)
+    # nothing is known of it, and it is taken as it is
+    job = solved(s, {**SCENE, "assert": [{"quantity": "contact.max_pressure", "max": 1.0001 * contact["max_pressure"]}]})
+    one, = job["summary"]["assertions"]
+    check(one["result"] == "pass" and one["error"] is None, one)
+
+
+def test_assertions_are_judged_by_estimates(s):
+    found = solved(s, refined(0.05))["summary"]["contact"]["estimates"]
+    for name, key in (("contact.max_pressure", "max_pressure"), ("contact.area", "area")):
+        low, high = found[key]["low"], found[key]["high"]
+        middle = (low + high) / 2
+        limits = ({"max": high * 1.001}, "pass"), ({"max": middle}, "uncertain"), ({"max": low * 0.999}, "fail"), ({"min": middle}, "uncertain")
+        job = solved(s, refined(0.05, **{"assert": [{"quantity": name, **limit} for limit, _ in limits]}))
+        lines = job["summary"]["assertions"]
+        check([one["result"] for one in lines] == [wanted for _, wanted in limits], found, lines)
+        check("by estimate the exact value is between" in lines[1]["reason"] and lines[1]["error"] > 0, lines)
+
+
+def test_a_pressure_at_a_corner_has_no_limit(s):
+    """A rigid punch with sharp edges."""
+    request = refined(0.03)
+    punch = [[-10, -5], [5, -5], [5, 0.01], [15, 0.01], [15, -5], [30, -5]]
+    request["problem"].update(mesh={"box": {"size": [20, 10], "cells": [8, 4], "element": "quad4"}, "refine": "auto"},
+                              supports=[{"on": "top", "ux": 0, "uy": -0.1}],
+                              contacts=[{"on": "bottom", "obstacle": {"polyline": {"points": punch}}}])
+    request["assert"] = [{"quantity": "contact.max_pressure", "max": 1e6}]
+    summary = solved(s, request)["summary"]
+    one = summary["contact"]["estimates"]["max_pressure"]
+    check(one["order"] is None and one["high"] is None and one["low"] > 0 and "no limit" in one["why"], one, summary["mesh"]["ladder"])
+    line, = summary["assertions"]
+    check(line["result"] == "uncertain" and "unbounded" in line["reason"], line)
+
+
+# ---------------------------------------------------------------- while it runs
+
+def events_of(s, job, out):
+    with s.connect(60) as connection:
+        connection.sendall(f"GET /v1/jobs/{job}/events HTTP/1.1\r\nHost: {s.host}:{s.port}\r\n\r\n".encode())
+        text = b""
+        while chunk := connection.recv(1 << 16):
+            text += chunk
+            if b'"status": "successful"' in text.split(b"event: status")[-1] or b'"status":"successful"' in text.split(b"event: status")[-1]:
+                break
+    for line in text.decode(errors="replace").splitlines():
+        if line.startswith("data: {"):
+            try:
+                out.append(json.loads(line[6:]))
+            except ValueError:
+                pass  # a chunk ends within it
+
+
+def test_a_search_tells_its_grids_and_the_time_left(s):
+    job = s.post(refined(0.012)).json["id"]
+    told, looked = [], []
+    watcher = threading.Thread(target=events_of, args=(s, job, told))
+    watcher.start()
+    while (now := s.get(f"/v1/jobs/{job}").json)["status"] in ("accepted", "running"):
+        looked.append(now)
+        time.sleep(0.01)
+    watcher.join()
+    check("grid" not in now, now)
+    grids = [one["grid"] for one in told + looked if "grid" in one]
+    check(grids, "no grid was told", told)
+    ladder = now["summary"]["mesh"]["ladder"]
+    for one in grids:
+        k = one["number"] - 1
+        check(0 <= k < len(ladder) and one["asked"] == 0.012, one)
+        check(one["error"] == (ladder[k - 1]["error"] if k > 0 else None), one, ladder)
+        check(one["seconds_left"] is None if k < 3 else one["seconds_left"] is None or one["seconds_left"] > 0, one)
+    check(max(one["number"] for one in grids) > 3, grids)
+
+
+# ---------------------------------------------------------------- pictures
+
+def picture(s, job, query=""):
+    reply = expect(s.get(f"/v1/jobs/{job}/whole-error.svg{query}"), 200)
+    check(reply.headers["content-type"] == "image/svg+xml", reply.headers)
+    root = xml.etree.ElementTree.fromstring(reply.body)
+    return reply.body.decode(), root
+
+
+def test_grids_are_drawn(s):
+    job = solved(s, refined(0.05))
+    text, root = picture(s, job["id"])
+    name = "{http://www.w3.org/2000/svg}"
+    rings = root.findall(f"{name}circle")
+    check(len(rings) == 2 * len(job["summary"]["mesh"]["ladder"]), len(rings))
+    check("unknowns of each grid" in text and "seconds since" in text and "asked for" in text and "estimated" in text, text)
+    places = [(float(one.get("cx")), float(one.get("cy"))) for one in rings]
+    check(all(math.isfinite(x) and math.isfinite(y) for x, y in places), places)
+    seconds = places[:len(rings) // 2]
+    check(seconds == sorted(seconds), seconds)  # time goes on to the right
+    check(places[-1][1] > places[0][1] + 20, places)  # and the error down
+    expect(s.get(f"/v1/jobs/{job['id']}/whole-error.svg?width=9"), 400)
+    expect(s.get(f"/v1/jobs/{job['id']}/whole-error.svg?x=seconds"), 400, "unknown_parameter")
+
+
+def test_one_mesh_has_a_floor(s):
+    text, root = picture(s, solved(s, SCENE)["id"], "?theme=dark&width=500")
+    check(root.get("width") == "500" and "of the mesh" in text and "unknowns" not in text, text)
+    check("<polyline" in text, text)
+    text, _ = picture(s, solved(s, MATRICES)["id"])
+    check("of the mesh" not in text and "guaranteed" in text, text)
+
+
+def test_cases_have_pictures_of_their_own(s):
+    job = solved(s, {**SCENE, "cases": [{"name": "a", "loads": SCENE["problem"]["loads"]}]})["id"]
+    expect(s.get(f"/v1/jobs/{job}/whole-error.svg"), 400, "case_needed")
+    text, _ = picture(s, job, "?case=a")
+    check(f"{job}, a" in text, text[:400])
+
+
+if __name__ == "__main__":
+    service.main(globals())
