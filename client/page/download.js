@@ -41,6 +41,8 @@ export async function files_of(api, job, case_name) {
     { name: `${stem}-history.csv`, path: of_case("history.csv"), text: "History, CSV" });
   if (await api.offers("/v1/jobs/{id}/convergence.svg"))
     files.push({ name: `${stem}-convergence.svg`, path: of_case("convergence.svg"), text: "Convergence, SVG" });
+  if (await api.offers("/v1/jobs/{id}/whole-error.svg"))
+    files.push({ name: `${stem}-whole-error.svg`, path: of_case("whole-error.svg"), text: "Whole error, SVG" });
   if (job.summary?.problem?.kind === "scene")
     files.push({ name: `${stem}.vtu`, path: of_case("result.vtu"), text: "Fields, VTU" },
       { name: `${stem}-deformed.svg`, path: of_case("deformed.svg"), text: "Deformed body, SVG" });

@@ -9,7 +9,8 @@ import { show_precision } from "./precision.js";
 import { refine_form } from "./refine.js";
 import { timings_bar } from "./timings.js";
 import { failure_card, verdict_card } from "./verdict.js";
-import { has_ended } from "./words.js";
+import { show_whole_error } from "./whole_error.js";
+import { grid_words, has_ended } from "./words.js";
 
 const HISTORY_MS = 700, MOST_CASES = 10000;
 
@@ -25,9 +26,10 @@ class JobView {
     this.timings = h("section", { "aria-label": "Timings", hidden: true });
     this.convergence_place = h("section", { "aria-label": "Convergence", id: "convergence", hidden: true });
     this.precision = h("section", { "aria-label": "Time against certified error", id: "precision", hidden: true });
+    this.whole = h("section", { "aria-label": "Whole error and its price", id: "whole", hidden: true });
     this.body = h("section", { "aria-label": "Body", hidden: true });
     this.downloads = h("section", { "aria-label": "Downloads", hidden: true });
-    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.convergence_place,
+    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.whole, this.convergence_place,
       this.body, this.precision, this.timings, this.downloads));
   }
 
@@ -65,6 +67,8 @@ class JobView {
     this.progress.hidden = has_ended(job);
     if (this.progress.hidden) return;
     const words = [job.status === "running" ? `running for ${seconds(elapsed(job.started))}` : "waiting for its turn"];
+    const grid = grid_words(row ? row.grid : job.grid);
+    if (grid) words.push(grid);
     if (row?.iteration !== undefined && row.iteration !== null) words.push(`iteration ${number(row.iteration, 9)}`);
     if (Number.isFinite(row?.error_bound)) words.push(`certified bound ${number_towards(row.error_bound, 3, 1)}`);
     if (Number.isFinite(row?.residual_total)) words.push(`residual ${number(row.residual_total)}`);
@@ -121,6 +125,9 @@ class JobView {
       this.refresh_convergence();
       this.show_precision();
     }
+    const whole = this.summary() ? show_whole_error(this.whole, this.summary()) : null;
+    this.whole.hidden = !whole;
+    if (whole) this.parts.push(whole);
     if (job.status === "successful" && job.summary?.problem?.kind === "scene") this.show_body();
     this.downloads.hidden = false;
     show(this.downloads, h("h2", null, "Downloads"), download_buttons(this.api, await files_of(this.api, job, this.case_name), (error) => this.complain(error)));

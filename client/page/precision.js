@@ -20,8 +20,10 @@ export async function show_precision(element, api, id, case_name, signal) {
   if (levels.length)
     series.push({ name: "a whole solve at this level", colour: 3, line: false, texts: true, size: 5,
       points: levels.map((one) => [one.seconds, one.relative_error, one.level]) });
-  if (Number.isFinite(got.mesh_error) && got.mesh_error > 0)
+  if (Number.isFinite(got.mesh_error) && got.mesh_error > 0) {
+    series.push({ name: "whole error: both together", colour: 4, points: points.map(([at, error]) => [at, Math.hypot(error, got.mesh_error)]) });
     series.push({ name: "error of the mesh, estimated", colour: 2, dash: "6 3", across: true, points: [[points[0][0], got.mesh_error]] });
+  }
   chart.update({ x: { label: "time", log: true, format: seconds }, y: { label: "relative error", log: true }, series,
     label: `When each decade of the relative error was first certified, from ${seconds(points[0][0])} to ${seconds(points[points.length - 1][0])}` });
   return () => chart.destroy();

@@ -3,7 +3,7 @@
 import { h } from "./dom.js";
 import { draft } from "./examples.js";
 import { count, counted, number, number_towards, percent_up, seconds } from "./format.js";
-import { certificate_words, method_words, outcome_words, problem_words, whole_words } from "./words.js";
+import { certificate_words, method_words, outcome_words, problem_words, trend_words, whole_words } from "./words.js";
 
 function vector(values) {
   return values ? `(${values.map((value) => number(value)).join(", ")})` : null;
@@ -20,8 +20,10 @@ function facts_of(summary) {
     ["Residual, relative", certificate ? number(certificate.relative_residual.total) : null],
     ["In contact", contact ? `${count(contact.active)} of ${counted(contact.candidates, "candidate")}` : null],
     ["Contact force", contact ? vector(contact.force) || number(contact.reaction_sum, 6) : null],
-    ["Largest pressure", Number.isFinite(contact?.max_pressure) ? `${number(contact.max_pressure, 4)}${at ? ` at ${vector(at)}` : ""}` : null],
-    ["Contact area", Number.isFinite(contact?.area) ? number(contact.area, 4) : null],
+    ["Largest pressure on this mesh", Number.isFinite(contact?.max_pressure) ? `${number(contact.max_pressure, 4)}${at ? ` at ${vector(at)}` : ""}` : null],
+    ["Contact area on this mesh", Number.isFinite(contact?.area) ? number(contact.area, 4) : null],
+    ["Largest pressure, estimated", trend_words(contact?.estimates?.max_pressure)],
+    ["Contact area, estimated", trend_words(contact?.estimates?.area)],
     ["Largest penetration", contact ? number(contact.max_penetration) : null],
     ["Energy", energy ? `${number(energy.primal, 6)} (at least ${number_towards(energy.dual, 6, -1)})` : null],
     ["Potential energy of the body", Number.isFinite(energy?.potential) ? number(energy.potential, 6) : null],

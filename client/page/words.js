@@ -1,6 +1,6 @@
 // words.js: what a job's status, outcome and certificate mean, in sentences.
 
-import { count, counted, number, percent_up, seconds } from "./format.js";
+import { count, counted, number, number_towards, percent_up, seconds } from "./format.js";
 
 export const STATUSES = ["accepted", "running", "successful", "failed", "dismissed"];
 export const STATUS_WORDS = {
@@ -70,6 +70,23 @@ export function whole_words(summary) {
   if (is_bounded(summary)) return `The answer is off by at most ${Number.isFinite(total) ? percent_up(total) : number(bound)} in the energy norm, mesh and equations together (guaranteed).`;
   if (!Number.isFinite(total)) return `How far the answer is off in all is not known: ${Number.isFinite(mesh) ? "nothing could be certified" : "what the mesh loses could not be estimated"}.`;
   return `The answer is off by about ${percent_up(total)} in the energy norm, ${mesh > 0.99 * total ? "nearly all of it" : percent_up(mesh)} by its mesh (estimated).`;
+}
+
+/** The grid that a job which looks for a mesh solves on; "" of others. */
+export function grid_words(grid) {
+  if (!grid) return "";
+  const words = [`grid ${grid.number}, ${counted(grid.unknowns, "unknown")}`];
+  if (Number.isFinite(grid.error)) words.push(`${percent_up(grid.error)} on the one before, ${percent_up(grid.asked)} asked for`);
+  if (Number.isFinite(grid.seconds_left)) words.push(`about ${seconds(Math.max(1, Math.round(grid.seconds_left)))} left`);
+  return words.join(", ");
+}
+
+/** Of the largest pressure or the area: where it is without a mesh, by estimate. */
+export function trend_words(one) {
+  if (!one) return null;
+  if (!Number.isFinite(one.high)) return Number.isFinite(one.low) ? `no limit: ${one.why}` : `none: ${one.why}`;
+  const half = Math.max(one.high - one.value, one.value - one.low);
+  return `${number(one.value, 4)} ± ${number_towards(half, 2, 1)}, ${Number.isFinite(one.order) ? `order ${number(one.order, 2)} observed on ${counted(one.grids, "grid")}` : one.why}`;
 }
 
 /** One line about what was solved. */
