@@ -335,7 +335,9 @@ def trade(data):
         return None
 
     def cost(one):
-        return NONE if not one else f"{'' if one['reached'] else '~'}{sig(one['d'], 3)} ({duration(one['seconds'])})"
+        if not one:
+            return NONE
+        return f"{'' if one['reached'] else '~'}{sig(one['d'], 3)}" + (f" ({duration(one['seconds'])})" if one["seconds"] is not None else "")
 
     measured, rows = data["trade"]["rows"], []
     for row in measured:

@@ -4,7 +4,8 @@ estimate and guaranteed, with linear and quadratic elements. Minutes; BUILD/trad
 usage: trade.py BUILD_DIR OUTPUT.json [NAME...]   only bodies whose names contain one of these
 
 Refined everywhere, each side of the first mesh is halved until the error is small enough or the next mesh has too many unknowns; what a
-target takes is interpolated between two meshes (by logarithms), and beyond the last one extrapolated by its order: `reached` is false then.
+target takes is interpolated between two meshes (by logarithms), and beyond the last one its unknowns are extrapolated by its order: `reached` is
+false then, and seconds are not known.
 """
 import copy
 import json
@@ -18,14 +19,15 @@ import service  # noqa: E402  after its place is known
 
 TARGETS = (0.1, 0.05, 0.02, 0.01)
 MOST = {"guaranteed": 40000, "estimated": 150000}  # unknowns of meshes that are finer everywhere
-TIME = 120
+TIME = 60
+NONE = "-"
 
 
 class Mesh:
-    """Elements of one kind, tri3 or quad4; groups of edges, and of elements. arcs: new nodes between two that are equally far from the origin
-    are so, too."""
+    """Elements of one kind, tri3 or quad4; groups of edges, and of elements. arcs: [(centre, radius)]; new nodes between two that are that far
+    from the centre are so, too; radius None: equally far, whatever that is."""
 
-    def __init__(self, nodes, elements, edges, parts=None, arcs=False):
+    def __init__(self, nodes, elements, edges, parts=None, arcs=()):
         self.nodes, self.elements, self.edges, self.parts, self.arcs = nodes, elements, edges, parts or {}, arcs
 
     def amid(self, arcs):
@@ -37,9 +39,10 @@ class Mesh:
             if key not in known:
                 known[key] = len(nodes)
                 nodes.append([(x + y) / 2 for x, y in zip(nodes[a], nodes[b])])
-                radius = [math.hypot(*nodes[k]) for k in (a, b)]
-                if arcs and abs(radius[0] - radius[1]) < 1e-6 * radius[0]:
-                    nodes[-1] = [x * radius[0] / math.hypot(*nodes[-1]) for x in nodes[-1]]
+                for centre, wanted in arcs:
+                    radius = [math.dist(nodes[k], centre) for k in (a, b)]
+                    if all(abs(r - (wanted or radius[0])) < 1e-6 * r for r in radius):
+                        nodes[-1] = [c + (x - c) * radius[0] / math.dist(nodes[-1], centre) for x, c in zip(nodes[-1], centre)]
             return known[key]
         return nodes, middle
 
@@ -58,7 +61,7 @@ class Mesh:
         return Mesh(nodes, elements, edges, {name: [4 * e + k for e in part for k in range(4)] for name, part in self.parts.items()}, self.arcs)
 
     def json(self, quadratic):
-        nodes, middle = self.amid(False)  # sides stay straight
+        nodes, middle = self.amid(())  # sides stay straight
         corners = len(self.elements[0])
         kind = {(3, False): "tri3", (4, False): "quad4", (3, True): "tri6", (4, True): "quad8"}[corners, quadratic]
         elements = [e + [middle(a, b) for a, b in zip(e, e[1:] + e[:1])] if quadratic else e for e in self.elements]
@@ -103,7 +106,41 @@ def from_gallery(name):
     kind, = given["elements"]
     edges = {group: what["edges"] for group, what in given["groups"].items() if "edges" in what}
     return problem, Mesh(given["nodes"], given["elements"][kind], edges,
-                         {group: what["elements"] for group, what in given["groups"].items() if "elements" in what}, True)
+                         {group: what["elements"] for group, what in given["groups"].items() if "elements" in what}, [((0, 0), None)])
+
+
+def bracket():
+    """That of the gallery: a file of Gmsh (4.1, in text) with triangles, of which its groups are read; the rim of the hole is round."""
+    problem = json.loads((ROOT / "client" / "examples" / "gallery" / "bracket.json").read_text())["problem"]
+    part = {}
+    for piece in problem.pop("mesh")["gmsh"].split("$End")[:-1]:
+        title, *lines = piece[piece.index("$") + 1:].splitlines()
+        part[title] = [line.split() for line in lines if line.strip()]
+    names = {(int(dim), int(tag)): name.strip('"') for dim, tag, name in part["PhysicalNames"][1:]}
+    points, curves, surfaces = (int(n) for n in part["Entities"][0][:3])
+    groups = {}  # (dimension, entity): names
+    for dim, lines in ((1, part["Entities"][1 + points:1 + points + curves]), (2, part["Entities"][1 + points + curves:1 + points + curves + surfaces])):
+        groups.update({(dim, int(line[0])): [names[dim, int(tag)] for tag in line[8:8 + int(line[7])]] for line in lines})
+    nodes, number, at = [], {}, 1
+    while at < len(part["Nodes"]):
+        count = int(part["Nodes"][at][3])
+        for tag, place in zip(part["Nodes"][at + 1:at + 1 + count], part["Nodes"][at + 1 + count:at + 1 + 2 * count]):
+            number[tag[0]] = len(nodes)
+            nodes.append([float(x) for x in place[:2]])
+        at += 1 + 2 * count
+    elements, edges, parts, at = [], {}, {}, 1
+    while at < len(part["Elements"]):
+        dim, entity, _, count = (int(x) for x in part["Elements"][at])
+        for line in part["Elements"][at + 1:at + 1 + count]:
+            for name in groups.get((dim, entity), []):
+                if dim == 1:
+                    edges.setdefault(name, []).append([number[x] for x in line[1:]])
+                else:
+                    parts.setdefault(name, []).append(len(elements))
+            if dim == 2:
+                elements.append([number[x] for x in line[1:]])
+        at += 1 + count
+    return problem, Mesh(nodes, elements, edges, parts, [((9, 48), 5)])
 
 
 def bodies():
@@ -114,15 +151,25 @@ def bodies():
                    contacts=[plane("bottom", [0, -2e-4])])
     hertz = scene("plane_strain", 1000, 0.3, supports=[{"on": "bottom", "uy": 0}, {"on": "left", "ux": 0}],
                   contacts=[{"on": "top", "obstacle": {"circle": {"center": [0, 69.75], "radius": 30}}}])
+    beam = scene("plane_strain", 5, 0.45, supports=[{"on": "left", "ux": 0, "uy": 0}], loads=[{"on": "top", "pressure": 0.01}],
+                 contacts=[{"on": "bottom", "obstacle": {"circle": {"center": [30, -20], "radius": 19}}}])  # README.md's
+    gear = json.loads((ROOT / "client" / "examples" / "gallery" / "gear.json").read_text())["problem"]
+    origin = gear.pop("mesh")["box"]["origin"]
+    gear["kinematics"] = "fixed"  # else errors are those of contact that moves as well
+    block = plate([60, 20], [30, 10])
+    block.nodes = [[x + o for x, o in zip(node, origin)] for node in block.nodes]
     return {"paper's body": (paper, plate([60, 20], [6, 2])),
             "L with a corner": (corner, plate([60, 60], [4, 4], lambda x, y: x > 30 and y > 30)),
             "block under a disc": (hertz, plate([20, 40], [4, 8])),
+            "beam on a disc": (beam, plate([40, 10], [16, 4])), "bracket": bracket(), "gear": (gear, block),
             "press fit": from_gallery("press_fit"), "cylinder": from_gallery("cylinder")}
 
 
 def ask(s, problem, accuracy, mesh):
     """What the service says of it: unknowns, error, seconds; None where it has no such answer."""
-    job = s.solve({"problem": {**copy.deepcopy(problem), "mesh": mesh}, "solver": {"accuracy": accuracy, "time_limit_s": TIME}})
+    job = s.post({"problem": {**copy.deepcopy(problem), "mesh": mesh}, "solver": {"accuracy": accuracy, "time_limit_s": TIME}}).json
+    while job["status"] in ("accepted", "running"):
+        job = s.get(f"/v1/jobs/{job['id']}", Prefer="wait=20").json
     if job["status"] != "successful":
         print("   ", job.get("error"), flush=True)
         return None
@@ -155,7 +202,8 @@ def at_target(found, target):
     if after == 0 and a["error"] <= target:
         return {"d": a["d"], "seconds": a["seconds"], "reached": True}
     part = math.log(a["error"] / target) / math.log(a["error"] / b["error"])
-    return {**{key: a[key] * (b[key] / a[key]) ** part for key in ("d", "seconds")}, "reached": b["error"] <= target}
+    reached = b["error"] <= target
+    return {"d": a["d"] * (b["d"] / a["d"]) ** part, "seconds": a["seconds"] * (b["seconds"] / a["seconds"]) ** part if reached else None, "reached": reached}
 
 
 def order(found):
@@ -163,7 +211,13 @@ def order(found):
     if len(found) < 2:
         return None
     a, b = found[-2:]
+    if a["d"] == b["d"]:
+        return None
     return math.log(a["error"] / b["error"]) / math.log(b["d"] / a["d"])
+
+
+def shown(one):
+    return "-" if not one else f"{'' if one['reached'] else '~'}{one['d']:.0f} ({NONE if one['seconds'] is None else '%.2f s' % one['seconds']})"
 
 
 def main():
@@ -187,8 +241,7 @@ def main():
                            "uniform": [at_target(uniform, t) for t in TARGETS], "adaptive": adaptive,
                            "order_uniform": order(uniform), "order_adaptive": order([reached[0], reached[-1]]) if len(reached) > 1 else None}
                     rows.append(row)
-                    told = [f"{100 * t:g} %: {'-' if not a else '%d (%.2f s)' % (a['d'], a['seconds'])} of {'-' if not u else '%d (%.2f s)' % (u['d'], u['seconds'])}"
-                            for t, a, u in zip(TARGETS, adaptive, row["uniform"])]
+                    told = [f"{100 * t:g} %: {shown(a)} of {shown(u)}" for t, a, u in zip(TARGETS, adaptive, row["uniform"])]
                     print(f"{row['name']:45s} {'; '.join(told)}", flush=True)
     finally:
         s.stop()
