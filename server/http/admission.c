@@ -154,8 +154,9 @@ static bool check_client(api *context, http_request *rq, bool has_route, problem
     const bool limited = context->rate.per_s > 0.0 && !(rq->route && strcmp(rq->route->pattern, "/healthz") == 0);
     const void *key = rq->token[0] ? (const void *)rq->token : rq->address;
     const size_t key_len = rq->token[0] ? strlen(rq->token) : rq->address_len;
-    const double wait =
-        limited && key_len > 0 ? rate_take(&context->rate, key, key_len, clock_seconds(CLOCK_MONOTONIC)) : 0.0;
+    const double wait = limited && key_len > 0
+                            ? rate_take(&context->rate, rq->token, key, key_len, clock_seconds(CLOCK_MONOTONIC))
+                            : 0.0;
     if (wait > 0.0) {
         metrics_add(context->metrics, METRIC_RATE_LIMITED, 1);
         rq->reply.retry_after_s = 1 + (int)wait;

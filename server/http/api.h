@@ -6,6 +6,7 @@
 #include "http/auth.h"
 #include "http/http.h"
 #include "http/rate.h"
+#include "http/rates.h"
 #include "http/transport/transport.h"
 #include "store/store.h"
 #include "store/uploads.h"
@@ -34,6 +35,7 @@ typedef struct api {
     const webhooks *webhooks; /* NULL: there are none */
     auth *auth;               /* NULL: everybody may all */
     rate rate;                /* per_s 0: no limit */
+    rates *rates;             /* NULL: it counts for this daemon alone */
     http_options options;
     transport *server;
     sem_t turns;                /* so many replies may be computed at a time, the others wait: fields.c */

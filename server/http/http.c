@@ -74,6 +74,7 @@ static void on_account(void *ctx, const http_request *rq, bool completed, bool e
 
 static void free_context(api *context)
 {
+    rates_stop(context->rates);
     sem_destroy(&context->turns);
     for (size_t i = 0; i < TOLD_TEXTS; i++)
         free(context->told[i].data);
@@ -112,6 +113,7 @@ bool http_start(http_server *out, int listen_fd, const http_parts *parts, const 
     context->rate.per_s = options->max_client_rate > 0 ? options->max_client_rate : 0;
     if (getrandom(&context->rate.seed, sizeof context->rate.seed, 0) != (ssize_t)sizeof context->rate.seed)
         context->rate.seed = (uint64_t)(uintptr_t)context;
+    context->rates = rates_start(context->store, &context->rate);
     const transport_handlers handlers = {.ctx = context,
                                          .admit = admission_check,
                                          .take = uploads_take,

@@ -120,11 +120,11 @@ static const uz_option ROWS[] = {
             .zero_is_off = true,
             .about =
                 "connections of one address open at once; 0: no limit of its own. Behind a proxy all clients are one"),
-    SETTING(
-        "max-client-rate", INTEGER, max_client_rate, .value = "N", .most = 1000000,
-        .normal = "10000", .unit = "requests per second", .zero_is_off = true,
-        .about =
-            "requests of one address or token per second, twice as many at once; more are answered 429; 0: no limit"),
+    SETTING("max-client-rate", INTEGER, max_client_rate, .value = "N", .most = 1000000, .normal = "10000",
+            .unit = "requests per second", .zero_is_off = true,
+            .about = "requests of one address, or of one token to all daemons, per second, twice as many at once; more "
+                     "are answered "
+                     "429; 0: no limit"),
     SETTING("max-body", BYTES, max_body, .value = "BYTES", .least = 1, .normal = "64M", .unit = "bytes",
             .about = "largest request body"),
     SETTING("max-json-depth", INTEGER, max_json_depth, .value = "N", .least = 8, .most = 64, .normal = "64",

@@ -4,6 +4,7 @@ import collections
 import concurrent.futures
 import contextlib
 import json
+import pathlib
 import signal
 import time
 
@@ -198,6 +199,30 @@ def test_a_job_does_not_wait_for_long_for_who_has_its_body(s):
         check(a.solve(body_of(1e5))["status"] == "successful")
         check(metric(other, "uzawad_claims_body_others_total") == 1)
         a.request("DELETE", f"/v1/jobs/{long}")
+
+
+def test_a_token_asks_as_often_of_all_as_of_one(s):
+    token = {"Authorization": "Bearer 0123456789abcdef0123456789abcdef"}
+    with daemons(s.build, 0) as (_, name):
+        some = [Service(s.build, "--workers", "1", "--max-client-rate", "2", db=SERVER.address(name)) for _ in range(2)]
+        try:
+            for one in some:
+                tokens = pathlib.Path(one.folder, "tokens")
+                tokens.write_text(f"all admin {token['Authorization'].split()[1]}\n", encoding="ascii")
+                tokens.chmod(0o600)
+                one.options += ("--token-file", str(tokens))
+                one.start()
+            begun, taken, asked = time.monotonic(), 0, 0
+            while time.monotonic() < begun + 6 or asked < 60:
+                asked += 2
+                taken += sum(one.request("GET", "/v1/limits", headers=token).status == 200 for one in some)
+                time.sleep(0.02)
+            seconds = time.monotonic() - begun
+            # each begins with 4 of its own, and goes on with 2 a second where it is alone
+            check(4 < taken < 8 + 3 * seconds, taken, asked, seconds)
+        finally:
+            for one in some:
+                one.stop()
 
 
 def test_one_is_killed(s):
