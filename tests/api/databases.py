@@ -22,13 +22,15 @@ class Server:
         self.made = 0
         self.start()
 
-    def start(self):
+    def start(self, port=5432):
+        """port: as the settings say."""
+        self.port = port
         os.chmod(self.folder, 0o711)
         with open(os.path.join(self.folder, "log"), "ab") as log:
             self.process = subprocess.Popen([SCRIPT, self.folder, *self.settings], stdout=log, stderr=log)
         end = time.monotonic() + 60
         while self.process.poll() is None and time.monotonic() < end:
-            if os.path.exists(os.path.join(self.folder, ".s.PGSQL.5432")) and self.try_sql("postgres", "SELECT 1")[0]:
+            if os.path.exists(os.path.join(self.folder, f".s.PGSQL.{port}")) and self.try_sql("postgres", "SELECT 1")[0]:
                 return
             time.sleep(0.05)
         status = self.process.poll()
@@ -56,7 +58,7 @@ class Server:
         return f"test{self.made}"
 
     def address(self, database):
-        return f"postgresql://postgres@/{database}?host={self.folder}"
+        return f"postgresql://postgres@/{database}?host={self.folder}" + (f"&port={self.port}" if self.port != 5432 else "")
 
     def try_sql(self, database, statement):
         """Did it go well, and what was printed."""

@@ -29,7 +29,8 @@ int schema_version(link_to *l)
         return refuse(l, "the server is older than PostgreSQL 15: give a database of a newer one");
     link_begin(l, LINK_READ);
     link_send(l, &(call){.sql = "SELECT current_setting('server_encoding'), to_regnamespace('uzawa') IS NOT NULL,"
-                                " to_regclass('uzawa.format') IS NOT NULL"});
+                                " CASE WHEN has_schema_privilege(to_regnamespace('uzawa')::oid, 'USAGE')"
+                                " THEN to_regclass('uzawa.format') IS NOT NULL ELSE false END"});
     if (link_end(l) != STORE_OK)
         return -1;
     if (strcmp(PQgetvalue(l->answers[0], 0, 0), "UTF8") != 0)

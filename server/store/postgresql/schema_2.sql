@@ -11,9 +11,11 @@ ALTER TABLE node ADD COLUMN name text NOT NULL DEFAULT '', ADD COLUMN version te
     ADD COLUMN workers integer NOT NULL DEFAULT 0, ADD COLUMN busy integer NOT NULL DEFAULT 0,
     ADD COLUMN factors bigint NOT NULL DEFAULT 0, ADD COLUMN bytes bigint NOT NULL DEFAULT 0,
     ADD COLUMN max_bytes bigint NOT NULL DEFAULT 0, ADD COLUMN draining boolean NOT NULL DEFAULT false;
--- Bodies whose factor a node has, or makes now; seconds: what its first run of the body took, NULL: it has not ended.
+-- Bodies whose factor a node has, or makes now; seconds, again: what its first and its second run of the body took,
+-- NULL: it has not ended.
 CREATE TABLE holding(
     body bigint NOT NULL, node text COLLATE "C" NOT NULL REFERENCES node(id) ON DELETE CASCADE, seconds float8,
+    again float8,
     PRIMARY KEY(body, node)
 );
 CREATE INDEX holding_by_node ON holding(node);
@@ -50,8 +52,9 @@ BEGIN
             seconds := greatest(0, NEW.finished - NEW.started);
         END IF;
         IF NEW.status = 2 AND OLD.body IS NOT NULL THEN
-            UPDATE holding AS h SET seconds = greatest(0, NEW.finished - NEW.started)
-                WHERE h.body = OLD.body AND h.node = OLD.node AND h.seconds IS NULL;
+            UPDATE holding AS h SET seconds = coalesce(h.seconds, NEW.finished - NEW.started),
+                again = CASE WHEN h.seconds IS NOT NULL THEN NEW.finished - NEW.started END
+                WHERE h.body = OLD.body AND h.node = OLD.node AND h.again IS NULL;
         END IF;
     END IF;
     INSERT INTO ledger(was, becomes, share, ahead, small, client, bytes_was, bytes, used, seconds, day)
@@ -85,7 +88,7 @@ END $$;
 -- it. id NULL: none, or none yet: one of them waits for who has its body, for `later` seconds more at most.
 --
 -- A job that this node has the body of goes before older ones of the same priority, and one that others have is left to
--- them for as long as this node would take to make the factor itself, but no longer than p_bound. Once it is p_bound
+-- them for as long as the factor spared them, but no longer than p_bound. Once it is p_bound
 -- since a job was first passed over, it goes before all of its priority. The first 64 are looked at.
 CREATE FUNCTION choose(p_node text, p_share text, p_ahead boolean, p_small boolean, p_bound float8, now float8,
     OUT id text, OUT body bigint, OUT fit integer, OUT later float8) LANGUAGE plpgsql
@@ -122,7 +125,7 @@ BEGIN
               AND i.share = p_share AND (i.priority > 5) = p_ahead AND (i.queue_until = 0 OR i.queue_until >= now)
               ORDER BY i.priority DESC, i.id LIMIT 64) AS j
         LEFT JOIN LATERAL (SELECT CASE WHEN bool_or(k.node = p_node) THEN 1 ELSE 2 END AS fit,
-                                  min(coalesce(k.seconds, p_bound)) AS worth
+                                  min(greatest(0, coalesce(k.seconds - coalesce(k.again, 0), p_bound))) AS worth
             FROM holding AS k JOIN node AS n ON n.id = k.node WHERE k.body = j.body
             AND (k.node = p_node OR (n.seen > now - 30 AND NOT n.draining)) HAVING count(*) > 0) AS h ON true
         ORDER BY j.priority DESC, overdue DESC, CASE coalesce(h.fit, 0) WHEN 1 THEN 0 WHEN 0 THEN 1 ELSE 2 END, j.id
