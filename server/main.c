@@ -11,6 +11,7 @@
 #include "store/engine_base.h"
 #include "store/engines/engines.h"
 #include "store/nodes.h"
+#include "store/objects/objects.h"
 #include "uzawa.h"
 #include "work/solver_process.h"
 #include "work/webhook.h"
@@ -36,6 +37,7 @@ typedef struct {
     metrics *metrics;
     char node[STORE_NODE]; /* the name of this daemon */
     store *store;
+    objects *objects; /* NULL: everything is in the store's own place */
     work *work;
     webhooks *webhooks;
     http_server http;
@@ -124,10 +126,29 @@ static void name_node(service *s, const server_options *options, const char *url
         snprintf(s->node, sizeof s->node, "%s%s", host, strrchr(url, ':') ? strrchr(url, ':') : "");
 }
 
+/* While the process may read the keys. */
+static bool reach_objects(service *s, const server_options *options, char *message, size_t size)
+{
+    const objects_options o = {.url = options->objects,
+                               .region = options->object_region,
+                               .key_file = options->object_key_file,
+                               .least = (int64_t)options->object_least,
+                               .metrics = s->metrics};
+    if (!options->objects[0])
+        return true;
+    if (!store_engine_of(options_address(options))->collect) {
+        snprintf(message, size, "--objects needs --store postgresql://...: a file keeps everything beside it");
+        return false;
+    }
+    s->objects = objects_open(&o, message, size);
+    return s->objects != NULL;
+}
+
 /* The store and those who work on it. */
 static bool start_work(service *s, const server_options *options, char *message, size_t size)
 {
     const store_settings settings = {.metrics = s->metrics,
+                                     .objects = s->objects,
                                      .max_queue = options->max_queue,
                                      .affinity_s = options->affinity_s,
                                      .quotas = {.waiting = options->client_queue,
@@ -212,7 +233,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     if (!codec_init(&limits, message, size))
         return false;
     uz_process_init(options->workers + 1); /* fields of results are computed here */
-    if (!read_secrets(s, options, message, size))
+    if (!read_secrets(s, options, message, size) || !reach_objects(s, options, message, size))
         return false;
     /* The port is taken before any job runs, so that a second daemon fails without a trace; and before the privileges
      * go that a low port needs. */
@@ -255,6 +276,7 @@ static void end(service *s)
     }
     if (s->store)
         store_close(s->store);
+    objects_close(s->objects);
     forget_secrets(s);
     codec_end();
 }
@@ -350,13 +372,15 @@ static int check_config(const server_options *options)
     char *port = strrchr(address, ':');
     if (port && port[1] && !port[1 + strspn(port + 1, "0123456789")] && atol(port + 1) <= 65535)
         strcpy(port + 1, "0");
-    const bool secrets = read_secrets(&s, options, message, sizeof message);
+    const bool secrets =
+        read_secrets(&s, options, message, sizeof message) && reach_objects(&s, options, message, sizeof message);
     const int fd = secrets ? http_listen(address, "http", url, sizeof url, message, sizeof message) : -1;
     const bool good = fd >= 0 && check_exposure(&s, options, fd, message, sizeof message);
     if (fd >= 0)
         close(fd);
     if (!good)
         fprintf(stderr, "uzawad: %s\n", message);
+    objects_close(s.objects);
     forget_secrets(&s);
     return good ? EXIT_ENDED : EXIT_FAILED;
 }

@@ -173,6 +173,10 @@ static void write_counted(const metrics *m, FILE *out)
         [METRIC_BODY_NEW] = {"claims_body_new_total", "Jobs claimed whose body no daemon had."},
         [METRIC_BODY_OTHERS] = {"claims_body_others_total", "Jobs claimed whose body only other daemons had."},
         [METRIC_DELETED] = {"jobs_deleted_total", "Ended jobs that were deleted for their age, number or size."},
+        [METRIC_OBJECT_WRITTEN] = {"object_written_bytes_total", "Bytes put into the object store."},
+        [METRIC_OBJECT_READ] = {"object_read_bytes_total", "Bytes got from the object store."},
+        [METRIC_OBJECT_FAILED] = {"object_failures_total", "Requests to the object store that failed after all tries."},
+        [METRIC_OBJECT_GONE] = {"objects_removed_total", "Objects that belonged to nothing any more and were removed."},
         [METRIC_UPLOADS] = {"uploads_total", "Uploads that were stored, or sent again."},
         [METRIC_WEBHOOK_TOLD] = {"webhooks_told_total", "Ends of jobs that webhooks were told."},
         [METRIC_WEBHOOK_FAILED] = {"webhook_failures_total", "Attempts to tell a webhook that failed."},
@@ -197,6 +201,8 @@ static void write_counted(const metrics *m, FILE *out)
         fprintf(out, "uzawad_http_requests_total{code=\"%d\"} %" PRIu64 "\n", m->codes[i].code, m->codes[i].count);
     write_head(out, "store_commit_seconds", "histogram", "Time of a commit, which is on disk after it.");
     write_histogram(out, "store_commit_seconds", "", &m->histograms[METRIC_COMMIT]);
+    write_head(out, "object_request_seconds", "histogram", "Time of a request to the object store, each try.");
+    write_histogram(out, "object_request_seconds", "", &m->histograms[METRIC_OBJECT]);
     write_head(out, "job_phase_seconds", "histogram", "Time of a job's phases; total is from its submission.");
     for (size_t i = METRIC_QUEUE; i < METRIC_HISTOGRAMS; i++) {
         snprintf(labels, sizeof labels, "phase=\"%s\",", PHASES[i]);

@@ -18,6 +18,7 @@ void metrics_free(metrics *m);
 /* Histograms of seconds. */
 typedef enum {
     METRIC_COMMIT, /* of the store: a transaction's COMMIT */
+    METRIC_OBJECT, /* a request to the object store, each try */
     METRIC_QUEUE,  /* of a job, and so on to TOTAL */
     METRIC_PARSE,
     METRIC_ASSEMBLE,
@@ -45,6 +46,10 @@ typedef enum {
     METRIC_BODY_NEW,       /* nobody */
     METRIC_BODY_OTHERS,    /* others, which had no time for them */
     METRIC_DELETED,        /* ended jobs that were kept long enough */
+    METRIC_OBJECT_WRITTEN, /* bytes put into the object store */
+    METRIC_OBJECT_READ,    /* bytes got from there */
+    METRIC_OBJECT_FAILED,  /* requests to it that failed, after all tries */
+    METRIC_OBJECT_GONE,    /* objects that were nobody's any more and were removed */
     METRIC_UPLOADS,        /* uploads stored, or sent again */
     METRIC_WEBHOOK_TOLD,   /* ends of jobs that were told */
     METRIC_WEBHOOK_FAILED, /* attempts to tell that failed */

@@ -112,6 +112,11 @@ bool decode_source_open(decode_source *out, decoding *d, const json_value *value
     if (status == STORE_NOT_FOUND)
         return decode_refuse(d, "unknown_upload", upload,
                              "names no upload of this server: send the text to POST /v1/uploads first.");
+    if (status == STORE_AWAY) {
+        decode_refuse(d, "store_unavailable", upload, "names an upload that can't be reached now: try again later.");
+        d->problem->status = 503;
+        return false;
+    }
     decode_refuse(d, status == STORE_DAMAGED ? "stored_data_damaged" : "store_error", upload,
                   status == STORE_DAMAGED
                       ? "names an upload whose file is not what was sent, by its digest: send the text to POST "

@@ -35,6 +35,7 @@ static const struct {
     {"memory_limit", "The problem needs more memory than allowed"},
     {"out_of_memory", "Not enough memory now"},
     {"unknown_upload", "An upload is not there"},
+    {"store_unavailable", "The store does not answer"},
     {"queue_time_limit", "The job waited too long"},
     {"cancelled", "The job was dismissed"},
     {"internal", "A fault of this service"},

@@ -27,6 +27,9 @@ typedef struct {
     /* where */
     char listen[OPTION_PATH], db[OPTION_PATH], store[OPTION_PATH], node[OPTION_PATH], config[OPTION_PATH];
     double affinity_s;
+    /* large blobs: "" where there is no object store */
+    char objects[OPTION_PATH], object_region[OPTION_PATH], object_key_file[OPTION_PATH];
+    size_t object_least;
     /* who may: "" where there is none */
     char token_file[OPTION_PATH], tls_cert[OPTION_PATH], tls_key[OPTION_PATH], user[OPTION_PATH],
         audit_log[OPTION_PATH];

@@ -43,6 +43,17 @@ static const uz_option ROWS[] = {
             .zero_is_off = true,
             .about = "with several daemons, a job waits at most so long for the one that has its body's factor, or "
                      "because jobs of others go before it for that; 0: it does not"),
+    SETTING("objects", TEXT, objects, .value = "URL", .normal = "",
+            .about =
+                "large results and uploads are kept in an object store with the S3 interface, not in the database: "
+                "https://HOST/BUCKET or https://HOST/BUCKET/PREFIX; with PostgreSQL only, the same for all daemons"),
+    SETTING("object-region", TEXT, object_region, .value = "TEXT", .normal = "us-east-1",
+            .about = "region that requests to the object store are signed for"),
+    SETTING("object-key-file", TEXT, object_key_file, .value = "FILE", .normal = "",
+            .about = "one line \"ACCESS_KEY_ID SECRET_ACCESS_KEY\" of the object store, mode 600; without it they come "
+                     "from AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"),
+    SETTING("object-least", BYTES, object_least, .value = "BYTES", .least = 1, .normal = "256K", .unit = "bytes",
+            .about = "what has fewer bytes stays in the database"),
     SETTING("config", TEXT, config, .value = "FILE", .normal = "",
             .about = "file with lines \"name = value\" for all options but this one"),
     SETTING("token-file", TEXT, token_file, .value = "FILE", .normal = "",

@@ -24,7 +24,8 @@ typedef struct {
     store_status (*seal)(blob_writer *w, char cause[BLOB_CAUSE]); /* all bytes are durable: publishing is quick */
     store_status (*publish)(blob_writer *w, const char *id, char cause[BLOB_CAUSE]);
     void (*end)(blob_writer *w); /* frees it, and removes what was not published */
-    /* A descriptor for reading, which the caller closes; -1: errno, ENOENT where there is none. */
+    /* A descriptor for reading, which the caller closes; -1: errno, ENOENT where there is none, EHOSTUNREACH where the
+     * place does not answer now. */
     int (*open)(blobs *b, const char *id);
     void (*remove)(blobs *b, const char *id); /* what it fails to remove sweep does */
     /* Removes half-written ones, and those that are not to be kept; while nobody writes. NULL: there are none. */

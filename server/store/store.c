@@ -129,6 +129,12 @@ static store_status publish_job(store_status status, job *out)
     return status;
 }
 
+store_status store_collect_objects(store *s, int64_t *count)
+{
+    *count = 0;
+    return s->engine->collect ? s->engine->collect(s, count) : STORE_OK;
+}
+
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated)
 {
     *out = (job){.progress = 0};

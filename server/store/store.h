@@ -83,6 +83,8 @@ typedef struct {
     client_quotas quotas;
     double affinity_s; /* with several daemons a job waits at most so long for one that has its body, or because others
                         * whose body the claimer has go before it; 0: it does not */
+    struct objects
+        *objects; /* where an engine that says so puts large blobs (objects/objects.h); NULL: with the rest */
 } store_settings;
 /* NULL is fine. */
 void store_close(store *s);
@@ -261,6 +263,10 @@ store_status store_count_vectors(store *s, const char *id, const char *name, int
  * (0: the job) has no stored history; STORE_OK with a count of 0 when it has one but nothing after `after`. */
 store_status store_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
                                int64_t *columns);
+
+/* Removes from the place of large blobs what belongs to nothing any more, a part of it; *count is how much. One thread
+ * asks, often. */
+store_status store_collect_objects(store *s, int64_t *count);
 
 /* Writes something that changes nothing, all the way to the disk: what a submission would meet now. */
 store_status store_try_write(store *s);

@@ -318,7 +318,9 @@ store_status store_upload_descriptor(store *s, const char *id, const char *of_jo
     *fd = s->uploads->blobs->does->open(s->uploads->blobs, id);
     if (*fd >= 0)
         return STORE_OK;
-    status = errno == ENOENT ? STORE_DAMAGED : STORE_ERROR;
+    status = errno == ENOENT ? STORE_DAMAGED : errno == EHOSTUNREACH ? STORE_AWAY : STORE_ERROR;
+    if (status == STORE_AWAY) /* the engine has said more */
+        return status;
     snprintf(cause, sizeof cause, "cannot read the file of upload %s: %s", id, strerror(errno));
     store_set_message(s, cause);
     return status;

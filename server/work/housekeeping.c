@@ -88,6 +88,8 @@ void *housekeeping_loop(void *arg)
         if (total > 0)
             log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
         store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
+        store_collect_objects(w->store, &count);
+        metrics_add(w->options.metrics, METRIC_OBJECT_GONE, count);
         pthread_mutex_lock(&w->lock);
     }
     pthread_mutex_unlock(&w->lock);

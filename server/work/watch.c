@@ -17,6 +17,7 @@ enum { PATIENCE = SANITIZED ? 10 : 1 };
 #define RELEASE_S (0.5 * PATIENCE) /* the service stops, or another owner has the job */
 #define HEARD_S   (1.0 * PATIENCE) /* more, where the process has seen it and certifies its answer */
 #define START_S   (20.0 * PATIENCE)
+#define ASK_S     1.0              /* what the store could not give is asked for again */
 #define LANE_S    (1.0 * PATIENCE) /* a job that takes longer is no small one: another worker begins it again */
 
 /* Beyond its time limit. Once it iterates there is an answer, whose certificate may take a while. */
@@ -30,12 +31,29 @@ typedef struct {
     relay_rights rights;
     size_t body_len;
     double told_at, stop_at, due_at, grown_at; /* on CLOCK_MONOTONIC */
-    double limit_s;
+    double limit_s, ask_at;                    /* ask_at: infinite where nothing is to be asked for again */
+    packet asked;
     int told; /* percent */
     bool stopping;
     bool read;  /* the process has read the text */
     bool again; /* it is not the first process that has it */
 } watch;
+
+/* The process waits for what it has asked for, also while the store is away: until it is back or the job is to end.
+ * False: the process is gone. */
+static bool answer(watch *w, const packet *question, double now)
+{
+    packet reply;
+    int fd;
+    relay_answer(&reply, &fd, w->me->w->store, &w->rights, question, &w->p->inbox, (w->body_len + 7) / 8 * 8);
+    const bool away = reply.status == STORE_AWAY;
+    const bool sent = away || message_send(w->p->socket, &reply, fd);
+    if (fd >= 0)
+        close(fd);
+    w->asked = *question;
+    w->ask_at = away ? now + ASK_S : (double)INFINITY;
+    return sent;
+}
 
 /* False: it is no message that may come now, and who says such things is not trusted with a job. */
 static bool hear(watch *w, const packet *m, double now)
@@ -49,15 +67,8 @@ static bool hear(watch *w, const packet *m, double now)
             log_write(me->w->log, LOG_WARN, "process_not_confined", (log_field[]){{0}});
         return true;
     }
-    if (m->kind == MESSAGE_ASK) {
-        packet reply;
-        int fd;
-        relay_answer(&reply, &fd, me->w->store, &w->rights, m, &w->p->inbox, (w->body_len + 7) / 8 * 8);
-        const bool sent = message_send(w->p->socket, &reply, fd);
-        if (fd >= 0)
-            close(fd);
-        return sent;
-    }
+    if (m->kind == MESSAGE_ASK)
+        return answer(w, m, now);
     if (m->kind != MESSAGE_READ)
         return false;
     w->read = true;
@@ -98,7 +109,9 @@ static watch_end follow(watch *w, watch_report *out)
                 feed_moved(w->me->w->feed, w->me->id);
             w->told = progress;
         }
-        double wait = TELL_S;
+        if (now >= w->ask_at && !answer(w, &w->asked, now))
+            return WATCH_DIED;
+        double wait = fmin(TELL_S, fmax(0.0, w->ask_at - now));
         wait = w->stopping ? fmin(wait, fmax(0.0, w->stop_at - now)) : wait;
         wait = heard && now >= w->stop_at ? fmin(TELL_S, w->stop_at + HEARD_S - now) : wait;
         wait = w->due_at > now ? fmin(wait, w->due_at - now) : wait;
@@ -136,6 +149,7 @@ watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len,
                .rights = {.job = claimed->id},
                .body_len = body_len,
                .told = -1,
+               .ask_at = (double)INFINITY,
                .limit_s = o->max_solve_s};
     if (body) /* before it is where the process writes, too */
         relay_find_start(w.rights.start, body, body_len);

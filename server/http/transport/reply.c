@@ -85,6 +85,8 @@ void reply_json(http_reply *reply, int status, char *text)
 void reply_problem(http_reply *reply, const problem_details *problem)
 {
     char *text = codec_encode_problem(problem);
+    if (strcmp(problem->code, "store_unavailable") == 0 && reply->retry_after_s == 0)
+        reply->retry_after_s = 5; /* also where a request could not be checked for it */
     reply_text(reply, problem->status, PROBLEM_TYPE, text, text ? strlen(text) : 0);
 }
 

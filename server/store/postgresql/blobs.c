@@ -1,8 +1,8 @@
-/* blobs.c: bytes of uploads in the database, in pieces, so that every daemon has them. They are written under a name of
- * their own, in transactions of a piece each, and are the blob once they are published. Whoever reads one gets a copy
- * in a file that has no name. */
+/* blobs.c: bytes of uploads in the database, in pieces, so that every daemon has them; large pieces in an object store,
+ * where there is one. They are written under a name of their own, in transactions of a piece each, and are the blob
+ * once they are published. Whoever reads one gets a copy in a file that has no name. */
 #include "store/blobs.h"
-#include "store/postgresql/internal.h"
+#include "store/postgresql/objects.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -24,9 +24,9 @@ typedef struct {
     postgresql_store *s;
     char name[33];
     int64_t part;
-    size_t len;
+    size_t len, room;
     bool published;
-    char piece[PIECE];
+    char piece[]; /* room of them */
 } database_writer;
 
 static store_status run(postgresql_store *s, const call *c, char cause[BLOB_CAUSE])
@@ -41,7 +41,8 @@ static store_status begin(blobs *b, blob_writer **out, char cause[BLOB_CAUSE])
 {
     postgresql_store *s = ((database_blobs *)b)->s;
     uint64_t random[2];
-    database_writer *w = calloc(1, sizeof *w);
+    const size_t room = s->base.settings.objects ? OBJECT_MOST : PIECE;
+    database_writer *w = calloc(1, sizeof *w + room);
     call c = {.sql = "INSERT INTO uzawa.blob(id, written, sealed) VALUES ($1, uzawa.moment(), false)"};
     *out = NULL;
     if (!w || getrandom(random, sizeof random, 0) != (ssize_t)sizeof random) {
@@ -51,6 +52,7 @@ static store_status begin(blobs *b, blob_writer **out, char cause[BLOB_CAUSE])
     }
     w->base.blobs = b;
     w->s = s;
+    w->room = room;
     snprintf(w->name, sizeof w->name, "%016llx%016llx", (unsigned long long)random[0], (unsigned long long)random[1]);
     call_text(&c, w->name);
     const store_status status = run(s, &c, cause);
@@ -63,12 +65,24 @@ static store_status begin(blobs *b, blob_writer **out, char cause[BLOB_CAUSE])
 
 static store_status send_piece(database_writer *w, char cause[BLOB_CAUSE])
 {
-    call c = {.sql = "INSERT INTO uzawa.blob_piece(blob, part, data) VALUES ($1, $2, $3)"};
+    objects *place = w->s->base.settings.objects;
+    char name[OBJECT_NAME];
+    const bool placed = place && (int64_t)w->len >= objects_least(place);
+    call c = {.sql = placed ? "SELECT uzawa.blob_place($1, $2, $3, $4)"
+                            : "INSERT INTO uzawa.blob_piece(blob, part, data) VALUES ($1, $2, $3)"};
     if (w->len == 0)
         return STORE_OK;
     call_text(&c, w->name);
     call_integer(&c, w->part++);
-    call_bytes(&c, w->piece, w->len);
+    if (placed) {
+        const store_status status = postgresql_put_object(w->s, w->piece, w->len, name, cause);
+        if (status != STORE_OK)
+            return status;
+        call_text(&c, name);
+        call_integer(&c, (int64_t)w->len);
+    } else {
+        call_bytes(&c, w->piece, w->len);
+    }
     w->len = 0;
     return run(w->s, &c, cause);
 }
@@ -78,12 +92,12 @@ static store_status put(blob_writer *base, const void *data, size_t size, char c
     database_writer *w = (database_writer *)base;
     store_status status = STORE_OK;
     for (const char *at = data; size > 0 && status == STORE_OK;) {
-        const size_t n = size < PIECE - w->len ? size : PIECE - w->len;
+        const size_t n = size < w->room - w->len ? size : w->room - w->len;
         memcpy(w->piece + w->len, at, n);
         w->len += n;
         at += n;
         size -= n;
-        if (w->len == PIECE)
+        if (w->len == w->room)
             status = send_piece(w, cause);
     }
     return status;
@@ -97,7 +111,7 @@ static store_status seal(blob_writer *base, char cause[BLOB_CAUSE])
 static store_status publish(blob_writer *base, const char *id, char cause[BLOB_CAUSE])
 {
     database_writer *w = (database_writer *)base;
-    call c = {.sql = "SELECT uzawa.blob_publish($1, $2)"};
+    call c = {.sql = "SELECT uzawa.blob_publish_2($1, $2)"};
     call_text(&c, w->name);
     call_text(&c, id);
     const store_status status = run(w->s, &c, cause);
@@ -116,20 +130,75 @@ static void end(blob_writer *base)
     free(w);
 }
 
+/* A piece whose bytes are in an object, and where they go. */
+typedef struct {
+    char object[OBJECT_NAME];
+    int64_t size;
+    off_t at;
+} placed_part;
+
 typedef struct {
     int fd, cause;
     bool any;
+    off_t at; /* of the next piece */
+    placed_part *placed;
+    size_t n_placed, room;
 } copy;
+
+static bool note_placed(copy *to, const PGresult *r)
+{
+    if (to->n_placed == to->room) {
+        const size_t room = to->room ? 2 * to->room : 16;
+        placed_part *grown = realloc(to->placed, room * sizeof *grown);
+        to->cause = grown ? 0 : ENOMEM;
+        if (!grown)
+            return false;
+        to->placed = grown;
+        to->room = room;
+    }
+    placed_part *one = &to->placed[to->n_placed++];
+    *one = (placed_part){.size = cell_integer(r, 0, 2), .at = to->at};
+    if (!cell_write(one->object, sizeof one->object, r, 0, 1) || one->size <= 0 || one->size > OBJECT_MOST)
+        to->cause = ENOENT;
+    to->at += one->size;
+    return to->cause == 0;
+}
 
 static bool copy_piece(void *ctx, const PGresult *r)
 {
     copy *to = ctx;
     to->any = true;
+    if (!PQgetisnull(r, 0, 1))
+        return note_placed(to, r);
     if (PQgetisnull(r, 0, 0)) /* it has no bytes */
         return true;
-    if (!blob_write_all(to->fd, PQgetvalue(r, 0, 0), (size_t)PQgetlength(r, 0, 0)))
+    if (lseek(to->fd, to->at, SEEK_SET) < 0 ||
+        !blob_write_all(to->fd, PQgetvalue(r, 0, 0), (size_t)PQgetlength(r, 0, 0)))
         to->cause = errno;
+    to->at += PQgetlength(r, 0, 0);
     return to->cause == 0;
+}
+
+/* Sets to->cause, and the store's message. */
+static void copy_placed(postgresql_store *s, copy *to)
+{
+    char cause[OBJECT_CAUSE] = "a part of this is in an object store, and this daemon was given none: --objects";
+    char *bytes = to->n_placed > 0 ? malloc(OBJECT_MOST) : NULL;
+    if (to->n_placed > 0 && !bytes)
+        to->cause = ENOMEM;
+    for (size_t i = 0; i < to->n_placed && to->cause == 0; i++) {
+        const placed_part *one = &to->placed[i];
+        const store_status status = s->base.settings.objects ? objects_get(s->base.settings.objects, one->object, 0,
+                                                                           bytes, (size_t)one->size, cause)
+                                                             : STORE_AWAY;
+        if (status != STORE_OK) {
+            store_set_message(&s->base, cause);
+            to->cause = status == STORE_DAMAGED ? ENOENT : EHOSTUNREACH;
+        } else if (lseek(to->fd, one->at, SEEK_SET) < 0 || !blob_write_all(to->fd, bytes, (size_t)one->size)) {
+            to->cause = errno;
+        }
+    }
+    free(bytes);
 }
 
 static int open_blob(blobs *b, const char *id)
@@ -137,17 +206,20 @@ static int open_blob(blobs *b, const char *id)
     postgresql_store *s = ((database_blobs *)b)->s;
     const char *folder = getenv("TMPDIR");
     copy to = {.fd = open(folder ? folder : "/tmp", O_TMPFILE | O_RDWR | O_CLOEXEC, 0600)};
-    call c = {.sql = "SELECT data FROM uzawa.blob LEFT JOIN uzawa.blob_piece ON blob = id WHERE id = $1 AND sealed"
-                     " ORDER BY part"};
+    call c = {.sql = "SELECT data, object, size FROM uzawa.blob LEFT JOIN uzawa.blob_piece ON blob = id WHERE id = $1"
+                     " AND sealed ORDER BY part"};
     if (to.fd < 0)
         return -1;
     call_text(&c, id);
     link_to *l = postgresql_take(s);
     const store_status status = postgresql_give(s, l, link_stream(l, &c, copy_piece, &to));
+    if (status == STORE_OK && to.cause == 0)
+        copy_placed(s, &to);
+    free(to.placed);
     if (status == STORE_OK && to.any && to.cause == 0 && lseek(to.fd, 0, SEEK_SET) == 0)
         return to.fd;
     close(to.fd);
-    errno = status != STORE_OK ? EIO : to.cause != 0 ? to.cause : ENOENT;
+    errno = status == STORE_AWAY ? EHOSTUNREACH : status != STORE_OK ? EIO : to.cause != 0 ? to.cause : ENOENT;
     return -1;
 }
 

@@ -145,6 +145,7 @@ static void fail_as_said(link_to *l, const PGresult *r)
         const char *begin;
         store_status status;
     } CODES[] = {{"UZ001", STORE_CONFLICT},  {"UZ002", STORE_NOT_FOUND},
+                 {"UZ003", STORE_AWAY},                               /* an object has to be written again */
                  {"23503", STORE_NOT_FOUND},                          /* what it belongs to is gone */
                  {"53100", STORE_FULL},      {"55P03", STORE_LOCKED}, /* lock_timeout */
                  {"57014", STORE_LOCKED},                             /* statement_timeout */

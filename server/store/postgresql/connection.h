@@ -59,7 +59,7 @@ typedef enum {
 void link_begin(link_to *l, link_kind kind);
 void link_send(link_to *l, const call *c);
 /* STORE_OK: all of it was carried out; else nothing was, or l->lost. Answers stay until the next link_begin. Codes that
- * functions raise: UZ001 STORE_CONFLICT, UZ002 STORE_NOT_FOUND. */
+ * functions raise: UZ001 STORE_CONFLICT, UZ002 STORE_NOT_FOUND, UZ003 STORE_AWAY. */
 store_status link_end(link_to *l);
 
 /* Hands over the rows of a call one by one, as of one moment, until `take` returns false. */

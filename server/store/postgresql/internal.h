@@ -35,6 +35,7 @@ typedef struct {
     char *lost_json;
 
     told *told;
+    double collect_after; /* CLOCK_MONOTONIC; of the one thread that collects */
 } postgresql_store;
 
 static inline postgresql_store *postgresql_of(store *s)
@@ -129,6 +130,7 @@ store_status postgresql_upload_add(store *s, const char *id, const char *client,
 store_status postgresql_upload_forget(store *s, const char *id, const char *client, bool *gone);
 store_status postgresql_upload_idle(store *s, double before, upload_info *out);
 store_status postgresql_upload_total(store *s, int64_t *bytes);
+store_status postgresql_collect(store *s, int64_t *count); /* objects.c */
 store_status postgresql_try_write(store *s);
 int64_t postgresql_free_bytes(store *s);
 store_status postgresql_check(store *s, store_findings *out);

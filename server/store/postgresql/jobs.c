@@ -1,6 +1,6 @@
 /* jobs.c: the life of a job, each step one transaction. Submissions and ends that come while others are on their way
  * are one transaction together: they wait for the same disk. */
-#include "store/postgresql/internal.h"
+#include "store/postgresql/objects.h"
 
 #include <gnutls/crypto.h>
 #include <stdio.h>
@@ -22,7 +22,8 @@ typedef struct {
     bool repeated;
     const store_lease *lease;
     const store_outcome *outcome;
-    bool again; /* it may have been carried out before */
+    const placed_result *placed; /* its result is in objects; NULL: it goes with the transaction */
+    bool again;                  /* it may have been carried out before */
     store_status status;
     size_t answer; /* where the call's that decides is */
     char message[LINK_CAUSE];
@@ -133,12 +134,26 @@ static store_status read_verdict(link_to *l, change *c)
 
 /* ---- finish */
 
+/* The result in rows; *bytes and *contents as result_blobs_put has them. */
+static void send_result(link_to *l, const change *c, int64_t *bytes, char **contents)
+{
+    result_place place = {.link = l, .job = c->lease->job, .token = c->lease->token};
+    char cause[256] = "";
+    store_status put = result_blobs_put(&POSTGRESQL_RESULTS, &place, c->lease->job, c->outcome, bytes, contents, cause);
+    if (put == STORE_OK)
+        put = postgresql_send_pieces(&place);
+    free(place.bytes);
+    if (put != STORE_OK && l->status == STORE_OK) {
+        l->status = put;
+        snprintf(l->message, sizeof l->message, "%.200s", cause);
+    }
+}
+
 /* What decides comes last: until then nobody waits for this transaction, whatever becomes of the process. */
 static void send_end(link_to *l, change *c)
 {
     const store_outcome *o = c->outcome;
-    result_place place = {.link = l, .job = c->lease->job, .token = c->lease->token};
-    int64_t bytes = 0;
+    int64_t bytes = c->placed ? c->placed->bytes : 0;
     char *contents = NULL;
     for (size_t i = 0; i < o->n_cases; i++) { /* the job's own is in its row */
         call q = {.sql = "INSERT INTO uzawa.answer(job, token, number, name, summary, sum) VALUES ($1::text,"
@@ -151,15 +166,10 @@ static void send_end(link_to *l, change *c)
         call_text(&q, o->cases[i].summary);
         link_send(l, &q);
     }
-    char cause[256] = "";
-    store_status put = result_blobs_put(&POSTGRESQL_RESULTS, &place, c->lease->job, o, &bytes, &contents, cause);
-    if (put == STORE_OK)
-        put = postgresql_send_pieces(&place);
-    free(place.bytes);
-    if (put != STORE_OK && l->status == STORE_OK) {
-        l->status = put;
-        snprintf(l->message, sizeof l->message, "%.200s", cause);
-    }
+    if (c->placed)
+        postgresql_send_placed(l, c->lease->job, c->lease->token, c->placed);
+    else
+        send_result(l, c, &bytes, &contents);
     call q = {.sql = "SELECT uzawa.finish($1, $2, $3, $4, $5, $6, $7, $8, $9)"};
     call_text(&q, c->lease->job);
     call_text(&q, c->lease->owner);
@@ -169,7 +179,7 @@ static void send_end(link_to *l, change *c)
     call_text(&q, o->whole.summary);
     call_text(&q, o->error);
     call_integer(&q, bytes);
-    call_text(&q, contents);
+    call_text(&q, c->placed ? c->placed->contents : contents);
     c->answer = l->sent;
     if (l->status == STORE_OK)
         link_send(l, &q);
@@ -422,7 +432,13 @@ static store_status finish(postgresql_store *s, const store_lease *lease, const 
     int64_t bytes = bytes_of(&outcome->whole);
     for (size_t i = 0; i < outcome->n_cases; i++)
         bytes += bytes_of(&outcome->cases[i]);
-    return carry_out(s, &c, bytes > SHARED_MOST);
+    store_status status;
+    placed_result *placed = postgresql_place_result(s, lease->job, outcome, &status);
+    c.placed = placed;
+    if (status == STORE_OK)
+        status = carry_out(s, &c, !placed && bytes > SHARED_MOST);
+    postgresql_placed_free(placed);
+    return status;
 }
 
 store_status postgresql_use_lease(store *base, const store_lease *lease, const lease_use *use)

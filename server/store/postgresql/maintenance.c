@@ -22,7 +22,8 @@ static const struct {
      "the list of the result of job %s is not what was written\n"},
     {"SELECT id FROM uzawa.job WHERE contents IS NOT NULL AND split_part(contents, ' ', 1)::bigint <>"
      " (SELECT count(*) FROM uzawa.answer WHERE answer.job = id)"
-     " + (SELECT count(*) FROM uzawa.piece WHERE piece.job = id AND part = 0) LIMIT 20",
+     " + (SELECT count(*) FROM uzawa.piece WHERE piece.job = id AND part = 0)"
+     " + (SELECT count(*) FROM uzawa.placed WHERE placed.job = id AND part = 0) LIMIT 20",
      "a part of the result of job %s is missing\n"},
     {"SELECT name FROM (SELECT name, waiting, bytes FROM uzawa.client UNION ALL SELECT client,"
      " (coalesce(becomes, 9) = 0)::int - (coalesce(was, 9) = 0)::int, bytes - bytes_was FROM uzawa.ledger"
@@ -44,7 +45,14 @@ static const struct {
     {"SELECT name || ' of job ' || job FROM uzawa.piece WHERE sum <> uzawa.sum_of(uzawa.piece_keys(piece), data)"
      " LIMIT 20",
      "the %s is not what was written\n"},
-    {"SELECT upload.id FROM uzawa.upload WHERE id <> coalesce((SELECT encode(sha256(string_agg(data, ''::bytea"
+    {"SELECT name || ' of job ' || job FROM uzawa.placed WHERE sum <> uzawa.sum_of(uzawa.placed_keys(placed), digest)"
+     " LIMIT 20",
+     "the place of the %s is not what was written\n"},
+    {"SELECT object || ' of job ' || job FROM uzawa.placed WHERE size > 0 AND NOT EXISTS (SELECT 1 FROM uzawa.object"
+     " WHERE object.name = placed.object AND object.job = placed.job AND NOT doomed) LIMIT 20",
+     "the object %s is nobody's\n"},
+    {"SELECT upload.id FROM uzawa.upload WHERE NOT EXISTS (SELECT 1 FROM uzawa.blob_piece WHERE blob = upload.id"
+     " AND object IS NOT NULL) AND id <> coalesce((SELECT encode(sha256(string_agg(data, ''::bytea"
      " ORDER BY part)), 'hex') FROM uzawa.blob_piece WHERE blob = upload.id), encode(sha256(''), 'hex')) LIMIT 20",
      "the bytes of upload %s are not what was sent\n"},
 };

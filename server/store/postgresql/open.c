@@ -201,6 +201,7 @@ const store_engine STORE_POSTGRESQL = {
     .upload_idle = postgresql_upload_idle,
     .upload_total = postgresql_upload_total,
     .nodes = &POSTGRESQL_NODES,
+    .collect = postgresql_collect,
     .try_write = postgresql_try_write,
     .free_bytes = postgresql_free_bytes,
     .check = postgresql_check,

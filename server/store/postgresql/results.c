@@ -1,5 +1,6 @@
-/* results.c: the blobs of results as rows: each piece of one is a row, in the transaction that ends the job. */
-#include "store/postgresql/internal.h"
+/* results.c: the blobs of results as rows: each piece of one is a row, in the transaction that ends the job, with its
+ * bytes, or with the place in an object where they are. */
+#include "store/postgresql/objects.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -81,8 +82,32 @@ static store_status put(void *transaction, const result_key *key, const result_p
 typedef struct {
     bool (*take)(void *ctx, const result_piece *piece);
     void *ctx;
-    bool any;
+    bool any, full; /* full: there was no memory */
+    placed_row *placed;
+    size_t n_placed, room;
 } taker;
+
+/* Its bytes are got when all rows are there: meanwhile nobody else needs the connection. */
+static bool keep_placed(taker *t, const result_piece *piece, const PGresult *r)
+{
+    if (t->n_placed == t->room) {
+        const size_t room = t->room ? 2 * t->room : 16;
+        placed_row *grown = realloc(t->placed, room * sizeof *grown);
+        t->full = !grown;
+        if (t->full)
+            return false;
+        t->placed = grown;
+        t->room = room;
+    }
+    placed_row *row = &t->placed[t->n_placed++];
+    *row = (placed_row){.piece = *piece, .at = cell_integer(r, 0, 7)};
+    row->piece.size = cell_integer(r, 0, 8);
+    row->piece.good = piece->good && cell_write(row->object, sizeof row->object, r, 0, 6) &&
+                      PQgetlength(r, 0, 4) == sizeof row->digest;
+    if (row->piece.good)
+        memcpy(row->digest, PQgetvalue(r, 0, 4), sizeof row->digest);
+    return true;
+}
 
 static bool take_row(void *ctx, const PGresult *r)
 {
@@ -95,7 +120,7 @@ static bool take_row(void *ctx, const PGresult *r)
                                 .size = PQgetlength(r, 0, 4),
                                 .good = cell_integer(r, 0, 5) != 0};
     t->any = true;
-    return t->take(t->ctx, &piece);
+    return PQgetisnull(r, 0, 6) ? t->take(t->ctx, &piece) : keep_placed(t, &piece, r);
 }
 
 /* Not tried again where the connection is lost: `take` has had some of it. */
@@ -103,10 +128,14 @@ static store_status get(store *base, const result_key *key, int64_t after,
                         bool (*take)(void *ctx, const result_piece *piece), void *ctx)
 {
     postgresql_store *s = postgresql_of(base);
-    taker t = {take, ctx, false};
+    taker t = {take, ctx, .any = false};
     call c = {.sql = "SELECT part, encoding, header, last, CASE WHEN name <> '" HISTORY "' OR last > $4::float8"
-                     " THEN data ELSE '' END, sum = uzawa.sum_of(uzawa.piece_keys(piece), data)"
-                     " FROM uzawa.piece WHERE job = $1 AND number = $2::bigint AND name = $3 ORDER BY part"};
+                     " THEN data ELSE '' END, sum = uzawa.sum_of(uzawa.piece_keys(piece), data),"
+                     " NULL, NULL::bigint, NULL::bigint"
+                     " FROM uzawa.piece WHERE job = $1 AND number = $2::bigint AND name = $3"
+                     " UNION ALL SELECT part, encoding, header, last, digest,"
+                     " sum = uzawa.sum_of(uzawa.placed_keys(placed), digest), object, at, size"
+                     " FROM uzawa.placed WHERE job = $1 AND number = $2::bigint AND name = $3 ORDER BY part"};
     call_text(&c, key->job);
     call_integer(&c, key->number);
     call_text(&c, key->name ? key->name : HISTORY);
@@ -115,7 +144,15 @@ static store_status get(store *base, const result_key *key, int64_t after,
     store_status status = link_stream(l, &c, take_row, &t);
     if (status == STORE_OK && !t.any)
         status = STORE_NOT_FOUND;
-    return postgresql_give(s, l, status);
+    if (t.full) {
+        status = STORE_ERROR;
+        strcpy(l->message, "no memory for a result");
+    }
+    status = postgresql_give(s, l, status);
+    if (status == STORE_OK && t.n_placed > 0)
+        status = postgresql_get_placed(s, t.placed, t.n_placed, after, !key->name, take, ctx);
+    free(t.placed);
+    return status;
 }
 
 static store_status read_total(link_to *l, const PGresult *r, void *ctx)
@@ -127,8 +164,9 @@ static store_status read_total(link_to *l, const PGresult *r, void *ctx)
 
 static store_status count(store *base, const char *id, const char *name, int64_t *total)
 {
-    call c = {.sql = "SELECT coalesce(sum(header), 0)::bigint FROM uzawa.piece WHERE job = $1 AND name = $2"
-                     " AND part = 0"};
+    call c = {.sql = "SELECT coalesce(sum(header), 0)::bigint FROM"
+                     " (SELECT header FROM uzawa.piece WHERE job = $1 AND name = $2 AND part = 0"
+                     " UNION ALL SELECT header FROM uzawa.placed WHERE job = $1 AND name = $2 AND part = 0) AS each"};
     call_text(&c, id);
     call_text(&c, name);
     return postgresql_do(postgresql_of(base), LINK_READ, true, &c, read_total, total);
