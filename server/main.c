@@ -10,6 +10,7 @@
 #include "privileges.h"
 #include "store/engine_base.h"
 #include "store/engines/engines.h"
+#include "store/move.h"
 #include "store/nodes.h"
 #include "store/objects/objects.h"
 #include "uzawa.h"
@@ -407,6 +408,40 @@ static int check_db(const char *path)
     return whole ? EXIT_ENDED : EXIT_FAILED;
 }
 
+/* --move */
+static int move_file(const server_options *options, const char *path)
+{
+    service s = {0};
+    char message[OPTION_PATH + 700] = "";
+    move_report found = {.jobs = 0};
+    bool good = false;
+    store *from = NULL;
+    if (store_engine_of(path)->scheme[0] || !store_engine_of(options_address(options))->scheme[0])
+        snprintf(message, sizeof message,
+                 "--move takes a file, and the database of PostgreSQL that it goes into: --move "
+                 "FILE postgresql://USER@HOST/NAME");
+    else if (access(path, R_OK | W_OK) != 0)
+        snprintf(message, sizeof message, "%s: %s", path, strerror(errno));
+    else if ((from = store_open(path, message, sizeof message)) && reach_objects(&s, options, message, sizeof message))
+        s.store = store_open(options_address(options), message, sizeof message);
+    if (s.store) {
+        s.store->settings.objects = s.objects;
+        good = store_move(from, s.store, &found, message, sizeof message);
+    }
+    store_close(s.store);
+    store_close(from);
+    objects_close(s.objects);
+    if (good)
+        printf(
+            "%s: %lld jobs and %lld uploads, %lld bytes, are in the database as they were; %lld and %lld of them were "
+            "there before\n",
+            path, (long long)found.jobs, (long long)found.uploads, (long long)found.bytes,
+            (long long)(found.jobs - found.jobs_new), (long long)(found.uploads - found.uploads_new));
+    else
+        fprintf(stderr, "uzawad: %s\n", message);
+    return good ? EXIT_ENDED : EXIT_FAILED;
+}
+
 int main(int argc, char **argv)
 {
     server_options options;
@@ -438,6 +473,8 @@ int main(int argc, char **argv)
         }
         printf("%s: %lld bytes\n", backup, (long long)bytes);
         return EXIT_ENDED;
+    case OPTIONS_MOVE:
+        return move_file(&options, backup);
     case OPTIONS_RUN:
         break;
     }

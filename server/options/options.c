@@ -86,7 +86,7 @@ static options_verdict read_flags(flags *f, int argc, char **argv, char *message
                            .abbreviated = true,
                            .argc = argc,
                            .argv = argv};
-    const char *operand = NULL, *meant;
+    const char *operand = NULL, *meant, *second = NULL;
     for (uz_walk_step step; (step = uz_option_next(&walk)) != UZ_WALK_END;) {
         switch (step) {
         case UZ_WALK_OPTION:
@@ -105,13 +105,16 @@ static options_verdict read_flags(flags *f, int argc, char **argv, char *message
                      meant);
             return OPTIONS_WRONG;
         case UZ_WALK_OPERAND:
+            second = operand ? walk.word : NULL;
             operand = operand ? operand : walk.word;
             break;
         case UZ_WALK_END:
             break;
         }
     }
-    if (operand) {
+    if (operand && f->verdict == OPTIONS_MOVE && !second) { /* --move FILE URL */
+        f->value[uz_option_find(walk.table, OPTION_SETTING, "store", strlen("store")) - walk.table.rows] = operand;
+    } else if (operand) {
         snprintf(message, size, "unexpected argument \"%s\"", operand);
         return OPTIONS_WRONG;
     }

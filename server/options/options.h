@@ -76,10 +76,12 @@ typedef enum {
     OPTIONS_EXAMPLE,  /* --example-config */
     OPTIONS_CHECK_DB, /* --check-db */
     OPTIONS_BACKUP,   /* --backup FILE */
+    OPTIONS_MOVE,     /* --move FILE [URL] */
     OPTIONS_WRONG     /* the reason is in message */
 } options_verdict;
 
-/* Reads argv, the environment and the file. backup (OPTION_PATH bytes, may be NULL) takes the FILE of --backup. */
+/* Reads argv, the environment and the file. backup (OPTION_PATH bytes, may be NULL) takes the FILE of --backup or
+ * --move. */
 options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size);
 
 /* Where jobs are kept: store, or db where that is "". */

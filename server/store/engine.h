@@ -11,6 +11,7 @@
 #ifndef SERVER_STORE_ENGINE_H
 #define SERVER_STORE_ENGINE_H
 
+#include "store/move.h"
 #include "store/nodes.h"
 #include "store/result_blobs.h"
 #include "store/uploads.h"
@@ -73,6 +74,7 @@ typedef struct {
     store_status (*check)(store *s, store_findings *out);
     /* Of an address whose store may be open elsewhere. */
     bool (*check_file)(const char *address, store_findings *out, char *message, size_t size);
+    const store_moves *moves; /* for a move into another engine, or from one; NULL: there is none */
     bool (*backup_file)(const char *address, const char *to, int64_t *bytes, char *message, size_t size);
 } store_engine;
 

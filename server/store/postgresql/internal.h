@@ -89,6 +89,7 @@ typedef struct {
 } result_place;
 store_status postgresql_send_pieces(result_place *place); /* those that are kept */
 extern const result_blobs POSTGRESQL_RESULTS;
+extern const store_moves POSTGRESQL_MOVES; /* move.c */
 
 /* The text of an array whose elements are quoted; NULL: no memory. */
 char *postgresql_quoted_array(const char *const *words, size_t n);

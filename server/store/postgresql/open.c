@@ -206,5 +206,6 @@ const store_engine STORE_POSTGRESQL = {
     .free_bytes = postgresql_free_bytes,
     .check = postgresql_check,
     .check_file = postgresql_check_file,
+    .moves = &POSTGRESQL_MOVES,
     .backup_file = postgresql_backup_file,
 };

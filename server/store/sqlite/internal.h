@@ -108,6 +108,7 @@ char *sqlite_copy_text(statement *st, int at, bool *ok);
 
 /* In a transaction's connection. */
 extern const result_blobs SQLITE_RESULTS;
+extern const store_moves SQLITE_MOVES; /* move.c */
 
 /* ---- the operations of the engine (engine.h), by the files that have them */
 store *sqlite_open(const char *address, char *message, size_t size);

@@ -186,6 +186,7 @@ const store_engine STORE_SQLITE = {
     .free_bytes = sqlite_free_bytes,
     .check = sqlite_check,
     .check_file = sqlite_check_file,
+    .moves = &SQLITE_MOVES,
     .backup_file = sqlite_backup_file,
 };
 
