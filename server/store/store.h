@@ -83,8 +83,7 @@ typedef struct {
     client_quotas quotas;
     double affinity_s; /* with several daemons a job waits at most so long for one that has its body, or because others
                         * whose body the claimer has go before it; 0: it does not */
-    struct objects
-        *objects; /* where an engine that says so puts large blobs (objects/objects.h); NULL: with the rest */
+    struct objects *objects; /* where large blobs go (objects/objects.h), if the engine does so; NULL: with the rest */
 } store_settings;
 /* NULL is fine. */
 void store_close(store *s);
