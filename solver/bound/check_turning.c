@@ -18,7 +18,9 @@
  *
  *     |int delta . w| <= |delta| inf |w - rigid| <= |delta| TRACE |A^-1| |A|^2 sqrt(L / det A) |eps(w)|_P
  *
- * since A'w has the strain A' eps(w) A, and 2 mu |eps|^2 is no more than sigma : eps. */
+ * since A'w has the strain A' eps(w) A, and 2 mu |eps|^2 is no more than sigma : eps. Of rings r_a, the pressure and
+ * delta are times the radius, and so is sigma : eps, which has that of the hoop as well: |eps|^2 in the plane times the
+ * least radius of P is no more than its part. At the axis this is nothing, and nothing presses there. */
 #include "bound/check.h"
 
 #include <math.h>
@@ -46,7 +48,7 @@ static double triangle(double corner[3][2], const examination *x, const uz_bound
 {
     uz_bound_centre(corner[2], x->body, edge->element[0]);
     for (int k = 0; k < 2; k++)
-        memcpy(corner[k], x->mesh->xyz + 2 * edge->node[k], sizeof corner[k]);
+        uz_bound_place(corner[k], x->body, edge->node[k]);
     return (corner[1][0] - corner[0][0]) * (corner[2][1] - corner[0][1]) -
            (corner[1][1] - corner[0][1]) * (corner[2][0] - corner[0][0]);
 }
@@ -204,7 +206,7 @@ static void examine_pressure(double turned[MOMENTS][2], examination *x, const do
 {
     const uz_bound_edge *edge = &x->body->edge[i];
     const int moments = x->moments;
-    const double thickness = x->body->model->thickness;
+    const double thickness = x->body->depth;
     double r[MOMENTS], sum[2], off[2], along[2][3], phi[MOMENTS], n[2];
     double integral[MOMENTS][2] = {{0}}, coefficient[MOMENTS][2] = {{0}}, gap = 0, left = 0;
     const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
@@ -255,8 +257,11 @@ void uz_count_turning(examination *x, const uz_bound_edge *edge, double left)
     double corner[3][2];
     const double area2 = triangle(corner, x, edge);
     const double length = hypot(corner[1][0] - corner[0][0], corner[1][1] - corner[0][1]);
-    x->turning += x->body->model->thickness * left * TRACE2[x->moments - 2] * shape_factor(corner, area2, length) /
-                  (2 * uz_element_material(x->body->model, edge->element[0])->lame.mu);
+    double radius = 1; /* the least */
+    for (int k = 0; k < 3 && x->body->rings; k++)
+        radius = fmin(k == 0 ? corner[k][0] : radius, corner[k][0]);
+    x->turning += x->body->depth * left * TRACE2[x->moments - 2] * shape_factor(corner, area2, length) /
+                  (2 * uz_element_material(x->body->model, edge->element[0])->lame.mu * radius);
 }
 
 void uz_examine_turning(double turned[MOMENTS][2], examination *x, const double *u, int64_t i)
@@ -304,26 +309,30 @@ bool uz_lift_turning(examination *x, const double *u, int64_t i)
 
 /* ---- what is still in the obstacle */
 
-/* 2 times the strain energy of 4 l0 l1 d on a triangle, with l0 and l1 its coordinates that are 1 at the edge's ends.
- */
-static double bulge_energy(double corner[3][2], double area2, uz_lame lame, double thickness, const double d[2])
+/* 2 times the strain energy of 4 l0 l1 d on the triangle at an edge, with l0 and l1 its coordinates that are 1 at the
+ * edge's ends. */
+static double bulge_energy(const examination *x, const uz_bound_edge *edge, const double d[2])
 {
-    static const double MIDDLE[3][2] = {{0.5, 0.5}, {0, 0.5}, {0.5, 0}};
-    double slope[2][2], sum = 0;
-    for (int k = 0; k < 2; k++) {
-        const double *p = corner[(k + 1) % 3], *q = corner[(k + 2) % 3];
-        slope[k][0] = (p[1] - q[1]) / area2;
-        slope[k][1] = (q[0] - p[0]) / area2;
-    }
-    for (int g = 0; g < 3; g++) { /* exact for what is of degree 2 */
-        double grad[2];
+    const uz_lame lame = uz_element_material(x->body->model, edge->element[0])->lame;
+    double corner[3][2], slope[3][2], at[2], weight, sum = 0;
+    triangle(corner, x, edge);
+    uz_triangle_slopes(slope, corner);
+    for (uz_walk walk = uz_walk_begin(corner, x->body->rings, 2); uz_walk_next(&walk, at, &weight);) {
+        double l[2], grad[2], hoop = 0;
+        for (int k = 0; k < 2; k++)
+            l[k] = slope[k][0] * (at[0] - corner[2][0]) + slope[k][1] * (at[1] - corner[2][1]);
         for (int c = 0; c < 2; c++)
-            grad[c] = 4 * (MIDDLE[g][0] * slope[1][c] + MIDDLE[g][1] * slope[0][c]);
+            grad[c] = 4 * (l[0] * slope[1][c] + l[1] * slope[0][c]);
+        if (x->body->rings) {
+            hoop = 4 * l[0] * l[1] * d[0] / at[0];
+            weight *= at[0];
+        }
         const double xx = grad[0] * d[0], yy = grad[1] * d[1], xy = grad[1] * d[0] + grad[0] * d[1];
-        sum += area2 / 6 * thickness *
-               ((lame.lambda + lame.mu) * (xx + yy) * (xx + yy) + lame.mu * ((xx - yy) * (xx - yy) + xy * xy));
+        const double trace = xx + yy + hoop;
+        sum += weight * x->body->depth *
+               (lame.lambda * trace * trace + lame.mu * (2 * (xx * xx + yy * yy + hoop * hoop) + xy * xy));
     }
-    return sum;
+    return sum * (1 + UZ_SUM_ROUNDING);
 }
 
 /* The least of the line between its ends less bend (x - x_0)(x_1 - x) / 2, which s is above on a stretch. */
@@ -420,10 +429,7 @@ static bulge find_bulge(examination *x, const double *v, int64_t i)
 void uz_look_at_turning(examination *x, const double *u, int64_t i)
 {
     const uz_bound_edge *edge = &x->body->edge[i];
-    const uz_body_model *model = x->body->model;
-    const uz_lame lame = uz_element_material(model, edge->element[0])->lame;
-    double corner[3][2], m[MOMENTS], along[2][3], work = 0, *v = x->moved;
-    const double area2 = triangle(corner, x, edge);
+    double m[MOMENTS], along[2][3], work = 0, *v = x->moved;
     for (int a = 0; a < 3; a++)
         for (int c = 0; c < 2 && edge->node[a] >= 0; c++)
             v[2 * edge->node[a] + c] = u[2 * edge->node[a] + c] + x->lift[2 * edge->node[a] + c];
@@ -445,7 +451,7 @@ void uz_look_at_turning(examination *x, const double *u, int64_t i)
     if (!(b.by > 0))
         return;
     const double shape[3] = {0, 2 * b.by, 0}, d[2] = {-b.by * b.n[0], -b.by * b.n[1]};
-    x->bulge += bulge_energy(corner, area2, lame, model->thickness, d);
+    x->bulge += bulge_energy(x, edge, d);
     x->bulged += x->gap[edge->element[0]];
     uz_edge_means(m, shape, x->moments);
     for (int a = 0; a < x->moments; a++)
@@ -480,11 +486,9 @@ void uz_bulge_excess(examination *x, const double *u, const double *w, double om
                      int64_t i)
 {
     const uz_bound_edge *edge = &x->body->edge[i];
-    const uz_lame lame = uz_element_material(x->body->model, edge->element[0])->lame;
-    double corner[3][2], size = fabs(om), widest = 0, mean[MOMENTS];
+    double size = fabs(om), widest = 0, mean[MOMENTS];
     bulge b = {.by = 0};
     bool out = true;
-    const double area2 = triangle(corner, x, edge);
     for (int a = 0; a < 6; a++)
         size = edge->node[a / 2] < 0 ? size : fmax(size, fabs(w[2 * edge->node[a / 2] + a % 2]));
     for (course c = begin_course(x, w, i); next_stretch(&c);)
@@ -515,7 +519,7 @@ void uz_bulge_excess(examination *x, const double *u, const double *w, double om
         return;
     const double shape[3] = {0, 2 * b.by, 0}, d[2] = {b.by * b.n[0], b.by * b.n[1]};
     uz_edge_means(mean, shape, x->moments);
-    x->bulge += bulge_energy(corner, area2, lame, x->body->model->thickness, d);
+    x->bulge += bulge_energy(x, edge, d);
     for (int a = 0; a < x->moments; a++)
         x->bulge_work += pressure[i * x->moments + a] * mean[a];
 }

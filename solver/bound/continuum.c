@@ -32,6 +32,7 @@ static void take_supports(survey *x);
 static uz_status take_contacts(survey *x, uz_error *err);
 static void take_springs(survey *x);
 static void take_loads(survey *x);
+static void raise_degree(uz_bound_body *body);
 static void look_at_rings(uz_bound_body *body);
 
 /* The first reason stays. */
@@ -62,9 +63,10 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
                                                         (long long)mesh->n_nodes);
     if (status == UZ_OK && has_straight_sides(&x)) {
         take_supports(&x);
+        take_loads(&x);
+        raise_degree(out);
         status = take_contacts(&x, err);
         take_springs(&x);
-        take_loads(&x);
         look_at_rings(out);
         if (status == UZ_OK)
             status = uz_free_strains(&out->free_strain, model, scene, err);
@@ -355,23 +357,24 @@ static void take_loads(survey *x)
     }
 }
 
-/* The radius times an axial force is balanced by stresses of degree 2. The axis is no side, but for the radial support
- * that it is anyway. */
-static void look_at_rings(uz_bound_body *body)
+/* The radius times an axial force is balanced by stresses of degree 2. */
+static void raise_degree(uz_bound_body *body)
 {
     for (int64_t e = 0; e < body->model->mesh.n_elements && body->rings; e++)
         if (fabs(body->force[2 * e + 1]) > 0)
             body->degree = 2;
+}
+
+/* The axis is no side, but for the radial support that it is anyway. */
+static void look_at_rings(uz_bound_body *body)
+{
     for (int64_t i = 0; i < body->n_edges && body->rings; i++) {
-        const uz_bound_edge *edge = &body->edge[i];
+        uz_bound_edge *edge = &body->edge[i];
         const bool held = edge->held[1] || (edge->held[0] && (fabs(edge->axis[0][1]) > 0 || fabs(edge->value[0]) > 0));
         if (edge->facing != UZ_BOUND_ALONE)
             refuse(body, "parts of a body of revolution press on each other", "");
-        if (edge->turns)
-            refuse(
-                body,
-                "a body of revolution is before an obstacle along which normals turn, where no tractions of rings turn",
-                "");
+        if (edge->turns && !(fmin(edge->weight[0], edge->weight[1]) > 0)) /* check_turning.c */
+            edge->presses = false;
         if (!(edge->weight[0] + edge->weight[1] > 0) &&
             (held || edge->contact >= 0 || edge->spring[0] > 0 || edge->spring[1] > 0))
             refuse(body, "something holds the axis of revolution, which the continuum does not feel", "");

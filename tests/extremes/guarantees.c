@@ -61,4 +61,6 @@ void run_guarantees(suite *all)
     run_kind(all, BOUND_SPRINGS, "springs");
     run_kind(all, BOUND_RINGS, "ring");
     run_kind(all, BOUND_LINES, "lines");
+    run_kind(all, BOUND_RINGS_ROUND, "round ring");
+    run_kind(all, BOUND_RINGS_LINES, "ring lines");
 }

@@ -56,7 +56,16 @@ static inline uz_load *bound_load(uz_scene *scene, uz_load_kind kind, const char
     return &scene->loads[scene->n_loads - 1];
 }
 
-typedef enum { BOUND_STRAIGHT, BOUND_ROUND, BOUND_RESTING, BOUND_SPRINGS, BOUND_RINGS, BOUND_LINES } bound_kind;
+typedef enum {
+    BOUND_STRAIGHT,
+    BOUND_ROUND,
+    BOUND_RESTING,
+    BOUND_SPRINGS,
+    BOUND_RINGS,
+    BOUND_LINES,
+    BOUND_RINGS_ROUND,
+    BOUND_RINGS_LINES
+} bound_kind;
 
 /* A polyline or a table below the bottom, `gap` away: flat, a hill or a hollow, with teeth or without, of few pieces or
  * many. */
@@ -96,6 +105,7 @@ static inline void bound_lines(uz_scene *scene, double gap, qp_random *rng)
 static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, double stress, qp_random *rng)
 {
     const double *x = scene->box.origin, width = scene->box.size[0], height = scene->box.size[1];
+    const bool turns = kind == BOUND_RINGS_ROUND || kind == BOUND_RINGS_LINES;
     if (kind == BOUND_RESTING) { /* on the bottom, and at another plane or along a slide; what presses is the most */
         const bool corner = random_chance(rng, 0.5);
         scene->n_supports = 0;
@@ -119,8 +129,8 @@ static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, do
         scene->supports[scene->n_supports++] =
             (uz_support){.kind = UZ_SUPPORT_SPRING, .on = "top", .spring = {slides ? 0 : k * random_unit(rng), k}};
     }
-    if (kind == BOUND_RINGS) { /* held or pressed on top, on springs, or resting; around a hole or not */
-        const int64_t how = random_int(rng, 0, 4);
+    if (kind == BOUND_RINGS || turns) { /* held or pressed on top, on springs, or resting; around a hole or not */
+        const int64_t how = random_int(rng, 0, turns ? 3 : 4); /* it rests on planes alone */
         const bool hole = random_chance(rng, 0.6);
         const double k = scene->materials[0].young / height * random_power(rng, -1.5, 1.5);
         scene->model = UZ_AXISYMMETRIC;
@@ -146,14 +156,17 @@ static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, do
         if (hole && random_chance(rng, 0.5))
             bound_load(scene, UZ_LOAD_PRESSURE, "left", stress * random_unit(rng), 0);
     }
-    if (kind == BOUND_LINES)
+    if (kind == BOUND_LINES || kind == BOUND_RINGS_LINES)
         bound_lines(scene, gap, rng);
-    if (kind == BOUND_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
+    if (kind == BOUND_ROUND ||
+        kind == BOUND_RINGS_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
         uz_contact *c = &scene->contacts[0];
         c->kind = UZ_OBSTACLE_ROUND;
         c->radius = (width + height) * random_power(rng, 0.3, 2.5);
         c->inside = random_chance(rng, 0.3);
         c->point[0] = x[0] + width * (0.1 + 0.8 * random_unit(rng));
+        if (kind == BOUND_RINGS_ROUND && random_chance(rng, 0.5)) /* a ball, and no ring of its section */
+            c->point[0] = 0;
         c->point[1] = x[1] - gap - c->radius;
         if (c->inside)
             c->point[1] =
@@ -220,33 +233,42 @@ static inline uz_scene bound_scene(uint64_t seed, bound_kind kind, const char *e
     return scene;
 }
 
-/* A body on meshes of all elements, the last, finer one to compare with; `steps` halvings of the coarsest. */
-static inline bound_sweep sweep_bounds(uint64_t seed, bound_kind kind, int64_t coarsest, int64_t finest)
+/* As bound_scene; corners within every other body's coarsest meshes are moved. */
+static inline uz_scene bound_moved_scene(uint64_t seed, int kind, const char *element, int64_t n, bool coarsest)
+{
+    uz_scene scene = bound_scene(seed, (bound_kind)kind, element, n);
+    if (!coarsest || seed % 2 != 0)
+        return scene;
+    bound_random = (qp_random){seed + 1000};
+    for (int c = 0; c < 2; c++) {
+        bound_low[c] = scene.box.origin[c];
+        bound_high[c] = scene.box.origin[c] + scene.box.size[c];
+        bound_cell[c] = scene.box.size[c] / (double)scene.box.cells[c];
+    }
+    bound_cell[0] *= 0.2; /* cells are graded */
+    body_give_mesh(&scene, bound_shuffle);
+    body_straighten(&scene);
+    return scene;
+}
+
+/* A body on meshes of all elements, the last, finer one to compare with. */
+typedef uz_scene (*bound_maker)(uint64_t seed, int kind, const char *element, int64_t n, bool coarsest);
+static inline bound_sweep sweep_meshes(bound_maker make, uint64_t seed, int kind, int64_t coarsest, int64_t finest)
 {
     bound_sweep x = {.highest = -INFINITY, .lowest = INFINITY};
     double primal[16], bound[16];
     int linear[16], n = 0;
     for (int k = 0; k < 9; k++) {
         const bool last = k == 8;
-        uz_scene scene = bound_scene(seed, kind, last ? "quad8" : BOUND_ELEMENTS[k % 4],
-                                     last    ? finest
-                                     : k < 4 ? coarsest
-                                             : 2 * coarsest);
+        uz_scene scene = make(seed, kind, last ? "quad8" : BOUND_ELEMENTS[k % 4],
+                              last    ? finest
+                              : k < 4 ? coarsest
+                                      : 2 * coarsest,
+                              k < 4);
         uz_problem problem;
         uz_settings settings = uz_settings_default();
         uz_result *result = NULL;
         uz_error err = {0};
-        if (k < 4 && seed % 2 == 0) {
-            bound_random = (qp_random){seed + 1000};
-            for (int c = 0; c < 2; c++) {
-                bound_low[c] = scene.box.origin[c];
-                bound_high[c] = scene.box.origin[c] + scene.box.size[c];
-                bound_cell[c] = scene.box.size[c] / (double)scene.box.cells[c];
-            }
-            bound_cell[0] *= 0.2; /* cells are graded */
-            body_give_mesh(&scene, bound_shuffle);
-            body_straighten(&scene);
-        }
         settings.guaranteed = true;
         problem = (uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = scene};
         if (uz_solve(&result, &problem, &settings, NULL, NULL, &err) != UZ_OK) {
@@ -277,6 +299,11 @@ static inline bound_sweep sweep_bounds(uint64_t seed, bound_kind kind, int64_t c
             x.effect[linear[i]][x.count[linear[i]]++] = bound[i] / error;
     }
     return x;
+}
+
+static inline bound_sweep sweep_bounds(uint64_t seed, bound_kind kind, int64_t coarsest, int64_t finest)
+{
+    return sweep_meshes(bound_moved_scene, seed, kind, coarsest, finest);
 }
 
 /* ---- where answers enter the obstacle, energies say nothing of their error */

@@ -254,3 +254,18 @@ TEST(never_below_the_truth)
         CHECK_MSG(count[k] > 40 && exp(sum[k] / count[k]) < (k == 0 ? 1.15 : 1.3), "%d: %g", count[k],
                   exp(sum[k] / count[k]));
 }
+
+/* Balls, rings of round section, polylines and tables below rings, with a hole and without, with axial forces in them
+ * (stresses of degree 2 on linear elements) and without. */
+TEST(never_below_the_truth_before_what_turns)
+{
+    int count = 0;
+    for (uint64_t seed = 1; seed <= 6; seed++) {
+        const bound_sweep x = sweep_differences(seed, seed % 2 ? BOUND_RINGS_ROUND : BOUND_RINGS_LINES, 2, 8);
+        CHECK_MSG(x.answers == 10 && x.proved == 10, "seed %d: %d of %d %s", (int)seed, x.proved, x.answers, x.why);
+        CHECK_MSG(x.highest <= x.lowest + 1e-12 * x.size, "seed %d: %.10e above %.10e", (int)seed, x.highest, x.lowest);
+        CHECK_MSG(x.least >= 1, "seed %d: %g", (int)seed, x.least);
+        count += x.count[0] + x.count[1];
+    }
+    CHECK_INT(count, 6 * 8);
+}
