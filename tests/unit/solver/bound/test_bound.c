@@ -1,6 +1,6 @@
 /* The guaranteed bound on the whole error: its elements, what it proves, and what it refuses. */
 #include "bound/bound.h"
-#include "bound_scenes.h"
+#include "bound_shapes.h"
 #include "linalg/blas.h"
 #include "scene_fixture.h"
 
@@ -215,6 +215,23 @@ TEST(never_below_the_truth_before_lines)
         count += x.count[0] + x.count[1];
     }
     CHECK_INT(count, 12 * 8);
+}
+
+/* Outlines with corners that run inwards, bent and slender patches of materials that differ a thousandfold, in two
+ * parts or one, all supports and loads: energies below and above the body's never cross. */
+TEST(never_below_the_truth_of_any_outline)
+{
+    int answers = 0;
+    for (uint64_t seed = 1; seed <= 40; seed++) {
+        const bound_sweep x = sweep_meshes(shape_scene, seed, 0, 1, 3);
+        answers += x.answers;
+        CHECK_MSG(x.proved == x.answers, "seed %d: %s", (int)seed, x.why);
+        CHECK_MSG(x.highest <= x.lowest + 1e-12 * x.size, "seed %d: %.10e above %.10e", (int)seed, x.highest, x.lowest);
+        for (int k = 0; k < 2; k++)
+            for (int i = 0; i < x.count[k]; i++)
+                CHECK_MSG(x.effect[k][i] >= 1, "seed %d: %g", (int)seed, x.effect[k][i]);
+    }
+    CHECK_MSG(answers > 320, "%d", answers);
 }
 
 /* A block that a support presses on what is below its bottom. */
