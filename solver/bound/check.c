@@ -33,6 +33,8 @@
  * elements, relative to the stress. */
 #define AGREE  1e-9
 #define INSIDE 1e-9
+/* An energy, below which parts of it are lost that are not to rounding. */
+#define SMALLEST (DBL_MIN / DBL_EPSILON)
 
 enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 };
 
@@ -42,6 +44,17 @@ static void settle_motions(examination *x, const double *u, const int64_t *dof);
 static void lift_on(examination *x, const double *u);
 static void look_at_lift(examination *x, const double *u, int64_t i);
 static const uz_check_of *check_of(const examination *x);
+
+/* -> farthest. Is u more than a translation? */
+static bool look_at_displacement(examination *x, const double *u)
+{
+    bool strained = false;
+    for (int64_t i = 0; i < 2 * x->mesh->n_nodes; i++) {
+        x->farthest = fmax(x->farthest, fabs(u[i]));
+        strained = strained || u[i] > u[i % 2] || u[i] < u[i % 2];
+    }
+    return strained;
+}
 
 uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
                          const int64_t *dof, int64_t n_dofs, const double *u, const double *lift, const double *stress,
@@ -61,8 +74,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     if (!out->residual || !x.resultant || !x.pressure || !x.lift || !x.moved || !x.gap || !out->lifted)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check the stress of %lld elements",
                          (long long)mesh->n_elements);
-    for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
-        x.farthest = fmax(x.farthest, fabs(u[i]));
+    const bool strained = look_at_displacement(&x, u);
     for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++)
         uz_examine_element(&x, u, stress + e * STRESSES, e);
     double load = status == UZ_OK ? uz_work_of_loads(&x, scene, u, &status, err) : 0;
@@ -115,6 +127,8 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         if (!*out->fault && !(x.inside <= INSIDE))
             snprintf(out->fault, sizeof out->fault, "the stress is not in equilibrium within elements, by %.1e of it",
                      x.inside);
+        if (!*out->fault && strained && !(scale > SMALLEST)) /* what underflows is in no margin */
+            snprintf(out->fault, sizeof out->fault, "energies of %.1e are too small for double precision", scale);
         if (!*out->fault && !(out->gap >= -AGREE * scale && fabs(apart) <= AGREE * scale))
             snprintf(out->fault, sizeof out->fault, "two ways to evaluate the gap, %.9e, differ by %.1e", out->gap,
                      apart);

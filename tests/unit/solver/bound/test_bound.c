@@ -519,6 +519,22 @@ TEST(small_displacements_excuse_nothing)
 }
 
 /* All nodes of the border, and the border: diagonals that cut off corners between them are not held. */
+/* Squares of what is as small as this are 0, and so would be the bound: an error of 2e-303 was proved to be 1e-313. */
+TEST(what_underflows_is_not_proved)
+{
+    for (int k = 0; k < 3; k++) {
+        uz_scene scene = paper_scene(6, 2);
+        const double times[] = {1e-100, 1e-155, 1e-300};
+        for (int64_t i = 0; i < scene.n_loads; i++)
+            for (int c = 0; c < 2; c++)
+                scene.loads[i].v[c] *= times[k];
+        const uz_guarantee g = bound_of(&scene);
+        CHECK_MSG(g.proved == (k == 0) && (g.proved || (isinf(g.bound) && strstr(g.why, "too small"))), "%g: %g %s",
+                  times[k], g.bound, g.why);
+        uz_scene_clear(&scene);
+    }
+}
+
 TEST(nodes_hold_the_border_that_they_are_on)
 {
     double least[2];
