@@ -2,8 +2,8 @@
  *
  * What presses is a polynomial on each edge of the one, the slave's; the other, the master, gets the polynomial on each
  * of its edges that has the same moments. On edges of the slave that have nothing before a part of them nothing
- * presses. Which of the two is the slave changes how narrow the bound is, and no more: the one that faces more of the
- * other; of equals the one on whose edges the other's lie as a whole, as there the two are one polynomial, and the
+ * presses. Which of the two is the slave changes how narrow the bound is, and no more: the one on whose edges the
+ * other's lie as a whole, as there the two are one polynomial; else the one that faces more of the other, of equals the
  * finer one. */
 #include "bound/bound.h"
 
@@ -78,15 +78,19 @@ static bool take_surface(surface *s, const uz_bound_body *body, const double *wa
     return straight;
 }
 
-/* Pairs of edges that face each other, as segments of the first surface's, ascending along the line. Returns how many;
- * *covered: how many of its edges are covered all along; *parted: along how much of the line edges of the other one are
- * before it in part. */
-static int64_t face(uz_bound_segment *segment, int64_t *covered, double *parted, const surface *one,
-                    const surface *other, double gap)
+/* Of a surface before another one: its edges that are covered all along, how many and how long together, and along how
+ * much of the line edges of the other one are before its own in part. */
+typedef struct {
+    int64_t edges;
+    double covered, parted;
+} cover;
+
+/* Pairs of edges that face each other, as segments of the first surface's, ascending along the line. Returns how many.
+ */
+static int64_t face(uz_bound_segment *segment, cover *own, const surface *one, const surface *other, double gap)
 {
     int64_t n = 0, first = 0;
-    *covered = 0;
-    *parted = 0;
+    *own = (cover){.edges = 0};
     for (int64_t i = 0; i < one->group->n_faces; i++) {
         const reach *mine = &one->edges[i];
         double sum = 0;
@@ -103,9 +107,12 @@ static int64_t face(uz_bound_segment *segment, int64_t *covered, double *parted,
                                               .gap = gap};
             sum += high - low;
             const double whole = other->edges[j].high - other->edges[j].low;
-            *parted += high - low < (1 - ROUNDING) * whole ? high - low : 0;
+            own->parted += high - low < (1 - ROUNDING) * whole ? high - low : 0;
         }
-        *covered += sum >= (1 - ROUNDING) * (mine->high - mine->low);
+        if (sum >= (1 - ROUNDING) * (mine->high - mine->low)) {
+            own->edges++;
+            own->covered += mine->high - mine->low;
+        }
     }
     return n;
 }
@@ -185,8 +192,7 @@ uz_status uz_bound_take_pair(uz_bound_body *body, const uz_scene *scene, int64_t
     body->segment = segment;
     segment += body->n_segments;
     s[1].edges = s[0].edges + s[0].group->n_faces;
-    int64_t covered[2];
-    double parted[2];
+    cover of[2];
     if (!take_surface(&s[0], body, way) || !take_surface(&s[1], body, way)) {
         refuse(body, "the contact of \"%s\" is with another part of the body, and edges lie on each other",
                contact->on);
@@ -194,19 +200,15 @@ uz_status uz_bound_take_pair(uz_bound_body *body, const uz_scene *scene, int64_t
         return UZ_OK;
     }
     const double own = fabs(gap) < TOUCHING * mesh->extent ? 0 : gap;
-    face(segment, &covered[0], &parted[0], &s[0], &s[1], own);
-    face(segment, &covered[1], &parted[1], &s[1], &s[0], own);
-    const double share[2] = {(double)covered[0] / (double)s[0].group->n_faces,
-                             (double)covered[1] / (double)s[1].group->n_faces};
-    const double least = fmin(parted[0], parted[1]) + ROUNDING * mesh->extent;
+    face(segment, &of[0], &s[0], &s[1], own);
+    face(segment, &of[1], &s[1], &s[0], own);
+    const double same = ROUNDING * mesh->extent, share[2] = {(double)of[0].edges / (double)s[0].group->n_faces,
+                                                             (double)of[1].edges / (double)s[1].group->n_faces};
+    const bool whole[2] = {of[0].parted <= same && of[0].covered >= of[1].covered - same,
+                           of[1].parted <= same && of[1].covered >= of[0].covered - same};
     const bool finer = s[1].group->n_faces > s[0].group->n_faces;
-    const int slave = share[1] > share[0]     ? 1
-                      : share[1] < share[0]   ? 0
-                      : !(parted[0] <= least) ? 1
-                      : !(parted[1] <= least) ? 0
-                                              : finer;
-    take_segments(body, face(segment, &covered[slave], &parted[slave], &s[slave], &s[1 - slave], own), &s[slave], way,
-                  contact, number);
+    const int slave = whole[0] != whole[1] ? whole[1] : share[1] > share[0] || (!(share[1] < share[0]) && finer);
+    take_segments(body, face(segment, &of[slave], &s[slave], &s[1 - slave], own), &s[slave], way, contact, number);
     free(s[0].edges);
     return UZ_OK;
 }

@@ -39,6 +39,19 @@ def test_paper_body(s):
     check(0.019 < error["estimated_mesh"] < error["total"] and error["dual_unknowns"] == 2560 - 40, error)
 
 
+def test_paper_body_on_finer_meshes(s):
+    """The energy from below is below the body's on each, whatever the mesh; two of them to five digits."""
+    for cells, total, low in ((45, None, None), (60, 0.0154, -3.9629288e-3), (75, None, None), (120, 0.0093, -3.9628169e-3), (240, None, None)):
+        if cells > 120 and service.INSTRUMENTED:
+            continue
+        request = asked({"guaranteed": True})
+        request["problem"]["mesh"]["box"]["cells"] = [cells, cells // 3]
+        error = summary_of(s, request)["error"]
+        check(error["kind"] == "guaranteed" and error["energy_low"] <= LOWEST and error["energy_high"] >= HIGHEST, cells, error)
+        if total:
+            check(abs(error["total"] - total) < 6e-5 and abs(error["energy_low"] - low) < 6e-11, cells, error)
+
+
 def test_a_mesh_that_is_too_coarse(s):
     summary = summary_of(s, asked({"total": 0.02, "guaranteed": True}))
     check(summary["outcome"] == "mesh_limit" and summary["error"]["kind"] == "guaranteed", summary)
@@ -308,6 +321,9 @@ def test_bodies_on_each_other(s):
             low.append(errors[0]["energy_low"])
             high.append(errors[0]["energy_high"])
         check(max(low) <= 5.1233 <= min(high) and min(high) - max(low) < 0.012, gap, low, high)
+    for element, within in (("quad4", 0.18), ("tri6", 0.09), ("quad8", 0.075)):  # edges of one lie on edges of the other as a whole: one polynomial
+        error = summary_of(s, blocks(element, ((12, 4), (12, 4))))["error"]
+        check(error["kind"] == "guaranteed" and error["total"] < within, element, error)
     refined = blocks("tri6", ((12, 4), (6, 4)), total=0.02)
     refined["problem"]["mesh"]["refine"] = "auto"
     summary = summary_of(s, refined)
