@@ -212,9 +212,9 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
 double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
                               const double *nodal);
 
-/* *energy: the same estimate of ||u - u_h||_E^2, not relative to anything. free_strain: as of uz_free_strains, or NULL.
- * It is the square of a seminorm of (nodal, free_strain), so that two fields have an inner product by polarization.
- * UZ_ERR_MEMORY. */
+/* *energy: the same estimate of ||u - u_h||_E^2, not relative to anything, less what quadratic triangles and tetrahedra
+ * are taken to hide. free_strain: as of uz_free_strains, or NULL. It is the square of a seminorm of (nodal,
+ * free_strain), so that two fields have an inner product by polarization. UZ_ERR_MEMORY. */
 uz_status uz_mesh_error_energy(double *energy, const uz_body_model *model, const double *free_strain,
                                const double *nodal, uz_error *err);
 

@@ -14,10 +14,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Of quadratic triangles and tetrahedra the average over the few elements at a node takes a part of the error with it:
+ * eta is 0.68 to 0.79 of the error of smooth fields, and eta^2 is taken for this much of it where it is told. */
+#define HIDDEN (16. / 9)
+
 typedef struct {
     const uz_body_model *model;
     uz_nodal_strains nodal; /* rows: stresses, once they are recovered */
     uz_stress_sums sums;
+    bool whole; /* with what is hidden */
 } estimate;
 
 static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
@@ -36,15 +41,22 @@ static void compare(void *ctx, const uz_strain_group *group)
 {
     estimate *x = ctx;
     const int64_t *place[UZ_STRAIN_LANES];
+    const double before = x->sums.eta2;
+    const uz_element_kind kind = (uz_element_kind)x->model->mesh.kind[group->element[0]];
     uz_nodal_places(place, &x->nodal, group, &x->model->mesh);
     uz_stress_rows_compare(&x->sums, x->nodal.rows, x->nodal.size, group, place);
+    if (!x->whole || (kind != UZ_TRI6 && kind != UZ_TET10))
+        return;
+    x->sums.eta2 = before + HIDDEN * (x->sums.eta2 - before);
+    for (int l = 0; l < group->count && x->sums.eta2_of; l++)
+        x->sums.eta2_of[group->element[l]] *= HIDDEN;
 }
 
-/* The integrals of both stresses, added to the sums. */
-static uz_status integrate(uz_stress_sums *sums, const uz_strain_source *from, uz_error *err)
+/* The integrals of both stresses, added to the sums; whole: with what is hidden in them. */
+static uz_status integrate(uz_stress_sums *sums, const uz_strain_source *from, bool whole, uz_error *err)
 {
     const uz_body_model *model = from->model;
-    estimate x = {.model = model, .sums = *sums};
+    estimate x = {.model = model, .sums = *sums, .whole = whole};
     const uz_strain_work work = {make_rule, compare, &x};
     uz_status status = uz_nodal_strains_recover(&x.nodal, from, UZ_CONTINUE_LINEAR, NULL, err);
     const int n = x.nodal.strains;
@@ -69,7 +81,7 @@ uz_status uz_mesh_error_energy(double *energy, const uz_body_model *model, const
 {
     uz_stress_sums sums = {0};
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
-    const uz_status status = integrate(&sums, &from, err);
+    const uz_status status = integrate(&sums, &from, false, err);
     *energy = sums.eta2;
     return status;
 }
@@ -96,7 +108,7 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
         return 0;
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
     uz_stress_sums sums = {.eta2_of = eta2};
-    const uz_status status = integrate(&sums, &from, NULL);
+    const uz_status status = integrate(&sums, &from, true, NULL);
     free(free_strain);
     if (status != UZ_OK)
         return NAN;

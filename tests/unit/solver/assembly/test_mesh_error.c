@@ -286,7 +286,8 @@ static void add_energies(plain *x, const plain_element *s, int64_t e)
             }
             work += whole[c] * s->strain[g][c];
         }
-        x->eta2 += s->volume[g] * complementary(s->element.model, s->element.lame, jump);
+        x->eta2 += s->volume[g] * complementary(s->element.model, s->element.lame, jump) *
+                   (s->element.kind == UZ_TRI6 || s->element.kind == UZ_TET10 ? 16. / 9 : 1);
         x->stress2 += s->volume[g] * complementary(s->element.model, s->element.lame, s->stress[g]);
         x->whole2 += s->volume[g] * work;
     }
