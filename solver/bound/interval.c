@@ -373,7 +373,7 @@ static void look_at_edge(weighing *y, int64_t i)
     }
     if (!*y->scratch.fault && !(most <= PLACES * size))
         snprintf(y->scratch.fault, sizeof y->scratch.fault,
-                 "the contact meets supports%s, where what presses has no bound",
+                 "the contact meets supports%s, where what presses has no bound; end it before",
                  y->body->corners ? " or a corner" : "");
 }
 
@@ -402,7 +402,7 @@ static void look_at_pairs(weighing *y)
             const int64_t node = slave->node[a];
             if (!uz_way_along(way, body->model, node, slave->normal) && !*y->scratch.fault)
                 snprintf(y->scratch.fault, sizeof y->scratch.fault,
-                         "the contact meets supports, where what presses has no bound");
+                         "the contact meets supports, where what presses has no bound; end it before");
             for (int c = 0; c < 2; c++)
                 if (fabs(most * way[c]) > fabs(by[2 * node + c]))
                     by[2 * node + c] = most * way[c];

@@ -44,23 +44,46 @@ static bool has_name(const uz_scene *scene, uz_quantity_kind kind, const char *o
     }
 }
 
+/* The names that has_name knows, as far as there is room: `there are "top" and "bottom"`, quoted and with commas. */
+static void list_names(char *out, size_t size, const uz_scene *scene, uz_quantity_kind kind)
+{
+    const bool support = kind == UZ_QUANTITY_REACTION, contact = !support && kind != UZ_QUANTITY_DISPLACEMENT;
+    const int64_t count = support ? scene->n_supports : contact ? scene->n_contacts : scene->given.n_groups;
+    size_t used = 0;
+    *out = '\0';
+    for (int64_t i = 0; i < count && used + 70 < size; i++) {
+        const char *name = support   ? scene->supports[i].on
+                           : contact ? scene->contacts[i].on
+                                     : scene->given.groups[i].name;
+        bool told = !name[0];
+        for (int64_t j = 0; j < i && !told; j++)
+            told = strcmp(name, support   ? scene->supports[j].on
+                                : contact ? scene->contacts[j].on
+                                          : scene->given.groups[j].name) == 0;
+        if (!told)
+            used += (size_t)snprintf(out + used, size - used, "%s\"%.63s\"", used ? ", " : "; there is ", name);
+    }
+}
+
 static uz_status check_quantity(const uz_problem *problem, int64_t i, uz_error *err)
 {
     const uz_quantity *q = &problem->quantities[i];
     const uz_scene *scene = &problem->scene;
     const bool contact = q->kind == UZ_QUANTITY_CONTACT_FORCE || q->kind == UZ_QUANTITY_MEAN_PRESSURE;
-    char where[UZ_QUANTITY_POINTER];
+    char where[UZ_QUANTITY_POINTER], names[200];
     if (problem->kind != UZ_PROBLEM_SCENE)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/quantities", "quantities are of scenes");
     if (contact && scene->n_contacts == 0)
         return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "quantity"),
                        "the scene has no contacts that it could be of: give it some, or leave the quantity out");
-    if (!has_name(scene, q->kind, q->on))
-        return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "on"), "no %s \"%.63s\"",
+    if (!has_name(scene, q->kind, q->on)) {
+        list_names(names, sizeof names, scene, q->kind);
+        return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "on"), "no %s \"%.63s\"%s",
                        contact                           ? "contact is on"
                        : q->kind == UZ_QUANTITY_REACTION ? "support is on"
                                                          : "group is called",
-                       q->on);
+                       q->on, names);
+    }
     if (q->kind == UZ_QUANTITY_REACTION && scene->model == UZ_AXISYMMETRIC && q->direction[0] != 0)
         return uz_fail(err, UZ_ERR_SCENE, uz_quantity_place(where, problem, i, "direction"),
                        "around a ring what acts along the radius sums to nothing: use [0, 1]");

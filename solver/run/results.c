@@ -95,7 +95,7 @@ void uz_judge_quantity(uz_result *result)
     else
         snprintf(s->message, sizeof s->message,
                  "%.40s is known within %.3g of itself on this mesh, asked for %.3g%s%.60s. %s.", q->name, error,
-                 e->asked, q->why[0] ? ": " : "", q->why, "Use a finer mesh, or a box with \"cells\": \"auto\"");
+                 e->asked, q->why[0] ? ": " : "", q->why, "Use a finer mesh, or \"refine\": \"auto\" in it");
 }
 
 /* The rows with a share in the contradiction: exactly, or by more than a ray's rounding. */

@@ -96,6 +96,22 @@ def test_a_pressure_at_a_corner_has_no_limit(s):
     check(line["result"] == "uncertain" and "unbounded" in line["reason"], line)
 
 
+def test_mistakes_in_what_is_asked_name_what_is_there(s):
+    for accuracy, there in (({"quantity": "contact.force", "on": "upper"}, 'no contact is on "upper"; there is "top"'),
+                            ({"quantity": "reaction", "on": "top", "direction": [0, 1]}, 'no support is on "top"; there is "bottom", "left"')):
+        job = s.solve({"problem": BLOCK, "solver": {"accuracy": {**accuracy, "relative": 0.02}}})
+        check(job["error"]["detail"] == there and job["error"]["pointer"] == "/solver/accuracy/on", job["error"])
+
+
+def test_the_force_of_a_contact_that_meets_a_support_names_the_remedy(s):
+    request = {"problem": copy.deepcopy(SCENE["problem"]), "solver": {"accuracy": {"quantity": "contact.force", "on": "bottom", "relative": 0.5, "guaranteed": True}}}
+    summary = solved(s, request)["summary"]
+    force, = summary["quantities"]
+    check(force["kind"] == "estimated" and force["low"] < force["high"], force)
+    check("meets supports" in force["why"] and "end it before" in force["why"], force)
+    check(summary["outcome"] == "mesh_limit" and "end it before" in summary["message"], summary)
+
+
 # ---------------------------------------------------------------- while it runs
 
 def events_of(s, job, out):
