@@ -314,38 +314,44 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
 #define FEW_BOUNDS 0.125
 enum { REFUSED_MOST = 8 };
 
+static bool are_few(int64_t m, int64_t d)
+{
+    return (double)m < FEW_BOUNDS * (double)d;
+}
+
 static bool guess_active(uz_dual_load *load, bool *active)
 {
     free_load *x = (free_load *)load;
-    const bool few = (double)load->dual->m < FEW_BOUNDS * (double)load->dual->d;
-    if (x->sparse.box && few && x->refused++ < REFUSED_MOST)
+    if (x->sparse.box && are_few(load->dual->m, load->dual->d) && x->refused++ < REFUSED_MOST)
         return false;
     return uz_sparse_guess_active(load, active);
 }
 
 /* ------------------------------------------------------------- its price */
 
-/* A cycle and a product: 5 passes of K and what the coarse levels add. The other numbers are cycles: making a
- * multigrid, bounding the spectrum, solving once, a step of the active set, an iteration that starts at the last one's
- * answer. Plane bodies and obstacles. */
+/* A cycle and a product, in passes of K by columns. The other numbers are cycles: making a multigrid, bounding the
+ * spectrum, solving once, a step of the active set, without and with sweeps over bounds on many dofs, an iteration that
+ * starts at the last one's answer. Plane and solid bodies; obstacles. */
 #define CYCLE_PASSES    6.5
-#define CREATE_CYCLES   16.0
-#define SPECTRUM_CYCLES 55.0
-#define SOLVE_CYCLES    22.0
+#define CREATE_CYCLES   50.0
+#define SPECTRUM_CYCLES 38.0
+#define SOLVE_CYCLES    10.0
 #define STEPS           6.0
-#define STEP_CYCLES     30.0
+#define STEP_CYCLES     11.0
+#define SWEPT_CYCLES    30.0
 #define CHANGE_CYCLES   6.0
 /* As UZ_COST_VECTORS, with conjugate gradients; not all of them at the time of what a guess of bounds takes. */
 #define VECTORS        62.0
-#define BOUNDS_VECTORS 50.0
+#define BOUNDS_VECTORS 53.0
 
 static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
                      const uz_cost_rates *rates)
 {
     (void)factor;
     double cycle = CYCLE_PASSES * (double)size->k_entries * rates->entry_s, setup = CREATE_CYCLES + SPECTRUM_CYCLES;
+    const bool sweeps = size->bounds && !are_few(size->m, size->d);
     double load = SOLVE_CYCLES + (size->m == 0   ? 0.0
-                                  : size->bounds ? STEPS * STEP_CYCLES
+                                  : size->bounds ? STEPS * (sweeps ? SWEPT_CYCLES : STEP_CYCLES)
                                                  : UZ_COST_ITERATIONS * CHANGE_CYCLES);
     double levels = uz_amg_predict_bytes(size->d, size->k_entries, size->modes);
     cost->setup_s += setup * cycle;
@@ -353,7 +359,7 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     cost->flops += (setup + load) * CYCLE_PASSES * 4.0 * (double)size->k_entries;
     /* beside it the dofs that are swept, with both triangles of K */
     const double swept = 32.0 * (double)size->k_entries + 52.0 * (double)size->d;
-    cost->bytes += levels + (size->bounds ? swept : 0.0);
+    cost->bytes += levels + (sweeps ? swept : 0.0);
     cost->bytes += 8.0 * (size->bounds ? BOUNDS_VECTORS : VECTORS) * (double)size->d;
 }
 
