@@ -7,7 +7,7 @@ _uzawa_ids() {
 
 _uzawa() {
     local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-    local command='' options='' words='' files='' i commands='submit upload status wait refine verify result picture history plot list cancel delete factors doctor version help'
+    local command='' options='' words='' files='' i commands='submit upload status wait refine verify result picture history plot list cancel delete factors nodes doctor version help'
     COMPREPLY=()
     if [[ $current == '=' ]]; then current=''; previous='='; fi
     if [[ $previous == '=' ]]; then
@@ -33,6 +33,7 @@ _uzawa() {
     cancel) options='--quiet --json --server --timeout --retry --help --version ' ;;
     delete) options='--quiet --json --server --timeout --retry --help --version ' ;;
     factors) options='--json --server --timeout --retry --help --version ' ;;
+    nodes) options='--json --server --timeout --retry --help --version ' ;;
     doctor) options='--quiet --json --server --timeout --retry --help --version ' ;;
     version) options='--json --help --version ' ;;
     help) options='--format --json --help --version ' ;;
@@ -131,6 +132,9 @@ _uzawa() {
     factors--server|factors-s) words='' ;;
     factors--timeout|factors-t) words='' ;;
     factors--retry) words='' ;;
+    nodes--server|nodes-s) words='' ;;
+    nodes--timeout|nodes-t) words='' ;;
+    nodes--retry) words='' ;;
     doctor--server|doctor-s) words='' ;;
     doctor--timeout|doctor-t) words='' ;;
     doctor--retry) words='' ;;

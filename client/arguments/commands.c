@@ -71,6 +71,8 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
                        "A job that waits or runs is left alone and refused: see cancel.\n", NULL},
     [CLIENT_FACTORS] = {"factors", "factors", "list the factors that the service keeps for the next job", NULL, 0, "",
                         NULL},
+    [CLIENT_NODES] = {"nodes", "nodes", "list the daemons that share the service's jobs, and what they hold", NULL, 0,
+                      "", NULL},
     [CLIENT_DOCTOR] = {"doctor", "doctor", "check the way to the service and the service itself", NULL, 0,
                        "Prints a line for each thing checked: ok, or what is wrong and what helps.\n",
                        "0 all is well, or only warnings; 4 the token is missing, wrong or allows too little; 5 the "

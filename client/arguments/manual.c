@@ -45,7 +45,8 @@ static const struct {
      "uzawa submit body.json --set materials.0.poisson=0.30001 --wait --baseline $baseline --tolerance 1e-3"},
     {"In scripts:", "uzawa submit body.json --wait --json | jq .summary.contact.active\n"
                     "uzawa list --quiet --limit 5\n"
-                    "uzawa factors --json | jq .bytes"},
+                    "uzawa factors --json | jq .bytes\n"
+                    "uzawa nodes --json | jq .nodes[].name"},
     {"When something is wrong:", "uzawa doctor"},
 };
 

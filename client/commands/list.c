@@ -93,3 +93,32 @@ client_exit client_factors(client_session *s)
     json_decref(held);
     return code;
 }
+
+/* ---------------------------------------------------------------- nodes */
+
+client_exit client_nodes(client_session *s)
+{
+    json_t *held = NULL;
+    client_request request = client_request_new(s, "GET", "/v1/nodes");
+    client_exit code = client_ask_json(s, &held, &request);
+    const json_t *nodes = json_object_get(held, "nodes");
+    if (code == CLIENT_OK && !json_is_array(nodes))
+        code = client_complain(s, CLIENT_SERVER_ERROR, "the reply is no list of nodes");
+    else if (code == CLIENT_OK && s->options->json)
+        code = client_print_json(s, held);
+    else if (code == CLIENT_OK) {
+        fprintf(s->out, "%-24s  %-8s  %-10s  %8s  %8s  %8s  %8s\n", "name", "state", "version", "workers", "running",
+                "factors", "bodies");
+        for (size_t i = 0; i < json_array_size(nodes); i++) {
+            const json_t *node = json_array_get(nodes, i);
+            client_print_cell(s->out, client_json_text(node, "name"), 24);
+            client_print_cell(s->out, client_json_text(node, "state"), 8);
+            client_print_cell(s->out, client_json_text(node, "version"), 10);
+            fprintf(s->out, "%8.0f  %8.0f  %8.0f  %8zu\n", client_json_number(node, "workers"),
+                    client_json_number(node, "running"), client_json_number(node, "cache.factors"),
+                    json_array_size(json_object_get(node, "bodies")));
+        }
+    }
+    json_decref(held);
+    return code;
+}

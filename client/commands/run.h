@@ -25,6 +25,7 @@ client_exit client_history(client_session *s);
 client_exit client_plot(client_session *s);
 client_exit client_delete(client_session *s);
 client_exit client_factors(client_session *s);
+client_exit client_nodes(client_session *s);
 client_exit client_doctor(client_session *s);
 
 #endif

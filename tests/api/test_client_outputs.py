@@ -200,6 +200,12 @@ def test_factors(server):
     check(len(lines) == 3 and lines[1].split()[1:3] == ["660", "30"] and lines[1].split()[4] == "1", lines)
 
 
+def test_nodes(server):
+    name = json.loads(run(server, "nodes", "--json").stdout)["nodes"][0]["name"]
+    lines = run(server, "nodes").stdout.splitlines()
+    check(len(lines) == 2 and lines[1].split()[:2] == [name, "active"], lines)
+
+
 # ------------------------------------------------------------------ doctor
 
 
@@ -338,7 +344,7 @@ def test_json_of_every_command(server):
     lines = [["submit", SPRINGS], ["submit", SPRINGS, "--wait"], ["submit", SPRINGS, "--vary", "solver.max_iterations=100,200"],
              ["upload", "tests/data/springs_K.mtx"], ["status", job], ["wait", job], ["refine", job, "-a", "1e-9", "--wait"],
              ["result", job], ["picture", job, "-o", target], ["history", job], ["plot", job, "--deformed", "-o", target],
-             ["list"], ["factors"], ["doctor"]]
+             ["list"], ["factors"], ["nodes"], ["doctor"]]
     for words in lines:
         done = run(server, *words, "--json")
         check(isinstance(json.loads(done.stdout), (dict, list)) and done.stderr == "", words, done)
