@@ -166,10 +166,11 @@ static const uz_option ROWS[] = {
             .about = "look whether the file of --db is whole, also while a daemon uses it, and end"),
     REQUEST("backup", WORD, .least = OPTIONS_BACKUP, .value = "FILE",
             .about = "copy the database to a new FILE, also while a daemon uses it, and end"),
-    REQUEST("move", WORD, .least = OPTIONS_MOVE, .value = "FILE",
-            .about =
-                "bring everything in FILE, which no daemon uses, into the database of PostgreSQL that --store, or a word "
-                "behind FILE, names; compare both, and end. What is there already stays: it may be run again"),
+    REQUEST(
+        "move", WORD, .least = OPTIONS_MOVE, .value = "FILE",
+        .about =
+            "bring everything in FILE, which no daemon uses, into the database of PostgreSQL that --store, or a word "
+            "behind FILE, names; compare both, and end. What is there already stays: it may be run again"),
     REQUEST("version", FLAG, .least = OPTIONS_VERSION),
     REQUEST("help", FLAG, .least = OPTIONS_HELP),
 };

@@ -1,5 +1,6 @@
 """The files of server/deploy: they are well-formed, name what there is, and the programs that read them take them."""
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -85,6 +86,15 @@ def test_the_compose_file_is_whole(s):
     text = (DEPLOY / "compose.yaml").read_text()
     for variable in set(re.findall(r"UZAWAD_[A-Z_]+(?=:)", text)):
         check("--" + variable[7:].lower().replace("_", "-") in options, variable, "is no option")
+    # a node starts with what the image and this file give it
+    image = dict(word.split("=", 1) for word in re.search(r"^ENV (.*)$", (ROOT / "server/Containerfile").read_text(), re.M)[1].split())
+    with tempfile.TemporaryDirectory() as folder:
+        tokens = pathlib.Path(folder, "tokens")
+        tokens.write_text("me admin a-secret-of-the-test\n")
+        tokens.chmod(0o600)
+        given = {**os.environ, **image, **compose["x-node"]["environment"], "UZAWAD_TOKEN_FILE": str(tokens)}
+        got = subprocess.run(s.command("--check-config"), capture_output=True, text=True, check=False, env=given)
+        check(got.returncode == 0 and "postgresql://uzawa@database/uzawa" in got.stdout, got)
     balancer = (DEPLOY / "haproxy.cfg").read_text()
     check(re.findall(r"server \w+ (\w+):8080", balancer) == list(nodes), balancer)
 
