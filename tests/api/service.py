@@ -82,9 +82,9 @@ class Reply:
 
 
 # What tells which schema a reply must meet: a member that only this kind of object has.
-KINDS = [("valid", "valid.json"), ("nodes", "nodes.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("limits", "limits.json"),
+KINDS = [("valid", "valid.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("limits", "limits.json"),
          ("whole", "check.json"), ("rows", "history.json"), ("decades", "work-precision.json"), ("code", "problem-details.json"),
-         ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json")]
+         ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json"), ("nodes", "nodes.json")]  # a result has nodes too
 
 
 def schema_of(reply):
