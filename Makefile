@@ -251,6 +251,13 @@ test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 test-api: all $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB) ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
+.PHONY: test-postgresql
+# In its short form some of them; test_daemons, test_database and the tests of the store are on it anyway.
+ON_POSTGRESQL ?= test_assert test_between test_client
+test-postgresql: deps-test ## tests of the daemon whose jobs are in PostgreSQL; ALL=1: all of them; FILTER=name runs some
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB)
+	@UZAWA_STORE=postgresql tests/run.sh $(BUILD) api "$(FILTER)" "$(if $(ALL)$(FILTER),,$(ON_POSTGRESQL))"
+
 .PHONY: test-browser screenshots
 test-browser: deps-test ## the web page in headless Chromium; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all

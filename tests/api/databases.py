@@ -28,7 +28,7 @@ class Server:
         os.chmod(self.folder, 0o711)
         with open(os.path.join(self.folder, "log"), "ab") as log:
             self.process = subprocess.Popen([SCRIPT, self.folder, *self.settings], stdout=log, stderr=log)
-        end = time.monotonic() + 60
+        end = time.monotonic() + 180  # a machine that has much to do takes its time for initdb
         while self.process.poll() is None and time.monotonic() < end:
             if os.path.exists(os.path.join(self.folder, f".s.PGSQL.{port}")) and self.try_sql("postgres", "SELECT 1")[0]:
                 return
@@ -45,7 +45,12 @@ class Server:
         """SIGQUIT: at once, as after a power loss."""
         if self.process.poll() is None:
             self.process.send_signal(number)
-        self.process.wait(timeout=60)
+        try:
+            self.process.wait(timeout=60)
+        except subprocess.TimeoutExpired:  # still the script, to which a shell in the background has SIGQUIT ignored
+            self.process.kill()
+            self.process.wait()
+            raise
 
     def end(self):
         self.stop()

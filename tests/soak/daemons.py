@@ -305,7 +305,9 @@ def mixture(build, affinity_s, jobs, bodies, cells, cache, clients=16, seed=7):
                     i, k = next(turn, (None, None))
                 if i is None:
                     return
-                job = daemons[i % 3].solve(body_of(k, cells))
+                job = daemons[i % 3].post(body_of(k, cells)).json
+                while job["status"] in ("accepted", "running"):
+                    job = daemons[i % 3].get(f"/v1/jobs/{job['id']}", Prefer="wait=20").json
                 if job["status"] != "successful":
                     errors.append(job)
         begun, before = time.monotonic(), processor(pids)
