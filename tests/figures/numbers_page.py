@@ -170,10 +170,10 @@ ELEMENTS = """What a formulation buys: Cook's membrane, tip displacement (conver
 convergence of every element. The stiffness of CalculiX's tetrahedra is reproduced to rounding."""
 
 TRADE = """Unknowns of the last mesh and seconds of the whole job, all its meshes and proofs included, until the whole error is small enough (`make trade`): refined where it is
-(`refine`: `auto`) and everywhere, each side halved again and again, with what a target takes interpolated between two meshes. `~`: extrapolated by the order of the last two,
-or what there was when the time or the mesh's limit came. Elements are quadrilaterals with straight sides, of which a guaranteed refinement makes triangles. The
-order is that of the error in unknowns: 0.5 and 1 are the best that linear and quadratic elements can do in the plane. The press fit has no guarantee, as bodies press on each
-other; the cylinder's first mesh is graded towards its contact by hand."""
+(`refine`: `auto`) and everywhere, each side halved again and again, with what a target takes interpolated between two meshes. `~`: extrapolated by the order of the last two;
+nothing: it was not reached in the time that each job had, a minute. Elements are quadrilaterals with straight sides, of which a guaranteed refinement makes triangles. The
+order is that of the error in unknowns: 0.5 and 1 are the best that linear and quadratic elements can do in the plane. Bodies that press on each other along curves, or that only round obstacles hold, have no guarantee. Times are of a machine on
+which others worked; unknowns are what counts."""
 
 SERVICE = "What was done to the service (`make soak`), and what came of it; below, the figures as they are."
 

@@ -341,7 +341,7 @@ def trade(data):
 
     measured, rows = data["trade"]["rows"], []
     for row in measured:
-        rows += [[row["body"], row["elements"], row["way"], "where it is"] + [cost(one) for one in row["adaptive"]] + [sig(row["order_adaptive"])],
+        rows += [[row["body"], row["elements"], row["way"], "where it is"] + [cost(one if one and one["reached"] else None) for one in row["adaptive"]] + [sig(row["order_adaptive"])],
                  ["", "", "", "everywhere"] + [cost(one) for one in row["uniform"]] + [sig(row["order_uniform"])]]
     return table(["body", "elements", "error", "refined"] + [f"{sig(100 * t)} %" for t in measured[0]["targets"]] + ["order"], rows)
 
