@@ -180,6 +180,7 @@ typedef struct {
     double *residual; /* as many as unknowns: what edges lack of equilibrium */
     double *lifted;   /* n_nodes x 2: u_h with what takes its nodes out of the obstacle */
     double *pressure; /* n_edges x moments: r_h, as resultants */
+    double *local;    /* n_elements: what each has of the gap; of what presses that at its side, where it is no less */
     char fault[160];  /* what is wrong, a clause: nothing is proved; "" */
 } uz_bound_check_result;
 

@@ -69,7 +69,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     x.pressure = uz_alloc_zero(body->n_edges * x.moments, sizeof *x.pressure);
     x.lift = uz_alloc_zero(2 * mesh->n_nodes, sizeof *x.lift);
     x.moved = uz_alloc_zero(2 * mesh->n_nodes, sizeof *x.moved);
-    x.gap = uz_alloc_zero(mesh->n_elements, sizeof *x.gap);
+    out->local = x.gap = uz_alloc_zero(mesh->n_elements, sizeof *x.gap);
     out->lifted = uz_alloc(2 * mesh->n_nodes, sizeof *out->lifted);
     if (!out->residual || !x.resultant || !x.pressure || !x.lift || !x.moved || !x.gap || !out->lifted)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check the stress of %lld elements",
@@ -137,7 +137,6 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     free(x.resultant);
     free(x.lift);
     free(x.moved);
-    free(x.gap);
     if (status != UZ_OK)
         uz_bound_check_clear(out);
     return status;
@@ -148,7 +147,8 @@ void uz_bound_check_clear(uz_bound_check_result *result)
     free(result->residual);
     free(result->lifted);
     free(result->pressure);
-    result->residual = result->lifted = result->pressure = NULL;
+    free(result->local);
+    result->residual = result->lifted = result->pressure = result->local = NULL;
 }
 
 double uz_bound_lacking(const uz_bound_check_result *c, double residual_norm)
@@ -254,15 +254,21 @@ static void needed_lift(double nodal[3], const double s[3])
     nodal[2] = (up[0] + 2 * fmax(up[1], (up[0] + up[2]) / 2) + up[2]) / 4;
 }
 
+void uz_add_contact_gap(examination *x, const uz_bound_edge *edge, double work)
+{
+    x->out->gap += work;
+    if (x->out->local)
+        x->out->local[edge->element[0]] += fmax(0, work);
+}
+
 /* The work of the gap that u_h leaves, and w where it is not >= 0 all along. */
 static void examine_contact(examination *x, const double *u, const uz_bound_edge *edge, const double *pressure)
 {
-    uz_bound_check_result *out = x->out;
     double s[3], m[UZ_BOUND_MOMENTS], nodal[3], none[3], more[3] = {0};
     gap_along(s, none, x, u, edge);
     uz_edge_means(m, s, x->moments);
     for (int a = 0; a < x->moments; a++)
-        out->gap += pressure[a] * m[a];
+        uz_add_contact_gap(x, edge, pressure[a] * m[a]);
     uz_add_given(more, x, edge, uz_bound_line(x->body, edge)->normal); /* what was given to take it out */
     for (int a = 0; a < 3; a++)
         s[a] -= more[a];

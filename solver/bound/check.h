@@ -71,6 +71,8 @@ double uz_energy_of(double *margin, const examination *x, const double *u, bool 
 double uz_spring_energy(const examination *x, const double *u);
 /* Of the loads but temperature, as the discrete problem has them: the edges have to agree with that. */
 double uz_work_of_loads(const examination *x, const uz_scene *scene, const double *u, uz_status *status, uz_error *err);
+/* What presses along an edge does on the gap: of the whole, and of its element. */
+void uz_add_contact_gap(examination *x, const uz_bound_edge *edge, double work);
 
 /* Means of a quadratic polynomial over an edge with the Bernstein polynomials of degree `moments` - 1 as weights. */
 void uz_edge_means(double m[UZ_BOUND_MOMENTS], const double b[3], int moments);

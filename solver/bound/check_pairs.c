@@ -97,7 +97,7 @@ static void press(examination *x, double *acting, const uz_bound_segment *s, con
     double leap[3];
     uz_along_segment(leap, x, s, u);
     const double on_gap = uz_segment_work(x, s, x->pressure, open), moved = uz_segment_work(x, s, x->pressure, leap);
-    x->out->gap += on_gap - moved;
+    uz_add_contact_gap(x, &x->body->edge[s->slave], on_gap - moved);
     x->out->dual -= on_gap;
     x->scale += fabs(on_gap) + fabs(moved);
     for (int g = 0; g < POINTS; g++) {

@@ -231,7 +231,7 @@ static void examine_pressure(double turned[MOMENTS][2], examination *x, const do
         for (int a = 0; a < 2 * moments; a++)
             integral[a / 2][a % 2] += p.w * phi[a / 2] * off[a % 2];
     }
-    x->out->gap += gap;
+    uz_add_contact_gap(x, edge, gap);
     for (int a = 0; a < moments; a++)
         for (int c = 0; c < 2; c++) {
             for (int k = 0; k < moments; k++)

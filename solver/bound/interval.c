@@ -500,7 +500,8 @@ uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, cons
     uz_status status = begin(&y, n_dofs, err);
     double *limit = uz_alloc(body->n_edges * (body->degree + 1), sizeof *limit);
     *out = (uz_bound_interval){.share = pair->share};
-    if (status == UZ_OK && !limit)
+    out->local = uz_alloc(body->model->mesh.n_elements, sizeof *out->local);
+    if (status == UZ_OK && (!limit || !out->local))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure of a quantity");
     if (status == UZ_OK) {
         for (int64_t k = 0; k < body->n_edges * (body->degree + 1); k++)
@@ -509,6 +510,7 @@ uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, cons
         bring_nodes(&y);
         look_at_supports(&y, out);
         out->apart = sqrt(square_apart(&y, true));
+        memcpy(out->local, y.x.gap, (size_t)body->model->mesh.n_elements * sizeof *out->local);
         out->lacking = 100 * y.x.inside * sqrt(2 * fabs(y.x.complementary));
         out->rounding = out->lacking * norm_of(&y.x, u); /* what is missing within elements works on u_h, too */
         const double work = uz_work_of_loads(&y.x, scene, pair->w, &status, err);

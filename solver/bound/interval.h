@@ -40,6 +40,7 @@ typedef struct {
     double rounding;       /* of the middle, from above */
     double lacking;        /* as uz_bound_lacking, but for that of the residual */
     double *residual;      /* as many as unknowns: what edges lack of equilibrium; the caller frees it */
+    double *local;         /* n_elements: half of what each has of |d|^2; the caller frees it */
     char fault[96];        /* what is wrong, a clause: nothing is proved; "" */
 } uz_bound_interval;
 

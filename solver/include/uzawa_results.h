@@ -204,6 +204,10 @@ typedef struct {
     int64_t n_quantities;
     uz_quantity_found *quantities; /* in the problem's order */
     double asked;                  /* uz_settings.quantity_error */
+    /* Where the mesh is refined: by node the displacement of the adjoint of the first quantity, if one is asked for;
+     * what each element has of the square of the error and of that of this adjoint, as parts of their sums, where both
+     * are proved. NULL: neither. */
+    double *adjoint, *share;
 } uz_evaluation;
 void uz_evaluation_free(uz_evaluation *evaluation);
 

@@ -178,6 +178,27 @@ static uz_status prove(uz_result *result, uz_guaranteed *g, const uz_body_model 
     return status;
 }
 
+void uz_add_share(uz_evaluation *evaluation, int64_t n, const double *of)
+{
+    double sum = 0;
+    for (int64_t i = 0; i < n; i++)
+        sum += of[i];
+    for (int64_t i = 0; i < n && evaluation->share && sum > 0; i++)
+        evaluation->share[i] += of[i] / sum;
+}
+
+/* For the next mesh: which elements have what of the gap. */
+static uz_status share_gap(uz_result *result, const uz_guaranteed *g, uz_error *err)
+{
+    const int64_t n = g->body.model->mesh.n_elements;
+    free(result->evaluation->share);
+    result->evaluation->share = uz_alloc_zero(n, sizeof(double));
+    if (!result->evaluation->share)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the errors of %lld elements", (long long)n);
+    uz_add_share(result->evaluation, n, g->shown->local);
+    return UZ_OK;
+}
+
 static void guarantee_answer(uz_result *result, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
                              const uz_hooks *hooks, double started)
 {
@@ -200,6 +221,8 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
     uz_status status = uz_body_model_build(&model, &problem->scene, UZ_BODY_OUTLINE, &err);
     if (status == UZ_OK)
         status = prove(result, &g, &model, &problem->scene, &err);
+    if (status == UZ_OK && out->proved && problem->scene.refine)
+        status = share_gap(result, &g, &err);
     if (status == UZ_OK && out->proved && result->evaluation->n_quantities > 0)
         status = uz_bound_keep_maps(&g.body, &g.stop, &err);
     if (status == UZ_OK && out->proved)

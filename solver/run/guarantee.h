@@ -36,4 +36,7 @@ uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err);
  * estimate, and says why. UZ_ERR_MEMORY, _CANCELLED and what problems in matrices fail with. */
 uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_error *err);
 
+/* Adds what elements have of something, n of them, to what evaluation->share says, as parts of the sum. */
+void uz_add_share(uz_evaluation *evaluation, int64_t n, const double *of);
+
 #endif

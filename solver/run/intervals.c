@@ -67,6 +67,7 @@ typedef struct {
     double *w, *stress;    /* n_nodes x 2; as uz_bound_stress */
     double *wanted, *open; /* n_contacts; n_nodes (uz_bound_openings) */
     double ball, widest;   /* sqrt(H); the largest of `open` that is finite */
+    double *local, *share; /* of the pair at hand (uz_bound_interval); of the best of the first quantity */
 } proving;
 
 /* By nodes -> as the rows are. */
@@ -478,6 +479,8 @@ static uz_status weigh(proving *v, uz_quantity_found *out, double *middle, doubl
     if (status == UZ_OK)
         status = uz_measure_residual(&own, g, interval.residual, err);
     free(interval.residual);
+    free(v->local);
+    v->local = interval.local;
     *middle = interval.middle;
     *apart = interval.apart;
     *half = status == UZ_OK ? uz_bound_half(&interval, g->shown, g->rho, own) : (double)INFINITY;
@@ -571,6 +574,11 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
         status = weigh(v, out, &middle, &half, &apart, share, err);
         if (status == UZ_OK && half < best) {
             best = half;
+            if (out == v->result->evaluation->quantities) {
+                double *worse = v->share;
+                v->share = v->local;
+                v->local = worse;
+            }
             out->value = middle;
             out->low = middle - half;
             out->high = middle + half;
@@ -826,7 +834,10 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
     end_rows(&v.primal, g->cache);
     end_rows(&v.dual, g->cache);
     end_contact_rows(&v.own, g->cache);
-    void *room[] = {v.open, v.w, v.stress, v.wanted, v.adjoint.edge, v.adjoint.before.at, v.adjoint.force};
+    if (v.share && e->asked > 0)
+        uz_add_share(e, g->body.model->mesh.n_elements, v.share);
+    void *room[] = {v.local,        v.share, v.open, v.w, v.stress, v.wanted, v.adjoint.edge, v.adjoint.before.at,
+                    v.adjoint.force};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return status;

@@ -71,6 +71,32 @@ static void add_contact(double *eta2, double *room, const uz_body_model *body, c
     }
 }
 
+/* Of cases beside others: the square of the error that is asked for, which of a quantity is of second order already. */
+static double weight_of(const uz_result *result)
+{
+    const uz_summary *s = &result->summary;
+    const double error = fmin(uz_asked_error(s), 1e6);
+    return s->evaluation->asked > 0 ? error : error * error;
+}
+
+/* A quantity is off by the product of two errors: of the answer and of its adjoint. Elements have of both -> eta2, as
+ * parts of their sums. False: there is no adjoint, or no error of it. */
+static bool add_adjoint(double *eta2, double *other, const uz_body_model *body, const uz_result *result)
+{
+    const int64_t n = body->mesh.n_elements;
+    double sum[2] = {0};
+    if (!result->evaluation->adjoint ||
+        !isfinite(uz_estimate_mesh_error(other, NULL, body, NULL, result->evaluation->adjoint)))
+        return false;
+    for (int64_t e = 0; e < n; e++) {
+        sum[0] += eta2[e];
+        sum[1] += other[e];
+    }
+    for (int64_t e = 0; e < n && sum[1] > 0; e++)
+        eta2[e] = eta2[e] / sum[0] + other[e] / sum[1];
+    return sum[1] > 0;
+}
+
 uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body, const uz_problem *problem,
                            uz_result *const *results, double left, bool subdivided, uz_error *err)
 {
@@ -78,31 +104,40 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
     const uz_element_type *type = uz_element_type_of((uz_element_kind)body->mesh.kind[0]);
     const int order = type->nodes > type->corners ? 2 : 1;
     indicator *all = uz_alloc(n_elements, sizeof *all);
-    double *eta2 = uz_alloc(n_elements, sizeof *eta2), *room = uz_alloc_zero(2 * body->mesh.n_nodes, sizeof *room),
+    double *eta2 = uz_alloc(2 * n_elements, sizeof *eta2), *room = uz_alloc_zero(2 * body->mesh.n_nodes, sizeof *room),
            sum = 0, part = 0;
     int64_t count = 0;
-    bool done = all && eta2 && room;
+    bool done = all && eta2 && room, squared = false; /* is the error one of second order? */
     for (int64_t e = 0; e < n_elements && done; e++)
         all[e] = (indicator){0, e};
     for (int64_t i = 0; i < n_cases && done; i++) {
         const uz_scene scene = uz_scene_of_case(problem, i);
+        squared = squared || (results[i]->evaluation && results[i]->evaluation->asked > 0);
+        const double *known = results[i]->evaluation ? results[i]->evaluation->share : NULL;
         double seen = 0;
         if (uz_has_no_answer(&results[i]->summary))
+            continue;
+        for (int64_t e = 0; e < n_elements && known; e++)
+            all[e].share = fmax(all[e].share, known[e] * weight_of(results[i]));
+        if (known)
             continue;
         const double error = uz_estimate_mesh_error(eta2, NULL, body, &scene, results[i]->u);
         done = !isnan(error);
         for (int64_t e = 0; e < n_elements; e++)
             seen += eta2[e];
         add_contact(eta2, room, body, &scene, results[i]);
-        for (int64_t e = 0; e < n_elements && seen > 0 && isfinite(error); e++)
-            all[e].share = fmax(all[e].share, eta2[e] * (error * error / seen));
+        if (!(seen > 0) || !isfinite(error))
+            continue;
+        const bool product = add_adjoint(eta2, eta2 + n_elements, body, results[i]);
+        for (int64_t e = 0; e < n_elements; e++)
+            all[e].share = fmax(all[e].share, eta2[e] * (product ? weight_of(results[i]) : error * error / seen));
     }
     for (int64_t e = 0; e < n_elements && done; e++)
         sum += all[e].share;
     if (done)
         qsort(all, (size_t)n_elements, sizeof *all, by_share);
     /* what is bisected once along each direction keeps 4^-order of the square of its error */
-    const double needed = (1 - AIM * AIM * left * left) / (1 - pow(4, -order)),
+    const double kept = squared ? AIM * left : AIM * AIM * left * left, needed = (1 - kept) / (1 - pow(4, -order)),
                  bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
     while (done && count < n_elements && part < bulk && all[count].share > 0)
         part += all[count++].share;

@@ -248,6 +248,19 @@ static bool is_about_to_touch(const adjoint *x, double mesh_error)
     return x->answer->summary.active == 0 && nearest <= mesh_error * farthest;
 }
 
+/* Of the quantity that is asked for: where to refine. */
+static uz_status keep_adjoint(uz_quantity_found *out, const adjoint *x, int64_t n, uz_error *err)
+{
+    uz_evaluation *e = x->answer->evaluation;
+    if (out != e->quantities || !(x->work->settings->quantity_error > 0) || !x->work->problem->scene.refine)
+        return UZ_OK;
+    e->adjoint = uz_alloc(n, sizeof *e->adjoint);
+    if (!e->adjoint)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the adjoint's %lld displacements", (long long)n);
+    memcpy(e->adjoint, x->z, (size_t)n * sizeof *e->adjoint);
+    return UZ_OK;
+}
+
 static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functional *of, uz_error *err)
 {
     const uz_body_model *model = x->work->model;
@@ -265,7 +278,9 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
         snprintf(out->why, sizeof out->why, "the rows in contact could not be held for its adjoint problem");
         return UZ_OK;
     }
-    status = uz_strain_energy(&norm, model, x->z, true, err);
+    status = keep_adjoint(out, x, n, err);
+    if (status == UZ_OK)
+        status = uz_strain_energy(&norm, model, x->z, true, err);
     if (status == UZ_OK)
         status = uz_strain_energy(&strain, model, u, true, err);
     const double scale = norm > 0 && strain > 0 ? sqrt(strain / norm) : 1; /* both of one size */

@@ -128,6 +128,10 @@ static void open_lab(lab *l, const char *element, int cells, obstacle below)
     CHECK(uz_bound_check(&l->g.checked, &l->g.body, &l->scene, l->g.dof, l->g.qp.K.cols, l->result->u, NULL,
                          l->g.stress, &err) == UZ_OK);
     CHECK_STR(l->g.checked.fault, "");
+    double parts = 0;
+    for (int64_t e = 0; e < l->model.mesh.n_elements; e++)
+        parts += l->g.checked.local[e];
+    CHECK(parts > 0 && (l->g.checked.lift > 0 || parts >= (1 - 1e-6) * l->g.checked.gap)); /* all is somewhere */
     CHECK(uz_measure_residual(&l->g.rho, &l->g, l->g.checked.residual, &err) == UZ_OK);
     l->g.shown = &l->g.checked;
     l->adjoint = l->g.body;
@@ -205,7 +209,12 @@ TEST(pairs_are_trusted_in_nothing)
             const uz_quantity_found *q = &reference->evaluation->quantities[quantity];
             CHECK_MSG(interval.middle - half <= q->high && interval.middle + half >= q->low,
                       "%d %d %s: %g +- %g, it is %g .. %g", k, trial, q->name, interval.middle, half, q->low, q->high);
+            double parts = 0;
+            for (int64_t e = 0; e < l.model.mesh.n_elements; e++)
+                parts += 2 * interval.local[e];
+            CHECK(interval.apart > 0 && fabs(sqrt(parts) / interval.apart - 1) < 1e-6);
             free(interval.residual);
+            free(interval.local);
         }
         free(w);
         free(v);
@@ -282,6 +291,7 @@ TEST(a_displacement_off_its_supports_is_told)
         CHECK((*interval.fault != '\0') == (wrong == 1));
         CHECK(isinf(uz_bound_half(&interval, &l.g.checked, 0, 0)) == (wrong == 1));
         free(interval.residual);
+        free(interval.local);
     }
     free(w);
     free(stress);
