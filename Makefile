@@ -148,9 +148,9 @@ $(BUILD)/obj/%.o: %.c
 	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests -Itests/support) $(if $(filter tests/unit/%,$<),-O0) -c -o $@ $<
 
 # Contraction only saves roundings there; the double-double arithmetic of certificates must never have it.
-$(call obj,solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c): CFLAGS += -ffp-contract=fast
+$(call obj,solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c $(wildcard solver/brick/*.c)): CFLAGS += -ffp-contract=fast
 # Short loops of known length around the registers are unrolled.
-$(call obj,solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/element/*.c solver/post/*.c) solver/io/vtu.c): CFLAGS += -O3
+$(call obj,solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/post/*.c) solver/io/vtu.c): CFLAGS += -O3
 
 $(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS)
 	@mkdir -p $(@D)

@@ -59,6 +59,11 @@ typedef struct {
      * since it was made. CANCELLED where it had to stop; the room may then only be freed, or told again. */
     uz_status (*hold)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, const bool *held, size_t *bytes,
                       const uz_stop *stop, uz_error *err);
+    /* Where the contact problem, 1/2 u'Ku - p'u minimal over bottom <= u <= top (n; infinite: no bound), is well begun:
+     * u (n), and which dofs it holds at their bounds, by coarser grids. *found false: there are none, or it had to
+     * stop. No dof may be held; none is afterwards. NULL: nothing is known. */
+    uz_status (*start)(const uz_multigrid *mg, uz_multigrid_room *room, bool *found, double *u, bool *held,
+                       const double *p, const double *bottom, const double *top, const uz_stop *stop, uz_error *err);
     void (*free)(uz_multigrid *mg);
 } uz_multigrid_kind;
 
@@ -68,7 +73,8 @@ struct uz_multigrid {
     int64_t n;
     int levels;
     size_t bytes;
-    double most; /* a bound on lambda_max(diag(K)^-1 M) */
+    double most;  /* a bound on lambda_max(diag(K)^-1 M) */
+    bool knows_K; /* without being handed it: of that only the diagonal is read, and need be there */
 };
 
 /* A V-cycle on smoothed aggregates for K (lower triangle).

@@ -1,0 +1,41 @@
+/* grids.h: the multigrid of a brick as its files see it. */
+#ifndef UZ_BRICK_GRIDS_H
+#define UZ_BRICK_GRIDS_H
+
+#include "brick/levels.h"
+
+typedef struct {
+    uz_multigrid base;
+    const uz_brick *brick;
+    double unit;                         /* of K on all grids */
+    double block[9 * UZ_BRICK_PARITIES]; /* of the first one, in double precision, unit 1 */
+    uz_brick_level level[UZ_BRICK_LEVELS_MOST];
+    float *inverse[UZ_BRICK_LEVELS_MOST];
+    double *coarsest; /* the factor of the last grid's K, n x n */
+    int64_t n_coarsest;
+} uz_brick_grids;
+
+struct uz_multigrid_room {
+    int levels;
+    uz_brick_vectors v[UZ_BRICK_LEVELS_MOST];
+    float *held[UZ_BRICK_LEVELS_MOST]; /* the inverses of each grid with more dofs held; NULL: there are none */
+    double *held_coarsest;             /* and the factor of the last */
+    uz_brick_planes planes;
+    double *coarse; /* a vector of the last grid */
+    uz_brick_product product;
+};
+
+/* A factor of the last grid's K, its held dofs, where inverse is 0, being rows of the unit matrix. */
+uz_status uz_brick_factor_coarsest(double **out, const uz_brick_grids *mg, const float *inverse, const uz_stop *stop,
+                                   uz_error *err);
+/* inverse of a grid from that of the next finer one. */
+void uz_brick_next_inverse(float *inverse, const uz_brick_level *level, const uz_brick_level *finer,
+                           const float *above);
+/* room->v[first].x from room->v[first].b, with the grids from `first` on. */
+void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int first);
+
+/* As uz_multigrid_kind says. */
+uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool *found, double *u, bool *held,
+                         const double *p, const double *bottom, const double *top, const uz_stop *stop, uz_error *err);
+
+#endif

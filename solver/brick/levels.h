@@ -1,0 +1,63 @@
+/* levels.h: the grids of a brick's multigrid, and what is done on one of them. Vectors of a grid are in single
+ * precision, by component, padded as a uz_brick_level says, and 0 at held dofs and in the padding. */
+#ifndef UZ_BRICK_LEVELS_H
+#define UZ_BRICK_LEVELS_H
+
+#include "brick/private.h"
+
+enum { UZ_BRICK_LEVELS_MOST = 24, UZ_BRICK_SHARES = 4 };
+
+/* Linear interpolation along one axis, from a grid to the next finer one. */
+typedef struct {
+    int64_t fine, coarse; /* cells; equal: every node is its own */
+    bool halves;          /* two cells become one everywhere */
+    int32_t *below;       /* fine + 1: the coarse node at or before a fine one ... */
+    float *beyond;        /* fine + 1: ... and the share of the one after it */
+    int32_t *first;       /* coarse + 1: the first fine node that a coarse one has a share in ... */
+    float *share;         /* (coarse + 1) x UZ_BRICK_SHARES: ... and those of that and the next ones */
+} uz_brick_axis;
+
+typedef struct {
+    int64_t cells[3];
+    double cell[3];
+    int64_t stride, plane, size; /* numbers in a line, a plane, and in all of one component */
+    float block[9 * UZ_BRICK_PARITIES];
+    float diagonal[3];   /* what one cell gives to a node */
+    double most;         /* a bound on the largest eigenvalue of diag(K)^-1 K */
+    uz_brick_axis to[3]; /* the next grid; not of the last one */
+} uz_brick_level;
+
+/* 3 size numbers and what kernels read beyond. */
+static inline int64_t uz_brick_numbers(const uz_brick_level *level)
+{
+    return 3 * level->size + 2 * UZ_BRICK_PAD;
+}
+
+/* false: no memory; clear it all the same. */
+bool uz_brick_axis_init(uz_brick_axis *axis, int64_t fine, int64_t coarse);
+void uz_brick_axis_clear(uz_brick_axis *axis);
+
+/* What a thread needs of a grid. inverse: 1 / K_jj, 0 at held dofs. */
+typedef struct {
+    float *x, *b, *t, *d; /* t: not of the last */
+    const float *inverse;
+} uz_brick_vectors;
+
+/* Room of a product: two planes, the sums of a line, and a line. */
+typedef struct {
+    float *plane[2], *sums, *line;
+} uz_brick_planes;
+
+/* One step of a polynomial smoother: d = p d + q inverse (b - K x), x += d. */
+void uz_brick_step(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room, float p,
+                   float q);
+/* t = b - K x at free dofs. */
+void uz_brick_residual(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room);
+/* coarse->b = P't, 0 at its held dofs. */
+void uz_brick_restrict(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
+                       const uz_brick_vectors *coarse, const uz_brick_planes *room);
+/* x += P coarse->x at free dofs. */
+void uz_brick_prolong(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
+                      const uz_brick_vectors *coarse, const uz_brick_planes *room);
+
+#endif

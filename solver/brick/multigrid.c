@@ -1,0 +1,499 @@
+/* multigrid.c: the grids of a brick, its V-cycle, and what the rest of the program sees of it. */
+#include "brick/grids.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "linalg/blas.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The smoother is made for the eigenvalues of diag(K)^-1 K from the largest down to this part of it. */
+#define SMOOTHED 6.0
+/* Cells that are this much longer than the shortest are not made longer. */
+#define SHORT 1.6
+/* A grid of so few dofs is the last. */
+enum { FEW_DOFS = 200, ROOT_POWERS = 7 };
+
+/* -------------------------------------------------------------- the grids */
+
+/* lambda_max of a symmetric 3 x 3 matrix, at most 1 % too large: the root of the norm of a high power. */
+static double largest(const double given[9])
+{
+    double A[9], log_scale = 0.0;
+    memcpy(A, given, sizeof A);
+    for (int power = 0; power <= ROOT_POWERS; power++) {
+        double norm = 0.0, square[9];
+        for (int i = 0; i < 3; i++)
+            norm = fmax(norm, fabs(A[3 * i]) + fabs(A[3 * i + 1]) + fabs(A[3 * i + 2]));
+        if (norm == 0.0)
+            return 0.0;
+        log_scale = 2.0 * log_scale + log(norm); /* A stands for exp(log_scale) A */
+        for (int i = 0; i < 9; i++)
+            A[i] /= norm;
+        if (power == ROOT_POWERS)
+            return exp(log_scale / (double)(1 << ROOT_POWERS));
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++)
+                square[3 * i + j] = A[3 * i] * A[j] + A[3 * i + 1] * A[3 + j] + A[3 * i + 2] * A[6 + j];
+        memcpy(A, square, sizeof A);
+    }
+    return 0.0;
+}
+
+/* The largest eigenvalue of diag(K)^-1 K is at most that of a cell (Fried, J. Sound Vib. 22 (1972)), which is one of
+ * those of its blocks. */
+static double most_of_cell(const double *block, const double *ke, double unit)
+{
+    double most = 0.0;
+    for (int p = 0; p < UZ_BRICK_PARITIES; p++) {
+        double scaled[9];
+        for (int m = 0; m < 3; m++)
+            for (int l = 0; l < 3; l++)
+                scaled[3 * m + l] =
+                    UZ_BRICK_NODES * block[9 * p + 3 * m + l] /
+                    (sqrt(ke[(UZ_BRICK_DOFS + 1) * m] / unit) * sqrt(ke[(UZ_BRICK_DOFS + 1) * l] / unit));
+        most = fmax(most, largest(scaled));
+    }
+    return most;
+}
+
+static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit)
+{
+    double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS], block[9 * UZ_BRICK_PARITIES];
+    level->stride = uz_brick_stride(level->cells[0]);
+    level->plane = level->stride * (level->cells[1] + 1);
+    level->size = level->plane * (level->cells[2] + 1);
+    if (!uz_brick_stiffness(ke, brick, level->cell))
+        return false;
+    (void)uz_brick_blocks(block, ke, unit);
+    for (int i = 0; i < 9 * UZ_BRICK_PARITIES; i++)
+        level->block[i] = (float)block[i];
+    for (int c = 0; c < 3; c++)
+        level->diagonal[c] = (float)(ke[(UZ_BRICK_DOFS + 1) * c] / unit);
+    level->most = most_of_cell(block, ke, unit);
+    return true;
+}
+
+static int64_t node_count(const int64_t cells[3])
+{
+    return (cells[0] + 1) * (cells[1] + 1) * (cells[2] + 1);
+}
+
+/* The cells of the next grid; false: there is none. */
+static bool coarsen(int64_t next[3], const uz_brick_level *level)
+{
+    double least = INFINITY;
+    for (int c = 0; c < 3; c++)
+        if (level->cells[c] > 1)
+            least = fmin(least, level->cell[c]);
+    for (int c = 0; c < 3; c++)
+        next[c] = level->cells[c] > 1 && level->cell[c] < SHORT * least ? (level->cells[c] + 1) / 2 : level->cells[c];
+    return 3 * node_count(level->cells) > FEW_DOFS && node_count(next) < node_count(level->cells);
+}
+
+static bool make_levels(uz_brick_grids *mg, bool *sound)
+{
+    const uz_brick *brick = mg->brick;
+    int l = 0;
+    *sound = true;
+    memcpy(mg->level[0].cells, brick->cells, sizeof brick->cells);
+    memcpy(mg->level[0].cell, brick->cell, sizeof brick->cell);
+    for (;; l++) {
+        uz_brick_level *level = &mg->level[l];
+        int64_t next[3];
+        *sound = *sound && init_level(level, brick, mg->unit);
+        mg->base.levels = l + 1;
+        if (!*sound || l + 1 == UZ_BRICK_LEVELS_MOST || !coarsen(next, level))
+            return true;
+        for (int c = 0; c < 3; c++) {
+            mg->level[l + 1].cells[c] = next[c];
+            mg->level[l + 1].cell[c] = level->cell[c] * ((double)level->cells[c] / (double)next[c]);
+            if (!uz_brick_axis_init(&level->to[c], level->cells[c], next[c]))
+                return false;
+        }
+    }
+}
+
+/* ----------------------------------------------------------- what is held */
+
+/* inverse of the first grid: 0 at supported dofs, those of `held` (d, NULL: none), and in the padding. */
+static void first_inverse(float *inverse, const uz_brick_grids *mg, const bool *held)
+{
+    const uz_brick_level *level = &mg->level[0];
+    const int64_t *dof = mg->brick->dof, *n = level->cells;
+    for (int64_t k = 0; k <= n[2]; k++)
+        for (int64_t j = 0; j <= n[1]; j++)
+            for (int64_t i = 0; i <= n[0]; i++, dof += 3) {
+                const int cells =
+                    (i > 0 && i < n[0] ? 2 : 1) * (j > 0 && j < n[1] ? 2 : 1) * (k > 0 && k < n[2] ? 2 : 1);
+                for (int c = 0; c < 3; c++)
+                    inverse[c * level->size + k * level->plane + j * level->stride + i] =
+                        dof[c] < 0 || (held && held[dof[c]]) ? 0.0F : 1.0F / ((float)cells * level->diagonal[c]);
+            }
+}
+
+/* A node of a coarser grid is held where the node of the finer one that stands there, or nearest to it, is. */
+void uz_brick_next_inverse(float *inverse, const uz_brick_level *level, const uz_brick_level *finer, const float *above)
+{
+    const int64_t *n = level->cells, *f = finer->cells;
+    for (int64_t k = 0; k <= n[2]; k++)
+        for (int64_t j = 0; j <= n[1]; j++)
+            for (int64_t i = 0; i <= n[0]; i++) {
+                const int cells =
+                    (i > 0 && i < n[0] ? 2 : 1) * (j > 0 && j < n[1] ? 2 : 1) * (k > 0 && k < n[2] ? 2 : 1);
+                const int64_t there = (k * f[2] + n[2] / 2) / n[2] * finer->plane +
+                                      (j * f[1] + n[1] / 2) / n[1] * finer->stride + (i * f[0] + n[0] / 2) / n[0];
+                for (int c = 0; c < 3; c++)
+                    inverse[c * level->size + k * level->plane + j * level->stride + i] =
+                        above[c * finer->size + there] != 0.0F ? 1.0F / ((float)cells * level->diagonal[c]) : 0.0F;
+            }
+}
+
+/* Where the dofs of the last grid stand in its vectors, by the order of these; returns how many. */
+static int64_t list_coarsest(int64_t *place, const uz_brick_level *level)
+{
+    int64_t n = 0;
+    for (int c = 0; c < 3; c++)
+        for (int64_t k = 0; k <= level->cells[2]; k++)
+            for (int64_t j = 0; j <= level->cells[1]; j++)
+                for (int64_t i = 0; i <= level->cells[0]; i++, n++)
+                    if (place)
+                        place[n] = c * level->size + k * level->plane + j * level->stride + i;
+    return n;
+}
+
+/* The factor of the last grid's K, held dofs being rows of the unit matrix. */
+uz_status uz_brick_factor_coarsest(double **out, const uz_brick_grids *mg, const float *inverse, const uz_stop *stop,
+                                   uz_error *err)
+{
+    const uz_brick_level *level = &mg->level[mg->base.levels - 1];
+    double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS];
+    const int64_t n = mg->n_coarsest, nx = level->cells[0] + 1, ny = level->cells[1] + 1, nodes = n / 3;
+    int64_t *place = uz_alloc(n, sizeof *place);
+    double *A = uz_alloc_zero(n * n, sizeof *A);
+    uz_status status = UZ_OK;
+    *out = NULL;
+    if (!place || !A || !uz_brick_stiffness(ke, mg->brick, level->cell)) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
+        goto done;
+    }
+    list_coarsest(place, level);
+    for (int64_t k = 0; k < level->cells[2]; k++)
+        for (int64_t j = 0; j < level->cells[1]; j++)
+            for (int64_t i = 0; i < level->cells[0]; i++)
+                for (int row = 0; row < UZ_BRICK_DOFS; row++)
+                    for (int column = 0; column < UZ_BRICK_DOFS; column++) {
+                        const int *a = uz_brick_corner[row / 3], *b = uz_brick_corner[column / 3];
+                        const int64_t at = row % 3 * nodes + ((k + a[2]) * ny + j + a[1]) * nx + i + a[0],
+                                      from = column % 3 * nodes + ((k + b[2]) * ny + j + b[1]) * nx + i + b[0];
+                        if (inverse[place[at]] != 0.0F && inverse[place[from]] != 0.0F)
+                            A[from * n + at] += ke[row * UZ_BRICK_DOFS + column] / mg->unit;
+                    }
+    for (int64_t i = 0; i < n; i++)
+        if (inverse[place[i]] == 0.0F)
+            A[i * n + i] = 1.0;
+    if (!uz_potrf_lower_while(n, A, stop))
+        status = uz_stop_is_due(stop)
+                     ? uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration")
+                     : uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                               "K is not positive definite: the body can move freely. Support it so that it can't");
+    if (status == UZ_OK) {
+        *out = A;
+        A = NULL;
+    }
+done:
+    free(place);
+    free(A);
+    return status;
+}
+
+/* -------------------------------------------------------------- the cycle */
+
+/* Chebyshev's recurrence for two steps on [most / SMOOTHED, most]: d = q0 inverse r, then d = p1 d + q1 inverse r. */
+typedef struct {
+    float q0, p1, q1;
+} polynomial;
+
+static polynomial polynomial_of(double most)
+{
+    const double least = most / SMOOTHED, middle = 0.5 * (most + least), half = 0.5 * (most - least);
+    const double sigma = middle / half, rho = 1.0 / sigma, next = 1.0 / (2.0 * sigma - rho);
+    return (polynomial){(float)(1.0 / middle), (float)(next * rho), (float)(2.0 * next / half)};
+}
+
+/* A bound on lambda_max(diag(K)^-1 M): M^-1 is at least what the smoothers do without the coarser grids,
+ * (1 - phi(t)^2) / t for an eigenvalue t of diag(K)^-1 K, phi what two steps leave. */
+static double bound_on_cycle(double most)
+{
+    enum { SAMPLES = 4000 };
+    const polynomial s = polynomial_of(most);
+    double worst = 0.0;
+    for (int k = 1; k <= SAMPLES; k++) {
+        const double t = most * k / SAMPLES, first = 1.0 - (double)s.q0 * t;
+        const double phi = first - t * ((double)s.p1 * (double)s.q0 + (double)s.q1 * first);
+        worst = fmax(worst, t / (1.0 - phi * phi));
+    }
+    return 1.01 * worst;
+}
+
+static void solve_coarsest(const uz_brick_grids *mg, const uz_multigrid_room *room)
+{
+    const int last = mg->base.levels - 1;
+    const uz_brick_level *level = &mg->level[last];
+    const uz_brick_vectors *v = &room->v[last];
+    const double *L = room->held_coarsest ? room->held_coarsest : mg->coarsest;
+    double *x = room->coarse;
+    int64_t n = 0;
+    for (int c = 0; c < 3; c++)
+        for (int64_t k = 0; k <= level->cells[2]; k++)
+            for (int64_t j = 0; j <= level->cells[1]; j++)
+                for (int64_t i = 0; i <= level->cells[0]; i++)
+                    x[n++] = (double)v->b[c * level->size + k * level->plane + j * level->stride + i];
+    uz_potrs_lower(n, L, n, x);
+    n = 0;
+    for (int c = 0; c < 3; c++)
+        for (int64_t k = 0; k <= level->cells[2]; k++)
+            for (int64_t j = 0; j <= level->cells[1]; j++)
+                for (int64_t i = 0; i <= level->cells[0]; i++) {
+                    const int64_t at = c * level->size + k * level->plane + j * level->stride + i;
+                    v->x[at] = v->inverse[at] != 0.0F ? (float)x[n] : 0.0F;
+                    n++;
+                }
+}
+
+void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int first)
+{
+    const int last = mg->base.levels - 1;
+    for (int l = first; l < last; l++) {
+        const uz_brick_level *level = &mg->level[l];
+        const uz_brick_vectors *v = &room->v[l];
+        const polynomial s = polynomial_of(level->most);
+        const int64_t n = 3 * level->size;
+        for (int64_t i = 0; i < n; i++)
+            v->x[i] = v->d[i] = s.q0 * v->inverse[i] * v->b[i];
+        uz_brick_step(level, v, &room->planes, s.p1, s.q1);
+        uz_brick_residual(level, v, &room->planes);
+        uz_brick_restrict(level, level + 1, v, v + 1, &room->planes);
+    }
+    solve_coarsest(mg, room);
+    for (int l = last - 1; l >= first; l--) {
+        const uz_brick_level *level = &mg->level[l];
+        const uz_brick_vectors *v = &room->v[l];
+        const polynomial s = polynomial_of(level->most);
+        uz_brick_prolong(level, level + 1, v, v + 1, &room->planes);
+        uz_brick_step(level, v, &room->planes, 0.0F, s.q0);
+        uz_brick_step(level, v, &room->planes, s.p1, s.q1);
+    }
+}
+
+static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
+                       uz_error *err)
+{
+    const uz_brick_grids *mg = (const uz_brick_grids *)base;
+    const uz_brick_level *level = &mg->level[0];
+    const uz_brick_vectors *v = &room->v[0];
+    const int64_t *dof = mg->brick->dof;
+    double most = 0.0;
+    (void)K;
+    (void)err;
+    for (int64_t j = 0; j < base->n; j++)
+        most = fabs(r[j]) > most ? fabs(r[j]) : most;
+    /* by a power of two, so that single precision holds it whatever the units are */
+    const double down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 1.0, up = 1.0 / (down * mg->unit);
+    for (int64_t k = 0; k <= level->cells[2]; k++)
+        for (int64_t j = 0; j <= level->cells[1]; j++) {
+            float *b = v->b + k * level->plane + j * level->stride;
+            const float *inverse = v->inverse + k * level->plane + j * level->stride;
+            for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
+                for (int c = 0; c < 3; c++) {
+                    const int64_t at = c * level->size + i;
+                    b[at] = inverse[at] != 0.0F ? (float)(down * r[dof[c]]) : 0.0F;
+                }
+        }
+    uz_brick_cycle(mg, room, 0);
+    dof = mg->brick->dof;
+    for (int64_t k = 0; k <= level->cells[2]; k++)
+        for (int64_t j = 0; j <= level->cells[1]; j++) {
+            const float *x = v->x + k * level->plane + j * level->stride;
+            for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
+                for (int c = 0; c < 3; c++)
+                    if (dof[c] >= 0)
+                        z[dof[c]] = up * (double)x[c * level->size + i];
+        }
+    return UZ_OK;
+}
+
+static void multiply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x)
+{
+    const uz_brick_grids *mg = (const uz_brick_grids *)base;
+    (void)K;
+    uz_brick_multiply(y, mg->brick, mg->block, &room->product, x, NULL);
+}
+
+/* -------------------------------------------------------------- the room */
+
+static void free_room(uz_multigrid_room *room)
+{
+    if (!room)
+        return;
+    for (int l = 0; l < room->levels; l++) {
+        free(room->v[l].x);
+        free(room->v[l].b);
+        free(room->v[l].t);
+        free(room->v[l].d);
+        free(room->held[l]);
+    }
+    free(room->held_coarsest);
+    free(room->planes.plane[0]);
+    free(room->planes.plane[1]);
+    free(room->planes.sums);
+    free(room->planes.line);
+    free(room->coarse);
+    uz_brick_product_clear(&room->product);
+    free(room);
+}
+
+static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
+{
+    const uz_brick_grids *mg = (const uz_brick_grids *)base;
+    const uz_brick_level *first = &mg->level[0];
+    uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
+    if (!room)
+        return NULL;
+    *bytes = sizeof *room;
+    bool ok = uz_brick_product_init(&room->product, mg->brick);
+    *bytes += 96 * (size_t)room->product.plane;
+    room->levels = base->levels;
+    for (int l = 0; l < base->levels; l++) {
+        uz_brick_vectors *v = &room->v[l];
+        const int64_t n = uz_brick_numbers(&mg->level[l]);
+        float **all[] = {&v->x, &v->b, &v->t, &v->d};
+        for (int k = 0; k < 4; k++)
+            ok = (*all[k] = uz_alloc_zero(n, sizeof(float))) && ok;
+        v->inverse = mg->inverse[l];
+        *bytes += 16 * (size_t)n;
+    }
+    const int64_t plane = 3 * first->plane + 2 * UZ_BRICK_PAD, sums = 24 * (first->stride + 2 * UZ_BRICK_PAD),
+                  line = 2 * (first->stride + UZ_BRICK_PAD);
+    room->planes.plane[0] = uz_alloc_zero(plane, sizeof(float));
+    room->planes.plane[1] = uz_alloc_zero(plane, sizeof(float));
+    room->planes.sums = uz_alloc_zero(sums, sizeof(float));
+    room->planes.line = uz_alloc_zero(line, sizeof(float));
+    room->coarse = uz_alloc(mg->n_coarsest, sizeof(double));
+    *bytes += 4 * (size_t)(2 * plane + sums + line) + 8 * (size_t)mg->n_coarsest;
+    ok = ok && room->planes.plane[0] && room->planes.plane[1] && room->planes.sums && room->planes.line && room->coarse;
+    if (ok)
+        return room;
+    free_room(room);
+    return NULL;
+}
+
+static uz_status hold(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, const bool *held,
+                      size_t *bytes, const uz_stop *stop, uz_error *err)
+{
+    const uz_brick_grids *mg = (const uz_brick_grids *)base;
+    const int last = base->levels - 1;
+    (void)K;
+    free(room->held_coarsest);
+    room->held_coarsest = NULL;
+    *bytes = 0;
+    for (int l = 0; l < base->levels; l++) {
+        const int64_t n = uz_brick_numbers(&mg->level[l]);
+        room->v[l].inverse = mg->inverse[l];
+        if (!held)
+            continue;
+        if (!room->held[l] && !(room->held[l] = uz_alloc_zero(n, sizeof(float))))
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to hold dofs of %lld", (long long)base->n);
+        if (l == 0)
+            first_inverse(room->held[0], mg, held);
+        else
+            uz_brick_next_inverse(room->held[l], &mg->level[l], &mg->level[l - 1], room->held[l - 1]);
+        room->v[l].inverse = room->held[l];
+        *bytes += 4 * (size_t)n;
+    }
+    if (!held)
+        return UZ_OK;
+    *bytes += 8 * (size_t)(mg->n_coarsest * mg->n_coarsest);
+    return uz_brick_factor_coarsest(&room->held_coarsest, mg, room->held[last], stop, err);
+}
+
+/* --------------------------------------------------------------- the whole */
+
+static void free_multigrid(uz_multigrid *base)
+{
+    uz_brick_grids *mg = (uz_brick_grids *)base;
+    if (!mg)
+        return;
+    for (int l = 0; l < UZ_BRICK_LEVELS_MOST; l++) {
+        for (int c = 0; c < 3; c++)
+            uz_brick_axis_clear(&mg->level[l].to[c]);
+        free(mg->inverse[l]);
+    }
+    free(mg->coarsest);
+    free(mg);
+}
+
+static const uz_multigrid_kind KIND = {.apply = apply,
+                                       .multiply = multiply,
+                                       .room = make_room,
+                                       .free_room = free_room,
+                                       .hold = hold,
+                                       .start = uz_brick_start,
+                                       .free = free_multigrid};
+
+/* A room in single precision, five numbers a dof of all grids; the factor of the last; with dofs held both again. */
+double uz_brick_predict_bytes(const uz_brick *brick)
+{
+    const double stride = (double)uz_brick_stride(brick->cells[0]);
+    const double padded = 3.0 * stride * (double)((brick->cells[1] + 1) * (brick->cells[2] + 1));
+    return 4.0 * 6.0 * 1.25 * padded + 16.0 * FEW_DOFS * FEW_DOFS + 48.0 * stride * (double)(brick->cells[1] + 1) * 3.0;
+}
+
+uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t memory_limit, uz_error *err)
+{
+    *out = NULL;
+    const double bytes = uz_brick_predict_bytes(brick);
+    if (memory_limit > 0 && bytes > (double)memory_limit)
+        return uz_fail(err, UZ_ERR_LIMIT, "K", "a multigrid takes %.0f bytes, and the limit is %zu: raise the limit",
+                       bytes, memory_limit);
+    uz_brick_grids *mg = uz_alloc_zero(1, sizeof *mg);
+    if (!mg)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
+    mg->base.kind = &KIND;
+    mg->base.n = brick->d;
+    mg->base.knows_K = true;
+    mg->brick = brick;
+    double most = 0.0;
+    for (int i = 0; i < UZ_BRICK_DOFS; i++)
+        most = fmax(most, brick->ke[(UZ_BRICK_DOFS + 1) * i]);
+    mg->unit = ldexp(1.0, ilogb(most));
+    (void)uz_brick_blocks(mg->block, brick->ke, 1.0);
+    bool sound = true, ok = make_levels(mg, &sound);
+    for (int l = 0; ok && sound && l < mg->base.levels; l++) {
+        ok = (mg->inverse[l] = uz_alloc_zero(uz_brick_numbers(&mg->level[l]), sizeof(float)));
+        mg->base.bytes += 4 * (size_t)uz_brick_numbers(&mg->level[l]);
+        if (ok && l == 0)
+            first_inverse(mg->inverse[0], mg, NULL);
+        else if (ok)
+            uz_brick_next_inverse(mg->inverse[l], &mg->level[l], &mg->level[l - 1], mg->inverse[l - 1]);
+    }
+    uz_status status = UZ_OK;
+    if (!ok)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid on %lld dofs", (long long)brick->d);
+    else if (!sound)
+        status =
+            uz_fail(err, UZ_ERR_NOT_FINITE, "/materials", "the stiffness of larger cells overflows; use other units");
+    if (status == UZ_OK) {
+        mg->n_coarsest = list_coarsest(NULL, &mg->level[mg->base.levels - 1]);
+        mg->base.most = bound_on_cycle(mg->level[0].most);
+        mg->base.bytes += sizeof *mg + 8 * (size_t)(mg->n_coarsest * mg->n_coarsest);
+        status = uz_brick_factor_coarsest(&mg->coarsest, mg, mg->inverse[mg->base.levels - 1], NULL, err);
+    }
+    if (status == UZ_OK)
+        *out = &mg->base;
+    else
+        free_multigrid(&mg->base);
+    return status;
+}

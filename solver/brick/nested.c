@@ -1,0 +1,302 @@
+/* nested.c: where a contact problem on a brick begins: its solution on coarser grids, from grid to grid.
+ *
+ * On each grid the rows that touch are guessed and corrected as on the finest one (Hintermueller, Ito, Kunisch, SIAM J.
+ * Optim. 13 (2003)), with the load and the bounds of the finest grid there, and conjugate gradients in single precision
+ * that stop as soon as they are as good as the grid. The border of the contact then moves by about a node from one grid
+ * to the next. Nothing that is proved of an answer follows from this. */
+#include "brick/grids.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hooks.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Grids below the finest that are solved on; steps on each; conjugate gradients of a step. */
+enum { GRIDS = 3, STEPS_MOST = 12, ITERATIONS_MOST = 30 };
+/* In the energy norm, relative to that of the load's response. */
+#define AS_GOOD_AS_A_GRID 3e-3
+/* A node between nodes of the coarser grid touches where so much of these does. */
+#define MOSTLY 0.6F
+
+/* Of one grid; touches: 1 at its upper bound, -1 at its lower one, 0: free. */
+typedef struct {
+    float *p, *bottom, *top, *u, *touches;
+} grid_problem;
+
+typedef struct {
+    const uz_brick_grids *mg;
+    uz_multigrid_room *room;
+    grid_problem grid[GRIDS + 1]; /* of the first, which is the finest one, only p and bounds; not owned */
+    float *r, *direction, *q, *zero;
+    double energy; /* norm of the response on the coarsest of them */
+} nested;
+
+static double dot(const float *x, const float *y, int64_t n)
+{
+    double sum[4] = {0.0};
+    int64_t i = 0;
+    for (; i + 4 <= n; i += 4)
+        for (int k = 0; k < 4; k++)
+            sum[k] += (double)x[i + k] * (double)y[i + k];
+    for (; i < n; i++)
+        sum[0] += (double)x[i] * (double)y[i];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+static bool allocate(nested *x, int last)
+{
+    bool ok = true;
+    for (int l = 0; l <= last; l++) {
+        grid_problem *g = &x->grid[l];
+        float **all[] = {&g->p, &g->bottom, &g->top, &g->u, &g->touches};
+        for (int k = 0; k < (l == 0 ? 3 : 5); k++)
+            ok = (*all[k] = uz_alloc_zero(uz_brick_numbers(&x->mg->level[l]), sizeof(float))) && ok;
+    }
+    float **all[] = {&x->r, &x->direction, &x->q, &x->zero};
+    for (int k = 0; k < 4; k++)
+        ok = (*all[k] = uz_alloc_zero(uz_brick_numbers(&x->mg->level[1]), sizeof(float))) && ok;
+    for (int l = 0; l < x->mg->base.levels; l++)
+        if (!x->room->held[l])
+            ok = (x->room->held[l] = uz_alloc_zero(uz_brick_numbers(&x->mg->level[l]), sizeof(float))) && ok;
+    return ok;
+}
+
+static void clear(nested *x)
+{
+    for (int l = 0; l <= GRIDS; l++) {
+        grid_problem *g = &x->grid[l];
+        float *all[] = {g->p, g->bottom, g->top, g->u, g->touches};
+        for (int k = 0; k < 5; k++)
+            free(all[k]);
+    }
+    free(x->r);
+    free(x->direction);
+    free(x->q);
+    free(x->zero);
+}
+
+/* Load and bounds of a coarser grid: bounds are those of the node that stands there, or nearest to it. */
+static void restrict_problem(nested *x, int l)
+{
+    const uz_brick_level *fine = &x->mg->level[l - 1], *level = &x->mg->level[l];
+    const grid_problem *from = &x->grid[l - 1], *to = &x->grid[l];
+    const uz_brick_vectors above = {.t = from->p}, below = {.b = to->p, .inverse = x->mg->inverse[l]};
+    const int64_t *n = level->cells, *f = fine->cells;
+    uz_brick_restrict(fine, level, &above, &below, &x->room->planes);
+    for (int64_t k = 0; k <= n[2]; k++)
+        for (int64_t j = 0; j <= n[1]; j++)
+            for (int64_t i = 0; i <= n[0]; i++) {
+                const int64_t there = (k * f[2] + n[2] / 2) / n[2] * fine->plane +
+                                      (j * f[1] + n[1] / 2) / n[1] * fine->stride + (i * f[0] + n[0] / 2) / n[0];
+                for (int c = 0; c < 3; c++) {
+                    const int64_t at = c * level->size + k * level->plane + j * level->stride + i;
+                    to->bottom[at] = from->bottom[c * fine->size + there];
+                    to->top[at] = from->top[c * fine->size + there];
+                }
+            }
+}
+
+/* u of a grid and what touches, from those of the next coarser one. touches becomes numbers between. */
+static void prolong_problem(const nested *x, int l, float *u, float *touches)
+{
+    const uz_brick_level *level = &x->mg->level[l];
+    const grid_problem *from = &x->grid[l + 1];
+    float *const to[] = {u, touches}, *const of[] = {from->u, from->touches};
+    for (int k = 0; k < 2; k++) {
+        const uz_brick_vectors v = {.x = to[k], .inverse = x->mg->inverse[l]}, coarse = {.x = of[k]};
+        memset(to[k], 0, (size_t)uz_brick_numbers(level) * sizeof(float));
+        uz_brick_prolong(level, level + 1, &v, &coarse, &x->room->planes);
+    }
+}
+
+/* From what was interpolated: touches where most of the nodes around it do, or where u is beyond its bound. */
+static float decide(float *u, float touches, float bottom, float top)
+{
+    const bool up = isfinite(top) && (touches > MOSTLY || *u > top),
+               down = !up && isfinite(bottom) && (touches < -MOSTLY || *u < bottom);
+    *u = up ? top : down ? bottom : *u;
+    return up ? 1.0F : down ? -1.0F : 0.0F;
+}
+
+/* Holds what touches on the grid and on all coarser ones. */
+static uz_status hold(nested *x, int l, const uz_stop *stop, uz_error *err)
+{
+    const uz_brick_grids *mg = x->mg;
+    uz_multigrid_room *room = x->room;
+    const int last = mg->base.levels - 1;
+    const int64_t n = 3 * mg->level[l].size;
+    for (int64_t i = 0; i < n; i++)
+        room->held[l][i] = x->grid[l].touches[i] != 0.0F ? 0.0F : mg->inverse[l][i];
+    for (int k = l; k <= last; k++) {
+        if (k > l)
+            uz_brick_next_inverse(room->held[k], &mg->level[k], &mg->level[k - 1], room->held[k - 1]);
+        room->v[k].inverse = room->held[k];
+    }
+    free(room->held_coarsest);
+    return uz_brick_factor_coarsest(&room->held_coarsest, mg, room->held[last], stop, err);
+}
+
+/* r = p - K u, at held dofs too. */
+static void residual(const nested *x, int l)
+{
+    const grid_problem *g = &x->grid[l];
+    const uz_brick_vectors v = {.x = g->u, .b = g->p, .t = x->r, .d = x->r, .inverse = x->mg->inverse[l]};
+    uz_brick_residual(&x->mg->level[l], &v, &x->room->planes);
+}
+
+/* z = M^-1 r in room->v[l].x; sqrt(r'z). */
+static double precondition(const nested *x, int l)
+{
+    const int64_t n = 3 * x->mg->level[l].size;
+    memcpy(x->room->v[l].b, x->r, (size_t)n * sizeof(float));
+    uz_brick_cycle(x->mg, x->room, l);
+    return dot(x->r, x->room->v[l].x, n);
+}
+
+/* Conjugate gradients on the dofs that are not held; r: the residual there. */
+static void iterate(nested *x, int l)
+{
+    const int64_t n = 3 * x->mg->level[l].size;
+    const float *inverse = x->room->held[l], *z = x->room->v[l].x;
+    const uz_brick_vectors v = {.x = x->direction, .b = x->zero, .t = x->q, .d = x->q, .inverse = inverse};
+    for (int64_t i = 0; i < n; i++)
+        x->r[i] = inverse[i] != 0.0F ? x->r[i] : 0.0F;
+    double square = precondition(x, l);
+    x->energy = fmax(x->energy, sqrt(fmax(0.0, square)));
+    const double goal = AS_GOOD_AS_A_GRID * x->energy;
+    memcpy(x->direction, z, (size_t)n * sizeof(float));
+    for (int k = 0; k < ITERATIONS_MOST && square > goal * goal; k++) {
+        uz_brick_residual(&x->mg->level[l], &v, &x->room->planes); /* q = -K direction */
+        const double curvature = -dot(x->direction, x->q, n), before = square;
+        if (!(curvature > 0.0))
+            return;
+        const float alpha = (float)(square / curvature);
+        for (int64_t i = 0; i < n; i++) {
+            x->grid[l].u[i] += alpha * x->direction[i];
+            x->r[i] += alpha * x->q[i];
+        }
+        square = precondition(x, l);
+        const float beta = (float)(square / before);
+        for (int64_t i = 0; i < n; i++)
+            x->direction[i] = z[i] + beta * x->direction[i];
+    }
+}
+
+/* All that touches wrongly changes; r: p - K u. Returns how many did. */
+static int64_t exchange(const nested *x, int l)
+{
+    const grid_problem *g = &x->grid[l];
+    int64_t changed = 0;
+    for (int64_t i = 0; i < 3 * x->mg->level[l].size; i++) {
+        const float before = g->touches[i], pull = x->r[i] * before;
+        if (before != 0.0F && pull < 0.0F) {
+            g->touches[i] = 0.0F;
+            changed++;
+        } else if (before == 0.0F && x->mg->inverse[l][i] != 0.0F && (g->u[i] > g->top[i] || g->u[i] < g->bottom[i])) {
+            g->touches[i] = decide(&g->u[i], 0.0F, g->bottom[i], g->top[i]);
+            changed++;
+        }
+    }
+    return changed;
+}
+
+static uz_status solve_grid(nested *x, int l, const uz_stop *stop, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    for (int step = 0; step < STEPS_MOST && status == UZ_OK && !uz_stop_is_due(stop); step++) {
+        status = hold(x, l, stop, err);
+        if (status != UZ_OK)
+            break;
+        residual(x, l);
+        iterate(x, l);
+        residual(x, l);
+        if (exchange(x, l) == 0)
+            break;
+    }
+    return status;
+}
+
+/* Load and bounds of the finest grid, in units in which single precision holds them. */
+static double read_finest(nested *x, const double *p, const double *bottom, const double *top)
+{
+    const uz_brick_level *level = &x->mg->level[0];
+    const int64_t *dof = x->mg->brick->dof;
+    const grid_problem *g = &x->grid[0];
+    double most = 0.0;
+    for (int64_t j = 0; j < x->mg->base.n; j++) {
+        const double size[3] = {fabs(p[j]) / x->mg->unit, bottom[j], -top[j]}; /* of bounds those that 0 is beyond */
+        for (int k = 0; k < 3; k++)
+            most = size[k] > most && isfinite(size[k]) ? size[k] : most;
+    }
+    const double down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 1.0;
+    for (int64_t k = 0; k <= level->cells[2]; k++)
+        for (int64_t j = 0; j <= level->cells[1]; j++)
+            for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
+                for (int c = 0; c < 3; c++) {
+                    const int64_t at = c * level->size + k * level->plane + j * level->stride + i;
+                    const bool free = dof[c] >= 0;
+                    g->p[at] = free ? (float)(down * (p[dof[c]] / x->mg->unit)) : 0.0F;
+                    g->bottom[at] = free ? (float)(down * bottom[dof[c]]) : -INFINITY;
+                    g->top[at] = free ? (float)(down * top[dof[c]]) : INFINITY;
+                }
+    return down;
+}
+
+/* u of the finest grid and what it holds, from the next coarser one. */
+static void write_finest(const nested *x, double *u, bool *held, const double *bottom, const double *top, double down)
+{
+    const uz_brick_level *level = &x->mg->level[0];
+    const uz_brick_vectors *v = &x->room->v[0];
+    const int64_t *dof = x->mg->brick->dof;
+    prolong_problem(x, 0, v->x, v->d);
+    for (int64_t k = 0; k <= level->cells[2]; k++)
+        for (int64_t j = 0; j <= level->cells[1]; j++)
+            for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
+                for (int c = 0; c < 3; c++) {
+                    const int64_t at = c * level->size + k * level->plane + j * level->stride + i, own = dof[c];
+                    if (own < 0)
+                        continue;
+                    const float touches = decide(&v->x[at], v->d[at], x->grid[0].bottom[at], x->grid[0].top[at]);
+                    held[own] = touches != 0.0F;
+                    u[own] = touches > 0.0F ? top[own] : touches < 0.0F ? bottom[own] : (double)v->x[at] / down;
+                }
+}
+
+uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool *found, double *u, bool *held,
+                         const double *p, const double *bottom, const double *top, const uz_stop *stop, uz_error *err)
+{
+    nested x = {.mg = (const uz_brick_grids *)base, .room = room};
+    const int last = base->levels - 1 < GRIDS ? base->levels - 1 : GRIDS;
+    uz_status status = UZ_OK;
+    *found = false;
+    if (last < 1)
+        return UZ_OK;
+    if (!allocate(&x, last))
+        status =
+            uz_fail(err, UZ_ERR_MEMORY, "", "no memory to begin on coarser grids of %lld dofs", (long long)base->n);
+    const double down = status == UZ_OK ? read_finest(&x, p, bottom, top) : 1.0;
+    for (int l = 1; status == UZ_OK && l <= last; l++)
+        restrict_problem(&x, l);
+    for (int l = last; status == UZ_OK && l >= 1; l--) {
+        const grid_problem *g = &x.grid[l];
+        if (l < last)
+            prolong_problem(&x, l, g->u, g->touches);
+        for (int64_t i = 0; i < 3 * x.mg->level[l].size; i++)
+            g->touches[i] =
+                x.mg->inverse[l][i] != 0.0F ? decide(&g->u[i], g->touches[i], g->bottom[i], g->top[i]) : 0.0F;
+        status = solve_grid(&x, l, stop, err);
+    }
+    if (status == UZ_OK && !uz_stop_is_due(stop)) {
+        write_finest(&x, u, held, bottom, top, down);
+        *found = true;
+    }
+    clear(&x);
+    for (int l = 0; l < base->levels; l++)
+        room->v[l].inverse = x.mg->inverse[l];
+    free(room->held_coarsest);
+    room->held_coarsest = NULL;
+    return status;
+}

@@ -1,0 +1,32 @@
+/* private.h: what the files of the brick share. */
+#ifndef UZ_BRICK_PRIVATE_H
+#define UZ_BRICK_PRIVATE_H
+
+#include "brick/brick.h"
+
+/* Lines of nodes begin so many nodes apart from each other or a multiple of it: registers of either precision. */
+enum { UZ_BRICK_PAD = 8 };
+
+static inline int64_t uz_brick_stride(int64_t cells)
+{
+    return (cells + 1 + UZ_BRICK_PAD - 1) / UZ_BRICK_PAD * UZ_BRICK_PAD;
+}
+
+/* ke by parities, 9 numbers each, divided by `unit`. The largest entry off the blocks, relative to the largest of all.
+ */
+double uz_brick_blocks(double block[9 * UZ_BRICK_PARITIES], const double *ke, double unit);
+/* ke of a cell of another size; false: it is out of range. */
+bool uz_brick_stiffness(double *ke, const uz_brick *brick, const double size[3]);
+
+/* K times a vector in double precision, plane by plane. One room per thread. */
+typedef struct {
+    int64_t stride, plane; /* numbers in a line and in a plane of nodes, of one component */
+    double *in[2], *out[2], *sums;
+} uz_brick_product;
+bool uz_brick_product_init(uz_brick_product *room, const uz_brick *brick); /* false: no memory; clear it all the same */
+void uz_brick_product_clear(uz_brick_product *room);
+/* y (d) = K x, with block of uz_brick_blocks, unit 1; supported dofs are moved by `value`, or NULL: not. x NULL: 0. */
+void uz_brick_multiply(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x,
+                       const double *value);
+
+#endif
