@@ -20,6 +20,7 @@
 #ifndef UZ_ASSEMBLY_H
 #define UZ_ASSEMBLY_H
 
+#include "brick/cells.h"
 #include "element/element.h"
 #include "law/law.h"
 #include "scene/mesh.h"
@@ -80,10 +81,11 @@ typedef struct {
 
 typedef struct {
     int64_t d, m, n_fixed;
-    uz_csc K;       /* d x d, lower triangle */
-    uz_csc N;       /* m x d */
-    uz_csc K_fixed; /* d x n_fixed: what supported dofs do to free ones; p loses K_fixed times the prescribed values */
-    int64_t *dof;   /* n_nodes x dim: number of a free dof, -1 - k for supported dof k, UZ_NO_DOF at hanging nodes */
+    uz_csc K;        /* d x d, lower triangle; of a brick only the diagonal */
+    uz_brick *brick; /* what K is then; NULL: K has its entries, and K_fixed */
+    uz_csc N;        /* m x d */
+    uz_csc K_fixed;  /* d x n_fixed: what supported dofs do to free ones; p loses K_fixed times the prescribed values */
+    int64_t *dof;    /* n_nodes x dim: number of a free dof, -1 - k for supported dof k, UZ_NO_DOF at hanging nodes */
     int64_t *frame_of; /* n_nodes: 1 + place in info.rotated_node, <= 0: along the axes. NULL: all of them are */
     uz_mesh mesh;
     uz_mesh_info info; /* as uz_scene_to_qp gives it; its xyz is the mesh's own array */
@@ -119,6 +121,7 @@ void uz_body_side(uz_side *side, double xyz[3 * UZ_FACE_NODES], int64_t node[UZ_
 
 typedef enum {
     UZ_BODY_SUPPORTED, /* by supports and springs alone */
+    UZ_BODY_CELLS,     /* likewise; K is not assembled where it can be told by `brick` */
     /* by obstacles, too: K is then singular and has `modes` for null space. Refuses with UZ_ERR_FREE_BODY only what no
      * obstacle stands in the way of; whether the load presses the body on is the load's matter */
     UZ_BODY_HELD,
@@ -129,6 +132,8 @@ typedef enum {
  * Errors: UZ_ERR_SCENE, _FREE_BODY, _NOT_FINITE, _MEMORY. */
 uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_body_extent extent, uz_error *err);
 void uz_body_model_clear(uz_body_model *model);
+/* K and K_fixed of a brick after all. */
+uz_status uz_body_model_assemble(uz_body_model *model, uz_error *err);
 /* The same body with its contacts found where it has been displaced by scene->place: gaps, normals and what faces what
  * are those there, and rows and gaps are linear about it, so that they are exact for a body that stays there. K, dofs
  * and frames are those of `model`, which has to outlive *out and must be at no place itself. Matrices of an outline

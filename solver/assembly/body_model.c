@@ -66,6 +66,7 @@ void uz_body_model_clear(uz_body_model *model)
         uz_mesh_clear(&model->mesh);
         uz_csc_clear(&model->K);
         uz_csc_clear(&model->K_fixed);
+        free(model->brick);
         free(model->dof);
         free(model->frame_of);
         free(model->modes);
@@ -84,7 +85,7 @@ size_t uz_body_model_bytes(const uz_body_model *model)
     size_t bytes = uz_csc_bytes(&model->N) + rows * 8 * (5 + dim + (model->row_ends ? 2 : 0));
     bytes += model->place ? 8 * nodes * dim : 0;
     if (!model->is_place) {
-        bytes += uz_csc_bytes(&model->K) + uz_csc_bytes(&model->K_fixed);
+        bytes += uz_csc_bytes(&model->K) + uz_csc_bytes(&model->K_fixed) + (model->brick ? sizeof *model->brick : 0);
         bytes += nodes * 8 * (2 * dim + (model->frame_of ? 1 : 0) + (model->spring ? dim : 0));
         bytes +=
             8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
@@ -119,7 +120,8 @@ static uz_status displace(uz_body_model *model, const uz_body_model *rest, const
 
 uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_body_extent extent, uz_error *err)
 {
-    const bool held = extent != UZ_BODY_SUPPORTED;
+    const bool held = extent != UZ_BODY_SUPPORTED && extent != UZ_BODY_CELLS;
+    bool by_cells = false;
     memset(model, 0, sizeof *model);
     uz_status status = uz_mesh_from_scene(&model->mesh, scene, err);
     if (status == UZ_OK)
@@ -154,11 +156,21 @@ uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_bo
         status = uz_build_contact_rows(model, scene, err);
     if (status == UZ_OK && held)
         status = uz_rigid_modes(&model->modes, &model->n_modes, model, err);
-    if (status == UZ_OK && extent != UZ_BODY_OUTLINE)
+    if (status == UZ_OK && extent == UZ_BODY_CELLS)
+        status = uz_build_cells(&by_cells, model, scene, err);
+    if (status == UZ_OK && extent != UZ_BODY_OUTLINE && !by_cells)
         status = uz_build_stiffness(model, err);
     if (status != UZ_OK)
         uz_body_model_clear(model);
     return status;
+}
+
+uz_status uz_body_model_assemble(uz_body_model *model, uz_error *err)
+{
+    uz_csc_clear(&model->K);
+    free(model->brick);
+    model->brick = NULL;
+    return uz_build_stiffness(model, err);
 }
 
 uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, const uz_scene *scene, uz_error *err)
@@ -207,9 +219,13 @@ uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_
         status = uz_nodal_loads(f, model, scene, err);
     if (status == UZ_OK) {
         uz_gather_nodal(p, model, f);
-        uz_csc_gaxpy(p, &model->K_fixed, -1, prescribed);
-        status = check_finite(p, model->d, "/loads", err);
+        if (!model->brick)
+            uz_csc_gaxpy(p, &model->K_fixed, -1, prescribed);
+        else if (uz_is_moved(model, prescribed))
+            status = uz_brick_subtract_moved(p, model->brick, prescribed, err);
     }
+    if (status == UZ_OK)
+        status = check_finite(p, model->d, "/loads", err);
     free(own);
     free(f);
     return status;

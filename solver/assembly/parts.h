@@ -3,6 +3,7 @@
 #define UZ_ASSEMBLY_PARTS_H
 
 #include "assembly/assembly.h"
+#include "brick/brick.h"
 
 /* Unit vectors that differ less from the span of others add nothing to it. */
 #define UZ_DEPENDENT 1e-9
@@ -87,6 +88,8 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
 uz_status uz_build_pattern(uz_body_model *model, uz_error *err);
 /* mesh, dof, frames, materials, spring -> K, K_fixed. */
 uz_status uz_build_stiffness(uz_body_model *model, uz_error *err);
+/* K's diagonal and `brick`, where the body is one whose rows bound a dof each (*made); else nothing. */
+uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* Refuses what uz_build_stiffness would refuse. */
 uz_status uz_check_elements(const uz_body_model *model, uz_error *err);
 

@@ -50,7 +50,8 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, const double 
     c->u_b = uz_alloc(c->n_b, sizeof(double));
     c->weight_b = uz_alloc(c->n_b, sizeof(double));
     c->res.weight = c->weight;
-    c->sums.terms = in->terms > 0 ? in->terms : uz_most_terms(in->K, in->N);
+    c->res.brick = in->brick;
+    c->sums.terms = in->terms > 0 ? in->terms : uz_most_terms(in->K, in->brick, in->N);
     ok = ok && c->c && c->u_b && c->weight_b && c->sums.terms > 0;
     if (!ok || !uz_feasible_init(&c->feasible, &c->Nt, c->weight_b))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->d);

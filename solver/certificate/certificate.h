@@ -16,6 +16,7 @@
 #ifndef UZ_CERTIFICATE_H
 #define UZ_CERTIFICATE_H
 
+#include "brick/cells.h"
 #include "certificate/bound.h"
 #include "uzawa.h"
 
@@ -29,7 +30,8 @@ typedef uz_status (*uz_measure_doubt)(void *ctx, double *doubt, uz_error *err);
 enum { UZ_CERTIFY_SPARES = 20000 };
 
 typedef struct {
-    const uz_csc *K, *N; /* lower triangle; m x d */
+    const uz_csc *K, *N;   /* lower triangle; m x d */
+    const uz_brick *brick; /* what K is, of which only the diagonal is there then; NULL: K has its entries */
     const double *p, *h;
     uz_inverse_norm inverse_norm;
     uz_measure_doubt measure_doubt; /* asked where inverse_bound says that it may matter to what is sharp; NULL: there

@@ -121,7 +121,7 @@ uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_certify_inp
     if (ok) {
         for (int64_t j = 0; j < d; j++)
             c->weight[j] = uz_dof_weight(K, j);
-        c->in.terms = in->terms > 0 ? in->terms : uz_most_terms(K, N);
+        c->in.terms = in->terms > 0 ? in->terms : uz_most_terms(K, NULL, N);
         ok = c->in.terms > 0;
         c->steepest = N->rows > 0 ? uz_bound_largest(N->val, N->ptr[N->cols]) : 0.0;
         status = compress(c, err);

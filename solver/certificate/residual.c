@@ -4,6 +4,7 @@
  * runs, and what is done to a run is done in lanes. Sums in lanes are double-double too, and are added up as such. */
 #include "certificate/residual.h"
 
+#include "certificate/brick_product.h"
 #include "certificate/double_double.h"
 #include "core/alloc.h"
 #include "core/cpu.h"
@@ -277,11 +278,9 @@ static inline __attribute__((always_inline)) void finish_four(const uz_residuals
     AT(four, out->Ku + j) = Ku;
 }
 
-static inline __attribute__((always_inline)) void run(const uz_residuals *out, const product_of *q, const uz_csc *N,
-                                                      const double *p, const double *r, int fused)
+static inline __attribute__((always_inline)) void multiply(const product_of *q, int fused)
 {
-    const int64_t d = q->A->cols;
-    for (int64_t j = 0; j < d; j++) {
+    for (int64_t j = 0; j < q->A->cols; j++) {
         prepare_column(q, j);
         if (is_pair(q->A, j)) {
             prepare_column(q, j + 1);
@@ -290,19 +289,39 @@ static inline __attribute__((always_inline)) void run(const uz_residuals *out, c
             take_column(q, j, fused);
         }
     }
-    for (int64_t j = 0; j < d;)
-        if (j + 4 <= d && N->ptr[j + 4] == N->ptr[j]) {
-            finish_four(out, j, q->lo, p);
+}
+
+UZ_AVX2_FMA static void multiply_fused(const product_of *q)
+{
+    multiply(q, 1);
+}
+
+static void multiply_split(const product_of *q)
+{
+    multiply(q, 0);
+}
+
+static inline __attribute__((always_inline)) void finish(const uz_residuals *out, const double *lo, const uz_csc *N,
+                                                         const double *p, const double *r)
+{
+    for (int64_t j = 0; j < N->cols;)
+        if (j + 4 <= N->cols && N->ptr[j + 4] == N->ptr[j]) {
+            finish_four(out, j, lo, p);
             j += 4;
         } else {
-            finish_row(out, j++, q->lo, N, p, r);
+            finish_row(out, j++, lo, N, p, r);
         }
 }
 
-UZ_AVX2_FMA static void run_fused(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p,
-                                  const double *r)
+UZ_AVX2_FMA static void finish_wide(const uz_residuals *out, const double *lo, const uz_csc *N, const double *p,
+                                    const double *r)
 {
-    run(out, q, N, p, r, 1);
+    finish(out, lo, N, p, r);
+}
+
+static void finish_narrow(const uz_residuals *out, const double *lo, const uz_csc *N, const double *p, const double *r)
+{
+    finish(out, lo, N, p, r);
 }
 
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
@@ -320,12 +339,17 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
         product.first++;
     while (product.last >= 0 && c[product.last] == 0.0)
         product.last--;
-    if (uz_cpu_has_avx2_fma())
-        run_fused(out, &product, N, p, r);
-    else
-        run(out, &product, N, p, r, 0);
+    uz_status status = UZ_OK;
+    if (out->brick) {
+        for (int64_t j = 0; out->weight && j < d; j++)
+            out->weight[j] = uz_dof_weight(K, j);
+        status = uz_brick_precise_product(out->Ku, lo, out->Kc, out->brick, u, c, err);
+    } else {
+        (uz_cpu_has_avx2_fma() ? multiply_fused : multiply_split)(&product);
+    }
+    (uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow)(out, lo, N, p, r);
     free(lo);
-    return UZ_OK;
+    return status;
 }
 
 double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double *u, const double *c)
@@ -339,14 +363,15 @@ double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double 
     return sum.hi + sum.lo;
 }
 
-int64_t uz_most_terms(const uz_csc *K, const uz_csc *N)
+int64_t uz_most_terms(const uz_csc *K, const uz_brick *brick, const uz_csc *N)
 {
     const int64_t room = K->rows > N->rows ? K->rows : N->rows;
     int64_t most = 1, *count = uz_alloc_zero(room, sizeof *count);
     if (!count)
         return -1;
     for (int64_t j = 0; j < K->cols; j++) {
-        count[j] += K->ptr[j + 1] - K->ptr[j] + (N->ptr ? N->ptr[j + 1] - N->ptr[j] : 0);
+        const int64_t own = brick ? UZ_BRICK_NODES * UZ_BRICK_DOFS : K->ptr[j + 1] - K->ptr[j];
+        count[j] += own + (N->ptr ? N->ptr[j + 1] - N->ptr[j] : 0);
         for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
             count[K->idx[k]] += K->idx[k] != j;
     }

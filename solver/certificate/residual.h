@@ -2,19 +2,22 @@
 #ifndef UZ_RESIDUAL_H
 #define UZ_RESIDUAL_H
 
+#include "brick/cells.h"
 #include "uzawa.h"
 
 /* One pass over K (rows ascending in each column) for v = u + c: e (d) = K v - p - N'r and e_u (d) = K u - p - N'r; Ku
  * and Kc (d) in passing. K is the lower triangle; c is small beside u and enters in double precision. */
 typedef struct {
     double *e, *e_u, *Ku, *Kc;
-    double *weight; /* d: uz_dof_weight of each, in passing; NULL: not wanted */
+    double *weight;        /* d: uz_dof_weight of each, in passing; NULL: not wanted */
+    const uz_brick *brick; /* what K is, of which only the diagonal is there then; NULL: K has its entries */
 } uz_residuals;
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
                                   const double *c, const double *r, uz_error *err);
 
-/* The most terms that an entry of e, or a gap of u + c, is the sum of; -1: no memory. K: lower triangle. */
-int64_t uz_most_terms(const uz_csc *K, const uz_csc *N);
+/* The most terms that an entry of e, or a gap of u + c, is the sum of; -1: no memory. K: lower triangle; brick: as
+ * above, or NULL. */
+int64_t uz_most_terms(const uz_csc *K, const uz_brick *brick, const uz_csc *N);
 
 /* 1 / K_jj; 1 where that is not positive. */
 static inline double uz_dof_weight(const uz_csc *K, int64_t j)

@@ -84,9 +84,35 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
     return true;
 }
 
-/* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to. */
-void uz_bounded_balance(uz_bounded *box, const uz_csc *K)
+/* Of the magnitudes of a row of K the largest share that its diagonal has not: an element of three dimensions has four
+ * times its diagonal. */
+#define ROW_SUM 4.0
+
+/* Where K has its diagonal only: the force by its product, and for size what a row of a mesh of equal cells may add up
+ * to with the largest displacement that there is. */
+static void balance_by_product(const uz_sparse_load *x)
 {
+    uz_bounded *box = x->box;
+    const uz_csc *K = x->load.K;
+    double largest = 0.0;
+    uz_sparse_multiply(&x->load, box->force, box->u);
+    for (int64_t j = 0; j < K->cols; j++)
+        largest = fabs(box->u[j]) > largest ? fabs(box->u[j]) : largest;
+    for (int64_t j = 0; j < K->cols; j++) {
+        box->force[j] -= box->p[j];
+        box->size[j] = fabs(box->p[j]) + ROW_SUM * K->val[K->ptr[j]] * largest;
+    }
+}
+
+/* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to. */
+void uz_bounded_balance(const uz_sparse_load *x)
+{
+    uz_bounded *box = x->box;
+    const uz_csc *K = x->load.K;
+    if (!uz_sparse_has_entries(x->load.dual)) {
+        balance_by_product(x);
+        return;
+    }
     for (int64_t j = 0; j < K->cols; j++) {
         box->force[j] = -box->p[j];
         box->size[j] = fabs(box->p[j]);
@@ -336,7 +362,7 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
     const uz_csc *K = load->K;
     uz_bounded *box = x->box;
     region near;
-    if (!box || box->contradictory)
+    if (!box || box->contradictory || !uz_sparse_has_entries(load->dual)) /* sweeps go by the entries of K */
         return false;
     /* The energy only falls, so the points converge to the solution whatever the exact steps do. */
     const bool there = approach(box, K, box->has_exact ? box->u : x->base, x->work);

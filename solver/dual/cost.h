@@ -12,6 +12,7 @@ typedef struct {
     int64_t n_entries; /* of N */
     int modes;         /* of the near-null space */
     bool bounds;       /* the active set is to solve with the free dofs only */
+    double by_cells;   /* bytes of a multigrid on equal cells, where K has its diagonal only; else 0 */
     int64_t cases;     /* loads on the body */
 } uz_cost_size;
 

@@ -95,6 +95,18 @@ void uz_sparse_unload(uz_sparse_load *x)
     free(box);
 }
 
+void uz_sparse_multiply(const uz_dual_load *load, double *y, const double *x)
+{
+    uz_multigrid_room *room = ((const uz_sparse_load *)load)->room;
+    if (room) {
+        const uz_multigrid *mg = load->dual->amg->mg;
+        mg->kind->multiply(mg, load->K, room, y, x);
+        return;
+    }
+    memset(y, 0, (size_t)load->dual->d * sizeof *y);
+    uz_csc_symv(y, load->K, 1.0, x);
+}
+
 enum { MAX_SWEEPS = 60 };
 
 static double column_dot(const uz_csc *Nt, int64_t i, const double *x)
@@ -143,8 +155,7 @@ uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r,
     }
     for (int64_t i = 0; i < dual->m; i++)
         complementarity -= r[i] * fmax(0.0, g[i] - Nc[i]);
-    memset(Kc, 0, (size_t)dual->d * sizeof *Kc);
-    uz_csc_symv(Kc, x->load.K, 1.0, c);
+    uz_sparse_multiply(load, Kc, c);
     for (int64_t j = 0; j < dual->d; j++)
         square += c[j] * Kc[j];
     double distance = sqrt(fmax(0.0, square)) + x->slack;

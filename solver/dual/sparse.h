@@ -36,12 +36,13 @@ typedef struct {
 /* Corrections are c (d). */
 typedef struct {
     uz_dual_load load;
-    double *base;         /* d: u0 = K^-1 p */
-    double *response;     /* d: K^-1 N'r of the last apply */
-    double *work, *work2; /* max(d, m) each */
-    double *weight;       /* d: 1 / K_ii: the metric in which penetrating rows are lifted */
-    double slack;         /* how far u(r) is from what the last apply or solve_active left, in the energy norm */
-    uz_bounded *box;      /* with bounds, else NULL */
+    double *base;            /* d: u0 = K^-1 p */
+    double *response;        /* d: K^-1 N'r of the last apply */
+    double *work, *work2;    /* max(d, m) each */
+    double *weight;          /* d: 1 / K_ii: the metric in which penetrating rows are lifted */
+    double slack;            /* how far u(r) is from what the last apply or solve_active left, in the energy norm */
+    uz_bounded *box;         /* with bounds, else NULL */
+    uz_multigrid_room *room; /* the form's, who frees it; NULL: it has none */
 } uz_sparse_load;
 
 /* Operations, or most of them: create, clear; load: with a base of zeros, and then from the base. */
@@ -57,11 +58,19 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active);
 /* x->box, once base, h and g0 are there. */
 uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const double *p, uz_error *err);
 
+/* Does load->K have its entries, or its diagonal only? */
+static inline bool uz_sparse_has_entries(const uz_dual *dual)
+{
+    return !dual->amg || !dual->amg->mg->knows_K;
+}
+/* y (d) = K x, by whatever the operator has of K. */
+void uz_sparse_multiply(const uz_dual_load *load, double *y, const double *x);
+
 /* Steps of solve_active: holds the dofs of the active rows at their bounds, the others at 0 or where they were (keep);
  * false: the bounds contradict each other. force = K u - p and size = |K| |u| + |p|, what its rounding is in proportion
  * to; r from what holds the dofs, `active` the rows that do; the gaps. */
 bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep);
-void uz_bounded_balance(uz_bounded *box, const uz_csc *K);
+void uz_bounded_balance(const uz_sparse_load *x);
 void uz_bounded_react(const uz_sparse_load *x, double *g, bool *active);
 /* y (m): the ray of two bounds on one dof that cross; false, y untouched: none do. */
 bool uz_bounded_crossed(const uz_sparse_load *x, double *y);

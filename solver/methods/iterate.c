@@ -113,14 +113,16 @@ uz_status uz_iterate_take(uz_iterate *it, const double *r, const double *g, uz_d
         it->Dr[i] = g0[i] - g[i];
     }
     it->law->kind->project(it->law, it->r, it->m);
-    uz_status status = admissible ? UZ_OK : uz_dual_load_apply(load, it->Dr, it->r, err);
+    /* Where D r takes a solve, a guess that is wrong is not bounded: the next one is as near. */
+    const bool passed = !admissible && !load->dual->can->exact;
+    uz_status status = admissible || passed ? UZ_OK : uz_dual_load_apply(load, it->Dr, it->r, err);
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
     memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     it->tau = 1.0;
     it->step_norm = NAN;
     it->fresh = false;
     it->iteration++;
-    return status == UZ_OK ? uz_iterate_bound(it, load, by, err) : status;
+    return status == UZ_OK && !passed ? uz_iterate_bound(it, load, by, err) : status;
 }
 
 uz_status uz_iterate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,

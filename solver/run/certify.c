@@ -82,6 +82,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         return status;
     *input = (uz_certify_input){
         .K = K,
+        .brick = setup->model.brick,
         .N = all_rows ? uz_setup_all_rows(setup, asked->problem) : uz_setup_N(setup, asked->problem),
         .p = run->load.p,
         .h = all_rows ? run->load.h_all : run->load.h,

@@ -112,8 +112,8 @@ double uz_cost_analysis_bytes(const uz_cost_size *size)
     return matrix_bytes(size) + 20.0 * (double)size->k_entries + 130.0 * (double)size->d;
 }
 
-uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, int64_t n_b, int dim, int64_t cases,
-                             const uz_settings *settings)
+uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_brick *brick, int64_t n_b, int dim,
+                             int64_t cases, const uz_settings *settings)
 {
     const bool by_auto = settings->method == UZ_METHOD_AUTO && settings->stopping == UZ_STOP_CERTIFIED;
     const bool by_active_set = by_auto || settings->method == UZ_METHOD_ACTIVE_SET;
@@ -124,6 +124,7 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, int64_t n_b, int 
                           .n_entries = N->ptr[N->cols],
                           .modes = dim == 3 ? 6 : 3,
                           .bounds = by_active_set && uz_dual_bounds_dofs(N),
+                          .by_cells = brick ? uz_brick_predict_bytes(brick) : 0.0,
                           .cases = cases};
 }
 

@@ -1,5 +1,6 @@
 /* operator.c: which form of the operator a setup gets, and the making of it: a factor, or a multigrid in its place. */
 #include "run/setup.h"
+#include "brick/brick.h"
 #include "dual/form.h"
 #include "core/alloc.h"
 #include "core/clock.h"
@@ -92,15 +93,23 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
 {
     uz_setup *setup = m->setup;
     const uz_cost_plan *plan = &setup->plan;
-    const bool choice = m->asked == UZ_OPERATOR_AUTO && plan->count > 1 && plan->form[0].fits;
+    const bool choice = m->asked == UZ_OPERATOR_AUTO && (setup->model.brick || (plan->count > 1 && plan->form[0].fits));
     double limit = (double)m->settings->memory_limit, budget = 0.0;
     uz_modes modes;
     if (m->settings->memory_limit > 0)
         budget = uz_amg_predict_bytes(m->size.d, m->size.k_entries, m->size.modes) +
                  fmax(0.0, limit - plan->form[plan->chosen].bytes);
-    uz_status status = find_modes(&modes, setup, m->K, err);
-    if (status == UZ_OK)
-        status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, m->hooks, err);
+    uz_status status = UZ_OK;
+    if (setup->model.brick) {
+        uz_multigrid *mg = NULL;
+        status = uz_brick_multigrid(&mg, setup->model.brick, (size_t)budget, err);
+        if (status == UZ_OK)
+            status = uz_amg_of(&setup->amg, mg, m->K, m->hooks, err);
+    } else {
+        status = find_modes(&modes, setup, m->K, err);
+        if (status == UZ_OK)
+            status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, m->hooks, err);
+    }
     if (status == UZ_OK)
         status = make_dual(m, plan->form[plan->chosen].op, err);
     *regretted = choice && (status == UZ_OK ? setup->amg->info.lambda < LAMBDA_LEAST : status == UZ_ERR_NOT_SPD);
@@ -111,7 +120,7 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
     setup->dual = NULL;
     setup->amg = NULL;
     uz_error_reset(err);
-    return UZ_OK;
+    return setup->model.brick ? uz_body_model_assemble(&setup->model, err) : UZ_OK;
 }
 
 enum { TRIES = 4 };
@@ -131,7 +140,7 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
         return status;
     if (!base->factor)
         return make_dual(&m, base->dual->can->op, err);
-    m.size = uz_cost_size_of(m.K, m.N, n_b, setup->model.mesh.dim, 0, settings);
+    m.size = uz_cost_size_of(m.K, m.N, NULL, n_b, setup->model.mesh.dim, 0, settings);
     const uz_factor_info there = uz_factor_describe(base->factor);
     const uz_operator direct = uz_dual_choose(m.N, n_b, settings->op);
     uz_cost_decide(&setup->plan, &m.size, &there, direct, settings->op, settings->memory_limit);
@@ -159,9 +168,10 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, m.N, err);
     if (status != UZ_OK)
         return status;
-    m.size = uz_cost_size_of(m.K, m.N, n_b, setup->is_scene ? setup->model.mesh.dim : 0, problem->n_cases, settings);
-    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor,
-               no_factor = free_asked || (limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit);
+    m.size = uz_cost_size_of(m.K, m.N, setup->model.brick, n_b, setup->is_scene ? setup->model.mesh.dim : 0,
+                             problem->n_cases, settings);
+    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor;
+    bool no_factor = free_asked || setup->model.brick || (limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit);
     m.direct = uz_dual_choose(m.N, n_b, free_asked ? UZ_OPERATOR_AUTO : settings->op);
     bool done = false;
     for (int k = 0; status == UZ_OK && !done && k < TRIES; k++) {
@@ -187,6 +197,11 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
             status = precondition(&m, &regretted, err);
             done = !regretted;
             m.asked = regretted ? m.direct : m.asked;
+            if (regretted && m.size.by_cells > 0.0) { /* K is there now, and nobody has its digest */
+                m.size = uz_cost_size_of(m.K, m.N, NULL, n_b, 3, problem->n_cases, settings);
+                no_factor = limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit;
+                cache = NULL;
+            }
         } else {
             m.direct = plan->form[plan->chosen].op;
         }

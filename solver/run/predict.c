@@ -1,4 +1,5 @@
 /* predict.c: what a solve will take, from the pattern of its matrices: nothing is factored. */
+#include "core/alloc.h"
 #include "core/error.h"
 #include "dual/form.h"
 #include "run/cost.h"
@@ -6,13 +7,14 @@
 #include "factor/factor.h"
 #include "run/rows.h"
 #include "run/settings.h"
+#include "run/setup.h"
 #include "uzawa.h"
 
 #include <stdlib.h>
 
 /* The form and what it takes, of K and N; the analysis of a factor where there is to be one. */
-static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, int dim, int64_t cases,
-                         const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
+static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, const uz_brick *brick, int dim,
+                         int64_t cases, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
     const size_t limit = settings->memory_limit;
     const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor;
@@ -22,8 +24,8 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, i
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, N, err);
     if (status != UZ_OK)
         return status;
-    const uz_cost_size size = uz_cost_size_of(K, N, n_b, dim, cases, settings);
-    const bool no_factor = free_asked || (limit > 0 && uz_cost_analysis_bytes(&size) > (double)limit);
+    const uz_cost_size size = uz_cost_size_of(K, N, brick, n_b, dim, cases, settings);
+    const bool no_factor = free_asked || brick || (limit > 0 && uz_cost_analysis_bytes(&size) > (double)limit);
     const uz_operator form = uz_dual_choose(N, n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
     if (no_factor) {
         uz_cost_decide(&plan, &size, NULL, form, settings->op, limit);
@@ -51,39 +53,50 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, i
     return UZ_OK;
 }
 
+/* N of a scene with the rows that its solve begins with; *all: how many there are. */
+static uz_status find_rows(uz_csc *N, int64_t *all, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    uz_candidates rows = {0};
+    double *p = uz_alloc(model->d, sizeof *p), *h = uz_alloc(model->m, sizeof *h);
+    uz_status status = p && h ? uz_body_model_load(p, h, NULL, model, scene, err)
+                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld loads", (long long)model->d);
+    *all = model->m;
+    if (status == UZ_OK)
+        status = uz_choose_rows(&rows, h, model->m, &model->info, scene, NULL, err);
+    if (status == UZ_OK)
+        status = rows.in ? uz_candidates_reduce(N, &model->N, &rows, err) : uz_csc_copy(N, &model->N, err);
+    uz_candidates_clear(&rows);
+    free(p);
+    free(h);
+    return status;
+}
+
 uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                      uz_error *err)
 {
-    uz_qp made = {.p = NULL};
-    const uz_qp *qp = &problem->qp;
-    bool scene = problem->kind == UZ_PROBLEM_SCENE;
+    const bool scene = problem->kind == UZ_PROBLEM_SCENE;
     *out = (uz_prediction){.d = 0};
     uz_status status = uz_check_settings(settings, err);
-    int64_t m = problem->qp.N.rows;
     if (status == UZ_OK && scene) {
-        /* the matrices of a scene with the rows that its solve begins with */
-        uz_mesh_info info = {0};
-        uz_candidates rows = {0};
+        uz_body_model model;
         uz_csc N = {0};
-        status = uz_scene_to_qp(&made, &info, &problem->scene, err);
-        m = made.N.rows;
+        int64_t m = 0;
+        uz_error_reset(err);
+        status = uz_body_model_build(&model, &problem->scene, uz_setup_extent(problem, settings), err);
         if (status == UZ_OK)
-            status = uz_choose_rows(&rows, made.h, m, &info, &problem->scene, NULL, err);
-        if (status == UZ_OK && rows.in) {
-            status = uz_candidates_reduce(&N, &made.N, &rows, err);
-            uz_csc_clear(&made.N);
-            made.N = N;
+            status = find_rows(&N, &m, &model, &problem->scene, err);
+        if (status == UZ_OK) {
+            out->d = model.d;
+            out->m = m;
+            status =
+                predict(out, &model.K, &N, model.brick, problem->scene.box.dim, problem->n_cases, settings, hooks, err);
         }
-        uz_candidates_clear(&rows);
-        uz_mesh_info_clear(&info);
-        qp = &made;
+        uz_csc_clear(&N);
+        uz_body_model_clear(&model);
+    } else if (status == UZ_OK) {
+        out->d = problem->qp.K.cols;
+        out->m = problem->qp.N.rows;
+        status = predict(out, &problem->qp.K, &problem->qp.N, NULL, 0, problem->n_cases, settings, hooks, err);
     }
-    if (status == UZ_OK) {
-        out->d = qp->K.cols;
-        out->m = m;
-        status =
-            predict(out, &qp->K, &qp->N, scene ? problem->scene.box.dim : 0, problem->n_cases, settings, hooks, err);
-    }
-    uz_qp_clear(&made);
     return status;
 }

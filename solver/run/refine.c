@@ -128,7 +128,7 @@ static bool is_worth_it(const uz_run *run)
 
 uz_status uz_run_refine(uz_run *run, uz_error *err)
 {
-    refinement x = {.run = run};
+    refinement x = {.run = run, .res.brick = run->asked->setup->model.brick};
     double **of_d[] = {&x.res.e, &x.res.e_u, &x.res.Ku, &x.res.Kc, &x.zero, &x.e, &x.c};
     double **of_m[] = {&x.f, &x.s, &x.r, &x.g, &x.ray};
     bool ok = true;

@@ -8,12 +8,53 @@
 #include "core/digest.h"
 #include "core/error.h"
 #include "core/lock.h"
+#include "dual/form.h"
 #include "linalg/linalg.h"
 #include "run/rows.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Cubes of this many dofs are solved by their cells in the time that a factor of them takes, and larger ones in less.
+ */
+#define MANY_DOFS 2e4
+
+static bool is_along_axis(const double n[3])
+{
+    return (n[0] != 0.0) + (n[1] != 0.0) + (n[2] != 0.0) == 1;
+}
+
+/* A box of equal hex8 whose supports and obstacles are along the axes, as far as the scene itself tells. */
+static bool has_cells(const uz_scene *scene)
+{
+    const uz_box *box = &scene->box;
+    bool has = scene->source == UZ_MESH_BOX && scene->model == UZ_SOLID && scene->n_materials == 1 && !scene->place &&
+               !box->automatic && strncmp(box->element, "hex8", sizeof box->element) == 0;
+    for (int c = 0; has && c < 3; c++)
+        has = box->grading[c] == 0.0 || box->grading[c] == 1.0;
+    for (int64_t i = 0; has && i < scene->n_supports; i++)
+        has = scene->supports[i].kind == UZ_SUPPORT_COMPONENTS ||
+              (scene->supports[i].kind == UZ_SUPPORT_NORMAL && is_along_axis(scene->supports[i].normal));
+    for (int64_t k = 0; has && k < scene->n_contacts; k++)
+        has = scene->contacts[k].kind == UZ_OBSTACLE_PLANE && is_along_axis(scene->contacts[k].normal);
+    return has;
+}
+
+uz_body_extent uz_setup_extent(const uz_problem *problem, const uz_settings *settings)
+{
+    const uz_scene *scene = &problem->scene;
+    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor,
+               by_auto = settings->op == UZ_OPERATOR_AUTO && settings->method == UZ_METHOD_AUTO &&
+                         settings->stopping == UZ_STOP_CERTIFIED;
+    if (!(free_asked || by_auto) || problem->kind != UZ_PROBLEM_SCENE || problem->n_quantities > 0 ||
+        scene->kinematics == UZ_KINEMATICS_MOVING || !has_cells(scene))
+        return UZ_BODY_SUPPORTED;
+    double dofs = 3.0;
+    for (int c = 0; c < 3; c++)
+        dofs *= (double)scene->box.cells[c] + 1.0;
+    return free_asked || dofs >= MANY_DOFS ? UZ_BODY_CELLS : UZ_BODY_SUPPORTED;
+}
 
 uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz_candidates *wanted,
                           const uz_settings *settings, uz_error *err)
@@ -22,7 +63,8 @@ uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz
     uz_digest *state = uz_digest_new();
     if (!state)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
-    int choices[3] = {(int)problem->kind, (int)settings->op, (int)settings->ordering};
+    const int choices[] = {(int)problem->kind, (int)settings->op, (int)settings->ordering,
+                           (int)uz_setup_extent(problem, settings)};
     uz_status status = UZ_OK;
     uz_digest_add(state, choices, sizeof choices);
     uz_digest_add(state, &settings->memory_limit, sizeof settings->memory_limit);
@@ -86,7 +128,8 @@ static uz_status refuse_large_box(const uz_problem *problem, const uz_settings *
         nodes *= (double)box->cells[axis] + 1.0;
         entries *= 3.0; /* a node and its neighbours in a row */
     }
-    double dofs = nodes * box->dim, least = dofs * (8.0 * (entries * box->dim) + 200.0);
+    const bool by_cells = uz_setup_extent(problem, settings) == UZ_BODY_CELLS;
+    double dofs = nodes * box->dim, least = dofs * (by_cells ? 250.0 : 8.0 * (entries * box->dim) + 200.0);
     if (least <= (double)settings->memory_limit)
         return UZ_OK;
     return uz_fail(err, UZ_ERR_LIMIT, "/mesh",
@@ -140,12 +183,12 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
     if (setup->is_scene)
         status = refuse_large_box(problem, settings, err);
     if (status == UZ_OK && setup->is_scene)
-        status = uz_body_model_build(&setup->model, &problem->scene, UZ_BODY_SUPPORTED, err);
+        status = uz_body_model_build(&setup->model, &problem->scene, uz_setup_extent(problem, settings), err);
     else if (status == UZ_OK && problem->qp.N.rows == 0) /* N may come as a zeroed struct */
         status = uz_csc_init(&setup->no_rows, 0, problem->qp.K.cols, 0, err);
     setup->law = setup->is_scene ? setup->model.law : &uz_law_frictionless;
     if (status == UZ_OK)
-        setup->terms = uz_most_terms(uz_setup_K(setup, problem), uz_setup_all_rows(setup, problem));
+        setup->terms = uz_most_terms(uz_setup_K(setup, problem), setup->model.brick, uz_setup_all_rows(setup, problem));
     setup->assemble_s = uz_seconds() - start;
     if (status == UZ_OK && setup->is_scene && uz_may_omit_rows(problem))
         status = choose_rows(setup, &problem->scene, wanted, err);
@@ -173,7 +216,7 @@ uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *proble
     uz_status status = uz_body_model_move(&setup->model, &base->model, &problem->scene, err);
     setup->law = setup->is_scene ? setup->model.law : &uz_law_frictionless;
     if (status == UZ_OK)
-        setup->terms = uz_most_terms(uz_setup_K(setup, problem), uz_setup_all_rows(setup, problem));
+        setup->terms = uz_most_terms(uz_setup_K(setup, problem), setup->model.brick, uz_setup_all_rows(setup, problem));
     setup->assemble_s = uz_seconds() - start;
     if (status == UZ_OK && uz_may_omit_rows(problem))
         status = choose_rows(setup, &problem->scene, wanted, err);

@@ -69,6 +69,9 @@ double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, const uz_stop *s
  * bodies whose condition leaves doubts ask. UZ_ERR_NOT_SPD is not kept: nothing is solved on such a setup. */
 uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, const uz_stop *stop, uz_error *err);
 
+/* How a scene's body is built: with K assembled, or, where all that is asked of it can do without, by its cells. */
+uz_body_extent uz_setup_extent(const uz_problem *problem, const uz_settings *settings);
+
 /* Its matrices: the model's for a scene, the problem's otherwise. N has the rows it is solved with. */
 const uz_csc *uz_setup_K(const uz_setup *setup, const uz_problem *problem);
 const uz_csc *uz_setup_N(const uz_setup *setup, const uz_problem *problem);

@@ -121,7 +121,7 @@ static void check_pattern(pattern some, bool diagonal, uint64_t seed)
 {
     qp_random rng = {seed};
     double *K = vector(D * D), *N = vector(M * D), *p = vector(D), *u = vector(D), *c = vector(D), r[M];
-    uz_residuals got = {vector(D), vector(D), vector(D), vector(D), vector(D)};
+    uz_residuals got = {vector(D), vector(D), vector(D), vector(D), vector(D), NULL};
     uz_error err;
     fill(K, N, some, diagonal, &rng);
     for (int64_t i = 0; i < D; i++) {
@@ -133,7 +133,7 @@ static void check_pattern(pattern some, bool diagonal, uint64_t seed)
         r[k] = -fabs(wide(&rng));
     uz_csc lower = csc_from_dense(K, D, D, true), rows = csc_from_dense(N, M, D, false);
     CHECK_INT(uz_equilibrium_residual(&got, &lower, &rows, p, u, c, r, &err), UZ_OK);
-    check_rows(&got, K, N, p, u, c, r, uz_most_terms(&lower, &rows));
+    check_rows(&got, K, N, p, u, c, r, uz_most_terms(&lower, NULL, &rows));
     double *room[] = {K, N, p, u, c, got.e, got.e_u, got.Ku, got.Kc, got.weight};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);

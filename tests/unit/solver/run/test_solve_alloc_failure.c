@@ -136,6 +136,23 @@ static uz_problem block_problem(void)
     return problem;
 }
 
+/* A cube whose matrix is not assembled, on some grids. */
+static uz_problem cells_problem(void)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(4, 4, 4, 4)};
+    uz_scene *scene = &problem.scene;
+    scene->model = UZ_SOLID;
+    scene->box.dim = 3;
+    scene->box.size[2] = 4;
+    scene->box.cells[2] = 3;
+    snprintf(scene->box.element, sizeof scene->box.element, "hex8");
+    add_support(scene, "left", 0.01, 0);
+    scene->supports[0].u[2] = 0;
+    add_load(scene, "top", 0, -5);
+    add_plane(scene, "bottom", 0, 0, 0, 1);
+    return problem;
+}
+
 static uz_problem obstacle_problem(void)
 {
     qp_random rng = {3};
@@ -185,6 +202,7 @@ static uz_problem weak_problem(void)
 TEST(scenes)
 {
     check_scenario("scene", scene_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
+    check_scenario("cells", cells_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE, UZ_ORDERING_AUTO, true);
     check_scenario("cached scene", scene_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_CAMD, true);
     uz_problem chosen = scene_problem();
     chosen.scene.box.automatic = true;

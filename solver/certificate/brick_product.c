@@ -1,0 +1,198 @@
+/* brick_product.c: four cells of a row at a time, one in each lane. What the cells do to a node is added up in a plane
+ * of nodes, as pairs; a plane is written out once both layers of cells beside it are through. */
+#include "certificate/brick_product.h"
+
+#include "certificate/double_double.h"
+#include "core/alloc.h"
+#include "core/cpu.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+
+enum { LANES = 4, NODES = UZ_BRICK_NODES, DOFS = UZ_BRICK_DOFS };
+
+/* In the order of ke. */
+static const int CORNER[NODES][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                     {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+
+/* Planes of nodes, component by component, lines padded to whole lanes and one more. */
+typedef struct {
+    const uz_brick *brick;
+    int64_t stride, plane;
+    double *x[2], *hi[2], *lo[2]; /* of the nodes below and above a layer of cells */
+} planes;
+
+static bool make(planes *w, const uz_brick *brick)
+{
+    *w = (planes){.brick = brick, .stride = (brick->cells[0] / LANES + 2) * LANES};
+    w->plane = w->stride * (brick->cells[1] + 1);
+    bool ok = true;
+    for (int k = 0; k < 2; k++) {
+        double **all[] = {&w->x[k], &w->hi[k], &w->lo[k]};
+        for (int i = 0; i < 3; i++)
+            ok = (*all[i] = uz_alloc_zero(3 * w->plane + LANES, sizeof(double))) && ok;
+    }
+    return ok;
+}
+
+static void clear(planes *w)
+{
+    for (int k = 0; k < 2; k++) {
+        free(w->x[k]);
+        free(w->hi[k]);
+        free(w->lo[k]);
+    }
+}
+
+/* Row by row, hi + lo = ke v for four cells; of these `count` are cells. */
+static inline __attribute__((always_inline)) void multiply(four *hi, four *lo, const double *ke, const four *v,
+                                                           int count, int fused)
+{
+    for (int row = 0; row < DOFS; row += 3) { /* three at a time do not wait for each other */
+        four sum[3] = {{0}}, rest[3] = {{0}};
+        for (int column = 0; column < DOFS; column++)
+            for (int r = 0; r < 3; r++) {
+                const double factor = ke[(row + r) * DOFS + column];
+                const four a = {factor, factor, factor, factor}, product = a * v[column];
+                four error = {0.0};
+                for (int l = 0; l < LANES; l++)
+                    error[l] = fused ? __builtin_fma(factor, v[column][l], -product[l])
+                                     : product_error_split(factor, v[column][l], product[l]);
+                const four next = sum[r] + product, back = next - sum[r];
+                rest[r] += ((sum[r] - (next - back)) + (product - back)) + error;
+                sum[r] = next;
+            }
+        for (int r = 0; r < 3; r++) {
+            for (int l = count; l < LANES; l++)
+                sum[r][l] = rest[r][l] = 0.0;
+            hi[row + r] = sum[r];
+            lo[row + r] = rest[r];
+        }
+    }
+}
+
+static inline __attribute__((always_inline)) void layer(const planes *w, int fused)
+{
+    const int64_t *cells = w->brick->cells;
+    for (int64_t j = 0; j < cells[1]; j++)
+        for (int64_t i = 0; i < cells[0]; i += LANES) {
+            four v[DOFS], hi[DOFS], lo[DOFS];
+            for (int row = 0; row < DOFS; row++) {
+                const int *corner = CORNER[row / 3];
+                v[row] =
+                    *(const four *)(w->x[corner[2]] + row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0]);
+            }
+            multiply(hi, lo, w->brick->ke, v, cells[0] - i < LANES ? (int)(cells[0] - i) : LANES, fused);
+            for (int row = 0; row < DOFS; row++) {
+                const int *corner = CORNER[row / 3];
+                const int64_t at = row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0];
+                four *to = (four *)(w->hi[corner[2]] + at), *low = (four *)(w->lo[corner[2]] + at);
+                const four before = *to, sum = before + hi[row], back = sum - before;
+                *low += ((before - (sum - back)) + (hi[row] - back)) + lo[row];
+                *to = sum;
+            }
+        }
+}
+
+UZ_AVX2_FMA static void layer_fused(const planes *w)
+{
+    layer(w, 1);
+}
+
+static void layer_split(const planes *w)
+{
+    layer(w, 0);
+}
+
+static void read_plane(const planes *w, double *plane, int64_t k, const double *x)
+{
+    const int64_t line = w->brick->cells[0] + 1, lines = w->brick->cells[1] + 1;
+    const int64_t *dof = w->brick->dof + 3 * line * lines * k;
+    for (int64_t j = 0; j < lines; j++)
+        for (int64_t i = 0; i < line; i++, dof += 3)
+            for (int c = 0; c < 3; c++)
+                plane[c * w->plane + j * w->stride + i] = dof[c] >= 0 ? x[dof[c]] : 0.0;
+}
+
+/* The plane's sums go to the dofs, and it begins anew. */
+static void write_plane(const planes *w, double *hi, double *lo, int64_t k)
+{
+    const int64_t line = w->brick->cells[0] + 1, lines = w->brick->cells[1] + 1;
+    const int64_t *dof = w->brick->dof + 3 * line * lines * k;
+    for (int64_t j = 0; j < lines; j++)
+        for (int64_t i = 0; i < line; i++, dof += 3)
+            for (int c = 0; c < 3; c++) {
+                const int64_t at = c * w->plane + j * w->stride + i;
+                if (dof[c] < 0)
+                    continue;
+                hi[dof[c]] = w->hi[0][at];
+                lo[dof[c]] = w->lo[0][at];
+            }
+    memset(w->hi[0], 0, (size_t)(3 * w->plane) * sizeof(double));
+    memset(w->lo[0], 0, (size_t)(3 * w->plane) * sizeof(double));
+}
+
+static void swap(double *pair[2])
+{
+    double *const first = pair[0];
+    pair[0] = pair[1];
+    pair[1] = first;
+}
+
+/* y += K c, of the cells where c is not zero. */
+static void add_sparse(double *y, const uz_brick *brick, const double *c)
+{
+    const int64_t *n = brick->cells, line = n[0] + 1, plane = line * (n[1] + 1);
+    for (int64_t k = 0; k < n[2]; k++)
+        for (int64_t j = 0; j < n[1]; j++)
+            for (int64_t i = 0; i < n[0]; i++) {
+                const int64_t *dof[DOFS];
+                double v[DOFS];
+                bool any = false;
+                for (int row = 0; row < DOFS; row++) {
+                    const int *corner = CORNER[row / 3];
+                    dof[row] =
+                        brick->dof + 3 * ((k + corner[2]) * plane + (j + corner[1]) * line + i + corner[0]) + row % 3;
+                    v[row] = *dof[row] >= 0 ? c[*dof[row]] : 0.0;
+                    any = any || v[row] != 0.0;
+                }
+                for (int row = 0; any && row < DOFS; row++) {
+                    double sum = 0.0;
+                    for (int column = 0; column < DOFS; column++)
+                        sum += brick->ke[row * DOFS + column] * v[column];
+                    if (*dof[row] >= 0)
+                        y[*dof[row]] += sum;
+                }
+            }
+}
+
+uz_status uz_brick_precise_product(double *hi, double *lo, double *y, const uz_brick *brick, const double *x,
+                                   const double *c, uz_error *err)
+{
+    void (*const of_layer)(const planes *) = uz_cpu_has_avx2_fma() ? layer_fused : layer_split;
+    planes w;
+    const bool ok = make(&w, brick);
+    bool any = false;
+    for (int64_t k = 0; ok && k <= brick->cells[2]; k++) {
+        if (k == 0)
+            read_plane(&w, w.x[0], 0, x);
+        if (k < brick->cells[2]) {
+            read_plane(&w, w.x[1], k + 1, x);
+            of_layer(&w);
+        }
+        write_plane(&w, hi, lo, k);
+        swap(w.x);
+        swap(w.hi);
+        swap(w.lo);
+    }
+    clear(&w);
+    memset(y, 0, (size_t)brick->d * sizeof *y);
+    for (int64_t j = 0; j < brick->d && !any; j++)
+        any = c[j] != 0.0;
+    if (ok && any)
+        add_sparse(y, brick, c);
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a residual of %lld dofs", (long long)brick->d);
+}
