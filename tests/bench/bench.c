@@ -267,6 +267,28 @@ static void bench_cubes(report *out)
     }
 }
 
+static void bench_boxes(report *out)
+{
+    static const int64_t sizes[] = {16, 24};
+    for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
+        bench_cells_row row;
+        char name[64];
+        if (!bench_cells(&row, sizes[k])) {
+            printf("the cube of %lld^3 cells did not converge\n", (long long)sizes[k]);
+            exit(1);
+        }
+        const bench_value values[] = {row.linear, row.aggregates, row.cached};
+        static const char *const over[] = {"", "_over_aggregates", "_cached"},
+                                 *const of[] = {"linear solve (analyse, factorise, solve)",
+                                                "the same by its matrix and aggregates",
+                                                "the same with nothing cached"};
+        for (int i = 0; i < 3; i++) {
+            snprintf(name, sizeof name, "cells_hex8_n%lld%s", (long long)sizes[k], over[i]);
+            print_row(out, name, "x", values[i], of[i]);
+        }
+    }
+}
+
 static void bench_oblique_planes(report *out)
 {
     for (int64_t nx = 300; nx <= 600; nx += 300) {
@@ -484,6 +506,8 @@ int main(int argc, char **argv)
         bench_surfaces(&out);
     if (wanted(&out, "hex8"))
         bench_cubes(&out);
+    if (wanted(&out, "cells"))
+        bench_boxes(&out);
     if (!out.filter || strncmp(out.filter, "stop", 4) == 0)
         bench_stops(&out);
     bench_assemblies(&out);

@@ -71,6 +71,12 @@ void bench_sizes(FILE *json, char **wanted, int count);
 /* Cold certified solves of the cube of n x n x n bricks, one dof in each row or (leaning) three, in units of CHOLMOD's
  * linear solve. false: no answer. */
 bool bench_hex8(bench_value *ratio, int64_t n, bool leaning);
+/* Cold solves, certified 1e-6, of a cube of n x n x n equal cells without a matrix: in units of CHOLMOD's linear solve
+ * of the same K, and of the solve by aggregates of that matrix; and of one with the body cached. */
+typedef struct {
+    bench_value linear, aggregates, cached;
+} bench_cells_row;
+bool bench_cells(bench_cells_row *row, int64_t n);
 /* 100 load cases of the paper's body with nx x nx/3 cells, certified 1e-8: their time over that of one CHOLMOD solve
  * of one right-hand side, both with the factor at hand. false: no answer. */
 bool bench_load_cases(bench_value *ratio, int64_t nx);
