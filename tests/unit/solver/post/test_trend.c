@@ -55,7 +55,7 @@ TEST(fewer_than_three_grids_tell_nothing)
     uz_trend t;
     uz_trend_fit(&t, &(uz_trend_point){1, 5}, 1, 5, 0.5);
     CHECK(isnan(t.low) && isnan(t.high) && isnan(t.order) && t.grids == 1 && strstr(t.why, "one grid"));
-    CHECK_REL(t.value, 5, 0);
+    CHECK_REL(t.value, 5.0, 0);
     const uz_trend_point unseen[] = {{1, NAN}, {0.5, NAN}}, two[] = {{1, 5}, {0.5, 5.001}};
     uz_trend_fit(&t, unseen, 2, 0, 0);
     CHECK(isnan(t.high) && t.grids == 0);
