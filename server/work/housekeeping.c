@@ -22,8 +22,7 @@ static const problem_details WAITED = {
     .detail =
         "It had not begun when its queue_limit_s was over. Submit it again, with more time or a larger priority."};
 
-/* How this daemon is, for who looks at all of them; and whether it is to claim jobs. */
-static void report(work *w)
+void housekeeping_report(work *w)
 {
     store_node now = {.pid = (int)getpid(), .workers = w->options.workers, .busy = work_busy(w)};
     size_t entries, bytes;
@@ -63,7 +62,7 @@ void *housekeeping_loop(void *arg)
             malloc_trim(0);
         work_rest_processes(w);
         if (clock_seconds(CLOCK_MONOTONIC) >= next_report) {
-            report(w);
+            housekeeping_report(w);
             next_report = clock_seconds(CLOCK_MONOTONIC) + REPORT_S;
         }
         int64_t expired = 0, total = 0, count = 1;

@@ -4,6 +4,9 @@
 
 #include "work/internal.h"
 
+/* Says how this daemon is, for who looks at all of them, and asks whether it is to claim jobs. */
+void housekeeping_report(work *w);
+
 /* The body of the thread; ends with w->finished. */
 void *housekeeping_loop(void *arg);
 

@@ -331,6 +331,7 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
         work_free(w);
         return NULL;
     }
+    housekeeping_report(w); /* nobody finds it without a name */
     s->changed = tell_change;
     s->changed_ctx = w;
     /* Signals are for the thread that waits for them; those that a fault raises in its own thread stay open. */

@@ -3,6 +3,7 @@
 #include "store_place.h"
 #include "store/engine_base.h"
 #include "store/nodes.h"
+#include "store/postgresql/schema.h"
 
 /* Two daemons: of the place, and another one. */
 typedef struct {
@@ -231,7 +232,7 @@ TEST(a_database_of_version_1_is_brought_to_the_next)
     two.b = store_open(two.p.address, message, sizeof message);
     CHECK_MSG(two.b, "%s", message);
     CHECK(postgresql_run(two.p.database, "SELECT version FROM uzawa.format", &number));
-    CHECK_INT((int)number, 2);
+    CHECK_INT((int)number, SCHEMA_VERSION);
     snprintf(sql, sizeof sql, OLD, 2); /* one of version 1 goes on */
     run_sql(&two, sql);
     CHECK(postgresql_run(two.p.database, "SELECT right(id, 1)::int FROM uzawa.claim('old', 'o', 30, false)", &number));
