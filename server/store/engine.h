@@ -25,15 +25,6 @@ typedef struct {
     bool counted;                 /* release: the attempt */
 } lease_use;
 
-/* What daemons that share a store have of each other (nodes.h). */
-typedef struct {
-    store_status (*report)(store *s, const store_node *now, bool *draining);
-    store_status (*list)(store *s, store_node **nodes, size_t *count);
-    store_status (*drain)(store *s, const char *name, bool drain);
-    store_status (*forget)(store *s, const uint64_t *bodies, size_t n); /* n > 0 */
-    store_status (*rates)(store *s, store_rate *rates, size_t n);       /* n > 0 */
-} store_engine_nodes;
-
 typedef struct {
     const char *scheme; /* how its addresses begin: "postgresql://"; "": it takes all others, as names of files */
     store *(*open)(const char *address, char *message, size_t size);

@@ -48,4 +48,13 @@ typedef struct {
 /* Adds what was used and sets the totals; with an engine of one process they stay 0. */
 store_status store_exchange_rates(store *s, store_rate *rates, size_t n);
 
+/* ---- for who writes an engine of several daemons: the same operations */
+typedef struct {
+    store_status (*report)(store *s, const store_node *now, bool *draining);
+    store_status (*list)(store *s, store_node **nodes, size_t *count);
+    store_status (*drain)(store *s, const char *name, bool drain);
+    store_status (*forget)(store *s, const uint64_t *bodies, size_t n); /* n > 0 */
+    store_status (*rates)(store *s, store_rate *rates, size_t n);       /* n > 0 */
+} store_engine_nodes;
+
 #endif
