@@ -324,9 +324,10 @@ static void print_certificate(FILE *to, const json_t *summary)
     else
         fprintf(to, "the exact %s is within %s of this one, relative, in the energy norm",
                 guaranteed ? "displacement" : "solution of these equations", client_format_bound(absolute, relative));
-    if (!guaranteed && isfinite(relative))
-        fprintf(to, isfinite(total) ? "" : "\n%11s", ""); /* what was asked for has a line of its own */
-    else if (relative > 0 && relative < 1 && digits >= 1)
+    const bool certified = !guaranteed && isfinite(relative);
+    if (certified && !isfinite(total))
+        fprintf(to, "\n%11s", ""); /* what was asked for has a line of its own */
+    else if (!certified && relative > 0 && relative < 1 && digits >= 1)
         fprintf(to, ":\n%12s%.0f digit%s %s certain", "", fmin(digits, 15), digits > 1 ? "s" : "",
                 digits > 1 ? "are" : "is");
     if (!isfinite(asked))

@@ -35,7 +35,6 @@ typedef struct {
     store_status (*use_lease)(store *s, const store_lease *lease, const lease_use *use);
     store_status (*recover)(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
     store_status (*expire)(store *s, const char *error_json, int64_t *count);
-    /* At least one limit; now: for ages. */
     store_status (*retain)(store *s, const store_retention *limits, double now, int64_t *count);
     store_status (*dismiss)(store *s, const char *id, job_status *was);
     store_status (*get)(store *s, const char *id, job *out);

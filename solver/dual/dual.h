@@ -85,7 +85,8 @@ void uz_dual_load_free(uz_dual_load *load);
 /* What the answers will be needed for, and how long that may take. Called before the methods run, and again when the
  * aim gets smaller.
  *   relative_error  in the energy norm: forms that are not exact solve no better than that (before the first call psi0
- *                   and g0 are rough, and D r is solved as for 1e-10). 0: no worse than rounding, so that iterations are those of the exact D. NaN: as before
+ *                   and g0 are rough, and D r is solved as for 1e-10). 0: no worse than rounding, so that
+ *                   iterations are those of the exact D. NaN: as before
  *   stop            asked inside long work; NULL or no call: never. Where it came, solve_active comes back unsolved,
  *                   uz_dual_load_prepare leaves D to be applied by its factors, and lambda_max is 0: nothing is wrong,
  *                   and whoever asks next finds that it came */

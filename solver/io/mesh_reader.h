@@ -12,8 +12,8 @@ typedef struct {
     /* Reads a whole file. `text` may be anything, and counts in it are not to be trusted; max_bytes bounds what the
      * mesh may take (0: no bound). *out is for uz_given_mesh_clear, and empty on failure: elements have VTK's order of
      * nodes (the descriptors of element/element_type.h have that of the format), nodes and elements are numbered from 0
-     * in the order of the file, named parts are groups, and from_file is "/mesh/NAME". Errors: UZ_ERR_FORMAT, _UNSUPPORTED,
-     * _NOT_FINITE and _LIMIT with the line, _MEMORY. */
+     * in the order of the file, named parts are groups, and from_file is "/mesh/NAME". Errors: UZ_ERR_FORMAT,
+     * _UNSUPPORTED, _NOT_FINITE and _LIMIT with the line, _MEMORY. */
     uz_status (*read)(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 } uz_mesh_reader;
 

@@ -303,7 +303,7 @@ static inline bound_sweep sweep_meshes(bound_maker make, uint64_t seed, int kind
 
 static inline bound_sweep sweep_bounds(uint64_t seed, bound_kind kind, int64_t coarsest, int64_t finest)
 {
-    return sweep_meshes(bound_moved_scene, seed, kind, coarsest, finest);
+    return sweep_meshes(bound_moved_scene, seed, (int)kind, coarsest, finest);
 }
 
 /* ---- where answers enter the obstacle, energies say nothing of their error */

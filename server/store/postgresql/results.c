@@ -93,9 +93,10 @@ static bool keep_placed(taker *t, const result_piece *piece, const PGresult *r)
     if (t->n_placed == t->room) {
         const size_t room = t->room ? 2 * t->room : 16;
         placed_row *grown = realloc(t->placed, room * sizeof *grown);
-        t->full = !grown;
-        if (t->full)
+        if (!grown) {
+            t->full = true;
             return false;
+        }
         t->placed = grown;
         t->room = room;
     }
