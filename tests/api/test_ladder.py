@@ -38,8 +38,8 @@ def test_ladder_is_told(s):
     ladder = summary["mesh"]["ladder"]
     check(summary["outcome"] == "converged" and summary["requested_error"] == 0.02, summary)
     check(summary["total_error"] <= 0.02 and summary["started_from"] == "warm", summary)
-    check(len(ladder) >= 2 and all(set(r) == {"cells", "elements", "d", "iterations", "discretization_error",
-                                              "certified_error", "seconds"} for r in ladder), ladder)
+    check(len(ladder) >= 2 and all(set(r) == {"cells", "elements", "d", "iterations", "discretization_error", "certified_error", "error", "seconds",
+                                              "max_pressure", "contact_area"} for r in ladder), ladder)
     final = [r for r in ladder if r["cells"] == summary["mesh"]["cells"]]
     check(len(final) == 1 and final[0]["discretization_error"] == summary["discretization_error"], summary["mesh"])
     check(final[0]["d"] == summary["problem"]["d"], final)

@@ -67,6 +67,17 @@ SHOWN = {
                   f"at any moment, {count(f['reloaded'])} reloads",
         lambda f: none_of(f, "errors", "stuck", "twice", "broken") + f"; megabytes at each quarter {f['memory_mb']}"),
     "200 x SIGTERM under load": (lambda f: f"{count(f['cycles'])} x SIGTERM under load", lambda f: "all exit 0" if not f["wrong_exit"] else none_of(f, "wrong_exit")),
+    "three daemons and PostgreSQL: 500 faults, 16 posting clients": (
+        lambda f: f"{count(f['faults'])} faults of three daemons and their PostgreSQL (killed, stopped past the lease, restarted, cut off) with 16 clients posting, "
+                  f"{count(f['acknowledged'])} jobs acknowledged",
+        lambda f: none_of(f, "lost", "twice", "stuck", "damaged")),
+    "two daemons: one dies": (lambda f: f"one of two daemons dies, lease {sig(f['lease_s'])} s", lambda f: f"its jobs wait {sig(f['waited_s'])} s; {none_of(f, 'stuck')}"),
+    "three daemons: upgrade from the version before": (lambda f: f"three daemons are replaced by those of the next version, {count(f['acknowledged'])} jobs acknowledged",
+                                                       lambda f: none_of(f, "errors", "lost", "twice", "stuck", "damaged")),
+    "three daemons: 1,500 jobs of 200 bodies": (
+        lambda f: f"{count(f['jobs'])} jobs of {count(f['bodies'])} bodies on three daemons, jobs where their body's factor is against jobs anywhere",
+        lambda f: errors(f, f"{sig(f['hits_percent'])} % against {sig(f['hits_by_chance_percent'])} % of factors are there; time {ratio(f['time_ratio'])}")),
+    "30 x 10 body, default solver, PostgreSQL": (lambda f: f"the 30 x 10 body through PostgreSQL, {f['clients']} keep-alive clients, to the certified answer", throughput),
     "1,000 power losses, faults at every write, 1,000 damaged files": (
         lambda f: f"{count(f.get('power_losses'))} simulated power losses; a full disk or an I/O error at every write; {count(f.get('damaged_files'))} damaged database files",
         lambda f: errors(f, f"nothing acknowledged lost, no crash; refused files left as they were; of the {count(f.get('opened'))} that opened, what was read is what was written")),
