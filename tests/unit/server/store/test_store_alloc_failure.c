@@ -88,7 +88,8 @@ static bool decode(void)
 static bool encode(void)
 {
     const double row[CODEC_HISTORY_COLUMNS] = {1, 2, 3};
-    char *texts[] = {codec_encode_upload(&(upload_info){.id = "x"}), codec_encode_progress(5, &(job_grid){.number = 2}, row),
+    char *texts[] = {codec_encode_upload(&(upload_info){.id = "x"}),
+                     codec_encode_progress(5, &(job_grid){.number = 2}, row),
                      codec_encode_valid(&(uz_prediction){.d = 1}), codec_encode_valid(NULL)};
     bool good = true;
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
