@@ -277,7 +277,7 @@ def test_wait_survives_a_restart(server):
         check(server.process.stdout.readline().startswith(b"listening"), server.log())
         server.wait_status(job, "running")
         run(server, "cancel", job, code=0)
-        out, err = waiting.communicate(timeout=60)
+        out, err = waiting.communicate(timeout=150)  # on PostgreSQL the lease of who was killed has to end
         check(waiting.returncode == 9, waiting.returncode, out, err)
     finally:
         if waiting.poll() is None:
