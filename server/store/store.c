@@ -63,8 +63,10 @@ void store_close(store *s)
 
 void store_tell(const store *s, const char *id, bool waits, const char *gone)
 {
-    if (s->changed)
-        s->changed(s->changed_ctx, id, waits, gone);
+    /* An engine's own thread may tell while the listener is being set (work_start): its context is there before it. */
+    void (*changed)(void *, const char *, bool, const char *) = __atomic_load_n(&s->changed, __ATOMIC_ACQUIRE);
+    if (changed)
+        changed(s->changed_ctx, id, waits, gone);
 }
 
 void store_set_message(store *s, const char *cause)

@@ -332,8 +332,8 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
         return NULL;
     }
     housekeeping_report(w); /* nobody finds it without a name */
-    s->changed = tell_change;
     s->changed_ctx = w;
+    __atomic_store_n(&s->changed, tell_change, __ATOMIC_RELEASE);
     /* Signals are for the thread that waits for them; those that a fault raises in its own thread stay open. */
     static const int FAULTS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP};
     sigset_t blocked, before;
