@@ -43,3 +43,17 @@ void *uz_realloc(void *block, int64_t count, size_t size)
     size_t bytes;
     return bytes_for(count, size, &bytes) ? realloc(block, bytes) : NULL;
 }
+
+bool uz_grow(void *list, int64_t count, int64_t more, int64_t *room, size_t size)
+{
+    void **block = list;
+    if (more <= *room - count)
+        return true;
+    const int64_t wanted = count + more + count / 2 + 64;
+    void *grown = uz_realloc(*block, wanted, size);
+    if (!grown)
+        return false;
+    *block = grown;
+    *room = wanted;
+    return true;
+}

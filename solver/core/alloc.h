@@ -2,6 +2,7 @@
 #ifndef UZ_CORE_ALLOC_H
 #define UZ_CORE_ALLOC_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <stddef.h>
 
@@ -18,5 +19,9 @@ void *uz_malloc_huge(size_t bytes);
 
 /* Grows or shrinks; on failure NULL and the old block stays. */
 void *uz_realloc(void *block, int64_t count, size_t size);
+
+/* Room for `more` items behind the first count of *list, a pointer to any type of `size` bytes: grows it and *room
+ * where there is too little, by half at least. False: no memory, and the list stays. */
+bool uz_grow(void *list, int64_t count, int64_t more, int64_t *room, size_t size);
 
 #endif

@@ -61,20 +61,6 @@ abaqus_type abaqus_type_of(int number)
 
 /* ---- lists that grow, and numbers that are looked up */
 
-bool abaqus_grow(void *list, int64_t count, int64_t more, int64_t *room, size_t size)
-{
-    void **block = list;
-    if (more <= *room - count)
-        return true;
-    const int64_t wanted = count + more + count / 2 + 64;
-    void *grown = uz_realloc(*block, wanted, size);
-    if (!grown)
-        return false;
-    *block = grown;
-    *room = wanted;
-    return true;
-}
-
 uz_status abaqus_no_memory(const abaqus_text *text)
 {
     return abaqus_fail(text, UZ_ERR_MEMORY, "no memory for the mesh");
@@ -158,7 +144,7 @@ static uz_status set_of_block(int64_t *set, abaqus_file *file, const abaqus_keyw
 
 static uz_status add_tag(abaqus_file *file, abaqus_tags *tags, int64_t set, int64_t tag)
 {
-    if (!abaqus_grow(&tags->tag, tags->count, 1, &tags->room, sizeof *tags->tag))
+    if (!uz_grow(&tags->tag, tags->count, 1, &tags->room, sizeof *tags->tag))
         return abaqus_no_memory(&file->text);
     tags->tag[tags->count] = tag;
     const abaqus_item item = {.line = file->text.number, .first = tag, .last = tag, .step = 1, .set = -1};
@@ -179,7 +165,7 @@ static uz_status read_nodes(abaqus_file *file, const abaqus_keyword *keyword)
         int count = 0;
         abaqus_field(field, text);
         status = abaqus_int(&tag, field, "the number of a node", text);
-        if (status == UZ_OK && !abaqus_grow(&file->xyz, 3 * n, 3, &file->xyz_room, sizeof *file->xyz))
+        if (status == UZ_OK && !uz_grow(&file->xyz, 3 * n, 3, &file->xyz_room, sizeof *file->xyz))
             status = abaqus_no_memory(text);
         if (status == UZ_OK)
             memset(file->xyz + 3 * n, 0, 3 * sizeof *file->xyz);
@@ -207,10 +193,10 @@ static uz_status read_element(abaqus_file *file, int type, int64_t set)
     int64_t tag, from = e > 0 ? file->first[e] : 0;
     abaqus_field(field, text);
     uz_status status = abaqus_int(&tag, field, "the number of an element", text);
-    if (status == UZ_OK && (!abaqus_grow(&file->type, e, 1, &file->type_room, sizeof *file->type) ||
-                            !abaqus_grow(&file->line, e, 1, &file->line_room, sizeof *file->line) ||
-                            !abaqus_grow(&file->first, e, 2, &file->first_room, sizeof *file->first) ||
-                            !abaqus_grow(&file->node, from, nodes, &file->place_room, sizeof *file->node)))
+    if (status == UZ_OK && (!uz_grow(&file->type, e, 1, &file->type_room, sizeof *file->type) ||
+                            !uz_grow(&file->line, e, 1, &file->line_room, sizeof *file->line) ||
+                            !uz_grow(&file->first, e, 2, &file->first_room, sizeof *file->first) ||
+                            !uz_grow(&file->node, from, nodes, &file->place_room, sizeof *file->node)))
         status = abaqus_no_memory(text);
     if (status != UZ_OK)
         return status;

@@ -108,8 +108,6 @@ typedef struct {
     int64_t n_parts, n_instances;
 } abaqus_file;
 
-/* Makes room for `more` items behind count; false: no memory. */
-bool abaqus_grow(void *list, int64_t count, int64_t more, int64_t *room, size_t size);
 uz_status abaqus_no_memory(const abaqus_text *text);
 
 /* A type of element: one of the body, or of its sides. */

@@ -43,7 +43,7 @@ uz_status abaqus_set_of(int64_t *out, abaqus_file *file, abaqus_set_kind kind, c
     if (file->n_sets == UZ_MESH_MAX_GROUPS)
         return abaqus_fail(&file->text, UZ_ERR_UNSUPPORTED, "there are more than %d sets and surfaces",
                            UZ_MESH_MAX_GROUPS);
-    if (!abaqus_grow(&file->sets, file->n_sets, 1, &file->sets_room, sizeof *file->sets))
+    if (!uz_grow(&file->sets, file->n_sets, 1, &file->sets_room, sizeof *file->sets))
         return abaqus_no_memory(&file->text);
     abaqus_set *set = &file->sets[file->n_sets];
     *set = (abaqus_set){.kind = kind};
@@ -62,7 +62,7 @@ uz_status abaqus_set_add(abaqus_file *file, int64_t at, abaqus_item item)
         last->last = item.last;
         return UZ_OK;
     }
-    if (!abaqus_grow(&set->item, set->n_items, 1, &set->room, sizeof *set->item))
+    if (!uz_grow(&set->item, set->n_items, 1, &set->room, sizeof *set->item))
         return abaqus_no_memory(&file->text);
     set->item[set->n_items++] = item;
     return UZ_OK;
@@ -220,8 +220,8 @@ static uz_status take(set_work *w, int64_t set, int64_t index, int face)
     if (!sides && w->seen[index] == set + 1)
         return UZ_OK;
     w->seen[index] = set + 1;
-    if ((sides && !abaqus_grow(&to->face, to->count, 1, &to->face_room, sizeof *to->face)) ||
-        !abaqus_grow(&to->index, to->count, 1, &to->room, sizeof *to->index))
+    if ((sides && !uz_grow(&to->face, to->count, 1, &to->face_room, sizeof *to->face)) ||
+        !uz_grow(&to->index, to->count, 1, &to->room, sizeof *to->index))
         return abaqus_no_memory(&w->file->text);
     if (sides)
         to->face[to->count] = (unsigned char)face;

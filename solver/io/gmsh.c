@@ -38,7 +38,7 @@ static uz_status parts_of_tags(gmsh_file *file)
         const gmsh_part part = {.key = {gmsh_type_of(file->type[e]).dim, file->part_tag[e]}};
         if (part.key.tag == 0 || (file->n_parts > 0 && gmsh_compare(&part, &file->parts[file->n_parts - 1]) == 0))
             continue;
-        if (!gmsh_grow((void **)&file->parts, file->n_parts, &file->part_room, sizeof *file->parts))
+        if (!uz_grow(&file->parts, file->n_parts, 1, &file->part_room, sizeof *file->parts))
             return gmsh_no_memory(file);
         file->parts[file->n_parts++] = part;
     }
@@ -87,7 +87,7 @@ static uz_status list_groups(grouping *g)
     }
     for (int64_t i = 0; i < file->n_parts; i++)
         for (int64_t k = 0; file->parts[i].used && k < file->parts[i].count; k++) {
-            if (!gmsh_grow((void **)&g->group, g->n_groups, &room, sizeof *g->group))
+            if (!uz_grow(&g->group, g->n_groups, 1, &room, sizeof *g->group))
                 return gmsh_no_memory(file);
             g->group[g->n_groups++] =
                 (physical_group){{file->parts[i].key.dim, file->physical[file->parts[i].first + k]}, 0, 0};

@@ -98,8 +98,6 @@ typedef struct {
     bool entities_read;
 } gmsh_file;
 
-/* Makes room for one more item behind `count`; false: no memory. */
-bool gmsh_grow(void **list, int64_t count, int64_t *room, size_t size);
 uz_status gmsh_no_memory(const gmsh_file *file);
 
 /* ---- sections: each starts behind its "$Name" line and ends before "$EndName" */

@@ -6,19 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool gmsh_grow(void **list, int64_t count, int64_t *room, size_t size)
-{
-    if (count < *room)
-        return true;
-    const int64_t wanted = 2 * *room + 64;
-    void *grown = uz_realloc(*list, wanted, size);
-    if (!grown)
-        return false;
-    *list = grown;
-    *room = wanted;
-    return true;
-}
-
 uz_status gmsh_no_memory(const gmsh_file *file)
 {
     return gmsh_fail(&file->text, UZ_ERR_MEMORY, "no memory for the mesh");
@@ -89,7 +76,7 @@ static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
     for (; part.count < groups && status == UZ_OK; part.count += status == UZ_OK) {
         status = gmsh_int(text, &tag, "the number of a physical group");
         if (status == UZ_OK &&
-            !gmsh_grow((void **)&file->physical, file->n_physical, &file->physical_room, sizeof *file->physical))
+            !uz_grow(&file->physical, file->n_physical, 1, &file->physical_room, sizeof *file->physical))
             status = gmsh_no_memory(file);
         if (status == UZ_OK) /* a negative one asks for the opposite sense, which groups have not */
             file->physical[file->n_physical++] = tag < 0 ? -tag : tag;
@@ -100,7 +87,7 @@ static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
         status = skip_ints(text, count);
     if (status != UZ_OK)
         return status;
-    if (!gmsh_grow((void **)&file->parts, file->n_parts, &file->part_room, sizeof *file->parts))
+    if (!uz_grow(&file->parts, file->n_parts, 1, &file->part_room, sizeof *file->parts))
         return gmsh_no_memory(file);
     file->parts[file->n_parts++] = part;
     return UZ_OK;
