@@ -58,7 +58,7 @@ uz_status abaqus_set_add(abaqus_file *file, int64_t at, abaqus_item item)
     abaqus_set *set = &file->sets[at];
     abaqus_item *last = set->n_items > 0 ? &set->item[set->n_items - 1] : NULL;
     if (last && last->set < 0 && item.set < 0 && last->face == item.face && !last->generated && !item.generated &&
-        item.first == last->last + 1) {
+        item.first - 1 == last->last) { /* numbers may be the largest that there is */
         last->last = item.last;
         return UZ_OK;
     }

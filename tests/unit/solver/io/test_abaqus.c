@@ -168,6 +168,7 @@ static const struct {
     {TRI "*SURFACE,NAME=A,TYPE=CUTTING SURFACE\n", UZ_ERR_UNSUPPORTED, 7, "type CUTTING SURFACE"},
     {TRI "*PART,NAME=A\n*END PART\n*PART,NAME=B\n", UZ_ERR_UNSUPPORTED, 9, "second part"},
     {TRI "*INSTANCE,NAME=A,PART=B\n1,0,0\n", UZ_ERR_UNSUPPORTED, 7, "instance that is moved"},
+    {TRI "*NSET,NSET=A\n9223372036854775807, 9223372036854775807\n", UZ_ERR_FORMAT, 8, "one is not there"},
     {TRI "*NSET,NSET=A,\n", UZ_ERR_FORMAT, 7, "ends in a comma"},
     {TRI "*NSET,NSET=\"A\n", UZ_ERR_FORMAT, 7, "open quote"},
 };
