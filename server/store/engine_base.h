@@ -11,8 +11,9 @@
 struct store {
     const store_engine *engine;
     store_settings settings;
-    store_listener *changed; /* may be NULL */
-    void *changed_ctx;
+    pthread_rwlock_t listener_lock; /* the next two; shared while the listener runs */
+    store_listener *listener;       /* may be NULL */
+    void *listener_ctx;
     store_uploads *uploads;
     age_clock ages; /* of who retains and collects */
     char *missing;  /* what was on disk once and was not any more at opening, in words; NULL: nothing that is known */
@@ -26,7 +27,7 @@ void store_base_begin(store *s, const store_engine *engine);
 void store_base_end(store *s);
 void store_set_message(store *s, const char *cause);
 /* As a store_listener is told. */
-void store_tell(const store *s, const char *id, bool waits, const char *gone);
+void store_tell(store *s, const char *id, bool waits, const char *gone);
 
 /* The next id of a job: 12 hex digits of milliseconds, 4 of a counter within them, 16 random. Under the engine's lock.
  * last_ms and sequence are those of the newest id, so that ids ascend when the clock does not. */

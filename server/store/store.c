@@ -43,6 +43,7 @@ void store_cases_free(store_case *cases, size_t count)
 void store_base_begin(store *s, const store_engine *engine)
 {
     *s = (store){.engine = engine};
+    pthread_rwlock_init(&s->listener_lock, NULL);
     pthread_mutex_init(&s->message_lock, NULL);
     pthread_mutex_init(&s->node_lock, NULL);
 }
@@ -53,6 +54,7 @@ void store_base_end(store *s)
     free(s->missing);
     pthread_mutex_destroy(&s->node_lock);
     pthread_mutex_destroy(&s->message_lock);
+    pthread_rwlock_destroy(&s->listener_lock);
 }
 
 void store_close(store *s)
@@ -61,12 +63,20 @@ void store_close(store *s)
         s->engine->close(s);
 }
 
-void store_tell(const store *s, const char *id, bool waits, const char *gone)
+void store_listen(store *s, store_listener *listener, void *ctx)
 {
-    /* An engine's own thread may tell while the listener is being set (work_start): its context is there before it. */
-    void (*changed)(void *, const char *, bool, const char *) = __atomic_load_n(&s->changed, __ATOMIC_ACQUIRE);
-    if (changed)
-        changed(s->changed_ctx, id, waits, gone);
+    pthread_rwlock_wrlock(&s->listener_lock);
+    s->listener = listener;
+    s->listener_ctx = ctx;
+    pthread_rwlock_unlock(&s->listener_lock);
+}
+
+void store_tell(store *s, const char *id, bool waits, const char *gone)
+{
+    pthread_rwlock_rdlock(&s->listener_lock);
+    if (s->listener)
+        s->listener(s->listener_ctx, id, waits, gone);
+    pthread_rwlock_unlock(&s->listener_lock);
 }
 
 void store_set_message(store *s, const char *cause)

@@ -94,14 +94,16 @@ void store_message(store *s, char *buffer, size_t size);
 /* What a program without privileges may still write to the store's disk; -1: not known. */
 int64_t store_free_bytes(store *s);
 
-/* ---- notification: who waits learns of changes: the member `changed` of the store (engine.h) is called with
- * changed_ctx after every change of a job was committed that anybody but its owner made (submitted, dismissed, expired,
- * deleted), without a lock, by the thread that made it or by one of the engine's. What owners do (claim, finish,
- * release) they tell themselves; an engine of several processes tells what owners in the others do, and that a job
- * which runs here is to end (store_renew says so). waits: the job now waits to be claimed. gone: the job was deleted,
- * and this client's it was; else NULL. id NULL: changes may have been missed, everybody is to look again. NULL: nobody
- * is told. It is set before other threads use the store, and after they did. */
+/* ---- notification: who waits learns of changes. The listener is called after every change of a job was committed that
+ * anybody but its owner made (submitted, dismissed, expired, deleted), by the thread that made it or by one of the
+ * engine's. What owners do (claim, finish, release) they tell themselves; an engine of several processes tells what
+ * owners in the others do, and that a job which runs here is to end (store_renew says so). waits: the job now waits to
+ * be claimed. gone: the job was deleted, and this client's it was; else NULL. id NULL: changes may have been missed,
+ * everybody is to look again. It asks nothing of the store. */
 typedef void store_listener(void *ctx, const char *id, bool waits, const char *gone);
+/* At most one listens; NULL: nobody is told. When it returns the one before runs no more, and what it stands on may go.
+ * Not from a listener. */
+void store_listen(store *s, store_listener *listener, void *ctx);
 
 /* What is submitted. */
 typedef struct {

@@ -332,8 +332,7 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
         return NULL;
     }
     housekeeping_report(w); /* nobody finds it without a name */
-    s->changed_ctx = w;
-    __atomic_store_n(&s->changed, tell_change, __ATOMIC_RELEASE);
+    store_listen(s, tell_change, w);
     /* Signals are for the thread that waits for them; those that a fault raises in its own thread stay open. */
     static const int FAULTS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP};
     sigset_t blocked, before;
@@ -408,7 +407,7 @@ void work_free(work *w)
         return;
     if (w->feed)
         work_stop(w, 0.0);
-    w->store->changed = NULL;
+    store_listen(w->store, NULL, NULL);
     for (int i = 0; w->workers && i < w->n; i++) {
         if (w->workers[i].wake >= 0)
             close(w->workers[i].wake);

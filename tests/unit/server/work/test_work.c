@@ -482,10 +482,11 @@ TEST(what_may_have_been_missed_is_looked_for)
         return;
     for (int i = 0; i < 20; i++) /* both workers have looked and wait by now */
         short_sleep();
-    store_listener *told = v.place.s->changed;
-    v.place.s->changed = NULL;
+    store_listener *told = v.place.s->listener;
+    void *ctx = v.place.s->listener_ctx;
+    store_listen(v.place.s, NULL, NULL);
     submit(&v, SMALL, id);
-    v.place.s->changed = told;
+    store_listen(v.place.s, told, ctx);
     store_tell(v.place.s, NULL, false, NULL);
     CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
