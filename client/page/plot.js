@@ -6,7 +6,8 @@ import { line } from "d3-shape";
 import { h, s, show } from "./dom.js";
 import { number, superscript } from "./format.js";
 
-const MARGIN = { left: 62, right: 14, top: 10, bottom: 42 };
+const MARGIN = { left: 62, right: 14, top: 10, bottom: 42 }; // at the left more, where the numbers there are long
+const DIGIT = 6.6; // wide at most
 
 function power_of_ten(value) {
   const exponent = Math.round(Math.log10(value));
@@ -85,20 +86,20 @@ function ticks_of(scale, { log, format, whole }, most) {
   return shown(fine_ticks(low, high));
 }
 
-function draw_axes(svg, { x, y }, scales, size) {
-  const bottom = size.height - MARGIN.bottom, right = size.width - MARGIN.right;
+function draw_axes(svg, { x, y }, scales, y_ticks, size) {
+  const bottom = size.height - MARGIN.bottom, [left, right] = scales.x.range();
   for (const { value, text } of ticks_of(scales.x, x, Math.max(3, Math.floor(size.width / 90)))) {
     const at = scales.x(value);
     svg.append(s("line", { class: "grid", x1: at, x2: at, y1: MARGIN.top, y2: bottom }),
       s("text", { class: "tick", x: at, y: bottom + 16, "text-anchor": "middle" }, text));
   }
-  for (const { value, text } of ticks_of(scales.y, y, Math.max(3, Math.floor(size.height / 34)))) {
+  for (const { value, text } of y_ticks) {
     const at = scales.y(value);
-    svg.append(s("line", { class: "grid", x1: MARGIN.left, x2: right, y1: at, y2: at }),
-      s("text", { class: "tick", x: MARGIN.left - 7, y: at + 4, "text-anchor": "end" }, text));
+    svg.append(s("line", { class: "grid", x1: left, x2: right, y1: at, y2: at }),
+      s("text", { class: "tick", x: left - 7, y: at + 4, "text-anchor": "end" }, text));
   }
-  svg.append(s("path", { class: "axis", d: `M${MARGIN.left},${MARGIN.top}V${bottom}H${right}` }),
-    s("text", { class: "label", x: (MARGIN.left + right) / 2, y: size.height - 6, "text-anchor": "middle" }, x.label),
+  svg.append(s("path", { class: "axis", d: `M${left},${MARGIN.top}V${bottom}H${right}` }),
+    s("text", { class: "label", x: (left + right) / 2, y: size.height - 6, "text-anchor": "middle" }, x.label),
     s("text", { class: "label", transform: `translate(13 ${(MARGIN.top + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, y.label));
 }
 
@@ -177,15 +178,15 @@ export class Chart {
     const { x, y, series, label } = this.what, size = { width, height: this.height };
     this.shown = series.map((one) => ({ one, points: visible(one.points, x.log, y.log) }));
     const all = this.shown.flatMap(({ points }) => points);
-    this.scales = {
-      x: scale_of(x, all.map((p) => p[0]), [MARGIN.left, width - MARGIN.right]),
-      y: scale_of(y, all.map((p) => p[1]), [this.height - MARGIN.bottom, MARGIN.top]),
-    };
+    const y_scale = scale_of(y, all.map((p) => p[1]), [this.height - MARGIN.bottom, MARGIN.top]);
+    const y_ticks = ticks_of(y_scale, y, Math.max(3, Math.floor(this.height / 34)));
+    const left = y_ticks.reduce((most, { text }) => Math.max(most, 28 + DIGIT * text.length), MARGIN.left);
+    this.scales = { x: scale_of(x, all.map((p) => p[0]), [left, width - MARGIN.right]), y: y_scale };
     this.svg.setAttribute("viewBox", `0 0 ${width} ${this.height}`);
     this.svg.setAttribute("height", this.height);
     this.svg.setAttribute("aria-label", label);
     show(this.svg);
-    draw_axes(this.svg, { x, y }, this.scales, size);
+    draw_axes(this.svg, { x, y }, this.scales, y_ticks, size);
     if (!all.length) this.svg.append(s("text", { class: "label", x: width / 2, y: this.height / 2, "text-anchor": "middle" }, "nothing to show yet"));
     const texts_last = [...this.shown].sort((a, b) => Boolean(a.one.texts) - Boolean(b.one.texts));
     for (const { one, points } of texts_last) draw_series(this.svg, one, thin(points, 4 * width), this.scales);
@@ -201,14 +202,14 @@ export class Chart {
   point(event) {
     if (!this.shown || this.shown.every(({ one }) => one.line === false)) return;
     const box = this.svg.getBoundingClientRect();
-    const at = Math.min(Math.max(event.clientX - box.left, MARGIN.left), box.width - MARGIN.right);
-    const x = this.scales.x.invert(at);
+    const [left, right] = this.scales.x.range(), at = Math.min(Math.max(event.clientX - box.left, left), right);
+    const x = this.scales.x.invert(at), text_of = ({ format }, value, digits) => (format ? format(value) : number(value, digits));
     this.cursor.setAttribute("x1", at);
     this.cursor.setAttribute("x2", at);
     this.cursor.setAttribute("visibility", "visible");
     const found = this.shown.map(({ one, points }) => [one, nearest(points, x)]).filter(([, point]) => point);
-    show(this.readout, found.length ? `${this.what.x.label} ${(this.what.x.format || ((v) => number(v, 4)))(found[0][1][0])}: ` +
-      found.map(([one, point]) => `${one.name} ${number(point[1])}`).join(", ") : "");
+    show(this.readout, found.length ? `${this.what.x.label} ${text_of(this.what.x, found[0][1][0], 4)}: ` +
+      found.map(([one, point]) => `${one.name} ${text_of(this.what.y, point[1])}`).join(", ") : "");
   }
 
   leave() {

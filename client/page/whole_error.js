@@ -31,8 +31,9 @@ export function show_whole_error(element, summary) {
   const what = of_quantity ? `Error of ${summary.quantities[0].name}` : "Whole error";
   const kind = (of_quantity ? summary.quantities[0] : summary.error)?.kind || "estimated";
   const place = h("div"), form = h("form", { class: "choose", onsubmit: (event) => event.preventDefault() }, choices(() => draw()));
-  show(element, h("h2", null, `${what} and its price`), place, form,
-    h("p", { class: "muted" }, `${percent_up(last.error)}, ${kind}, on ${count(last.d)} unknowns after ${seconds(last.at)} of all grids together.`), table_of(ladder, what));
+  show(element, h("h2", null, `${what} and its price`), place,
+    h("p", { class: "muted" }, `${percent_up(last.error)}, ${kind}, on ${count(last.d)} unknowns after ${seconds(last.at)} of all grids together.`),
+    form, table_of(ladder, what));
   const chart = new Chart(place, 260);
   function draw() {
     const key = new FormData(form).get("over"), x = key === "d" ? { label: "unknowns", log: true } : { label: "time", log: true, format: seconds };

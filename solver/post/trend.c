@@ -90,8 +90,8 @@ void uz_trend_fit(uz_trend *out, const uz_trend_point *point, int count, double 
     if (n < 3) {
         snprintf(out->why, sizeof out->why,
                  count < 2 ? "one grid shows neither error nor order: \"refine\": \"auto\" in the mesh makes more"
-                           : "elements at the contact have %d size%s on all grids, and three show an order",
-                 n, n == 1 ? "" : "s");
+                 : n == 1  ? "elements at the contact have the same size on all grids: an order needs three sizes"
+                           : "elements at the contact have two sizes on all grids: an order needs three");
         return;
     }
     for (int i = 0; i < n; i++) {

@@ -45,6 +45,34 @@ def test_is_watched_live_from_the_editor_on(s, b):
     check(not b.run("return document.querySelector('section.progress').checkVisibility()"), "there is progress no longer")
 
 
+def test_whole_error_is_drawn(s, b):
+    paper = json.loads((browser.ROOT / "tests/data/paper_body.json").read_text())
+    paper["problem"]["mesh"].update(refine="auto")
+    paper["solver"] = {"accuracy": {"total": 0.02, "guaranteed": True}}
+    grids = s.solve(paper)["summary"]["mesh"]["ladder"]
+    chart = "#whole"
+    for dark, (width, height, phone) in ((False, (1200, 900, False)), (True, (760, 900, False)), (False, (360, 740, True))):
+        b.size(width, height, phone)
+        b.media("prefers-color-scheme", "dark" if dark else "light")
+        b.open(s, f"jobs/{s.get('/v1/jobs').json['jobs'][0]['id']}")
+        b.says(chart, "Whole error and its price")
+        check(b.near(f"{chart} .chart", "--series-1") > 150, width, "the curve has too few pixels")
+        check(b.near(f"{chart} .chart", "--series-2") > 50, width, "what was asked for is not seen")
+        # Numbers at the axis stand between its name and the axis.
+        boxes = b.run("""const box = (e) => { const r = e.getBoundingClientRect(); return [r.left, r.right]; };
+            const all = [...document.querySelectorAll('.chart')].filter((one) => one.checkVisibility());
+            return all.map((one) => [box(one.querySelector('.label[transform]')), ...[...one.querySelectorAll('.tick[text-anchor=end]')].map(box)])""")
+        check(all(tick[0] >= name[1] - 1 for name, *ticks in boxes for tick in ticks), width, "numbers lie on the axis' name", boxes)
+        check(b.run("return document.documentElement.scrollWidth <= innerWidth"), width, "the page is wider than the screen")
+    b.click(f"{chart} summary")
+    rows = b.run("return [...document.querySelectorAll('table.grids tbody tr')].map((row) => row.innerText.split('\\t'))")
+    check([int(row[1].replace(",", "")) for row in rows] == [one["d"] for one in grids], rows, grids)
+    unknowns = b.run(f"return document.querySelector('{chart} path.line').getAttribute('d')")
+    b.click(f"{chart} input[value=at]")
+    b.wait("seconds", f"return document.querySelector('{chart} .chart').getAttribute('aria-label').includes('time')")
+    check(b.run(f"return document.querySelector('{chart} path.line').getAttribute('d')") != unknowns, "the same curve over seconds")
+
+
 def test_convergence_is_drawn(s, b):
     job = s.solve(SCENE)
     b.open(s, f"jobs/{job['id']}")
