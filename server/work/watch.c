@@ -15,7 +15,7 @@ enum { PATIENCE = SANITIZED ? 10 : 1 };
 #define TELL_S    0.25             /* progress is told so often */
 #define CANCEL_S  (0.2 * PATIENCE) /* from the word to the kill: somebody waits for that */
 #define RELEASE_S (0.5 * PATIENCE) /* the service stops, or another owner has the job */
-#define HEARD_S   (1.0 * PATIENCE) /* more, where the process has seen it and certifies its answer */
+#define HEARD_S   (1.0 * PATIENCE) /* more, where the process has an answer, or has seen it and makes one */
 #define START_S   (20.0 * PATIENCE)
 #define ASK_S     1.0              /* what the store could not give is asked for again */
 #define LANE_S    (1.0 * PATIENCE) /* a job that takes longer is no small one: another worker begins it again */
@@ -92,7 +92,7 @@ static watch_end follow(watch *w, watch_report *out)
             w->stopping = true;
             w->stop_at = now + (cancelled ? CANCEL_S : RELEASE_S);
         }
-        const bool heard = w->stopping && atomic_load(&w->p->board->heard);
+        const bool heard = w->stopping && (atomic_load(&w->p->board->heard) || live_read(&w->p->board->live).any);
         if (w->stopping && now >= w->stop_at + (heard ? HEARD_S : 0.0))
             return WATCH_STOPPED;
         if (now >= w->due_at + LIMIT_SHARE * w->limit_s || (now >= w->due_at && !live_read(&w->p->board->live).any))
