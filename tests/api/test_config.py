@@ -209,7 +209,7 @@ def test_limits_on_the_problem(s):
     check(s.solve(small)["status"] == "successful")
 
 
-@options("--max-solve-s", "0.3")
+@options("--max-solve-s", "1")
 def test_a_job_over_its_time_ends_and_others_go_on(s):
     job = s.solve(service.ENDLESS)
     check(job["status"] == "successful" and job["summary"]["outcome"] == "time_limit", job)
