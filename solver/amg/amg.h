@@ -44,6 +44,9 @@ void uz_modes_clear(uz_modes *modes);
 typedef struct uz_multigrid uz_multigrid;           /* immutable after creation */
 typedef struct uz_multigrid_room uz_multigrid_room; /* one per thread; each kind has its own */
 
+struct uz_cg_info;
+struct uz_cg_stop;
+
 /* What a kind of multigrid does. M^-1 is symmetric and positive definite, also with dofs held. */
 typedef struct {
     /* z = M^-1 r (n); z and r do not overlap. */
@@ -65,6 +68,10 @@ typedef struct {
     uz_status (*start)(const uz_multigrid *mg, uz_multigrid_room *room, bool *found, double *u, bool *held,
                        const double *p, const double *bottom, const double *top, const uz_stop *stop, uz_error *err);
     void (*free)(uz_multigrid *mg);
+    /* Whole solves, where they are elsewhere; NULL: by conjugate gradients here. As uz_cg_solve, which leaves info at
+     * 0; r: cg->r, of K as it is here. */
+    uz_status (*solve)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, struct uz_cg_info *info,
+                       double *x, double *r, const double *b, const struct uz_cg_stop *stop, uz_error *err);
 } uz_multigrid_kind;
 
 /* What every kind begins with. */
@@ -103,21 +110,21 @@ uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, uz_error *err);
 uz_status uz_cg_hold(uz_cg *cg, const uz_csc *K, const bool *held, const uz_stop *stop, uz_error *err);
 void uz_cg_clear(uz_cg *cg);
 
-typedef struct {
+typedef struct uz_cg_stop {
     double absolute, relative; /* of sqrt(r'M^-1 r): stop at the larger of absolute and relative times the first one */
     int64_t max_iterations;
     const uz_hooks *hooks; /* asked in each iteration; may be NULL */
     double deadline;       /* uz_seconds() */
 } uz_cg_stop;
 
-typedef struct {
+typedef struct uz_cg_info {
     int64_t iterations;
     double first, last; /* sqrt(r'M^-1 r) at the start, and of the true residual at the end */
     bool met;           /* the tolerance was reached; false: limit, cancel, deadline, or rounding */
 } uz_cg_info;
 
 /* x (n): in, a start; out, nearer to K^-1 b. At held dofs x is neither read nor written. The residual of the x that is
- * returned stands in cg->r, M^-1 times it in cg->z. UZ_ERR_NOT_SPD: some p'K p was not positive. */
+ * returned stands in cg->r. UZ_ERR_NOT_SPD: some p'K p was not positive. */
 uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b, const uz_cg_stop *stop,
                       uz_error *err);
 

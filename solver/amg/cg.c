@@ -62,6 +62,8 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
     const int64_t n = cg->n;
     double goal = 0.0, before = INFINITY;
     memset(info, 0, sizeof *info);
+    if (cg->mg->kind->solve)
+        return cg->mg->kind->solve(cg->mg, K, cg->room, info, x, cg->r, b, stop, err);
     for (int k = 0;; k++) {
         /* r = b - K x on the free dofs, z = M^-1 r; x at held dofs counts as 0 */
         memcpy(cg->p, x, (size_t)n * sizeof *x);
