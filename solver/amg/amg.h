@@ -138,6 +138,10 @@ typedef struct {
     double create_s;    /* seconds of the multigrid */
     double spectrum_s;  /* and of the bounds */
     int64_t iterations; /* that the bound on the spectrum took */
+    double least;       /* <= |lambda| of every eigenvalue of diag(K)^-1 K, but for a probability below 1e-12, whatever
+                           M is (uz_amg_probe); 0: not known, M is to be trusted */
+    double rounding;    /* with it: a product K x here is off by at most so many times the norm of diag(K)^1/2 x, in the
+                           norm of diag(K)^-1 */
 } uz_amg_info;
 
 /* Immutable after creation: shared by any number of threads. */
@@ -148,6 +152,9 @@ typedef struct {
 
 /* Of any multigrid for K, which is taken, also on failure. NOT_SPD where K is singular to working precision. */
 uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
+/* Finds info.least by solves with K that are checked here, so that what is certified by it needs no word of the program
+ * that holds M. UNSUPPORTED: the solves are not those of K, or too rough. NOT_SPD: they show that K is not definite. */
+uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
 /* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD as
  * uz_amg_of. */
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,

@@ -20,6 +20,7 @@
 #include "law/sign.h"
 #include "linalg/blas.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -208,6 +209,61 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
 #define SHARP 0.1
 enum { NORM_STEPS_MOST = 400 };
 
+/* s'K^-1 s at most, s = e - K w, by what does not depend on M, with all that rounding may hide in s. */
+static double bound_remainder(const free_load *x, const double *e, const double *w)
+{
+    const uz_csc *K = x->sparse.load.K;
+    const uz_amg_info *info = &x->sparse.load.dual->amg->info;
+    double left = 0.0, size = 0.0, reach = 0.0;
+    for (int64_t j = 0; j < x->cg.n; j++) {
+        const double own = K->val[K->ptr[j]];
+        left += x->cg.r[j] * x->cg.r[j] / own;
+        size += e[j] * e[j] / own;
+        reach += w[j] * w[j] * own;
+    }
+    const double norm = sqrt(left) + info->rounding * sqrt(reach) + DBL_EPSILON * sqrt(size);
+    return isnan(norm) ? INFINITY : norm * norm / info->least;
+}
+
+/* w'(e + s), the larger by what rounding may hide in s. */
+static double first_part(const free_load *x, const double *e, const double *w)
+{
+    const double rounding = x->sparse.load.dual->amg->info.rounding;
+    const uz_csc *K = x->sparse.load.K;
+    double sum = 0.0, reach = 0.0;
+    for (int64_t j = 0; j < x->cg.n; j++) {
+        sum += w[j] * (e[j] + x->cg.r[j]);
+        reach += w[j] * w[j] * K->val[K->ptr[j]];
+    }
+    return isnan(sum) ? INFINITY : fmax(0.0, sum) + rounding * reach;
+}
+
+enum { SHARPENED_MOST = 4 };
+
+/* The same value by solves of which nothing is believed: better ones, until what they leave is small whatever M is. */
+static uz_status sharpen(free_load *x, double *value, double *w, const double *e, double first, uz_error *err)
+{
+    double part = first_part(x, e, w), left = bound_remainder(x, e, w), last = first;
+    uz_status status = UZ_OK;
+    *value = part + left;
+    for (int k = 0; status == UZ_OK && k < SHARPENED_MOST && left > SHARP * SHARP * part && isfinite(left); k++) {
+        const uz_cg_stop stop = {.absolute = 0.5 * last * SHARP * sqrt(part / left),
+                                 .max_iterations = NORM_STEPS_MOST,
+                                 .hooks = x->stop.hooks,
+                                 .deadline = x->stop.deadline};
+        const double before = left;
+        uz_cg_info info;
+        status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
+        part = first_part(x, e, w);
+        left = bound_remainder(x, e, w);
+        last = info.last;
+        *value = fmin(*value, part + left); /* each is a bound */
+        if (!(left < 0.5 * before))
+            break;
+    }
+    return status;
+}
+
 /* With w from conjugate gradients, s = e - K w: e'K^-1 e = w'(e + s) + s'K^-1 s. */
 static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
 {
@@ -232,8 +288,10 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err
     uz_status status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
     for (int64_t j = 0; j < n; j++)
         sum += w[j] * (e[j] + x->cg.r[j]);
+    double scaled = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / lambda;
+    if (status == UZ_OK && x->sparse.load.dual->amg->info.least > 0.0)
+        status = sharpen(x, &scaled, w, e, info.last, err);
     if (status == UZ_OK) {
-        double scaled = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / lambda;
         *value = scaled * unit * unit;
         for (int64_t j = 0; j < n; j++)
             e[j] = unit * w[j];

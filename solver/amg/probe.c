@@ -1,0 +1,144 @@
+/* probe.c: how near to 0 an eigenvalue of diag(K)^-1 K can be, by solves that nobody vouches for.
+ *
+ * With D = diag(K), A = D^1/2 K^-1 D^1/2 and a standard normal s, ||A s|| >= ||A|| |gamma|, where gamma, the share of s
+ * in the direction that A stretches most, is standard normal as well: below t in each of k trials only with the
+ * probability (0.8 t)^k. Any y, however it was found, has a residual q = D^1/2 s - K y that is computed here, and
+ *
+ *     A s = D^1/2 y + D^1/2 K^-1 q,   so   ||A|| t <= max ||D^1/2 y|| + ||A|| max ||D^-1/2 q||,
+ *
+ * which bounds ||A|| = 1 / min |lambda(D^-1 K)| where the residuals are below t. It is the bound by a random start of
+ * Kuczynski and Wozniakowski, SIAM J. Matrix Anal. Appl. 13 (1992), after one step of inverse iteration, for inexact
+ * solves. Good solves need two trials, rougher ones more: t = 1e-12^(1/k) / 0.8, 1e-6 for two, 0.1 for twelve.
+ *
+ * No probability is spent on how M came to be: a solve that misses a dof leaves what s has there as its residual, and
+ * one of another matrix leaves its difference. */
+#include "amg/amg.h"
+
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/alloc.h"
+#include "core/hooks.h"
+#include "core/random.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PROBES_LEAST = 2, PROBES_MOST = 12, STEPS_MOST = 1000 };
+
+/* Of all that may be claimed after any number of trials, and what a share of t may be left by residuals. */
+#define CHANCE 1e-13
+#define LEFT   0.5
+/* What solves are asked for leaves room for what M makes of it. */
+#define ASKED 0.1
+
+static double threshold(int trials)
+{
+    return pow(CHANCE, 1.0 / trials) / 0.8;
+}
+
+/* The norm of D^-1/2 |K| D^-1/2, at most: its largest sum of a row; times what summing the longest row rounds. */
+static uz_status find_rounding(double *rounding, const uz_csc *K, uz_error *err)
+{
+    double *sum = uz_alloc_zero(K->cols, sizeof *sum), most = 0.0;
+    int64_t *count = uz_alloc_zero(K->cols, sizeof *count), longest = 0;
+    const bool ok = sum && count;
+    for (int64_t j = 0; ok && j < K->cols; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
+            const int64_t i = K->idx[k];
+            const double scaled = fabs(K->val[k]) / sqrt(K->val[K->ptr[i]]) / sqrt(K->val[K->ptr[j]]);
+            sum[j] += scaled;
+            count[j]++;
+            sum[i] += i != j ? scaled : 0.0;
+            count[i] += i != j;
+        }
+    for (int64_t j = 0; ok && j < K->cols; j++) {
+        most = fmax(most, sum[j]);
+        longest = count[j] > longest ? count[j] : longest;
+    }
+    *rounding = DBL_EPSILON * (double)(longest + 1) * most;
+    free(sum);
+    free(count);
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)K->cols);
+}
+
+/* One trial: *reach = ||D^1/2 y||, *missed >= ||D^-1/2 q||. */
+static uz_status try_once(double *reach, double *missed, double *y, double *b, uz_cg *cg, const uz_csc *K,
+                          uint64_t *state, double rounding, const uz_cg_stop *stop, uz_error *err)
+{
+    uz_cg_info info;
+    double wide = 0.0, left = 0.0, size = 0.0, work = 0.0;
+    for (int64_t j = 0; j < cg->n; j++) {
+        const double s = uz_normal(state);
+        b[j] = sqrt(K->val[K->ptr[j]]) * s;
+        y[j] = 0.0;
+        size += s * s;
+    }
+    const uz_status status = uz_cg_solve(&info, y, cg, K, b, stop, err);
+    if (status != UZ_OK)
+        return status;
+    for (int64_t j = 0; j < cg->n; j++) {
+        const double own = K->val[K->ptr[j]];
+        wide += own * y[j] * y[j];
+        left += cg->r[j] * cg->r[j] / own;
+        work += y[j] * (b[j] + cg->r[j]); /* b'K^-1 b, but for q'K^-1 q */
+    }
+    *reach = isnan(wide) ? INFINITY : sqrt(wide);
+    *missed = (isnan(left) ? INFINITY : sqrt(left)) + rounding * *reach + DBL_EPSILON * sqrt(size);
+    if (*missed < 1.0 && !(work > 0.0))
+        return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                       "K is not positive definite: a force does negative work on the displacement that it causes. "
+                       "Check the signs of K.");
+    return UZ_OK;
+}
+
+static uz_status fail_probes(double missed, uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_UNSUPPORTED, "operator",
+                   "operator distributed: solves by the group of processes leave too much of random loads (%.1g of "
+                   "each dof's) to certify anything by them: K is too ill-conditioned for it, or they are wrong. Use "
+                   "condensed or factored",
+                   missed);
+}
+
+uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err)
+{
+    const double start = uz_seconds();
+    const int64_t n = K->cols;
+    double *y = uz_alloc(n, sizeof *y), *b = uz_alloc(n, sizeof *b), reach = 0.0, missed = 0.0;
+    uint64_t state = 0xD1B54A32D192ED03u;
+    uz_cg cg = {0};
+    uz_status status = uz_cg_init(&cg, amg->mg, err);
+    if (status == UZ_OK && (!y || !b))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)n);
+    if (status == UZ_OK)
+        status = find_rounding(&amg->info.rounding, K, err);
+    amg->info.least = 0.0;
+    for (int k = 1; status == UZ_OK && k <= PROBES_MOST && !(amg->info.least > 0.0); k++) {
+        const double t = threshold(k), aim = threshold(k < PROBES_LEAST ? PROBES_LEAST : k);
+        const uz_cg_stop stop = {.absolute = ASKED * aim / sqrt(fmax(1.0, amg->mg->most)),
+                                 .max_iterations = STEPS_MOST,
+                                 .hooks = hooks,
+                                 .deadline = INFINITY};
+        double wide, left;
+        if (uz_cancelled(hooks)) {
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
+            break;
+        }
+        status = try_once(&wide, &left, y, b, &cg, K, &state, amg->info.rounding, &stop, err);
+        reach = fmax(reach, wide);
+        missed = fmax(missed, left);
+        if (status == UZ_OK && k >= PROBES_LEAST && missed <= LEFT * t)
+            amg->info.least = (t - missed) / reach;
+    }
+    if (status == UZ_OK && !(amg->info.least > 0.0))
+        status = fail_probes(missed, err);
+    if (status == UZ_OK)
+        amg->info.rcond = fmin(amg->info.rcond, 1.0 / reach);
+    uz_cg_clear(&cg);
+    free(y);
+    free(b);
+    amg->info.spectrum_s += uz_seconds() - start;
+    return status;
+}
