@@ -24,6 +24,9 @@ TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl local
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
 TEST_PACKAGES += chromium chromium-driver python3-selenium python3-pil
 
+# One body on many machines: uzawa-group is built where these are, and nothing else needs them.
+GROUP_PACKAGES := libpetsc-real-dev openmpi-bin
+
 PEER_PACKAGES := coinor-libipopt-dev coinor-libclp-dev python3-numpy python3-cvxopt octave python3-siconos python3-petsc4py \
                  calculix-ccx
 
@@ -45,6 +48,8 @@ GOLD           = $(if $(findstring clang,$(CC)),,$(GOLD_OF_GCC))
 LDFLAGS_ALL   = $(SAN) -pthread $(GOLD) $(LDFLAGS)
 
 SOLVER_SRC := $(sort $(wildcard solver/*/*.c))
+HAS_PETSC  := $(shell pkg-config --exists petsc ompi-c 2>/dev/null && echo yes)
+GROUP_SRC  := $(sort $(wildcard solver/group/worker/*.c))
 SERVER_SRC := $(sort $(wildcard server/*.c server/*/*.c server/*/*/*.c))
 CLIENT_SRC := $(sort $(wildcard client/*.c client/*/*.c))
 UNIT_SRC   := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c tests/unit/*/*/*/test_*.c))
@@ -58,9 +63,9 @@ GUARD_SRC  := $(sort $(wildcard tests/guard/*.c))
 PEERS_SRC  := $(sort $(wildcard tests/peers/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
+C_FILES    := $(SOLVER_SRC) $(if $(HAS_PETSC),$(GROUP_SRC)) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
               $(wildcard tests/support/*.c)
-H_FILES    := $(wildcard solver/*/*.h server/*.h server/*/*.h server/*/*/*.h client/*.h client/*/*.h tests/*/*.h)
+H_FILES    := $(if $(HAS_PETSC),$(wildcard solver/group/worker/*.h)) $(wildcard solver/*/*.h server/*.h server/*/*.h server/*/*/*.h client/*.h client/*/*.h tests/*/*.h)
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 
@@ -68,6 +73,7 @@ obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 SOLVER_OBJ := $(call obj,$(SOLVER_SRC))
 SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(BUILD)/obj/gen/embedded.o $(BUILD)/obj/gen/page.o
 CLIENT_OBJ := $(call obj,$(CLIENT_SRC))
+GROUP_OBJ  := $(call obj,$(GROUP_SRC))
 # What unit tests may link: everything but the two mains.
 PARTS_OBJ  := $(filter-out $(BUILD)/obj/server/main.o,$(SERVER_OBJ)) $(filter-out $(BUILD)/obj/client/main.o,$(CLIENT_OBJ))
 UNIT_BIN   := $(addprefix $(BUILD)/tests/,$(notdir $(basename $(UNIT_SRC))))
@@ -75,8 +81,8 @@ PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
-.PHONY: all demo gallery run man guide install clean help deps deps-test
-all: $(BUILD)/uzawad $(BUILD)/uzawa ## build the daemon and the client
+.PHONY: all group deps-group demo gallery run man guide install clean help deps deps-test
+all: $(BUILD)/uzawad $(BUILD)/uzawa $(if $(HAS_PETSC),$(BUILD)/uzawa-group) ## build the daemon and the client, and uzawa-group where PETSc is
 
 # After deps, which may have installed the compiler; said, since it takes a minute where nothing is built yet.
 build_programs = @$(MAKE) --no-print-directory -q all 2>/dev/null || echo "building the daemon and the client"; \
@@ -98,6 +104,12 @@ run: deps ## keep the daemon in the foreground on 127.0.0.1:8080 with ./contact.
 deps: ## install the Debian packages that are missing
 	@tests/deps.sh $(PACKAGES)
 
+deps-group: ## the same with what one body on many machines needs: PETSc and Open MPI
+	@tests/deps.sh $(PACKAGES) $(GROUP_PACKAGES)
+
+group: deps-group ## build uzawa-group, the program of the operator distributed
+	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/uzawa-group
+
 deps-test: ## the same with what only the tests use
 	@tests/deps.sh $(PACKAGES) $(TEST_PACKAGES)
 
@@ -112,6 +124,7 @@ man: $(BUILD)/uzawa ## renew client/uzawa.1 and client/uzawa.bash, which follow 
 install: all ## install both programs, the manual page and the completion for bash under PREFIX
 	install -D -m 755 $(BUILD)/uzawad $(DESTDIR)$(PREFIX)/bin/uzawad
 	install -D -m 755 $(BUILD)/uzawa $(DESTDIR)$(PREFIX)/bin/uzawa
+	$(if $(HAS_PETSC),install -D -m 755 $(BUILD)/uzawa-group $(DESTDIR)$(PREFIX)/bin/uzawa-group)
 	install -D -m 644 client/uzawa.1 $(DESTDIR)$(PREFIX)/share/man/man1/uzawa.1
 	install -D -m 644 client/uzawa.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/uzawa
 
@@ -141,6 +154,14 @@ $(BUILD)/uzawad: $(SERVER_OBJ) $(BUILD)/libuzawa.a
 # Of the library it takes what both programs share (solver/text) and nothing that needs a library of the solver's.
 $(BUILD)/uzawa: $(CLIENT_OBJ) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(CLIENT_LIBS)
+
+# PETSc's macros for memory convert signed sizes in whoever uses them. It has a heap and handlers of its own, and runs
+# under mpirun: no sanitizer.
+GROUP_FLAGS = $(patsubst -I%,-isystem %,$(filter -I%,$(call pkg,--cflags petsc ompi-c))) -Wno-sign-conversion
+$(GROUP_OBJ): CFLAGS += $(GROUP_FLAGS) -O3
+$(GROUP_OBJ): SAN =
+$(BUILD)/uzawa-group: $(GROUP_OBJ)
+	$(CC) $(GOLD) $(LDFLAGS) -o $@ $^ $(call pkg,--libs petsc ompi-c) -lm
 
 # Unit tests are a third of what is compiled, and run as fast without optimization: the time is the solver's.
 $(BUILD)/obj/%.o: %.c

@@ -4,7 +4,9 @@
 set -uo pipefail
 cores=$(nproc)
 sources=$(make -s print-sources)
-c_files=$(printf '%s\n' $sources | grep '\.c$')
+c_files=$(printf '%s\n' $sources | grep '\.c$' | grep -v '^solver/group/worker/')
+group_files=$(printf '%s\n' $sources | grep '^solver/group/worker/.*\.c$') # where PETSc is
+group_flags=$(make -s print-GROUP_FLAGS)
 includes=$(make -s print-INC)
 cflags=$(make -s print-SERVER_CFLAGS)
 strict="$(make -s print-STD) $(make -s print-WARN)"
@@ -29,12 +31,17 @@ gcc_warnings() { # those that need no optimization
     unbuilt | xargs -r -P "$cores" -n 8 gcc -fsyntax-only $strict $includes $cflags -Itests -Itests/support
 }
 tidy() { # every warning of clang, and the quick checks that find mistakes; those left out see one in correct code here
-    printf '%s\n' $c_files | xargs -P "$cores" -n 8 sh -c 'options=$1; shift; clang-tidy --quiet --warnings-as-errors="*" \
+    tidy_files "" $c_files && { [ -z "$group_files" ] || tidy_files "$group_flags" $group_files; }
+}
+tidy_files() { # FLAGS FILE...
+    local flags=$1
+    shift
+    printf '%s\n' "$@" | xargs -P "$cores" -n 8 sh -c 'options=$1; shift; clang-tidy --quiet --warnings-as-errors="*" \
         --checks="-*,clang-diagnostic-*,bugprone-*,misc-redundant-expression,readability-misleading-indentation,
             -bugprone-branch-clone,-bugprone-easily-swappable-parameters,-bugprone-implicit-widening-of-multiplication-result,
             -bugprone-misplaced-widening-cast,-bugprone-narrowing-conversions,-bugprone-not-null-terminated-result,
             -bugprone-reserved-identifier,-bugprone-sizeof-expression,-bugprone-suspicious-memory-comparison" \
-        "$@" -- $options 2>&1' tidy "$strict $includes $cflags -Itests -Itests/support" |
+        "$@" -- $options 2>&1' tidy "$strict $includes $cflags $flags -Itests -Itests/support" |
         grep -Ev '^[0-9]+ warnings? (generated|treated as error)'
     return "${PIPESTATUS[1]}"
 }
@@ -62,13 +69,13 @@ only_in() { # HEADER PATTERN: the header is included nowhere but in files that m
 headers_alone() { # a header says all that it needs
     printf '%s\n' $sources | grep '\.h$' | xargs -P "$cores" -n 4 sh -c 'options=$1; shift; status=0
         for header; do printf "#include \"%s\"\n" "$header" | gcc -fsyntax-only -x c $options -I. - || status=255; done
-        exit $status' headers "$strict $includes $cflags -Itests -Itests/support"
+        exit $status' headers "$strict $includes $cflags $group_flags -Itests -Itests/support"
 }
 check format clang-format --dry-run -Werror $sources
 check gcc gcc_warnings
 check clang tidy
 check cppcheck cppcheck -j "$cores" --quiet --std=c11 --error-exitcode=1 --inline-suppr --enable=warning,portability \
-    --suppress=missingIncludeSystem --suppress=normalCheckLevelMaxBranches $includes $c_files
+    --suppress=missingIncludeSystem --suppress=normalCheckLevelMaxBranches $includes $c_files $group_files
 check headers_alone headers_alone
 check rooms python3 -B tests/rooms.py
 check file_length long_files
@@ -79,5 +86,7 @@ check cholmod_only_in_factor only_in 'cholmod' '^solver/factor/'
 check sqlite_only_in_its_engine only_in 'sqlite3' '^server/store/sqlite/'
 check libpq_only_in_its_engine only_in 'libpq' '^server/store/postgresql/'
 check microhttpd_only_in_transport only_in 'microhttpd' '^server/http/transport/'
+check petsc_only_in_worker only_in 'petsc' '^solver/group/worker/'
+check mpi_only_in_worker only_in 'mpi' '^solver/group/worker/'
 check jansson_only_in_client only_in 'jansson' '^client/'
 exit $status

@@ -347,6 +347,13 @@ typedef struct {
     double seconds_left;
 } uz_grid_start;
 
+/* The processes of an operator distributed, at the other end of a stream: a program of its own, uzawa-group. */
+typedef struct uz_process_group uz_process_group;
+uz_process_group *uz_process_group_new(int stream); /* has the descriptor from now on. NULL: no memory; it is closed */
+/* It ended in the middle of a solve, whose error is then INTERNAL. */
+bool uz_process_group_is_lost(const uz_process_group *group);
+void uz_process_group_free(uz_process_group *group); /* and the processes end */
+
 /* Asked between iterations and before every expensive step; from the solving thread. */
 typedef struct {
     void *ctx;
@@ -354,6 +361,9 @@ typedef struct {
     void (*progress)(void *ctx, const uz_history_row *row); /* may be NULL; after each iteration */
     void (*begins)(void *ctx, int64_t load_case);           /* may be NULL; before the first iteration of a case */
     void (*grid)(void *ctx, const uz_grid_start *grid); /* may be NULL; where the mesh is chosen: before each grid */
+    /* may be NULL; the operator distributed: the group of processes to solve with, for as long as the call lasts. NULL:
+     * none could be had; `why` (size bytes) then says so */
+    uz_process_group *(*group)(void *ctx, char *why, size_t size);
 } uz_hooks;
 
 #ifdef __cplusplus

@@ -1,0 +1,476 @@
+/* group.c: the stream to a group of processes, and solves by them (wire.h says what passes). */
+#include "group/group.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "group/spread.h"
+#include "group/wire.h"
+
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+struct uz_process_group {
+    int stream;
+    bool lost;
+    int64_t processes; /* 0: it has not said yet */
+    int64_t next_id;
+    pthread_mutex_t mutex; /* of an exchange: a question, its answer, and what both share with others of a solve */
+};
+
+uz_process_group *uz_process_group_new(int stream)
+{
+    uz_process_group *group = uz_alloc_zero(1, sizeof *group);
+    if (!group) {
+        close(stream);
+        return NULL;
+    }
+    group->stream = stream;
+    group->next_id = 1;
+    pthread_mutex_init(&group->mutex, NULL);
+    return group;
+}
+
+bool uz_process_group_is_lost(const uz_process_group *group)
+{
+    return group->lost;
+}
+
+void uz_process_group_free(uz_process_group *group)
+{
+    if (!group)
+        return;
+    close(group->stream); /* it ends then */
+    pthread_mutex_destroy(&group->mutex);
+    free(group);
+}
+
+/* ---- the stream */
+
+static bool put(uz_process_group *group, const void *from, size_t size)
+{
+    struct iovec part = {.iov_base = (void *)(uintptr_t)from, .iov_len = size};
+    const struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1};
+    while (!group->lost && part.iov_len > 0) {
+        const ssize_t sent = sendmsg(group->stream, &message, MSG_NOSIGNAL);
+        if (sent < 0 && errno == EINTR)
+            continue;
+        if (sent <= 0)
+            group->lost = true;
+        else
+            part = (struct iovec){.iov_base = (char *)part.iov_base + sent, .iov_len = part.iov_len - (size_t)sent};
+    }
+    return !group->lost;
+}
+
+static bool take(uz_process_group *group, void *to, size_t size)
+{
+    for (char *at = to; !group->lost && size > 0;) {
+        const ssize_t got = read(group->stream, at, size);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got <= 0) {
+            group->lost = true;
+        } else {
+            at += got;
+            size -= (size_t)got;
+        }
+    }
+    return !group->lost;
+}
+
+static bool ask(uz_process_group *group, uz_wire_head head)
+{
+    head.version = UZ_WIRE_VERSION;
+    return put(group, &head, sizeof head);
+}
+
+static bool hear(uz_process_group *group, uz_wire_head *head, uz_wire_kind kind)
+{
+    if (take(group, head, sizeof *head) && (head->kind != (int32_t)kind || head->version != UZ_WIRE_VERSION))
+        group->lost = true; /* of another build, or no group at all */
+    return !group->lost;
+}
+
+static uz_status fail_lost(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_INTERNAL, "", "the group of processes that held the body was lost");
+}
+
+static uz_status fail_wrong(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_INTERNAL, "operator",
+                   "operator distributed: what the group of processes says of its residual is not true of K: use "
+                   "matrix_free, and report the request");
+}
+
+/* ---- systems */
+
+typedef struct {
+    uz_multigrid base;
+    uz_process_group *group;
+    int64_t id;
+    uz_spread map; /* of dofs to places */
+    double *wide;  /* map.size: a vector in the group's order */
+} far_multigrid;
+
+/* Which of the body's systems a thread works on. */
+struct uz_multigrid_room {
+    int which;        /* UZ_WIRE_WHOLE, or FREE_DOFS where some are held */
+    const bool *held; /* d; NULL: none */
+    double square;    /* r'M^-1 r of the last step, as the group says */
+    double most;      /* of the system: see uz_multigrid */
+};
+
+/* Both together, as a call has them. */
+typedef struct {
+    const far_multigrid *body;
+    uz_multigrid_room *room;
+} far_system;
+
+static far_system system_of(const uz_multigrid *mg, uz_multigrid_room *room)
+{
+    return (far_system){(const far_multigrid *)mg, room};
+}
+
+static uz_multigrid_room *make_room(const uz_multigrid *mg, size_t *bytes)
+{
+    uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
+    *bytes = sizeof *room;
+    if (room)
+        room->most = mg->most;
+    return room;
+}
+
+static void free_room(uz_multigrid_room *room)
+{
+    free(room);
+}
+
+static void free_multigrid(uz_multigrid *mg)
+{
+    far_multigrid *body = (far_multigrid *)mg;
+    pthread_mutex_lock(&body->group->mutex);
+    if (body->id > 0)
+        ask(body->group, (uz_wire_head){.kind = UZ_WIRE_FREE, .id = body->id});
+    pthread_mutex_unlock(&body->group->mutex);
+    uz_spread_clear(&body->map);
+    free(body->wide);
+    free(body);
+}
+
+static void multiply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x)
+{
+    (void)room;
+    memset(y, 0, (size_t)mg->n * sizeof *y);
+    uz_csc_symv(y, K, 1.0, x);
+}
+
+/* x at dofs that are not held, and zeros. */
+static bool put_vector(const far_system *s, const double *x)
+{
+    const far_multigrid *body = s->body;
+    memset(body->wide, 0, (size_t)body->map.size * sizeof *body->wide);
+    for (int64_t j = 0; x && j < body->map.d; j++)
+        if (!s->room->held || !s->room->held[j])
+            body->wide[body->map.place[j]] = x[j];
+    return put(body->group, body->wide, (size_t)body->map.size * sizeof *body->wide);
+}
+
+/* zeros: x is 0 at held dofs; else it stays there. */
+static bool take_vector(const far_system *s, double *x, bool zeros)
+{
+    const far_multigrid *body = s->body;
+    uz_wire_head head;
+    if (!hear(body->group, &head, UZ_WIRE_VECTOR) ||
+        !take(body->group, body->wide, (size_t)body->map.size * sizeof *body->wide))
+        return false;
+    for (int64_t j = 0; j < body->map.d; j++)
+        if (!s->room->held || !s->room->held[j])
+            x[j] = body->wide[body->map.place[j]];
+        else if (zeros)
+            x[j] = 0.0;
+    return true;
+}
+
+static bool ask_of(const far_system *s, uz_wire_head head)
+{
+    head.id = s->body->id;
+    head.a = s->room->which;
+    return ask(s->body->group, head);
+}
+
+static bool hear_square(const far_system *s)
+{
+    uz_wire_head head = {.kind = 0};
+    const bool heard = hear(s->body->group, &head, UZ_WIRE_STATE);
+    s->room->square = head.x;
+    return heard;
+}
+
+static uz_status apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
+                       uz_error *err)
+{
+    const far_system of = system_of(mg, room), *s = &of;
+    (void)K;
+    pthread_mutex_lock(&s->body->group->mutex);
+    const bool done = ask_of(s, (uz_wire_head){.kind = UZ_WIRE_APPLY}) && put_vector(s, r) && take_vector(s, z, true);
+    pthread_mutex_unlock(&s->body->group->mutex);
+    return done ? UZ_OK : fail_lost(err);
+}
+
+/* x NULL: from 0. */
+static bool begin(const far_system *s, const double *x, const double *b)
+{
+    return ask_of(s, (uz_wire_head){.kind = UZ_WIRE_BEGIN}) && put_vector(s, x) && put_vector(s, b) && hear_square(s);
+}
+
+/* Up to `most` steps while the square is above goal2. */
+static bool make_steps(const far_system *s, int *made, bool *flat, double *alpha, double *beta, int most, double goal2)
+{
+    uz_wire_head head;
+    *made = 0;
+    const uz_wire_head question = {.kind = UZ_WIRE_STEPS, .b = most, .x = goal2, .y = s->room->square};
+    if (!ask_of(s, question) || !hear(s->body->group, &head, UZ_WIRE_STATE))
+        return false;
+    if (head.a < 0 || head.a > most)
+        return false;
+    *made = (int)head.a;
+    *flat = head.b != 0;
+    s->room->square = head.x;
+    return take(s->body->group, alpha, (size_t)head.a * sizeof *alpha) &&
+           take(s->body->group, beta, (size_t)head.a * sizeof *beta);
+}
+
+/* ---- conjugate gradients, as amg/cg.c has them: the recurrence is begun again from the true residual until that meets
+ * the goal too, or gains nothing more */
+
+enum { RESTARTS_MOST = 4 };
+
+/* The group's residual and the one found here are alike but for rounding: a share that says that they are not, and the
+ * rounding of a product, relative. */
+#define BELIEVED 0.01
+#define ROUNDED  1e-11
+
+/* Between two looks whether to go on. */
+#define SLICE_S 0.02
+
+static bool should_stop(const uz_cg_info *info, const uz_cg_stop *stop)
+{
+    return info->iterations >= stop->max_iterations || uz_cancelled(stop->hooks) || uz_seconds() >= stop->deadline;
+}
+
+static bool run_steps(const far_system *s, uz_cg_info *info, bool *flat, const uz_cg_stop *stop, double goal2)
+{
+    double alpha[UZ_WIRE_STEPS_MOST], beta[UZ_WIRE_STEPS_MOST];
+    for (int most = 1; s->room->square > goal2 && !*flat && !should_stop(info, stop);) {
+        const double start = uz_seconds();
+        const int64_t left = stop->max_iterations - info->iterations;
+        int made;
+        if (!make_steps(s, &made, flat, alpha, beta, left < most ? (int)left : most, goal2))
+            return false;
+        info->iterations += made;
+        if (made == 0) /* nothing more to gain */
+            break;
+        if (uz_seconds() - start < SLICE_S && most < UZ_WIRE_STEPS_MOST)
+            most *= 2;
+    }
+    return true;
+}
+
+/* What r'M^-1 r can't be less than: M <= most diag(K). The square is the group's word, r is not, nor is what rounding
+ * makes of r in x and b. */
+static bool is_possible(const far_system *s, const uz_csc *K, const double *r, const double *x, const double *b)
+{
+    double least = 0.0, size = 0.0;
+    for (int64_t j = 0; j < s->body->map.d; j++) {
+        const double own = K->val[K->ptr[j]];
+        if (s->room->held && s->room->held[j])
+            continue;
+        least += r[j] * r[j] / own;
+        size += b[j] * b[j] / own + x[j] * x[j] * own;
+    }
+    return s->room->square * s->room->most >= BELIEVED * least - ROUNDED * ROUNDED * size;
+}
+
+/* r = b - K x on the dofs that are not held. */
+static void find_residual(const far_system *s, const uz_csc *K, double *r, const double *x, const double *b)
+{
+    const int64_t d = s->body->map.d;
+    double *free_part = s->body->wide; /* a vector in the group's order is not longer */
+    for (int64_t j = 0; j < d; j++)
+        free_part[j] = s->room->held && s->room->held[j] ? 0.0 : x[j];
+    multiply(&s->body->base, K, s->room, r, free_part);
+    for (int64_t j = 0; j < d; j++)
+        r[j] = s->room->held && s->room->held[j] ? 0.0 : b[j] - r[j];
+}
+
+/* The group's part of it: false: it was lost. */
+static bool solve_there(const far_system *s, uz_cg_info *info, bool *flat, double *x, const double *b,
+                        const uz_cg_stop *stop)
+{
+    double goal = 0.0, before = INFINITY;
+    bool done = begin(s, x, b);
+    for (int k = 0; done; k++) {
+        done = k == 0 || (ask_of(s, (uz_wire_head){.kind = UZ_WIRE_AGAIN}) && hear_square(s));
+        info->last = uz_root(s->room->square);
+        if (k == 0) {
+            info->first = info->last;
+            goal = fmax(stop->absolute, stop->relative * info->first);
+        }
+        info->met = info->last <= goal;
+        if (!done || (k > 0 && should_stop(info, stop)) || k == RESTARTS_MOST || !(info->last > goal) ||
+            !(info->last < 0.5 * before))
+            break;
+        before = info->last;
+        done = run_steps(s, info, flat, stop, goal * goal);
+        if (*flat)
+            break;
+    }
+    return done && ask_of(s, (uz_wire_head){.kind = UZ_WIRE_FETCH}) && take_vector(s, x, false);
+}
+
+static uz_status solve(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, uz_cg_info *info, double *x,
+                       double *r, const double *b, const uz_cg_stop *stop, uz_error *err)
+{
+    const far_system of = system_of(mg, room), *s = &of;
+    bool flat = false;
+    pthread_mutex_lock(&s->body->group->mutex);
+    const bool done = solve_there(s, info, &flat, x, b, stop);
+    if (done)
+        find_residual(s, K, r, x, b);
+    pthread_mutex_unlock(&s->body->group->mutex);
+    if (!done)
+        return fail_lost(err);
+    if (flat)
+        return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                       "K is not positive definite: conjugate gradients met a direction that it does not resist. "
+                       "Support the body so that it can't move freely, or check the signs of K.");
+    return is_possible(s, K, r, x, b) ? UZ_OK : fail_wrong(err);
+}
+
+/* ---- making them */
+
+static bool hear_made(uz_process_group *group, uz_multigrid *info)
+{
+    uz_wire_head head;
+    if (!hear(group, &head, UZ_WIRE_MADE))
+        return false;
+    info->levels = (int)head.a;
+    info->bytes = (size_t)head.b;
+    info->most = head.x;
+    return true;
+}
+
+static uz_status hold(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, const bool *held, size_t *bytes,
+                      const uz_stop *stop, uz_error *err)
+{
+    const far_multigrid *body = (const far_multigrid *)mg;
+    uz_multigrid free_dofs;
+    (void)K;
+    *bytes = 0;
+    room->which = UZ_WIRE_WHOLE;
+    room->held = NULL;
+    room->most = mg->most;
+    if (!held)
+        return UZ_OK;
+    if (uz_stop_is_due(stop))
+        return uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the multigrid was made");
+    char *marks = uz_alloc_zero(body->map.size, sizeof *marks);
+    if (!marks)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)mg->n);
+    for (int64_t j = 0; j < body->map.d; j++)
+        marks[body->map.place[j]] = held[j];
+    pthread_mutex_lock(&body->group->mutex);
+    const bool made = ask(body->group, (uz_wire_head){.kind = UZ_WIRE_HOLD, .id = body->id}) &&
+                      put(body->group, marks, (size_t)body->map.size) && hear_made(body->group, &free_dofs);
+    pthread_mutex_unlock(&body->group->mutex);
+    free(marks);
+    if (!made)
+        return fail_lost(err);
+    room->which = UZ_WIRE_FREE_DOFS;
+    room->held = held;
+    room->most = free_dofs.most;
+    return UZ_OK;
+}
+
+static const uz_multigrid_kind KIND = {.apply = apply,
+                                       .multiply = multiply,
+                                       .room = make_room,
+                                       .free_room = free_room,
+                                       .hold = hold,
+                                       .free = free_multigrid,
+                                       .solve = solve};
+
+/* Rows, process after process, of which each has its nodes in a row. */
+static bool put_rows(uz_process_group *group, int64_t id, const uz_spread *map, const uz_spread_rows *rows)
+{
+    const size_t squared = (size_t)(map->bs * map->bs);
+    const uz_wire_head head = {.kind = UZ_WIRE_ROWS, .id = id, .a = rows->nodes, .b = rows->blocks, .c = rows->process};
+    return ask(group, head) && put(group, rows->count, (size_t)rows->nodes * sizeof *rows->count) &&
+           put(group, rows->column, (size_t)rows->blocks * sizeof *rows->column) &&
+           put(group, rows->value, (size_t)rows->blocks * squared * sizeof *rows->value) &&
+           put(group, rows->mode, (size_t)(rows->nodes * map->bs * map->modes) * sizeof *rows->mode);
+}
+
+/* All of it, until the group has made its multigrid. */
+static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes *modes, uz_error *err)
+{
+    uz_process_group *group = body->group;
+    uz_spread *map = &body->map;
+    uz_wire_head head;
+    if (group->processes == 0) {
+        if (!hear(group, &head, UZ_WIRE_HELLO) || head.a < 1)
+            return fail_lost(err);
+        group->processes = head.a;
+    }
+    body->id = group->next_id++;
+    head = (uz_wire_head){.kind = UZ_WIRE_BODY, .id = body->id, .a = map->nodes, .b = map->bs, .c = map->modes};
+    if (!ask(group, head) || !put(group, map->offset, (size_t)(map->nodes + 1) * sizeof *map->offset) ||
+        !put(group, map->neighbour, (size_t)map->offset[map->nodes] * sizeof *map->neighbour) ||
+        !hear(group, &head, UZ_WIRE_PARTS) || !take(group, map->part, (size_t)map->nodes * sizeof *map->part))
+        return fail_lost(err);
+    uz_status status = uz_spread_number(map, group->processes, err);
+    for (int64_t process = 0; status == UZ_OK && !group->lost && process < group->processes; process++) {
+        uz_spread_rows rows = {.process = process};
+        status = uz_spread_fill(&rows, map, K, modes, err);
+        while (status == UZ_OK && uz_spread_next(&rows, map) && put_rows(group, body->id, map, &rows))
+            ;
+        uz_spread_rows_clear(&rows);
+    }
+    if (status != UZ_OK) {
+        group->lost = true; /* it waits for the rest */
+        return status;
+    }
+    return !group->lost && hear_made(group, &body->base) ? UZ_OK : fail_lost(err);
+}
+
+uz_status uz_group_multigrid(uz_multigrid **out, uz_process_group *group, const uz_csc *K, const uz_modes *modes,
+                             uz_error *err)
+{
+    far_multigrid *body = uz_alloc_zero(1, sizeof *body);
+    *out = NULL;
+    if (!body)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a body");
+    body->base.kind = &KIND;
+    body->base.n = K->cols;
+    body->group = group;
+    uz_status status = uz_spread_init(&body->map, K, modes, err);
+    if (status == UZ_OK && !(body->wide = uz_alloc(body->map.size, sizeof *body->wide)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a vector of %lld numbers", (long long)body->map.size);
+    if (status == UZ_OK) {
+        pthread_mutex_lock(&group->mutex);
+        status = send_body(body, K, modes, err);
+        pthread_mutex_unlock(&group->mutex);
+    }
+    if (status == UZ_OK)
+        *out = &body->base;
+    else
+        free_multigrid(&body->base);
+    return status;
+}

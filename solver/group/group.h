@@ -1,0 +1,16 @@
+/* group.h: a multigrid that a group of processes holds, with its part of K each (worker/main.c): the side that asks.
+ *
+ * K is whole here, too: its rows go to the processes once, each block of a node to one of them. After that vectors of
+ * d pass, for each solve and not for each of its iterations. */
+#ifndef UZ_GROUP_H
+#define UZ_GROUP_H
+
+#include "amg/amg.h"
+#include "uzawa.h"
+
+/* Dofs that are held are those of the last one who held some: of one room at a time. Errors: NOT_SPD where the diagonal
+ * shows it; UNSUPPORTED: too large; MEMORY; INTERNAL: the group was lost (uz_process_group_is_lost). */
+uz_status uz_group_multigrid(uz_multigrid **out, uz_process_group *group, const uz_csc *K, const uz_modes *modes,
+                             uz_error *err);
+
+#endif

@@ -1,0 +1,45 @@
+/* spread.h: K by blocks of nodes, for processes that have some nodes each. */
+#ifndef UZ_GROUP_SPREAD_H
+#define UZ_GROUP_SPREAD_H
+
+#include "amg/amg.h"
+#include "uzawa.h"
+
+/* Every node gets as many dofs as the fullest has; those that it does not have are rows of the unit matrix, times the
+ * largest diagonal entry of the node. */
+typedef struct {
+    int64_t d, nodes, size; /* size = nodes x bs */
+    int64_t bs, modes;
+    int32_t *node;               /* d: of each dof */
+    int32_t *offset, *neighbour; /* nodes + 1, offset[nodes]: the graph, without loops; sorted by uz_spread_number */
+    int32_t *part;               /* nodes: the process of each, filled by the caller before uz_spread_number */
+    int32_t *order, *number;     /* nodes: by process, and of each node its place in that order */
+    int64_t *place;              /* d: number of its node x bs + which of its dofs */
+} uz_spread;
+
+/* All but part, order, number; of `place` only which dof of its node it is. Errors: NOT_SPD where a diagonal entry is
+ * not positive; UNSUPPORTED: too large for 32 bits. */
+uz_status uz_spread_init(uz_spread *map, const uz_csc *K, const uz_modes *modes, uz_error *err);
+uz_status uz_spread_number(uz_spread *map, int64_t processes, uz_error *err);
+void uz_spread_clear(uz_spread *map);
+
+/* The rows of one process, some at a time. */
+typedef struct {
+    int64_t process;
+    int64_t nodes, blocks;  /* of the current ones */
+    const int32_t *count;   /* nodes: blocks of each, */
+    const int32_t *column;  /* blocks: and their columns, ascending */
+    const double *value;    /* blocks x bs x bs: row by row of the matrix */
+    const float *mode;      /* nodes x bs x modes */
+    int64_t first, end, at; /* in map->order: of the process, and of the current nodes the one after the last */
+    int64_t *from;          /* end - first + 1: blocks before each node's */
+    int32_t *counts, *columns;
+    double *values;
+    float *mode_values;
+} uz_spread_rows;
+uz_status uz_spread_fill(uz_spread_rows *rows, const uz_spread *map, const uz_csc *K, const uz_modes *modes,
+                         uz_error *err);
+bool uz_spread_next(uz_spread_rows *rows, const uz_spread *map); /* false: there are no more */
+void uz_spread_rows_clear(uz_spread_rows *rows);
+
+#endif

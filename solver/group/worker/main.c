@@ -1,0 +1,522 @@
+/* main.c: uzawa-group: the processes that hold one body together (docs/architecture/dual-form.md).
+ *
+ * Started by the daemon through a command of the administrator's, as a rule mpirun. The first process reads what is
+ * asked from a stream (wire.h) and passes it on; all of them do it. It sees matrices and vectors, never a request.
+ * A process that finds something amiss ends the whole group, and the other end of the stream sees that. */
+#include "stream.h"
+#include "worker.h"
+
+#include "../wire.h"
+
+#include <limits.h>
+#include <sched.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/* A body, its rows by process. */
+typedef struct {
+    int64_t id; /* 0: this place is free */
+    PetscInt nodes, bs, modes, arrived;
+    PetscMPIInt *count, *first; /* dofs of each process, and the first of them */
+    int64_t blocks;             /* of the rows here */
+    PetscInt here, filled;      /* nodes here, and those that have come; entries that have come: row[filled * bs] */
+    PetscInt *row, *column;     /* until the matrix is made: its rows here */
+    double *value;
+    float *mode; /* here x bs x modes */
+    linear_system system[2];
+    bool made[2];
+} body;
+
+typedef struct {
+    int stream; /* of the first process */
+    PetscMPIInt rank, size;
+    body body[UZ_WIRE_BODIES];
+    double *whole; /* the first process: a vector, room of `room` numbers */
+    size_t room;
+} group;
+
+#define IS_FIRST(g) ((g)->rank == 0)
+
+static void give_up(const char *why)
+{
+    fprintf(stderr, "uzawa-group: %s\n", why);
+    MPI_Abort(PETSC_COMM_WORLD, 1);
+}
+
+static void take(group *g, void *to, size_t size)
+{
+    if (!stream_read(g->stream, to, size))
+        give_up("the stream ended in the middle of a message");
+}
+
+static void put(group *g, const void *from, size_t size)
+{
+    if (!stream_write(g->stream, from, size))
+        give_up("nobody reads the answer");
+}
+
+static void answer(group *g, uz_wire_head head)
+{
+    head.version = UZ_WIRE_VERSION;
+    if (IS_FIRST(g))
+        put(g, &head, sizeof head);
+}
+
+static body *find(group *g, int64_t id)
+{
+    for (int k = 0; k < UZ_WIRE_BODIES; k++)
+        if (g->body[k].id == id)
+            return &g->body[k];
+    give_up("no such body, or too many");
+    return NULL;
+}
+
+/* ---- a body comes in */
+
+/* Which process is to have each node: a partition of the graph of nodes (PT-Scotch, unless options say otherwise). */
+static PetscErrorCode divide(group *g, PetscInt n, const int32_t *offset, const int32_t *neighbour, int32_t *part)
+{
+    const PetscInt share = n / g->size, first = share * g->rank, mine = g->rank == g->size - 1 ? n - first : share;
+    PetscMPIInt count;
+    PetscInt *ia, *ja;
+    const PetscInt *found;
+    Mat graph;
+    MatPartitioning how;
+    IS parts;
+    PetscFunctionBeginUser;
+    if (!IS_FIRST(g)) {
+        PetscCall(PetscMalloc1(mine + 1, &ia));
+        PetscCallMPI(MPI_Recv(ia, mine + 1, MPIU_INT, 0, 1, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+        PetscCall(PetscMalloc1(ia[mine] + 1, &ja));
+        PetscCallMPI(MPI_Recv(ja, ia[mine], MPIU_INT, 0, 2, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+    }
+    for (PetscMPIInt to = g->size - 1; IS_FIRST(g) && to >= 0; to--) {
+        const PetscInt from = share * to, nodes = to == g->size - 1 ? n - from : share;
+        PetscCall(PetscMalloc1(nodes + 1, &ia));
+        for (PetscInt i = 0; i <= nodes; i++)
+            ia[i] = offset[from + i] - offset[from];
+        PetscCall(PetscMalloc1(ia[nodes] + 1, &ja));
+        for (PetscInt k = 0; k < ia[nodes]; k++)
+            ja[k] = neighbour[offset[from] + k];
+        if (to == 0)
+            break;
+        PetscCallMPI(MPI_Send(ia, nodes + 1, MPIU_INT, to, 1, PETSC_COMM_WORLD));
+        PetscCallMPI(MPI_Send(ja, ia[nodes], MPIU_INT, to, 2, PETSC_COMM_WORLD));
+        PetscCall(PetscFree(ia));
+        PetscCall(PetscFree(ja));
+    }
+    PetscCall(MatCreateMPIAdj(PETSC_COMM_WORLD, mine, n, ia, ja, NULL, &graph)); /* has both now */
+    PetscCall(MatPartitioningCreate(PETSC_COMM_WORLD, &how));
+    PetscCall(MatPartitioningSetAdjacency(how, graph));
+    PetscCall(MatPartitioningSetType(how, MATPARTITIONINGPTSCOTCH));
+    PetscCall(MatPartitioningSetFromOptions(how));
+    PetscCall(MatPartitioningApply(how, &parts));
+    PetscCall(ISGetIndices(parts, &found));
+    PetscMPIInt *counts = NULL, *firsts = NULL;
+    PetscCall(PetscMalloc2(g->size, &counts, g->size, &firsts));
+    for (PetscMPIInt k = 0; k < g->size; k++) {
+        firsts[k] = share * k;
+        counts[k] = k == g->size - 1 ? n - firsts[k] : share;
+    }
+    PetscCall(PetscMPIIntCast(mine, &count));
+    PetscCallMPI(MPI_Gatherv(found, count, MPIU_INT, part, counts, firsts, MPI_INT32_T, 0, PETSC_COMM_WORLD));
+    PetscCall(PetscFree2(counts, firsts));
+    PetscCall(ISRestoreIndices(parts, &found));
+    PetscCall(ISDestroy(&parts));
+    PetscCall(MatPartitioningDestroy(&how));
+    PetscCall(MatDestroy(&graph));
+    PetscFunctionReturn(0);
+}
+
+static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
+{
+    body *b = find(g, 0);
+    int32_t *offset = NULL, *neighbour = NULL, *part = NULL;
+    PetscInt *nodes, *blocks, mine[2];
+    PetscFunctionBeginUser;
+    PetscCheck(m->a > 0 && m->b > 0 && m->b <= 6 && m->c > 0 && m->c <= 6 && m->a * m->b < INT_MAX, PETSC_COMM_WORLD,
+               PETSC_ERR_ARG_OUTOFRANGE, "a body of %lld nodes", (long long)m->a);
+    *b = (body){.id = m->id, .nodes = (PetscInt)m->a, .bs = (PetscInt)m->b, .modes = (PetscInt)m->c};
+    PetscCall(PetscCalloc2(2 * g->size, &nodes, 2 * g->size, &blocks));
+    if (IS_FIRST(g)) {
+        PetscCall(PetscMalloc1(b->nodes + 1, &offset));
+        take(g, offset, (size_t)(b->nodes + 1) * sizeof *offset);
+        PetscCall(PetscMalloc1(offset[b->nodes] + 1, &neighbour));
+        take(g, neighbour, (size_t)offset[b->nodes] * sizeof *neighbour);
+        PetscCall(PetscCalloc1(b->nodes, &part));
+    }
+    if (g->size > 1 && b->nodes >= 8 * g->size)
+        PetscCall(divide(g, b->nodes, offset, neighbour, part));
+    for (PetscInt i = 0; IS_FIRST(g) && i < b->nodes; i++) {
+        nodes[2 * part[i]]++;
+        nodes[2 * part[i] + 1] += offset[i + 1] - offset[i] + 1;
+    }
+    PetscCallMPI(MPI_Bcast(nodes, 2 * g->size, MPIU_INT, 0, PETSC_COMM_WORLD));
+    PetscCall(PetscMalloc2(g->size, &b->count, g->size, &b->first));
+    for (PetscMPIInt k = 0, at = 0; k < g->size; at += b->count[k++]) {
+        b->first[k] = at;
+        b->count[k] = nodes[2 * k] * b->bs;
+    }
+    mine[0] = nodes[2 * g->rank];
+    mine[1] = nodes[2 * g->rank + 1];
+    PetscCall(PetscFree2(nodes, blocks));
+    b->here = mine[0];
+    b->blocks = mine[1];
+    PetscCheck(b->blocks * b->bs * b->bs < INT_MAX, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+               "more than 2^31 - 1 entries of K for one process: take more processes");
+    PetscCall(PetscMalloc1(b->here * b->bs + 1, &b->row));
+    PetscCall(PetscMalloc2(b->blocks * b->bs * b->bs, &b->column, b->blocks * b->bs * b->bs, &b->value));
+    PetscCall(PetscMalloc1(b->here * b->bs * b->modes, &b->mode));
+    b->row[0] = 0;
+    answer(g, (uz_wire_head){.kind = UZ_WIRE_PARTS, .id = b->id, .a = g->size});
+    if (IS_FIRST(g))
+        put(g, part, (size_t)b->nodes * sizeof *part);
+    PetscCall(PetscFree(offset));
+    PetscCall(PetscFree(neighbour));
+    PetscCall(PetscFree(part));
+    PetscFunctionReturn(0);
+}
+
+/* Bytes that a system takes, on all processes: its matrices. */
+static PetscErrorCode count_bytes(int64_t *bytes, const linear_system *s)
+{
+    MatInfo info;
+    PetscFunctionBeginUser;
+    *bytes = 0;
+    for (int k = 0; k < s->levels; k++) {
+        PetscCall(MatGetInfo(s->level[k].A, MAT_GLOBAL_SUM, &info));
+        *bytes += (int64_t)(12.0 * info.nz_allocated);
+        if (!s->level[k].P)
+            continue;
+        PetscCall(MatGetInfo(s->level[k].P, MAT_GLOBAL_SUM, &info));
+        *bytes += (int64_t)(12.0 * info.nz_allocated);
+    }
+    PetscFunctionReturn(0);
+}
+
+static PetscErrorCode make_system(group *g, body *b, int which, Mat A, const float *modes)
+{
+    const double start = MPI_Wtime();
+    linear_system *s = &b->system[which];
+    int64_t bytes;
+    PetscFunctionBeginUser;
+    PetscCall(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
+    PetscCall(MatSetOption(A, MAT_SPD, PETSC_TRUE));
+    PetscCall(system_create(s, A, modes, b->modes));
+    b->made[which] = true;
+    PetscCall(count_bytes(&bytes, s));
+    answer(g,
+           (uz_wire_head){
+               .kind = UZ_WIRE_MADE, .id = b->id, .a = s->levels, .b = bytes, .x = s->most, .y = MPI_Wtime() - start});
+    PetscFunctionReturn(0);
+}
+
+/* Values of a matrix from its rows, of type MPIAIJ also on one process. */
+static PetscErrorCode make_matrix(Mat *A, const body *b, PetscInt rows)
+{
+    PetscFunctionBeginUser;
+    PetscCall(MatCreate(PETSC_COMM_WORLD, A));
+    PetscCall(MatSetSizes(*A, rows, rows, b->nodes * b->bs, b->nodes * b->bs));
+    PetscCall(MatSetType(*A, MATMPIAIJ));
+    PetscCall(MatSetBlockSize(*A, b->bs));
+    PetscCall(MatMPIAIJSetPreallocationCSR(*A, b->row, b->column, b->value));
+    PetscFunctionReturn(0);
+}
+
+static PetscErrorCode take_rows(group *g, const uz_wire_head *m)
+{
+    body *b = find(g, m->id);
+    const PetscInt nodes = (PetscInt)m->a, blocks = (PetscInt)m->b, bs = b->bs, of = nodes * bs * b->modes;
+    const PetscMPIInt owner = (PetscMPIInt)m->c;
+    PetscFunctionBeginUser;
+    PetscCheck(owner >= 0 && owner < g->size && nodes > 0 && blocks >= nodes, PETSC_COMM_WORLD,
+               PETSC_ERR_ARG_OUTOFRANGE, "rows for process %d", owner);
+    b->arrived += nodes;
+    if (g->rank == owner || IS_FIRST(g)) {
+        int32_t *count, *column;
+        double *value;
+        float *mode;
+        PetscCall(PetscMalloc4(nodes, &count, blocks, &column, blocks * bs * bs, &value, of, &mode));
+        if (IS_FIRST(g)) {
+            take(g, count, (size_t)nodes * sizeof *count);
+            take(g, column, (size_t)blocks * sizeof *column);
+            take(g, value, (size_t)(blocks * bs * bs) * sizeof *value);
+            take(g, mode, (size_t)of * sizeof *mode);
+        }
+        if (owner != 0 && IS_FIRST(g)) {
+            PetscCallMPI(MPI_Send(count, nodes, MPI_INT32_T, owner, 3, PETSC_COMM_WORLD));
+            PetscCallMPI(MPI_Send(column, blocks, MPI_INT32_T, owner, 4, PETSC_COMM_WORLD));
+            PetscCallMPI(MPI_Send(value, blocks * bs * bs, MPI_DOUBLE, owner, 5, PETSC_COMM_WORLD));
+            PetscCallMPI(MPI_Send(mode, of, MPI_FLOAT, owner, 6, PETSC_COMM_WORLD));
+        } else if (owner != 0) {
+            PetscCallMPI(MPI_Recv(count, nodes, MPI_INT32_T, 0, 3, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+            PetscCallMPI(MPI_Recv(column, blocks, MPI_INT32_T, 0, 4, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+            PetscCallMPI(MPI_Recv(value, blocks * bs * bs, MPI_DOUBLE, 0, 5, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+            PetscCallMPI(MPI_Recv(mode, of, MPI_FLOAT, 0, 6, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+        }
+        if (g->rank == owner) {
+            PetscInt at = b->row[b->filled * bs], block = 0;
+            PetscCheck(b->filled + nodes <= b->here && at + blocks * bs * bs <= b->blocks * bs * bs, PETSC_COMM_SELF,
+                       PETSC_ERR_ARG_OUTOFRANGE, "more rows than were told of");
+            PetscCall(PetscArraycpy(b->value + at, value, blocks * bs * bs));
+            PetscCall(PetscArraycpy(b->mode + b->filled * bs * b->modes, mode, of));
+            for (PetscInt i = 0; i < nodes; block += count[i++])
+                for (PetscInt c = 0; c < bs; c++) {
+                    for (PetscInt k = 0; k < count[i]; k++)
+                        for (PetscInt e = 0; e < bs; e++)
+                            b->column[at++] = column[block + k] * bs + e;
+                    b->row[(b->filled + i) * bs + c + 1] = at;
+                }
+            b->filled += nodes;
+        }
+        PetscCall(PetscFree4(count, column, value, mode));
+    }
+    if (b->arrived == b->nodes) {
+        Mat A;
+        PetscCall(make_matrix(&A, b, b->here * bs));
+        PetscCall(PetscFree2(b->column, b->value));
+        PetscCall(PetscFree(b->row));
+        PetscCall(make_system(g, b, UZ_WIRE_WHOLE, A, b->mode));
+    }
+    PetscFunctionReturn(0);
+}
+
+static PetscErrorCode free_body(body *b)
+{
+    PetscFunctionBeginUser;
+    for (int which = 0; which < 2; which++)
+        if (b->made[which])
+            PetscCall(system_free(&b->system[which]));
+    PetscCall(PetscFree2(b->column, b->value));
+    PetscCall(PetscFree(b->row));
+    PetscCall(PetscFree(b->mode));
+    PetscCall(PetscFree2(b->count, b->first));
+    *b = (body){.id = 0};
+    PetscFunctionReturn(0);
+}
+
+/* K_FF: rows and columns of held dofs become those of the unit matrix. */
+static PetscErrorCode hold(group *g, body *b)
+{
+    const PetscInt n = b->here * b->bs;
+    char *whole = NULL, *held;
+    PetscInt *which, first, count = 0;
+    float *modes;
+    Mat A;
+    PetscFunctionBeginUser;
+    if (b->made[UZ_WIRE_FREE_DOFS])
+        PetscCall(system_free(&b->system[UZ_WIRE_FREE_DOFS]));
+    b->made[UZ_WIRE_FREE_DOFS] = false;
+    PetscCall(PetscMalloc3(n, &held, n, &which, n * b->modes, &modes));
+    if (IS_FIRST(g)) {
+        PetscCall(PetscMalloc1(b->nodes * b->bs, &whole));
+        take(g, whole, (size_t)(b->nodes * b->bs));
+    }
+    PetscCallMPI(MPI_Scatterv(whole, b->count, b->first, MPI_CHAR, held, n, MPI_CHAR, 0, PETSC_COMM_WORLD));
+    PetscCall(PetscFree(whole));
+    PetscCall(MatDuplicate(b->system[UZ_WIRE_WHOLE].A, MAT_COPY_VALUES, &A));
+    PetscCall(MatGetOwnershipRange(A, &first, NULL));
+    for (PetscInt i = 0; i < n; i++) {
+        for (PetscInt k = 0; k < b->modes; k++)
+            modes[i * b->modes + k] = held[i] ? 0.0F : b->mode[i * b->modes + k];
+        if (held[i])
+            which[count++] = first + i;
+    }
+    PetscCall(MatZeroRowsColumns(A, count, which, 1.0, NULL, NULL));
+    PetscCall(make_system(g, b, UZ_WIRE_FREE_DOFS, A, modes));
+    PetscCall(PetscFree3(held, which, modes));
+    PetscFunctionReturn(0);
+}
+
+/* ---- vectors and steps */
+
+static PetscErrorCode take_vector(group *g, const body *b, Vec v)
+{
+    PetscScalar *to;
+    const size_t n = (size_t)(b->nodes * b->bs);
+    PetscFunctionBeginUser;
+    if (IS_FIRST(g) && g->room < n) {
+        free(g->whole);
+        g->whole = malloc(n * sizeof *g->whole);
+        g->room = n;
+        PetscCheck(g->whole, PETSC_COMM_SELF, PETSC_ERR_MEM, "no memory for a vector");
+    }
+    if (IS_FIRST(g))
+        take(g, g->whole, n * sizeof *g->whole);
+    PetscCall(VecGetArrayWrite(v, &to));
+    PetscCallMPI(
+        MPI_Scatterv(g->whole, b->count, b->first, MPI_DOUBLE, to, b->count[g->rank], MPI_DOUBLE, 0, PETSC_COMM_WORLD));
+    PetscCall(VecRestoreArrayWrite(v, &to));
+    PetscFunctionReturn(0);
+}
+
+static PetscErrorCode put_vector(group *g, const body *b, Vec v)
+{
+    const PetscScalar *from;
+    PetscFunctionBeginUser;
+    PetscCall(VecGetArrayRead(v, &from));
+    PetscCallMPI(MPI_Gatherv(from, b->count[g->rank], MPI_DOUBLE, g->whole, b->count, b->first, MPI_DOUBLE, 0,
+                             PETSC_COMM_WORLD));
+    PetscCall(VecRestoreArrayRead(v, &from));
+    answer(g, (uz_wire_head){.kind = UZ_WIRE_VECTOR, .id = b->id});
+    if (IS_FIRST(g))
+        put(g, g->whole, (size_t)(b->nodes * b->bs) * sizeof *g->whole);
+    PetscFunctionReturn(0);
+}
+
+static PetscErrorCode make_steps(group *g, linear_system *s, const uz_wire_head *m)
+{
+    double alpha[UZ_WIRE_STEPS_MOST], beta[UZ_WIRE_STEPS_MOST], square = m->y;
+    int made;
+    bool flat;
+    PetscFunctionBeginUser;
+    PetscCheck(m->b > 0 && m->b <= UZ_WIRE_STEPS_MOST, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "too many steps");
+    PetscCall(system_steps(s, &square, &made, &flat, alpha, beta, (int)m->b, m->x));
+    answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .a = made, .b = flat, .x = square});
+    if (IS_FIRST(g)) {
+        put(g, alpha, (size_t)made * sizeof *alpha);
+        put(g, beta, (size_t)made * sizeof *beta);
+    }
+    PetscFunctionReturn(0);
+}
+
+static PetscErrorCode obey(group *g, const uz_wire_head *m)
+{
+    double square = 0.0;
+    PetscFunctionBeginUser;
+    if (m->kind == UZ_WIRE_BODY) {
+        PetscCall(begin_body(g, m));
+        PetscFunctionReturn(0);
+    }
+    if (m->kind == UZ_WIRE_ROWS) {
+        PetscCall(take_rows(g, m));
+        PetscFunctionReturn(0);
+    }
+    body *b = find(g, m->id);
+    if (m->kind == UZ_WIRE_FREE) {
+        PetscCall(free_body(b));
+        PetscFunctionReturn(0);
+    }
+    if (m->kind == UZ_WIRE_HOLD) {
+        PetscCall(hold(g, b));
+        PetscFunctionReturn(0);
+    }
+    PetscCheck((m->a == 0 || m->a == 1) && b->made[m->a], PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONGSTATE, "no such system");
+    linear_system *s = &b->system[m->a];
+    if (m->kind == UZ_WIRE_BEGIN) {
+        PetscCall(take_vector(g, b, s->x));
+        PetscCall(take_vector(g, b, s->b));
+    }
+    if (m->kind == UZ_WIRE_BEGIN || m->kind == UZ_WIRE_AGAIN) {
+        PetscCall(system_begin(s, &square));
+        answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .x = square});
+    } else if (m->kind == UZ_WIRE_STEPS) {
+        PetscCall(make_steps(g, s, m));
+    } else if (m->kind == UZ_WIRE_FETCH) {
+        PetscCall(put_vector(g, b, s->x));
+    } else if (m->kind == UZ_WIRE_APPLY) {
+        PetscCall(take_vector(g, b, s->r));
+        PetscCall(system_precondition(s, s->z, s->r));
+        PetscCall(put_vector(g, b, s->z));
+    } else {
+        SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "message of kind %d", m->kind);
+    }
+    PetscFunctionReturn(0);
+}
+
+/* ---- beginning and end */
+
+#define SPIN_S  2e-3  /* a process that waits asks all the time for so long: the next question may come at once, */
+#define FIRST_S 50e-6 /* then it sleeps between, */
+#define LAST_S  2e-3  /* longer each time: MPI's own wait would take a processor */
+
+/* What is asked next, from the first process to all. */
+static PetscErrorCode hear(group *g, uz_wire_head *m)
+{
+    MPI_Request request;
+    int there = 0;
+    double since, nap = FIRST_S;
+    PetscFunctionBeginUser;
+    if (IS_FIRST(g) && !stream_read(g->stream, m, sizeof *m))
+        m->kind = 0;
+    PetscCallMPI(MPI_Ibcast(m, (int)sizeof *m, MPI_BYTE, 0, PETSC_COMM_WORLD, &request));
+    since = MPI_Wtime();
+    for (;;) {
+        PetscCallMPI(MPI_Test(&request, &there, MPI_STATUS_IGNORE));
+        if (there)
+            break;
+        if (MPI_Wtime() - since < SPIN_S) {
+            sched_yield();
+            continue;
+        }
+        nanosleep(&(struct timespec){.tv_nsec = (long)(1e9 * nap)}, NULL);
+        nap = nap < LAST_S ? 1.5 * nap : LAST_S;
+    }
+    PetscFunctionReturn(0);
+}
+
+static PetscErrorCode serve(group *g)
+{
+    PetscFunctionBeginUser;
+    answer(g, (uz_wire_head){.kind = UZ_WIRE_HELLO, .a = g->size});
+    for (;;) {
+        uz_wire_head m = {.kind = 0};
+        PetscCall(hear(g, &m));
+        if (m.kind == 0)
+            break;
+        PetscCheck(m.version == UZ_WIRE_VERSION, PETSC_COMM_WORLD, PETSC_ERR_ARG_INCOMP, "message of another version");
+        PetscCall(obey(g, &m));
+    }
+    for (int k = 0; k < UZ_WIRE_BODIES; k++)
+        if (g->body[k].id)
+            PetscCall(free_body(&g->body[k]));
+    free(g->whole);
+    PetscFunctionReturn(0);
+}
+
+/* What is not on the command line. Levels are smoothed by this program: PETSc's own smoothers only need to be cheap to
+ * set up. The coarsest level stays on one process; where its modes depend on each other it has pivots of 0. */
+static PetscErrorCode set_defaults(void)
+{
+    static const char *const DEFAULTS[][2] = {
+        {"-mg_levels_ksp_type", "richardson"},
+        {"-mg_levels_pc_type", "none"},
+        {"-mg_levels_ksp_norm_type", "none"},
+        {"-mg_coarse_sub_pc_type", "cholesky"},
+        {"-mg_coarse_sub_pc_factor_shift_type", "nonzero"},
+        {"-pc_gamg_type", "agg"},
+        {"-pc_gamg_agg_nsmooths", "1"},
+        {"-pc_gamg_coarse_eq_limit", "1000"},
+        {"-pc_gamg_threshold", "0.01"},
+        {"-pc_gamg_aggressive_coarsening", "1"},
+        {"-pc_gamg_esteig_ksp_type", "cg"},
+        {"-pc_gamg_esteig_ksp_max_it", "10"},
+    };
+    PetscFunctionBeginUser;
+    for (size_t k = 0; k < sizeof DEFAULTS / sizeof DEFAULTS[0]; k++) {
+        PetscBool given;
+        PetscCall(PetscOptionsHasName(NULL, NULL, DEFAULTS[k][0], &given));
+        if (!given)
+            PetscCall(PetscOptionsSetValue(NULL, DEFAULTS[k][0], DEFAULTS[k][1]));
+    }
+    PetscFunctionReturn(0);
+}
+
+int main(int argc, char **argv)
+{
+    static const char HELP[] = "uzawa-group SOCKET [PETSC OPTIONS]: how uzawad solves with `operator` distributed\n";
+    const char *where = argc > 1 ? argv[1] : "";
+    group g = {.stream = -1};
+    if (PetscInitialize(&argc, &argv, NULL, HELP))
+        return 1;
+    PetscPopSignalHandler();
+    MPI_Comm_rank(PETSC_COMM_WORLD, &g.rank);
+    MPI_Comm_size(PETSC_COMM_WORLD, &g.size);
+    if (IS_FIRST(&g) && (g.stream = stream_open(where)) < 0)
+        give_up("there is nobody at the socket: this is a program that uzawad starts");
+    if (set_defaults() || serve(&g))
+        MPI_Abort(PETSC_COMM_WORLD, 1);
+    return PetscFinalize() ? 1 : 0;
+}

@@ -1,0 +1,132 @@
+/* K by blocks of nodes for several processes: every entry arrives once, at the place that its dofs have. */
+#include "harness.h"
+#include "group/spread.h"
+
+enum { D = 40, PROCESSES = 3 };
+
+typedef struct {
+    double dense[D][D];
+    uz_csc K;
+    uz_modes modes;
+    int32_t node[D];
+    float value[D * 2];
+    int64_t ptr[D + 1], idx[D * D];
+    double val[D * D];
+} body;
+
+/* A band and some couplings far away; dof j belongs to node j % nodes, so that dofs of a node are apart. */
+static void fill(body *b, int32_t nodes)
+{
+    memset(b, 0, sizeof *b);
+    for (int j = 0; j < D; j++) {
+        b->node[j] = j % nodes;
+        b->value[2 * j] = (float)j;
+        b->value[2 * j + 1] = (float)(100 + j);
+        b->dense[j][j] = 10.0 + j;
+        for (int i = j + 1; i < D; i++)
+            if (i - j < 3 || (i * 7 + j) % 31 == 0)
+                b->dense[i][j] = b->dense[j][i] = -1.0 / (1.0 + i + 2.0 * j);
+    }
+    int64_t at = 0;
+    for (int j = 0; j < D; j++) {
+        for (int i = j; i < D; i++)
+            if (b->dense[i][j] != 0.0) {
+                b->idx[at] = i;
+                b->val[at++] = b->dense[i][j];
+            }
+        b->ptr[j + 1] = at;
+    }
+    b->K = (uz_csc){.rows = D, .cols = D, .ptr = b->ptr, .idx = b->idx, .val = b->val};
+    b->modes = (uz_modes){.count = 2, .n_nodes = nodes, .node = b->node, .value = b->value};
+}
+
+/* Rows of all processes, put together. */
+static void gather(double *whole, float *modes, const uz_spread *map, const body *b)
+{
+    const int64_t bs = map->bs;
+    int64_t node = 0;
+    uz_error err = {0};
+    for (int64_t process = 0; process < PROCESSES; process++) {
+        uz_spread_rows rows = {.process = process};
+        CHECK(uz_spread_fill(&rows, map, &b->K, &b->modes, &err) == UZ_OK);
+        while (uz_spread_next(&rows, map)) {
+            const double *value = rows.value;
+            int64_t block = 0;
+            for (int64_t i = 0; i < rows.nodes; block += rows.count[i++], node++) {
+                CHECK(map->part[map->order[node]] == process);
+                for (int64_t c = 0; c < bs; c++)
+                    for (int64_t k = 0; k < rows.count[i]; k++)
+                        for (int64_t e = 0; e < bs; e++)
+                            whole[(node * bs + c) * map->size + rows.column[block + k] * bs + e] = *value++;
+                for (int64_t k = 1; k < rows.count[i]; k++)
+                    CHECK(rows.column[block + k - 1] < rows.column[block + k]);
+                memcpy(modes + node * bs * 2, rows.mode + i * bs * 2, (size_t)(bs * 2) * sizeof *modes);
+            }
+        }
+        uz_spread_rows_clear(&rows);
+    }
+    CHECK(node == map->nodes);
+}
+
+static void check_spread(int32_t nodes, int64_t bs, int64_t padded)
+{
+    body *b = malloc(sizeof *b);
+    uz_spread map;
+    uz_error err = {0};
+    fill(b, nodes);
+    CHECK(uz_spread_init(&map, &b->K, &b->modes, &err) == UZ_OK);
+    CHECK(map.bs == bs && map.size == D + padded);
+    for (int64_t i = 0; i < map.nodes; i++)
+        map.part[i] = (int32_t)((i * 5 + 1) % PROCESSES);
+    CHECK(uz_spread_number(&map, PROCESSES, &err) == UZ_OK);
+    double *whole = calloc((size_t)(map.size * map.size), sizeof *whole);
+    float *modes = calloc((size_t)(map.size * 2), sizeof *modes);
+    bool *has = calloc((size_t)map.size, sizeof *has);
+    gather(whole, modes, &map, b);
+    for (int i = 0; i < D; i++) {
+        CHECK(!has[map.place[i]]);
+        has[map.place[i]] = true;
+        CHECK(modes[map.place[i] * 2] == (float)i && modes[map.place[i] * 2 + 1] == (float)(100 + i));
+        for (int j = 0; j < D; j++)
+            CHECK(whole[map.place[i] * map.size + map.place[j]] == b->dense[i][j]);
+    }
+    for (int64_t i = 0; i < map.size; i++)
+        for (int64_t j = 0; !has[i] && j < map.size; j++)
+            CHECK(i == j ? whole[i * map.size + j] > 0.0
+                         : whole[i * map.size + j] == 0.0 && whole[j * map.size + i] == 0.0);
+    uz_spread_clear(&map);
+    free(whole);
+    free(modes);
+    free(has);
+    free(b);
+}
+
+TEST(nodes_are_filled_up)
+{
+    check_spread(15, 3, 5); /* ten nodes of three dofs, five of two */
+    check_spread(20, 2, 0);
+}
+
+TEST(dofs_are_nodes_where_too_much_would_be_added)
+{
+    check_spread(27, 1, 0); /* thirteen nodes of two, fourteen of one */
+    check_spread(4, 1, 0);  /* ten dofs each are no node */
+}
+
+TEST(a_part_that_does_not_exist_is_refused)
+{
+    body *b = malloc(sizeof *b);
+    uz_spread map;
+    uz_error err = {0};
+    fill(b, 20);
+    CHECK(uz_spread_init(&map, &b->K, &b->modes, &err) == UZ_OK);
+    for (int64_t i = 0; i < map.nodes; i++)
+        map.part[i] = i == 7 ? PROCESSES : 0;
+    CHECK(uz_spread_number(&map, PROCESSES, &err) == UZ_ERR_INTERNAL);
+    uz_spread_clear(&map);
+    b->val[0] = -1.0;
+    err = (uz_error){.status = UZ_OK};
+    CHECK(uz_spread_init(&map, &b->K, &b->modes, &err) == UZ_ERR_NOT_SPD && strcmp(err.where, "K") == 0);
+    uz_spread_clear(&map);
+    free(b);
+}
