@@ -7,7 +7,8 @@
 #include <stdlib.h>
 
 /* In the order of preference among those that suit. */
-const uz_dual_form *const uz_dual_forms[UZ_DUAL_FORMS] = {&uz_dual_condensed, &uz_dual_factored, &uz_dual_matrix_free};
+const uz_dual_form *const uz_dual_forms[UZ_DUAL_FORMS] = {&uz_dual_condensed, &uz_dual_factored, &uz_dual_matrix_free,
+                                                          &uz_dual_distributed};
 
 const uz_dual_form *uz_dual_form_of(uz_operator op)
 {

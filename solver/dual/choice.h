@@ -13,11 +13,12 @@ typedef struct {
     bool exact;        /* it solves to rounding; else within the aim, each solve the nearer the closer r is to that of
                         * the last apply, and with a bound on what is left in every answer */
     bool cheap_steps;  /* solve_active works on the contact only: a step costs little beside a linear solve */
+    bool asked_for;    /* only by name, never by AUTO */
     bool lanes;        /* several loads with one pass over the factor: block.h */
 } uz_dual_abilities;
 
 typedef struct uz_dual_form uz_dual_form; /* form.h */
-enum { UZ_DUAL_FORMS = 3 };
+enum { UZ_DUAL_FORMS = 4 };
 /* In the order of preference of uz_dual_choose. */
 extern const uz_dual_form *const uz_dual_forms[UZ_DUAL_FORMS];
 /* By its name, not AUTO. */

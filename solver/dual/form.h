@@ -74,6 +74,6 @@ struct uz_dual_form {
                                bool corrected, uz_error *err);
 };
 
-extern const uz_dual_form uz_dual_condensed, uz_dual_factored, uz_dual_matrix_free;
+extern const uz_dual_form uz_dual_condensed, uz_dual_factored, uz_dual_matrix_free, uz_dual_distributed;
 
 #endif

@@ -488,11 +488,45 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     cost->bytes += 8.0 * (size->bounds ? BOUNDS_VECTORS : VECTORS) * (double)size->d;
 }
 
+/* The same on so many processes of equal speed; here are K, its rows on their way, and the vectors. */
+#define PROCESSES 2.0
+
+static void add_cost_distributed(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
+                                 const uz_cost_rates *rates)
+{
+    uz_cost_estimate alone = *cost;
+    add_cost(&alone, size, factor, rates);
+    cost->setup_s += (alone.setup_s - cost->setup_s) / PROCESSES;
+    cost->case_s += (alone.case_s - cost->case_s) / PROCESSES;
+    cost->flops = alone.flops;
+    cost->bytes += 16.0 * (double)size->k_entries / PROCESSES + 8.0 * VECTORS * (double)size->d;
+}
+
 const uz_dual_form uz_dual_matrix_free = {
     .can = {.op = UZ_OPERATOR_MATRIX_FREE},
     .dual_size = sizeof(uz_sparse),
     .load_size = sizeof(free_load),
     .add_cost = add_cost,
+    .create = uz_sparse_create,
+    .clear = uz_sparse_clear,
+    .load = make_load,
+    .unload = unload,
+    .aim = aim_at,
+    .probe = probe,
+    .apply = apply,
+    .correct = uz_sparse_correct,
+    .recover = uz_sparse_recover,
+    .solve_active = solve_active,
+    .guess_active = guess_active,
+    .inverse_norm = inverse_norm,
+};
+
+/* What differs is the kind of multigrid: one that a group of processes holds (group/group.h). */
+const uz_dual_form uz_dual_distributed = {
+    .can = {.op = UZ_OPERATOR_DISTRIBUTED, .asked_for = true},
+    .dual_size = sizeof(uz_sparse),
+    .load_size = sizeof(free_load),
+    .add_cost = add_cost_distributed,
     .create = uz_sparse_create,
     .clear = uz_sparse_clear,
     .load = make_load,

@@ -66,7 +66,13 @@ typedef enum {
     UZ_METHOD_GIVEN,               /* results of uz_verify only: the answer is the caller's */
     UZ_METHOD_LINEAR /* results only: without contact rows u is one linear solve, whatever was asked for */
 } uz_method;
-typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE } uz_operator;
+typedef enum {
+    UZ_OPERATOR_AUTO,
+    UZ_OPERATOR_CONDENSED,
+    UZ_OPERATOR_FACTORED,
+    UZ_OPERATOR_MATRIX_FREE,
+    UZ_OPERATOR_DISTRIBUTED /* matrix_free by a group of processes: uz_hooks.group; never what AUTO becomes */
+} uz_operator;
 typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;
 typedef enum { UZ_STOP_CERTIFIED, UZ_STOP_PAPER } uz_stopping;
 /* The rows of N that steps on the reactions are taken on. */

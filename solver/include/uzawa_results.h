@@ -94,7 +94,7 @@ typedef struct {
 typedef struct {
     double seconds, bytes, flops;
     double actual_seconds, actual_bytes;
-    uz_cost_option considered[3];
+    uz_cost_option considered[4];
     int n_considered;
 } uz_cost;
 

@@ -157,6 +157,8 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
         plan->form[plan->count++] = estimate(&uz_dual_form_of(direct)->can, size, factor, direct, &measured);
     for (int k = 0; k < UZ_DUAL_FORMS; k++) {
         const uz_dual_abilities *can = &uz_dual_forms[k]->can;
+        if (can->asked_for && can->op != asked)
+            continue;
         if (!can->needs_factor || (factor && can->op != direct))
             plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, &measured);
     }

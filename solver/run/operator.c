@@ -5,6 +5,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "group/group.h"
 #include "linalg/linalg.h"
 
 #include <math.h>
@@ -86,6 +87,27 @@ static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_er
 /* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
 #define LAMBDA_LEAST 1e-3
 
+/* A multigrid that a group of processes holds. */
+static uz_status spread(making *m, uz_modes *modes, uz_error *err)
+{
+    const double start = uz_seconds();
+    char why[256] = "this program has no group of processes to solve with";
+    const bool may = m->hooks && m->hooks->group;
+    uz_process_group *group = may ? m->hooks->group(m->hooks->ctx, why, sizeof why) : NULL;
+    uz_multigrid *mg;
+    uz_status status = group ? uz_group_multigrid(&mg, group, m->K, modes, err)
+                             : uz_fail(err, UZ_ERR_UNSUPPORTED, "operator", "operator distributed: %s", why);
+    uz_modes_clear(modes);
+    const double made = uz_seconds();
+    if (status == UZ_OK)
+        status = uz_amg_of(&m->setup->amg, mg, m->K, m->hooks, err);
+    if (status == UZ_OK) {
+        m->setup->amg->info.create_s = made - start;
+        status = uz_amg_probe(m->setup->amg, m->K, m->hooks, err);
+    }
+    return status;
+}
+
 /* A multigrid in the factor's place, and what it may take so that the whole stays within the limit. *regretted: nothing
  * was made, as the plan took matrix_free for its price only, and the matrix is one of those that it is not cheap for,
  * or that tell more to a factorization. */
@@ -107,7 +129,9 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
             status = uz_amg_of(&setup->amg, mg, m->K, m->hooks, err);
     } else {
         status = find_modes(&modes, setup, m->K, err);
-        if (status == UZ_OK)
+        if (status == UZ_OK && plan->form[plan->chosen].op == UZ_OPERATOR_DISTRIBUTED)
+            status = spread(m, &modes, err);
+        else if (status == UZ_OK)
             status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, m->hooks, err);
     }
     if (status == UZ_OK)

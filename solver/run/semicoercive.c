@@ -333,6 +333,7 @@ static uz_status run_rounds(uz_semi *s, uz_error *err)
     if (s->hooks) {
         quiet.ctx = s->hooks->ctx;
         quiet.cancelled = s->hooks->cancelled;
+        quiet.group = s->hooks->group;
     }
     while (status == UZ_OK && !done && s->rounds < ROUNDS) {
         memcpy(s->weight, s->soft, (size_t)s->m * sizeof *s->weight);

@@ -13,6 +13,7 @@ static const char *const OPERATORS[] = {
     [UZ_OPERATOR_CONDENSED] = "condensed",
     [UZ_OPERATOR_FACTORED] = "factored",
     [UZ_OPERATOR_MATRIX_FREE] = "matrix_free",
+    [UZ_OPERATOR_DISTRIBUTED] = "distributed",
 };
 static const char *const ORDERINGS[] = {
     [UZ_ORDERING_AUTO] = "auto",

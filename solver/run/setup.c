@@ -44,9 +44,9 @@ static bool has_cells(const uz_scene *scene)
 uz_body_extent uz_setup_extent(const uz_problem *problem, const uz_settings *settings)
 {
     const uz_scene *scene = &problem->scene;
-    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor,
-               by_auto = settings->op == UZ_OPERATOR_AUTO && settings->method == UZ_METHOD_AUTO &&
-                         settings->stopping == UZ_STOP_CERTIFIED;
+    const bool free_asked = settings->op == UZ_OPERATOR_MATRIX_FREE, /* a group has rows of K */
+        by_auto = settings->op == UZ_OPERATOR_AUTO && settings->method == UZ_METHOD_AUTO &&
+                  settings->stopping == UZ_STOP_CERTIFIED;
     if (!(free_asked || by_auto) || problem->kind != UZ_PROBLEM_SCENE || problem->n_quantities > 0 ||
         scene->kinematics == UZ_KINEMATICS_MOVING || !has_cells(scene))
         return UZ_BODY_SUPPORTED;

@@ -38,6 +38,8 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
             uz_setup_release(cache, base);
         return status;
     }
+    if (settings->op == UZ_OPERATOR_DISTRIBUTED) /* its group ends with the call */
+        cache = NULL;
     if (cache)
         status = uz_setup_digest(&key, problem, wanted, settings, err);
     if (cache && status == UZ_OK)
@@ -72,9 +74,9 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
 void uz_setup_release(uz_cache *cache, uz_setup *setup)
 {
     uz_setup *base = setup ? setup->base : NULL;
-    if (!cache || base)
+    if (!setup || !setup->item || base)
         uz_setup_free(setup);
-    else if (setup)
+    else
         uz_table_release(cache, setup->item);
     if (base)
         uz_setup_release(cache, base);
