@@ -36,9 +36,10 @@ typedef struct {
     bool insecure_public;
     /* work */
     int workers, lanes, max_attempts;
-    size_t cache, memory; /* bytes; memory: of one solve */
-    double max_solve_s;   /* of one job; 0: no limit */
-    int max_queue;        /* jobs that wait; 0: no limit */
+    size_t cache, memory;            /* bytes; memory: of one solve */
+    double max_solve_s;              /* of one job; 0: no limit */
+    char group_command[OPTION_PATH]; /* "": none */
+    int max_queue;                   /* jobs that wait; 0: no limit */
     /* of one owner of tokens; 0: no limit */
     int client_queue;
     size_t client_bytes;

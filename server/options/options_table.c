@@ -84,6 +84,10 @@ static const uz_option ROWS[] = {
             .zero_is_off = true,
             .about = "time that one job may take; it ends with the best answer so far, or fails where there is none; "
                      "0: no limit"),
+    SETTING("group-command", TEXT, group_command, .value = "TEXT", .normal = "",
+            .about =
+                "what starts the processes of a solve with the operator distributed, by sh; {program} in it stands "
+                "for uzawa-group: mpirun -n 4 {program}. Without it the operator is refused"),
     SETTING("max-queue", INTEGER, max_queue, .value = "N", .most = INT_MAX, .normal = "0", .unit = "jobs",
             .zero_is_off = true, .about = "jobs that may wait; one more is answered 503; 0: no limit"),
     SETTING("client-queue", INTEGER, client_queue, .value = "N", .most = INT_MAX, .normal = "0", .unit = "jobs",

@@ -6,7 +6,8 @@
  *
  *     <- READY                      once, when it has started
  *     -> JOB                        its text is in the inbox
- *     <- ASK     -> ANSWER          an upload, or a part of an earlier job; as often as it likes
+ *     <- ASK     -> ANSWER          an upload, or a part of an earlier job; as often as it likes; or a stream to a
+ *                                   group of processes, once, which takes a while
  *     <- READ                       the text was read; names of the cases are in the outbox
  *     <- DONE                       the outcome is in the outbox
  *     -> PREDICT <- PREDICTED       a text in the inbox whose cost is asked for; it may ASK meanwhile
@@ -38,7 +39,7 @@ typedef enum {
     MESSAGE_PREDICT,
     MESSAGE_PREDICTED
 } message_kind;
-typedef enum { ASK_UPLOAD, ASK_BLOB, ASK_CASE } ask_kind;
+typedef enum { ASK_UPLOAD, ASK_BLOB, ASK_CASE, ASK_GROUP } ask_kind;
 
 enum { CASE_NAME = 64 }; /* bytes of a name in the list of cases */
 

@@ -85,8 +85,11 @@ void work_rest_processes(work *w)
     const double before = clock_seconds(CLOCK_MONOTONIC) - IDLE_S;
     pthread_mutex_lock(&w->pool_lock);
     for (int i = 0; i < w->n; i++)
-        if (!w->processes[i].taken && w->processes[i].given < before)
+        if (!w->processes[i].taken && w->processes[i].given < before) {
+            int status;
             rest_process(&w->processes[i], SEGMENT_KEPT);
+            group_process_ended(&w->processes[i].group, &status); /* so that no zombie stays */
+        }
     pthread_mutex_unlock(&w->pool_lock);
 }
 

@@ -56,6 +56,8 @@ void process_free(process *p)
             kill(p->pid, SIGKILL);
         process_reap(p, &out_of_memory);
     }
+    group_process_end(&p->group);
+    group_process_reap(&p->group, true);
     segment_close(&p->board_memory);
     segment_close(&p->inbox);
     segment_close(&p->outbox);
@@ -147,6 +149,7 @@ void process_kill(process *p)
     if (p->pid > 0)
         kill(p->pid, SIGKILL);
     forget(p);
+    group_process_end(&p->group);
 }
 
 int process_reap(process *p, bool *out_of_memory)

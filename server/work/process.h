@@ -6,6 +6,7 @@
 #define SERVER_WORK_PROCESS_H
 
 #include "base/log.h"
+#include "work/group_process.h"
 #include "work/message.h"
 #include "work/segment.h"
 
@@ -17,6 +18,7 @@ typedef struct {
     const char *program; /* that is started; NULL: this one, again */
     size_t cache_bytes, solve_bytes;
     server_log *log;
+    group_process group; /* of its job, until the next one has its own */
 
     pid_t pid;         /* 0: none lives */
     int socket;        /* -1 when none lives */

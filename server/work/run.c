@@ -2,6 +2,7 @@
 #include "codec/quantity.h"
 #include "work/internal.h"
 #include "work/parcel.h"
+#include "work/solver_process.h"
 #include "work/watch.h"
 
 #include <errno.h>
@@ -183,6 +184,8 @@ static run_end judge_death(run *r, const watch_report *seen, const char *told)
     char how[64];
     if (WIFSIGNALED(seen->status))
         snprintf(how, sizeof how, "signal %d", WTERMSIG(seen->status));
+    else if (WEXITSTATUS(seen->status) == SOLVER_GROUP_LOST)
+        snprintf(how, sizeof how, "the loss of its group of processes");
     else
         snprintf(how, sizeof how, "status %d", WEXITSTATUS(seen->status));
     log_write(r->me->w->log, LOG_WARN, "process_died",

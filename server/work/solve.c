@@ -91,6 +91,8 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
         if (strstr(err.where, "start")) /* the library's name for what the request calls warm_start */
             strcpy(err.where, "/solver/warm_start");
     }
+    if (strcmp(err.where, "operator") == 0)
+        strcpy(err.where, "/solver/operator");
     if (status == UZ_ERR_MEMORY) {
         err.status = UZ_ERR_LIMIT;
         add_remedy(&err, ": the process that solves may take no more than it has");

@@ -43,8 +43,9 @@ typedef struct {
     uz_reserve *reserve;
     size_t cache_bytes;
     live_writer live;
-    size_t names; /* bytes at the begin of the outbox */
-    bool fresh;   /* a job has ended since memory was made ready last, or none was solved yet */
+    size_t names;            /* bytes at the begin of the outbox */
+    uz_process_group *group; /* of the job; NULL: it has none */
+    bool fresh;              /* a job has ended since memory was made ready last, or none was solved yet */
 } solver;
 
 /* ---- what the solver asks and tells */
@@ -72,6 +73,29 @@ static void note_case(void *ctx, int64_t load_case)
 static void note_grid(void *ctx, const uz_grid_start *grid)
 {
     live_grid(&((solver *)ctx)->live, grid, clock_seconds(CLOCK_MONOTONIC));
+}
+
+/* The group of processes of this job. */
+static uz_process_group *find_group(void *ctx, char *why, size_t size)
+{
+    solver *s = ctx;
+    const packet question = {.kind = MESSAGE_ASK, .u.ask = {.what = ASK_GROUP}};
+    packet answer;
+    int stream = -1;
+    if (s->group)
+        return s->group;
+    if (!message_send(s->socket, &question, -1) || !message_receive(s->socket, &answer, &stream) ||
+        answer.kind != MESSAGE_ANSWER)
+        _exit(1); /* the daemon is gone */
+    if (answer.status == STORE_NOT_FOUND)
+        snprintf(why, size,
+                 "this service has no group of processes to solve with. Its option --group-command configures one; or "
+                 "ask for the operator matrix_free, or for auto");
+    else
+        snprintf(why, size,
+                 "the group of processes could not be started, and the service's log has the cause. Ask for the "
+                 "operator matrix_free, or for auto");
+    return s->group = stream >= 0 ? uz_process_group_new(stream) : NULL;
 }
 
 /* The names come before the news, and the news before the solve. */
@@ -116,8 +140,12 @@ static void run_prediction(solver *s, const packet *m)
 
 static void run_job(solver *s, const packet *m)
 {
-    const uz_hooks hooks = {
-        .ctx = s, .cancelled = is_stopped, .progress = note_progress, .begins = note_case, .grid = note_grid};
+    const uz_hooks hooks = {.ctx = s,
+                            .cancelled = is_stopped,
+                            .progress = note_progress,
+                            .begins = note_case,
+                            .grid = note_grid,
+                            .group = find_group};
     const solve_with with = {.source = s->source,
                              .cache = s->cache,
                              .hooks = &hooks,
@@ -132,6 +160,10 @@ static void run_job(solver *s, const packet *m)
     uz_process_threads(m->u.job.threads);
     if (body || m->u.job.damaged) {
         solve_job(&solved, &with, m->u.job.id, body, (size_t)m->u.job.size);
+        if (s->group && uz_process_group_is_lost(s->group))
+            _exit(SOLVER_GROUP_LOST); /* the job is run again, as where this process had been lost */
+        uz_process_group_free(s->group);
+        s->group = NULL;
     } else {
         solved = (solution){.n = 0};
         solution_fail(&solved, NULL);

@@ -13,6 +13,9 @@ enum { SOLVER_SOCKET = 3, SOLVER_BOARD, SOLVER_INBOX, SOLVER_OUTBOX };
 /* Of the cache's bytes one part in so many is the reserve's: memory that lies ready for the next factor. */
 enum { RESERVE_SHARE = 4 };
 
+/* Its exit status where the group of processes that it solved with was lost: with it goes all that was made. */
+enum { SOLVER_GROUP_LOST = 3 };
+
 /* Solves what comes until the daemon closes its end. Returns the exit status. */
 int solver_process(int argc, char **argv);
 

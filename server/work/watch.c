@@ -8,6 +8,7 @@
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 enum { PATIENCE = SANITIZED ? 10 : 1 };
@@ -17,8 +18,9 @@ enum { PATIENCE = SANITIZED ? 10 : 1 };
 #define RELEASE_S (0.5 * PATIENCE) /* the service stops, or another owner has the job */
 #define HEARD_S   (1.0 * PATIENCE) /* more, where the process has an answer, or has seen it and makes one */
 #define START_S   (20.0 * PATIENCE)
-#define ASK_S     1.0              /* what the store could not give is asked for again */
-#define LANE_S    (1.0 * PATIENCE) /* a job that takes longer is no small one: another worker begins it again */
+#define ASK_S     1.0               /* what the store could not give is asked for again */
+#define GROUP_S   (60.0 * PATIENCE) /* a queue of a cluster that takes longer is none for the jobs of a service */
+#define LANE_S    (1.0 * PATIENCE)  /* a job that takes longer is no small one: another worker begins it again */
 
 /* Beyond its time limit. Once it iterates there is an answer, whose certificate may take a while. */
 #define LIMIT_S     (0.7 * PATIENCE)
@@ -35,8 +37,9 @@ typedef struct {
     packet asked;
     int told; /* percent */
     bool stopping;
-    bool read;  /* the process has read the text */
-    bool again; /* it is not the first process that has it */
+    bool read;       /* the process has read the text */
+    bool again;      /* it is not the first process that has it */
+    double group_by; /* a group of processes was asked for, and has to call until then; 0: none is waited for */
 } watch;
 
 /* The process waits for what it has asked for, also while the store is away: until it is back or the job is to end.
@@ -55,6 +58,50 @@ static bool answer(watch *w, const packet *question, double now)
     return sent;
 }
 
+/* stream: the group's, closed here; -1: there is none. */
+static bool answer_group(watch *w, store_status status, int stream)
+{
+    const packet reply = {.kind = MESSAGE_ANSWER, .status = (int32_t)status};
+    w->group_by = 0.0;
+    const bool sent = message_send(w->p->socket, &reply, stream);
+    if (stream >= 0)
+        close(stream);
+    return sent;
+}
+
+/* A process asks for a group. False: it may not, or is gone. */
+static bool begin_group(watch *w, double now)
+{
+    const char *command = w->me->w->options.group_command;
+    const bool is_known = command && *command;
+    if (w->group_by > 0.0)
+        return false;
+    if (!is_known || !group_process_begin(&w->p->group, command, w->me->w->log))
+        return answer_group(w, is_known ? STORE_ERROR : STORE_NOT_FOUND, -1);
+    w->group_by = now + GROUP_S;
+    return true;
+}
+
+/* A group that was started calls, or does not. False: the process is gone. */
+static bool look_for_group(watch *w, bool calls, double now)
+{
+    group_process *group = &w->p->group;
+    int status = 0;
+    const int stream = calls ? group_process_accept(group) : -1;
+    if (stream >= 0)
+        return answer_group(w, STORE_OK, stream);
+    const bool ended = group_process_ended(group, &status);
+    if (!ended && now < w->group_by)
+        return true;
+    log_write(w->me->w->log, LOG_ERROR, "group_not_started",
+              (log_field[]){LOG_S("job", w->job->id),
+                            LOG_S("cause", ended ? "the command has ended" : "nobody has called"),
+                            LOG_I("status", WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status)),
+                            {0}});
+    group_process_end(group);
+    return answer_group(w, STORE_ERROR, -1);
+}
+
 /* False: it is no message that may come now, and who says such things is not trusted with a job. */
 static bool hear(watch *w, const packet *m, double now)
 {
@@ -68,7 +115,7 @@ static bool hear(watch *w, const packet *m, double now)
         return true;
     }
     if (m->kind == MESSAGE_ASK)
-        return answer(w, m, now);
+        return m->u.ask.what == ASK_GROUP ? begin_group(w, now) : answer(w, m, now);
     if (m->kind != MESSAGE_READ)
         return false;
     w->read = true;
@@ -83,7 +130,8 @@ static bool hear(watch *w, const packet *m, double now)
 /* Until it is done, dead or killed. */
 static watch_end follow(watch *w, watch_report *out)
 {
-    struct pollfd fds[] = {{.fd = w->p->socket, .events = POLLIN}, {.fd = w->me->wake, .events = POLLIN}};
+    struct pollfd fds[] = {
+        {.fd = w->p->socket, .events = POLLIN}, {.fd = w->me->wake, .events = POLLIN}, {.fd = -1, .events = POLLIN}};
     for (;;) {
         double now = clock_seconds(CLOCK_MONOTONIC);
         const bool cancelled = atomic_load(&w->me->cancel), stops = atomic_load(&w->me->w->interrupt);
@@ -116,7 +164,11 @@ static watch_end follow(watch *w, watch_report *out)
         wait = heard && now >= w->stop_at ? fmin(TELL_S, w->stop_at + HEARD_S - now) : wait;
         wait = w->due_at > now ? fmin(wait, w->due_at - now) : wait;
         wait = w->grown_at > now ? fmin(wait, w->grown_at - now) : wait;
-        if (poll(fds, 2, (int)(1e3 * wait) + 1) <= 0)
+        fds[2].fd = w->group_by > 0.0 ? w->p->group.listener : -1;
+        const int events = poll(fds, 3, (int)(1e3 * wait) + 1);
+        if (w->group_by > 0.0 && !look_for_group(w, events > 0 && fds[2].revents, clock_seconds(CLOCK_MONOTONIC)))
+            return WATCH_DIED;
+        if (events <= 0)
             continue;
         if (fds[1].revents) {
             uint64_t count;

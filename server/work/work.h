@@ -42,6 +42,7 @@ typedef struct {
     size_t cache_bytes;  /* factor caches of all processes, with their reserves */
     size_t solve_bytes;  /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
     double max_solve_s;  /* of one job, whatever it asks for; 0: no limit */
+    const char *group_command; /* starts the processes of an operator distributed (group_process.h); "", NULL: none */
     double lease_s;
     double room_wait_s;        /* a result that has no room on the disk waits so long before its job is failed; 0: 60 */
     store_retention retention; /* of ended jobs */

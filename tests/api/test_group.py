@@ -1,0 +1,185 @@
+"""One body on several processes (`operator` distributed): its answers, and what becomes of a job whose group ends.
+usage: test_group.py BUILD_DIR [FILTER]"""
+# not under sanitizers: MPI and PETSc are not made for them, and the daemon's part is that of any process
+import copy
+import os
+import pathlib
+import shutil
+import signal
+import time
+
+import service
+from service import MATRICES, SCENE, Skip, check, options, wait_until
+
+# As root, on fewer processors than processes, and in a container without process_vm_readv.
+os.environ.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
+                  OMPI_MCA_btl_vader_single_copy_mechanism="none")
+PATIENT_S = 150  # processes of MPI that wait for each other are slow where others use the processors, too
+PAIR = "mpirun --oversubscribe -n 2 {program}"
+
+CUBE = {"problem": {"kind": "scene", "model": "solid",
+                    "mesh": {"box": {"origin": [0, 0, -1], "size": [1, 1, 1], "cells": [3, 3, 3], "element": "hex8"}},
+                    "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                    "supports": [{"on": "back", "ux": 0, "uy": 0, "uz": 0}],
+                    "contacts": [{"on": "front", "obstacle": {"sphere": {"center": [0.5, 0.5, 1.98], "radius": 2}}}]}}
+
+ON_PLANE = copy.deepcopy(CUBE)  # by cells, without a matrix, where it is not distributed
+ON_PLANE["problem"]["contacts"][0]["obstacle"] = {"plane": {"point": [0, 0, -0.01], "normal": [0, 0, -1]}}
+
+BEAM = copy.deepcopy(SCENE)
+BEAM["problem"]["mesh"]["box"]["cells"] = [12, 4]
+
+
+def square(group, low, cells):
+    """Nodes and elements of a unit square above `low`, and its two sides."""
+    n = cells + 1
+    nodes = [[i / cells, low + j / cells] for j in range(n) for i in range(n)]
+    quads = [[a + b for b in (0, 1, n + 1, n)] for a in (i + j * n for j in range(cells) for i in range(cells))]
+    sides = {f"{group}_bottom": range(n), f"{group}_top": range(n * n - n, n * n)}
+    return nodes, quads, sides
+
+
+def two_bodies():
+    """A square on another one with other nodes, overlapping a little: rows of several entries."""
+    nodes, quads, groups = [], [], {}
+    for name, low, cells in (("lower", 0, 4), ("upper", 0.999, 3)):
+        more, elements, sides = square(name, low, cells)
+        quads += [[a + len(nodes) for a in quad] for quad in elements]
+        for side, members in sides.items():
+            members = [a + len(nodes) for a in members]
+            groups[side] = {"nodes": members, "edges": [list(pair) for pair in zip(members, members[1:])]}
+        nodes += more
+    return {"problem": {"kind": "scene", "model": "plane_strain",
+                        "mesh": {"nodes": nodes, "elements": {"quad4": quads}, "groups": groups},
+                        "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                        "supports": [{"on": "lower_bottom", "ux": 0, "uy": 0}, {"on": "upper_top", "ux": 0, "uy": -0.01}],
+                        "contacts": [{"on": "lower_top", "with": "upper_bottom"}]}}
+
+
+def solve(s, request):
+    """As s.solve, but it may take a while."""
+    job = s.post(request, {"Prefer": "wait=40"}).json
+    while job["status"] in ("accepted", "running"):
+        job = s.get(f"/v1/jobs/{job['id']}", Prefer="wait=40").json
+    return job
+
+
+def by(operator, request, **solver):
+    accuracy = {"accuracy": {"relative_error": 1e-6}}
+    return {**copy.deepcopy(request), "solver": {**accuracy, **solver, "operator": operator}}
+
+
+def processes(s):
+    """The processes of this service's groups."""
+    found = []
+    for path in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            if os.readlink(path / "exe") == str(pathlib.Path(s.build, "uzawa-group").resolve()):
+                found.append(int(path.name))
+        except OSError:
+            pass
+    return found
+
+
+def needs_group(test):
+    def run(s):
+        if not pathlib.Path(s.build, "uzawa-group").exists() or not shutil.which("mpirun"):
+            raise Skip("uzawa-group needs PETSc and MPI (make deps-group)")
+        s.start()
+        test(s)
+        wait_until(lambda: not processes(s), PATIENT_S)  # nothing of it stays
+    run.options = (None, *test.options)
+    return run
+
+
+@needs_group
+@options("--workers", "1", "--group-command", PAIR + " -pc_gamg_coarse_eq_limit 40")  # levels also of small bodies
+def test_answers_are_those_of_one_process(s):
+    """The paper's body, a cube on a sphere and on a plane, two bodies, matrices: certified, and the same."""
+    for request in (BEAM, CUBE, ON_PLANE, two_bodies(), MATRICES):
+        alone, group = (solve(s, by(operator, request)) for operator in ("condensed", "distributed"))
+        check(group["status"] == "successful", group)
+        one, two = alone["summary"], group["summary"]
+        check(two["operator"] == "distributed" and two["outcome"] == "converged", two)
+        check(two["certificate"]["relative_error"] <= 1e-6, two["certificate"])
+        check(two["contact"]["active"] > 0 and two["factor"]["bytes"] > 0 or request is MATRICES, two)
+        # energies differ by half the square of the error at most
+        check(abs(one["energy"]["primal"] - two["energy"]["primal"]) <= 1e-11 * abs(one["energy"]["primal"]), one, two)
+        near = 1e-4 * abs(one["contact"]["reaction_sum"])
+        check(abs(one["contact"]["reaction_sum"] - two["contact"]["reaction_sum"]) <= near, one["contact"], two["contact"])
+    wait_until(lambda: not processes(s), PATIENT_S)  # the group ends with its job
+    job = solve(s, {**MATRICES, "solver": {"operator": "distributed"}})
+    check(job["status"] == "successful", job)
+
+
+def waiting_in_group(s, request):
+    """A job that iterates on a group."""
+    job = s.post(request).json["id"]
+    wait_until(lambda: len(s.get(f"/v1/jobs/{job}/history").json.get("rows", ())) > 2, PATIENT_S)
+    check(len(processes(s)) == 2, processes(s))
+    return job
+
+
+# Two springs, and steps so short that it runs until it is told to stop.
+LONG = by("distributed", MATRICES, method="uzawa", alpha=1e-9, max_iterations=1000000000)
+
+
+@needs_group
+@options("--workers", "1", "--max-attempts", "2", "--group-command", PAIR)
+def test_a_lost_process_is_a_lost_attempt(s):
+    """Killed: a process of the group, in both attempts; then the job has failed, and the service solves the next one."""
+    job = waiting_in_group(s, LONG)
+    os.kill(max(processes(s)), signal.SIGKILL)
+    wait_until(lambda: s.get(f"/v1/jobs/{job}").json["attempts"] == 2, PATIENT_S)
+    gone_before = s.events("process_died")
+    check([event["cause"] for event in gone_before] == ["the loss of its group of processes"], gone_before)
+    wait_until(lambda: len(s.get(f"/v1/jobs/{job}/history").json.get("rows", ())) > 2 and len(processes(s)) == 2,
+               PATIENT_S)
+    os.kill(min(processes(s)), signal.SIGKILL)
+    ended = s.wait_status(job, "failed", seconds=PATIENT_S)
+    check(ended["error"]["code"] == "process_died" and "group" in ended["error"]["detail"], ended)
+    check(s.solve(MATRICES)["status"] == "successful")
+
+
+@needs_group
+@options("--workers", "1", "--max-attempts", "1", "--group-command", PAIR)
+def test_mpirun_is_lost(s):
+    job = waiting_in_group(s, LONG)
+    group = processes(s)
+    parents = {int(pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[1]) for pid in group}
+    check(len(parents) == 1, parents)
+    os.kill(parents.pop(), signal.SIGKILL)
+    ended = s.wait_status(job, "failed", seconds=PATIENT_S)
+    check(ended["error"]["code"] == "process_died", ended)
+    check(s.solve(MATRICES)["status"] == "successful")
+
+
+@needs_group
+@options("--workers", "1", "--group-command", PAIR)
+def test_dismissed(s):
+    """With its best answer so far, and no process stays."""
+    job = waiting_in_group(s, LONG)
+    began = time.monotonic()
+    s.request("DELETE", f"/v1/jobs/{job}")
+    ended = s.wait_status(job, "dismissed", seconds=PATIENT_S)
+    check(time.monotonic() - began < 10, ended)
+
+
+@options("--workers", "1")
+def test_refused_without_a_command(s):
+    job = s.solve(by("distributed", SCENE))
+    check(job["status"] == "failed" and "--group-command" in job["error"]["detail"], job)
+    check(job["error"]["pointer"] == "/solver/operator" and "matrix_free" in job["error"]["detail"], job)
+
+
+@options("--workers", "1", "--group-command", "echo no such cluster; exit 7")
+def test_a_command_that_does_not_start_it(s):
+    job = s.solve(by("distributed", SCENE))
+    check(job["status"] == "failed" and "log" in job["error"]["detail"], job)
+    events = s.events("group_not_started")
+    check(len(events) == 1 and events[0]["status"] == 7 and "no such cluster" in s.log(), events)
+    check(s.solve(MATRICES)["status"] == "successful")
+
+
+if __name__ == "__main__":
+    service.main(globals())
