@@ -279,6 +279,11 @@ test-postgresql: deps-test ## tests of the daemon whose jobs are in PostgreSQL; 
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB)
 	@UZAWA_STORE=postgresql tests/run.sh $(BUILD) api "$(FILTER)" "$(if $(ALL)$(FILTER),,$(ON_POSTGRESQL))"
 
+.PHONY: test-group
+test-group: deps-test deps-group ## tests of one body on several processes, which skip what needs PETSc where it is not
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_group $(BUILD)/tests/test_spread
+	@tests/run.sh $(BUILD) "unit api" "" "test_group test_spread"
+
 .PHONY: test-browser screenshots
 test-browser: deps-test ## the web page in headless Chromium; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all

@@ -1,0 +1,278 @@
+/* stand_in.h: another end of the stream to a group of processes: conjugate gradients on a dense matrix in a thread,
+ * preconditioned by the diagonal, and wrong in a chosen way. */
+#ifndef TESTS_STAND_IN_H
+#define TESTS_STAND_IN_H
+
+#include "group/wire.h"
+#include "uzawa.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+typedef enum {
+    STAND_IN_HONEST,
+    STAND_IN_DROPS,   /* M^-1 is 0 at the first dof */
+    STAND_IN_LIES,    /* of every start it says that it solves the equations */
+    STAND_IN_SOFTER,  /* its K is softer by 1 % in the first dof */
+    STAND_IN_SHIFTS,  /* adds 1e-3 of its largest number to each solution */
+    STAND_IN_SKEW,    /* M^-1 is not symmetric */
+    STAND_IN_NEGATIVE /* M^-1 is negative at the first dof */
+} stand_in_fault;
+
+enum { STAND_IN_MOST = 64 };
+
+typedef struct {
+    int stream, honest_solves; /* the fault begins after so many solves */
+    stand_in_fault fault;
+    pthread_t thread;
+    double most; /* what it says that diag(K)^-1 M is bounded by */
+    int64_t nodes, bs, modes, n, at, solves;
+    double K[2][STAND_IN_MOST][STAND_IN_MOST];
+    double x[STAND_IN_MOST], b[STAND_IN_MOST], r[STAND_IN_MOST], z[STAND_IN_MOST], p[STAND_IN_MOST];
+} stand_in;
+
+static inline bool stand_in_take(stand_in *s, void *to, size_t size)
+{
+    for (char *at = to; size > 0;) {
+        const ssize_t got = read(s->stream, at, size);
+        if (got <= 0)
+            return false;
+        at += got;
+        size -= (size_t)got;
+    }
+    return true;
+}
+
+static inline void stand_in_put(stand_in *s, const void *from, size_t size)
+{
+    for (const char *at = from; size > 0;) {
+        const ssize_t sent = send(s->stream, at, size, MSG_NOSIGNAL);
+        if (sent <= 0)
+            return;
+        at += sent;
+        size -= (size_t)sent;
+    }
+}
+
+static inline void stand_in_answer(stand_in *s, uz_wire_head head)
+{
+    head.version = UZ_WIRE_VERSION;
+    stand_in_put(s, &head, sizeof head);
+}
+
+static inline bool stand_in_is_wrong(const stand_in *s, stand_in_fault fault)
+{
+    return s->fault == fault && s->solves > s->honest_solves;
+}
+
+static inline double stand_in_cycle(stand_in *s, int which, double *z, const double *r)
+{
+    double square = 0.0;
+    for (int64_t i = 0; i < s->n; i++)
+        z[i] = r[i] / s->K[which][i][i];
+    if (stand_in_is_wrong(s, STAND_IN_DROPS))
+        z[0] = 0.0;
+    if (stand_in_is_wrong(s, STAND_IN_NEGATIVE))
+        z[0] = -z[0];
+    for (int64_t i = 1; i < s->n && stand_in_is_wrong(s, STAND_IN_SKEW); i++)
+        z[i] += 0.9 * r[i - 1] / s->K[which][i][i];
+    for (int64_t i = 0; i < s->n; i++)
+        square += r[i] * z[i];
+    return stand_in_is_wrong(s, STAND_IN_LIES) ? 0.0 : square;
+}
+
+static inline void stand_in_multiply(const stand_in *s, int which, double *y, const double *x)
+{
+    for (int64_t i = 0; i < s->n; i++) {
+        y[i] = 0.0;
+        for (int64_t j = 0; j < s->n; j++)
+            y[i] += s->K[which][i][j] * x[j];
+    }
+    if (stand_in_is_wrong(s, STAND_IN_SOFTER))
+        y[0] -= 0.01 * s->K[which][0][0] * x[0];
+}
+
+static inline void stand_in_begin(stand_in *s, int which)
+{
+    stand_in_multiply(s, which, s->r, s->x);
+    for (int64_t i = 0; i < s->n; i++)
+        s->r[i] = s->b[i] - s->r[i];
+    const double square = stand_in_cycle(s, which, s->z, s->r);
+    memcpy(s->p, s->z, sizeof s->p);
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_STATE, .x = square});
+}
+
+static inline void stand_in_steps(stand_in *s, const uz_wire_head *m)
+{
+    const int which = (int)m->a;
+    double q[STAND_IN_MOST], alpha[UZ_WIRE_STEPS_MOST], beta[UZ_WIRE_STEPS_MOST], square = m->y;
+    int64_t made = 0;
+    bool flat = false;
+    while (made < m->b && square > m->x) {
+        double curvature = 0.0;
+        const double last = square;
+        stand_in_multiply(s, which, q, s->p);
+        for (int64_t i = 0; i < s->n; i++)
+            curvature += s->p[i] * q[i];
+        flat = !(curvature > 0.0);
+        if (flat)
+            break;
+        alpha[made] = last / curvature;
+        for (int64_t i = 0; i < s->n; i++) {
+            s->x[i] += alpha[made] * s->p[i];
+            s->r[i] -= alpha[made] * q[i];
+        }
+        square = stand_in_cycle(s, which, s->z, s->r);
+        beta[made] = square / last;
+        for (int64_t i = 0; i < s->n; i++)
+            s->p[i] = s->z[i] + beta[made] * s->p[i];
+        made++;
+    }
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_STATE, .a = made, .b = flat, .x = square});
+    stand_in_put(s, alpha, (size_t)made * sizeof *alpha);
+    stand_in_put(s, beta, (size_t)made * sizeof *beta);
+}
+
+static inline void stand_in_answer_vector(stand_in *s, const double *v)
+{
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_VECTOR});
+    stand_in_put(s, v, (size_t)s->n * sizeof *v);
+}
+
+static inline void stand_in_fetch(stand_in *s)
+{
+    double most = 0.0;
+    for (int64_t i = 0; i < s->n; i++)
+        most = fmax(most, fabs(s->x[i]));
+    for (int64_t i = 0; i < s->n && stand_in_is_wrong(s, STAND_IN_SHIFTS); i++)
+        s->x[i] += 1e-3 * most;
+    stand_in_answer_vector(s, s->x);
+}
+
+static inline bool stand_in_take_body(stand_in *s, const uz_wire_head *m)
+{
+    int32_t offset[STAND_IN_MOST + 1], neighbour[STAND_IN_MOST * STAND_IN_MOST], part[STAND_IN_MOST] = {0};
+    s->nodes = m->a;
+    s->bs = m->b;
+    s->modes = m->c;
+    s->n = s->nodes * s->bs;
+    s->at = 0;
+    if (s->n > STAND_IN_MOST || !stand_in_take(s, offset, (size_t)(s->nodes + 1) * sizeof *offset) ||
+        !stand_in_take(s, neighbour, (size_t)offset[s->nodes] * sizeof *neighbour))
+        return false;
+    memset(s->K, 0, sizeof s->K);
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_PARTS, .a = 1});
+    stand_in_put(s, part, (size_t)s->nodes * sizeof *part);
+    return true;
+}
+
+static inline void stand_in_answer_made(stand_in *s)
+{
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_MADE, .a = 1, .x = s->most});
+}
+
+static inline bool stand_in_take_rows(stand_in *s, const uz_wire_head *m)
+{
+    const int64_t bs = s->bs;
+    int32_t count[STAND_IN_MOST], column[STAND_IN_MOST * STAND_IN_MOST];
+    double value[STAND_IN_MOST * STAND_IN_MOST];
+    float mode[STAND_IN_MOST * 6];
+    if (!stand_in_take(s, count, (size_t)m->a * sizeof *count) ||
+        !stand_in_take(s, column, (size_t)m->b * sizeof *column) ||
+        !stand_in_take(s, value, (size_t)(m->b * bs * bs) * sizeof *value) ||
+        !stand_in_take(s, mode, (size_t)(m->a * bs * s->modes) * sizeof *mode))
+        return false;
+    int64_t block = 0, from = 0;
+    for (int64_t i = 0; i < m->a; block += count[i++], s->at++)
+        for (int64_t c = 0; c < bs; c++)
+            for (int64_t k = 0; k < count[i]; k++)
+                for (int64_t e = 0; e < bs; e++)
+                    s->K[UZ_WIRE_WHOLE][s->at * bs + c][column[block + k] * bs + e] = value[from++];
+    if (s->at == s->nodes)
+        stand_in_answer_made(s);
+    return true;
+}
+
+static inline bool stand_in_hold(stand_in *s)
+{
+    char held[STAND_IN_MOST];
+    if (!stand_in_take(s, held, (size_t)s->n))
+        return false;
+    for (int64_t i = 0; i < s->n; i++)
+        for (int64_t j = 0; j < s->n; j++)
+            s->K[UZ_WIRE_FREE_DOFS][i][j] = held[i] || held[j] ? (double)(i == j) : s->K[UZ_WIRE_WHOLE][i][j];
+    stand_in_answer_made(s);
+    return true;
+}
+
+static inline bool stand_in_obey(stand_in *s, const uz_wire_head *m)
+{
+    const size_t size = (size_t)s->n * sizeof(double);
+    const int which = (int)m->a;
+    switch (m->kind) {
+    case UZ_WIRE_BODY:
+        return stand_in_take_body(s, m);
+    case UZ_WIRE_ROWS:
+        return stand_in_take_rows(s, m);
+    case UZ_WIRE_HOLD:
+        return stand_in_hold(s);
+    case UZ_WIRE_BEGIN:
+        s->solves++;
+        if (!stand_in_take(s, s->x, size) || !stand_in_take(s, s->b, size))
+            return false;
+        stand_in_begin(s, which);
+        return true;
+    case UZ_WIRE_AGAIN:
+        stand_in_begin(s, which);
+        return true;
+    case UZ_WIRE_STEPS:
+        stand_in_steps(s, m);
+        return true;
+    case UZ_WIRE_FETCH:
+        stand_in_fetch(s);
+        return true;
+    case UZ_WIRE_APPLY:
+        if (!stand_in_take(s, s->b, size))
+            return false;
+        stand_in_cycle(s, which, s->z, s->b);
+        stand_in_answer_vector(s, s->z);
+        return true;
+    default:
+        return m->kind == UZ_WIRE_FREE;
+    }
+}
+
+static inline void *stand_in_run(void *arg)
+{
+    stand_in *s = arg;
+    uz_wire_head m;
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_HELLO, .a = 1});
+    while (stand_in_take(s, &m, sizeof m) && stand_in_obey(s, &m))
+        ;
+    close(s->stream);
+    return NULL;
+}
+
+/* The end of the stream that is to be asked. */
+static inline int stand_in_start(stand_in *s, stand_in_fault fault, int honest_solves, double most)
+{
+    int pair[2];
+    memset(s, 0, sizeof *s);
+    s->fault = fault;
+    s->honest_solves = honest_solves;
+    s->most = most;
+    if (socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0)
+        abort();
+    s->stream = pair[1];
+    if (pthread_create(&s->thread, NULL, stand_in_run, s) != 0)
+        abort();
+    return pair[0];
+}
+
+#endif

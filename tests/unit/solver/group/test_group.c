@@ -1,0 +1,255 @@
+/* Solves by other processes: what is certified holds whatever they answer. Small systems that were once certified
+ * wrongly (K = diag(2, 1), whose multigrid had one level that left a dof alone), by a stand-in and by uzawa-group. */
+#include "group/group.h"
+#include "harness.h"
+#include "qp_fixture.h"
+#include "sanitized.h"
+#include "stand_in.h"
+#include "work/group_process.h"
+
+#include <limits.h>
+#include <poll.h>
+
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_process_init(2);
+}
+
+static uz_process_group *group_of(void *ctx, char *why, size_t size)
+{
+    (void)why;
+    (void)size;
+    return ctx;
+}
+
+static uz_status solve_by(uz_result **result, const uz_problem *problem, uz_operator op, uz_process_group *group,
+                          uz_error *err)
+{
+    uz_settings settings = uz_settings_default();
+    const uz_hooks hooks = {.ctx = group, .group = group_of};
+    settings.op = op;
+    settings.relative_error = 1e-8;
+    return uz_solve(result, problem, &settings, NULL, group ? &hooks : NULL, err);
+}
+
+static double distance(const uz_csc *K, const double *u, const double *v)
+{
+    double *e = vector(K->cols), *Ke = vector(K->cols), sum = 0.0;
+    for (int64_t j = 0; j < K->cols; j++)
+        e[j] = u[j] - v[j];
+    uz_csc_symv(Ke, K, 1.0, e);
+    for (int64_t j = 0; j < K->cols; j++)
+        sum += e[j] * Ke[j];
+    free(e);
+    free(Ke);
+    return sqrt(fmax(0.0, sum));
+}
+
+typedef enum { MUST_CONVERGE, MAY_END, MUST_FAIL } expectation;
+
+/* Takes the problem. Whatever comes out, its bound covers its distance from the answer by a factor. */
+static void check_problem(const char *name, uz_qp qp, uz_process_group *group, expectation wanted)
+{
+    uz_problem problem = problem_of(qp);
+    uz_result *exact = NULL, *got = NULL;
+    uz_error err = {0};
+    CHECK_MSG(solve_by(&exact, &problem, UZ_OPERATOR_CONDENSED, NULL, &err) == UZ_OK, "%s: %s", name, err.message);
+    const uz_status status = solve_by(&got, &problem, UZ_OPERATOR_DISTRIBUTED, group, &err);
+    if (wanted == MUST_FAIL)
+        CHECK_MSG(status == UZ_ERR_INTERNAL || status == UZ_ERR_UNSUPPORTED || status == UZ_ERR_NOT_SPD,
+                  "%s: status %d", name, (int)status);
+    if (wanted == MUST_CONVERGE)
+        CHECK_MSG(status == UZ_OK && got->summary.outcome == UZ_CONVERGED, "%s: %s, outcome %d, error %g", name,
+                  err.message, got ? (int)got->summary.outcome : -1,
+                  got ? got->summary.certificate.relative_error : NAN);
+    if (status == UZ_OK && exact) {
+        const double off = distance(&problem.qp.K, got->u, exact->u), bound = got->summary.certificate.absolute_error,
+                     slack = exact->summary.certificate.absolute_error;
+        CHECK_MSG(off <= bound + slack, "%s: off by %g, certified %g", name, off, bound);
+    }
+    uz_result_free(exact);
+    uz_result_free(got);
+    uz_problem_clear(&problem);
+}
+
+/* Dofs that nothing couples, the first of them against an obstacle. */
+static uz_qp diagonal(int64_t d, const double *stiffness)
+{
+    double *K = vector(d * d), *N = vector(d);
+    uz_qp qp = {.p = vector(d), .h = vector(1)};
+    for (int64_t j = 0; j < d; j++) {
+        K[j * d + j] = stiffness[j];
+        qp.p[j] = stiffness[j] * (1.0 + 0.5 * (double)j);
+    }
+    N[0] = 1.0;
+    qp.h[0] = 0.25;
+    qp.K = csc_from_dense(K, d, d, true);
+    qp.N = csc_from_dense(N, 1, d, false);
+    free(K);
+    free(N);
+    return qp;
+}
+
+static void check_small_systems(uz_process_group *group, expectation wanted)
+{
+    static const double SPREAD[] = {1e-6, 1.0, 1e6, 1e3, 1e-3}, TWO[] = {2.0, 1.0}, THREE[] = {3.0, 5.0, 7.0};
+    qp_random rng = {7};
+    check_problem("1 x 1", diagonal(1, TWO), group, wanted);
+    check_problem("diag(2, 1)", diagonal(2, TWO), group, wanted);
+    check_problem("3 x 3", diagonal(3, THREE), group, wanted);
+    check_problem("a spread of 1e12", diagonal(5, SPREAD), group, wanted);
+    check_problem("springs", random_obstacle(&rng, 17, 1), group, wanted);
+    for (int64_t d = 2; d <= 22; d += 4)
+        check_problem("random", random_qp(&rng, &(qp_kind){.d = d, .m = 1 + d / 4, .condition = 10.0 * (double)d}),
+                      group, wanted);
+}
+
+/* As a bound on lambda_max(diag(K)^-1 M): what is said of a residual is then possible whatever it is. */
+#define ANYTHING 1e12
+
+/* A group ends with what it holds, so that each problem has one of its own. */
+static void check_stand_in(stand_in_fault fault, int honest_solves, double most, expectation wanted)
+{
+    static const double TWO[] = {2.0, 1.0}, FOUR[] = {1.0, 2.0, 1.0, 9.0};
+    for (int k = 0; k < 4; k++) {
+        stand_in *s = malloc(sizeof *s);
+        uz_process_group *group = uz_process_group_new(stand_in_start(s, fault, honest_solves, most));
+        qp_random rng = {11};
+        uz_qp qp = k == 0   ? diagonal(2, TWO)
+                   : k == 1 ? diagonal(4, FOUR)
+                   : k == 2 ? random_obstacle(&rng, 12, 1)
+                            : random_qp(&rng, &(qp_kind){.d = 10, .m = 3, .condition = 20});
+        char name[64];
+        snprintf(name, sizeof name, "fault %d after %d solves, problem %d", (int)fault, honest_solves, k);
+        check_problem(name, qp, group, wanted);
+        uz_process_group_free(group);
+        pthread_join(s->thread, NULL);
+        free(s);
+    }
+}
+
+TEST(an_honest_group_gives_certified_answers)
+{
+    stand_in *s = malloc(sizeof *s);
+    uz_process_group *group = uz_process_group_new(stand_in_start(s, STAND_IN_HONEST, 0, 1.0));
+    check_small_systems(group, MUST_CONVERGE);
+    uz_process_group_free(group);
+    pthread_join(s->thread, NULL);
+    free(s);
+}
+
+/* From the first solve on, which is that of a random load. */
+TEST(solves_that_are_not_those_of_K_are_refused)
+{
+    check_stand_in(STAND_IN_DROPS, 0, 1.0, MUST_FAIL);
+    check_stand_in(STAND_IN_LIES, 0, 1.0, MUST_FAIL);
+    check_stand_in(STAND_IN_SOFTER, 0, 1.0, MUST_FAIL);
+    check_stand_in(STAND_IN_SHIFTS, 0, 1.0, MUST_FAIL);
+    check_stand_in(STAND_IN_NEGATIVE, 0, 1.0, MUST_FAIL);
+    check_stand_in(STAND_IN_SKEW, 0, 1.0, MAY_END);
+    check_stand_in(STAND_IN_DROPS, 0, ANYTHING, MUST_FAIL);
+    check_stand_in(STAND_IN_LIES, 0, ANYTHING, MUST_FAIL);
+}
+
+/* The bound at the end takes nobody's word either. */
+TEST(solves_that_go_wrong_later_are_not_certified)
+{
+    for (int fault = STAND_IN_DROPS; fault <= STAND_IN_NEGATIVE; fault++)
+        for (int honest = 2; honest < 9; honest++)
+            for (int k = 0; k < 2; k++)
+                check_stand_in((stand_in_fault)fault, honest, k == 0 ? 1.0 : ANYTHING, MAY_END);
+}
+
+/* With a positive diagonal, and a negative eigenvalue between the others. */
+static uz_qp indefinite(qp_random *rng, int64_t d)
+{
+    double *K = random_spd(rng, d, 10, 1), *v = vector(d), *N = vector(d), square = 0.0, work = 0.0;
+    uz_qp qp = {.p = vector(d), .h = vector(1)};
+    for (int64_t i = 0; i < d; i++) {
+        v[i] = random_unit(rng) < 0.5 ? -1.0 : 1.0;
+        square += v[i] * v[i];
+        qp.p[i] = random_signed(rng);
+    }
+    for (int64_t i = 0; i < d; i++)
+        for (int64_t j = 0; j < d; j++)
+            work += v[i] * K[i * d + j] * v[j];
+    for (int64_t i = 0; i < d; i++)
+        for (int64_t j = 0; j < d; j++)
+            K[i * d + j] -= 1.2 * work / square / square * v[i] * v[j];
+    N[0] = 1.0;
+    qp.h[0] = 0.1;
+    qp.K = csc_from_dense(K, d, d, true);
+    qp.N = csc_from_dense(N, 1, d, false);
+    free(K);
+    free(v);
+    free(N);
+    return qp;
+}
+
+TEST(an_indefinite_K_is_refused)
+{
+    qp_random rng = {3};
+    for (int k = 0; k < 12; k++) {
+        stand_in *s = malloc(sizeof *s);
+        uz_process_group *group = uz_process_group_new(stand_in_start(s, STAND_IN_HONEST, 0, 1.0));
+        uz_problem problem = problem_of(indefinite(&rng, 4 + 4 * k));
+        uz_result *result = NULL;
+        uz_error err = {0};
+        CHECK_INT(solve_by(&result, &problem, UZ_OPERATOR_DISTRIBUTED, group, &err), UZ_ERR_NOT_SPD);
+        uz_result_free(result);
+        uz_problem_clear(&problem);
+        uz_process_group_free(group);
+        pthread_join(s->thread, NULL);
+        free(s);
+    }
+}
+
+/* ---- the program itself */
+
+/* Where uzawa-group is, beside the folder of this program; false: it was not built. */
+static bool find_program(void)
+{
+    char path[PATH_MAX], rest[2 * PATH_MAX + 32];
+    const ssize_t length = readlink("/proc/self/exe", path, sizeof path - 1);
+    path[length > 0 ? length : 0] = '\0';
+    for (int k = 0; k < 2; k++) {
+        char *slash = strrchr(path, '/');
+        if (!slash)
+            return false;
+        *slash = '\0';
+    }
+    snprintf(rest, sizeof rest, "%s/uzawa-group", path);
+    if (access(rest, X_OK) != 0 || system("command -v mpirun >/dev/null") != 0)
+        return false;
+    const char *before = getenv("PATH");
+    snprintf(rest, sizeof rest, "%s:%s", path, before ? before : "/usr/bin:/bin");
+    setenv("PATH", rest, 1);
+    setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
+    setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
+    setenv("OMPI_MCA_btl_vader_single_copy_mechanism", "none", 1);
+    return true;
+}
+
+static void check_program(const char *command)
+{
+    group_process process = {0};
+    CHECK(group_process_begin(&process, command, NULL));
+    struct pollfd waiting = {.fd = process.listener, .events = POLLIN};
+    CHECK(poll(&waiting, 1, 60000) == 1);
+    const int stream = group_process_accept(&process);
+    CHECK(stream >= 0);
+    uz_process_group *group = uz_process_group_new(stream);
+    check_small_systems(group, MUST_CONVERGE);
+    uz_process_group_free(group);
+    group_process_reap(&process, true);
+}
+
+TEST(small_systems_by_processes)
+{
+    if (SANITIZED || !find_program()) {
+        test_skip("uzawa-group needs PETSc and Open MPI (make deps-group), and no sanitizer");
+        return;
+    }
+    check_program("exec mpirun --oversubscribe -n 1 {program} -pc_gamg_coarse_eq_limit 4"); /* levels, too */
+    check_program("exec mpirun --oversubscribe -n 2 {program}");
+}
