@@ -368,7 +368,8 @@ static void print_effort(FILE *to, const json_t *summary)
     size_t i;
     if (json_is_object(factor))
         label(to, "factor");
-    if (json_is_object(factor) && strcmp(client_json_text(summary, "operator"), "matrix_free") == 0) {
+    const char *by = client_json_text(summary, "operator");
+    if (json_is_object(factor) && (strcmp(by, "matrix_free") == 0 || strcmp(by, "distributed") == 0)) {
         fprintf(to, "none: coarse levels of %.3g MB, %s\n", isfinite(bytes) ? bytes / 1e6 : 0.0, from);
     } else if (json_is_object(factor)) {
         fprintf(to, "%s, ", from);
