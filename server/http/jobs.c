@@ -150,8 +150,9 @@ static void waiting_free(delayed_reply *d)
 /* So long a wait keeps its thread: a connection that has given it up ends with the reply (held.h). */
 static const double SHORT_WAIT_S = 1.0;
 
-void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http_reply *reply)
+void jobs_wait_then(api *context, http_request *rq, job *j, uint64_t since, jobs_then then, http_reply *reply)
 {
+    job found = {.progress = 0};
     double seconds = request_wait(rq, 0, context->options.max_wait_s), rest = fmax(seconds - SHORT_WAIT_S, 0.0);
     if (seconds <= 0 || jobs_ended(j)) {
         then(context, j, reply);
@@ -159,7 +160,14 @@ void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http
     }
     /* by the request's own preference: without one there is nothing to wait for */
     snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
-    const bool ended = work_wait(context->work, j->id, seconds - rest, rq->fd, transport_draining(context->server));
+    const bool ended = work_wait_since(context->work, j->id, since, seconds - rest, rq->fd,
+                                       transport_draining(context->server), &found);
+    if (found.id[0]) {
+        job_clear(j);
+        *j = found;
+        then(context, j, reply);
+        return;
+    }
     waiting *w = ended || rest == 0.0 ? NULL : calloc(1, sizeof *w);
     if (w) {
         /* the reply comes from a source: when the job has ended, or the rest of the time is over */
@@ -206,9 +214,10 @@ void jobs_acknowledge(api *context, job *j, http_reply *reply)
 void jobs_get(api *context, http_request *rq, http_reply *reply)
 {
     job j;
+    const uint64_t since = feed_last(work_feed(context->work));
     reply->tag_by_body = true;
     if (jobs_load(context, rq, &j, reply))
-        jobs_wait_then(context, rq, &j, reply_job, reply);
+        jobs_wait_then(context, rq, &j, since, reply_job, reply);
     job_clear(&j);
 }
 

@@ -21,8 +21,8 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
 /* Answers with the job as it is then. */
 typedef void (*jobs_then)(api *context, job *j, http_reply *reply);
 /* Waits as the request prefers and answers by `then`; a longer wait goes on after the handler's return (transport.h),
- * so that then must not need what the handler has. */
-void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http_reply *reply);
+ * so that then must not need what the handler has. since: as work_wait_since has it. */
+void jobs_wait_then(api *context, http_request *rq, job *j, uint64_t since, jobs_then then, http_reply *reply);
 
 /* Answers with the job: 200 where it has ended, else 202, and where it is. */
 void jobs_acknowledge(api *context, job *j, http_reply *reply);

@@ -247,6 +247,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     codec_request request = {0};
     job j = {0};
     char *key = NULL;
+    const uint64_t since = feed_last(work_feed(context->work));
     const char *validate = target_value(&rq->target, "validate");
     const bool validate_only = validate && strcmp(validate, "true") == 0;
     bool good = !validate || validate_only || strcmp(validate, "false") == 0;
@@ -262,7 +263,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         if (!find_repeat(context, rq, validate_only ? NULL : key, &j))
             reply_problem(reply, &problem);
         else
-            jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
+            jobs_wait_then(context, rq, &j, since, jobs_acknowledge, reply);
     } else if (validate_only) {
         uz_prediction predicted;
         api_asker asker = {context, rq};
@@ -279,7 +280,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
         store_request stored = kept_request(context, rq, &request, rq->body, rq->body_len, key);
         if (store_job(context, rq, &stored, &j, reply))
-            jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
+            jobs_wait_then(context, rq, &j, since, jobs_acknowledge, reply);
     }
     job_clear(&j);
     codec_request_clear(&request);
@@ -375,6 +376,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
     problem_details problem = {0};
     job old = {0};
     char *key = NULL;
+    const uint64_t since = feed_last(work_feed(context->work));
     if (!read_key(rq, &key, &problem))
         reply_problem(reply, &problem);
     else if (jobs_load(context, rq, &old, reply) && results_exist(&old, reply) && has_reactions(context, &old, reply)) {
@@ -403,7 +405,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
             request.refines = old.id;
             job new = {0};
             if (body && store_job(context, rq, &request, &new, reply))
-                jobs_wait_then(context, rq, &new, jobs_acknowledge, reply);
+                jobs_wait_then(context, rq, &new, since, jobs_acknowledge, reply);
             job_clear(&new);
         }
         free(cells);

@@ -18,6 +18,7 @@
 struct listener {
     feed *feed;
     char id[33];   /* "": all jobs */
+    bool of_end;   /* told only of what may be the job's end */
     int wake;      /* eventfd; -1: there was none to be had */
     bool signaled; /* wake was written since the last wait returned */
     listener **at, *next;
@@ -33,6 +34,7 @@ struct feed {
     uint64_t last;
     kept_change kept[FEED_KEPT];  /* number n at n % FEED_KEPT */
     uint64_t newest[BUCKETS];     /* a change of one of the jobs with this hash: the newest */
+    uint64_t ends[BUCKETS];       /* the same of those that may be an end */
     listener *listeners[BUCKETS]; /* to one job */
     listener *all;
 };
@@ -64,11 +66,11 @@ void feed_free(feed *f)
 
 /* ---- telling */
 
-/* Those who listen to this job; NULL: all of the list. Under the lock. */
-static void wake(listener *first, const char *id)
+/* Those who listen to this job; NULL: all of the list. goes_on: not those who wait for its end. Under the lock. */
+static void wake(listener *first, const char *id, bool goes_on)
 {
     for (listener *l = first; l; l = l->next) {
-        if (id && strcmp(l->id, id) != 0)
+        if ((id && strcmp(l->id, id) != 0) || (goes_on && l->of_end))
             continue;
         if (!l->signaled && l->wake >= 0)
             eventfd_write(l->wake, 1);
@@ -76,7 +78,7 @@ static void wake(listener *first, const char *id)
     }
 }
 
-void feed_changed(feed *f, const char *id, const char *deleted_of)
+static void change(feed *f, const char *id, bool goes_on, const char *deleted_of)
 {
     pthread_mutex_lock(&f->lock);
     uint64_t *newest = &f->newest[bucket(id)];
@@ -84,19 +86,31 @@ void feed_changed(feed *f, const char *id, const char *deleted_of)
     if (*newest > 0 && before->change.number == *newest && strcmp(before->change.id, id) == 0)
         before->is_past = true;
     *newest = now->change.number = f->last;
+    if (!goes_on)
+        f->ends[bucket(id)] = f->last;
     now->is_past = false;
     snprintf(now->change.id, sizeof now->change.id, "%s", id);
     now->change.deleted = deleted_of != NULL;
     snprintf(now->change.client, sizeof now->change.client, "%s", deleted_of ? deleted_of : "");
-    wake(f->listeners[bucket(id)], id);
-    wake(f->all, NULL);
+    wake(f->listeners[bucket(id)], id, goes_on);
+    wake(f->all, NULL, false);
     pthread_mutex_unlock(&f->lock);
+}
+
+void feed_changed(feed *f, const char *id, const char *deleted_of)
+{
+    change(f, id, false, deleted_of);
+}
+
+void feed_goes_on(feed *f, const char *id)
+{
+    change(f, id, true, NULL);
 }
 
 void feed_moved(feed *f, const char *id)
 {
     pthread_mutex_lock(&f->lock);
-    wake(f->listeners[bucket(id)], id);
+    wake(f->listeners[bucket(id)], id, true);
     pthread_mutex_unlock(&f->lock);
 }
 
@@ -104,14 +118,14 @@ void feed_wake_all(feed *f)
 {
     pthread_mutex_lock(&f->lock);
     for (size_t i = 0; i < BUCKETS; i++)
-        wake(f->listeners[i], NULL);
-    wake(f->all, NULL);
+        wake(f->listeners[i], NULL, false);
+    wake(f->all, NULL, false);
     pthread_mutex_unlock(&f->lock);
 }
 
 /* ---- listening */
 
-listener *feed_listen(feed *f, const char *id)
+static listener *listen_to(feed *f, const char *id, bool of_end, uint64_t after)
 {
     listener *l = calloc(1, sizeof *l);
     if (!l)
@@ -119,7 +133,11 @@ listener *feed_listen(feed *f, const char *id)
     l->feed = f;
     l->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     snprintf(l->id, sizeof l->id, "%s", id ? id : "");
+    l->of_end = of_end;
     pthread_mutex_lock(&f->lock);
+    l->signaled = of_end && f->ends[bucket(l->id)] > after;
+    if (l->signaled && l->wake >= 0)
+        eventfd_write(l->wake, 1);
     l->at = id ? &f->listeners[bucket(id)] : &f->all;
     l->next = *l->at;
     if (l->next)
@@ -127,6 +145,16 @@ listener *feed_listen(feed *f, const char *id)
     *l->at = l;
     pthread_mutex_unlock(&f->lock);
     return l;
+}
+
+listener *feed_listen(feed *f, const char *id)
+{
+    return listen_to(f, id, false, 0);
+}
+
+listener *feed_listen_end(feed *f, const char *id, uint64_t after)
+{
+    return listen_to(f, id, true, after);
 }
 
 void feed_unlisten(listener *l)
@@ -181,4 +209,12 @@ bool feed_since(feed *f, uint64_t after, feed_change *out, size_t most, size_t *
     }
     pthread_mutex_unlock(&f->lock);
     return known;
+}
+
+uint64_t feed_last(feed *f)
+{
+    pthread_mutex_lock(&f->lock);
+    const uint64_t last = f->last;
+    pthread_mutex_unlock(&f->lock);
+    return last;
 }

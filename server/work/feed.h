@@ -28,6 +28,8 @@ void feed_free(feed *f); /* nobody listens any more; NULL is fine */
 
 /* deleted_of: whose job it was, which is not known from the store any more; NULL: it is not gone. */
 void feed_changed(feed *f, const char *id, const char *deleted_of);
+/* The same of a change that is not the job's end, for which those who wait for that need not look. */
+void feed_goes_on(feed *f, const char *id);
 /* Something that only those who follow this job want to know: no number, and nothing that is kept. */
 void feed_moved(feed *f, const char *id);
 /* Everybody looks again. */
@@ -35,6 +37,9 @@ void feed_wake_all(feed *f);
 
 /* Listens to one job, or with id NULL to all, from now on. NULL: no memory. Freed by feed_unlisten (NULL is fine). */
 listener *feed_listen(feed *f, const char *id);
+/* Listens to what may be the end of a job, and has something at once where that was told after change number `after`.
+ */
+listener *feed_listen_end(feed *f, const char *id, uint64_t after);
 void feed_unlisten(listener *l);
 /* Returns when there was something since the last return, when the peer of the socket fd has closed it (-1: no socket)
  * or after so many seconds. True: there was something. One thread waits for one listener. */
@@ -48,5 +53,8 @@ int feed_descriptor(const listener *l);
  * of them are not kept any more, or `after` is no number of this feed; *seen is the number of the last one, 0: there
  * was none. */
 bool feed_since(feed *f, uint64_t after, feed_change *out, size_t most, size_t *count, uint64_t *seen);
+/* The number of the last change. Whoever asks for it before he looks at a job misses no later end by feed_listen_end.
+ */
+uint64_t feed_last(feed *f);
 
 #endif

@@ -152,7 +152,7 @@ static watch_end follow(watch *w, watch_report *out)
             const int progress = w->me->progress = live_progress(&w->p->board->live, w->me->progress);
             pthread_mutex_unlock(&w->me->lock);
             if (progress != w->told)
-                feed_changed(w->me->w->feed, w->me->id, NULL); /* only this thread changes its id */
+                feed_goes_on(w->me->w->feed, w->me->id); /* only this thread changes its id */
             else
                 feed_moved(w->me->w->feed, w->me->id);
             w->told = progress;

@@ -59,7 +59,7 @@ static store_status claim(worker *me, job *claimed, char **body, size_t *body_le
     }
     pthread_mutex_unlock(&w->claim_lock);
     if (status == STORE_OK)
-        feed_changed(w->feed, claimed->id, NULL);
+        feed_goes_on(w->feed, claimed->id);
     return status;
 }
 
@@ -279,7 +279,9 @@ static worker *find_worker(work *w, const char *id)
 static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
 {
     work *w = ctx;
-    if (id)
+    if (id && waits)
+        feed_goes_on(w->feed, id);
+    else if (id)
         feed_changed(w->feed, id, gone);
     else
         feed_wake_all(w->feed);

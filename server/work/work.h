@@ -60,6 +60,11 @@ bool work_cancel(work *w, const char *id);
  * the client at the socket fd (-1: none): returns too when it has closed its end, or when *no_more (may be NULL) is
  * true, which whoever sets it tells by feed_wake_all. */
 bool work_wait(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more);
+/* The same for who has seen that the job had not ended after he asked for the number `since` (feed_last): nobody looks
+ * at the store before there is something to see. *found: the ended job, freed by the caller; it stays as it is where
+ * none was seen. */
+bool work_wait_since(work *w, const char *id, uint64_t since, double seconds, int fd, const atomic_bool *no_more,
+                     job *found);
 /* What changes jobs is told there: by the store what others than a job's owner do, by the workers the rest. */
 feed *work_feed(work *w);
 

@@ -192,7 +192,7 @@ bool reply_delay(http_request *rq, delayed_reply *d, const char *id)
 {
     d->server = rq->server;
     d->rq = rq;
-    d->listener = feed_listen(rq->server->options.feed, id);
+    d->listener = feed_listen_end(rq->server->options.feed, id, UINT64_MAX); /* it looks first in any case */
     if (!d->listener)
         return false;
     rq->reply.source = (reply_source){.read = delayed_read,

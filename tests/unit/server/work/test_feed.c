@@ -81,6 +81,31 @@ TEST(who_listens_is_woken)
     feed_free(NULL);
 }
 
+/* Who waits for the end is not woken by what is none, and learns of one that came before he listened. */
+TEST(an_end_is_waited_for_without_looks_between)
+{
+    feed *f = feed_new();
+    feed_changed(f, "a", NULL);
+    const uint64_t since = feed_last(f);
+    CHECK(since == 1);
+    feed_goes_on(f, "a");
+    listener *end = feed_listen_end(f, "a", since), *any = feed_listen(f, "a");
+    feed_goes_on(f, "a");
+    feed_moved(f, "a");
+    CHECK(feed_wait(any, -1, 60) && !feed_wait(end, -1, 0));
+    feed_changed(f, "a", NULL);
+    CHECK(feed_wait(end, -1, 60) && !feed_wait(end, -1, 0));
+    listener *late = feed_listen_end(f, "a", since), *none = feed_listen_end(f, "a", feed_last(f));
+    CHECK(feed_wait(late, -1, 60) && !feed_wait(late, -1, 0) && !feed_wait(none, -1, 0));
+    feed_wake_all(f);
+    CHECK(feed_wait(none, -1, 60) && feed_wait(end, -1, 60));
+    feed_unlisten(end);
+    feed_unlisten(any);
+    feed_unlisten(late);
+    feed_unlisten(none);
+    feed_free(f);
+}
+
 /* The wait ends when the client leaves, long before its time. */
 TEST(a_client_that_leaves_ends_the_wait)
 {
