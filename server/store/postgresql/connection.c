@@ -30,6 +30,16 @@ bool link_address_fits(const char *address, char *message, size_t size)
     return read && !secret;
 }
 
+/* A pooler tells its clients process numbers of its own, and hands the connection on after each transaction. */
+static bool find_out(link_to *l)
+{
+    link_begin(l, LINK_READ);
+    link_send(l, &(call){.sql = "SELECT pg_backend_pid()"});
+    const bool good = link_end(l) == STORE_OK;
+    l->direct = good && cell_integer(l->answers[0], 0, 0) == PQbackendPID(l->pg);
+    return good;
+}
+
 bool link_open(link_to *l, const char *address)
 {
     /* Before what the address says: after so many seconds without a sign from the other machine it is gone. */
@@ -39,10 +49,13 @@ bool link_open(link_to *l, const char *address)
     const char *const values[] = {"5", "15", "5", "3", "30000", address, "UTF8", "uzawad", NULL};
     link_close(l);
     l->pg = PQconnectdbParams(NAMES, values, 1);
-    if (l->pg && PQstatus(l->pg) == CONNECTION_OK && PQsetnonblocking(l->pg, 1) == 0 && PQenterPipelineMode(l->pg) == 1)
+    const bool begun =
+        l->pg && PQstatus(l->pg) == CONNECTION_OK && PQsetnonblocking(l->pg, 1) == 0 && PQenterPipelineMode(l->pg) == 1;
+    if (begun && find_out(l))
         return true;
-    snprintf(l->message, sizeof l->message, "cannot reach the database: %.200s",
-             l->pg ? PQerrorMessage(l->pg) : "no memory");
+    char cause[LINK_CAUSE];
+    snprintf(cause, sizeof cause, "%s", begun ? l->message : l->pg ? PQerrorMessage(l->pg) : "no memory");
+    snprintf(l->message, sizeof l->message, "cannot reach the database: %.200s", cause);
     l->message[strcspn(l->message, "\n")] = '\0';
     PQfinish(l->pg);
     l->pg = NULL;
@@ -53,9 +66,10 @@ static void forget_answers(link_to *l)
 {
     for (size_t i = 0; i < l->n_answers; i++)
         PQclear(l->answers[i]);
-    l->n_answers = l->sent = 0;
+    l->n_answers = l->sent = l->asked = l->heard = l->n_parsing = 0;
+    l->settings = SIZE_MAX;
     l->status = STORE_OK;
-    l->lost = l->passing = l->settings = false;
+    l->lost = l->passing = false;
 }
 
 void link_close(link_to *l)
@@ -156,8 +170,11 @@ static void fail_as_said(link_to *l, const PGresult *r)
     const char *code = PQresultErrorField(r, PG_DIAG_SQLSTATE), *text = PQresultErrorField(r, PG_DIAG_MESSAGE_PRIMARY);
     char cause[LINK_CAUSE];
     store_status status = STORE_ERROR;
-    if (!code) { /* libpq's own: the connection */
-        lose(l, PQresultErrorMessage(r));
+    /* libpq's own: the connection. Or there is no such statement, or another of that name, since somebody stands
+     * between after all; or its tables have changed since it was parsed. */
+    l->misled = l->misled || (code && (strcmp(code, "26000") == 0 || strcmp(code, "42P05") == 0));
+    if (!code || l->misled || strcmp(code, "0A000") == 0) {
+        lose(l, code ? text : PQresultErrorMessage(r));
         return;
     }
     for (size_t i = 0; i < sizeof CODES / sizeof CODES[0] && status == STORE_ERROR; i++)
@@ -205,15 +222,42 @@ static PGresult *next_answer(link_to *l)
     return l->lost ? NULL : PQgetResult(l->pg);
 }
 
+/* The number of a statement that the server keeps, which has it parsed where it was not; -1: it is sent as it stands.
+ */
+static int statement_of(link_to *l, const call *c)
+{
+    char name[16];
+    int free_one = -1;
+    if (!l->direct || c->once)
+        return -1;
+    for (int i = 0; i < LINK_KEPT; i++) {
+        if (l->kept[i] == c->sql)
+            return i;
+        if (!l->kept[i] && free_one < 0)
+            free_one = i;
+    }
+    snprintf(name, sizeof name, "u%d", free_one);
+    if (free_one < 0 || !PQsendPrepare(l->pg, name, c->sql, c->n, NULL))
+        return -1;
+    l->kept[free_one] = c->sql;
+    l->parsing[l->n_parsing++] = (link_parsing){free_one, l->asked++};
+    return free_one;
+}
+
 static bool send_one(link_to *l, const call *c)
 {
+    char name[16];
     if (l->lost)
         return false;
-    if (c->n > CALL_ARGUMENTS || !PQsendQueryParams(l->pg, c->sql, c->n, NULL, c->values, c->lengths, c->formats, 1)) {
+    const int kept = c->n <= CALL_ARGUMENTS ? statement_of(l, c) : -1;
+    snprintf(name, sizeof name, "u%d", kept);
+    const bool sent = c->n <= CALL_ARGUMENTS &&
+                      (kept >= 0 ? PQsendQueryPrepared(l->pg, name, c->n, c->values, c->lengths, c->formats, 1)
+                                 : PQsendQueryParams(l->pg, c->sql, c->n, NULL, c->values, c->lengths, c->formats, 1));
+    if (!sent)
         lose(l, c->n > CALL_ARGUMENTS ? "a call has too many arguments" : PQerrorMessage(l->pg));
-        return false;
-    }
-    return true;
+    l->asked++;
+    return sent;
 }
 
 /* What holds for one transaction: a statement, and one that waits for a lock, ends before the caller gives up. A server
@@ -235,8 +279,8 @@ void link_begin(link_to *l, link_kind kind)
         l->lost = true;
         return;
     }
-    if (SETTINGS[kind])
-        l->settings = send_one(l, &(call){.sql = SETTINGS[kind]});
+    if (SETTINGS[kind] && send_one(l, &(call){.sql = SETTINGS[kind]}))
+        l->settings = l->asked - 1;
 }
 
 void link_send(link_to *l, const call *c)
@@ -262,6 +306,27 @@ static void keep_answer(link_to *l, PGresult *r)
     l->answers[l->n_answers++] = r;
 }
 
+/* One answer, in the order of what was asked. */
+static void hear(link_to *l, PGresult *r)
+{
+    const ExecStatusType is = PQresultStatus(r);
+    const bool good = is == PGRES_TUPLES_OK || is == PGRES_COMMAND_OK;
+    const size_t number = l->heard++;
+    bool ours = number == l->settings;
+    for (size_t i = 0; i < l->n_parsing; i++)
+        if (l->parsing[i].answer == number) {
+            ours = true;
+            if (!good)
+                l->kept[l->parsing[i].kept] = NULL;
+        }
+    if (is == PGRES_FATAL_ERROR || is == PGRES_BAD_RESPONSE)
+        fail_as_said(l, r);
+    if (good && !ours)
+        keep_answer(l, r);
+    else
+        PQclear(r);
+}
+
 store_status link_end(link_to *l)
 {
     if (!l->lost && !PQpipelineSync(l->pg))
@@ -271,16 +336,11 @@ store_status link_end(link_to *l)
         PGresult *r = next_answer(l); /* NULL: the next one is of another call */
         if (!r && !l->lost && PQstatus(l->pg) != CONNECTION_OK)
             lose(l, PQerrorMessage(l->pg));
-        const ExecStatusType is = r ? PQresultStatus(r) : PGRES_EMPTY_QUERY;
-        ended = is == PGRES_PIPELINE_SYNC;
-        if (is == PGRES_FATAL_ERROR || is == PGRES_BAD_RESPONSE)
-            fail_as_said(l, r);
-        if ((is == PGRES_TUPLES_OK || is == PGRES_COMMAND_OK) && !l->settings)
-            keep_answer(l, r);
+        ended = r && PQresultStatus(r) == PGRES_PIPELINE_SYNC;
+        if (r && !ended)
+            hear(l, r);
         else
             PQclear(r);
-        if (is == PGRES_TUPLES_OK)
-            l->settings = false;
     }
     if (l->status == STORE_OK && l->n_answers != l->sent)
         fail(l, STORE_ERROR, "the database answered more or less than it was asked");
@@ -290,8 +350,10 @@ store_status link_end(link_to *l)
 store_status link_stream(link_to *l, const call *c, bool (*take)(void *ctx, const PGresult *row), void *ctx)
 {
     bool more = true;
+    call alone = *c; /* its answer is the first */
+    alone.once = true;
     link_begin(l, LINK_READ);
-    if (send_one(l, c) && !(PQsetSingleRowMode(l->pg) && PQpipelineSync(l->pg)))
+    if (send_one(l, &alone) && !(PQsetSingleRowMode(l->pg) && PQpipelineSync(l->pg)))
         lose(l, PQerrorMessage(l->pg));
     flush(l);
     for (bool ended = false; !ended && !l->lost;) {

@@ -1,7 +1,7 @@
 /* connection.h: one connection to a PostgreSQL server, the calls made on it and what they answer. Used by one thread at
  * a time. Calls are sent together and answered together (libpq's pipeline mode): a transaction is one round trip,
- * however many calls it has. No call has a name on the server and no setting outlives its transaction, so that a pooler
- * may stand between. */
+ * however many calls it has. No setting outlives its transaction, so that a pooler may stand between; where none does,
+ * statements are parsed and planned once for each connection. */
 #ifndef SERVER_STORE_POSTGRESQL_CONNECTION_H
 #define SERVER_STORE_POSTGRESQL_CONNECTION_H
 
@@ -13,14 +13,27 @@
 #include <stdint.h>
 
 #define LINK_CAUSE 256
+#define LINK_KEPT  64 /* statements that the server keeps for a connection */
+
+/* A statement that is being parsed for later use: which, and the number of the answer that says so. */
+typedef struct {
+    int kept;
+    size_t answer;
+} link_parsing;
 
 typedef struct {
     PGconn *pg;         /* NULL: there is none */
     PGresult **answers; /* of the calls of the last transaction, in order, from 0 */
     size_t n_answers, room, sent;
+    size_t asked, heard;         /* all that was sent and answered, with what is not the caller's */
+    size_t settings;             /* which of them is that of the settings of the transaction; SIZE_MAX: none */
+    const char *kept[LINK_KEPT]; /* texts, by their address, that the server has as statements; NULL: free */
+    link_parsing parsing[LINK_KEPT];
+    size_t n_parsing;
+    bool direct; /* the server itself answers, and keeps what it has parsed: no pooler hands out its connections */
+    bool misled; /* it seemed so, and was not */
     store_status status; /* the first failure since link_begin */
     bool lost;           /* it failed in a way that leaves open what was carried out; it is closed when given back */
-    bool settings;       /* the next answer is that of the settings of the transaction */
     bool passing;        /* the failure is one that another try may not meet: a deadlock, a key that came meanwhile */
     char message[LINK_CAUSE];
 } link_to;
@@ -36,9 +49,10 @@ void link_close(link_to *l);
 bool link_alive(link_to *l);
 
 /* A statement and its arguments $1, $2, ... in order; what they point to must live until it was sent. */
-#define CALL_ARGUMENTS 20
+#define CALL_ARGUMENTS 24
 typedef struct {
-    const char *sql;
+    const char *sql; /* a text that stays where it is, the same for the same statement */
+    bool once;       /* it is planned for its arguments, each time */
     int n;
     const char *values[CALL_ARGUMENTS];
     int lengths[CALL_ARGUMENTS], formats[CALL_ARGUMENTS];

@@ -18,13 +18,14 @@ typedef struct {
     char *address;
     char node[33]; /* this daemon's name among those that share the database */
 
-    pthread_mutex_t links_lock; /* what follows, down to connect_delay */
+    pthread_mutex_t links_lock; /* what follows, down to pooled */
     pthread_cond_t link_free;
     link_to links[STORE_LINKS];
     link_to *links_free[STORE_LINKS];
     int n_links_free;
     double connect_after, connect_delay; /* not before this (CLOCK_MONOTONIC), after what failed */
     char connect_cause[LINK_CAUSE];
+    bool pooled; /* somebody stands between who hands connections on, as it turned out */
 
     batch changes; /* submissions and ends that wait for their transaction; jobs.c */
 

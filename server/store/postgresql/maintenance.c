@@ -71,7 +71,7 @@ static bool check(link_to *l, store_findings *out)
     for (size_t i = 0; i <= sizeof CHECKS / sizeof CHECKS[0] && status == STORE_OK; i++) {
         const bool last = i == sizeof CHECKS / sizeof CHECKS[0];
         link_begin(l, LINK_READ);
-        link_send(l, &(call){.sql = last ? "SELECT count(*) FROM uzawa.job" : CHECKS[i].sql});
+        link_send(l, &(call){.sql = last ? "SELECT count(*) FROM uzawa.job" : CHECKS[i].sql, .once = true});
         status = link_end(l);
         for (int row = 0; status == STORE_OK && !last && row < PQntuples(l->answers[0]); row++)
             fprintf(text, CHECKS[i].finding, PQgetvalue(l->answers[0], row, 0));

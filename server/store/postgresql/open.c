@@ -27,6 +27,7 @@ static void connect_link(postgresql_store *s, link_to *l)
     link_close(l);
     const bool good = now && link_open(l, s->address);
     pthread_mutex_lock(&s->links_lock);
+    l->direct = l->direct && !s->pooled;
     if (good) {
         s->connect_delay = 0.0;
     } else if (now) {
@@ -55,11 +56,13 @@ store_status postgresql_give(postgresql_store *s, link_to *l, store_status statu
 {
     if (status != STORE_OK && status != STORE_NOT_FOUND && status != STORE_CONFLICT && status != STORE_BUSY)
         store_set_message(&s->base, l->message);
+    const bool misled = l->misled;
     if (l->lost)
         link_close(l);
     else if (l->pg)
         link_begin(l, LINK_READ); /* lets go of the answers */
     pthread_mutex_lock(&s->links_lock);
+    s->pooled = s->pooled || misled;
     s->links_free[s->n_links_free++] = l;
     pthread_cond_signal(&s->link_free);
     pthread_mutex_unlock(&s->links_lock);

@@ -43,7 +43,7 @@ static store_status read_one(link_to *l, const PGresult *r, void *out)
 
 store_status postgresql_get(store *base, const char *id, job *out)
 {
-    call c = {.sql = "SELECT * FROM uzawa.get_job($1)"};
+    call c = {.sql = "SELECT " JOB_COLUMNS " FROM uzawa.job WHERE id = $1"};
     call_text(&c, id);
     return postgresql_do(postgresql_of(base), LINK_READ, true, &c, read_one, out);
 }
@@ -82,7 +82,7 @@ store_status postgresql_list(store *base, const store_query *q, job *jobs, size_
     list_args a = {jobs, (size_t)q->limit + 1, count};
     char least[16];
     const double ms = (q->since - 1.0) * 1e3;
-    call c = {.sql = q->ascending ? LIST(">", "ASC") : LIST("<", "DESC")};
+    call c = {.sql = q->ascending ? LIST(">", "ASC") : LIST("<", "DESC"), .once = true};
     snprintf(least, sizeof least, "%012llx", ms > 0.0 ? (unsigned long long)fmin(ms, 281474976710655.0) : 0ULL);
     call_text(&c, q->before ? q->before : q->ascending ? "" : "~"); /* after every hex digit */
     call_integer(&c, q->limit + 1);
