@@ -23,7 +23,7 @@ typedef struct {
     const store_lease *lease;
     const store_outcome *outcome;
     const placed_result *placed; /* its result is in objects; NULL: it goes with the transaction */
-    bool again;                  /* it may have been carried out before */
+    bool again;                  /* a submission that may have been carried out before */
     store_status status;
     size_t answer; /* where the call's that decides is */
     char message[LINK_CAUSE];
@@ -55,8 +55,8 @@ static void send_submission(postgresql_store *s, link_to *l, change *c)
     const client_quotas *most = &s->base.settings.quotas;
     char *uploads = r->n_uploads > 0 ? array_of(r->uploads, r->n_uploads) : NULL;
     call q = {.sql =
-                  "SELECT verdict, job FROM uzawa.submit_2($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14,"
-                  " $15, $16, $17, $18, $19, $20)"};
+                  "SELECT verdict, job FROM uzawa.submit_3($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14,"
+                  " $15, $16, $17, $18, $19, $20, $21)"};
     call_text(&q, c->id);
     call_real(&q, c->created);
     call_bytes(&q, r->body, r->body_len);
@@ -80,6 +80,7 @@ static void send_submission(postgresql_store *s, link_to *l, change *c)
         call_integer(&q, (int64_t)r->held_body);
     else
         call_text(&q, NULL);
+    call_bool(&q, c->again);
     c->answer = l->sent;
     if (r->n_uploads > 0 && !uploads) { /* never one that names none */
         l->status = STORE_ERROR;
@@ -158,7 +159,8 @@ static void send_end(link_to *l, change *c)
     for (size_t i = 0; i < o->n_cases; i++) { /* the job's own is in its row */
         call q = {.sql = "INSERT INTO uzawa.answer(job, token, number, name, summary, sum) VALUES ($1::text,"
                          " $2::bigint, $3::bigint, $4::text, $5::text,"
-                         " uzawa.sum_of(concat_ws(E'\\x1f', $1::text, $3::bigint, $4::text), $5::text))"};
+                         " uzawa.sum_of(concat_ws(E'\\x1f', $1::text, $3::bigint, $4::text), $5::text))"
+                         " ON CONFLICT (job, number, token) DO NOTHING"}; /* an end that is sent again */
         call_text(&q, c->lease->job);
         call_integer(&q, (int64_t)c->lease->token);
         call_integer(&q, (int64_t)i + 1);
@@ -170,11 +172,10 @@ static void send_end(link_to *l, change *c)
         postgresql_send_placed(l, c->lease->job, c->lease->token, c->placed);
     else
         send_result(l, c, &bytes, &contents);
-    call q = {.sql = "SELECT uzawa.finish($1, $2, $3, $4, $5, $6, $7, $8, $9)"};
+    call q = {.sql = "SELECT uzawa.finish_2($1, $2, $3, $4, $5, $6, $7, $8)"};
     call_text(&q, c->lease->job);
     call_text(&q, c->lease->owner);
     call_integer(&q, (int64_t)c->lease->token);
-    call_bool(&q, c->again);
     call_integer(&q, o->status);
     call_text(&q, o->whole.summary);
     call_text(&q, o->error);
@@ -388,7 +389,7 @@ store_status postgresql_claim(store *base, store_lease *lease, double lease_s, b
 {
     postgresql_store *s = postgresql_of(base);
     claim_args a = {lease, out, body, len};
-    call c = {.sql = "SELECT * FROM uzawa.claim_2($1, $2, $3, $4, $5)"};
+    call c = {.sql = "SELECT * FROM uzawa.claim_3($1, $2, $3, $4, $5)"};
     lease->seconds = lease_s;
     call_text(&c, s->node);
     call_text(&c, lease->owner);

@@ -13,25 +13,36 @@
 
 store_status postgresql_send_pieces(result_place *place)
 {
-    char *text[7] = {NULL};
-    size_t len[7];
+    enum { LISTS = 8 };
+    char *text[LISTS] = {NULL};
+    size_t len[LISTS];
     bool good = true;
-    call c = {.sql = "SELECT uzawa.put_pieces($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)"};
+    /* An end that is sent again finds its own. The sum is that of piece_keys. */
+    call c = {.sql =
+                  "INSERT INTO uzawa.piece(job, token, number, name, part, encoding, header, last, data, sum)"
+                  " SELECT $1::text, $2::bigint, number, name, part, encoding, header, last, data,"
+                  " uzawa.sum_of(concat_ws(E'\\x1f', $1::text, number, name, part, encoding, header, last), data)"
+                  " FROM (SELECT e.*, substring($11::bytea FROM at::int + 1 FOR size::int) AS data FROM"
+                  " unnest($3::bigint[], $4::text[], $5::bigint[], $6::bigint[], $7::bigint[], $8::float8[],"
+                  " $9::bigint[], $10::bigint[]) AS e(number, name, part, encoding, header, last, size, at) OFFSET 0)"
+                  " AS each ON CONFLICT DO NOTHING"};
     if (place->n == 0 || place->link->status != STORE_OK)
         return place->link->status;
     call_text(&c, place->job);
     call_integer(&c, (int64_t)place->token);
-    for (int k = 0; k < 7; k++) {
+    for (int k = 0; k < LISTS; k++) {
         FILE *out = open_memstream(&text[k], &len[k]);
+        int64_t at = 0;
         for (size_t i = 0; out && i < place->n; i++) {
             const kept_piece *p = &place->kept[i];
-            const int64_t integers[] = {p->number, 0, p->part, p->encoding, p->header, 0, p->size};
+            const int64_t integers[] = {p->number, 0, p->part, p->encoding, p->header, 0, p->size, at};
             if (k == 1) /* names are words of the solver's */
                 ELEMENT(out, "\"%s\"", p->name);
             else if (k == 5)
                 ELEMENT(out, "%.17g", p->last);
             else
                 ELEMENT(out, "%lld", (long long)integers[k]);
+            at += p->size;
         }
         good = out && fputc('}', out) != EOF && fclose(out) == 0 && good;
         call_text(&c, text[k]);
@@ -43,7 +54,7 @@ store_status postgresql_send_pieces(result_place *place)
         place->link->status = STORE_ERROR;
         strcpy(place->link->message, "no memory for a result");
     }
-    for (int k = 0; k < 7; k++)
+    for (int k = 0; k < LISTS; k++)
         free(text[k]);
     place->n = place->len = 0;
     return place->link->status;

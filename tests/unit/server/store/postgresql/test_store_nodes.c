@@ -102,6 +102,45 @@ TEST(a_job_goes_where_its_body_is)
     pair_end(&two);
 }
 
+/* The answer of a commit is lost and the end is sent again: it is there, and nothing is said against it. */
+TEST(an_end_that_is_sent_again_is_the_same)
+{
+    static const double FORCES[] = {-1.0, -2.0};
+    const store_vector vector = {.name = "reactions", .count = 2, .data = FORCES};
+    const store_answer one = {.name = "one", .summary = "{}", .vectors = &vector, .n_vectors = 1};
+    const store_outcome with_result = {.status = JOB_SUCCESSFUL,
+                                       .whole = {.summary = "{\"a\": 1}", .vectors = &vector, .n_vectors = 1},
+                                       .cases = &one,
+                                       .n_cases = 1};
+    store_outcome other = with_result;
+    pair two;
+    char id[33];
+    int64_t rows = 0;
+    double *got = NULL;
+    if (!pair_begin(&two, 1000.0))
+        return;
+    other.whole.summary = "{\"a\": 2}";
+    submit_body(two.a, 1, 0, id);
+    store_lease lease = claim_next(two.a);
+    CHECK_INT(store_finish(two.a, &lease, &with_result), STORE_OK);
+    CHECK_INT(store_finish(two.a, &lease, &with_result), STORE_OK);
+    CHECK_INT(store_finish(two.a, &lease, &other), STORE_CONFLICT);
+    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 2);
+    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.answer", &rows) && rows == 1);
+    CHECK_INT(store_get_vector(two.b, id, 1, "reactions", &got, &rows), STORE_OK);
+    CHECK(got && rows == 2 && got[1] == -2.0);
+    free(got);
+    /* and with another lease it is another's */
+    lease.token++;
+    CHECK_INT(store_finish(two.a, &lease, &with_result), STORE_CONFLICT);
+    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 2);
+    /* what belongs to a job goes with it */
+    job_status was;
+    CHECK_INT(store_dismiss(two.b, id, &was), STORE_OK);
+    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 0);
+    pair_end(&two);
+}
+
 TEST(none_waits_for_long_for_who_has_its_body)
 {
     pair two;
