@@ -14,9 +14,16 @@ if [ "$(id -u)" -eq 0 ]; then
     as=(setpriv --reuid postgres --regid postgres --clear-groups --pdeathsig QUIT)
 fi
 cd /
-if [ ! -d "$folder/data" ]; then
+# What initdb makes takes it seconds and is always the same: the first test of this machine keeps it for the others.
+made=${TMPDIR:-/tmp}/uzawa-initdb-$(id -u)-$("$bin/postgres" --version | tr -cd '0-9.')
+if [ ! -d "$folder/data" ] && [ ! -O "$made" ] && [ ! -e "$made" ]; then
     "${as[@]}" "$bin/initdb" --pgdata "$folder/data" --username postgres --auth trust --encoding UTF8 --locale C \
         --no-sync --no-instructions >/dev/null
+    mkdir -m 700 "$folder/made" && cp -a "$folder/data" "$folder/made/" && mv -T "$folder/made" "$made" 2>/dev/null ||
+        rm -rf "$folder/made"
+elif [ ! -d "$folder/data" ]; then
+    [ -O "$made" ] # another's would be no surprise here, but a risk
+    cp -a "$made/data" "$folder/data"
 fi
 settings=()
 for setting; do settings+=(-c "$setting"); done

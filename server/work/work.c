@@ -275,7 +275,7 @@ static worker *find_worker(work *w, const char *id)
 }
 
 /* What the store tells (store_listener): a job that waits is for one of the workers. One that runs here was changed by
- * another process: the keeper asks what that was. */
+ * another process: the keeper asks what that was, also where changes may have been missed. */
 static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
 {
     work *w = ctx;
@@ -291,12 +291,12 @@ static void tell_change(void *ctx, const char *id, bool waits, const char *gone)
     if (!waits && id && !runs)
         return;
     pthread_mutex_lock(&w->lock);
-    if (runs) {
+    if (runs || !id) {
         w->keep_now = true;
         pthread_cond_broadcast(&w->tick);
-    } else {
-        call_worker(w, !id);
     }
+    if (!runs)
+        call_worker(w, !id);
     pthread_mutex_unlock(&w->lock);
 }
 

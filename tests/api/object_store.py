@@ -83,7 +83,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         with store.lock:
             store.seen.append((self.command, name, self.headers.get("range"), code))
         if fault == "slow":
-            time.sleep(2)
+            time.sleep(0.3)
         if fault == "cut":
             self.connection.shutdown(socket.SHUT_RDWR)
             self.close_connection = True

@@ -8,6 +8,7 @@ Where a module says SHARED = True, the tests that are not decorated have one Ser
 as much as many a test: they leave it running, and count on nothing that others may have done to it. @options() gives a
 test a Service of its own.
 """
+import concurrent.futures
 import contextlib
 import functools
 import gzip
@@ -331,6 +332,12 @@ def wait_until(holds, seconds=60):
     while not holds():
         check(time.monotonic() < end, "not true after", seconds, "s")
         time.sleep(0.02)
+
+
+def together(what, some):
+    """What it returns for each; what takes its time for one takes it for all at once."""
+    with concurrent.futures.ThreadPoolExecutor(len(some) or 1) as pool:
+        return list(pool.map(what, some))
 
 
 def expect(reply, status, code=None):

@@ -10,7 +10,7 @@ import time
 
 import databases
 import service
-from service import ENDLESS, MATRICES, SCENE, Service, check, expect, wait_until
+from service import ENDLESS, MATRICES, SCENE, Service, check, expect, together, wait_until
 
 SERVER = None  # one for all tests, made by the first
 
@@ -23,12 +23,11 @@ def daemons(build, n, *options):
     name = SERVER.database()
     some = [Service(build, "--workers", "1", *options, db=SERVER.address(name)) for _ in range(n)]
     try:
-        for one in some:
-            one.start()
+        together(Service.start, some)
         yield some, name
-        for one in some:
-            if one.process.poll() is None:
-                check(one.end() == 0, one.log())
+        live = [one for one in some if one.process.poll() is None]
+        for one, status in zip(live, together(Service.end, live)):
+            check(status == 0, one.log())
     finally:
         for one in some:
             if one.process and one.process.poll() is None:
@@ -213,7 +212,7 @@ def test_a_token_asks_as_often_of_all_as_of_one(s):
                 one.options += ("--token-file", str(tokens))
                 one.start()
             begun, taken, asked = time.monotonic(), 0, 0
-            while time.monotonic() < begun + 6 or asked < 60:
+            while time.monotonic() < begun + 4 or asked < 60:
                 asked += 2
                 taken += sum(one.request("GET", "/v1/limits", headers=token).status == 200 for one in some)
                 time.sleep(0.02)
@@ -268,7 +267,7 @@ def test_the_database_is_away_for_a_while(s):
         check(int(refused.headers["retry-after"]) > 0)
         expect(a.post(numbered(9), {"Idempotency-Key": "later"}), 503, "store_unavailable")
         expect(a.get("/readyz"), 503, "store_unavailable")
-        time.sleep(3)
+        wait_until(lambda: a.events("store_failed"), seconds=90)  # it has its answer, and nowhere to put it
         SERVER.start()
         wait_until(lambda: a.get(f"/v1/jobs/{job}").status == 200)
         found = a.wait_status(job, "successful", "failed", seconds=90)
@@ -290,9 +289,10 @@ def test_connections_that_are_cut_lose_nothing(s):
                 check(reply.status == 503, reply)
                 time.sleep(0.05 * (attempt + 1))
             raise AssertionError(f"{i} was never taken")
-        ends = pool.submit(lambda: [time.sleep(0.1) or SERVER.sql(
-            "postgres", f"SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE datname = '{name}'")
-            for _ in range(20)])
+        ends = pool.submit(lambda: SERVER.sql("postgres", f"""DO $$ BEGIN FOR i IN 1..20 LOOP
+            PERFORM pg_sleep(0.2), pg_stat_clear_snapshot();
+            PERFORM pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = '{name}';
+            END LOOP; END $$"""))
         posted = dict(pool.map(post, range(60)))
         ends.result()
         check(len(posted) == 60, len(posted), outcomes)

@@ -10,7 +10,7 @@ import time
 import databases
 import object_store
 import service
-from service import MATRICES, SCENE, Service, check, expect, wait_until
+from service import MATRICES, SCENE, Service, check, expect, together, wait_until
 
 SERVER = None
 LARGE = {**SCENE, "tags": ["large"]}
@@ -28,12 +28,12 @@ def daemons(build, n, *options, least="2K", start=True):
     try:
         for one in some:
             one.environment = dict(KEYS)
-            if start:
-                one.start()
+        if start:
+            together(Service.start, some)
         yield some, name, place
-        for one in some:
-            if one.process and one.process.poll() is None:
-                check(one.end() == 0, one.log())
+        live = [one for one in some if one.process and one.process.poll() is None]
+        for one, status in zip(live, together(Service.end, live)):
+            check(status == 0, one.log())
     finally:
         place.released.set()
         for one in some:

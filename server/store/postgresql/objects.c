@@ -9,9 +9,9 @@
 #include <string.h>
 #include <sys/random.h>
 
-#define COLLECT_S    10.0 /* between two looks for what is to go */
-#define COLLECT_MOST 50   /* removed in one look's rounds each */
-#define HISTORY      "/"  /* results.c */
+#define COLLECT_S    2.0 /* between two looks for what is to go */
+#define COLLECT_MOST 50  /* removed in one look's rounds each */
+#define HISTORY      "/" /* results.c */
 
 /* ---- writing */
 

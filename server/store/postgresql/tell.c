@@ -16,6 +16,7 @@
 
 #define LOOK_S  1.0
 #define BEAT_S  10.0
+#define PAUSE_S 0.01 /* between messages: what changes meanwhile is one */
 #define MESSAGE 7900 /* bytes; PostgreSQL takes less than 8000 */
 #define KEPT    (16 * MESSAGE)
 #define NODE    32
@@ -67,13 +68,13 @@ static void hear_line(postgresql_store *s, const char *line, size_t len)
     store_tell(&s->base, id, line[0] == TELL_WAITS, line[0] == TELL_GONE ? client : NULL);
 }
 
-/* What has come. True: also of our own, so that messages do come. */
+/* What has come. True: also of our own, so that messages do come; through a pooler that is luck, for once. */
 static bool hear(postgresql_store *s, link_to *l)
 {
     bool own = false;
     for (PGnotify *n; (n = PQnotifies(l->pg)); PQfreemem(n)) {
         if (strncmp(n->extra, s->node, NODE) == 0) {
-            own = true;
+            own = l->direct;
             continue;
         }
         for (const char *at = n->extra + strnlen(n->extra, NODE); *at;) {
@@ -134,7 +135,7 @@ static void *tell_loop(void *ctx)
     told *t = s->told;
     link_to l = {.pg = NULL};
     bool heard = false, stop = false;
-    double next_look = 0.0, next_beat = 0.0;
+    double next_look = 0.0, next_beat = 0.0, next_send = 0.0;
     while (has_more(t, &stop), !stop) {
         const double now = clock_seconds(CLOCK_MONOTONIC);
         if (!l.pg && link_open(&l, s->address)) {
@@ -151,8 +152,10 @@ static void *tell_loop(void *ctx)
             good = beat(s, &l);
             next_beat = now + BEAT_S;
         }
-        while (good && has_more(t, &stop) && !stop)
+        while (good && now >= next_send && has_more(t, &stop) && !stop)
             good = send_message(s, &l);
+        if (now >= next_send)
+            next_send = now + PAUSE_S;
         if (l.pg && hear(s, &l) && !heard) {
             heard = true;
             store_tell(&s->base, NULL, false, NULL); /* what changed before it was heard */
@@ -160,7 +163,7 @@ static void *tell_loop(void *ctx)
         if (l.pg && !good)
             link_close(&l);
         struct pollfd p[2] = {{.fd = t->wake, .events = POLLIN}, {.fd = l.pg ? PQsocket(l.pg) : -1, .events = POLLIN}};
-        poll(p, 2, 1000);
+        poll(p, 2, l.pg && has_more(t, &stop) ? (int)(1e3 * PAUSE_S) : 1000);
         eventfd_t unused;
         if (p[0].revents)
             eventfd_read(t->wake, &unused);
