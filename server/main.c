@@ -32,6 +32,9 @@
 enum { EXIT_ENDED = 0, EXIT_FAILED = 1, EXIT_USAGE = 2 };
 
 static const double LEASE_S = 60;
+/* Small jobs that a claim takes beside its own, for the next claims of this daemon: a claim costs more than they do. */
+enum { CLAIMS_AHEAD = 3 };
+static const double AHEAD_S = 0.5;
 
 typedef struct {
     server_log log, audit; /* audit: who did what; its stream NULL: not kept */
@@ -152,6 +155,8 @@ static bool start_work(service *s, const server_options *options, char *message,
                                      .objects = s->objects,
                                      .max_queue = options->max_queue,
                                      .affinity_s = options->affinity_s,
+                                     .claims_ahead = CLAIMS_AHEAD,
+                                     .ahead_s = AHEAD_S,
                                      .quotas = {.waiting = options->client_queue,
                                                 .bytes = (int64_t)options->client_bytes,
                                                 .seconds = options->client_seconds},

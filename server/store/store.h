@@ -83,6 +83,8 @@ typedef struct {
     client_quotas quotas;
     double affinity_s; /* with several daemons a job waits at most so long for one that has its body, or because others
                         * whose body the claimer has go before it; 0: it does not */
+    int claims_ahead; /* with several daemons: so many small jobs a claim takes beside its own, for those that follow */
+    double ahead_s;   /* what nobody here has begun by then waits again: all workers have something else to do */
     struct objects *objects; /* where large blobs go (objects/objects.h), if the engine does so; NULL: with the rest */
 } store_settings;
 /* NULL is fine. */

@@ -9,6 +9,16 @@
 #include <pthread.h>
 
 #define STORE_LINKS 8
+#define CLAIMS_MOST 8 /* that a claim may take beside its own */
+
+/* A job that was claimed for whoever claims next. */
+typedef struct {
+    job job;
+    store_lease lease;
+    char *body;
+    size_t len;
+    double since; /* CLOCK_MONOTONIC */
+} kept_claim;
 
 typedef struct told told; /* tell.c */
 
@@ -34,6 +44,8 @@ typedef struct {
     unsigned sequence;
     int most_attempts; /* as recover was told, for jobs whose owner is gone later on; 0: nothing was told */
     char *lost_json;
+    kept_claim ahead[CLAIMS_MOST]; /* n_ahead, the oldest first */
+    size_t n_ahead;
 
     told *told;
     double collect_after; /* CLOCK_MONOTONIC; of the one thread that collects */
@@ -111,6 +123,8 @@ store_status postgresql_submit(store *s, const store_request *request, job *out,
 store_status postgresql_find_repeat(store *s, const store_request *request, job *out);
 store_status postgresql_claim(store *s, store_lease *lease, double lease_s, bool small, job *out, char **body,
                               size_t *len);
+/* Puts back what was claimed ahead and nobody has begun; all: also what is fresh. */
+void postgresql_put_back(postgresql_store *s, bool all);
 store_status postgresql_use_lease(store *s, const store_lease *lease, const lease_use *use);
 store_status postgresql_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 store_status postgresql_expire(store *s, const char *error_json, int64_t *count);

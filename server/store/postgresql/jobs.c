@@ -337,75 +337,158 @@ store_status postgresql_find_repeat(store *base, const store_request *request, j
 /* ---- claim */
 
 typedef struct {
-    store_lease *lease;
-    job *out;
-    char **body;
-    size_t *len;
+    postgresql_store *s;
+    const store_lease *asked;
+    kept_claim got[1 + CLAIMS_MOST];
+    size_t n;
+    double later_s;
 } claim_args;
+
+static bool read_claimed(kept_claim *k, const PGresult *r, int row)
+{
+    unsigned char digest[32];
+    job *j = &k->job;
+    bool ok = cell_write(j->id, sizeof j->id, r, row, 0);
+    j->status = JOB_RUNNING;
+    j->attempts = (int)cell_integer(r, row, 1);
+    j->created = cell_real(r, row, 2);
+    j->started = cell_real(r, row, 3);
+    j->tags = cell_copy(r, row, 4, &ok);
+    j->priority = (int)cell_integer(r, row, 6);
+    ok = cell_write(j->refines, sizeof j->refines, r, row, 5) && ok;
+    ok = cell_write(j->client, sizeof j->client, r, row, 7) && ok;
+    memcpy(k->lease.job, j->id, sizeof k->lease.job);
+    k->lease.token = (uint64_t)cell_integer(r, row, 8);
+    k->lease.held_body = (uint64_t)cell_integer(r, row, 11);
+    k->lease.fit = cell_integer(r, row, 12) == 1 ? FIT_HELD : cell_integer(r, row, 12) == 2 ? FIT_OTHERS : FIT_NEW;
+    k->since = clock_seconds(CLOCK_MONOTONIC);
+    const size_t len = (size_t)PQgetlength(r, row, 9);
+    if (!PQgetisnull(r, row, 9) && gnutls_hash_fast(GNUTLS_DIG_SHA256, PQgetvalue(r, row, 9), len, digest) == 0 &&
+        PQgetlength(r, row, 10) == sizeof digest && memcmp(digest, PQgetvalue(r, row, 10), sizeof digest) == 0)
+        k->body = malloc(len + 1);
+    if (k->body) { /* else it is asked for, which also tells what is wrong with it */
+        memcpy(k->body, PQgetvalue(r, row, 9), len);
+        k->body[len] = '\0';
+        k->len = len;
+    }
+    return ok;
+}
+
+static void kept_claim_clear(kept_claim *k)
+{
+    job_clear(&k->job);
+    free(k->body);
+    k->body = NULL;
+}
 
 static store_status read_claim(link_to *l, const PGresult *r, void *ctx)
 {
     claim_args *a = ctx;
-    unsigned char digest[32];
-    job *j = a->out;
     bool ok = true;
     if (PQntuples(r) == 0)
         return STORE_NOT_FOUND;
     if (PQgetisnull(r, 0, 0)) {
-        a->lease->later_s = cell_real(r, 0, 13);
+        a->later_s = cell_real(r, 0, 13);
         return STORE_NOT_FOUND;
     }
-    job_clear(j);
-    ok = cell_write(j->id, sizeof j->id, r, 0, 0);
-    j->status = JOB_RUNNING;
-    j->attempts = (int)cell_integer(r, 0, 1);
-    j->created = cell_real(r, 0, 2);
-    j->started = cell_real(r, 0, 3);
-    j->tags = cell_copy(r, 0, 4, &ok);
-    j->priority = (int)cell_integer(r, 0, 6);
-    ok = cell_write(j->refines, sizeof j->refines, r, 0, 5) && ok;
-    ok = cell_write(j->client, sizeof j->client, r, 0, 7) && ok;
-    a->lease->token = (uint64_t)cell_integer(r, 0, 8);
-    a->lease->held_body = (uint64_t)cell_integer(r, 0, 11);
-    a->lease->fit = cell_integer(r, 0, 12) == 1 ? FIT_HELD : cell_integer(r, 0, 12) == 2 ? FIT_OTHERS : FIT_NEW;
-    if (!ok) {
-        strcpy(l->message, "a job's row is damaged, or there is no memory for it");
-        return STORE_ERROR;
+    for (a->n = 0; ok && (int)a->n < PQntuples(r) && a->n < 1 + CLAIMS_MOST; a->n += ok) {
+        kept_claim *k = &a->got[a->n];
+        *k = (kept_claim){.lease = *a->asked};
+        ok = read_claimed(k, r, (int)a->n);
+        if (!ok)
+            kept_claim_clear(k);
     }
-    const size_t len = (size_t)PQgetlength(r, 0, 9);
-    if (!PQgetisnull(r, 0, 9) && gnutls_hash_fast(GNUTLS_DIG_SHA256, PQgetvalue(r, 0, 9), len, digest) == 0 &&
-        PQgetlength(r, 0, 10) == sizeof digest && memcmp(digest, PQgetvalue(r, 0, 10), sizeof digest) == 0)
-        *a->body = malloc(len + 1);
-    if (!*a->body)
-        return STORE_OK; /* it is asked for, which also tells what is wrong with it */
-    memcpy(*a->body, PQgetvalue(r, 0, 9), len);
-    (*a->body)[len] = '\0';
-    *a->len = len;
-    return STORE_OK;
+    if (a->n > 0) /* what can't be read of others is taken back when the lease is over */
+        return STORE_OK;
+    strcpy(l->message, "a job's row is damaged, or there is no memory for it");
+    return STORE_ERROR;
+}
+
+/* The oldest of what was claimed ahead, if it is fresh. */
+static bool take_ahead(postgresql_store *s, kept_claim *out)
+{
+    const double after = clock_seconds(CLOCK_MONOTONIC) - s->base.settings.ahead_s;
+    pthread_mutex_lock(&s->state_lock);
+    const bool any = s->n_ahead > 0 && s->ahead[0].since > after;
+    if (any) {
+        *out = s->ahead[0];
+        memmove(s->ahead, s->ahead + 1, --s->n_ahead * sizeof *s->ahead);
+    }
+    pthread_mutex_unlock(&s->state_lock);
+    return any;
+}
+
+void postgresql_put_back(postgresql_store *s, bool all)
+{
+    const double before = clock_seconds(CLOCK_MONOTONIC) - s->base.settings.ahead_s;
+    kept_claim old[CLAIMS_MOST];
+    size_t n = 0, left = 0;
+    pthread_mutex_lock(&s->state_lock);
+    for (size_t i = 0; i < s->n_ahead; i++)
+        if (all || s->ahead[i].since <= before)
+            old[n++] = s->ahead[i];
+        else
+            s->ahead[left++] = s->ahead[i];
+    s->n_ahead = left;
+    pthread_mutex_unlock(&s->state_lock);
+    for (size_t i = 0; i < n; i++) {
+        call c = {.sql = "SELECT uzawa.unclaim($1, $2)"};
+        call_text(&c, old[i].lease.job);
+        call_integer(&c, (int64_t)old[i].lease.token);
+        /* where it fails the job is taken back when its lease is over */
+        if (postgresql_do(s, LINK_DURABLE, true, &c, NULL, NULL) == STORE_OK)
+            postgresql_tell(s, old[i].lease.job, TELL_WAITS, NULL, true);
+        kept_claim_clear(&old[i]);
+    }
+}
+
+/* What came beside the first one is for the next claims. */
+static store_status claim_from_database(postgresql_store *s, claim_args *a, double lease_s, bool small)
+{
+    int more = s->base.settings.claims_ahead < CLAIMS_MOST ? s->base.settings.claims_ahead : CLAIMS_MOST;
+    call c = {.sql = "SELECT * FROM uzawa.claim_3($1, $2, $3, $4, $5, $6)"};
+    pthread_mutex_lock(&s->state_lock);
+    more = s->n_ahead > 0 ? 0 : more;
+    pthread_mutex_unlock(&s->state_lock);
+    call_text(&c, s->node);
+    call_text(&c, a->asked->owner);
+    call_real(&c, lease_s);
+    call_bool(&c, small);
+    call_real(&c, s->base.settings.affinity_s);
+    call_integer(&c, more);
+    const store_status status = postgresql_do(s, LINK_LAZY, true, &c, read_claim, a);
+    for (size_t i = 0; status == STORE_OK && i < a->n; i++)
+        postgresql_tell(s, a->got[i].job.id, TELL_CHANGED, NULL, false);
+    pthread_mutex_lock(&s->state_lock);
+    size_t taken = 1;
+    for (; taken < a->n && s->n_ahead < CLAIMS_MOST; taken++)
+        s->ahead[s->n_ahead++] = a->got[taken];
+    pthread_mutex_unlock(&s->state_lock);
+    for (; taken < a->n; taken++) /* two claimed at once */
+        kept_claim_clear(&a->got[taken]);
+    return status;
 }
 
 store_status postgresql_claim(store *base, store_lease *lease, double lease_s, bool small, job *out, char **body,
                               size_t *len)
 {
     postgresql_store *s = postgresql_of(base);
-    claim_args a = {lease, out, body, len};
-    call c = {.sql = "SELECT * FROM uzawa.claim_3($1, $2, $3, $4, $5)"};
+    claim_args a = {.s = s, .asked = lease};
     lease->seconds = lease_s;
-    call_text(&c, s->node);
-    call_text(&c, lease->owner);
-    call_real(&c, lease_s);
-    call_bool(&c, small);
-    call_real(&c, base->settings.affinity_s);
-    store_status status = postgresql_do(s, LINK_LAZY, true, &c, read_claim, &a);
+    store_status status = take_ahead(s, &a.got[0]) ? STORE_OK : claim_from_database(s, &a, lease_s, small);
+    lease->later_s = a.later_s;
     if (status != STORE_OK)
         return status;
-    postgresql_tell(s, out->id, TELL_CHANGED, NULL, false);
+    *out = a.got[0].job;
+    *lease = a.got[0].lease;
+    *body = a.got[0].body;
+    *len = a.got[0].len;
     if (*body)
         return STORE_OK;
     status = postgresql_get_body(base, out->id, body, len);
     if (status == STORE_OK || status == STORE_DAMAGED) /* it is to end, not to stand before all others for ever */
         return STORE_OK;
-    memcpy(lease->job, out->id, sizeof lease->job); /* somebody runs it when the database is back */
+    /* somebody runs it when the database is back */
     postgresql_use_lease(base, lease, &(lease_use){.what = LEASE_RELEASE});
     return status == STORE_NOT_FOUND ? STORE_ERROR : status;
 }
@@ -511,6 +594,7 @@ store_status postgresql_expire(store *base, const char *error_json, int64_t *cou
     postgresql_store *s = postgresql_of(base);
     taken_back t = {.s = s};
     call c = {.sql = "SELECT job, becomes, waited FROM uzawa.expire($1, $2, $3)"};
+    postgresql_put_back(s, false);
     pthread_mutex_lock(&s->state_lock);
     char *lost = s->lost_json ? strdup(s->lost_json) : NULL;
     const int most = lost ? s->most_attempts : 0;

@@ -158,6 +158,7 @@ store *postgresql_open(const char *address, char *message, size_t size)
 void postgresql_close(store *base)
 {
     postgresql_store *s = postgresql_of(base);
+    postgresql_put_back(s, true);
     postgresql_tell_end(s);
     if (s->node[0]) { /* what its jobs were is for the others */
         call c = {.sql = "DELETE FROM uzawa.node WHERE id = $1"};

@@ -215,7 +215,10 @@ BEGIN
 END $$;
 
 -- As claim_2. A job whose body this node has, if it is the first of the share whose turn it is, needs no choice.
-CREATE FUNCTION claim_3(p_node text, p_owner text, p_lease float8, p_small boolean, p_bound float8)
+--
+-- p_more: so many more, of the jobs that come next, where nobody else's wait, all are small, this node has their bodies,
+-- and four times as many wait.
+CREATE FUNCTION claim_3(p_node text, p_owner text, p_lease float8, p_small boolean, p_bound float8, p_more integer)
     RETURNS SETOF claimed_2 LANGUAGE plpgsql ROWS 1
     SET jit = off SET enable_seqscan = off SET enable_bitmapscan = off SET plan_cache_mode = force_generic_plan AS $$
 DECLARE
@@ -224,6 +227,7 @@ DECLARE
     chosen text;
     its_body bigint;
     its_fit integer;
+    is_small boolean;
     wait float8;
     later float8;
     now float8;
@@ -236,7 +240,7 @@ BEGIN
     PERFORM uzawa.fold();
     now := uzawa.moment();
     -- A share whose jobs have all waited longer than they may, or are left to others, is passed over.
-    FOR s IN SELECT h.name, h.ahead FROM uzawa.share AS h WHERE h.waiting > 0 AND (h.small > 0 OR NOT p_small)
+    FOR s IN SELECT h.name, h.ahead, h.waiting FROM uzawa.share AS h WHERE h.waiting > 0 AND (h.small > 0 OR NOT p_small)
         ORDER BY h.ahead DESC, h.running, h.used, h.name LOOP
         IF p_small THEN
             SELECT j.id, j.body, j.passed INTO first FROM uzawa.job AS j WHERE j.status = 0 AND j.small
@@ -280,10 +284,33 @@ BEGIN
         WHERE j.id = chosen
         RETURNING j.id, j.attempts, j.created, j.started, j.tags, j.refines, j.priority, j.client, j.token, NULL::bytea,
             NULL::bytea, j.body, its_fit, NULL::float8 INTO got;
-    SELECT r.body, r.digest INTO got.body, got.digest FROM uzawa.request AS r
-        WHERE r.job = chosen AND length(r.body) <= 65536;
+    SELECT r.body, r.digest, j.small INTO got.body, got.digest, is_small FROM uzawa.job AS j
+        LEFT JOIN uzawa.request AS r ON r.job = j.id AND length(r.body) <= 65536 WHERE j.id = chosen;
     RETURN NEXT got;
+    IF p_more = 0 OR s.waiting < 5 OR NOT is_small
+        OR EXISTS (SELECT 1 FROM uzawa.share AS h WHERE h.waiting > 0 AND (h.name <> s.name OR h.ahead <> s.ahead)) THEN
+        RETURN;
+    END IF;
+    FOR first IN SELECT j.id, j.small, j.body FROM uzawa.job AS j WHERE j.status = 0 AND j.share = s.name
+        AND (j.priority > 5) = s.ahead AND (j.queue_until = 0 OR j.queue_until >= now)
+        ORDER BY j.priority DESC, j.id LIMIT least(p_more, (s.waiting - 1) / 4) FOR NO KEY UPDATE SKIP LOCKED LOOP
+        EXIT WHEN NOT first.small OR (first.body IS NOT NULL AND first.body IS DISTINCT FROM its_body AND NOT EXISTS
+            (SELECT 1 FROM uzawa.holding AS h WHERE h.body = first.body AND h.node = p_node));
+        UPDATE uzawa.job AS j SET status = 1, attempts = j.attempts + 1, progress = 0, started = now, finished = 0,
+            node = p_node, owner = p_owner, token = nextval('uzawa.token'), lease = now + p_lease, lease_s = p_lease
+            WHERE j.id = first.id
+            RETURNING j.id, j.attempts, j.created, j.started, j.tags, j.refines, j.priority, j.client, j.token,
+                NULL::bytea, NULL::bytea, j.body, 1, NULL::float8 INTO got;
+        SELECT r.body, r.digest INTO got.body, got.digest FROM uzawa.request AS r
+            WHERE r.job = first.id AND length(r.body) <= 65536;
+        RETURN NEXT got;
+    END LOOP;
 END $$;
+
+-- What was claimed and nobody has begun waits again as if it had not been; one that was told to end does.
+CREATE FUNCTION unclaim(p_job text, p_token bigint) RETURNS smallint LANGUAGE sql AS $$
+    UPDATE uzawa.job SET status = CASE WHEN finished > 0 THEN 4 ELSE 0 END, attempts = attempts - 1, started = 0,
+        node = NULL, owner = NULL, lease = 0 WHERE id = p_job AND status = 1 AND token = p_token RETURNING status $$;
 
 -- As finish. An end that is there already, of this claim and with the same words, is this one: its answer was lost.
 CREATE FUNCTION finish_2(p_job text, p_owner text, p_token bigint, p_status integer, p_summary text, p_error text,

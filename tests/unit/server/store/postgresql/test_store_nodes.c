@@ -102,6 +102,71 @@ TEST(a_job_goes_where_its_body_is)
     pair_end(&two);
 }
 
+static void submit_small(store *s, const char *share, char id[33])
+{
+    job j = {0};
+    bool repeated;
+    const store_request r = {.body = "{}", .body_len = 2, .small = true, .share = share};
+    CHECK_INT(store_submit(s, &r, &j, &repeated), STORE_OK);
+    strcpy(id, j.id);
+    job_clear(&j);
+}
+
+static int64_t count_of(const pair *two, const char *where)
+{
+    char sql[200];
+    int64_t n = -1;
+    snprintf(sql, sizeof sql, "SELECT count(*) FROM uzawa.job WHERE %s", where);
+    CHECK(postgresql_run(two->p.database, sql, &n));
+    return n;
+}
+
+/* In the order in which they came, each with a lease of its own, and only where many wait and all are one share's. */
+TEST(small_jobs_are_claimed_ahead)
+{
+    enum { JOBS = 20 };
+    pair two;
+    char id[JOBS][33], other[33];
+    store_lease lease;
+    int64_t count;
+    if (!pair_begin(&two, 1000.0))
+        return;
+    two.a->settings.claims_ahead = 3;
+    two.a->settings.ahead_s = 1000.0;
+    for (int i = 0; i < JOBS; i++)
+        submit_small(two.a, "one", id[i]);
+    for (int i = 0; i < 5; i++) {
+        lease = claim_next(two.a);
+        CHECK_STR(lease.job, id[i]);
+        CHECK_INT(store_finish(two.a, &lease, &PLAIN_SUCCESS), STORE_OK);
+        CHECK_INT(count_of(&two, "status = 1"), 3 - i % 4);
+    }
+    CHECK_STR(claim_next(two.b).job, id[8]); /* another daemon has none of them */
+    CHECK_INT(count_of(&two, "status = 1"), 4);
+    /* what nobody has begun for long waits again, as it did before */
+    CHECK_INT(store_expire(two.a, "{}", &count), STORE_OK);
+    CHECK_INT(count_of(&two, "status = 1"), 4);
+    two.a->settings.ahead_s = 0.0;
+    CHECK_INT(store_expire(two.a, "{}", &count), STORE_OK);
+    CHECK_INT(count_of(&two, "status = 1"), 1);
+    CHECK_INT(count_of(&two, "status = 0 AND small AND attempts = 0 AND node IS NULL"), JOBS - 6);
+    two.a->settings.ahead_s = 1000.0;
+    /* nobody else's turn is passed over */
+    submit_small(two.b, "two", other);
+    lease = claim_next(two.a);
+    CHECK_STR(lease.job, other);
+    CHECK_INT(count_of(&two, "status = 1"), 2);
+    CHECK_STR(claim_next(two.b).job, id[5]);
+    /* a daemon that ends leaves none */
+    CHECK_STR(claim_next(two.a).job, id[6]);
+    CHECK_INT(count_of(&two, "status = 1"), 7);
+    store_close(two.a);
+    two.a = two.p.s = NULL;
+    CHECK_INT(count_of(&two, "status = 1"), 4);
+    check_counts(two.b, JOBS + 1 - 9, 4, 5, 0, 0);
+    pair_end(&two);
+}
+
 /* The answer of a commit is lost and the end is sent again: it is there, and nothing is said against it. */
 TEST(an_end_that_is_sent_again_is_the_same)
 {
