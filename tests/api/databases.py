@@ -13,6 +13,18 @@ from service import Skip, check
 SCRIPT = pathlib.Path(__file__).resolve().parent.parent / "postgresql.sh"
 
 
+def ask(address, statement):
+    told = subprocess.run(["psql", "-X", "-q", "-A", "-t", "-F", "|", "-v", "ON_ERROR_STOP=1", "-d", address, "-c",
+                           statement], capture_output=True, text=True, check=False)
+    return told.returncode == 0, told.stdout + told.stderr
+
+
+def rows(address, statement):
+    good, told = ask(address, statement)
+    check(good, statement, told)
+    return [line.split("|") for line in told.splitlines()]
+
+
 class Server:
     """settings: of the server, "name=value". It syncs nothing to the disk unless they say so."""
 
@@ -67,15 +79,11 @@ class Server:
 
     def try_sql(self, database, statement):
         """Did it go well, and what was printed."""
-        told = subprocess.run(["psql", "-X", "-q", "-A", "-t", "-F", "|", "-v", "ON_ERROR_STOP=1", "-d",
-                               self.address(database), "-c", statement], capture_output=True, text=True, check=False)
-        return told.returncode == 0, told.stdout + told.stderr
+        return ask(self.address(database), statement)
 
     def sql(self, database, statement):
         """The rows, each a list of texts."""
-        good, told = self.try_sql(database, statement)
-        check(good, statement, told)
-        return [line.split("|") for line in told.splitlines()]
+        return rows(self.address(database), statement)
 
 
 SHARED = []

@@ -235,11 +235,23 @@ class Service:
         self.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
+    def file(self):
+        """The name of SQLite's file, for a test that is about that."""
+        if "://" in self.db:
+            raise Skip("it is about SQLite's file")
+        return self.db
+
+    def kept_uploads(self):
+        """The digests of uploads that are in the store."""
+        if "://" in self.db:
+            import databases
+            return sorted(row[0] for row in databases.rows(self.db, "SELECT id FROM uzawa.upload"))
+        folder = pathlib.Path(self.db + "-uploads")
+        return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
+
     def sql(self, statement, values=()):
         """What SQLite answers past the daemon, on its database; changes are kept."""
-        if "://" in self.db:
-            raise Skip("it looks into SQLite's file")
-        with contextlib.closing(sqlite3.connect(self.db)) as db, db:
+        with contextlib.closing(sqlite3.connect(self.file())) as db, db:
             return db.execute(statement, values).fetchall()
 
     def solvers(self):

@@ -347,7 +347,7 @@ def test_user(s):
     s.start()
     with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
         status = dict(line.rstrip("\n").split(":\t", 1) for line in file if ":\t" in line)
-    check(set(status["Uid"].split()) == {str(os.stat(s.db).st_uid)} != {"0"} and "0" not in status["Gid"].split(), status)
+    check(set(status["Uid"].split()) == {str(os.stat(s.file()).st_uid)} != {"0"} and "0" not in status["Gid"].split(), status)
     check(s.solve(MATRICES)["status"] == "successful")
     check(s.end() == 0 and not s.events("tokens_not_readable_again"), s.log())
     tokens = os.path.join(s.folder, "tokens")  # root's, which nobody cannot read again

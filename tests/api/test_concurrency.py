@@ -413,7 +413,7 @@ def test_another_program_holds_the_database(s):
     """Nobody is told of a failure of the service, and what ran meanwhile is kept."""
     job = s.post({**SCENE, "solver": {"method": "uzawa", "alpha": 1e-9, "max_iterations": 1000000000, "time_limit_s": 0.5}}).json["id"]
     s.wait_status(job, "running")
-    other = sqlite3.connect(s.db, isolation_level=None)
+    other = sqlite3.connect(s.file(), isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     reply = expect(s.post(MATRICES), 503, "store_locked")
     check(int(reply.headers["retry-after"]) > 0, reply)
@@ -427,7 +427,7 @@ def test_another_program_holds_the_database(s):
 def test_the_database_goes_from_its_place(s):
     """What would be written to a file that no start finds again is not acknowledged."""
     kept = s.solve(MATRICES)["id"]
-    os.rename(s.db, s.db + ".away")
+    os.rename(s.file(), s.file() + ".away")
     expect(s.post(MATRICES), 500, "store_error")
     check("replaced" in s.events("store_error")[-1]["cause"], s.log())
     time.sleep(1.1)

@@ -87,14 +87,14 @@ def run(s, *arguments):
 
 
 def test_port_in_use(s):
-    got = run(s, "--listen", f"127.0.0.1:{s.port}", "--db", s.db + "2")
+    got = run(s, "--listen", f"127.0.0.1:{s.port}", "--db", s.db + ("" if "://" in s.db else "2"))
     check(got.returncode == 1 and got.stdout == "" and "cannot listen" in got.stderr and "in use" in got.stderr, got)
     check("give another port" in got.stderr, "no remedy", got)
 
 
 def test_database_in_use(s):
-    got = run(s, "--listen", "127.0.0.1:0", "--db", s.db)
-    check(got.returncode == 1 and got.stdout == "" and s.db in got.stderr, got)
+    got = run(s, "--listen", "127.0.0.1:0", "--db", s.file())
+    check(got.returncode == 1 and got.stdout == "" and s.file() in got.stderr, got)
     check(s.solve(MATRICES)["status"] == "successful")
 
 

@@ -13,9 +13,9 @@ from service import ENDLESS, MATRICES, SCENE, check, expect, options
 def change(s, old, new):
     """Changes the one place in the file of a stopped daemon that holds these bytes."""
     check(len(old) == len(new) and old != new, old, new)
-    data = pathlib.Path(s.db).read_bytes()
+    data = pathlib.Path(s.file()).read_bytes()
     check(data.count(old) == 1, old, data.count(old))
-    pathlib.Path(s.db).write_bytes(data.replace(old, new))
+    pathlib.Path(s.file()).write_bytes(data.replace(old, new))
 
 
 def stop(s):
@@ -31,7 +31,7 @@ def doubles(values):
 
 
 def findings(s):
-    done = subprocess.run(s.command("--check-db", "--db", s.db), capture_output=True, text=True, check=False)
+    done = subprocess.run(s.command("--check-db", "--db", s.file()), capture_output=True, text=True, check=False)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -85,7 +85,7 @@ def test_the_name_of_a_vector(s):
 def test_a_log_that_was_cut(s):
     """To SQLite a write-ahead log without its end is one that ends there: what was acknowledged would be gone unsaid."""
     kept = s.solve(MATRICES)["id"]
-    wal = pathlib.Path(s.db + "-wal")
+    wal = pathlib.Path(s.file() + "-wal")
     size = wal.stat().st_size
     lost = [s.post(MATRICES, {"Prefer": "wait=30"}).json["id"] for _ in range(3)]
     s.terminate(number=signal.SIGKILL)
@@ -114,7 +114,7 @@ def test_an_upload(s):
     running = s.post(ENDLESS).json["id"]  # the only worker: the next job waits
     s.wait_status(running, "running")
     waits = s.post(body).json["id"]
-    file = pathlib.Path(s.db + "-uploads") / upload
+    file = pathlib.Path(s.file() + "-uploads") / upload
     file.write_bytes(text.replace(b"1 1 2", b"1 1 9"))
     refused = expect(s.post(body), 500, "stored_data_damaged")
     check(refused.json["pointer"] == "/problem/K/upload" and "again" in refused.json["detail"], refused)
@@ -135,9 +135,9 @@ def test_a_start(s):
     job = s.solve(SCENE)["id"]
     reactions = doubles(s.get(f"/v1/jobs/{job}/result").json["reactions"])
     stop(s)
-    data = pathlib.Path(s.db).read_bytes()
+    data = pathlib.Path(s.file()).read_bytes()
     at = data.index(reactions)  # the state holds them too
-    pathlib.Path(s.db).write_bytes(flipped(data, at + 8 * 3 + 1))
+    pathlib.Path(s.file()).write_bytes(flipped(data, at + 8 * 3 + 1))
     s.start()
     named = s.get(f"/v1/jobs/{job}/result?fields=reactions").status == 500
     warm = s.post({**SCENE, "solver": {**SCENE["solver"], "warm_start": {"job": job}}})
@@ -164,7 +164,7 @@ def test_a_summary(s):
     """A digit of a certificate."""
     job, other = s.solve(SCENE), s.solve(MATRICES)
     stop(s)
-    data = pathlib.Path(s.db).read_bytes()
+    data = pathlib.Path(s.file()).read_bytes()
     old = b'"iterations":' + str(job["summary"]["iterations"]).encode()
     check(data.count(old) == 1, old)
     change(s, old, flipped(old, len(old) - 1))
@@ -184,10 +184,10 @@ def test_the_summary_of_a_case(s):
     two = s.get(f"/v1/jobs/{job}/result?case=two").json["summary"]
     stop(s)
     old = b'"iterations":%d,' % two["iterations"]
-    data = pathlib.Path(s.db).read_bytes()
+    data = pathlib.Path(s.file()).read_bytes()
     at = data.rindex(old) if data.count(old) else -1
     check(at >= 0)
-    pathlib.Path(s.db).write_bytes(flipped(data, at + len(old) - 2))
+    pathlib.Path(s.file()).write_bytes(flipped(data, at + len(old) - 2))
     s.start()
     replies = [s.get(f"/v1/jobs/{job}" + one) for one in ("/result?case=one", "/result?case=two", "/result", "")]
     bad = [one for one in replies if one.status == 500]

@@ -118,7 +118,7 @@ def test_uploads(s):
     expect(ask(s, BOB, "DELETE", f"/v1/jobs/{job}"), 204)
     expect(ask(s, BOB, "DELETE", path), 204)
     expect(ask(s, BOSS, "GET", path), 404, "not_found")
-    check(not os.listdir(s.db + "-uploads"))
+    check(not s.kept_uploads())
 
 
 def told(c, *wanted, seconds=20):
@@ -223,7 +223,7 @@ def test_quota_of_bytes(s):
     expect(ask(s, BOB, "POST", "/v1/uploads", b"x" * 95000), 201)
     reply = expect(ask(s, BOB, "POST", "/v1/uploads", b"y" * 9000), 429, "quota_exceeded")
     check("--client-bytes" in reply.json["detail"], reply)
-    check(len(os.listdir(s.db + "-uploads")) == 1, "the bytes of a refused upload stayed")
+    check(len(s.kept_uploads()) == 1, "the bytes of a refused upload stayed")
     large = {"problem": {**MATRICES["problem"], "K": MATRICES["problem"]["K"] + "\n" * 5000}}
     expect(ask(s, BOB, "POST", "/v1/jobs", large), 429, "quota_exceeded")
     solved(s, BOB, MATRICES)

@@ -102,7 +102,7 @@ def queue_of(s, share, client, count, body):
     check(s.end() == 0)
     s.process.stdout.close()
     s.log_file.close()
-    with contextlib.closing(sqlite3.connect(s.db)) as db, db:
+    with contextlib.closing(sqlite3.connect(s.file())) as db, db:
         names = [f"{i:012x}{0:04x}{i:016x}" for i in range(1, count + 1)]
         db.executemany("INSERT INTO job(id, status, created, tags, client, share, small) VALUES(?, 0, 1e9, '[]', ?, ?, 1)",
                        [(name, client, share) for name in names])

@@ -358,8 +358,8 @@ def test_database_copied_while_it_ran_is_usable(s):
     s.process.wait()
     target = os.path.join(s.folder, "moved.db")
     for suffix in ("", "-wal"):
-        if os.path.exists(s.db + suffix):
-            os.rename(s.db + suffix, target + suffix)
+        if os.path.exists(s.file() + suffix):
+            os.rename(s.file() + suffix, target + suffix)
     s.db = target
     s.restart()
     check(s.get(f"/v1/jobs/{job['id']}").json == job, json.dumps(job))

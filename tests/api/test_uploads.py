@@ -25,11 +25,11 @@ def send(s, text, **headers):
 
 
 def folder(s):
-    return pathlib.Path(s.db + "-uploads")
+    return pathlib.Path(s.file() + "-uploads")
 
 
 def files(s):
-    return sorted(path.name for path in folder(s).iterdir()) if folder(s).exists() else []
+    return s.kept_uploads()
 
 
 def with_uploads(**ids):

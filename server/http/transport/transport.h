@@ -249,7 +249,8 @@ typedef struct delayed_reply {
     size_t len, at;
 } delayed_reply;
 
-/* Answers by d, which looks whenever the feed tells of what may be the end of the job id. Owns d; false: no memory, and d is as before. */
+/* Answers by d, which looks whenever the feed tells of what may be the end of the job id. Owns d; false: no memory, and
+ * d is as before. */
 bool reply_delay(http_request *rq, delayed_reply *d, const char *id);
 
 /* ---- the server */
