@@ -172,7 +172,16 @@ class Service:
         """The option that says where jobs are kept."""
         return "--store" if "://" in self.db else "--db", self.db
 
+    def end_leases(self):
+        """Of a daemon that was killed, where the tests run on PostgreSQL: as if their time were over. SQLite's file has no
+        other owner, so that the next start knows at once that they are."""
+        if os.environ.get("UZAWA_STORE") == "postgresql" and "://" in self.db and self.process and self.process.poll():
+            import databases
+            databases.rows(self.db, "UPDATE uzawa.job SET lease = uzawa.moment() - 1 WHERE status = 1 AND node IN"
+                                    f" (SELECT id FROM uzawa.node WHERE pid = {self.process.pid})")
+
     def start(self):
+        self.end_leases()
         self.close()
         self.log_file = open(os.path.join(self.folder, "log"), "ab")
         suppressions = f"suppressions={ROOT / 'tests' / 'tsan.supp'} {os.environ.get('TSAN_OPTIONS', '')}"
