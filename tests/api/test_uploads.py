@@ -101,6 +101,7 @@ def test_limit_of_all(s):
 
 def test_a_full_disk(s):
     """What is refused in the middle of a body says when to come again."""
+    s.file()  # what is half written lies beside it
     resource.prlimit(s.process.pid, resource.RLIMIT_FSIZE, (100000, resource.RLIM_INFINITY))
     reply = expect(send(s, bytes(1000000)), 507, "storage_full")
     check(int(reply.headers["retry-after"]) > 0, reply)
@@ -257,6 +258,7 @@ def start_sending(s, text, count):
 
 
 def test_a_broken_send_leaves_nothing(s):
+    s.file()  # what is half written lies beside it
     text = random.Random(1).randbytes(300000)
     start_sending(s, text, 100000).close()
     end = time.monotonic() + 20
@@ -267,6 +269,7 @@ def test_a_broken_send_leaves_nothing(s):
 
 
 def test_kill_while_it_comes(s):
+    s.file()  # what is half written lies beside it
     expect(send(s, K), 201)
     text = random.Random(2).randbytes(300000)
     with start_sending(s, text, 100000):
