@@ -206,3 +206,39 @@ uz_status uz_bound_take_obstacle(uz_bound_body *body, int64_t i, const uz_obstac
     }
     return UZ_OK;
 }
+
+/* ---- what presses */
+
+void uz_bound_push(double *push, double *open, const uz_bound_body *body, const double *pressure, const double *u)
+{
+    static const double AT[3] = {0.11270166537925831, 0.5, 0.88729833462074169},
+                        WEIGHT[3] = {5. / 18, 8. / 18, 5. / 18};
+    const int moments = body->degree + 1;
+    const int64_t n_nodes = body->model->mesh.n_nodes;
+    memset(push, 0, (size_t)(2 * n_nodes) * sizeof *push);
+    for (int64_t i = 0; i < n_nodes; i++)
+        open[i] = INFINITY;
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        const uz_bound_edge *edge = &body->edge[i];
+        const int nodes = edge->node[2] < 0 ? 2 : 3;
+        if (edge->contact < 0)
+            continue;
+        for (int k = 0; k < nodes; k++) {
+            double n[2];
+            const double gap = uz_bound_gap(n, body, i, k == 2 ? 0.5 : k);
+            open[edge->node[k]] = fmin(open[edge->node[k]], gap - uz_dot2(n, u + 2 * edge->node[k]));
+        }
+        for (int g = 0; g < 3; g++) {
+            const double q = AT[g], p = 1 - q;
+            const double shape[3] = {nodes == 2 ? p : p * (1 - 2 * q), nodes == 2 ? q : q * (2 * q - 1), 4 * p * q};
+            double phi[UZ_BOUND_MOMENTS], n[2];
+            uz_bound_bernstein(phi, moments, q);
+            for (int a = 0; a < moments; a++) {
+                uz_bound_normal(n, body, i, a);
+                for (int k = 0; k < 2 * nodes; k++)
+                    push[2 * edge->node[k / 2] + k % 2] -=
+                        WEIGHT[g] * shape[k / 2] * moments * phi[a] * pressure[i * moments + a] * n[k % 2];
+            }
+        }
+    }
+}

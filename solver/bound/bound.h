@@ -165,6 +165,15 @@ void uz_bound_centre(double centre[2], const uz_bound_body *body, int64_t elemen
 /* Nodal forces (n_nodes x 2) of the scene's loads but temperature. UZ_ERR_SCENE, _MEMORY. */
 uz_status uz_bound_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
+/* What a pressure (n_edges x moments, resultants) pushes nodes by, away from obstacles, as it works on displacements ->
+ * push: n_nodes x 2; and the gap that u leaves at each -> open: n_nodes, INFINITY where nothing is before it. */
+void uz_bound_push(double *push, double *open, const uz_bound_body *body, const double *pressure, const double *u);
+
+/* Of a displacement between nodes, fully integrated: the potential energy, that of the strain alone, with springs', and
+ * how far either is off at most. scene: with the loads of the case. UZ_ERR_MEMORY. */
+uz_status uz_bound_potential(double *potential, double *strain, double *margin, const uz_bound_body *body,
+                             const uz_scene *scene, const double *u, uz_error *err);
+
 /* What check.c found, in energies: force times length. */
 typedef struct {
     double gap;       /* int 1/2 |sigma_h - C eps(u_h)|^2 + int r_h s_h, with the terms of the violations and a

@@ -142,6 +142,21 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
     return status;
 }
 
+uz_status uz_bound_potential(double *potential, double *strain, double *margin, const uz_bound_body *body,
+                             const uz_scene *scene, const double *u, uz_error *err)
+{
+    examination x = {.body = body, .mesh = &body->model->mesh, .moments = body->degree + 1};
+    uz_status status = UZ_OK;
+    *strain = uz_spring_energy(&x, u);
+    *margin = 0;
+    for (int64_t e = 0; e < x.mesh->n_elements; e++)
+        *strain += uz_energy_of(margin, &x, u, true, e);
+    const double load = uz_work_of_loads(&x, scene, u, &status, err);
+    *potential = *strain - load;
+    *margin += 4 * UZ_SUM_ROUNDING * (*strain + fabs(load));
+    return status;
+}
+
 void uz_bound_check_clear(uz_bound_check_result *result)
 {
     free(result->residual);

@@ -13,6 +13,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* The square of a bound over |sigma_h - C eps(u_h)|^2, up to which another way out of obstacles would gain little. */
+#define NARROW 1.5
+/* An obstacle that is off a line by less, of the largest displacement, is one. */
+#define SEEN 1e-2
+
 uz_settings uz_guarantee_settings(const uz_guaranteed *g, double now)
 {
     uz_settings settings = uz_settings_default();
@@ -79,7 +84,7 @@ static uz_status hold(uz_guaranteed *g, const uz_result *result, uz_error *err)
  * most. */
 static uz_status check(uz_guaranteed *g, const double *u, const uz_scene *scene, uz_error *err)
 {
-    const double *lifts[] = {NULL, g->lift, g->cheap};
+    const double *lifts[] = {NULL, g->lift, g->cheap, g->carried[0], g->carried[1]};
     uz_status status = UZ_OK;
     for (size_t k = 0; k < sizeof lifts / sizeof lifts[0] && status == UZ_OK; k++) {
         uz_bound_check_result with;
@@ -121,12 +126,175 @@ static uz_status take_out(uz_guaranteed *g, const double *u, const uz_scene *sce
     return status;
 }
 
+/* The dual problem, and its stress. *solved false: it has none, and out->why says so. */
+static uz_status make_stress(uz_guaranteed *g, bool *solved, uz_guarantee *out, uz_error *err)
+{
+    const int64_t n = g->body.model->mesh.n_elements;
+    uz_result *dual = NULL;
+    *solved = false;
+    uz_status status = uz_bound_dual_problem(&g->qp, &g->dof, &g->body, &g->stop, err);
+    if (status == UZ_OK)
+        status = solve(&dual, g, &g->qp, err);
+    if (status == UZ_OK && !isfinite(dual->summary.certificate.absolute_error)) {
+        snprintf(out->why, sizeof out->why, "the dual problem could not be solved: %.100s", dual->summary.message);
+        uz_result_free(dual);
+        return UZ_OK;
+    }
+    if (status == UZ_OK) {
+        g->stress = uz_alloc(n * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, sizeof *g->stress);
+        status = g->stress ? uz_bound_stress(g->stress, &g->body, g->dof, dual->u, &g->stop, err)
+                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of %lld elements", (long long)n);
+    }
+    *solved = status == UZ_OK;
+    uz_result_free(dual);
+    return status;
+}
+
+static void clear(uz_guaranteed *g)
+{
+    uz_bound_body_clear(&g->body);
+    uz_qp_clear(&g->qp);
+    free(g->dof);
+    free(g->stress);
+    free(g->lift);
+    free(g->cheap);
+    free(g->carried[0]);
+    free(g->carried[1]);
+    free(g->admissible);
+    uz_bound_check_clear(&g->checked);
+    uz_bound_check_clear(&g->out_of_it);
+}
+
+/* From the interpolation of the answer on the closer mesh to the answer. The two are one on the sides of its own mesh,
+ * so that their gaps to a stress differ by the potential energies, and by what the stress lacks of equilibrium on their
+ * difference, which is no more than that of the norms. */
+static uz_status take_answer(uz_guaranteed *closer, const uz_guaranteed *g, const uz_scene *scene,
+                             const uz_closer *mesh, const double *u, uz_error *err)
+{
+    double own, own_strain, own_margin, its, its_strain, its_margin;
+    if (mesh->triangles)
+        return UZ_OK;
+    uz_status status = uz_bound_potential(&own, &own_strain, &own_margin, &g->body, scene, u, err);
+    if (status == UZ_OK)
+        status = uz_bound_potential(&its, &its_strain, &its_margin, &closer->body, &mesh->problem.scene, mesh->u, err);
+    if (status != UZ_OK)
+        return status;
+    closer->checked.gap += own - its + own_margin + its_margin +
+                           closer->rho * (sqrt(2 * (own_strain + own_margin)) + sqrt(2 * (its_strain + its_margin)));
+    closer->checked.norm = sqrt(2 * fmax(0, own_strain - own_margin));
+    return UZ_OK;
+}
+
+/* What `closer` proves, on its mesh. Its fault, or infinite norms: nothing. */
+static uz_status prove_on(uz_guaranteed *closer, const uz_guaranteed *g, const uz_closer *mesh, const uz_scene *scene,
+                          const double *u, uz_error *err)
+{
+    const uz_scene *its = &mesh->problem.scene;
+    const int64_t n = mesh->model.mesh.n_nodes;
+    uz_status status = uz_bound_check(&closer->checked, &closer->body, its, closer->dof, closer->qp.K.cols, mesh->u,
+                                      NULL, closer->stress, err);
+    double *push = uz_alloc(3 * n, sizeof *push);
+    if (status == UZ_OK && !push)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for what presses on %lld nodes", (long long)n);
+    if (status == UZ_OK) {
+        const uz_standing answer = {.u = mesh->u, .push = push, .open = push + 2 * n};
+        uz_bound_push(push, push + 2 * n, &closer->body, closer->checked.pressure, mesh->u);
+        status = uz_lift_out(closer, &answer, err);
+    }
+    if (status == UZ_OK)
+        status = check(closer, mesh->u, its, err);
+    if (status == UZ_OK)
+        status = uz_measure_residual(&closer->rho, closer, closer->checked.residual, err);
+    if (status == UZ_OK)
+        status = take_answer(closer, g, scene, mesh, u, err);
+    free(push);
+    return status;
+}
+
+/* What both meshes prove is true. */
+static void take_better(uz_guarantee *out, const uz_guaranteed *g, double bound)
+{
+    const uz_bound_check_result *c = &g->checked;
+    const double dual = c->dual - fabs(c->defect) - uz_bound_lacking(c, g->rho) * bound,
+                 primal = g->admissible ? fmin(c->primal, g->out_of_it.primal) : c->primal;
+    out->primal = out->proved ? fmin(out->primal, primal) : primal;
+    out->dual = out->proved ? fmax(out->dual, dual) : dual;
+    if (!out->proved || bound < out->bound) {
+        out->bound = bound;
+        out->relative = !(bound > 0) ? 0 : c->norm > bound ? bound / (c->norm - bound) : (double)INFINITY;
+        out->unknowns = g->qp.K.cols;
+    }
+    out->proved = true;
+}
+
+/* On a mesh that is finer where the answer presses (closer.c). *narrow: is little of the bound of what takes the answer
+ * out of obstacles, and of how far that stands off them? */
+static uz_status prove_closer(uz_guarantee *out, bool *narrow, const uz_result *result, const uz_guaranteed *g,
+                              const uz_scene *scene, uz_error *err)
+{
+    uz_guarantee other = {.asked = true};
+    uz_guaranteed closer = {.settings = g->settings, .cache = g->cache, .hooks = g->hooks, .stop = g->stop};
+    uz_closer mesh;
+    bool any = false, solved = false;
+    uz_status status = uz_closer_make(&mesh, &any, g, result, err);
+    closer.problem = &mesh.problem;
+    closer.rho = INFINITY;
+    if (status == UZ_OK && any)
+        status = uz_bound_body_make(&closer.body, &mesh.model, &mesh.problem.scene, err);
+    const double *own[] = {g->lift, g->cheap};
+    for (int k = 0; k < 2 && status == UZ_OK && any; k++)
+        closer.carried[k] = own[k] ? uz_closer_carry(&mesh.model.mesh, own[k], g->body.model->mesh.n_nodes, 2) : NULL;
+    if (status == UZ_OK && any && !*closer.body.why)
+        status = make_stress(&closer, &solved, &other, err);
+    if (status == UZ_OK && solved)
+        status = prove_on(&closer, g, &mesh, scene, result->u, err);
+    const uz_bound_check_result *c = &closer.checked;
+    const double bound = solved && status == UZ_OK ? uz_bound_error(c, closer.rho) : (double)INFINITY;
+    if (isfinite(bound))
+        take_better(out, &closer, bound);
+    *narrow = isfinite(bound) && bound * bound <= NARROW * c->least;
+    clear(&closer);
+    uz_closer_clear(&mesh);
+    return status == UZ_ERR_MEMORY || status == UZ_ERR_CANCELLED ? status : UZ_OK; /* there is the answer's own mesh */
+}
+
+/* By how much the obstacle before an edge is off a line, as far as normals say. */
+static double bent(const uz_bound_body *body, int64_t i)
+{
+    const uz_bound_edge *edge = &body->edge[i];
+    double first[2], n[2], most = 0, from = 0;
+    if (!edge->turns)
+        return 0;
+    uz_bound_piece_gap(first, body, i, edge->before, 0);
+    for (int64_t k = edge->before; k < edge->before + edge->pieces; k++) {
+        const double end = body->before.at[k].end;
+        for (int j = 0; j < 2; j++) {
+            uz_bound_piece_gap(n, body, i, k, j == 0 ? from : end);
+            most = fmax(most, hypot(n[0] - first[0], n[1] - first[1]));
+        }
+        from = end;
+    }
+    return most * uz_bound_measure(body, i) / body->depth;
+}
+
+/* Is what a bound is too wide by along the contact? Before planes gaps and pressures are polynomials. */
+static bool wants_closer(const uz_guaranteed *g, const double *u)
+{
+    double off = 0, farthest = 0;
+    for (int64_t i = 0; i < g->body.n_edges; i++)
+        off = fmax(off, bent(&g->body, i));
+    for (int64_t i = 0; i < 2 * g->body.model->mesh.n_nodes; i++)
+        farthest = fmax(farthest, fabs(u[i]));
+    return g->body.n_loose == 0 && (g->body.n_segments > 0 || off > SEEN * farthest);
+}
+
 /* -> summary.guarantee, but for its time and reasons that are errors. */
 static uz_status prove(uz_result *result, uz_guaranteed *g, const uz_body_model *model, const uz_scene *scene,
                        uz_error *err)
 {
     uz_guarantee *out = &result->summary.guarantee;
-    uz_result *dual = NULL;
+    const uz_standing answer = {.u = result->u, .r = result->r, .gap = result->g};
+    bool solved = false, narrow = false;
     uz_status status = uz_bound_body_make(&g->body, model, scene, err);
     for (int64_t k = 0; k < scene->n_contacts && result->place && status == UZ_OK && !*g->body.why; k++)
         if (scene->contacts[k].kind != UZ_OBSTACLE_PLANE)
@@ -138,43 +306,30 @@ static uz_status prove(uz_result *result, uz_guaranteed *g, const uz_body_model 
         snprintf(out->why, sizeof out->why, "%s", g->body.why);
         return status;
     }
-    status = uz_bound_dual_problem(&g->qp, &g->dof, &g->body, &g->stop, err);
-    if (status == UZ_OK)
-        status = solve(&dual, g, &g->qp, err);
-    if (status == UZ_OK && !isfinite(dual->summary.certificate.absolute_error)) {
-        snprintf(out->why, sizeof out->why, "the dual problem could not be solved: %.100s", dual->summary.message);
-        uz_result_free(dual);
-        return UZ_OK;
-    }
-    if (status == UZ_OK) {
-        out->unknowns = g->qp.K.cols;
-        g->stress = uz_alloc(model->mesh.n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, sizeof *g->stress);
-        status = g->stress ? uz_bound_stress(g->stress, &g->body, g->dof, dual->u, &g->stop, err)
-                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of %lld elements",
-                                     (long long)model->mesh.n_elements);
-    }
-    uz_result_free(dual);
-    if (status == UZ_OK)
-        status = uz_lift_out(g, result, err);
-    if (status == UZ_OK)
-        status = check(g, result->u, scene, err);
+    const bool closer = wants_closer(g, result->u), alone = result->evaluation->n_quantities == 0 && !scene->refine;
+    status = uz_lift_out(g, &answer, err);
+    if (status == UZ_OK && closer && alone)
+        status = prove_closer(out, &narrow, result, g, scene, err);
+    if (status == UZ_OK && !narrow)
+        status = make_stress(g, &solved, out, err);
+    if (status != UZ_OK || !solved)
+        return status;
+    status = check(g, result->u, scene, err);
     if (status == UZ_OK)
         status = uz_measure_residual(&g->rho, g, g->checked.residual, err);
     if (status != UZ_OK)
         return status;
     const uz_bound_check_result *c = &g->checked;
     const double bound = uz_bound_error(c, g->rho);
-    if (!isfinite(bound)) {
+    if (!isfinite(bound) && !out->proved)
         snprintf(out->why, sizeof out->why, "%s",
                  *c->fault ? c->fault : "what the stress lacks of equilibrium could not be bounded");
+    if (!isfinite(bound))
         return UZ_OK;
-    }
-    out->proved = true;
-    out->bound = bound;
-    out->relative = !(bound > 0) ? 0 : c->norm > bound ? bound / (c->norm - bound) : (double)INFINITY;
     status = take_out(g, result->u, scene, err);
-    out->primal = g->admissible ? fmin(c->primal, g->out_of_it.primal) : c->primal;
-    out->dual = c->dual - fabs(c->defect) - uz_bound_lacking(c, g->rho) * bound;
+    take_better(out, g, bound);
+    if (status == UZ_OK && bound > 0 && closer && !alone)
+        status = prove_closer(out, &narrow, result, g, scene, err);
     return status;
 }
 
@@ -227,17 +382,9 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
         status = uz_bound_keep_maps(&g.body, &g.stop, &err);
     if (status == UZ_OK && out->proved)
         status = uz_prove_quantities(result, &g, &err);
-    uz_bound_body_clear(&g.body);
+    clear(&g);
     uz_body_model_clear(&model);
-    uz_qp_clear(&g.qp);
     uz_cache_free(own_cache);
-    free(g.dof);
-    free(g.stress);
-    free(g.lift);
-    free(g.cheap);
-    free(g.admissible);
-    uz_bound_check_clear(&g.checked);
-    uz_bound_check_clear(&g.out_of_it);
     if (status != UZ_OK) /* the answer is there, and stays */
         snprintf(out->why, sizeof out->why, "%.150s",
                  uz_stop_is_due(&g.stop) ? "it was stopped before the bound was made" : err.message);

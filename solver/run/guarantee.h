@@ -17,6 +17,7 @@ typedef struct {
     double *stress;
     double *lift, *cheap; /* n_nodes x 2: both take the answer out of obstacles, one by itself with the least norm, the
                            * other to the least energy; NULL: it is out of them, or no way out was found */
+    double *carried[2];   /* the same of the answer's own mesh, on one that is refined from it */
     uz_bound_check_result checked;
     double *admissible; /* n_nodes x 2: the answer of least energy, where more is proved with it; NULL: the answer */
     uz_bound_check_result out_of_it;    /* of this */
@@ -29,9 +30,36 @@ uz_settings uz_guarantee_settings(const uz_guaranteed *g, double now);
 /* |residual| in the norm of the inverse of the dual problem's K, from above; INFINITY where that was not found. */
 uz_status uz_measure_residual(double *norm, const uz_guaranteed *g, double *residual, uz_error *err);
 
+/* An answer before obstacles, on the mesh of `g`: its own, or one that is refined from it (closer.c). */
+typedef struct {
+    const double *u;           /* n_nodes x 2 */
+    const double *r, *gap;     /* by its rows; NULL: it has no rows there, but ... */
+    const double *push, *open; /* n_nodes x 2, n_nodes: as uz_bound_push */
+} uz_standing;
+
 /* intervals.c: what takes an answer out of obstacles that it stands in between its nodes: g->lift, g->cheap. Nothing is
  * proved of them. UZ_ERR_MEMORY, _CANCELLED. */
-uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err);
+uz_status uz_lift_out(uz_guaranteed *g, const uz_standing *answer, uz_error *err);
+
+/* How deep a displacement stands in an obstacle along an edge, at most of some points of each piece before it; below
+ * zero: it is out of it. */
+double uz_depth_along(const uz_bound_body *body, int64_t edge, const double *u);
+
+/* closer.c: the mesh of an answer, and the answer on it, refined where it presses on obstacles. */
+typedef struct {
+    uz_problem problem; /* of the same case, with another list of elements to be bisected */
+    int64_t *bisected;
+    uz_body_model model;
+    double *u;      /* n_nodes x 2: the answer's at the nodes; between them it is the answer on all sides of its mesh */
+    bool triangles; /* ... and within its elements: they are triangles */
+} uz_closer;
+
+/* *any false: nothing presses, or the mesh cannot be refined within the straight sides that it has. g: of the answer's
+ * own mesh. Errors as those of meshes, and UZ_ERR_MEMORY, _CANCELLED. The caller clears *out. */
+uz_status uz_closer_make(uz_closer *out, bool *any, const uz_guaranteed *g, const uz_result *result, uz_error *err);
+void uz_closer_clear(uz_closer *closer);
+/* What is by nodes, n_nodes x stride, at those of a mesh that is refined from theirs. NULL: no memory. */
+double *uz_closer_carry(const uz_mesh *finer, const double *value, int64_t n_nodes, int stride);
 /* ... guaranteed intervals for the quantities, once the whole error is proved; what has none keeps its
  * estimate, and says why. UZ_ERR_MEMORY, _CANCELLED and what problems in matrices fail with. */
 uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_error *err);

@@ -648,12 +648,11 @@ static uz_status begin(proving *v, uz_error *err)
     return status;
 }
 
-/* How deep an answer stands in an obstacle along an edge, at most of some points of each piece before it. */
-static double depth_along(const uz_bound_body *body, int64_t i, const double *u)
+double uz_depth_along(const uz_bound_body *body, int64_t i, const double *u)
 {
     enum { POINTS = 16 };
     const uz_bound_edge *edge = &body->edge[i];
-    double deepest = 0, from = 0;
+    double deepest = -INFINITY, from = 0;
     for (int64_t piece = edge->before; piece < edge->before + edge->pieces; piece++) {
         const double part = body->before.at[piece].end - from;
         const int points = (int)fmax(1, ceil(POINTS * part));
@@ -683,7 +682,7 @@ static bool look_for_depth(double *depth, double *more, double *at, const uz_bou
             at[2 * i + c] = u[2 * i + c] + lift[2 * i + c];
     }
     for (int64_t i = 0; i < body->n_edges; i++) {
-        const double deep = body->edge[i].contact >= 0 ? DEEPER * depth_along(body, i, at) : 0;
+        const double deep = body->edge[i].contact >= 0 ? DEEPER * fmax(0, uz_depth_along(body, i, at)) : 0;
         any = any || deep > 0;
         for (int a = 0; a < 3 && body->edge[i].node[a] >= 0; a++)
             more[body->edge[i].node[a]] = fmax(more[body->edge[i].node[a]], deep);
@@ -703,10 +702,10 @@ static uz_status take_lift(double *lift, rows_problem *x, const contact_rows *ow
 }
 
 /* The displacement of least norm that takes nodes out by their depth. */
-static uz_status lift_least(double *lift, rows_problem *x, const contact_rows *own, const uz_result *result,
+static uz_status lift_least(double *lift, rows_problem *x, const contact_rows *own, const uz_standing *answer,
                             const double *depth, bool *solved, uz_error *err)
 {
-    (void)result;
+    (void)answer;
     for (int64_t k = 0; k < x->m; k++) {
         const double deep = depth[own->model->info.contact_node[own->row[k]]];
         x->held[k] = deep > 0 && !uz_row_inner(own->model, own->row[k]);
@@ -715,17 +714,32 @@ static uz_status lift_least(double *lift, rows_problem *x, const contact_rows *o
     return take_lift(lift, x, own, solved, err);
 }
 
+/* The reaction of a row, and its gap. */
+static void look_at_row(double *r, double *gap, const contact_rows *own, const uz_standing *answer, int64_t row)
+{
+    const uz_mesh_info *info = &own->model->info;
+    const int64_t node = info->contact_node[row];
+    if (answer->r) {
+        *r = answer->r[row];
+        *gap = answer->gap[row];
+        return;
+    }
+    *r = -fmax(0, answer->push[2 * node] * info->contact_normal[2 * row] +
+                      answer->push[2 * node + 1] * info->contact_normal[2 * row + 1]);
+    *gap = answer->open[node];
+}
+
 /* What makes of the answer the displacement of least energy with its nodes, and coefficients, by their depth out of
- * obstacles: the answer's reactions are taken off it, and others found by active sets. */
-static uz_status lift_cheaply(double *lift, rows_problem *x, const contact_rows *own, const uz_result *result,
+ * obstacles: the answer's reactions are taken off it, and others found by active sets. Where what presses is that of a
+ * stress, it is the w of least |w|^2 / 2 + int r_h w_n, which the bound has (check.c). */
+static uz_status lift_cheaply(double *lift, rows_problem *x, const contact_rows *own, const uz_standing *answer,
                               const double *depth, bool *solved, uz_error *err)
 {
     uz_status status = UZ_OK;
     bool changed = true;
     for (int64_t k = 0; k < x->m; k++) {
-        x->held[k] = result->r[own->row[k]] < 0;
-        x->y[k] = result->r[own->row[k]];
-        x->width[k] = result->g[own->row[k]];
+        look_at_row(&x->y[k], &x->width[k], own, answer, own->row[k]);
+        x->held[k] = x->y[k] < 0;
     }
     memset(x->p, 0, (size_t)x->d * sizeof *x->p);
     uz_csc_gaxpy_t(x->p, own->nodal, -1, x->y);
@@ -750,7 +764,7 @@ static uz_status lift_cheaply(double *lift, rows_problem *x, const contact_rows 
 
 /* Lifts by greater and greater depths until the answer is out of obstacles. depth: 4 n_nodes, room. */
 static uz_status lift_out(double **out, double *depth, uz_guaranteed *g, rows_problem *x, const contact_rows *own,
-                          const uz_result *result, bool cheaply, uz_error *err)
+                          const uz_standing *answer, bool cheaply, uz_error *err)
 {
     const int64_t n = g->body.model->mesh.n_nodes;
     double *lift = uz_alloc_zero(2 * n, sizeof *lift);
@@ -759,11 +773,11 @@ static uz_status lift_out(double **out, double *depth, uz_guaranteed *g, rows_pr
     int steps = 0;
     memset(depth, 0, (size_t)n * sizeof *depth);
     for (; steps < MOST_LIFTS && solved && status == UZ_OK &&
-           look_for_depth(depth, depth + n, depth + 2 * n, &g->body, result->u, lift);
+           look_for_depth(depth, depth + n, depth + 2 * n, &g->body, answer->u, lift);
          steps++) {
         if (steps == 0 && cheaply && own->any) /* coefficients take it out, but for what is no polynomial */
             memset(depth, 0, (size_t)n * sizeof *depth);
-        status = (cheaply ? lift_cheaply : lift_least)(lift, x, own, result, depth, &solved, err);
+        status = (cheaply ? lift_cheaply : lift_least)(lift, x, own, answer, depth, &solved, err);
     }
     if (status == UZ_OK && steps > 0 && solved)
         *out = lift;
@@ -772,7 +786,7 @@ static uz_status lift_out(double **out, double *depth, uz_guaranteed *g, rows_pr
     return status;
 }
 
-uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err)
+uz_status uz_lift_out(uz_guaranteed *g, const uz_standing *answer, uz_error *err)
 {
     const int64_t n = g->body.model->mesh.n_nodes;
     double *depth = uz_alloc_zero(6 * n, sizeof *depth);
@@ -781,14 +795,14 @@ uz_status uz_lift_out(uz_guaranteed *g, const uz_result *result, uz_error *err)
     uz_status status =
         depth ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to take %lld nodes out", (long long)n);
     if (depth && g->body.n_loose == 0 &&
-        look_for_depth(depth, depth + n, depth + 2 * n, &g->body, result->u, depth + 4 * n)) {
+        look_for_depth(depth, depth + n, depth + 2 * n, &g->body, answer->u, depth + 4 * n)) {
         status = begin_contact_rows(&own, g, err);
         if (status == UZ_OK)
             status = begin_own(&x, &own, g, err);
         if (status == UZ_OK)
-            status = lift_out(&g->lift, depth, g, &x, &own, result, false, err);
+            status = lift_out(&g->lift, depth, g, &x, &own, answer, false, err);
         if (status == UZ_OK)
-            status = lift_out(&g->cheap, depth, g, &x, &own, result, true, err);
+            status = lift_out(&g->cheap, depth, g, &x, &own, answer, true, err);
     }
     end_rows(&x, g->cache);
     end_contact_rows(&own, g->cache);

@@ -29,8 +29,9 @@ typedef struct {
     double size;            /* of an energy */
     int count[2];           /* of linear and of quadratic elements: bounds */
     double least;           /* what may not be below 1, of sweep_differences */
-    double effect[2][8];    /* and what they are of the error by energies, sqrt(2 (J(u_h) - J)) */
-    char why[160];          /* where one was not proved */
+    /* and what they are of the error by energies, sqrt(2 (J(u_h) - J)), of the answer or what is out of obstacles */
+    double effect[2][8];
+    char why[160]; /* where one was not proved */
 } bound_sweep;
 
 static double bound_cell[2], bound_low[2], bound_high[2]; /* what the map that follows is about */
@@ -286,7 +287,7 @@ static inline bound_sweep sweep_meshes(bound_maker make, uint64_t seed, int kind
             }
             if (g.proved && !last) {
                 linear[n] = k % 4 < 2 ? 0 : 1;
-                primal[n] = g.primal;
+                primal[n] = fmin(g.primal, result->summary.evaluation->potential_energy);
                 bound[n++] = g.bound;
             }
         }
