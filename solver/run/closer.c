@@ -97,12 +97,12 @@ static uz_status list_round(uz_closer *out, int64_t *n, int64_t *count, const uz
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld elements", (long long)n_elements);
 }
 
-/* Are its new nodes amid those of the answer's mesh, so that the two have all sides of that in common? New ones may
- * have been moved onto what facets stand for. */
-static bool is_within(const uz_mesh *mesh, int64_t n_nodes)
+/* Has it the nodes of the answer's mesh, and its new ones amid these, so that the two have all sides in common? New
+ * ones may have been moved onto what facets stand for. */
+static bool is_within(const uz_mesh *mesh, const uz_mesh *own)
 {
-    bool within = true;
-    for (int64_t i = n_nodes; i < mesh->n_nodes; i++)
+    bool within = memcmp(mesh->xyz, own->xyz, (size_t)(2 * own->n_nodes) * sizeof *mesh->xyz) == 0;
+    for (int64_t i = own->n_nodes; i < mesh->n_nodes; i++)
         for (int c = 0; c < 2; c++)
             within = within &&
                      fabs(mesh->xyz[2 * i + c] - uz_mesh_value_amid(mesh, i, mesh->xyz + c, 2)) <= AMID * mesh->extent;
@@ -125,7 +125,7 @@ static void straighten(uz_mesh *mesh, int64_t n_nodes)
 }
 
 /* The model of a longer list, and what the answer is on it. */
-static uz_status take_mesh(uz_closer *out, int64_t n, const uz_result *result, int64_t n_nodes, bool *within,
+static uz_status take_mesh(uz_closer *out, int64_t n, const uz_result *result, const uz_mesh *own, bool *within,
                            uz_error *err)
 {
     uz_body_model_clear(&out->model);
@@ -136,9 +136,9 @@ static uz_status take_mesh(uz_closer *out, int64_t n, const uz_result *result, i
     const uz_status status = uz_body_model_build(&out->model, &out->problem.scene, UZ_BODY_OUTLINE, err);
     if (status != UZ_OK)
         return status;
-    out->u = uz_closer_carry(&out->model.mesh, result->u, n_nodes, 2);
-    *within = *within && is_within(&out->model.mesh, n_nodes);
-    straighten(&out->model.mesh, n_nodes);
+    out->u = uz_closer_carry(&out->model.mesh, result->u, own->n_nodes, 2);
+    *within = *within && is_within(&out->model.mesh, own);
+    straighten(&out->model.mesh, own->n_nodes);
     return out->u ? UZ_OK
                   : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacement of %lld nodes",
                             (long long)out->model.mesh.n_nodes);
@@ -174,7 +174,7 @@ uz_status uz_closer_make(uz_closer *out, bool *any, const uz_guaranteed *g, cons
         count = *body.why || (round >= ROUNDS && count > FEW) ? 0 : count;
         uz_bound_body_clear(&body);
         if (status == UZ_OK && count > 0)
-            status = take_mesh(out, n, result, own->n_nodes, &within, err);
+            status = take_mesh(out, n, result, own, &within, err);
         n = count > 0 ? n : before;
         *any = *any || (status == UZ_OK && count > 0);
         out->problem.scene.n_bisected = n;

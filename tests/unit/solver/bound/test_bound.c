@@ -203,7 +203,7 @@ TEST(never_below_the_truth_before_round_obstacles)
             }
     }
     CHECK_MSG(count == 24 && most < 2.5, "%d: %g", count, most); /* 3.3 with sides no finer than the answer's */
-    CHECK_MSG(exp(sum / count) < 1.45, "%g", exp(sum / count)); /* 1.64 */
+    CHECK_MSG(exp(sum / count) < 1.45, "%g", exp(sum / count));  /* 1.64 */
 }
 
 /* Polylines and tables, flat and not, with teeth and without. */

@@ -127,7 +127,7 @@ static uz_problem block_problem(void)
     uz_problem problem = asking_problem();
     uz_scene *scene = &problem.scene;
     uz_scene_clear(scene);
-    *scene = box_scene(4, 2, 4, 2);
+    *scene = box_scene(4, 2, 2, 1);
     add_support(scene, "left", 0, NAN);
     add_support(scene, "top", NAN, -0.05);
     add_plane(scene, "bottom", 2, -5, 0, 1);
