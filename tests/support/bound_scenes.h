@@ -287,7 +287,9 @@ static inline bound_sweep sweep_meshes(bound_maker make, uint64_t seed, int kind
             }
             if (g.proved && !last) {
                 linear[n] = k % 4 < 2 ? 0 : 1;
-                primal[n] = fmin(g.primal, result->summary.evaluation->potential_energy);
+                primal[n] = g.primal;
+                if (scene.n_contacts > 0 && scene.contacts[0].kind == UZ_OBSTACLE_BODY) /* bounded on another mesh */
+                    primal[n] = fmin(primal[n], result->summary.evaluation->potential_energy);
                 bound[n++] = g.bound;
             }
         }
