@@ -9,7 +9,8 @@
  *     <- ASK     -> ANSWER          an upload, or a part of an earlier job; as often as it likes; or a stream to a
  *                                   group of processes, once, which takes a while
  *     <- READ                       the text was read; names of the cases are in the outbox
- *     <- DONE                       the outcome is in the outbox
+ *     <- KEPT                       an outcome is in the outbox that holds if the process is ended before it is done
+ *     <- DONE                       the outcome is in the outbox; not where one lies that was kept
  *     -> PREDICT <- PREDICTED       a text in the inbox whose cost is asked for; it may ASK meanwhile
  *     -> LIST    <- LISTED          between jobs: what its cache has, in the outbox */
 #ifndef SERVER_WORK_MESSAGE_H
@@ -33,6 +34,7 @@ typedef enum {
     MESSAGE_ASK,
     MESSAGE_ANSWER,
     MESSAGE_READ,
+    MESSAGE_KEPT,
     MESSAGE_DONE,
     MESSAGE_LIST,
     MESSAGE_LISTED,
@@ -78,7 +80,7 @@ typedef struct {
             uint64_t at, size;     /* of the parcel in the outbox */
             bool listed;           /* what follows is set: the cache has changed */
             uint64_t cached, held; /* entries and bytes of the cache */
-        } done;
+        } done;                    /* of KEPT up to the size */
         struct {
             uint64_t count; /* entries from the begin of the outbox on */
         } listed;

@@ -215,7 +215,7 @@ static run_end judge_end(run *r, watch_end end, const watch_report *seen)
     problem_details problem;
     char told[256];
     const bool cancelled = atomic_load(&me->cancel), lost = atomic_load(&me->lost);
-    if (end == WATCH_DONE) {
+    if (end == WATCH_DONE || (end == WATCH_KEPT && !lost && !cancelled)) {
         segment *outbox = &me->process->outbox;
         const uint64_t at = seen->done.u.done.at, size = seen->done.u.done.size;
         r->figures = seen->done.u.done.figures;

@@ -36,13 +36,12 @@ static uz_status verify(solution *s, const solve_with *with, uz_error *err)
 }
 
 /* Phases and cache: of the first case, which paid for the body; iterating and certifying of all. */
-static void count(solution *s)
+void solve_count(solve_figures *f, uz_result *const *results, int64_t n)
 {
-    solve_figures *f = &s->figures;
-    f->cases = s->n;
-    if (!s->results || !s->results[0])
+    f->cases = n;
+    if (!results || !results[0])
         return;
-    const uz_summary *first = &s->results[0]->summary;
+    const uz_summary *first = &results[0]->summary;
     f->has_answer = true;
     f->outcome = first->outcome;
     f->cached = first->reused.factor;
@@ -50,10 +49,10 @@ static void count(solution *s)
     f->order = first->timings.order;
     f->factor = first->timings.factor;
     f->condense = first->timings.condense;
-    for (int64_t i = 0; i < s->n && s->results[i]; i++) {
-        f->iterations += s->results[i]->summary.iterations;
-        f->iterate += s->results[i]->summary.timings.iterate;
-        f->certify += s->results[i]->summary.timings.certify;
+    for (int64_t i = 0; i < n && results[i]; i++) {
+        f->iterations += results[i]->summary.iterations;
+        f->iterate += results[i]->summary.timings.iterate;
+        f->certify += results[i]->summary.timings.certify;
     }
 }
 
@@ -113,7 +112,7 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
         codec_problem_from_error(&problem, &err, out->request.problem.kind);
         solution_fail(out, codec_encode_problem(&problem));
     }
-    count(out);
+    solve_count(&out->figures, out->results, out->n);
 }
 
 /* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */

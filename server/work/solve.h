@@ -52,6 +52,9 @@ void solution_clear(solution *s);
  * take too long. body: freed once it was read. */
 bool solve_predict(uz_prediction *out, const solve_with *with, char *body, size_t body_len);
 
+/* Of results that a solve has, or has so far: its first n are not NULL, or nothing is counted but n. */
+void solve_count(solve_figures *f, uz_result *const *results, int64_t n);
+
 /* Makes the outcome a failure: its error is `encoded`, which the solution then owns, or, where that is NULL, that there
  * was no memory. */
 void solution_fail(solution *s, char *encoded);

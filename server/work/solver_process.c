@@ -6,10 +6,13 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "base/sanitized.h"
+#include "work/answers.h"
 #include "work/confine.h"
 #include "work/message.h"
 #include "work/parcel.h"
 #include "work/relay.h"
+#include "work/solve.h"
+#include "work/starts.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -43,7 +46,10 @@ typedef struct {
     uz_reserve *reserve;
     size_t cache_bytes;
     live_writer live;
-    size_t names;            /* bytes at the begin of the outbox */
+    size_t names; /* bytes at the begin of the outbox: where the outcome goes, unless one was kept there */
+    /* Of the job at hand: its request, once it was read, and what waiting and reading took. */
+    const codec_request *request;
+    double queue_s, parse_s, given_at;
     uz_process_group *group; /* of the job; NULL: it has none */
     bool fresh;              /* a job has ended since memory was made ready last, or none was solved yet */
 } solver;
@@ -110,8 +116,33 @@ static void note_request(void *ctx, const codec_request *request)
         for (int64_t i = 0; i < problem->n_cases; i++)
             snprintf(s->outbox.at + i * CASE_NAME, CASE_NAME, "%s", problem->cases[i].name);
     }
+    s->request = request;
+    s->parse_s = clock_seconds(CLOCK_MONOTONIC) - s->given_at;
     live_begin(&s->live, &s->board->live, &request->settings, problem);
     message_send(s->socket, &m, -1);
+}
+
+/* What there is of an answer lies in the outbox from now on, and what comes goes behind it: this process may be ended
+ * at any instruction. Without memory for it there is none, as before. */
+static void keep_answers(void *ctx, uz_result *const *results, int64_t n)
+{
+    solver *s = ctx;
+    const starts from_zero = {.n = n}; /* a mesh that is chosen has no start */
+    store_outcome outcome = {.status = JOB_SUCCESSFUL};
+    packet kept = {.kind = MESSAGE_KEPT};
+    answers built;
+    if (answers_build(&built, &outcome, results, s->request, &from_zero, s->queue_s, s->parse_s)) {
+        kept.u.done.at = s->names;
+        kept.u.done.size = parcel_write(NULL, &outcome);
+        kept.u.done.figures.parse = s->parse_s;
+        solve_count(&kept.u.done.figures, results, n);
+        if (segment_reach(&s->outbox, s->names + kept.u.done.size, true)) {
+            parcel_write(s->outbox.at + s->names, &outcome);
+            s->names += kept.u.done.size;
+            message_send(s->socket, &kept, -1);
+        }
+    }
+    answers_clear(&built);
 }
 
 /* ---- messages */
@@ -145,6 +176,7 @@ static void run_job(solver *s, const packet *m)
                             .progress = note_progress,
                             .begins = note_case,
                             .grid = note_grid,
+                            .keep = keep_answers,
                             .group = find_group};
     const solve_with with = {.source = s->source,
                              .cache = s->cache,
@@ -157,6 +189,8 @@ static void run_job(solver *s, const packet *m)
     solution solved;
     char *body = take_text(s, m);
     s->names = 0;
+    s->queue_s = m->u.job.queue_s;
+    s->given_at = clock_seconds(CLOCK_MONOTONIC);
     uz_process_threads(m->u.job.threads);
     if (body || m->u.job.damaged) {
         solve_job(&solved, &with, m->u.job.id, body, (size_t)m->u.job.size);
@@ -171,7 +205,7 @@ static void run_job(solver *s, const packet *m)
     done.u.done.at = s->names;
     done.u.done.size = parcel_write(NULL, &solved.outcome);
     if (!segment_reach(&s->outbox, s->names + done.u.done.size, true)) {
-        solution_fail(&solved, NULL); /* takes the place of the answer */
+        solution_fail(&solved, NULL); /* takes the place of the answer, and of what was kept */
         done.u.done.at = s->names = 0;
         done.u.done.size = parcel_write(NULL, &solved.outcome); /* that fits in any */
     }

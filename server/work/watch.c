@@ -143,8 +143,10 @@ static watch_end follow(watch *w, watch_report *out)
         const bool heard = w->stopping && (atomic_load(&w->p->board->heard) || live_read(&w->p->board->live).any);
         if (w->stopping && now >= w->stop_at + (heard ? HEARD_S : 0.0))
             return WATCH_STOPPED;
-        if (now >= w->due_at + LIMIT_SHARE * w->limit_s || (now >= w->due_at && !live_read(&w->p->board->live).any))
-            return w->p->ready ? WATCH_OVERDUE : WATCH_NOT_STARTED;
+        if (now >= w->due_at + LIMIT_SHARE * w->limit_s || (now >= w->due_at && !live_read(&w->p->board->live).any)) {
+            out->done = out->kept;
+            return out->kept.kind == MESSAGE_KEPT ? WATCH_KEPT : w->p->ready ? WATCH_OVERDUE : WATCH_NOT_STARTED;
+        }
         /* To all who follow this job; to those who follow all jobs only where the percentage is another one. */
         if (w->job->id[0] && now - w->told_at >= TELL_S && live_read(&w->p->board->live).any) {
             w->told_at = now;
@@ -181,7 +183,9 @@ static watch_end follow(watch *w, watch_report *out)
             return w->p->ready && (w->read || w->again) ? WATCH_DIED : WATCH_NOT_STARTED;
         if (out->done.kind == MESSAGE_DONE)
             return WATCH_DONE;
-        if (!hear(w, &out->done, clock_seconds(CLOCK_MONOTONIC)))
+        if (out->done.kind == MESSAGE_KEPT && w->read)
+            out->kept = out->done;
+        else if (!hear(w, &out->done, clock_seconds(CLOCK_MONOTONIC)))
             return WATCH_DIED;
     }
 }

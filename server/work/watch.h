@@ -7,6 +7,7 @@
 typedef enum {
     WATCH_DONE,        /* *done says so; the outcome is in the outbox */
     WATCH_STOPPED,     /* killed, since it did not stop when it was told to */
+    WATCH_KEPT,        /* killed: its time was over; *done says what it had kept in the outbox until then */
     WATCH_OVERDUE,     /* killed: its time was over, and it had no answer */
     WATCH_DIED,        /* of itself */
     WATCH_NOT_STARTED, /* the log says why */
@@ -14,7 +15,7 @@ typedef enum {
 } watch_end;
 
 typedef struct {
-    packet done;
+    packet done, kept;   /* kept.kind: MESSAGE_KEPT, once it has kept something */
     double time_limit_s; /* OVERDUE: that was over */
     bool began;          /* OVERDUE: it had begun to iterate */
     int status;          /* DIED: as waitpid has it */

@@ -361,6 +361,9 @@ typedef struct {
     void (*progress)(void *ctx, const uz_history_row *row); /* may be NULL; after each iteration */
     void (*begins)(void *ctx, int64_t load_case);           /* may be NULL; before the first iteration of a case */
     void (*grid)(void *ctx, const uz_grid_start *grid); /* may be NULL; where the mesh is chosen: before each grid */
+    /* May be NULL; where the mesh is chosen and the time limited: before each grid but the first, the max(1, n_cases)
+     * results that the call would return if the time ended now. They are there during this call only. */
+    void (*keep)(void *ctx, uz_result *const *results, int64_t n);
     /* may be NULL; the operator distributed: the group of processes to solve with, for as long as the call lasts. NULL:
      * none could be had; `why` (size bytes) then says so */
     uz_process_group *(*group)(void *ctx, char *why, size_t size);

@@ -95,6 +95,7 @@ static uz_status check(const search *g, const uz_state *const *starts, uz_error 
 static uz_status try_grid(search *g, grid on, uz_error *err);
 static void choose_next(grid *next, search *g);
 static bool choose_between(grid *next, const search *g);
+static void offer(search *g);
 static uz_status publish(search *g, uz_error *err);
 
 uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem, const uz_settings *settings,
@@ -342,6 +343,8 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
                                       .seconds_left = seconds_left(g, x->on.dofs)};
         if (g->hooks && g->hooks->grid)
             g->hooks->grid(g->hooks->ctx, &begins);
+        if (g->hooks && g->hooks->keep && g->best.results && isfinite(g->deadline))
+            offer(g);
         status = solve_cases(x, level, g, &problem, &outline, err);
     }
     if (status == UZ_OK && x->results && g->refines && x->error > g->requested)
@@ -403,7 +406,7 @@ static uz_status try_grid(search *g, grid on, uz_error *err)
     }
     const bool lasting = status == UZ_ERR_MEMORY || status == UZ_ERR_ARGUMENT || status == UZ_ERR_INTERNAL;
     if (g->best.results && !lasting) {
-        g->stop = status == UZ_ERR_CANCELLED ? STOP_CANCELLED : STOP_GRID;
+        g->stop = status != UZ_ERR_CANCELLED ? STOP_GRID : uz_cancelled(g->hooks) ? STOP_CANCELLED : STOP_TIME;
         snprintf(g->reason, sizeof g->reason, "the next grid was refused: %.120s", failure.message);
         return UZ_OK;
     }
@@ -467,28 +470,67 @@ static void tell_trends(const search *g, uz_result *result, const seen *of)
     uz_trend_fit(&e->area, area, count, e->contact_area, grain);
 }
 
+/* What the search knows beside the answer of a case. */
+static uz_status complete(const search *g, uz_result *result, int64_t i, uz_error *err)
+{
+    result->grids = uz_alloc(1, sizeof *result->grids);
+    if (!result->grids)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grids that were tried");
+    *result->grids = g->sequence;
+    result->summary.grids = result->grids;
+    if (result->evaluation)
+        tell_trends(g, result, g->seen + i * UZ_GRID_LEVELS);
+    if (g->refines) { /* may be shorter than the search's list: of a grid that was tried later */
+        const int64_t n = result->grids->n_bisected = g->best.on.n_bisected;
+        int64_t *list = result->grids->bisected = uz_alloc(n, sizeof *list);
+        if (!list)
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the elements that were bisected");
+        if (n > 0)
+            memcpy(list, g->bisected, (size_t)n * sizeof *list);
+    }
+    uz_timings_add(&result->summary.timings, &g->spent[i]);
+    uz_trade_shift(&result->trade, g->spent[i].total);
+    conclude(g, &result->summary);
+    return UZ_OK;
+}
+
+/* The best answers so far, as if the time were over: a process whose next grid takes too long is ended, and has nothing
+ * else to tell. They stay as they are: what is completed are copies, but for what the search does not change. Without
+ * memory for that there is nothing to offer. */
+static void offer(search *g)
+{
+    const stop_kind stop = g->stop;
+    uz_result **shown = uz_alloc_zero(g->n_cases, sizeof *shown), *copy = uz_alloc_zero(g->n_cases, sizeof *copy);
+    uz_evaluation *evaluation = uz_alloc_zero(g->n_cases, sizeof *evaluation);
+    bool whole = shown && copy && evaluation;
+    g->stop = STOP_TIME;
+    for (int64_t i = 0; i < g->n_cases && whole; i++) {
+        const uz_result *result = g->best.results[i];
+        shown[i] = &copy[i];
+        copy[i] = *result;
+        if (result->evaluation) {
+            evaluation[i] = *result->evaluation;
+            copy[i].summary.evaluation = copy[i].evaluation = &evaluation[i];
+        }
+        whole = complete(g, &copy[i], i, NULL) == UZ_OK;
+    }
+    g->stop = stop;
+    if (whole)
+        g->hooks->keep(g->hooks->ctx, shown, g->n_cases);
+    for (int64_t i = 0; copy && i < g->n_cases; i++) {
+        if (copy[i].grids)
+            free(copy[i].grids->bisected);
+        free(copy[i].grids);
+    }
+    free(shown);
+    free(copy);
+    free(evaluation);
+}
+
 static uz_status publish(search *g, uz_error *err)
 {
-    for (int64_t i = 0; i < g->n_cases; i++) {
-        uz_result *result = g->best.results[i];
-        result->grids = uz_alloc(1, sizeof *result->grids);
-        if (!result->grids)
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grids that were tried");
-        *result->grids = g->sequence;
-        result->summary.grids = result->grids;
-        if (result->evaluation)
-            tell_trends(g, result, g->seen + i * UZ_GRID_LEVELS);
-        if (g->refines) { /* may be shorter than the search's list: of a grid that was tried later */
-            const int64_t n = result->grids->n_bisected = g->best.on.n_bisected;
-            int64_t *list = result->grids->bisected = uz_alloc(n, sizeof *list);
-            if (!list)
-                return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the elements that were bisected");
-            if (n > 0)
-                memcpy(list, g->bisected, (size_t)n * sizeof *list);
-        }
-        uz_timings_add(&result->summary.timings, &g->spent[i]);
-        uz_trade_shift(&result->trade, g->spent[i].total);
-        conclude(g, &result->summary);
-    }
-    return UZ_OK;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < g->n_cases && status == UZ_OK; i++)
+        status = complete(g, g->best.results[i], i, err);
+    return status;
 }

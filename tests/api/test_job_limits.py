@@ -3,7 +3,10 @@ usage: test_job_limits.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
 import copy
 import math
+import os
 import re
+import signal
+import time
 
 import service
 from service import MATRICES, SCENE, check, expect, options
@@ -57,6 +60,37 @@ def test_time_of_the_daemon(s):
     """The daemon's own limit holds where the request asks for more, or for nothing."""
     check_out_of_time(s, plate())
     check_out_of_time(s, plate(time_limit_s=1000))
+
+
+def stopped_amid_grids(s, cases):
+    """A job that refines its mesh, whose process stands still from its fourth grid on, as one in a factorization that takes too long."""
+    body = plate((6, 2), accuracy={"relative_error": 1e-3}, time_limit_s=2)
+    body["problem"]["mesh"]["refine"] = "auto"
+    if cases:
+        body["cases"] = [{"name": name, "loads": SCENE["problem"]["loads"]} for name in cases]
+    job = expect(s.post(body), 202).json
+    while job["status"] in ("accepted", "running") and job.get("grid", {}).get("number", 0) < 4:
+        time.sleep(0.005)
+        job = s.get(f"/v1/jobs/{job['id']}").json
+    check(job["status"] == "running", job)
+    for pid in s.solvers():
+        os.kill(pid, signal.SIGSTOP)
+    return s.get(f"/v1/jobs/{job['id']}", Prefer="wait=60").json
+
+
+def test_time_while_a_finer_grid_is_factored(s):
+    """The process is ended, and what is told is the answer of the last grid that it had finished."""
+    for cases in ((), ("a", "b")):
+        job = stopped_amid_grids(s, cases)
+        check(job["status"] == "successful", job.get("error"), job["status"])
+        summary = job["summary"]
+        check(summary["outcome"] == "time_limit", summary["outcome"], summary)
+        check(len(summary["mesh"]["ladder"]) >= 3 if not cases else summary["cases"]["count"] == 2, summary)
+        result = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=displacements,reactions,nodes,von_mises{'&case=b' if cases else ''}"), 200).json
+        check(len(result["displacements"]) == len(result["nodes"]) == len(result["von_mises"]) > 21, len(result["nodes"]))
+        check(min(result["reactions"]) < 0 and 1e-3 < result["summary"]["error"]["total"] < 1, result["summary"])
+        check("time_limit_s" in result["summary"]["message"], result["summary"]["message"])
+        check(s.solve(plate())["summary"]["outcome"] == "converged", "the next job has another process")
 
 
 @options("--memory", "4M")

@@ -27,6 +27,17 @@ typedef struct {
     long step;   /* between the allocations that fail */
 } scenario;
 
+/* What is offered between grids is an answer as one that is returned, and not met yet: what was asked for. */
+static void look_at_offer(void *ctx, uz_result *const *results, int64_t n)
+{
+    const uz_summary *summary = &results[0]->summary;
+    *(int *)ctx += 1;
+    CHECK_INT(n, 1);
+    CHECK_INT(summary->outcome, UZ_TIME_LIMIT);
+    CHECK(summary->grids == results[0]->grids && summary->grids->count > 0 && summary->message[0]);
+    CHECK(summary->evaluation == results[0]->evaluation && results[0]->u && isfinite(results[0]->u[0]));
+}
+
 /* Solves once or twice; whether every call ended as it may: with an answer or with UZ_ERR_MEMORY. */
 static void attempt(const scenario *s, long n)
 {
@@ -36,11 +47,17 @@ static void attempt(const scenario *s, long n)
         uz_result *result = (uz_result *)&heap;
         uz_error err = {0};
         bool failed_before = heap.failed;
-        uz_status status = uz_solve(&result, &s->problem, &s->settings, cache, NULL, &err);
+        int offers = 0;
+        const uz_hooks hooks = {.ctx = &offers, .keep = look_at_offer};
+        uz_status status = uz_solve(&result, &s->problem, &s->settings, cache, &hooks, &err);
         bool fair = status == UZ_OK || (status == UZ_ERR_MEMORY && heap.failed && !failed_before);
         CHECK_MSG(fair, "%s: allocation %ld ends in %s: %s", s->name, n, uz_status_name(status), err.message);
         CHECK_MSG((status == UZ_OK) == (result != NULL), "%s: allocation %ld", s->name, n);
         CHECK_INT(err.status, status);
+        if (status == UZ_OK)
+            CHECK_MSG(offers == (result->grids && isfinite(s->settings.time_limit_s) ? result->grids->count - 1 : 0) ||
+                          heap.failed,
+                      "%s: allocation %ld: %d offers", s->name, n, offers);
         if (status == UZ_OK)
             CHECK_MSG(result->summary.outcome == UZ_CONVERGED, "%s: allocation %ld: %s", s->name, n,
                       uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome));
@@ -78,6 +95,7 @@ static void check_scenario(const char *name, uz_problem problem, uz_method metho
     const bool scene = problem.kind == UZ_PROBLEM_SCENE,
                chosen = scene && (problem.scene.box.automatic || problem.scene.refine);
     const bool refined = scene && problem.scene.refine;
+    s.settings.time_limit_s = refined ? 1000 : s.settings.time_limit_s;
     s.settings.relative_error = refined ? 0.04 : chosen ? 0.02 : 1e-4; /* three grids */
     s.settings.balanced = scene && !chosen;
     long count = fail_each(&s);
