@@ -389,7 +389,7 @@ theory: deps ## stress and contact pressure against theory on finer and finer me
 roller: $(BUILD)/uzawad ## a roller pushed into a block, graded meshes, from either side: the force that contact that moves converges to; minutes
 	@$(PYTHON) -B tests/theory/roller.py $(BUILD)
 
-trade: $(BUILD)/uzawad ## what a whole error of 10, 5, 2 and 1 % costs, by estimate and guaranteed: a table and build/trade.json; minutes; FILTER=words: bodies by their names
+trade: $(BUILD)/uzawad ## what a whole error of 10, 5, 2 and 1 % costs, by estimate and guaranteed, and a contact force within 2 %: tables and build/trade.json; minutes; FILTER=words: bodies by their names, "force" of forces alone
 	@$(call measured,trade $(if $(FILTER),--part)) $(PYTHON) -B tests/figures/trade.py $(BUILD) $(BUILD)/trade.json $(FILTER)
 
 page-size: $(BUILD)/gen/page.c

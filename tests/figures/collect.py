@@ -83,12 +83,16 @@ def peers(raw):
             "runs": raw["runs"], "means": raw["means"], "body": raw["body"], "profiles": raw["profiles"]}
 
 
+def trade(raw, old, when):
+    return {**renewed("rows", "name", raw, old, when), **renewed("forces", "name", raw, old, when)}
+
+
 def alone(make):
     return lambda raw, old, when: make(raw)
 
 
 KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": bench_size, "extremes": alone(extremes),
-         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": renewed_rows("rows"), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
+         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
 
 
 def dump(value):

@@ -346,6 +346,13 @@ def trade(data):
     return table(["body", "elements", "error", "refined"] + [f"{sig(100 * t)} %" for t in measured[0]["targets"]] + ["order"], rows)
 
 
+def forces(data):
+    """What a contact force within 2 % takes, beside the best mesh found by hand."""
+    rows = [[row["body"], row["element"], f"{row['d']:,}", row["grids"], f"{row['value']:.5g}", f"{row['low']:.5g} .. {row['high']:.5g}", f"{row['true']:.5g}",
+             f"{row['hand']:,} {row['hand_element']}", sig(row["d"] / row["hand"]), f"{row['sure']:,}" if row["sure"] else "none"] for row in (data.get("trade") or {}).get("forces", [])]
+    return table(["body", "elements", "unknowns", "grids", "force", "interval", "true", "by hand, known", "unknowns over those", "by hand, told"], rows) if rows else None
+
+
 FORMULATIONS = (("quad4", "standard"), ("quad4", "incompatible_modes"), ("quad4", "bbar"), ("quad8", "standard"))
 
 

@@ -22,10 +22,10 @@ def towards(middle, end, steep):
     return lambda t: end * math.sinh(steep * t) / math.sinh(steep)
 
 
-def request(element, n, exchanged):
-    """n cells along the block's top; half widths of contact are 0.6. Stress units: MPa, lengths: mm."""
-    wide, deep = towards(True, 100, 7), towards(False, 100, 8)
-    around, inwards = towards(True, 0.25 * math.pi, 4.5), towards(False, 1, 5)
+def request(element, n, exchanged, steep=1):
+    """n cells along the block's top, graded so many times as steeply; half widths of contact are 0.6. Stress units: MPa, lengths: mm."""
+    wide, deep = towards(True, 100, 7 * steep), towards(False, 100, 8 * steep)
+    around, inwards = towards(True, 0.25 * math.pi, 4.5 * steep), towards(False, 1, 5 * steep)
 
     def block(x, y):
         return wide(x), 100 - deep(1 - y)
