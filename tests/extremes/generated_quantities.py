@@ -248,6 +248,32 @@ def prove(daemon, scene):
     return false, rows
 
 
+def prove_cases(daemon, scene):
+    """The scene's loads and two thirds of them as load cases of one job, and each alone: what is guaranteed of the one and not of the other."""
+    def times(value, factor):
+        return [factor * x for x in value] if isinstance(value, list) else factor * value
+
+    loads = {name: [{key: value if key == "on" else times(value, factor) for key, value in load.items()} for load in scene.loads]
+             for name, factor in (("all", 1), ("less", 2 / 3))}
+    request = {**scene.request(), "solver": {"accuracy": {"guaranteed": True}}}
+    together, why = daemon.answer({**request, "cases": [{"name": name, "loads": one} for name, one in loads.items()]})
+    if not together:
+        return [why]
+    false = []
+    for case in together["cases"]:
+        alone, why = daemon.answer({**request, "problem": {**request["problem"], "loads": loads[case["name"]]}})
+        if not alone:
+            return [why]
+        found = [(one["error"]["kind"], [(one["error"].get(key), 1) for key in ("energy_low", "energy_high")],
+                  [(q[key], abs(q["value"])) for q in one["quantities"] if q["kind"] == "guaranteed" for key in ("low", "high")])
+                 for one in (case["summary"], alone["summary"])]
+        numbers = [one[1] + one[2] if one[0] == "guaranteed" else [] for one in found]
+        if found[0][0] != found[1][0] or len(numbers[0]) != len(numbers[1]) or \
+                any(abs(a - b) > 1e-6 * max(abs(b), size) + ROUNDING for (a, _), (b, size) in zip(*numbers)):
+            false.append(f"case {case['name']} has {found[0]}, alone {found[1]}")
+    return false
+
+
 def run(s, numbers, say=print):
     """Looks at scenes by number: every interval with its reference, and what was false."""
     daemon, failures, rows, proved = contacts.Daemon(s), [], [], []
@@ -269,6 +295,8 @@ def run(s, numbers, say=print):
         for which in [*proofs, Blocks(number)]:
             false, of = prove(daemon, which)
             proved += of
+            if which is scene and scene.loads:
+                false += prove_cases(daemon, scene)
             for one in false:
                 failures.append((number, which.family, one))
                 say(*failures[-1], flush=True)
