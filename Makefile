@@ -375,12 +375,14 @@ peers: deps bench-deps ## the same problems by what Debian has, one certificate 
 peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json; DECKS=folder: CalculiX's own decks, too
 	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json $(DECKS)
 
-extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles, 100 with quantities: tables, build/extremes.json, build/contacts.json, build/obstacles.json, build/quantities.json; FILTER=name: some, FILTER=contacts, obstacles or quantities: these scenes alone, SCENES=100: the first of them
+extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles, 100 with quantities, 40 solids, bounds of known scenes: tables, build/extremes.json, build/contacts.json, build/obstacles.json, build/quantities.json, build/solids.json, build/bounds.json; FILTER=name: some, FILTER=contacts, obstacles, quantities, solids or bounds: these scenes alone, SCENES=100: the first of them
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/uzawad
-	@$(if $(filter contacts obstacles quantities,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
+	@$(if $(filter contacts obstacles quantities solids bounds,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
 	@$(if $(filter-out contacts,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_contacts.py $(BUILD) $(BUILD)/contacts.json $(SCENES))
 	@$(if $(filter-out obstacles,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_obstacles.py $(BUILD) $(BUILD)/obstacles.json $(SCENES))
 	@$(if $(filter-out quantities,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_quantities.py $(BUILD) $(BUILD)/quantities.json $(SCENES))
+	@$(if $(filter-out solids,$(FILTER)),,$(call measured,solids) $(PYTHON) -B tests/extremes/generated_solids.py $(BUILD) $(BUILD)/solids.json $(SCENES))
+	@$(if $(filter-out bounds,$(FILTER)),,$(call measured,bounds) $(PYTHON) -B tests/extremes/bounds.py $(BUILD) $(BUILD)/bounds.json)
 
 theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table and build/theory.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory

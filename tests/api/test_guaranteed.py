@@ -4,12 +4,17 @@ import copy
 import itertools
 import json
 import math
+import pathlib
 import subprocess
+import sys
 import tempfile
 
 import service
 from service import SCENE, check, expect
 from two_bodies import body
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
+import bounds  # noqa: after its place is known
 
 SHARED = True  # one service for all tests
 
@@ -354,6 +359,14 @@ def test_uniform_pressure_between_bodies(s):
         request["problem"]["mesh"]["groups"]["left"] = {"edges": request["problem"]["mesh"]["groups"].pop("sides")["edges"]}
         error = summary_of(s, request)["error"]
         check(error["kind"] == "guaranteed" and error["total"] < 1e-6, element, cells, error)
+
+
+def test_bounds_over_true_errors(s):
+    """Of scenes of theory, in every element; `make extremes FILTER=bounds` has more."""
+    scenes = bounds.theory()
+    for name in ("thick tube", "bent beam"):
+        for row in bounds.look(s, name, *scenes[name]):
+            check("why" not in row and row["bound"] >= row["low"] > 0 and 1 <= row["ratio"] < 1.2, row)
 
 
 def test_bodies_that_nothing_is_proved_for(s):

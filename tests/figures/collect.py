@@ -2,6 +2,7 @@
 import json
 import math
 import pathlib
+import statistics
 
 import stamp
 
@@ -87,12 +88,21 @@ def trade(raw, old, when):
     return {**renewed("rows", "name", raw, old, when), **renewed("forces", "name", raw, old, when)}
 
 
+def solids(raw):
+    """By element: what was told of errors over what they are."""
+    rows = []
+    for element in dict.fromkeys(row["element"] for row in raw["rows"]):
+        ratios = sorted(row["told"] / row["true"] for row in raw["rows"] if row["element"] == element)
+        rows.append({"element": element, "meshes": len(ratios), "median": statistics.median(ratios), "least": ratios[0], "largest": ratios[-1]})
+    return {"scenes": raw["scenes"], "rows": rows}
+
+
 def alone(make):
     return lambda raw, old, when: make(raw)
 
 
 KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": bench_size, "extremes": alone(extremes),
-         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
+         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "bounds": alone(dict), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
 
 
 def dump(value):

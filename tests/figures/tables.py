@@ -1,6 +1,7 @@
 """The tables of docs/numbers.md, from the data in docs/figures. Each function returns
 Markdown lines, or None where the data it needs was not measured."""
 import math
+import statistics
 
 import stamp
 
@@ -351,6 +352,28 @@ def forces(data):
     rows = [[row["body"], row["element"], f"{row['d']:,}", row["grids"], f"{row['value']:.5g}", f"{row['low']:.5g} .. {row['high']:.5g}", f"{row['true']:.5g}",
              f"{row['hand']:,} {row['hand_element']}", sig(row["d"] / row["hand"]), f"{row['sure']:,}" if row["sure"] else "none"] for row in (data.get("trade") or {}).get("forces", [])]
     return table(["body", "elements", "unknowns", "grids", "force", "interval", "true", "by hand, known", "unknowns over those", "by hand, told"], rows) if rows else None
+
+
+def solids(data):
+    """Estimated errors in space over true ones."""
+    rows = [[f"`{row['element']}`", row["meshes"], *[f"{row[key]:.2f}" for key in ("median", "least", "largest")]] for row in (data.get("solids") or {}).get("rows", [])]
+    return table(["element", "meshes", "told over true: median", "least", "largest"], rows) if rows else None
+
+
+def bounds(data):
+    """Guaranteed bounds over true errors."""
+    rows = (data.get("bounds") or {}).get("rows", [])
+    proved = [row for row in rows if row.get("bound")]
+    if not proved:
+        return None
+    found = {kind: sorted(row["ratio"] for row in proved if row["ratio"] and row["element"] in of) for kind, of in
+             (("linear", ("tri3", "quad4")), ("quadratic", ("tri6", "quad8")))}
+    told = [[row["name"], f"`{row['element']}`", f"{row['d']:,}", sig(row["bound"], 3), sig(row["low"], 3) + " .. " + sig(row["high"], 3),
+             f"{row['ratio']:.3f}" if row["ratio"] else NONE] for row in proved]
+    without = list(dict.fromkeys(row["name"] for row in rows if not row.get("bound")))
+    return table(["scene", "element", "unknowns", "bound", "true", "ratio"], told) + ["", "; ".join(
+        f"{kind} elements: median {statistics.median(ratios):.3f}, {ratios[0]:.3f} .. {ratios[-1]:.3f}" for kind, ratios in found.items() if ratios) +
+        f". False: {data['bounds']['false'] or 'none'}." + (f" Not proved: {', '.join(without)}." if without else "")]
 
 
 FORMULATIONS = (("quad4", "standard"), ("quad4", "incompatible_modes"), ("quad4", "bbar"), ("quad8", "standard"))
