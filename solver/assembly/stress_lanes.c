@@ -195,6 +195,7 @@ INLINE void compare(uz_stress_sums *sums, const double *rows, const uz_strain_gr
                              (g->material.lambda * trace * trace + twice_mu * work + g->material.mu * shear_work);
         }
     }
+    eta *= sums->times;
     for (int l = 0; l < g->count; l++) {
         sums->eta2 += eta[l];
         if (sums->eta2_of)

@@ -273,6 +273,19 @@ static double complementary(uz_model model, uz_lame lame, const double *stress)
     return trace * trace / (direct * (direct * lame.lambda + 2 * lame.mu)) + deviator / (2 * lame.mu);
 }
 
+/* What the square of an element's part is taken for: what the averages are not of its own, and what they hide. */
+static double times_of(const plain *x, const plain_element *s, int64_t e)
+{
+    const uz_element_kind kind = s->element.kind;
+    double volume = 0, others = 0;
+    for (int g = 0; g < s->points; g++)
+        volume += s->volume[g];
+    for (int a = 0; a < s->nodes; a++)
+        others += 1 - volume / average_at(x, e, s->node[a])[STRESSES];
+    return (kind == UZ_TRI6 || kind == UZ_TET10 ? 16. / 9 : 1) /
+           (kind == UZ_TET4 || kind == UZ_TET10 ? fmax(0.25, others / s->nodes) : 1);
+}
+
 static void add_energies(plain *x, const plain_element *s, int64_t e)
 {
     for (int g = 0; g < s->points; g++) {
@@ -286,8 +299,7 @@ static void add_energies(plain *x, const plain_element *s, int64_t e)
             }
             work += whole[c] * s->strain[g][c];
         }
-        x->eta2 += s->volume[g] * complementary(s->element.model, s->element.lame, jump) *
-                   (s->element.kind == UZ_TRI6 || s->element.kind == UZ_TET10 ? 16. / 9 : 1);
+        x->eta2 += s->volume[g] * complementary(s->element.model, s->element.lame, jump) * times_of(x, s, e);
         x->stress2 += s->volume[g] * complementary(s->element.model, s->element.lame, s->stress[g]);
         x->whole2 += s->volume[g] * work;
     }
