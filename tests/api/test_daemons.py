@@ -36,7 +36,10 @@ def daemons(build, n, *options):
 
 
 def end_leases(name, daemon):
-    """Of the jobs that this daemon runs: as if the time were over."""
+    """Of the jobs that this daemon runs, also by a claim that it left to PostgreSQL when it ended: as if the time were over."""
+    now = SERVER.sql(name, "SELECT clock_timestamp()")[0][0]
+    wait_until(lambda: SERVER.sql(name, f"SELECT count(*) FROM pg_stat_activity WHERE datname = '{name}' AND pid <> pg_backend_pid()"
+                                        f" AND xact_start <= '{now}'") == [["0"]])
     SERVER.sql(name, f"UPDATE uzawa.job SET lease = uzawa.moment() - 1 WHERE status = 1 AND node IN"
                      f" (SELECT id FROM uzawa.node WHERE pid = {daemon.process.pid})")
 
