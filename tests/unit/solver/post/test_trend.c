@@ -60,7 +60,7 @@ TEST(fewer_than_three_grids_tell_nothing)
     uz_trend_fit(&t, unseen, 2, 0, 0);
     CHECK(isnan(t.high) && t.grids == 0);
     uz_trend_fit(&t, two, 2, 0, 0);
-    CHECK(isnan(t.high) && t.grids == 2 && strstr(t.why, "2 sizes"));
+    CHECK(isnan(t.high) && t.grids == 2 && strstr(t.why, "two sizes"));
 }
 
 /* A pressure at a corner grows as h^-0.3: there is no limit, and none must be told. */
