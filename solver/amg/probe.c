@@ -121,7 +121,7 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_e
                                  .max_iterations = STEPS_MOST,
                                  .hooks = hooks,
                                  .deadline = INFINITY};
-        double wide, left;
+        double wide = INFINITY, left = INFINITY;
         if (uz_cancelled(hooks)) {
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
             break;
