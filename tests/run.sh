@@ -12,7 +12,8 @@ if [[ $filter == test_* ]]; then
     if [[ $filter == *.* ]]; then filter=${filter#*.}; else filter=; fi
 fi
 work=$(mktemp -d)
-log=$work/log limit=600
+log=$work/log
+case $build in */*san) limit=1200 ;; *) limit=600 ;; esac # seconds of one program; sanitizers take three times as long
 trap 'rm -rf "$work"' EXIT
 : >"$log"
 
