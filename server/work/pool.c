@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LIST_MS 500 /* a process that is idle gets so long to say what it has */
+#define LIST_MS 10000 /* a process that is idle gets so long to say what it has, then it is killed with its factors */
 
 #define IDLE_S 2.0 /* then what is shared with a process goes back to the system */
 

@@ -71,6 +71,7 @@ def check_shared_factor(s, solver):
         check(near(summary["contact"]["reaction_sum"], factor * REACTION_SUM, 1e-7), factor, summary)
     fresh = [factor for factor, summary in everything if not summary["factor"]["cached"]]
     check(1 <= len(fresh) <= WORKERS, "factored for the loads", fresh)  # each process at most once
+
     def held_now():
         return expect(s.get("/v1/factors"), 200).json
 
