@@ -504,41 +504,15 @@ static void add_cost_distributed(uz_cost_estimate *cost, const uz_cost_size *siz
     cost->bytes += 16.0 * (double)size->k_entries / PROCESSES + 8.0 * VECTORS * (double)size->d;
 }
 
-const uz_dual_form uz_dual_matrix_free = {
-    .can = {.op = UZ_OPERATOR_MATRIX_FREE},
-    .dual_size = sizeof(uz_sparse),
-    .load_size = sizeof(free_load),
-    .add_cost = add_cost,
-    .create = uz_sparse_create,
-    .clear = uz_sparse_clear,
-    .load = make_load,
-    .unload = unload,
-    .aim = aim_at,
-    .probe = probe,
-    .apply = apply,
-    .correct = uz_sparse_correct,
-    .recover = uz_sparse_recover,
-    .solve_active = solve_active,
-    .guess_active = guess_active,
-    .inverse_norm = inverse_norm,
-};
+/* What both forms do: solves by the multigrid of their setup, whose kind is all that differs: one that is here, or one
+ * that a group of processes holds (group/group.h). */
+#define BY_MULTIGRID                                                                                                   \
+    .dual_size = sizeof(uz_sparse), .load_size = sizeof(free_load), .create = uz_sparse_create,                        \
+    .clear = uz_sparse_clear, .load = make_load, .unload = unload, .aim = aim_at, .probe = probe, .apply = apply,      \
+    .correct = uz_sparse_correct, .recover = uz_sparse_recover, .solve_active = solve_active,                          \
+    .guess_active = guess_active, .inverse_norm = inverse_norm
 
-/* What differs is the kind of multigrid: one that a group of processes holds (group/group.h). */
+const uz_dual_form uz_dual_matrix_free = {.can = {.op = UZ_OPERATOR_MATRIX_FREE}, .add_cost = add_cost, BY_MULTIGRID};
+
 const uz_dual_form uz_dual_distributed = {
-    .can = {.op = UZ_OPERATOR_DISTRIBUTED, .asked_for = true},
-    .dual_size = sizeof(uz_sparse),
-    .load_size = sizeof(free_load),
-    .add_cost = add_cost_distributed,
-    .create = uz_sparse_create,
-    .clear = uz_sparse_clear,
-    .load = make_load,
-    .unload = unload,
-    .aim = aim_at,
-    .probe = probe,
-    .apply = apply,
-    .correct = uz_sparse_correct,
-    .recover = uz_sparse_recover,
-    .solve_active = solve_active,
-    .guess_active = guess_active,
-    .inverse_norm = inverse_norm,
-};
+    .can = {.op = UZ_OPERATOR_DISTRIBUTED, .asked_for = true}, .add_cost = add_cost_distributed, BY_MULTIGRID};
