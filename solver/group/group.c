@@ -231,7 +231,7 @@ static bool begin(const far_system *s, const double *x, const double *b)
 }
 
 /* Up to `most` steps while the square is above goal2. */
-static bool make_steps(const far_system *s, int *made, bool *flat, double *alpha, double *beta, int most, double goal2)
+static bool make_steps(const far_system *s, int *made, bool *flat, int most, double goal2)
 {
     uz_wire_head head;
     *made = 0;
@@ -243,8 +243,7 @@ static bool make_steps(const far_system *s, int *made, bool *flat, double *alpha
     *made = (int)head.a;
     *flat = head.b != 0;
     s->room->square = head.x;
-    return take(s->body->group, alpha, (size_t)head.a * sizeof *alpha) &&
-           take(s->body->group, beta, (size_t)head.a * sizeof *beta);
+    return true;
 }
 
 /* ---- conjugate gradients, as amg/cg.c has them: the recurrence is begun again from the true residual until that meets
@@ -267,12 +266,11 @@ static bool should_stop(const uz_cg_info *info, const uz_cg_stop *stop)
 
 static bool run_steps(const far_system *s, uz_cg_info *info, bool *flat, const uz_cg_stop *stop, double goal2)
 {
-    double alpha[UZ_WIRE_STEPS_MOST], beta[UZ_WIRE_STEPS_MOST];
     for (int most = 1; s->room->square > goal2 && !*flat && !should_stop(info, stop);) {
         const double start = uz_seconds();
         const int64_t left = stop->max_iterations - info->iterations;
         int made;
-        if (!make_steps(s, &made, flat, alpha, beta, left < most ? (int)left : most, goal2))
+        if (!make_steps(s, &made, flat, left < most ? (int)left : most, goal2))
             return false;
         info->iterations += made;
         if (made == 0) /* nothing more to gain */

@@ -13,8 +13,7 @@
  *     -> HOLD    a byte for each dof: held or not           <- MADE
  *     -> BEGIN   a: system; start, right-hand side (double) <- STATE   x: r'M^-1 r
  *     -> STEPS   a: system, b: at most so many, x: until r'M^-1 r is not above it, y: what it is now
- *     <- STATE   a: made, fewer where there is no more to gain, b: 1 where p'K p was not positive, x: r'M^-1 r;
- *                alpha and beta of each step
+ *     <- STATE   a: made, fewer where there is no more to gain, b: 1 where p'K p was not positive, x: r'M^-1 r
  *     -> AGAIN   a: system; from the true residual          <- STATE   x: r'M^-1 r
  *     -> FETCH   a: system                                  <- VECTOR  x
  *     -> APPLY   a: system; r                               <- VECTOR  M^-1 r
@@ -44,7 +43,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 1
+#define UZ_WIRE_VERSION 2
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

@@ -111,7 +111,7 @@ static inline void stand_in_begin(stand_in *s, int which)
 static inline void stand_in_steps(stand_in *s, const uz_wire_head *m)
 {
     const int which = (int)m->a;
-    double q[STAND_IN_MOST], alpha[UZ_WIRE_STEPS_MOST], beta[UZ_WIRE_STEPS_MOST], square = m->y;
+    double q[STAND_IN_MOST], square = m->y;
     int64_t made = 0;
     bool flat = false;
     while (made < m->b && square > m->x) {
@@ -123,20 +123,18 @@ static inline void stand_in_steps(stand_in *s, const uz_wire_head *m)
         flat = !(curvature > 0.0);
         if (flat)
             break;
-        alpha[made] = last / curvature;
+        const double alpha = last / curvature;
         for (int64_t i = 0; i < s->n; i++) {
-            s->x[i] += alpha[made] * s->p[i];
-            s->r[i] -= alpha[made] * q[i];
+            s->x[i] += alpha * s->p[i];
+            s->r[i] -= alpha * q[i];
         }
         square = stand_in_cycle(s, which, s->z, s->r);
-        beta[made] = square / last;
+        const double beta = square / last;
         for (int64_t i = 0; i < s->n; i++)
-            s->p[i] = s->z[i] + beta[made] * s->p[i];
+            s->p[i] = s->z[i] + beta * s->p[i];
         made++;
     }
     stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_STATE, .a = made, .b = flat, .x = square});
-    stand_in_put(s, alpha, (size_t)made * sizeof *alpha);
-    stand_in_put(s, beta, (size_t)made * sizeof *beta);
 }
 
 static inline void stand_in_answer_vector(stand_in *s, const double *v)

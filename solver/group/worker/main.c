@@ -368,17 +368,13 @@ static PetscErrorCode put_vector(group *g, const body *b, Vec v)
 
 static PetscErrorCode make_steps(group *g, linear_system *s, const uz_wire_head *m)
 {
-    double alpha[UZ_WIRE_STEPS_MOST], beta[UZ_WIRE_STEPS_MOST], square = m->y;
+    double square = m->y;
     int made;
     bool flat;
     PetscFunctionBeginUser;
     PetscCheck(m->b > 0 && m->b <= UZ_WIRE_STEPS_MOST, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "too many steps");
-    PetscCall(system_steps(s, &square, &made, &flat, alpha, beta, (int)m->b, m->x));
+    PetscCall(system_steps(s, &square, &made, &flat, (int)m->b, m->x));
     answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .a = made, .b = flat, .x = square});
-    if (IS_FIRST(g)) {
-        put(g, alpha, (size_t)made * sizeof *alpha);
-        put(g, beta, (size_t)made * sizeof *beta);
-    }
     PetscFunctionReturn(0);
 }
 

@@ -324,8 +324,7 @@ PetscErrorCode system_begin(linear_system *s, double *square)
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode system_steps(linear_system *s, double *square, int *made, bool *flat, double *alpha, double *beta,
-                            int most, double goal2)
+PetscErrorCode system_steps(linear_system *s, double *square, int *made, bool *flat, int most, double goal2)
 {
     PetscFunctionBeginUser;
     *flat = false;
@@ -338,13 +337,12 @@ PetscErrorCode system_steps(linear_system *s, double *square, int *made, bool *f
         *flat = !(curvature > 0.0);
         if (*flat)
             break;
-        alpha[*made] = last / curvature;
-        PetscCall(VecAXPY(s->x, alpha[*made], s->p));
-        PetscCall(VecAXPY(s->r, -alpha[*made], s->q));
+        const double alpha = last / curvature;
+        PetscCall(VecAXPY(s->x, alpha, s->p));
+        PetscCall(VecAXPY(s->r, -alpha, s->q));
         PetscCall(system_precondition(s, s->z, s->r));
         PetscCall(VecDot(s->r, s->z, square));
-        beta[*made] = *square / last;
-        PetscCall(VecAYPX(s->p, beta[*made], s->z));
+        PetscCall(VecAYPX(s->p, *square / last, s->z));
         (*made)++;
     }
     PetscFunctionReturn(0);

@@ -40,9 +40,8 @@ PetscErrorCode system_free(linear_system *s);
 PetscErrorCode system_precondition(linear_system *s, Vec z, Vec r);
 /* From x and b: r = b - A x, z = M^-1 r, p = z; *square = r'z. */
 PetscErrorCode system_begin(linear_system *s, double *square);
-/* Steps of conjugate gradients until *square <= goal2; *made of them, each with its alpha and beta. *flat: the last one
+/* Steps of conjugate gradients until *square <= goal2; *made of them. *flat: the last one
  * was not made, as p'A p was not positive. */
-PetscErrorCode system_steps(linear_system *s, double *square, int *made, bool *flat, double *alpha, double *beta,
-                            int most, double goal2);
+PetscErrorCode system_steps(linear_system *s, double *square, int *made, bool *flat, int most, double goal2);
 
 #endif
