@@ -159,7 +159,7 @@ $(BUILD)/uzawa: $(CLIENT_OBJ) $(BUILD)/libuzawa.a
 # under mpirun: no sanitizer.
 GROUP_FLAGS = $(patsubst -I%,-isystem %,$(filter -I%,$(call pkg,--cflags petsc ompi-c))) -Wno-sign-conversion
 $(GROUP_OBJ): CFLAGS += $(GROUP_FLAGS) -O3
-$(GROUP_OBJ): SAN =
+$(GROUP_OBJ): override SAN =
 $(BUILD)/uzawa-group: $(GROUP_OBJ)
 	$(CC) $(GOLD) $(LDFLAGS) -o $@ $^ $(call pkg,--libs petsc ompi-c) -lm
 
