@@ -97,6 +97,39 @@ def test_results_and_uploads_of_two_daemons(s):
         check("\nuzawad_object_written_bytes_total 0\n" not in metrics and "uzawad_object_request_seconds_count" in metrics)
 
 
+def padded(kilobytes):
+    """A problem whose request is that long."""
+    lines = ("%" + " " * 1022 + "\n") * kilobytes
+    return {"problem": {**MATRICES["problem"], "K": MATRICES["problem"]["K"].replace("symmetric\n", "symmetric\n" + lines)}}
+
+
+def test_requests_of_two_daemons(s):
+    with daemons(s.build, 2) as ((a, b), name, place):
+        job = a.post(padded(4100), {"Idempotency-Key": "long"}).json["id"]
+        check(a.wait_status(job, "successful", "failed")["status"] == "successful")
+        check(SERVER.sql(name, "SELECT cardinality(objects), size > 4 << 20 FROM uzawa.request_placed") == [["2", "t"]])
+        check(SERVER.sql(name, "SELECT 1 FROM uzawa.request") == [])
+        refine = lambda: b.request("POST", f"/v1/jobs/{job}/refine", {"accuracy": {"relative_error": 1e-12}})
+        again = expect(refine(), 202).json["id"]
+        check(a.wait_status(again, "successful", "failed")["status"] == "successful")
+        check(b.post(padded(4100), {"Idempotency-Key": "long"}).json["id"] == job)
+        expect(b.post(padded(3), {"Idempotency-Key": "long"}), 422)
+        check(a.request("POST", "/v1/admin/check").json["whole"])
+        with place.failing("500", "GET"):
+            expect(refine(), 503, "store_unavailable")
+        objects = dict(place.objects)
+        place.objects.update({one: bytes(len(data)) for one, data in objects.items()})
+        expect(until_back(refine), 500, "stored_data_damaged")
+        place.objects.update(objects)
+        with place.failing("500", "PUT"):  # it is acknowledged all the same
+            other = a.post(padded(3)).json["id"]
+        check(b.wait_status(other, "successful", "failed", seconds=60)["status"] == "successful")
+        check(SERVER.sql(name, "SELECT job FROM uzawa.request") == [[other]])
+        for one in job, again:
+            expect(b.request("DELETE", f"/v1/jobs/{one}"), 204)
+        collect(name, place, lambda: not place.objects)
+
+
 def test_what_is_deleted_is_collected(s):
     with daemons(s.build, 2) as ((a, b), name, place):
         job = solve(a)

@@ -18,6 +18,7 @@ typedef struct {
     double created;
     kept_key key;
     unsigned char digest[32];
+    const char *body_objects; /* the names of those that have the body; NULL: it goes with the transaction */
     job *out;
     bool repeated;
     const store_lease *lease;
@@ -56,10 +57,13 @@ static void send_submission(postgresql_store *s, link_to *l, change *c)
     char *uploads = r->n_uploads > 0 ? array_of(r->uploads, r->n_uploads) : NULL;
     call q = {.sql =
                   "SELECT verdict, job FROM uzawa.submit_3($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14,"
-                  " $15, $16, $17, $18, $19, $20, $21)"};
+                  " $15, $16, $17, $18, $19, $20, $21, $22, $23)"};
     call_text(&q, c->id);
     call_real(&q, c->created);
-    call_bytes(&q, r->body, r->body_len);
+    if (c->body_objects)
+        call_text(&q, NULL);
+    else
+        call_bytes(&q, r->body, r->body_len);
     call_bytes(&q, c->digest, sizeof c->digest);
     call_text(&q, r->tags ? r->tags : "[]");
     call_text(&q, r->client ? r->client : "");
@@ -81,6 +85,8 @@ static void send_submission(postgresql_store *s, link_to *l, change *c)
     else
         call_text(&q, NULL);
     call_bool(&q, c->again);
+    call_integer(&q, (int64_t)r->body_len);
+    call_text(&q, c->body_objects);
     c->answer = l->sent;
     if (r->n_uploads > 0 && !uploads) { /* never one that names none */
         l->status = STORE_ERROR;
@@ -301,7 +307,11 @@ store_status postgresql_submit(store *base, const store_request *request, job *o
     pthread_mutex_lock(&s->state_lock);
     store_next_id(&s->last_ms, &s->sequence, c.id);
     pthread_mutex_unlock(&s->state_lock);
-    store_status status = carry_out(s, &c, request->n_uploads > 0 || (int64_t)request->body_len > SHARED_MOST);
+    char *placed = postgresql_place_request(s, request->body, request->body_len);
+    c.body_objects = placed;
+    store_status status =
+        carry_out(s, &c, request->n_uploads > 0 || (!placed && (int64_t)request->body_len > SHARED_MOST));
+    free(placed);
     *repeated = c.repeated;
     if (status != STORE_OK || c.repeated) {
         char id[33];
@@ -323,8 +333,7 @@ store_status postgresql_find_repeat(store *base, const store_request *request, j
 {
     unsigned char digest[32];
     const kept_key key = store_kept_key(request);
-    call c = {.sql = "SELECT " JOB_COLUMNS ", r.digest = $2 FROM uzawa.job JOIN uzawa.request AS r ON r.job = job.id"
-                     " WHERE job.key = $1"};
+    call c = {.sql = "SELECT " JOB_COLUMNS ", uzawa.request_digest(job.id) = $2 FROM uzawa.job WHERE job.key = $1"};
     if (!digest_of(request, digest)) {
         store_set_message(base, "the digest of a request failed");
         return STORE_ERROR;

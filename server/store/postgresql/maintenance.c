@@ -10,8 +10,7 @@
 static const struct {
     const char *sql, *finding;
 } CHECKS[] = {
-    {"SELECT id FROM uzawa.job WHERE NOT EXISTS (SELECT 1 FROM uzawa.request WHERE request.job = job.id) LIMIT 20",
-     "job %s has no request\n"},
+    {"SELECT id FROM uzawa.job WHERE uzawa.request_digest(id) IS NULL LIMIT 20", "job %s has no request\n"},
     {"SELECT counted.status::text FROM uzawa.counted LEFT JOIN (SELECT status, count(*) AS jobs, sum(bytes) AS bytes"
      " FROM uzawa.job GROUP BY status) AS there ON there.status = counted.status"
      " WHERE counted.jobs <> coalesce(there.jobs, 0) OR counted.bytes <> coalesce(there.bytes, 0)",
@@ -50,6 +49,10 @@ static const struct {
      "the place of the %s is not what was written\n"},
     {"SELECT object || ' of job ' || job FROM uzawa.placed WHERE size > 0 AND NOT EXISTS (SELECT 1 FROM uzawa.object"
      " WHERE object.name = placed.object AND object.job = placed.job AND NOT doomed) LIMIT 20",
+     "the object %s is nobody's\n"},
+    {"SELECT each || ' of the request of job ' || r.job FROM uzawa.request_placed AS r, unnest(objects) AS each"
+     " WHERE NOT EXISTS (SELECT 1 FROM uzawa.object AS o WHERE o.name = each AND o.job = r.job AND NOT o.doomed)"
+     " LIMIT 20",
      "the object %s is nobody's\n"},
     {"SELECT upload.id FROM uzawa.upload WHERE NOT EXISTS (SELECT 1 FROM uzawa.blob_piece WHERE blob = upload.id"
      " AND object IS NOT NULL) AND id <> coalesce((SELECT encode(sha256(string_agg(data, ''::bytea"

@@ -1,5 +1,5 @@
-/* objects.c: bytes in an object store: results are packed into objects of a few MiB, of which readers get the ranges
- * that they want; what belongs to nobody is removed. */
+/* objects.c: bytes in an object store: bodies of requests; results, packed into objects of a few MiB, of which readers
+ * get the ranges that they want; what belongs to nobody is removed. */
 #include "store/postgresql/objects.h"
 
 #include <gnutls/crypto.h>
@@ -37,6 +37,30 @@ store_status postgresql_put_object(postgresql_store *s, const void *data, size_t
         return objects_put(s->base.settings.objects, name, data, size, sum, cause);
     store_message(&s->base, cause, OBJECT_CAUSE);
     return status;
+}
+
+/* ---- requests */
+
+char *postgresql_place_request(postgresql_store *s, const void *body, size_t size)
+{
+    const size_t n = (size + OBJECT_MOST - 1) / OBJECT_MOST;
+    char cause[OBJECT_CAUSE];
+    if (!s->base.settings.objects || (int64_t)size < objects_least(s->base.settings.objects))
+        return NULL;
+    char *names = malloc(n * (OBJECT_NAME + 1) + 2), *at = names;
+    for (size_t i = 0; i < n && names; i++) {
+        const size_t from = i * OBJECT_MOST, left = size - from;
+        *at++ = i > 0 ? ',' : '{';
+        if (postgresql_put_object(s, (const char *)body + from, left < OBJECT_MOST ? left : OBJECT_MOST, at, cause) !=
+            STORE_OK) {
+            free(names);
+            return NULL;
+        }
+        at += strlen(at);
+    }
+    if (names)
+        strcpy(at, "}");
+    return names;
 }
 
 /* ---- results */
@@ -232,13 +256,34 @@ void postgresql_send_placed(link_to *l, const char *id, uint64_t token, const pl
 
 /* ---- reading */
 
+#define NO_OBJECTS "a part of this is in an object store, and this daemon was given none: --objects"
+
+store_status postgresql_get_request(postgresql_store *s, const char *names, char *body, size_t size)
+{
+    char cause[OBJECT_CAUSE] = NO_OBJECTS, name[OBJECT_NAME];
+    store_status status = s->base.settings.objects ? STORE_OK : STORE_AWAY;
+    size_t from = 0;
+    for (const char *at = names + 1; status == STORE_OK && from < size; from += OBJECT_MOST) { /* "{name,name}" */
+        const size_t len = strcspn(at, ",}"), left = size - from;
+        if (len == 0 || len >= sizeof name)
+            return STORE_DAMAGED;
+        memcpy(name, at, len);
+        name[len] = '\0';
+        at += len + 1;
+        status = objects_get(s->base.settings.objects, name, 0, body + from,
+                             left < OBJECT_MOST ? left : OBJECT_MOST, cause);
+    }
+    if (status != STORE_OK)
+        store_set_message(&s->base, cause);
+    return status;
+}
+
 static store_status fetch(postgresql_store *s, const placed_row *row, void *bytes, char cause[OBJECT_CAUSE], bool *good)
 {
     unsigned char digest[32];
     const size_t size = (size_t)row->piece.size;
     if (!s->base.settings.objects) {
-        snprintf(cause, OBJECT_CAUSE,
-                 "a part of this is in an object store, and this daemon was given none: --objects");
+        snprintf(cause, OBJECT_CAUSE, NO_OBJECTS);
         return STORE_AWAY;
     }
     const store_status status = objects_get(s->base.settings.objects, row->object, row->at, bytes, size, cause);

@@ -15,6 +15,12 @@
 store_status postgresql_put_object(postgresql_store *s, const void *data, size_t size, char name[OBJECT_NAME],
                                    char cause[OBJECT_CAUSE]);
 
+/* The body of a request in objects, which are nobody's yet: the text of an array of their names, in order. NULL: it is
+ * to be in a row, as it also is where the object store does not answer. The caller frees it. */
+char *postgresql_place_request(postgresql_store *s, const void *body, size_t size);
+/* Back from there; names: as postgresql_place_request returned it. STORE_DAMAGED: they have not `size` bytes. */
+store_status postgresql_get_request(postgresql_store *s, const char *names, char *body, size_t size);
+
 /* A piece of a result: where its bytes are. */
 typedef struct {
     char name[32]; /* of the vector or history, as in its row */

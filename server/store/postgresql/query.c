@@ -1,5 +1,5 @@
 /* query.c: what only reads. */
-#include "store/postgresql/internal.h"
+#include "store/postgresql/objects.h"
 
 #include <gnutls/crypto.h>
 #include <math.h>
@@ -104,43 +104,66 @@ _Static_assert(STORE_MORE_TAGS == 3, "LIST has as many");
 /* ---- the request */
 
 typedef struct {
-    const char *id;
-    char *body;
+    char *body, *objects; /* objects: the names of those that have it */
     size_t len;
+    unsigned char digest[32];
 } body_args;
+
+static void body_clear(body_args *a)
+{
+    free(a->body);
+    free(a->objects);
+    a->body = a->objects = NULL;
+}
 
 static store_status read_body(link_to *l, const PGresult *r, void *ctx)
 {
     body_args *a = ctx;
-    unsigned char digest[32];
-    free(a->body);
-    a->body = NULL;
+    bool ok = true;
+    body_clear(a);
     if (PQntuples(r) == 0)
         return STORE_NOT_FOUND;
-    const size_t len = (size_t)PQgetlength(r, 0, 0);
-    if (PQgetlength(r, 0, 1) != sizeof digest ||
-        gnutls_hash_fast(GNUTLS_DIG_SHA256, PQgetvalue(r, 0, 0), len, digest) != 0 ||
-        memcmp(digest, PQgetvalue(r, 0, 1), sizeof digest) != 0) {
-        snprintf(l->message, sizeof l->message, "the request of job %.32s is not what was written", a->id);
+    const bool placed = !PQgetisnull(r, 0, 2);
+    a->len = placed ? (size_t)cell_integer(r, 0, 3) : (size_t)PQgetlength(r, 0, 0);
+    if (PQgetlength(r, 0, 1) != sizeof a->digest)
         return STORE_DAMAGED;
-    }
-    a->body = malloc(len + 1);
-    if (!a->body) {
+    memcpy(a->digest, PQgetvalue(r, 0, 1), sizeof a->digest);
+    a->body = malloc(a->len + 1);
+    a->objects = placed ? cell_copy(r, 0, 2, &ok) : NULL;
+    if (!a->body || !ok) {
         strcpy(l->message, "no memory for the request of a job");
         return STORE_ERROR;
     }
-    memcpy(a->body, PQgetvalue(r, 0, 0), len);
-    a->body[len] = '\0';
-    a->len = len;
+    if (!placed)
+        memcpy(a->body, PQgetvalue(r, 0, 0), a->len);
     return STORE_OK;
 }
 
 store_status postgresql_get_body(store *base, const char *id, char **body, size_t *len)
 {
-    body_args a = {.id = id};
-    call c = {.sql = "SELECT body, digest FROM uzawa.request WHERE job = $1"};
+    body_args a = {.len = 0};
+    unsigned char digest[32];
+    char cause[96];
+    call c = {.sql = "SELECT body, digest, NULL, NULL::bigint FROM uzawa.request WHERE job = $1 UNION ALL"
+                     " SELECT NULL, digest, objects::text, size FROM uzawa.request_placed WHERE job = $1"};
     call_text(&c, id);
-    const store_status status = postgresql_do(postgresql_of(base), LINK_READ, true, &c, read_body, &a);
+    store_status status = postgresql_do(postgresql_of(base), LINK_READ, true, &c, read_body, &a);
+    if (status == STORE_OK && a.objects)
+        status = postgresql_get_request(postgresql_of(base), a.objects, a.body, a.len);
+    if (status == STORE_OK && (gnutls_hash_fast(GNUTLS_DIG_SHA256, a.body, a.len, digest) != 0 ||
+                               memcmp(digest, a.digest, sizeof digest) != 0))
+        status = STORE_DAMAGED;
+    if (status == STORE_DAMAGED) {
+        snprintf(cause, sizeof cause, "the request of job %.32s is not what was written", id);
+        store_set_message(base, cause);
+    }
+    if (status != STORE_OK) {
+        body_clear(&a);
+        a.len = 0;
+    }
+    if (a.body)
+        a.body[a.len] = '\0';
+    free(a.objects);
     *body = a.body;
     *len = a.len;
     return status;

@@ -148,11 +148,20 @@ BEGIN
     END IF;
 END $$;
 
--- As submit_2, in one. p_again: it was tried before and the answer was lost.
+-- A request whose body is in objects, in order. Daemons of version 3, which find no body, give its job back.
+CREATE TABLE request_placed(
+    job text COLLATE "C" PRIMARY KEY REFERENCES job(id) ON DELETE CASCADE, size bigint NOT NULL, digest bytea NOT NULL,
+    objects text[] COLLATE "C" NOT NULL
+);
+CREATE FUNCTION request_digest(p_job text) RETURNS bytea LANGUAGE sql STABLE
+    RETURN coalesce((SELECT r.digest FROM request AS r WHERE r.job = p_job),
+                    (SELECT p.digest FROM request_placed AS p WHERE p.job = p_job));
+
+-- As submit_2, in one. p_again: it was tried before and the answer was lost. p_body NULL: it is in p_objects.
 CREATE FUNCTION submit_3(p_id text, p_created float8, p_body bytea, p_digest bytea, p_tags text, p_client text,
     p_share text, p_key text, p_refines text, p_uploads text[], p_any_upload boolean, p_priority integer,
     p_small boolean, p_webhook text, p_queue_limit float8, p_max_queue bigint, p_waiting bigint, p_bytes bigint,
-    p_seconds float8, p_held bigint, p_again boolean, OUT verdict text, OUT job text) LANGUAGE plpgsql
+    p_seconds float8, p_held bigint, p_again boolean, p_size bigint, p_objects text[], OUT verdict text, OUT job text) LANGUAGE plpgsql
     SET plan_cache_mode = force_generic_plan AS $$
 DECLARE
     has record;
@@ -165,8 +174,8 @@ BEGIN
         RETURN;
     END IF;
     IF p_key IS NOT NULL THEN
-        SELECT CASE WHEN r.digest = p_digest THEN 'repeat' ELSE 'differs' END, j.id INTO verdict, job
-            FROM uzawa.job AS j JOIN uzawa.request AS r ON r.job = j.id WHERE j.key = p_key;
+        SELECT CASE WHEN uzawa.request_digest(j.id) = p_digest THEN 'repeat' ELSE 'differs' END, j.id INTO verdict, job
+            FROM uzawa.job AS j WHERE j.key = p_key;
         IF FOUND THEN
             RETURN;
         END IF;
@@ -179,7 +188,7 @@ BEGIN
     IF p_client <> '' AND (p_waiting > 0 OR p_bytes > 0 OR p_seconds > 0) THEN
         SELECT * INTO has FROM uzawa.client_has(p_client);
         verdict := CASE WHEN p_waiting > 0 AND has.waiting >= p_waiting THEN 'waiting'
-                        WHEN p_bytes > 0 AND has.bytes + length(p_body) > p_bytes THEN 'bytes'
+                        WHEN p_bytes > 0 AND has.bytes + p_size > p_bytes THEN 'bytes'
                         WHEN p_seconds > 0 AND has.seconds >= p_seconds THEN 'seconds' END;
         IF verdict IS NOT NULL THEN
             RETURN;
@@ -198,9 +207,14 @@ BEGIN
     END IF;
     INSERT INTO uzawa.job(id, created, tags, key, refines, priority, queue_until, bytes, client, share, small, body)
         VALUES (p_id, p_created, p_tags, p_key, p_refines, p_priority,
-                CASE WHEN p_queue_limit > 0 THEN uzawa.moment() + p_queue_limit ELSE 0 END, length(p_body), p_client,
+                CASE WHEN p_queue_limit > 0 THEN uzawa.moment() + p_queue_limit ELSE 0 END, p_size, p_client,
                 p_share, p_small, p_held);
-    INSERT INTO uzawa.request(job, body, digest) VALUES (p_id, p_body, p_digest);
+    IF p_body IS NOT NULL THEN
+        INSERT INTO uzawa.request(job, body, digest) VALUES (p_id, p_body, p_digest);
+    ELSE
+        PERFORM uzawa.object_keep(p_objects, p_id, NULL);
+        INSERT INTO uzawa.request_placed(job, size, digest, objects) VALUES (p_id, p_size, p_digest, p_objects);
+    END IF;
     IF p_tags <> '[]' THEN
         INSERT INTO uzawa.tag(tag, job) SELECT DISTINCT value #>> '{}', p_id
             FROM jsonb_array_elements(p_tags::jsonb) AS value WHERE jsonb_typeof(value) = 'string';
@@ -329,6 +343,18 @@ BEGIN
             PERFORM uzawa.refuse_lease(p_job);
         END IF;
     END IF;
+END $$;
+
+-- Who had the tables of version 3 has this.
+DO $$
+DECLARE
+    who record;
+BEGIN
+    FOR who IN SELECT DISTINCT grantee FROM information_schema.role_table_grants
+        WHERE table_schema = 'uzawa' AND table_name = 'job' AND privilege_type = 'INSERT' AND grantee <> CURRENT_USER LOOP
+        EXECUTE format('GRANT SELECT, INSERT, UPDATE, DELETE ON uzawa.request_placed TO %s',
+                       CASE who.grantee WHEN 'PUBLIC' THEN 'PUBLIC' ELSE quote_ident(who.grantee) END);
+    END LOOP;
 END $$;
 
 UPDATE format SET version = 4;
