@@ -270,8 +270,8 @@ store_status postgresql_get_request(postgresql_store *s, const char *names, char
         memcpy(name, at, len);
         name[len] = '\0';
         at += len + 1;
-        status = objects_get(s->base.settings.objects, name, 0, body + from,
-                             left < OBJECT_MOST ? left : OBJECT_MOST, cause);
+        status =
+            objects_get(s->base.settings.objects, name, 0, body + from, left < OBJECT_MOST ? left : OBJECT_MOST, cause);
     }
     if (status != STORE_OK)
         store_set_message(&s->base, cause);
