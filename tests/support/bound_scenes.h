@@ -288,7 +288,8 @@ static inline bound_sweep sweep_meshes(bound_maker make, uint64_t seed, int kind
             if (g.proved && !last) {
                 linear[n] = k % 4 < 2 ? 0 : 1;
                 primal[n] = g.primal;
-                if (scene.n_contacts > 0 && scene.contacts[0].kind == UZ_OBSTACLE_BODY) /* bounded on another mesh */
+                /* not by the energies: of the answer itself, and `primal` is of what was taken out of the obstacle */
+                if (g.bound * g.bound < 2 * (1 - 1e-9) * (g.primal - g.dual))
                     primal[n] = fmin(primal[n], result->summary.evaluation->potential_energy);
                 bound[n++] = g.bound;
             }
