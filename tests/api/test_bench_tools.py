@@ -107,7 +107,7 @@ def test_a_filter_that_matches_nothing_is_an_error(s):
         ran = subprocess.run([sys.executable, "-B", *map(str, command)], cwd=ROOT, capture_output=True, text=True, check=False)
         check(ran.returncode != 0, command, ran.stdout, ran.stderr)
         check("nonsense" in ran.stderr + ran.stdout, command, ran.stdout, ran.stderr)
-    ran = subprocess.run(["tests/run.sh", str(s.build), "unit", "test_csc.nonsense"], cwd=ROOT, capture_output=True, text=True, check=False)
+    ran = subprocess.run(["tests/run.sh", str(s.build), "api", "test_bench_tools.nonsense"], cwd=ROOT, capture_output=True, text=True, check=False)
     check(ran.returncode != 0 and "nonsense" in ran.stdout, ran.stdout)
 
 
