@@ -64,7 +64,7 @@ def test_counts_follow_what_happens(s):
     check(now["uzawad_store_commit_seconds_count", ""] > before["uzawad_store_commit_seconds_count", ""], now)
     check(now["uzawad_job_phase_seconds_count", 'phase="total"'] == 3, now)
     check(now["uzawad_job_phase_seconds_count", 'phase="factor"'] == 2, now)
-    check(now["uzawad_store_free_bytes", ""] > 1e6, now)
+    check("://" in s.db or now["uzawad_store_free_bytes", ""] > 1e6, now)  # a database has its disk elsewhere
     check(any(name == "uzawad_build_info" and value == 1 for (name, _), value in now.items()), now)
     check(now["process_resident_memory_bytes", ""] > 1e6 and now["uzawad_http_connections", ""] >= 1, now)
 
@@ -110,12 +110,13 @@ def test_ready_solves_a_problem(s):
         check(expect(s.get("/readyz"), 200).json["status"] == "ready")
     seconds, now = time.monotonic() - begun, scrape(s)
     made = now["uzawad_store_changes_total", ""] - commits
-    check(1 <= made <= 1 + seconds, made, seconds)  # it is tried once a second at most
+    check(("://" in s.db or 1 <= made) and made <= 1 + seconds, made, seconds)  # it is tried once a second at most
     check(now["uzawad_jobs", 'status="successful"'] == 0)
 
 
 def test_ready_finds_a_full_disk(s):
     """No file of the daemon may grow or be written: as on a full disk, and then there is room again."""
+    s.file()
     check(s.solve(MATRICES)["status"] == "successful")
     resource.prlimit(s.process.pid, resource.RLIMIT_FSIZE, (1, resource.RLIM_INFINITY))
     time.sleep(1.1)  # what was found out before is good for a second

@@ -129,12 +129,12 @@ PHRASES = {
     "bytes (256 KiB) into an object store": lambda program: program.limits is None or program.limits["object_least"]["value"] == 256 << 10,
     "on the ports 8081 to 8083": None,
     # an estimate, of counts that were taken once
-    "### On paper: 10,000 cores, 1,000,000,000 unknowns, 1,000,000 jobs a day": None, "9 kB of log and 6 kB of the database": None,
-    "70 kB of log and 64 kB of the database": None, "processor 7 ms of a job that comes alone": None,
+    "### On paper: 10,000 cores, 1,000,000,000 unknowns, 1,000,000 jobs a day": None, "9 kB of log and 8 kB of the database": None,
+    "69 kB of log and 67 kB of the database": None, "1 to 2 ms of PostgreSQL's processor": None,
     "One body of 1,000,000,000 unknowns**: refused, a scene may have 20 million": constant(20e6, r"UZ_SCENE_MAX_DOFS (\d+)"),
     "displacements alone are 8 GB, 1,908 objects": constant(4, r"#define OBJECT_MOST +\((\d+) << 20\)"),
     "1,000,000 results of the 600 x 200 body": None, "10,000 cores are 313 daemons of 32 workers and 2,817 connections": None,
-    "make 6,900 commits a second": None, "**1,000,000 jobs a day** are 12 a second, 8 % of a processor of PostgreSQL and 9 to 70 GB of log": None,
+    "make 940 commits a second": None, "**1,000,000 jobs a day** are 12 a second, 2 % of a processor of PostgreSQL and 9 to 70 GB of log": None,
     # limits
     "A request body may have 64 MiB": limit("max_body", 64 << 20), "an upload 1 GiB": limit("max_upload", 1 << 30),
     "three quarters of `--max-connections` (1,024)": limit("max_connections", 1024),
