@@ -175,7 +175,7 @@ class Service:
     def end_leases(self):
         """Of a daemon that was killed, where the tests run on PostgreSQL: as if their time were over. SQLite's file has no
         other owner, so that the next start knows at once that they are."""
-        if os.environ.get("UZAWA_STORE") == "postgresql" and "://" in self.db and self.process and self.process.poll():
+        if os.environ.get("UZAWA_STORE") == "postgresql" and "://" in self.db and self.process and (self.process.poll() or 0) < 0:
             import databases
             databases.rows(self.db, "UPDATE uzawa.job SET lease = uzawa.moment() - 1 WHERE status = 1 AND node IN"
                                     f" (SELECT id FROM uzawa.node WHERE pid = {self.process.pid})")

@@ -368,6 +368,7 @@ def test_database_copied_while_it_ran_is_usable(s):
 @options("--workers", "1", "--max-solve-s", "0.5")
 def test_a_result_waits_for_room_on_the_disk(s):
     """A disk that is full when a job ends: once there is room the result is kept, without a restart and another run."""
+    s.file()
     job = s.post(ENDLESS).json["id"]
     s.wait_status(job, "running")
     no_limit = resource.RLIM_INFINITY

@@ -1,9 +1,12 @@
 """Short forms of `make soak`: a daemon that is ended under load, slow clients, cancels, many jobs. Nothing is timed:
 usage: test_soak.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
+import os
 import pathlib
 import signal
 import sys
+
+os.environ.pop("UZAWA_STORE", None)  # they look into a file, or have a server of PostgreSQL of their own
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "soak"))
 
