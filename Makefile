@@ -256,9 +256,9 @@ $(BUILD)/%.so: tests/preload/%.c
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
         bench-size bench-deps peers peers-contact extremes theory roller trade figures numbers collect page-size
-test: deps-test ## build and pass every test
+test: deps-test ## build and pass every test; ONCE=1: but those of the daemon that make asan runs as they are
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
-	@tests/run.sh $(BUILD)
+	@tests/run.sh $(BUILD) "" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
 
 guard: deps-test ## instructions of small problems against those kept in tests/data/guard.json; KEEP=1: keep the new ones
 	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/guard
@@ -304,11 +304,16 @@ sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT
 without_tsan = $(shell grep -L 'not under \(ThreadSanitizer\|sanitizers\)' $(1))
 TSAN_UNIT = $(notdir $(basename $(call without_tsan,$(shell grep -lE 'pthread_create|include "(http|base/log|store|work|core/aside)' $(UNIT_SRC)))))
 TSAN_API  = $(notdir $(basename $(call without_tsan,$(wildcard tests/api/test_*.py))))
-ASAN_RUNS = $(UNIT_SRC) $(shell grep -L 'not under sanitizers' tests/api/test_*.py)
+ASAN_API  = $(shell grep -L 'not under sanitizers' tests/api/test_*.py)
+# Of these, those that do no less there (tests/api/service.py) need not run in the ordinary build as well.
+SAME_IN_ASAN = $(shell grep -LE 'INSTRUMENTED|\<some\$(open)' $(ASAN_API))
+open := (
+# As tests/run.sh names them: KIND/NAME.
+programs = $(foreach test,$(1),$(word 2,$(subst /, ,$(test)))/$(notdir $(basename $(test))))
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
 	$(call sanitized,asan,-fsanitize=address$(comma)undefined -fno-sanitize-recover=all) all unit-bins
-	@tests/run.sh $(BUILD)/asan "unit api" "$(FILTER)" "$(foreach test,$(ASAN_RUNS),$(word 2,$(subst /, ,$(test)))/$(notdir $(basename $(test))))"
+	@tests/run.sh $(BUILD)/asan "unit api" "$(FILTER)" "$(call programs,$(UNIT_SRC) $(ASAN_API))"
 
 ubsan: deps-test ## the C tests under UndefinedBehaviorSanitizer alone
 	$(call sanitized,ubsan,-fsanitize=undefined -fno-sanitize-recover=all) all unit-bins

@@ -44,7 +44,7 @@ run_one() { # KIND NAME COMMAND...
     # Show failures with what led to them; successes stay one line per program.
     if grep -q '^not ok ' "$out"; then cat "$out"; elif [ -z "$filter" ] || grep -q '^ok \|^skip ' "$out"; then
         printf '%-34s %4s passed %4s s %4.0f s of processor\n' "$name" "$(grep -c '^ok ' "$out")" "$SECONDS" \
-            "$(echo "$user + $system" | awk '{print $1 + $3}')"
+            "$(awk "BEGIN {print $user + $system}")"
         grep '^skip ' "$out"
     fi
     cat "$out" >>"$log"
@@ -83,8 +83,11 @@ run_row() {
         if mkdir "$work/$kind.$name" 2>/dev/null; then run_program "$kind" "$name" 3<&-; fi
     done 3<"$work/programs"
 }
+SECONDS=0
 for ((row = 0; row < $(nproc) + 2; row++)); do run_row & done
 wait
+cat "$work"/*.time 2>/dev/null | awk -v cores="$(nproc)" -v wall="$SECONDS" \
+    '{used += $1 + $2} END {printf "%.0f s of processor in %d s on %d cores\n", used, wall, cores}'
 passed=$(grep -c '^ok ' "$log") failed=$(grep -c '^not ok ' "$log") skipped=$(grep -c '^skip ' "$log")
 [ "$skipped" -eq 0 ] || echo "$skipped skipped"
 [ -z "$filter$programs" ] || [ $((passed + failed + skipped)) -gt 0 ] || echo "no test's name contains '${3:-$4}'"
