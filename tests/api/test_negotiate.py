@@ -1,4 +1,5 @@
 """Conditional requests, ranges, content codings and requests from pages of other origins."""
+# not under ThreadSanitizer: about answers, not about threads
 import gzip
 
 import service
