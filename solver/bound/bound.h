@@ -90,9 +90,17 @@ uz_status uz_bound_take_pair(uz_bound_body *body, const uz_scene *scene, int64_t
 void uz_bound_segment_weights(double W[UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS], const uz_bound_body *body,
                               const uz_bound_segment *segment);
 
-/* Of a body that only obstacles hold in some motions: chooses what holds it in the dual problem. pressure: n_nodes,
- * that of the answer on obstacles, 0 elsewhere. body->why where there is too little of it. */
+/* Of a body that only obstacles hold in some motions: chooses what holds it in the dual problem. pressure: n_edges x
+ * moments, what presses on obstacles by all that is known of it, 0 elsewhere. body->why where there is too little. */
 void uz_bound_hold(uz_bound_body *body, const double *pressure);
+/* That of an answer, from its pressure by nodes. out: n_edges x moments. */
+void uz_bound_pressure_at_moments(double *out, const uz_bound_body *body, const double *pressure);
+/* What a pressure, by resultants of an edge's moments, does on displacements at these, along x and y, into the
+ * obstacle: what it does along the normal, which turns, or does not. */
+void uz_bound_acts(double acts[UZ_BOUND_MOMENTS][2], const uz_bound_body *body, int64_t edge,
+                   const double pressure[UZ_BOUND_MOMENTS]);
+/* The work on a motion of such vectors: a polynomial of degree 1 along an edge, which has its moments. */
+double uz_bound_work_on(const uz_bound_body *body, int motion, int64_t edge, double at[UZ_BOUND_MOMENTS][2]);
 /* Which of the pressed moments an edge's a-th along the normal is; -1: none. */
 int uz_bound_pressed(const uz_bound_body *body, int64_t edge, int a);
 /* The mean along n of a motion over an edge with the a-th weight. */
@@ -190,6 +198,7 @@ typedef struct {
     double *lifted;   /* n_nodes x 2: u_h with what takes its nodes out of the obstacle */
     double *pressure; /* n_edges x moments: r_h, as resultants */
     double *local;    /* n_elements: what each has of the gap; of what presses that at its side, where it is no less */
+    bool pulls;       /* ... that what was chosen to hold the body would have to pull (uz_bound_hold) */
     char fault[160];  /* what is wrong, a clause: nothing is proved; "" */
 } uz_bound_check_result;
 

@@ -38,8 +38,10 @@
 
 enum { STRESSES = UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 };
 
+static uz_status examine_edges(examination *x, const double *u, const int64_t *dof, uz_error *err);
 static void examine_edge(examination *x, const double *u, const int64_t *dof, int64_t i);
 static void examine_springs(examination *x, const double *u, int64_t i, int k);
+static bool holds_turning(const uz_bound_body *body, int64_t i);
 static void settle_motions(examination *x, const double *u, const int64_t *dof);
 static void lift_on(examination *x, const double *u);
 static void look_at_lift(examination *x, const double *u, int64_t i);
@@ -83,10 +85,7 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         out->dual = -x.complementary - x.own_margin;
         out->gap = x.margin + x.own_margin + UZ_SUM_ROUNDING * x.scale;
         const double rounding = out->gap;
-        for (int64_t i = 0; i < body->n_edges; i++)
-            examine_edge(&x, u, dof, i);
-        settle_motions(&x, u, dof);
-        const uz_status pairs = uz_press_masters(&x, u, dof, err);
+        const uz_status pairs = examine_edges(&x, u, dof, err);
         uz_take_pairs_apart(&x, u);
         for (int64_t i = 0; i < 2 * mesh->n_nodes && lift; i++)
             x.lift[i] += lift[i];
@@ -104,8 +103,11 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
         for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
             out->lifted[i] = u[i] + x.lift[i];
         double lifted = 0, margin = 0, strain = x.strain;
-        for (int64_t e = 0; e < mesh->n_elements; e++)
-            lifted += 2 * uz_energy_of(&margin, &x, x.lift, false, e);
+        for (int64_t e = 0; e < mesh->n_elements; e++) {
+            const double own = uz_energy_of(&margin, &x, x.lift, false, e);
+            lifted += 2 * own;
+            out->local[e] += own;
+        }
         lifted += 2 * uz_spring_energy(&x, x.lift);
         const double by_nodes = sqrt(lifted + 2 * margin);
         out->lift = by_nodes + sqrt(x.bulge);
@@ -421,7 +423,6 @@ void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, c
 {
     const uz_bound_edge *edge = &x->body->edge[i];
     double *pressure = x->pressure + i * x->moments, share[2], turned[UZ_BOUND_MOMENTS][2] = {{0}};
-    uz_less_load(x->resultant, x, edge, i);
     if (edge->turns)
         uz_examine_turning(turned, x, u, i);
     for (int a = 0; a < x->moments; a++) {
@@ -433,7 +434,7 @@ void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, c
                       axis[k][1] * x->resultant[(i * x->moments + a) * 2 + 1];
             share[k] = normal[0] * axis[k][0] + normal[1] * axis[k][1];
         }
-        const bool pressed = uz_bound_pressed(x->body, i, a) >= 0;
+        const bool pressed = !edge->turns && uz_bound_pressed(x->body, i, a) >= 0;
         if (pressed)
             pressure[a] = -acts[0];
         else if ((edge->contact >= 0 || edge->facing == UZ_BOUND_SLAVE) && !edge->held[0] &&
@@ -465,11 +466,12 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
             if (edge->held[k]) {
                 out->dual -= missing[a][k] * edge->value[k];
                 x->scale += fabs(missing[a][k] * edge->value[k]);
-            } else if (at >= 0) {
+            } else if (at >= 0 || (k == 0 && uz_bound_pressed(x->body, i, a) >= 0)) {
                 uz_along_edge(b, u, edge->node, axis[k]);
                 uz_edge_means(m, b, x->moments);
                 out->defect += missing[a][k] * m[a];
-                out->residual[at] = missing[a][k];
+                if (at >= 0)
+                    out->residual[at] = missing[a][k];
             }
         }
         if (edge->contact >= 0 && !edge->turns) {
@@ -493,27 +495,52 @@ static void examine_edge(examination *x, const double *u, const int64_t *dof, in
         examine_contact(x, u, edge, pressure);
 }
 
-/* What is missing of equilibrium does no work on motions that nothing but the obstacle holds: the pressures that hold
- * them are what they have to be for that, exactly. A displacement less the motion that it has at these moments has none
- * there, so that the norm of K^-1, with these held, is one over all displacements. */
-static void settle_motions(examination *x, const double *u, const int64_t *dof)
+/* Before a round obstacle, or corners, what is not along the normal depends on what presses: such edges come after it
+ * is settled. */
+static bool holds_turning(const uz_bound_body *body, int64_t i)
+{
+    bool holds = false;
+    for (int a = 0; a <= body->degree && body->edge[i].turns; a++)
+        holds = holds || uz_bound_pressed(body, i, a) >= 0;
+    return holds;
+}
+
+/* Rows of A by motions: what presses at the moments that hold them does on them, by columns, and last what is missing
+ * of that. */
+static void find_missing(double A[UZ_BOUND_LOOSE][UZ_BOUND_LOOSE + 1], examination *x, const int64_t *dof)
 {
     const uz_bound_body *body = x->body;
-    const int n = body->n_loose;
-    double A[UZ_BOUND_LOOSE][UZ_BOUND_LOOSE + 1] = {{0}};
-    for (int k = 0; k < n; k++)
-        for (int64_t i = 0; i < body->n_edges; i++)
-            for (int a = 0; a < x->moments; a++) {
-                double axis[2][2];
-                uz_bound_axes(axis, body, i, a);
-                for (int c = 0; c < 2; c++) {
-                    const int64_t at = dof[(i * x->moments + a) * 2 + c];
-                    A[k][n] -= at < 0 ? 0 : x->out->residual[at] * uz_bound_moved(body, k, i, a, axis[c]);
-                }
-                const int held = uz_bound_pressed(body, i, a);
-                if (held >= 0)
-                    A[k][held] = uz_bound_moved(body, k, i, a, uz_bound_line(body, &body->edge[i])->normal);
+    for (int64_t i = 0; i < body->n_edges; i++)
+        for (int a = 0; a < x->moments; a++) {
+            double axis[2][2];
+            uz_bound_axes(axis, body, i, a);
+            for (int c = 0; c < 2; c++) {
+                const int64_t at = dof[(i * x->moments + a) * 2 + c];
+                for (int k = 0; k < body->n_loose && at >= 0; k++)
+                    A[k][body->n_loose] -= x->out->residual[at] * uz_bound_moved(body, k, i, a, axis[c]);
             }
+        }
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        double missing[UZ_BOUND_MOMENTS][2];
+        if (!holds_turning(body, i))
+            continue;
+        uz_missing_before(missing, x, i);
+        for (int k = 0; k < body->n_loose; k++)
+            A[k][body->n_loose] -= uz_bound_work_on(body, k, i, missing);
+    }
+    for (int held = 0; held < body->n_pressed; held++) {
+        const int64_t i = body->pressed[held] / x->moments;
+        double acts[UZ_BOUND_MOMENTS][2], one[UZ_BOUND_MOMENTS] = {0};
+        one[body->pressed[held] % x->moments] = 1;
+        uz_bound_acts(acts, body, i, one);
+        for (int k = 0; k < body->n_loose; k++)
+            A[k][held] = uz_bound_work_on(body, k, i, acts);
+    }
+}
+
+/* A of n rows by its last column, by Gauss's elimination: out, n. */
+static void solve_small(double out[UZ_BOUND_LOOSE], double A[UZ_BOUND_LOOSE][UZ_BOUND_LOOSE + 1], int n)
+{
     for (int k = 0; k < n; k++) {
         int best = k;
         for (int i = k + 1; i < n; i++)
@@ -527,12 +554,45 @@ static void settle_motions(examination *x, const double *u, const int64_t *dof)
             for (int j = n; j >= k && i != k; j--)
                 A[i][j] -= A[i][k] / A[k][k] * A[k][j];
     }
-    for (int k = 0; k < n; k++) {
+    for (int k = 0; k < n; k++)
+        out[k] = A[k][n] / A[k][k];
+}
+
+static uz_status examine_edges(examination *x, const double *u, const int64_t *dof, uz_error *err)
+{
+    const uz_bound_body *body = x->body;
+    for (int64_t i = 0; i < body->n_edges; i++)
+        uz_less_load(x->resultant, x, &body->edge[i], i);
+    for (int64_t i = 0; i < body->n_edges; i++)
+        if (!holds_turning(body, i))
+            examine_edge(x, u, dof, i);
+    const uz_status status = uz_press_masters(x, u, dof, err);
+    settle_motions(x, u, dof);
+    for (int64_t i = 0; i < body->n_edges; i++)
+        if (holds_turning(body, i))
+            examine_edge(x, u, dof, i);
+    return status;
+}
+
+/* What is missing of equilibrium does no work on motions that nothing but the obstacle holds: the pressures that hold
+ * them are what they have to be for that, exactly. A displacement less the motion that it has at these moments has none
+ * there, so that the norm of K^-1, with these held, is one over all displacements. */
+static void settle_motions(examination *x, const double *u, const int64_t *dof)
+{
+    const uz_bound_body *body = x->body;
+    double A[UZ_BOUND_LOOSE][UZ_BOUND_LOOSE + 1] = {{0}};
+    if (body->n_loose == 0)
+        return;
+    find_missing(A, x, dof);
+    solve_small(x->settled, A, body->n_loose);
+    for (int k = 0; k < body->n_loose; k++) {
         const int64_t i = body->pressed[k] / x->moments;
         const int a = (int)(body->pressed[k] % x->moments);
         const uz_bound_edge *edge = &body->edge[i];
-        const double missing = A[k][n] / A[k][k];
+        const double missing = x->settled[k];
         double b[3], moved[UZ_BOUND_MOMENTS], none[2], *pressure = &x->pressure[body->pressed[k]];
+        if (edge->turns)
+            continue;
         const double gap = uz_bound_gap(none, body, i, (a + 1.) / (x->moments + 1));
         uz_along_edge(b, u, edge->node, uz_bound_line(body, edge)->normal);
         uz_edge_means(moved, b, x->moments);
@@ -540,9 +600,15 @@ static void settle_motions(examination *x, const double *u, const int64_t *dof)
         x->out->dual += missing * gap;
         x->out->defect += missing * moved[a];
         x->out->gap -= missing * (gap - moved[a]);
-        if (!*x->out->fault && !(*pressure >= 0))
-            snprintf(x->out->fault, sizeof x->out->fault, "the obstacle would have to pull at an edge that it holds");
+        uz_look_at_holding(x, *pressure);
     }
+}
+
+void uz_look_at_holding(examination *x, double pressure)
+{
+    x->out->pulls = x->out->pulls || !(pressure >= 0);
+    if (!*x->out->fault && x->out->pulls)
+        snprintf(x->out->fault, sizeof x->out->fault, "the obstacle would have to pull at an edge that it holds");
 }
 
 /* ---- in an element */

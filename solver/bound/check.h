@@ -25,6 +25,7 @@ typedef struct {
     /* Of bulges, the part of w that is zero at all nodes: square of their norm, the gap of their elements, and the work
      * that the tractions do on them. */
     double bulge, bulged, bulge_work;
+    double settled[UZ_BOUND_LOOSE]; /* what is taken off the pressures that hold motions, for equilibrium */
     const double *limit; /* n_edges x moments: what presses may pull as well, by so much at most; NULL: it may not, and
                           * presses by what it likes */
 } examination;
@@ -58,9 +59,14 @@ void uz_triangle_slopes(double slope[3][2], double corner[3][2]);
 
 /* An element's part of the sums, and the resultants of its tractions. */
 void uz_examine_element(examination *x, const double *u, const double *stress, int64_t e);
-/* The resultants less the edge's load, its pressure, and what is missing of equilibrium, by the axes of its moments: of
- * supports minus what they do. Springs take whatever acts: nothing is missing there. */
+/* Of the resultants, which are less the edge's load (uz_less_load): its pressure, and what is missing of equilibrium,
+ * by the axes of its moments: of supports minus what they do. Springs take whatever acts: nothing is missing there. */
 void uz_examine_tractions(double missing[UZ_BOUND_MOMENTS][2], examination *x, const double *u, int64_t i);
+/* What presses at a moment that holds a motion has to be >= 0, else there is a fault. */
+void uz_look_at_holding(examination *x, double pressure);
+/* Of an edge that holds motions and whose normal turns, until they are settled: what is missing at its moments, along x
+ * and y, if it presses by what the stress has there. */
+void uz_missing_before(double missing[UZ_BOUND_MOMENTS][2], const examination *x, int64_t edge);
 /* The part of a pressure that may be there. */
 double uz_admit_pressure(const examination *x, int64_t moment, double pressure);
 /* int sigma : expansion over a part, from the values at its points. */

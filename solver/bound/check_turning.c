@@ -201,6 +201,38 @@ static double press(double sum[2], double off[2], const uz_bound_edge *edge, con
     return pressure;
 }
 
+/* What presses, as coefficients r, off the normal: the polynomial that has its moments along the edge -> coefficients,
+ * as r. */
+static void project_turned(double coefficient[MOMENTS][2], const uz_bound_body *body, const double r[MOMENTS],
+                           int64_t i)
+{
+    const uz_bound_edge *edge = &body->edge[i];
+    const int moments = body->degree + 1;
+    double integral[MOMENTS][2] = {{0}}, sum[2], off[2], phi[MOMENTS], n[2];
+    for (points p = begin_points(edge); next_point(&p, body, edge);) {
+        uz_bound_piece_gap(n, body, i, p.piece, p.q);
+        uz_bound_bernstein(phi, moments, p.q);
+        press(sum, off, edge, r, phi, moments, n);
+        for (int a = 0; a < 2 * moments; a++)
+            integral[a / 2][a % 2] += p.w * phi[a / 2] * off[a % 2];
+    }
+    for (int a = 0; a < moments; a++)
+        for (int c = 0; c < 2; c++) {
+            coefficient[a][c] = 0;
+            for (int k = 0; k < moments; k++)
+                coefficient[a][c] += uz_bound_product_inverse[moments - 2][a][k] * integral[k][c];
+        }
+}
+
+/* The pressure at a moment, as the stress has it: what holds motions less what settles them. */
+static double pressure_of(const examination *x, int64_t i, int a)
+{
+    const double *acts = x->resultant + (i * x->moments + a) * 2, *n = x->body->edge[i].along[a];
+    const int held = uz_bound_pressed(x->body, i, a);
+    const double p = -(acts[0] * n[0] + acts[1] * n[1]);
+    return held >= 0 ? p - x->settled[held] : uz_admit_pressure(x, i * x->moments + a, p);
+}
+
 /* What presses on an edge: its work on the gap, and what of it is not along the normal. */
 static void examine_pressure(double turned[MOMENTS][2], examination *x, const double *u, int64_t i)
 {
@@ -208,17 +240,17 @@ static void examine_pressure(double turned[MOMENTS][2], examination *x, const do
     const int moments = x->moments;
     const double thickness = x->body->depth;
     double r[MOMENTS], sum[2], off[2], along[2][3], phi[MOMENTS], n[2];
-    double integral[MOMENTS][2] = {{0}}, coefficient[MOMENTS][2] = {{0}}, gap = 0, left = 0;
+    double coefficient[MOMENTS][2], gap = 0, left = 0;
     const double *from = x->mesh->xyz + 2 * edge->node[0], *to = x->mesh->xyz + 2 * edge->node[1];
     const double length = hypot(to[0] - from[0], to[1] - from[1]);
     const points begin = begin_points(edge);
     for (int c = 0; c < 2; c++)
         uz_along_edge(along[c], u, edge->node, (const double[2]){c == 0, c == 1});
     for (int a = 0; a < moments; a++) {
-        const double *acts = x->resultant + (i * moments + a) * 2;
-        x->pressure[i * moments + a] =
-            uz_admit_pressure(x, i * moments + a, -(acts[0] * edge->along[a][0] + acts[1] * edge->along[a][1]));
+        x->pressure[i * moments + a] = pressure_of(x, i, a);
         r[a] = x->pressure[i * moments + a] * moments / (length * thickness);
+        if (uz_bound_pressed(x->body, i, a) >= 0)
+            uz_look_at_holding(x, r[a]);
     }
     for (points p = begin; next_point(&p, x->body, edge);) {
         const double h = uz_bound_piece_gap(n, x->body, i, p.piece, p.q);
@@ -228,16 +260,11 @@ static void examine_pressure(double turned[MOMENTS][2], examination *x, const do
         gap += force * (h - moved);
         x->out->dual -= force * h;
         x->scale += force * (fabs(h) + fabs(moved));
-        for (int a = 0; a < 2 * moments; a++)
-            integral[a / 2][a % 2] += p.w * phi[a / 2] * off[a % 2];
     }
     uz_add_contact_gap(x, edge, gap);
-    for (int a = 0; a < moments; a++)
-        for (int c = 0; c < 2; c++) {
-            for (int k = 0; k < moments; k++)
-                coefficient[a][c] += uz_bound_product_inverse[moments - 2][a][k] * integral[k][c];
-            turned[a][c] = coefficient[a][c] * length * thickness / moments;
-        }
+    project_turned(coefficient, x->body, r, i);
+    for (int a = 0; a < 2 * moments; a++)
+        turned[a / 2][a % 2] = coefficient[a / 2][a % 2] * length * thickness / moments;
     for (points p = begin; next_point(&p, x->body, edge);) {
         uz_bound_piece_gap(n, x->body, i, p.piece, p.q);
         uz_bound_bernstein(phi, moments, p.q);
@@ -250,6 +277,28 @@ static void examine_pressure(double turned[MOMENTS][2], examination *x, const do
         }
     }
     uz_count_turning(x, edge, left);
+}
+
+void uz_bound_acts(double acts[MOMENTS][2], const uz_bound_body *body, int64_t i, const double pressure[MOMENTS])
+{
+    double turned[MOMENTS][2] = {{0}}, normal[2];
+    if (body->edge[i].turns)
+        project_turned(turned, body, pressure, i);
+    for (int a = 0; a <= body->degree; a++) {
+        uz_bound_normal(normal, body, i, a);
+        for (int c = 0; c < 2; c++)
+            acts[a][c] = pressure[a] * normal[c] - turned[a][c];
+    }
+}
+
+void uz_missing_before(double missing[MOMENTS][2], const examination *x, int64_t i)
+{
+    double pressure[MOMENTS] = {0};
+    for (int a = 0; a < x->moments; a++)
+        pressure[a] = pressure_of(x, i, a);
+    uz_bound_acts(missing, x->body, i, pressure);
+    for (int a = 0; a < 2 * x->moments; a++)
+        missing[a / 2][a % 2] = -missing[a / 2][a % 2] - x->resultant[2 * i * x->moments + a];
 }
 
 void uz_count_turning(examination *x, const uz_bound_edge *edge, double left)
@@ -451,8 +500,10 @@ void uz_look_at_turning(examination *x, const double *u, int64_t i)
     if (!(b.by > 0))
         return;
     const double shape[3] = {0, 2 * b.by, 0}, d[2] = {-b.by * b.n[0], -b.by * b.n[1]};
-    x->bulge += bulge_energy(x, edge, d);
+    const double bulged = bulge_energy(x, edge, d);
+    x->bulge += bulged;
     x->bulged += x->gap[edge->element[0]];
+    x->out->local[edge->element[0]] += bulged / 2;
     uz_edge_means(m, shape, x->moments);
     for (int a = 0; a < x->moments; a++)
         for (int c = 0; c < 2; c++)

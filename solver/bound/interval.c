@@ -428,6 +428,7 @@ static void weigh_edges(weighing *y, uz_bound_interval *out, const int64_t *dof)
     for (int64_t i = 0; i < y->body->n_edges; i++) {
         const uz_bound_edge *edge = &y->body->edge[i];
         double missing[MOMENTS][2], b[3], m[MOMENTS];
+        uz_less_load(x->resultant, x, &x->body->edge[i], i);
         uz_examine_tractions(missing, x, y->pair->w, i);
         for (int a = 0; a < x->moments; a++) {
             double axis[2][2], term;

@@ -97,22 +97,23 @@ static uz_status list_round(uz_closer *out, int64_t *n, int64_t *count, const uz
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld elements", (long long)n_elements);
 }
 
-/* Has it the nodes of the answer's mesh, and its new ones amid these, so that the two have all sides in common? New
- * ones may have been moved onto what facets stand for. */
+/* Has it the nodes of the answer's mesh? */
 static bool is_within(const uz_mesh *mesh, const uz_mesh *own)
 {
-    bool within = memcmp(mesh->xyz, own->xyz, (size_t)(2 * own->n_nodes) * sizeof *mesh->xyz) == 0;
-    for (int64_t i = own->n_nodes; i < mesh->n_nodes; i++)
-        for (int c = 0; c < 2; c++)
-            within = within &&
-                     fabs(mesh->xyz[2 * i + c] - uz_mesh_value_amid(mesh, i, mesh->xyz + c, 2)) <= AMID * mesh->extent;
-    return within;
+    return memcmp(mesh->xyz, own->xyz, (size_t)(2 * own->n_nodes) * sizeof *mesh->xyz) == 0;
 }
 
-/* The middle of what parts a quadrilateral is that of its map, which need not be amid its ends: what the answer is
- * within elements that are cut is taken for nothing, and nodes on their sides stay where they are, but for rounding. */
+/* The two meshes have all sides in common: new nodes are amid those of the answer's, also where refinement has moved
+ * them onto what facets stand for. The middle of what parts a quadrilateral is that of its map, which need not be amid
+ * its ends: what the answer is within elements that are cut is taken for nothing. */
 static void straighten(uz_mesh *mesh, int64_t n_nodes)
 {
+    for (int64_t i = n_nodes; i < mesh->n_nodes; i++)
+        for (int c = 0; c < 2; c++) {
+            const double amid = uz_mesh_value_amid(mesh, i, mesh->xyz + c, 2);
+            if (fabs(mesh->xyz[2 * i + c] - amid) > AMID * mesh->extent)
+                mesh->xyz[2 * i + c] = amid;
+        }
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);

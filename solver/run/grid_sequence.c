@@ -214,9 +214,12 @@ static void choose_next(grid *next, search *g)
     const int count = g->sequence.count;
     bool in_vain = false;
     if (g->refines) {
-        /* at best the error falls with the order of the elements, as it does once all of the mesh is fine enough */
-        const uz_tried *last = &g->tried[count - 1];
-        const double wanted = g->tried_dofs * pow(last->error / g->requested, (double)g->sequence.dim / g->order);
+        /* at best the error falls with the order of the elements, as it does once all of the mesh is fine enough: from
+         * the best grid, as a bound may be wide for what a few elements add to it */
+        double wanted = INFINITY;
+        for (int k = 0; k < count; k++)
+            wanted = fmin(wanted, (double)g->sequence.level[k].d *
+                                      pow(g->tried[k].error / g->requested, (double)g->sequence.dim / g->order));
         in_vain = next->n_bisected == g->n_bisected;
         next->n_bisected = g->n_bisected;
         g->stop = count == UZ_GRID_LEVELS || in_vain || (count > 2 && wanted > 2 * MOST_DOFS) ? STOP_GRID : STOP_NOT;

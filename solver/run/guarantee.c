@@ -17,6 +17,10 @@
 #define NARROW 1.5
 /* An obstacle that is off a line by less, of the largest displacement, is one. */
 #define SEEN 1e-2
+/* So often what holds a body that only obstacles hold is chosen anew; and what its answer presses by beside a stress.
+ */
+enum { MOST_CHOICES = 10 };
+#define BY_ANSWER 0.01
 
 uz_settings uz_guarantee_settings(const uz_guaranteed *g, double now)
 {
@@ -64,20 +68,46 @@ uz_status uz_measure_residual(double *norm, const uz_guaranteed *g, double *resi
     return status;
 }
 
-/* A body that only obstacles hold, where its answer presses on them. */
-static uz_status hold(uz_guaranteed *g, const uz_result *result, uz_error *err)
+/* How hard an answer presses at its nodes, 0 elsewhere; NULL: no memory. */
+static double *press_at_nodes(const uz_result *result)
 {
     const uz_mesh_info *mesh = &result->mesh;
     double *pressure = uz_alloc_zero(result->n_nodes, sizeof *pressure);
-    if (!pressure)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld nodes", (long long)result->n_nodes);
-    for (int64_t i = 0; i < result->m; i++)
+    for (int64_t i = 0; i < result->m && pressure; i++)
         if (mesh->contact_area[i] > 0)
             pressure[mesh->contact_node[i]] =
                 fmax(pressure[mesh->contact_node[i]], -result->r[i] / mesh->contact_area[i]);
-    uz_bound_hold(&g->body, pressure);
-    free(pressure);
+    return pressure;
+}
+
+/* A body that only obstacles hold, where its answer presses on them: pressure by nodes, NULL if there was no memory for
+ * it. */
+static uz_status hold(uz_guaranteed *g, const double *pressure, uz_error *err)
+{
+    free(g->pressing);
+    g->pressing = uz_alloc(g->body.n_edges * (g->body.degree + 1), sizeof *g->pressing);
+    if (!g->pressing || !pressure)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld edges", (long long)g->body.n_edges);
+    uz_bound_pressure_at_moments(g->pressing, &g->body, pressure);
+    uz_bound_hold(&g->body, g->pressing);
     return UZ_OK;
+}
+
+/* Anew, where what was chosen would have to pull: the moment that would most is not chosen again, and others by what
+ * presses in the stress, resultants, or does so in the answer, which counts less. */
+static void hold_elsewhere(uz_guaranteed *g, double *resultant)
+{
+    uz_bound_body *body = &g->body;
+    const int moments = body->degree + 1;
+    int64_t worst = body->pressed[0];
+    for (int k = 1; k < body->n_pressed; k++)
+        worst = resultant[body->pressed[k]] < resultant[worst] ? body->pressed[k] : worst;
+    g->pressing[worst] = NAN;
+    for (int64_t i = 0; i < body->n_edges * moments; i++) {
+        const double p = fmax(resultant[i] / uz_bound_measure(body, i / moments), BY_ANSWER * g->pressing[i]);
+        resultant[i] = isnan(g->pressing[i]) ? 0 : p;
+    }
+    uz_bound_hold(body, resultant);
 }
 
 /* With what takes the answer out of obstacles, and without it, as the check finds something by itself, too: what proves
@@ -150,12 +180,41 @@ static uz_status make_stress(uz_guaranteed *g, bool *solved, uz_guarantee *out, 
     return status;
 }
 
+/* The same of a body that only obstacles hold, which may be held elsewhere then. */
+static uz_status make_held_stress(uz_guaranteed *g, bool *solved, uz_guarantee *out, const uz_scene *scene,
+                                  const double *u, uz_error *err)
+{
+    bool pulls = g->body.n_loose > 0;
+    uz_status status = make_stress(g, solved, out, err);
+    for (int again = 0; again < MOST_CHOICES && pulls && *solved && status == UZ_OK; again++) {
+        uz_bound_check_result found;
+        status = uz_bound_check(&found, &g->body, scene, g->dof, g->qp.K.cols, u, NULL, g->stress, err);
+        pulls = status == UZ_OK && found.pulls;
+        if (pulls)
+            hold_elsewhere(g, found.pressure);
+        uz_bound_check_clear(&found);
+        *solved = !*g->body.why;
+        if (!pulls || !*solved)
+            break;
+        uz_qp_clear(&g->qp);
+        free(g->dof);
+        free(g->stress);
+        g->dof = NULL;
+        g->stress = NULL;
+        status = make_stress(g, solved, out, err);
+    }
+    if (*g->body.why)
+        snprintf(out->why, sizeof out->why, "%s", g->body.why);
+    return status;
+}
+
 static void clear(uz_guaranteed *g)
 {
     uz_bound_body_clear(&g->body);
     uz_qp_clear(&g->qp);
     free(g->dof);
     free(g->stress);
+    free(g->pressing);
     free(g->lift);
     free(g->cheap);
     free(g->carried[0]);
@@ -227,6 +286,16 @@ static void take_better(uz_guarantee *out, const uz_guaranteed *g, double bound)
     out->proved = true;
 }
 
+static uz_status hold_closer(uz_guaranteed *closer, const uz_closer *mesh, const uz_result *result, uz_error *err)
+{
+    double *own = press_at_nodes(result),
+           *finer = own ? uz_closer_carry(&mesh->model.mesh, own, result->n_nodes, 1) : NULL;
+    const uz_status status = hold(closer, finer, err);
+    free(own);
+    free(finer);
+    return status;
+}
+
 /* On a mesh that is finer where the answer presses (closer.c). *narrow: is little of the bound of what takes the answer
  * out of obstacles, and of how far that stands off them? */
 static uz_status prove_closer(uz_guarantee *out, bool *narrow, const uz_result *result, const uz_guaranteed *g,
@@ -244,8 +313,10 @@ static uz_status prove_closer(uz_guarantee *out, bool *narrow, const uz_result *
     const double *own[] = {g->lift, g->cheap};
     for (int k = 0; k < 2 && status == UZ_OK && any; k++)
         closer.carried[k] = own[k] ? uz_closer_carry(&mesh.model.mesh, own[k], g->body.model->mesh.n_nodes, 2) : NULL;
+    if (status == UZ_OK && any && !*closer.body.why && closer.body.n_loose > 0)
+        status = hold_closer(&closer, &mesh, result, err);
     if (status == UZ_OK && any && !*closer.body.why)
-        status = make_stress(&closer, &solved, &other, err);
+        status = make_held_stress(&closer, &solved, &other, &mesh.problem.scene, mesh.u, err);
     if (status == UZ_OK && solved)
         status = prove_on(&closer, g, &mesh, scene, result->u, err);
     const uz_bound_check_result *c = &closer.checked;
@@ -285,7 +356,7 @@ static bool wants_closer(const uz_guaranteed *g, const double *u)
         off = fmax(off, bent(&g->body, i));
     for (int64_t i = 0; i < 2 * g->body.model->mesh.n_nodes; i++)
         farthest = fmax(farthest, fabs(u[i]));
-    return g->body.n_loose == 0 && (g->body.n_segments > 0 || off > SEEN * farthest);
+    return g->body.n_segments > 0 || off > SEEN * farthest;
 }
 
 /* -> summary.guarantee, but for its time and reasons that are errors. */
@@ -300,8 +371,11 @@ static uz_status prove(uz_result *result, uz_guaranteed *g, const uz_body_model 
         if (scene->contacts[k].kind != UZ_OBSTACLE_PLANE)
             snprintf(g->body.why, sizeof g->body.why,
                      "gaps of the answer are those where the body has gone; they are proved with fixed kinematics");
-    if (status == UZ_OK && g->body.n_loose > 0)
-        status = hold(g, result, err);
+    if (status == UZ_OK && g->body.n_loose > 0 && !*g->body.why) {
+        double *pressure = press_at_nodes(result);
+        status = hold(g, pressure, err);
+        free(pressure);
+    }
     if (status != UZ_OK || *g->body.why) {
         snprintf(out->why, sizeof out->why, "%s", g->body.why);
         return status;
@@ -311,7 +385,7 @@ static uz_status prove(uz_result *result, uz_guaranteed *g, const uz_body_model 
     if (status == UZ_OK && closer && alone)
         status = prove_closer(out, &narrow, result, g, scene, err);
     if (status == UZ_OK && !narrow)
-        status = make_stress(g, &solved, out, err);
+        status = make_held_stress(g, &solved, out, scene, result->u, err);
     if (status != UZ_OK || !solved)
         return status;
     status = check(g, result->u, scene, err);

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "post/functional.h"
 #include "run/setup_cache.h"
+#include "semicoercive/augment.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -27,6 +28,9 @@ enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 5 };
 
 /* What takes an answer out of an obstacle goes a little farther than it stands in there, at points. */
 #define DEEPER 1.02
+
+/* Motions have a largest entry of 1: what a row tells of one is no less. */
+#define LEAST_TOLD 0.02
 
 /* Before an obstacle what is no wider open, of the widest, is closed: rounding. */
 #define CLOSED 1e-10
@@ -56,6 +60,12 @@ typedef struct {
     const uz_csc *nodal; /* all of nodes */
     uz_csc N;            /* as they are; empty where all are */
     bool any;            /* coefficients */
+    /* Of a body that only obstacles hold, which has no setup: its model, and a K that is regular by the stiffness of
+     * `pinned` rows, which tell its motions apart and press. */
+    uz_body_model held;
+    uz_problem regular;
+    int64_t pinned[UZ_BOUND_LOOSE];
+    int n_pinned;
 } contact_rows;
 
 typedef struct {
@@ -153,7 +163,23 @@ static void end_contact_rows(contact_rows *x, uz_cache *cache)
     uz_csc_clear(&x->N);
     free(x->row);
     free(x->ends);
+    uz_augmented_clear(&x->regular);
+    uz_body_model_clear(&x->held);
     uz_setup_release(cache, x->setup);
+}
+
+static uz_status take_rows(contact_rows *x, const uz_candidates *some, const uz_bound_body *body, uz_error *err)
+{
+    x->m = x->nodal->rows;
+    x->row = uz_alloc(x->m, sizeof *x->row);
+    x->ends = uz_alloc(2 * x->m, sizeof *x->ends);
+    if (!x->row || !x->ends)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)x->m);
+    for (int64_t i = 0, k = 0; i < x->model->m; i++)
+        if (!some || some->in[i])
+            x->row[k++] = i;
+    const uz_status status = find_coefficients(x, body, err);
+    return status == UZ_OK && x->any ? make_coefficients(x, x->nodal, err) : status;
 }
 
 static uz_status begin_contact_rows(contact_rows *x, const uz_guaranteed *g, uz_error *err)
@@ -164,20 +190,9 @@ static uz_status begin_contact_rows(contact_rows *x, const uz_guaranteed *g, uz_
     uz_status status = uz_setup_acquire(&x->setup, &reused, g->cache, &problem, NULL, g->settings, &g->hooks, err);
     if (status != UZ_OK)
         return status;
-    const uz_csc *N = uz_setup_N(x->setup, &problem);
-    const uz_candidates *some = x->setup->rows.in ? &x->setup->rows : NULL;
+    x->nodal = uz_setup_N(x->setup, &problem);
     x->model = &x->setup->model;
-    x->nodal = N;
-    x->m = N->rows;
-    x->row = uz_alloc(x->m, sizeof *x->row);
-    x->ends = uz_alloc(2 * x->m, sizeof *x->ends);
-    if (!x->row || !x->ends)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)x->m);
-    for (int64_t i = 0, k = 0; i < x->model->m; i++)
-        if (!some || some->in[i])
-            x->row[k++] = i;
-    status = find_coefficients(x, &g->body, err);
-    return status == UZ_OK && x->any ? make_coefficients(x, N, err) : status;
+    return take_rows(x, x->setup->rows.in ? &x->setup->rows : NULL, &g->body, err);
 }
 
 static uz_status begin_rows(rows_problem *x, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
@@ -208,14 +223,92 @@ static uz_status begin_rows(rows_problem *x, const uz_problem *problem, const uz
                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld unknowns", (long long)x->d);
 }
 
+/* The rows that hold a loose body, those that press hardest and tell its motions apart, as of edges (bound/loose.c).
+ * pressing: m. Are there as many as motions? */
+static bool pin(contact_rows *x, const uz_csc *Nt, const double *pressing)
+{
+    const uz_body_model *model = x->model;
+    double chosen[UZ_BOUND_LOOSE][UZ_BOUND_LOOSE];
+    for (x->n_pinned = 0; x->n_pinned < model->n_modes; x->n_pinned++) {
+        double best = 0, by[UZ_BOUND_LOOSE], *of = chosen[x->n_pinned];
+        for (int64_t i = 0; i < x->m; i++) {
+            double size = 0;
+            for (int k = 0; k < model->n_modes && pressing[i] > 0; k++) {
+                by[k] = 0;
+                for (int64_t q = Nt->ptr[i]; q < Nt->ptr[i + 1]; q++)
+                    by[k] += Nt->val[q] * model->modes[k * model->d + Nt->idx[q]];
+            }
+            for (int j = 0; j < x->n_pinned && pressing[i] > 0; j++) {
+                double along = 0;
+                for (int k = 0; k < model->n_modes; k++)
+                    along += by[k] * chosen[j][k];
+                for (int k = 0; k < model->n_modes; k++)
+                    by[k] -= along * chosen[j][k];
+            }
+            for (int k = 0; k < model->n_modes && pressing[i] > 0; k++)
+                size += by[k] * by[k];
+            if (sqrt(size) > LEAST_TOLD && sqrt(pressing[i] * size) > best) {
+                best = sqrt(pressing[i] * size);
+                x->pinned[x->n_pinned] = i;
+                for (int k = 0; k < model->n_modes; k++)
+                    of[k] = by[k] / sqrt(size);
+            }
+        }
+        if (!(best > 0))
+            return false;
+    }
+    return true;
+}
+
+static void look_at_row(double *r, double *gap, const contact_rows *own, const uz_standing *answer, int64_t row);
+
+/* The same of a body that only obstacles hold. *any: its K could be made regular. */
+static uz_status begin_held_rows(contact_rows *x, bool *any, const uz_guaranteed *g, const uz_standing *answer,
+                                 uz_error *err)
+{
+    uz_csc Nt = {0};
+    double *room = NULL, *weight, none;
+    *any = false;
+    uz_status status = uz_body_model_build(&x->held, &g->problem->scene, UZ_BODY_HELD, err);
+    x->model = &x->held;
+    x->nodal = &x->held.N;
+    if (status == UZ_OK)
+        status = take_rows(x, NULL, &g->body, err);
+    const uz_csc *N = x->any ? &x->N : x->nodal;
+    const int64_t d = x->held.d;
+    if (status == UZ_OK)
+        status = uz_csc_transpose(&Nt, N, err);
+    if (status == UZ_OK && !(room = uz_alloc_zero(2 * d + 3 * x->m, sizeof *room)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)x->m);
+    if (status == UZ_OK) {
+        double *stiffness = room + 2 * d, *pressing = stiffness + x->m;
+        weight = pressing + x->m;
+        for (int64_t k = 0; k < x->m; k++) {
+            look_at_row(&pressing[k], &none, x, answer, x->row[k]);
+            pressing[k] = -pressing[k];
+        }
+        *any = pin(x, &Nt, pressing);
+        uz_row_stiffness(stiffness, room, &x->held.K, &Nt);
+        for (int k = 0; k < x->n_pinned; k++)
+            weight[x->pinned[k]] = stiffness[x->pinned[k]];
+        const uz_singular of = {&x->held.K, N, room + d, stiffness};
+        if (*any)
+            status = uz_augment(&x->regular, &of, &Nt, weight, pressing, err);
+    }
+    uz_csc_clear(&Nt);
+    free(room);
+    return status;
+}
+
 /* Of the answer's K and rows. */
 static uz_status begin_own(rows_problem *x, const contact_rows *own, const uz_guaranteed *g, uz_error *err)
 {
     const uz_settings settings = uz_guarantee_settings(g, uz_seconds());
-    const uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES,
-                                 .qp = {.K = *uz_setup_K(own->setup, g->problem), .N = own->N}};
-    return own->any ? begin_rows(x, &matrices, &settings, g->cache, &g->hooks, &g->stop, err)
-                    : begin_rows(x, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
+    const bool pinned = own->n_pinned > 0;
+    const uz_csc *K = pinned ? &own->regular.qp.K : uz_setup_K(own->setup, g->problem);
+    const uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES, .qp = {.K = *K, .N = own->any ? own->N : *own->nodal}};
+    return own->any || pinned ? begin_rows(x, &matrices, &settings, g->cache, &g->hooks, &g->stop, err)
+                              : begin_rows(x, g->problem, g->settings, g->cache, &g->hooks, &g->stop, err);
 }
 
 static void end_rows(rows_problem *x, uz_cache *cache)
@@ -729,6 +822,14 @@ static void look_at_row(double *r, double *gap, const contact_rows *own, const u
     *gap = answer->open[node];
 }
 
+static bool is_pinned(const contact_rows *own, int64_t k)
+{
+    bool is = false;
+    for (int j = 0; j < own->n_pinned; j++)
+        is = is || own->pinned[j] == k;
+    return is;
+}
+
 /* What makes of the answer the displacement of least energy with its nodes, and coefficients, by their depth out of
  * obstacles: the answer's reactions are taken off it, and others found by active sets. Where what presses is that of a
  * stress, it is the w of least |w|^2 / 2 + int r_h w_n, which the bound has (check.c). */
@@ -754,7 +855,7 @@ static uz_status lift_cheaply(double *lift, rows_problem *x, const contact_rows 
         status = take_lift(lift, x, own, solved, err);
         changed = false;
         for (int64_t k = 0; k < x->m && *solved; k++) {
-            const bool next = x->held[k] ? x->r[k] < 0 : x->y[k] > x->target[k];
+            const bool next = x->held[k] ? x->r[k] < 0 || is_pinned(own, k) : x->y[k] > x->target[k];
             changed = changed || next != x->held[k];
             x->held[k] = next;
         }
@@ -794,16 +895,18 @@ uz_status uz_lift_out(uz_guaranteed *g, const uz_standing *answer, uz_error *err
     rows_problem x = {.setup = NULL};
     uz_status status =
         depth ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to take %lld nodes out", (long long)n);
-    if (depth && g->body.n_loose == 0 &&
-        look_for_depth(depth, depth + n, depth + 2 * n, &g->body, answer->u, depth + 4 * n)) {
+    bool any = depth && look_for_depth(depth, depth + n, depth + 2 * n, &g->body, answer->u, depth + 4 * n);
+    const bool loose = g->body.n_loose > 0;
+    if (any && loose) /* the least norm would be a motion's, which costs what presses */
+        status = begin_held_rows(&own, &any, g, answer, err);
+    else if (any)
         status = begin_contact_rows(&own, g, err);
-        if (status == UZ_OK)
-            status = begin_own(&x, &own, g, err);
-        if (status == UZ_OK)
-            status = lift_out(&g->lift, depth, g, &x, &own, answer, false, err);
-        if (status == UZ_OK)
-            status = lift_out(&g->cheap, depth, g, &x, &own, answer, true, err);
-    }
+    if (any && status == UZ_OK)
+        status = begin_own(&x, &own, g, err);
+    if (any && status == UZ_OK && !loose)
+        status = lift_out(&g->lift, depth, g, &x, &own, answer, false, err);
+    if (any && status == UZ_OK)
+        status = lift_out(&g->cheap, depth, g, &x, &own, answer, true, err);
     end_rows(&x, g->cache);
     end_contact_rows(&own, g->cache);
     free(depth);

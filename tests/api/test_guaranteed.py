@@ -57,6 +57,23 @@ def test_paper_body_on_finer_meshes(s):
             check(abs(error["total"] - total) < 6e-5 and abs(error["energy_low"] - low) < 6e-11, cells, error)
 
 
+def test_a_bracket_on_a_bolt_and_a_wall(s):
+    """The gallery's, without any support: what is proved on one mesh of its polygon and another has the same body's energy within, and refinement
+    goes where the bolt presses."""
+    problem, mesh = bounds.trade.bracket()
+    mesh.arcs = []
+    found = []
+    for of, quadratic in ((mesh, False), (mesh.halved(), False), (mesh, True)):
+        request = {"problem": {**problem, "mesh": of.json(quadratic), "kinematics": "fixed"}, "solver": {"accuracy": {"guaranteed": True}}}
+        summary = summary_of(s, request)
+        check(summary["error"]["kind"] == "guaranteed", summary["error"])
+        found.append(summary["error"])
+    check(max(e["energy_low"] for e in found) <= min(e["energy_high"] for e in found), found)
+    check(found[2]["total"] < 0.2 and found[1]["total"] < 0.5 * found[0]["total"], found)
+    refined = summary_of(s, {"problem": {**problem, "mesh": {**mesh.json(True), "refine": "auto"}}, "solver": {"accuracy": {"total": 0.1, "guaranteed": True}}})
+    check(refined["outcome"] == "converged" and refined["problem"]["d"] < 1.25 * 3110, refined["problem"], refined["error"])
+
+
 def test_a_mesh_that_is_too_coarse(s):
     summary = summary_of(s, asked({"total": 0.02, "guaranteed": True}))
     check(summary["outcome"] == "mesh_limit" and summary["error"]["kind"] == "guaranteed", summary)

@@ -62,6 +62,7 @@ void run_guarantees(suite *all)
     run_kind(all, BOUND_STRAIGHT, "body");
     run_kind(all, BOUND_ROUND, "round");
     run_kind(all, BOUND_RESTING, "resting");
+    run_kind(all, BOUND_PERCHED, "perched");
     run_kind(all, BOUND_SPRINGS, "springs");
     run_kind(all, BOUND_RINGS, "ring");
     run_kind(all, BOUND_LINES, "lines");

@@ -172,7 +172,7 @@ convergence of every element. The stiffness of CalculiX's tetrahedra is reproduc
 TRADE = """Unknowns of the last mesh and seconds of the whole job, all its meshes and proofs included, until the whole error is small enough (`make trade`): refined where it is
 (`refine`: `auto`) and everywhere, each side halved again and again, with what a target takes interpolated between two meshes. `~`: extrapolated by the order of the last two;
 nothing: it was not reached in the time that each job had, at most two minutes. Elements are quadrilaterals with straight sides, of which a guaranteed refinement makes triangles. The
-order is that of the error in unknowns: 0.5 and 1 are the best that linear and quadratic elements can do in the plane. Bodies that press on each other along curves, or that only round obstacles hold, have no guarantee. Times are of a machine on
+order is that of the error in unknowns: 0.5 and 1 are the best that linear and quadratic elements can do in the plane. Bodies that press on each other along curves have no guarantee. Times are of a machine on
 which others worked; unknowns are what counts."""
 
 FORCES = """`{"quantity": "contact.force", "relative": 0.02}` on a coarse mesh with `refine`: `auto` (`make trade FILTER=force`): the unknowns of the last mesh, the force

@@ -65,7 +65,8 @@ typedef enum {
     BOUND_RINGS,
     BOUND_LINES,
     BOUND_RINGS_ROUND,
-    BOUND_RINGS_LINES
+    BOUND_RINGS_LINES,
+    BOUND_PERCHED
 } bound_kind;
 
 /* A polyline or a table below the bottom, `gap` away: flat, a hill or a hollow, with teeth or without, of few pieces or
@@ -100,6 +101,26 @@ static inline void bound_lines(uz_scene *scene, double gap, qp_random *rng)
     for (int i = 0; i < n; i++)
         y[i] += x[1] - gap - highest;
     *(table ? &c->z : &c->y) = y;
+}
+
+/* On a disc, and at a wall that its weight, inclined, turns it against about the disc's centre. */
+static inline void bound_perched(uz_scene *scene, double gap, double stress, qp_random *rng)
+{
+    const double *x = scene->box.origin, width = scene->box.size[0], height = scene->box.size[1];
+    const double weight = stress / height * (1 + random_unit(rng)), place = 0.3 + 0.4 * random_unit(rng);
+    uz_contact *c = &scene->contacts[0];
+    scene->n_supports = 0;
+    scene->n_loads = 1;
+    *c = (uz_contact){
+        .kind = UZ_OBSTACLE_ROUND, .on = "bottom", .radius = (width + height) * random_power(rng, -0.3, 1)};
+    c->point[0] = x[0] + width * place;
+    c->point[1] = x[1] - gap - c->radius;
+    add_plane(scene, "left", x[0] - gap * random_unit(rng), x[1], 1, 0);
+    const double arm = (0.5 * width - width * place) / (0.5 * height + c->radius);
+    bound_load(scene, UZ_LOAD_BODY_FORCE, "all", -weight * (fmax(0, arm) + 0.1 + 0.3 * random_unit(rng)), -weight);
+    bound_load(scene, UZ_LOAD_PRESSURE, "top", 0.3 * stress * random_unit(rng), 0);
+    scene->loads[0].v[0] = 0;
+    scene->loads[0].v[1] = -0.3 * fabs(scene->loads[0].v[1]);
 }
 
 /* Makes the scene before a plane one of its kind. */
@@ -159,6 +180,8 @@ static inline void bound_change(uz_scene *scene, bound_kind kind, double gap, do
     }
     if (kind == BOUND_LINES || kind == BOUND_RINGS_LINES)
         bound_lines(scene, gap, rng);
+    if (kind == BOUND_PERCHED)
+        bound_perched(scene, gap, stress, rng);
     if (kind == BOUND_ROUND ||
         kind == BOUND_RINGS_ROUND) { /* a disc below the bottom, or a hole in which its corners stand */
         uz_contact *c = &scene->contacts[0];
