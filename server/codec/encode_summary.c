@@ -225,6 +225,8 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
                             {"seconds", g->seconds}},
                   5);
         text_integer(t, "dual_unknowns", g->unknowns);
+        if (g->straightened > 0)
+            text_number(t, "straightened", g->straightened);
     }
     text_close(t, '}');
 }

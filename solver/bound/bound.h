@@ -82,6 +82,10 @@ typedef struct {
 uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 void uz_bound_body_clear(uz_bound_body *body);
 
+/* Puts middles of sides that are nearly amid them, as files with few digits have them, where they should be: the bound
+ * is then one of that body. Returns how far one was off, the most, in parts of its side. Others stay. */
+double uz_bound_straighten(uz_mesh *mesh);
+
 /* Part of uz_bound_body_make: a contact of straight surfaces of the body. What is not is in body->why. UZ_ERR_MEMORY.
  */
 uz_status uz_bound_take_pair(uz_bound_body *body, const uz_scene *scene, int64_t contact, uz_error *err);

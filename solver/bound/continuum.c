@@ -12,7 +12,9 @@
 
 /* Relative to the body's extent: how far a middle may be off the middle of its side. */
 #define ROUNDING 1e-13
-#define PI       3.14159265358979323846
+/* Relative to its side: so far off its middle a node may be straightened. Files have six digits or more. */
+#define NEARLY 1e-5
+#define PI     3.14159265358979323846
 
 const double uz_bound_product_inverse[2][UZ_BOUND_MOMENTS][UZ_BOUND_MOMENTS] = {{{4, -2}, {-2, 4}},
                                                                                 {{9, -9, 3}, {-9, 21, -9}, {3, -9, 9}}};
@@ -157,6 +159,27 @@ static uz_status find_edges(survey *x, uz_error *err)
     }
     free(half);
     return UZ_OK;
+}
+
+double uz_bound_straighten(uz_mesh *mesh)
+{
+    double farthest = 0;
+    for (int64_t e = 0; e < mesh->n_elements && mesh->dim == 2; e++) {
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        const int corners = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
+        for (int k = corners; k < count; k++) {
+            const double *a = mesh->xyz + 2 * node[k - corners], *b = mesh->xyz + 2 * node[(k - corners + 1) % corners];
+            const double middle[2] = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
+            double *at = mesh->xyz + 2 * node[k];
+            const double off = hypot(at[0] - middle[0], at[1] - middle[1]), length = hypot(b[0] - a[0], b[1] - a[1]);
+            if (!(off > ROUNDING * mesh->extent) || !(off <= NEARLY * length))
+                continue;
+            memcpy(at, middle, sizeof middle);
+            farthest = fmax(farthest, off / length);
+        }
+    }
+    return farthest;
 }
 
 static bool has_straight_sides(const survey *x)

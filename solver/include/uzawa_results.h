@@ -219,6 +219,7 @@ typedef struct {
         relative; /* the same over a lower bound of the norm of the stress of u; INFINITY where that is not positive */
     double primal, dual; /* energies that enclose the continuum's minimum, of a u_h that does not enter the obstacle */
     int64_t unknowns;    /* of the dual problem */
+    double straightened; /* it is of a body with straight sides, whose middles were off by so much of a side; 0: none */
     double seconds;
     char why[160]; /* asked for and not proved: a clause; else "" */
 } uz_guarantee;

@@ -24,6 +24,8 @@ enum { ROUNDS = 2, MOST_ROUNDS = 8, FEW = 6 };
 
 /* Relative to the body's extent: how far a new node may be from where those that it is amid say. */
 #define AMID 1e-13
+/* The same of nodes that are the answer's own, some of which were straightened. */
+#define NEAR 1e-5
 
 double *uz_closer_carry(const uz_mesh *mesh, const double *value, int64_t n_nodes, int stride)
 {
@@ -97,10 +99,14 @@ static uz_status list_round(uz_closer *out, int64_t *n, int64_t *count, const uz
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld elements", (long long)n_elements);
 }
 
-/* Has it the nodes of the answer's mesh? */
-static bool is_within(const uz_mesh *mesh, const uz_mesh *own)
+/* Has it the nodes of the answer's mesh? They go where those are, which may have been straightened. */
+static bool is_within(uz_mesh *mesh, const uz_mesh *own)
 {
-    return memcmp(mesh->xyz, own->xyz, (size_t)(2 * own->n_nodes) * sizeof *mesh->xyz) == 0;
+    bool within = true;
+    for (int64_t i = 0; i < 2 * own->n_nodes; i++)
+        within = within && fabs(mesh->xyz[i] - own->xyz[i]) <= NEAR * own->extent;
+    memcpy(mesh->xyz, own->xyz, (size_t)(2 * own->n_nodes) * sizeof *mesh->xyz);
+    return within;
 }
 
 /* The two meshes have all sides in common: new nodes are amid those of the answer's, also where refinement has moved

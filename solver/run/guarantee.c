@@ -448,8 +448,10 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
     uz_cache *own_cache = cache ? NULL : uz_cache_new(SIZE_MAX); /* both of its problems have one K */
     g.cache = cache ? cache : own_cache;
     uz_status status = uz_body_model_build(&model, &problem->scene, UZ_BODY_OUTLINE, &err);
-    if (status == UZ_OK)
+    if (status == UZ_OK) {
+        out->straightened = uz_bound_straighten(&model.mesh);
         status = prove(result, &g, &model, &problem->scene, &err);
+    }
     if (status == UZ_OK && out->proved && problem->scene.refine)
         status = share_gap(result, &g, &err);
     if (status == UZ_OK && out->proved && result->evaluation->n_quantities > 0)

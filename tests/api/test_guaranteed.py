@@ -74,6 +74,27 @@ def test_a_bracket_on_a_bolt_and_a_wall(s):
     check(refined["outcome"] == "converged" and refined["problem"]["d"] < 1.25 * 3110, refined["problem"], refined["error"])
 
 
+def test_middle_nodes_of_a_file_with_few_digits(s):
+    """Places with six decimals: what is proved is that of straight sides, and says so; sides that are bent are refused."""
+    at = [0, 1 / 3, 0.57, 1]
+    mesh = bounds.trade.plate([1, 1], [3, 3])
+    mesh.nodes = [[at[round(3 * x)], at[round(3 * y)] + 0.1 * at[round(3 * x)] * at[round(3 * y)]] for x, y in mesh.nodes]
+    found = []
+    for digits, bend in ((None, 0), (6, 0), (6, 1e-3)):
+        of = mesh.json(True)
+        if digits:
+            of["nodes"] = [[round(x, digits), round(y, digits)] for x, y in of["nodes"]]
+        of["nodes"][of["elements"]["quad8"][4][5]][0] += bend
+        problem = {**BLOCK, "mesh": of, "kinematics": "fixed", "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [0.4, -2], "radius": 2}}}]}
+        found.append(summary_of(s, {"problem": problem, "quantities": ASKED, "solver": {"accuracy": {"guaranteed": True}}}))
+    exact, rounded, bent = (one["error"] for one in found)
+    check(exact["kind"] == rounded["kind"] == "guaranteed" and "straightened" not in exact and 1e-7 < rounded["straightened"] < 1e-5, exact, rounded)
+    check(abs(rounded["bound"] / exact["bound"] - 1) < 0.01, rounded, exact)
+    check(bent["kind"] == "estimated" and "curved sides" in bent["why"] and "straightened" not in bent, bent)
+    for one, other in zip(found[0]["quantities"], found[1]["quantities"]):
+        check(one["kind"] == other["kind"] and (one["kind"] == "estimated" or max(one["low"], other["low"]) < min(one["high"], other["high"])), one, other)
+
+
 def test_a_mesh_that_is_too_coarse(s):
     summary = summary_of(s, asked({"total": 0.02, "guaranteed": True}))
     check(summary["outcome"] == "mesh_limit" and summary["error"]["kind"] == "guaranteed", summary)
