@@ -187,21 +187,25 @@ static void poles_of(double radius[4], double det[4], const moved *m)
     }
 }
 
-static double cell_energy(double *margin, const moved *m, const double low[2], const double high[2], double q,
+/* z: where the poles along both directions are. Each has points of its own, and what they may be off by. */
+static double cell_energy(double *margin, const moved *m, const double low[2], const double high[2], const double z[2],
                           bool smallest)
 {
-    enum { MOST_POINTS = 24 };
-    double at[MOST_POINTS], weight[MOST_POINTS], sum = 0;
-    int n = m->nodes > 4 ? 4 : 3;
-    while (n < MOST_POINTS && 64 * pow(q, 2 * n - 6) > 1e-15)
-        n++;
-    uz_gauss(at, weight, n);
-    for (int g = 0; g < n * n; g++) {
-        const double point[3] = {low[0] + (high[0] - low[0]) * (1 + at[g % n]) / 2,
-                                 low[1] + (high[1] - low[1]) * (1 + at[g / n]) / 2};
-        sum += weight[g % n] * weight[g / n] / 4 * (high[0] - low[0]) * (high[1] - low[1]) * density(m, point);
+    double at[2][UZ_GAUSS_MOST], weight[2][UZ_GAUSS_MOST], off = 0, sum = 0;
+    int n[2];
+    for (int c = 0; c < 2; c++) {
+        const double q = 1 / (z[c] + sqrt(fmax(0, z[c] * z[c] - 1)));
+        n[c] = uz_gauss_points(m->nodes > 4 ? 4 : 3, 64, q, 1e-15);
+        off += 64 * pow(q, 2 * n[c] - 6);
+        uz_gauss(at[c], weight[c], n[c]);
     }
-    *margin += (smallest ? 100 : 64 * pow(q, 2 * n - 6)) * sum;
+    for (int g = 0; g < n[0] * n[1]; g++) {
+        const int i = g % n[0], j = g / n[0];
+        const double point[3] = {low[0] + (high[0] - low[0]) * (1 + at[0][i]) / 2,
+                                 low[1] + (high[1] - low[1]) * (1 + at[1][j]) / 2};
+        sum += weight[0][i] * weight[1][j] / 4 * (high[0] - low[0]) * (high[1] - low[1]) * density(m, point);
+    }
+    *margin += (smallest ? 100 : off) * sum;
     return sum;
 }
 
@@ -231,7 +235,7 @@ static double quadrilateral_energy(double *margin, const moved *m)
         const int c = alike ? (high[0] - low[0] < high[1] - low[1]) : z[1] < z[0];
         const bool smallest = high[c] - low[c] <= 2 * SMALLEST;
         if (z[c] >= 3 || smallest || n + 2 > MOST) {
-            sum += cell_energy(margin, m, low, high, 1 / (z[c] + sqrt(fmax(0, z[c] * z[c] - 1))), z[c] < 3);
+            sum += cell_energy(margin, m, low, high, z, z[c] < 3);
             continue;
         }
         const double middle = (low[c] + high[c]) / 2;

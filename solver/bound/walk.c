@@ -12,29 +12,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Gauss's rule of n points on [-1, 1], by Newton's method on Legendre's polynomial. */
-void uz_gauss(double *at, double *weight, int n)
-{
-    for (int i = 0; i < n; i++) {
-        double z = cos(3.14159265358979323846 * (i + 0.75) / (n + 0.5)), slope = 1;
-        for (int step = 0; step < 20; step++) {
-            double p = 1, before = 0;
-            for (int k = 1; k <= n; k++) {
-                const double next = ((2 * k - 1) * z * p - (k - 1) * before) / k;
-                before = p;
-                p = next;
-            }
-            slope = n * (z * p - before) / (z * z - 1);
-            const double change = p / slope;
-            z -= change;
-            if (fabs(change) < DBL_EPSILON)
-                break;
-        }
-        at[i] = z;
-        weight[i] = 2 / ((1 - z * z) * slope * slope);
-    }
-}
-
 static void begin_piece(uz_line_walk *walk, double from)
 {
     const double *r = walk->radius, across = r[1] - r[0], a = r[0] + from * across;
@@ -45,8 +22,7 @@ static void begin_piece(uz_line_walk *walk, double from)
     if (across > a && a > 0) /* to twice the radius */
         walk->to = fmin(1, 2 * from + r[0] / across);
     const double b = r[0] + walk->to * across, z = (b + a) / fmax(b - a, DBL_MIN), q = 1 / (z + sqrt(z * z - 1));
-    while (a > 0 && walk->n < UZ_WALK_POINTS && 20 * pow(q, 2 * walk->n - 6) > UZ_WALK_MARGIN)
-        walk->n++;
+    walk->n = a > 0 ? (int)fmin(UZ_WALK_POINTS, uz_gauss_points(walk->n, 20, q, UZ_WALK_MARGIN)) : walk->n;
     uz_gauss(walk->at, walk->weight, walk->n);
 }
 

@@ -4,7 +4,7 @@
 
 #include "bound/bound.h"
 
-enum { UZ_WALK_POINTS = 16 };
+enum { UZ_WALK_POINTS = 16, UZ_GAUSS_MOST = 24 };
 
 /* Of integrals of r^-1 times polynomials that are nowhere negative: what the sum may be off by, as a part of it. */
 #define UZ_WALK_MARGIN 1e-15
@@ -34,7 +34,9 @@ typedef struct {
 uz_walk uz_walk_begin(double corner[3][2], bool rings, int degree);
 bool uz_walk_next(uz_walk *walk, double at[2], double *weight);
 
-/* Gauss's rule of n points on [-1, 1]. */
+/* Gauss's rule of n points on [-1, 1], 1 to UZ_GAUSS_MOST. */
 void uz_gauss(double *at, double *weight, int n);
+/* The least n from `least` on for which times q^(2n - 6) is at most `most`; UZ_GAUSS_MOST: there is none. */
+int uz_gauss_points(int least, double times, double q, double most);
 
 #endif

@@ -1,5 +1,6 @@
 /* The guaranteed bound on the whole error of bodies of revolution: elements, and what it proves. */
 #include "bound/bound.h"
+#include "bound/walk.h"
 #include "bound_scenes.h"
 #include "linalg/blas.h"
 #include "scene_fixture.h"
@@ -15,6 +16,28 @@ static uz_guarantee bound_of(const uz_scene *scene)
     const uz_guarantee g = result->summary.guarantee;
     uz_result_free(result);
     return g;
+}
+
+/* Rules of n points: exact for polynomials of degree 2n - 1, and for no more; points within, weights positive. */
+TEST(gauss_rules)
+{
+    for (int n = 1; n <= UZ_GAUSS_MOST; n++) {
+        double at[UZ_GAUSS_MOST], weight[UZ_GAUSS_MOST];
+        uz_gauss(at, weight, n);
+        for (int degree = 0; degree <= 2 * n; degree++) {
+            double sum = 0;
+            for (int i = 0; i < n; i++)
+                sum += weight[i] * pow(at[i], degree);
+            const double off = fabs(sum - (degree % 2 ? 0 : 2. / (degree + 1)));
+            CHECK_MSG(degree == 2 * n ? n > 20 || off > 1e-14 : off < 1e-15, "%d points, x^%d: %g", n, degree, off);
+        }
+        for (int i = 0; i < n; i++)
+            CHECK(fabs(at[i]) < 1 && weight[i] > 0 && (i == 0 || at[i] < at[i - 1]));
+    }
+    CHECK_INT(uz_gauss_points(3, 20, 1e-300, 1e-15), 4);
+    CHECK_INT(uz_gauss_points(4, 64, 1, 1e-15), UZ_GAUSS_MOST);
+    for (int n = uz_gauss_points(3, 64, 0.1, 1e-15), k = 0; k < 2; k++)
+        CHECK((64 * pow(0.1, 2 * (n - k) - 6) <= 1e-15) == (k == 0));
 }
 
 /* A ring of the radii `inner` to `inner` + 1, one high, of n x n cells. */
