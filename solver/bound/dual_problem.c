@@ -39,6 +39,8 @@ static macro *make(macro *kept, const uz_bound_body *body, int64_t element);
 static inline double dot(int n, const double *x, const double *y);
 static inline void add(int n, double alpha, const double *x, double *y);
 static void spread(macro *m, double *stress, const double *v);
+static void weigh(macro *m);
+static int64_t *order_of(const uz_bound_body *body);
 
 /* ---- the problem */
 
@@ -172,51 +174,45 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     int64_t count = 0, room = 0, *row = NULL, *col = NULL;
     double *val = NULL;
     macro *kept = uz_alloc_zero(MADE, sizeof *kept), *m = NULL;
-    uz_status status = kept ? UZ_OK : UZ_ERR_MEMORY;
-    for (int64_t e = 0; e < n && status == UZ_OK; e++) {
+    int64_t *order = order_of(body);
+    uz_status status = kept && order ? UZ_OK : UZ_ERR_MEMORY;
+    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        const int64_t e = order[i];
         int64_t dof_of[OUTER];
         double value[OUTER], p[OUTER], K[OUTER * OUTER];
         if (!stiffness && !has_force(body, e) && !has_values(body, e))
             continue;
         if (stiffness && count + most > room) {
-            room = e == 0 ? 16 * most : count * n / e + count / 8 + 16 * most;
+            room = i == 0 ? 16 * most : count * n / i + count / 8 + 16 * most;
             if (!uz_triplets_grow(&row, &col, &val, room)) {
                 status = UZ_ERR_MEMORY;
                 break;
             }
         }
-        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, body, e))) {
+        if ((i % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, body, e))) {
             status = fail_at(stop, e, err);
             break;
         }
-        uz_block_outer(&(uz_outer){.rows = m->outer,
-                                   .n = m->outer,
-                                   .k = m->kept,
-                                   .A = m->A + m->kept,
-                                   .ld = m->kept + m->outer,
-                                   .C = K,
-                                   .ldc = m->outer});
+        if (!m->weighed)
+            weigh(m);
+        memcpy(K, m->K, (size_t)(m->outer * m->outer) * sizeof *K);
+        memcpy(p, m->p, (size_t)m->outer * sizeof *p);
         number(dof_of, value, m, dof);
-        for (int i = 0; i < m->outer; i++) {
-            p[i] = -m->rest[i];
-            for (int k = 0; k < m->kept; k++)
-                p[i] += m->A[m->kept + i + (m->kept + m->outer) * k] * m->y[k];
-        }
         add_springs(K, m);
         turn(K, p, m, false);
-        for (int i = 0; i < m->outer; i++) {
+        for (int r = 0; r < m->outer; r++) {
             for (int j = 0; j < m->outer; j++) {
-                const double entry = i >= j ? K[i + m->outer * j] : K[j + m->outer * i];
+                const double entry = r >= j ? K[r + m->outer * j] : K[j + m->outer * r];
                 if (dof_of[j] < 0)
-                    p[i] -= entry * value[j];
-                else if (stiffness && dof_of[i] >= dof_of[j]) {
-                    row[count] = dof_of[i];
+                    p[r] -= entry * value[j];
+                else if (stiffness && dof_of[r] >= dof_of[j]) {
+                    row[count] = dof_of[r];
                     col[count] = dof_of[j];
                     val[count++] = entry;
                 }
             }
-            if (dof_of[i] >= 0)
-                qp->p[dof_of[i]] += p[i];
+            if (dof_of[r] >= 0)
+                qp->p[dof_of[r]] += p[r];
         }
     }
     if (status == UZ_OK)
@@ -227,6 +223,7 @@ static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     free(col);
     free(val);
     free(kept);
+    free(order);
     return status;
 }
 
@@ -409,45 +406,54 @@ static int place_of_value(int k, int degree)
     return k / of_part * UZ_BOUND_POINTS * 3 + k % of_part;
 }
 
+/* The stresses by an element's unknowns -> map. */
+static void make_map(double *map, macro *m)
+{
+    const int values = values_of(m->parts, m->degree);
+    for (int j = 0; j < m->outer; j++) {
+        double v[OUTER] = {0}, s[UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3] = {0};
+        v[j] = 1;
+        spread(m, s, v);
+        for (int k = 0; k < values; k++)
+            map[(int64_t)j * values + k] = s[place_of_value(k, m->degree)];
+    }
+}
+
 uz_status uz_bound_keep_maps(uz_bound_body *body, const uz_stop *stop, uz_error *err)
 {
-    const uz_mesh *mesh = &body->model->mesh;
-    const int64_t n = mesh->n_elements;
+    const int64_t n = body->model->mesh.n_elements;
     uz_bound_body plain = *body; /* without loads */
-    int64_t total = 0;
-    plain.free_strain = NULL;
-    body->map_at = uz_alloc(n, sizeof *body->map_at);
-    for (int64_t e = 0; e < n && body->map_at; e++) {
-        const int parts = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
-        body->map_at[e] = total;
-        total += (int64_t)values_of(parts, body->degree) * parts * (body->degree + 1) * 2;
-    }
-    if (body->map_at && total * (int64_t)sizeof(double) > MOST_KEPT)
-        return UZ_OK;
+    int64_t total = 0, room = 0, *order = order_of(body);
     macro *kept = uz_alloc_zero(MADE, sizeof *kept), *m = NULL;
+    plain.free_strain = NULL;
     plain.force = uz_alloc_zero(2 * n, sizeof *plain.force);
-    body->map = body->map_at ? uz_alloc(total, sizeof *body->map) : NULL;
-    uz_status status =
-        kept && plain.force && body->map
-            ? UZ_OK
-            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stresses of %lld elements", (long long)n);
-    for (int64_t e = 0; e < n && status == UZ_OK; e++) {
-        if ((e % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, &plain, e))) {
-            status = fail_at(stop, e, err);
+    body->map_at = uz_alloc(n, sizeof *body->map_at);
+    bool memory = order && kept && plain.force && body->map_at, large = false;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < n && memory && !large && status == UZ_OK; i++) {
+        if ((i % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, &plain, order[i]))) {
+            status = fail_at(stop, order[i], err);
             break;
         }
-        const int values = values_of(m->parts, m->degree);
-        for (int j = 0; j < m->outer; j++) {
-            double v[OUTER] = {0}, s[UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3] = {0};
-            v[j] = 1;
-            spread(m, s, v);
-            for (int k = 0; k < values; k++)
-                body->map[body->map_at[e] + (int64_t)j * values + k] = s[place_of_value(k, m->degree)];
+        const int64_t size = (int64_t)values_of(m->parts, m->degree) * m->outer;
+        large = m->map < 0 && (total + size) * (int64_t)sizeof(double) > MOST_KEPT;
+        memory = m->map >= 0 || large || uz_grow(&body->map, total, size, &room, sizeof *body->map);
+        if (m->map < 0 && memory && !large) { /* else that of others like it is there */
+            m->map = total;
+            make_map(body->map + total, m);
+            total += size;
         }
+        body->map_at[order[i]] = m->map;
+    }
+    if (large) {
+        free(body->map);
+        body->map = NULL;
     }
     free(plain.force);
     free(kept);
-    return status;
+    free(order);
+    return memory ? status
+                  : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stresses of %lld elements", (long long)n);
 }
 
 uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64_t *dof, const double *v,
@@ -456,10 +462,15 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
     const int64_t n = body->model->mesh.n_elements;
     uz_status status = UZ_OK;
     macro *kept = uz_alloc_zero(MADE + 1, sizeof *kept), *m = NULL;
-    if (!kept)
+    int64_t *order = order_of(body);
+    if (!kept || !order) {
+        free(kept);
+        free(order);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of an element");
+    }
     memset(stress, 0, (size_t)n * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 * sizeof *stress);
-    for (int64_t e = 0; e < n && status == UZ_OK; e++) {
+    for (int64_t k = 0; k < n && status == UZ_OK; k++) {
+        const int64_t e = order[k];
         int64_t dof_of[OUTER];
         double value[OUTER];
         const bool mapped = body->map && !has_force(body, e);
@@ -471,7 +482,7 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
             m->parts = uz_element_type_of((uz_element_kind)body->model->mesh.kind[e])->corners;
             m->outer = 2 * m->parts * (m->degree + 1);
         }
-        if ((e % 256 == 0 && uz_stop_is_due(stop)) || (!mapped && !(m = make(kept, body, e)))) {
+        if ((k % 256 == 0 && uz_stop_is_due(stop)) || (!mapped && !(m = make(kept, body, e)))) {
             status = fail_at(stop, e, err);
             break;
         }
@@ -489,10 +500,11 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
         double sum[UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3] = {0};
         for (int j = 0; j < m->outer; j++)
             add(values, value[j], body->map + body->map_at[e] + (int64_t)j * values, sum);
-        for (int k = 0; k < values; k++)
-            to[place_of_value(k, m->degree)] = sum[k];
+        for (int i = 0; i < values; i++)
+            to[place_of_value(i, m->degree)] = sum[i];
     }
     free(kept);
+    free(order);
     return status;
 }
 
@@ -677,16 +689,47 @@ static void scale(macro *m)
         m->times[i] = 1 / largest[i];
 }
 
-/* Turns to an element. True: it is the one that was made there, but for where it stands and rounding of the shape, of
- * which what the stress then lacks of equilibrium is found as any other. */
-static bool place(double key_of[KEY], macro *m, const uz_bound_body *body, int64_t element)
+typedef struct {
+    double radius;
+    int64_t element;
+} placed;
+
+static int by_radius(const void *a, const void *b)
+{
+    const placed *x = a, *y = b;
+    const int way = (x->radius > y->radius) - (x->radius < y->radius);
+    return way != 0 ? way : (x->element > y->element) - (x->element < y->element);
+}
+
+/* In which elements are gone through: of rings by the radius, at which others may be like it. NULL: no memory. */
+static int64_t *order_of(const uz_bound_body *body)
 {
     const uz_mesh *mesh = &body->model->mesh;
-    const uz_lame lame = uz_element_material(body->model, element)->lame;
-    int count, at = 6;
+    const int64_t n = mesh->n_elements;
+    int64_t *order = uz_alloc(n, sizeof *order);
+    placed *all = body->rings && order ? uz_alloc(n, sizeof *all) : NULL;
+    for (int64_t e = 0; e < n && order; e++)
+        order[e] = e;
+    for (int64_t e = 0; e < n && all; e++)
+        all[e] = (placed){mesh->xyz[2 * mesh->node[mesh->first[e]]], e};
+    if (all)
+        qsort(all, (size_t)n, sizeof *all, by_radius);
+    for (int64_t e = 0; e < n && all; e++)
+        order[e] = all[e].element;
+    if (body->rings && !all) {
+        free(order);
+        order = NULL;
+    }
+    free(all);
+    return order;
+}
+
+/* Turns to an element. */
+static void place(macro *m, const uz_bound_body *body, int64_t element)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    int count;
     const int64_t *node = uz_mesh_element(mesh, element, &count);
-    double key[KEY] = {0}, size = 0;
-    bool same = m->made;
     m->body = body;
     m->element = element;
     m->degree = body->degree;
@@ -696,29 +739,50 @@ static bool place(double key_of[KEY], macro *m, const uz_bound_body *body, int64
     m->all = m->parts * m->functions;
     m->outer = m->parts * 2 * (m->degree + 1);
     uz_bound_centre(m->centre, body, element);
-    for (int k = 0; k < m->parts; k++) {
-        const uz_bound_edge *edge = &body->edge[body->edge_of[4 * element + k]];
+    for (int k = 0; k < m->parts; k++)
         uz_bound_place(m->corner[k], body, node[k]);
+}
+
+/* What an element's own numbers follow from; returns its size. */
+static double find_key(double key[KEY], const uz_bound_body *body, int64_t element)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    const uz_lame lame = uz_element_material(body->model, element)->lame;
+    int count, at = 6;
+    const int64_t *node = uz_mesh_element(mesh, element, &count);
+    const int parts = uz_element_type_of((uz_element_kind)mesh->kind[element])->corners;
+    double size = 0, first[2], corner[2];
+    memset(key, 0, KEY * sizeof *key);
+    uz_bound_place(first, body, node[0]);
+    for (int k = 0; k < parts; k++) {
+        const uz_bound_edge *edge = &body->edge[body->edge_of[4 * element + k]];
+        uz_bound_place(corner, body, node[k]);
         for (int c = 0; c < 2 && k > 0; c++) {
-            key[2 * (k - 1) + c] = m->corner[k][c] - m->corner[0][c];
+            key[2 * (k - 1) + c] = corner[c] - first[c];
             size = fmax(size, fabs(key[2 * (k - 1) + c]));
         }
         key[at++] = edge->node[0] == node[k];
         memcpy(key + at, edge->axis, sizeof edge->axis);
         at += 4;
     }
-    const double rest[] = {body->rings ? m->corner[0][0] : 0, /* rings have elements alike at one radius alone */
-                           m->parts,
+    const double rest[] = {body->rings ? first[0] : 0, /* rings have elements alike at one radius alone */
+                           parts,
                            lame.lambda,
                            lame.mu,
                            body->force[2 * element],
                            body->force[2 * element + 1],
                            body->free_strain ? body->free_strain[element] : 0};
     memcpy(key + KEY - sizeof rest / sizeof rest[0], rest, sizeof rest);
+    return size;
+}
+
+/* Is it the element that was made there, but for where it stands and rounding of the shape, of which what the stress
+ * then lacks of equilibrium is found as any other? */
+static bool is_like(const macro *m, const double key[KEY], double size)
+{
+    bool same = m->made;
     for (int i = 0; i < KEY && same; i++)
         same = fabs(key[i] - m->key[i]) <= (i < 6 ? 1e-13 * size : 0);
-    if (!same)
-        memcpy(key_of, key, sizeof key);
     return same;
 }
 
@@ -731,18 +795,27 @@ static macro *make(macro *kept, const uz_bound_body *body, int64_t element)
     const int64_t *node = uz_mesh_element(mesh, element, &count);
     double key[KEY];
     macro *m = kept;
-    double inner[INNER * MOST] = {0}, outer[OUTER * MOST] = {0};
+    double inner[INNER * MOST], outer[OUTER * MOST];
     double F[UZ_MACRO_FUNCTIONS * UZ_MACRO_FUNCTIONS], f[UZ_MACRO_FUNCTIONS];
+    const double size = find_key(key, body, element);
+    int64_t latest = 0;
+    for (int i = 0; i < MADE; i++)
+        latest = kept[i].last > latest ? kept[i].last : latest;
     for (int i = 0; i < MADE; i++) {
-        if (place(key, &kept[i], body, element)) {
-            kept[i].last = element;
+        if (is_like(&kept[i], key, size)) {
+            place(&kept[i], body, element);
+            kept[i].last = latest + 1;
             return &kept[i];
         }
-        m = kept[i].last < m->last || !kept[i].made ? &kept[i] : m; /* the one not used for longest */
+        m = kept[i].last < m->last ? &kept[i] : m; /* the one not used for longest */
     }
+    place(m, body, element);
     memcpy(m->key, key, sizeof m->key);
-    m->made = false;
-    m->last = element;
+    m->made = m->weighed = false;
+    m->last = latest + 1;
+    m->map = -1;
+    memset(inner, 0, (size_t)((m->outer + (body->rings ? INNER - OUTER : 0)) * m->all) * sizeof *inner);
+    memset(outer, 0, (size_t)(m->outer * m->all) * sizeof *outer);
     scale(m);
     memset(m->rest, 0, sizeof m->rest);
     for (int k = 0; k < m->parts; k++) {
@@ -760,8 +833,8 @@ static macro *make(macro *kept, const uz_bound_body *body, int64_t element)
         return NULL;
     m->kept = m->all - rank;
     const int ld = m->kept + m->outer;
-    memset(m->A, 0, sizeof m->A);
-    memset(m->y, 0, sizeof m->y);
+    memset(m->A, 0, (size_t)(ld * m->kept) * sizeof *m->A);
+    memset(m->y, 0, (size_t)m->kept * sizeof *m->y);
     for (int part = 0; part < m->parts; part++) {
         comply(F, f, m, part);
         for (int j = 0; j < m->kept; j++) {
@@ -782,6 +855,20 @@ static macro *make(macro *kept, const uz_bound_body *body, int64_t element)
     uz_trsv_lower(m->kept, m->A, ld, m->y, false);
     m->made = true;
     return m;
+}
+
+/* K = BB' and By - D_0. */
+static void weigh(macro *m)
+{
+    const int ld = m->kept + m->outer;
+    uz_block_outer(&(uz_outer){
+        .rows = m->outer, .n = m->outer, .k = m->kept, .A = m->A + m->kept, .ld = ld, .C = m->K, .ldc = m->outer});
+    for (int i = 0; i < m->outer; i++) {
+        m->p[i] = -m->rest[i];
+        for (int k = 0; k < m->kept; k++)
+            m->p[i] += m->A[m->kept + i + ld * k] * m->y[k];
+    }
+    m->weighed = true;
 }
 
 static void spread(macro *m, double *stress, const double *v)

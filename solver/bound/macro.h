@@ -37,8 +37,12 @@ struct uz_macro {
     double A[(UZ_BOUND_PARTS * UZ_MACRO_FUNCTIONS + UZ_MACRO_OUTER) * UZ_BOUND_PARTS * UZ_MACRO_FUNCTIONS];
     double y[UZ_BOUND_PARTS * UZ_MACRO_FUNCTIONS], rest[UZ_MACRO_OUTER]; /* L^-1 Z'f; D_0 */
     double key[UZ_MACRO_KEY]; /* what these follow from: its first 6 numbers are the shape */
-    bool made;
-    int64_t last; /* element that it was used for */
+    /* of it by the axes of edges: the condensed stiffness, lower triangle, and what the balancing stress makes of p;
+     * weighed false: not yet */
+    double K[UZ_MACRO_OUTER * UZ_MACRO_OUTER], p[UZ_MACRO_OUTER];
+    bool made, weighed;
+    int64_t last; /* when it was used: the count of calls of that */
+    int64_t map;  /* uz_bound_keep_maps: where its own is; -1: none yet */
 };
 
 /* The stresses of Airy's functions, of degree 2 to degree + 2, at a point: columns from 0. Polynomials in coordinates
