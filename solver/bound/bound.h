@@ -213,6 +213,11 @@ uz_status uz_bound_check(uz_bound_check_result *out, const uz_bound_body *body, 
                          const int64_t *dof, int64_t n_dofs, const double *u, const double *lift, const double *stress,
                          uz_error *err);
 
+/* With each of n lifts, of which some may be NULL: the one that proves most, whatever the residual. */
+uz_status uz_bound_check_lifts(uz_bound_check_result *out, const uz_bound_body *body, const uz_scene *scene,
+                               const int64_t *dof, int64_t n_dofs, const double *u, const double *const *lifts, int n,
+                               const double *stress, uz_error *err);
+
 void uz_bound_check_clear(uz_bound_check_result *result);
 
 /* Bound on the norm of all that equilibrium lacks, with that of the residual in the norm of K^-1. */

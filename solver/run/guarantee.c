@@ -114,21 +114,14 @@ static void hold_elsewhere(uz_guaranteed *g, double *resultant)
  * most. */
 static uz_status check(uz_guaranteed *g, const double *u, const uz_scene *scene, uz_error *err)
 {
-    const double *lifts[] = {NULL, g->lift, g->cheap, g->carried[0], g->carried[1]};
-    uz_status status = UZ_OK;
-    for (size_t k = 0; k < sizeof lifts / sizeof lifts[0] && status == UZ_OK; k++) {
-        uz_bound_check_result with;
-        if (k > 0 && !lifts[k])
-            continue;
-        status = uz_bound_check(&with, &g->body, scene, g->dof, g->qp.K.cols, u, lifts[k], g->stress, err);
-        if (status == UZ_OK && (k == 0 || uz_bound_error(&with, 0) < uz_bound_error(&g->checked, 0))) {
-            uz_bound_check_clear(&g->checked);
-            g->checked = with;
-        } else {
-            uz_bound_check_clear(&with);
-        }
-    }
-    return status;
+    const double *const all[] = {g->lift, g->cheap, g->carried[0], g->carried[1]};
+    const double *lifts[1 + sizeof all / sizeof all[0]] = {NULL};
+    int n = 1;
+    for (size_t k = 0; k < sizeof all / sizeof all[0]; k++)
+        if (all[k])
+            lifts[n++] = all[k];
+    uz_bound_check_clear(&g->checked);
+    return uz_bound_check_lifts(&g->checked, &g->body, scene, g->dof, g->qp.K.cols, u, lifts, n, g->stress, err);
 }
 
 /* The displacement of least energy, where that proves more of quantities: its errors are smaller than those of the
@@ -260,7 +253,7 @@ static uz_status prove_on(uz_guaranteed *closer, const uz_guaranteed *g, const u
         uz_bound_push(push, push + 2 * n, &closer->body, closer->checked.pressure, mesh->u);
         status = uz_lift_out(closer, &answer, err);
     }
-    if (status == UZ_OK)
+    if (status == UZ_OK && (closer->lift || closer->cheap || closer->carried[0] || closer->carried[1]))
         status = check(closer, mesh->u, its, err);
     if (status == UZ_OK)
         status = uz_measure_residual(&closer->rho, closer, closer->checked.residual, err);

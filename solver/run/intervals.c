@@ -32,6 +32,11 @@ enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 5 };
 /* Motions have a largest entry of 1: what a row tells of one is no less. */
 #define LEAST_TOLD 0.02
 
+/* Of the largest displacement: what an answer is in an obstacle by rounding of its gaps, and is not taken out of it
+ * for.
+ */
+#define TOUCHING 1e-13
+
 /* Before an obstacle what is no wider open, of the widest, is closed: rounding. */
 #define CLOSED 1e-10
 
@@ -768,14 +773,18 @@ static bool look_for_depth(double *depth, double *more, double *at, const uz_bou
                            const double *lift)
 {
     const int64_t n = body->model->mesh.n_nodes;
+    double farthest = 0;
     bool any = false;
     for (int64_t i = 0; i < n; i++) {
         more[i] = 0;
-        for (int c = 0; c < 2; c++)
+        for (int c = 0; c < 2; c++) {
             at[2 * i + c] = u[2 * i + c] + lift[2 * i + c];
+            farthest = fmax(farthest, fabs(at[2 * i + c]));
+        }
     }
     for (int64_t i = 0; i < body->n_edges; i++) {
-        const double deep = body->edge[i].contact >= 0 ? DEEPER * fmax(0, uz_depth_along(body, i, at)) : 0;
+        const double in_it = body->edge[i].contact >= 0 ? uz_depth_along(body, i, at) : 0;
+        const double deep = in_it > TOUCHING * farthest ? DEEPER * in_it : 0;
         any = any || deep > 0;
         for (int a = 0; a < 3 && body->edge[i].node[a] >= 0; a++)
             more[body->edge[i].node[a]] = fmax(more[body->edge[i].node[a]], deep);

@@ -389,6 +389,27 @@ static void bench_assemblies(report *out)
     }
 }
 
+static void bench_guarantees(report *out)
+{
+    char row[64], name[80];
+    for (int k = 0; bench_guarantee_name(row, k) != NULL; k++) {
+        bench_guarantee_row cost;
+        if (!wanted(out, row))
+            continue;
+        if (!bench_guarantee(&cost, k)) {
+            printf("%s was not proved\n", row);
+            exit(1);
+        }
+        print_row(out, row, "x", cost.error, "the solve (target: 10)");
+        snprintf(name, sizeof name, "%s_quantity", row);
+        print_row(out, name, "x", cost.quantity, "the solve (target: 25)");
+        snprintf(name, sizeof name, "%s_milliseconds", row);
+        print_row(out, name, "ms", cost.solve_ms, "the solve");
+        snprintf(name, sizeof name, "%s_bound", row);
+        print_row(out, name, "", (bench_value){cost.bound, cost.bound, cost.bound, 1}, "");
+    }
+}
+
 /* Not in the solver: what it would save, and where. Large D are slow to iterate on: fewer digits of those. */
 static void bench_precisions(report *out)
 {
@@ -511,6 +532,7 @@ int main(int argc, char **argv)
     if (!out.filter || strncmp(out.filter, "stop", 4) == 0)
         bench_stops(&out);
     bench_assemblies(&out);
+    bench_guarantees(&out);
     if (wanted(&out, "mixed"))
         bench_precisions(&out);
     for (int64_t nx = 300; wanted(&out, "load_cases") && nx <= 600; nx += 300)

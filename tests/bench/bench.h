@@ -87,6 +87,16 @@ bool bench_load_cases(bench_value *ratio, int64_t nx);
 const char *bench_stop_name(int which);
 bool bench_stop(bench_value *between, bench_value *work, bench_value *to_return, int which);
 
+/* A body by what it touches, with the elements of a kind: what a guaranteed bound on the whole error takes, and the
+ * same with the interval of a quantity, over the solve alone; of the processor's time, all threads. name: NULL after
+ * the last row. false: no answer, or no proof. */
+typedef struct {
+    bench_value error, quantity, solve_ms;
+    double bound;
+} bench_guarantee_row;
+const char *bench_guarantee_name(char name[64], int which);
+bool bench_guarantee(bench_guarantee_row *row, int which);
+
 /* Scenes of 200,000 dofs: seconds of the assembly, of all fields and the VTK file, of CHOLMOD's analysis and factor
  * with METIS, and (whole) the sum of the first two over the third. name: NULL after the last scene. false: no answer.
  */
