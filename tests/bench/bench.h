@@ -93,6 +93,7 @@ bool bench_stop(bench_value *between, bench_value *work, bench_value *to_return,
 typedef struct {
     bench_value error, quantity, solve_ms;
     double bound;
+    bool proved; /* the interval, too: not where a contact meets a corner, of a quantity that leaps there */
 } bench_guarantee_row;
 const char *bench_guarantee_name(char name[64], int which);
 bool bench_guarantee(bench_guarantee_row *row, int which);
