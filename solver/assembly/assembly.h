@@ -30,6 +30,7 @@
 typedef struct {
     uz_lame lame;
     double poisson, density, expansion;
+    uz_elasticity law;
 } uz_body_material;
 
 /* A place inside a side of a group, where rows at its nodes alone would let a rigid obstacle in (node_to_obstacle.c).

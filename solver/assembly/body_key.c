@@ -165,7 +165,7 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
 
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err)
 {
-    static const char format[] = "uzawa body 6";
+    static const char format[] = "uzawa body 7";
     uz_buffer key = {0};
     char *text = NULL;
     const int dim = uz_scene_dim(scene);
@@ -195,6 +195,7 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
     put_int(&key, scene->n_materials);
     for (int64_t i = 0; i < scene->n_materials; i++) {
         put_name(&key, scene->materials[i].on, sizeof scene->materials[i].on);
+        put_int(&key, scene->materials[i].law);
         put_double(&key, scene->materials[i].young);
         put_double(&key, scene->materials[i].poisson);
         put_double(&key, scene->materials[i].density); /* not in K, but kept with the body */

@@ -19,7 +19,7 @@ uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_erro
     for (int64_t k = 0; k < scene->n_materials; k++) {
         const uz_material *from = &scene->materials[k];
         model->materials[k] = (uz_body_material){uz_lame_of(scene->model, from->young, from->poisson), from->poisson,
-                                                 from->density, from->expansion};
+                                                 from->density, from->expansion, from->law};
     }
     const int64_t n = model->mesh.n_elements;
     if (scene->n_materials <= 1)

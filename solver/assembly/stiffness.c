@@ -122,7 +122,7 @@ uz_status uz_check_elements(const uz_body_model *model, uz_error *err)
 
 /* A stiffness of displacements at nodes. The rows of a node stand together in every column, at a place that the column
  * of another's first free dof tells: each following one lacks the rows of that node before its diagonal. */
-static void add_stiffness(uz_body_model *model, const double *ke, const int64_t *node, int count)
+void uz_add_stiffness(uz_body_model *model, const double *ke, const int64_t *node, int count)
 {
     double turned[DOFS * DOFS], tied[DOFS * DOFS];
     uz_ties ties;
@@ -192,7 +192,7 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
         const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
-            add_stiffness(model, ke, node, count);
+            uz_add_stiffness(model, ke, node, count);
     }
     /* the springs of a node as a matrix of its dofs: Q diag(k) Q' */
     for (int64_t a = 0; a < model->mesh.n_nodes && status == UZ_OK && model->spring; a++) {
@@ -202,7 +202,7 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
         for (int c = 0; c < dim; c++)
             own[c * dim + c] = k[c];
         if (uz_mesh_hangs(&model->mesh, a))
-            add_stiffness(model, own, &a, 1);
+            uz_add_stiffness(model, own, &a, 1);
         for (int j = 0; j < dim && !uz_mesh_hangs(&model->mesh, a); j++)
             for (int i = 0; i < dim; i++) {
                 double value = Q || i != j ? 0 : k[i];

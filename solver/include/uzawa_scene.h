@@ -94,8 +94,19 @@ uz_status uz_abaqus_read(uz_given_mesh *out, const char *text, size_t len, size_
 uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,
                        uz_error *err);
 
+/* How stress follows from strain. E is the Green-Lagrange strain, C = I + 2 E, J the root of det C, lambda and mu
+ * Lame's constants, K = lambda + 2/3 mu. All of them are the linear law where strains are small. */
+typedef enum {
+    UZ_ELASTIC_LINEAR,
+    UZ_ELASTIC_ST_VENANT_KIRCHHOFF, /* W = lambda/2 (tr E)^2 + mu E:E */
+    UZ_ELASTIC_NEO_HOOKE,           /* W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2 */
+    UZ_ELASTIC_NEO_HOOKE_ISOCHORIC, /* W = mu/2 (J^(-2/3) tr C - 3) + K/2 (J - 1)^2 */
+    UZ_ELASTICITIES                 /* how many */
+} uz_elasticity;
+
 typedef struct {
     char on[64];
+    uz_elasticity law; /* kinematics FINITE: any but the linear one; else that one */
     double young, poisson;
     double density;   /* mass per volume: 0 where no gravity asks for it */
     double expansion; /* strain per unit of temperature */
@@ -173,9 +184,10 @@ typedef enum { UZ_MESH_BOX, UZ_MESH_GIVEN } uz_mesh_source;
 
 /* Where gaps, normals and what faces what are taken. */
 typedef enum {
-    UZ_KINEMATICS_AUTO,  /* before anything moves, unless that changes the answer by more than is tolerable */
-    UZ_KINEMATICS_FIXED, /* before anything moves */
-    UZ_KINEMATICS_MOVING /* where the answer itself has moved the surfaces to */
+    UZ_KINEMATICS_AUTO,   /* before anything moves, unless that changes the answer by more than is tolerable */
+    UZ_KINEMATICS_FIXED,  /* before anything moves */
+    UZ_KINEMATICS_MOVING, /* where the answer itself has moved the surfaces to */
+    UZ_KINEMATICS_FINITE  /* there, too, and rotations and strains are as large as they are */
 } uz_kinematics;
 
 typedef struct {

@@ -1,0 +1,23 @@
+/* envelope.h: a Cholesky factor within the envelope of a matrix: short, and nobody else's. */
+#ifndef UZ_CERTIFICATE_ENVELOPE_H
+#define UZ_CERTIFICATE_ENVELOPE_H
+
+#include "uzawa.h"
+
+typedef struct {
+    int64_t n;
+    int64_t *place, *first, *start; /* n: where each dof stands; the first column of each row, and where it is in L */
+    double *L;
+} uz_envelope;
+
+/* A = L L' of a symmetric matrix given by its lower triangle, in the order of Cuthill and McKee reversed. *definite:
+ * each pivot was more than `least` times its entry of `size` (n, positive), or there is no factor. Memory grows as n
+ * times the bandwidth, time as n times its square. Source: George and Liu, "Computer Solution of Large Sparse Positive
+ * Definite Systems", ch. 4. UZ_ERR_MEMORY. The caller clears *out in every case. */
+uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, const double *size, double least,
+                             uz_error *err);
+/* x (n) becomes L^-1 x, in the order of the factor: x'x is then x' A^-1 x. */
+void uz_envelope_forward(double *x, const uz_envelope *factor, double *room);
+void uz_envelope_clear(uz_envelope *factor);
+
+#endif

@@ -1,0 +1,40 @@
+/* finite.h: what can be said of an answer to a scene of finite kinematics, whoever made it.
+ *
+ * Nothing here is shared with the iteration (finite/, run/finite.c) but the scene's data: forces and tangent follow
+ * from the first Piola-Kirchhoff stress as a function of F, in extended precision, and the factor is one of its own. */
+#ifndef UZ_CERTIFICATE_FINITE_H
+#define UZ_CERTIFICATE_FINITE_H
+
+#include "assembly/assembly.h"
+
+typedef struct {
+    const uz_body_model *model; /* at the place u: its rows are those that the answer has there */
+    const uz_scene *scene;      /* with the loads, supports and obstacles that the answer is for */
+    const double *u;            /* n_nodes x 2 */
+    const double *r, *g;        /* m: reactions, and gaps at the place */
+    const double *prescribed;   /* n_fixed */
+} uz_finite_answer;
+
+typedef struct {
+    double energy;    /* strain energy, of the law's W */
+    double least_det; /* of F, at quadrature points and corners */
+    /* (f' H^-1 f + 2 |r'g|)^(1/2) over the root of twice the energy: H is the second derivatives of the Lagrangian with
+     * stiffness along the pressed rows, f what the forces on free dofs leave over, with what that stiffness makes of
+     * gaps of these rows; r'g of the others. To first order a bound on the distance from the equilibrium, in the norm
+     * of H. INFINITY where H is not positive definite */
+    double residual;
+    double rounding; /* less than this of `residual` may be rounding of F, as where strains are tiny */
+    /* A Cholesky factor of H exists: the energy grows along every small motion that leaves the pressed rows closed, so
+     * that the equilibrium is a strict local minimum of what the mesh can do */
+    bool definite;
+    double worst_reaction; /* the largest, > 0: an obstacle that pulls; relative to the largest in size */
+    double worst_support;  /* by how much a supported dof is off what is prescribed: a length */
+    double least_gap;      /* of the obstacles from points on the deformed sides, a length: SAMPLES a side, and nodes */
+    double least_part;     /* the same over the length of the side there, of those between nodes */
+    double least_at_rows;  /* of g */
+} uz_finite_certificate;
+
+/* Errors: UZ_ERR_MEMORY, and those of obstacles. */
+uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *answer, uz_error *err);
+
+#endif

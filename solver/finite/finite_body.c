@@ -1,0 +1,62 @@
+#include "finite/finite_body.h"
+
+#include "assembly/parts.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "finite/finite_element.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangent, const uz_body_model *model,
+                    const double *nodal)
+{
+    const uz_mesh *mesh = &model->mesh;
+    double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES];
+    *out = (uz_finite_measure){.least_det = INFINITY, .at = -1};
+    if (force)
+        memset(force, 0, (size_t)(2 * mesh->n_nodes) * sizeof *force);
+    if (tangent) {
+        memset(tangent->K.val, 0, (size_t)tangent->K.ptr[tangent->K.cols] * sizeof *ke);
+        memset(tangent->K_fixed.val, 0, (size_t)tangent->K_fixed.ptr[tangent->K_fixed.cols] * sizeof *ke);
+    }
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        uz_element element;
+        uz_finite_forces own;
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        uz_body_element(&element, xyz, model, e);
+        for (int i = 0; i < 2 * count; i++)
+            u[i] = nodal[2 * node[i / 2] + i % 2];
+        uz_finite_element(&own, tangent ? ke : NULL, &element, uz_element_material(model, e)->law, u);
+        out->energy += own.energy;
+        if (!(own.least_det >= out->least_det)) { /* not a number, too */
+            out->least_det = own.least_det;
+            out->at = e;
+        }
+        for (int i = 0; i < 2 * count && force; i++)
+            force[2 * node[i / 2] + i % 2] += own.force[i];
+        if (tangent)
+            uz_add_stiffness(tangent, ke, node, count);
+    }
+}
+
+uz_status uz_finite_tangent_of(uz_body_model *out, const uz_body_model *model, uz_error *err)
+{
+    const int64_t own = model->K.ptr[model->K.cols], fixed = model->K_fixed.ptr[model->K_fixed.cols];
+    *out = *model;
+    out->K.val = uz_alloc_zero(own, sizeof(double));
+    out->K_fixed.val = uz_alloc_zero(fixed, sizeof(double));
+    if (out->K.val && out->K_fixed.val)
+        return UZ_OK;
+    uz_finite_tangent_clear(out);
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a tangent of %lld entries", (long long)own);
+}
+
+void uz_finite_tangent_clear(uz_body_model *tangent)
+{
+    free(tangent->K.val);
+    free(tangent->K_fixed.val);
+    memset(tangent, 0, sizeof *tangent);
+}

@@ -1,0 +1,125 @@
+/* finite_element.c: internal forces and tangent of one element.
+ *
+ * With g_a the gradients of the shape functions before anything moves, F = I + sum_a u_a x g_a; the variation of E by
+ * u_a is B_a = (F_i1 g_1, F_i2 g_2, F_i1 g_2 + F_i2 g_1), so that
+ *     force_a = integral B_a'S,     K_ab = integral B_a' D B_b + (g_a . S g_b) I.
+ * Source: Bonet and Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", ch. 9; total Lagrangian form of
+ * Bathe, "Finite Element Procedures", ch. 6. */
+#include "finite/finite_element.h"
+
+#include "finite/hyperelastic.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { N_STRAINS = UZ_FINITE_STRAINS };
+
+static double deformation(double F[2][2], double grad[UZ_ELEMENT_NODES][3], int nodes, const double *u)
+{
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++) {
+            F[i][j] = i == j;
+            for (int a = 0; a < nodes; a++)
+                F[i][j] += (u[2 * a + i] - u[i]) * grad[a][j]; /* a translation leaves no rounding */
+        }
+    return F[0][0] * F[1][1] - F[0][1] * F[1][0];
+}
+
+static void cauchy_green(double C[N_STRAINS], double F[2][2])
+{
+    C[0] = F[0][0] * F[0][0] + F[1][0] * F[1][0];
+    C[1] = F[0][1] * F[0][1] + F[1][1] * F[1][1];
+    C[2] = F[0][0] * F[0][1] + F[1][0] * F[1][1];
+}
+
+static double least_det_at_corners(const uz_element *element, const double *u)
+{
+    const uz_element_type *type = uz_element_type_of(element->kind);
+    double least = INFINITY, grad[UZ_ELEMENT_NODES][3], F[2][2];
+    for (int a = 0; a < type->corners; a++) {
+        uz_element_gradients(grad, element, type->local[a]);
+        least = fmin(least, deformation(F, grad, type->nodes, u));
+    }
+    return least;
+}
+
+static void add_tangent(double *ke, int nodes, double weight, double B[][N_STRAINS], double D[N_STRAINS][N_STRAINS],
+                        double grad[UZ_ELEMENT_NODES][3], const double *S)
+{
+    const int n = 2 * nodes;
+    for (int p = 0; p < n; p++) {
+        double DB[N_STRAINS];
+        for (int i = 0; i < N_STRAINS; i++)
+            DB[i] = weight * (D[i][0] * B[p][0] + D[i][1] * B[p][1] + D[i][2] * B[p][2]);
+        for (int q = 0; q <= p; q++)
+            ke[p * n + q] += DB[0] * B[q][0] + DB[1] * B[q][1] + DB[2] * B[q][2];
+    }
+    for (int a = 0; a < nodes; a++) {
+        const double t[2] = {weight * (S[0] * grad[a][0] + S[2] * grad[a][1]),
+                             weight * (S[2] * grad[a][0] + S[1] * grad[a][1])};
+        for (int b = 0; b <= a; b++)
+            for (int i = 0; i < 2; i++)
+                ke[(2 * a + i) * n + 2 * b + i] += t[0] * grad[b][0] + t[1] * grad[b][1];
+    }
+}
+
+bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law, const double *u)
+{
+    const uz_gauss_rule *rule = uz_element_rule(element->kind, element->model);
+    const int nodes = uz_element_node_count(element->kind), n = 2 * nodes;
+    double grad[UZ_ELEMENT_NODES][3], F[2][2], B[2 * UZ_ELEMENT_NODES][N_STRAINS];
+    memset(out, 0, sizeof *out);
+    out->least_det = least_det_at_corners(element, u);
+    if (ke)
+        memset(ke, 0, (size_t)(n * n) * sizeof *ke);
+    for (int g = 0; g < rule->count; g++) {
+        double W, C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS];
+        const double measure = uz_element_gradients(grad, element, rule->point[g].at);
+        const double weight = rule->point[g].weight * measure * element->thickness;
+        out->least_det = fmin(out->least_det, deformation(F, grad, nodes, u));
+        cauchy_green(C, F);
+        if (!(out->least_det > 0) || !uz_hyperelastic(&W, S, D, law, element->lame.lambda, element->lame.mu, C))
+            continue; /* the other points may be worse */
+        out->energy += weight * W;
+        for (int a = 0; a < nodes; a++)
+            for (int i = 0; i < 2; i++) {
+                double *b = B[2 * a + i];
+                b[0] = F[i][0] * grad[a][0];
+                b[1] = F[i][1] * grad[a][1];
+                b[2] = F[i][0] * grad[a][1] + F[i][1] * grad[a][0];
+                out->force[2 * a + i] += weight * (b[0] * S[0] + b[1] * S[1] + b[2] * S[2]);
+            }
+        if (ke)
+            add_tangent(ke, nodes, weight, B, D, grad, S);
+    }
+    for (int p = 0; p < n && ke; p++)
+        for (int q = 0; q < p; q++)
+            ke[q * n + p] = ke[p * n + q];
+    return out->least_det > 0;
+}
+
+void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elasticity law, const double *u,
+                        const double point[3])
+{
+    double grad[UZ_ELEMENT_NODES][3], F[2][2], C[N_STRAINS], W, S[N_STRAINS], D[N_STRAINS][N_STRAINS];
+    uz_element_gradients(grad, element, point);
+    out->det = deformation(F, grad, uz_element_node_count(element->kind), u);
+    memcpy(out->F, F, sizeof out->F);
+    cauchy_green(C, F);
+    memcpy(out->strain, (double[4]){0.5 * (C[0] - 1), 0.5 * (C[1] - 1), 0, 0.5 * C[2]}, sizeof out->strain);
+    if (!(out->det > 0) || !uz_hyperelastic(&W, S, D, law, element->lame.lambda, element->lame.mu, C)) {
+        for (int c = 0; c < 4; c++)
+            out->stress[c] = NAN;
+        return;
+    }
+    /* F S F' / J */
+    const double full[2][2] = {{S[0], S[2]}, {S[2], S[1]}};
+    double sigma[2][2] = {{0}};
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++)
+            for (int k = 0; k < 2; k++)
+                for (int l = 0; l < 2; l++)
+                    sigma[i][j] += F[i][k] * full[k][l] * F[j][l] / out->det;
+    const double across = uz_hyperelastic_across(law, element->lame.lambda, element->lame.mu, C) / out->det;
+    memcpy(out->stress, (double[4]){sigma[0][0], sigma[1][1], across, sigma[0][1]}, sizeof out->stress);
+}

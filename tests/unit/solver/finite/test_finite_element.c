@@ -1,0 +1,171 @@
+/* Laws and elements of finite strain: derivatives by differences, the linear law where strains are small, rotations. */
+#include "body_fixture.h"
+#include "certificate/piola.h"
+#include "finite/finite_element.h"
+#include "finite/hyperelastic.h"
+#include "qp_fixture.h"
+
+enum { MOST = 2 * UZ_ELEMENT_NODES };
+static const double LAMBDA = 1.3, MU = 0.7;
+
+static double any(qp_random *rng, double size)
+{
+    return size * (2 * random_unit(rng) - 1);
+}
+
+static void strains_of(double C[3], const double F[4])
+{
+    C[0] = F[0] * F[0] + F[2] * F[2];
+    C[1] = F[1] * F[1] + F[3] * F[3];
+    C[2] = F[0] * F[1] + F[2] * F[3];
+}
+
+/* S = dW/dE and D = dS/dE, E = (C - I) / 2. */
+TEST(stress_and_tangent_of_laws_are_derivatives)
+{
+    qp_random rng = {7};
+    for (int k = 0; k < 60; k++)
+        for (int law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF; law < UZ_ELASTICITIES; law++) {
+            const double F[4] = {1 + any(&rng, 0.4), any(&rng, 0.4), any(&rng, 0.4), 1 + any(&rng, 0.4)}, h = 1e-6;
+            double C[3], W, S[3], D[3][3];
+            strains_of(C, F);
+            CHECK(uz_hyperelastic(&W, S, D, (uz_elasticity)law, LAMBDA, MU, C));
+            for (int j = 0; j < 3; j++) {
+                double moved[3], energy[2], stress[2][3], unused[3][3];
+                for (int side = 0; side < 2; side++) {
+                    memcpy(moved, C, sizeof C);
+                    moved[j] += (side ? h : -h) * (j == 2 ? 1 : 2); /* 2 E_xy = C_xy */
+                    CHECK(uz_hyperelastic(&energy[side], stress[side], unused, (uz_elasticity)law, LAMBDA, MU, moved));
+                }
+                CHECK_MSG(fabs((energy[1] - energy[0]) / (2 * h) - S[j]) < 1e-8, "law %d", law);
+                for (int i = 0; i < 3; i++)
+                    CHECK_MSG(fabs((stress[1][i] - stress[0][i]) / (2 * h) - D[i][j]) < 1e-6, "law %d", law);
+            }
+        }
+    double W, S[3], D[3][3];
+    CHECK(!uz_hyperelastic(&W, S, D, UZ_ELASTIC_NEO_HOOKE, LAMBDA, MU, (double[3]){1, 1, 1}));
+}
+
+/* The certificate's own statement of the laws, P = F S, and its derivative by differences. */
+TEST(the_certificate_states_the_same_laws)
+{
+    qp_random rng = {8};
+    for (int k = 0; k < 60; k++)
+        for (int law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF; law < UZ_ELASTICITIES; law++) {
+            const double F[4] = {1 + any(&rng, 0.4), any(&rng, 0.4), any(&rng, 0.4), 1 + any(&rng, 0.4)};
+            const long double at[4] = {F[0], F[1], F[2], F[3]}, h = 1e-7L;
+            double C[3], W, S[3], D[3][3];
+            uz_piola own, side[2];
+            strains_of(C, F);
+            CHECK(uz_hyperelastic(&W, S, D, (uz_elasticity)law, LAMBDA, MU, C));
+            uz_piola_at(&own, (uz_elasticity)law, LAMBDA, MU, at);
+            const double P[4] = {F[0] * S[0] + F[1] * S[2], F[0] * S[2] + F[1] * S[1], F[2] * S[0] + F[3] * S[2],
+                                 F[2] * S[2] + F[3] * S[1]};
+            CHECK(fabs((double)own.W - W) < 1e-14);
+            for (int i = 0; i < 4; i++)
+                CHECK_MSG(fabs((double)own.P[i] - P[i]) < 1e-13, "law %d", law);
+            for (int j = 0; j < 4; j++) {
+                for (int s = 0; s < 2; s++) {
+                    long double moved[4] = {at[0], at[1], at[2], at[3]};
+                    moved[j] += s ? h : -h;
+                    uz_piola_at(&side[s], (uz_elasticity)law, LAMBDA, MU, moved);
+                }
+                for (int i = 0; i < 4; i++)
+                    CHECK_MSG(fabsl((side[1].P[i] - side[0].P[i]) / (2 * h) - own.A[i][j]) < 1e-10L, "law %d", law);
+            }
+        }
+}
+
+static uz_element bent_element(double *xyz, uz_element_kind kind, qp_random *rng)
+{
+    const uz_element_type *type = uz_element_type_of(kind);
+    for (int a = 0; a < type->nodes; a++)
+        for (int c = 0; c < 2; c++)
+            xyz[2 * a + c] = type->local[a][c] + any(rng, 0.08);
+    return (uz_element){.kind = kind,
+                        .model = UZ_PLANE_STRAIN,
+                        .formulation = UZ_FORMULATION_STANDARD,
+                        .lame = {LAMBDA, MU},
+                        .thickness = 1.5,
+                        .xyz = xyz};
+}
+
+static const uz_element_kind KINDS[] = {UZ_TRI3, UZ_QUAD4, UZ_TRI6, UZ_QUAD8};
+
+TEST(forces_and_tangents_of_elements_are_derivatives)
+{
+    qp_random rng = {9};
+    for (int k = 0; k < 40; k++) {
+        double xyz[MOST], u[MOST], ke[MOST * MOST], other[MOST * MOST];
+        const uz_element element = bent_element(xyz, KINDS[k % 4], &rng);
+        const uz_elasticity law = (uz_elasticity)(1 + k / 4 % 3);
+        const int n = 2 * uz_element_node_count(element.kind);
+        uz_finite_forces at, side[2];
+        for (int i = 0; i < n; i++)
+            u[i] = any(&rng, 0.15);
+        if (!uz_finite_element(&at, ke, &element, law, u))
+            continue;
+        for (int j = 0; j < n; j++) {
+            const double h = 1e-6, before = u[j];
+            for (int s = 0; s < 2; s++) {
+                u[j] = before + (s ? h : -h);
+                CHECK(uz_finite_element(&side[s], NULL, &element, law, u));
+            }
+            u[j] = before;
+            CHECK(fabs((side[1].energy - side[0].energy) / (2 * h) - at.force[j]) < 1e-7);
+            for (int i = 0; i < n; i++)
+                CHECK_MSG(fabs((side[1].force[i] - side[0].force[i]) / (2 * h) - ke[i * n + j]) < 1e-6, "%s",
+                          uz_element_name(element.kind));
+        }
+        /* undeformed: the stiffness of small strain */
+        memset(u, 0, sizeof u);
+        CHECK(uz_finite_element(&at, ke, &element, law, u) && fabs(at.energy) < 1e-15);
+        CHECK_INT(uz_element_stiffness(other, &element), UZ_SHAPE_GOOD);
+        for (int i = 0; i < n * n; i++)
+            CHECK(fabs(ke[i] - other[i]) < 1e-12);
+    }
+}
+
+/* Turned and carried off, an element has its energy, and its forces turn along; Cauchy's stress does, too. */
+TEST(rotations_strain_nothing)
+{
+    qp_random rng = {10};
+    for (int k = 0; k < 24; k++) {
+        double xyz[MOST], u[MOST], turned[MOST];
+        const uz_element element = bent_element(xyz, KINDS[k % 4], &rng);
+        const uz_elasticity law = (uz_elasticity)(1 + k / 4 % 3);
+        const int n = uz_element_node_count(element.kind);
+        const double angle = any(&rng, 3), c = cos(angle), s = sin(angle);
+        uz_finite_forces before, after;
+        uz_finite_state state[2];
+        for (int i = 0; i < 2 * n; i++)
+            u[i] = any(&rng, 0.05);
+        for (int a = 0; a < n; a++) {
+            const double x = xyz[2 * a] + u[2 * a], y = xyz[2 * a + 1] + u[2 * a + 1];
+            turned[2 * a] = c * x - s * y + 5 - xyz[2 * a];
+            turned[2 * a + 1] = s * x + c * y - 2 - xyz[2 * a + 1];
+        }
+        CHECK(uz_finite_element(&before, NULL, &element, law, u));
+        CHECK(uz_finite_element(&after, NULL, &element, law, turned));
+        CHECK(fabs(before.energy - after.energy) < 1e-12 && fabs(before.least_det - after.least_det) < 1e-12);
+        for (int a = 0; a < n; a++)
+            CHECK(fabs(c * before.force[2 * a] - s * before.force[2 * a + 1] - after.force[2 * a]) < 1e-12);
+        const double *centre = uz_element_type_of(element.kind)->centre;
+        uz_finite_state_at(&state[0], &element, law, u, centre);
+        uz_finite_state_at(&state[1], &element, law, turned, centre);
+        const double *a = state[0].stress, *b = state[1].stress;
+        CHECK(fabs(a[0] + a[1] - b[0] - b[1]) < 1e-12 && fabs(a[2] - b[2]) < 1e-12);
+        CHECK(fabs(c * c * a[0] + s * s * a[1] - 2 * c * s * a[3] - b[0]) < 1e-12);
+        CHECK(fabs(state[0].strain[3] - state[1].strain[3]) < 1e-12);
+    }
+}
+
+TEST(what_is_inside_out_is_told)
+{
+    qp_random rng = {11};
+    double xyz[MOST], u[MOST] = {0};
+    const uz_element element = bent_element(xyz, UZ_QUAD4, &rng);
+    uz_finite_forces at;
+    u[4] = u[5] = -2.5; /* a corner beyond the opposite one: no quadrature point need see it */
+    CHECK(!uz_finite_element(&at, NULL, &element, UZ_ELASTIC_NEO_HOOKE, u) && at.least_det < 0);
+}
