@@ -23,6 +23,8 @@ const OUTCOMES = {
   out_of_reach: ["bad", "Out of reach", "Contact conditions contradict each other but for rounding: a displacement that meets them all, if there is one, is far away."],
   loose: ["warn", "Loose", "No load presses the body on what would hold it: where the obstacles leave it room it may lie anywhere, and this is one such place."],
   moving_geometry: ["warn", "Geometry not settled", "The surfaces move so far that gaps and normals, taken where the answer moves them to, did not settle. This is the last answer."],
+  unstable: ["bad", "Unstable", "Beyond a part of the load no stable equilibrium was found: a limit load or a bifurcation. This is the answer under that part."],
+  inverted: ["bad", "Inverted", "Beyond a part of the load elements turn inside out. This is the answer under that part."],
   dismissed: ["warn", "Dismissed", "It was stopped. This is the best answer so far, with its own certificate."],
   mesh_limit: ["warn", "Mesh limit", "A grid fine enough would be larger than allowed. The answer is on the finest one that is."],
 };
@@ -51,6 +53,7 @@ export function certificate_words(summary) {
       ? "It is proved that no displacement at all satisfies the contact conditions."
       : `It is proved that no displacement whose components are all smaller than ${number(radius)} satisfies the contact conditions.`;
   }
+  if (summary.finite) return `${summary.finite.definite ? "A" : "No"} stable equilibrium under ${number(summary.finite.load)} of the load: a further Newton step would change it by ${percent_up(summary.finite.residual)}, in the energy norm. Nothing bounds its error: compare meshes.`;
   if (bound === null) return "No bound on the error could be proved: this answer must not be relied on.";
   return `The exact answer of ${has_mesh(summary) ? "its equations" : "this problem"} differs by at most ${percent_up(bound)}, in the energy norm.`;
 }

@@ -71,6 +71,8 @@ static void print_outcome(FILE *to, const json_t *summary)
         {"out_of_reach", "a displacement that satisfies all contact conditions, if there is one, is far away"},
         {"moving_geometry",
          "the surfaces move so far that the contact's geometry did not settle; this is the last answer"},
+        {"unstable", "no stable equilibrium was found under all of the load; this is the answer under a part of it"},
+        {"inverted", "elements turn inside out under all of the load; this is the answer under a part of it"},
         {"loose", "nothing says where the body lies; this is one place of many"},
         {"dismissed", "it was dismissed; this is the best answer so far"},
         {"verified", "the certificate of the given answer meets what was asked for"},
@@ -301,6 +303,21 @@ static void print_resultants(FILE *to, const json_t *summary)
     fprintf(to, "imbalance %s of their sizes\n", number_in_words(text, acts, "imbalance", 2));
 }
 
+/* Of finite kinematics, where nothing bounds the error. */
+static void print_finite(FILE *to, const json_t *finite, double asked, const char *met)
+{
+    char least[32], residual[32];
+    fprintf(to, "%sstable equilibrium under %.6g of the load: a further Newton step would change it\n",
+            json_is_true(json_object_get(finite, "definite")) ? "" : "no ", client_json_number(finite, "load"));
+    label(to, "");
+    fprintf(to, "by %s, relative, in the energy norm (asked for %.3g: %s). Nothing bounds its error\n",
+            number_in_words(residual, finite, "residual", 2), asked, met);
+    label(to, "");
+    fprintf(to, "%.0f contact problems in %.0f steps, the least determinant of F is %s\n",
+            client_json_number(finite, "qps"), client_json_number(finite, "steps"),
+            number_in_words(least, finite, "least_det", 3));
+}
+
 /* The bound, whether it is what was asked for, and what it is made of. */
 static void print_certificate(FILE *to, const json_t *summary)
 {
@@ -316,6 +333,10 @@ static void print_certificate(FILE *to, const json_t *summary)
     if (!json_is_object(certificate))
         return;
     label(to, "certificate");
+    if (json_is_object(json_object_get(summary, "finite"))) {
+        print_finite(to, json_object_get(summary, "finite"), asked, met);
+        return;
+    }
     /* What the bound says to somebody who never heard of an energy norm: how many digits it leaves. */
     const double left = client_json_number(summary, "contact.geometry.left");
     const double digits = floor(-log10(left > relative ? left : relative));

@@ -204,8 +204,10 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
         const char *key, *names[4]; /* the first is the default; in the order of the library's enums */
     } WORDS[] = {{"model", {"plane_stress", "plane_strain", "axisymmetric", "solid"}},
                  {"formulation", {"auto", "standard", "bbar", "incompatible_modes"}},
-                 {"kinematics", {"auto", "fixed", "moving"}}};
+                 {"kinematics", {"auto", "fixed", "moving", "finite"}}};
     static const char *const COMPONENTS[] = {"ux", "uy", "uz"};
+    static const char *const LAWS[UZ_ELASTICITIES] = {"linear", "st_venant_kirchhoff", "neo_hooke",
+                                                      "neo_hooke_isochoric"}; /* in the order of the library's enum */
     const json_value *mesh = json_get(object, "mesh"), *box = json_get(mesh, "box");
     const json_value *materials = json_get(object, "materials"), *supports = json_get(object, "supports");
     int words[3] = {0};
@@ -227,6 +229,9 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
         const json_value *item = &materials->items[i];
         uz_material *to = &out->materials[i];
         decode_name(to->on, sizeof to->on, item, "on", "");
+        for (size_t law = 0; law < sizeof LAWS / sizeof *LAWS; law++)
+            if (json_text_is(json_get(item, "law"), LAWS[law]))
+                to->law = (uz_elasticity)law;
         to->young = json_number(json_get(item, "young"), 0);
         to->poisson = json_number(json_get(item, "poisson"), 0);
         to->density = json_number(json_get(item, "density"), 0);

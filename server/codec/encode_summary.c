@@ -180,6 +180,26 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
     text_close(t, '}');
 }
 
+/* Of finite kinematics. */
+static void put_finite(text *t, const uz_finite *f)
+{
+    const struct {
+        const char *key;
+        int64_t value;
+    } COUNTS[] = {{"steps", f->steps}, {"failed", f->failed}, {"qps", f->qps},
+                  {"most", f->most},   {"held", f->held},     {"shifted", f->shifted}};
+    text_open(t, "finite", '{');
+    for (size_t k = 0; k < sizeof COUNTS / sizeof *COUNTS; k++)
+        text_integer(t, COUNTS[k].key, COUNTS[k].value);
+    put_named(
+        t, NULL,
+        (named[]){
+            {"load", f->load}, {"least_det", f->least_det}, {"residual", f->residual}, {"least_gap", f->least_gap}},
+        4);
+    text_bool(t, "definite", f->definite);
+    text_close(t, '}');
+}
+
 /* The energies, and how far the answer may be off. */
 static void put_certificate(text *t, const uz_summary *s, bool scene)
 {
@@ -348,6 +368,8 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     text_integer(&t, "m", summary->m);
     text_close(&t, '}');
     put_contact(&t, summary, scene);
+    if (scene && summary->geometry.kind == UZ_KINEMATICS_FINITE)
+        put_finite(&t, &summary->finite);
     put_certificate(&t, summary, scene);
     if (summary->evaluation)
         put_evaluation(&t, summary->evaluation, summary->dim);

@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/blas.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -114,15 +115,10 @@ static double eliminate(uz_envelope *f, int64_t i)
     for (int64_t j = f->first[i]; j < i; j++) {
         const double *other = f->L + f->start[j] - f->first[j];
         const int64_t from = f->first[i] > f->first[j] ? f->first[i] : f->first[j];
-        double sum = row[j];
-        for (int64_t k = from; k < j; k++)
-            sum -= row[k] * other[k];
-        row[j] = sum / other[j];
+        row[j] = (row[j] - uz_dot(j - from, row + from, other + from)) / other[j];
     }
-    double pivot = row[i];
-    for (int64_t k = f->first[i]; k < i; k++)
-        pivot -= row[k] * row[k];
-    return pivot;
+    const double *own = row + f->first[i];
+    return row[i] - uz_dot(i - f->first[i], own, own);
 }
 
 uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, const double *size, double least,
@@ -160,8 +156,7 @@ void uz_envelope_forward(double *x, const uz_envelope *f, double *room)
         room[f->place[j]] = x[j];
     for (int64_t i = 0; i < f->n; i++) {
         const double *row = f->L + f->start[i] - f->first[i];
-        for (int64_t k = f->first[i]; k < i; k++)
-            room[i] -= row[k] * room[k];
+        room[i] -= uz_dot(i - f->first[i], row + f->first[i], room + f->first[i]);
         room[i] /= row[i];
     }
     memcpy(x, room, (size_t)f->n * sizeof *x);

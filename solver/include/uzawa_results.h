@@ -26,8 +26,11 @@ typedef enum {
     UZ_MESH_LIMIT,   /* cells chosen here: the grid that would meet the request is larger than allowed */
     UZ_OUT_OF_REACH, /* every feasible u, if there is one, is at least infeasible_radius away, and none was certified */
     UZ_LOOSE,        /* semicoercive: no load presses the body on what would hold it; u is one place of many */
-    UZ_MOVING_GEOMETRY /* gaps and normals taken where the answer moves the surfaces to did not settle; the last answer
-                        */
+    UZ_MOVING_GEOMETRY, /* gaps and normals taken where the answer moves the surfaces to did not settle; the last answer
+                         */
+    UZ_UNSTABLE, /* finite: no stable equilibrium was reached under the whole load; the answer is that of the last part
+                  * of it that has one (uz_finite.load) */
+    UZ_INVERTED  /* finite: likewise, where beyond that part elements turn inside out */
 } uz_outcome;
 
 /* KKT residual of the paper, section 4: e1 = Ku - p - N'r, e2 = min(g, 0), e3 = max(r, 0), e4 = -g.r; 2-norms. */
@@ -147,13 +150,29 @@ typedef struct {
 /* Scenes: where the contact's geometry was taken, and what that leaves. Errors are in the energy norm, relative to the
  * certificate's. */
 typedef struct {
-    uz_kinematics kind; /* FIXED, or MOVING: where the answer is, in `passes` solves */
+    uz_kinematics kind; /* FIXED, or MOVING, FINITE: where the answer is, in `passes` solves */
     int64_t passes;
     double change;  /* MOVING: what the last pass changed. FIXED: what another would, where AUTO tried it, else NaN */
     double left;    /* MOVING: what further passes would change, by the rate at which they get smaller */
     double sliding; /* FIXED: how far gaps and normals are off where the answer has moved the surfaces to
                      * (post/sliding.c); NaN: not known */
 } uz_geometry;
+
+/* Scenes of kinematics FINITE: how the answer was reached, and what its certificate (certificate/finite.h) found. */
+typedef struct {
+    double load;    /* the part of loads and prescribed displacements that the answer is for: 1 is the whole */
+    int64_t steps;  /* parts in which the load was put on, without those that failed */
+    int64_t failed; /* and those */
+    int64_t qps;    /* contact problems on a tangent that were solved, all together */
+    int64_t most;   /* of these in one step that did not fail */
+    int64_t held; /* those whose tangent was positive definite only with the pressed rows stiff: they keep it stable */
+    int64_t shifted;  /* those where that was not enough, and stiffness of the undeformed body was added */
+    double least_det; /* of the deformation gradient, at quadrature points and corners */
+    double residual;  /* by which the answer's own Newton step would change it: in the norm of the tangent, relative to
+                       * the root of twice the strain energy. An estimate of its error, not a bound */
+    double least_gap; /* of points sampled on the deformed sides of the contacts: a length, < 0: within the obstacle */
+    bool definite;    /* the tangent is positive definite among motions that leave the pressed rows closed */
+} uz_finite;
 
 /* A quantity of uz_problem: where its value for the body itself, without a mesh, is by estimate. */
 typedef struct {
@@ -277,6 +296,7 @@ typedef struct {
     uz_certificate certificate;
     uz_semicoercive semicoercive;
     uz_geometry geometry;
+    uz_finite finite;   /* geometry.kind FINITE only */
     bool factor_cached; /* everything about the body was */
     uz_reuse reused;
     bool contact_last; /* the dofs that N touches are eliminated after all others */

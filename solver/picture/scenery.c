@@ -37,14 +37,14 @@ uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double 
     return point;
 }
 
-double uz_show_factor(const uz_mesh *mesh, const double *u)
+double uz_show_factor(const uz_scene *scene, const uz_mesh *mesh, const double *u)
 {
     double largest = 0;
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
         largest = fmax(largest, fabs(u[i]));
     const double ideal = 0.06 * mesh->extent / largest;
-    if (!(largest > 0 && isfinite(ideal)))
-        return 1;
+    if (!(largest > 0 && isfinite(ideal)) || scene->kinematics == UZ_KINEMATICS_FINITE)
+        return 1; /* larger rotations are not small rotations times a number */
     /* A power of ten times 1, 2 or 5: a factor that reads well. */
     const double power = pow(10, floor(log10(ideal))), rest = ideal / power;
     return fmax(power * (rest < 2 ? 1 : rest < 5 ? 2 : 5), 1);
@@ -61,7 +61,7 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
     memcpy(scenery->axes, scenery->model->mesh.dim == 2 ? PLANE : solid, sizeof scenery->axes);
     scenery->extent = scenery->model->mesh.extent;
     if (!(scenery->factor > 0))
-        scenery->factor = uz_show_factor(&scenery->model->mesh, scenery->answer->u);
+        scenery->factor = uz_show_factor(scenery->scene, &scenery->model->mesh, scenery->answer->u);
     scenery->scale = 1;
     scenery->offset[0] = scenery->offset[1] = 0;
     /* where the nodes are before and after, in lengths */

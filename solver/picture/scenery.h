@@ -32,7 +32,7 @@ uz_status uz_scenery_check_answer(const uz_field_source *answer, const uz_body_m
 uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err);
 
 /* How many times as large displacements (n_nodes x dim) are drawn to be seen: at least 1; it reads well. */
-double uz_show_factor(const uz_mesh *mesh, const double *u);
+double uz_show_factor(const uz_scene *scene, const uz_mesh *mesh, const double *u);
 
 /* Where a point (dim coordinates) is. */
 uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x);

@@ -305,8 +305,29 @@ static uz_status thermal_energy(double *work, double *own, const balance *b, uz_
     return status;
 }
 
+/* The forces of elements at held nodes, as they are known. */
+static void take_inner(balance *b, const double *inner)
+{
+    for (int64_t i = 0; i < b->model->mesh.n_nodes * b->dim; i++) {
+        if (!b->held[i / b->dim])
+            continue;
+        b->inner[i] = inner[i];
+        b->size += fabs(inner[i]);
+    }
+}
+
+static uz_status energy_of(double *energy, const balance *b, uz_error *err)
+{
+    /* Supports move the body, or do not hold it: then most of u may be rigid motion. */
+    const uz_body_model *model = b->model;
+    bool carried = model->n_modes > 0;
+    for (int64_t i = 0; i < model->mesh.n_nodes * b->dim && !carried; i++)
+        carried = model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF && b->u[i] != 0;
+    return uz_strain_energy(energy, model, b->u, carried, err);
+}
+
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                            const double *r, uz_error *err)
+                            const double *r, const uz_balance_known *known, uz_error *err)
 {
     const int64_t n = model->mesh.n_nodes, dim = model->mesh.dim;
     balance b = {.model = model, .scene = scene, .u = u, .r = r, .out = out, .dim = model->mesh.dim};
@@ -330,7 +351,10 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     }
     memcpy(b.centre, model->mesh.xyz, (size_t)dim * sizeof *b.centre);
     add_contacts(&b);
-    status = uz_nodal_loads(b.load, model, scene, err);
+    if (known)
+        memcpy(b.load, known->load, (size_t)(n * dim) * sizeof *b.load);
+    else
+        status = uz_nodal_loads(b.load, model, scene, err);
     for (int64_t a = 0; a < n && status == UZ_OK; a++) {
         const double *f = b.load + a * dim;
         for (int64_t c = 0; c < dim; c++)
@@ -340,10 +364,12 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     }
     if (status == UZ_OK && !list_supports(&b))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
-    if (status == UZ_OK) {
+    if (status == UZ_OK && known)
+        take_inner(&b, known->inner);
+    else if (status == UZ_OK)
         add_elements(&b);
+    if (status == UZ_OK)
         leave_hanging(&b);
-    }
     for (int64_t a = 0; a < n && status == UZ_OK; a++)
         if (b.held[a] && !uz_mesh_hangs(&model->mesh, a))
             add_reaction(&b, a);
@@ -351,13 +377,10 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         status = add_springs(&b, err);
     if (status == UZ_OK)
         status = thermal_energy(&expanding, &expanded, &b, err);
-    if (status == UZ_OK) { /* not from the work of the forces: what they leave over works along with the whole body */
-        /* Supports move the body, or do not hold it: then most of u may be rigid motion. */
-        bool carried = model->n_modes > 0;
-        for (int64_t i = 0; i < n * dim && !carried; i++)
-            carried = model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF && u[i] != 0;
-        status = uz_strain_energy(&energy, model, u, carried, err);
-    }
+    if (known)
+        energy = known->energy;
+    else if (status == UZ_OK) /* not from the work of the forces: what they leave over works along with the body */
+        status = energy_of(&energy, &b, err);
     out->strain_energy = energy - expanding + expanded;
     out->potential_energy = energy - work + expanded;
     out->imbalance = imbalance(&b);

@@ -5,10 +5,17 @@
 #include "assembly/assembly.h"
 #include "uzawa.h"
 
+/* What is known of a body that its stiffness at rest does not tell: forces by node (n_nodes x dim), of its elements and
+ * of its loads, and its strain energy. Moments are then about places of the model's nodes where these are. */
+typedef struct {
+    const double *inner, *load;
+    double energy;
+} uz_balance_known;
+
 /* Fills out->contacts, supports, loads, imbalance and both energies; the names and zeros are there. u: n_nodes x dim;
- * r: m; scene: with the loads of the case. */
+ * r: m; scene: with the loads of the case; known: NULL: all follows from the stiffness. */
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                            const double *r, uz_error *err);
+                            const double *r, const uz_balance_known *known, uz_error *err);
 
 /* Contact with a rigid obstacle that is narrower than the mesh can tell (coarse.c), of the scene's contacts the worst.
  */

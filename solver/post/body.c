@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "finite/finite_element.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +29,31 @@ void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const
     out->group.count = 0;
 }
 
+/* Cauchy's stress and the Green-Lagrange strain. */
+static void finite_states(uz_field_state *state, const uz_field_points *points, int64_t e)
+{
+    const uz_body_model *model = points->body->model;
+    double xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES];
+    uz_element element;
+    int count;
+    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
+    uz_body_element(&element, xyz, model, e);
+    for (int i = 0; i < 2 * count; i++)
+        u[i] = points->u[2 * node[i / 2] + i % 2];
+    for (int k = 0; k < points->count; k++) {
+        uz_finite_state at;
+        uz_finite_state_at(&at, &element, uz_element_material(model, e)->law, u, points->point[k]);
+        memcpy(state[k].stress, at.stress, sizeof at.stress);
+        memcpy(state[k].strain, at.strain, sizeof at.strain);
+    }
+}
+
 void uz_field_points_states(uz_field_state *state, uz_field_points *points, int64_t element)
 {
+    if (points->body->scene->kinematics == UZ_KINEMATICS_FINITE) {
+        finite_states(state, points, element);
+        return;
+    }
     uz_strain_group *group = &points->group;
     if (group->count == 0 || element < group->element[0] || element >= group->element[0] + group->count) {
         /* This element and those that follow it, as long as they are of its kind and formulation. */

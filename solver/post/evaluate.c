@@ -26,11 +26,9 @@ void uz_evaluation_free(uz_evaluation *evaluation)
     free(evaluation);
 }
 
-uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_ahead *ahead,
-                      uz_error *err)
+/* Room, names, and what does not depend on the answer. */
+static uz_status begin(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
-    uz_summary *summary = &result->summary;
-    const uz_mesh_info *mesh = &result->mesh;
     uz_evaluation *e = uz_alloc_zero(1, sizeof *e);
     result->evaluation = e;
     if (!e)
@@ -52,22 +50,27 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
         memcpy(e->contacts[i].on, scene->contacts[i].on, sizeof e->contacts[i].on);
     for (int64_t i = 0; i < e->n_supports; i++)
         memcpy(e->supports[i].on, scene->supports[i].on, sizeof e->supports[i].on);
-    summary->evaluation = e;
+    result->summary.evaluation = e;
     result->pressure = uz_alloc(result->m, sizeof *result->pressure);
-    if (!result->pressure)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)result->m);
-    uz_status status = uz_contact_pressure(result->pressure, model, scene, result->r, err);
-    if (status != UZ_OK)
-        return status;
-    /* Force (of rings: axial), area and peak of the contact: the obstacle pushes a row's node along its normal by
-     * -push, and `on` is pushed the other way where the masters are its own. */
+    return result->pressure
+               ? UZ_OK
+               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)result->m);
+}
+
+/* Force (of rings: axial), area and peak of the contact: the obstacle pushes a row's node along its normal by -push,
+ * and `on` is pushed the other way where the masters are its own. *pressed: the sum of the forces of all rows. */
+static uz_status sum_contact(double *pressed, uz_result *result, const uz_body_model *model, uz_error *err)
+{
+    uz_summary *summary = &result->summary;
+    uz_evaluation *e = result->evaluation;
+    const uz_mesh_info *mesh = &result->mesh;
     double *push = uz_alloc(result->m, sizeof *push);
     if (!push)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)result->m);
     uz_row_forces(push, model, result->r);
     summary->dim = mesh->dim;
-    summary->max_pressure = 0.0;
-    double pressed = 0; /* the sum of the forces of all rows */
+    summary->max_pressure = *pressed = 0.0;
+    memset(summary->force, 0, sizeof summary->force);
     for (int64_t i = 0; i < result->m; i++) {
         const int64_t node = mesh->contact_node[i];
         const uz_contact_sites *sites = model->sites ? &model->sites[mesh->contact_of[i]] : NULL;
@@ -75,7 +78,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
         const int times = (of & UZ_SLAVE_ON ? 1 : 0) - (of & UZ_MASTER_ON ? 1 : 0);
         for (int axis = model->kind == UZ_AXISYMMETRIC ? 1 : 0; axis < mesh->dim; axis++)
             summary->force[axis] -= times * push[i] * mesh->contact_normal[i * mesh->dim + axis];
-        pressed += fabs(push[i]);
+        *pressed += fabs(push[i]);
         if (model->law->kind->active(model->law, NULL, &result->r[i], 1) > 0)
             e->contact_area += mesh->contact_area[i];
         if (!(result->pressure[i] > summary->max_pressure))
@@ -90,7 +93,22 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     const double size = e->peak_node >= 0 ? 1.0 : 0.0; /* what nothing presses on tells nothing */
     uz_trend_fit(&e->peak, &(uz_trend_point){size, summary->max_pressure}, 1, summary->max_pressure, 0.0);
     uz_trend_fit(&e->area, &(uz_trend_point){size, e->contact_area}, 1, e->contact_area, 0.0);
-    status = uz_balance_forces(e, model, scene, result->u, result->r, err);
+    return UZ_OK;
+}
+
+uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_ahead *ahead,
+                      uz_error *err)
+{
+    uz_summary *summary = &result->summary;
+    double pressed;
+    uz_status status = begin(result, model, scene, err);
+    uz_evaluation *e = result->evaluation;
+    if (status == UZ_OK)
+        status = uz_contact_pressure(result->pressure, model, scene, result->r, err);
+    if (status == UZ_OK)
+        status = sum_contact(&pressed, result, model, err);
+    if (status == UZ_OK)
+        status = uz_balance_forces(e, model, scene, result->u, result->r, NULL, err);
     if (status == UZ_OK)
         status = uz_measure_overlap(e->overlap, model, scene, result->u, err);
     if (status != UZ_OK)
@@ -102,4 +120,82 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);
     status = uz_measure_sliding(&summary->geometry.sliding, model, scene, result->u, result->r, e->approach, err);
     return status == UZ_OK ? uz_find_doubts(result, model, scene, err) : status;
+}
+
+/* ---- finite kinematics */
+
+uz_status uz_displaced(uz_body_model *out, const uz_body_model *model, const double *u, uz_error *err)
+{
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    double *xyz = uz_alloc(n, sizeof *xyz);
+    if (!xyz)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the places of %lld nodes",
+                       (long long)model->mesh.n_nodes);
+    for (int64_t i = 0; i < n; i++)
+        xyz[i] = model->mesh.xyz[i] + u[i];
+    *out = *model;
+    out->mesh.xyz = xyz;
+    out->mesh.uniform = false;
+    return UZ_OK;
+}
+
+/* The area of each row becomes that of the deformed side: as the sides around its node have grown. */
+static uz_status stretch_areas(uz_result *result, const uz_body_model *model, const uz_body_model *displaced,
+                               const uz_scene *scene, uz_error *err)
+{
+    const uz_body_model *const of[2] = {model, displaced};
+    double *area = uz_alloc_zero(2 * model->mesh.n_nodes, sizeof *area);
+    if (!area)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the areas of %lld nodes", (long long)model->mesh.n_nodes);
+    for (int64_t k = 0; k < scene->n_contacts; k++) {
+        const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
+        for (int64_t f = 0; group && f < group->n_faces; f++)
+            for (int which = 0; which < 2; which++) {
+                double xyz[3 * UZ_FACE_NODES], weight[UZ_FACE_NODES];
+                int64_t node[UZ_FACE_NODES];
+                uz_side side;
+                uz_body_side(&side, xyz, node, of[which], group->face[f]);
+                uz_side_positive_weights(weight, &side);
+                for (int a = 0; a < side.nodes; a++)
+                    area[2 * node[a] + which] += weight[a];
+            }
+    }
+    for (int64_t i = 0; i < result->m; i++) {
+        const double *own = area + 2 * result->mesh.contact_node[i];
+        result->mesh.contact_area[i] *= own[0] > 0 ? own[1] / own[0] : 1;
+    }
+    free(area);
+    return UZ_OK;
+}
+
+uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, const uz_scene *scene, const double *inner,
+                             double energy, uz_error *err)
+{
+    uz_body_model displaced = {.mesh.xyz = NULL};
+    double pressed, *load = uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *load);
+    uz_status status = begin(result, model, scene, err);
+    if (status == UZ_OK && !load)
+        status =
+            uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)model->mesh.n_nodes);
+    if (status == UZ_OK)
+        status = uz_nodal_loads(load, model, scene, err);
+    if (status == UZ_OK)
+        status = uz_displaced(&displaced, model, result->u, err);
+    if (status == UZ_OK)
+        status = uz_contact_pressure(result->pressure, &displaced, scene, result->r, err);
+    if (status == UZ_OK)
+        status = stretch_areas(result, model, &displaced, scene, err);
+    if (status == UZ_OK)
+        status = sum_contact(&pressed, result, model, err);
+    if (status == UZ_OK)
+        status = uz_balance_forces(result->evaluation, &displaced, scene, result->u, result->r,
+                                   &(uz_balance_known){inner, load, energy}, err);
+    if (status == UZ_OK)
+        status = uz_measure_overlap(result->evaluation->overlap, model, scene, result->u, err);
+    if (status == UZ_OK)
+        result->evaluation->approach =
+            uz_contact_approach(energy, pressed, result->evaluation->overlap, scene->n_contacts);
+    free(displaced.mesh.xyz);
+    free(load);
+    return status;
 }

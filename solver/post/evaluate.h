@@ -13,4 +13,13 @@
 uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_ahead *ahead,
                       uz_error *err);
 
+/* The same of an answer of finite kinematics, with its contacts where it has gone: forces, areas and pressures are
+ * those of the deformed body, what follows from the stiffness at rest is left out. inner: n_nodes x dim, forces of the
+ * elements; energy: their strain energy. */
+uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, const uz_scene *scene, const double *inner,
+                             double energy, uz_error *err);
+
+/* The body with its nodes where u has taken them: a borrower of all but mesh.xyz, which the caller frees. */
+uz_status uz_displaced(uz_body_model *out, const uz_body_model *model, const double *u, uz_error *err);
+
 #endif

@@ -1,4 +1,5 @@
 /* fields.c: what an answer means, computed from the scene, the displacements and the reactions. */
+#include "post/evaluate.h"
 #include "post/parts.h"
 
 #include "core/alloc.h"
@@ -166,6 +167,20 @@ static uz_status nodal_fields(uz_fields *out, const uz_field_body *body, const d
     return UZ_OK;
 }
 
+/* Per area where the body is: before anything moves, but of finite kinematics. */
+static uz_status pressure_of(double *pressure, const uz_field_body *body, const uz_field_source *answer, uz_error *err)
+{
+    uz_body_model displaced;
+    if (body->scene->kinematics != UZ_KINEMATICS_FINITE || !answer->u)
+        return uz_contact_pressure(pressure, body->model, body->scene, answer->r, err);
+    uz_status status = uz_displaced(&displaced, body->model, answer->u, err);
+    if (status != UZ_OK)
+        return status;
+    status = uz_contact_pressure(pressure, &displaced, body->scene, answer->r, err);
+    free(displaced.mesh.xyz);
+    return status;
+}
+
 static const unsigned OF_BODY = OF_STRESS | UZ_FIELD_STRAIN | UZ_FIELD_STRESS_GAUSS | UZ_FIELD_DISPLACEMENTS;
 static const unsigned OF_CONTACT = UZ_FIELD_PRESSURE | UZ_FIELD_CONTACT_STATUS | UZ_FIELD_REACTIONS;
 
@@ -190,7 +205,7 @@ uz_status uz_fields_of_body(uz_fields *out, const uz_field_body *body, const uz_
     if (status == UZ_OK)
         status = make_room(&out->contact_status, which & UZ_FIELD_CONTACT_STATUS, m, 1, err);
     if (status == UZ_OK && out->pressure)
-        status = uz_contact_pressure(out->pressure, model, body->scene, answer->r, err);
+        status = pressure_of(out->pressure, body, answer, err);
     for (int64_t i = 0; status == UZ_OK && out->contact_status && i < m; i++)
         out->contact_status[i] = (double)model->law->kind->active(model->law, NULL, &answer->r[i], 1);
     if (status == UZ_OK)

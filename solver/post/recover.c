@@ -47,6 +47,47 @@ static void average_materials(double *stress, double *strain, double *volume, co
         }
 }
 
+/* Of finite kinematics, whose stress does not follow from strains at nodes: the stress at the points where an element
+ * is most accurate, continued to its nodes, and averaged by volume; of nodes that are not done. */
+static void average_states(double *stress, double *strain, double *volume, const unsigned char *done,
+                           const uz_field_body *body, const double *u)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    const int n = body->components;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
+        double share[UZ_ELEMENT_NODES][UZ_ELEMENT_SAMPLES], sample[UZ_ELEMENT_SAMPLES][3], xyz[3 * UZ_ELEMENT_NODES];
+        uz_field_state state[UZ_ELEMENT_SAMPLES];
+        uz_field_points points = {.count = uz_element_type_of(kind)->recover(sample, share, kind)};
+        uz_element element;
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        memcpy(points.point, sample, (size_t)points.count * sizeof *sample);
+        uz_field_points_init(&points, body, u);
+        uz_field_points_states(state, &points, e);
+        uz_body_element(&element, xyz, body->model, e);
+        const double own = uz_element_volume(&element);
+        for (int a = 0; a < count; a++) {
+            if (done[node[a]])
+                continue;
+            volume[node[a]] += own;
+            for (int k = 0; k < points.count; k++)
+                for (int c = 0; c < n; c++) {
+                    if (stress)
+                        stress[node[a] * n + c] += own * share[a][k] * state[k].stress[c];
+                    if (strain)
+                        strain[node[a] * n + c] += own * share[a][k] * state[k].strain[c];
+                }
+        }
+    }
+    for (int64_t i = 0; i < mesh->n_nodes * n; i++) {
+        if (stress && !done[i / n])
+            stress[i] = volume[i / n] > 0 ? stress[i] / volume[i / n] : NAN;
+        if (strain && !done[i / n])
+            strain[i] = volume[i / n] > 0 ? strain[i] / volume[i / n] : NAN;
+    }
+}
+
 uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,
                            const uz_hooks *hooks, uz_error *err)
 {
@@ -65,7 +106,9 @@ uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at %lld nodes", (long long)n_nodes);
     if (status == UZ_OK)
         status = uz_field_fit_patches(stress, strain, done, body, u, hooks, err);
-    if (status == UZ_OK && memchr(done, 0, (size_t)n_nodes)) {
+    if (status == UZ_OK && body->scene->kinematics == UZ_KINEMATICS_FINITE) {
+        average_states(stress, strain, volume, done, body, u);
+    } else if (status == UZ_OK && memchr(done, 0, (size_t)n_nodes)) {
         status = uz_nodal_strains_recover(&recovered, &from, UZ_CONTINUE_WHOLE, hooks, err);
         if (status == UZ_OK)
             average_materials(stress, strain, volume, done, &recovered, body);

@@ -44,6 +44,8 @@ static const char *const OUTCOMES[] = {
     [UZ_OUT_OF_REACH] = "out_of_reach",
     [UZ_LOOSE] = "loose",
     [UZ_MOVING_GEOMETRY] = "moving_geometry",
+    [UZ_UNSTABLE] = "unstable",
+    [UZ_INVERTED] = "inverted",
 };
 static const char *const QUANTITIES[] = {
     [UZ_QUANTITY_CONTACT_FORCE] = "contact.force", [UZ_QUANTITY_REACTION] = "reaction",
@@ -54,6 +56,7 @@ static const char *const KINEMATICS[] = {
     [UZ_KINEMATICS_AUTO] = "auto",
     [UZ_KINEMATICS_FIXED] = "fixed",
     [UZ_KINEMATICS_MOVING] = "moving",
+    [UZ_KINEMATICS_FINITE] = "finite",
 };
 
 #define COUNTED(table) table, sizeof(table) / sizeof((table)[0])

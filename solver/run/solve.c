@@ -1,5 +1,6 @@
 /* solve.c: where a call enters. What follows stands in the order in which control goes down (solve.h):
  *
+ *     finite kinematics -> parts of a load -> contact problems on tangents, each by rounds
  *     chosen cells -> grids -> rounds of contact rows -> blocks or one by one -> one load
  *                           -> what the answers of the rounds ask for */
 #include "run/solve.h"
@@ -7,6 +8,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "run/finite.h"
 #include "run/results.h"
 
 #include <stdlib.h>
@@ -19,21 +21,48 @@ static bool is_mesh_chosen(const uz_problem *problem)
            (scene->refine || (scene->source == UZ_MESH_BOX && scene->box.automatic));
 }
 
+/* The kinds of runs. The first that is one for the problem takes it; results as those of uz_solve_rounds. */
+typedef struct {
+    bool (*takes)(const uz_problem *problem);
+    uz_status (*solve)(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                       const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+} run_kind;
+
+static bool any(const uz_problem *problem)
+{
+    (void)problem;
+    return true;
+}
+
+/* On the mesh that is given, and by the stiffness that it has there. */
+static uz_status solve_given(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                             const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    const double started = uz_seconds();
+    const uz_status status = uz_solve_rounds(results, problem, settings, starts, NULL, cache, hooks, err);
+    return uz_settle_cases(results, status, problem, settings, starts, cache, hooks, started, err);
+}
+
+static const run_kind KINDS[] = {
+    {uz_is_finite, uz_solve_finite}, {is_mesh_chosen, uz_solve_grid_sequence}, {any, solve_given}};
+
+static uz_status run(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                     const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    const run_kind *kind = KINDS;
+    while (!kind->takes(problem))
+        kind++;
+    return kind->solve(results, problem, settings, starts, cache, hooks, err);
+}
+
 uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
                    const uz_hooks *hooks, uz_error *err)
 {
-    const double started = uz_seconds();
-    uz_status status;
     *out = NULL;
     uz_error_reset(err);
     if (problem->n_cases > 0)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "a problem with load cases is for uz_solve_cases");
-    if (is_mesh_chosen(problem)) {
-        status = uz_solve_grid_sequence(out, problem, settings, NULL, cache, hooks, err);
-    } else {
-        status = uz_solve_rounds(out, problem, settings, NULL, NULL, cache, hooks, err);
-        status = uz_settle_cases(out, status, problem, settings, NULL, cache, hooks, started, err);
-    }
+    const uz_status status = run(out, problem, settings, NULL, cache, hooks, err);
     if (status != UZ_OK) {
         uz_result_free(*out);
         *out = NULL;
@@ -45,19 +74,12 @@ uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_s
                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
-    const double started = uz_seconds();
-    uz_status status;
     *out = NULL;
     uz_error_reset(err);
     uz_result **results = uz_alloc_zero(n, sizeof(uz_result *));
     if (!results)
         return uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for the results of %lld cases", (long long)n);
-    if (is_mesh_chosen(problem)) {
-        status = uz_solve_grid_sequence(results, problem, settings, starts, cache, hooks, err);
-    } else {
-        status = uz_solve_rounds(results, problem, settings, starts, NULL, cache, hooks, err);
-        status = uz_settle_cases(results, status, problem, settings, starts, cache, hooks, started, err);
-    }
+    const uz_status status = run(results, problem, settings, starts, cache, hooks, err);
     if (status == UZ_OK)
         *out = results;
     else

@@ -105,6 +105,9 @@ uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u,
     if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_MOVING)
         return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
                        "an answer is verified with its contacts as they are before anything moves: ask for \"fixed\"");
+    if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_FINITE)
+        return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
+                       "answers of finite kinematics are certified where they are made only: ask for \"fixed\"");
     if (problem->n_cases > 0)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "an answer to one load is verified, not to load cases");
     uz_status status = uz_check_settings(settings, err);

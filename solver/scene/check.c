@@ -117,7 +117,9 @@ uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_err
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                        "the formulations bbar and incompatible_modes are those of quad4 and hex8, and the mesh has "
                        "none; use auto");
-    const uz_status status = uz_check_materials(scene, mesh, err);
+    uz_status status = uz_check_finite_body(scene, err);
+    if (status == UZ_OK)
+        status = uz_check_materials(scene, mesh, err);
     return status == UZ_OK ? check_supports_and_contacts(scene, mesh, err) : status;
 }
 
@@ -197,6 +199,8 @@ uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_err
 {
     char where[UZ_CHECK_POINTER];
     uz_status status = check_supports_and_contacts(scene, mesh, err);
+    if (status == UZ_OK)
+        status = uz_check_finite_loads(scene, err);
     for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
         const uz_load *load = &scene->loads[i];
         if (load->kind >= UZ_LOAD_KINDS)

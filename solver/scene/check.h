@@ -23,6 +23,9 @@ uz_status uz_check_number(double value, const char *list, int64_t i, const char 
  * contact before it may have named for each other. */
 uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err);
 uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err);
+/* What finite kinematics have no model for, and laws that need them (check_finite.c): of the body, and of its loads. */
+uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err);
+uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err);
 uz_status uz_check_materials(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
 
 #endif

@@ -1,0 +1,288 @@
+/* finite.c: the load put on in parts.
+ *
+ * The whole of it at once, loads and prescribed displacements alike. A part that does not lead to a certified stable
+ * equilibrium is halved, one that needed few contact problems doubled. Where parts become small without one, the load
+ * cannot be borne beyond, or the body is led to turn inside out: the answer is then that of the last part which has an
+ * equilibrium, and is not called converged. */
+#include "run/finite.h"
+
+#include "assembly/parts.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "run/problem.h"
+#include "run/settings.h"
+#include "run/solve.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Parts are doubled after at most FEW contact problems. The smallest one, of the whole load. */
+enum { FEW = 4, MOST_PARTS = 200 };
+#define LEAST_PART (1.0 / 1024)
+/* Orderings and factors of tangents that are kept. */
+#define CACHE_BYTES ((size_t)256 << 20)
+/* Contact problems are solved to this, and the answer to no less than that. */
+#define STEP_ERROR  1e-10
+#define LEAST_ERROR 1e-12
+
+bool uz_is_finite(const uz_problem *problem)
+{
+    return problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_FINITE;
+}
+
+/* ---- what is refused */
+
+static uz_status check_asked(const uz_problem *problem, const uz_settings *settings, uz_error *err)
+{
+    if (problem->scene.box.automatic && problem->scene.source == UZ_MESH_BOX)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
+                       "cells are chosen by the error of small deformation; give their numbers where kinematics are "
+                       "finite");
+    if (problem->scene.refine) /* before what it asks of the accuracy */
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
+                       "meshes are refined by the error of small deformation; give a mesh where kinematics are finite");
+    if (problem->n_quantities > 0)
+        return uz_fail(err, UZ_ERR_SCENE, problem->quantities[0].asked ? "/solver/accuracy" : "/quantities",
+                       "quantities are bounded by duality of small deformation; leave them out where kinematics are "
+                       "finite, and compare meshes");
+    if (settings->guaranteed || settings->total_error > 0 || settings->balanced)
+        return uz_fail(err, UZ_ERR_SCENE, "/solver/accuracy",
+                       "the error of the mesh is not estimated where kinematics are finite: ask for a relative_error "
+                       "of the equations, and compare meshes");
+    if (settings->stopping == UZ_STOP_PAPER)
+        return uz_fail(err, UZ_ERR_SCENE, "/solver/stopping",
+                       "finite kinematics end by their certificate; leave stopping out");
+    return UZ_OK;
+}
+
+/* ---- parts of the load */
+
+void uz_finite_put_on(uz_finite_run *run, double t)
+{
+    const uz_scene *whole = &run->problem->scene;
+    run->load = t;
+    for (int64_t i = 0; i < whole->n_supports; i++) {
+        for (int c = 0; c < 3; c++)
+            run->scene.supports[i].u[c] = t * whole->supports[i].u[c]; /* NaN where free */
+        run->scene.supports[i].value = t * whole->supports[i].value;
+    }
+    for (int64_t i = 0; i < whole->n_loads; i++) {
+        for (int c = 0; c < 3; c++)
+            run->scene.loads[i].v[c] = t * whole->loads[i].v[c];
+        run->scene.loads[i].value = t * whole->loads[i].value;
+    }
+}
+
+static uz_status put_on(uz_finite_run *run, double t, uz_error *err)
+{
+    uz_finite_put_on(run, t);
+    return uz_prescribed_values(run->prescribed, &run->base, &run->scene, err);
+}
+
+/* A copy of the lists that a part changes. */
+static bool copy_lists(uz_scene *scene, const uz_scene *from)
+{
+    scene->supports = uz_alloc(from->n_supports, sizeof *scene->supports);
+    scene->loads = uz_alloc(from->n_loads, sizeof *scene->loads);
+    if (!scene->supports || !scene->loads)
+        return false;
+    if (from->n_supports > 0)
+        memcpy(scene->supports, from->supports, (size_t)from->n_supports * sizeof *scene->supports);
+    if (from->n_loads > 0)
+        memcpy(scene->loads, from->loads, (size_t)from->n_loads * sizeof *scene->loads);
+    return true;
+}
+
+static uz_status begin_load(uz_finite_run *run, uz_error *err)
+{
+    const uz_mesh *mesh = &run->base.mesh;
+    run->n = 2 * mesh->n_nodes;
+    run->d = run->base.d;
+    for (int64_t j = 0; j < run->d; j++)
+        run->stiffest = fmax(run->stiffest, run->base.K.val[run->base.K.ptr[j]]);
+    run->grain = 1e-14 * run->stiffest * mesh->extent * mesh->extent;
+    run->loads = uz_alloc(run->n, sizeof *run->loads);
+    run->prescribed = uz_alloc(run->base.n_fixed, sizeof *run->prescribed);
+    run->p = uz_alloc(run->d, sizeof *run->p);
+    run->v = uz_alloc(run->d, sizeof *run->v);
+    run->Kv = uz_alloc(run->d, sizeof *run->Kv);
+    double *h = uz_alloc(run->base.m, sizeof *h);
+    uz_status status = UZ_OK;
+    if (!run->loads || !run->prescribed || !run->p || !run->v || !run->Kv || !h)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the load of %lld dofs", (long long)run->d);
+    if (status == UZ_OK) /* checks what it reads */
+        status = uz_body_model_load(run->p, h, run->prescribed, &run->base, &run->scene, err);
+    if (status == UZ_OK)
+        status = uz_nodal_loads(run->loads, &run->base, &run->scene, err);
+    free(h);
+    return status;
+}
+
+static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
+                       double deadline, uz_error *err)
+{
+    *run = (uz_finite_run){.problem = one, .settings = *settings, .scene = one->scene, .deadline = deadline};
+    const double start = uz_seconds();
+    run->hooks = hooks ? *hooks : (uz_hooks){.ctx = NULL};
+    run->hooks.begins = NULL;
+    run->hooks.progress = NULL; /* steps of contact problems, and there are many of these */
+    run->requested = fmax(LEAST_ERROR, uz_requested_error(settings));
+    run->settings.relative_error = fmin(STEP_ERROR, run->requested);
+    run->settings.semidefinite = false;
+    const bool copied = copy_lists(&run->scene, &one->scene);
+    run->cache = uz_cache_new(CACHE_BYTES);
+    if (!copied || !run->cache)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+    uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_SUPPORTED, err);
+    if (status == UZ_OK)
+        status = begin_load(run, err);
+    if (status == UZ_OK)
+        status = uz_finite_tangent_of(&run->tangent, &run->base, err);
+    if (status == UZ_OK)
+        status = uz_finite_place_init(&run->at, run, err);
+    if (status == UZ_OK)
+        status = uz_finite_place_init(&run->trial, run, err);
+    run->spent.assemble = uz_seconds() - start;
+    return status;
+}
+
+static void end(uz_finite_run *run)
+{
+    uz_finite_place_clear(&run->at);
+    uz_finite_place_clear(&run->trial);
+    uz_finite_tangent_clear(&run->tangent);
+    uz_body_model_clear(&run->base);
+    uz_cache_free(run->cache);
+    uz_result_free(run->last);
+    free(run->scene.supports);
+    free(run->scene.loads);
+    free(run->loads);
+    free(run->prescribed);
+    free(run->r);
+    free(run->p);
+    free(run->v);
+    free(run->Kv);
+}
+
+/* What is gone back to. */
+typedef struct {
+    double *u, *r;
+    int64_t n_r;
+    uz_finite_certificate certificate;
+} settled;
+
+static bool keep(settled *to, const uz_finite_run *run)
+{
+    double *r = uz_alloc(run->n_r, sizeof *r);
+    if (!r)
+        return false;
+    free(to->r);
+    to->r = r;
+    to->n_r = run->n_r;
+    to->certificate = run->certificate;
+    memcpy(to->u, run->at.u, (size_t)run->n * sizeof *to->u);
+    if (run->n_r > 0)
+        memcpy(r, run->r, (size_t)run->n_r * sizeof *r);
+    return true;
+}
+
+static uz_status go_back(uz_finite_run *run, const settled *to, double t, uz_error *err)
+{
+    bool fits;
+    double *r = uz_alloc(to->n_r, sizeof *r);
+    if (!r)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld reactions", (long long)to->n_r);
+    if (to->n_r > 0)
+        memcpy(r, to->r, (size_t)to->n_r * sizeof *r);
+    free(run->r);
+    run->r = r;
+    run->n_r = to->n_r;
+    run->certificate = to->certificate;
+    memcpy(run->at.u, to->u, (size_t)run->n * sizeof *to->u);
+    const uz_status status = put_on(run, t, err);
+    return status == UZ_OK ? uz_finite_place_find(&fits, &run->at, run, err) : status;
+}
+
+/* Until the whole load is on, or no further part of it holds. */
+static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_error *err)
+{
+    settled last = {.u = uz_alloc_zero(run->n, sizeof *last.u)};
+    uz_finite *found = &run->found;
+    double step = 1;
+    uz_status status = last.u ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+    *why = UZ_PART_SETTLED;
+    while (status == UZ_OK && found->load < 1 && step >= LEAST_PART && found->steps + found->failed < MOST_PARTS) {
+        uz_part part = UZ_PART_UNSETTLED;
+        const double t = fmin(1.0, found->load + step);
+        status = put_on(run, t, err);
+        if (status == UZ_OK)
+            status = uz_finite_settle(&part, run, err);
+        if (status != UZ_OK)
+            break;
+        if (part == UZ_PART_SETTLED) {
+            found->load = t;
+            found->steps++;
+            found->least_det = run->certificate.least_det;
+            found->most = run->step_qps > found->most ? run->step_qps : found->most;
+            step *= run->step_qps <= FEW ? 2 : 1;
+            if (!keep(&last, run))
+                status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+            continue;
+        }
+        *why = part;
+        *tried = t;
+        found->failed++;
+        step *= 0.5;
+        status = go_back(run, &last, found->load, err);
+        if (part == UZ_PART_STOPPED)
+            break;
+    }
+    free(last.u);
+    free(last.r);
+    return status;
+}
+
+static uz_status solve_case(uz_result **out, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
+                            double deadline, uz_error *err)
+{
+    uz_finite_run run;
+    uz_part why = UZ_PART_SETTLED;
+    const double start = uz_seconds();
+    double tried = 0;
+    uz_status status = begin(&run, one, settings, hooks, deadline, err);
+    if (status == UZ_OK)
+        status = put_on_all(&why, &tried, &run, err);
+    if (status == UZ_OK) {
+        run.spent.total = uz_seconds() - start;
+        status = uz_finite_report(out, &run, why, tried, err);
+    }
+    end(&run);
+    return status;
+}
+
+uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
+    const double deadline = uz_seconds() + settings->time_limit_s;
+    (void)starts; /* where small deformation has got to says nothing of it */
+    (void)cache;  /* tangents are those of one answer */
+    uz_status status = uz_check_settings(settings, err);
+    if (status == UZ_OK)
+        status = uz_check_problem(problem, err);
+    if (status == UZ_OK)
+        status = check_asked(problem, settings, err);
+    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        const uz_problem one = uz_problem_of_case(problem, i);
+        if (uz_cancelled(hooks))
+            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
+        if (hooks && hooks->begins)
+            hooks->begins(hooks->ctx, i);
+        status = solve_case(&results[i], &one, settings, hooks, deadline, err);
+        if (status != UZ_OK && problem->n_cases > 0)
+            uz_error_name_case(err, i);
+    }
+    return status;
+}

@@ -1,0 +1,83 @@
+/* finite.h: scenes of finite kinematics: large rotations and strains, contact where the body has gone.
+ *
+ *     uz_solve_finite    finite.c          load cases; the load put on in parts
+ *     uz_finite_settle   finite_newton.c   the equilibrium under one part: contact problems on tangents
+ *     uz_finite_report   finite_report.c   the answer as a result */
+#ifndef UZ_RUN_FINITE_H
+#define UZ_RUN_FINITE_H
+
+#include "certificate/finite.h"
+#include "core/hooks.h"
+#include "finite/finite_body.h"
+#include "uzawa.h"
+
+/* The kind of run (solve.c): results as those of uz_solve_rounds. Every case is answered with its whole load, or with
+ * the last part that has a stable equilibrium and the outcome UZ_UNSTABLE or UZ_INVERTED. Refuses what is not made for
+ * it: errors at fixed moduli, quantities, bounds on the whole error. */
+bool uz_is_finite(const uz_problem *problem);
+uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+
+/* ---- shared by the files above */
+
+/* A displacement, and what follows from it. Its rows are those of the body there. */
+typedef struct {
+    double *u, *force; /* n: displacements by node, internal forces */
+    uz_finite_measure body;
+    uz_body_model rows;
+    double *h, *gap;  /* m of rows */
+    double violation; /* the sum of the gaps that are negative */
+} uz_finite_place;
+
+typedef enum {
+    UZ_PART_SETTLED,
+    UZ_PART_UNSETTLED,     /* no equilibrium was found */
+    UZ_PART_INDEFINITE,    /* one that is no minimum */
+    UZ_PART_INVERTED,      /* the way to it turns elements inside out */
+    UZ_PART_CONTRADICTORY, /* contact conditions that no displacement meets */
+    UZ_PART_STOPPED        /* by time, or by the caller, or by a limit on iterations: run->stopped */
+} uz_part;
+
+typedef struct {
+    const uz_problem *problem; /* of one case */
+    uz_settings settings;      /* of the contact problems */
+    double requested;          /* error of the answer */
+    uz_hooks hooks;
+    double deadline;
+    uz_cache *cache; /* of tangents: their ordering is found once */
+    uz_scene scene;  /* with supports and loads times `load`, of its own */
+    double load;     /* t */
+    uz_body_model base, tangent;
+    int64_t n, d;
+    double *loads;      /* n: forces of the whole load */
+    double *prescribed; /* n_fixed: under t */
+    uz_finite_place at, trial;
+    double *r; /* reactions of the rows that the last contact problem had, n_r of them */
+    int64_t n_r;
+    double *p, *v, *Kv;          /* d: room */
+    double penalty, hold, shift; /* of merits; what the last tangent had added, see finite_newton.c */
+    double stiffest, grain;      /* of the undeformed body: its stiffest dof; what rounding may leave of an energy */
+    int64_t step_qps;
+    uz_result *last; /* of the last contact problem: methods and factor */
+    uz_timings spent;
+    uz_outcome stopped;
+    uz_finite_certificate certificate; /* of `at`, where a part has settled */
+    uz_finite found;
+} uz_finite_run;
+
+/* Supports and loads are those of a part t of the whole. */
+void uz_finite_put_on(uz_finite_run *run, double t);
+/* Room for a place, and what follows from its u; false in *fits: elements are inverted there, or there is no contact
+ * geometry. */
+uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run, uz_error *err);
+uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run *run, uz_error *err);
+void uz_finite_place_clear(uz_finite_place *place);
+
+/* From run->at to the equilibrium under run->load. On UZ_PART_SETTLED run->at, r and certificate are those of the
+ * equilibrium; else run->at is somewhere. */
+uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
+
+/* *out: the answer run->at under run->load. why: of the part beyond it that was tried last, `tried`. */
+uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err);
+
+#endif

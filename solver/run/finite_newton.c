@@ -1,0 +1,494 @@
+/* finite_newton.c: equilibrium under one part of the load.
+ *
+ * Each step solves the contact problem of the tangent at the place u_k, in all of the free displacements u:
+ *
+ *     minimize 1/2 u'K u - (f + K u_k)'u   subject to   h - N u >= 0,        f = loads - internal forces at u_k,
+ *
+ * K the second derivatives of the energy and of r times the gaps, h and N the gaps and normals where the body is:
+ * Newton's method on the conditions of equilibrium with contact, sequential quadratic programming (Nocedal and Wright,
+ * "Numerical Optimization", ch. 18). A K that is not positive definite gets stiffness along the pressed rows added,
+ * which changes nothing where they stay closed, and where that is not enough that of the undeformed body, which costs
+ * steps. Steps are shortened until no element turns inside out and the potential energy, with a penalty on negative
+ * gaps that exceeds the reactions (ibid., ch. 18.3), is less than it was at one of the last places; but that which
+ * moves the supports, whose place has no energy to compare. The end is the certificate's to say. */
+#include "run/finite.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "linalg/blas.h"
+#include "linalg/linalg.h"
+#include "assembly/parts.h"
+#include "obstacle/obstacle.h"
+#include "run/solve.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Contact problems of one part, and how often a step is halved. */
+enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3 };
+/* The certificate is asked once steps are less than this part of the energy's norm. */
+#define ASKED_FROM 1e-3
+/* A determinant of F that is next to none. */
+#define NEARLY_FLAT 0.2
+/* Equations of a step are solved to this; they are those of all of u, which may be rotation for the most part. */
+#define STEP_ERROR 1e-10
+/* Stiffness along pressed rows, in those of the stiffest dof. */
+#define LEAST_HOLD 1.0
+#define MOST_HOLD  1e3
+/* Stiffness of the undeformed body that is added first, and by how much more each time. */
+#define FIRST_SHIFT 0.01
+#define MORE_SHIFT  4.0
+#define MOST_SHIFT  1e4
+
+/* ---- places */
+
+uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run, uz_error *err)
+{
+    place->u = uz_alloc_zero(run->n, sizeof *place->u);
+    place->force = uz_alloc_zero(run->n, sizeof *place->force);
+    return place->u && place->force
+               ? UZ_OK
+               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the place of %lld nodes", (long long)(run->n / 2));
+}
+
+static void forget_rows(uz_finite_place *place)
+{
+    uz_body_model_clear(&place->rows);
+    free(place->h);
+    free(place->gap);
+    place->h = place->gap = NULL;
+}
+
+void uz_finite_place_clear(uz_finite_place *place)
+{
+    forget_rows(place);
+    free(place->u);
+    free(place->force);
+    memset(place, 0, sizeof *place);
+}
+
+/* Gaps as the rows have them, with supports where the load has them. */
+static uz_status find_gaps(uz_finite_place *place, uz_finite_run *run, uz_error *err)
+{
+    const int64_t m = place->rows.m;
+    uz_restrict_nodal(run->v, &run->base, place->u);
+    place->h = uz_alloc(m, sizeof *place->h);
+    place->gap = uz_alloc(m, sizeof *place->gap);
+    if (!place->h || !place->gap)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld gaps", (long long)m);
+    const uz_status status = uz_initial_gaps(place->h, run->prescribed, &place->rows, &run->scene, err);
+    if (status != UZ_OK)
+        return status;
+    memcpy(place->gap, place->h, (size_t)m * sizeof *place->gap);
+    uz_csc_gaxpy(place->gap, &place->rows.N, -1, run->v);
+    place->violation = 0;
+    for (int64_t i = 0; i < m; i++)
+        place->violation += fmax(0, -place->gap[i]);
+    return UZ_OK;
+}
+
+uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run *run, uz_error *err)
+{
+    uz_error own = {0};
+    forget_rows(place);
+    uz_finite_body(&place->body, place->force, NULL, &run->base, place->u);
+    *fits = place->body.least_det > 0 && isfinite(place->body.energy);
+    if (!*fits)
+        return UZ_OK;
+    run->scene.place = place->u;
+    uz_status status = uz_body_model_move(&place->rows, &run->base, &run->scene, &own);
+    if (status == UZ_OK)
+        status = find_gaps(place, run, &own);
+    run->scene.place = NULL;
+    if (status == UZ_ERR_SCENE && run->found.qps > 0) { /* the scene is good: it is the place that is not */
+        *fits = false;
+        return UZ_OK;
+    }
+    if (status != UZ_OK && err)
+        *err = own;
+    return status;
+}
+
+/* ---- one contact problem */
+
+/* Where a row stands: shares of nodes, as many as a side of the plane has at most. */
+typedef struct {
+    int n;
+    int64_t node[3];
+    double share[3], x[3][2], at[2]; /* at: the place */
+} row_place;
+
+static row_place place_of_row(const uz_finite_place *place, int64_t row)
+{
+    const uz_body_model *rows = &place->rows;
+    const uz_inner_place *inner = uz_row_inner(rows, row);
+    row_place out = {.n = inner ? inner->nodes : 1};
+    for (int a = 0; a < out.n; a++) {
+        out.node[a] = inner ? inner->node[a] : rows->info.contact_node[row];
+        out.share[a] = inner ? inner->share[a] : 1;
+        for (int c = 0; c < 2; c++) {
+            out.x[a][c] = rows->mesh.xyz[2 * out.node[a] + c] + place->u[2 * out.node[a] + c];
+            out.at[c] += out.share[a] * out.x[a][c];
+        }
+    }
+    return out;
+}
+
+/* Second derivatives of the gap at a place, in displacements of its nodes: the normal n turns by `curvature` as the
+ * place moves along t, and a place inside a side moves on along it, too, to where the side is nearest: where the
+ * derivative of the gap along the side is zero again. */
+static void gap_curvature(double ke[36], const row_place *p, const double n[2], double curvature)
+{
+    /* of shape functions along the side, from -1 to 1; of two nodes the place is share[1] - share[0], of three as well
+     */
+    const double s = p->n > 1 ? p->share[1] - p->share[0] : 0, t[2] = {-n[1], n[0]};
+    const double slope[3] = {p->n == 3 ? s - 0.5 : -0.5, p->n == 3 ? s + 0.5 : 0.5, -2 * s};
+    double along = 0, bend = 0, moves[6];
+    for (int a = 0; a < p->n && p->n > 1; a++) {
+        along += slope[a] * (t[0] * p->x[a][0] + t[1] * p->x[a][1]);
+        if (p->n == 3)
+            bend += (a == 2 ? -2 : 1) * (n[0] * p->x[a][0] + n[1] * p->x[a][1]);
+    }
+    const double second = curvature * along * along + bend;
+    const bool follows = p->n > 1 && second > 0;
+    for (int i = 0; i < 2 * p->n; i++)
+        moves[i] = curvature * along * p->share[i / 2] * t[i % 2] + slope[i / 2] * n[i % 2];
+    for (int i = 0; i < 2 * p->n; i++)
+        for (int j = 0; j < 2 * p->n; j++)
+            ke[i * 2 * p->n + j] = curvature * p->share[i / 2] * p->share[j / 2] * t[i % 2] * t[j % 2] -
+                                   (follows ? moves[i] * moves[j] / second : 0);
+}
+
+/* r g: what curved obstacles add to the tangent. */
+static uz_status add_curvature(uz_finite_run *run, uz_error *err)
+{
+    const uz_body_model *rows = &run->at.rows;
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK && run->n_r == rows->m; k++) {
+        uz_obstacle *obstacle = NULL;
+        if (rows->sites[k].n == 0)
+            continue;
+        status = uz_obstacle_new(&obstacle, &run->scene.contacts[k], k, run->scene.model, err);
+        for (int64_t i = 0; status == UZ_OK && i < rows->m && !uz_obstacle_has_edges(obstacle); i++) {
+            double ke[36];
+            uz_gap gap;
+            if (rows->info.contact_of[i] != k || run->r[i] >= 0)
+                continue;
+            const row_place place = place_of_row(&run->at, i);
+            if (uz_obstacle_gap(&gap, obstacle, place.at, NULL) != UZ_OK)
+                continue;
+            gap_curvature(ke, &place, rows->info.contact_normal + 2 * i, gap.curvature);
+            for (int p = 0; p < 4 * place.n * place.n; p++)
+                ke[p] *= run->r[i];
+            uz_add_stiffness(&run->tangent, ke, place.node, place.n);
+        }
+        uz_obstacle_free(obstacle);
+    }
+    return status;
+}
+
+/* p: what free dofs are loaded with in the contact problem of all of u. *moved: do supports still have to move? */
+static void load_step(bool *moved, uz_finite_run *run)
+{
+    const uz_finite_place *at = &run->at;
+    const uz_body_model *model = &run->base;
+    *moved = false;
+    double *rest = run->trial.force; /* it is free until the next place is looked at */
+    for (int64_t i = 0; i < run->n; i++)
+        rest[i] = run->load * run->loads[i] - at->force[i];
+    uz_gather_nodal(run->p, model, rest);
+    for (int64_t i = 0; i < run->n; i++) {
+        const int64_t dof = model->dof[i];
+        if (dof >= 0)
+            continue;
+        const double way = run->prescribed[-1 - dof] - uz_along_dof(model, i / 2, (int)(i % 2), at->u + 2 * (i / 2));
+        const uz_csc *fixed = &run->tangent.K_fixed;
+        const double rounding = 1e-15 * (fabs(run->prescribed[-1 - dof]) + model->mesh.extent);
+        *moved = *moved || fabs(way) > rounding;
+        for (int64_t q = fixed->ptr[-1 - dof]; q < fixed->ptr[-dof]; q++)
+            run->p[fixed->idx[q]] -= fixed->val[q] * way;
+    }
+    uz_restrict_nodal(run->v, model, at->u);
+    uz_csc_symv(run->p, &run->tangent.K, 1, run->v);
+}
+
+static uz_status solve_qp(uz_finite_run *run, uz_error *err)
+{
+    const uz_problem qp = {.kind = UZ_PROBLEM_MATRICES, .qp = {run->tangent.K, run->at.rows.N, run->p, run->at.h}};
+    uz_result *next = NULL;
+    run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
+    const uz_status status = uz_solve_rounds(&next, &qp, &run->settings, NULL, NULL, run->cache, &run->hooks, err);
+    if (status != UZ_OK)
+        return status;
+    run->found.qps++;
+    run->step_qps++;
+    uz_timings_add(&run->spent, &next->summary.timings);
+    uz_result_free(run->last);
+    run->last = next;
+    return UZ_OK;
+}
+
+/* Stiffness `factor` along the rows that were pressed, about their being closed: where they stay closed the answer is
+ * the same. Dofs of a row are of one node, or of the nodes of one side, so that K has room for it. */
+static uz_status hold_rows(uz_finite_run *run, double factor, uz_error *err)
+{
+    uz_csc *K = &run->tangent.K, rows = {0};
+    const uz_body_model *model = &run->at.rows;
+    uz_status status = UZ_OK;
+    if (run->n_r != model->m || factor == 0)
+        return UZ_OK;
+    status = uz_csc_transpose(&rows, &model->N, err);
+    for (int64_t i = 0; i < model->m && status == UZ_OK; i++)
+        for (int64_t p = rows.ptr[i]; p < rows.ptr[i + 1] && run->r[i] < 0; p++)
+            for (int64_t q = rows.ptr[i]; q <= p; q++)
+                K->val[uz_csc_find(K, rows.idx[p], rows.idx[q])] += factor * rows.val[p] * rows.val[q];
+    uz_csc_clear(&rows);
+    return status;
+}
+
+/* The same in p, whose part K u_k has it at the gaps that there are. */
+static void load_rows(uz_finite_run *run, double factor)
+{
+    const uz_body_model *model = &run->at.rows;
+    if (run->n_r != model->m || factor == 0)
+        return;
+    const uz_csc *N = &model->N;
+    for (int64_t j = 0; j < run->d; j++)
+        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+            if (run->r[N->idx[q]] < 0)
+                run->p[j] += factor * N->val[q] * run->at.gap[N->idx[q]];
+}
+
+/* What is added to a tangent that is not positive definite, from nothing on: first along the pressed rows, as contact
+ * may be all that keeps the body stable, then of the undeformed body. */
+static bool add_more(double *hold, double *shift, bool rows)
+{
+    if (rows && *hold == 0) {
+        *hold = LEAST_HOLD;
+    } else if (rows && *hold < MOST_HOLD && *shift == 0) {
+        *hold = MOST_HOLD;
+    } else {
+        *shift = fmax(FIRST_SHIFT, MORE_SHIFT * *shift);
+    }
+    return *shift <= MOST_SHIFT;
+}
+
+static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
+{
+    const uz_csc *K = &run->tangent.K;
+    uz_error own = {0};
+    uz_status status = UZ_ERR_NOT_SPD;
+    const double stiffest = run->stiffest;
+    double hold = run->hold, shift = run->shift / MORE_SHIFT < FIRST_SHIFT ? 0 : run->shift / MORE_SHIFT;
+    bool pressed = false, more = true;
+    for (int64_t i = 0; i < run->n_r && run->n_r == run->at.rows.m; i++)
+        pressed = pressed || run->r[i] < 0;
+    while (more && (status == UZ_ERR_NOT_SPD || status == UZ_ERR_FREE_BODY)) {
+        const double start = uz_seconds();
+        uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u);
+        uz_error_reset(&own);
+        status = add_curvature(run, &own);
+        if (status == UZ_OK)
+            status = hold_rows(run, hold * stiffest, &own);
+        for (int64_t q = 0; q < K->ptr[K->cols] && shift > 0; q++)
+            K->val[q] += shift * run->base.K.val[q];
+        run->spent.assemble += uz_seconds() - start;
+        if (status != UZ_OK)
+            break;
+        load_step(moved, run);
+        load_rows(run, hold * stiffest);
+        status = solve_qp(run, &own);
+        run->hold = hold;
+        run->shift = shift;
+        more = add_more(&hold, &shift, pressed);
+    }
+    if (status == UZ_OK) {
+        run->found.held += run->hold > 0 && run->shift == 0;
+        run->found.shifted += run->shift > 0;
+    } else if (err) {
+        *err = own;
+    }
+    return status;
+}
+
+/* ---- the step */
+
+static double merit(const uz_finite_run *run, const uz_finite_place *place)
+{
+    double work = 0;
+    for (int64_t i = 0; i < run->n; i++)
+        work += run->loads[i] * place->u[i];
+    return place->body.energy - run->load * work + run->penalty * place->violation;
+}
+
+/* trial becomes a part of the way from `at` to `to`, the largest that is let. before: merits of the last places, of
+ * which one must be above; NULL: any will do. */
+static uz_status step_towards(bool *found, bool *inverted, uz_finite_run *run, const double *to, const double *before,
+                              int remembered, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    double most = -INFINITY, part = 1;
+    *found = *inverted = false;
+    for (int k = 0; k < remembered && before; k++)
+        most = fmax(most, before[k]);
+    for (int k = 0; k <= (before ? MOST_HALVINGS : 0) && status == UZ_OK && !*found; k++, part *= 0.5) {
+        for (int64_t i = 0; i < run->n; i++)
+            run->trial.u[i] = part == 1 ? to[i] : run->at.u[i] + part * (to[i] - run->at.u[i]);
+        status = uz_finite_place_find(found, &run->trial, run, err);
+        *inverted = status == UZ_OK && !*found;
+        if (status == UZ_OK && *found && before)
+            *found = merit(run, &run->trial) <= most + 1e-10 * (fabs(most) + run->trial.body.energy) + run->grain;
+    }
+    return status;
+}
+
+/* Has the new place the rows of the problem that led to it? */
+static bool same_rows(const uz_body_model *a, const uz_body_model *b)
+{
+    const size_t bytes = (size_t)a->m * sizeof(int64_t);
+    return a->m == b->m && memcmp(a->info.contact_node, b->info.contact_node, bytes) == 0 &&
+           memcmp(a->info.contact_of, b->info.contact_of, bytes) == 0;
+}
+
+static void take_trial(uz_finite_run *run)
+{
+    const uz_finite_place old = run->at;
+    run->at = run->trial;
+    run->trial = old;
+}
+
+/* What the certificate says of run->at. *done: it is not to be iterated further. */
+static uz_status ask_certificate(bool *done, uz_part *out, uz_finite_run *run, uz_error *err)
+{
+    const uz_finite_answer answer = {&run->at.rows, &run->scene, run->at.u, run->r, run->at.gap, run->prescribed};
+    uz_finite_certificate *c = &run->certificate;
+    const double start = uz_seconds();
+    const uz_status status = uz_certify_finite(c, &answer, err);
+    run->spent.certify += uz_seconds() - start;
+    const double length = 1e-9 * run->base.mesh.extent;
+    *done = true;
+    if (status != UZ_OK)
+        return status;
+    if (!(c->least_det > 0))
+        *out = UZ_PART_INVERTED;
+    else if (!c->definite)
+        *out = UZ_PART_INDEFINITE;
+    else if (!(c->residual <= fmax(run->requested, c->rounding)) || c->worst_support > length ||
+             c->least_at_rows < -length || c->worst_reaction > 0)
+        *done = false;
+    else
+        *out = UZ_PART_SETTLED;
+    return status;
+}
+
+static uz_part why_stopped(uz_finite_run *run)
+{
+    switch (run->last->summary.outcome) {
+    case UZ_CONVERGED:
+    case UZ_PRECISION_LIMIT:
+        return UZ_PART_SETTLED;
+    case UZ_INFEASIBLE:
+    case UZ_OUT_OF_REACH:
+        return UZ_PART_CONTRADICTORY;
+    default:
+        run->stopped = run->last->summary.outcome;
+        return UZ_PART_STOPPED;
+    }
+}
+
+static uz_status keep_reactions(uz_finite_run *run, uz_error *err)
+{
+    const int64_t m = run->last->m;
+    free(run->r);
+    run->r = uz_alloc(m, sizeof *run->r);
+    run->n_r = run->r ? m : 0;
+    if (!run->r)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld reactions", (long long)m);
+    for (int64_t i = 0; i < m; i++) {
+        run->r[i] = run->last->r[i];
+        run->penalty = fmax(run->penalty, -1.5 * run->r[i]);
+    }
+    return UZ_OK;
+}
+
+/* sqrt(v'K v) over the root of twice the energy, v the step; 0 where that energy is rounding. */
+static double step_norm(uz_finite_run *run)
+{
+    const uz_csc *K = &run->tangent.K;
+    uz_restrict_nodal(run->v, &run->base, run->at.u);
+    for (int64_t j = 0; j < run->d; j++)
+        run->v[j] = run->last->u[j] - run->v[j];
+    memset(run->Kv, 0, (size_t)run->d * sizeof *run->Kv);
+    uz_csc_symv(run->Kv, K, 1, run->v);
+    const double square = fmax(0, uz_dot(run->d, run->v, run->Kv));
+    return square == 0 || run->at.body.energy <= 10 * run->grain ? 0 : sqrt(square / (2 * run->at.body.energy));
+}
+
+/* What passes a point where it is not stable may well turn inside out behind it, and is to be called unstable; but not
+ * where elements had become flat before. */
+static bool is_nearly_flat(const uz_finite_run *run)
+{
+    return run->found.steps > 0 && run->found.least_det < NEARLY_FLAT;
+}
+
+uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
+{
+    double before[REMEMBERED] = {0};
+    int remembered = 0;
+    const uz_stop stop = {&run->hooks, run->deadline};
+    double *to = uz_alloc(run->n, sizeof *to);
+    uz_status status =
+        to ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld nodes", (long long)(run->n / 2));
+    bool done = false, fits = true;
+    const int64_t shifted = run->found.shifted;
+    *out = UZ_PART_UNSETTLED;
+    run->penalty = run->hold = run->shift = 0;
+    run->step_qps = 0;
+    if (status == UZ_OK)
+        status = uz_finite_place_find(&fits, &run->at, run, err); /* supports have moved */
+    while (status == UZ_OK && fits && !done && run->step_qps < MOST_QPS) {
+        bool moved = false, found = false, inverted = false;
+        if (uz_stop_is_due(&stop)) {
+            run->stopped = uz_cancelled(&run->hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
+            *out = UZ_PART_STOPPED;
+            break;
+        }
+        status = solve_definite(&moved, run, err);
+        if (status == UZ_ERR_NOT_SPD || status == UZ_ERR_FREE_BODY) { /* whatever is added */
+            status = UZ_OK;
+            break;
+        }
+        if (status != UZ_OK)
+            break;
+        const uz_part ended = why_stopped(run);
+        if (ended != UZ_PART_SETTLED) {
+            *out = ended;
+            break;
+        }
+        status = keep_reactions(run, err);
+        if (status != UZ_OK)
+            break;
+        const double norm = moved ? (double)INFINITY : step_norm(run);
+        uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);
+        const bool free_step = moved || run->step_qps == 1;
+        if (!free_step) {
+            memmove(before + 1, before, (REMEMBERED - 1) * sizeof *before);
+            before[0] = merit(run, &run->at);
+            remembered = remembered < REMEMBERED ? remembered + 1 : REMEMBERED;
+        }
+        status = step_towards(&found, &inverted, run, to, free_step ? NULL : before, remembered, err);
+        if (status != UZ_OK || !found) {
+            *out = inverted && (run->found.shifted == shifted || is_nearly_flat(run)) ? UZ_PART_INVERTED
+                                                                                      : UZ_PART_UNSETTLED;
+            break;
+        }
+        const bool comparable = same_rows(&run->at.rows, &run->trial.rows);
+        take_trial(run);
+        if (comparable && norm < ASKED_FROM)
+            status = ask_certificate(&done, out, run, err);
+    }
+    free(to);
+    return status;
+}

@@ -1,0 +1,147 @@
+/* finite_report.c: the answer of finite kinematics as a result. What follows from fixed moduli is left out: the error
+ * of the mesh, bounds, and doubts about small deformation. */
+#include "run/finite.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "post/evaluate.h"
+#include "run/results.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* An obstacle that stands deeper in a side between rows than this part of its length: rows leave 0.01 at most. */
+#define CUTS_IN 0.03
+
+static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double tried)
+{
+    const double load = s->finite.load;
+    const uz_finite_certificate *c = &run->certificate;
+    char *text = s->message;
+    const size_t size = sizeof s->message;
+    if (s->outcome == UZ_MESH_LIMIT) {
+        snprintf(text, size,
+                 "the obstacle stands %.3g of a side's length deep in it, between rows: use a finer mesh along the "
+                 "contact",
+                 -c->least_part);
+        return;
+    }
+    if (s->outcome == UZ_PRECISION_LIMIT) {
+        snprintf(text, size,
+                 "strains are so small that rounding of the deformation gradient leaves %.3g of them, asked for %.3g: "
+                 "small deformation is the better model",
+                 s->finite.residual, s->requested_error);
+        return;
+    }
+    switch (why) {
+    case UZ_PART_INVERTED:
+        snprintf(text, size,
+                 "elements turn inside out under %.6g of the load: this is the answer under %.6g of it, the last part "
+                 "with a stable equilibrium. Use a finer mesh, or another law",
+                 tried, load);
+        break;
+    case UZ_PART_CONTRADICTORY:
+        snprintf(text, size,
+                 "under %.6g of the load contact conditions contradict each other: this is the answer under %.6g of "
+                 "it, the last part with a stable equilibrium",
+                 tried, load);
+        break;
+    case UZ_PART_STOPPED:
+        snprintf(text, size, "%s: this is the answer under %.6g of the load",
+                 run->stopped == UZ_DISMISSED    ? "stopped by request"
+                 : run->stopped == UZ_TIME_LIMIT ? "the time allowed was used up: raise time_limit_s"
+                                                 : "the iterations allowed were used up: raise max_iterations",
+                 load);
+        break;
+    default:
+        snprintf(text, size,
+                 "no stable equilibrium was found under %.6g of the load: the last one is that under %.6g of it, and "
+                 "this is the answer there. A limit load or a bifurcation; prescribed displacements may pass it",
+                 tried, load);
+    }
+}
+
+static uz_outcome outcome_of(const uz_finite_run *run, uz_part why)
+{
+    const uz_finite_certificate *c = &run->certificate;
+    if (run->found.load >= 1)
+        return c->least_part < -CUTS_IN           ? UZ_MESH_LIMIT
+               : !(c->residual <= run->requested) ? UZ_PRECISION_LIMIT
+                                                  : UZ_CONVERGED;
+    return why == UZ_PART_INVERTED ? UZ_INVERTED : why == UZ_PART_STOPPED ? run->stopped : UZ_UNSTABLE;
+}
+
+/* Of what was found, in place of what the last contact problem has of its own. */
+static void summarize(uz_summary *s, const uz_finite_run *run, uz_part why, double tried)
+{
+    const uz_finite_certificate *c = &run->certificate;
+    s->outcome = outcome_of(run, why);
+    s->finite = run->found;
+    s->finite.least_det = run->found.steps > 0 ? c->least_det : 1;
+    s->finite.residual = run->found.steps > 0 ? c->residual : 0;
+    s->finite.definite = run->found.steps > 0 && c->definite;
+    s->finite.least_gap = run->found.steps > 0 && isfinite(c->least_gap) ? c->least_gap : (double)NAN;
+    s->geometry = (uz_geometry){.kind = UZ_KINEMATICS_FINITE, .passes = run->found.qps, .change = NAN, .sliding = NAN};
+    s->requested_error = run->requested;
+    s->timings = run->spent;
+    s->origin = UZ_FROM_ZERO;
+    s->rounds = 1;
+    s->added = 0;
+    s->infeasible_radius = 0;
+    s->discretization_error = NAN;
+    s->stress_share = 1; /* of a mesh whose error is not known */
+    s->message[0] = '\0';
+    memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
+    if (s->outcome != UZ_CONVERGED)
+        explain(s, run, why, tried);
+}
+
+static uz_status take_rows(uz_result *result, const uz_finite_run *run, uz_error *err)
+{
+    const uz_body_model *rows = &run->at.rows;
+    const int64_t m = rows->m;
+    uz_summary *s = &result->summary;
+    result->m = s->m = s->kept = m;
+    result->d = s->d = run->d;
+    result->r = uz_alloc_zero(m, sizeof *result->r);
+    result->g = uz_alloc(m, sizeof *result->g);
+    result->u = uz_alloc(run->n, sizeof *result->u);
+    result->place = uz_alloc(run->n, sizeof *result->place);
+    if (!result->r || !result->g || !result->u || !result->place)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer at %lld nodes", (long long)(run->n / 2));
+    memcpy(result->u, run->at.u, (size_t)run->n * sizeof *result->u);
+    memcpy(result->place, run->at.u, (size_t)run->n * sizeof *result->place);
+    if (m > 0)
+        memcpy(result->g, run->at.gap, (size_t)m * sizeof *result->g);
+    if (m > 0 && run->n_r == m)
+        memcpy(result->r, run->r, (size_t)m * sizeof *result->r);
+    s->active = 0;
+    s->reaction_sum = s->max_penetration = 0;
+    for (int64_t i = 0; i < m; i++) {
+        s->active += rows->law->kind->active(rows->law, NULL, &result->r[i], 1);
+        s->reaction_sum += result->r[i];
+        s->max_penetration = fmax(s->max_penetration, -result->g[i]);
+    }
+    result->n_nodes = run->base.mesh.n_nodes;
+    return uz_mesh_info_copy(&result->mesh, &rows->info, m, err);
+}
+
+uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err)
+{
+    uz_result *result = uz_alloc_zero(1, sizeof *result);
+    if (!result)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
+    if (run->last) /* method, factor and cost: those of the last contact problem */
+        result->summary = run->last->summary;
+    summarize(&result->summary, run, why, tried);
+    uz_status status = take_rows(result, run, err);
+    if (status == UZ_OK)
+        status = uz_evaluate_finite(result, &run->at.rows, &run->scene, run->at.force, run->at.body.energy, err);
+    if (status == UZ_OK)
+        *out = result;
+    else
+        uz_result_free(result);
+    return status;
+}

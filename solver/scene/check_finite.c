@@ -1,0 +1,68 @@
+/* check_finite.c: what there is a model of large deformation for. Everything else is refused: an answer that leaves out
+ * what a scene has would be a wrong one. */
+#include "scene/check.h"
+
+#include "core/error.h"
+
+static uz_status check_laws(const uz_scene *scene, uz_error *err)
+{
+    const bool finite = scene->kinematics == UZ_KINEMATICS_FINITE;
+    char where[UZ_CHECK_POINTER];
+    for (int64_t i = 0; i < scene->n_materials; i++) {
+        const uz_elasticity law = scene->materials[i].law;
+        uz_check_place(where, "materials", i, "law");
+        if (law >= UZ_ELASTICITIES)
+            return uz_fail(err, UZ_ERR_SCENE, where,
+                           "unknown law; use linear, st_venant_kirchhoff, neo_hooke or neo_hooke_isochoric");
+        if (finite && law == UZ_ELASTIC_LINEAR)
+            return uz_fail(err, UZ_ERR_SCENE, where,
+                           "the linear law says nothing of finite strain, and which law is taken decides the answer "
+                           "beyond some per cent of it: use st_venant_kirchhoff (large rotations, small strains), "
+                           "neo_hooke, or neo_hooke_isochoric");
+        if (!finite && law != UZ_ELASTIC_LINEAR)
+            return uz_fail(err, UZ_ERR_SCENE, where,
+                           "this law is one of finite strain: add \"kinematics\": \"finite\" to the scene, or use "
+                           "linear, which it becomes where strains are small");
+    }
+    return UZ_OK;
+}
+
+uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    const uz_status status = check_laws(scene, err);
+    if (status != UZ_OK || scene->kinematics != UZ_KINEMATICS_FINITE)
+        return status;
+    if (scene->model != UZ_PLANE_STRAIN)
+        return uz_fail(err, UZ_ERR_SCENE, "/model",
+                       "finite kinematics are there for plane_strain only; use that, or the kinematics \"moving\"");
+    if (scene->formulation != UZ_FORMULATION_AUTO && scene->formulation != UZ_FORMULATION_STANDARD)
+        return uz_fail(err, UZ_ERR_SCENE, "/formulation",
+                       "finite kinematics have the standard formulation only; use auto, and quad8 or tri6 for bending "
+                       "and nearly incompressible bodies");
+    for (int64_t i = 0; i < scene->n_supports; i++)
+        if (scene->supports[i].kind == UZ_SUPPORT_SPRING)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "spring"),
+                           "finite kinematics have no springs; mesh the ground, or prescribe displacements");
+    for (int64_t i = 0; i < scene->n_contacts; i++)
+        if (scene->contacts[i].kind == UZ_OBSTACLE_BODY)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
+                           "finite kinematics have contact with rigid obstacles only; give an obstacle, or use the "
+                           "kinematics \"moving\"");
+    return UZ_OK;
+}
+
+uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    for (int64_t i = 0; scene->kinematics == UZ_KINEMATICS_FINITE && i < scene->n_loads; i++) {
+        if (scene->loads[i].kind == UZ_LOAD_PRESSURE)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "pressure"),
+                           "a pressure turns with the side that it acts on, and finite kinematics have loads that do "
+                           "not: use traction or force");
+        if (scene->loads[i].kind == UZ_LOAD_TEMPERATURE)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
+                           "finite kinematics have no temperature: leave it out, or use the kinematics \"moving\"");
+    }
+    return UZ_OK;
+}

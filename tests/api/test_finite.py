@@ -1,0 +1,118 @@
+"""Finite kinematics through the service: closed forms, a body pushed over a roller, limit loads, refusals, and all that is
+computed from an answer."""
+# not under ThreadSanitizer: about answers, not about threads
+import copy
+
+import service
+from service import check, expect
+
+SHARED = True  # one service for all tests
+
+BLOCK = {"problem": {"kind": "scene", "model": "plane_strain", "kinematics": "finite",
+                     "mesh": {"box": {"size": [1, 1], "cells": [2, 2], "element": "quad8"}},
+                     "materials": [{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke"}],
+                     "supports": [{"on": "left", "ux": 0}, {"on": "top", "uy": -0.3}],
+                     "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]}}
+
+
+def block(law="neo_hooke", **problem):
+    body = copy.deepcopy(BLOCK)
+    body["problem"]["materials"][0]["law"] = law
+    body["problem"].update(problem)
+    return body
+
+
+def roller(aside):
+    return block(mesh={"box": {"size": [4, 1], "cells": [16, 4], "element": "quad8"}},
+                 supports=[{"on": "top", "ux": aside, "uy": -0.2}],
+                 contacts=[{"on": "bottom", "obstacle": {"circle": {"center": [1, -2], "radius": 2}}}])
+
+
+def answer(s, body, fields="summary,displacements,reactions,gaps,pressure,stress,strain,contact_status"):
+    job = s.post(body)
+    expect(job, 202)
+    ended = s.wait_status(job.json["id"], "successful", "failed", seconds=60)
+    check(ended["status"] == "successful", ended)
+    return job.json["id"], s.get(f"/v1/jobs/{job.json['id']}/result?fields={fields}").json
+
+
+def test_a_squeezed_block_has_its_closed_form(s):
+    for law, force in (("neo_hooke", 0.45842392), ("neo_hooke_isochoric", 0.47813424), ("st_venant_kirchhoff", 0.19615385)):
+        name, found = answer(s, block(law))
+        summary = found["summary"]
+        check(summary["outcome"] == "converged" and abs(summary["contact"]["force"][1] - force) < 1e-7, summary)
+        # Cauchy's stress, and the pressure per deformed area: the side has become wider
+        width = 1 + max(u[0] for u in found["displacements"])
+        check(width > 1.05 and all(abs(stress[1] + force / width) < 1e-7 and abs(stress[0]) < 1e-7 for stress in found["stress"]), found["stress"][:2])
+        check(all(abs(p - force / width) < 1e-7 for p in found["pressure"]), found["pressure"])
+        check(abs(summary["contact"]["area"] - width) < 1e-7, summary["contact"])
+        check(all(abs(strain[1] - (0.7 ** 2 - 1) / 2) < 1e-9 for strain in found["strain"]), found["strain"][:2])
+        # what holds it up top, and how it was found
+        top = summary["resultants"]["supports"][1]["force"][1]
+        check(abs(top + force) < 1e-7 and summary["resultants"]["imbalance"] < 1e-8, summary["resultants"])
+        finite = summary["finite"]
+        check(finite["steps"] == 1 and finite["load"] == 1 and finite["qps"] <= 5 and finite["definite"], finite)
+        check(0.5 < finite["least_det"] < 1 and finite["residual"] <= 1e-8 and abs(finite["least_gap"]) < 1e-12, finite)
+        # what small deformation says is left out
+        check(summary["error"]["mesh"] is None and summary["error"]["total"] is None and summary["error"]["kind"] == "estimated", summary["error"])
+        check(summary["certificate"]["relative_error"] is None and summary["discretization_error"] is None and not summary["warnings"], summary["energy"])
+        check(summary["contact"]["geometry"]["kinematics"] == "finite", summary["contact"]["geometry"])
+        for of in ("result.vtu", "deformed.svg", "surface", "history", "result?fields=stress_gauss,von_mises,principal"):
+            expect(s.get(f"/v1/jobs/{name}/{of}"), 200)
+        check("displacements \u00d7 1<" in s.get(f"/v1/jobs/{name}/deformed.svg").body.decode(), "not at true scale")
+
+
+def test_a_block_over_a_roller_is_mirrored(s):
+    here, there = answer(s, roller(0))[1]["summary"], answer(s, roller(-2))[1]["summary"]
+    for one in (here, there):
+        check(one["outcome"] == "converged" and one["finite"]["steps"] == 1 and one["finite"]["qps"] <= 12, one)
+        check(abs(one["contact"]["force"][1] - 0.34405) < 0.005 * 0.34405, one["contact"])
+    check(abs(here["contact"]["force"][0] + there["contact"]["force"][0]) < 1e-8, (here["contact"], there["contact"]))
+    check(abs(here["contact"]["force"][1] - there["contact"]["force"][1]) < 1e-8, (here["contact"], there["contact"]))
+
+
+def test_a_limit_load_is_no_answer(s):
+    """Of St. Venant and Kirchhoff's law: 0.21148 at the stretch of 1 / sqrt 3, by one element, which can do nothing else."""
+    body = block("st_venant_kirchhoff", supports=[{"on": "left", "ux": 0}, {"on": "bottom", "uy": 0}], contacts=[],
+                 mesh={"box": {"size": [1, 1], "cells": [1, 1]}}, loads=[{"on": "top", "traction": [0, -0.25]}])
+    body["cases"] = [{"name": "too much", "loads": [{"on": "top", "traction": [0, -0.25]}]},
+                     {"name": "borne", "loads": [{"on": "top", "traction": [0, -0.2]}]}]
+    job = s.post(body)
+    check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job)
+    result = s.get(f"/v1/jobs/{job.json['id']}/result").json
+    first, second = (case["summary"] for case in result["cases"])
+    check(first["outcome"] == "unstable" and "under 0.84" in first["message"], first["message"])
+    check(abs(first["finite"]["load"] * 0.25 - 0.21148362) < 0.0005, first["finite"])
+    check(second["outcome"] == "converged" and second["finite"]["load"] == 1, second)
+    whole = s.get(f"/v1/jobs/{job.json['id']}").json["summary"]
+    check(whole["outcome"] == "unstable" and whole["cases"]["unstable"] == 1 and whole["cases"]["converged"] == 1, whole["cases"])
+
+
+def test_what_is_not_modelled_is_refused(s):
+    asked = [(block("linear"), "/problem/materials/0/law", "neo_hooke_isochoric"),
+             (block(kinematics="auto"), "/problem/materials/0/law", "\"kinematics\": \"finite\""),
+             (block(model="plane_stress"), "/problem/model", "plane_strain"),
+             (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
+             (block(loads=[{"on": "right", "pressure": 1}]), "/problem/loads/0/pressure", "traction"),
+             (block(supports=[{"on": "left", "ux": 0}, {"on": "top", "spring": [1, 1]}]), "/problem/supports/1/spring", "prescribe"),
+             (block(mesh={"box": {"size": [1, 1], "cells": "auto"}}), "/problem/mesh/box/cells", "give their numbers"),
+             (block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "/problem/mesh/refine", "give a mesh"),
+             ({**block(), "solver": {"accuracy": {"total": 0.1}}}, "/solver/accuracy", "compare meshes"),
+             ({**block(), "quantities": [{"quantity": "contact.force"}]}, "/quantities", "compare meshes")]
+    for body, pointer, remedy in asked:
+        reply = s.post(body)
+        if reply.status == 202:
+            ended = s.wait_status(reply.json["id"], "successful", "failed", seconds=60)
+            check(ended["status"] == "failed", ended)
+            found = ended["error"]
+        else:
+            found = reply.json
+        check(found["pointer"] == pointer and remedy in found["detail"], (pointer, found))
+    body = block()
+    result = answer(s, body, "summary,displacements,reactions")[1]
+    refused = s.request("POST", "/v1/verify", {**body, "answer": {"displacements": result["displacements"], "reactions": result["reactions"]}})
+    check(refused.status in (400, 422) and refused.json["pointer"] == "/problem/kinematics", refused)
+
+
+if __name__ == "__main__":
+    service.main(globals())

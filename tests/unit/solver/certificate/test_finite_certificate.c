@@ -1,0 +1,222 @@
+/* The certificate of finite kinematics: what it says of an answer, and of answers that are wrong in one respect each.
+ */
+#include "body_fixture.h"
+#include "certificate/envelope.h"
+#include "certificate/finite.h"
+#include "finite/finite_body.h"
+#include "linalg/linalg.h"
+#include "qp_fixture.h"
+
+/* An answer with all that the certificate reads. */
+typedef struct {
+    uz_scene scene;
+    uz_result *result;
+    uz_body_model base, there;
+    double *prescribed, *p, *h;
+} answered;
+
+static uz_scene block(const char *element, int64_t cells, uz_elasticity law)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRAIN, element, (double[3]){1, 1, 0}, (int64_t[3]){cells, cells, 0});
+    s.materials[0].young = 1;
+    s.materials[0].law = law;
+    s.kinematics = UZ_KINEMATICS_FINITE;
+    return s;
+}
+
+static void answer(answered *a, const uz_scene *scene)
+{
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *scene};
+    const uz_settings settings = uz_settings_default();
+    uz_error err = {0};
+    a->scene = *scene;
+    CHECK_MSG(uz_solve(&a->result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+    CHECK_INT(a->result->summary.outcome, UZ_CONVERGED);
+    CHECK_INT(uz_body_model_build(&a->base, scene, UZ_BODY_SUPPORTED, &err), UZ_OK);
+    a->scene.place = a->result->u;
+    CHECK_INT(uz_body_model_move(&a->there, &a->base, &a->scene, &err), UZ_OK);
+    a->scene.place = NULL;
+    a->prescribed = body_room(a->base.n_fixed + 1, sizeof(double));
+    a->p = body_room(a->base.d + 1, sizeof(double));
+    a->h = body_room(a->there.m + 1, sizeof(double));
+    CHECK_INT(uz_body_model_load(a->p, a->h, a->prescribed, &a->there, &a->scene, &err), UZ_OK);
+}
+
+static void give_back(answered *a)
+{
+    uz_body_model_clear(&a->there);
+    uz_body_model_clear(&a->base);
+    uz_result_free(a->result);
+    free(a->prescribed);
+    free(a->p);
+    free(a->h);
+    uz_scene_clear(&a->scene);
+}
+
+static uz_finite_certificate judge(const answered *a)
+{
+    const uz_result *r = a->result;
+    const uz_finite_answer of = {&a->there, &a->scene, r->u, r->r, r->g, a->prescribed};
+    uz_finite_certificate c;
+    uz_error err = {0};
+    CHECK_MSG(uz_certify_finite(&c, &of, &err) == UZ_OK, "%s", err.message);
+    return c;
+}
+
+static uz_scene on_a_ball(void)
+{
+    uz_scene s = block("quad8", 4, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "top", 0.05, -0.15, NAN);
+    uz_contact *ball = body_plane(&s, "bottom", (double[3]){0.4, -1.5, 0}, (double[3]){0, 1, 0});
+    ball->kind = UZ_OBSTACLE_ROUND;
+    ball->radius = 1.5;
+    return s;
+}
+
+TEST(an_answer_and_what_is_wrong_with_others)
+{
+    const uz_scene s = on_a_ball();
+    answered a;
+    answer(&a, &s);
+    uz_result *r = a.result;
+    uz_finite_certificate c = judge(&a);
+    CHECK(c.definite && c.residual <= 1e-8 && c.least_det > 0.5 && c.worst_reaction <= 0 && c.worst_support < 1e-15);
+    CHECK_MSG(fabs(c.least_det - r->summary.finite.least_det) < 1e-12 && c.least_at_rows > -1e-12 &&
+                  c.least_part > -0.02,
+              "%.15g %.3g %.3g", c.least_det, c.least_at_rows, c.least_part);
+    CHECK(fabs(c.energy - r->evaluation->strain_energy) < 1e-12);
+    int64_t pressed = 0, top = 0;
+    for (int64_t i = 0; i < r->m; i++)
+        pressed = r->r[i] < r->r[pressed] ? i : pressed;
+    for (int64_t i = 0; i < r->n_nodes; i++)
+        top = r->mesh.xyz[2 * i + 1] > 1 - 1e-9 ? i : top;
+    const double reaction = r->r[pressed];
+    r->r[pressed] *= 1.001;
+    CHECK(judge(&a).residual > 1e-6);
+    r->r[pressed] = -reaction;
+    CHECK(judge(&a).worst_reaction > 0.9);
+    r->r[pressed] = reaction;
+    r->g[pressed] += 1e-6; /* a gap that is open under a reaction */
+    CHECK(judge(&a).residual > 1e-7);
+    r->g[pressed] -= 1e-6;
+    double *u = r->u + 2 * r->mesh.contact_node[pressed];
+    u[1] -= 0.02; /* into the ball */
+    c = judge(&a);
+    CHECK(c.least_gap < -0.019 && c.least_part < -0.07 && c.residual > 1e-3);
+    u[1] += 0.02;
+    r->u[2 * top] += 1e-6;
+    c = judge(&a);
+    CHECK(fabs(c.worst_support - 1e-6) < 1e-12);
+    r->u[2 * top] -= 1e-6;
+    u[1] += 3; /* through the top */
+    c = judge(&a);
+    CHECK(c.least_det < 0 && isinf(c.residual) && !c.definite);
+    u[1] -= 3;
+    CHECK(judge(&a).residual <= 1e-8);
+    give_back(&a);
+}
+
+/* To first order the residual is the distance in the norm of the tangent: without contact, that of the iteration. */
+TEST(the_residual_is_the_distance)
+{
+    uz_scene s = block("quad4", 4, UZ_ELASTIC_NEO_HOOKE_ISOCHORIC);
+    body_hold(&s, "bottom", 0, 0, NAN);
+    body_load(&s, UZ_LOAD_TRACTION, "top", 0.05, 0.05, 0);
+    answered a;
+    answer(&a, &s);
+    uz_body_model tangent;
+    uz_finite_measure measure;
+    uz_error err = {0};
+    CHECK_INT(uz_finite_tangent_of(&tangent, &a.base, &err), UZ_OK);
+    uz_finite_body(&measure, NULL, &tangent, &a.base, a.result->u);
+    qp_random rng = {5};
+    double *v = body_room(a.base.d, sizeof *v), *Kv = body_room(a.base.d, sizeof *Kv), square = 0;
+    for (int64_t i = 0; i < 2 * a.base.mesh.n_nodes; i++)
+        if (a.base.dof[i] >= 0) {
+            v[a.base.dof[i]] = 1e-6 * (random_unit(&rng) - 0.5);
+            a.result->u[i] += v[a.base.dof[i]];
+        }
+    uz_csc_symv(Kv, &tangent.K, 1, v);
+    for (int64_t j = 0; j < a.base.d; j++)
+        square += v[j] * Kv[j];
+    const double expected = sqrt(square / (2 * measure.energy));
+    const uz_finite_certificate c = judge(&a);
+    CHECK_MSG(c.definite && fabs(c.residual - expected) < 1e-3 * expected, "%.9g, not %.9g", c.residual, expected);
+    free(v);
+    free(Kv);
+    uz_finite_tangent_clear(&tangent);
+    give_back(&a);
+}
+
+/* A block between frictionless plates at St. Venant and Kirchhoff's law: homogeneous states are equilibria, and from a
+ * stretch of 0.63643 down no minima. */
+TEST(an_equilibrium_that_is_no_minimum)
+{
+    uz_scene s = block("quad8", 6, UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "bottom", NAN, 0, NAN);
+    body_hold(&s, "top", NAN, -0.2, NAN);
+    answered a;
+    answer(&a, &s);
+    static const double STRETCH[] = {0.66, 0.645, 0.625, 0.6};
+    for (int k = 0; k < 4; k++) {
+        const double lambda = 0.3 / (1.3 * 0.4), mu = 1 / 2.6, up = STRETCH[k];
+        const double aside = sqrt(1 - lambda / (lambda + 2 * mu) * (up * up - 1)); /* no stress along x */
+        for (int64_t i = 0; i < a.result->n_nodes; i++) {
+            const double *x = a.result->mesh.xyz + 2 * i;
+            a.result->u[2 * i] = (aside - 1) * x[0];
+            a.result->u[2 * i + 1] = (up - 1) * x[1];
+        }
+        for (int64_t i = 0; i < 2 * a.base.mesh.n_nodes; i++)
+            if (a.base.dof[i] < 0)
+                a.prescribed[-1 - a.base.dof[i]] = a.result->u[i];
+        const uz_finite_certificate c = judge(&a);
+        CHECK(c.worst_support == 0 && c.least_det > 0.5);
+        CHECK_MSG(c.definite == (up > 0.63643), "stretch %g", up);
+        CHECK(c.definite ? c.residual < 1e-12 : isinf(c.residual));
+    }
+    give_back(&a);
+}
+
+/* A matrix of random places, with two parts that nothing connects. */
+TEST(the_factor_is_one)
+{
+    enum { N = 40 };
+    qp_random rng = {3};
+    for (int k = 0; k < 20; k++) {
+        double dense[N * N] = {0}, x[N], b[N], room[N], size[N], sum = 0, square = 0;
+        uz_envelope factor;
+        uz_error err = {0};
+        bool definite;
+        for (int i = 0; i < N; i++)
+            for (int j = 0; j < i; j++)
+                if ((i < 25) == (j < 25) && random_unit(&rng) < 0.08)
+                    dense[i * N + j] = dense[j * N + i] = random_unit(&rng) - 0.5;
+        for (int i = 0; i < N; i++) {
+            double around = 0;
+            for (int j = 0; j < N; j++)
+                around += fabs(dense[i * N + j]);
+            dense[i * N + i] = size[i] = around + 0.1;
+            x[i] = random_unit(&rng) - 0.5;
+        }
+        for (int i = 0; i < N; i++) {
+            b[i] = 0;
+            for (int j = 0; j < N; j++)
+                b[i] += dense[i * N + j] * x[j];
+            sum += x[i] * b[i];
+        }
+        uz_csc A = csc_from_dense(dense, N, N, true);
+        CHECK_INT(uz_envelope_factor(&factor, &definite, &A, size, 1e-12, &err), UZ_OK);
+        CHECK(definite);
+        uz_envelope_forward(b, &factor, room);
+        for (int i = 0; i < N; i++)
+            square += b[i] * b[i]; /* x'A x = b'A^-1 b */
+        CHECK_MSG(fabs(square - sum) < 1e-12 * sum, "%.15g, not %.15g", square, sum);
+        uz_envelope_clear(&factor);
+        A.val[A.ptr[k]] = -0.1; /* no longer */
+        CHECK_INT(uz_envelope_factor(&factor, &definite, &A, size, 1e-12, &err), UZ_OK);
+        CHECK(!definite);
+        uz_envelope_clear(&factor);
+        uz_csc_clear(&A);
+    }
+}

@@ -1,0 +1,439 @@
+/* Finite kinematics: closed forms, elastica, path independence, limit loads, and what is refused. Reference values are
+ * those of closed forms, or of finer meshes by an independent program. */
+#include "body_fixture.h"
+#include "finite/finite_body.h"
+#include "qp_fixture.h"
+
+static uz_scene block(const char *element, double length, double height, int64_t nx, int64_t ny, uz_elasticity law)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRAIN, element, (double[3]){length, height, 0}, (int64_t[3]){nx, ny, 0});
+    s.materials[0].young = 1;
+    s.materials[0].law = law;
+    s.kinematics = UZ_KINEMATICS_FINITE;
+    return s;
+}
+
+static uz_result *solve(const uz_scene *s)
+{
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *s};
+    const uz_settings settings = uz_settings_default();
+    uz_result *result = NULL;
+    uz_error err = {0};
+    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where, err.message);
+    if (!result)
+        exit(1);
+    return result;
+}
+
+static void give_back(uz_result *result, uz_scene *s)
+{
+    uz_result_free(result);
+    uz_scene_clear(s);
+}
+
+/* Of the node at x, y before anything moves. */
+static const double *moved_by(const uz_result *r, double x, double y)
+{
+    for (int64_t i = 0; i < r->n_nodes; i++)
+        if (hypot(r->mesh.xyz[2 * i] - x, r->mesh.xyz[2 * i + 1] - y) < 1e-9)
+            return r->u + 2 * i;
+    CHECK_MSG(false, "no node at %g, %g", x, y);
+    exit(1);
+}
+
+static void check_converged(const uz_result *r, int64_t steps, int64_t qps)
+{
+    const uz_finite *f = &r->summary.finite;
+    CHECK_MSG(r->summary.outcome == UZ_CONVERGED, "%s", r->summary.message);
+    CHECK_MSG(f->steps <= steps && f->qps <= qps && f->failed == 0, "%lld steps, %lld contact problems",
+              (long long)f->steps, (long long)f->qps);
+    CHECK(f->load == 1 && f->definite && f->residual <= r->summary.requested_error && f->least_det > 0);
+    CHECK_INT(r->summary.geometry.kind, UZ_KINEMATICS_FINITE);
+    CHECK(isnan(r->summary.certificate.relative_error) && isinf(uz_total_error(NULL, &r->summary)));
+}
+
+static void check_ended(const uz_result *r, uz_outcome outcome, double least, double most)
+{
+    const uz_finite *f = &r->summary.finite;
+    CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, r->summary.outcome), uz_choice_name(UZ_CHOICE_OUTCOME, outcome));
+    CHECK_MSG(f->load > least && f->load < most, "%.6g", f->load);
+    CHECK(f->failed > 0 && f->definite && f->least_det > 0 && f->residual <= r->summary.requested_error);
+    CHECK(strlen(r->summary.message) > 20);
+}
+
+static uz_scene squeezed(const char *element, int64_t cells, uz_elasticity law, double stretch)
+{
+    uz_scene s = block(element, 1, 1, cells, cells, law);
+    body_plane(&s, "bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "top", NAN, stretch - 1, NAN);
+    return s;
+}
+
+/* A homogeneous state, which every element has exactly. The stretch aside has no stress along it; the force is that of
+ * closed forms. */
+TEST(a_squeezed_block_has_its_closed_form)
+{
+    static const char *const ELEMENTS[] = {"quad4", "quad8", "tri3", "tri6"};
+    static const double FORCE[] = {0.19615385, 0.45842392, 0.47813424};
+    for (int law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF; law < UZ_ELASTICITIES; law++)
+        for (int k = 0; k < 4; k++) {
+            uz_scene s = squeezed(ELEMENTS[k], 2, (uz_elasticity)law, 0.7);
+            uz_result *result = solve(&s);
+            check_converged(result, 1, 5);
+            CHECK_MSG(fabs(result->summary.force[1] - FORCE[law - 1]) < 1e-8, "%.9g", result->summary.force[1]);
+            CHECK(fabs(result->evaluation->supports[1].force[1] + FORCE[law - 1]) < 1e-8);
+            CHECK(result->evaluation->imbalance < 1e-9 && result->evaluation->n_warnings == 0);
+            give_back(result, &s);
+        }
+}
+
+/* St. Venant and Kirchhoff's law bears a stretch of 0.63643 of this block, where its free side begins to fold, and
+ * under forces, of one element, which can do nothing else, 0.21148 at a stretch of 1 / sqrt 3. */
+TEST(what_is_not_stable_is_no_answer)
+{
+    uz_scene s = squeezed("quad8", 4, UZ_ELASTIC_ST_VENANT_KIRCHHOFF, 0.61);
+    uz_result *result = solve(&s);
+    check_ended(result, UZ_UNSTABLE, (1 - 0.63643) / 0.39 - 0.004, (1 - 0.63643) / 0.39 + 0.004);
+    give_back(result, &s);
+    s = block("quad4", 1, 1, 1, 1, UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "bottom", NAN, 0, NAN);
+    body_load(&s, UZ_LOAD_TRACTION, "top", 0, -0.25, 0);
+    result = solve(&s);
+    check_ended(result, UZ_UNSTABLE, (0.21148362 - 0.0003) / 0.25, 0.21148362 / 0.25);
+    CHECK(result->place && result->summary.timings.total > 0);
+    give_back(result, &s);
+}
+
+TEST(what_turns_inside_out_is_no_answer)
+{
+    uz_scene s = squeezed("quad4", 2, UZ_ELASTIC_NEO_HOOKE, -0.2);
+    body_hold(&s, "right", 0, NAN, NAN);
+    uz_result *result = solve(&s);
+    check_ended(result, UZ_INVERTED, 0.7, 1 / 1.2);
+    give_back(result, &s);
+}
+
+/* The elastica under a force P L^2 / EI = 10 that keeps its direction: 0.810609 and 0.554996; with the stretch and the
+ * shear of this beam 0.811192 and 0.555479. */
+TEST(a_cantilever_bends_as_the_elastica)
+{
+    uz_scene s = block("quad8", 10, 0.2, 32, 1, UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
+    s.materials[0].young = 1.2e6;
+    s.materials[0].poisson = 0;
+    body_hold(&s, "left", 0, 0, NAN);
+    body_load(&s, UZ_LOAD_FORCE, "right", 0, 80, 0);
+    uz_result *result = solve(&s);
+    check_converged(result, 1, 20);
+    const double *u = moved_by(result, 10, 0.1);
+    CHECK_MSG(fabs(u[1] / 10 - 0.811192) < 0.002 * 0.811192, "%.6f", u[1] / 10);
+    CHECK_MSG(fabs(u[0] / 10 + 0.555479) < 0.002 * 0.555479, "%.6f", u[0] / 10);
+    CHECK(fabs(result->evaluation->supports[0].force[1] + 80) < 1e-5);
+    CHECK(fabs(result->evaluation->supports[0].moment[2] + 80 * (10 + u[0])) < 0.02 * 800); /* about where it is */
+    give_back(result, &s);
+}
+
+static uz_scene over_roller(const char *element, int64_t cells, double aside)
+{
+    uz_scene s = block(element, 4, 1, 4 * cells, cells, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "top", aside, -0.2, NAN);
+    uz_contact *roller = body_plane(&s, "bottom", (double[3]){1, -2, 0}, (double[3]){0, 1, 0});
+    roller->kind = UZ_OBSTACLE_ROUND;
+    roller->radius = 2;
+    return s;
+}
+
+/* The block is moved over the roller to the mirror image of where it began: what it has slid over does not matter. */
+TEST(a_block_over_a_roller_is_mirrored)
+{
+    static const char *const ELEMENTS[] = {"quad4", "quad8"};
+    for (int k = 0; k < 2; k++) {
+        uz_scene s[3];
+        uz_result *r[3];
+        for (int i = 0; i < 3; i++) {
+            s[i] = over_roller(ELEMENTS[k], k == 0 ? 8 : 4, -i);
+            r[i] = solve(&s[i]);
+            check_converged(r[i], 1, 12);
+        }
+        CHECK_MSG(fabs(r[0]->summary.force[1] - 0.34405) < (k == 0 ? 0.01 : 0.003) * 0.34405, "%.7g",
+                  r[0]->summary.force[1]);
+        CHECK_MSG(fabs(r[1]->summary.force[1] - 0.36159) < (k == 0 ? 0.01 : 0.002) * 0.36159, "%.7g",
+                  r[1]->summary.force[1]);
+        CHECK(fabs(r[1]->summary.force[0]) < 1e-9);
+        CHECK_MSG(fabs(r[0]->summary.force[0] + r[2]->summary.force[0]) < 1e-9, "%.12g", r[2]->summary.force[0]);
+        CHECK_MSG(fabs(r[0]->summary.force[1] - r[2]->summary.force[1]) < 1e-9, "%.12g", r[2]->summary.force[1]);
+        for (int i = 0; i < 3; i++)
+            give_back(r[i], &s[i]);
+    }
+}
+
+static void bend(double x[3])
+{
+    const double r = x[0], angle = x[1];
+    x[0] = r * cos(angle);
+    x[1] = r * sin(angle);
+}
+
+/* A quarter of a ring between plates: its crown stays, and its foot comes up. Values of a much finer mesh. */
+TEST(a_ring_between_plates)
+{
+    static const double UP[] = {0.525, 1.05, 5.25}, FORCE[] = {5.9166e-4, 1.11042e-3, 5.7399e-3};
+    for (int k = 0; k < 3; k++) {
+        uz_scene s = block("quad8", 1, acos(0), 2, 16, UZ_ELASTIC_NEO_HOOKE);
+        s.box.origin[0] = 9.5;
+        body_give_mesh(&s, bend);
+        body_hold(&s, "bottom", NAN, UP[k], NAN);
+        body_hold(&s, "top", 0, NAN, NAN);
+        body_plane(&s, "right", (double[3]){0, 10.5, 0}, (double[3]){0, -1, 0});
+        uz_result *result = solve(&s);
+        check_converged(result, 1, 14);
+        CHECK_MSG(fabs(-2 * result->summary.force[1] - FORCE[k]) < 0.004 * FORCE[k], "%.7g",
+                  -2 * result->summary.force[1]);
+        if (k == 2) { /* its middle has lifted off the plate */
+            const double *crown = moved_by(result, 10.5 * cos(acos(0)), 10.5);
+            CHECK_MSG(fabs(moved_by(result, 10.5, 0)[0] - 3.23773) < 0.002, "%.6g", moved_by(result, 10.5, 0)[0]);
+            CHECK_MSG(crown[1] < -1e-5, "%.6g", crown[1]);
+        }
+        give_back(result, &s);
+    }
+}
+
+/* Pressure and outer radius by quadrature of the equilibrium of a thick tube. */
+TEST(a_tube_over_a_rod)
+{
+    static const double RADIUS[] = {1.1, 1.5}, PRESSURE[] = {0.04624617, 0.15335612},
+                        OUTER[] = {2.06485078, 2.34524417};
+    for (int k = 0; k < 2; k++) {
+        uz_scene s = block("quad8", 1, acos(0), 4, 8, UZ_ELASTIC_NEO_HOOKE);
+        s.box.origin[0] = 1;
+        body_give_mesh(&s, bend);
+        body_hold(&s, "bottom", NAN, 0, NAN);
+        body_hold(&s, "top", 0, NAN, NAN);
+        uz_contact *rod = body_plane(&s, "left", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+        rod->kind = UZ_OBSTACLE_ROUND;
+        rod->radius = RADIUS[k];
+        uz_result *result = solve(&s);
+        check_converged(result, 1, 6);
+        CHECK_MSG(fabs(result->summary.max_pressure - PRESSURE[k]) < 5e-4 * PRESSURE[k], "%.8g",
+                  result->summary.max_pressure);
+        CHECK_MSG(fabs(2 + moved_by(result, 2, 0)[0] - OUTER[k]) < 5e-6, "%.8g", 2 + moved_by(result, 2, 0)[0]);
+        CHECK(fabs(result->evaluation->contact_area - RADIUS[k] * acos(0)) < 1e-3);
+        give_back(result, &s);
+    }
+}
+
+static void bend_arch(double x[3])
+{
+    const double r = x[0], angle = x[1];
+    x[0] = -r * sin(angle);
+    x[1] = r * cos(angle) - 24;
+}
+
+/* Half an arch of span 20 and rise 2, whose limit load is 0.5747: below it bears, above it has gone through and lies on
+ * the plane. Both are minima. */
+TEST(an_arch_bears_or_has_gone_through)
+{
+    static const double LOAD[] = {0.56, 1.0};
+    for (int k = 0; k < 2; k++) {
+        uz_scene s = block("quad8", 0.5, asin(10.0 / 26), 1, 16, UZ_ELASTIC_NEO_HOOKE);
+        s.materials[0].young = 1000;
+        s.box.origin[0] = 25.75;
+        body_give_mesh(&s, bend_arch);
+        body_hold(&s, "top", 0, 0, NAN);
+        body_hold(&s, "bottom", 0, NAN, NAN);
+        body_plane(&s, "left", (double[3]){0, -0.75, 0}, (double[3]){0, 1, 0});
+        body_load(&s, UZ_LOAD_FORCE, "bottom", 0, -LOAD[k] / 2, 0);
+        uz_result *result = solve(&s);
+        check_converged(result, 2, 25);
+        CHECK_MSG(k == 0 ? result->summary.force[1] == 0 : result->summary.force[1] > 0.1, "%.6g",
+                  result->summary.force[1]);
+        give_back(result, &s);
+    }
+}
+
+/* Nothing is strained: no norm to compare with. */
+TEST(a_body_that_is_carried_along)
+{
+    uz_scene s = block("quad8", 2, 1, 2, 1, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "left", 100, -3, NAN);
+    uz_result *result = solve(&s);
+    check_converged(result, 1, 3);
+    CHECK(fabs(moved_by(result, 2, 1)[0] - 100) < 1e-9 && fabs(moved_by(result, 2, 1)[1] + 3) < 1e-9);
+    give_back(result, &s);
+}
+
+/* Pulled so little that rounding shows. */
+TEST(what_rounding_leaves_is_told)
+{
+    uz_scene s = block("quad4", 1, 1, 1, 1, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "left", 0, 0, NAN);
+    body_load(&s, UZ_LOAD_TRACTION, "right", 1e-11, 0, 0);
+    uz_result *result = solve(&s);
+    CHECK_INT(result->summary.outcome, UZ_PRECISION_LIMIT);
+    CHECK(result->summary.finite.load == 1 && result->summary.finite.residual < 0.1);
+    CHECK(strlen(result->summary.message) > 20);
+    give_back(result, &s);
+}
+
+static bool stop_now(void *ctx)
+{
+    int *left = ctx;
+    return (*left)-- <= 0;
+}
+
+TEST(a_solve_that_is_stopped_says_what_it_has)
+{
+    int stopped = 0;
+    for (int questions = 0; questions < 400; questions += 40) {
+        uz_scene s = over_roller("quad4", 4, -2);
+        int left = questions;
+        const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+        const uz_settings settings = uz_settings_default();
+        const uz_hooks hooks = {.ctx = &left, .cancelled = stop_now};
+        uz_result *result = NULL;
+        uz_error err = {0};
+        const uz_status status = uz_solve(&result, &problem, &settings, NULL, &hooks, &err);
+        CHECK(status == UZ_OK || status == UZ_ERR_CANCELLED);
+        CHECK(!result || result->summary.outcome == UZ_CONVERGED || result->summary.outcome == UZ_DISMISSED);
+        stopped += !result || result->summary.outcome == UZ_DISMISSED;
+        give_back(result, &s);
+    }
+    CHECK(stopped > 0);
+}
+
+TEST(what_there_is_no_model_for_is_refused)
+{
+    for (int k = 0; k < 3; k++) {
+        uz_scene s = squeezed("quad4", 1, UZ_ELASTIC_NEO_HOOKE, 0.9);
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+        uz_settings settings = uz_settings_default();
+        uz_result *result = NULL;
+        uz_error err = {0};
+        static const char *const WHERE[] = {"/materials/0/law", "/solver/stopping", "/solver/accuracy"};
+        if (k == 0)
+            problem.scene.materials[0].law = UZ_ELASTIC_LINEAR;
+        settings.stopping = k == 1 ? UZ_STOP_PAPER : UZ_STOP_CERTIFIED;
+        settings.balanced = k == 2;
+        CHECK_INT(uz_solve(&result, &problem, &settings, NULL, NULL, &err), UZ_ERR_SCENE);
+        CHECK_STR(err.where, WHERE[k]);
+        CHECK(!result);
+        uz_scene_clear(&s);
+    }
+}
+
+/* ---- generated scenes: whatever is called converged is an equilibrium by differences of the energy */
+
+enum { LINE = 4 };
+
+static void put_obstacle(uz_scene *s, qp_random *rng, double length)
+{
+    uz_contact *c = body_plane(s, "bottom", (double[3]){0, 0, 0}, (double[3]){0.4 * random_signed(rng), 1, 0});
+    const double kind = random_unit(rng);
+    if (kind < 0.25)
+        return;
+    const double radius = length * (0.2 + random_unit(rng)), at = length * random_unit(rng);
+    c->point[0] = at;
+    c->point[1] = -radius;
+    c->radius = radius;
+    c->kind = UZ_OBSTACLE_ROUND;
+    if (kind < 0.7)
+        return;
+    c->kind = UZ_OBSTACLE_POLYLINE;
+    c->n_x = LINE;
+    c->x = body_room(LINE, sizeof *c->x);
+    c->y = body_room(LINE, sizeof *c->y);
+    for (int k = 0; k < LINE; k++) {
+        c->x[k] = length * (k - 0.5) / 2;
+        c->y[k] = k == 0 || k == 3 ? -0.3 : -0.05 * random_unit(rng);
+    }
+}
+
+static uz_scene random_finite(qp_random *rng)
+{
+    static const char *const ELEMENTS[] = {"quad4", "quad8", "tri3", "tri6"};
+    const double length = 1 + 3 * random_unit(rng);
+    const int64_t cells = 2 + (int64_t)(3 * random_unit(rng));
+    uz_scene s = block(ELEMENTS[(int)(4 * random_unit(rng))], length, 1, (int64_t)((double)cells * length), cells,
+                       (uz_elasticity)(1 + (int)(3 * random_unit(rng))));
+    s.materials[0].poisson = 0.4 * random_unit(rng);
+    put_obstacle(&s, rng, length);
+    if (random_unit(rng) < 0.6) {
+        body_hold(&s, "top", 2 * random_signed(rng), -0.6 * random_unit(rng), NAN);
+    } else {
+        body_hold(&s, "left", 0, 0.2 * random_signed(rng), NAN);
+        body_load(&s, UZ_LOAD_TRACTION, "top", 0, -0.15 * random_unit(rng), 0);
+    }
+    return s;
+}
+
+/* The slope of the energy along a motion that leaves all rows where they are and supports too, by the sizes of forces.
+ */
+static double slope_along(const uz_result *r, const uz_scene *scene, qp_random *rng)
+{
+    uz_body_model model = body_model(scene);
+    const int64_t n = 2 * r->n_nodes;
+    double *u = body_room(n, sizeof *u), *v = body_room(n, sizeof *v), *f = body_room(n, sizeof *f), norm = 0, work = 0;
+    const double h = 1e-5; /* of fourth order, as flat elements have large third derivatives */
+    static const double WAY[] = {-2, -1, 1, 2};
+    uz_finite_measure at[4];
+    uz_error err = {0};
+    uz_scene part = *scene;
+    CHECK_INT(uz_nodal_loads(f, &model, &part, &err), UZ_OK);
+    for (int64_t i = 0; i < n; i++)
+        v[i] = model.dof[i] < 0 && !model.frame_of ? 0 : random_signed(rng);
+    for (int64_t a = 0; a < r->n_nodes; a++) { /* nodes of contacts stay, and held ones */
+        const bool stays = r->mesh.xyz[2 * a + 1] < 1e-9 || model.dof[2 * a] < 0 || model.dof[2 * a + 1] < 0;
+        v[2 * a] *= !stays;
+        v[2 * a + 1] *= !stays;
+    }
+    for (int s = 0; s < 4; s++) {
+        for (int64_t i = 0; i < n; i++)
+            u[i] = r->u[i] + WAY[s] * h * v[i];
+        uz_finite_body(&at[s], NULL, NULL, &model, u);
+    }
+    for (int64_t i = 0; i < n; i++) {
+        work += f[i] * v[i];
+        norm += v[i] * v[i];
+    }
+    free(u);
+    free(v);
+    free(f);
+    uz_body_model_clear(&model);
+    const double slope = (8 * (at[2].energy - at[1].energy) - (at[3].energy - at[0].energy)) / (12 * h);
+    return fabs(slope - work) / sqrt(norm);
+}
+
+TEST(what_converges_is_an_equilibrium)
+{
+    enum { SCENES = 40 };
+    int converged = 0;
+    int64_t most = 0;
+    for (int k = 0; k < SCENES; k++) {
+        qp_random rng = {(uint64_t)k + 1};
+        uz_scene s = random_finite(&rng);
+        const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+        const uz_settings settings = uz_settings_default();
+        uz_result *result = NULL;
+        uz_error err = {0};
+        const uz_status status = uz_solve(&result, &problem, &settings, NULL, NULL, &err);
+        CHECK_MSG(status == UZ_OK || (status == UZ_ERR_SCENE && strstr(err.message, "is held by a support")), "%s: %s",
+                  err.where, err.message);
+        if (status != UZ_OK) {
+            uz_scene_clear(&s);
+            continue;
+        }
+        const uz_summary *sum = &result->summary;
+        if (sum->outcome == UZ_CONVERGED) {
+            converged++;
+            most = sum->finite.qps > most ? sum->finite.qps : most;
+            const double slope = slope_along(result, &s, &rng);
+            /* the residual is relative to an energy of about 1; flat elements are stiffer */
+            CHECK_MSG(slope < 1e-8 / sum->finite.least_det, "scene %d: %.3g", k, slope);
+            CHECK(sum->finite.definite && sum->finite.least_det > 0 && sum->max_penetration < 1e-8);
+        }
+        give_back(result, &s);
+    }
+    printf("# %d of %d converged, in at most %lld contact problems\n", converged, SCENES, (long long)most);
+    CHECK(2 * converged > SCENES);
+}
