@@ -81,6 +81,11 @@ PHRASES = {
     "Applied Mathematics 5, 1947": None, "SIAM J. Scientific Computing 23, 2001": None, "Equilibrium Finite Element Formulations, 2017": None,
     "in ordinary precision, with 1e-14 of what they add up": constant(1e-14, r"#define UZ_SUM_ROUNDING +([\d.e-]+)"),
     "off the middles of their sides by up to 1e-5 of these": constant(1e-5, r"#define NEARLY +([\d.e-]+)"),
+    "end without a certified equilibrium in 20 steps": constant(20, r"MOST_QPS = (\d+)"),
+    "no row is closer than -1e-9 of the body's extent": None, "no deeper than 0.03 of the side": constant(0.03, r"#define CUTS_IN +([\d.]+)"),
+    "(rows leave 0.01 at most": constant(0.01, r"#define SLACK ([\d.]+)"),
+    "are off the circle by 0.004, where the overlap that makes all of the stress is 0.05": None,  # of its geometry
+    "Finite Element Analysis, 2nd edition, 2008": None, "Numerical Optimization, 2nd edition, 2006": None,
     "Computing 56, 1996": None, "SIAM J. Numerical Analysis 33, 1996": None, "Computing 22, 2000": None, "Contact Mechanics, 1985": None, "Acta Numerica 10, 2001": None, "SIAM J. Numerical Analysis 38, 2000": None,
     "Int. J. Numerical Methods in Engineering 83, 2010": None, "Applied Mechanics and Engineering 193, 2004": None,
     "Applied Mechanics and Engineering 200, 2011": None,
