@@ -274,7 +274,7 @@ test-api: all $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB) ## the test
 
 .PHONY: test-postgresql
 # In its short form some of them; test_daemons, test_database and the tests of the store are on it anyway.
-ON_POSTGRESQL ?= test_assert test_between test_client
+ON_POSTGRESQL ?= test_assert test_between test_client test_refine
 test-postgresql: deps-test ## tests of the daemon whose jobs are in PostgreSQL; ALL=1: all of them; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB)
 	@UZAWA_STORE=postgresql tests/run.sh $(BUILD) api "$(FILTER)" "$(if $(ALL)$(FILTER),,$(ON_POSTGRESQL))"

@@ -371,6 +371,17 @@ static void make_request(api *context, const http_request *rq, const job *old, c
     *body = NULL;
 }
 
+static void refine_as(api *context, http_request *rq, const codec_request *made, const char *body, size_t len,
+                      const char *key, const char *refines, uint64_t since, http_reply *reply)
+{
+    store_request request = kept_request(context, rq, made, body, len, key);
+    job new = {0};
+    request.refines = refines;
+    if (store_job(context, rq, &request, &new, reply))
+        jobs_wait_then(context, rq, &new, since, jobs_acknowledge, reply);
+    job_clear(&new);
+}
+
 void jobs_refine(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem = {0};
@@ -401,12 +412,8 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
             make_request(context, rq, &old, old_body, old_len, &body, &len, &made, reply);
             free(old_body); /* as large as the new one: not kept while the client waits */
             old_body = NULL;
-            store_request request = kept_request(context, rq, &made, body, len, key);
-            request.refines = old.id;
-            job new = {0};
-            if (body && store_job(context, rq, &request, &new, reply))
-                jobs_wait_then(context, rq, &new, since, jobs_acknowledge, reply);
-            job_clear(&new);
+            if (body)
+                refine_as(context, rq, &made, body, len, key, old.id, since, reply);
         }
         free(cells);
         free(old_body);
