@@ -134,7 +134,7 @@ static int row_nodes(const int64_t **node, const double **share, const uz_body_m
  *     - w w' / (k (t.x')^2 + n.x''),     w_a = k (t.x') N_a t + N_a' n,     x' = dx/ds. */
 static void side_curvature(double ke[], const double n[2], double k, const double *share, const double *x, int nodes)
 {
-    const double t[2] = {-n[1], n[0]}, s = share[1] - share[0];
+    const double t[2] = {-n[1], n[0]}, s = nodes > 1 ? share[1] - share[0] : 0;
     const double slope[3] = {nodes == 2 ? -0.5 : s - 0.5, nodes == 2 ? 0.5 : s + 0.5, -2 * s}, bend[3] = {1, 1, -2};
     double along = 0, out = 0, w[2 * UZ_FACE_NODES];
     for (int a = 0; a < nodes; a++) {
