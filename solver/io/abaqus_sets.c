@@ -444,10 +444,12 @@ static uz_status add_groups(set_work *w, int64_t s)
         if (k < s)
             return UZ_OK;
         if (file->sets[k].kind == ABAQUS_SURFACE && w->list[k].count > 0) {
-            if (made[BY_SIDES].n_faces > 0) /* a set of elements that are sides has the name already */
-                return fail_at(w, file->text.number, UZ_ERR_UNSUPPORTED,
-                               "\"%s\" is the name of a surface and of a set of sides; give one another name", name, 0);
-            status = add_surface(&made[BY_SIDES], w, k);
+            /* a set of elements that are sides may have the name already */
+            status =
+                made[BY_SIDES].n_faces == 0
+                    ? add_surface(&made[BY_SIDES], w, k)
+                    : fail_at(w, file->text.number, UZ_ERR_UNSUPPORTED,
+                              "\"%s\" is the name of a surface and of a set of sides; give one another name", name, 0);
         }
         if (file->sets[k].kind == ABAQUS_ELSET) {
             status = add_elements(&made[BY_ELEMENTS], w, k, 0);

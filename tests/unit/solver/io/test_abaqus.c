@@ -165,6 +165,8 @@ static const struct {
     {TRI "*SURFACE,NAME=A\nE\n", UZ_ERR_UNSUPPORTED, 8, "give the sides"},
     {TRI "*SURFACE,NAME=A\nE, SPOS\n", UZ_ERR_UNSUPPORTED, 8, "S1 to S6"},
     {TRI "*SURFACE,NAME=A\nE, S4\n", UZ_ERR_UNSUPPORTED, 6, "S4, that this element has not"},
+    {TRI "*ELEMENT,TYPE=T3D2,ELSET=S\n8,1,2\n*SURFACE,NAME=S\nE, S1\n", UZ_ERR_UNSUPPORTED, 10,
+     "a surface and of a set of sides"},
     {TRI "*SURFACE,NAME=A,TYPE=CUTTING SURFACE\n", UZ_ERR_UNSUPPORTED, 7, "type CUTTING SURFACE"},
     {TRI "*PART,NAME=A\n*END PART\n*PART,NAME=B\n", UZ_ERR_UNSUPPORTED, 9, "second part"},
     {TRI "*INSTANCE,NAME=A,PART=B\n1,0,0\n", UZ_ERR_UNSUPPORTED, 7, "instance that is moved"},
