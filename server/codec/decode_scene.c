@@ -198,26 +198,30 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
 
 /* ---- the whole */
 
+enum { WORDS_MOST = 4 };
+_Static_assert(UZ_ELASTICITIES == (int)WORDS_MOST, "each law has a word");
+
+/* Which of the words it is, that are in the order of the library's enum; the first is the default. */
+static int word_of(const json_value *value, const char *const words[WORDS_MOST])
+{
+    for (int i = 0; i < WORDS_MOST && words[i]; i++)
+        if (json_text_is(value, words[i]))
+            return i;
+    return 0;
+}
+
 bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
 {
-    static const struct {
-        const char *key, *names[4]; /* the first is the default; in the order of the library's enums */
-    } WORDS[] = {{"model", {"plane_stress", "plane_strain", "axisymmetric", "solid"}},
-                 {"formulation", {"auto", "standard", "bbar", "incompatible_modes"}},
-                 {"kinematics", {"auto", "fixed", "moving", "finite"}}};
+    static const char *const MODELS[WORDS_MOST] = {"plane_stress", "plane_strain", "axisymmetric", "solid"};
+    static const char *const FORMULATIONS[WORDS_MOST] = {"auto", "standard", "bbar", "incompatible_modes"};
+    static const char *const KINEMATICS[WORDS_MOST] = {"auto", "fixed", "moving", "finite"};
+    static const char *const LAWS[WORDS_MOST] = {"linear", "st_venant_kirchhoff", "neo_hooke", "neo_hooke_isochoric"};
     static const char *const COMPONENTS[] = {"ux", "uy", "uz"};
-    static const char *const LAWS[UZ_ELASTICITIES] = {"linear", "st_venant_kirchhoff", "neo_hooke",
-                                                      "neo_hooke_isochoric"}; /* in the order of the library's enum */
     const json_value *mesh = json_get(object, "mesh"), *box = json_get(mesh, "box");
     const json_value *materials = json_get(object, "materials"), *supports = json_get(object, "supports");
-    int words[3] = {0};
-    for (size_t k = 0; k < 3; k++)
-        for (int i = 0; i < 4 && WORDS[k].names[i]; i++)
-            if (json_text_is(json_get(object, WORDS[k].key), WORDS[k].names[i]))
-                words[k] = i;
-    out->model = (uz_model)words[0];
-    out->formulation = (uz_formulation)words[1];
-    out->kinematics = (uz_kinematics)words[2];
+    out->model = (uz_model)word_of(json_get(object, "model"), MODELS);
+    out->formulation = (uz_formulation)word_of(json_get(object, "formulation"), FORMULATIONS);
+    out->kinematics = (uz_kinematics)word_of(json_get(object, "kinematics"), KINEMATICS);
     out->thickness = json_number(json_get(object, "thickness"), 1);
     out->all_candidates = json_text_is(json_get(object, "candidates"), "all");
     if (box ? !decode_box(out, d, box) : !decode_mesh(out, d, mesh))
@@ -229,9 +233,7 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
         const json_value *item = &materials->items[i];
         uz_material *to = &out->materials[i];
         decode_name(to->on, sizeof to->on, item, "on", "");
-        for (size_t law = 0; law < sizeof LAWS / sizeof *LAWS; law++)
-            if (json_text_is(json_get(item, "law"), LAWS[law]))
-                to->law = (uz_elasticity)law;
+        to->law = (uz_elasticity)word_of(json_get(item, "law"), LAWS);
         to->young = json_number(json_get(item, "young"), 0);
         to->poisson = json_number(json_get(item, "poisson"), 0);
         to->density = json_number(json_get(item, "density"), 0);

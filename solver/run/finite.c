@@ -23,7 +23,8 @@ enum { FEW = 4, MOST_PARTS = 200 };
 #define LEAST_PART (1.0 / 1024)
 /* Orderings and factors of tangents that are kept. */
 #define CACHE_BYTES ((size_t)256 << 20)
-/* Contact problems are solved to this, and the answer to no less than that. */
+/* Contact problems, which are those of all of u, of which most may be rotation, are solved to the first, and the answer
+ * to no less than the second. */
 #define STEP_ERROR  1e-10
 #define LEAST_ERROR 1e-12
 

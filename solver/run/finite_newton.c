@@ -32,8 +32,6 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3 };
 #define ASKED_FROM 1e-3
 /* A determinant of F that is next to none. */
 #define NEARLY_FLAT 0.2
-/* Equations of a step are solved to this; they are those of all of u, which may be rotation for the most part. */
-#define STEP_ERROR 1e-10
 /* Stiffness along pressed rows, in those of the stiffest dof. */
 #define LEAST_HOLD 1.0
 #define MOST_HOLD  1e3
