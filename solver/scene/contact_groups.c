@@ -80,16 +80,12 @@ static uz_status join(uz_group *out, const uz_mesh *mesh, const uz_names *groups
         out->n_inner += group->n_inner;
     }
     qsort(out->face, (size_t)out->n_faces, sizeof *out->face, uz_face_order);
-    qsort(out->node, (size_t)out->n_nodes, sizeof *out->node, uz_ascending);
-    faces = nodes = 0;
+    faces = 0;
     for (int64_t i = 0; i < out->n_faces; i++)
         if (i == 0 || uz_face_order(&out->face[i], &out->face[faces - 1]) != 0)
             out->face[faces++] = out->face[i];
-    for (int64_t i = 0; i < out->n_nodes; i++)
-        if (i == 0 || out->node[i] != out->node[nodes - 1])
-            out->node[nodes++] = out->node[i];
     out->n_faces = faces;
-    out->n_nodes = nodes;
+    out->n_nodes = uz_sort_unique(out->node, out->n_nodes);
     return UZ_OK;
 }
 

@@ -43,13 +43,7 @@ static bool append(number_list *list, int64_t value)
 /* Sorts the list and leaves each number once. */
 static void sort_unique(number_list *list)
 {
-    int64_t kept = 0;
-    if (list->count > 1)
-        qsort(list->value, (size_t)list->count, sizeof *list->value, uz_ascending);
-    for (int64_t i = 0; i < list->count; i++)
-        if (i == 0 || list->value[i] != list->value[kept - 1])
-            list->value[kept++] = list->value[i];
-    list->count = kept;
+    list->count = uz_sort_unique(list->value, list->count);
 }
 
 /* Everything that is given under one name. */
