@@ -15,7 +15,8 @@ typedef struct {
     struct store *store; /* where uploads are read that it names; NULL: there are none */
     char (*uploads)[65]; /* n_uploads ids that were read, each once; who takes them sets it to NULL */
     size_t n_uploads;
-    size_t bound; /* bytes that one matrix or vector may take */
+    size_t bound;    /* bytes that one matrix or vector may take */
+    uz_scene *scene; /* what groups are of; NULL: the problem is in matrices */
     problem_details *problem;
 } decoding;
 
@@ -27,6 +28,17 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object);
 bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list, int dim);
 /* A scene's mesh, not a box; out->model is there. */
 bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh);
+/* Groups by where they are (decode_groups.c), after the mesh; d->scene is where they go. */
+bool decode_selections(uz_scene *out, decoding *d, const json_value *list);
+/* What is said `on`: the name of a group of d->scene, of sides of boxes also +x and the like; or a place, which becomes
+ * a selection of the scene, and its name says which. value NULL: "". */
+typedef enum {
+    GROUP_OF_ANY,
+    GROUP_OF_SIDES,
+    GROUP_OF_ELEMENTS,
+    GROUP_OR_CONTACT /* any name: also what several groups are called together, which is no group; checked later */
+} group_use;
+bool decode_group(char name[64], decoding *d, const json_value *value, group_use use);
 /* What stands beside the problem (decode_beside.c); list or object NULL: none, or the defaults. */
 bool decode_cases(uz_problem *problem, decoding *d, const json_value *list);
 void decode_settings(uz_settings *out, const json_value *object);

@@ -141,7 +141,8 @@ bool decode_quantities(uz_problem *problem, uz_settings *settings, decoding *d, 
         uz_quantity *to = &problem->quantities[i];
         double length = 0;
         to->kind = (uz_quantity_kind)uz_choice_find(UZ_CHOICE_QUANTITY, json_text(json_get(item, "quantity")));
-        decode_name(to->on, sizeof to->on, item, "on", "");
+        if (!decode_group(to->on, d, json_get(item, "on"), GROUP_OR_CONTACT))
+            return false;
         if (json_get(item, "direction") &&
             !decode_components(to->direction, d, item, "direction", 0, dim, "it must be the direction of the number"))
             return false;

@@ -49,7 +49,9 @@ bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list
     for (int64_t i = 0; i < *n; i++) {
         const json_value *item = &list->items[i], *node = json_get(item, "node");
         uz_load *to = &loads[i];
-        decode_name(to->on, sizeof to->on, item, "on", "");
+        if (!decode_group(to->on, d, json_get(item, "on"),
+                          json_get(item, "traction") || json_get(item, "pressure") ? GROUP_OF_SIDES : GROUP_OF_ANY))
+            return false;
         for (size_t k = 0; k < sizeof LOADS / sizeof LOADS[0]; k++) {
             if (!json_get(item, LOADS[k].key))
                 continue;
@@ -152,15 +154,12 @@ static const struct {
 static bool decode_groups(char name[64], uz_names *groups, decoding *d, const json_value *item, const char *key)
 {
     const json_value *value = json_get(item, key);
-    if (!json_is(value, JSON_IS_ARRAY)) {
-        decode_name(name, 64, item, key, "");
-        return true;
-    }
+    if (!json_is(value, JSON_IS_ARRAY))
+        return decode_group(name, d, value, GROUP_OF_SIDES);
     groups->name = decode_room(d, value, sizeof *groups->name, &groups->n);
-    for (int64_t i = 0; groups->name && i < groups->n; i++) {
-        const size_t len = value->items[i].count;
-        memcpy(groups->name[i], json_text(&value->items[i]), len < 64 ? len : 63);
-    }
+    for (int64_t i = 0; groups->name && i < groups->n; i++)
+        if (!decode_group(groups->name[i], d, &value->items[i], GROUP_OF_SIDES))
+            return false;
     if (groups->name)
         uz_name_together(name, groups);
     return groups->name != NULL;
@@ -227,12 +226,16 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     if (box ? !decode_box(out, d, box) : !decode_mesh(out, d, mesh))
         return false;
     out->refine = json_get(mesh, "refine") != NULL; /* "auto" is all that it can be */
+    d->scene = out;
+    if (!decode_selections(out, d, json_get(object, "groups")))
+        return false;
     const int dim = uz_scene_dim(out);
     out->materials = decode_room(d, materials, sizeof *out->materials, &out->n_materials);
     for (int64_t i = 0; i < out->n_materials; i++) {
         const json_value *item = &materials->items[i];
         uz_material *to = &out->materials[i];
-        decode_name(to->on, sizeof to->on, item, "on", "");
+        if (!decode_group(to->on, d, json_get(item, "on"), GROUP_OF_ELEMENTS))
+            return false;
         to->law = (uz_elasticity)word_of(json_get(item, "law"), LAWS);
         to->young = json_number(json_get(item, "young"), 0);
         to->poisson = json_number(json_get(item, "poisson"), 0);
@@ -243,10 +246,12 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     for (int64_t i = 0; i < out->n_supports && good; i++) {
         const json_value *item = &supports->items[i];
         uz_support *to = &out->supports[i];
-        decode_name(to->on, sizeof to->on, item, "on", "");
+        good = decode_group(to->on, d, json_get(item, "on"), GROUP_OF_ANY);
         for (int c = 0; c < 3; c++)
             to->u[c] = json_number(json_get(item, COMPONENTS[c]), (double)NAN);
         to->kind = UZ_SUPPORT_COMPONENTS;
+        if (!good)
+            break;
         if (json_get(item, "normal")) {
             to->kind = UZ_SUPPORT_NORMAL;
             to->value = json_number(json_get(item, "u"), 0);

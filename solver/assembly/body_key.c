@@ -85,6 +85,24 @@ static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
     uz_buffer_put(key, hex, sizeof hex);
 }
 
+/* Groups by where they are. All of them: what a load pushes on must be there in the body that is found. */
+static void put_selections(uz_buffer *key, const uz_scene *scene)
+{
+    put_int(key, scene->n_selections);
+    for (int64_t i = 0; i < scene->n_selections; i++) {
+        const uz_selection *s = &scene->selections[i];
+        const double *const points[] = {s->low,        s->high, s->plane_point, s->plane_normal, s->centre,
+                                        s->axis_point, s->axis, s->facing,      s->nearest};
+        const double numbers[] = {s->radius, s->axis_radius, s->within, s->tolerance};
+        put_name(key, s->name, sizeof s->name);
+        put_int(key, s->kind);
+        put_int(key, s->by);
+        for (size_t k = 0; k < sizeof points / sizeof points[0]; k++)
+            put_doubles(key, points[k], 3);
+        put_doubles(key, numbers, sizeof numbers / sizeof numbers[0]);
+    }
+}
+
 static int by_group(const void *a, const void *b)
 {
     const uz_support *const *left = a, *const *right = b;
@@ -165,7 +183,7 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
 
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err)
 {
-    static const char format[] = "uzawa body 7";
+    static const char format[] = "uzawa body 8";
     uz_buffer key = {0};
     char *text = NULL;
     const int dim = uz_scene_dim(scene);
@@ -189,6 +207,7 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
             put_double(&key, grading == 0 ? 1 : grading);
         }
     }
+    put_selections(&key, scene);
     put_int(&key, scene->n_bisected);
     if (scene->n_bisected > 0)
         uz_buffer_put(&key, scene->bisected, (size_t)scene->n_bisected * sizeof *scene->bisected);

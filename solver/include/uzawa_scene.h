@@ -94,6 +94,37 @@ uz_status uz_abaqus_read(uz_given_mesh *out, const char *text, size_t len, size_
 uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,
                        uz_error *err);
 
+/* What a selection is made of. */
+typedef enum {
+    UZ_SELECT_WHAT_IS_THERE, /* sides, or where there are none, nodes */
+    UZ_SELECT_SIDES,         /* outer edges or faces that lie there whole; on something round with their corners */
+    UZ_SELECT_NODES,
+    UZ_SELECT_ELEMENTS, /* whose middle (the mean of the corners) lies there */
+    UZ_SELECT_KINDS     /* how many */
+} uz_select_kind;
+enum {
+    UZ_SELECT_RANGE = 1,    /* low <= x <= high, each component; -+INFINITY: no limit */
+    UZ_SELECT_PLANE = 2,    /* on the plane through plane_point with this normal */
+    UZ_SELECT_ROUND = 4,    /* on the circle or the sphere of this centre and radius */
+    UZ_SELECT_CYLINDER = 8, /* 3D: on the cylinder around this axis */
+    UZ_SELECT_FACING = 16,  /* sides only: the outward normal in the middle is within so many degrees of `facing` */
+    UZ_SELECT_NEAREST = 32  /* nodes only: of those that meet the rest the nearest to the point, of equals the first */
+};
+/* A named part of the mesh by where it is before anything moves: what meets all conditions of `by`. */
+typedef struct {
+    char name[64];
+    char place[96]; /* where it is in the problem, "/groups/0/where" (a JSON pointer), for messages */
+    uz_select_kind kind;
+    unsigned by; /* UZ_SELECT_RANGE | ... */
+    double low[3], high[3];
+    double plane_point[3], plane_normal[3];
+    double centre[3], radius;
+    double axis_point[3], axis[3], axis_radius;
+    double facing[3], within;
+    double nearest[3];
+    double tolerance; /* a length; 0: 1e-6 of the diagonal of the body's bounding box */
+} uz_selection;
+
 /* How stress follows from strain. E is the Green-Lagrange strain, C = I + 2 E, J the root of det C, lambda and mu
  * Lame's constants, K = lambda + 2/3 mu. All of them are the linear law where strains are small. */
 typedef enum {
@@ -197,6 +228,8 @@ typedef struct {
     uz_mesh_source source;
     uz_box box;
     uz_given_mesh given;
+    uz_selection *selections; /* parts of either mesh by where they are; no name is one of the mesh's own */
+    int64_t n_selections;
     bool refine; /* no wedges: uz_solve and uz_solve_cases divide elements where the error is */
     /* n_bisected, borrowed: the mesh is refined by this list (uz_grid_sequence.bisected). NULL: not yet. The functions
      * that refine make lists themselves and take none. */

@@ -33,6 +33,8 @@ static bool has_name(const uz_scene *scene, uz_quantity_kind kind, const char *o
             there = there || strcmp(SIDES[i], on) == 0;
         for (int64_t i = 0; i < scene->given.n_groups && given; i++)
             there = there || strcmp(scene->given.groups[i].name, on) == 0;
+        for (int64_t i = 0; i < scene->n_selections; i++)
+            there = there || strcmp(scene->selections[i].name, on) == 0;
         return there || strcmp(on, "all") == 0 || (given && strcmp(on, "boundary") == 0);
     case UZ_QUANTITY_CONTACT_FORCE:
     case UZ_QUANTITY_MEAN_PRESSURE:

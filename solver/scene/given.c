@@ -124,6 +124,8 @@ uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
 {
     uz_status status = scene->source == UZ_MESH_GIVEN ? uz_mesh_from_given(out, &scene->given, uz_scene_dim(scene), err)
                                                       : uz_mesh_from_box(out, &scene->box, err);
+    if (status == UZ_OK && scene->n_selections > 0)
+        status = uz_mesh_select(out, scene, err);
     if (status == UZ_OK && scene->refine)
         status = check_refinement(out, scene, err);
     if (status == UZ_OK && scene->n_bisected > 0)

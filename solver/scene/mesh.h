@@ -70,11 +70,16 @@ uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, 
 /* Faces (uz_face) by element, then by side, for qsort. */
 int uz_face_order(const void *a, const void *b);
 
+/* Adds the groups that the scene selects by where they are (select.c). Errors: UZ_ERR_SCENE at the selection's place,
+ * _NOT_FINITE, _MEMORY. */
+uz_status uz_mesh_select(uz_mesh *mesh, const uz_scene *scene, uz_error *err);
+
 /* Adds the groups that contacts name together (uz_names). Errors: UZ_ERR_SCENE at "/contacts/i/on" or "with", _MEMORY.
  */
 uz_status uz_mesh_join_groups(uz_mesh *mesh, const uz_scene *scene, uz_error *err);
 
-/* The mesh of a scene, whatever it comes from, with the groups that its contacts name together. */
+/* The mesh of a scene, whatever it comes from, with the groups that it selects and those that its contacts name
+ * together. */
 uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err);
 void uz_mesh_clear(uz_mesh *mesh);
 

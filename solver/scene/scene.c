@@ -35,6 +35,7 @@ void uz_scene_clear(uz_scene *scene)
         free(scene->contacts[i].with_groups.name);
     }
     uz_given_mesh_clear(&scene->given);
+    free(scene->selections);
     free(scene->materials);
     free(scene->supports);
     free(scene->loads);

@@ -101,12 +101,82 @@ TEST(supports_and_loads)
     CHECK(s.loads[0].node == INT64_MAX);
     uz_scene_clear(&s);
     /* 63 characters may be more bytes than a name has: what is left must not be another group's name */
-    s = take(MESH "},\"loads\":[{\"on\":\"a\\u0000b\",\"force\":[1,2]},{\"on\":\"" LONG "\",\"force\":[1,2]}]}}");
-    CHECK_STR(s.loads[0].on, "");
-    CHECK_STR(s.loads[1].on, "");
-    uz_scene_clear(&s);
+    refuse(MESH ",\"groups\":{\"a\":{\"nodes\":[0]}}},\"loads\":[{\"on\":\"a\\u0000b\",\"force\":[1,2]}]}}",
+           "not_allowed", "/problem/loads/0/on", "\"a\", \"all\", \"boundary\"");
+    refuse(MESH "},\"loads\":[{\"on\":\"" LONG "\",\"force\":[1,2]}]}}", "not_allowed", "/problem/loads/0/on",
+           "no group");
     refuse(PLANE ",\"supports\":[{\"on\":\"left\",\"normal\":[0,-0.0],\"u\":0}]}}", "out_of_range",
            "/problem/supports/0/normal", "is zero");
+}
+
+TEST(names_of_groups)
+{
+    uz_scene s = take(SOLID ",\"supports\":[{\"on\":\"-z\",\"uz\":0},{\"on\":\"+x\",\"ux\":0}],"
+                            "\"contacts\":[{\"on\":[\"+y\",\"left\"],\"with\":\"+z\"}]}}");
+    CHECK_STR(s.supports[0].on, "back");
+    CHECK_STR(s.supports[1].on, "right");
+    CHECK_STR(s.contacts[0].on, "left + top");
+    CHECK_STR(s.contacts[0].with, "front");
+    uz_scene_clear(&s);
+    refuse(PLANE ",\"supports\":[{\"on\":\"lefft\",\"ux\":0}]}}", "not_allowed", "/problem/supports/0/on",
+           "Did you mean \"left\"");
+    refuse(PLANE ",\"supports\":[{\"on\":\"front\",\"ux\":0}]}}", "not_allowed", "/problem/supports/0/on", "\"left\"");
+    refuse(PLANE ",\"loads\":[{\"on\":\"all\",\"traction\":[0,1]}]}}", "not_allowed", "/problem/loads/0/on",
+           "name sides");
+    refuse(PLANE ",\"contacts\":[{\"on\":\"bottom\",\"with\":[\"top\",\"tip\"]}]}}", "not_allowed",
+           "/problem/contacts/0/with/1", "Did you mean \"top\"");
+    refuse("{\"problem\":{\"kind\":\"scene\",\"model\":\"plane_stress\",\"mesh\":{\"box\":{\"size\":[2,1],"
+           "\"cells\":[2,1]}},\"materials\":[{\"on\":\"left\",\"young\":2,\"poisson\":0.25}]}}",
+           "not_allowed", "/problem/materials/0/on", "must be \"all\"");
+}
+
+#define WHERE(what) PLANE ",\"supports\":[{\"on\":{\"where\":{" what "}},\"ux\":0}]}}"
+
+TEST(groups_by_where_they_are)
+{
+    uz_scene s =
+        take(PLANE ",\"groups\":[{\"name\":\"roof\",\"where\":{\"y\":1}}],\"supports\":[{\"on\":\"roof\","
+                   "\"uy\":0},{\"on\":{\"where\":{\"y\":0,\"x\":{\"min\":0.5}}},\"ux\":0},{\"on\":{\"where\":"
+                   "{\"x\":{\"min\":0.5},\"y\":{\"min\":0,\"max\":0}}},\"uy\":0}],\"loads\":[{\"on\":{\"where\":"
+                   "{\"nearest\":[2,1]}},\"force\":[0,1]}],\"contacts\":[{\"on\":[\"bottom\",{\"where\":"
+                   "{\"normal\":{\"direction\":[1,0],\"within\":10},\"tolerance\":0.1}}],\"obstacle\":{"
+                   "\"plane\":{\"point\":[0,0],\"normal\":[0,1]}}}]}}");
+    CHECK_INT(s.n_selections, 4); /* what says the same is the same */
+    CHECK_STR(s.selections[0].name, "roof");
+    CHECK_STR(s.selections[0].place, "/groups/0/where");
+    CHECK_STR(s.supports[1].on, "x>=0.5 y=0");
+    CHECK_STR(s.supports[2].on, s.supports[1].on);
+    CHECK_STR(s.selections[1].place, "/supports/1/on/where");
+    CHECK(s.selections[1].by == UZ_SELECT_RANGE && s.selections[1].low[0] == 0.5 && isinf(s.selections[1].high[0]));
+    CHECK(s.selections[1].low[1] == 0 && s.selections[1].high[1] == 0);
+    CHECK_STR(s.loads[0].on, "nearest 2,1");
+    CHECK(s.selections[3].by == UZ_SELECT_FACING && s.selections[3].within == 10 && s.selections[3].tolerance == 0.1);
+    CHECK_STR(s.contacts[0].on, "bottom + normal 1,0 within 10 tolerance 0.1");
+    uz_scene_clear(&s);
+    s = take(SOLID ",\"supports\":[{\"on\":{\"where\":{\"x\":0.12345678901}},\"ux\":0},{\"on\":{\"where\":{\"x\":"
+                   "0.12345678902}},\"uy\":0},{\"on\":{\"where\":{\"cylinder\":{\"point\":[1,2,3.25],\"axis\":"
+                   "[0.5,0.25,0.125],\"radius\":0.75},\"of\":\"elements\"}},\"uz\":0}]}}");
+    CHECK_STR(s.supports[0].on, "x=0.123456789"); /* two that would be called the same are told apart */
+    CHECK_STR(s.supports[1].on, "x=0.123456789...#2");
+    CHECK_STR(s.supports[2].on, "elements cylinder 1,2,3.25 axis 0.5,0.25,0.125 radius 0.75");
+    CHECK(s.selections[2].by == UZ_SELECT_CYLINDER && s.selections[2].kind == UZ_SELECT_ELEMENTS);
+    uz_scene_clear(&s);
+    refuse(WHERE("\"z\":1"), "not_allowed", "/problem/supports/0/on/where/z", "for solids");
+    refuse(WHERE("\"sphere\":{\"center\":[0,0],\"radius\":1}"), "not_allowed", "/problem/supports/0/on/where/sphere",
+           "a circle");
+    refuse(WHERE("\"circle\":{\"center\":[0,0,0],\"radius\":1}"), "out_of_range",
+           "/problem/supports/0/on/where/circle/center", "2 numbers");
+    refuse(WHERE("\"x\":{\"min\":2,\"max\":1}"), "out_of_range", "/problem/supports/0/on/where/x",
+           "nothing is between");
+    refuse(WHERE("\"tolerance\":2"), "missing_key", "/problem/supports/0/on/where", "circle, normal or nearest");
+    refuse(WHERE("\"plane\":{\"point\":[0,0],\"normal\":[0,0]}"), "out_of_range",
+           "/problem/supports/0/on/where/plane/normal", "is zero");
+    refuse(WHERE("\"normal\":{\"direction\":[0,1]},\"of\":\"nodes\""), "not_allowed", "/problem/supports/0/on/where/of",
+           "must be sides");
+    refuse(WHERE("\"nearest\":[0,1],\"of\":\"sides\""), "not_allowed", "/problem/supports/0/on/where/nearest",
+           "a node");
+    refuse(PLANE ",\"groups\":[{\"name\":\"a\",\"where\":{\"y\":1}},{\"name\":\"a\",\"where\":{\"y\":0}}]}}",
+           "not_allowed", "/problem/groups/1/name", "another of these");
 }
 
 TEST(obstacles)

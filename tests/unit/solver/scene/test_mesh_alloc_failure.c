@@ -92,6 +92,25 @@ TEST(boxes)
     CHECK(fail_each(make_box) > 10);
 }
 
+static uz_status select_in_box(uz_error *err)
+{
+    uz_selection places[] = {{.name = "a", .by = UZ_SELECT_FACING, .facing = {0, 0, 1}},
+                             {.name = "b", .by = UZ_SELECT_NEAREST},
+                             {.name = "c", .by = UZ_SELECT_RANGE, .high = {1, 1, 1}, .kind = UZ_SELECT_ELEMENTS}};
+    uz_mesh mesh;
+    uz_scene scene = {.model = UZ_SOLID, .selections = places, .n_selections = 3};
+    scene.box = (uz_box){.size = {1, 1, 1}, .cells = {2, 1, 1}, .element = "tet4", .dim = 3};
+    const uz_status status = uz_mesh_from_scene(&mesh, &scene, err);
+    CHECK((mesh.xyz != NULL) == (status == UZ_OK));
+    uz_mesh_clear(&mesh);
+    return status;
+}
+
+TEST(groups_by_where_they_are)
+{
+    CHECK(fail_each(select_in_box) > 15);
+}
+
 static uz_status refine_box(uz_error *err)
 {
     static const int64_t MARKED[] = {2, 0, 7, 1, 12};
