@@ -74,6 +74,16 @@ function quantities_of(summary) {
       h("td", null, number(one.on_this_mesh, 6))))));
 }
 
+/** How each contact presses, where there are several. */
+function contacts_of(summary) {
+  const pressed = (summary.resultants?.contacts || []).filter((one) => Number.isFinite(one.mean_pressure));
+  if ((summary.resultants?.contacts || []).length < 2 || !pressed.length) return null;
+  return h("table", { class: "assertions", id: "contacts" }, h("caption", null, "Contacts on this mesh"),
+    h("thead", null, h("tr", null, ["On", "Force", "Mean pressure", "Largest", "Area", "Center of pressure"].map((name) => h("th", { scope: "col" }, name)))),
+    h("tbody", null, pressed.map((one) => h("tr", null, h("td", null, one.on), h("td", null, vector(one.force)),
+      ...[one.mean_pressure, one.max_pressure, one.area].map((value) => h("td", null, number(value, 4))), h("td", null, vector(one.center))))));
+}
+
 /** The card of a summary. */
 export function verdict_card(summary) {
   const outcome = outcome_words(summary), whole = whole_words(summary);
@@ -82,7 +92,7 @@ export function verdict_card(summary) {
     whole ? h("p", { class: "certificate", id: "whole-error" }, whole) : null,
     h("p", { class: whole ? "" : "certificate", id: "certificate" }, certificate_words(summary)),
     h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
-    quantities_of(summary), hint_of(summary), warnings_of(summary), assertions_of(summary),
+    quantities_of(summary), contacts_of(summary), hint_of(summary), warnings_of(summary), assertions_of(summary),
     h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));
 }
 

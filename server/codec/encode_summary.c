@@ -23,13 +23,23 @@ static void put_named(text *t, const char *key, const named *list, size_t count)
         text_close(t, '}');
 }
 
-static void put_resultant(text *t, const char *key, const uz_resultant *r, int dim)
+/* total: how it presses, of a contact. */
+static void put_resultant(text *t, const char *key, const uz_resultant *r, const uz_contact_total *total, int dim)
 {
     text_open(t, key, '{');
     if (r->on[0])
         text_string(t, "on", r->on);
     text_numbers(t, "force", r->force, dim);
     text_numbers(t, "moment", dim == 2 ? r->moment + 2 : r->moment, dim == 2 ? 1 : 3);
+    if (total) {
+        put_named(t, NULL,
+                  (named[]){{"normal_force", total->normal_force},
+                            {"area", total->area},
+                            {"mean_pressure", total->mean_pressure},
+                            {"max_pressure", total->max_pressure}},
+                  4);
+        text_numbers(t, "center", total->center, dim);
+    }
     text_close(t, '}');
 }
 
@@ -81,13 +91,13 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
     text_open(t, "resultants", '{');
     text_open(t, "contacts", '[');
     for (int64_t i = 0; i < e->n_contacts; i++)
-        put_resultant(t, NULL, &e->contacts[i], dim);
+        put_resultant(t, NULL, &e->contacts[i], &e->totals[i], dim);
     text_close(t, ']');
     text_open(t, "supports", '[');
     for (int64_t i = 0; i < e->n_supports; i++)
-        put_resultant(t, NULL, &e->supports[i], dim);
+        put_resultant(t, NULL, &e->supports[i], NULL, dim);
     text_close(t, ']');
-    put_resultant(t, "loads", &e->loads, dim);
+    put_resultant(t, "loads", &e->loads, NULL, dim);
     text_number(t, "imbalance", e->imbalance);
     text_close(t, '}');
     text_open(t, "warnings", '[');

@@ -112,6 +112,15 @@ typedef struct {
     double force[3], moment[3];
 } uz_resultant;
 
+/* How one contact presses, whichever way it looks. Of a contact between bodies: on the sides that have the rows. */
+typedef struct {
+    double normal_force;  /* the sum of the forces along each place's normal, >= 0; of rings all around */
+    double area;          /* of what touches */
+    double mean_pressure; /* normal_force by area; NaN: nothing touches */
+    double max_pressure;
+    double center[3]; /* mean place of these forces, of rings in the half plane; NaN: there are none */
+} uz_contact_total;
+
 /* What the sides of one surface of a contact between two are taken for: in words, as the result has it. */
 typedef struct {
     char group[64], shape[12];
@@ -208,6 +217,7 @@ typedef struct {
     double peak_size;    /* of the side there: the root of its row's area in space, the area in the plane */
     uz_trend peak, area; /* of max_pressure and contact_area */
     int64_t n_contacts, n_supports;
+    uz_contact_total *totals; /* n_contacts */
     uz_resultant *contacts,
         *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
     uz_resultant loads; /* all of them; on is "" */

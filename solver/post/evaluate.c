@@ -16,6 +16,7 @@ void uz_evaluation_free(uz_evaluation *evaluation)
 {
     if (!evaluation)
         return;
+    free(evaluation->totals);
     free(evaluation->contacts);
     free(evaluation->supports);
     free(evaluation->overlap);
@@ -36,11 +37,12 @@ static uz_status begin(uz_result *result, const uz_body_model *model, const uz_s
     e->n_contacts = scene->n_contacts;
     e->n_supports = scene->n_supports;
     e->peak_node = -1;
+    e->totals = uz_alloc_zero(e->n_contacts, sizeof *e->totals);
     e->contacts = uz_alloc_zero(e->n_contacts, sizeof *e->contacts);
     e->supports = uz_alloc_zero(e->n_supports, sizeof *e->supports);
     e->overlap = uz_alloc_zero(e->n_contacts, sizeof *e->overlap);
     e->surfaces = uz_alloc_zero(2 * e->n_contacts, sizeof *e->surfaces);
-    if (!e->contacts || !e->supports || !e->overlap || !e->surfaces)
+    if (!e->totals || !e->contacts || !e->supports || !e->overlap || !e->surfaces)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld resultants",
                        (long long)(e->n_contacts + e->n_supports));
     for (int64_t i = 0; i < e->n_contacts && model->sites; i++)
@@ -57,9 +59,38 @@ static uz_status begin(uz_result *result, const uz_body_model *model, const uz_s
                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)result->m);
 }
 
+/* Adds to a contact's total what acts at one of its rows; its centre is a sum until end_totals. moved: by node, NULL:
+ * where the body is before anything moves. */
+static void add_total(uz_contact_total *to, const uz_result *result, const uz_body_model *model, int64_t row,
+                      double force, const double *moved)
+{
+    const uz_inner_place *inner = uz_row_inner(model, row);
+    const int dim = result->mesh.dim;
+    to->normal_force += force;
+    to->max_pressure = fmax(to->max_pressure, result->pressure[row]);
+    for (int a = 0; a < (inner ? inner->nodes : 1); a++) {
+        const int64_t at = dim * (inner ? inner->node[a] : result->mesh.contact_node[row]);
+        for (int axis = 0; axis < dim; axis++)
+            to->center[axis] += force * (inner ? inner->share[a] : 1.0) *
+                                (result->mesh.xyz[at + axis] + (moved ? moved[at + axis] : 0.0));
+    }
+}
+
+static void end_totals(uz_evaluation *e)
+{
+    for (int64_t k = 0; k < e->n_contacts; k++) {
+        uz_contact_total *total = &e->totals[k];
+        total->mean_pressure = total->area > 0.0 ? total->normal_force / total->area : (double)NAN;
+        for (int axis = 0; axis < 3; axis++)
+            total->center[axis] = total->normal_force > 0.0 ? total->center[axis] / total->normal_force : (double)NAN;
+    }
+}
+
 /* Force (of rings: axial), area and peak of the contact: the obstacle pushes a row's node along its normal by -push,
- * and `on` is pushed the other way where the masters are its own. *pressed: the sum of the forces of all rows. */
-static uz_status sum_contact(double *pressed, uz_result *result, const uz_body_model *model, uz_error *err)
+ * and `on` is pushed the other way where the masters are its own. *pressed: the sum of the forces of all rows; moved:
+ * as of add_total. */
+static uz_status sum_contact(double *pressed, uz_result *result, const uz_body_model *model, const double *moved,
+                             uz_error *err)
 {
     uz_summary *summary = &result->summary;
     uz_evaluation *e = result->evaluation;
@@ -79,8 +110,11 @@ static uz_status sum_contact(double *pressed, uz_result *result, const uz_body_m
         for (int axis = model->kind == UZ_AXISYMMETRIC ? 1 : 0; axis < mesh->dim; axis++)
             summary->force[axis] -= times * push[i] * mesh->contact_normal[i * mesh->dim + axis];
         *pressed += fabs(push[i]);
-        if (model->law->kind->active(model->law, NULL, &result->r[i], 1) > 0)
+        add_total(&e->totals[mesh->contact_of[i]], result, model, i, -push[i], moved);
+        if (model->law->kind->active(model->law, NULL, &result->r[i], 1) > 0) {
             e->contact_area += mesh->contact_area[i];
+            e->totals[mesh->contact_of[i]].area += mesh->contact_area[i];
+        }
         if (!(result->pressure[i] > summary->max_pressure))
             continue;
         summary->max_pressure = result->pressure[i];
@@ -90,6 +124,7 @@ static uz_status sum_contact(double *pressed, uz_result *result, const uz_body_m
             e->peak_at[axis] = mesh->xyz[node * mesh->dim + axis];
     }
     free(push);
+    end_totals(e);
     const double size = e->peak_node >= 0 ? 1.0 : 0.0; /* what nothing presses on tells nothing */
     uz_trend_fit(&e->peak, &(uz_trend_point){size, summary->max_pressure}, 1, summary->max_pressure, 0.0);
     uz_trend_fit(&e->area, &(uz_trend_point){size, e->contact_area}, 1, e->contact_area, 0.0);
@@ -106,7 +141,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     if (status == UZ_OK)
         status = uz_contact_pressure(result->pressure, model, scene, result->r, err);
     if (status == UZ_OK)
-        status = sum_contact(&pressed, result, model, err);
+        status = sum_contact(&pressed, result, model, NULL, err);
     if (status == UZ_OK)
         status = uz_balance_forces(e, model, scene, result->u, result->r, NULL, err);
     if (status == UZ_OK)
@@ -186,7 +221,7 @@ uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, cons
     if (status == UZ_OK)
         status = stretch_areas(result, model, &displaced, scene, err);
     if (status == UZ_OK)
-        status = sum_contact(&pressed, result, model, err);
+        status = sum_contact(&pressed, result, model, result->u, err);
     if (status == UZ_OK)
         status = uz_balance_forces(result->evaluation, &displaced, scene, result->u, result->r,
                                    &(uz_balance_known){inner, load, energy}, err);

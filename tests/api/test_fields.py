@@ -60,6 +60,11 @@ def test_what_acts_on_the_body(s):
           acts)
     check(all(close(a, b, 1e-9) for a, b in zip(acts["loads"]["force"], [50, -15])), acts["loads"])
     check(acts["contacts"][0]["force"] == summary["contact"]["force"], acts["contacts"])
+    bottom = acts["contacts"][0]
+    check(close(bottom["normal_force"], bottom["force"][1], 1e-12) and bottom["area"] == summary["contact"]["area"], bottom)
+    check(close(bottom["mean_pressure"] * bottom["area"], bottom["normal_force"], 1e-12), bottom)
+    check(close(bottom["center"][0] * bottom["force"][1], bottom["moment"][0], 1e-9) and bottom["center"][1] == 0, bottom)
+    check("area" not in acts["loads"] and "area" not in acts["supports"][0], acts)
     everything = [acts["loads"], acts["contacts"][0], acts["supports"][0]]
     check(max(map(abs, add(*(one["force"] for one in everything)))) < 1e-4, acts)  # certified to 1e-6
     check(abs(add(*(one["moment"] for one in everything))[0]) < 1e-2 and len(acts["loads"]["moment"]) == 1, acts)
@@ -78,6 +83,8 @@ def test_each_case_has_its_own_resultants(s):
     cases = result(s, solved(s, request))["cases"]
     check([round(case["summary"]["resultants"]["loads"]["force"][1], 9) for case in cases] == [-300, 0], cases)
     check(cases[1]["summary"]["contact"]["max_pressure_at"] is None, cases[1]["summary"]["contact"])
+    free = cases[1]["summary"]["resultants"]["contacts"][0]
+    check(free["mean_pressure"] is None and free["center"] == [None, None] and free["normal_force"] == 0, free)
 
 
 def test_matrices_have_no_resultants(s):

@@ -25,6 +25,7 @@ def test_contact_force_is_axial(s):
     check(summary["outcome"] == "converged" and summary["contact"]["max_pressure"] > 1, summary)
     check(sleeve["force"] == [0, 0] and ground["force"][0] == 0 and ground["force"][1] > 1, sleeve, ground)
     check(summary["contact"]["force"][0] == 0, summary["contact"])
+    check(sleeve["normal_force"] > 1 and sleeve["center"][0] == 2 and 0 < sleeve["center"][1] < 2, sleeve)
     check(abs(summary["contact"]["force"][1] - ground["force"][1]) < 1e-9 * ground["force"][1], summary)
     check(summary["resultants"]["imbalance"] < 1e-9, summary["resultants"])
 

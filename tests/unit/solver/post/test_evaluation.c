@@ -59,6 +59,14 @@ static void check_pressed(uz_model model, const char *element)
     CHECK(e->peak_node >= 0 && e->peak_at[1] == 0);
     CHECK(fabs(e->contacts[0].force[1] - 7 * area) <= 1e-7 * area);
     CHECK(fabs(e->loads.force[1] + 7 * area) <= 1e-11 * area);
+    const uz_contact_total *total = &e->totals[0];
+    const double center[3] = {model == UZ_AXISYMMETRIC ? 4.0 / 3 : 1, 0, model == UZ_SOLID ? 0.5 : 0};
+    CHECK_REL(total->normal_force, 7 * area, 1e-7);
+    CHECK_REL(total->area, area, 1e-12);
+    CHECK(fabs(total->mean_pressure - 7) <= 1e-6 && total->max_pressure == result->summary.max_pressure);
+    for (int c = 0; c < (model == UZ_SOLID ? 3 : 2); c++)
+        CHECK_MSG(fabs(total->center[c] - center[c]) <= 1e-6, "%s %d: center[%d] is %g", element, model, c,
+                  total->center[c]);
     CHECK(e->n_supports == 0 || fabs(e->supports[0].force[0]) <= 1e-6);
     CHECK_MSG(e->imbalance <= 1e-8, "%s %d: %g", element, model, e->imbalance);
     CHECK_INT(e->n_warnings, 0);
