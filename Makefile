@@ -24,6 +24,9 @@ TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl local
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
 TEST_PACKAGES += chromium chromium-driver python3-selenium python3-pil
 
+# The Python package, and what builds its wheel.
+TEST_PACKAGES += python3-numpy python3-pip python3-setuptools python3-wheel
+
 # One body on many machines: uzawa-group is built where these are, and nothing else needs them.
 GROUP_PACKAGES := libpetsc-real-dev openmpi-bin
 
@@ -81,7 +84,7 @@ PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
-.PHONY: all group deps-group demo gallery run man guide install clean help deps deps-test
+.PHONY: all wheel group deps-group demo gallery run man guide install clean help deps deps-test
 all: $(BUILD)/uzawad $(BUILD)/uzawa $(if $(HAS_PETSC),$(BUILD)/uzawa-group) ## build the daemon and the client, and uzawa-group where PETSc is
 
 # After deps, which may have installed the compiler; said, since it takes a minute where nothing is built yet.
@@ -116,6 +119,11 @@ deps-test: ## the same with what only the tests use
 guide: ## renew docs/scenes.md, whose tables follow from schemas/request.json
 	@$(PYTHON) -B tests/figures/scenes_page.py >$(BUILD)/scenes.md
 	@mv $(BUILD)/scenes.md docs/scenes.md
+
+wheel: ## build the wheel of the Python package in build/python (python3-pip, -setuptools, -wheel)
+	@rm -rf $(BUILD)/python && mkdir -p $(BUILD)/python
+	@cp -r client/python $(BUILD)/python/source
+	@$(PYTHON) -m pip wheel -q --no-deps --no-build-isolation --no-cache-dir --disable-pip-version-check -w $(BUILD)/python $(BUILD)/python/source
 
 man: $(BUILD)/uzawa ## renew client/uzawa.1 and client/uzawa.bash, which follow from the client's table of commands
 	@$(BUILD)/uzawa help --format man >client/uzawa.1

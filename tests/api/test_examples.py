@@ -21,10 +21,14 @@ ASSERTIONS = ROOT / "tests/data/assertions.json"
 PYTHON = [sys.executable, "-B"]
 
 
+def environ(s):
+    return {**os.environ, "UZAWA_SERVER": s.url, "PYTHONPATH": str(ROOT / "client/python")}
+
+
 def run(s, *words, code=0, cwd=None, seconds=120, **environment):
     """A program with the daemon's address in its environment; what it printed."""
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=seconds, cwd=cwd,
-                          env={**os.environ, "UZAWA_SERVER": s.url, **environment})
+                          env={**environ(s), **environment})
     check(done.returncode == code, words, "exit", done.returncode, "wanted", code, done.stdout, done.stderr)
     return done.stdout
 
@@ -55,7 +59,7 @@ def check_submit_and_wait(s, language):
         said = run(s, *program, request_file(folder, failing), code=1)
         check("fail: contact.active = 22" in said, said)
         wrong = subprocess.run([str(word) for word in program] + [str(request_file(folder, {"problem": {"kind": "nothing"}}))],
-                               capture_output=True, text=True, timeout=60, env={**os.environ, "UZAWA_SERVER": s.url})
+                               capture_output=True, text=True, timeout=60, env=environ(s))
         check(wrong.returncode != 0 and "/problem" in wrong.stdout + wrong.stderr, wrong)
 
 
