@@ -181,7 +181,7 @@ $(call obj,solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/f
 # Short loops of known length around the registers are unrolled.
 $(call obj,solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/post/*.c) solver/io/vtu.c): CFLAGS += -O3
 
-$(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS)
+$(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS) $(BUILD)/gen/openapi.json
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS_ALL) -c -o $@ $<
 
@@ -196,17 +196,23 @@ $(BUILD)/gen/page.c: $(PAGE_SRC)
 	@mkdir -p $(@D)
 	@client/page/bundle.sh $(BUILD)
 
-# Every schema file becomes bytes in the daemon, found by name (server/codec/embedded.h).
+# References of openapi.json are to files beside it; the service also has it one folder higher.
+$(BUILD)/gen/openapi.json: schemas/openapi.json
+	@mkdir -p $(@D)
+	@sed -E 's#("\$$ref": ")([a-z-]+\.json)#\1schemas/\2#g' $< > $@
+
+# Every schema file becomes bytes in the daemon, found by name (server/codec/embedded.h); that last one as /openapi.json.
+EMBEDDED = $(SCHEMAS) $(BUILD)/gen/openapi.json
 $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 	@mkdir -p $(@D)
 	@{ echo '#include "codec/embedded.h"'; \
-	   n=0; for f in $(SCHEMAS); do n=$$((n+1)); \
+	   n=0; for f in $(EMBEDDED); do n=$$((n+1)); \
 	     echo "__asm__(\".section .rodata\\nembedded_$$n: .incbin \\\"$$f\\\"\\nembedded_$${n}_end: .byte 0\\n.text\");"; \
 	     echo "extern const char embedded_$$n[], embedded_$${n}_end[];"; done; \
 	   echo 'size_t embedded_count(void) { return '$$n'; }'; \
 	   echo 'embedded_file embedded_at(size_t i) {'; \
-	   n=0; for f in $(SCHEMAS); do n=$$((n+1)); \
-	     echo "    if (i == $$((n-1))) return (embedded_file){\"$$(basename $$f)\", embedded_$$n, (size_t)(embedded_$${n}_end - embedded_$$n)};"; done; \
+	   n=0; for f in $(EMBEDDED); do n=$$((n+1)); name=$${f#schemas/}; \
+	     echo "    if (i == $$((n-1))) return (embedded_file){\"$${name#$(BUILD)/gen}\", embedded_$$n, (size_t)(embedded_$${n}_end - embedded_$$n)};"; done; \
 	   echo '    return (embedded_file){0, 0, 0};'; echo '}'; } > $@
 
 # A test program stands in BUILD/tests by its name alone, wherever its source is.

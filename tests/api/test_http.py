@@ -5,6 +5,7 @@ import re
 import signal
 import threading
 import time
+import urllib.parse
 
 import service
 from service import ENDLESS, MATRICES, SCENE, check, expect, head_of, options
@@ -147,6 +148,11 @@ def test_service_routes(s):
     for path in service.SCHEMAS.glob("*.json"):
         reply = expect(s.get(f"/schemas/{path.name}"), 200)
         check(reply.body == path.read_bytes(), path)
+    for place in ("/openapi.json", "/schemas/openapi.json"):  # generators of clients follow references from either
+        found = set(re.findall(r'"\$ref": ?"([^"#]+)', s.get(place).body.decode()))
+        check(len(found) > 8, found)
+        for name in found:
+            expect(s.get(urllib.parse.urljoin(place, name)), 200)
     expect(s.get("/schemas/none.json"), 404, "not_found")
     expect(s.get("/schemas/..%2FMakefile"), 404, "not_found")
 
