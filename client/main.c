@@ -27,7 +27,7 @@ static const command_run RUN[CLIENT_COMMANDS] = {
     [CLIENT_CANCEL] = client_delete, [CLIENT_REFINE] = client_refine,   [CLIENT_VERIFY] = client_verify,
     [CLIENT_UPLOAD] = client_upload, [CLIENT_PICTURE] = client_picture, [CLIENT_PLOT] = client_plot,
     [CLIENT_DELETE] = client_delete, [CLIENT_FACTORS] = client_factors, [CLIENT_NODES] = client_nodes,
-    [CLIENT_DOCTOR] = client_doctor,
+    [CLIENT_DOCTOR] = client_doctor, [CLIENT_REPORT] = client_report,   [CLIENT_REQUEST] = client_request_of,
 };
 
 /* command: the one that was named, CLIENT_HELP where none was. */

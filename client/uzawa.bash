@@ -7,7 +7,7 @@ _uzawa_ids() {
 
 _uzawa() {
     local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-    local command='' options='' words='' files='' i commands='submit upload status wait refine verify result picture history plot list cancel delete factors nodes doctor version help'
+    local command='' options='' words='' files='' i commands='submit upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor version help'
     COMPREPLY=()
     if [[ $current == '=' ]]; then current=''; previous='='; fi
     if [[ $previous == '=' ]]; then
@@ -29,6 +29,8 @@ _uzawa() {
     picture) options='--colour --factor --width --case --output --json --server --timeout --retry --help --version ' ;;
     history) options='--csv --plot --width --height --ascii --case --output --json --server --timeout --retry --help --version ' ;;
     plot) options='--deformed --error --trade --x --with --colour --factor --width --ascii --case --output --json --server --timeout --retry --help --version ' ;;
+    report) options='--case --output --json --server --timeout --retry --help --version ' ;;
+    request) options='--output --json --server --timeout --retry --help --version ' ;;
     list) options='--status --tag --limit --quiet --json --server --timeout --retry --help --version ' ;;
     cancel) options='--quiet --json --server --timeout --retry --help --version ' ;;
     delete) options='--quiet --json --server --timeout --retry --help --version ' ;;
@@ -117,6 +119,15 @@ _uzawa() {
     plot--server|plot-s) words='' ;;
     plot--timeout|plot-t) words='' ;;
     plot--retry) words='' ;;
+    report--case|report-c) words='' ;;
+    report--output|report-o) files=1 ;;
+    report--server|report-s) words='' ;;
+    report--timeout|report-t) words='' ;;
+    report--retry) words='' ;;
+    request--output|request-o) files=1 ;;
+    request--server|request-s) words='' ;;
+    request--timeout|request-t) words='' ;;
+    request--retry) words='' ;;
     list--status) words='accepted running successful failed dismissed' ;;
     list--tag) words='' ;;
     list--limit|list-n) words='' ;;
@@ -150,6 +161,8 @@ _uzawa() {
     picture) words=$(_uzawa_ids) ;;
     history) words=$(_uzawa_ids) ;;
     plot) words=$(_uzawa_ids) ;;
+    report) words=$(_uzawa_ids) ;;
+    request) words=$(_uzawa_ids) ;;
     cancel) words=$(_uzawa_ids) ;;
     delete) words=$(_uzawa_ids) ;;
     help) words=$commands ;;

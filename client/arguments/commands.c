@@ -61,6 +61,14 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
          "bound. A file that ends in .png gets a PNG, by way of rsvg-convert (Debian: librsvg2-bin); any "
          "other an SVG.\n",
          NULL},
+    [CLIENT_REPORT] = {"report", "report ID [options]", "write all that is known of an answer into one HTML file", "ID",
+                       CLIENT_OPERAND_NEEDED,
+                       "For the archive and for print: the verdict with the whole error, quantities, contacts, "
+                       "assertions, warnings, pictures, and the request that it is the answer to. The file needs no "
+                       "network and no other file. Of a job with load cases it tells of the worst, and lists all.\n",
+                       NULL},
+    [CLIENT_REQUEST] = {"request", "request ID [options]", "fetch the request that a job was made of", "ID",
+                        CLIENT_OPERAND_NEEDED, "As it was sent, to be changed and submitted again.\n", NULL},
     [CLIENT_LIST] = {"list", "list [options]", "list jobs, newest first", NULL, 0, "", NULL},
     [CLIENT_CANCEL] =
         {"cancel", "cancel ID", "dismiss a waiting or running job", "ID", CLIENT_OPERAND_NEEDED,
@@ -85,7 +93,8 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
 #define ASKING      (CLIENT_EVERYWHERE & ~IN(VERSION) & ~IN(HELP)) /* commands that talk to the server */
 #define MAKING      (IN(SUBMIT) | IN(REFINE))                      /* commands that make a job */
 #define STAYING     (MAKING | IN(VERIFY) | IN(WAIT))
-#define FILES       (IN(RESULT) | IN(PICTURE) | IN(HISTORY) | IN(PLOT)) /* commands whose output may go to a file */
+#define OF_A_CASE   (IN(PICTURE) | IN(HISTORY) | IN(PLOT))
+#define FILES       (IN(RESULT) | OF_A_CASE | IN(REPORT) | IN(REQUEST)) /* commands whose output may go to a file */
 
 #define OPTION(NAME, LETTER, KIND, MEMBER, COMMANDS, ...)                                                              \
     {                                                                                                                  \
@@ -170,7 +179,9 @@ static const uz_option OPTIONS[] = {
     OPTION("ascii", 0, FLAG, ascii, IN(HISTORY) | IN(PLOT),
            .about = "draw in plain ASCII (default where the locale is not UTF-8)"),
     OPTION("case", 'c', WORD, case_name, IN(RESULT), .value = "NAME", .about = "of this load case alone"),
-    OPTION("case", 'c', WORD, case_name, FILES, .value = "NAME",
+    OPTION("case", 'c', WORD, case_name, IN(REPORT), .value = "NAME",
+           .about = "of this load case (default: the worst)"),
+    OPTION("case", 'c', WORD, case_name, OF_A_CASE, .value = "NAME",
            .about = "of this load case; needed where the job has some"),
     OPTION("output", 'o', WORD, output, FILES, .value = "FILE", .about = "write to FILE, whole or not at all"),
     OPTION("status", 0, WORD, status, IN(LIST), .value = "S", .choices = "accepted running successful failed dismissed",
@@ -187,7 +198,8 @@ static const uz_option OPTIONS[] = {
            .about = "print nothing; the exit status tells"),
     OPTION("json", 'j', FLAG, json, IN(SUBMIT) | IN(REFINE) | IN(VERIFY) | IN(WAIT) | IN(STATUS),
            .about = "print the job as JSON, and what is wrong too"),
-    OPTION("json", 'j', FLAG, json, IN(PICTURE), .about = "with --output: print what was written as JSON"),
+    OPTION("json", 'j', FLAG, json, IN(PICTURE) | IN(REPORT) | IN(REQUEST),
+           .about = "with --output: print what was written as JSON"),
     OPTION("json", 'j', FLAG, json, IN(PLOT),
            .about = "with --output: print what was written as JSON; with --trade: print the numbers"),
     OPTION("json", 'j', FLAG, json, CLIENT_EVERYWHERE, .about = "print JSON, and what is wrong as JSON too"),

@@ -20,6 +20,8 @@ static const struct {
                       "uzawa result $job --format vtu -o body.vtu\n"
                       "uzawa plot $job -o convergence.svg\n"
                       "uzawa plot $job --deformed -o body.svg\n"
+                      "uzawa report $job -o report.html\n"
+                      "uzawa request $job -o again.json\n"
                       "uzawa list --tag plate\n"
                       "uzawa delete $job"},
     {"Change values of a scene, and take its mesh from Gmsh:",

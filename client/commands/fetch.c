@@ -1,4 +1,4 @@
-/* status, cancel, delete, result, picture, history: one question, one answer. */
+/* status, cancel, delete, request, result, picture, history: one question, one answer. */
 #include "commands/fetch.h"
 #include "show/report.h"
 
@@ -189,6 +189,11 @@ client_exit client_picture(client_session *s)
                                   {"case", o->case_name},
                                   {NULL, NULL}};
     return fetch_and_deliver(s, client_path_with_query(s, "/deformed.svg", query));
+}
+
+client_exit client_request_of(client_session *s)
+{
+    return fetch_and_deliver(s, client_job_path(s, s->options->operand, "/request"));
 }
 
 client_exit client_history(client_session *s)

@@ -23,6 +23,8 @@ client_exit client_result(client_session *s);
 client_exit client_picture(client_session *s);
 client_exit client_history(client_session *s);
 client_exit client_plot(client_session *s);
+client_exit client_report(client_session *s);
+client_exit client_request_of(client_session *s);
 client_exit client_delete(client_session *s);
 client_exit client_factors(client_session *s);
 client_exit client_nodes(client_session *s);

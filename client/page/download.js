@@ -34,7 +34,8 @@ export async function files_of(api, job, case_name) {
   const base = `/v1/jobs/${job.id}`, query = case_name ? `case=${encodeURIComponent(case_name)}` : "";
   const of_case = (path, more = "") => `${base}/${path}${[query, more].filter(Boolean).length ? "?" : ""}${[query, more].filter(Boolean).join("&")}`;
   const stem = case_name ? `${job.id.slice(-8)}-${case_name}` : job.id.slice(-8);
-  const files = [{ name: `${stem}-job.json`, path: base, text: "Job, JSON" }];
+  const files = [{ name: `${stem}-job.json`, path: base, text: "Job, JSON" },
+    { name: `${job.id.slice(-8)}-request.json`, path: `${base}/request`, text: "Request, JSON" }];
   if (job.status !== "successful") return files;
   const fields = job.summary?.problem?.kind === "scene" ? "summary,nodes,displacements,reactions,gaps,pressure" : "summary,displacements,reactions,gaps";
   files.push({ name: `${stem}-result.json`, path: of_case("result", `fields=${fields}`), text: "Result, JSON" },

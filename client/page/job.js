@@ -3,7 +3,9 @@
 import { Convergence } from "./convergence.js";
 import { announce, h, pause, show } from "./dom.js";
 import { download_buttons, files_of } from "./download.js";
+import { draft } from "./examples.js";
 import { elapsed, moment, number, number_towards, seconds, short_id } from "./format.js";
+import { pretty } from "./json_locate.js";
 import { status_chip, sure_button } from "./list.js";
 import { show_precision } from "./precision.js";
 import { refine_form } from "./refine.js";
@@ -12,7 +14,7 @@ import { failure_card, verdict_card } from "./verdict.js";
 import { show_whole_error } from "./whole_error.js";
 import { grid_words, has_ended } from "./words.js";
 
-const HISTORY_MS = 700, MOST_CASES = 10000;
+const HISTORY_MS = 700, MOST_CASES = 10000, MOST_TIDIED = 200000;
 
 class JobView {
   constructor(main, api, id) {
@@ -56,10 +58,23 @@ class JobView {
       }
     });
     stop.id = "stop";
-    const actions = h("div", { class: "actions" }, job.status === "successful" ? refine_form(this.api, job) : null, stop);
+    const again = job.summary?.outcome?.endsWith("verified") ? null
+      : h("button", { type: "button", class: "small", id: "edit", onclick: () => this.edit() }, "Edit and resubmit");
+    const actions = h("div", { class: "actions" }, again, job.status === "successful" ? refine_form(this.api, job) : null, stop);
     show(this.head, h("h1", { title: this.id }, "Job ", h("code", null, short_id(this.id))), status_chip(job.status, job.summary?.outcome),
       h("span", { class: "muted" }, moment(job.created)), job.tags.map((tag) => h("span", { class: "tag" }, tag)),
       refines ? h("a", { href: `#/jobs/${refines.href.split("/").pop()}` }, `refines ${short_id(refines.href.split("/").pop())}`) : null, actions);
+  }
+
+  /** The job's request goes into the editor. */
+  async edit() {
+    try {
+      const text = await this.api.text(`/v1/jobs/${this.id}/request`, { signal: this.ends.signal });
+      draft.set(text.trim().includes("\n") || text.length > MOST_TIDIED ? text : pretty(JSON.parse(text)));
+      location.hash = "#/new";
+    } catch (error) {
+      this.complain(error);
+    }
   }
 
   show_progress(row) {

@@ -92,6 +92,7 @@ bool route_check_parameters(const http_request *rq, problem_details *problem);
 void jobs_submit(api *context, http_request *rq, http_reply *reply);
 void jobs_list(api *context, http_request *rq, http_reply *reply);
 void jobs_get(api *context, http_request *rq, http_reply *reply);
+void jobs_request(api *context, http_request *rq, http_reply *reply);
 void jobs_delete(api *context, http_request *rq, http_reply *reply);
 void jobs_refine(api *context, http_request *rq, http_reply *reply);
 void verify_submit(api *context, http_request *rq, http_reply *reply);

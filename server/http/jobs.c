@@ -221,6 +221,25 @@ void jobs_get(api *context, http_request *rq, http_reply *reply)
     job_clear(&j);
 }
 
+void jobs_request(api *context, http_request *rq, http_reply *reply)
+{
+    job j = {0};
+    char *body = NULL;
+    size_t len = 0;
+    reply->tag_by_body = true;
+    if (jobs_load(context, rq, &j, reply)) {
+        const store_status status = store_get_body(context->store, j.id, &body, &len);
+        if (status == STORE_OK) {
+            reply_text(reply, 200, "application/json", body, len);
+            reply->takes_ranges = true; /* it never changes */
+        } else {
+            reply_store_failure(context, status, reply);
+        }
+        jobs_check_still_there(context, &j, reply);
+    }
+    job_clear(&j);
+}
+
 /* ----------------------------------------------------------------- dismiss */
 
 /* A running job ends soon after it is told to; this much is worth waiting for, so that the answer says "dismissed". */

@@ -17,6 +17,7 @@ static const route ROUTES[] = {
     {"GET", "/v1/jobs", LIST, jobs_list, false},
     {"GET", "/v1/jobs/{id}", NONE, jobs_get, false},
     {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete, false},
+    {"GET", "/v1/jobs/{id}/request", NONE, jobs_request, false},
     {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine, false},
     {"GET", "/v1/jobs/{id}/events", NONE, events_get, false},
     {"GET", "/v1/events", NONE, events_get_all, false},

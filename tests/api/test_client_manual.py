@@ -127,13 +127,13 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
 def test_completion_of_commands_and_options(_):
     names = [command["name"] for command in commands()]
     check(complete("uzawa ") == names, complete("uzawa "))
-    check(complete("uzawa re") == ["refine", "result"], complete("uzawa re"))
+    check(complete("uzawa re") == ["refine", "result", "report", "request"], complete("uzawa re"))
     check(complete("uzawa --server http://h li") == ["list"])
     check(complete("uzawa --s") == ["--server"])
     for command in commands():
         offered = complete(f"uzawa {command['name']} --")
         check(sorted(offered) == sorted({option["name"] for option in command["options"]}), command["name"], offered)
-    check(complete("uzawa help re") == ["refine", "result"])
+    check(complete("uzawa help re") == ["refine", "result", "report", "request"])
 
 
 @options(None)

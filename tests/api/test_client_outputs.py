@@ -1,15 +1,19 @@
 """What the client fetches and prints: tables, pictures, the price of digits, factors, the doctor, JSON everywhere.
 usage: test_client_outputs.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
+import base64
 import csv
 import datetime
 import email.utils
+import html.parser
 import io
 import json
 import os
 import shutil
 import subprocess
 import sys
+import tempfile
+import xml.etree.ElementTree
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
@@ -29,12 +33,76 @@ def run(server, *words, code=0, stdin=None, **environment):
     return done
 
 
-def solved(server, body=PAPER, *words):
-    return run(server, "submit", body, "--wait", "--quiet", *words).stdout.strip()
+def solved(server, body=PAPER, *words, stdin=None):
+    return run(server, "submit", body, "--wait", "--quiet", *words, stdin=stdin).stdout.strip()
 
 
 def table(server, job, *words):
     return list(csv.DictReader(io.StringIO(run(server, "result", job, "--format", "csv", *words).stdout)))
+
+
+# ------------------------------------------------- requests and reports
+
+class Page(html.parser.HTMLParser):
+    """The tags that are open, the images, and the words of a page."""
+    VOID = {"meta", "img", "br"}
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.images, self.words, self.outside = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+        self.images += [dict(attrs)["src"]] if tag == "img" else []
+        self.outside += [value for name, value in attrs if name in ("src", "href") and not value.startswith("data:")]
+
+    def handle_endtag(self, tag):
+        check(self.open.pop() == tag, tag, self.open)
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+def test_requests_come_back_as_they_were_sent(server):
+    job = solved(server)
+    with open(PAPER, encoding="utf-8") as file:
+        sent = json.load(file)
+    check(json.loads(run(server, "request", job).stdout) == sent)
+    check("no job" in run(server, "request", ID, code=4).stderr)
+
+
+def test_a_report_is_one_file_with_everything(server):
+    """Well formed, its pictures in it, every text of others escaped."""
+    with open(PAPER, encoding="utf-8") as file:
+        request = json.load(file)
+    request["tags"] = ["<script>alert(1)</script>"]
+    request["assert"] = [{"quantity": "contact.active", "min": 1, "name": "it <b>touches</b> & holds"}]
+    request["quantities"] = [{"quantity": "contact.force", "name": "<i>push"}]
+    job = solved(server, "-", stdin=json.dumps(request))
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "report.html")
+        run(server, "report", job, "-o", path)
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+    page = Page(text)
+    said = " ".join(page.words)
+    check(page.open == ["html"] and not page.outside and "<script" not in text and "<b>touches" not in text, page.open)
+    check("converged" in said and "whole error" in said and "it <b>touches</b> & holds" in said and "<i>push" in said, said)
+    check("Center of pressure" in said and job in said and '"kind": "scene"' in said, said)
+    pictures = [base64.b64decode(one.partition(",")[2]) for one in page.images]
+    check(len(pictures) == 4, len(pictures))
+    for picture in pictures:
+        xml.etree.ElementTree.fromstring(picture)
+    with_cases = {**request, "assert": [], "cases": [{"name": "a", "loads": request["problem"]["loads"]}, {"name": "b & c", "loads": []}]}
+    job = solved(server, "-", stdin=json.dumps(with_cases))
+    said = " ".join(Page(run(server, "report", job, "--case", "b & c").stdout).words)
+    check("b & c" in said and "Load cases" in said, said)
+    check("no load case" in run(server, "report", job, "--case", "z", code=2).stderr)
+    said = " ".join(Page(run(server, "report", solved(server, SPRINGS)).stdout).words)
+    check("exact solution" in said and "Contacts" not in said, said)
+    check("no job" in run(server, "report", ID, code=4).stderr)
 
 
 # ----------------------------------------------------------------- tables

@@ -192,13 +192,27 @@ def test_files_are_saved(s, b):
         b.click(f'[data-file="{name}"]')
         content = file_saved(b, name)
         if name.endswith(".json"):
-            check(json.loads(content).get("id", json.loads(content).get("job")) == job["id"], name)
+            told = json.loads(content)
+            check(told.get("id", told.get("job", job["id"])) == job["id"] and ("problem" in told) == ("request" in name), name)
         elif name.endswith(".csv"):
             check(content == s.get(f"/v1/jobs/{job['id']}/history.csv").body, name)
         else:
             check(xml.etree.ElementTree.fromstring(content).tag.endswith("svg" if name.endswith(".svg") else "VTKFile"), name)
     saved = {path.name for path in pathlib.Path(b.downloads).iterdir()}
     check({f"{stem}-job.json", f"{stem}-result.json", f"{stem}-history.csv", f"{stem}.vtu", f"{stem}-deformed.svg"} <= saved, saved)
+
+
+def test_its_request_is_edited(s, b):
+    job = s.solve({**SCENE, "tags": ["again"]})
+    b.open(s, f"jobs/{job['id']}")
+    b.says(".verdict h2", "Converged")
+    b.click("#edit")
+    b.says("#verdict", "Valid")
+    written = b.run("return document.querySelector('#job-text').value")
+    check(json.loads(written) == json.loads(s.get(f"/v1/jobs/{job['id']}/request").body), written[:300])
+    b.click("#submit")
+    b.says(".verdict h2", "Converged")
+    check(len(s.get("/v1/jobs?tag=again").json["jobs"]) == 2, "it was not submitted again")
 
 
 def test_refines(s, b):
