@@ -29,7 +29,7 @@ typedef struct {
     examination x;         /* of the pair */
     double *acts[2];       /* resultants less the loads, of the answer's stress and of the pair's */
     double *v, *tractions; /* n_nodes x 2, n_elements x STRESSES: room */
-    double *force, *free_strain;
+    double *force, *free_strain, *limit;
     double nodal; /* norm of what slaves' nodes have to go by */
 } weighing;
 
@@ -51,8 +51,9 @@ static uz_status begin(weighing *y, int64_t n_dofs, uz_error *err)
     y->tractions = uz_alloc(mesh->n_elements * STRESSES, sizeof(double));
     y->force = uz_alloc(2 * mesh->n_elements, sizeof(double));
     y->free_strain = uz_alloc(mesh->n_elements, sizeof(double));
+    y->limit = uz_alloc(n_moments, sizeof(double));
     return y->scratch.residual && y->x.resultant && y->x.pressure && y->x.lift && y->x.moved && y->x.gap &&
-                   y->acts[0] && y->acts[1] && y->v && y->tractions && y->force && y->free_strain
+                   y->acts[0] && y->acts[1] && y->v && y->tractions && y->force && y->free_strain && y->limit
                ? UZ_OK
                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a quantity of %lld elements",
                          (long long)mesh->n_elements);
@@ -60,8 +61,8 @@ static uz_status begin(weighing *y, int64_t n_dofs, uz_error *err)
 
 static void end(weighing *y)
 {
-    void *room[] = {y->scratch.residual, y->x.resultant, y->x.pressure, y->x.lift,    y->x.moved, y->x.gap,
-                    y->acts[0],          y->acts[1],     y->v,          y->tractions, y->force,   y->free_strain};
+    void *room[] = {y->scratch.residual, y->x.resultant, y->x.pressure, y->x.lift, y->x.moved,     y->x.gap, y->acts[0],
+                    y->acts[1],          y->v,           y->tractions,  y->force,  y->free_strain, y->limit};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
 }
@@ -493,47 +494,79 @@ static double norm_of(const examination *x, const double *u)
     return sqrt(2 * (sum + margin));
 }
 
+/* |d| and bulges, for which w is brought to where it may be: all that widths are of, but for rounding. */
+static void measure(weighing *y, uz_bound_interval *out)
+{
+    const uz_bound_body *body = y->body;
+    for (int64_t k = 0; k < body->n_edges * y->x.moments; k++)
+        y->limit[k] = y->pair->share * fmax(0, y->checked->pressure[k]);
+    y->x.limit = y->limit;
+    bring_nodes(y);
+    look_at_supports(y, out);
+    out->apart = sqrt(square_apart(y, true));
+    memcpy(out->local, y->x.gap, (size_t)body->model->mesh.n_elements * sizeof *out->local);
+    out->lacking = 100 * y->x.inside * sqrt(2 * fabs(y->x.complementary));
+    for (int64_t i = 0; i < 2 * body->model->mesh.n_nodes; i++)
+        y->x.farthest = fmax(y->x.farthest, fabs(y->checked->lifted[i]));
+    for (int64_t i = 0; i < body->n_edges; i++)
+        if (body->edge[i].contact >= 0)
+            look_at_edge(y, i);
+    look_at_pairs(y);
+    out->bulge = sqrt(y->x.bulge) + y->nodal;
+    out->pressed = y->x.bulge_work;
+    if (!*out->fault)
+        snprintf(out->fault, sizeof out->fault, "%.90s", y->scratch.fault);
+}
+
+/* What is known of the quantity, and rounding. */
+static uz_status find_middle(weighing *y, uz_bound_interval *out, const uz_scene *scene, const int64_t *dof,
+                             uz_error *err)
+{
+    uz_status status = UZ_OK;
+    out->rounding = out->lacking * norm_of(&y->x, y->u); /* what is missing within elements works on u_h, too */
+    const double work = uz_work_of_loads(&y->x, scene, y->pair->w, &status, err);
+    weigh_edges(y, out, dof);
+    status = status == UZ_OK ? weigh_masters(y, out, dof, err) : status;
+    out->lacking += sqrt(y->x.turning);
+    out->middle += work - work_apart(y, out->apart, &out->rounding) + expansion_work(y, &out->rounding);
+    out->rounding += UZ_SUM_ROUNDING * fabs(work);
+    return status;
+}
+
+static uz_status begin_interval(weighing *y, uz_bound_interval *out, int64_t n_dofs, uz_error *err)
+{
+    *out = (uz_bound_interval){.share = y->pair->share};
+    out->local = uz_alloc(y->body->model->mesh.n_elements, sizeof *out->local);
+    const uz_status status = begin(y, n_dofs, err);
+    return status == UZ_OK && !out->local
+               ? uz_fail(err, UZ_ERR_MEMORY, "", "no memory for what elements have of an interval")
+               : status;
+}
+
+uz_status uz_bound_width(uz_bound_interval *out, const uz_bound_pair *pair, const uz_bound_body *body,
+                         const uz_bound_check_result *checked, uz_error *err)
+{
+    weighing y = {.pair = pair, .body = body, .checked = checked};
+    const uz_status status = begin_interval(&y, out, 1, err);
+    out->middle = NAN;
+    if (status == UZ_OK)
+        measure(&y, out);
+    end(&y);
+    return status;
+}
+
 uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, const uz_bound_body *body,
                          const uz_scene *scene, const int64_t *dof, int64_t n_dofs, const double *u,
                          const double *stress, const uz_bound_check_result *checked, uz_error *err)
 {
     weighing y = {.pair = pair, .body = body, .u = u, .stress = stress, .checked = checked};
-    uz_status status = begin(&y, n_dofs, err);
-    double *limit = uz_alloc(body->n_edges * (body->degree + 1), sizeof *limit);
-    *out = (uz_bound_interval){.share = pair->share};
-    out->local = uz_alloc(body->model->mesh.n_elements, sizeof *out->local);
-    if (status == UZ_OK && (!limit || !out->local))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure of a quantity");
+    uz_status status = begin_interval(&y, out, n_dofs, err);
     if (status == UZ_OK) {
-        for (int64_t k = 0; k < body->n_edges * (body->degree + 1); k++)
-            limit[k] = pair->share * fmax(0, checked->pressure[k]);
-        y.x.limit = limit;
-        bring_nodes(&y);
-        look_at_supports(&y, out);
-        out->apart = sqrt(square_apart(&y, true));
-        memcpy(out->local, y.x.gap, (size_t)body->model->mesh.n_elements * sizeof *out->local);
-        out->lacking = 100 * y.x.inside * sqrt(2 * fabs(y.x.complementary));
-        out->rounding = out->lacking * norm_of(&y.x, u); /* what is missing within elements works on u_h, too */
-        const double work = uz_work_of_loads(&y.x, scene, pair->w, &status, err);
-        for (int64_t i = 0; i < 2 * body->model->mesh.n_nodes; i++)
-            y.x.farthest = fmax(y.x.farthest, fabs(checked->lifted[i]));
-        for (int64_t i = 0; i < body->n_edges; i++)
-            if (body->edge[i].contact >= 0)
-                look_at_edge(&y, i);
-        look_at_pairs(&y);
-        out->bulge = sqrt(y.x.bulge) + y.nodal;
-        out->pressed = y.x.bulge_work;
-        if (!*out->fault)
-            snprintf(out->fault, sizeof out->fault, "%.90s", y.scratch.fault);
+        measure(&y, out);
         out->residual = y.scratch.residual;
-        weigh_edges(&y, out, dof);
-        status = status == UZ_OK ? weigh_masters(&y, out, dof, err) : status;
+        status = find_middle(&y, out, scene, dof, err);
         y.scratch.residual = NULL;
-        out->lacking += sqrt(y.x.turning);
-        out->middle += work - work_apart(&y, out->apart, &out->rounding) + expansion_work(&y, &out->rounding);
-        out->rounding += UZ_SUM_ROUNDING * fabs(work);
     }
-    free(limit);
     end(&y);
     return status;
 }

@@ -50,6 +50,10 @@ void uz_bound_openings(double *open, const uz_bound_body *body, const uz_bound_c
 /* |eps(w) - C^-1 tau|, as it is. UZ_ERR_MEMORY. */
 uz_status uz_bound_apart(double *apart, const uz_bound_pair *pair, uz_error *err);
 
+/* All of it but the middle, what is known of which takes longer, and with that rounding and residual: how wide an
+ * interval would be. The caller frees out->local. UZ_ERR_MEMORY. */
+uz_status uz_bound_width(uz_bound_interval *out, const uz_bound_pair *pair, const uz_bound_body *body,
+                         const uz_bound_check_result *checked, uz_error *err);
 /* What is known of a quantity. u, stress: of the answer, as checked. UZ_ERR_MEMORY. */
 uz_status uz_bound_weigh(uz_bound_interval *out, const uz_bound_pair *pair, const uz_bound_body *body,
                          const uz_scene *scene, const int64_t *dof, int64_t n_dofs, const double *u,

@@ -79,10 +79,12 @@ typedef struct {
     contact_rows own;
     rows_problem primal, dual;
     uz_bound_body adjoint;
-    double *w, *stress;    /* n_nodes x 2; as uz_bound_stress */
+    double *w, *stress;           /* n_nodes x 2; as uz_bound_stress */
+    double *best_w, *best_stress; /* the same of the narrowest pair, its share, and half its interval */
+    double best_share, best;
     double *wanted, *open; /* n_contacts; n_nodes (uz_bound_openings) */
     double ball, widest;   /* sqrt(H); the largest of `open` that is finite */
-    double *local, *share; /* of the pair at hand (uz_bound_interval); of the best of the first quantity */
+    double *share;         /* what elements have of the interval of the first quantity */
 } proving;
 
 /* By nodes -> as the rows are. */
@@ -564,26 +566,62 @@ static void say(uz_quantity_found *out, const char *why)
     snprintf(out->unproved, sizeof out->unproved, "%s", why);
 }
 
-/* Half the interval that the pair at hand proves; the middle -> *middle. */
-static uz_status weigh(proving *v, uz_quantity_found *out, double *middle, double *half, double *apart, double share,
-                       uz_error *err)
+/* Half the interval that the pair at hand would prove, but for rounding; INFINITY: none, and out->unproved says why.
+ * Of the narrowest one so far the pair is kept. */
+static uz_status look_at_pair(proving *v, uz_quantity_found *out, double *half, double *apart, double share,
+                              uz_error *err)
+{
+    const uz_guaranteed *g = v->g;
+    uz_bound_interval interval;
+    const uz_bound_pair pair = {&v->adjoint, v->w, v->stress, v->wanted, share};
+    const uz_status status = uz_bound_width(&interval, &pair, &g->body, g->shown, err);
+    *apart = interval.apart;
+    *half = status == UZ_OK ? uz_bound_half(&interval, g->shown, g->rho, 0) : (double)INFINITY;
+    if (!isfinite(*half))
+        say(out, interval.fault);
+    free(interval.local);
+    if (*half < v->best) {
+        double *const w = v->w, *const stress = v->stress;
+        v->w = v->best_w;
+        v->best_w = w;
+        v->stress = v->best_stress;
+        v->best_stress = stress;
+        v->best_share = share;
+        v->best = *half;
+    }
+    return status;
+}
+
+/* What the narrowest pair proves. */
+static uz_status weigh(proving *v, uz_quantity_found *out, uz_error *err)
 {
     const uz_guaranteed *g = v->g;
     uz_bound_interval interval;
     double own = INFINITY;
-    const uz_bound_pair pair = {&v->adjoint, v->w, v->stress, v->wanted, share};
+    const uz_bound_pair pair = {&v->adjoint, v->best_w, v->best_stress, v->wanted, v->best_share};
     uz_status status = uz_bound_weigh(&interval, &pair, &g->body, &g->problem->scene, g->dof, g->qp.K.cols,
                                       g->admissible ? g->admissible : v->result->u, g->stress, g->shown, err);
     if (status == UZ_OK)
         status = uz_measure_residual(&own, g, interval.residual, err);
-    free(interval.residual);
-    free(v->local);
-    v->local = interval.local;
-    *middle = interval.middle;
-    *apart = interval.apart;
-    *half = status == UZ_OK ? uz_bound_half(&interval, g->shown, g->rho, own) : (double)INFINITY;
-    if (!isfinite(*half))
+    const double half = status == UZ_OK ? uz_bound_half(&interval, g->shown, g->rho, own) : (double)INFINITY;
+    if (isfinite(half)) {
+        out->value = interval.middle;
+        out->low = interval.middle - half;
+        out->high = interval.middle + half;
+        out->mesh = half;
+        out->equations = 0;
+        out->guaranteed = true;
+        out->why[0] = '\0';
+        out->unproved[0] = '\0'; /* by one share, whatever another one could not */
+    } else {
         say(out, *interval.fault ? interval.fault : "what the stress lacks of equilibrium could not be bounded");
+    }
+    if (out->guaranteed && out == v->result->evaluation->quantities) {
+        v->share = interval.local;
+        interval.local = NULL;
+    }
+    free(interval.residual);
+    free(interval.local);
     return status;
 }
 
@@ -623,7 +661,7 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
     const contact_rows *own = &v->own;
     const uz_body_model *model = own->model;
     bool solved = true;
-    double apart = 0, best = INFINITY;
+    double apart = 0;
     memset(primal->x, 0, (size_t)primal->d * sizeof *primal->x);
     take_displacement(v, of);
     const char *why = make_adjoint(v, quantity, v->w, err);
@@ -659,8 +697,9 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
     status = uz_bound_apart(&apart, &(uz_bound_pair){&v->adjoint, v->w, v->stress, v->wanted, 1}, err);
     attempts tried = {.n = 0};
     double share = apart > 0 && v->ball > 0 ? apart / (2 * v->ball) : 1;
+    v->best = INFINITY;
     while (share > 0 && status == UZ_OK && solved) {
-        double middle = NAN, half = INFINITY;
+        double half = INFINITY;
         status = solve_within(primal, &solved, share, err);
         if (status == UZ_OK && solved)
             status = solve_sliding(dual, &solved, share, err);
@@ -669,27 +708,10 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
         if (status != UZ_OK || !solved)
             break;
         take_displacement(v, of);
-        status = weigh(v, out, &middle, &half, &apart, share, err);
-        if (status == UZ_OK && half < best) {
-            best = half;
-            if (out == v->result->evaluation->quantities) {
-                double *worse = v->share;
-                v->share = v->local;
-                v->local = worse;
-            }
-            out->value = middle;
-            out->low = middle - half;
-            out->high = middle + half;
-            out->mesh = half;
-            out->equations = 0;
-            out->guaranteed = true;
-            out->why[0] = '\0';
-        }
+        status = look_at_pair(v, out, &half, &apart, share, err);
         share = primal->m == 0 ? 0 : next_share(&tried, share, half, v->ball > 0 ? apart / (2 * v->ball) : 0);
     }
-    if (out->guaranteed) /* by one share, whatever another one could not */
-        *out->unproved = '\0';
-    return status;
+    return status == UZ_OK && isfinite(v->best) ? weigh(v, out, err) : status;
 }
 
 /* The strain energy is the potential energy, which two energies enclose, and the work f(u) of the loads. */
@@ -730,10 +752,13 @@ static uz_status begin(proving *v, uz_error *err)
     v->adjoint.force = uz_alloc(2 * mesh->n_elements, sizeof *body->force);
     v->w = uz_alloc_zero(2 * mesh->n_nodes, sizeof *v->w);
     v->wanted = uz_alloc_zero(g->problem->scene.n_contacts, sizeof *v->wanted);
+    v->best_w = uz_alloc_zero(2 * mesh->n_nodes, sizeof *v->w);
     v->stress = uz_alloc(mesh->n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, sizeof *v->stress);
+    v->best_stress = uz_alloc(mesh->n_elements * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3, sizeof *v->stress);
     v->open = uz_alloc(mesh->n_nodes, sizeof *v->open);
     v->ball = sqrt(uz_bound_ball(g->shown, g->rho));
-    if (!v->adjoint.edge || !v->adjoint.before.at || !v->adjoint.force || !v->w || !v->wanted || !v->open || !v->stress)
+    if (!v->adjoint.edge || !v->adjoint.before.at || !v->adjoint.force || !v->w || !v->wanted || !v->open ||
+        !v->stress || !v->best_w || !v->best_stress)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes", (long long)mesh->n_nodes);
     uz_bound_openings(v->open, body, g->shown);
     for (int64_t i = 0; i < mesh->n_nodes; i++)
@@ -962,8 +987,9 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
     end_contact_rows(&v.own, g->cache);
     if (v.share && e->asked > 0)
         uz_add_share(e, g->body.model->mesh.n_elements, v.share);
-    void *room[] = {v.local,        v.share, v.open, v.w, v.stress, v.wanted, v.adjoint.edge, v.adjoint.before.at,
-                    v.adjoint.force};
+    void *room[] = {
+        v.share,        v.open, v.w, v.best_w, v.stress, v.best_stress, v.wanted, v.adjoint.edge, v.adjoint.before.at,
+        v.adjoint.force};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return status;
