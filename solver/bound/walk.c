@@ -70,9 +70,9 @@ uz_walk uz_walk_begin(double corner[3][2], bool rings, int degree)
         return walk;
     sort(walk.corner);
     walk.half = -1;
-    walk.i = 3;
+    walk.i = walk.along = degree + 1;
     walk.line.to = 1;
-    uz_gauss(walk.at, walk.share, 3);
+    uz_gauss(walk.at, walk.share, walk.along);
     return walk;
 }
 
@@ -110,7 +110,7 @@ bool uz_walk_next(uz_walk *walk, double at[2], double *weight)
         *weight = walk->rule.point[walk->i++].weight * area2;
         return true;
     }
-    if (walk->i == 3 && !next_chord(walk))
+    if (walk->i == walk->along && !next_chord(walk))
         return false;
     at[0] = walk->radius;
     at[1] = (walk->low + walk->high) / 2 + walk->at[walk->i] * (walk->high - walk->low) / 2;

@@ -26,11 +26,12 @@ typedef struct {
     double corner[3][2]; /* of rings by their radius, ascending */
     uz_gauss_rule rule;  /* plane */
     bool rings;
-    int half, i; /* of rings: before the middle corner, or behind it; plane: the next point */
+    int half, i, along; /* of rings: before the middle corner, or behind it; points of a chord; plane: the next point */
     uz_line_walk line;
     double radius, low, high, weight, at[3], share[3]; /* the chord at hand */
 } uz_walk;
-/* degree: of stresses, of which squares are integrated; it matters to plane bodies. */
+/* degree: of stresses, of which squares are integrated. Of rings polynomials of degree 3 along the axis, if it is 1,
+ * and 5, if it is 2. */
 uz_walk uz_walk_begin(double corner[3][2], bool rings, int degree);
 bool uz_walk_next(uz_walk *walk, double at[2], double *weight);
 
