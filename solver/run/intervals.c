@@ -22,9 +22,13 @@
 
 enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 5 };
 
-/* Shares are looked for by steps of this factor, and between two that are farther apart than the other one. */
-#define STEP  2.5
-#define APART 2.0
+/* Shares are looked for by steps of this factor, not beside those that were tried by less than the second one, and as
+ * long as an interval is expected that is narrower than the narrowest so far by the third one. By what is more than the
+ * last one |d| falls no more. */
+#define STEP   2.5
+#define BESIDE 1.15
+#define WORTH  0.97
+#define LEVEL  0.98
 
 /* What takes an answer out of an obstacle goes a little farther than it stands in there, at points. */
 #define DEEPER 1.02
@@ -625,33 +629,66 @@ static uz_status weigh(proving *v, uz_quantity_found *out, uz_error *err)
     return status;
 }
 
-/* Shares that were tried, ascending, and half the intervals that they left. */
+/* Shares that were tried, ascending: |d| of their pairs, and half the intervals, INFINITY where there is none. */
 typedef struct {
     int n;
-    double share[MOST_SHARES], half[MOST_SHARES];
+    double share[MOST_SHARES], apart[MOST_SHARES], half[MOST_SHARES];
 } attempts;
 
-/* The share to try next, 0: none. The last one left `half`; `suits` is what its pair suggests. |d| gets smaller with a
- * larger one, by leaps where what the answer presses with has to be in balance with much else. */
-static double next_share(attempts *a, double last, double half, double suits)
+static void add_attempt(attempts *a, double share, double apart, double half)
 {
-    int at = a->n, best = 0;
-    for (; at > 0 && a->share[at - 1] > last; at--) {
+    int at = a->n++;
+    for (; at > 0 && a->share[at - 1] > share; at--) {
         a->share[at] = a->share[at - 1];
+        a->apart[at] = a->apart[at - 1];
         a->half[at] = a->half[at - 1];
     }
-    a->share[at] = last;
+    a->share[at] = share;
+    a->apart[at] = apart;
     a->half[at] = half;
-    if (++a->n == MOST_SHARES || !(suits > 0))
+}
+
+/* |d| of a share: between those that were tried it falls, and beyond as beside them, as a power; or by a leap, in the
+ * middle, before shares where it falls no more. */
+static double expect_apart(const attempts *a, double share)
+{
+    int k = 1;
+    while (k < a->n - 1 && a->share[k] < share)
+        k++;
+    const double *A = a->apart + k, *m = a->share + k;
+    if (k < a->n - 1 && A[1] > LEVEL * A[0] && share < m[0])
+        return share * share >= m[-1] * m[0] ? A[0] : A[-1];
+    return A[-1] * exp(fmin(0, log(A[0] / A[-1])) * log(share / m[-1]) / log(m[0] / m[-1]));
+}
+
+/* The share to try next, 0: none that is expected to be worth it. ball: sqrt(H). A pair that suits a share suits larger
+ * ones, so |d| gets smaller with a larger one, by leaps where what the answer presses with has to be in balance with
+ * much else. Without an interval yet a larger one is tried once. */
+static double next_share(const attempts *a, double last, double ball)
+{
+    enum { STEPS = 48 };
+    double best = INFINITY, least = INFINITY, next = 0;
+    for (int k = 0; k < a->n; k++)
+        best = fmin(best, a->half[k]);
+    if (a->n == MOST_SHARES || !(ball > 0) || !(a->apart[0] > 0) || !(a->apart[a->n - 1] > 0))
         return 0;
-    if (a->n == 1)
+    if (a->n == 1) {
+        const double suits = a->apart[0] / (2 * ball);
         return fabs(suits - last) > 0.2 * last ? suits : STEP * last;
-    for (int k = 1; k < a->n; k++)
-        best = a->half[k] < a->half[best] ? k : best;
-    if (best == a->n - 1 || best == 0)
-        return best == 0 ? a->share[0] / STEP : STEP * a->share[best];
-    const double below = a->share[best] / a->share[best - 1], above = a->share[best + 1] / a->share[best];
-    return fmax(below, above) < APART ? 0 : a->share[best] * (above > below ? sqrt(above) : 1 / sqrt(below));
+    }
+    if (!isfinite(best))
+        return a->n == 2 ? STEP * a->share[1] : 0;
+    const double low = a->share[0] / STEP, high = a->share[a->n - 1] * STEP;
+    for (int i = 0; i <= STEPS; i++) {
+        const double m = low * pow(high / low, (double)i / STEPS), A = expect_apart(a, m);
+        const double half = 2 * m * ball <= A ? A * ball : m * ball * ball + A * A / (4 * m);
+        bool fresh = half < least;
+        for (int k = 0; k < a->n && fresh; k++) /* below one that is no pair there is none */
+            fresh = fmax(m, a->share[k]) > BESIDE * fmin(m, a->share[k]) && (isfinite(a->half[k]) || m > a->share[k]);
+        least = fresh ? half : least;
+        next = fresh ? m : next;
+    }
+    return least < WORTH * best ? next : 0;
 }
 
 static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity *quantity, const uz_functional *of,
@@ -709,7 +746,8 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
             break;
         take_displacement(v, of);
         status = look_at_pair(v, out, &half, &apart, share, err);
-        share = primal->m == 0 ? 0 : next_share(&tried, share, half, v->ball > 0 ? apart / (2 * v->ball) : 0);
+        add_attempt(&tried, share, apart, half);
+        share = primal->m == 0 ? 0 : next_share(&tried, share, v->ball);
     }
     return status == UZ_OK && isfinite(v->best) ? weigh(v, out, err) : status;
 }
