@@ -165,63 +165,111 @@ static bool has_values(const uz_bound_body *body, int64_t e)
     return has;
 }
 
-/* K, if it is wanted, and what elements add to p. */
-static uz_status assemble(uz_qp *qp, int64_t d, const uz_bound_body *body, const int64_t *dof, bool stiffness,
+/* Edges from one on that have an element with it, ascending. */
+static int edges_beside(int64_t beside[2 * UZ_BOUND_PARTS], const uz_bound_body *body, int64_t edge)
+{
+    int n = 1;
+    beside[0] = edge;
+    for (int k = 0; k < 2 && body->edge[edge].element[k] >= 0; k++) {
+        const int64_t e = body->edge[edge].element[k];
+        const int sides = uz_element_type_of((uz_element_kind)body->model->mesh.kind[e])->corners;
+        for (int s = 0; s < sides; s++) {
+            const int64_t other = body->edge_of[4 * e + s];
+            int at = n;
+            if (other <= edge)
+                continue;
+            for (n++; beside[at - 1] > other; at--)
+                beside[at] = beside[at - 1];
+            beside[at] = other;
+        }
+    }
+    return n;
+}
+
+/* Where K has entries, its lower triangle: unknowns of edges that have an element in common, which are numbered by
+ * edges. first: n_edges + 1, of each its first unknown. */
+static uz_status begin_stiffness(uz_csc *K, const int64_t *first, const uz_bound_body *body, uz_error *err)
+{
+    int64_t beside[2 * UZ_BOUND_PARTS], count = 0;
+    const int64_t d = first[body->n_edges];
+    for (int64_t i = 0; i < body->n_edges; i++) {
+        const int64_t own = first[i + 1] - first[i];
+        count -= own * (own - 1) / 2;
+        for (int k = edges_beside(beside, body, i) - 1; k >= 0; k--)
+            count += own * (first[beside[k] + 1] - first[beside[k]]);
+    }
+    const uz_status status = uz_csc_init(K, d, d, count, err);
+    count = 0;
+    for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) {
+        const int n = edges_beside(beside, body, i);
+        for (int64_t c = first[i]; c < first[i + 1]; c++) {
+            for (int k = 0; k < n; k++)
+                for (int64_t r = k == 0 ? c : first[beside[k]]; r < first[beside[k] + 1]; r++)
+                    K->idx[count++] = r;
+            K->ptr[c + 1] = count;
+        }
+    }
+    return status;
+}
+
+/* An element's lower triangle, of which dof_of are the unknowns. */
+static void add_stiffness(uz_csc *K, const int64_t *first, const macro *m, const double *own, const int64_t *dof_of)
+{
+    const int per = 2 * (m->degree + 1);
+    const int64_t *edge = m->body->edge_of + 4 * m->element;
+    for (int s = 0; s < m->parts; s++) {
+        int64_t beside[2 * UZ_BOUND_PARTS];
+        edges_beside(beside, m->body, edge[s]);
+        for (int t = 0; t < m->parts; t++) {
+            int64_t before = 0; /* unknowns of a column's edges before this one */
+            for (int k = 0; edge[t] >= edge[s] && beside[k] < edge[t]; k++)
+                before += first[beside[k] + 1] - first[beside[k]];
+            for (int j = s * per; j < (s + 1) * per && edge[t] >= edge[s]; j++)
+                for (int r = t * per; r < (t + 1) * per && dof_of[j] >= 0; r++)
+                    if (dof_of[r] >= dof_of[j])
+                        K->val[K->ptr[dof_of[j]] - (dof_of[j] - first[edge[s]]) + before + dof_of[r] -
+                               first[edge[t]]] += r >= j ? own[r + m->outer * j] : own[j + m->outer * r];
+        }
+    }
+}
+
+/* K, unless it is NULL, and what elements add to p. */
+static uz_status assemble(uz_csc *K, double *p, const int64_t *first, const uz_bound_body *body, const int64_t *dof,
                           const uz_stop *stop, uz_error *err)
 {
     const int64_t n = body->model->mesh.n_elements;
-    const int most = OUTER * (OUTER + 1) / 2;
-    int64_t count = 0, room = 0, *row = NULL, *col = NULL;
-    double *val = NULL;
     macro *kept = uz_alloc_zero(MADE, sizeof *kept), *m = NULL;
     int64_t *order = order_of(body);
-    uz_status status = kept && order ? UZ_OK : UZ_ERR_MEMORY;
+    uz_status status = kept && order ? UZ_OK
+                                     : uz_fail(err, UZ_ERR_MEMORY, "",
+                                               "no memory for the dual problem of %lld elements", (long long)n);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const int64_t e = order[i];
         int64_t dof_of[OUTER];
-        double value[OUTER], p[OUTER], K[OUTER * OUTER];
-        if (!stiffness && !has_force(body, e) && !has_values(body, e))
+        double value[OUTER], own_p[OUTER], own[OUTER * OUTER];
+        if (!K && !has_force(body, e) && !has_values(body, e))
             continue;
-        if (stiffness && count + most > room) {
-            room = i == 0 ? 16 * most : count * n / i + count / 8 + 16 * most;
-            if (!uz_triplets_grow(&row, &col, &val, room)) {
-                status = UZ_ERR_MEMORY;
-                break;
-            }
-        }
         if ((i % 256 == 0 && uz_stop_is_due(stop)) || !(m = make(kept, body, e))) {
             status = fail_at(stop, e, err);
             break;
         }
         if (!m->weighed)
             weigh(m);
-        memcpy(K, m->K, (size_t)(m->outer * m->outer) * sizeof *K);
-        memcpy(p, m->p, (size_t)m->outer * sizeof *p);
+        memcpy(own, m->K, (size_t)(m->outer * m->outer) * sizeof *own);
+        memcpy(own_p, m->p, (size_t)m->outer * sizeof *own_p);
         number(dof_of, value, m, dof);
-        add_springs(K, m);
-        turn(K, p, m, false);
+        add_springs(own, m);
+        turn(own, own_p, m, false);
         for (int r = 0; r < m->outer; r++) {
-            for (int j = 0; j < m->outer; j++) {
-                const double entry = r >= j ? K[r + m->outer * j] : K[j + m->outer * r];
+            for (int j = 0; j < m->outer; j++)
                 if (dof_of[j] < 0)
-                    p[r] -= entry * value[j];
-                else if (stiffness && dof_of[r] >= dof_of[j]) {
-                    row[count] = dof_of[r];
-                    col[count] = dof_of[j];
-                    val[count++] = entry;
-                }
-            }
+                    own_p[r] -= (r >= j ? own[r + m->outer * j] : own[j + m->outer * r]) * value[j];
             if (dof_of[r] >= 0)
-                qp->p[dof_of[r]] += p[r];
+                p[dof_of[r]] += own_p[r];
         }
+        if (K)
+            add_stiffness(K, first, m, own, dof_of);
     }
-    if (status == UZ_OK)
-        status = uz_csc_from_triplets(&qp->K, d, d, count, row, col, val, err);
-    else if (status == UZ_ERR_MEMORY)
-        uz_fail(err, status, "", "no memory for the dual problem of %lld elements", (long long)n);
-    free(row);
-    free(col);
-    free(val);
     free(kept);
     free(order);
     return status;
@@ -346,21 +394,29 @@ static uz_status make_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *bod
                               uz_error *err)
 {
     const int moments = body->degree + 1;
-    int64_t d = 0;
+    int64_t d = 0, *first = uz_alloc(body->n_edges + 1, sizeof *first);
     *qp = (uz_qp){.p = NULL};
     *dof = uz_alloc(body->n_edges * 2 * moments, sizeof **dof);
-    if (!*dof)
+    if (!*dof || !first) {
+        free(first);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual problem of %lld edges",
                        (long long)body->n_edges);
-    for (int64_t i = 0; i < body->n_edges * 2 * moments; i++)
+    }
+    for (int64_t i = 0; i < body->n_edges * 2 * moments; i++) {
+        first[i / (2 * moments)] = i % (2 * moments) == 0 ? d : first[i / (2 * moments)];
         (*dof)[i] = body->edge[i / (2 * moments)].held[i % 2] ||
                             !(uz_bound_weight(body, i / (2 * moments), (int)(i % (2 * moments) / 2)) > 0) ||
                             (i % 2 == 0 && uz_bound_pressed(body, i / (2 * moments), (int)(i % (2 * moments) / 2)) >= 0)
                         ? -1
                         : d++;
+    }
+    first[body->n_edges] = d;
     qp->p = uz_alloc_zero(d, sizeof *qp->p);
-    uz_status status = qp->p ? assemble(qp, d, body, *dof, stiffness, stop, err)
-                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld unknowns", (long long)d);
+    uz_status status = qp->p ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld unknowns", (long long)d);
+    if (status == UZ_OK)
+        status = stiffness ? begin_stiffness(&qp->K, first, body, err) : uz_csc_init(&qp->K, d, d, 0, err);
+    if (status == UZ_OK)
+        status = assemble(stiffness ? &qp->K : NULL, qp->p, first, body, *dof, stop, err);
     for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++) { /* a constant traction is shared by weights */
         const uz_bound_edge *edge = &body->edge[i];
         for (int a = 0; a < 2 * moments; a++) {
@@ -374,6 +430,7 @@ static uz_status make_problem(uz_qp *qp, int64_t **dof, const uz_bound_body *bod
     }
     if (status == UZ_OK)
         status = add_rows(qp, d, body, *dof, err);
+    free(first);
     if (status != UZ_OK) {
         uz_qp_clear(qp);
         free(*dof);
