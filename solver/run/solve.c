@@ -34,13 +34,17 @@ static bool any(const uz_problem *problem)
     return true;
 }
 
-/* On the mesh that is given, and by the stiffness that it has there. */
+/* On the mesh that is given, and by the stiffness that it has there. What is proved of an answer is by its factor, too.
+ */
 static uz_status solve_given(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                              const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     const double started = uz_seconds();
-    const uz_status status = uz_solve_rounds(results, problem, settings, starts, NULL, cache, hooks, err);
-    return uz_settle_cases(results, status, problem, settings, starts, cache, hooks, started, err);
+    uz_cache *own = settings->guaranteed && !cache ? uz_cache_new(SIZE_MAX) : NULL, *kept = own ? own : cache;
+    uz_status status = uz_solve_rounds(results, problem, settings, starts, NULL, kept, hooks, err);
+    status = uz_settle_cases(results, status, problem, settings, starts, kept, hooks, started, err);
+    uz_cache_free(own);
+    return status;
 }
 
 static const run_kind KINDS[] = {
