@@ -224,13 +224,26 @@ static void project_turned(double coefficient[MOMENTS][2], const uz_bound_body *
         }
 }
 
-/* The pressure at a moment, as the stress has it: what holds motions less what settles them. */
-static double pressure_of(const examination *x, int64_t i, int a)
+/* The pressures at the moments, as the stress has them: those whose resultants along the directions are its own, with
+ * what of them is not along the normal, which is small. What holds motions is less what settles them: of that what is
+ * not along the normal is left, so that all else is as it was before. */
+static void pressures_of(double out[MOMENTS], const examination *x, int64_t i)
 {
-    const double *acts = x->resultant + (i * x->moments + a) * 2, *n = x->body->edge[i].along[a];
-    const int held = uz_bound_pressed(x->body, i, a);
-    const double p = -(acts[0] * n[0] + acts[1] * n[1]);
-    return held >= 0 ? p - x->settled[held] : uz_admit_pressure(x, i * x->moments + a, p);
+    enum { PASSES = 3 };
+    double turned[MOMENTS][2] = {{0}};
+    for (int pass = 0; pass < PASSES; pass++) {
+        for (int a = 0; a < x->moments; a++) {
+            const double *acts = x->resultant + (i * x->moments + a) * 2, *n = x->body->edge[i].along[a];
+            const double p = -((acts[0] - turned[a][0]) * n[0] + (acts[1] - turned[a][1]) * n[1]);
+            out[a] = uz_bound_pressed(x->body, i, a) >= 0 ? p : uz_admit_pressure(x, i * x->moments + a, p);
+        }
+        if (pass + 1 < PASSES)
+            project_turned(turned, x->body, out, i);
+    }
+    for (int a = 0; a < x->moments; a++) {
+        const int held = uz_bound_pressed(x->body, i, a);
+        out[a] -= held >= 0 ? x->settled[held] : 0;
+    }
 }
 
 /* What presses on an edge: its work on the gap, and what of it is not along the normal. */
@@ -246,8 +259,8 @@ static void examine_pressure(double turned[MOMENTS][2], examination *x, const do
     const points begin = begin_points(edge);
     for (int c = 0; c < 2; c++)
         uz_along_edge(along[c], u, edge->node, (const double[2]){c == 0, c == 1});
+    pressures_of(x->pressure + i * moments, x, i);
     for (int a = 0; a < moments; a++) {
-        x->pressure[i * moments + a] = pressure_of(x, i, a);
         r[a] = x->pressure[i * moments + a] * moments / (length * thickness);
         if (uz_bound_pressed(x->body, i, a) >= 0)
             uz_look_at_holding(x, r[a]);
@@ -294,8 +307,7 @@ void uz_bound_acts(double acts[MOMENTS][2], const uz_bound_body *body, int64_t i
 void uz_missing_before(double missing[MOMENTS][2], const examination *x, int64_t i)
 {
     double pressure[MOMENTS] = {0};
-    for (int a = 0; a < x->moments; a++)
-        pressure[a] = pressure_of(x, i, a);
+    pressures_of(pressure, x, i);
     uz_bound_acts(missing, x->body, i, pressure);
     for (int a = 0; a < 2 * x->moments; a++)
         missing[a / 2][a % 2] = -missing[a / 2][a % 2] - x->resultant[2 * i * x->moments + a];

@@ -322,24 +322,29 @@ static void add_entry(row_list *N, int64_t at, double value)
     N->val[N->count++] = value;
 }
 
-/* Of an edge before an obstacle. */
+/* Of an edge before an obstacle: what the pressure with the a-th polynomial does along the normals, at all moments where
+ * they turn. Of u . n_a alone the gap would be off by what the edge has of u across n_a, which alternates from moment to
+ * moment: a strain that does not get smaller with the edge. */
 static void add_edge_rows(row_list *N, const uz_bound_body *body, const int64_t *dof, int64_t i)
 {
     const int moments = body->degree + 1;
     for (int a = 0; a < moments; a++) {
-        double axis[2][2], normal[2], gap = mean_gap(normal, body, i, a);
-        const int64_t before = N->count;
-        uz_bound_axes(axis, body, i, a);
-        for (int k = 0; k < 2; k++) {
-            const double share = normal[0] * axis[k][0] + normal[1] * axis[k][1];
-            const int64_t at = dof[(i * moments + a) * 2 + k];
+        double normal[2], acts[UZ_BOUND_MOMENTS][2], one[UZ_BOUND_MOMENTS] = {0}, gap = mean_gap(normal, body, i, a);
+        if (!uz_bound_has_row(body, dof, i, a))
+            continue;
+        one[a] = 1;
+        uz_bound_acts(acts, body, i, one);
+        for (int k = 0; k < 2 * moments; k++) {
+            double axis[2][2];
+            uz_bound_axes(axis, body, i, k / 2);
+            const double share = acts[k / 2][0] * axis[k % 2][0] + acts[k / 2][1] * axis[k % 2][1];
+            const int64_t at = dof[i * 2 * moments + k];
             if (at < 0)
-                gap -= share * given(body, i, a, k);
+                gap -= share * given(body, i, k / 2, k % 2);
             else if (fabs(share) > 1e-9) /* uz_bound_has_row */
                 add_entry(N, at, share);
         }
-        if (N->count > before)
-            N->h[N->m++] = gap;
+        N->h[N->m++] = gap;
     }
 }
 
@@ -367,7 +372,7 @@ static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const
     int64_t edges = 0;
     for (int64_t i = 0; i < body->n_edges; i++)
         edges += body->edge[i].presses || body->edge[i].facing == UZ_BOUND_SLAVE;
-    const int64_t room = moments * (2 * edges + moments * body->n_segments);
+    const int64_t room = moments * moments * (2 * edges + body->n_segments);
     row_list N = {.row = uz_alloc(room, sizeof(int64_t)), .col = uz_alloc(room, sizeof(int64_t))};
     N.val = uz_alloc(room, sizeof *N.val);
     N.h = qp->h = uz_alloc(moments * edges, sizeof *qp->h);

@@ -283,6 +283,36 @@ static uz_guarantee pressed_block(const char *element, int64_t cells, const uz_c
     return g;
 }
 
+/* A block all of whose bottom is in a hole that turns by a fifth of a right angle along it: along the tangents the rows
+ * of the stress have what they should have, else sides have a strain there that does not get smaller with them. */
+TEST(sides_that_turn_add_no_strain_of_their_own)
+{
+    static const double BY_THE_DIRECTIONS_ALONE[2][2] = {{0.0174, 0.0621}, {0.0294, 0.0902}};
+    static const double LESS[2][2] = {{0.8, 0.98}, {0.7, 0.8}};
+    for (int k = 0; k < 4; k++) {
+        const bool ring = k >= 2;
+        uz_scene scene = box_scene(1, 1, 8, 8);
+        snprintf(scene.box.element, sizeof scene.box.element, "%s", k % 2 == 0 ? "quad8" : "quad4");
+        scene.kinematics = UZ_KINEMATICS_FIXED;
+        scene.model = ring ? UZ_AXISYMMETRIC : UZ_PLANE_STRESS;
+        scene.box.origin[0] = ring ? 1 : 0;
+        scene.materials[0].young = 1000;
+        add_support(&scene, "top", NAN, -0.2);
+        for (int side = 0; side < 2 && !ring; side++)
+            add_support(&scene, side == 0 ? "left" : "right", 0, NAN);
+        scene.contacts[0] = (uz_contact){.kind = UZ_OBSTACLE_ROUND,
+                                         .on = "bottom",
+                                         .point = {scene.box.origin[0], 5},
+                                         .radius = 5,
+                                         .inside = true};
+        scene.n_contacts = 1;
+        const uz_guarantee g = bound_of(&scene);
+        CHECK_MSG(g.proved && g.dual < g.primal, "%s: %g %g", g.why, g.dual, g.primal);
+        CHECK_MSG(g.relative < LESS[k / 2][k % 2] * BY_THE_DIRECTIONS_ALONE[k / 2][k % 2], "%d: %g", k, g.relative);
+        uz_scene_clear(&scene);
+    }
+}
+
 /* One segment, or flat values, however many points it has. */
 TEST(a_line_of_one_direction_is_a_plane)
 {
