@@ -159,6 +159,8 @@ uz_status uz_bound_dual_load(uz_qp *qp, int64_t **dof, const uz_bound_body *body
 
 /* Has the edge's a-th moment a row there? They come by edges and moments. */
 bool uz_bound_has_row(const uz_bound_body *body, const int64_t *dof, int64_t edge, int a);
+/* What that row has of a displacement that is 1 along the normal all along the edge: 1 but where that turns. */
+double uz_bound_mean_along(const uz_bound_body *body, int64_t edge, int a);
 
 /* The stress that belongs to the unknowns v, of rings times the radius: xx, yy, xy at the corners, of degree 2 also in
  * the middles of the edges 01, 12, 20, of each part of an element: n_elements x UZ_BOUND_PARTS x UZ_BOUND_POINTS x 3.

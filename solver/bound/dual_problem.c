@@ -35,6 +35,7 @@ static const double STATIONS[2][UZ_BOUND_MOMENTS] = {{0, 1}, {0, 0.5, 1}}; /* al
 typedef uz_macro macro;
 
 static double mean_gap(double normal[2], const uz_bound_body *body, int64_t i, int a);
+static double mean_before(double normal[2], const uz_bound_body *body, int64_t i, int a, bool gaps);
 static macro *make(macro *kept, const uz_bound_body *body, int64_t element);
 static inline double dot(int n, const double *x, const double *y);
 static inline void add(int n, double alpha, const double *x, double *y);
@@ -276,14 +277,25 @@ static uz_status assemble(uz_csc *K, double *p, const int64_t *first, const uz_b
 }
 
 /* The mean of the gap with the a-th weight, along the direction of the a-th moments: that of a line is its value at
- * (a + 1) / (degree + 2) of its length; where the normal turns by Simpson's rule, as nothing is proved here. */
+ * (a + 1) / (degree + 2) of its length. */
 static double mean_gap(double normal[2], const uz_bound_body *body, int64_t i, int a)
+{
+    return body->edge[i].turns ? mean_before(normal, body, i, a, true)
+                               : uz_bound_gap(normal, body, i, (a + 1.) / (body->degree + 2));
+}
+
+double uz_bound_mean_along(const uz_bound_body *body, int64_t edge, int a)
+{
+    double normal[2];
+    return body->edge[edge].turns ? mean_before(normal, body, edge, a, false) : 1;
+}
+
+/* Where the normal turns: the same, or of 1 in place of the gap, by Simpson's rule, as nothing is proved here. */
+static double mean_before(double normal[2], const uz_bound_body *body, int64_t i, int a, bool gaps)
 {
     const uz_bound_edge *edge = &body->edge[i];
     const int moments = body->degree + 1, steps = edge->pieces > 4 ? 4 : 16;
     double n[2], sum = 0, from = 0;
-    if (!edge->turns)
-        return uz_bound_gap(normal, body, i, (a + 1.) / (moments + 1));
     uz_bound_normal(normal, body, i, a);
     for (int64_t piece = edge->before; piece < edge->before + edge->pieces; piece++) {
         const double end = body->before.at[piece].end;
@@ -291,7 +303,7 @@ static double mean_gap(double normal[2], const uz_bound_body *body, int64_t i, i
             const double t = from + (end - from) * k / steps, gap = uz_bound_piece_gap(n, body, i, piece, t);
             const double weight = (end - from) * (k % steps == 0 ? 1. : k % 2 ? 4. : 2.) / (3 * steps);
             const double phi = (a == 1 && moments == 3 ? 2 : 1) * pow(1 - t, moments - 1 - a) * pow(t, a);
-            sum += moments * weight * phi * (normal[0] * n[0] + normal[1] * n[1]) * gap;
+            sum += moments * weight * phi * (normal[0] * n[0] + normal[1] * n[1]) * (gaps ? gap : 1);
         }
         from = end;
     }

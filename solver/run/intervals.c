@@ -533,7 +533,9 @@ static uz_status make_dual_rows(proving *v, uz_error *err)
     for (int64_t i = 0; i < body->n_edges && status == UZ_OK; i++)
         for (int a = 0; a < moments; a++)
             if (uz_bound_has_row(body, dof, i, a)) {
-                v->dual.target[row] = body->edge[i].turns ? v->wanted[body->edge[i].contact] : qp.h[row];
+                v->dual.target[row] = body->edge[i].turns
+                                          ? v->wanted[body->edge[i].contact] * uz_bound_mean_along(body, i, a)
+                                          : qp.h[row];
                 v->dual.width[row++] = fmax(0, v->g->shown->pressure[i * moments + a]);
             }
     for (int64_t k = 0; k < body->n_segments && status == UZ_OK; k++) {
