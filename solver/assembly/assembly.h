@@ -219,9 +219,10 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
                               const double *nodal);
 
 /* *energy: the same estimate of ||u - u_h||_E^2, not relative to anything, less what quadratic triangles and tetrahedra
- * are taken to hide. free_strain: as of uz_free_strains, or NULL. It is the square of a seminorm of (nodal,
- * free_strain), so that two fields have an inner product by polarization. UZ_ERR_MEMORY. */
-uz_status uz_mesh_error_energy(double *energy, const uz_body_model *model, const double *free_strain,
+ * are taken to hide. eta2 (n_elements, NULL: not wanted): what each element has of it. free_strain: as of
+ * uz_free_strains, or NULL. It is the square of a seminorm of (nodal, free_strain), of each element, too, so that two
+ * fields have an inner product by polarization. UZ_ERR_MEMORY. */
+uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model *model, const double *free_strain,
                                const double *nodal, uz_error *err);
 
 /* *out: n_elements, expansion times rise of temperature by the scene's loads; NULL where there are no such loads. The

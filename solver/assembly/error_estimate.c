@@ -94,10 +94,10 @@ static uz_status integrate(uz_stress_sums *sums, const uz_strain_source *from, b
     return status;
 }
 
-uz_status uz_mesh_error_energy(double *energy, const uz_body_model *model, const double *free_strain,
+uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model *model, const double *free_strain,
                                const double *nodal, uz_error *err)
 {
-    uz_stress_sums sums = {0};
+    uz_stress_sums sums = {.eta2_of = eta2};
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
     const uz_status status = integrate(&sums, &from, false, err);
     *energy = sums.eta2;

@@ -4,7 +4,8 @@
  *     adjoint z_h: one solve on the factor that is there, the rows in contact held as equations
  *     a(e_u, e_z) = 1/4 (|e_u + e_z|^2 - |e_u - e_z|^2), each square by the recovered stresses
  *     depth: what obstacles that stand in sides between their nodes come to, by the adjoint's reactions
- *     value = found + a(e_u, e_z) + depth, within parts of both, of |e_u| |e_z|, and of what the ends of contacts leave
+ *     value = found + a(e_u, e_z) + depth, within parts of both, of |e_u| |e_z| summed over elements, and of what the
+ *             ends of contacts leave
  *
  * The parts cover the errors of generated scenes (tests/extremes/generated_quantities.py; docs/accuracy.md has the
  * figures). To these comes what the certificate leaves of the equations: |z|_K times its bound, and the
@@ -27,6 +28,8 @@
 #define OF_ESTIMATE 0.5
 #define OF_DEPTH    0.5
 #define OF_END      0.2
+/* ... and of the product of the norms of both errors at least, where elements say less. */
+#define OF_PRODUCT 0.5
 /* ... of forces of contacts, whose rows in contact the adjoint takes for known: what a finer mesh changes of them is of
  * second order, and on coarse meshes a part of all the rest; where temperature presses the body into its obstacles it
  * is more than that; of all other quantities. */
@@ -52,6 +55,7 @@ typedef struct {
     double *z, *w;           /* n_nodes x dim; w: room of d as well */
     double *free_strain;
     double own_error, of_product; /* |e_u|^2 */
+    double *of_elements;          /* 3 n_elements: |e_u|^2 of each; of u plus and less z */
 } adjoint;
 
 static uz_status begin(adjoint *x, uz_error *err)
@@ -71,8 +75,9 @@ static uz_status begin(adjoint *x, uz_error *err)
     x->pressing = uz_alloc_zero(model->m, sizeof *x->pressing);
     x->z = uz_alloc(n, sizeof *x->z);
     x->w = uz_alloc(n, sizeof *x->w);
+    x->of_elements = uz_alloc_zero(3 * model->mesh.n_elements, sizeof *x->of_elements);
     if (!x->p || !x->h || !x->y || !x->g || !x->of_rows || !x->depth || !x->bulge || !x->slip || !x->row_of ||
-        !x->active || !x->pressing || !x->z || !x->w)
+        !x->active || !x->pressing || !x->z || !x->w || !x->of_elements)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes",
                        (long long)model->mesh.n_nodes);
     /* Of the product of both norms, by the kinds of elements. Beside corners where stress is singular an estimate is as
@@ -94,7 +99,7 @@ static uz_status begin(adjoint *x, uz_error *err)
     if (status == UZ_OK)
         status = uz_contact_depth(x->depth, x->bulge, model, x->work->scene, x->answer, err);
     if (status == UZ_OK)
-        status = uz_mesh_error_energy(&x->own_error, model, x->free_strain, x->answer->u, err);
+        status = uz_mesh_error_energy(&x->own_error, x->of_elements, model, x->free_strain, x->answer->u, err);
     return status;
 }
 
@@ -261,6 +266,23 @@ static uz_status keep_adjoint(uz_quantity_found *out, const adjoint *x, int64_t 
     return UZ_OK;
 }
 
+/* |e_u| |e_z|, summed over elements: what is far off in the one need not be where the other is. Rows of contacts may
+ * change on finer meshes, which no element's own part knows: it is no less than a part of the product of the norms, and
+ * all of that where temperature presses the body into its obstacles. scale: z's. */
+static double product_of_errors(const adjoint *x, double scale)
+{
+    const int64_t n = x->work->model->mesh.n_elements;
+    double sum = 0, square[2] = {0};
+    for (int64_t e = 0; e < n; e++) {
+        const double both = x->of_elements[n + e] + x->of_elements[2 * n + e];
+        const double own[2] = {x->of_elements[e], fmax(0, 0.5 * both - x->of_elements[e])};
+        sum += sqrt(own[0] * own[1]);
+        for (int k = 0; k < 2; k++)
+            square[k] += own[k];
+    }
+    return fmax(sum, (x->free_strain ? 1 : OF_PRODUCT) * sqrt(square[0] * square[1])) / scale;
+}
+
 static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functional *of, uz_error *err)
 {
     const uz_body_model *model = x->work->model;
@@ -287,7 +309,8 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     for (int k = 0; k < 2 && status == UZ_OK; k++) {
         for (int64_t i = 0; i < n; i++)
             x->w[i] = u[i] + (k == 0 ? scale : -scale) * x->z[i];
-        status = uz_mesh_error_energy(&both[k], model, x->free_strain, x->w, err);
+        status = uz_mesh_error_energy(&both[k], x->of_elements + (k + 1) * model->mesh.n_elements, model,
+                                      x->free_strain, x->w, err);
     }
     if (status != UZ_OK)
         return status;
@@ -299,10 +322,9 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     for (int64_t i = 0; i < n; i++)
         length = hypot(length, x->z[i]);
     const double depth = depth_shift(x, of, x->depth), bulge = depth_shift(x, of, x->bulge);
-    const double shift = (both[0] - both[1]) / (4 * scale),
-                 square = fmax(0, 0.5 * (both[0] + both[1]) - x->own_error) / (scale * scale);
+    const double shift = (both[0] - both[1]) / (4 * scale);
     const double times = !pressed ? OF_OTHER : x->free_strain ? OF_HEAT : OF_CONTACT;
-    out->mesh = OF_ESTIMATE * fabs(shift) + x->of_product * sqrt(x->own_error * square) + OF_DEPTH * fabs(depth) +
+    out->mesh = OF_ESTIMATE * fabs(shift) + x->of_product * product_of_errors(x, scale) + OF_DEPTH * fabs(depth) +
                 fabs(bulge) + OF_END * end_error(x) + of->blur;
     double whole = fabs(out->found); /* a reaction may be what large forces leave of each other */
     for (int64_t i = 0; i < model->m && out->kind == UZ_QUANTITY_REACTION; i++)
@@ -359,8 +381,8 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
         e->n_quantities = i + 1;
     }
     e->asked = work->settings->quantity_error;
-    void *room[] = {x.p,    x.h, x.y, x.g,           x.of_rows, x.depth,  x.bulge,
-                    x.slip, x.z, x.w, x.free_strain, x.active,  x.row_of, x.pressing};
+    void *room[] = {x.p, x.h, x.y,           x.g,      x.of_rows, x.depth,    x.bulge,      x.slip,
+                    x.z, x.w, x.free_strain, x.active, x.row_of,  x.pressing, x.of_elements};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return status;

@@ -154,7 +154,7 @@ def test_cells_are_chosen_for_a_quantity(s):
 
 def test_a_force_within_two_percent_of_three_bodies(s):
     """From coarse meshes, with few unknowns; what is true is in the interval. `make trade FILTER=force` compares with meshes made by hand."""
-    for name, true, unknowns in some((("press fit", 3106.44, 160), ("block under a disc", 53.699, 320), ("roller", 1738.9, 3000)), 2):
+    for name, true, unknowns in some((("press fit", 3106.44, 160), ("block under a disc", 53.699, 280), ("roller", 1738.9, 2850)), 2):
         on, make, (first, *_), *_ = forces.BODIES[name]
         problem = make(*first)
         problem["mesh"]["refine"] = "auto"
