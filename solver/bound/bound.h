@@ -74,7 +74,9 @@ typedef struct {
     double *motion;  /* n_loose x n_nodes x 2 */
     int n_pressed;   /* of uz_bound_hold: n_loose moments that the obstacle is to hold, as edge x (degree + 1) + a */
     int64_t pressed[UZ_BOUND_LOOSE];
-    char why[160]; /* what of the scene is outside of what is proved, a clause; "": nothing */
+    double
+        pressed_at[UZ_BOUND_LOOSE]; /* what the dual problem has them at along the normal; NAN: the mean of the gap */
+    char why[160];                  /* what of the scene is outside of what is proved, a clause; "": nothing */
 } uz_bound_body;
 
 /* model: of `scene`, at least its outline; borrowed. A scene that no bound is proved for is no failure: out->why says

@@ -48,8 +48,11 @@ static int64_t *order_of(const uz_bound_body *body);
 /* What the k-th of an edge's a-th moments is given, where it is held. */
 static double given(const uz_bound_body *body, int64_t edge, int a, int k)
 {
+    const int held = k == 0 ? uz_bound_pressed(body, edge, a) : -1;
     double normal[2];
-    return k == 0 && uz_bound_pressed(body, edge, a) >= 0 ? mean_gap(normal, body, edge, a) : body->edge[edge].value[k];
+    return held < 0                        ? body->edge[edge].value[k]
+           : isnan(body->pressed_at[held]) ? mean_gap(normal, body, edge, a)
+                                           : body->pressed_at[held];
 }
 
 /* Free dofs of the element's moments, -1 where held; value: what these are given. */
@@ -334,9 +337,9 @@ static void add_entry(row_list *N, int64_t at, double value)
     N->val[N->count++] = value;
 }
 
-/* Of an edge before an obstacle: what the pressure with the a-th polynomial does along the normals, at all moments where
- * they turn. Of u . n_a alone the gap would be off by what the edge has of u across n_a, which alternates from moment to
- * moment: a strain that does not get smaller with the edge. */
+/* Of an edge before an obstacle: what the pressure with the a-th polynomial does along the normals, at all moments
+ * where they turn. Of u . n_a alone the gap would be off by what the edge has of u across n_a, which alternates from
+ * moment to moment: a strain that does not get smaller with the edge. */
 static void add_edge_rows(row_list *N, const uz_bound_body *body, const int64_t *dof, int64_t i)
 {
     const int moments = body->degree + 1;

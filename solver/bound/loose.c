@@ -2,9 +2,9 @@
  *
  * The dual problem has no least value without supports, but where a pressure is surely not zero its row may as well be
  * an equation: the edge's moment is held in the obstacle, and has the pressure that it takes. As many moments hold as
- * there are motions, those where the answer presses hardest and which tell the motions apart: before round obstacles
- * along the directions of what presses there (uz_bound_normal). Nothing depends on the choice but whether these
- * pressures come out >= 0. */
+ * there are motions, those where the answer or a stress presses hardest and which tell the motions apart: before round
+ * obstacles along the directions of what presses there (uz_bound_normal). Nothing depends on the choice but whether
+ * these pressures come out >= 0. */
 #include "bound/bound.h"
 
 #include "core/alloc.h"
@@ -127,6 +127,7 @@ void uz_bound_hold(uz_bound_body *body, const double *pressure)
                  count);
         for (int k = 0; k < body->n_loose; k++)
             chosen[count][k] /= told;
+        body->pressed_at[count] = NAN;
         body->n_pressed = count + 1;
     }
 }

@@ -17,10 +17,13 @@
 #define NARROW 1.5
 /* An obstacle that is off a line by less, of the largest displacement, is one. */
 #define SEEN 1e-2
-/* So often what holds a body that only obstacles hold is chosen anew; and what its answer presses by beside a stress.
+/* So often what holds a body that only obstacles hold is chosen anew; what its answer presses by beside a stress that
+ * was held itself; and, in parts of the stiffness of its unknowns, the springs that find out where it presses: from
+ * 1e-8 to 1e-11 they make no difference.
  */
 enum { MOST_CHOICES = 10 };
 #define BY_ANSWER 0.01
+#define SOFT      1e-9
 
 uz_settings uz_guarantee_settings(const uz_guaranteed *g, double now)
 {
@@ -93,21 +96,81 @@ static uz_status hold(uz_guaranteed *g, const double *pressure, uz_error *err)
     return UZ_OK;
 }
 
-/* Anew, where what was chosen would have to pull: the moment that would most is not chosen again, and others by what
- * presses in the stress, resultants, or does so in the answer, which counts less. */
-static void hold_elsewhere(uz_guaranteed *g, double *resultant)
+/* By what presses at moments, resultants; or, of a stress that did not tell all by itself, in the answer, which counts
+ * less. */
+static void hold_pressed(uz_guaranteed *g, double *resultant)
 {
     uz_bound_body *body = &g->body;
     const int moments = body->degree + 1;
+    for (int64_t i = 0; i < body->n_edges * moments; i++) {
+        const double own = g->at ? 0 : BY_ANSWER * g->pressing[i];
+        const double p = fmax(resultant[i] / uz_bound_measure(body, i / moments), own);
+        resultant[i] = isnan(g->pressing[i]) ? 0 : p;
+    }
+    uz_bound_hold(body, resultant);
+    for (int k = 0; k < body->n_pressed && g->at; k++)
+        body->pressed_at[k] = g->at[body->pressed[k]];
+}
+
+/* Anew, where what was chosen would have to pull: the moment that would most is not chosen again, and others by what
+ * presses in the stress. */
+static void hold_elsewhere(uz_guaranteed *g, double *resultant)
+{
+    const uz_bound_body *body = &g->body;
     int64_t worst = body->pressed[0];
     for (int k = 1; k < body->n_pressed; k++)
         worst = resultant[body->pressed[k]] < resultant[worst] ? body->pressed[k] : worst;
     g->pressing[worst] = NAN;
-    for (int64_t i = 0; i < body->n_edges * moments; i++) {
-        const double p = fmax(resultant[i] / uz_bound_measure(body, i / moments), BY_ANSWER * g->pressing[i]);
-        resultant[i] = isnan(g->pressing[i]) ? 0 : p;
+    hold_pressed(g, resultant);
+}
+
+/* Where the stress itself presses, and what its displacement is: held by nothing but soft springs at all unknowns, its
+ * rows tell. Moments that press there may as well be held where they are, and do not pull then. Where it tells nothing
+ * the choice that there is stays. */
+static uz_status hold_where_stress_presses(uz_guaranteed *g, uz_error *err)
+{
+    uz_bound_body *body = &g->body;
+    const uz_bound_body chosen = *body;
+    const int moments = body->degree + 1;
+    const int64_t n = body->n_edges * moments;
+    uz_qp qp = {.p = NULL};
+    uz_result *soft = NULL;
+    int64_t *dof = NULL, row = 0;
+    double *resultant = uz_alloc_zero(n, sizeof *resultant), *at = uz_alloc_zero(n, sizeof *at);
+    body->n_pressed = 0;
+    uz_status status = resultant && at ? uz_bound_dual_problem(&qp, &dof, body, &g->stop, err)
+                                       : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld edges",
+                                                 (long long)body->n_edges);
+    for (int64_t j = 0; j < qp.K.cols && status == UZ_OK; j++)
+        for (int64_t q = qp.K.ptr[j]; q < qp.K.ptr[j + 1]; q++)
+            qp.K.val[q] *= qp.K.idx[q] == j ? 1 + SOFT : 1;
+    if (status == UZ_OK)
+        status = solve(&soft, g, &qp, err);
+    const bool told = status == UZ_OK && isfinite(soft->summary.certificate.absolute_error);
+    for (int64_t i = 0; i < n && told; i++)
+        if (uz_bound_has_row(body, dof, i / moments, (int)(i % moments))) {
+            resultant[i] = fmax(0, -soft->r[row++]);
+            at[i] = dof[2 * i] < 0 ? 0 : soft->u[dof[2 * i]];
+        }
+    if (told) {
+        g->at = at;
+        at = NULL;
+        hold_pressed(g, resultant);
     }
-    uz_bound_hold(body, resultant);
+    if (!told || *body->why) {
+        free(g->at);
+        g->at = NULL;
+        body->n_pressed = chosen.n_pressed;
+        memcpy(body->pressed, chosen.pressed, sizeof body->pressed);
+        memcpy(body->pressed_at, chosen.pressed_at, sizeof body->pressed_at);
+        memcpy(body->why, chosen.why, sizeof body->why);
+    }
+    uz_result_free(soft);
+    uz_qp_clear(&qp);
+    free(dof);
+    free(resultant);
+    free(at);
+    return status == UZ_ERR_MEMORY || status == UZ_ERR_CANCELLED ? status : UZ_OK;
 }
 
 /* With what takes the answer out of obstacles, and without it, as the check finds something by itself, too: what proves
@@ -177,17 +240,28 @@ static uz_status make_stress(uz_guaranteed *g, bool *solved, uz_guarantee *out, 
 static uz_status make_held_stress(uz_guaranteed *g, bool *solved, uz_guarantee *out, const uz_scene *scene,
                                   const double *u, uz_error *err)
 {
-    bool pulls = g->body.n_loose > 0;
-    uz_status status = make_stress(g, solved, out, err);
+    const int moments = g->body.degree + 1;
+    bool pulls = g->body.n_loose > 0, softly = false;
+    uz_status status = UZ_OK;
+    *solved = false;
+    for (int k = 0; k < g->body.n_pressed; k++) /* of what turns not even the gap of a moment by itself is known */
+        softly = softly || g->body.edge[g->body.pressed[k] / moments].turns;
+    if (softly)
+        status = hold_where_stress_presses(g, err);
+    if (status == UZ_OK)
+        status = make_stress(g, solved, out, err);
     for (int again = 0; again < MOST_CHOICES && pulls && *solved && status == UZ_OK; again++) {
         uz_bound_check_result found;
         status = uz_bound_check(&found, &g->body, scene, g->dof, g->qp.K.cols, u, NULL, g->stress, err);
         pulls = status == UZ_OK && found.pulls;
-        if (pulls)
+        if (pulls && !softly)
+            status = hold_where_stress_presses(g, err);
+        else if (pulls)
             hold_elsewhere(g, found.pressure);
+        softly = true;
         uz_bound_check_clear(&found);
         *solved = !*g->body.why;
-        if (!pulls || !*solved)
+        if (!pulls || !*solved || status != UZ_OK)
             break;
         uz_qp_clear(&g->qp);
         free(g->dof);
@@ -208,6 +282,7 @@ static void clear(uz_guaranteed *g)
     free(g->dof);
     free(g->stress);
     free(g->pressing);
+    free(g->at);
     free(g->lift);
     free(g->cheap);
     free(g->carried[0]);

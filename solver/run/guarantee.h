@@ -16,6 +16,7 @@ typedef struct {
     int64_t *dof;
     double *stress;
     double *pressing;     /* n_edges x moments: what the answer presses by, of bodies that only obstacles hold */
+    double *at;           /* ... the displacement there, along the normal, of the stress on soft springs; NULL: none */
     double *lift, *cheap; /* n_nodes x 2: both take the answer out of obstacles, one by itself with the least norm, the
                            * other to the least energy; NULL: it is out of them, or no way out was found */
     double *carried[2];   /* the same of the answer's own mesh, on one that is refined from it */

@@ -219,11 +219,15 @@ TEST(never_below_the_truth_before_round_obstacles)
     CHECK_MSG(mean < 1.45, "%g", mean); /* 1.64 */
 }
 
-/* Held by a disc and a wall alone: pressures that turn with the disc hold two of its three motions. */
+/* Held by a disc and a wall alone: pressures that turn with the disc hold two of its three motions. What holds them is
+ * where the stress itself presses: where the answer does, one of the first body's bounds and one of the second's was
+ * not found. */
 TEST(never_below_the_truth_where_round_obstacles_hold)
 {
-    const double mean = over_differences(NULL, BOUND_PERCHED, 2, 1, 3, 2, 8);
-    CHECK_MSG(mean < 1.6, "%g", mean);
+    double most;
+    const double mean = over_differences(&most, BOUND_PERCHED, 1, 7, 2, 2, 8);
+    CHECK_MSG(most < 1.7, "%g", most); /* 2.9 */
+    CHECK_MSG(mean < 1.4, "%g", mean);
 }
 
 /* Polylines and tables, flat and not, with teeth and without. */
@@ -300,11 +304,8 @@ TEST(sides_that_turn_add_no_strain_of_their_own)
         add_support(&scene, "top", NAN, -0.2);
         for (int side = 0; side < 2 && !ring; side++)
             add_support(&scene, side == 0 ? "left" : "right", 0, NAN);
-        scene.contacts[0] = (uz_contact){.kind = UZ_OBSTACLE_ROUND,
-                                         .on = "bottom",
-                                         .point = {scene.box.origin[0], 5},
-                                         .radius = 5,
-                                         .inside = true};
+        scene.contacts[0] = (uz_contact){
+            .kind = UZ_OBSTACLE_ROUND, .on = "bottom", .point = {scene.box.origin[0], 5}, .radius = 5, .inside = true};
         scene.n_contacts = 1;
         const uz_guarantee g = bound_of(&scene);
         CHECK_MSG(g.proved && g.dual < g.primal, "%s: %g %g", g.why, g.dual, g.primal);
