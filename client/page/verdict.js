@@ -3,7 +3,7 @@
 import { h } from "./dom.js";
 import { draft } from "./examples.js";
 import { count, counted, number, number_towards, percent_up, seconds } from "./format.js";
-import { certificate_words, method_words, outcome_words, problem_words, trend_words, whole_words } from "./words.js";
+import { certificate_words, kinematics_words, method_words, outcome_words, problem_words, trend_words, whole_words } from "./words.js";
 
 function vector(values) {
   return values ? `(${values.map((value) => number(value)).join(", ")})` : null;
@@ -86,11 +86,12 @@ function contacts_of(summary) {
 
 /** The card of a summary. */
 export function verdict_card(summary) {
-  const outcome = outcome_words(summary), whole = whole_words(summary);
+  const outcome = outcome_words(summary), whole = whole_words(summary), kinematics = kinematics_words(summary);
   return h("div", { class: `verdict tone-${outcome.tone}` },
     h("h2", null, h("span", { class: outcome.tone }, outcome.title)),
     whole ? h("p", { class: "certificate", id: "whole-error" }, whole) : null,
     h("p", { class: whole ? "" : "certificate", id: "certificate" }, certificate_words(summary)),
+    kinematics ? h("p", { id: "kinematics" }, kinematics) : null,
     h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
     quantities_of(summary), contacts_of(summary), hint_of(summary), warnings_of(summary), assertions_of(summary),
     h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));

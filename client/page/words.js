@@ -58,6 +58,14 @@ export function certificate_words(summary) {
   return `The exact answer of ${has_mesh(summary) ? "its equations" : "this problem"} differs by at most ${percent_up(bound)}, in the energy norm.`;
 }
 
+/** What large deformation makes of it; null where that was not looked at. */
+export function kinematics_words(summary) {
+  const small = summary.small_deformation;
+  if (!small) return null;
+  if (!Number.isFinite(small.error)) return `Large deformation has no stable equilibrium beyond ${number(small.load)} of the load.`;
+  return `Small deformation ${summary.finite ? "would have erred" : "errs"} by ${percent_up(small.error)}.`;
+}
+
 /** Is the error of the answer more than that of its equations? Of bodies; matrices have no mesh. */
 function has_mesh(summary) {
   return summary.error?.kind === "estimated" || is_bounded(summary);

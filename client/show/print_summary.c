@@ -324,6 +324,22 @@ static void print_finite(FILE *to, const json_t *finite, double asked, const cha
             number_in_words(least, finite, "least_det", 3));
 }
 
+/* Of the kinematics auto. */
+static void print_small(FILE *to, const json_t *summary)
+{
+    const json_t *small = json_object_get(summary, "small_deformation");
+    const double error = client_json_number(small, "error");
+    if (!json_is_object(small))
+        return;
+    label(to, "kinematics");
+    if (!isfinite(error))
+        fprintf(to, "large deformation has no stable equilibrium beyond %.6g of the load\n",
+                client_json_number(small, "load"));
+    else
+        fprintf(to, "small deformation %s by %.2g %%\n",
+                json_is_object(json_object_get(summary, "finite")) ? "would have erred" : "errs", 100 * error);
+}
+
 /* The bound, whether it is what was asked for, and what it is made of. */
 static void print_certificate(FILE *to, const json_t *summary)
 {
@@ -468,6 +484,7 @@ void client_print_summary(FILE *to, const json_t *job)
                     number_in_words(primal, summary, "energy.potential", 6));
     }
     print_certificate(to, summary);
+    print_small(to, summary);
     print_effort(to, summary);
     client_checks checks = {.item = NULL};
     client_checks_assertions(&checks, summary, "");

@@ -380,6 +380,11 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     put_contact(&t, summary, scene);
     if (scene && summary->geometry.kind == UZ_KINEMATICS_FINITE)
         put_finite(&t, &summary->finite);
+    if (summary->small.compared) {
+        text_open(&t, "small_deformation", '{');
+        put_named(&t, NULL, (named[]){{"error", summary->small.error}, {"load", summary->small.load}}, 2);
+        text_close(&t, '}');
+    }
     put_certificate(&t, summary, scene);
     if (summary->evaluation)
         put_evaluation(&t, summary->evaluation, summary->dim);

@@ -183,6 +183,15 @@ typedef struct {
     bool definite;    /* the tangent is positive definite among motions that leave the pressed rows closed */
 } uz_finite;
 
+/* Scenes of kinematics AUTO whose rotations or strains were not surely small: what large deformation makes of them, by
+ * their own laws, and by St. Venant and Kirchhoff's in place of the linear one, which it is where strains are small. */
+typedef struct {
+    bool compared;
+    double error; /* of small deformation: relative, of the displacements, of the resultants or of the root of the
+                   * strain energy, whichever is most; INFINITY: large deformation has no answer under the whole load */
+    double load;  /* the part of it that it has a stable equilibrium under */
+} uz_small;
+
 /* A quantity of uz_problem: where its value for the body itself, without a mesh, is by estimate. */
 typedef struct {
     uz_quantity_kind kind;
@@ -228,6 +237,8 @@ typedef struct {
     double imbalance;
     uz_overlap *overlap; /* n_contacts */
     double approach;     /* see uz_contact_approach in post/overlap.h; a length, 0: nothing is pressed */
+    double nonlinear;    /* of small deformation that large deformation could replace: what it leaves out, by
+                          * uz_measure_nonlinear in post/balance.h; NaN: not measured */
     int n_warnings;
     uz_warning warnings[8];
     int64_t n_quantities;
@@ -306,7 +317,8 @@ typedef struct {
     uz_certificate certificate;
     uz_semicoercive semicoercive;
     uz_geometry geometry;
-    uz_finite finite;   /* geometry.kind FINITE only */
+    uz_finite finite; /* geometry.kind FINITE only */
+    uz_small small;
     bool factor_cached; /* everything about the body was */
     uz_reuse reused;
     bool contact_last; /* the dofs that N touches are eliminated after all others */

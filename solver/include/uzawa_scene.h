@@ -137,7 +137,7 @@ typedef enum {
 
 typedef struct {
     char on[64];
-    uz_elasticity law; /* kinematics FINITE: any but the linear one; else that one */
+    uz_elasticity law; /* kinematics FINITE: any but the linear one; FIXED, MOVING: that one */
     double young, poisson;
     double density;   /* mass per volume: 0 where no gravity asks for it */
     double expansion; /* strain per unit of temperature */
@@ -215,7 +215,9 @@ typedef enum { UZ_MESH_BOX, UZ_MESH_GIVEN } uz_mesh_source;
 
 /* Where gaps, normals and what faces what are taken. */
 typedef enum {
-    UZ_KINEMATICS_AUTO,   /* before anything moves, unless that changes the answer by more than is tolerable */
+    /* before anything moves, unless that changes the answer by more than is tolerable; with laws of finite strain
+     * FIXED or FINITE, by the same rule */
+    UZ_KINEMATICS_AUTO,
     UZ_KINEMATICS_FIXED,  /* before anything moves */
     UZ_KINEMATICS_MOVING, /* where the answer itself has moved the surfaces to */
     UZ_KINEMATICS_FINITE  /* there, too, and rotations and strains are as large as they are */

@@ -6,6 +6,7 @@
 #include "core/hooks.h"
 #include "obstacle/shape.h"
 #include "obstacle/vectors.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <string.h>
@@ -43,7 +44,7 @@ double uz_show_factor(const uz_scene *scene, const uz_mesh *mesh, const double *
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
         largest = fmax(largest, fabs(u[i]));
     const double ideal = 0.06 * mesh->extent / largest;
-    if (!(largest > 0 && isfinite(ideal)) || scene->kinematics == UZ_KINEMATICS_FINITE)
+    if (!(largest > 0 && isfinite(ideal)) || uz_is_finite_answer(scene))
         return 1; /* larger rotations are not small rotations times a number */
     /* A power of ten times 1, 2 or 5: a factor that reads well. */
     const double power = pow(10, floor(log10(ideal))), rest = ideal / power;

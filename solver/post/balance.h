@@ -30,12 +30,21 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
 /* Adds to the warnings of result->evaluation what makes the answer doubtful. Reads its overlap and approach, and the
  * summary's geometry.sliding and discretization_error. */
 uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* About how much of the forces of the answer u small deformation leaves out: squares of its gradient in the strains, by
+ * the energy norm; stress that turns with the body, along u; strains and rotations in the law itself, weighted by the
+ * energy (U, > 0). Relative to its energy norm; plane strain only. NaN: elements are not of the standard formulation,
+ * the only one that large deformation has. */
+double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy);
+/* Warns that small deformation is off by `error` (uz_small) under a linear law. */
+void uz_doubt_deformation(uz_evaluation *out, const uz_small *small);
 /* Takes the warning `sliding` back, which turned out to be without ground, and warns of overlap that it had explained.
  */
 void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene);
 
 /* Beyond the first, answers with their contacts as they are before anything moves have the second. */
 #define UZ_MOST_SLIDING 0.05
+/* Less than this of uz_measure_nonlinear is no large deformation. */
+#define UZ_SURELY_SMALL 0.02
 #define UZ_WARN_SLIDING "sliding"
 #define UZ_WARN_COARSE  "coarse_contact"
 #define UZ_WARN_OVERLAP "overlap"

@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "finite/finite_element.h"
+#include "scene/scene.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -50,7 +51,7 @@ static void finite_states(uz_field_state *state, const uz_field_points *points, 
 
 void uz_field_points_states(uz_field_state *state, uz_field_points *points, int64_t element)
 {
-    if (points->body->scene->kinematics == UZ_KINEMATICS_FINITE) {
+    if (uz_is_finite_answer(points->body->scene)) {
         finite_states(state, points, element);
         return;
     }

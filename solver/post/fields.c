@@ -4,6 +4,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/scene.h"
 
 #include <float.h>
 #include <math.h>
@@ -171,7 +172,7 @@ static uz_status nodal_fields(uz_fields *out, const uz_field_body *body, const d
 static uz_status pressure_of(double *pressure, const uz_field_body *body, const uz_field_source *answer, uz_error *err)
 {
     uz_body_model displaced;
-    if (body->scene->kinematics != UZ_KINEMATICS_FINITE || !answer->u)
+    if (!uz_is_finite_answer(body->scene) || !answer->u)
         return uz_contact_pressure(pressure, body->model, body->scene, answer->r, err);
     uz_status status = uz_displaced(&displaced, body->model, answer->u, err);
     if (status != UZ_OK)

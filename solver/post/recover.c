@@ -8,6 +8,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -106,7 +107,7 @@ uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at %lld nodes", (long long)n_nodes);
     if (status == UZ_OK)
         status = uz_field_fit_patches(stress, strain, done, body, u, hooks, err);
-    if (status == UZ_OK && body->scene->kinematics == UZ_KINEMATICS_FINITE) {
+    if (status == UZ_OK && uz_is_finite_answer(body->scene)) {
         average_states(stress, strain, volume, done, body, u);
     } else if (status == UZ_OK && memchr(done, 0, (size_t)n_nodes)) {
         status = uz_nodal_strains_recover(&recovered, &from, UZ_CONTINUE_WHOLE, hooks, err);

@@ -5,6 +5,7 @@
 #include "core/vector3.h"
 #include "post/parts.h"
 #include "obstacle/obstacle.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -151,6 +152,32 @@ static void look_at_elements(const doubts *d)
         warn(d->out, "large_strain", strain,
              "element %lld is strained by %.2g; small strains were assumed, and beyond %g they are not small",
              (long long)strained, strain, MOST_STRAIN);
+}
+
+/* Could uz_measure_nonlinear come to anything? Gradients are at most about four times the slope that is_steep finds,
+ * and the body's energy norm is known. */
+static bool may_be_nonlinear(const doubts *d)
+{
+    const double U = d->out->strain_energy, extent = d->model->mesh.extent;
+    double stiffest = 0;
+    for (int64_t k = 0; k < d->model->n_materials; k++)
+        stiffest = fmax(stiffest, d->model->materials[k].lame.lambda + 2 * d->model->materials[k].lame.mu);
+    const double most = sqrt(stiffest * extent * extent * d->model->thickness), least = 0.25 * UZ_SURELY_SMALL;
+    return U > 0 && is_steep(d, 0.25 * fmin(least, sqrt(2 * least * sqrt(2 * U) / most)));
+}
+
+void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)
+{
+    if (isfinite(small->error))
+        warn(out, "large_deformation", small->error,
+             "small deformation errs by %.2g %% as rotations and strains are large: take the law neo_hooke, or "
+             "st_venant_kirchhoff where strains stay small",
+             100 * small->error);
+    else
+        warn(out, "large_deformation", small->error,
+             "with rotations taken into account (st_venant_kirchhoff) nothing is stable beyond %.3g of the load: take "
+             "that law, or neo_hooke",
+             small->load);
 }
 
 /* ---- contact */
@@ -461,6 +488,9 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
         model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
     if (is_steep(&d, 0.25 * fmin(MOST_STRAIN, MOST_ROTATION)))
         look_at_elements(&d);
+    d.out->nonlinear = NAN;
+    if (scene->kinematics == UZ_KINEMATICS_AUTO && scene->model == UZ_PLANE_STRAIN && uz_has_finite_model(scene))
+        d.out->nonlinear = may_be_nonlinear(&d) ? uz_measure_nonlinear(model, result->u, d.out->strain_energy) : 0;
     look_at_mesh(&d);
     look_at_surfaces(&d);
     const uz_status status = look_at_contact(&d, err);

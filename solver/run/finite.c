@@ -35,7 +35,7 @@ bool uz_is_finite(const uz_problem *problem)
 
 /* ---- what is refused */
 
-static uz_status check_asked(const uz_problem *problem, const uz_settings *settings, uz_error *err)
+uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings *settings, uz_error *err)
 {
     if (problem->scene.box.automatic && problem->scene.source == UZ_MESH_BOX)
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
@@ -245,8 +245,8 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
     return status;
 }
 
-static uz_status solve_case(uz_result **out, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
-                            double deadline, uz_error *err)
+uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_settings *settings,
+                               const uz_hooks *hooks, double deadline, const uz_result *small, uz_error *err)
 {
     uz_finite_run run;
     uz_part why = UZ_PART_SETTLED;
@@ -259,6 +259,8 @@ static uz_status solve_case(uz_result **out, const uz_problem *one, const uz_set
         run.spent.total = uz_seconds() - start;
         status = uz_finite_report(out, &run, why, tried, err);
     }
+    if (status == UZ_OK && small)
+        (*out)->summary.small = uz_finite_compare(&run, *out, small);
     end(&run);
     return status;
 }
@@ -274,14 +276,14 @@ uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const 
     if (status == UZ_OK)
         status = uz_check_problem(problem, err);
     if (status == UZ_OK)
-        status = check_asked(problem, settings, err);
+        status = uz_check_finite_settings(problem, settings, err);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const uz_problem one = uz_problem_of_case(problem, i);
         if (uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
         if (hooks && hooks->begins)
             hooks->begins(hooks->ctx, i);
-        status = solve_case(&results[i], &one, settings, hooks, deadline, err);
+        status = uz_solve_finite_load(&results[i], &one, settings, hooks, deadline, NULL, err);
         if (status != UZ_OK && problem->n_cases > 0)
             uz_error_name_case(err, i);
     }

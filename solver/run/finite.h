@@ -2,7 +2,8 @@
  *
  *     uz_solve_finite    finite.c          load cases; the load put on in parts
  *     uz_finite_settle   finite_newton.c   the equilibrium under one part: contact problems on tangents
- *     uz_finite_report   finite_report.c   the answer as a result */
+ *     uz_finite_report   finite_report.c   the answer as a result
+ *     uz_solve_weighed   weigh.c           whether small deformation is enough (kinematics AUTO) */
 #ifndef UZ_RUN_FINITE_H
 #define UZ_RUN_FINITE_H
 
@@ -18,7 +19,23 @@ bool uz_is_finite(const uz_problem *problem);
 uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 
+/* Another one: of kinematics AUTO with laws of finite strain. Answers are those of small deformation, of fixed
+ * kinematics, where that is not off by more than is tolerable, else those of uz_solve_finite. */
+bool uz_is_weighed(const uz_problem *problem);
+uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+/* Weighs an answer of small deformation to a problem without load cases, of kinematics AUTO: it gets summary.small, and
+ * under a linear law stays with a warning; else *result becomes that of large deformation where it has to. started:
+ * uz_seconds(), from which the time limit counts. */
+uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const uz_settings *settings,
+                               const uz_hooks *hooks, double started, uz_error *err);
+
 /* ---- shared by the files above */
+
+/* One load. small: an answer that is to be compared, in the result's summary.small; NULL: none. */
+uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_settings *settings,
+                               const uz_hooks *hooks, double deadline, const uz_result *small, uz_error *err);
+uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings *settings, uz_error *err);
 
 /* A displacement, and what follows from it. Its rows are those of the body there. */
 typedef struct {
@@ -79,5 +96,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
 
 /* *out: the answer run->at under run->load. why: of the part beyond it that was tried last, `tried`. */
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err);
+/* How far the answer `small` is off from *result, that of run (uz_small). */
+uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, const uz_result *small);
 
 #endif

@@ -145,3 +145,44 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
         uz_result_free(result);
     return status;
 }
+
+/* The largest difference of forces of the same list, and the largest force of large deformation. */
+static void compare_forces(double *off, double *most, const uz_resultant *here, const uz_resultant *small, int64_t n)
+{
+    for (int64_t i = 0; i < n; i++) {
+        *off = fmax(*off, hypot(here[i].force[0] - small[i].force[0], here[i].force[1] - small[i].force[1]));
+        *most = fmax(*most, hypot(here[i].force[0], here[i].force[1]));
+    }
+}
+
+/* Displacements by their mean squares, without what carries the body as a whole. */
+static double compare_displacements(const double *here, const double *small, int64_t n)
+{
+    double mean[2] = {0}, off = 0, all = 0;
+    for (int64_t i = 0; i < n; i++)
+        mean[i % 2] += here[i] / (0.5 * (double)n);
+    for (int64_t i = 0; i < n; i++) {
+        off += (here[i] - small[i]) * (here[i] - small[i]);
+        all += (here[i] - mean[i % 2]) * (here[i] - mean[i % 2]);
+    }
+    return all > 0 ? sqrt(off / all) : off > 0 ? (double)INFINITY : 0;
+}
+
+uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, const uz_result *small)
+{
+    const uz_evaluation *here = result->evaluation, *there = small->evaluation;
+    const double energy = run->at.body.energy;
+    double off = 0, most = 0;
+    uz_small out = {.compared = true, .error = INFINITY, .load = run->found.load};
+    if (run->found.load < 1)
+        return out;
+    out.error = compare_displacements(result->u, small->u, run->n);
+    if (energy <= 10 * run->grain) /* forces and energy are rounding, too */
+        return out;
+    compare_forces(&off, &most, here->contacts, there->contacts, here->n_contacts);
+    compare_forces(&off, &most, here->supports, there->supports, here->n_supports);
+    if (most > 0)
+        out.error = fmax(out.error, off / most);
+    out.error = fmax(out.error, fabs(sqrt(there->strain_energy / energy) - 1));
+    return out;
+}

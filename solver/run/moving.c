@@ -24,6 +24,7 @@
 #include "run/setup_cache.h"
 #include "run/solve.h"
 #include "run/transfer.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -68,7 +69,7 @@ static bool is_asked(const uz_result *result, const uz_problem *problem)
     const uz_summary *s = &result->summary;
     bool changes = false;
     if (problem->kind != UZ_PROBLEM_SCENE || scene->kinematics == UZ_KINEMATICS_FIXED || s->outcome != UZ_CONVERGED ||
-        s->semicoercive.free_modes > 0)
+        s->semicoercive.free_modes > 0 || uz_has_finite_law(scene)) /* which have another way (weigh.c) */
         return false;
     for (int64_t k = 0; k < scene->n_contacts; k++)
         changes = changes || scene->contacts[k].kind != UZ_OBSTACLE_PLANE;

@@ -1,6 +1,7 @@
 /* solve.c: where a call enters. What follows stands in the order in which control goes down (solve.h):
  *
  *     finite kinematics -> parts of a load -> contact problems on tangents, each by rounds
+ *     auto, laws of finite strain -> what is given, compared with finite kinematics
  *     chosen cells -> grids -> rounds of contact rows -> blocks or one by one -> one load
  *                           -> what the answers of the rounds ask for */
 #include "run/solve.h"
@@ -9,6 +10,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "run/finite.h"
+#include "run/problem.h"
 #include "run/results.h"
 
 #include <stdlib.h>
@@ -34,21 +36,28 @@ static bool any(const uz_problem *problem)
     return true;
 }
 
-/* On the mesh that is given, and by the stiffness that it has there. What is proved of an answer is by its factor, too.
- */
-static uz_status solve_given(uz_result **results, const uz_problem *problem, const uz_settings *settings,
-                             const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+/* What is proved of an answer is by its factor, too. */
+uz_status uz_solve_given(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                         const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     const double started = uz_seconds();
     uz_cache *own = settings->guaranteed && !cache ? uz_cache_new(SIZE_MAX) : NULL, *kept = own ? own : cache;
     uz_status status = uz_solve_rounds(results, problem, settings, starts, NULL, kept, hooks, err);
     status = uz_settle_cases(results, status, problem, settings, starts, kept, hooks, started, err);
     uz_cache_free(own);
+    for (int64_t i = 0; i < (problem->n_cases > 0 ? problem->n_cases : 1) && status == UZ_OK; i++) {
+        const uz_problem one = uz_problem_of_case(problem, i);
+        status = uz_weigh_deformation(&results[i], &one, settings, hooks, started, err);
+        if (status != UZ_OK && problem->n_cases > 0)
+            uz_error_name_case(err, i);
+    }
     return status;
 }
 
-static const run_kind KINDS[] = {
-    {uz_is_finite, uz_solve_finite}, {is_mesh_chosen, uz_solve_grid_sequence}, {any, solve_given}};
+static const run_kind KINDS[] = {{uz_is_finite, uz_solve_finite},
+                                 {uz_is_weighed, uz_solve_weighed},
+                                 {is_mesh_chosen, uz_solve_grid_sequence},
+                                 {any, uz_solve_given}};
 
 static uz_status run(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                      const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)

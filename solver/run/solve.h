@@ -18,6 +18,10 @@
 uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                                  const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 
+/* The same on the mesh that is given, by the stiffness that it has there. */
+uz_status uz_solve_given(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                         const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+
 /* What is left to do when the rounds on a mesh are over: cases that were refused or not certified because only the
  * obstacle holds the body are solved for one by one; then contacts that move, the whole error and quantities are
  * judged. results, starts  as handed to uz_solve_rounds rounds           how those ended, with what they left in *err

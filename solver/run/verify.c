@@ -7,6 +7,7 @@
 #include "run/problem.h"
 #include "run/run.h"
 #include "run/settings.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -105,9 +106,12 @@ uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u,
     if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_MOVING)
         return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
                        "an answer is verified with its contacts as they are before anything moves: ask for \"fixed\"");
-    if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_FINITE)
-        return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
-                       "answers of finite kinematics are certified where they are made only: ask for \"fixed\"");
+    if (problem->kind == UZ_PROBLEM_SCENE &&
+        (problem->scene.kinematics == UZ_KINEMATICS_FINITE || uz_has_finite_law(&problem->scene)))
+        return uz_fail(
+            err, UZ_ERR_SCENE, "/kinematics",
+            "answers of finite kinematics are certified where they are made only: ask for \"fixed\", and for "
+            "linear laws");
     if (problem->n_cases > 0)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "an answer to one load is verified, not to load cases");
     uz_status status = uz_check_settings(settings, err);

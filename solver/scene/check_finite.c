@@ -3,10 +3,32 @@
 #include "scene/check.h"
 
 #include "core/error.h"
+#include "scene/scene.h"
+
+bool uz_has_finite_law(const uz_scene *scene)
+{
+    bool has = false;
+    for (int64_t i = 0; i < scene->n_materials && !has; i++)
+        has = scene->materials[i].law != UZ_ELASTIC_LINEAR;
+    return has;
+}
+
+bool uz_is_finite_answer(const uz_scene *scene)
+{
+    return scene->kinematics == UZ_KINEMATICS_FINITE ||
+           (scene->kinematics == UZ_KINEMATICS_AUTO && scene->place && uz_has_finite_law(scene));
+}
+
+/* Finite kinematics may be what it is solved with. */
+static bool may_be_finite(const uz_scene *scene)
+{
+    return scene->kinematics == UZ_KINEMATICS_FINITE ||
+           (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_law(scene));
+}
 
 static uz_status check_laws(const uz_scene *scene, uz_error *err)
 {
-    const bool finite = scene->kinematics == UZ_KINEMATICS_FINITE;
+    const bool finite = may_be_finite(scene);
     char where[UZ_CHECK_POINTER];
     for (int64_t i = 0; i < scene->n_materials; i++) {
         const uz_elasticity law = scene->materials[i].law;
@@ -21,18 +43,16 @@ static uz_status check_laws(const uz_scene *scene, uz_error *err)
                            "neo_hooke, or neo_hooke_isochoric");
         if (!finite && law != UZ_ELASTIC_LINEAR)
             return uz_fail(err, UZ_ERR_SCENE, where,
-                           "this law is one of finite strain: add \"kinematics\": \"finite\" to the scene, or use "
+                           "this law is one of finite strain: use the kinematics \"auto\" or \"finite\", or the law "
                            "linear, which it becomes where strains are small");
     }
     return UZ_OK;
 }
 
-uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err)
+/* Whatever its laws. */
+static uz_status check_body(const uz_scene *scene, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
-    const uz_status status = check_laws(scene, err);
-    if (status != UZ_OK || scene->kinematics != UZ_KINEMATICS_FINITE)
-        return status;
     if (scene->model != UZ_PLANE_STRAIN)
         return uz_fail(err, UZ_ERR_SCENE, "/model",
                        "finite kinematics are there for plane_strain only; use that, or the kinematics \"moving\"");
@@ -52,10 +72,10 @@ uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err)
     return UZ_OK;
 }
 
-uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err)
+static uz_status check_loads(const uz_scene *scene, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
-    for (int64_t i = 0; scene->kinematics == UZ_KINEMATICS_FINITE && i < scene->n_loads; i++) {
+    for (int64_t i = 0; i < scene->n_loads; i++) {
         if (scene->loads[i].kind == UZ_LOAD_PRESSURE)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "pressure"),
                            "a pressure turns with the side that it acts on, and finite kinematics have loads that do "
@@ -65,4 +85,21 @@ uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err)
                            "finite kinematics have no temperature: leave it out, or use the kinematics \"moving\"");
     }
     return UZ_OK;
+}
+
+uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err)
+{
+    const uz_status status = check_laws(scene, err);
+    return status == UZ_OK && may_be_finite(scene) ? check_body(scene, err) : status;
+}
+
+uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err)
+{
+    const uz_status status = uz_check_finite_body(scene, err); /* the body may be one of other kinematics */
+    return status == UZ_OK && may_be_finite(scene) ? check_loads(scene, err) : status;
+}
+
+bool uz_has_finite_model(const uz_scene *scene)
+{
+    return check_body(scene, NULL) == UZ_OK && check_loads(scene, NULL) == UZ_OK;
 }

@@ -13,6 +13,13 @@ uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_err
  * scene may come with a body that was built from another one. */
 uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
 
+/* Has it a law of finite strain, so that its kinematics are finite, or auto chooses between them and fixed ones? */
+bool uz_has_finite_law(const uz_scene *scene);
+/* Is an answer to it one of finite kinematics? Where auto chose them, that has a place. */
+bool uz_is_finite_answer(const uz_scene *scene);
+/* Is there a model of large deformation for it, with laws of finite strain? (check_finite.c) */
+bool uz_has_finite_model(const uz_scene *scene);
+
 /* normal / ||normal||, whatever its length. A component that is zero but for rounding becomes zero: it would make a
  * contact row out of noise. False where there is no direction (zero, NaN, Inf). */
 bool uz_unit_normal(double out[3], const double normal[3], int dim);

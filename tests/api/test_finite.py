@@ -88,9 +88,47 @@ def test_a_limit_load_is_no_answer(s):
     check(whole["outcome"] == "unstable" and whole["cases"]["unstable"] == 1 and whole["cases"]["converged"] == 1, whole["cases"])
 
 
+def test_auto_takes_the_model_that_the_deformation_needs(s):
+    """Small deformation where it is enough; fields of an answer follow the model that it has."""
+    def told(name):
+        return s.get(f"/v1/jobs/{name}/result?fields=summary,stress,displacements").json
+    def squeezed(by, law, kinematics="auto"):
+        body = block(law, kinematics=kinematics)
+        body["problem"]["supports"][1]["uy"] = -by
+        return body
+    name, large = answer(s, squeezed(0.3, "neo_hooke"))
+    summary, width = large["summary"], 1 + max(u[0] for u in large["displacements"])
+    check(summary["outcome"] == "converged" and summary["contact"]["geometry"]["kinematics"] == "finite", summary)
+    check(0.25 < summary["small_deformation"]["error"] < 0.3 and summary["small_deformation"]["load"] == 1, summary["small_deformation"])
+    check(all(abs(stress[1] + 0.45842392 / width) < 1e-7 for stress in told(name)["stress"]), large["stress"][:2])
+    check("displacements \u00d7 1<" in s.get(f"/v1/jobs/{name}/deformed.svg").body.decode(), "not at true scale")
+    name, small = answer(s, squeezed(0.03, "neo_hooke"))
+    summary, linear = small["summary"], answer(s, squeezed(0.03, "linear", "fixed"))[1]
+    check(summary["contact"]["geometry"]["kinematics"] == "fixed" and "finite" not in summary, summary)
+    check(0.01 < summary["small_deformation"]["error"] < 0.05 and not summary["warnings"], summary)
+    check(told(name)["displacements"] == linear["displacements"] and told(name)["stress"] == linear["stress"], small["stress"][:2])
+    name, warned = answer(s, squeezed(0.1, "linear"))
+    summary = warned["summary"]
+    check([w["code"] for w in summary["warnings"]] == ["large_strain", "large_deformation"], summary["warnings"])
+    check(summary["warnings"][1]["value"] == summary["small_deformation"]["error"] > 0.05 and "finite" not in summary, summary)
+    summary = answer(s, squeezed(0.001, "linear"))[1]["summary"]
+    check("small_deformation" not in summary and not summary["warnings"], summary)
+    whole = squeezed(0, "neo_hooke")
+    whole["problem"]["supports"] = [{"on": "left", "ux": 0, "uy": 0}]
+    whole["cases"] = [{"name": "little", "loads": [{"on": "top", "traction": [0, -0.01]}]}, {"name": "much", "loads": [{"on": "top", "traction": [0, -0.4]}]}]
+    job = s.post(whole)
+    check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job.json)
+    kinds = [case["summary"]["contact"]["geometry"]["kinematics"] for case in s.get(f"/v1/jobs/{job.json['id']}/result").json["cases"]]
+    check(kinds == ["fixed", "finite"], kinds)
+    refused = s.request("POST", "/v1/verify", {**squeezed(0.03, "neo_hooke"), "answer": {"displacements": small["displacements"], "reactions": small["reactions"]}})
+    check(refused.status in (400, 422) and refused.json["pointer"] == "/problem/kinematics", refused)
+
+
 def test_what_is_not_modelled_is_refused(s):
     asked = [(block("linear"), "/problem/materials/0/law", "neo_hooke_isochoric"),
-             (block(kinematics="auto"), "/problem/materials/0/law", "\"kinematics\": \"finite\""),
+             (block(kinematics="moving"), "/problem/materials/0/law", "\"auto\" or \"finite\""),
+             (block(kinematics="auto", model="plane_stress"), "/problem/model", "plane_strain"),
+             ({**block(kinematics="auto"), "quantities": [{"quantity": "contact.force"}]}, "/quantities", "compare meshes"),
              (block(model="plane_stress"), "/problem/model", "plane_strain"),
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
              (block(loads=[{"on": "right", "pressure": 1}]), "/problem/loads/0/pressure", "traction"),

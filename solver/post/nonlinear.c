@@ -1,0 +1,58 @@
+/* nonlinear.c: what small deformation leaves out of an answer, told by the answer alone.
+ *
+ * With H the gradient of u, e and s its strain and stress of small deformation, the forces of large deformation at u do
+ * the work  s : e(v)  +  C (H'H / 2) : e(v)  +  s : (H'grad v)  + ...  on v. Of what comes first after the linear part
+ * the one is bounded by the energy norm of H'H / 2, the other is taken along u itself; what the law adds is as much of
+ * the stress as H is large. */
+#include "post/balance.h"
+
+#include "assembly/parts.h"
+
+#include <math.h>
+
+typedef struct {
+    double squares, along, law; /* integrals */
+} sums;
+
+static void add_point(sums *to, double weight, const uz_lame *lame, double H[2][2])
+{
+    double Q[3], e[3]; /* xx, yy, xy */
+    for (int k = 0; k < 3; k++) {
+        const int i = k == 1, j = k > 0;
+        Q[k] = H[0][i] * H[0][j] + H[1][i] * H[1][j];
+        e[k] = 0.5 * (H[i][j] + H[j][i]);
+    }
+    const double spread = Q[0] + Q[1], trace = e[0] + e[1];
+    const double size = H[0][0] * H[0][0] + H[0][1] * H[0][1] + H[1][0] * H[1][0] + H[1][1] * H[1][1];
+    to->squares +=
+        0.25 * weight * (lame->lambda * spread * spread + 2 * lame->mu * (Q[0] * Q[0] + Q[1] * Q[1] + 2 * Q[2] * Q[2]));
+    to->along +=
+        weight * (lame->lambda * trace * spread + 2 * lame->mu * (e[0] * Q[0] + e[1] * Q[1] + 2 * e[2] * Q[2]));
+    to->law +=
+        weight * size * (lame->lambda * trace * trace + 2 * lame->mu * (e[0] * e[0] + e[1] * e[1] + 2 * e[2] * e[2]));
+}
+
+double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy)
+{
+    sums all = {0};
+    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
+        double xyz[3 * UZ_ELEMENT_NODES], grad[UZ_ELEMENT_NODES][3];
+        uz_element element;
+        int nodes;
+        const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
+        uz_body_element(&element, xyz, model, e);
+        if (element.formulation != UZ_FORMULATION_STANDARD)
+            return NAN;
+        const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
+        for (int g = 0; g < rule->count; g++) {
+            double H[2][2] = {{0}};
+            const double measure = uz_element_gradients(grad, &element, rule->point[g].at);
+            for (int a = 1; a < nodes; a++) /* from the first: a translation leaves no rounding */
+                for (int i = 0; i < 2; i++)
+                    for (int j = 0; j < 2; j++)
+                        H[i][j] += (u[2 * node[a] + i] - u[2 * node[0] + i]) * grad[a][j];
+            add_point(&all, rule->point[g].weight * measure * element.thickness, &element.lame, H);
+        }
+    }
+    return (sqrt(all.squares) + sqrt(all.law)) / sqrt(2 * energy) + fabs(all.along) / (2 * energy);
+}

@@ -1,0 +1,132 @@
+/* weigh.c: is small deformation enough (kinematics AUTO)?
+ *
+ * An answer of small deformation tells about how much it leaves out (post/nonlinear.c). Where that is surely little the
+ * answer stays as it is, and nothing else is computed. Else the same scene is solved for large deformation, and both
+ * are compared: Newton's first correction alone would say little of slender bodies, whose rotations make strains that
+ * are not there. Laws of finite strain then decide which of the two is the answer. Under the linear law, which says
+ * nothing of finite strain, it stays and has a warning; rotations are taken into account by St. Venant and Kirchhoff's
+ * law, which is the linear one in the strain of Green and Lagrange. */
+#include "run/finite.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "post/balance.h"
+#include "run/problem.h"
+#include "run/settings.h"
+#include "run/solve.h"
+#include "scene/scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Small deformation is off by less than the first; gaps and normals that are off by more than the second are a reason
+ * to compare, too. */
+#define TOLERABLE UZ_MOST_SLIDING
+#define SLIDES    0.02
+/* Under the linear law: dofs up to which the comparison takes seconds at most, and the error of its equations. */
+enum { MOST_DOFS = 20000 };
+#define COMPARED_TO 1e-4
+
+/* ---- which answers are looked at */
+
+static bool is_asked(const uz_result *result, const uz_problem *one, bool own_laws)
+{
+    const uz_summary *s = &result->summary;
+    const uz_evaluation *e = result->evaluation;
+    if (one->kind != UZ_PROBLEM_SCENE || one->scene.kinematics != UZ_KINEMATICS_AUTO || s->outcome != UZ_CONVERGED ||
+        !e)
+        return false;
+    if (own_laws)
+        return e->nonlinear > UZ_SURELY_SMALL || s->geometry.sliding > SLIDES;
+    return e->nonlinear > UZ_SURELY_SMALL && s->semicoercive.free_modes == 0 && result->d <= MOST_DOFS;
+}
+
+/* ---- the comparison */
+
+/* Of the linear law: by what it is in the strain of Green and Lagrange. */
+static uz_status compare_linear(uz_result *result, const uz_problem *one, const uz_hooks *hooks, double deadline,
+                                uz_error *err)
+{
+    uz_problem by_law = *one;
+    uz_settings coarse = uz_settings_default();
+    uz_result *large = NULL;
+    uz_error own = {0};
+    by_law.scene.kinematics = UZ_KINEMATICS_FINITE;
+    by_law.scene.materials = uz_alloc(one->scene.n_materials, sizeof *by_law.scene.materials);
+    if (!by_law.scene.materials)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld materials", (long long)one->scene.n_materials);
+    for (int64_t i = 0; i < one->scene.n_materials; i++) {
+        by_law.scene.materials[i] = one->scene.materials[i];
+        by_law.scene.materials[i].law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF;
+    }
+    coarse.relative_error = COMPARED_TO;
+    const uz_status status = uz_solve_finite_load(&large, &by_law, &coarse, hooks, deadline, result, &own);
+    free(by_law.scene.materials);
+    if (status == UZ_ERR_MEMORY || status == UZ_ERR_INTERNAL) {
+        if (err)
+            *err = own;
+        return status;
+    }
+    if (status != UZ_OK) /* there is no large deformation of it, as where a support holds a node in an obstacle */
+        return UZ_OK;
+    const uz_outcome outcome = large->summary.outcome;
+    const bool ended = outcome == UZ_UNSTABLE || outcome == UZ_INVERTED || large->summary.small.load == 1;
+    uz_timings_add(&result->summary.timings, &large->summary.timings);
+    if (ended)
+        result->summary.small = large->summary.small;
+    if (ended && !(large->summary.small.error <= TOLERABLE))
+        uz_doubt_deformation(result->evaluation, &large->summary.small);
+    uz_result_free(large);
+    return UZ_OK;
+}
+
+static uz_status choose(uz_result **result, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
+                        double deadline, uz_error *err)
+{
+    uz_problem finite = *one;
+    uz_result *large = NULL, *left;
+    finite.scene.kinematics = UZ_KINEMATICS_FINITE;
+    const uz_status status = uz_solve_finite_load(&large, &finite, settings, hooks, deadline, *result, err);
+    if (status != UZ_OK)
+        return status;
+    const bool enough = large->summary.small.error <= TOLERABLE;
+    left = enough ? *result : large;
+    left->summary.small = large->summary.small;
+    uz_timings_add(&left->summary.timings, enough ? &large->summary.timings : &(*result)->summary.timings);
+    uz_result_free(enough ? large : *result);
+    *result = left;
+    return UZ_OK;
+}
+
+uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const uz_settings *settings,
+                               const uz_hooks *hooks, double started, uz_error *err)
+{
+    const bool own_laws = one->kind == UZ_PROBLEM_SCENE && uz_has_finite_law(&one->scene);
+    const double deadline = started + settings->time_limit_s;
+    if (!is_asked(*result, one, own_laws))
+        return UZ_OK;
+    if (own_laws)
+        return choose(result, one, settings, hooks, deadline, err);
+    return compare_linear(*result, one, hooks, deadline, err);
+}
+
+/* ---- the kind of run */
+
+bool uz_is_weighed(const uz_problem *problem)
+{
+    return problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_AUTO &&
+           uz_has_finite_law(&problem->scene);
+}
+
+uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    uz_status status = uz_check_settings(settings, err);
+    if (status == UZ_OK)
+        status = uz_check_problem(problem, err);
+    if (status == UZ_OK)
+        status = uz_check_finite_settings(problem, settings, err);
+    return status == UZ_OK ? uz_solve_given(results, problem, settings, starts, cache, hooks, err) : status;
+}

@@ -1,0 +1,242 @@
+/* Kinematics auto: small deformation where it is enough, large deformation or a warning where it is not. */
+#include "body_fixture.h"
+#include "qp_fixture.h"
+
+#define TOLERABLE 0.05
+
+static uz_result *solve_as(const uz_scene *s, uz_kinematics kinematics, uz_elasticity law)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *s};
+    const uz_settings settings = uz_settings_default();
+    uz_material material = s->materials[0];
+    uz_result *result = NULL;
+    uz_error err = {0};
+    material.law = law;
+    problem.scene.materials = &material;
+    problem.scene.kinematics = kinematics;
+    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where, err.message);
+    if (!result)
+        exit(1);
+    return result;
+}
+
+static uz_scene block(const char *element, double length, double height, int64_t nx, int64_t ny)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRAIN, element, (double[3]){length, height, 0}, (int64_t[3]){nx, ny, 0});
+    s.materials[0].young = 1;
+    return s;
+}
+
+static uz_scene squeezed(double by)
+{
+    uz_scene s = block("quad8", 1, 1, 2, 2);
+    body_plane(&s, "bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "top", NAN, -by, NAN);
+    return s;
+}
+
+static uz_scene cantilever(double force)
+{
+    uz_scene s = block("quad8", 10, 0.2, 16, 1);
+    s.materials[0].young = 1.2e6;
+    s.materials[0].poisson = 0;
+    body_hold(&s, "left", 0, 0, NAN);
+    body_load(&s, UZ_LOAD_FORCE, "right", 0, force, 0);
+    return s;
+}
+
+static void bend(double x[3])
+{
+    const double r = x[0], angle = x[1];
+    x[0] = r * cos(angle);
+    x[1] = r * sin(angle);
+}
+
+static uz_scene ring(double up)
+{
+    uz_scene s = block("quad8", 1, acos(0), 2, 16);
+    s.box.origin[0] = 9.5;
+    body_give_mesh(&s, bend);
+    body_hold(&s, "bottom", NAN, up, NAN);
+    body_hold(&s, "top", 0, NAN, NAN);
+    body_plane(&s, "right", (double[3]){0, 10.5, 0}, (double[3]){0, -1, 0});
+    return s;
+}
+
+static uz_scene over_roller(double by)
+{
+    uz_scene s = block("quad8", 4, 1, 16, 4);
+    body_hold(&s, "top", 0, -by, NAN);
+    uz_contact *roller = body_plane(&s, "bottom", (double[3]){1, -2, 0}, (double[3]){0, 1, 0});
+    roller->kind = UZ_OBSTACLE_ROUND;
+    roller->radius = 2;
+    return s;
+}
+
+typedef uz_scene maker(double size);
+static maker *const MAKERS[] = {squeezed, cantilever, ring, over_roller};
+enum { KINDS = 4, SIZES = 5 };
+static const double SIZE[KINDS][SIZES] = {
+    {0.001, 0.02, 0.05, 0.1, 0.3}, {1e-3, 0.3, 1, 3, 10}, {1e-3, 0.2, 0.525, 1.05, 5}, {1e-3, 0.02, 0.05, 0.2, 0.3}};
+
+static bool is_same(const uz_result *a, const uz_result *b)
+{
+    const size_t bytes = (size_t)(2 * a->n_nodes) * sizeof *a->u;
+    return a->n_nodes == b->n_nodes && a->m == b->m && memcmp(a->u, b->u, bytes) == 0 &&
+           (a->m == 0 || memcmp(a->r, b->r, (size_t)a->m * sizeof *a->r) == 0);
+}
+
+/* The largest of displacements' mean squares and of forces, by both answers. */
+static double error_of(const uz_result *small, const uz_result *large)
+{
+    double off = 0, all = 0, force = 0, most = 0, mean[2] = {0};
+    for (int64_t i = 0; i < 2 * small->n_nodes; i++)
+        mean[i % 2] += large->u[i] / (double)small->n_nodes;
+    for (int64_t i = 0; i < 2 * small->n_nodes; i++) {
+        off += pow(small->u[i] - large->u[i], 2);
+        all += pow(large->u[i] - mean[i % 2], 2);
+    }
+    const uz_evaluation *a = small->evaluation, *b = large->evaluation;
+    for (int c = 0; c < 2; c++)
+        for (int64_t k = 0; k < a->n_supports; k++) {
+            force = fmax(force, fabs(a->supports[k].force[c] - b->supports[k].force[c]));
+            most = fmax(most, fabs(b->supports[k].force[c]));
+        }
+    return fmax(sqrt(off / all), 0.7 * force / most); /* of one component: at least as much of the whole */
+}
+
+/* Laws of finite strain: the answer is one of the two to the last bit, small deformation wherever that is within 5 %.
+ */
+TEST(the_model_is_as_large_as_the_deformation)
+{
+    int small = 0, surely = 0;
+    for (int k = 0; k < KINDS; k++)
+        for (int i = 0; i < SIZES; i++) {
+            uz_scene s = MAKERS[k](SIZE[k][i]);
+            uz_result *chosen = solve_as(&s, UZ_KINEMATICS_AUTO, UZ_ELASTIC_NEO_HOOKE);
+            uz_result *fixed = solve_as(&s, UZ_KINEMATICS_FIXED, UZ_ELASTIC_LINEAR);
+            uz_result *finite = solve_as(&s, UZ_KINEMATICS_FINITE, UZ_ELASTIC_NEO_HOOKE);
+            const uz_summary *sum = &chosen->summary;
+            const bool is_small = sum->geometry.kind == UZ_KINEMATICS_FIXED;
+            const double error = error_of(fixed, finite);
+            CHECK_MSG(sum->outcome == UZ_CONVERGED && is_same(chosen, is_small ? fixed : finite), "%d %g", k,
+                      SIZE[k][i]);
+            CHECK_MSG(is_small ? error < TOLERABLE : sum->small.error > TOLERABLE, "%d %g: %g", k, SIZE[k][i], error);
+            CHECK(is_small || (sum->small.compared && chosen->place != NULL));
+            CHECK_MSG(!sum->small.compared || (sum->small.error >= error && sum->small.load == 1), "%d %g: %g, not %g",
+                      k, SIZE[k][i], error, sum->small.error);
+            small += is_small;
+            surely += !sum->small.compared;
+            uz_result_free(chosen);
+            uz_result_free(fixed);
+            uz_result_free(finite);
+            uz_scene_clear(&s);
+        }
+    CHECK(surely >= KINDS - 1 && small > surely && small < KINDS * SIZES);
+}
+
+static const uz_warning *warning(const uz_result *r, const char *code)
+{
+    for (int i = 0; i < r->evaluation->n_warnings; i++)
+        if (strcmp(r->evaluation->warnings[i].code, code) == 0)
+            return &r->evaluation->warnings[i];
+    return NULL;
+}
+
+/* The linear law says nothing of finite strain: its answer stays, with what it errs by. A ring that is squeezed by a
+ * twentieth turns by less than what is called a large rotation. */
+TEST(a_linear_law_is_not_replaced)
+{
+    for (int k = 0; k < KINDS; k++)
+        for (int i = 0; i < SIZES; i += 2) {
+            uz_scene s = MAKERS[k](SIZE[k][i]);
+            uz_result *chosen = solve_as(&s, UZ_KINEMATICS_AUTO, UZ_ELASTIC_LINEAR);
+            uz_result *fixed = solve_as(&s, UZ_KINEMATICS_FIXED, UZ_ELASTIC_LINEAR);
+            uz_result *finite = solve_as(&s, UZ_KINEMATICS_FINITE, UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
+            const uz_summary *sum = &chosen->summary;
+            const uz_warning *told = warning(chosen, "large_deformation");
+            const double error = error_of(fixed, finite);
+            CHECK_MSG(chosen->summary.geometry.kind == UZ_KINEMATICS_MOVING || is_same(chosen, fixed), "%d", k);
+            CHECK(!sum->small.compared || finite->summary.outcome != UZ_CONVERGED || sum->small.error > 0.7 * error);
+            CHECK((told != NULL) == (sum->small.compared && !(sum->small.error <= TOLERABLE)));
+            CHECK(!told || (told->value == sum->small.error && strstr(told->message, "neo_hooke") &&
+                            strstr(told->message, "st_venant_kirchhoff") && strlen(told->message) < 159));
+            CHECK(finite->summary.outcome != UZ_CONVERGED || error < TOLERABLE || told);
+            CHECK(warning(fixed, "large_deformation") == NULL && !fixed->summary.small.compared);
+            if (k == 2 && i == 2) {
+                CHECK_MSG(fabs(sum->small.error - 0.077) < 0.001, "%g", sum->small.error);
+                CHECK(told && !warning(chosen, "large_rotation"));
+            }
+            uz_result_free(chosen);
+            uz_result_free(fixed);
+            uz_result_free(finite);
+            uz_scene_clear(&s);
+        }
+}
+
+/* More than a block of St. Venant and Kirchhoff's law bears: one element, which can do nothing else. */
+TEST(a_load_that_cannot_be_borne)
+{
+    for (int linear = 0; linear < 2; linear++) {
+        uz_scene s = block("quad4", 1, 1, 1, 1);
+        body_hold(&s, "left", 0, NAN, NAN);
+        body_hold(&s, "bottom", NAN, 0, NAN);
+        body_load(&s, UZ_LOAD_TRACTION, "top", 0, -0.25, 0);
+        uz_result *result =
+            solve_as(&s, UZ_KINEMATICS_AUTO, linear ? UZ_ELASTIC_LINEAR : UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
+        const uz_small *small = &result->summary.small;
+        CHECK(small->compared && isinf(small->error) && fabs(small->load * 0.25 - 0.21148362) < 0.0005);
+        CHECK_INT(result->summary.outcome, linear ? UZ_CONVERGED : UZ_UNSTABLE);
+        const uz_warning *told = warning(result, "large_deformation");
+        CHECK(linear ? told && strstr(told->message, "nothing is stable beyond 0.84") && strlen(told->message) < 159
+                     : !told);
+        uz_result_free(result);
+        uz_scene_clear(&s);
+    }
+}
+
+/* Where there is no model of large deformation nothing is compared, and the other warnings are there. */
+TEST(what_cannot_be_compared_stays)
+{
+    for (int k = 0; k < 3; k++) {
+        uz_scene s = squeezed(0.3);
+        if (k == 0)
+            s.model = UZ_PLANE_STRESS;
+        if (k == 1)
+            body_spring(&s, "right", 1e-3, 0, 0);
+        if (k == 2) {
+            snprintf(s.box.element, sizeof s.box.element, "quad4");
+            s.materials[0].poisson = 0.45; /* mean dilatation */
+        }
+        uz_result *result = solve_as(&s, UZ_KINEMATICS_AUTO, UZ_ELASTIC_LINEAR);
+        CHECK(result->summary.outcome == UZ_CONVERGED && !result->summary.small.compared);
+        CHECK(warning(result, "large_strain") && !warning(result, "large_deformation"));
+        uz_result_free(result);
+        uz_scene_clear(&s);
+    }
+}
+
+/* Laws of finite strain want all that finite kinematics want, also where the body is known from an answer before. */
+TEST(what_there_is_no_model_for_is_refused)
+{
+    static const char *const WHERE[] = {"/model", "/solver/accuracy", "/materials/0/law"};
+    uz_cache *cache = uz_cache_new(SIZE_MAX);
+    for (int k = -1; k < 3; k++) {
+        uz_scene s = squeezed(0.1);
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+        uz_settings settings = uz_settings_default();
+        uz_result *result = NULL;
+        uz_error err = {0};
+        problem.scene.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+        problem.scene.model = k == 0 ? UZ_PLANE_STRESS : UZ_PLANE_STRAIN;
+        settings.guaranteed = k == 1;
+        problem.scene.kinematics = k == 2 ? UZ_KINEMATICS_MOVING : UZ_KINEMATICS_AUTO;
+        CHECK_INT(uz_solve(&result, &problem, &settings, cache, NULL, &err), k < 0 ? UZ_OK : UZ_ERR_SCENE);
+        CHECK_STR(err.where, k < 0 ? "" : WHERE[k]);
+        CHECK(!result == (k >= 0));
+        uz_result_free(result);
+        uz_scene_clear(&s);
+    }
+    uz_cache_free(cache);
+}
