@@ -129,25 +129,14 @@ static int row_nodes(const int64_t **node, const double **share, const uz_body_m
     return inner ? inner->nodes : 1;
 }
 
-/* Second derivatives of the gap of the place s of a side that is nearest to the obstacle: with n its normal there, t
- * the tangent and k its curvature, those of the gap at s are k N_a N_b t t', and the place follows:
- *     - w w' / (k (t.x')^2 + n.x''),     w_a = k (t.x') N_a t + N_a' n,     x' = dx/ds. */
-static void side_curvature(double ke[], const double n[2], double k, const double *share, const double *x, int nodes)
+/* Second derivatives of the gap of a place of the material, whose shares of nodes stay: with t along the obstacle and k
+ * its curvature they are k N_a N_b t t'. */
+static void place_curvature(double ke[], const double n[2], double k, const double *share, int nodes)
 {
-    const double t[2] = {-n[1], n[0]}, s = nodes > 1 ? share[1] - share[0] : 0;
-    const double slope[3] = {nodes == 2 ? -0.5 : s - 0.5, nodes == 2 ? 0.5 : s + 0.5, -2 * s}, bend[3] = {1, 1, -2};
-    double along = 0, out = 0, w[2 * UZ_FACE_NODES];
-    for (int a = 0; a < nodes; a++) {
-        along += slope[a] * (t[0] * x[2 * a] + t[1] * x[2 * a + 1]);
-        out += nodes == 3 ? bend[a] * (n[0] * x[2 * a] + n[1] * x[2 * a + 1]) : 0;
-    }
-    const double steep = k * along * along + out;
-    for (int p = 0; p < 2 * nodes; p++)
-        w[p] = k * along * share[p / 2] * t[p % 2] + slope[p / 2] * n[p % 2];
+    const double t[2] = {-n[1], n[0]};
     for (int p = 0; p < 2 * nodes; p++)
         for (int q = 0; q < 2 * nodes; q++)
-            ke[p * 2 * nodes + q] = k * share[p / 2] * t[p % 2] * share[q / 2] * t[q % 2] -
-                                    (nodes > 1 && steep > 0 ? w[p] * w[q] / steep : 0);
+            ke[p * 2 * nodes + q] = k * share[p / 2] * t[p % 2] * share[q / 2] * t[q % 2];
 }
 
 /* What the obstacle's curvature does to the stiffness: the Lagrangian has r g. The edges of lines and tables are none:
@@ -159,20 +148,18 @@ static uz_status add_curvature(work *w, uz_obstacle *const *obstacle, double mos
     for (int64_t row = 0; row < model->m && status == UZ_OK; row++) {
         const double *share, *normal = model->info.contact_normal + 2 * row;
         const int64_t *node;
-        double x[2] = {0}, places[2 * UZ_FACE_NODES], ke[4 * UZ_FACE_NODES * UZ_FACE_NODES];
+        double x[2] = {0}, ke[4 * UZ_FACE_NODES * UZ_FACE_NODES];
         uz_gap at;
         if (!(w->of->r[row] < -PRESSED * most) || model->sites[model->info.contact_of[row]].n == 0)
             continue;
         const int n = row_nodes(&node, &share, model, row);
         for (int a = 0; a < n; a++)
-            for (int c = 0; c < 2; c++) {
-                places[2 * a + c] = model->mesh.xyz[2 * node[a] + c] + w->of->u[2 * node[a] + c];
-                x[c] += share[a] * places[2 * a + c];
-            }
+            for (int c = 0; c < 2; c++)
+                x[c] += share[a] * (model->mesh.xyz[2 * node[a] + c] + w->of->u[2 * node[a] + c]);
         status = uz_obstacle_gap(&at, obstacle[model->info.contact_of[row]], x, err);
         if (status != UZ_OK || uz_obstacle_has_edges(obstacle[model->info.contact_of[row]]))
             continue;
-        side_curvature(ke, normal, at.curvature, share, places, n);
+        place_curvature(ke, normal, at.curvature, share, n);
         for (int p = 0; p < 4 * n * n; p++)
             ke[p] *= w->of->r[row];
         uz_add_stiffness(&w->tangent, ke, node, n);

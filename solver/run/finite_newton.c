@@ -115,7 +115,7 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
 typedef struct {
     int n;
     int64_t node[3];
-    double share[3], x[3][2], at[2]; /* at: the place */
+    double share[3], at[2]; /* at: the place */
 } row_place;
 
 static row_place place_of_row(const uz_finite_place *place, int64_t row)
@@ -127,36 +127,20 @@ static row_place place_of_row(const uz_finite_place *place, int64_t row)
         out.node[a] = inner ? inner->node[a] : rows->info.contact_node[row];
         out.share[a] = inner ? inner->share[a] : 1;
         for (int c = 0; c < 2; c++) {
-            out.x[a][c] = rows->mesh.xyz[2 * out.node[a] + c] + place->u[2 * out.node[a] + c];
-            out.at[c] += out.share[a] * out.x[a][c];
+            out.at[c] += out.share[a] * (rows->mesh.xyz[2 * out.node[a] + c] + place->u[2 * out.node[a] + c]);
         }
     }
     return out;
 }
 
 /* Second derivatives of the gap at a place, in displacements of its nodes: the normal n turns by `curvature` as the
- * place moves along t, and a place inside a side moves on along it, too, to where the side is nearest: where the
- * derivative of the gap along the side is zero again. */
+ * place moves along t. A place inside a side is one of the material (node_to_obstacle.c), and stays there. */
 static void gap_curvature(double ke[36], const row_place *p, const double n[2], double curvature)
 {
-    /* of shape functions along the side, from -1 to 1; of two nodes the place is share[1] - share[0], of three as well
-     */
-    const double s = p->n > 1 ? p->share[1] - p->share[0] : 0, t[2] = {-n[1], n[0]};
-    const double slope[3] = {p->n == 3 ? s - 0.5 : -0.5, p->n == 3 ? s + 0.5 : 0.5, -2 * s};
-    double along = 0, bend = 0, moves[6];
-    for (int a = 0; a < p->n && p->n > 1; a++) {
-        along += slope[a] * (t[0] * p->x[a][0] + t[1] * p->x[a][1]);
-        if (p->n == 3)
-            bend += (a == 2 ? -2 : 1) * (n[0] * p->x[a][0] + n[1] * p->x[a][1]);
-    }
-    const double second = curvature * along * along + bend;
-    const bool follows = p->n > 1 && second > 0;
-    for (int i = 0; i < 2 * p->n; i++)
-        moves[i] = curvature * along * p->share[i / 2] * t[i % 2] + slope[i / 2] * n[i % 2];
+    const double t[2] = {-n[1], n[0]};
     for (int i = 0; i < 2 * p->n; i++)
         for (int j = 0; j < 2 * p->n; j++)
-            ke[i * 2 * p->n + j] = curvature * p->share[i / 2] * p->share[j / 2] * t[i % 2] * t[j % 2] -
-                                   (follows ? moves[i] * moves[j] / second : 0);
+            ke[i * 2 * p->n + j] = curvature * p->share[i / 2] * p->share[j / 2] * t[i % 2] * t[j % 2];
 }
 
 /* r g: what curved obstacles add to the tangent. */

@@ -223,6 +223,25 @@ TEST(a_tube_over_a_rod)
     }
 }
 
+/* Pressed on a roller that stands in it, by rows that stay where they are inside of sides: the force is that of a finer
+ * mesh within the error of this one. */
+TEST(a_roller_that_stands_in_a_block)
+{
+    static const double DEPTH[] = {0.2, 0.6}, FORCE[] = {0.36124, 2.4789};
+    for (int k = 0; k < 4; k++) {
+        uz_scene s = block(k < 2 ? "quad8" : "quad4", 4, 1, 16, 4, UZ_ELASTIC_NEO_HOOKE);
+        body_hold(&s, "top", 0, 0, NAN);
+        uz_contact *roller = body_plane(&s, "bottom", (double[3]){2, DEPTH[k % 2] - 2, 0}, (double[3]){0, 1, 0});
+        roller->kind = UZ_OBSTACLE_ROUND;
+        roller->radius = 2;
+        uz_result *result = solve(&s);
+        check_converged(result, 1, 6);
+        CHECK_MSG(fabs(result->summary.force[1] / FORCE[k % 2] - 1) < (k < 2 ? 1e-3 : 0.04), "%.8g",
+                  result->summary.force[1]);
+        give_back(result, &s);
+    }
+}
+
 static void bend_arch(double x[3])
 {
     const double r = x[0], angle = x[1];
