@@ -1,9 +1,9 @@
 /* finite.c: the load put on in parts.
  *
- * The whole of it at once, loads and prescribed displacements alike. A part that does not lead to a certified stable
- * equilibrium is halved, one that needed few contact problems doubled. Where parts become small without one, the load
- * cannot be borne beyond, or the body is led to turn inside out: the answer is then that of the last part which has an
- * equilibrium, and is not called converged. */
+ * The whole of it at once, loads, prescribed displacements, and what obstacles overlap before anything moves. A part
+ * that does not lead to a certified stable equilibrium is halved, one that needed few contact problems doubled. Where
+ * parts become small without one, the load cannot be borne beyond, or the body is led to turn inside out: the answer is
+ * then that of the last part which has an equilibrium, and is not called converged. */
 #include "run/finite.h"
 
 #include "assembly/parts.h"
@@ -106,12 +106,13 @@ static uz_status begin_load(uz_finite_run *run, uz_error *err)
     run->grain = 1e-14 * run->stiffest * mesh->extent * mesh->extent;
     run->loads = uz_alloc(run->n, sizeof *run->loads);
     run->prescribed = uz_alloc(run->base.n_fixed, sizeof *run->prescribed);
+    run->overlap = uz_alloc_zero(run->scene.n_contacts, sizeof *run->overlap);
     run->p = uz_alloc(run->d, sizeof *run->p);
     run->v = uz_alloc(run->d, sizeof *run->v);
     run->Kv = uz_alloc(run->d, sizeof *run->Kv);
     double *h = uz_alloc(run->base.m, sizeof *h);
     uz_status status = UZ_OK;
-    if (!run->loads || !run->prescribed || !run->p || !run->v || !run->Kv || !h)
+    if (!run->loads || !run->prescribed || !run->overlap || !run->p || !run->v || !run->Kv || !h)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the load of %lld dofs", (long long)run->d);
     if (status == UZ_OK) /* checks what it reads */
         status = uz_body_model_load(run->p, h, run->prescribed, &run->base, &run->scene, err);
@@ -161,6 +162,7 @@ static void end(uz_finite_run *run)
     free(run->scene.loads);
     free(run->loads);
     free(run->prescribed);
+    free(run->overlap);
     free(run->r);
     free(run->p);
     free(run->v);
@@ -206,6 +208,15 @@ static uz_status go_back(uz_finite_run *run, const settled *to, double t, uz_err
     return status == UZ_OK ? uz_finite_place_find(&fits, &run->at, run, err) : status;
 }
 
+/* Of the body at rest, where run->at is. */
+static void measure_overlap(uz_finite_run *run)
+{
+    for (int64_t i = 0; i < run->at.rows.m; i++) {
+        double *most = &run->overlap[run->at.rows.info.contact_of[i]];
+        *most = fmax(*most, -run->at.gap[i]);
+    }
+}
+
 /* Until the whole load is on, or no further part of it holds. */
 static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_error *err)
 {
@@ -237,6 +248,8 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
         found->failed++;
         step *= 0.5;
         status = go_back(run, &last, found->load, err);
+        if (status == UZ_OK && found->failed == 1 && found->load == 0)
+            measure_overlap(run);
         if (part == UZ_PART_STOPPED)
             break;
     }

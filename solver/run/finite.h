@@ -64,6 +64,9 @@ typedef struct {
     uz_cache *cache; /* of tangents: their ordering is found once */
     uz_scene scene;  /* with supports and loads times `load`, of its own */
     double load;     /* t */
+    /* n_contacts: how deep nodes of the body at rest stand in the obstacle, which is set back by 1 - t of it, as
+     * supports and loads are; 0 until a part of the load is asked for */
+    double *overlap;
     uz_body_model base, tangent;
     int64_t n, d;
     double *loads;      /* n: forces of the whole load */

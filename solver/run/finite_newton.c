@@ -79,6 +79,8 @@ static uz_status find_gaps(uz_finite_place *place, uz_finite_run *run, uz_error 
     const uz_status status = uz_initial_gaps(place->h, run->prescribed, &place->rows, &run->scene, err);
     if (status != UZ_OK)
         return status;
+    for (int64_t i = 0; i < m; i++)
+        place->h[i] += (1 - run->load) * run->overlap[place->rows.info.contact_of[i]];
     memcpy(place->gap, place->h, (size_t)m * sizeof *place->gap);
     uz_csc_gaxpy(place->gap, &place->rows.N, -1, run->v);
     place->violation = 0;

@@ -242,6 +242,30 @@ TEST(a_roller_that_stands_in_a_block)
     }
 }
 
+/* A rod of two and a half and six times the bore: what it overlaps is put on in parts. Pressure and outer radius by
+ * quadrature. */
+TEST(a_rod_much_thicker_than_the_bore)
+{
+    static const double RADIUS[] = {2.5, 6}, PRESSURE[] = {0.23487387, 0.26450414}, OUTER[] = {3.143535, 6.3436366};
+    for (int k = 0; k < 2; k++) {
+        uz_scene s = block("quad8", 1, acos(0), 4, 8, UZ_ELASTIC_NEO_HOOKE);
+        s.box.origin[0] = 1;
+        body_give_mesh(&s, bend);
+        body_hold(&s, "bottom", NAN, 0, NAN);
+        body_hold(&s, "top", 0, NAN, NAN);
+        uz_contact *rod = body_plane(&s, "left", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+        rod->kind = UZ_OBSTACLE_ROUND;
+        rod->radius = RADIUS[k];
+        uz_result *result = solve(&s);
+        const uz_finite *f = &result->summary.finite;
+        CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+        CHECK(f->load == 1 && f->steps > 1 && f->failed > 0 && f->qps < 40 && fabs(f->least_gap) < 2e-2);
+        CHECK_MSG(fabs(result->summary.max_pressure / PRESSURE[k] - 1) < 2e-3, "%.8g", result->summary.max_pressure);
+        CHECK_MSG(fabs((2 + moved_by(result, 2, 0)[0]) / OUTER[k] - 1) < 1e-4, "%.8g", 2 + moved_by(result, 2, 0)[0]);
+        give_back(result, &s);
+    }
+}
+
 static void bend_arch(double x[3])
 {
     const double r = x[0], angle = x[1];
