@@ -10,10 +10,11 @@
 #include <string.h>
 
 void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangent, const uz_body_model *model,
-                    const double *nodal)
+                    const double *nodal, const double *step)
 {
     const uz_mesh *mesh = &model->mesh;
-    double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES];
+    double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES],
+        d[2 * UZ_ELEMENT_NODES];
     *out = (uz_finite_measure){.least_det = INFINITY, .at = -1};
     if (force)
         memset(force, 0, (size_t)(2 * mesh->n_nodes) * sizeof *force);
@@ -29,7 +30,9 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
         uz_body_element(&element, xyz, model, e);
         for (int i = 0; i < 2 * count; i++)
             u[i] = nodal[2 * node[i / 2] + i % 2];
-        uz_finite_element(&own, tangent ? ke : NULL, &element, uz_element_material(model, e)->law, u);
+        for (int i = 0; i < 2 * count && step; i++)
+            d[i] = step[2 * node[i / 2] + i % 2];
+        uz_finite_element(&own, tangent ? ke : NULL, &element, uz_element_material(model, e)->law, u, step ? d : NULL);
         out->energy += own.energy;
         if (!(own.least_det >= out->least_det)) { /* not a number, too */
             out->least_det = own.least_det;

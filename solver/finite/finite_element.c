@@ -3,8 +3,13 @@
  * With g_a the gradients of the shape functions before anything moves, F = I + sum_a u_a x g_a; the variation of E by
  * u_a is B_a = (F_i1 g_1, F_i2 g_2, F_i1 g_2 + F_i2 g_1), so that
  *     force_a = integral B_a'S,     K_ab = integral B_a' D B_b + (g_a . S g_b) I.
- * Source: Bonet and Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", ch. 9; total Lagrangian form of
- * Bathe, "Finite Element Procedures", ch. 6. */
+ * A step d by this tangent takes a slender part that turns along its tangent, which lengthens it by a strain that it
+ * does not have in the end, and whose stress is all that the next tangent would see. So K's second part has S of the
+ * strain that the step was made for, E - h'h / 2 with h = grad d: what stress would be as an unknown of its own. At the
+ * end, where steps are small, it is the same.
+ * Sources: Bonet and Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", ch. 9; total Lagrangian form of
+ * Bathe, "Finite Element Procedures", ch. 6; of the step: Magisano, Leonetti and Garcea, Comput. Methods Appl. Mech.
+ * Engrg. 313 (2017) 986-1005. */
 #include "finite/finite_element.h"
 
 #include "finite/hyperelastic.h"
@@ -63,7 +68,21 @@ static void add_tangent(double *ke, int nodes, double weight, double B[][N_STRAI
     }
 }
 
-bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law, const double *u)
+/* S of the strain without h'h / 2. */
+static void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS],
+                          double grad[UZ_ELEMENT_NODES][3], int nodes, const double *step)
+{
+    double h[2][2], q[N_STRAINS];
+    deformation(h, grad, nodes, step);
+    h[0][0] -= 1;
+    h[1][1] -= 1;
+    cauchy_green(q, h);
+    for (int i = 0; i < N_STRAINS; i++)
+        T[i] = S[i] - 0.5 * (D[i][0] * q[0] + D[i][1] * q[1] + 2 * D[i][2] * q[2]);
+}
+
+bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law, const double *u,
+                       const double *step)
 {
     const uz_gauss_rule *rule = uz_element_rule(element->kind, element->model);
     const int nodes = uz_element_node_count(element->kind), n = 2 * nodes;
@@ -73,7 +92,7 @@ bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *elem
     if (ke)
         memset(ke, 0, (size_t)(n * n) * sizeof *ke);
     for (int g = 0; g < rule->count; g++) {
-        double W, C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS];
+        double W, C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS], T[N_STRAINS];
         const double measure = uz_element_gradients(grad, element, rule->point[g].at);
         const double weight = rule->point[g].weight * measure * element->thickness;
         out->least_det = fmin(out->least_det, deformation(F, grad, nodes, u));
@@ -89,8 +108,10 @@ bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *elem
                 b[2] = F[i][0] * grad[a][1] + F[i][1] * grad[a][0];
                 out->force[2 * a + i] += weight * (b[0] * S[0] + b[1] * S[1] + b[2] * S[2]);
             }
+        if (ke && step)
+            stress_before(T, S, D, grad, nodes, step);
         if (ke)
-            add_tangent(ke, nodes, weight, B, D, grad, S);
+            add_tangent(ke, nodes, weight, B, D, grad, step ? T : S);
     }
     for (int p = 0; p < n && ke; p++)
         for (int q = 0; q < p; q++)

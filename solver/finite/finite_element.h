@@ -12,9 +12,11 @@ typedef struct {
 
 /* Of an element of plane strain whose shape is good, displaced by u (nodes x 2). ke (NULL: not wanted): the tangent,
  * the energy's second derivatives, full and symmetric, as uz_element_stiffness has it; at u = 0 it is that of the
- * standard formulation. False: det F <= 0 somewhere; least_det alone is then filled. */
-bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law,
-                       const double *u);
+ * standard formulation. False: det F <= 0 somewhere; least_det alone is then filled.
+ *   step  nodes x 2, the last change of u: in ke alone, what the stress does to turning parts is that of the strains
+ * that this change was linear for. NULL: none */
+bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law, const double *u,
+                       const double *step);
 
 /* At a local point: F by rows, xx xy yx yy, its determinant, and Cauchy's stress and the Green-Lagrange strain with the
  * components xx, yy, zz, xy. */

@@ -110,9 +110,10 @@ static uz_status begin_load(uz_finite_run *run, uz_error *err)
     run->p = uz_alloc(run->d, sizeof *run->p);
     run->v = uz_alloc(run->d, sizeof *run->v);
     run->Kv = uz_alloc(run->d, sizeof *run->Kv);
+    run->step = uz_alloc(run->n, sizeof *run->step);
     double *h = uz_alloc(run->base.m, sizeof *h);
     uz_status status = UZ_OK;
-    if (!run->loads || !run->prescribed || !run->overlap || !run->p || !run->v || !run->Kv || !h)
+    if (!run->loads || !run->prescribed || !run->overlap || !run->p || !run->v || !run->Kv || !run->step || !h)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the load of %lld dofs", (long long)run->d);
     if (status == UZ_OK) /* checks what it reads */
         status = uz_body_model_load(run->p, h, run->prescribed, &run->base, &run->scene, err);
@@ -167,6 +168,7 @@ static void end(uz_finite_run *run)
     free(run->p);
     free(run->v);
     free(run->Kv);
+    free(run->step);
 }
 
 /* What is gone back to. */

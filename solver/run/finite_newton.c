@@ -8,9 +8,11 @@
  * Newton's method on the conditions of equilibrium with contact, sequential quadratic programming (Nocedal and Wright,
  * "Numerical Optimization", ch. 18). A K that is not positive definite gets stiffness along the pressed rows added,
  * which changes nothing where they stay closed, and where that is not enough that of the undeformed body, which costs
- * steps. Steps are shortened until no element turns inside out and the potential energy, with a penalty on negative
- * gaps that exceeds the reactions (ibid., ch. 18.3), is less than it was at one of the last places; but that which
- * moves the supports, whose place has no energy to compare. The end is the certificate's to say. */
+ * steps. After a large step K first has the stress that the step was made for (finite_element.c), which takes half of
+ * the steps where slender parts turn; where it is not positive definite with that the body's own comes next. Steps are
+ * shortened until no element turns inside out and the potential energy, with a penalty on negative gaps that exceeds
+ * the reactions (ibid., ch. 18.3), is less than it was at one of the last places; but that which moves the supports,
+ * whose place has no energy to compare. The end is the certificate's to say. */
 #include "run/finite.h"
 
 #include "core/alloc.h"
@@ -35,10 +37,13 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3 };
 /* Stiffness along pressed rows, in those of the stiffest dof. */
 #define LEAST_HOLD 1.0
 #define MOST_HOLD  1e3
-/* Stiffness of the undeformed body that is added first, and by how much more each time. */
+/* Stiffness of the undeformed body that is added first, by how much more each time, and less in the next step. */
 #define FIRST_SHIFT 0.01
 #define MORE_SHIFT  4.0
+#define LESS_SHIFT  16.0
 #define MOST_SHIFT  1e4
+/* Steps that are more than this in the energy's norm may turn slender parts. */
+#define LARGE_STEP 0.3
 
 /* ---- places */
 
@@ -93,7 +98,7 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
 {
     uz_error own = {0};
     forget_rows(place);
-    uz_finite_body(&place->body, place->force, NULL, &run->base, place->u);
+    uz_finite_body(&place->body, place->force, NULL, &run->base, place->u, NULL);
     *fits = place->body.least_det > 0 && isfinite(place->body.energy);
     if (!*fits)
         return UZ_OK;
@@ -265,13 +270,17 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
     uz_error own = {0};
     uz_status status = UZ_ERR_NOT_SPD;
     const double stiffest = run->stiffest;
-    double hold = run->hold, shift = run->shift / MORE_SHIFT < FIRST_SHIFT ? 0 : run->shift / MORE_SHIFT;
+    double hold = run->hold, shift = run->shift / LESS_SHIFT < FIRST_SHIFT ? 0 : run->shift / LESS_SHIFT;
     bool pressed = false, more = true;
+    const bool large = !(run->norm > 0) || run->norm > LARGE_STEP;
+    double *step = run->step_qps > 0 && shift == 0 && large ? run->step : NULL; /* run->trial is the place before */
+    for (int64_t i = 0; i < run->n && step; i++)
+        step[i] = run->at.u[i] - run->trial.u[i];
     for (int64_t i = 0; i < run->n_r && run->n_r == run->at.rows.m; i++)
         pressed = pressed || run->r[i] < 0;
     while (more && (status == UZ_ERR_NOT_SPD || status == UZ_ERR_FREE_BODY)) {
         const double start = uz_seconds();
-        uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u);
+        uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u, step);
         uz_error_reset(&own);
         status = add_curvature(run, &own);
         if (status == UZ_OK)
@@ -286,7 +295,8 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         status = solve_qp(run, &own);
         run->hold = hold;
         run->shift = shift;
-        more = add_more(&hold, &shift, pressed);
+        more = step || add_more(&hold, &shift, pressed);
+        step = NULL;
     }
     if (status == UZ_OK) {
         run->found.held += run->hold > 0 && run->shift == 0;
@@ -454,7 +464,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         status = keep_reactions(run, err);
         if (status != UZ_OK)
             break;
-        const double norm = moved ? (double)INFINITY : step_norm(run);
+        const double norm = run->norm = moved ? (double)INFINITY : step_norm(run);
         uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);
         const bool free_step = moved || run->step_qps == 1;
         if (!free_step) {

@@ -128,7 +128,7 @@ TEST(the_residual_is_the_distance)
     uz_finite_measure measure;
     uz_error err = {0};
     CHECK_INT(uz_finite_tangent_of(&tangent, &a.base, &err), UZ_OK);
-    uz_finite_body(&measure, NULL, &tangent, &a.base, a.result->u);
+    uz_finite_body(&measure, NULL, &tangent, &a.base, a.result->u, NULL);
     qp_random rng = {5};
     double *v = body_room(a.base.d, sizeof *v), *Kv = body_room(a.base.d, sizeof *Kv), square = 0;
     for (int64_t i = 0; i < 2 * a.base.mesh.n_nodes; i++)

@@ -103,13 +103,13 @@ TEST(forces_and_tangents_of_elements_are_derivatives)
         uz_finite_forces at, side[2];
         for (int i = 0; i < n; i++)
             u[i] = any(&rng, 0.15);
-        if (!uz_finite_element(&at, ke, &element, law, u))
+        if (!uz_finite_element(&at, ke, &element, law, u, NULL))
             continue;
         for (int j = 0; j < n; j++) {
             const double h = 1e-6, before = u[j];
             for (int s = 0; s < 2; s++) {
                 u[j] = before + (s ? h : -h);
-                CHECK(uz_finite_element(&side[s], NULL, &element, law, u));
+                CHECK(uz_finite_element(&side[s], NULL, &element, law, u, NULL));
             }
             u[j] = before;
             CHECK(fabs((side[1].energy - side[0].energy) / (2 * h) - at.force[j]) < 1e-7);
@@ -119,7 +119,7 @@ TEST(forces_and_tangents_of_elements_are_derivatives)
         }
         /* undeformed: the stiffness of small strain */
         memset(u, 0, sizeof u);
-        CHECK(uz_finite_element(&at, ke, &element, law, u) && fabs(at.energy) < 1e-15);
+        CHECK(uz_finite_element(&at, ke, &element, law, u, NULL) && fabs(at.energy) < 1e-15);
         CHECK_INT(uz_element_stiffness(other, &element), UZ_SHAPE_GOOD);
         for (int i = 0; i < n * n; i++)
             CHECK(fabs(ke[i] - other[i]) < 1e-12);
@@ -145,8 +145,8 @@ TEST(rotations_strain_nothing)
             turned[2 * a] = c * x - s * y + 5 - xyz[2 * a];
             turned[2 * a + 1] = s * x + c * y - 2 - xyz[2 * a + 1];
         }
-        CHECK(uz_finite_element(&before, NULL, &element, law, u));
-        CHECK(uz_finite_element(&after, NULL, &element, law, turned));
+        CHECK(uz_finite_element(&before, NULL, &element, law, u, NULL));
+        CHECK(uz_finite_element(&after, NULL, &element, law, turned, NULL));
         CHECK(fabs(before.energy - after.energy) < 1e-12 && fabs(before.least_det - after.least_det) < 1e-12);
         for (int a = 0; a < n; a++)
             CHECK(fabs(c * before.force[2 * a] - s * before.force[2 * a + 1] - after.force[2 * a]) < 1e-12);
@@ -160,6 +160,32 @@ TEST(rotations_strain_nothing)
     }
 }
 
+/* Stepped along the tangent of a turn, w (-y, x), an element is stretched by w^2 / 2 in all directions, with the stress
+ * (lambda + mu) w^2; the step was made for no strain at all. Along a uniform stretch aside the difference of the two
+ * tangents is this stress by the area. */
+TEST(a_step_along_a_turn_leaves_no_stress_in_the_tangent)
+{
+    qp_random rng = {12};
+    for (int k = 0; k < 4; k++) {
+        double xyz[MOST], u[MOST], plain[MOST * MOST], stepped[MOST * MOST], sum = 0;
+        const uz_element element = bent_element(xyz, KINDS[k], &rng);
+        const int n = 2 * uz_element_node_count(element.kind);
+        const double w = 0.3, stress = (element.lame.lambda + element.lame.mu) * w * w;
+        uz_finite_forces at;
+        for (int a = 0; a < n; a += 2) {
+            u[a] = -w * xyz[a + 1];
+            u[a + 1] = w * xyz[a];
+        }
+        CHECK(uz_finite_element(&at, plain, &element, UZ_ELASTIC_ST_VENANT_KIRCHHOFF, u, NULL));
+        CHECK(uz_finite_element(&at, stepped, &element, UZ_ELASTIC_ST_VENANT_KIRCHHOFF, u, u));
+        for (int i = 0; i < n; i += 2)
+            for (int j = 0; j < n; j += 2)
+                sum += xyz[i] * (plain[i * n + j] - stepped[i * n + j]) * xyz[j];
+        const double expected = stress * uz_element_volume(&element);
+        CHECK_MSG(fabs(sum - expected) < 1e-12 * expected, "%.15g, not %.15g", sum, expected);
+    }
+}
+
 TEST(what_is_inside_out_is_told)
 {
     qp_random rng = {11};
@@ -167,5 +193,5 @@ TEST(what_is_inside_out_is_told)
     const uz_element element = bent_element(xyz, UZ_QUAD4, &rng);
     uz_finite_forces at;
     u[4] = u[5] = -2.5; /* a corner beyond the opposite one: no quadrature point need see it */
-    CHECK(!uz_finite_element(&at, NULL, &element, UZ_ELASTIC_NEO_HOOKE, u) && at.least_det < 0);
+    CHECK(!uz_finite_element(&at, NULL, &element, UZ_ELASTIC_NEO_HOOKE, u, NULL) && at.least_det < 0);
 }

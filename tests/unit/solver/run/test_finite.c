@@ -125,7 +125,7 @@ TEST(a_cantilever_bends_as_the_elastica)
     body_hold(&s, "left", 0, 0, NAN);
     body_load(&s, UZ_LOAD_FORCE, "right", 0, 80, 0);
     uz_result *result = solve(&s);
-    check_converged(result, 1, 20);
+    check_converged(result, 1, 9);
     const double *u = moved_by(result, 10, 0.1);
     CHECK_MSG(fabs(u[1] / 10 - 0.811192) < 0.002 * 0.811192, "%.6f", u[1] / 10);
     CHECK_MSG(fabs(u[0] / 10 + 0.555479) < 0.002 * 0.555479, "%.6f", u[0] / 10);
@@ -147,19 +147,20 @@ static uz_scene over_roller(const char *element, int64_t cells, double aside)
 /* The block is moved over the roller to the mirror image of where it began: what it has slid over does not matter. */
 TEST(a_block_over_a_roller_is_mirrored)
 {
-    static const char *const ELEMENTS[] = {"quad4", "quad8"};
-    for (int k = 0; k < 2; k++) {
+    static const char *const ELEMENTS[] = {"quad4", "quad8", "quad8"};
+    static const double FACE[] = {0.01, 0.003, 0.002};
+    for (int k = 0; k < 3; k++) {
         uz_scene s[3];
         uz_result *r[3];
         for (int i = 0; i < 3; i++) {
-            s[i] = over_roller(ELEMENTS[k], k == 0 ? 8 : 4, -i);
+            s[i] = over_roller(ELEMENTS[k], k == 1 ? 4 : 8, -i);
             r[i] = solve(&s[i]);
-            check_converged(r[i], 1, 12);
+            if (k < 2 || i < 2) /* of the finer mesh the first half alone is passed at once */
+                check_converged(r[i], 1, i == 0 ? 4 : 9);
+            CHECK(r[i]->summary.outcome == UZ_CONVERGED && r[i]->summary.finite.qps <= 25);
         }
-        CHECK_MSG(fabs(r[0]->summary.force[1] - 0.34405) < (k == 0 ? 0.01 : 0.003) * 0.34405, "%.7g",
-                  r[0]->summary.force[1]);
-        CHECK_MSG(fabs(r[1]->summary.force[1] - 0.36159) < (k == 0 ? 0.01 : 0.002) * 0.36159, "%.7g",
-                  r[1]->summary.force[1]);
+        CHECK_MSG(fabs(r[0]->summary.force[1] - 0.34405) < FACE[k] * 0.34405, "%.7g", r[0]->summary.force[1]);
+        CHECK_MSG(fabs(r[1]->summary.force[1] - 0.36159) < FACE[k] * 0.36159, "%.7g", r[1]->summary.force[1]);
         CHECK(fabs(r[1]->summary.force[0]) < 1e-9);
         CHECK_MSG(fabs(r[0]->summary.force[0] + r[2]->summary.force[0]) < 1e-9, "%.12g", r[2]->summary.force[0]);
         CHECK_MSG(fabs(r[0]->summary.force[1] - r[2]->summary.force[1]) < 1e-9, "%.12g", r[2]->summary.force[1]);
@@ -178,19 +179,19 @@ static void bend(double x[3])
 /* A quarter of a ring between plates: its crown stays, and its foot comes up. Values of a much finer mesh. */
 TEST(a_ring_between_plates)
 {
-    static const double UP[] = {0.525, 1.05, 5.25}, FORCE[] = {5.9166e-4, 1.11042e-3, 5.7399e-3};
-    for (int k = 0; k < 3; k++) {
-        uz_scene s = block("quad8", 1, acos(0), 2, 16, UZ_ELASTIC_NEO_HOOKE);
+    static const double UP[] = {0.525, 1.05, 5.25, 5.25}, FORCE[] = {5.9166e-4, 1.11042e-3, 5.7399e-3, 5.7399e-3};
+    for (int k = 0; k < 4; k++) {
+        uz_scene s = block("quad8", 1, acos(0), 2, k < 3 ? 16 : 48, UZ_ELASTIC_NEO_HOOKE);
         s.box.origin[0] = 9.5;
         body_give_mesh(&s, bend);
         body_hold(&s, "bottom", NAN, UP[k], NAN);
         body_hold(&s, "top", 0, NAN, NAN);
         body_plane(&s, "right", (double[3]){0, 10.5, 0}, (double[3]){0, -1, 0});
         uz_result *result = solve(&s);
-        check_converged(result, 1, 14);
-        CHECK_MSG(fabs(-2 * result->summary.force[1] - FORCE[k]) < 0.004 * FORCE[k], "%.7g",
+        check_converged(result, 1, k < 2 ? 5 : 14);
+        CHECK_MSG(fabs(-2 * result->summary.force[1] - FORCE[k]) < (k < 3 ? 0.004 : 0.002) * FORCE[k], "%.7g",
                   -2 * result->summary.force[1]);
-        if (k == 2) { /* its middle has lifted off the plate */
+        if (k >= 2) { /* its middle has lifted off the plate */
             const double *crown = moved_by(result, 10.5 * cos(acos(0)), 10.5);
             CHECK_MSG(fabs(moved_by(result, 10.5, 0)[0] - 3.23773) < 0.002, "%.6g", moved_by(result, 10.5, 0)[0]);
             CHECK_MSG(crown[1] < -1e-5, "%.6g", crown[1]);
@@ -433,7 +434,7 @@ static double slope_along(const uz_result *r, const uz_scene *scene, qp_random *
     for (int s = 0; s < 4; s++) {
         for (int64_t i = 0; i < n; i++)
             u[i] = r->u[i] + WAY[s] * h * v[i];
-        uz_finite_body(&at[s], NULL, NULL, &model, u);
+        uz_finite_body(&at[s], NULL, NULL, &model, u, NULL);
     }
     for (int64_t i = 0; i < n; i++) {
         work += f[i] * v[i];
