@@ -32,9 +32,12 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
 uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* About how much of the forces of the answer u small deformation leaves out: squares of its gradient in the strains, by
  * the energy norm; stress that turns with the body, along u; strains and rotations in the law itself, weighted by the
- * energy (U, > 0). Relative to its energy norm; plane strain only. NaN: elements are not of the standard formulation,
- * the only one that large deformation has. */
+ * energy (U, > 0). Relative to its energy norm; plane strain only. UZ_SURELY_SMALL and more also where
+ * the body, as a strip, is pressed by half of what it may buckle under. NaN: elements are not of the standard
+ * formulation, the only one that large deformation has. */
 double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy);
+/* The strain from which on a strip as flat as the body may buckle, by Euler; plane bodies. */
+double uz_least_buckling_strain(const uz_body_model *model);
 /* Warns that small deformation is off by `error` (uz_small) under a linear law. */
 void uz_doubt_deformation(uz_evaluation *out, const uz_small *small);
 /* Takes the warning `sliding` back, which turned out to be without ground, and warns of overlap that it had explained.

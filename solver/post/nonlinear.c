@@ -3,7 +3,13 @@
  * With H the gradient of u, e and s its strain and stress of small deformation, the forces of large deformation at u do
  * the work  s : e(v)  +  C (H'H / 2) : e(v)  +  s : (H'grad v)  + ...  on v. Of what comes first after the linear part
  * the one is bounded by the energy norm of H'H / 2, the other is taken along u itself; what the law adds is as much of
- * the stress as H is large. */
+ * the stress as H is large.
+ *
+ * None of this sees a column that is pressed along its axis until it has a reason to go aside. A strip of length L and
+ * thickness h does so from a strain of pi^2 / 48 (h / L)^2 on where one end is free, later if it is held better
+ * (Euler). The body is taken for such a strip, of its own area along its diagonal, and for pressed by its mean stress,
+ * which of a body that bends is next to none. Area in small parts along the diagonal, as of a frame, is taken for a
+ * thicker strip. */
 #include "post/balance.h"
 
 #include "assembly/parts.h"
@@ -12,6 +18,7 @@
 
 typedef struct {
     double squares, along, law; /* integrals */
+    double stress[3], modulus;  /* the same; xx, yy, xy */
 } sums;
 
 static void add_point(sums *to, double weight, const uz_lame *lame, double H[2][2])
@@ -28,8 +35,35 @@ static void add_point(sums *to, double weight, const uz_lame *lame, double H[2][
         0.25 * weight * (lame->lambda * spread * spread + 2 * lame->mu * (Q[0] * Q[0] + Q[1] * Q[1] + 2 * Q[2] * Q[2]));
     to->along +=
         weight * (lame->lambda * trace * spread + 2 * lame->mu * (e[0] * Q[0] + e[1] * Q[1] + 2 * e[2] * Q[2]));
+    for (int k = 0; k < 3; k++)
+        to->stress[k] += weight * (2 * lame->mu * e[k] + (k < 2 ? lame->lambda * trace : 0));
+    to->modulus += weight * 4 * lame->mu * (lame->lambda + lame->mu) / (lame->lambda + 2 * lame->mu);
     to->law +=
         weight * size * (lame->lambda * trace * trace + 2 * lame->mu * (e[0] * e[0] + e[1] * e[1] + 2 * e[2] * e[2]));
+}
+
+double uz_least_buckling_strain(const uz_body_model *model)
+{
+    const uz_mesh *mesh = &model->mesh;
+    double area = 0;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        int nodes;
+        const int64_t *node = uz_mesh_element(mesh, e, &nodes);
+        const int corners = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
+        for (int a = 0; a < corners; a++) {
+            const double *x = mesh->xyz + 2 * node[a], *y = mesh->xyz + 2 * node[(a + 1) % corners];
+            area += 0.5 * (x[0] * y[1] - x[1] * y[0]);
+        }
+    }
+    const double flat = area / (mesh->extent * mesh->extent);
+    return 0.2 * flat * flat;
+}
+
+/* The mean stress along the axis in which it presses most, as a strain. */
+static double pressed_by(const sums *of)
+{
+    const double middle = 0.5 * (of->stress[0] + of->stress[1]), half = 0.5 * (of->stress[0] - of->stress[1]);
+    return of->modulus > 0 ? fmax(0, hypot(half, of->stress[2]) - middle) / of->modulus : 0;
 }
 
 double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy)
@@ -54,5 +88,7 @@ double uz_measure_nonlinear(const uz_body_model *model, const double *u, double 
             add_point(&all, rule->point[g].weight * measure * element.thickness, &element.lame, H);
         }
     }
-    return (sqrt(all.squares) + sqrt(all.law)) / sqrt(2 * energy) + fabs(all.along) / (2 * energy);
+    const double buckles = 2 * pressed_by(&all) / uz_least_buckling_strain(model); /* 1: half of what it may bear */
+    return fmax(UZ_SURELY_SMALL * buckles,
+                (sqrt(all.squares) + sqrt(all.law)) / sqrt(2 * energy) + fabs(all.along) / (2 * energy));
 }

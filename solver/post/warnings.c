@@ -163,7 +163,8 @@ static bool may_be_nonlinear(const doubts *d)
     for (int64_t k = 0; k < d->model->n_materials; k++)
         stiffest = fmax(stiffest, d->model->materials[k].lame.lambda + 2 * d->model->materials[k].lame.mu);
     const double most = sqrt(stiffest * extent * extent * d->model->thickness), least = 0.25 * UZ_SURELY_SMALL;
-    return U > 0 && is_steep(d, 0.25 * fmin(least, sqrt(2 * least * sqrt(2 * U) / most)));
+    const double buckles = 0.5 * uz_least_buckling_strain(d->model);
+    return U > 0 && is_steep(d, 0.25 * fmin(buckles, fmin(least, sqrt(2 * least * sqrt(2 * U) / most))));
 }
 
 void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)

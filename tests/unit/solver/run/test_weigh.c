@@ -196,6 +196,31 @@ TEST(a_load_that_cannot_be_borne)
     }
 }
 
+/* A strip that is pressed along its axis bends aside under pi^2 / 48 (h / L)^2 of strain, a little later in plane
+ * strain as the end is held across. Its answer of small deformation is straight, and right below. */
+TEST(a_column_that_buckles)
+{
+    static const double PART[] = {0.3, 0.9, 1.5};
+    for (int k = 0; k < 6; k++) {
+        const bool linear = k < 3;
+        const double euler = acos(-1) * acos(-1) / 48 / (20 * 20) / (1 - 0.3 * 0.3);
+        uz_scene s = block("quad8", 20, 1, 20, 1);
+        body_hold(&s, "left", 0, 0, NAN);
+        body_load(&s, UZ_LOAD_TRACTION, "right", -PART[k % 3] * euler, 0, 0);
+        uz_result *result = solve_as(&s, UZ_KINEMATICS_AUTO, linear ? UZ_ELASTIC_LINEAR : UZ_ELASTIC_NEO_HOOKE);
+        const uz_small *small = &result->summary.small;
+        CHECK(small->compared == (k % 3 > 0));
+        CHECK_INT(result->summary.outcome, k == 5 ? UZ_UNSTABLE : UZ_CONVERGED);
+        CHECK_INT(result->summary.geometry.kind, k == 5 ? UZ_KINEMATICS_FINITE : UZ_KINEMATICS_FIXED);
+        CHECK(k % 3 != 1 || (small->error < 0.01 && small->load == 1));
+        CHECK_MSG(k % 3 != 2 || (isinf(small->error) && fabs(small->load * 1.5 - 1) < 0.02), "%g of Euler's load",
+                  small->load * 1.5);
+        CHECK((warning(result, "large_deformation") != NULL) == (k == 2));
+        uz_result_free(result);
+        uz_scene_clear(&s);
+    }
+}
+
 /* Where there is no model of large deformation nothing is compared, and the other warnings are there. */
 TEST(what_cannot_be_compared_stays)
 {
