@@ -18,7 +18,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Parts are doubled after at most FEW contact problems. The smallest one, of the whole load. */
+/* Parts are doubled after at most FEW contact problems. The smallest one, of the whole load while none of it is borne.
+ */
 enum { FEW = 4, MOST_PARTS = 200 };
 #define LEAST_PART (1.0 / 1024)
 /* Orderings and factors of tangents that are kept. */
@@ -219,6 +220,12 @@ static void measure_overlap(uz_finite_run *run)
     }
 }
 
+/* The load that is borne is known to a thousandth: a part that fails may be twice the least. */
+static double least_part(double load)
+{
+    return LEAST_PART * (load > 0 ? 0.5 * load : 1);
+}
+
 /* Until the whole load is on, or no further part of it holds. */
 static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_error *err)
 {
@@ -227,7 +234,8 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
     double step = 1;
     uz_status status = last.u ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
     *why = UZ_PART_SETTLED;
-    while (status == UZ_OK && found->load < 1 && step >= LEAST_PART && found->steps + found->failed < MOST_PARTS) {
+    while (status == UZ_OK && found->load < 1 && step >= least_part(found->load) &&
+           found->steps + found->failed < MOST_PARTS) {
         uz_part part = UZ_PART_UNSETTLED;
         const double t = fmin(1.0, found->load + step);
         status = put_on(run, t, err);

@@ -104,6 +104,13 @@ TEST(what_is_not_stable_is_no_answer)
     check_ended(result, UZ_UNSTABLE, (0.21148362 - 0.0003) / 0.25, 0.21148362 / 0.25);
     CHECK(result->place && result->summary.timings.total > 0);
     give_back(result, &s);
+    s = block("quad4", 1, 1, 1, 1, UZ_ELASTIC_ST_VENANT_KIRCHHOFF); /* of many times the load: to 0.1 % of the limit */
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "bottom", NAN, 0, NAN);
+    body_load(&s, UZ_LOAD_TRACTION, "top", 0, -40, 0);
+    result = solve(&s);
+    check_ended(result, UZ_UNSTABLE, 0.999 * 0.21148362 / 40, 0.21148362 / 40);
+    give_back(result, &s);
 }
 
 TEST(what_turns_inside_out_is_no_answer)
