@@ -32,9 +32,8 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
 uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* About how much of the forces of the answer u small deformation leaves out: squares of its gradient in the strains, by
  * the energy norm; stress that turns with the body, along u; strains and rotations in the law itself, weighted by the
- * energy (U, > 0). Relative to its energy norm; plane strain only. UZ_SURELY_SMALL and more also where
- * the body, as a strip, is pressed by half of what it may buckle under. NaN: elements are not of the standard
- * formulation, the only one that large deformation has. */
+ * energy (U, > 0). Relative to its energy norm; and what the mean stress does to a strip that bends, see nonlinear.c.
+ * Plane strain only. NaN: elements are not of the standard formulation, the only one that large deformation has. */
 double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy);
 /* The strain from which on a strip as flat as the body may buckle, by Euler; plane bodies. */
 double uz_least_buckling_strain(const uz_body_model *model);
@@ -46,6 +45,8 @@ void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_sc
 
 /* Beyond the first, answers with their contacts as they are before anything moves have the second. */
 #define UZ_MOST_SLIDING 0.05
+/* Under the linear law: dofs up to which small deformation is compared with large, which takes seconds at most. */
+enum { UZ_MOST_COMPARED = 20000 };
 /* Less than this of uz_measure_nonlinear is no large deformation. */
 #define UZ_SURELY_SMALL 0.02
 #define UZ_WARN_SLIDING "sliding"

@@ -5,11 +5,12 @@
  * the one is bounded by the energy norm of H'H / 2, the other is taken along u itself; what the law adds is as much of
  * the stress as H is large.
  *
- * None of this sees a column that is pressed along its axis until it has a reason to go aside. A strip of length L and
- * thickness h does so from a strain of pi^2 / 48 (h / L)^2 on where one end is free, later if it is held better
- * (Euler). The body is taken for such a strip, of its own area along its diagonal, and for pressed by its mean stress,
- * which of a body that bends is next to none. Area in small parts along the diagonal, as of a frame, is taken for a
- * thicker strip. */
+ * All of this is in parts of the whole energy, and of a strip that is pressed or pulled along its axis that is nearly
+ * all along the axis: what its stress does to how it bends aside is not seen. It is P / P_0 of that, P_0 the load that
+ * buckles it where one end is free: a strain of pi^2 / 48 (h / L)^2 of a length L and a thickness h (Euler). The body
+ * is taken for such a strip, of its own area along its diagonal, P is its mean stress, which of a body that only bends
+ * is next to none, and what bends aside the part of the gradient that turns. From half of P_0 on it counts in any case.
+ * Area in thin parts along the diagonal, as of a frame, is taken for a thicker strip. */
 #include "post/balance.h"
 
 #include "assembly/parts.h"
@@ -17,8 +18,8 @@
 #include <math.h>
 
 typedef struct {
-    double squares, along, law; /* integrals */
-    double stress[3], modulus;  /* the same; xx, yy, xy */
+    double squares, along, law, turns, gradient; /* integrals */
+    double stress[3], modulus;                   /* the same; xx, yy, xy */
 } sums;
 
 static void add_point(sums *to, double weight, const uz_lame *lame, double H[2][2])
@@ -35,6 +36,8 @@ static void add_point(sums *to, double weight, const uz_lame *lame, double H[2][
         0.25 * weight * (lame->lambda * spread * spread + 2 * lame->mu * (Q[0] * Q[0] + Q[1] * Q[1] + 2 * Q[2] * Q[2]));
     to->along +=
         weight * (lame->lambda * trace * spread + 2 * lame->mu * (e[0] * Q[0] + e[1] * Q[1] + 2 * e[2] * Q[2]));
+    to->gradient += weight * size;
+    to->turns += 0.5 * weight * (H[1][0] - H[0][1]) * (H[1][0] - H[0][1]);
     for (int k = 0; k < 3; k++)
         to->stress[k] += weight * (2 * lame->mu * e[k] + (k < 2 ? lame->lambda * trace : 0));
     to->modulus += weight * 4 * lame->mu * (lame->lambda + lame->mu) / (lame->lambda + 2 * lame->mu);
@@ -59,11 +62,11 @@ double uz_least_buckling_strain(const uz_body_model *model)
     return 0.2 * flat * flat;
 }
 
-/* The mean stress along the axis in which it presses most, as a strain. */
-static double pressed_by(const sums *of)
+/* The mean stress along the axis in which it is most, as a strain. */
+static double mean_strain(const sums *of)
 {
     const double middle = 0.5 * (of->stress[0] + of->stress[1]), half = 0.5 * (of->stress[0] - of->stress[1]);
-    return of->modulus > 0 ? fmax(0, hypot(half, of->stress[2]) - middle) / of->modulus : 0;
+    return of->modulus > 0 ? (hypot(half, of->stress[2]) + fabs(middle)) / of->modulus : 0;
 }
 
 double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy)
@@ -88,7 +91,8 @@ double uz_measure_nonlinear(const uz_body_model *model, const double *u, double 
             add_point(&all, rule->point[g].weight * measure * element.thickness, &element.lame, H);
         }
     }
-    const double buckles = 2 * pressed_by(&all) / uz_least_buckling_strain(model); /* 1: half of what it may bear */
-    return fmax(UZ_SURELY_SMALL * buckles,
+    const double part = mean_strain(&all) / uz_least_buckling_strain(model);
+    const double aside = all.gradient > 0 ? sqrt(all.turns / all.gradient) : 0;
+    return fmax(part * fmax(2 * UZ_SURELY_SMALL, aside),
                 (sqrt(all.squares) + sqrt(all.law)) / sqrt(2 * energy) + fabs(all.along) / (2 * energy));
 }

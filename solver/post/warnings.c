@@ -163,7 +163,7 @@ static bool may_be_nonlinear(const doubts *d)
     for (int64_t k = 0; k < d->model->n_materials; k++)
         stiffest = fmax(stiffest, d->model->materials[k].lame.lambda + 2 * d->model->materials[k].lame.mu);
     const double most = sqrt(stiffest * extent * extent * d->model->thickness), least = 0.25 * UZ_SURELY_SMALL;
-    const double buckles = 0.5 * uz_least_buckling_strain(d->model);
+    const double buckles = UZ_SURELY_SMALL * uz_least_buckling_strain(d->model);
     return U > 0 && is_steep(d, 0.25 * fmin(buckles, fmin(least, sqrt(2 * least * sqrt(2 * U) / most))));
 }
 
@@ -490,7 +490,8 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     if (is_steep(&d, 0.25 * fmin(MOST_STRAIN, MOST_ROTATION)))
         look_at_elements(&d);
     d.out->nonlinear = NAN;
-    if (scene->kinematics == UZ_KINEMATICS_AUTO && scene->model == UZ_PLANE_STRAIN && uz_has_finite_model(scene))
+    if (scene->kinematics == UZ_KINEMATICS_AUTO && scene->model == UZ_PLANE_STRAIN && uz_has_finite_model(scene) &&
+        (uz_has_finite_law(scene) || model->d <= UZ_MOST_COMPARED))
         d.out->nonlinear = may_be_nonlinear(&d) ? uz_measure_nonlinear(model, result->u, d.out->strain_energy) : 0;
     look_at_mesh(&d);
     look_at_surfaces(&d);

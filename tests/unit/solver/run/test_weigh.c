@@ -98,11 +98,14 @@ static double error_of(const uz_result *small, const uz_result *large)
         all += pow(large->u[i] - mean[i % 2], 2);
     }
     const uz_evaluation *a = small->evaluation, *b = large->evaluation;
-    for (int c = 0; c < 2; c++)
+    for (int c = 0; c < 2; c++) {
         for (int64_t k = 0; k < a->n_supports; k++) {
             force = fmax(force, fabs(a->supports[k].force[c] - b->supports[k].force[c]));
             most = fmax(most, fabs(b->supports[k].force[c]));
         }
+        for (int64_t k = 0; k < a->n_contacts; k++)
+            most = fmax(most, fabs(b->contacts[k].force[c]));
+    }
     return fmax(sqrt(off / all), 0.7 * force / most); /* of one component: at least as much of the whole */
 }
 
@@ -173,6 +176,68 @@ TEST(a_linear_law_is_not_replaced)
             uz_result_free(finite);
             uz_scene_clear(&s);
         }
+}
+
+/* A block or a strip on a plane or a circle, pushed or pulled by `size`. */
+static uz_scene random_scene(uint64_t seed, double size)
+{
+    static const char *const ELEMENTS[] = {"quad4", "quad8", "tri3", "tri6"};
+    qp_random rng = {seed};
+    const double length = 1 + 9 * random_unit(&rng) * random_unit(&rng);
+    const int64_t cells = 1 + (int64_t)(2 * random_unit(&rng));
+    uz_scene s = block(ELEMENTS[(int)(4 * random_unit(&rng))], length, 1, (int64_t)(2 * (double)cells * length), cells);
+    s.materials[0].poisson = 0.38 * random_unit(&rng);
+    uz_contact *c = body_plane(&s, "bottom", (double[3]){0, 0, 0}, (double[3]){0.4 * random_signed(&rng), 1, 0});
+    if (random_unit(&rng) < 0.5) {
+        c->kind = UZ_OBSTACLE_ROUND;
+        c->radius = length * (0.2 + random_unit(&rng));
+        c->point[0] = length * random_unit(&rng);
+        c->point[1] = -c->radius;
+    } else if (c->normal[0] < 0) {
+        c->point[0] = length; /* it touches a corner */
+    }
+    if (random_unit(&rng) < 0.5) {
+        body_hold(&s, "top", size * random_signed(&rng), -size * random_unit(&rng), NAN);
+    } else {
+        body_hold(&s, "left", 0, 0, NAN);
+        body_load(&s, UZ_LOAD_TRACTION, random_unit(&rng) < 0.5 ? "top" : "right", size * random_signed(&rng),
+                  size * random_signed(&rng) / length, 0);
+    }
+    return s;
+}
+
+/* Whatever is called small enough is, also where nothing was compared. */
+TEST(small_deformation_is_enough_where_it_is_the_answer)
+{
+    enum { SCENES = 15, LOADS = 4 };
+    int small = 0, surely = 0, large = 0;
+    double worst = 0;
+    for (int k = 0; k < SCENES * LOADS; k++) {
+        uz_scene s = random_scene((uint64_t)(k / LOADS + 1), 0.3 * pow(0.2, k % LOADS));
+        uz_result *chosen = solve_as(&s, UZ_KINEMATICS_AUTO, UZ_ELASTIC_NEO_HOOKE);
+        const uz_summary *sum = &chosen->summary;
+        if (sum->geometry.kind == UZ_KINEMATICS_FIXED && sum->outcome == UZ_CONVERGED) {
+            uz_result *finite = solve_as(&s, UZ_KINEMATICS_FINITE, UZ_ELASTIC_NEO_HOOKE);
+            const double error =
+                finite->evaluation->strain_energy > 1e-15 ? error_of(chosen, finite) : 0; /* or rounding */
+            CHECK_MSG(finite->summary.outcome != UZ_CONVERGED || error < TOLERABLE, "scene %d, load %d: %g (%d)",
+                      k / LOADS, k % LOADS, error, sum->small.compared);
+            CHECK_MSG(finite->summary.outcome == UZ_CONVERGED || finite->summary.outcome == UZ_PRECISION_LIMIT ||
+                          finite->summary.outcome == UZ_MESH_LIMIT,
+                      "scene %d, load %d: %s", k / LOADS, k % LOADS, finite->summary.message);
+            small++;
+            surely += !sum->small.compared;
+            worst = sum->small.compared || finite->summary.outcome != UZ_CONVERGED ? worst : fmax(worst, error);
+            uz_result_free(finite);
+        } else {
+            CHECK(sum->outcome != UZ_CONVERGED || sum->small.error > TOLERABLE);
+            large++;
+        }
+        uz_result_free(chosen);
+        uz_scene_clear(&s);
+    }
+    printf("# %d small, %d of them surely and by at most %.2g, %d large\n", small, surely, worst, large);
+    CHECK(small > surely && surely > 0 && large > 0);
 }
 
 /* More than a block of St. Venant and Kirchhoff's law bears: one element, which can do nothing else. */
