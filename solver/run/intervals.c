@@ -22,10 +22,11 @@
 
 enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 5 };
 
-/* Shares are looked for by steps of this factor, not beside those that were tried by less than the second one, and as
- * long as an interval is expected that is narrower than the narrowest so far by the third one. By what is more than the
- * last one |d| falls no more. */
+/* Shares are looked for by steps of this factor, to one that suits the last by no more than FAR, not beside those that
+ * were tried by less than BESIDE, and as long as an interval is expected that is narrower than WORTH of the narrowest
+ * so far. By what is more than LEVEL |d| falls no more. */
 #define STEP   2.5
+#define FAR    1000.0
 #define BESIDE 1.15
 #define WORTH  0.97
 #define LEVEL  0.98
@@ -665,28 +666,37 @@ static double expect_apart(const attempts *a, double share)
 
 /* The share to try next, 0: none that is expected to be worth it. ball: sqrt(H). A pair that suits a share suits larger
  * ones, so |d| gets smaller with a larger one, by leaps where what the answer presses with has to be in balance with
- * much else. Without an interval yet a larger one is tried once. */
+ * much else. */
 static double next_share(const attempts *a, double last, double ball)
 {
     enum { STEPS = 48 };
-    double best = INFINITY, least = INFINITY, next = 0;
-    for (int k = 0; k < a->n; k++)
-        best = fmin(best, a->half[k]);
+    double best, least = INFINITY, next = 0;
+    int at = 0;
+    for (int k = 1; k < a->n; k++)
+        at = a->half[k] < a->half[at] ? k : at;
+    best = a->half[at];
     if (a->n == MOST_SHARES || !(ball > 0) || !(a->apart[0] > 0) || !(a->apart[a->n - 1] > 0))
         return 0;
     if (a->n == 1) {
-        const double suits = a->apart[0] / (2 * ball);
+        const double suits = fmin(FAR * last, fmax(last / FAR, a->apart[0] / (2 * ball)));
         return fabs(suits - last) > 0.2 * last ? suits : STEP * last;
     }
     if (!isfinite(best))
-        return a->n == 2 ? STEP * a->share[1] : 0;
-    const double low = a->share[0] / STEP, high = a->share[a->n - 1] * STEP;
+        return a->share[0] / STEP;
+    const double *first = a->share, *end = a->share + a->n - 1;
+    const double low = fmin(*first / STEP, fmax(*first / FAR, a->apart[0] / (2 * ball))),
+                 high = fmax(*end * STEP, fmin(*end * FAR, a->apart[a->n - 1] / (2 * ball)));
+    if (at == a->n - 1 && high > *end * STEP) /* what it suits is no wider by it, and may be narrower */
+        return high;
+    if (a->n == 2 && at == 0 && last >= STEP * *first && a->apart[1] > LEVEL * a->apart[0]) /* |d| is not the least */
+        return *first / STEP;
     for (int i = 0; i <= STEPS; i++) {
         const double m = low * pow(high / low, (double)i / STEPS), A = expect_apart(a, m);
         const double half = 2 * m * ball <= A ? A * ball : m * ball * ball + A * A / (4 * m);
         bool fresh = half < least;
-        for (int k = 0; k < a->n && fresh; k++) /* below one that is no pair there is none */
-            fresh = fmax(m, a->share[k]) > BESIDE * fmin(m, a->share[k]) && (isfinite(a->half[k]) || m > a->share[k]);
+        for (int k = 0; k < a->n && fresh; k++) /* what is no pair is not gone beyond */
+            fresh = fmax(m, a->share[k]) > BESIDE * fmin(m, a->share[k]) &&
+                    (isfinite(a->half[k]) || (m > a->share[k]) == (a->share[at] > a->share[k]));
         least = fresh ? half : least;
         next = fresh ? m : next;
     }
