@@ -12,6 +12,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "post/functional.h"
+#include "run/interval_share.h"
 #include "run/setup_cache.h"
 #include "semicoercive/augment.h"
 
@@ -20,16 +21,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_STEPS = 40, MOST_SHARES = 7, MOST_LIFTS = 5 };
-
-/* Shares are looked for by steps of this factor, to one that suits the last by no more than FAR, not beside those that
- * were tried by less than BESIDE, and as long as an interval is expected that is narrower than WORTH of the narrowest
- * so far. By what is more than LEVEL |d| falls no more. */
-#define STEP   2.5
-#define FAR    1000.0
-#define BESIDE 1.15
-#define WORTH  0.97
-#define LEVEL  0.98
+enum { MOST_STEPS = 40, MOST_LIFTS = 5 };
 
 /* What takes an answer out of an obstacle goes a little farther than it stands in there, at points. */
 #define DEEPER 1.02
@@ -632,77 +624,6 @@ static uz_status weigh(proving *v, uz_quantity_found *out, uz_error *err)
     return status;
 }
 
-/* Shares that were tried, ascending: |d| of their pairs, and half the intervals, INFINITY where there is none. */
-typedef struct {
-    int n;
-    double share[MOST_SHARES], apart[MOST_SHARES], half[MOST_SHARES];
-} attempts;
-
-static void add_attempt(attempts *a, double share, double apart, double half)
-{
-    int at = a->n++;
-    for (; at > 0 && a->share[at - 1] > share; at--) {
-        a->share[at] = a->share[at - 1];
-        a->apart[at] = a->apart[at - 1];
-        a->half[at] = a->half[at - 1];
-    }
-    a->share[at] = share;
-    a->apart[at] = apart;
-    a->half[at] = half;
-}
-
-/* |d| of a share: between those that were tried it falls, and beyond as beside them, as a power; or by a leap, in the
- * middle, before shares where it falls no more. */
-static double expect_apart(const attempts *a, double share)
-{
-    int k = 1;
-    while (k < a->n - 1 && a->share[k] < share)
-        k++;
-    const double *A = a->apart + k, *m = a->share + k;
-    if (k < a->n - 1 && A[1] > LEVEL * A[0] && share < m[0])
-        return share * share >= m[-1] * m[0] ? A[0] : A[-1];
-    return A[-1] * exp(fmin(0, log(A[0] / A[-1])) * log(share / m[-1]) / log(m[0] / m[-1]));
-}
-
-/* The share to try next, 0: none that is expected to be worth it. ball: sqrt(H). A pair that suits a share suits larger
- * ones, so |d| gets smaller with a larger one, by leaps where what the answer presses with has to be in balance with
- * much else. */
-static double next_share(const attempts *a, double last, double ball)
-{
-    enum { STEPS = 48 };
-    double best, least = INFINITY, next = 0;
-    int at = 0;
-    for (int k = 1; k < a->n; k++)
-        at = a->half[k] < a->half[at] ? k : at;
-    best = a->half[at];
-    if (a->n == MOST_SHARES || !(ball > 0) || !(a->apart[0] > 0) || !(a->apart[a->n - 1] > 0))
-        return 0;
-    if (a->n == 1) {
-        const double suits = fmin(FAR * last, fmax(last / FAR, a->apart[0] / (2 * ball)));
-        return fabs(suits - last) > 0.2 * last ? suits : STEP * last;
-    }
-    if (!isfinite(best))
-        return a->share[0] / STEP;
-    const double *first = a->share, *end = a->share + a->n - 1;
-    const double low = fmin(*first / STEP, fmax(*first / FAR, a->apart[0] / (2 * ball))),
-                 high = fmax(*end * STEP, fmin(*end * FAR, a->apart[a->n - 1] / (2 * ball)));
-    if (at == a->n - 1 && high > *end * STEP) /* what it suits is no wider by it, and may be narrower */
-        return high;
-    if (a->n == 2 && at == 0 && last >= STEP * *first && a->apart[1] > LEVEL * a->apart[0]) /* |d| is not the least */
-        return *first / STEP;
-    for (int i = 0; i <= STEPS; i++) {
-        const double m = low * pow(high / low, (double)i / STEPS), A = expect_apart(a, m);
-        const double half = 2 * m * ball <= A ? A * ball : m * ball * ball + A * A / (4 * m);
-        bool fresh = half < least;
-        for (int k = 0; k < a->n && fresh; k++) /* what is no pair is not gone beyond */
-            fresh = fmax(m, a->share[k]) > BESIDE * fmin(m, a->share[k]) &&
-                    (isfinite(a->half[k]) || (m > a->share[k]) == (a->share[at] > a->share[k]));
-        least = fresh ? half : least;
-        next = fresh ? m : next;
-    }
-    return least < WORTH * best ? next : 0;
-}
-
 static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity *quantity, const uz_functional *of,
                            uz_error *err)
 {
@@ -744,7 +665,7 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
     }
     take_displacement(v, of);
     status = uz_bound_apart(&apart, &(uz_bound_pair){&v->adjoint, v->w, v->stress, v->wanted, 1}, err);
-    attempts tried = {.n = 0};
+    uz_attempts tried = {.n = 0};
     double share = apart > 0 && v->ball > 0 ? apart / (2 * v->ball) : 1;
     v->best = INFINITY;
     while (share > 0 && status == UZ_OK && solved) {
@@ -758,8 +679,8 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
             break;
         take_displacement(v, of);
         status = look_at_pair(v, out, &half, &apart, share, err);
-        add_attempt(&tried, share, apart, half);
-        share = primal->m == 0 ? 0 : next_share(&tried, share, v->ball);
+        uz_attempts_add(&tried, share, apart, half);
+        share = primal->m == 0 ? 0 : uz_attempts_next(&tried, share, v->ball);
     }
     return status == UZ_OK && isfinite(v->best) ? weigh(v, out, err) : status;
 }
