@@ -1,6 +1,7 @@
 /* uzawa: the command line client of the contact solver service. It speaks HTTP and nothing else. */
 #include "commands/run.h"
 #include "request/build.h"
+#include "session/find_job.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -42,7 +43,7 @@ static client_exit complain_usage(const char *message, client_command command)
     return CLIENT_USAGE;
 }
 
-static client_exit run_command(const client_options *options)
+static client_exit run_command(client_options *options)
 {
     char message[256];
     if (options->version || options->command == CLIENT_VERSION) {
@@ -72,7 +73,10 @@ static client_exit run_command(const client_options *options)
         client_http_open(options->server, getenv("UZAWA_TOKEN"), getenv("UZAWA_CA"), message, sizeof message);
     if (!session.http)
         return complain_usage(message, options->command);
-    client_exit code = RUN[options->command](&session);
+    client_found_jobs found;
+    client_exit code = client_find_jobs(&session, options, &found);
+    if (code == CLIENT_OK)
+        code = RUN[options->command](&session);
     client_suites_clear(&session.suites);
     client_http_close(session.http);
     return code;

@@ -36,6 +36,7 @@ void client_help_print(FILE *to, client_command command)
               to);
         for (int i = 0; i < CLIENT_COMMANDS; i++)
             fprintf(to, "  %-9s %s\n", CLIENT_PAGES[i].name, CLIENT_PAGES[i].about);
+        fputs("\nAn ID may be cut to four digits and more that it begins or ends with; @last is the newest job.\n", to);
         print_options(to, CLIENT_COMMANDS, true);
         fputs("\nExit status:\n", to);
         for (const client_exit_line *line = CLIENT_EXITS; line->about; line++) {

@@ -143,6 +143,8 @@ void client_manual_print(FILE *to)
           "Every answer carries a certified bound on its error;\n"
           "the exit status says whether it meets what was asked for.\n"
           "Options may stand before or after the command and its operand;\n.Fl \\-\nends them.\n"
+          "An\n.Ar ID\nmay be cut to four digits and more that it begins or ends with,\n"
+          "where only one of the newest 2000 jobs fits;\n.Cm @last\nis the newest job.\n"
           ".Pp\nThese hold for all commands that talk to the service:\n",
           to);
     print_options(to, CLIENT_COMMANDS, true);

@@ -17,7 +17,8 @@ client_exit client_list(client_session *s)
     /* Up to `limit` jobs in as many pages as that takes. */
     char cursor[256] = "";
     client_exit code = CLIENT_OK;
-    while (code == CLIENT_OK && (long)json_array_size(jobs) < o->limit) {
+    bool last = false;
+    while (code == CLIENT_OK && !last && (long)json_array_size(jobs) < o->limit) {
         json_t *page = NULL;
         char start[64];
         client_buffer path = {0};
@@ -35,10 +36,8 @@ client_exit client_list(client_session *s)
         if (code == CLIENT_OK && (!json_is_array(more) || json_array_extend(jobs, more) != 0))
             code = client_complain(s, CLIENT_SERVER_ERROR, "the reply is no list of jobs");
         snprintf(cursor, sizeof cursor, "%s", client_json_text(page, "next"));
-        bool last = !*cursor || json_array_size(more) == 0;
+        last = !*cursor || json_array_size(more) == 0;
         json_decref(page);
-        if (last)
-            break;
     }
     if (code == CLIENT_OK && s->options->json)
         code = client_print_json(s, jobs);
@@ -58,6 +57,8 @@ client_exit client_list(client_session *s)
             client_print_tags(s->out, job, ",");
             fputc('\n', s->out);
         }
+        if (!last)
+            fprintf(s->err, "the newest %d: --limit shows more\n", o->limit);
     }
     json_decref(jobs);
     return code;

@@ -41,6 +41,27 @@ def table(server, job, *words):
     return list(csv.DictReader(io.StringIO(run(server, "result", job, "--format", "csv", *words).stdout)))
 
 
+# ------------------------------------------------------- jobs by short names
+
+def test_jobs_by_less_than_their_id(server):
+    check("no job yet" in run(server, "status", "@last", code=4).stderr)
+    jobs = [solved(server, SPRINGS) for _ in range(3)]
+    for word, job in (("@last", jobs[2]), (jobs[0][-8:], jobs[0]), (jobs[1][-12:], jobs[1]), (jobs[1], jobs[1])):
+        check(json.loads(run(server, "status", word, "--json").stdout)["id"] == job, word, job)
+    begins = os.path.commonprefix(jobs)
+    first = next(n for n in range(len(begins) + 1, 33) if sum(job.startswith(jobs[0][:n]) for job in jobs) == 1)
+    check(json.loads(run(server, "status", jobs[0][:max(first, 4)], "--json").stdout)["id"] == jobs[0])
+    check("of several jobs" in run(server, "status", begins[:4], code=2).stderr)
+    check("begins or ends with ffffffff" in run(server, "status", "ffffffff", code=4).stderr)
+    check("3 digits" not in run(server, "status", "abc", code=4).stderr)  # too short to be looked for: the service refuses it
+    run(server, "wait", "@last", "--baseline", jobs[0][-10:])
+    run(server, "delete", jobs[2][-8:])
+    check(json.loads(run(server, "status", "@last", "--json").stdout)["id"] == jobs[1])
+    short = run(server, "list", "--limit", "1")
+    check("--limit shows more" in short.stderr and short.stdout.count(jobs[1]) == 1, short)
+    check(run(server, "list").stderr == "", "nothing was cut")
+
+
 # ------------------------------------------------- requests and reports
 
 class Page(html.parser.HTMLParser):
