@@ -37,57 +37,93 @@ typedef struct {
 
 /* ---- elements */
 
-static void add_point(long double *force, double *ke, long double weight, double grad[UZ_ELEMENT_NODES][3], int nodes,
-                      const uz_piola *at)
+/* A point of an element: around is N / r of rings, else 0. */
+typedef struct {
+    double grad[UZ_ELEMENT_NODES][3], around[UZ_ELEMENT_NODES];
+    long double F[5]; /* in the plane by rows, then across it */
+    int nodes;
+    bool ring;
+} point_at;
+
+static void add_point(long double *force, double *ke, long double weight, const point_at *x, const uz_piola *at)
 {
-    for (int a = 0; a < nodes; a++)
+    for (int a = 0; a < x->nodes; a++)
         for (int i = 0; i < 2; i++) {
-            force[2 * a + i] += weight * (at->P[2 * i] * grad[a][0] + at->P[2 * i + 1] * grad[a][1]);
-            for (int b = 0; b < nodes; b++)
+            force[2 * a + i] += weight * (at->P[2 * i] * x->grad[a][0] + at->P[2 * i + 1] * x->grad[a][1]);
+            for (int b = 0; b < x->nodes; b++)
                 for (int k = 0; k < 2; k++) {
                     long double sum = 0;
                     for (int J = 0; J < 2; J++)
                         for (int L = 0; L < 2; L++)
-                            sum += at->A[2 * i + J][2 * k + L] * grad[a][J] * grad[b][L];
-                    ke[(2 * a + i) * 2 * nodes + 2 * b + k] += (double)(weight * sum);
+                            sum += at->A[2 * i + J][2 * k + L] * x->grad[a][J] * x->grad[b][L];
+                    ke[(2 * a + i) * 2 * x->nodes + 2 * b + k] += (double)(weight * sum);
                 }
         }
 }
 
-static long double gradient(long double F[4], double grad[UZ_ELEMENT_NODES][3], int nodes, const double *u)
+/* What the stretch around a ring adds: to forces along the radius, and to the tangent with all others. */
+static void add_hoop(long double *force, double *ke, long double weight, const point_at *x, const uz_piola *at)
 {
-    for (int i = 0; i < 4; i++) {
-        F[i] = i % 3 == 0;
-        for (int a = 0; a < nodes; a++)
-            F[i] += ((long double)u[2 * a + i / 2] - u[i / 2]) * grad[a][i % 2];
+    const int n = 2 * x->nodes;
+    for (int a = 0; a < x->nodes; a++) {
+        force[2 * a] += weight * at->P[4] * x->around[a];
+        for (int b = 0; b < x->nodes; b++) {
+            ke[2 * a * n + 2 * b] += (double)(weight * at->A[4][4] * x->around[a] * x->around[b]);
+            for (int k = 0; k < 2; k++) {
+                const double with = (double)(weight * x->around[a] *
+                                             (at->A[4][2 * k] * x->grad[b][0] + at->A[4][2 * k + 1] * x->grad[b][1]));
+                ke[2 * a * n + 2 * b + k] += with;
+                ke[(2 * b + k) * n + 2 * a] += with;
+            }
+        }
     }
-    return F[0] * F[3] - F[1] * F[2];
+}
+
+/* Returns the least of what must be positive: the determinant in the plane, and the stretch across it. */
+static long double deform(point_at *x, double *measure, const uz_element *element, const double *u,
+                          const double local[3])
+{
+    x->nodes = uz_element_node_count(element->kind);
+    x->ring = element->model == UZ_AXISYMMETRIC;
+    *measure = uz_element_gradients(x->grad, element, local);
+    *measure *= uz_element_around(x->around, element, x->grad, local);
+    for (int i = 0; i < 4; i++) {
+        x->F[i] = i % 3 == 0;
+        for (int a = 0; a < x->nodes; a++)
+            x->F[i] += ((long double)u[2 * a + i / 2] - u[i / 2]) * x->grad[a][i % 2];
+    }
+    x->F[4] = 1;
+    for (int a = 0; a < x->nodes && x->ring; a++)
+        x->F[4] += (long double)u[2 * a] * x->around[a];
+    const long double plane = x->F[0] * x->F[3] - x->F[1] * x->F[2];
+    return x->F[4] > 0 ? plane * x->F[4] : -fabsl(plane * x->F[4]);
 }
 
 /* What the energy is compared with: that of a strain of 1, where displacements and F are as large as they are; and the
  * energy of small strain, rotations apart, as that of the law is lost in its own terms where strains are tiny. */
-static void add_unit(work *w, long double weight, const uz_lame *lame, double grad[UZ_ELEMENT_NODES][3], int nodes,
-                     const double *u, const long double F[4])
+static void add_unit(work *w, long double weight, const uz_lame *lame, const point_at *x, const double *u)
 {
-    const long double H[4] = {F[0] - 1, F[1], F[2], F[3] - 1};
-    const long double E[3] = {H[0] + (H[0] * H[0] + H[2] * H[2]) / 2, H[3] + (H[1] * H[1] + H[3] * H[3]) / 2,
-                              (H[1] + H[2] + H[0] * H[1] + H[2] * H[3]) / 2};
-    const long double trace = E[0] + E[1];
+    const long double *F = x->F, H[4] = {F[0] - 1, F[1], F[2], F[3] - 1}, z = F[4] - 1;
+    const long double E[4] = {H[0] + (H[0] * H[0] + H[2] * H[2]) / 2, H[3] + (H[1] * H[1] + H[3] * H[3]) / 2,
+                              (H[1] + H[2] + H[0] * H[1] + H[2] * H[3]) / 2, z + z * z / 2};
+    const long double trace = E[0] + E[1] + E[3];
     double turn = 0;
-    for (int a = 0; a < nodes; a++)
-        turn = fmax(turn, hypot(u[2 * a], u[2 * a + 1]) * hypot(grad[a][0], grad[a][1]));
+    for (int a = 0; a < x->nodes; a++)
+        turn = fmax(turn, hypot(u[2 * a], u[2 * a + 1]) * hypot(x->grad[a][0], x->grad[a][1]));
     w->unit += weight * (lame->lambda + 2 * lame->mu) *
-               ((F[0] * F[0] + F[1] * F[1] + F[2] * F[2] + F[3] * F[3]) / 2 + (long double)turn * turn);
-    w->small += weight * (lame->lambda * trace * trace / 2 + lame->mu * (E[0] * E[0] + E[1] * E[1] + 2 * E[2] * E[2]));
+               ((F[0] * F[0] + F[1] * F[1] + F[2] * F[2] + F[3] * F[3] + (x->ring ? F[4] * F[4] : 0)) / 2 +
+                (long double)turn * turn);
+    w->small += weight * (lame->lambda * trace * trace / 2 +
+                          lame->mu * (E[0] * E[0] + E[1] * E[1] + 2 * E[2] * E[2] + E[3] * E[3]));
 }
 
 static void add_element(uz_finite_certificate *out, work *w, int64_t e)
 {
     const uz_body_model *model = w->of->model;
-    double xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS] = {0};
-    double grad[UZ_ELEMENT_NODES][3];
-    long double force[2 * UZ_ELEMENT_NODES] = {0}, F[4];
+    double xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS] = {0}, measure;
+    long double force[2 * UZ_ELEMENT_NODES] = {0};
     uz_element element;
+    point_at x;
     uz_piola at;
     int nodes;
     const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
@@ -96,21 +132,20 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
     for (int i = 0; i < 2 * nodes; i++)
         u[i] = w->of->u[2 * node[i / 2] + i % 2];
-    for (int a = 0; a < type->corners; a++) {
-        uz_element_gradients(grad, &element, type->local[a]);
-        out->least_det = fmin(out->least_det, (double)gradient(F, grad, nodes, u));
-    }
+    for (int a = 0; a < type->corners; a++)
+        out->least_det = fmin(out->least_det, (double)deform(&x, &measure, &element, u, type->local[a]));
     for (int g = 0; g < rule->count; g++) {
-        const double measure = uz_element_gradients(grad, &element, rule->point[g].at);
-        const long double det = gradient(F, grad, nodes, u);
-        const long double weight = (long double)rule->point[g].weight * measure * element.thickness;
+        const long double det = deform(&x, &measure, &element, u, rule->point[g].at);
+        const long double weight = (long double)rule->point[g].weight * measure;
         out->least_det = isnan(det) ? -INFINITY : fmin(out->least_det, (double)det);
         if (!(det > 0))
             continue;
-        uz_piola_at(&at, uz_element_material(model, e)->law, element.lame.lambda, element.lame.mu, F);
+        uz_piola_at(&at, uz_element_material(model, e)->law, element.lame.lambda, element.lame.mu, x.F);
         w->energy += weight * at.W;
-        add_unit(w, weight, &element.lame, grad, nodes, u, F);
-        add_point(force, ke, weight, grad, nodes, &at);
+        add_unit(w, weight, &element.lame, &x, u);
+        add_point(force, ke, weight, &x, &at);
+        if (x.ring)
+            add_hoop(force, ke, weight, &x, &at);
     }
     for (int i = 0; i < 2 * nodes; i++)
         w->force[2 * node[i / 2] + i % 2] += force[i];

@@ -5,11 +5,12 @@
 
 #include "uzawa.h"
 
-/* In plane strain, F of size 2 with determinant J > 0: W, P = dW/dF, and A[iJ][kL] = dP_iJ / dF_kL, with iJ = 2 i + J.
- * Source: Ogden, "Non-linear Elastic Deformations", ch. 4 and 6. */
+/* Of plane strain and of rings, F in the plane by rows with a positive determinant, then the stretch across it (F[4] >
+ * 0; 1 in plane strain): W, P = dW/dF, and A[i][k] = dP_i / dF_k. Source: Ogden, "Non-linear Elastic Deformations", ch.
+ * 4 and 6. */
 typedef struct {
-    long double W, P[4], A[4][4];
+    long double W, P[5], A[5][5];
 } uz_piola;
-void uz_piola_at(uz_piola *out, uz_elasticity law, long double lambda, long double mu, const long double F[4]);
+void uz_piola_at(uz_piola *out, uz_elasticity law, long double lambda, long double mu, const long double F[5]);
 
 #endif

@@ -101,6 +101,21 @@ double uz_ring_radius(double *largest, const uz_element *element, const double *
     return radius;
 }
 
+double uz_element_around(double around[UZ_ELEMENT_NODES], const uz_element *element, double grad[UZ_ELEMENT_NODES][3],
+                         const double point[3])
+{
+    const int nodes = uz_element_node_count(element->kind);
+    double N[UZ_ELEMENT_NODES], largest;
+    memset(around, 0, (size_t)nodes * sizeof *around);
+    if (element->model != UZ_AXISYMMETRIC)
+        return element->thickness;
+    uz_element_shape(N, element->kind, point);
+    const double radius = uz_ring_radius(&largest, element, N);
+    for (int a = 0; a < nodes; a++)
+        around[a] = radius > UZ_AXIS * largest ? N[a] / radius : grad[a][0];
+    return 2 * PI * radius;
+}
+
 void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g)
 {
     double largest;

@@ -41,24 +41,25 @@ static coefficients of_law(uz_elasticity law, double lambda, double mu, double J
 bool uz_hyperelastic(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE_STRAINS][UZ_FINITE_STRAINS],
                      uz_elasticity law, double lambda, double mu, const double C[UZ_FINITE_STRAINS])
 {
-    static const double I[UZ_FINITE_STRAINS] = {1, 1, 0};
-    static const int AXIS[UZ_FINITE_STRAINS][2] = {{0, 0}, {1, 1}, {0, 1}};
-    const double det = C[0] * C[1] - C[2] * C[2];
-    if (!(det > 0))
+    static const double I[UZ_FINITE_STRAINS] = {1, 1, 1, 0};
+    static const int AXIS[UZ_FINITE_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}};
+    const double det = C[0] * C[1] - C[3] * C[3]; /* in the plane */
+    if (!(det > 0 && C[2] > 0))
         return false;
     if (law == UZ_ELASTIC_ST_VENANT_KIRCHHOFF) {
-        const double E[UZ_FINITE_STRAINS] = {0.5 * (C[0] - 1), 0.5 * (C[1] - 1), 0.5 * C[2]}, sum = E[0] + E[1];
-        *W = 0.5 * lambda * sum * sum + mu * (E[0] * E[0] + E[1] * E[1] + 2 * E[2] * E[2]);
+        const double E[UZ_FINITE_STRAINS] = {0.5 * (C[0] - 1), 0.5 * (C[1] - 1), 0.5 * (C[2] - 1), 0.5 * C[3]};
+        const double sum = E[0] + E[1] + E[2];
+        *W = 0.5 * lambda * sum * sum + mu * (E[0] * E[0] + E[1] * E[1] + E[2] * E[2] + 2 * E[3] * E[3]);
         for (int i = 0; i < UZ_FINITE_STRAINS; i++) {
             S[i] = lambda * sum * I[i] + 2 * mu * E[i];
             for (int j = 0; j < UZ_FINITE_STRAINS; j++)
-                D[i][j] = lambda * I[i] * I[j] + (i != j ? 0 : i == 2 ? mu : 2 * mu);
+                D[i][j] = lambda * I[i] * I[j] + (i != j ? 0 : i == 3 ? mu : 2 * mu);
         }
         return true;
     }
-    const double B[UZ_FINITE_STRAINS] = {C[1] / det, C[0] / det, -C[2] / det};
-    const double full[2][2] = {{B[0], B[2]}, {B[2], B[1]}};
-    const coefficients k = of_law(law, lambda, mu, sqrt(det), C[0] + C[1] + 1);
+    const double B[UZ_FINITE_STRAINS] = {C[1] / det, C[0] / det, 1 / C[2], -C[3] / det};
+    const double full[3][3] = {{B[0], B[3], 0}, {B[3], B[1], 0}, {0, 0, B[2]}};
+    const coefficients k = of_law(law, lambda, mu, sqrt(det * C[2]), C[0] + C[1] + C[2]);
     *W = k.W;
     for (int i = 0; i < UZ_FINITE_STRAINS; i++) {
         S[i] = k.a * I[i] + k.b * B[i];
@@ -69,12 +70,4 @@ bool uz_hyperelastic(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE_
         }
     }
     return true;
-}
-
-double uz_hyperelastic_across(uz_elasticity law, double lambda, double mu, const double C[UZ_FINITE_STRAINS])
-{
-    if (law == UZ_ELASTIC_ST_VENANT_KIRCHHOFF)
-        return 0.5 * lambda * (C[0] + C[1] - 2);
-    const coefficients k = of_law(law, lambda, mu, sqrt(C[0] * C[1] - C[2] * C[2]), C[0] + C[1] + 1);
-    return k.a + k.b; /* B_zz = 1 */
 }

@@ -53,9 +53,14 @@ static uz_status check_laws(const uz_scene *scene, uz_error *err)
 static uz_status check_body(const uz_scene *scene, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
-    if (scene->model != UZ_PLANE_STRAIN)
+    if (scene->model == UZ_AXISYMMETRIC && scene->kinematics != UZ_KINEMATICS_FINITE) /* weigh.c has no measure of it */
+        return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
+                       "whether small deformation is enough is told of plane_strain only; for a body of revolution of "
+                       "such a law use the kinematics \"finite\"");
+    if (scene->model != UZ_PLANE_STRAIN && scene->model != UZ_AXISYMMETRIC)
         return uz_fail(err, UZ_ERR_SCENE, "/model",
-                       "finite kinematics are there for plane_strain only; use that, or the kinematics \"moving\"");
+                       "finite kinematics are there for plane_strain and axisymmetric only; use one of these, or the "
+                       "kinematics \"moving\"");
     if (scene->formulation != UZ_FORMULATION_AUTO && scene->formulation != UZ_FORMULATION_STANDARD)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                        "finite kinematics have the standard formulation only; use auto, and quad8 or tri6 for bending "

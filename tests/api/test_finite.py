@@ -124,12 +124,27 @@ def test_auto_takes_the_model_that_the_deformation_needs(s):
     check(refused.status in (400, 422) and refused.json["pointer"] == "/problem/kinematics", refused)
 
 
+def test_a_ring_over_a_rod(s):
+    """A tube from 1 to 2 over a rigid rod of radius 1.5: pressure, hoop stress at the bore and outer radius by quadrature."""
+    ring = block(model="axisymmetric", mesh={"box": {"origin": [1, 0], "size": [1, 0.25], "cells": [16, 4], "element": "quad8"}},
+                 supports=[{"on": "bottom", "uy": 0}, {"on": "top", "uy": 0}],
+                 contacts=[{"on": "left", "obstacle": {"plane": {"point": [1.5, 0], "normal": [1, 0]}}}])
+    _, found = answer(s, ring, "summary,displacements,pressure,stress,nodes")
+    summary = found["summary"]
+    check(summary["outcome"] == "converged" and summary["finite"]["qps"] <= 6 and summary["resultants"]["imbalance"] < 1e-9, summary)
+    check(all(abs(p / 0.15335612 - 1) < 2e-4 for p in found["pressure"]), found["pressure"])
+    bore = found["nodes"].index([1, 0])
+    check(abs(found["stress"][bore][2] / 0.48507586 - 1) < 2e-3, found["stress"][bore])
+    check(abs(2 + found["displacements"][found["nodes"].index([2, 0])][0] - 2.34524417) < 1e-6, found["displacements"][-1])
+
+
 def test_what_is_not_modelled_is_refused(s):
     asked = [(block("linear"), "/problem/materials/0/law", "neo_hooke_isochoric"),
              (block(kinematics="moving"), "/problem/materials/0/law", "\"auto\" or \"finite\""),
              (block(kinematics="auto", model="plane_stress"), "/problem/model", "plane_strain"),
              ({**block(kinematics="auto"), "quantities": [{"quantity": "contact.force"}]}, "/quantities", "compare meshes"),
              (block(model="plane_stress"), "/problem/model", "plane_strain"),
+             (block(kinematics="auto", model="axisymmetric"), "/problem/kinematics", "\"finite\""),
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
              (block(loads=[{"on": "right", "pressure": 1}]), "/problem/loads/0/pressure", "traction"),
              (block(supports=[{"on": "left", "ux": 0}, {"on": "top", "spring": [1, 1]}]), "/problem/supports/1/spring", "prescribe"),
