@@ -296,9 +296,9 @@ static void print_resultants(FILE *to, const json_t *summary)
             client_print_safe(to, client_json_text(one, "on"));
             print_vector(to, " ", client_json_at(one, "force"));
             if (k == 0 && isfinite(client_json_number(one, "mean_pressure"))) {
-                fprintf(to, ", pressure %s in the mean,", number_in_words(text, one, "mean_pressure", 6));
-                fprintf(to, " %s at most,", number_in_words(text, one, "max_pressure", 6));
-                fprintf(to, " on %s around", number_in_words(text, one, "area", 6));
+                fprintf(to, "\n%14spressure %s on average, ", "", number_in_words(text, one, "mean_pressure", 5));
+                fprintf(to, "%s at most, ", number_in_words(text, one, "max_pressure", 5));
+                fprintf(to, "on %s around", number_in_words(text, one, "area", 5));
                 print_vector(to, " ", client_json_at(one, "center"));
             }
             fputc('\n', to);
