@@ -159,10 +159,15 @@ def test_completion_of_files(server):
     check(complete("uzawa submit --K dir/", cwd=server.folder) == ["dir/x.mtx"])
 
 
+def complete_jobs(line, server):
+    """The service has a second to answer, which a busy machine may let pass."""
+    return next((found for found in (complete(line, server) for _ in range(10)) if found), [])
+
+
 def test_completion_of_jobs(server):
     ids = [server.post(service.MATRICES).json["id"] for _ in range(3)]
-    check(complete("uzawa status ", server) == ids[::-1], complete("uzawa status ", server))
-    check(complete(f"uzawa wait {ids[0][:31]}", server), ids)
+    check(complete_jobs("uzawa status ", server) == ids[::-1], ids)
+    check(complete_jobs(f"uzawa wait {ids[0][:31]}", server), ids)
     check(complete("uzawa status ") == [], "nobody answers: nothing is offered")
 
 
