@@ -2,6 +2,7 @@
  * image of its own (data:), so that no name in one meets that in another. */
 #include "commands/fetch.h"
 #include "show/report.h"
+#include "text/buffer.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,7 +11,7 @@
 /* A report on its way. */
 typedef struct {
     client_session *s;
-    FILE *to;
+    uz_buffer *to;
     const char *id, *case_name; /* case_name NULL: the job has none */
     const json_t *summary;
 } report;
@@ -28,76 +29,67 @@ static const char STYLE[] =
 
 /* ---- pieces */
 
-static void put_text(FILE *to, const char *text)
+static void put(uz_buffer *to, const char *text)
 {
-    for (; *text; text++)
-        switch (*text) {
-        case '<':
-            fputs("&lt;", to);
-            break;
-        case '>':
-            fputs("&gt;", to);
-            break;
-        case '&':
-            fputs("&amp;", to);
-            break;
-        case '"':
-            fputs("&quot;", to);
-            break;
-        default:
-            fputc(*text, to);
-        }
+    uz_buffer_put(to, text, strlen(text));
 }
 
-/* Base64 (RFC 4648, section 4). */
-static void put_base64(FILE *to, const unsigned char *bytes, size_t len)
-{
-    static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (size_t i = 0; i < len; i += 3) {
-        const size_t left = len - i;
-        const unsigned three = (unsigned)bytes[i] << 16 | (left > 1 ? (unsigned)bytes[i + 1] << 8 : 0) |
-                               (left > 2 ? (unsigned)bytes[i + 2] : 0);
-        fputc(DIGITS[three >> 18], to);
-        fputc(DIGITS[three >> 12 & 63], to);
-        fputc(left > 1 ? DIGITS[three >> 6 & 63] : '=', to);
-        fputc(left > 2 ? DIGITS[three & 63] : '=', to);
-    }
-}
-
-static void put_heads(FILE *to, const char *caption, const char *const *heads)
-{
-    fprintf(to, "<h2>%s</h2><table><tr>", caption);
-    for (; *heads; heads++)
-        fprintf(to, "<th>%s</th>", *heads);
-    fputs("</tr>\n", to);
-}
-
-static void put_cell(FILE *to, const char *text)
-{
-    fputs("<td>", to);
-    put_text(to, text);
-    fputs("</td>", to);
-}
-
-static void put_number(FILE *to, const json_t *number)
+static void put_number(uz_buffer *to, const json_t *number)
 {
     if (json_is_number(number))
-        fprintf(to, "<td class=\"n\">%.6g</td>", json_number_value(number));
+        uz_buffer_print(to, "<td class=\"n\">%.6g</td>", json_number_value(number));
     else
-        fputs("<td class=\"n muted\">unknown</td>", to);
+        put(to, "<td class=\"n muted\">unknown</td>");
 }
 
-static void put_vector(FILE *to, const json_t *vector)
+static void put_vector(uz_buffer *to, const json_t *vector)
 {
-    fputs("<td>", to);
+    put(to, "<td>");
     for (size_t i = 0; i < json_array_size(vector); i++) {
         const json_t *number = json_array_get(vector, i);
+        put(to, i ? ", " : "(");
         if (json_is_number(number))
-            fprintf(to, "%s%.6g", i ? ", " : "(", json_number_value(number));
+            uz_buffer_print(to, "%.6g", json_number_value(number));
         else
-            fprintf(to, "%sunknown", i ? ", " : "(");
+            put(to, "unknown");
     }
-    fputs(json_array_size(vector) ? ")</td>" : "</td>", to);
+    put(to, json_array_size(vector) ? ")</td>" : "</td>");
+}
+
+/* A list of the summary as a table, with a column for each of these; nothing where it is empty. */
+typedef struct {
+    const char *head, *key;
+    const char *otherwise; /* the key of a text that stands for one that is not there */
+    enum { CELL_TEXT, CELL_NUMBER, CELL_VECTOR } kind;
+} column;
+
+static void put_table(const report *r, const char *caption, const char *list_at, const column *columns, size_t count)
+{
+    const json_t *list = client_json_at(r->summary, list_at), *one;
+    size_t i;
+    if (json_array_size(list) == 0)
+        return;
+    uz_buffer_print(r->to, "<h2>%s</h2><table><tr>", caption);
+    for (size_t k = 0; k < count; k++)
+        uz_buffer_print(r->to, "<th>%s</th>", columns[k].head);
+    put(r->to, "</tr>\n");
+    json_array_foreach(list, i, one)
+    {
+        put(r->to, "<tr>");
+        for (size_t k = 0; k < count; k++) {
+            const column *c = &columns[k];
+            const char *text = client_json_text(one, c->key);
+            if (c->kind == CELL_TEXT) {
+                put(r->to, "<td>");
+                uz_buffer_put_escaped(r->to, *text || !c->otherwise ? text : client_json_text(one, c->otherwise));
+                put(r->to, "</td>");
+            } else {
+                (c->kind == CELL_NUMBER ? put_number : put_vector)(r->to, client_json_at(one, c->key));
+            }
+        }
+        put(r->to, "</tr>\n");
+    }
+    put(r->to, "</table>\n");
 }
 
 /* ---- parts */
@@ -112,93 +104,52 @@ static void put_verdict(const report *r, const json_t *job)
     const json_t *asserted = client_json_at(r->summary, "assertions_passed");
     const bool good = strcmp(client_json_text(r->summary, "outcome"), "converged") == 0 && !json_is_false(asserted);
     char error[32];
-    fprintf(r->to, "<p class=\"verdict%s\"><strong>", good ? " good" : "");
-    put_text(r->to, *client_json_text(r->summary, "outcome") ? client_json_text(r->summary, "outcome")
-                                                             : client_json_text(job, "status"));
-    fputs("</strong>", r->to);
+    uz_buffer_print(r->to, "<p class=\"verdict%s\"><strong>", good ? " good" : "");
+    uz_buffer_put_escaped(r->to, *client_json_text(r->summary, "outcome") ? client_json_text(r->summary, "outcome")
+                                                                          : client_json_text(job, "status"));
+    put(r->to, "</strong>");
     if (is_scene(r) && json_is_object(client_json_at(r->summary, "error"))) {
-        fputs("; the whole error, of mesh and equations together, is ", r->to);
-        put_text(r->to, client_format_error(error, r->summary));
-        fprintf(r->to, ", relative, in the energy norm (%s)", client_json_text(r->summary, "error.kind"));
+        put(r->to, "; the whole error, of mesh and equations together, is ");
+        uz_buffer_put_escaped(r->to, client_format_error(error, r->summary));
+        uz_buffer_print(r->to, ", relative, in the energy norm (%s)", client_json_text(r->summary, "error.kind"));
     } else if (isfinite(client_json_number(r->summary, "certificate.relative_error"))) {
-        fputs("; the exact solution of these equations is within ", r->to);
-        put_text(r->to, client_format_bound(error, client_json_number(r->summary, "certificate.relative_error")));
-        fputs(", relative, in the energy norm", r->to);
+        put(r->to, "; the exact solution of these equations is within ");
+        uz_buffer_put_escaped(r->to,
+                              client_format_bound(error, client_json_number(r->summary, "certificate.relative_error")));
+        put(r->to, ", relative, in the energy norm");
     }
     if (json_is_boolean(asserted))
-        fputs(json_is_true(asserted) ? "; every assertion passes" : "; an assertion fails", r->to);
-    fputs(".", r->to);
+        put(r->to, json_is_true(asserted) ? "; every assertion passes" : "; an assertion fails");
+    put(r->to, ".");
     if (*client_json_text(r->summary, "message")) {
-        fputc(' ', r->to);
-        put_text(r->to, client_json_text(r->summary, "message"));
+        put(r->to, " ");
+        uz_buffer_put_escaped(r->to, client_json_text(r->summary, "message"));
     }
-    fputs("</p>\n", r->to);
+    put(r->to, "</p>\n");
 }
 
-static void put_quantities(const report *r)
+static void put_tables(const report *r)
 {
-    static const char *const HEADS[] = {"Name", "Value", "From", "To", "On this mesh", "How sure", NULL};
-    const json_t *list = client_json_at(r->summary, "quantities"), *one;
-    size_t i;
-    if (json_array_size(list) == 0)
-        return;
-    put_heads(r->to, "Quantities", HEADS);
-    json_array_foreach(list, i, one)
-    {
-        fputs("<tr>", r->to);
-        put_cell(r->to, client_json_text(one, "name"));
-        put_number(r->to, client_json_at(one, "value"));
-        put_number(r->to, client_json_at(one, "low"));
-        put_number(r->to, client_json_at(one, "high"));
-        put_number(r->to, client_json_at(one, "on_this_mesh"));
-        put_cell(r->to, client_json_text(one, "kind"));
-        fputs("</tr>\n", r->to);
-    }
-    fputs("</table>\n", r->to);
-}
-
-static void put_contacts(const report *r)
-{
-    static const char *const HEADS[] = {"On",      "Force", "Normal force",       "Mean pressure",
-                                        "Largest", "Area",  "Center of pressure", NULL};
-    static const char *const NUMBERS[] = {"normal_force", "mean_pressure", "max_pressure", "area"};
-    const json_t *list = client_json_at(r->summary, "resultants.contacts"), *one;
-    size_t i;
-    if (json_array_size(list) == 0)
-        return;
-    put_heads(r->to, "Contacts, on this mesh", HEADS);
-    json_array_foreach(list, i, one)
-    {
-        fputs("<tr>", r->to);
-        put_cell(r->to, client_json_text(one, "on"));
-        put_vector(r->to, client_json_at(one, "force"));
-        for (size_t k = 0; k < sizeof NUMBERS / sizeof NUMBERS[0]; k++)
-            put_number(r->to, client_json_at(one, NUMBERS[k]));
-        put_vector(r->to, client_json_at(one, "center"));
-        fputs("</tr>\n", r->to);
-    }
-    fputs("</table>\n", r->to);
-}
-
-static void put_assertions(const report *r)
-{
-    static const char *const HEADS[] = {"Result", "Quantity", "Value", "Why", NULL};
-    const json_t *list = client_json_at(r->summary, "assertions"), *one;
-    size_t i;
-    if (json_array_size(list) == 0)
-        return;
-    put_heads(r->to, "Assertions", HEADS);
-    json_array_foreach(list, i, one)
-    {
-        const char *name = client_json_text(one, "name");
-        fputs("<tr>", r->to);
-        put_cell(r->to, client_json_text(one, "result"));
-        put_cell(r->to, *name ? name : client_json_text(one, "quantity"));
-        put_number(r->to, client_json_at(one, "value"));
-        put_cell(r->to, client_json_text(one, "reason"));
-        fputs("</tr>\n", r->to);
-    }
-    fputs("</table>\n", r->to);
+    static const column QUANTITIES[] = {{"Name", "name", NULL, CELL_TEXT},
+                                        {"Value", "value", NULL, CELL_NUMBER},
+                                        {"From", "low", NULL, CELL_NUMBER},
+                                        {"To", "high", NULL, CELL_NUMBER},
+                                        {"On this mesh", "on_this_mesh", NULL, CELL_NUMBER},
+                                        {"How sure", "kind", NULL, CELL_TEXT}},
+                        CONTACTS[] = {{"On", "on", NULL, CELL_TEXT},
+                                      {"Force", "force", NULL, CELL_VECTOR},
+                                      {"Normal force", "normal_force", NULL, CELL_NUMBER},
+                                      {"Mean pressure", "mean_pressure", NULL, CELL_NUMBER},
+                                      {"Largest", "max_pressure", NULL, CELL_NUMBER},
+                                      {"Area", "area", NULL, CELL_NUMBER},
+                                      {"Center of pressure", "center", NULL, CELL_VECTOR}},
+                        ASSERTIONS[] = {{"Result", "result", NULL, CELL_TEXT},
+                                        {"Quantity", "name", "quantity", CELL_TEXT},
+                                        {"Value", "value", NULL, CELL_NUMBER},
+                                        {"Why", "reason", NULL, CELL_TEXT}};
+    put_table(r, "Quantities", "quantities", QUANTITIES, sizeof QUANTITIES / sizeof QUANTITIES[0]);
+    put_table(r, "Contacts, on this mesh", "resultants.contacts", CONTACTS, sizeof CONTACTS / sizeof CONTACTS[0]);
+    put_table(r, "Assertions", "assertions", ASSERTIONS, sizeof ASSERTIONS / sizeof ASSERTIONS[0]);
 }
 
 static void put_warnings(const report *r)
@@ -207,16 +158,16 @@ static void put_warnings(const report *r)
     size_t i;
     if (json_array_size(list) == 0)
         return;
-    fputs("<h2>Warnings</h2><ul>", r->to);
+    put(r->to, "<h2>Warnings</h2><ul>");
     json_array_foreach(list, i, one)
     {
-        fputs("<li><strong>", r->to);
-        put_text(r->to, client_json_text(one, "code"));
-        fputs("</strong>: ", r->to);
-        put_text(r->to, client_json_text(one, "message"));
-        fputs("</li>", r->to);
+        put(r->to, "<li><strong>");
+        uz_buffer_put_escaped(r->to, client_json_text(one, "code"));
+        put(r->to, "</strong>: ");
+        uz_buffer_put_escaped(r->to, client_json_text(one, "message"));
+        put(r->to, "</li>");
     }
-    fputs("</ul>\n", r->to);
+    put(r->to, "</ul>\n");
 }
 
 /* A picture of the service's. One that it does not have for this job (409) is left out. */
@@ -231,13 +182,13 @@ static client_exit put_picture(const report *r, const char *suffix, const char *
     const client_http_end end = client_http_send(r->s->http, &reply, &request);
     client_exit code = CLIENT_OK;
     if (end == CLIENT_HTTP_ANSWERED && reply.status == 200 && reply.body.len > 0) {
-        fputs("<figure><img alt=\"", r->to);
-        put_text(r->to, caption);
-        fputs("\" src=\"data:image/svg+xml;base64,", r->to);
-        put_base64(r->to, (const unsigned char *)reply.body.data, reply.body.len);
-        fputs("\"><figcaption class=\"muted\">", r->to);
-        put_text(r->to, caption);
-        fputs("</figcaption></figure>\n", r->to);
+        put(r->to, "<figure><img alt=\"");
+        uz_buffer_put_escaped(r->to, caption);
+        put(r->to, "\" src=\"data:image/svg+xml;base64,");
+        uz_buffer_put_base64(r->to, reply.body.data, reply.body.len);
+        put(r->to, "\"><figcaption class=\"muted\">");
+        uz_buffer_put_escaped(r->to, caption);
+        put(r->to, "</figcaption></figure>\n");
     } else if (end != CLIENT_HTTP_ANSWERED || reply.status != 409) {
         code = client_explain(r->s, end, &reply);
     }
@@ -258,7 +209,7 @@ static client_exit put_pictures(const report *r)
         {"/convergence.svg", NULL, "How it converged: dual objective, residual, certified bound", false},
     };
     client_exit code = CLIENT_OK;
-    fputs("<h2>Pictures</h2>\n", r->to);
+    put(r->to, "<h2>Pictures</h2>\n");
     for (size_t i = 0; i < sizeof PICTURES / sizeof PICTURES[0] && code == CLIENT_OK; i++)
         if (is_scene(r) || !PICTURES[i].of_scenes)
             code = put_picture(r, PICTURES[i].suffix, PICTURES[i].colour, PICTURES[i].caption);
@@ -276,9 +227,9 @@ static void put_words(const report *r, const char *head, void (*print)(FILE *to,
         return;
     print(memory, value);
     if (fclose(memory) == 0) {
-        fprintf(r->to, "<h2>%s</h2><pre>", head);
-        put_text(r->to, words);
-        fputs("</pre>\n", r->to);
+        uz_buffer_print(r->to, "<h2>%s</h2><pre>", head);
+        uz_buffer_put_escaped(r->to, words);
+        put(r->to, "</pre>\n");
     }
     free(words);
 }
@@ -289,9 +240,9 @@ static client_exit put_request(const report *r)
     const client_exit code = client_get_json(r->s, &request, client_job_path(r->s, r->id, "/request"));
     char *text = request ? json_dumps(request, JSON_INDENT(2)) : NULL;
     if (text) {
-        fputs("<h2>Request</h2><details><summary>What was asked, as JSON</summary><pre>", r->to);
-        put_text(r->to, text);
-        fputs("</pre></details>\n", r->to);
+        put(r->to, "<h2>Request</h2><details><summary>What was asked, as JSON</summary><pre>");
+        uz_buffer_put_escaped(r->to, text);
+        put(r->to, "</pre></details>\n");
     }
     free(text);
     json_decref(request);
@@ -303,28 +254,27 @@ static client_exit put_request(const report *r)
 static client_exit put_report(report *r, const json_t *job, const json_t *cases)
 {
     static const char *const TIMES[] = {"created", "started", "finished"};
-    fprintf(r->to,
-            "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Contact report %.8s</title>"
-            "<meta name=\"viewport\" content=\"width=device-width\"><style>%s</style>\n<h1>Contact report</h1>"
-            "<p class=\"muted\">Job <code>%s</code> of ",
-            r->id, STYLE, r->id);
-    put_text(r->to, r->s->options->server);
+    uz_buffer_print(r->to,
+                    "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Contact report %.8s</title>"
+                    "<meta name=\"viewport\" content=\"width=device-width\"><style>",
+                    r->id);
+    put(r->to, STYLE);
+    uz_buffer_print(r->to, "</style>\n<h1>Contact report</h1><p class=\"muted\">Job <code>%s</code> of ", r->id);
+    uz_buffer_put_escaped(r->to, r->s->options->server);
     for (size_t i = 0; i < sizeof TIMES / sizeof TIMES[0]; i++) {
-        fprintf(r->to, ", %s ", TIMES[i]);
-        put_text(r->to, client_json_text(job, TIMES[i]));
+        uz_buffer_print(r->to, ", %s ", TIMES[i]);
+        uz_buffer_put_escaped(r->to, client_json_text(job, TIMES[i]));
     }
-    fprintf(r->to, "; written by uzawa %s", CLIENT_VERSION_TEXT);
+    uz_buffer_print(r->to, "; written by uzawa %s", CLIENT_VERSION_TEXT);
     if (r->case_name) {
-        fputs(". Load case <strong>", r->to);
-        put_text(r->to, r->case_name);
-        fputs("</strong>", r->to);
+        put(r->to, ". Load case <strong>");
+        uz_buffer_put_escaped(r->to, r->case_name);
+        put(r->to, "</strong>");
     }
-    fputs(".</p>\n", r->to);
+    put(r->to, ".</p>\n");
     put_verdict(r, job);
     put_warnings(r);
-    put_quantities(r);
-    put_contacts(r);
-    put_assertions(r);
+    put_tables(r);
     client_exit code = put_pictures(r);
     if (cases)
         put_words(r, "Load cases", client_print_cases, cases);
@@ -355,20 +305,20 @@ static client_exit choose_case(report *r, const json_t *job, json_t **cases)
 client_exit client_report(client_session *s)
 {
     json_t *job, *cases = NULL;
+    uz_buffer text = {.data = NULL};
     char *page = NULL;
     size_t len = 0;
     client_exit code = client_get_json(s, &job, client_job_path(s, s->options->operand, ""));
-    report r = {.s = s, .id = client_json_text(job, "id"), .summary = json_object_get(job, "summary")};
+    report r = {.s = s, .to = &text, .id = client_json_text(job, "id"), .summary = json_object_get(job, "summary")};
     if (code == CLIENT_OK && !json_is_object(r.summary))
         code = client_complain(s, CLIENT_REFUSED, "the job has no answer to report on: uzawa status says what it has");
     if (code == CLIENT_OK)
         code = choose_case(&r, job, &cases);
-    if (code == CLIENT_OK && !(r.to = open_memstream(&page, &len)))
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
     if (code == CLIENT_OK)
         code = put_report(&r, job, cases);
-    if (r.to && fclose(r.to) != 0 && code == CLIENT_OK)
+    if (code == CLIENT_OK && uz_buffer_finish(&page, &len, &text, NULL) != UZ_OK)
         code = client_complain(s, CLIENT_LOCAL, "no memory");
+    uz_buffer_drop(&text);
     if (code == CLIENT_OK)
         code = client_deliver(s, page, len);
     free(page);
