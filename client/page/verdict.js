@@ -11,7 +11,7 @@ function vector(values) {
 
 /** [name, value] pairs that are known. */
 function facts_of(summary) {
-  const { contact, energy, certificate } = summary;
+  const { contact, energy, certificate, stress } = summary;
   const at = contact?.max_pressure_at?.x;
   return [
     ["Problem", problem_words(summary)],
@@ -24,6 +24,10 @@ function facts_of(summary) {
     ["Contact area on this mesh", Number.isFinite(contact?.area) ? number(contact.area, 4) : null],
     ["Largest pressure, estimated", trend_words(contact?.estimates?.max_pressure)],
     ["Contact area, estimated", trend_words(contact?.estimates?.area)],
+    ["Largest von Mises stress on this mesh", stress ? `${number(stress.von_mises, 4)} at ${vector(stress.at.x)}` : null],
+    ["Largest von Mises stress, estimated", trend_words(stress?.estimates.von_mises)],
+    ["Safety factor on this mesh", Number.isFinite(stress?.safety) ? `${number(stress.safety, 4)} at ${vector(stress.weakest_at.x)}` : null],
+    ["Safety factor, estimated", trend_words(stress?.estimates.safety)],
     ["Largest penetration", contact ? number(contact.max_penetration) : null],
     ["Energy", energy ? `${number(energy.primal, 6)} (at least ${number_towards(energy.dual, 6, -1)})` : null],
     ["Potential energy of the body", Number.isFinite(energy?.potential) ? number(energy.potential, 6) : null],

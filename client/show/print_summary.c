@@ -202,18 +202,23 @@ static void print_method(FILE *to, const json_t *summary)
     fputc('\n', to);
 }
 
-/* Where the largest pressure and the area are without a mesh, by what grids tell: a line for each, or what is in the
- * way.
+/* Where the largest pressure, the area and the largest stress are without a mesh, by what grids tell: a line for each,
+ * or what is in the way.
  */
 static void print_trends(FILE *to, const json_t *estimates)
 {
-    static const char *const NAMES[][2] = {{"max_pressure", "largest pressure"}, {"area", "area"}};
+    static const char *const NAMES[][2] = {
+        {"max_pressure", "largest pressure"}, {"area", "area"}, {"von_mises", "largest stress"}, {"safety", "safety"}};
+    bool first = true;
     for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0] && json_is_object(estimates); k++) {
         const json_t *one = client_json_at(estimates, NAMES[k][0]);
         const double low = client_json_number(one, "low"), high = client_json_number(one, "high"),
                      value = client_json_number(one, "value"), order = client_json_number(one, "order");
         char within[32];
-        label(to, k == 0 ? "estimates" : "");
+        if (!json_is_object(one))
+            continue;
+        label(to, first ? "estimates" : "");
+        first = false;
         fprintf(to, "%s ", NAMES[k][1]);
         if (isfinite(high))
             fprintf(to, "%.5g within %s, by estimate: ", value,
@@ -276,6 +281,23 @@ static void print_contact(FILE *to, const json_t *summary)
             fprintf(to, ", %s off the facets", number_in_words(text, one, "largest_offset", 2));
         fprintf(to, ", turning by %s degrees\n", number_in_words(text, one, "largest_turn", 2));
     }
+}
+
+/* The largest stress, and what is left to the yield stress. */
+static void print_stress(FILE *to, const json_t *stress)
+{
+    char text[32];
+    if (!json_is_object(stress))
+        return;
+    label(to, "stress");
+    fprintf(to, "von Mises %s at most,", number_in_words(text, stress, "von_mises", 6));
+    print_vector(to, " at ", client_json_at(stress, "at.x"));
+    if (json_is_number(json_object_get(stress, "safety"))) {
+        fprintf(to, "; safety factor %s", number_in_words(text, stress, "safety", 4));
+        print_vector(to, " at ", client_json_at(stress, "weakest_at.x"));
+    }
+    fputc('\n', to);
+    print_trends(to, json_object_get(stress, "estimates"));
 }
 
 /* What acts on the body, without moments: "contact bottom (0, 10.5)". */
@@ -466,6 +488,7 @@ void client_print_summary(FILE *to, const json_t *job)
     print_method(to, summary);
     if (json_is_object(json_object_get(summary, "contact")))
         print_contact(to, summary);
+    print_stress(to, client_json_at(summary, "stress"));
     print_resultants(to, summary);
     json_array_foreach(json_object_get(summary, "warnings"), i, warning)
     {

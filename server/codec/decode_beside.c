@@ -219,6 +219,7 @@ bool decode_assertions(codec_request *out, decoding *d, const json_value *list)
         memcpy(a->quantity, quantity->text, quantity->count + 1);
         if (!check_named(out, d, quantity))
             return false;
+        out->problem.scene.peak_stress |= strncmp(a->quantity, "stress.", 7) == 0; /* measured only where asked for */
         a->least = json_number(json_get(object, "min"), (double)NAN);
         a->most = json_number(json_get(object, "max"), (double)NAN);
         a->near = json_number(json_get(object, "near"), (double)NAN);

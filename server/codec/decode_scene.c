@@ -241,6 +241,7 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
         to->poisson = json_number(json_get(item, "poisson"), 0);
         to->density = json_number(json_get(item, "density"), 0);
         to->expansion = json_number(json_get(item, "expansion"), 0);
+        to->yield = json_number(json_get(item, "yield"), 0);
     }
     bool good = out->materials && (out->supports = decode_room(d, supports, sizeof *out->supports, &out->n_supports));
     for (int64_t i = 0; i < out->n_supports && good; i++) {

@@ -145,6 +145,14 @@ static void put_trend(text *t, const char *key, const uz_trend *of)
     text_close(t, '}');
 }
 
+static void put_place(text *t, const char *key, int64_t node, const double *x, int dim)
+{
+    text_open(t, key, '{');
+    text_integer(t, "node", node);
+    text_numbers(t, "x", x, dim);
+    text_close(t, '}');
+}
+
 static void put_contact(text *t, const uz_summary *s, bool scene)
 {
     const uz_evaluation *e = s->evaluation;
@@ -162,14 +170,10 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
             text_number(t, "area", e->contact_area);
             put_surfaces(t, e, s->dim);
         }
-        if (e && e->peak_node < 0) {
+        if (e && e->peak_node < 0)
             text_raw(t, "max_pressure_at", NULL);
-        } else if (e) {
-            text_open(t, "max_pressure_at", '{');
-            text_integer(t, "node", e->peak_node);
-            text_numbers(t, "x", e->peak_at, s->dim);
-            text_close(t, '}');
-        }
+        else if (e)
+            put_place(t, "max_pressure_at", e->peak_node, e->peak_at, s->dim);
         if (e && e->n_contacts > 0) {
             text_open(t, "estimates", '{');
             put_trend(t, "max_pressure", &e->peak);
@@ -187,6 +191,39 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
             text_close(t, '}');
         }
     }
+    text_close(t, '}');
+}
+
+/* Of a number of which that of the body is the inverse: a safety factor. */
+static uz_trend inverse_of(const uz_trend *t)
+{
+    uz_trend out = *t;
+    out.value = 1.0 / t->value;
+    out.low = isinf(t->high) ? 0.0 : 1.0 / t->high;
+    out.high = t->low > 0.0 ? 1.0 / t->low : (double)INFINITY;
+    if (isnan(t->low))
+        out.low = out.high = NAN;
+    return out;
+}
+
+/* Where the body is stressed most, where that is asked for. */
+static void put_stress(text *t, const uz_evaluation *e, int dim)
+{
+    if (!e->stressed || e->von_mises.node < 0)
+        return;
+    const uz_trend safety = inverse_of(&e->used.trend);
+    text_open(t, "stress", '{');
+    text_number(t, "von_mises", e->von_mises.value);
+    put_place(t, "at", e->von_mises.node, e->von_mises.at, dim);
+    if (e->used.node >= 0) {
+        text_number(t, "safety", 1.0 / e->used.value);
+        put_place(t, "weakest_at", e->used.node, e->used.at, dim);
+    }
+    text_open(t, "estimates", '{');
+    put_trend(t, "von_mises", &e->von_mises.trend);
+    if (e->used.node >= 0)
+        put_trend(t, "safety", &safety);
+    text_close(t, '}');
     text_close(t, '}');
 }
 
@@ -378,6 +415,8 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     text_integer(&t, "m", summary->m);
     text_close(&t, '}');
     put_contact(&t, summary, scene);
+    if (summary->evaluation)
+        put_stress(&t, summary->evaluation, summary->dim);
     if (scene && summary->geometry.kind == UZ_KINEMATICS_FINITE)
         put_finite(&t, &summary->finite);
     if (summary->small.compared) {

@@ -69,11 +69,15 @@ static bound exact_bound(const json_value *summary, const char *quantity, double
 {
     /* Numbers of the answer, which a finer one would have otherwise; the others are what they are. */
     static const char *const FACTS[] = {"contact.candidates", "contact.kept", "contact.added", "contact.rounds"};
-    static const char *const ESTIMATES[] = {"contact.", "energy.", "resultants.", "warnings"};
+    static const char *const ESTIMATES[] = {"contact.", "energy.", "resultants.", "stress.", "warnings"};
     static const char *const TRENDS[][2] = {{"contact.max_pressure", "contact.estimates.max_pressure"},
                                             {"contact.area", "contact.estimates.area"},
                                             {"contact.estimates.max_pressure.value", "contact.estimates.max_pressure"},
-                                            {"contact.estimates.area.value", "contact.estimates.area"}};
+                                            {"contact.estimates.area.value", "contact.estimates.area"},
+                                            {"stress.von_mises", "stress.estimates.von_mises"},
+                                            {"stress.safety", "stress.estimates.safety"},
+                                            {"stress.estimates.von_mises.value", "stress.estimates.von_mises"},
+                                            {"stress.estimates.safety.value", "stress.estimates.safety"}};
     const double gap = number_at(summary, "certificate.gap"), e = number_at(summary, "certificate.absolute_error");
     bool estimate = false;
     for (size_t i = 0; i < sizeof ESTIMATES / sizeof ESTIMATES[0]; i++)

@@ -215,6 +215,14 @@ typedef struct {
     char why[112]; /* why there is no range, or no order; else "" */
 } uz_trend;
 
+/* Where the body is stressed most, by the nodal stress of uz_fields. */
+typedef struct {
+    int64_t node; /* -1: nothing was measured, or no node has an element */
+    double value, at[3];
+    double size; /* of the elements around it: the root of their mean area or volume */
+    uz_trend trend;
+} uz_peak;
+
 /* Scenes: what the answer comes to. */
 typedef struct {
     double strain_energy;    /* with that of springs */
@@ -225,6 +233,9 @@ typedef struct {
     double peak_at[3];
     double peak_size;    /* of the side there: the root of its row's area in space, the area in the plane */
     uz_trend peak, area; /* of max_pressure and contact_area */
+    bool stressed;       /* the scene asks for the two below */
+    uz_peak von_mises;   /* von Mises' stress */
+    uz_peak used;        /* that stress by the yield stress: the least of the materials around a node that have one */
     int64_t n_contacts, n_supports;
     uz_contact_total *totals; /* n_contacts */
     uz_resultant *contacts,

@@ -141,6 +141,7 @@ typedef struct {
     double young, poisson;
     double density;   /* mass per volume: 0 where no gravity asks for it */
     double expansion; /* strain per unit of temperature */
+    double yield;     /* von Mises' stress that it may bear; 0: not known */
 } uz_material;
 
 typedef enum {
@@ -246,6 +247,7 @@ typedef struct {
     uz_contact *contacts;
     int64_t n_contacts;
     bool all_candidates; /* solve with every contact row, also those far from any obstacle */
+    bool peak_stress;    /* the evaluation tells the largest stress, as it does where a material has a yield stress */
     uz_kinematics kinematics;
     /* n_nodes x dim, borrowed: contacts are found where the body has been displaced by this, and linear about it: a
      * uz_result's place. NULL: before anything moves. uz_solve finds places itself (kinematics) and takes none. */

@@ -154,6 +154,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
     e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);
     status = uz_measure_sliding(&summary->geometry.sliding, model, scene, result->u, result->r, e->approach, err);
+    if (status == UZ_OK)
+        status = uz_find_peak_stress(e, model, scene, result->u, err);
     return status == UZ_OK ? uz_find_doubts(result, model, scene, err) : status;
 }
 
@@ -227,6 +229,8 @@ uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, cons
                                    &(uz_balance_known){inner, load, energy}, err);
     if (status == UZ_OK)
         status = uz_measure_overlap(result->evaluation->overlap, model, scene, result->u, err);
+    if (status == UZ_OK)
+        status = uz_find_peak_stress(result->evaluation, model, scene, result->u, err);
     if (status == UZ_OK)
         result->evaluation->approach =
             uz_contact_approach(energy, pressed, result->evaluation->overlap, scene->n_contacts);

@@ -63,6 +63,11 @@ uz_status uz_fields_of_body(uz_fields *out, const uz_field_body *body, const uz_
 void uz_principal(double principal[3], const double *stress, int components);
 double uz_von_mises(const double *stress, int components);
 
+/* The largest stress of an answer, if the scene wants to know, as the field has it: see peak_stress.c. Fills stressed,
+ * von_mises and used. UZ_ERR_MEMORY. */
+uz_status uz_find_peak_stress(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
+                              uz_error *err);
+
 /* Pressure of each contact row from the reactions r (m): see contact_pressure.c. NaN where the contact has no area. */
 uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, const uz_scene *scene, const double *r,
                               uz_error *err);

@@ -67,6 +67,7 @@ typedef struct {
 typedef struct {
     double max_pressure, contact_area;
     double peak_size, mean_size; /* of sides at the peak, and of all that touch; 0: nothing does */
+    uz_trend_point von_mises, used;
 } seen;
 
 /* The search for the grid. */
@@ -253,6 +254,17 @@ static bool choose_between(grid *next, const search *g)
     return n > 0 && !uz_cancelled(g->hooks) && has_time(g, next->dofs);
 }
 
+static seen seen_of(const uz_summary *s)
+{
+    const uz_evaluation *e = s->evaluation;
+    return (seen){.max_pressure = s->max_pressure,
+                  .contact_area = e->contact_area,
+                  .peak_size = e->peak_size,
+                  .mean_size = s->active > 0 ? pow(e->contact_area / (double)s->active, 1.0 / (s->dim - 1)) : 0.0,
+                  .von_mises = {e->von_mises.size, e->von_mises.value},
+                  .used = {e->used.size, e->used.value}};
+}
+
 /* ---- one grid */
 
 /* Solves the cases of a problem on a grid, from the best answers so far. */
@@ -286,13 +298,11 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const 
         seen *known = &g->seen[i * UZ_GRID_LEVELS + g->sequence.count];
         level->iterations += s->iterations;
         level->d = s->d;
-        *known = (seen){NAN, NAN, 0.0, 0.0};
+        *known = (seen){.max_pressure = NAN, .contact_area = NAN, .von_mises.value = NAN, .used.value = NAN};
         if (uz_has_no_answer(s))
             continue;
         if (s->evaluation)
-            *known =
-                (seen){s->max_pressure, s->evaluation->contact_area, s->evaluation->peak_size,
-                       s->active > 0 ? pow(s->evaluation->contact_area / (double)s->active, 1.0 / (s->dim - 1)) : 0.0};
+            *known = seen_of(s);
         const double error = uz_asked_error(s);
         x->error = fmax(x->error, settings.quantity_error > 0.0 ? fmin(error, NO_INTERVAL) : error);
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
@@ -453,11 +463,12 @@ static void conclude(const search *g, uz_summary *s)
                  s->discretization_error, s->certificate.relative_error, g->requested);
 }
 
-/* What the grids tell of the largest pressure and of the area of a case's contact. The area ends within an element: of
- * a line at two ends, of a surface around it. A grid that does not see the contact tells nothing of it. */
+/* What the grids tell of the largest pressure, of the area of a case's contact and of the largest stress. The area ends
+ * within an element: of a line at two ends, of a surface around it. A grid that does not see the contact tells nothing
+ * of it. */
 static void tell_trends(const search *g, uz_result *result, const seen *of)
 {
-    uz_trend_point peak[UZ_GRID_LEVELS], area[UZ_GRID_LEVELS];
+    uz_trend_point peak[UZ_GRID_LEVELS], area[UZ_GRID_LEVELS], von_mises[UZ_GRID_LEVELS], used[UZ_GRID_LEVELS];
     uz_evaluation *e = result->evaluation;
     const int count = g->sequence.count, dim = g->sequence.dim;
     for (int i = 0; i < count; i++) {
@@ -466,11 +477,17 @@ static void tell_trends(const search *g, uz_result *result, const seen *of)
         level->contact_area = of[i].contact_area;
         peak[i] = (uz_trend_point){of[i].peak_size, of[i].max_pressure};
         area[i] = (uz_trend_point){of[i].mean_size, of[i].contact_area};
+        von_mises[i] = of[i].von_mises;
+        used[i] = of[i].used;
     }
     const double active = (double)result->summary.active, pi = acos(-1.0);
     const double grain = active > 0 ? e->contact_area / active * (dim == 2 ? 1.0 : sqrt(pi * active)) : 0.0;
     uz_trend_fit(&e->peak, peak, count, result->summary.max_pressure, 0.0);
     uz_trend_fit(&e->area, area, count, e->contact_area, grain);
+    if (e->stressed) {
+        uz_trend_fit(&e->von_mises.trend, von_mises, count, e->von_mises.value, 0.0);
+        uz_trend_fit(&e->used.trend, used, count, e->used.value, 0.0);
+    }
 }
 
 /* What the search knows beside the answer of a case. */

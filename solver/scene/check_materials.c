@@ -34,6 +34,11 @@ static uz_status check_values(const uz_scene *scene, int64_t i, uz_error *err)
     if (status == UZ_OK && material->density < 0)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "density"),
                        "a density must not be negative; it is %g", material->density);
+    if (status == UZ_OK)
+        status = uz_check_number(material->yield, "materials", i, "yield", err);
+    if (status == UZ_OK && material->yield < 0)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "yield"),
+                       "a yield stress must not be negative; it is %g", material->yield);
     return status == UZ_OK ? uz_check_number(material->expansion, "materials", i, "expansion", err) : status;
 }
 
