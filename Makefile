@@ -18,7 +18,7 @@ PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-
             libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libdeflate-dev libpng-dev libgmp-dev \
             libpq-dev
 TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev valgrind \
-                 postgresql pgbouncer haproxy python3-yaml nodejs git mandoc librsvg2-bin libgmp-dev
+                 postgresql pgbouncer haproxy python3-yaml nodejs git mandoc librsvg2-bin libgmp-dev zsh fish
 
 # The web page's bundler and libraries; the browser that tests it.
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
@@ -125,16 +125,18 @@ wheel: ## build the wheel of the Python package in build/python (python3-pip, -s
 	@cp -r client/python $(BUILD)/python/source
 	@$(PYTHON) -m pip wheel -q --no-deps --no-build-isolation --no-cache-dir --disable-pip-version-check -w $(BUILD)/python $(BUILD)/python/source
 
-man: $(BUILD)/uzawa ## renew client/uzawa.1 and client/uzawa.bash, which follow from the client's table of commands
+man: $(BUILD)/uzawa ## renew the client's manual page and completions, which follow from its table of commands
 	@$(BUILD)/uzawa help --format man >client/uzawa.1
-	@$(BUILD)/uzawa help --format bash >client/uzawa.bash
+	@$(foreach shell,bash zsh fish,$(BUILD)/uzawa help --format $(shell) >client/uzawa.$(shell);)
 
-install: all ## install both programs, the manual page and the completion for bash under PREFIX
+install: all ## install both programs, the manual page and the completions under PREFIX
 	install -D -m 755 $(BUILD)/uzawad $(DESTDIR)$(PREFIX)/bin/uzawad
 	install -D -m 755 $(BUILD)/uzawa $(DESTDIR)$(PREFIX)/bin/uzawa
 	$(if $(HAS_PETSC),install -D -m 755 $(BUILD)/uzawa-group $(DESTDIR)$(PREFIX)/bin/uzawa-group)
 	install -D -m 644 client/uzawa.1 $(DESTDIR)$(PREFIX)/share/man/man1/uzawa.1
 	install -D -m 644 client/uzawa.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/uzawa
+	install -D -m 644 client/uzawa.zsh $(DESTDIR)$(PREFIX)/share/zsh/vendor-completions/_uzawa
+	install -D -m 644 client/uzawa.fish $(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/uzawa.fish
 
 clean: ## remove everything built
 	rm -rf build

@@ -31,10 +31,14 @@ static const command_run RUN[CLIENT_COMMANDS] = {
     [CLIENT_DOCTOR] = client_doctor, [CLIENT_REPORT] = client_report,   [CLIENT_REQUEST] = client_request_of,
 };
 
-/* command: the one that was named, CLIENT_HELP where none was. */
-static client_exit complain_usage(const char *message, client_command command)
+/* options: as far as they were understood; command HELP where none was named. */
+static client_exit complain_usage(const char *message, const client_options *options)
 {
+    const client_command command = options->command;
     const client_page *page = &CLIENT_PAGES[command];
+    client_session session = {.options = options, .out = stdout, .err = stderr};
+    if (options->json)
+        return client_complain(&session, CLIENT_USAGE, message);
     fprintf(stderr, "uzawa: %s\n", message);
     if (command == CLIENT_HELP)
         fputs("usage: uzawa [--server URL] [--timeout S] COMMAND ...; see: uzawa help\n", stderr);
@@ -55,13 +59,15 @@ static client_exit run_command(client_options *options)
         const char *format = options->json ? "json" : options->format ? options->format : "text";
         if (strcmp(format, "json") == 0)
             return client_help_print_json(stdout) ? CLIENT_OK : CLIENT_LOCAL;
-        if (strcmp(format, "man") == 0 || strcmp(format, "bash") == 0) {
-            (*format == 'm' ? client_manual_print : client_completion_print)(stdout);
+        if (strcmp(format, "man") == 0) {
+            client_manual_print(stdout);
             return CLIENT_OK;
         }
+        if (client_completion_print(stdout, format))
+            return CLIENT_OK;
         if (topic == CLIENT_HELP && options->operand) {
             if (!client_command_find(&topic, options->operand))
-                return complain_usage("there is no such command", CLIENT_HELP);
+                return complain_usage("there is no such command", options);
         } else if (topic == CLIENT_HELP)
             topic = CLIENT_COMMANDS;
         client_help_print(stdout, topic);
@@ -72,7 +78,7 @@ static client_exit run_command(client_options *options)
     session.http =
         client_http_open(options->server, getenv("UZAWA_TOKEN"), getenv("UZAWA_CA"), message, sizeof message);
     if (!session.http)
-        return complain_usage(message, options->command);
+        return complain_usage(message, options);
     client_found_jobs found;
     client_exit code = client_find_jobs(&session, options, &found);
     if (code == CLIENT_OK)
@@ -88,7 +94,7 @@ int main(int argc, char **argv)
     client_options options;
     json_set_alloc_funcs(allocate_or_end, free);
     if (!client_arguments_parse(&options, argc, argv, getenv("UZAWA_SERVER"), message, sizeof message))
-        return (int)complain_usage(message, options.command);
+        return (int)complain_usage(message, &options);
     client_exit code = run_command(&options);
     if (fflush(stdout) != 0 || ferror(stdout)) {
         perror("uzawa: cannot write to standard output");

@@ -149,7 +149,7 @@ _uzawa() {
     doctor--server|doctor-s) words='' ;;
     doctor--timeout|doctor-t) words='' ;;
     doctor--retry) words='' ;;
-    help--format|help-f) words='text man bash json' ;;
+    help--format|help-f) words='text man bash zsh fish json' ;;
     *)  if [[ $current == -* ]]; then words=$options; else case $command in
     submit) files=1 ;;
     upload) files=1 ;;

@@ -170,6 +170,8 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             .width = -1,
                             .height = -1};
     parser p = {.options = out, .message = message, .size = size};
+    for (int i = 1; i < argc; i++) /* known also where the line is not understood */
+        out->json = out->json || strcmp(argv[i], "--json") == 0 || strcmp(argv[i], "-j") == 0;
     if (!take_words(&p, argc, argv, false) || !take_words(&p, argc, argv, true))
         return false;
     if (out->help || out->version)

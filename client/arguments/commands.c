@@ -131,8 +131,9 @@ static const uz_option OPTIONS[] = {
     OPTION("key", 'k', WORD, key, STAYING & ~IN(WAIT), .value = "KEY", .about = "idempotency key (default: random)"),
     OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json csv vtu",
            .about = "json (default), csv: a table, or vtu: scenes only"),
-    OPTION("format", 'f', CHOICE, format, IN(HELP), .value = "F", .choices = "text man bash json",
-           .about = "text (default); of all commands together: man, a manual page, bash, a completion, or json"),
+    OPTION("format", 'f', CHOICE, format, IN(HELP), .value = "F", .choices = "text man bash zsh fish json",
+           .about =
+               "text (default); of all commands together: man, a manual page, bash, zsh, fish, a completion, or json"),
     OPTION("fields", 0, WORDS, fields, IN(RESULT), .most = CLIENT_MAX_WORDS, .value = "A,B",
            .choices = "summary nodes reactions gaps pressure displacements contact_status stress principal von_mises "
                       "strain stress_gauss",

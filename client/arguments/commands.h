@@ -1,5 +1,5 @@
-/* commands.h: the one table of commands and options. The parser, `uzawa help`, the manual page and the completion for
- * bash all follow from it. */
+/* commands.h: the one table of commands and options. The parser, `uzawa help`, the manual page and the
+ * completions for bash, zsh and fish all follow from it. */
 #ifndef CLIENT_COMMANDS_H
 #define CLIENT_COMMANDS_H
 
@@ -66,9 +66,9 @@ extern const client_exit_line CLIENT_EXITS[];
 
 /* The overview (CLIENT_COMMANDS) or one command's page. */
 void client_help_print(FILE *to, client_command command);
-/* The whole as a manual page (mdoc), as a completion for bash, as JSON. */
+/* The whole as a manual page (mdoc), as a completion for bash, zsh or fish (false: another shell), as JSON. */
 void client_manual_print(FILE *to);
-void client_completion_print(FILE *to);
+bool client_completion_print(FILE *to, const char *shell);
 bool client_help_print_json(FILE *to);
 
 #endif

@@ -300,6 +300,9 @@ def test_usage(_):
         check(done.stdout == "" and "usage:" in done.stderr, words, done)
     check("see: uzawa help submit" in run(None, "submit", "x", "--accuracy", "1", code=2).stderr, "of the command that was named")
     run(None, "--server", "nonsense", "list", code=2)
+    for words in (["submt", "--json"], ["list", "-j", "--limit", "x"], ["--server", "nonsense", "list", "--json"]):
+        said = json.loads(run(None, *words, code=2).stderr)
+        check(said["exit"] == 2 and said["detail"], words, said)
     for words in (["--help"], ["help"], ["submit", "--help"], ["help", "history"]):
         done = run(None, *words, code=0)
         check(done.stderr == "" and done.stdout.startswith("usage: uzawa"), words, done)

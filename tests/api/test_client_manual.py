@@ -12,11 +12,13 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
 from service import ROOT, Skip, check, options
+from terminal import Terminal
 from test_client_requests import GMSH
 
 BUILD = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "build").resolve()
 CLIENT = str(BUILD / "uzawa")
 MANUAL, COMPLETION = ROOT / "client/uzawa.1", ROOT / "client/uzawa.bash"
+SHELLS = {"zsh": "share/zsh/vendor-completions/_uzawa", "fish": "share/fish/vendor_completions.d/uzawa.fish"}
 
 
 def text_of(*words):
@@ -30,7 +32,8 @@ def commands():
 @options(None)
 def test_files_are_what_the_client_says(_):
     check(MANUAL.read_text() == text_of("help", "--format", "man"), "make man renews client/uzawa.1")
-    check(COMPLETION.read_text() == text_of("help", "--format", "bash"), "make man renews client/uzawa.bash")
+    for shell in ("bash", *SHELLS):
+        check((ROOT / f"client/uzawa.{shell}").read_text() == text_of("help", "--format", shell), f"make man renews client/uzawa.{shell}")
 
 
 @options(None)
@@ -171,6 +174,54 @@ def test_completion_of_jobs(server):
     check(complete("uzawa status ") == [], "nobody answers: nothing is offered")
 
 
+def run_shell(command, server, script=None):
+    done = subprocess.run(command, input=script, capture_output=True, text=True, timeout=60, cwd=server.folder if server else None,
+                          env={**os.environ, "UZAWA_SERVER": server.url if server else "http://127.0.0.1:1", "HOME": os.devnull,
+                               "PATH": f"{BUILD}:{os.environ['PATH']}", "TERM": "dumb"})
+    check(done.returncode == 0, command, done)
+    return done.stdout
+
+
+def of_fish(line, server=None):
+    """What fish offers at the end of the line."""
+    script = f"source {ROOT / 'client/uzawa.fish'}; complete -C {line!r}"
+    return [one.split("\t")[0] for one in run_shell(["fish", "--no-config", "-c", script], server).splitlines()]
+
+
+def test_completion_of_fish(server):
+    names = [command["name"] for command in commands()]
+    check(sorted(of_fish("uzawa ")) == sorted(names), of_fish("uzawa "))
+    check(of_fish("uzawa --server http://h li") == ["list"])
+    for command in commands():
+        offered = of_fish(f"uzawa {command['name']} --")
+        check(sorted(offered) == sorted({option["name"] for option in command["options"]}), command["name"], offered)
+    check(sorted(of_fish("uzawa result x --format ")) == ["csv", "json", "vtu"], of_fish("uzawa result x --format "))
+    check(of_fish("uzawa list --limit ") == [] and of_fish("uzawa help ref") == ["refine"])
+    job = server.post(service.MATRICES).json["id"]
+    check(any(of_fish("uzawa status ", server) == [job] for _ in range(10)), "the service has a second to answer")
+
+
+@options(None)
+def test_completion_of_zsh(server):
+    folder = pathlib.Path(server.folder)
+    (folder / "_uzawa").write_text((ROOT / "client/uzawa.zsh").read_text())
+    (folder / ".zshrc").write_text("PS1='READY '; fpath=($ZDOTDIR $fpath); autoload -U compinit; compinit -u -D\n"
+                                   "zstyle ':completion:*' verbose no; LISTMAX=0; unsetopt beep; unset zle_bracketed_paste\n")
+    environment = {"ZDOTDIR": str(folder), "PATH": f"{BUILD}:{os.environ['PATH']}", "UZAWA_SERVER": "http://127.0.0.1:1",
+                   "TERM": "dumb"}
+    lines = {"uzawa re\t\t": rb"refine +report +request +result", "uzawa result x -f \t\t": rb"csv +json +vtu",
+             "uzawa help ref\t": b"uzawa help refine", "uzawa submit --bas\t": b"uzawa submit --baseline"}
+    with Terminal([shutil.which("zsh"), "-d", "-i"], columns=200, environment=environment) as terminal:
+        wanted = b"READY "
+        for line, following in [*lines.items(), ("", b"")]:
+            before = len(terminal.bytes)
+            terminal.until(lambda _, start=before, end=wanted: re.search(end, terminal.bytes[start:]))
+            terminal.type("\x15print an''swered\r")  # the line is given up, and the next prompt awaited
+            terminal.until(lambda _: re.search(rb"answered.*READY $", terminal.bytes, re.DOTALL))
+            terminal.type(line)
+            wanted = following
+
+
 @options(None)
 def test_install_puts_them_where_they_are_found(server):
     done = subprocess.run(["make", "-s", "-o", "all", f"BUILD={BUILD}", f"DESTDIR={server.folder}", "PREFIX=/usr", "install"],
@@ -179,6 +230,8 @@ def test_install_puts_them_where_they_are_found(server):
     root = pathlib.Path(server.folder) / "usr"
     check((root / "share/man/man1/uzawa.1").read_text() == MANUAL.read_text())
     check((root / "share/bash-completion/completions/uzawa").read_text() == COMPLETION.read_text())
+    for shell, place in SHELLS.items():
+        check((root / place).read_text() == (ROOT / f"client/uzawa.{shell}").read_text(), shell)
     check(os.access(root / "bin/uzawa", os.X_OK))
 
 
