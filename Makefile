@@ -51,6 +51,7 @@ GOLD           = $(if $(findstring clang,$(CC)),,$(GOLD_OF_GCC))
 LDFLAGS_ALL   = $(SAN) -pthread $(GOLD) $(LDFLAGS)
 
 SOLVER_SRC := $(sort $(wildcard solver/*/*.c))
+VERSION    := $(shell sed -n 's/^\#define UZAWAD_VERSION "\(.*\)"/\1/p' server/options/options.h)
 HAS_PETSC  := $(shell pkg-config --exists petsc ompi-c 2>/dev/null && echo yes)
 GROUP_SRC  := $(sort $(wildcard solver/group/worker/*.c))
 SERVER_SRC := $(sort $(wildcard server/*.c server/*/*.c server/*/*/*.c))
@@ -84,7 +85,7 @@ PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
-.PHONY: all wheel group deps-group demo gallery run man guide install clean help deps deps-test
+.PHONY: all wheel deb group deps-group demo gallery run man guide install clean help deps deps-test
 all: $(BUILD)/uzawad $(BUILD)/uzawa $(if $(HAS_PETSC),$(BUILD)/uzawa-group) ## build the daemon and the client, and uzawa-group where PETSc is
 
 # After deps, which may have installed the compiler; said, since it takes a minute where nothing is built yet.
@@ -137,6 +138,11 @@ install: all ## install both programs, the manual page and the completions under
 	install -D -m 644 client/uzawa.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/uzawa
 	install -D -m 644 client/uzawa.zsh $(DESTDIR)$(PREFIX)/share/zsh/vendor-completions/_uzawa
 	install -D -m 644 client/uzawa.fish $(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/uzawa.fish
+
+deb: all ## pack both programs, the unit of systemd and its configuration for Debian: build/uzawa_VERSION_ARCHITECTURE.deb
+	@rm -rf $(BUILD)/deb
+	@$(MAKE) --no-print-directory -s -o all HAS_PETSC= DESTDIR=$(BUILD)/deb/root PREFIX=/usr install
+	@server/deploy/deb.sh $(BUILD) $(VERSION)
 
 clean: ## remove everything built
 	rm -rf build

@@ -116,6 +116,26 @@ def test_the_units_are_taken(s):
         check("uzawad" not in told, told)
 
 
+def test_the_package(s):
+    """Its programs solve where they are unpacked, its unit starts what is in it, and it can be installed here."""
+    build = pathlib.Path(s.command()[0]).resolve().parent
+    if "san" in build.name:
+        raise Skip("the package of a build for tests is not made")
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(build, f"{folder}/build", ignore=lambda _, names: set(names) - {"uzawad", "uzawa"})
+        package = tool("make", "-s", "-o", "all", f"BUILD={folder}/build", "deb", cwd=ROOT).split()[-1]
+        tool("dpkg-deb", "-x", package, f"{folder}/root")
+        tool("apt-get", "-qq", "--simulate", "install", package)
+        about = tool("dpkg-deb", "-f", package)
+        check(re.search(r"^Depends: .*libmicrohttpd12.*libsqlite3-0", about, re.M) and "Version: 0" in about, about)
+        unit = pathlib.Path(folder, "root/lib/systemd/system/uzawad.service").read_text()
+        for program in re.findall(r"^Exec\w+=(/\S+/uzawad) ", unit, re.M):
+            check(os.access(f"{folder}/root{program}", os.X_OK), program)
+        tool(f"{folder}/root/usr/bin/uzawad", "--config", f"{folder}/root/etc/uzawad/uzawad.conf", "--check-config", cwd=folder)
+        told = tool(f"{folder}/root/usr/bin/uzawa", "-s", s.url, "submit", str(ROOT / "tests/data/paper_body.json"), "--wait")
+        check("converged" in told, told)
+
+
 def test_the_balancer_is_taken(_):
     with tempfile.TemporaryDirectory() as folder, socket.socket() as free:
         free.bind(("127.0.0.1", 0))
