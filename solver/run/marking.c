@@ -13,6 +13,7 @@
 #define BULK  0.5
 #define LEAST 0.05 /* one more grid is worth its while */
 #define AIM   0.95 /* missing it by a hair would take another grid */
+#define APART 0.5  /* errors are at different places that have less than so much of the product of their norms */
 
 typedef struct {
     double share;
@@ -79,21 +80,25 @@ static double weight_of(const uz_result *result)
     return s->evaluation->asked > 0 ? error : error * error;
 }
 
-/* A quantity is off by the product of two errors: of the answer and of its adjoint. Elements have of both -> eta2, as
- * parts of their sums. False: there is no adjoint, or no error of it. */
+/* A quantity is off by the sum of products of two errors, of the answer and of its adjoint; where they are at different
+ * places rows of contacts that change are more than that, and by a part of the product of both norms (quantities.c): of
+ * the first elements have their product, of the second both as parts of their sums. -> eta2. False: there is no
+ * adjoint, or no error of it. */
 static bool add_adjoint(double *eta2, double *other, const uz_body_model *body, const uz_result *result)
 {
     const int64_t n = body->mesh.n_elements;
-    double sum[2] = {0};
+    double sum[2] = {0}, products = 0;
     if (!result->evaluation->adjoint ||
         !isfinite(uz_estimate_mesh_error(other, NULL, body, NULL, result->evaluation->adjoint)))
         return false;
     for (int64_t e = 0; e < n; e++) {
         sum[0] += eta2[e];
         sum[1] += other[e];
+        products += sqrt(eta2[e] * other[e]);
     }
+    const bool apart = !(products > APART * sqrt(sum[0] * sum[1]));
     for (int64_t e = 0; e < n && sum[1] > 0; e++)
-        eta2[e] = eta2[e] / sum[0] + other[e] / sum[1];
+        eta2[e] = apart ? eta2[e] / sum[0] + other[e] / sum[1] : sqrt(eta2[e] / sum[0] * (other[e] / sum[1]));
     return sum[1] > 0;
 }
 
@@ -107,7 +112,7 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
     double *eta2 = uz_alloc(2 * n_elements, sizeof *eta2), *room = uz_alloc_zero(2 * body->mesh.n_nodes, sizeof *room),
            sum = 0, part = 0;
     int64_t count = 0;
-    bool done = all && eta2 && room, squared = false; /* is the error one of second order? */
+    bool done = all && eta2 && room, squared = false, proved = false; /* is the error one of second order? */
     for (int64_t e = 0; e < n_elements && done; e++)
         all[e] = (indicator){0, e};
     for (int64_t i = 0; i < n_cases && done; i++) {
@@ -119,6 +124,7 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
             continue;
         for (int64_t e = 0; e < n_elements && known; e++)
             all[e].share = fmax(all[e].share, known[e] * weight_of(results[i]));
+        proved = proved || known;
         if (known)
             continue;
         const double error = uz_estimate_mesh_error(eta2, NULL, body, &scene, results[i]->u);
@@ -136,9 +142,10 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
         sum += all[e].share;
     if (done)
         qsort(all, (size_t)n_elements, sizeof *all, by_share);
-    /* what is bisected once along each direction keeps 4^-order of the square of its error */
-    const double kept = squared ? AIM * left : AIM * AIM * left * left, needed = (1 - kept) / (1 - pow(4, -order)),
-                 bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
+    /* what is bisected once along each direction keeps 4^-order of the square of its error; what else is in intervals
+     * by estimate, of the ends of contacts, falls faster */
+    const double kept = squared ? (proved ? AIM : 1) * left : AIM * AIM * left * left,
+                 needed = (1 - kept) / (1 - pow(4, -order)), bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
     while (done && count < n_elements && part < bulk && all[count].share > 0)
         part += all[count++].share;
     int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 2 + count, sizeof *grown) : NULL;
