@@ -27,9 +27,11 @@
 /* Parts of the half width: of the estimate, of what depths and ends of contacts come to. */
 #define OF_ESTIMATE 0.5
 #define OF_DEPTH    0.5
-#define OF_END      0.2
+#define OF_END      0.1
 /* ... and of the product of the norms of both errors at least, where elements say less. */
 #define OF_PRODUCT 0.5
+/* An element stands out whose part of the sum of products is more than so many times the mean. */
+#define OUTSTANDING 3
 /* ... of forces of contacts, whose rows in contact the adjoint takes for known: what a finer mesh changes of them is of
  * second order, and on coarse meshes a part of all the rest; where temperature presses the body into its obstacles it
  * is more than that; of all other quantities. */
@@ -54,8 +56,8 @@ typedef struct {
     bool *active, *pressing; /* rows of the dual; the model's */
     double *z, *w;           /* n_nodes x dim; w: room of d as well */
     double *free_strain;
-    double own_error, of_product; /* |e_u|^2 */
-    double *of_elements;          /* 3 n_elements: |e_u|^2 of each; of u plus and less z */
+    double own_error;    /* |e_u|^2 */
+    double *of_elements; /* 3 n_elements: |e_u|^2 of each; of u plus and less z */
 } adjoint;
 
 static uz_status begin(adjoint *x, uz_error *err)
@@ -80,17 +82,6 @@ static uz_status begin(adjoint *x, uz_error *err)
         !x->active || !x->pressing || !x->z || !x->w || !x->of_elements)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the quantities of %lld nodes",
                        (long long)model->mesh.n_nodes);
-    /* Of the product of both norms, by the kinds of elements. Beside corners where stress is singular an estimate is as
-     * small as 0.74 of the error of linear elements, 0.67 of those of eight and twenty nodes, 0.47 of six and ten
-     * (docs/theory.md): a product of two, times the square of one over it. Clamped ends of contacts need as much again.
-     */
-    x->of_product = 1.7;
-    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-        const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
-        const uz_element_type *type = uz_element_type_of(kind);
-        const bool simplex = kind == UZ_TRI6 || kind == UZ_TET10;
-        x->of_product = fmax(x->of_product, simplex ? 7 : type->nodes > type->corners ? 3 : 0);
-    }
     memset(x->row_of, 0xff, (size_t)model->mesh.n_nodes * sizeof *x->row_of);
     for (int64_t i = 0; i < model->m; i++)
         if (!uz_row_inner(model, i))
@@ -266,21 +257,50 @@ static uz_status keep_adjoint(uz_quantity_found *out, const adjoint *x, int64_t 
     return UZ_OK;
 }
 
-/* |e_u| |e_z|, summed over elements: what is far off in the one need not be where the other is. Rows of contacts may
- * change on finer meshes, which no element's own part knows: it is no less than a part of the product of the norms, and
- * all of that where temperature presses the body into its obstacles. scale: z's. */
+/* Of |e_u| |e_z|, what is taken of an element's part, and of what that has beyond OUTSTANDING times the mean. Beside
+ * corners where stress is singular an estimate is as small as 0.74 of the error of linear elements, 0.67 of those of
+ * eight and twenty nodes, 0.47 of six and ten (docs/theory.md): a product of two, times the square of one over it, and
+ * clamped ends of contacts need as much again. Of quadratic plane elements the few at a corner have most of the sum
+ * then; where elements have about as much as others, as of smooth fields and of meshes that were refined where the
+ * error is, they need far less. Coarse solids have edges all over. */
+static void product_factors(double factor[2], uz_element_kind kind)
+{
+    const uz_element_type *type = uz_element_type_of(kind);
+    const bool plane = kind == UZ_TRI6 || kind == UZ_QUAD8;
+    if (type->nodes == type->corners)
+        factor[0] = factor[1] = 1.7;
+    else if (kind == UZ_TRI6 || kind == UZ_TET10) {
+        factor[0] = plane ? 2.4 : 7;
+        factor[1] = plane ? 10 : 7;
+    } else {
+        factor[0] = plane ? 1.5 : 3;
+        factor[1] = plane ? 5 : 3;
+    }
+}
+
+/* |e_u| |e_z|, summed over elements with their factors: what is far off in the one need not be where the other is. Rows
+ * of contacts may change on finer meshes, which no element's own part knows: it is no less than of a part of the
+ * product of the norms, and of all of that where temperature presses the body into its obstacles. scale: z's. */
 static double product_of_errors(const adjoint *x, double scale)
 {
     const int64_t n = x->work->model->mesh.n_elements;
-    double sum = 0, square[2] = {0};
+    double *product = x->of_elements + n; /* in place of what it is made of */
+    double sum = 0, weighted = 0, square[2] = {0}, factor[2] = {0};
     for (int64_t e = 0; e < n; e++) {
         const double both = x->of_elements[n + e] + x->of_elements[2 * n + e];
         const double own[2] = {x->of_elements[e], fmax(0, 0.5 * both - x->of_elements[e])};
-        sum += sqrt(own[0] * own[1]);
+        product[e] = sqrt(own[0] * own[1]);
+        sum += product[e];
         for (int k = 0; k < 2; k++)
             square[k] += own[k];
     }
-    return fmax(sum, (x->free_strain ? 1 : OF_PRODUCT) * sqrt(square[0] * square[1])) / scale;
+    const double usual = OUTSTANDING * sum / (double)n;
+    for (int64_t e = 0; e < n; e++) {
+        product_factors(factor, (uz_element_kind)x->work->model->mesh.kind[e]);
+        weighted += factor[0] * fmin(product[e], usual) + factor[1] * fmax(0, product[e] - usual);
+    }
+    const double least = (x->free_strain ? 1 : OF_PRODUCT) * sqrt(square[0] * square[1]);
+    return (sum > 0 ? weighted * fmax(1, least / sum) : factor[1] * least) / scale;
 }
 
 static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functional *of, uz_error *err)
@@ -324,8 +344,8 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     const double depth = depth_shift(x, of, x->depth), bulge = depth_shift(x, of, x->bulge);
     const double shift = (both[0] - both[1]) / (4 * scale);
     const double times = !pressed ? OF_OTHER : x->free_strain ? OF_HEAT : OF_CONTACT;
-    out->mesh = OF_ESTIMATE * fabs(shift) + x->of_product * product_of_errors(x, scale) + OF_DEPTH * fabs(depth) +
-                fabs(bulge) + OF_END * end_error(x) + of->blur;
+    out->mesh = OF_ESTIMATE * fabs(shift) + product_of_errors(x, scale) + OF_DEPTH * fabs(depth) + fabs(bulge) +
+                OF_END * end_error(x) + of->blur;
     double whole = fabs(out->found); /* a reaction may be what large forces leave of each other */
     for (int64_t i = 0; i < model->m && out->kind == UZ_QUANTITY_REACTION; i++)
         whole += fabs(x->answer->r[i]);
