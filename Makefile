@@ -407,7 +407,7 @@ extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies 
 	@$(if $(filter contacts obstacles quantities solids bounds,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
 	@$(if $(filter-out contacts,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_contacts.py $(BUILD) $(BUILD)/contacts.json $(SCENES))
 	@$(if $(filter-out obstacles,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_obstacles.py $(BUILD) $(BUILD)/obstacles.json $(SCENES))
-	@$(if $(filter-out quantities,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_quantities.py $(BUILD) $(BUILD)/quantities.json $(SCENES))
+	@$(if $(filter-out quantities,$(FILTER)),,$(call measured,quantities) $(PYTHON) -B tests/extremes/generated_quantities.py $(BUILD) $(BUILD)/quantities.json $(SCENES))
 	@$(if $(filter-out solids,$(FILTER)),,$(call measured,solids) $(PYTHON) -B tests/extremes/generated_solids.py $(BUILD) $(BUILD)/solids.json $(SCENES))
 	@$(if $(filter-out bounds,$(FILTER)),,$(call measured,bounds) $(PYTHON) -B tests/extremes/bounds.py $(BUILD) $(BUILD)/bounds.json)
 

@@ -223,6 +223,16 @@ def test_generated_scenes(s):
     check(not [r for r in off if not r["low"] <= r["true"] <= r["high"]], off)
 
 
+def test_intervals_are_counted(_s):
+    """A value inside, one outside, one that the fine mesh cannot tell, and one without an interval."""
+    row = {"quantity": "reaction", "on_this_mesh": 1.0, "true": 2.0, "value": 1.5, "low": 0.5, "high": 2.5, "reference": 0.01}
+    rows = [row, {**row, "low": 1.2, "high": 1.8}, {**row, "reference": 0.5}, {**row, "low": None, "high": None}]
+    *_, whole = generated_quantities.told(rows)
+    check(whole == {"quantity": "all", "inside": 1, "of": 2, "half": 0.65, "middle": 0.5, "without": 1, "asked": 4}, whole)
+    alike, lines, pairs = generated_quantities.proved([{"family": "bar", "half": 3, "error": 2}, {"family": "bar on lines", "half": 1, "error": 1}])
+    check((alike["of"], alike["half"], lines["of"], pairs["of"]) == (1, 1.5, 1, 0), alike, lines, pairs)
+
+
 def test_scenes_whose_intervals_were_too_narrow(s):
     """Heat, a mean over a window, a reaction that springs leave of a larger force; and a body that just does not touch."""
     found = generated_quantities.run(s, some((30373, 46, 5027, 5102, 5243, 20136)), lambda *said, **_: None)

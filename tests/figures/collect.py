@@ -97,12 +97,17 @@ def solids(raw):
     return {"scenes": raw["scenes"], "rows": rows}
 
 
+def quantities(raw):
+    """Of what was told of values on coarse meshes, and proved: the counts."""
+    return {"scenes": raw["scenes"], "told": raw["told"], "held": raw["held"]}
+
+
 def alone(make):
     return lambda raw, old, when: make(raw)
 
 
 KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": bench_size, "extremes": alone(extremes),
-         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "bounds": alone(dict), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
+         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "quantities": alone(quantities), "bounds": alone(dict), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
 
 
 def dump(value):

@@ -114,6 +114,20 @@ def claims(data):
     return total and f"{total['passed'] + total['failed']:,} claims {total['failed'] or 'none'}"
 
 
+def of_quantities(kind, text):
+    """Of the estimated intervals of generated scenes."""
+    def value(data):
+        row = next((row for row in (data.get("quantities") or {"told": []})["told"] if row["quantity"] == kind), None)
+        return None if row is None else text(row)
+    return value
+
+
+def proved_half(data):
+    """Half a guaranteed interval's width over the error of the mesh's value: medians of bodies on their own obstacle, on lines, on each other."""
+    rows = [row["half"] for row in (data.get("quantities") or {"held": []})["held"] if row["of"]]
+    return f"{min(rows):.1f} to {max(rows):.1f} times" if rows else None
+
+
 def steps_of_auto(data):
     return None if tables.ratio(data, "accuracy_auto_1e-02_iterations") == tables.NONE else tables.ratio(data, "accuracy_auto_1e-02_iterations", 0)
 
@@ -133,6 +147,11 @@ VALUES = {
     "digits.steps": steps_of_auto, "digits.gradient": gradient_digits, "mesh_error.30": mesh_error("paper_30"), "mesh_error.600": mesh_error("paper_600"),
     "cold.600": of_bench("cold_nx600_1e-08", "{:.2f}".format), "cached.600": of_bench("cached_nx600_1e-08", "{:.2f}".format),
     "cold.cube": of_bench("cold_hex8_d101277", "{:.2f}".format), "peers.cold": over_peers("cold"), "peers.cached": over_peers("cached"),
+    "quantities.scenes": lambda data: str(data["quantities"]["scenes"]) if data.get("quantities") else None,
+    "quantities.inside": of_quantities("all", lambda row: f"{row['inside']} of {row['of']} values"), "quantities.half": of_quantities("all", lambda row: f"{row['half']:.1f} times"),
+    "quantities.middle": of_quantities("all", lambda row: f"{row['middle']:.2f}"), "quantities.middle.energy": of_quantities("strain_energy", lambda row: f"{row['middle']:.2f}"),
+    "quantities.middle.force": of_quantities("contact.force", lambda row: f"{row['middle']:.2f}"),
+    "quantities.without": of_quantities("all", lambda row: f"{100 * row['without'] / row['asked']:.0f} %"), "quantities.proved": proved_half,
     "peers.solved": solved(True), "peers.others": solved(False), "extremes.claims": claims,
 }
 

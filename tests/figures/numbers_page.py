@@ -24,7 +24,7 @@ import tables  # noqa: E402
 
 ROOT = pathlib.Path(os.environ.get("NUMBERS_ROOT") or pathlib.Path(__file__).resolve().parent.parent.parent)
 WIDTH = 119
-COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "extremes": "make extremes", "solids": "make extremes FILTER=solids", "bounds": "make extremes FILTER=bounds", "trade": "make trade",
+COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "extremes": "make extremes", "solids": "make extremes FILTER=solids", "bounds": "make extremes FILTER=bounds", "quantities": "make extremes FILTER=quantities", "trade": "make trade",
             "theory": "make theory", "soak": "make soak", "peers": "make peers", "gallery": "make gallery", "page": "make figures (the page)"}
 ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems", "trade": "rows"}  # what is measured by parts
 
