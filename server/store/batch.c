@@ -12,45 +12,62 @@ void batch_end(batch *b)
     pthread_mutex_destroy(&b->lock);
 }
 
-/* Under the lock, which it gives up meanwhile: carries out the first ones of the queue, which begins with the caller's
- * own. */
-static void lead(batch *b)
+/* The first ones of the queue, which begins with the caller's own. */
+static batch_change *take_list(batch *b)
 {
-    batch_change *list = b->queue, *last = list, *next;
+    pthread_mutex_lock(&b->lock);
+    batch_change *list = b->queue, *last = list;
     for (int n = 1; n < BATCH_MOST && last->next; n++)
         last = last->next;
     b->queue = last->next;
     if (!b->queue)
         b->queue_end = &b->queue;
     last->next = NULL;
-    b->leading = true;
     pthread_mutex_unlock(&b->lock);
-    b->run(b->ctx, list);
+    return list;
+}
+
+/* Who is first among those that came meanwhile goes on. */
+static void hand_over(batch *b)
+{
     pthread_mutex_lock(&b->lock);
-    b->leading = false;
+    batch_change *next = b->queue;
+    b->leading = next != NULL;
+    pthread_mutex_unlock(&b->lock);
+    if (next)
+        sem_post(&next->turn);
+}
+
+/* Each owner sleeps on a semaphore of its own and takes no lock when it is woken: thirty that wake for one lock would
+ * stop each other as often. */
+static void lead(batch *b, batch_change *me)
+{
+    batch_change *list = take_list(b), *next;
+    b->run(b->ctx, list);
+    hand_over(b);
     for (; list; list = next) {
         next = list->next; /* its owner may go as soon as it is done */
+        if (list == me)
+            continue;
         list->done = true;
-        pthread_cond_signal(&list->turn);
+        sem_post(&list->turn);
     }
-    if (b->queue)
-        pthread_cond_signal(&b->queue->turn);
 }
 
 void batch_do(batch *b, batch_change *me)
 {
     me->next = NULL;
     me->done = false;
-    pthread_cond_init(&me->turn, NULL);
+    sem_init(&me->turn, 0, 0);
     pthread_mutex_lock(&b->lock);
     *b->queue_end = me;
     b->queue_end = &me->next;
-    while (!me->done) {
-        if (!b->leading && b->queue == me)
-            lead(b);
-        else
-            pthread_cond_wait(&me->turn, &b->lock);
-    }
+    const bool first = !b->leading;
+    b->leading = true;
     pthread_mutex_unlock(&b->lock);
-    pthread_cond_destroy(&me->turn);
+    while (!first && sem_wait(&me->turn) != 0)
+        ; /* a signal's handler ran */
+    if (!me->done)
+        lead(b, me);
+    sem_destroy(&me->turn);
 }

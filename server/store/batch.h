@@ -4,6 +4,7 @@
 #define SERVER_STORE_BATCH_H
 
 #include <pthread.h>
+#include <semaphore.h>
 #include <stdbool.h>
 
 #define BATCH_MOST 32 /* so that the first of them does not wait for ever */
@@ -11,14 +12,14 @@
 /* A change that waits for its turn, the first member of an engine's own; on its caller's stack. */
 typedef struct batch_change {
     struct batch_change *next;
+    sem_t turn; /* posted once: it is done, or it is first in the queue with nobody at work */
     bool done;
-    pthread_cond_t turn; /* done, or first in the queue with nobody at work */
 } batch_change;
 
 typedef struct {
     pthread_mutex_t lock; /* what follows; held by nobody while changes are carried out */
     batch_change *queue, **queue_end;
-    bool leading;                               /* somebody carries out changes */
+    bool leading;                               /* somebody carries out changes, or was told to */
     void (*run)(void *ctx, batch_change *list); /* 1 to BATCH_MOST of them, by one thread at a time */
     void *ctx;
 } batch;
