@@ -10,6 +10,8 @@
 /* A server that says nothing for so long is taken for lost; it ends what it was asked itself before (SETTINGS). */
 #define SILENT_S 45.0
 
+#define FLUSH_MOST ((size_t)64 << 10) /* bytes of a call that need not be on their way at once */
+
 /* ---- opening */
 
 bool link_address_fits(const char *address, char *message, size_t size)
@@ -283,10 +285,15 @@ void link_begin(link_to *l, link_kind kind)
         l->settings = l->asked - 1;
 }
 
+/* Small calls go together when the transaction ends, or as libpq's buffer fills: each by itself would be a system call
+ * here and a server that wakes for it. What a large call has does not stay in memory until then. */
 void link_send(link_to *l, const call *c)
 {
-    if (send_one(l, c))
-        flush(l); /* what a large call has does not stay in memory until the end */
+    size_t size = 0;
+    for (int i = 0; i < c->n && i < CALL_ARGUMENTS; i++)
+        size += (size_t)c->lengths[i];
+    if (send_one(l, c) && size > FLUSH_MOST)
+        flush(l);
     l->sent++;
 }
 
