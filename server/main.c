@@ -33,7 +33,7 @@ enum { EXIT_ENDED = 0, EXIT_FAILED = 1, EXIT_USAGE = 2 };
 
 static const double LEASE_S = 60;
 /* Small jobs that a claim takes beside its own, for the next claims of this daemon: a claim costs more than they do. */
-enum { CLAIMS_AHEAD = 3 };
+enum { CLAIMS_AHEAD = 7 };
 static const double AHEAD_S = 0.5;
 
 typedef struct {
