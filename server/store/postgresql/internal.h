@@ -85,7 +85,7 @@ void postgresql_tell(postgresql_store *s, const char *id, tell_what what, const 
 bool postgresql_tell_begin(postgresql_store *s);
 void postgresql_tell_end(postgresql_store *s);
 
-/* Pieces of a result, in the transaction that ends its job: many small ones are one call. */
+/* Pieces of a result, in the transaction that ends its job: many small ones are one call, and one row. */
 enum { PIECES_AT_ONCE = 64, PLACE_ROOM = RESULT_PIECE };
 typedef struct {
     char name[32];
@@ -96,6 +96,7 @@ typedef struct {
     link_to *link;
     const char *job;
     uint64_t token;
+    int bundles; /* sent so far */
     size_t n, len;
     kept_piece kept[PIECES_AT_ONCE];
     char *bytes; /* PLACE_ROOM of them, len in use; freed by who made the place */

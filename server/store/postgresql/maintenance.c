@@ -21,7 +21,7 @@ static const struct {
      "the list of the result of job %s is not what was written\n"},
     {"SELECT id FROM uzawa.job WHERE contents IS NOT NULL AND split_part(contents, ' ', 1)::bigint <>"
      " (SELECT count(*) FROM uzawa.answer WHERE answer.job = id)"
-     " + (SELECT count(*) FROM uzawa.piece WHERE piece.job = id AND part = 0)"
+     " + (SELECT count(*) FROM uzawa.pieces AS p WHERE p.job = id AND p.part = 0)"
      " + (SELECT count(*) FROM uzawa.placed WHERE placed.job = id AND part = 0) LIMIT 20",
      "a part of the result of job %s is missing\n"},
     {"SELECT name FROM (SELECT name, waiting, bytes FROM uzawa.client UNION ALL SELECT client,"
@@ -41,8 +41,11 @@ static const struct {
     {"SELECT number || ' of job ' || job FROM uzawa.answer"
      " WHERE sum <> uzawa.sum_of(concat_ws(E'\\x1f', job, number, name), summary) LIMIT 20",
      "the summary of case %s is not what was written\n"},
-    {"SELECT name || ' of job ' || job FROM uzawa.piece WHERE sum <> uzawa.sum_of(uzawa.piece_keys(piece), data)"
-     " LIMIT 20",
+    {"SELECT name || ' of job ' || job FROM uzawa.piece_row WHERE"
+     " sum <> uzawa.sum_of(uzawa.piece_keys(piece_row), data) LIMIT 20",
+     "the %s is not what was written\n"},
+    {"SELECT name || ' of job ' || job FROM uzawa.pieces WHERE NOT good AND job IN (SELECT b.job FROM uzawa.bundle AS b"
+     " WHERE b.sum <> uzawa.bundle_sum(b.job, b.n, b.list, b.data)) LIMIT 20",
      "the %s is not what was written\n"},
     {"SELECT name || ' of job ' || job FROM uzawa.placed WHERE sum <> uzawa.sum_of(uzawa.placed_keys(placed), digest)"
      " LIMIT 20",

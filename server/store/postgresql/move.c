@@ -62,7 +62,7 @@ static store_status read_job(store *base, const char *id, moved_job *out)
                      " WHERE upload_use.job = job.id), webhook.url, webhook.state, webhook.attempts, webhook.next"
                      " FROM uzawa.job LEFT JOIN uzawa.webhook ON webhook.job = job.id WHERE job.id = $1"};
     call names = {.sql = "SELECT number, CASE name WHEN '/' THEN '' ELSE name END FROM"
-                         " (SELECT number, name FROM uzawa.piece WHERE job = $1 UNION SELECT number, name"
+                         " (SELECT number, name FROM uzawa.pieces WHERE job = $1 UNION SELECT number, name"
                          " FROM uzawa.placed WHERE job = $1) AS each ORDER BY 1, 2"};
     call_text(&c, id);
     call_text(&names, id);

@@ -1,5 +1,5 @@
-/* results.c: the blobs of results as rows: each piece of one is a row, in the transaction that ends the job, with its
- * bytes, or with the place in an object where they are. */
+/* results.c: the blobs of results in rows, in the transaction that ends the job: the pieces of several, as many as a
+ * call holds, are one row with their bytes; those in an object store a row each, with the place where they are. */
 #include "store/postgresql/objects.h"
 
 #include <stdio.h>
@@ -8,54 +8,53 @@
 
 #define HISTORY "/" /* no vector has this name (result_blobs.h) */
 
-/* One element of the text of an array. */
-#define ELEMENT(text, format, value) fprintf(text, "%s" format, i > 0 ? "," : "{", value)
+/* The lines of uzawa.bundle's list. */
+static void print_list(FILE *out, const result_place *place)
+{
+    enum { LISTS = 8 };
+    for (int k = 0; k < LISTS; k++) {
+        int64_t at = 0;
+        for (size_t i = 0; i < place->n; i++) {
+            const kept_piece *p = &place->kept[i];
+            const int64_t integers[LISTS] = {p->number, 0, p->part, p->encoding, p->header, 0, p->size, at};
+            fputc(i > 0 ? ',' : '{', out);
+            if (k == 1) /* names are words of the solver's */
+                fprintf(out, "\"%s\"", p->name);
+            else if (k == 5)
+                fprintf(out, "%.17g", p->last);
+            else
+                fprintf(out, "%lld", (long long)integers[k]);
+            at += p->size;
+        }
+        fputs(k + 1 < LISTS ? "}\n" : "}", out);
+    }
+}
 
 store_status postgresql_send_pieces(result_place *place)
 {
-    enum { LISTS = 8 };
-    char *text[LISTS] = {NULL};
-    size_t len[LISTS];
-    bool good = true;
-    /* An end that is sent again finds its own. The sum is that of piece_keys. */
-    call c = {.sql =
-                  "INSERT INTO uzawa.piece(job, token, number, name, part, encoding, header, last, data, sum)"
-                  " SELECT $1::text, $2::bigint, number, name, part, encoding, header, last, data,"
-                  " uzawa.sum_of(concat_ws(E'\\x1f', $1::text, number, name, part, encoding, header, last), data)"
-                  " FROM (SELECT e.*, substring($11::bytea FROM at::int + 1 FOR size::int) AS data FROM"
-                  " unnest($3::bigint[], $4::text[], $5::bigint[], $6::bigint[], $7::bigint[], $8::float8[],"
-                  " $9::bigint[], $10::bigint[]) AS e(number, name, part, encoding, header, last, size, at) OFFSET 0)"
-                  " AS each ON CONFLICT DO NOTHING"};
+    char *list = NULL;
+    size_t len = 0;
+    /* An end that is sent again finds its own. */
+    call c = {.sql = "INSERT INTO uzawa.bundle(job, token, n, list, data, sum) VALUES ($1::text, $2, $3::integer,"
+                     " $4::text, $5::bytea, uzawa.bundle_sum($1::text, $3::integer, $4::text, $5::bytea))"
+                     " ON CONFLICT DO NOTHING"};
     if (place->n == 0 || place->link->status != STORE_OK)
         return place->link->status;
-    call_text(&c, place->job);
-    call_integer(&c, (int64_t)place->token);
-    for (int k = 0; k < LISTS; k++) {
-        FILE *out = open_memstream(&text[k], &len[k]);
-        int64_t at = 0;
-        for (size_t i = 0; out && i < place->n; i++) {
-            const kept_piece *p = &place->kept[i];
-            const int64_t integers[] = {p->number, 0, p->part, p->encoding, p->header, 0, p->size, at};
-            if (k == 1) /* names are words of the solver's */
-                ELEMENT(out, "\"%s\"", p->name);
-            else if (k == 5)
-                ELEMENT(out, "%.17g", p->last);
-            else
-                ELEMENT(out, "%lld", (long long)integers[k]);
-            at += p->size;
-        }
-        good = out && fputc('}', out) != EOF && fclose(out) == 0 && good;
-        call_text(&c, text[k]);
-    }
-    call_bytes(&c, place->bytes, place->len);
-    if (good) {
+    FILE *out = open_memstream(&list, &len);
+    if (out)
+        print_list(out, place);
+    if (out && fclose(out) == 0) {
+        call_text(&c, place->job);
+        call_integer(&c, (int64_t)place->token);
+        call_integer(&c, place->bundles++);
+        call_text(&c, list);
+        call_bytes(&c, place->bytes, place->len);
         link_send(place->link, &c);
     } else {
         place->link->status = STORE_ERROR;
         strcpy(place->link->message, "no memory for a result");
     }
-    for (int k = 0; k < LISTS; k++)
-        free(text[k]);
+    free(list);
     place->n = place->len = 0;
     return place->link->status;
 }
@@ -142,9 +141,8 @@ static store_status get(store *base, const result_key *key, int64_t after,
     postgresql_store *s = postgresql_of(base);
     taker t = {take, ctx, .any = false};
     call c = {.sql = "SELECT part, encoding, header, last, CASE WHEN name <> '" HISTORY "' OR last > $4::float8"
-                     " THEN data ELSE '' END, sum = uzawa.sum_of(uzawa.piece_keys(piece), data),"
-                     " NULL, NULL::bigint, NULL::bigint"
-                     " FROM uzawa.piece WHERE job = $1 AND number = $2::bigint AND name = $3"
+                     " THEN data ELSE '' END, good, NULL, NULL::bigint, NULL::bigint"
+                     " FROM uzawa.pieces WHERE job = $1 AND number = $2::bigint AND name = $3"
                      " UNION ALL SELECT part, encoding, header, last, digest,"
                      " sum = uzawa.sum_of(uzawa.placed_keys(placed), digest), object, at, size"
                      " FROM uzawa.placed WHERE job = $1 AND number = $2::bigint AND name = $3 ORDER BY part"};
@@ -177,7 +175,7 @@ static store_status read_total(link_to *l, const PGresult *r, void *ctx)
 static store_status count(store *base, const char *id, const char *name, int64_t *total)
 {
     call c = {.sql = "SELECT coalesce(sum(header), 0)::bigint FROM"
-                     " (SELECT header FROM uzawa.piece WHERE job = $1 AND name = $2 AND part = 0"
+                     " (SELECT header FROM uzawa.pieces WHERE job = $1 AND name = $2 AND part = 0"
                      " UNION ALL SELECT header FROM uzawa.placed WHERE job = $1 AND name = $2 AND part = 0) AS each"};
     call_text(&c, id);
     call_text(&c, name);
