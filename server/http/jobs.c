@@ -127,7 +127,7 @@ static bool waiting_ready(delayed_reply *d)
 {
     waiting *w = (waiting *)d;
     job_clear(&w->found);
-    w->status = store_get(w->context->store, w->id, &w->found);
+    w->status = work_look(w->context->work, w->id, &w->found);
     return w->status == STORE_NOT_FOUND || (w->status == STORE_OK && jobs_ended(&w->found));
 }
 

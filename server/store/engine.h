@@ -22,7 +22,9 @@ typedef struct {
     int progress;                 /* renew */
     bool *end;                    /* renew: store.h; false before the call, and stays where there is one process */
     const store_outcome *outcome; /* finish */
-    bool counted;                 /* release: the attempt */
+    double *finished; /* finish: when it was, where the end is durable by then; 0 before the call, and stays where a
+                       * reader has to wait for that */
+    bool counted;     /* release: the attempt */
 } lease_use;
 
 typedef struct {

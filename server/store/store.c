@@ -197,10 +197,14 @@ store_status store_renew(store *s, const store_lease *lease, int progress, bool 
     return s->engine->use_lease(s, lease, &use);
 }
 
-store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome)
+store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome, double *finished)
 {
+    double unused = 0.0;
+    finished = finished ? finished : &unused;
+    *finished = 0.0;
     if (outcome->status == JOB_SUCCESSFUL || outcome->status == JOB_FAILED || outcome->status == JOB_DISMISSED)
-        return s->engine->use_lease(s, lease, &(lease_use){.what = LEASE_FINISH, .outcome = outcome});
+        return s->engine->use_lease(s, lease,
+                                    &(lease_use){.what = LEASE_FINISH, .outcome = outcome, .finished = finished});
     store_set_message(s, "a job cannot be finished with a status that is not an end");
     return STORE_ERROR;
 }

@@ -192,8 +192,9 @@ typedef struct {
 } store_outcome;
 
 /* ---- finish: status, summaries, results and histories in one transaction. Only with the lease of the running job;
- * otherwise STORE_CONFLICT and nothing is written: each job gets one result. */
-store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome);
+ * otherwise STORE_CONFLICT and nothing is written: each job gets one result. *finished (may be NULL): when the job
+ * ended, by the store's clock, or 0 where that is not on disk yet and who reads the job waits for it. */
+store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome, double *finished);
 
 /* ---- requeue. store_release: one running job of ours goes back to accepted; counted: the attempt was one, since its
  * run failed (else the service stops).

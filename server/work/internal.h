@@ -3,6 +3,7 @@
 #define SERVER_WORK_INTERNAL_H
 
 #include "base/clock.h"
+#include "work/ends.h"
 #include "work/feed.h"
 #include "work/process.h"
 #include "work/work.h"
@@ -41,6 +42,7 @@ struct work {
     pthread_mutex_t claim_lock;
 
     feed *feed; /* told of every change of a job after it was committed */
+    ends *ends; /* of jobs that ended here, before the feed is told */
 
     pthread_mutex_t pool_lock; /* of each process what its header says; taken alone */
     pthread_cond_t pool_idle;  /* one was given back */

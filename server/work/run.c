@@ -63,9 +63,11 @@ static bool is_settled(store_status status)
 static store_status try_to_store(const run *r, bool for_ever)
 {
     work *w = r->me->w;
-    double begun = clock_seconds(CLOCK_MONOTONIC);
+    double begun = clock_seconds(CLOCK_MONOTONIC), finished;
     for (int attempt = 0;; attempt++) {
-        store_status status = store_finish(w->store, &r->me->lease, &r->outcome);
+        store_status status = store_finish(w->store, &r->me->lease, &r->outcome, &finished);
+        if (status == STORE_OK)
+            ends_keep(w->ends, r->job, &r->outcome, finished);
         if (is_settled(status))
             return status;
         if (attempt < FINISH_ATTEMPTS)

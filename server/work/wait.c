@@ -14,6 +14,11 @@ bool work_is_stopping(work *w)
     return stopping;
 }
 
+store_status work_look(work *w, const char *id, job *out)
+{
+    return ends_find(w->ends, id, out) ? STORE_OK : store_get(w->store, id, out);
+}
+
 bool work_wait_since(work *w, const char *id, uint64_t since, double seconds, int fd, const atomic_bool *no_more,
                      job *found)
 {
@@ -26,7 +31,7 @@ bool work_wait_since(work *w, const char *id, uint64_t since, double seconds, in
         job j = {.progress = 0};
         const double now = clock_seconds(CLOCK_MONOTONIC);
         if (told || now >= look_at) {
-            const store_status status = store_get(w->store, id, &j);
+            const store_status status = work_look(w, id, &j);
             ended = status == STORE_NOT_FOUND ||
                     (status == STORE_OK && j.status != JOB_ACCEPTED && j.status != JOB_RUNNING);
             look_at = now + LOOK_AGAIN_S;

@@ -250,6 +250,7 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     cpu_set_t may_use;
     w->processors = sched_getaffinity(0, sizeof may_use, &may_use) == 0 ? CPU_COUNT(&may_use) : 1;
     w->feed = feed_new();
+    w->ends = ends_new();
     w->workers = calloc((size_t)w->n, sizeof *w->workers);
     w->processes = calloc((size_t)w->n, sizeof *w->processes);
     for (int i = 0; w->workers && i < w->n; i++) {
@@ -316,7 +317,7 @@ static size_t cache_share(const work_options *o, size_t left, int i)
 work *work_start(store *s, const work_options *options, server_log *log, char *message, size_t size)
 {
     work *w = make_work(s, options, log);
-    bool made = w && w->workers && w->processes && w->feed;
+    bool made = w && w->workers && w->processes && w->feed && w->ends;
     size_t left = made ? w->options.cache_bytes : 0;
     for (int i = 0; made && i < w->n; i++) {
         const size_t share = cache_share(&w->options, left, i);
@@ -420,6 +421,7 @@ void work_free(work *w)
     free(w->workers);
     free(w->processes);
     feed_free(w->feed);
+    ends_free(w->ends);
     pthread_cond_destroy(&w->pool_idle);
     pthread_mutex_destroy(&w->pool_lock);
     pthread_cond_destroy(&w->tick);

@@ -65,6 +65,9 @@ bool work_wait(work *w, const char *id, double seconds, int fd, const atomic_boo
  * none was seen. */
 bool work_wait_since(work *w, const char *id, uint64_t since, double seconds, int fd, const atomic_bool *no_more,
                      job *found);
+/* The job, for who has seen that it had not ended and waits for that: as it was when it ended here, or as the store has
+ * it. */
+store_status work_look(work *w, const char *id, job *out);
 /* What changes jobs is told there: by the store what others than a job's owner do, by the workers the rest. */
 feed *work_feed(work *w);
 

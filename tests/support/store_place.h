@@ -139,7 +139,7 @@ static inline store_lease lease_of(const char *id, const char *owner)
 static inline store_status finish_as(store *s, const char *id, const char *owner, const store_outcome *outcome)
 {
     const store_lease lease = lease_of(id, owner);
-    return store_finish(s, &lease, outcome);
+    return store_finish(s, &lease, outcome, NULL);
 }
 
 static inline store_status renew_as(store *s, const char *id, const char *owner, int progress)

@@ -25,6 +25,7 @@ typedef struct {
     const store_outcome *outcome;
     const placed_result *placed; /* its result is in objects; NULL: it goes with the transaction */
     bool again;                  /* a submission that may have been carried out before */
+    double finished;             /* of an end: when it was */
     store_status status;
     size_t answer; /* where the call's that decides is */
     char message[LINK_CAUSE];
@@ -124,9 +125,14 @@ store_status postgresql_over_quota(link_to *l, const char *client, const char *w
     return STORE_QUOTA;
 }
 
+/* What the call that decides has answered. */
 static store_status read_verdict(link_to *l, change *c)
 {
     const PGresult *r = l->answers[c->answer];
+    if (!c->request) {
+        c->finished = cell_real(r, 0, 0);
+        return STORE_OK;
+    }
     const char *verdict = PQgetvalue(r, 0, 0);
     c->repeated = strcmp(verdict, "repeat") == 0;
     if (strcmp(verdict, "new") == 0 || strcmp(verdict, "again") == 0)
@@ -178,7 +184,7 @@ static void send_end(link_to *l, change *c)
         postgresql_send_placed(l, c->lease->job, c->lease->token, c->placed);
     else
         send_result(l, c, &bytes, &contents);
-    call q = {.sql = "SELECT uzawa.finish_2($1, $2, $3, $4, $5, $6, $7, $8)"};
+    call q = {.sql = "SELECT uzawa.finish_3($1, $2, $3, $4, $5, $6, $7, $8)"};
     call_text(&q, c->lease->job);
     call_text(&q, c->lease->owner);
     call_integer(&q, (int64_t)c->lease->token);
@@ -220,7 +226,7 @@ static void run_alone(postgresql_store *s, change *c)
         send_change(s, l, c);
         c->status = end_transaction(l);
         const bool again = tries < 4 && l->pg && (l->lost ? c->status == STORE_AWAY : l->passing);
-        if (c->status == STORE_OK && c->request)
+        if (c->status == STORE_OK)
             c->status = read_verdict(l, c);
         memcpy(c->message, l->message, sizeof c->message);
         c->again = c->again || l->lost;
@@ -260,7 +266,7 @@ static bool run_together(postgresql_store *s, change *list)
     for (size_t i = 0; i < n; i++) {
         all[i]->again = l->lost;
         all[i]->status = status;
-        if (status == STORE_OK && all[i]->request)
+        if (status == STORE_OK)
             all[i]->status = read_verdict(l, all[i]);
         memcpy(all[i]->message, l->message, sizeof all[i]->message);
     }
@@ -519,7 +525,8 @@ static int64_t bytes_of(const store_answer *a)
     return bytes;
 }
 
-static store_status finish(postgresql_store *s, const store_lease *lease, const store_outcome *outcome)
+static store_status finish(postgresql_store *s, const store_lease *lease, const store_outcome *outcome,
+                           double *finished)
 {
     change c = {.lease = lease, .outcome = outcome};
     int64_t bytes = bytes_of(&outcome->whole);
@@ -531,6 +538,7 @@ static store_status finish(postgresql_store *s, const store_lease *lease, const 
     if (status == STORE_OK)
         status = carry_out(s, &c, !placed && bytes > SHARED_MOST);
     postgresql_placed_free(placed);
+    *finished = c.finished;
     return status;
 }
 
@@ -547,7 +555,7 @@ store_status postgresql_use_lease(store *base, const store_lease *lease, const l
         return postgresql_do(s, LINK_LAZY, true, &c, read_renewal, use->end);
     }
     call_bool(&c, use->counted);
-    const store_status status = use->what == LEASE_FINISH ? finish(s, lease, use->outcome)
+    const store_status status = use->what == LEASE_FINISH ? finish(s, lease, use->outcome, use->finished)
                                                           : postgresql_do(s, LINK_DURABLE, false, &c, NULL, NULL);
     if (status == STORE_OK)
         postgresql_tell(s, lease->job, use->what == LEASE_RELEASE ? TELL_WAITS : TELL_CHANGED, NULL, false);

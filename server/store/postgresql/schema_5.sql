@@ -90,6 +90,28 @@ BEGIN
     RETURN NULL;
 END $$;
 
+-- As finish_2; when the job ended.
+CREATE FUNCTION finish_3(p_job text, p_owner text, p_token bigint, p_status integer, p_summary text, p_error text,
+    p_bytes bigint, p_contents text) RETURNS float8 LANGUAGE plpgsql SET plan_cache_mode = force_generic_plan AS $$
+DECLARE
+    ended float8;
+BEGIN
+    UPDATE uzawa.job SET status = p_status, finished = uzawa.moment(), summary = p_summary, error = p_error, node = NULL,
+        owner = NULL, lease = 0, progress = CASE WHEN p_status = 2 THEN 100 ELSE progress END,
+        summary_sum = uzawa.sum_of(uzawa.keys_of(id, p_status::text), p_summary), bytes = bytes + p_bytes,
+        contents = p_contents, contents_sum = uzawa.sum_of(id, p_contents)
+        WHERE id = p_job AND status = 1 AND owner = p_owner AND token = p_token RETURNING finished INTO ended;
+    IF NOT FOUND THEN
+        SELECT finished INTO ended FROM uzawa.job WHERE id = p_job AND status = p_status AND token = p_token
+            AND summary IS NOT DISTINCT FROM p_summary AND error IS NOT DISTINCT FROM p_error
+            AND contents IS NOT DISTINCT FROM p_contents;
+        IF NOT FOUND THEN
+            PERFORM uzawa.refuse_lease(p_job);
+        END IF;
+    END IF;
+    RETURN ended;
+END $$;
+
 -- Who had the tables of version 4 has these.
 DO $$
 DECLARE

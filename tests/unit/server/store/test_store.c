@@ -34,7 +34,7 @@ STORE_TEST(submit_claim_finish)
     CHECK(len == 8 && body && strcmp(body, "{\"a\": 1}") == 0);
     free(body);
     CHECK_INT(store_renew(p.s, &lease, 42, NULL), STORE_OK);
-    CHECK_INT(store_finish(p.s, &lease, &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(store_finish(p.s, &lease, &PLAIN_SUCCESS, NULL), STORE_OK);
     char id[33];
     strcpy(id, j.id);
     job_clear(&j);
@@ -103,12 +103,12 @@ STORE_TEST(an_earlier_lease_is_fenced_off)
     CHECK_STR(second.job, first.job);
     CHECK(second.token != first.token);
     CHECK_INT(store_renew(p.s, &first, 30, NULL), STORE_CONFLICT);
-    CHECK_INT(store_finish(p.s, &first, &PLAIN_SUCCESS), STORE_CONFLICT);
+    CHECK_INT(store_finish(p.s, &first, &PLAIN_SUCCESS, NULL), STORE_CONFLICT);
     CHECK_INT(store_release(p.s, &first, false), STORE_CONFLICT);
     CHECK_INT(store_get(p.s, id, &j), STORE_OK);
     CHECK(j.status == JOB_RUNNING && j.progress == 0);
     job_clear(&j);
-    CHECK_INT(store_finish(p.s, &second, &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(store_finish(p.s, &second, &PLAIN_SUCCESS, NULL), STORE_OK);
     place_end(&p);
 }
 
@@ -135,8 +135,8 @@ STORE_TEST(a_lease_ends_with_its_process)
             CHECK_INT(store_recover(p.s, 3, "{}", NULL, NULL), STORE_OK);
     }
     CHECK_INT(store_renew(p.s, &leases[0], 50, NULL), STORE_CONFLICT);
-    CHECK_INT(store_finish(p.s, &leases[0], &PLAIN_SUCCESS), STORE_CONFLICT);
-    CHECK_INT(store_finish(p.s, &leases[1], &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(store_finish(p.s, &leases[0], &PLAIN_SUCCESS, NULL), STORE_CONFLICT);
+    CHECK_INT(store_finish(p.s, &leases[1], &PLAIN_SUCCESS, NULL), STORE_OK);
     place_end(&p);
 }
 

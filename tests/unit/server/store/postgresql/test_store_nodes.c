@@ -71,7 +71,7 @@ static void check_claim(store *s, const char *id, int fit)
     const store_lease lease = claim_next(s);
     CHECK_STR(lease.job, id);
     CHECK_INT((int)lease.fit, fit);
-    CHECK_INT(store_finish(s, &lease, &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(store_finish(s, &lease, &PLAIN_SUCCESS, NULL), STORE_OK);
 }
 
 TEST(a_job_goes_where_its_body_is)
@@ -138,7 +138,7 @@ TEST(small_jobs_are_claimed_ahead)
     for (int i = 0; i < 5; i++) {
         lease = claim_next(two.a);
         CHECK_STR(lease.job, id[i]);
-        CHECK_INT(store_finish(two.a, &lease, &PLAIN_SUCCESS), STORE_OK);
+        CHECK_INT(store_finish(two.a, &lease, &PLAIN_SUCCESS, NULL), STORE_OK);
         CHECK_INT(count_of(&two, "status = 1"), 3 - i % 4);
     }
     CHECK_STR(claim_next(two.b).job, id[8]); /* another daemon has none of them */
@@ -187,9 +187,9 @@ TEST(an_end_that_is_sent_again_is_the_same)
     other.whole.summary = "{\"a\": 2}";
     submit_body(two.a, 1, 0, id);
     store_lease lease = claim_next(two.a);
-    CHECK_INT(store_finish(two.a, &lease, &with_result), STORE_OK);
-    CHECK_INT(store_finish(two.a, &lease, &with_result), STORE_OK);
-    CHECK_INT(store_finish(two.a, &lease, &other), STORE_CONFLICT);
+    CHECK_INT(store_finish(two.a, &lease, &with_result, NULL), STORE_OK);
+    CHECK_INT(store_finish(two.a, &lease, &with_result, NULL), STORE_OK);
+    CHECK_INT(store_finish(two.a, &lease, &other, NULL), STORE_CONFLICT);
     CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 2);
     CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.answer", &rows) && rows == 1);
     CHECK_INT(store_get_vector(two.b, id, 1, "reactions", &got, &rows), STORE_OK);
@@ -197,7 +197,7 @@ TEST(an_end_that_is_sent_again_is_the_same)
     free(got);
     /* and with another lease it is another's */
     lease.token++;
-    CHECK_INT(store_finish(two.a, &lease, &with_result), STORE_CONFLICT);
+    CHECK_INT(store_finish(two.a, &lease, &with_result, NULL), STORE_CONFLICT);
     CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 2);
     /* what belongs to a job goes with it */
     job_status was;
