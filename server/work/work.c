@@ -330,11 +330,11 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
         work_free(w);
         return NULL;
     }
+    housekeeping_report(w); /* nobody finds it without a name, nor knows whose place it takes */
     if (!recover(w, message, size)) {
         work_free(w);
         return NULL;
     }
-    housekeeping_report(w); /* nobody finds it without a name */
     store_listen(s, tell_change, w);
     /* Signals are for the thread that waits for them; those that a fault raises in its own thread stay open. */
     static const int FAULTS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP};

@@ -238,6 +238,19 @@ def test_one_is_killed(s):
         check_all(b, name, posted)
 
 
+def test_one_that_begins_anew_takes_up_its_jobs(s):
+    with daemons(s.build, 1) as ((a,), _):
+        job = a.post(ENDLESS).json["id"]
+        a.wait_status(job, "running")
+        a.process.kill()
+        a.process.wait()
+        a.start()  # the lease is good for most of a minute
+        wait_until(lambda: a.get(f"/v1/jobs/{job}").json["attempts"] == 2, seconds=20)
+        check([event["requeued"] for event in a.events("recovered")] == [1], a.events("recovered"))
+        check(len(a.get("/v1/nodes").json["nodes"]) == 1, "its former self is a node")
+        a.request("DELETE", f"/v1/jobs/{job}")
+
+
 def test_one_is_stopped_past_its_lease(s):
     with daemons(s.build, 2) as ((a, b), name):
         slow = {**SCENE, "problem": {**SCENE["problem"], "mesh": {"box": {"size": [60, 20], "cells": [300, 100],

@@ -1,5 +1,6 @@
 /* jobs.c: the life of a job, each step one transaction. Submissions and ends that come while others are on their way
  * are one transaction together: they wait for the same disk. */
+#include "store/postgresql/former.h"
 #include "store/postgresql/objects.h"
 
 #include <gnutls/crypto.h>
@@ -585,6 +586,50 @@ static store_status read_taken(link_to *l, const PGresult *r, void *ctx)
     return STORE_OK;
 }
 
+/* The names of nodes of which it is known that their daemons are no more, as an array. */
+static store_status read_gone(link_to *l, const PGresult *r, void *ctx)
+{
+    char **array = ctx;
+    size_t len = 0;
+    free(*array);
+    *array = NULL;
+    FILE *out = open_memstream(array, &len);
+    bool any = false;
+    for (int i = 0; out && i < PQntuples(r); i++) {
+        const char *process = PQgetvalue(r, i, 1);
+        const bool near = former_is_near(process);
+        if (near ? former_is_gone(process) : cell_integer(r, i, 2) != 0) {
+            fprintf(out, "%c%s", any ? ',' : '{', PQgetvalue(r, i, 0));
+            any = true;
+        }
+    }
+    if (out && any)
+        fputc('}', out);
+    if (out && fclose(out) == 0)
+        return any ? STORE_OK : STORE_NOT_FOUND;
+    strcpy(l->message, "no memory for the names of nodes");
+    return STORE_ERROR;
+}
+
+/* A daemon that was killed leaves its node, and leases that are good for long. The next one on the same machine sees
+ * that its process is no more; one that has its name, elsewhere or after a boot, has its place. What belongs to no node
+ * is nobody's. */
+static store_status forget_gone(postgresql_store *s)
+{
+    char *array = NULL;
+    call look = {.sql = "SELECT n.id, n.process, n.name <> '' AND n.name = me.name AND n.host = me.host"
+                        " FROM uzawa.node AS n, uzawa.node AS me WHERE me.id = $1 AND n.id <> me.id"};
+    call forget = {.sql = "DELETE FROM uzawa.node WHERE id = ANY($1::text[])"};
+    call_text(&look, s->node);
+    store_status status = postgresql_do(s, LINK_DURABLE, true, &look, read_gone, &array);
+    if (status == STORE_OK) {
+        call_text(&forget, array);
+        status = postgresql_do(s, LINK_DURABLE, true, &forget, NULL, NULL);
+    }
+    free(array);
+    return status == STORE_NOT_FOUND ? STORE_OK : status;
+}
+
 /* At the start, and from then on by expire: a daemon that is gone for good leaves its jobs to the others. */
 store_status postgresql_recover(store *base, int max_attempts, const char *error_json, int64_t *requeued,
                                 int64_t *failed)
@@ -600,7 +645,9 @@ store_status postgresql_recover(store *base, int max_attempts, const char *error
     s->lost_json = copy;
     s->most_attempts = copy ? max_attempts : 0;
     pthread_mutex_unlock(&s->state_lock);
-    const store_status status = postgresql_do(s, LINK_DURABLE, true, &c, read_taken, &t);
+    store_status status = forget_gone(s);
+    if (status == STORE_OK)
+        status = postgresql_do(s, LINK_DURABLE, true, &c, read_taken, &t);
     *requeued = t.requeued;
     *failed = t.failed;
     return status;

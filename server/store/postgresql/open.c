@@ -1,5 +1,6 @@
 /* open.c: opening and closing a store in a database, its connections, and the table of the engine. */
 #include "store/blobs.h"
+#include "store/postgresql/former.h"
 #include "store/postgresql/internal.h"
 #include "store/postgresql/postgresql.h"
 #include "store/postgresql/schema.h"
@@ -106,16 +107,18 @@ static bool read_newest(link_to *l, postgresql_store *s)
 static bool enter(link_to *l, postgresql_store *s)
 {
     uint64_t random[2] = {0};
-    char host[65] = "";
-    call c = {.sql = "INSERT INTO uzawa.node(id, host, pid, begun, seen) VALUES ($1, $2, $3, uzawa.moment(),"
-                     " uzawa.moment())"};
+    char host[65] = "", process[FORMER_TEXT] = "";
+    call c = {.sql = "INSERT INTO uzawa.node(id, host, pid, begun, seen, process) VALUES ($1, $2, $3, uzawa.moment(),"
+                     " uzawa.moment(), $4)"};
     if (getrandom(random, sizeof random, 0) != (ssize_t)sizeof random)
         return false;
     gethostname(host, sizeof host - 1);
+    former_describe(getpid(), process); /* where the system does not tell, leases do */
     snprintf(s->node, sizeof s->node, "%016llx%016llx", (unsigned long long)random[0], (unsigned long long)random[1]);
     call_text(&c, s->node);
     call_text(&c, host);
     call_integer(&c, getpid());
+    call_text(&c, process);
     link_begin(l, LINK_DURABLE);
     link_send(l, &c);
     return link_end(l) == STORE_OK;

@@ -1,5 +1,5 @@
--- Version 5: the pieces of a result in one row. Daemons of version 4 go on meanwhile and afterwards: to
--- them `piece` is what it was.
+-- Version 5: the pieces of a result in one row, and daemons that say which process they are. Daemons of version 4 go on
+-- meanwhile and afterwards: to them `piece` is what it was.
 SET LOCAL search_path = uzawa;
 
 -- A summary of 3 KB stays in its row as it is: to compress it, and to bring it back, was a third of the end of a job.
@@ -111,6 +111,9 @@ BEGIN
     END IF;
     RETURN ended;
 END $$;
+
+-- Which process a daemon is, and of which machine (former.h); '': it does not say.
+ALTER TABLE node ADD COLUMN process text NOT NULL DEFAULT '';
 
 -- Who had the tables of version 4 has these.
 DO $$

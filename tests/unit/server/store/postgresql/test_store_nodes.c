@@ -3,7 +3,11 @@
 #include "store_place.h"
 #include "store/engine_base.h"
 #include "store/nodes.h"
+#include "store/postgresql/former.h"
 #include "store/postgresql/schema.h"
+
+#include <signal.h>
+#include <sys/wait.h>
 
 /* Two daemons: of the place, and another one. */
 typedef struct {
@@ -203,6 +207,47 @@ TEST(an_end_that_is_sent_again_is_the_same)
     job_status was;
     CHECK_INT(store_dismiss(two.b, id, &was), STORE_OK);
     CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 0);
+    pair_end(&two);
+}
+
+/* The jobs of a daemon that was killed, at the start of the next one on its machine, or of that with its name. */
+TEST(jobs_of_a_process_that_is_no_more_are_taken_up)
+{
+    pair two;
+    char id[33], text[FORMER_TEXT], sql[400];
+    int64_t requeued, failed;
+    if (!pair_begin(&two, 1000.0))
+        return;
+    submit_body(two.a, 1, 0, id);
+    const store_lease lease = claim_next(two.b);
+    CHECK_STR(lease.job, id);
+    CHECK_INT(store_recover(two.a, 9, "{}", &requeued, &failed), STORE_OK); /* it lives */
+    CHECK_INT((int)requeued, 0);
+    const pid_t child = fork();
+    if (child == 0) {
+        pause();
+        _exit(0);
+    }
+    CHECK(former_describe(child, text));
+    snprintf(sql, sizeof sql, "UPDATE uzawa.node SET process = '%s' WHERE id = (SELECT node FROM uzawa.job)", text);
+    run_sql(&two, sql);
+    CHECK_INT(store_recover(two.a, 9, "{}", &requeued, &failed), STORE_OK);
+    CHECK_INT((int)requeued, 0);
+    kill(child, SIGKILL);
+    CHECK(waitpid(child, NULL, 0) == child);
+    CHECK_INT(store_recover(two.a, 9, "{}", &requeued, &failed), STORE_OK);
+    CHECK_INT((int)requeued, 1);
+    CHECK_INT(store_finish(two.b, &lease, &PLAIN_SUCCESS, NULL), STORE_CONFLICT); /* whatever it was */
+    /* of another machine only the name tells */
+    run_sql(&two, "INSERT INTO uzawa.node(id, host, pid, begun, seen, name, process) SELECT 'far', host, 1, seen, seen,"
+                  " 'one', '0-0 pid:[1] 1 1' FROM uzawa.node LIMIT 1");
+    CHECK_STR(claim_next(two.a).job, id);
+    run_sql(&two, "UPDATE uzawa.job SET node = 'far'");
+    CHECK_INT(store_recover(two.a, 9, "{}", &requeued, &failed), STORE_OK);
+    CHECK_INT((int)requeued, 0);
+    run_sql(&two, "UPDATE uzawa.node SET name = 'one'");
+    CHECK_INT(store_recover(two.a, 9, "{}", &requeued, &failed), STORE_OK);
+    CHECK_INT((int)requeued, 1);
     pair_end(&two);
 }
 
