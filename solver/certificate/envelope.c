@@ -91,34 +91,64 @@ static bool order_dofs(int64_t *place, const uz_csc *A)
     return room;
 }
 
+static int64_t columns(const uz_envelope *f, int64_t block)
+{
+    const int64_t first = block * UZ_ENVELOPE_BLOCK;
+    return first + UZ_ENVELOPE_BLOCK < f->n ? UZ_ENVELOPE_BLOCK : f->n - first;
+}
+
+/* Where the envelope ends below each block, and room for all of them. */
 static bool make_room(uz_envelope *f, const uz_csc *A)
 {
-    const int64_t n = f->n;
-    for (int64_t i = 0; i < n; i++)
-        f->first[i] = i;
-    for (int64_t j = 0; j < n; j++)
+    for (int64_t b = 0; b < f->blocks; b++)
+        f->end[b] = b * UZ_ENVELOPE_BLOCK + columns(f, b);
+    for (int64_t j = 0; j < f->n; j++)
         for (int64_t q = A->ptr[j]; q < A->ptr[j + 1]; q++) {
             const int64_t a = f->place[A->idx[q]], b = f->place[j], row = a > b ? a : b, column = a > b ? b : a;
-            f->first[row] = column < f->first[row] ? column : f->first[row];
+            int64_t *end = &f->end[column / UZ_ENVELOPE_BLOCK];
+            *end = row + 1 > *end ? row + 1 : *end;
         }
     f->start[0] = 0;
-    for (int64_t i = 0; i < n; i++)
-        f->start[i + 1] = f->start[i] + i - f->first[i] + 1;
-    f->L = uz_alloc_zero(f->start[n], sizeof *f->L);
+    for (int64_t b = 0; b < f->blocks; b++) { /* a row goes on to the diagonal from where it begins */
+        if (b > 0 && f->end[b] < f->end[b - 1])
+            f->end[b] = f->end[b - 1];
+        f->start[b + 1] = f->start[b] + columns(f, b) * (f->end[b] - b * UZ_ENVELOPE_BLOCK);
+    }
+    f->L = uz_alloc_zero(f->start[f->blocks], sizeof *f->L);
     return f->L != NULL;
 }
 
-/* Row i of L, from those above it. */
-static double eliminate(uz_envelope *f, int64_t i)
+static void fill(uz_envelope *f, const uz_csc *A)
 {
-    double *row = f->L + f->start[i] - f->first[i];
-    for (int64_t j = f->first[i]; j < i; j++) {
-        const double *other = f->L + f->start[j] - f->first[j];
-        const int64_t from = f->first[i] > f->first[j] ? f->first[i] : f->first[j];
-        row[j] = (row[j] - uz_dot(j - from, row + from, other + from)) / other[j];
+    for (int64_t j = 0; j < f->n; j++)
+        for (int64_t q = A->ptr[j]; q < A->ptr[j + 1]; q++) {
+            const int64_t a = f->place[A->idx[q]], b = f->place[j], row = a > b ? a : b, column = a > b ? b : a;
+            const int64_t block = column / UZ_ENVELOPE_BLOCK, first = block * UZ_ENVELOPE_BLOCK;
+            f->L[f->start[block] + (column - first) * (f->end[block] - first) + row - first] = A->val[q];
+        }
+}
+
+/* A block less what those before it make of it, divided by its own factor. own (n): what pivots are compared with. */
+static bool eliminate(uz_envelope *f, int64_t block, const double *own, double least)
+{
+    const int64_t first = block * UZ_ENVELOPE_BLOCK, rows = f->end[block] - first, n = columns(f, block);
+    double *L = f->L + f->start[block];
+    for (int64_t b = block - 1; b >= 0 && f->end[b] > first; b--) {
+        const int64_t before = b * UZ_ENVELOPE_BLOCK, ld = f->end[b] - before, below = f->end[b] - first;
+        const uz_outer outer = {.rows = below,
+                                .n = below < n ? below : n,
+                                .k = UZ_ENVELOPE_BLOCK,
+                                .A = f->L + f->start[b] + first - before,
+                                .ld = ld,
+                                .C = L,
+                                .ldc = rows,
+                                .subtract = true};
+        uz_block_outer(&outer);
     }
-    const double *own = row + f->first[i];
-    return row[i] - uz_dot(i - f->first[i], own, own);
+    bool good = uz_block_factor(n, rows - n, L, rows);
+    for (int64_t i = 0; i < n && good; i++)
+        good = L[i * rows + i] * L[i * rows + i] > least * own[first + i];
+    return good;
 }
 
 uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, const double *size, double least,
@@ -126,25 +156,19 @@ uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, 
 {
     const int64_t n = A->cols;
     *definite = false;
-    *out = (uz_envelope){.n = n};
+    *out = (uz_envelope){.n = n, .blocks = (n + UZ_ENVELOPE_BLOCK - 1) / UZ_ENVELOPE_BLOCK};
     out->place = uz_alloc(n, sizeof *out->place);
-    out->first = uz_alloc(n, sizeof *out->first);
-    out->start = uz_alloc(n + 1, sizeof *out->start);
+    out->end = uz_alloc(out->blocks, sizeof *out->end);
+    out->start = uz_alloc(out->blocks + 1, sizeof *out->start);
     double *own = uz_alloc(n, sizeof *own);
-    const bool room = out->place && out->first && out->start && own && order_dofs(out->place, A) && make_room(out, A);
-    for (int64_t j = 0; j < n && room; j++) {
+    const bool room = out->place && out->end && out->start && own && order_dofs(out->place, A) && make_room(out, A);
+    if (room)
+        fill(out, A);
+    for (int64_t j = 0; j < n && room; j++)
         own[out->place[j]] = size[j];
-        for (int64_t q = A->ptr[j]; q < A->ptr[j + 1]; q++) {
-            const int64_t a = out->place[A->idx[q]], b = out->place[j], row = a > b ? a : b, column = a > b ? b : a;
-            out->L[out->start[row] + column - out->first[row]] = A->val[q];
-        }
-    }
     bool good = room;
-    for (int64_t i = 0; i < n && good; i++) {
-        const double pivot = eliminate(out, i);
-        good = pivot > least * own[i];
-        out->L[out->start[i + 1] - 1] = good ? sqrt(pivot) : NAN;
-    }
+    for (int64_t b = 0; b < out->blocks && good; b++)
+        good = eliminate(out, b, own, least);
     free(own);
     *definite = good;
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the factor of %lld dofs", (long long)n);
@@ -154,10 +178,11 @@ void uz_envelope_forward(double *x, const uz_envelope *f, double *room)
 {
     for (int64_t j = 0; j < f->n; j++)
         room[f->place[j]] = x[j];
-    for (int64_t i = 0; i < f->n; i++) {
-        const double *row = f->L + f->start[i] - f->first[i];
-        room[i] -= uz_dot(i - f->first[i], row + f->first[i], room + f->first[i]);
-        room[i] /= row[i];
+    for (int64_t b = 0; b < f->blocks; b++) {
+        const int64_t first = b * UZ_ENVELOPE_BLOCK, rows = f->end[b] - first, n = columns(f, b);
+        const double *L = f->L + f->start[b];
+        uz_trsv_lower(n, L, rows, room + first, false);
+        uz_block_gemv(rows - n, n, L + n, rows, room + first, room + first + n, false);
     }
     memcpy(x, room, (size_t)f->n * sizeof *x);
 }
@@ -165,7 +190,7 @@ void uz_envelope_forward(double *x, const uz_envelope *f, double *room)
 void uz_envelope_clear(uz_envelope *factor)
 {
     free(factor->place);
-    free(factor->first);
+    free(factor->end);
     free(factor->start);
     free(factor->L);
     memset(factor, 0, sizeof *factor);
