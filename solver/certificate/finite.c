@@ -6,6 +6,7 @@
 #include "certificate/piola.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "linalg/linalg.h"
 #include "obstacle/obstacle.h"
 
@@ -14,7 +15,7 @@
 #include <string.h>
 
 /* Points of each side, between its ends, at which gaps are looked at. */
-enum { SAMPLES = 7 };
+enum { SAMPLES = 7 }; /* in space along both of its directions */
 
 /* A row is pressed where its reaction is more than this part of the largest. */
 #define PRESSED 1e-12
@@ -30,7 +31,7 @@ static const double ALONG[] = {1e2, 1e5};
 typedef struct {
     const uz_finite_answer *of;
     uz_body_model tangent;           /* borrows all but K's and K_fixed's values */
-    long double *force;              /* n_nodes x 2: internal */
+    long double *force;              /* n_nodes x dim: internal */
     double *f, *room, *size;         /* d */
     long double energy, small, unit; /* small: of small strain; unit: of a strain of 1 */
 } work;
@@ -40,98 +41,109 @@ typedef struct {
 /* A point of an element: around is N / r of rings, else 0. */
 typedef struct {
     double grad[UZ_ELEMENT_NODES][3], around[UZ_ELEMENT_NODES];
-    long double F[5]; /* in the plane by rows, then across it */
-    int nodes;
+    long double F[9]; /* by rows; in the plane the last is the stretch across it */
+    int nodes, dim;
     bool ring;
 } point_at;
 
+/* Forces in extended precision; of the tangent, whose entries are doubles, the half up to the diagonal. */
 static void add_point(long double *force, double *ke, long double weight, const point_at *x, const uz_piola *at)
 {
-    for (int a = 0; a < x->nodes; a++)
-        for (int i = 0; i < 2; i++) {
-            force[2 * a + i] += weight * (at->P[2 * i] * x->grad[a][0] + at->P[2 * i + 1] * x->grad[a][1]);
-            for (int b = 0; b < x->nodes; b++)
-                for (int k = 0; k < 2; k++) {
-                    long double sum = 0;
-                    for (int J = 0; J < 2; J++)
-                        for (int L = 0; L < 2; L++)
-                            sum += at->A[2 * i + J][2 * k + L] * x->grad[a][J] * x->grad[b][L];
-                    ke[(2 * a + i) * 2 * x->nodes + 2 * b + k] += (double)(weight * sum);
-                }
+    const int dim = x->dim, n = dim * x->nodes;
+    double A[9][9];
+    for (int i = 0; i < 9; i++)
+        for (int k = 0; k < 9; k++)
+            A[i][k] = (double)(weight * at->A[i][k]);
+    for (int p = 0; p < n; p++) {
+        const int a = p / dim, i = p % dim;
+        const bool hoop = x->ring && i == 0; /* moves what is around the axis, too */
+        double by[9] = {0};
+        for (int J = 0; J < dim; J++) {
+            force[p] += weight * at->P[3 * i + J] * x->grad[a][J];
+            for (int k = 0; k < 9; k++)
+                by[k] += A[3 * i + J][k] * x->grad[a][J];
         }
-}
-
-/* What the stretch around a ring adds: to forces along the radius, and to the tangent with all others. */
-static void add_hoop(long double *force, double *ke, long double weight, const point_at *x, const uz_piola *at)
-{
-    const int n = 2 * x->nodes;
-    for (int a = 0; a < x->nodes; a++) {
-        force[2 * a] += weight * at->P[4] * x->around[a];
-        for (int b = 0; b < x->nodes; b++) {
-            ke[2 * a * n + 2 * b] += (double)(weight * at->A[4][4] * x->around[a] * x->around[b]);
-            for (int k = 0; k < 2; k++) {
-                const double with = (double)(weight * x->around[a] *
-                                             (at->A[4][2 * k] * x->grad[b][0] + at->A[4][2 * k + 1] * x->grad[b][1]));
-                ke[2 * a * n + 2 * b + k] += with;
-                ke[(2 * b + k) * n + 2 * a] += with;
+        force[p] += hoop ? weight * at->P[8] * x->around[a] : 0;
+        for (int k = 0; k < 9 && hoop; k++)
+            by[k] += A[8][k] * x->around[a];
+        for (int b = 0; b <= a; b++)
+            for (int k = 0; k < dim; k++) {
+                double sum = x->ring && k == 0 ? by[8] * x->around[b] : 0;
+                for (int L = 0; L < dim; L++)
+                    sum += by[3 * k + L] * x->grad[b][L];
+                ke[p * n + dim * b + k] += sum;
             }
-        }
     }
 }
 
-/* Returns the least of what must be positive: the determinant in the plane, and the stretch across it. */
+/* Returns what must be positive: det F, which in the plane is not where the stretch across it is not. */
 static long double deform(point_at *x, double *measure, const uz_element *element, const double *u,
                           const double local[3])
 {
-    x->nodes = uz_element_node_count(element->kind);
+    const uz_element_type *type = uz_element_type_of(element->kind);
+    const int dim = x->dim = type->dim;
+    long double *F = x->F;
+    x->nodes = type->nodes;
     x->ring = element->model == UZ_AXISYMMETRIC;
     *measure = uz_element_gradients(x->grad, element, local);
     *measure *= uz_element_around(x->around, element, x->grad, local);
-    for (int i = 0; i < 4; i++) {
-        x->F[i] = i % 3 == 0;
-        for (int a = 0; a < x->nodes; a++)
-            x->F[i] += ((long double)u[2 * a + i / 2] - u[i / 2]) * x->grad[a][i % 2];
+    for (int i = 0; i < 9; i++) {
+        F[i] = i % 4 == 0;
+        for (int a = 0; a < x->nodes && i / 3 < dim && i % 3 < dim; a++)
+            F[i] += ((long double)u[dim * a + i / 3] - u[i / 3]) * x->grad[a][i % 3];
     }
-    x->F[4] = 1;
     for (int a = 0; a < x->nodes && x->ring; a++)
-        x->F[4] += (long double)u[2 * a] * x->around[a];
-    const long double plane = x->F[0] * x->F[3] - x->F[1] * x->F[2];
-    return x->F[4] > 0 ? plane * x->F[4] : -fabsl(plane * x->F[4]);
+        F[8] += (long double)u[2 * a] * x->around[a];
+    const long double plane = F[0] * F[4] - F[1] * F[3];
+    if (dim == 2)
+        return F[8] > 0 ? plane * F[8] : -fabsl(plane * F[8]);
+    return plane * F[8] + F[2] * (F[3] * F[7] - F[4] * F[6]) - F[5] * (F[0] * F[7] - F[1] * F[6]);
 }
 
 /* What the energy is compared with: that of a strain of 1, where displacements and F are as large as they are; and the
  * energy of small strain, rotations apart, as that of the law is lost in its own terms where strains are tiny. */
 static void add_unit(work *w, long double weight, const uz_lame *lame, const point_at *x, const double *u)
 {
-    const long double *F = x->F, H[4] = {F[0] - 1, F[1], F[2], F[3] - 1}, z = F[4] - 1;
-    const long double E[4] = {H[0] + (H[0] * H[0] + H[2] * H[2]) / 2, H[3] + (H[1] * H[1] + H[3] * H[3]) / 2,
-                              (H[1] + H[2] + H[0] * H[1] + H[2] * H[3]) / 2, z + z * z / 2};
-    const long double trace = E[0] + E[1] + E[3];
+    const int dim = x->dim;
+    long double H[9], size = 0, trace = 0, squares = 0;
     double turn = 0;
-    for (int a = 0; a < x->nodes; a++)
-        turn = fmax(turn, hypot(u[2 * a], u[2 * a + 1]) * hypot(x->grad[a][0], x->grad[a][1]));
-    w->unit += weight * (lame->lambda + 2 * lame->mu) *
-               ((F[0] * F[0] + F[1] * F[1] + F[2] * F[2] + F[3] * F[3] + (x->ring ? F[4] * F[4] : 0)) / 2 +
-                (long double)turn * turn);
-    w->small += weight * (lame->lambda * trace * trace / 2 +
-                          lame->mu * (E[0] * E[0] + E[1] * E[1] + 2 * E[2] * E[2] + E[3] * E[3]));
+    for (int i = 0; i < 9; i++) {
+        H[i] = x->F[i] - (i % 4 == 0);
+        size += i < 8 || dim == 3 || x->ring ? x->F[i] * x->F[i] : 0;
+    }
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const long double E =
+                (H[3 * i + j] + H[3 * j + i] + H[i] * H[j] + H[3 + i] * H[3 + j] + H[6 + i] * H[6 + j]) / 2;
+            trace += i == j ? E : 0;
+            squares += E * E;
+        }
+    for (int a = 0; a < x->nodes; a++) {
+        const double zero[3] = {0};
+        turn = fmax(turn, sqrt(uz_distance2(u + dim * a, zero, dim) * uz_distance2(x->grad[a], zero, dim)));
+    }
+    w->unit += weight * (lame->lambda + 2 * lame->mu) * (size / 2 + (long double)turn * turn);
+    w->small += weight * (lame->lambda * trace * trace / 2 + lame->mu * squares);
 }
 
 static void add_element(uz_finite_certificate *out, work *w, int64_t e)
 {
     const uz_body_model *model = w->of->model;
-    double xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS] = {0}, measure;
-    long double force[2 * UZ_ELEMENT_NODES] = {0};
+    const int dim = model->mesh.dim;
+    double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], measure;
+    long double force[UZ_ELEMENT_DOFS] = {0};
     uz_element element;
     point_at x;
-    uz_piola at;
+    uz_piola at = {0};
     int nodes;
     const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
     uz_body_element(&element, xyz, model, e);
     const uz_element_type *type = uz_element_type_of(element.kind);
     const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
-    for (int i = 0; i < 2 * nodes; i++)
-        u[i] = w->of->u[2 * node[i / 2] + i % 2];
+    const int n = dim * nodes;
+    memset(ke, 0, (size_t)(n * n) * sizeof *ke);
+    for (int i = 0; i < n; i++)
+        u[i] = w->of->u[dim * node[i / dim] + i % dim];
     for (int a = 0; a < type->corners; a++)
         out->least_det = fmin(out->least_det, (double)deform(&x, &measure, &element, u, type->local[a]));
     for (int g = 0; g < rule->count; g++) {
@@ -140,15 +152,16 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
         out->least_det = isnan(det) ? -INFINITY : fmin(out->least_det, (double)det);
         if (!(det > 0))
             continue;
-        uz_piola_at(&at, uz_element_material(model, e)->law, element.lame.lambda, element.lame.mu, x.F);
+        uz_piola_at(&at, uz_element_material(model, e)->law, element.lame.lambda, element.lame.mu, x.F, dim == 2);
         w->energy += weight * at.W;
         add_unit(w, weight, &element.lame, &x, u);
         add_point(force, ke, weight, &x, &at);
-        if (x.ring)
-            add_hoop(force, ke, weight, &x, &at);
     }
-    for (int i = 0; i < 2 * nodes; i++)
-        w->force[2 * node[i / 2] + i % 2] += force[i];
+    for (int i = 0; i < n; i++) {
+        w->force[dim * node[i / dim] + i % dim] += force[i];
+        for (int k = 0; k < i; k++)
+            ke[k * n + i] = ke[i * n + k];
+    }
     uz_add_stiffness(&w->tangent, ke, node, nodes);
 }
 
@@ -164,41 +177,48 @@ static int row_nodes(const int64_t **node, const double **share, const uz_body_m
     return inner ? inner->nodes : 1;
 }
 
-/* Second derivatives of the gap of a place of the material, whose shares of nodes stay: with t along the obstacle and k
- * its curvature they are k N_a N_b t t'. */
-static void place_curvature(double ke[], const double n[2], double k, const double *share, int nodes)
+/* `force` times the second derivatives of the gap of a place of the material, whose shares of nodes stay: they are
+ * k N_a N_b T, k the curvature along the obstacle, T the sum of t t' over its tangents t that are curved. */
+static void place_curvature(double *ke, double force, const double *n, const uz_gap *at, const double *share, int nodes,
+                            int dim)
 {
-    const double t[2] = {-n[1], n[0]};
-    for (int p = 0; p < 2 * nodes; p++)
-        for (int q = 0; q < 2 * nodes; q++)
-            ke[p * 2 * nodes + q] = k * share[p / 2] * t[p % 2] * share[q / 2] * t[q % 2];
+    for (int p = 0; p < dim * nodes; p++)
+        for (int q = 0; q < dim * nodes; q++) {
+            const int i = p % dim, j = q % dim;
+            const double T = (i == j) - n[i] * n[j] - at->along[i] * at->along[j];
+            ke[p * dim * nodes + q] = force * at->curvature * share[p / dim] * share[q / dim] * T;
+        }
 }
 
 /* What the obstacle's curvature does to the stiffness: the Lagrangian has r g. The edges of lines and tables are none:
- * rows take them as rounded. */
+ * rows take them as rounded. A row of the middle of an eight-node face is one of several nodes: it has r'g by node. */
 static uz_status add_curvature(work *w, uz_obstacle *const *obstacle, double most, uz_error *err)
 {
     const uz_body_model *model = w->of->model;
+    const int dim = model->mesh.dim;
     uz_status status = UZ_OK;
+    double *force = uz_alloc(model->m, sizeof *force);
+    if (!force)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)model->m);
+    uz_row_forces(force, model, w->of->r);
     for (int64_t row = 0; row < model->m && status == UZ_OK; row++) {
-        const double *share, *normal = model->info.contact_normal + 2 * row;
+        const double *share, *normal = model->info.contact_normal + dim * row;
         const int64_t *node;
-        double x[2] = {0}, ke[4 * UZ_FACE_NODES * UZ_FACE_NODES];
+        double x[3] = {0}, ke[9 * UZ_FACE_NODES * UZ_FACE_NODES];
         uz_gap at;
-        if (!(w->of->r[row] < -PRESSED * most) || model->sites[model->info.contact_of[row]].n == 0)
+        if (!(fabs(force[row]) > PRESSED * most) || model->sites[model->info.contact_of[row]].n == 0)
             continue;
         const int n = row_nodes(&node, &share, model, row);
         for (int a = 0; a < n; a++)
-            for (int c = 0; c < 2; c++)
-                x[c] += share[a] * (model->mesh.xyz[2 * node[a] + c] + w->of->u[2 * node[a] + c]);
+            for (int c = 0; c < dim; c++)
+                x[c] += share[a] * (model->mesh.xyz[dim * node[a] + c] + w->of->u[dim * node[a] + c]);
         status = uz_obstacle_gap(&at, obstacle[model->info.contact_of[row]], x, err);
         if (status != UZ_OK || uz_obstacle_has_edges(obstacle[model->info.contact_of[row]]))
             continue;
-        place_curvature(ke, normal, at.curvature, share, n);
-        for (int p = 0; p < 4 * n * n; p++)
-            ke[p] *= w->of->r[row];
+        place_curvature(ke, force[row], normal, &at, share, n, dim);
         uz_add_stiffness(&w->tangent, ke, node, n);
     }
+    free(force);
     return status;
 }
 
@@ -223,29 +243,36 @@ static uz_status add_along(work *w, double factor, double most, uz_error *err)
 static uz_status look_at_side(uz_finite_certificate *out, const uz_finite_answer *of, uz_face face,
                               const uz_obstacle *obstacle, uz_error *err)
 {
+    enum { STEPS = SAMPLES + 1 };
     uz_side side;
-    double xyz[3 * UZ_FACE_NODES], N[UZ_FACE_NODES];
+    double xyz[3 * UZ_FACE_NODES], N[UZ_FACE_NODES], length = 0;
     int64_t node[UZ_FACE_NODES];
     uz_status status = UZ_OK;
     uz_body_side(&side, xyz, node, of->model, face);
-    for (int a = 0; a < side.nodes; a++)
-        for (int c = 0; c < 2; c++)
-            xyz[2 * a + c] += of->u[2 * node[a] + c];
-    const double length = hypot(xyz[2] - xyz[0], xyz[3] - xyz[1]);
-    for (int k = 0; k <= SAMPLES + 1 && status == UZ_OK; k++) {
-        const double point[2] = {-1 + 2.0 * k / (SAMPLES + 1), 0};
-        double x[2] = {0};
-        uz_gap at;
-        uz_side_shape(N, &side, point);
-        for (int a = 0; a < side.nodes; a++)
-            for (int c = 0; c < 2; c++)
-                x[c] += N[a] * xyz[2 * a + c];
-        status = uz_obstacle_gap(&at, obstacle, x, err);
-        if (status != UZ_OK)
-            continue;
-        out->least_gap = fmin(out->least_gap, at.gap);
-        out->least_part = fmin(out->least_part, length > 0 ? at.gap / length : -(double)INFINITY);
+    const int dim = side.dim;
+    const bool triangle = dim == 3 && side.nodes % 3 == 0;
+    for (int a = 0; a < side.nodes; a++) {
+        for (int c = 0; c < dim; c++)
+            xyz[dim * a + c] += of->u[dim * node[a] + c];
+        for (int b = 0; b < a; b++)
+            length = fmax(length, sqrt(uz_distance2(xyz + dim * a, xyz + dim * b, dim)));
     }
+    for (int k = 0; k <= STEPS; k++)
+        for (int l = 0; l <= (dim == 2 ? 0 : triangle ? STEPS - k : STEPS) && status == UZ_OK; l++) {
+            const double first = triangle ? 0 : -1, step = (triangle ? 1.0 : 2.0) / STEPS;
+            const double point[2] = {first + step * k, first + step * l};
+            double x[3] = {0};
+            uz_gap at;
+            uz_side_shape(N, &side, point);
+            for (int a = 0; a < side.nodes; a++)
+                for (int c = 0; c < dim; c++)
+                    x[c] += N[a] * xyz[dim * a + c];
+            status = uz_obstacle_gap(&at, obstacle, x, err);
+            if (status != UZ_OK)
+                continue;
+            out->least_gap = fmin(out->least_gap, at.gap);
+            out->least_part = fmin(out->least_part, length > 0 ? at.gap / length : -(double)INFINITY);
+        }
     return status;
 }
 
@@ -284,7 +311,7 @@ static bool begin(work *w)
     w->tangent = *model;
     w->tangent.K.val = uz_alloc_zero(K->ptr[K->cols], sizeof(double));
     w->tangent.K_fixed.val = uz_alloc_zero(fixed->ptr[fixed->cols], sizeof(double));
-    w->force = uz_alloc_zero(2 * model->mesh.n_nodes, sizeof *w->force);
+    w->force = uz_alloc_zero(model->mesh.dim * model->mesh.n_nodes, sizeof *w->force);
     w->f = uz_alloc_zero(model->d, sizeof *w->f);
     w->room = uz_alloc(model->d, sizeof *w->room);
     w->size = uz_alloc(model->d, sizeof *w->size);
@@ -295,10 +322,11 @@ static bool begin(work *w)
 static uz_status leave_over(work *w, uz_error *err)
 {
     const uz_body_model *model = w->of->model;
-    const int64_t n = 2 * model->mesh.n_nodes;
+    const int64_t n = model->mesh.dim * model->mesh.n_nodes;
     double *nodal = uz_alloc(n, sizeof *nodal);
     if (!nodal)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on %lld nodes", (long long)(n / 2));
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on %lld nodes",
+                       (long long)model->mesh.n_nodes);
     const uz_status status = uz_nodal_loads(nodal, model, w->of->scene, err);
     for (int64_t i = 0; i < n && status == UZ_OK; i++)
         nodal[i] = (double)(nodal[i] - w->force[i]);
@@ -352,6 +380,7 @@ static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_erro
 uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *answer, uz_error *err)
 {
     const uz_body_model *model = answer->model;
+    const int dim = model->mesh.dim;
     work w = {.of = answer};
     double most = 0;
     *out = (uz_finite_certificate){.least_det = INFINITY,
@@ -364,10 +393,10 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
                   : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the tangent of %lld dofs", (long long)model->d);
     for (int64_t i = 0; i < model->m; i++)
         most = fmax(most, fabs(answer->r[i]));
-    for (int64_t i = 0; i < 2 * model->mesh.n_nodes && status == UZ_OK; i++) {
-        const double *u = answer->u + 2 * (i / 2);
+    for (int64_t i = 0; i < dim * model->mesh.n_nodes && status == UZ_OK; i++) {
+        const double *u = answer->u + dim * (i / dim);
         if (model->dof[i] < 0)
-            out->worst_support = fmax(out->worst_support, fabs(uz_along_dof(model, i / 2, (int)(i % 2), u) -
+            out->worst_support = fmax(out->worst_support, fabs(uz_along_dof(model, i / dim, (int)(i % dim), u) -
                                                                answer->prescribed[-1 - model->dof[i]]));
     }
     for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK; e++)

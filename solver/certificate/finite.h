@@ -10,7 +10,7 @@
 typedef struct {
     const uz_body_model *model; /* at the place u: its rows are those that the answer has there */
     const uz_scene *scene;      /* with the loads, supports and obstacles that the answer is for */
-    const double *u;            /* n_nodes x 2 */
+    const double *u;            /* n_nodes x dim */
     const double *r, *g;        /* m: reactions, and gaps at the place */
     const double *prescribed;   /* n_fixed */
 } uz_finite_answer;

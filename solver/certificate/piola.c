@@ -1,4 +1,4 @@
-/* piola.c: with G = F^-T of all of F and t = G : dF, so that dJ = J t and dG = -G dF' G:
+/* piola.c: with G = F^-T and t = G : dF, so that dJ = J t and dG = -G dF' G:
  *
  *     St. Venant, Kirchhoff   P = F S, S = lambda tr E I + 2 mu E       dP = dF S + F dS
  *     neo-Hooke               P = mu F + (lambda ln J - mu) G           dP = mu dF + lambda t G + (lambda ln J - mu) dG
@@ -10,67 +10,78 @@
 
 typedef long double real;
 
-static void multiply(real out[4], const real *A, bool transposed, const real *B)
-{
-    for (int i = 0; i < 2; i++)
-        for (int j = 0; j < 2; j++)
-            out[2 * i + j] = transposed ? A[i] * B[j] + A[2 + i] * B[2 + j] : A[2 * i] * B[j] + A[2 * i + 1] * B[2 + j];
-}
+/* Entries of F that may be other than 0. */
+static const int PLANE[] = {0, 1, 3, 4, 8}, ALL[] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
 
-static void kirchhoff(uz_piola *out, real lambda, real mu, const real F[5])
+typedef struct {
+    const int *at;
+    int n;
+} entries;
+
+/* With b = F F': dP_iJ / dF_kL = d_ik S_JL + lambda F_iJ F_kL + mu (b_ik d_JL + F_iL F_kJ). */
+static void kirchhoff(uz_piola *out, real lambda, real mu, const real F[9], entries of)
 {
-    real C[4], E[4], S[4];
-    multiply(C, F, true, F);
-    for (int i = 0; i < 4; i++)
-        E[i] = (C[i] - (i % 3 == 0)) / 2;
-    const real z = F[4], Ez = (z * z - 1) / 2, trace = E[0] + E[3] + Ez, Sz = 2 * mu * Ez + lambda * trace;
-    for (int i = 0; i < 4; i++)
-        S[i] = 2 * mu * E[i] + (i % 3 == 0 ? lambda * trace : 0);
-    out->W = lambda * trace * trace / 2 + mu * (E[0] * E[0] + E[1] * E[1] + E[2] * E[2] + E[3] * E[3] + Ez * Ez);
-    multiply(out->P, F, false, S);
-    out->P[4] = z * Sz;
-    out->A[4][4] = Sz + z * z * (lambda + 2 * mu);
-    for (int i = 0; i < 4; i++)
-        out->A[i][4] = out->A[4][i] = lambda * z * F[i];
-    for (int k = 0; k < 4; k++) {
-        real dF[4] = {0}, half[4], dE[4], dS[4], first[4], second[4];
-        dF[k] = 1;
-        multiply(half, F, true, dF);
-        for (int i = 0; i < 4; i++)
-            dE[i] = (half[i] + half[2 * (i % 2) + i / 2]) / 2;
-        for (int i = 0; i < 4; i++)
-            dS[i] = 2 * mu * dE[i] + (i % 3 == 0 ? lambda * (dE[0] + dE[3]) : 0);
-        multiply(first, dF, false, S);
-        multiply(second, F, false, dS);
-        for (int i = 0; i < 4; i++)
-            out->A[i][k] = first[i] + second[i];
+    real E[9], S[9], b[9], trace = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            b[3 * i + j] = F[3 * i] * F[3 * j] + F[3 * i + 1] * F[3 * j + 1] + F[3 * i + 2] * F[3 * j + 2];
+            E[3 * i + j] = (F[i] * F[j] + F[3 + i] * F[3 + j] + F[6 + i] * F[6 + j] - (i == j)) / 2;
+            trace += i == j ? E[3 * i + j] : 0;
+        }
+    out->W = lambda * trace * trace / 2;
+    for (int i = 0; i < 9; i++) {
+        S[i] = 2 * mu * E[i] + (i % 4 == 0 ? lambda * trace : 0);
+        out->W += mu * E[i] * E[i];
+    }
+    for (int p = 0; p < of.n; p++) {
+        const int i = of.at[p] / 3, J = of.at[p] % 3;
+        out->P[of.at[p]] = F[3 * i] * S[J] + F[3 * i + 1] * S[3 + J] + F[3 * i + 2] * S[6 + J];
+        for (int q = 0; q < of.n; q++) {
+            const int k = of.at[q] / 3, L = of.at[q] % 3;
+            out->A[of.at[p]][of.at[q]] = (i == k ? S[3 * J + L] : 0) + lambda * F[3 * i + J] * F[3 * k + L] +
+                                         mu * ((J == L ? b[3 * i + k] : 0) + F[3 * i + L] * F[3 * k + J]);
+        }
     }
 }
 
-void uz_piola_at(uz_piola *out, uz_elasticity law, real lambda, real mu, const real F[5])
+/* The cofactors of F, whose quotient by the determinant is G. Returns the determinant. */
+static real cofactors(real G[9], const real F[9])
 {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int a = 3 * ((i + 1) % 3), b = 3 * ((i + 2) % 3), c = (j + 1) % 3, d = (j + 2) % 3;
+            G[3 * i + j] = F[a + c] * F[b + d] - F[a + d] * F[b + c];
+        }
+    return F[0] * G[0] + F[1] * G[1] + F[2] * G[2];
+}
+
+void uz_piola_at(uz_piola *out, uz_elasticity law, real lambda, real mu, const real F[9], bool plane)
+{
+    const entries of = plane ? (entries){PLANE, 5} : (entries){ALL, 9};
     if (law == UZ_ELASTIC_ST_VENANT_KIRCHHOFF) {
-        kirchhoff(out, lambda, mu, F);
+        kirchhoff(out, lambda, mu, F, of);
         return;
     }
-    const real plane = F[0] * F[3] - F[1] * F[2], J = plane * F[4];
-    const real G[5] = {F[3] / plane, -F[2] / plane, -F[1] / plane, F[0] / plane, 1 / F[4]};
-    const real I1 = F[0] * F[0] + F[1] * F[1] + F[2] * F[2] + F[3] * F[3] + F[4] * F[4], log_J = logl(J);
-    const real K = lambda + 2 * mu / 3;
+    real G[9], I1 = 0;
+    const real J = cofactors(G, F), log_J = logl(J), K = lambda + 2 * mu / 3;
+    for (int i = 0; i < 9; i++) {
+        G[i] /= J;
+        I1 += F[i] * F[i];
+    }
     const bool plain = law == UZ_ELASTIC_NEO_HOOKE;
     const real a = plain ? mu : mu * powl(J, (real)-2 / 3);
     const real b = plain ? lambda * log_J - mu : K * (J - 1) * J - a * I1 / 3;
     out->W = plain ? mu * (I1 - 3) / 2 - mu * log_J + lambda * log_J * log_J / 2
                    : (a * I1 - 3 * mu) / 2 + K * (J - 1) * (J - 1) / 2;
-    for (int i = 0; i < 5; i++)
-        out->P[i] = a * F[i] + b * G[i];
-    for (int k = 0; k < 5; k++) {
+    for (int p = 0; p < of.n; p++)
+        out->P[of.at[p]] = a * F[of.at[p]] + b * G[of.at[p]];
+    for (int q = 0; q < of.n; q++) {
+        const int k = of.at[q];
         const real t = G[k], da = plain ? 0 : -2 * a * t / 3;
         const real db = plain ? lambda * t : K * (2 * J - 1) * J * t - (da * I1 + a * 2 * F[k]) / 3;
-        for (int i = 0; i < 5; i++) { /* (G dF' G)_ij with dF_kl = 1 is G_il G_kj */
-            const real twice = i < 4 && k < 4 ? G[2 * (i / 2) + k % 2] * G[2 * (k / 2) + i % 2]
-                               : i == k       ? G[4] * G[4]
-                                              : 0;
+        for (int p = 0; p < of.n; p++) { /* (G dF' G)_ij with dF_kl = 1 is G_il G_kj */
+            const int i = of.at[p];
+            const real twice = G[3 * (i / 3) + k % 3] * G[3 * (k / 3) + i % 3];
             out->A[i][k] = (i == k ? a : 0) + da * F[i] + db * G[i] - b * twice;
         }
     }

@@ -83,8 +83,8 @@ uz_shape_fault uz_element_check(const uz_element *element);
  * determinant. */
 double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3]);
 /* At the same point, of a ring: how displacements along the radius stretch it around, around[node] = N / r, which on
- * the axis is the derivative by r. Returns what an area there stands for: 2 pi r, of other models the thickness, and
- * `around` is 0 then. */
+ * the axis is the derivative by r. Returns what an area there stands for: 2 pi r, of other plane models the thickness,
+ * of solids (a volume) 1; and `around` is 0 then. */
 double uz_element_around(double around[UZ_ELEMENT_NODES], const uz_element *element, double grad[UZ_ELEMENT_NODES][3],
                          const double point[3]);
 

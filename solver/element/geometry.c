@@ -108,7 +108,7 @@ double uz_element_around(double around[UZ_ELEMENT_NODES], const uz_element *elem
     double N[UZ_ELEMENT_NODES], largest;
     memset(around, 0, (size_t)nodes * sizeof *around);
     if (element->model != UZ_AXISYMMETRIC)
-        return element->thickness;
+        return element->model == UZ_SOLID ? 1 : element->thickness;
     uz_element_shape(N, element->kind, point);
     const double radius = uz_ring_radius(&largest, element, N);
     for (int a = 0; a < nodes; a++)

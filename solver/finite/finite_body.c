@@ -13,11 +13,11 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
                     const double *nodal, const double *step)
 {
     const uz_mesh *mesh = &model->mesh;
-    double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES],
-        d[2 * UZ_ELEMENT_NODES];
+    const int dim = mesh->dim;
+    double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], d[UZ_ELEMENT_DOFS];
     *out = (uz_finite_measure){.least_det = INFINITY, .at = -1};
     if (force)
-        memset(force, 0, (size_t)(2 * mesh->n_nodes) * sizeof *force);
+        memset(force, 0, (size_t)(dim * mesh->n_nodes) * sizeof *force);
     if (tangent) {
         memset(tangent->K.val, 0, (size_t)tangent->K.ptr[tangent->K.cols] * sizeof *ke);
         memset(tangent->K_fixed.val, 0, (size_t)tangent->K_fixed.ptr[tangent->K_fixed.cols] * sizeof *ke);
@@ -28,18 +28,18 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         uz_body_element(&element, xyz, model, e);
-        for (int i = 0; i < 2 * count; i++)
-            u[i] = nodal[2 * node[i / 2] + i % 2];
-        for (int i = 0; i < 2 * count && step; i++)
-            d[i] = step[2 * node[i / 2] + i % 2];
+        for (int i = 0; i < dim * count; i++)
+            u[i] = nodal[dim * node[i / dim] + i % dim];
+        for (int i = 0; i < dim * count && step; i++)
+            d[i] = step[dim * node[i / dim] + i % dim];
         uz_finite_element(&own, tangent ? ke : NULL, &element, uz_element_material(model, e)->law, u, step ? d : NULL);
         out->energy += own.energy;
         if (!(own.least_det >= out->least_det)) { /* not a number, too */
             out->least_det = own.least_det;
             out->at = e;
         }
-        for (int i = 0; i < 2 * count && force; i++)
-            force[2 * node[i / 2] + i % 2] += own.force[i];
+        for (int i = 0; i < dim * count && force; i++)
+            force[dim * node[i / dim] + i % dim] += own.force[i];
         if (tangent)
             uz_add_stiffness(tangent, ke, node, count);
     }

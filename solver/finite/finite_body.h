@@ -10,11 +10,11 @@ typedef struct {
     int64_t at;       /* the element that has it */
 } uz_finite_measure;
 
-/* Of the body displaced by nodal (n_nodes x 2).
- *   force    n_nodes x 2, along the axes; NULL: not wanted
+/* Of the body displaced by nodal (n_nodes x dim).
+ *   force    n_nodes x dim, along the axes; NULL: not wanted
  *   tangent  a copy of `model` with K and K_fixed of its own, whose patterns are kept and whose values become those of
  *            the tangent; NULL: not wanted
- *   step     n_nodes x 2, the last change of nodal, as uz_finite_element takes it; NULL: none
+ *   step     n_nodes x dim, the last change of nodal, as uz_finite_element takes it; NULL: none
  * Where least_det <= 0 the others are not to be used. */
 void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangent, const uz_body_model *model,
                     const double *nodal, const double *step);

@@ -1,27 +1,28 @@
-/* finite_element.h: one plane element under finite deformation, total Lagrangian: pure functions. */
+/* finite_element.h: one element under finite deformation, total Lagrangian: pure functions. */
 #ifndef UZ_FINITE_ELEMENT_H
 #define UZ_FINITE_ELEMENT_H
 
 #include "element/element.h"
 
 typedef struct {
-    double energy;                      /* W over the element's volume */
-    double least_det;                   /* of F, at quadrature points and corners */
-    double force[2 * UZ_ELEMENT_NODES]; /* internal forces: the gradient of the energy */
+    double energy;                 /* W over the element's volume */
+    double least_det;              /* of F, at quadrature points and corners */
+    double force[UZ_ELEMENT_DOFS]; /* internal forces: the gradient of the energy */
 } uz_finite_forces;
 
-/* Of an element of plane strain whose shape is good, displaced by u (nodes x 2). ke (NULL: not wanted): the tangent,
- * the energy's second derivatives, full and symmetric, as uz_element_stiffness has it; at u = 0 it is that of the
- * standard formulation. False: det F <= 0 somewhere; least_det alone is then filled.
- *   step  nodes x 2, the last change of u: in ke alone, what the stress does to turning parts is that of the strains
- * that this change was linear for. NULL: none */
+/* Of an element of plane strain, of a ring or a solid, whose shape is good, displaced by u (nodes x dim). ke (NULL: not
+ * wanted): the tangent, the energy's second derivatives, full and symmetric, as uz_element_stiffness has it; at u = 0
+ * it is that of the standard formulation. False: det F <= 0 somewhere; least_det alone is then filled. step  nodes x
+ * dim, the last change of u: in ke alone, what the stress does to turning parts is that of the strains that this change
+ * was linear for. NULL: none */
 bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law, const double *u,
                        const double *step);
 
-/* At a local point: F by rows, xx xy yx yy, its determinant, and Cauchy's stress and the Green-Lagrange strain with the
- * components xx, yy, zz, xy. */
+/* At a local point: det F, and Cauchy's stress and the Green-Lagrange strain with the components xx, yy, zz, xy, yz,
+ * zx.
+ */
 typedef struct {
-    double F[4], det, stress[4], strain[4];
+    double det, stress[6], strain[6];
 } uz_finite_state;
 void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elasticity law, const double *u,
                         const double point[3]);

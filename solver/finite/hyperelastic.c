@@ -38,35 +38,61 @@ static coefficients of_law(uz_elasticity law, double lambda, double mu, double J
     return law == UZ_ELASTIC_NEO_HOOKE ? neo_hooke(lambda, mu, J, trace) : neo_hooke_isochoric(lambda, mu, J, trace);
 }
 
-bool uz_hyperelastic(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE_STRAINS][UZ_FINITE_STRAINS],
+/* B = C^-1; false: C is not positive definite. */
+static bool inverse(double B[3][3], double *det, const double C[UZ_FINITE_STRAINS])
+{
+    const double plane = C[0] * C[1] - C[3] * C[3];
+    B[0][0] = C[1] * C[2] - C[4] * C[4];
+    B[1][1] = C[0] * C[2] - C[5] * C[5];
+    B[2][2] = plane;
+    B[0][1] = C[4] * C[5] - C[3] * C[2];
+    B[1][2] = C[3] * C[5] - C[0] * C[4];
+    B[0][2] = C[3] * C[4] - C[1] * C[5];
+    *det = C[0] * B[0][0] + C[3] * B[0][1] + C[5] * B[0][2];
+    if (!(plane > 0 && *det > 0))
+        return false;
+    for (int i = 0; i < 3; i++)
+        for (int j = i; j < 3; j++)
+            B[i][j] = B[j][i] = B[i][j] / *det;
+    return true;
+}
+
+static void kirchhoff(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE_STRAINS][UZ_FINITE_STRAINS], int n,
+                      double lambda, double mu, const double C[UZ_FINITE_STRAINS])
+{
+    const double sum = 0.5 * (C[0] - 1) + 0.5 * (C[1] - 1) + 0.5 * (C[2] - 1);
+    *W = 0.5 * lambda * sum * sum;
+    for (int i = 0; i < n; i++) {
+        const double E = 0.5 * (C[i] - (i < 3)), direct = i < 3 ? lambda : 0;
+        *W += (i < 3 ? 1 : 2) * mu * E * E;
+        S[i] = direct * sum + 2 * mu * E;
+        for (int j = 0; j < n; j++)
+            D[i][j] = (j < 3 ? direct : 0) + (i != j ? 0 : i < 3 ? 2 * mu : mu);
+    }
+}
+
+bool uz_hyperelastic(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE_STRAINS][UZ_FINITE_STRAINS], int n,
                      uz_elasticity law, double lambda, double mu, const double C[UZ_FINITE_STRAINS])
 {
-    static const double I[UZ_FINITE_STRAINS] = {1, 1, 1, 0};
-    static const int AXIS[UZ_FINITE_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}};
-    const double det = C[0] * C[1] - C[3] * C[3]; /* in the plane */
-    if (!(det > 0 && C[2] > 0))
+    static const int AXIS[UZ_FINITE_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}};
+    double B[3][3], det;
+    if (!inverse(B, &det, C))
         return false;
     if (law == UZ_ELASTIC_ST_VENANT_KIRCHHOFF) {
-        const double E[UZ_FINITE_STRAINS] = {0.5 * (C[0] - 1), 0.5 * (C[1] - 1), 0.5 * (C[2] - 1), 0.5 * C[3]};
-        const double sum = E[0] + E[1] + E[2];
-        *W = 0.5 * lambda * sum * sum + mu * (E[0] * E[0] + E[1] * E[1] + E[2] * E[2] + 2 * E[3] * E[3]);
-        for (int i = 0; i < UZ_FINITE_STRAINS; i++) {
-            S[i] = lambda * sum * I[i] + 2 * mu * E[i];
-            for (int j = 0; j < UZ_FINITE_STRAINS; j++)
-                D[i][j] = lambda * I[i] * I[j] + (i != j ? 0 : i == 3 ? mu : 2 * mu);
-        }
+        kirchhoff(W, S, D, n, lambda, mu, C);
         return true;
     }
-    const double B[UZ_FINITE_STRAINS] = {C[1] / det, C[0] / det, 1 / C[2], -C[3] / det};
-    const double full[3][3] = {{B[0], B[3], 0}, {B[3], B[1], 0}, {0, 0, B[2]}};
-    const coefficients k = of_law(law, lambda, mu, sqrt(det * C[2]), C[0] + C[1] + C[2]);
+    const coefficients k = of_law(law, lambda, mu, sqrt(det), C[0] + C[1] + C[2]);
     *W = k.W;
-    for (int i = 0; i < UZ_FINITE_STRAINS; i++) {
-        S[i] = k.a * I[i] + k.b * B[i];
-        for (int j = 0; j < UZ_FINITE_STRAINS; j++) {
-            const int *p = AXIS[i], *q = AXIS[j];
-            const double mixed = 0.5 * (full[p[0]][q[0]] * full[p[1]][q[1]] + full[p[0]][q[1]] * full[p[1]][q[0]]);
-            D[i][j] = k.c * (I[i] * B[j] + B[i] * I[j]) + k.e * B[i] * B[j] + k.f * mixed;
+    for (int i = 0; i < n; i++) {
+        const int *p = AXIS[i];
+        const double own = B[p[0]][p[1]];
+        S[i] = k.a * (i < 3) + k.b * own;
+        for (int j = 0; j <= i; j++) {
+            const int *q = AXIS[j];
+            const double mixed = 0.5 * (B[p[0]][q[0]] * B[p[1]][q[1]] + B[p[0]][q[1]] * B[p[1]][q[0]]);
+            const double other = B[q[0]][q[1]];
+            D[i][j] = D[j][i] = k.c * ((i < 3) * other + own * (j < 3)) + k.e * own * other + k.f * mixed;
         }
     }
     return true;

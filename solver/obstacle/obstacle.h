@@ -38,6 +38,7 @@ typedef struct {
     double curvature; /* 1 / length: the second derivative of the gap at the point along that tangent where it is
                        * largest in size. > 0: the obstacle bulges towards the point, and the gap is wider than its row
                        * says; < 0: it closes in, and sliding may lead into it unseen. INFINITY: a corner itself */
+    double along[3];  /* solids: a unit tangent along which there is no curvature, of a cylinder its axis; 0: none */
     double foot[3];   /* the closest point of the obstacle's surface */
 } uz_gap;
 

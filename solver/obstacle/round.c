@@ -63,6 +63,7 @@ static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_er
     out->curvature = sign / distance;
     for (int c = 0; c < 3; c++) {
         out->normal[c] = sign * unit[c];
+        out->along[c] = o->direction[c];
         out->foot[c] = c < o->dim ? x[c] - (distance - o->radius) * unit[c] : 0;
     }
     return UZ_OK;

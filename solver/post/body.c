@@ -34,18 +34,19 @@ void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const
 static void finite_states(uz_field_state *state, const uz_field_points *points, int64_t e)
 {
     const uz_body_model *model = points->body->model;
-    double xyz[3 * UZ_ELEMENT_NODES], u[2 * UZ_ELEMENT_NODES];
+    const int dim = model->mesh.dim;
+    double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS];
     uz_element element;
     int count;
     const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
     uz_body_element(&element, xyz, model, e);
-    for (int i = 0; i < 2 * count; i++)
-        u[i] = points->u[2 * node[i / 2] + i % 2];
+    for (int i = 0; i < dim * count; i++)
+        u[i] = points->u[dim * node[i / dim] + i % dim];
     for (int k = 0; k < points->count; k++) {
         uz_finite_state at;
         uz_finite_state_at(&at, &element, uz_element_material(model, e)->law, u, points->point[k]);
-        memcpy(state[k].stress, at.stress, sizeof at.stress);
-        memcpy(state[k].strain, at.strain, sizeof at.strain);
+        memcpy(state[k].stress, at.stress, (size_t)points->body->components * sizeof at.stress[0]);
+        memcpy(state[k].strain, at.strain, (size_t)points->body->components * sizeof at.strain[0]);
     }
 }
 

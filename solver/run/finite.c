@@ -20,7 +20,7 @@
 
 /* Parts are doubled after at most FEW contact problems. The smallest one, of the whole load while none of it is borne.
  */
-enum { FEW = 4, MOST_PARTS = 200 };
+enum { FEW = 4, MOST_PARTS = 200, MOST_SOLID_DOFS = 20000 };
 #define LEAST_PART (1.0 / 1024)
 /* Orderings and factors of tangents that are kept. */
 #define CACHE_BYTES ((size_t)256 << 20)
@@ -97,10 +97,21 @@ static bool copy_lists(uz_scene *scene, const uz_scene *from)
     return true;
 }
 
+/* The certificate's factor is one within an envelope. */
+static uz_status check_size(const uz_body_model *base, uz_error *err)
+{
+    if (base->kind != UZ_SOLID || base->d <= MOST_SOLID_DOFS)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_SCENE, "/mesh",
+                   "finite kinematics of solids have at most %d dofs, and this mesh has %lld: use a coarser one, or "
+                   "the kinematics \"moving\"",
+                   MOST_SOLID_DOFS, (long long)base->d);
+}
+
 static uz_status begin_load(uz_finite_run *run, uz_error *err)
 {
     const uz_mesh *mesh = &run->base.mesh;
-    run->n = 2 * mesh->n_nodes;
+    run->n = mesh->dim * mesh->n_nodes;
     run->d = run->base.d;
     for (int64_t j = 0; j < run->d; j++)
         run->stiffest = fmax(run->stiffest, run->base.K.val[run->base.K.ptr[j]]);
@@ -140,6 +151,8 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     if (!copied || !run->cache)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
     uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_SUPPORTED, err);
+    if (status == UZ_OK)
+        status = check_size(&run->base, err);
     if (status == UZ_OK)
         status = begin_load(run, err);
     if (status == UZ_OK)

@@ -51,9 +51,9 @@ uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run,
 {
     place->u = uz_alloc_zero(run->n, sizeof *place->u);
     place->force = uz_alloc_zero(run->n, sizeof *place->force);
-    return place->u && place->force
-               ? UZ_OK
-               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the place of %lld nodes", (long long)(run->n / 2));
+    return place->u && place->force ? UZ_OK
+                                    : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the place of %lld nodes",
+                                              (long long)run->base.mesh.n_nodes);
 }
 
 static void forget_rows(uz_finite_place *place)
@@ -118,63 +118,75 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
 
 /* ---- one contact problem */
 
-/* Where a row stands: shares of nodes, as many as a side of the plane has at most. */
+/* Where a row stands: shares of nodes. */
 typedef struct {
     int n;
-    int64_t node[3];
-    double share[3], at[2]; /* at: the place */
+    int64_t node[UZ_FACE_NODES];
+    double share[UZ_FACE_NODES], at[3]; /* at: the place */
 } row_place;
+enum { PLACE_DOFS = 3 * UZ_FACE_NODES };
 
 static row_place place_of_row(const uz_finite_place *place, int64_t row)
 {
     const uz_body_model *rows = &place->rows;
     const uz_inner_place *inner = uz_row_inner(rows, row);
+    const int dim = rows->mesh.dim;
     row_place out = {.n = inner ? inner->nodes : 1};
     for (int a = 0; a < out.n; a++) {
         out.node[a] = inner ? inner->node[a] : rows->info.contact_node[row];
         out.share[a] = inner ? inner->share[a] : 1;
-        for (int c = 0; c < 2; c++) {
-            out.at[c] += out.share[a] * (rows->mesh.xyz[2 * out.node[a] + c] + place->u[2 * out.node[a] + c]);
-        }
+        for (int c = 0; c < dim; c++)
+            out.at[c] += out.share[a] * (rows->mesh.xyz[dim * out.node[a] + c] + place->u[dim * out.node[a] + c]);
     }
     return out;
 }
 
-/* Second derivatives of the gap at a place, in displacements of its nodes: the normal n turns by `curvature` as the
- * place moves along t. A place inside a side is one of the material (node_to_obstacle.c), and stays there. */
-static void gap_curvature(double ke[36], const row_place *p, const double n[2], double curvature)
+/* Second derivatives of the gap at a place, in displacements of its nodes, times `force`: the normal n turns as the
+ * place moves along the obstacle, but along the axis of a cylinder. A place inside a side is one of the material
+ * (node_to_obstacle.c), and stays there. */
+static void gap_curvature(double ke[PLACE_DOFS * PLACE_DOFS], const row_place *p, const double *n, const uz_gap *gap,
+                          double force, int dim)
 {
-    const double t[2] = {-n[1], n[0]};
-    for (int i = 0; i < 2 * p->n; i++)
-        for (int j = 0; j < 2 * p->n; j++)
-            ke[i * 2 * p->n + j] = curvature * p->share[i / 2] * p->share[j / 2] * t[i % 2] * t[j % 2];
+    double turn[3][3];
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            turn[i][j] = force * gap->curvature * ((i == j) - n[i] * n[j] - gap->along[i] * gap->along[j]);
+    for (int i = 0; i < dim * p->n; i++)
+        for (int j = 0; j < dim * p->n; j++)
+            ke[i * dim * p->n + j] = p->share[i / dim] * p->share[j / dim] * turn[i % dim][j % dim];
 }
 
-/* r g: what curved obstacles add to the tangent. */
+/* r g: what curved obstacles add to the tangent. Of middles of eight-node faces a reaction is one of several nodes. */
 static uz_status add_curvature(uz_finite_run *run, uz_error *err)
 {
     const uz_body_model *rows = &run->at.rows;
+    const int dim = rows->mesh.dim;
     uz_status status = UZ_OK;
-    for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK && run->n_r == rows->m; k++) {
+    double *force = run->n_r == rows->m ? uz_alloc(rows->m, sizeof *force) : NULL;
+    if (run->n_r != rows->m)
+        return UZ_OK;
+    if (!force)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)rows->m);
+    uz_row_forces(force, rows, run->r);
+    for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK; k++) {
         uz_obstacle *obstacle = NULL;
         if (rows->sites[k].n == 0)
             continue;
         status = uz_obstacle_new(&obstacle, &run->scene.contacts[k], k, run->scene.model, err);
         for (int64_t i = 0; status == UZ_OK && i < rows->m && !uz_obstacle_has_edges(obstacle); i++) {
-            double ke[36];
+            double ke[PLACE_DOFS * PLACE_DOFS];
             uz_gap gap;
-            if (rows->info.contact_of[i] != k || run->r[i] >= 0)
+            if (rows->info.contact_of[i] != k || force[i] == 0)
                 continue;
             const row_place place = place_of_row(&run->at, i);
             if (uz_obstacle_gap(&gap, obstacle, place.at, NULL) != UZ_OK)
                 continue;
-            gap_curvature(ke, &place, rows->info.contact_normal + 2 * i, gap.curvature);
-            for (int p = 0; p < 4 * place.n * place.n; p++)
-                ke[p] *= run->r[i];
+            gap_curvature(ke, &place, rows->info.contact_normal + dim * i, &gap, force[i], dim);
             uz_add_stiffness(&run->tangent, ke, place.node, place.n);
         }
         uz_obstacle_free(obstacle);
     }
+    free(force);
     return status;
 }
 
@@ -183,6 +195,7 @@ static void load_step(bool *moved, uz_finite_run *run)
 {
     const uz_finite_place *at = &run->at;
     const uz_body_model *model = &run->base;
+    const int dim = model->mesh.dim;
     *moved = false;
     double *rest = run->trial.force; /* it is free until the next place is looked at */
     for (int64_t i = 0; i < run->n; i++)
@@ -192,7 +205,8 @@ static void load_step(bool *moved, uz_finite_run *run)
         const int64_t dof = model->dof[i];
         if (dof >= 0)
             continue;
-        const double way = run->prescribed[-1 - dof] - uz_along_dof(model, i / 2, (int)(i % 2), at->u + 2 * (i / 2));
+        const double *u = at->u + dim * (i / dim);
+        const double way = run->prescribed[-1 - dof] - uz_along_dof(model, i / dim, (int)(i % dim), u);
         const uz_csc *fixed = &run->tangent.K_fixed;
         const double rounding = 1e-15 * (fabs(run->prescribed[-1 - dof]) + model->mesh.extent);
         *moved = *moved || fabs(way) > rounding;
@@ -434,7 +448,8 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     const uz_stop stop = {&run->hooks, run->deadline};
     double *to = uz_alloc(run->n, sizeof *to);
     uz_status status =
-        to ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld nodes", (long long)(run->n / 2));
+        to ? UZ_OK
+           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld nodes", (long long)run->base.mesh.n_nodes);
     bool done = false, fits = true;
     const int64_t shifted = run->found.shifted;
     *out = UZ_PART_UNSETTLED;

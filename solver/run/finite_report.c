@@ -4,6 +4,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "post/evaluate.h"
 #include "run/results.h"
 
@@ -110,7 +111,8 @@ static uz_status take_rows(uz_result *result, const uz_finite_run *run, uz_error
     result->u = uz_alloc(run->n, sizeof *result->u);
     result->place = uz_alloc(run->n, sizeof *result->place);
     if (!result->r || !result->g || !result->u || !result->place)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer at %lld nodes", (long long)(run->n / 2));
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer at %lld nodes",
+                       (long long)run->base.mesh.n_nodes);
     memcpy(result->u, run->at.u, (size_t)run->n * sizeof *result->u);
     memcpy(result->place, run->at.u, (size_t)run->n * sizeof *result->place);
     if (m > 0)
@@ -150,20 +152,20 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
 static void compare_forces(double *off, double *most, const uz_resultant *here, const uz_resultant *small, int64_t n)
 {
     for (int64_t i = 0; i < n; i++) {
-        *off = fmax(*off, hypot(here[i].force[0] - small[i].force[0], here[i].force[1] - small[i].force[1]));
-        *most = fmax(*most, hypot(here[i].force[0], here[i].force[1]));
+        *off = fmax(*off, sqrt(uz_distance2(here[i].force, small[i].force, 3)));
+        *most = fmax(*most, sqrt(uz_dot3(here[i].force, here[i].force)));
     }
 }
 
 /* Displacements by their mean squares, without what carries the body as a whole. */
-static double compare_displacements(const double *here, const double *small, int64_t n)
+static double compare_displacements(const double *here, const double *small, int64_t n, int dim)
 {
-    double mean[2] = {0}, off = 0, all = 0;
+    double mean[3] = {0}, off = 0, all = 0;
     for (int64_t i = 0; i < n; i++)
-        mean[i % 2] += here[i] / (0.5 * (double)n);
+        mean[i % dim] += here[i] * dim / (double)n;
     for (int64_t i = 0; i < n; i++) {
         off += (here[i] - small[i]) * (here[i] - small[i]);
-        all += (here[i] - mean[i % 2]) * (here[i] - mean[i % 2]);
+        all += (here[i] - mean[i % dim]) * (here[i] - mean[i % dim]);
     }
     return all > 0 ? sqrt(off / all) : off > 0 ? (double)INFINITY : 0;
 }
@@ -176,7 +178,7 @@ uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, co
     uz_small out = {.compared = true, .error = INFINITY, .load = run->found.load};
     if (run->found.load < 1)
         return out;
-    out.error = compare_displacements(result->u, small->u, run->n);
+    out.error = compare_displacements(result->u, small->u, run->n, run->base.mesh.dim);
     if (energy <= 10 * run->grain) /* forces and energy are rounding, too */
         return out;
     compare_forces(&off, &most, here->contacts, there->contacts, here->n_contacts);

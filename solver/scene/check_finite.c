@@ -53,14 +53,15 @@ static uz_status check_laws(const uz_scene *scene, uz_error *err)
 static uz_status check_body(const uz_scene *scene, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
-    if (scene->model == UZ_AXISYMMETRIC && scene->kinematics != UZ_KINEMATICS_FINITE) /* weigh.c has no measure of it */
-        return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
-                       "whether small deformation is enough is told of plane_strain only; for a body of revolution of "
-                       "such a law use the kinematics \"finite\"");
-    if (scene->model != UZ_PLANE_STRAIN && scene->model != UZ_AXISYMMETRIC)
+    if (scene->model == UZ_PLANE_STRESS)
         return uz_fail(err, UZ_ERR_SCENE, "/model",
-                       "finite kinematics are there for plane_strain and axisymmetric only; use one of these, or the "
+                       "finite kinematics are there for plane_strain, axisymmetric and solid; use one of these, or the "
                        "kinematics \"moving\"");
+    if (scene->model != UZ_PLANE_STRAIN && scene->kinematics != UZ_KINEMATICS_FINITE) /* weigh.c has no measure of it */
+        return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
+                       "whether small deformation is enough is told of plane_strain only; for a %s of such a law use "
+                       "the kinematics \"finite\"",
+                       scene->model == UZ_SOLID ? "solid" : "body of revolution");
     if (scene->formulation != UZ_FORMULATION_AUTO && scene->formulation != UZ_FORMULATION_STANDARD)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                        "finite kinematics have the standard formulation only; use auto, and quad8 or tri6 for bending "
@@ -69,11 +70,17 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
         if (scene->supports[i].kind == UZ_SUPPORT_SPRING)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "spring"),
                            "finite kinematics have no springs; mesh the ground, or prescribe displacements");
-    for (int64_t i = 0; i < scene->n_contacts; i++)
+    for (int64_t i = 0; i < scene->n_contacts; i++) {
         if (scene->contacts[i].kind == UZ_OBSTACLE_BODY)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
                            "finite kinematics have contact with rigid obstacles only; give an obstacle, or use the "
                            "kinematics \"moving\"");
+        if (scene->contacts[i].kind == UZ_OBSTACLE_HEIGHT && scene->model == UZ_SOLID) /* cells between values bend */
+            return uz_fail(
+                err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "obstacle/height"),
+                "finite kinematics of solids have planes, spheres and cylinders for obstacles; use these, or "
+                "the kinematics \"moving\"");
+    }
     return UZ_OK;
 }
 

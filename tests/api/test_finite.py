@@ -15,6 +15,9 @@ BLOCK = {"problem": {"kind": "scene", "model": "plane_strain", "kinematics": "fi
                      "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]}}
 
 
+CUBE = {"box": {"size": [1, 1, 1], "cells": [1, 1, 1]}}
+
+
 def block(law="neo_hooke", **problem):
     body = copy.deepcopy(BLOCK)
     body["problem"]["materials"][0]["law"] = law
@@ -138,6 +141,22 @@ def test_a_ring_over_a_rod(s):
     check(abs(2 + found["displacements"][found["nodes"].index([2, 0])][0] - 2.34524417) < 1e-6, found["displacements"][-1])
 
 
+def test_a_cube_on_a_ball(s):
+    """A solid: fields have six components, and all that is computed from an answer is there."""
+    cube = block(model="solid", mesh={"box": {"size": [1, 1, 1], "cells": [2, 2, 2], "element": "hex20"}},
+                 supports=[{"on": "left", "ux": 0}, {"on": "back", "uz": 0}, {"on": "top", "uy": -0.2}],
+                 contacts=[{"on": "bottom", "obstacle": {"sphere": {"center": [0, -1.5, 0], "radius": 1.5}}}])
+    name, found = answer(s, cube)
+    summary = found["summary"]
+    check(summary["outcome"] == "converged" and abs(summary["contact"]["force"][1] - 0.0616) < 0.02 * 0.0616, summary["contact"])
+    check(summary["finite"]["definite"] and summary["finite"]["qps"] <= 6 and summary["resultants"]["imbalance"] < 1e-8, summary["finite"])
+    check(all(len(stress) == 6 for stress in found["stress"] + found["strain"]), found["stress"][:1])
+    most = max(found["pressure"])
+    check(most > 0.1 and min(stress[1] for stress in found["stress"]) < -0.5 * most, (most, found["stress"][:2]))
+    for of in ("result.vtu", "deformed.svg", "surface", "history", "result?fields=stress_gauss,von_mises,principal"):
+        expect(s.get(f"/v1/jobs/{name}/{of}"), 200)
+
+
 def test_what_is_not_modelled_is_refused(s):
     asked = [(block("linear"), "/problem/materials/0/law", "neo_hooke_isochoric"),
              (block(kinematics="moving"), "/problem/materials/0/law", "\"auto\" or \"finite\""),
@@ -145,6 +164,11 @@ def test_what_is_not_modelled_is_refused(s):
              ({**block(kinematics="auto"), "quantities": [{"quantity": "contact.force"}]}, "/quantities", "compare meshes"),
              (block(model="plane_stress"), "/problem/model", "plane_strain"),
              (block(kinematics="auto", model="axisymmetric"), "/problem/kinematics", "\"finite\""),
+             (block(kinematics="auto", model="solid", mesh=CUBE, supports=[{"on": "top", "ux": 0, "uy": -0.1, "uz": 0}], contacts=[]),
+              "/problem/kinematics", "\"finite\""),
+             (block(model="solid", mesh=CUBE, supports=[{"on": "top", "ux": 0, "uy": -0.1, "uz": 0}],
+                    contacts=[{"on": "bottom", "obstacle": {"height": {"x": [0, 1], "y": [0, 1], "z": [[0, 0], [0, 0]]}}}]),
+              "/problem/contacts/0/obstacle/height", "cylinders"),
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
              (block(loads=[{"on": "right", "pressure": 1}]), "/problem/loads/0/pressure", "traction"),
              (block(supports=[{"on": "left", "ux": 0}, {"on": "top", "spring": [1, 1]}]), "/problem/supports/1/spring", "prescribe"),

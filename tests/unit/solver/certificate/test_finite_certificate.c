@@ -116,6 +116,49 @@ TEST(an_answer_and_what_is_wrong_with_others)
     give_back(&a);
 }
 
+/* The same of solids, on a cylinder whose axis is oblique. */
+TEST(an_answer_of_a_solid_and_what_is_wrong_with_others)
+{
+    static const char *const ELEMENTS[] = {"hex8", "tet10", "hex20"};
+    for (int k = 0; k < 3; k++) {
+        const int64_t cells = k == 0 ? 4 : 2;
+        uz_scene s = body_scene(UZ_SOLID, ELEMENTS[k], (double[3]){1, 1, 1}, (int64_t[3]){cells, cells, cells});
+        s.materials[0].young = 1;
+        s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+        s.kinematics = UZ_KINEMATICS_FINITE;
+        body_hold(&s, "top", 0.05, -0.1, 0.02);
+        uz_contact *roller = body_plane(&s, "bottom", (double[3]){0.4, -2, 0.5}, (double[3]){0.4, 0, 1});
+        roller->kind = UZ_OBSTACLE_CYLINDER;
+        roller->radius = 2;
+        answered a;
+        answer(&a, &s);
+        uz_result *r = a.result;
+        uz_finite_certificate c = judge(&a);
+        CHECK(c.definite && c.residual <= 1e-8 && c.least_det > 0.5 && c.worst_reaction <= 0);
+        CHECK(c.worst_support < 1e-15 && c.least_at_rows > -1e-12 && c.least_part > -0.03);
+        CHECK(fabs(c.energy - r->evaluation->strain_energy) < 1e-12);
+        int64_t pressed = 0;
+        for (int64_t i = 0; i < r->m; i++)
+            pressed = r->r[i] < r->r[pressed] && !uz_row_inner(&a.there, i) ? i : pressed;
+        const double reaction = r->r[pressed];
+        r->r[pressed] *= 1.001;
+        CHECK(judge(&a).residual > 1e-6);
+        r->r[pressed] = -reaction;
+        CHECK(judge(&a).worst_reaction > 0.1); /* the largest is inside of a side */
+        r->r[pressed] = reaction;
+        double *u = r->u + 3 * r->mesh.contact_node[pressed];
+        u[1] -= 0.05; /* into the cylinder */
+        c = judge(&a);
+        CHECK_MSG(c.least_gap < -0.045 && c.least_part < -0.03 && c.residual > 1e-3, "%.3g", c.least_gap);
+        u[1] += 3; /* through the top */
+        c = judge(&a);
+        CHECK(c.least_det < 0 && isinf(c.residual) && !c.definite);
+        u[1] -= 2.95;
+        CHECK(judge(&a).residual <= 1e-8);
+        give_back(&a);
+    }
+}
+
 /* To first order the residual is the distance in the norm of the tangent: without contact, that of the iteration. */
 TEST(the_residual_is_the_distance)
 {

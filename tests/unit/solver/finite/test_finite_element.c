@@ -5,7 +5,7 @@
 #include "finite/hyperelastic.h"
 #include "qp_fixture.h"
 
-enum { MOST = 2 * UZ_ELEMENT_NODES };
+enum { MOST = UZ_ELEMENT_DOFS };
 static const double LAMBDA = 1.3, MU = 0.7;
 
 static double any(qp_random *rng, double size)
@@ -13,71 +13,91 @@ static double any(qp_random *rng, double size)
     return size * (2 * random_unit(rng) - 1);
 }
 
-/* F in the plane by rows, and the stretch across it. */
-static void strains_of(double C[4], const double F[5])
+/* F by rows. */
+static void strains_of(double C[6], const double F[9])
 {
-    C[0] = F[0] * F[0] + F[2] * F[2];
-    C[1] = F[1] * F[1] + F[3] * F[3];
-    C[2] = F[4] * F[4];
-    C[3] = F[0] * F[1] + F[2] * F[3];
+    static const int AXIS[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
+    for (int c = 0; c < 6; c++) {
+        const int i = AXIS[c][0], j = AXIS[c][1];
+        C[c] = F[i] * F[j] + F[3 + i] * F[3 + j] + F[6 + i] * F[6 + j];
+    }
+}
+
+/* In the plane and across it, or all of it. */
+static void any_gradient(double F[9], qp_random *rng, bool plane)
+{
+    for (int i = 0; i < 9; i++)
+        F[i] = (i % 4 == 0) + (plane && (i == 2 || i == 5 || i == 6 || i == 7) ? 0 : any(rng, plane ? 0.4 : 0.25));
 }
 
 /* S = dW/dE and D = dS/dE, E = (C - I) / 2. */
 TEST(stress_and_tangent_of_laws_are_derivatives)
 {
     qp_random rng = {7};
-    for (int k = 0; k < 60; k++)
+    for (int k = 0; k < 120; k++)
         for (int law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF; law < UZ_ELASTICITIES; law++) {
-            const double F[5] = {1 + any(&rng, 0.4), any(&rng, 0.4), any(&rng, 0.4), 1 + any(&rng, 0.4),
-                                 1 + any(&rng, 0.4)},
-                         h = 1e-6;
-            double C[4], W, S[4], D[4][4];
+            const int n = k < 60 ? 4 : 6;
+            const double h = 1e-6;
+            double F[9], C[6], W, S[6], D[6][6];
+            any_gradient(F, &rng, n == 4);
             strains_of(C, F);
-            CHECK(uz_hyperelastic(&W, S, D, (uz_elasticity)law, LAMBDA, MU, C));
-            for (int j = 0; j < 4; j++) {
-                double moved[4], energy[2], stress[2][4], unused[4][4];
+            CHECK(uz_hyperelastic(&W, S, D, n, (uz_elasticity)law, LAMBDA, MU, C));
+            for (int j = 0; j < n; j++) {
+                double moved[6], energy[2], stress[2][6], unused[6][6];
                 for (int side = 0; side < 2; side++) {
                     memcpy(moved, C, sizeof C);
-                    moved[j] += (side ? h : -h) * (j == 3 ? 1 : 2); /* 2 E_xy = C_xy */
-                    CHECK(uz_hyperelastic(&energy[side], stress[side], unused, (uz_elasticity)law, LAMBDA, MU, moved));
+                    moved[j] += (side ? h : -h) * (j >= 3 ? 1 : 2); /* 2 E_xy = C_xy */
+                    CHECK(
+                        uz_hyperelastic(&energy[side], stress[side], unused, n, (uz_elasticity)law, LAMBDA, MU, moved));
                 }
                 CHECK_MSG(fabs((energy[1] - energy[0]) / (2 * h) - S[j]) < 1e-8, "law %d", law);
-                for (int i = 0; i < 4; i++)
+                for (int i = 0; i < n; i++)
                     CHECK_MSG(fabs((stress[1][i] - stress[0][i]) / (2 * h) - D[i][j]) < 1e-6, "law %d", law);
             }
         }
-    double W, S[4], D[4][4];
-    CHECK(!uz_hyperelastic(&W, S, D, UZ_ELASTIC_NEO_HOOKE, LAMBDA, MU, (double[4]){1, 1, 1, 1}));
-    CHECK(!uz_hyperelastic(&W, S, D, UZ_ELASTIC_NEO_HOOKE, LAMBDA, MU, (double[4]){1, 1, 0, 0}));
+    double W, S[6], D[6][6];
+    CHECK(!uz_hyperelastic(&W, S, D, 4, UZ_ELASTIC_NEO_HOOKE, LAMBDA, MU, (double[6]){1, 1, 1, 1}));
+    CHECK(!uz_hyperelastic(&W, S, D, 4, UZ_ELASTIC_NEO_HOOKE, LAMBDA, MU, (double[6]){1, 1}));
+    CHECK(!uz_hyperelastic(&W, S, D, 6, UZ_ELASTIC_NEO_HOOKE, LAMBDA, MU, (double[6]){1, 1, 1, 0, 1, 0}));
 }
 
 /* The certificate's own statement of the laws, P = F S, and its derivative by differences. */
 TEST(the_certificate_states_the_same_laws)
 {
+    static const int ROW[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
     qp_random rng = {8};
-    for (int k = 0; k < 60; k++)
+    for (int k = 0; k < 120; k++)
         for (int law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF; law < UZ_ELASTICITIES; law++) {
-            const double F[5] = {1 + any(&rng, 0.4), any(&rng, 0.4), any(&rng, 0.4), 1 + any(&rng, 0.4),
-                                 1 + any(&rng, 0.4)};
-            const long double at[5] = {F[0], F[1], F[2], F[3], F[4]}, h = 1e-7L;
-            double C[4], W, S[4], D[4][4];
+            const bool plane = k < 60;
+            const long double h = 1e-7L;
+            long double at[9];
+            double F[9], C[6], W, S[6] = {0}, D[6][6];
             uz_piola own, side[2];
+            any_gradient(F, &rng, plane);
+            for (int i = 0; i < 9; i++)
+                at[i] = F[i];
             strains_of(C, F);
-            CHECK(uz_hyperelastic(&W, S, D, (uz_elasticity)law, LAMBDA, MU, C));
-            uz_piola_at(&own, (uz_elasticity)law, LAMBDA, MU, at);
-            const double P[5] = {F[0] * S[0] + F[1] * S[3], F[0] * S[3] + F[1] * S[1], F[2] * S[0] + F[3] * S[3],
-                                 F[2] * S[3] + F[3] * S[1], F[4] * S[2]};
+            CHECK(uz_hyperelastic(&W, S, D, plane ? 4 : 6, (uz_elasticity)law, LAMBDA, MU, C));
+            uz_piola_at(&own, (uz_elasticity)law, LAMBDA, MU, at, plane);
             CHECK(fabs((double)own.W - W) < 1e-14);
-            for (int i = 0; i < 5; i++)
-                CHECK_MSG(fabs((double)own.P[i] - P[i]) < 1e-13, "law %d", law);
-            for (int j = 0; j < 5; j++) {
+            for (int j = 0; j < 9; j++) {
+                const bool none = plane && (j == 2 || j == 5 || j == 6 || j == 7);
+                double P = 0;
+                for (int l = 0; l < 3; l++)
+                    P += F[j / 3 * 3 + l] * S[ROW[l][j % 3]];
+                if (none)
+                    continue;
+                CHECK_MSG(fabs((double)own.P[j] - P) < 1e-13, "law %d", law);
                 for (int s = 0; s < 2; s++) {
-                    long double moved[5] = {at[0], at[1], at[2], at[3], at[4]};
+                    long double moved[9];
+                    memcpy(moved, at, sizeof at);
                     moved[j] += s ? h : -h;
-                    uz_piola_at(&side[s], (uz_elasticity)law, LAMBDA, MU, moved);
+                    uz_piola_at(&side[s], (uz_elasticity)law, LAMBDA, MU, moved, plane);
                 }
-                for (int i = 0; i < 5; i++)
-                    CHECK_MSG(fabsl((side[1].P[i] - side[0].P[i]) / (2 * h) - own.A[i][j]) < 1e-10L, "law %d", law);
+                for (int i = 0; i < 9; i++)
+                    CHECK_MSG((plane && (i == 2 || i == 5 || i == 6 || i == 7)) ||
+                                  fabsl((side[1].P[i] - side[0].P[i]) / (2 * h) - own.A[i][j]) < 1e-10L,
+                              "law %d", law);
             }
         }
 }
@@ -86,36 +106,40 @@ static uz_element bent_element(double *xyz, uz_element_kind kind, qp_random *rng
 {
     const uz_element_type *type = uz_element_type_of(kind);
     for (int a = 0; a < type->nodes; a++)
-        for (int c = 0; c < 2; c++)
-            xyz[2 * a + c] = type->local[a][c] + any(rng, 0.08);
+        for (int c = 0; c < type->dim; c++)
+            xyz[type->dim * a + c] = type->local[a][c] + any(rng, type->dim == 2 ? 0.08 : 0.04);
     return (uz_element){.kind = kind,
-                        .model = UZ_PLANE_STRAIN,
+                        .model = type->dim == 2 ? UZ_PLANE_STRAIN : UZ_SOLID,
                         .formulation = UZ_FORMULATION_STANDARD,
                         .lame = {LAMBDA, MU},
                         .thickness = 1.5,
                         .xyz = xyz};
 }
 
-static const uz_element_kind KINDS[] = {UZ_TRI3, UZ_QUAD4, UZ_TRI6, UZ_QUAD8};
+static const uz_element_kind KINDS[] = {UZ_TRI3, UZ_QUAD4, UZ_TRI6,  UZ_QUAD8,  UZ_TET4,
+                                        UZ_HEX8, UZ_TET10, UZ_HEX20, UZ_WEDGE6, UZ_WEDGE15};
 
 TEST(forces_and_tangents_of_elements_are_derivatives)
 {
     qp_random rng = {9};
-    for (int k = 0; k < 80; k++) {
+    int compared = 0;
+    for (int k = 0; k < 116; k++) {
         double xyz[MOST], u[MOST], ke[MOST * MOST], other[MOST * MOST];
-        uz_element element = bent_element(xyz, KINDS[k % 4], &rng);
-        const uz_elasticity law = (uz_elasticity)(1 + k / 4 % 3);
-        const int n = 2 * uz_element_node_count(element.kind);
+        uz_element element = bent_element(xyz, KINDS[k < 80 ? k % 4 : 4 + k % 6], &rng);
+        const uz_elasticity law = (uz_elasticity)(1 + k / (k < 80 ? 4 : 6) % 3);
+        const int n = (k < 80 ? 2 : 3) * uz_element_node_count(element.kind);
+        const bool ring = k >= 40 && k < 80;
         uz_finite_forces at, side[2];
-        if (k >= 40) { /* a ring; its inner side on the axis where it is straight */
+        if (ring) { /* a ring; its inner side on the axis where it is straight */
             element.model = UZ_AXISYMMETRIC;
             for (int a = 0; a < n / 2; a++)
                 xyz[2 * a] = k % 3 ? xyz[2 * a] + 2 : fmax(0, xyz[2 * a] + 1);
         }
         for (int i = 0; i < n; i++)
-            u[i] = any(&rng, 0.15);
+            u[i] = any(&rng, k < 80 ? 0.15 : 0.06);
         if (!uz_finite_element(&at, ke, &element, law, u, NULL))
             continue;
+        compared++;
         for (int j = 0; j < n; j++) {
             const double h = 1e-6, before = u[j];
             for (int s = 0; s < 2; s++) {
@@ -123,10 +147,9 @@ TEST(forces_and_tangents_of_elements_are_derivatives)
                 CHECK(uz_finite_element(&side[s], NULL, &element, law, u, NULL));
             }
             u[j] = before;
-            CHECK(fabs((side[1].energy - side[0].energy) / (2 * h) - at.force[j]) < (k < 40 ? 1e-7 : 1e-6));
+            CHECK(fabs((side[1].energy - side[0].energy) / (2 * h) - at.force[j]) < (ring ? 1e-6 : 1e-7));
             for (int i = 0; i < n; i++)
-                CHECK_MSG(fabs((side[1].force[i] - side[0].force[i]) / (2 * h) - ke[i * n + j]) <
-                              (k < 40 ? 1e-6 : 1e-4),
+                CHECK_MSG(fabs((side[1].force[i] - side[0].force[i]) / (2 * h) - ke[i * n + j]) < (ring ? 1e-4 : 1e-6),
                           "%s %d: %g", uz_element_name(element.kind), k, ke[i * n + j]);
         }
         /* undeformed: the stiffness of small strain */
@@ -136,6 +159,7 @@ TEST(forces_and_tangents_of_elements_are_derivatives)
         for (int i = 0; i < n * n; i++)
             CHECK(fabs(ke[i] - other[i]) < 1e-12);
     }
+    CHECK_MSG(compared > 100, "%d", compared);
 }
 
 /* Turned and carried off, an element has its energy, and its forces turn along; Cauchy's stress does, too. */
@@ -169,6 +193,55 @@ TEST(rotations_strain_nothing)
         CHECK(fabs(a[0] + a[1] - b[0] - b[1]) < 1e-12 && fabs(a[2] - b[2]) < 1e-12);
         CHECK(fabs(c * c * a[0] + s * s * a[1] - 2 * c * s * a[3] - b[0]) < 1e-12);
         CHECK(fabs(state[0].strain[3] - state[1].strain[3]) < 1e-12);
+    }
+}
+
+/* The same in space, about an axis of no direction in particular. */
+TEST(rotations_of_solids_strain_nothing)
+{
+    static const double AXIS[3] = {2. / 3, -1. / 3, 2. / 3};
+    qp_random rng = {13};
+    for (int k = 0; k < 24; k++) {
+        double xyz[MOST], u[MOST], turned[MOST], Q[9];
+        const uz_element element = bent_element(xyz, KINDS[4 + k % 6], &rng);
+        const uz_elasticity law = (uz_elasticity)(1 + k / 6 % 3);
+        const int n = uz_element_node_count(element.kind);
+        const double angle = any(&rng, 3), c = cos(angle), s = sin(angle);
+        uz_finite_forces before, after;
+        uz_finite_state state[2];
+        for (int i = 0; i < 9; i++) /* Rodrigues */
+            Q[i] = (i % 4 == 0 ? c : 0) + (1 - c) * AXIS[i / 3] * AXIS[i % 3];
+        for (int i = 0; i < 3; i++) {
+            Q[3 * i + (i + 1) % 3] -= s * AXIS[(i + 2) % 3];
+            Q[3 * i + (i + 2) % 3] += s * AXIS[(i + 1) % 3];
+        }
+        for (int i = 0; i < 3 * n; i++)
+            u[i] = any(&rng, 0.04);
+        for (int i = 0; i < 3 * n; i++) {
+            turned[i] = 5 - xyz[i];
+            for (int j = 0; j < 3; j++)
+                turned[i] += Q[3 * (i % 3) + j] * (xyz[i / 3 * 3 + j] + u[i / 3 * 3 + j]);
+        }
+        CHECK(uz_finite_element(&before, NULL, &element, law, u, NULL) && before.energy > 1e-4);
+        CHECK(uz_finite_element(&after, NULL, &element, law, turned, NULL));
+        CHECK(fabs(before.energy - after.energy) < 1e-12 && fabs(before.least_det - after.least_det) < 1e-12);
+        for (int i = 0; i < 3 * n; i++) {
+            const double *f = before.force + i / 3 * 3;
+            const double expected = Q[3 * (i % 3)] * f[0] + Q[3 * (i % 3) + 1] * f[1] + Q[3 * (i % 3) + 2] * f[2];
+            CHECK(fabs(expected - after.force[i]) < 1e-12);
+        }
+        const double *centre = uz_element_type_of(element.kind)->centre;
+        uz_finite_state_at(&state[0], &element, law, u, centre);
+        uz_finite_state_at(&state[1], &element, law, turned, centre);
+        const double *a = state[0].stress, *b = state[1].stress;
+        const double full[9] = {a[0], a[3], a[5], a[3], a[1], a[4], a[5], a[4], a[2]};
+        double xx = 0, xy = 0;
+        for (int i = 0; i < 9; i++) {
+            xx += Q[i / 3] * full[i] * Q[i % 3];
+            xy += Q[i / 3] * full[i] * Q[3 + i % 3];
+        }
+        CHECK(fabs(xx - b[0]) < 1e-12 && fabs(xy - b[3]) < 1e-12);
+        CHECK(fabs(state[0].strain[4] - state[1].strain[4]) < 1e-12);
     }
 }
 
