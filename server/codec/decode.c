@@ -56,11 +56,13 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
                    : status == UZ_ERR_UNSUPPORTED ? MESHES[i].unsupported
                                                   : code;
     if (strncmp(where, "/cases/", 7) == 0) {
-        /* A load case has loads, p and h; an error about anything else of it is one of the body that all cases share.
-         */
+        /* A load case has these; an error about anything else of it is one of the body that all cases share. */
+        static const char *const OWN[] = {"/p", "/h", "/part", "/after"};
         const char *rest = where + 7 + strspn(where + 7, "0123456789");
-        if (*rest && strncmp(rest, "/loads", 6) != 0 && strcmp(rest, "/p") != 0 && strcmp(rest, "/h") != 0)
-            where = rest;
+        bool own = !*rest || strncmp(rest, "/loads", 6) == 0;
+        for (size_t i = 0; i < sizeof OWN / sizeof OWN[0]; i++)
+            own = own || strcmp(rest, OWN[i]) == 0;
+        where = own ? where : rest;
     }
     /* The library names the matrices that it makes of a scene, and no request of a scene has them. Too large they are
      * because of the mesh. */

@@ -44,11 +44,17 @@ bool decode_cases(uz_problem *problem, decoding *d, const json_value *list)
         uz_load_case *out = &problem->cases[i];
         if (!decode_label(out->name, d, name, name->text, name->count, "A name of a case"))
             return false;
-        const bool good =
-            problem->kind == UZ_PROBLEM_SCENE
-                ? decode_loads(&out->loads, &out->n_loads, d, json_get(item, "loads"), uz_scene_dim(&problem->scene))
-                : take_vector(&out->p, d, item, "p", problem->qp.K.rows, "K") &&
-                      take_vector(&out->h, d, item, "h", problem->qp.N.rows, "N");
+        const json_value *after = json_get(item, "after"), *part = json_get(item, "part");
+        if (after && !decode_label(out->after, d, after, after->text, after->count, "A name of a case"))
+            return false;
+        out->has_part = part != NULL;
+        out->part = json_number(part, 1);
+        const bool own_loads = json_get(item, "loads") != NULL;
+        const bool good = problem->kind == UZ_PROBLEM_SCENE
+                              ? !own_loads || decode_loads(&out->loads, &out->n_loads, d, json_get(item, "loads"),
+                                                           uz_scene_dim(&problem->scene))
+                              : take_vector(&out->p, d, item, "p", problem->qp.K.rows, "K") &&
+                                    take_vector(&out->h, d, item, "h", problem->qp.N.rows, "N");
         if (!good)
             return false;
     }

@@ -243,6 +243,8 @@ static void put_finite(text *t, const uz_finite *f)
         (named[]){
             {"load", f->load}, {"least_det", f->least_det}, {"residual", f->residual}, {"least_gap", f->least_gap}},
         4);
+    if (!isnan(f->part))
+        put_named(t, NULL, (named[]){{"part", f->part}}, 1);
     text_bool(t, "definite", f->definite);
     text_close(t, '}');
 }

@@ -19,6 +19,10 @@ typedef struct {
     double *p, *h;  /* matrices: d, m */
     uz_load *loads; /* scenes: in place of all of the scene's loads; an empty list may be non-NULL: no load */
     int64_t n_loads;
+    /* Kinematics FINITE: the answer begins where that of an earlier case is, whose name this is; "": at rest. */
+    char after[64];
+    bool has_part; /* loads and prescribed displacements are `part` times as large */
+    double part;
 } uz_load_case;
 
 /* One number that a scene is solved for. */

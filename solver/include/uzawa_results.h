@@ -169,7 +169,10 @@ typedef struct {
 
 /* Scenes of kinematics FINITE: how the answer was reached, and what its certificate (certificate/finite.h) found. */
 typedef struct {
-    double load;    /* the part of loads and prescribed displacements that the answer is for: 1 is the whole */
+    double load;    /* the part of loads and prescribed displacements that the answer is for: 1 is the whole. Of a case
+                     * after another one: of the way from those of that one's answer */
+    double part;    /* of cases with a part, or after another one: that of the scene's prescribed displacements, and of
+                     * loads that both cases have, which the answer is for; else NaN */
     int64_t steps;  /* parts in which the load was put on, without those that failed */
     int64_t failed; /* and those */
     int64_t qps;    /* contact problems on a tangent that were solved, all together */

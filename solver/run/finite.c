@@ -61,39 +61,48 @@ uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings 
 
 /* ---- parts of the load */
 
-void uz_finite_put_on(uz_finite_run *run, double t)
+static void scale_load(uz_load *out, const uz_load *from, double factor)
+{
+    for (int c = 0; c < 3; c++)
+        out->v[c] = factor * from->v[c];
+    out->value = factor * from->value;
+}
+
+/* Supports and loads become those of a part t of the way from run->from to run->part of the whole. */
+static uz_status put_on(uz_finite_run *run, double t, uz_error *err)
 {
     const uz_scene *whole = &run->problem->scene;
+    const double moved = (1 - t) * (run->from ? run->from->part : 0) + t * run->part;
     run->load = t;
     for (int64_t i = 0; i < whole->n_supports; i++) {
         for (int c = 0; c < 3; c++)
-            run->scene.supports[i].u[c] = t * whole->supports[i].u[c]; /* NaN where free */
-        run->scene.supports[i].value = t * whole->supports[i].value;
+            run->scene.supports[i].u[c] = moved * whole->supports[i].u[c]; /* NaN where free */
+        run->scene.supports[i].value = moved * whole->supports[i].value;
     }
-    for (int64_t i = 0; i < whole->n_loads; i++) {
-        for (int c = 0; c < 3; c++)
-            run->scene.loads[i].v[c] = t * whole->loads[i].v[c];
-        run->scene.loads[i].value = t * whole->loads[i].value;
-    }
+    for (int64_t i = 0; i < run->scene.n_loads; i++) /* its own, and then those that it goes away from */
+        if (i < whole->n_loads)
+            scale_load(&run->scene.loads[i], &whole->loads[i], t * run->part);
+        else
+            scale_load(&run->scene.loads[i], &run->from->loads[i - whole->n_loads], 1 - t);
+    const uz_status status = uz_nodal_loads(run->loads, &run->base, &run->scene, err);
+    return status == UZ_OK ? uz_prescribed_values(run->prescribed, &run->base, &run->scene, err) : status;
 }
 
-static uz_status put_on(uz_finite_run *run, double t, uz_error *err)
+/* A copy of the lists that a part changes, with the loads of where it begins (NULL: at rest). */
+static bool copy_lists(uz_scene *scene, const uz_scene *from, const uz_finite_point *begins)
 {
-    uz_finite_put_on(run, t);
-    return uz_prescribed_values(run->prescribed, &run->base, &run->scene, err);
-}
-
-/* A copy of the lists that a part changes. */
-static bool copy_lists(uz_scene *scene, const uz_scene *from)
-{
+    const int64_t more = begins ? begins->n_loads : 0;
     scene->supports = uz_alloc(from->n_supports, sizeof *scene->supports);
-    scene->loads = uz_alloc(from->n_loads, sizeof *scene->loads);
+    scene->loads = uz_alloc(from->n_loads + more, sizeof *scene->loads);
+    scene->n_loads = from->n_loads + more;
     if (!scene->supports || !scene->loads)
         return false;
     if (from->n_supports > 0)
         memcpy(scene->supports, from->supports, (size_t)from->n_supports * sizeof *scene->supports);
     if (from->n_loads > 0)
         memcpy(scene->loads, from->loads, (size_t)from->n_loads * sizeof *scene->loads);
+    if (more > 0)
+        memcpy(scene->loads + from->n_loads, begins->loads, (size_t)more * sizeof *scene->loads);
     return true;
 }
 
@@ -129,16 +138,16 @@ static uz_status begin_load(uz_finite_run *run, uz_error *err)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the load of %lld dofs", (long long)run->d);
     if (status == UZ_OK) /* checks what it reads */
         status = uz_body_model_load(run->p, h, run->prescribed, &run->base, &run->scene, err);
-    if (status == UZ_OK)
-        status = uz_nodal_loads(run->loads, &run->base, &run->scene, err);
     free(h);
     return status;
 }
 
 static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
-                       double deadline, uz_error *err)
+                       double deadline, const uz_finite_path *path, uz_error *err)
 {
     *run = (uz_finite_run){.problem = one, .settings = *settings, .scene = one->scene, .deadline = deadline};
+    run->from = path ? path->from : NULL;
+    run->part = path ? path->part : 1;
     const double start = uz_seconds();
     run->hooks = hooks ? *hooks : (uz_hooks){.ctx = NULL};
     run->hooks.begins = NULL;
@@ -146,7 +155,7 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     run->requested = fmax(LEAST_ERROR, uz_requested_error(settings));
     run->settings.relative_error = fmin(STEP_ERROR, run->requested);
     run->settings.semidefinite = false;
-    const bool copied = copy_lists(&run->scene, &one->scene);
+    const bool copied = copy_lists(&run->scene, &one->scene, run->from);
     run->cache = uz_cache_new(CACHE_BYTES);
     if (!copied || !run->cache)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
@@ -239,14 +248,41 @@ static double least_part(double load)
     return LEAST_PART * (load > 0 ? 0.5 * load : 1);
 }
 
-/* Until the whole load is on, or no further part of it holds. */
+/* The way begins at rest, or where another case has come to. */
+static bool start_at(settled *to, const uz_finite_point *from)
+{
+    if (!from)
+        return true;
+    to->r = uz_alloc(from->n_r, sizeof *to->r);
+    if (!to->r)
+        return false;
+    memcpy(to->u, from->u, (size_t)from->n * sizeof *to->u);
+    if (from->n_r > 0)
+        memcpy(to->r, from->r, (size_t)from->n_r * sizeof *to->r);
+    to->n_r = from->n_r;
+    to->certificate = from->certificate;
+    return true;
+}
+
+/* Until the whole load is on, or no further part of it holds. Of a way that begins where another one has ended before
+ * its whole load nothing is put on. */
 static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_error *err)
 {
     settled last = {.u = uz_alloc_zero(run->n, sizeof *last.u)};
     uz_finite *found = &run->found;
     double step = 1;
-    uz_status status = last.u ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+    const uz_finite_point *from = run->from;
+    uz_status status =
+        last.u && start_at(&last, from) ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
     *why = UZ_PART_SETTLED;
+    if (status == UZ_OK && from)
+        status = go_back(run, &last, 0, err);
+    if (status == UZ_OK && from && !from->whole) {
+        *why = (uz_part)from->why;
+        *tried = from->tried;
+        run->stopped = from->stopped;
+        step = 0;
+    }
     while (status == UZ_OK && found->load < 1 && step >= least_part(found->load) &&
            found->steps + found->failed < MOST_PARTS) {
         uz_part part = UZ_PART_UNSETTLED;
@@ -271,7 +307,7 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
         found->failed++;
         step *= 0.5;
         status = go_back(run, &last, found->load, err);
-        if (status == UZ_OK && found->failed == 1 && found->load == 0)
+        if (status == UZ_OK && found->failed == 1 && found->load == 0 && !from)
             measure_overlap(run);
         if (part == UZ_PART_STOPPED)
             break;
@@ -281,23 +317,100 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
     return status;
 }
 
+void uz_finite_point_free(uz_finite_point *point)
+{
+    if (!point)
+        return;
+    free(point->u);
+    free(point->r);
+    free(point->loads);
+    free(point);
+}
+
+/* Where run->at is. */
+static uz_status take_point(uz_finite_point **out, const uz_finite_run *run, uz_part why, double tried, uz_error *err)
+{
+    const int64_t own = run->problem->scene.n_loads;
+    const bool whole = run->found.load >= 1;
+    const double before = run->from ? run->from->part : 0;
+    uz_finite_point *point = uz_alloc_zero(1, sizeof *point);
+    *out = point;
+    if (point) {
+        *point = (uz_finite_point){.n = run->n, .n_r = run->n_r, .whole = whole, .why = why, .tried = tried};
+        point->n_loads = whole ? own : run->scene.n_loads;
+        point->u = uz_alloc(run->n, sizeof *point->u);
+        point->r = uz_alloc(run->n_r, sizeof *point->r);
+        point->loads = uz_alloc(point->n_loads, sizeof *point->loads);
+    }
+    if (!point || !point->u || !point->r || !point->loads)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a point of a path");
+    point->part = before + run->found.load * (run->part - before);
+    point->certificate = run->certificate;
+    if (run->last || run->from)
+        point->last = run->last ? run->last->summary : run->from->last;
+    point->stopped = run->stopped;
+    memcpy(point->u, run->at.u, (size_t)run->n * sizeof *point->u);
+    if (run->n_r > 0)
+        memcpy(point->r, run->r, (size_t)run->n_r * sizeof *point->r);
+    if (point->n_loads > 0)
+        memcpy(point->loads, run->scene.loads, (size_t)point->n_loads * sizeof *point->loads);
+    return UZ_OK;
+}
+
 uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_settings *settings,
-                               const uz_hooks *hooks, double deadline, const uz_result *small, uz_error *err)
+                               const uz_hooks *hooks, double deadline, const uz_result *small,
+                               const uz_finite_path *path, uz_error *err)
 {
     uz_finite_run run;
     uz_part why = UZ_PART_SETTLED;
     const double start = uz_seconds();
     double tried = 0;
-    uz_status status = begin(&run, one, settings, hooks, deadline, err);
+    uz_status status = begin(&run, one, settings, hooks, deadline, path, err);
     if (status == UZ_OK)
         status = put_on_all(&why, &tried, &run, err);
     if (status == UZ_OK) {
         run.spent.total = uz_seconds() - start;
         status = uz_finite_report(out, &run, why, tried, err);
     }
+    if (status == UZ_OK && path && path->to)
+        status = take_point(path->to, &run, why, tried, err);
     if (status == UZ_OK && small)
         (*out)->summary.small = uz_finite_compare(&run, *out, small);
     end(&run);
+    return status;
+}
+
+/* The last case that is after case i; 0: none. */
+static int64_t last_after(const uz_problem *problem, int64_t i)
+{
+    int64_t last = problem->n_cases - 1;
+    while (last > i && (!problem->cases[last].after[0] || uz_case_before(problem, last) != i))
+        last--;
+    return last > i ? last : 0;
+}
+
+/* points: n_cases, those that later cases need. */
+static uz_status solve_case(uz_result **out, uz_finite_point **points, const uz_problem *problem, int64_t i,
+                            const uz_settings *settings, const uz_hooks *hooks, double deadline, uz_error *err)
+{
+    const uz_problem one = uz_problem_of_case(problem, i);
+    if (problem->n_cases == 0)
+        return uz_solve_finite_load(out, &one, settings, hooks, deadline, NULL, NULL, err);
+    const uz_load_case *own = &problem->cases[i];
+    const int64_t before = own->after[0] ? uz_case_before(problem, i) : -1;
+    const uz_finite_path path = {own->has_part ? own->part : 1, before >= 0 ? points[before] : NULL,
+                                 last_after(problem, i) > 0 ? &points[i] : NULL};
+    const uz_status status = uz_solve_finite_load(out, &one, settings, hooks, deadline, NULL, &path, err);
+    if (status != UZ_OK)
+        uz_error_name_case(err, i);
+    if (status == UZ_OK && (own->has_part || before >= 0)) {
+        const double from = before >= 0 ? points[before]->part : 0;
+        (*out)->summary.finite.part = from + (*out)->summary.finite.load * (path.part - from);
+    }
+    if (before >= 0 && last_after(problem, before) <= i) {
+        uz_finite_point_free(points[before]);
+        points[before] = NULL;
+    }
     return status;
 }
 
@@ -313,15 +426,20 @@ uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const 
         status = uz_check_problem(problem, err);
     if (status == UZ_OK)
         status = uz_check_finite_settings(problem, settings, err);
+    uz_finite_point **points = uz_alloc_zero(n, sizeof *points);
+    if (status == UZ_OK && !points)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld load cases", (long long)n);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
-        const uz_problem one = uz_problem_of_case(problem, i);
-        if (uz_cancelled(hooks))
-            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
+        if (uz_cancelled(hooks)) {
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
+            break;
+        }
         if (hooks && hooks->begins)
             hooks->begins(hooks->ctx, i);
-        status = uz_solve_finite_load(&results[i], &one, settings, hooks, deadline, NULL, err);
-        if (status != UZ_OK && problem->n_cases > 0)
-            uz_error_name_case(err, i);
+        status = solve_case(&results[i], points, problem, i, settings, hooks, deadline, err);
     }
+    for (int64_t i = 0; i < n && points; i++)
+        uz_finite_point_free(points[i]);
+    free(points);
     return status;
 }

@@ -33,8 +33,17 @@ uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const 
 /* ---- shared by the files above */
 
 /* One load. small: an answer that is to be compared, in the result's summary.small; NULL: none. */
+typedef struct uz_finite_point uz_finite_point;
+typedef struct {
+    double part;                 /* of loads and prescribed displacements */
+    const uz_finite_point *from; /* where it begins; NULL: at rest */
+    uz_finite_point **to;        /* where it has come to; NULL: not wanted. The caller frees it */
+} uz_finite_path;
+void uz_finite_point_free(uz_finite_point *point);
+/* path NULL: the whole load from rest. */
 uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_settings *settings,
-                               const uz_hooks *hooks, double deadline, const uz_result *small, uz_error *err);
+                               const uz_hooks *hooks, double deadline, const uz_result *small,
+                               const uz_finite_path *path, uz_error *err);
 uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings *settings, uz_error *err);
 
 /* A displacement, and what follows from it. Its rows are those of the body there. */
@@ -45,6 +54,20 @@ typedef struct {
     double *h, *gap;  /* m of rows */
     double violation; /* the sum of the gaps that are negative */
 } uz_finite_place;
+
+/* An equilibrium, from which a path goes on: what it is under, and why it is not under the whole load of its case. */
+struct uz_finite_point {
+    double *u, *r, part; /* n, n_r; of prescribed displacements */
+    int64_t n, n_r;
+    uz_load *loads;
+    int64_t n_loads;
+    uz_finite_certificate certificate;
+    uz_summary last; /* of the last contact problem; pointers are not to be read */
+    bool whole;
+    int why; /* a uz_part */
+    double tried;
+    uz_outcome stopped;
+};
 
 typedef enum {
     UZ_PART_SETTLED,
@@ -62,14 +85,17 @@ typedef struct {
     uz_hooks hooks;
     double deadline;
     uz_cache *cache; /* of tangents: their ordering is found once */
-    uz_scene scene;  /* with supports and loads times `load`, of its own */
+    uz_scene scene;  /* with supports and loads under `load`, of its own */
     double load;     /* t */
+    const uz_finite_point
+        *from; /* the way from there, or from rest (NULL) to `part` of the whole is put on in parts t */
+    double part;
     /* n_contacts: how deep nodes of the body at rest stand in the obstacle, which is set back by 1 - t of it, as
      * supports and loads are; 0 until a part of the load is asked for */
     double *overlap;
     uz_body_model base, tangent;
     int64_t n, d;
-    double *loads;      /* n: forces of the whole load */
+    double *loads;      /* n: forces under t */
     double *prescribed; /* n_fixed: under t */
     uz_finite_place at, trial;
     double *r; /* reactions of the rows that the last contact problem had, n_r of them */
@@ -86,8 +112,6 @@ typedef struct {
     uz_finite found;
 } uz_finite_run;
 
-/* Supports and loads are those of a part t of the whole. */
-void uz_finite_put_on(uz_finite_run *run, double t);
 /* Room for a place, and what follows from its u; false in *fits: elements are inverted there, or there is no contact
  * geometry. */
 uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run, uz_error *err);

@@ -8,7 +8,8 @@
  * Newton's method on the conditions of equilibrium with contact, sequential quadratic programming (Nocedal and Wright,
  * "Numerical Optimization", ch. 18). A K that is not positive definite gets stiffness along the pressed rows added,
  * which changes nothing where they stay closed, and where that is not enough that of the undeformed body, which costs
- * steps. After a large step K first has the stress that the step was made for (finite_element.c), which takes half of
+ * steps; along a path from another case the part is given up there, as the equilibrium beyond may be another one.
+ * After a large step K first has the stress that the step was made for (finite_element.c), which takes half of
  * the steps where slender parts turn; where it is not positive definite with that the body's own comes next. Steps are
  * shortened until no element turns inside out and the potential energy, with a penalty on negative gaps that exceeds
  * the reactions (ibid., ch. 18.3), is less than it was at one of the last places; but that which moves the supports,
@@ -44,6 +45,8 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3 };
 #define MOST_SHIFT  1e4
 /* Steps that are more than this in the energy's norm may turn slender parts. */
 #define LARGE_STEP 0.3
+/* Along a path: how far its end may be from where the first tangent leads to, in ways there. */
+#define MOST_LEAP 1.0
 
 /* ---- places */
 
@@ -199,7 +202,7 @@ static void load_step(bool *moved, uz_finite_run *run)
     *moved = false;
     double *rest = run->trial.force; /* it is free until the next place is looked at */
     for (int64_t i = 0; i < run->n; i++)
-        rest[i] = run->load * run->loads[i] - at->force[i];
+        rest[i] = run->loads[i] - at->force[i];
     uz_gather_nodal(run->p, model, rest);
     for (int64_t i = 0; i < run->n; i++) {
         const int64_t dof = model->dof[i];
@@ -310,6 +313,7 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         run->hold = hold;
         run->shift = shift;
         more = step || add_more(&hold, &shift, pressed);
+        more = more && !(run->from && shift > 0); /* a path goes from one stable equilibrium to the next one */
         step = NULL;
     }
     if (status == UZ_OK) {
@@ -328,7 +332,7 @@ static double merit(const uz_finite_run *run, const uz_finite_place *place)
     double work = 0;
     for (int64_t i = 0; i < run->n; i++)
         work += run->loads[i] * place->u[i];
-    return place->body.energy - run->load * work + run->penalty * place->violation;
+    return place->body.energy - work + run->penalty * place->violation;
 }
 
 /* trial becomes a part of the way from `at` to `to`, the largest that is let. before: merits of the last places, of
@@ -441,20 +445,34 @@ static bool is_nearly_flat(const uz_finite_run *run)
     return run->found.steps > 0 && run->found.least_det < NEARLY_FLAT;
 }
 
+/* A path that goes over a limit load leaps: much farther than the tangent of where it was led. begun, led: n. */
+static bool leaps(const uz_finite_run *run, const double *begun, const double *led)
+{
+    double off = 0, way = 0;
+    for (int64_t i = 0; i < run->n && run->from; i++) {
+        off += (run->at.u[i] - led[i]) * (run->at.u[i] - led[i]);
+        way += (led[i] - begun[i]) * (led[i] - begun[i]);
+    }
+    return off > MOST_LEAP * MOST_LEAP * way + run->base.mesh.extent * run->base.mesh.extent * 1e-16;
+}
+
 uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
 {
     double before[REMEMBERED] = {0};
     int remembered = 0;
     const uz_stop stop = {&run->hooks, run->deadline};
-    double *to = uz_alloc(run->n, sizeof *to);
-    uz_status status =
-        to ? UZ_OK
-           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld nodes", (long long)run->base.mesh.n_nodes);
+    double *to = uz_alloc(run->n, sizeof *to), *begun = uz_alloc(run->n, sizeof *begun),
+           *led = uz_alloc(run->n, sizeof *led);
+    uz_status status = to && begun && led ? UZ_OK
+                                          : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld nodes",
+                                                    (long long)run->base.mesh.n_nodes);
     bool done = false, fits = true;
     const int64_t shifted = run->found.shifted;
     *out = UZ_PART_UNSETTLED;
     run->penalty = run->hold = run->shift = 0;
     run->step_qps = 0;
+    if (status == UZ_OK)
+        memcpy(begun, run->at.u, (size_t)run->n * sizeof *begun);
     if (status == UZ_OK)
         status = uz_finite_place_find(&fits, &run->at, run, err); /* supports have moved */
     while (status == UZ_OK && fits && !done && run->step_qps < MOST_QPS) {
@@ -481,6 +499,8 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
             break;
         const double norm = run->norm = moved ? (double)INFINITY : step_norm(run);
         uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);
+        if (run->step_qps == 1)
+            memcpy(led, to, (size_t)run->n * sizeof *led);
         const bool free_step = moved || run->step_qps == 1;
         if (!free_step) {
             memmove(before + 1, before, (REMEMBERED - 1) * sizeof *before);
@@ -498,6 +518,10 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         if (comparable && norm < ASKED_FROM)
             status = ask_certificate(&done, out, run, err);
     }
+    if (status == UZ_OK && *out == UZ_PART_SETTLED && leaps(run, begun, led))
+        *out = UZ_PART_UNSETTLED;
     free(to);
+    free(begun);
+    free(led);
     return status;
 }

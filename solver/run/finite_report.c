@@ -22,6 +22,7 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
     const uz_finite_certificate *c = &run->certificate;
     char *text = s->message;
     const size_t size = sizeof s->message;
+    const char *of = run->from ? "the way from the load of the case before it" : "the load";
     if (s->outcome == UZ_MESH_LIMIT) {
         snprintf(text, size,
                  "the obstacle stands %.3g of a side's length deep in it, between rows: use a finer mesh along the "
@@ -36,31 +37,36 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
                  s->finite.residual, s->requested_error);
         return;
     }
+    if (run->from && !run->from->whole) {
+        snprintf(text, size,
+                 "the case that this one is after has no answer under its whole load: this is where it ended");
+        return;
+    }
     switch (why) {
     case UZ_PART_INVERTED:
         snprintf(text, size,
-                 "elements turn inside out under %.6g of the load: this is the answer under %.6g of it, the last part "
+                 "elements turn inside out under %.6g of %s: this is the answer under %.6g of it, the last part "
                  "with a stable equilibrium. Use a finer mesh, or another law",
-                 tried, load);
+                 tried, of, load);
         break;
     case UZ_PART_CONTRADICTORY:
         snprintf(text, size,
-                 "under %.6g of the load contact conditions contradict each other: this is the answer under %.6g of "
+                 "under %.6g of %s contact conditions contradict each other: this is the answer under %.6g of "
                  "it, the last part with a stable equilibrium",
-                 tried, load);
+                 tried, of, load);
         break;
     case UZ_PART_STOPPED:
-        snprintf(text, size, "%s: this is the answer under %.6g of the load",
+        snprintf(text, size, "%s: this is the answer under %.6g of %s",
                  run->stopped == UZ_DISMISSED    ? "stopped by request"
                  : run->stopped == UZ_TIME_LIMIT ? "the time allowed was used up: raise time_limit_s"
                                                  : "the iterations allowed were used up: raise max_iterations",
-                 load);
+                 load, of);
         break;
     default:
         snprintf(text, size,
-                 "no stable equilibrium was found under %.6g of the load: the last one is that under %.6g of it, and "
+                 "no stable equilibrium was found under %.6g of %s: the last one is that under %.6g of it, and "
                  "this is the answer there. A limit load or a bifurcation; prescribed displacements may pass it",
-                 tried, load);
+                 tried, of, load);
     }
 }
 
@@ -80,10 +86,12 @@ static void summarize(uz_summary *s, const uz_finite_run *run, uz_part why, doub
     const uz_finite_certificate *c = &run->certificate;
     s->outcome = outcome_of(run, why);
     s->finite = run->found;
-    s->finite.least_det = run->found.steps > 0 ? c->least_det : 1;
-    s->finite.residual = run->found.steps > 0 ? c->residual : 0;
-    s->finite.definite = run->found.steps > 0 && c->definite;
-    s->finite.least_gap = run->found.steps > 0 && isfinite(c->least_gap) ? c->least_gap : (double)NAN;
+    const bool known = run->found.steps > 0 || run->from;
+    s->finite.part = NAN;
+    s->finite.least_det = known ? c->least_det : 1;
+    s->finite.residual = known ? c->residual : 0;
+    s->finite.definite = known && c->definite;
+    s->finite.least_gap = known && isfinite(c->least_gap) ? c->least_gap : (double)NAN;
     s->geometry = (uz_geometry){.kind = UZ_KINEMATICS_FINITE, .passes = run->found.qps, .change = NAN, .sliding = NAN};
     s->requested_error = run->requested;
     s->timings = run->spent;
@@ -137,6 +145,8 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
     if (run->last) /* method, factor and cost: those of the last contact problem */
         result->summary = run->last->summary;
+    else if (run->from)
+        result->summary = run->from->last;
     summarize(&result->summary, run, why, tried);
     uz_status status = take_rows(result, run, err);
     if (status == UZ_OK)

@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "linalg/linalg.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -96,6 +97,32 @@ static uz_status check_quantity(const uz_problem *problem, int64_t i, uz_error *
     return UZ_OK;
 }
 
+int64_t uz_case_before(const uz_problem *problem, int64_t i)
+{
+    int64_t before = i;
+    while (--before >= 0 && strcmp(problem->cases[before].name, problem->cases[i].after) != 0)
+        continue;
+    return before;
+}
+
+static uz_status check_path(const uz_problem *problem, int64_t i, uz_error *err)
+{
+    const uz_load_case *one = &problem->cases[i];
+    const bool finite = problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_FINITE;
+    if (!one->after[0] && !one->has_part)
+        return UZ_OK;
+    if (!finite)
+        return uz_fail(err, UZ_ERR_SCENE, one->after[0] ? "/after" : "/part",
+                       "paths of loads are those of the kinematics \"finite\"; use these, or give the case its loads");
+    if (one->has_part && !isfinite(one->part))
+        return uz_fail(err, UZ_ERR_NOT_FINITE, "/part", "not a finite number");
+    if (one->after[0] && uz_case_before(problem, i) < 0)
+        return uz_fail(err, UZ_ERR_SCENE, "/after",
+                       "no case before this one is called \"%.63s\": name one that stands earlier in the list",
+                       one->after);
+    return UZ_OK;
+}
+
 uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
 {
     if (problem->n_cases < 0 || (problem->n_cases > 0 && !problem->cases))
@@ -106,6 +133,11 @@ uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
         status = check_quantity(problem, i, err);
     for (int64_t i = 0; status == UZ_OK && i < problem->n_cases; i++) {
         const uz_load_case *one = &problem->cases[i];
+        status = check_path(problem, i, err);
+        if (status != UZ_OK) {
+            uz_error_name_case(err, i);
+            break;
+        }
         if (scene ? one->p || one->h : one->loads != NULL)
             status = uz_fail(err, UZ_ERR_ARGUMENT, "", "%s",
                              scene ? "a load case of a scene has loads, not p or h"

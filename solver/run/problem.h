@@ -18,4 +18,7 @@ uz_problem uz_problem_of_case(const uz_problem *problem, int64_t i);
  * NULL. */
 void uz_error_name_case(uz_error *err, int64_t i);
 
+/* The case that case i is after; -1: there is none of that name before it. */
+int64_t uz_case_before(const uz_problem *problem, int64_t i);
+
 #endif

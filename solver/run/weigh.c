@@ -61,7 +61,7 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
         by_law.scene.materials[i].law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF;
     }
     coarse.relative_error = COMPARED_TO;
-    const uz_status status = uz_solve_finite_load(&large, &by_law, &coarse, hooks, deadline, result, &own);
+    const uz_status status = uz_solve_finite_load(&large, &by_law, &coarse, hooks, deadline, result, NULL, &own);
     free(by_law.scene.materials);
     if (status == UZ_ERR_MEMORY || status == UZ_ERR_INTERNAL) {
         if (err)
@@ -87,7 +87,7 @@ static uz_status choose(uz_result **result, const uz_problem *one, const uz_sett
     uz_problem finite = *one;
     uz_result *large = NULL, *left;
     finite.scene.kinematics = UZ_KINEMATICS_FINITE;
-    const uz_status status = uz_solve_finite_load(&large, &finite, settings, hooks, deadline, *result, err);
+    const uz_status status = uz_solve_finite_load(&large, &finite, settings, hooks, deadline, *result, NULL, err);
     if (status != UZ_OK)
         return status;
     const bool enough = large->summary.small.error <= TOLERABLE;

@@ -91,6 +91,27 @@ def test_a_limit_load_is_no_answer(s):
     check(whole["outcome"] == "unstable" and whole["cases"]["unstable"] == 1 and whole["cases"]["converged"] == 1, whole["cases"])
 
 
+def test_a_path_begins_where_the_case_before_has_come_to(s):
+    """The same block, step by step to its limit load; a name that no case before has is refused."""
+    body = block("st_venant_kirchhoff", supports=[{"on": "left", "ux": 0}, {"on": "bottom", "uy": 0}], contacts=[],
+                 mesh={"box": {"size": [1, 1], "cells": [1, 1]}}, loads=[{"on": "top", "traction": [0, -1]}])
+    body["cases"] = [{"name": "a", "part": 0.1}, {"name": "b", "part": 0.2, "after": "a"},
+                     {"name": "c", "part": 0.25, "after": "b"}, {"name": "d", "part": 0.3, "after": "c"}]
+    job = s.post(body)
+    check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job.json)
+    cases = [case["summary"] for case in s.get(f"/v1/jobs/{job.json['id']}/result").json["cases"]]
+    check([case["outcome"] for case in cases] == ["converged", "converged", "unstable", "unstable"], [case["outcome"] for case in cases])
+    check([case["finite"]["part"] for case in cases[:2]] == [0.1, 0.2], cases[0]["finite"])
+    for case in cases[2:]:
+        check(abs(case["finite"]["part"] - 0.21148362) < 0.0003, case["finite"])
+        check(abs(case["resultants"]["supports"][1]["force"][1] - case["finite"]["part"]) < 1e-6, case["resultants"])
+    check("the case before" in cases[2]["message"] and "where it ended" in cases[3]["message"], cases[3]["message"])
+    body["cases"][1]["after"] = "c"
+    reply = s.post(body)
+    found = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", seconds=60)["error"]
+    check(found["pointer"] == "/cases/1/after" and "earlier in the list" in found["detail"], found)
+
+
 def test_auto_takes_the_model_that_the_deformation_needs(s):
     """Small deformation where it is enough; fields of an answer follow the model that it has."""
     def told(name):

@@ -498,6 +498,102 @@ TEST(an_arch_bears_or_has_gone_through)
     }
 }
 
+/* ---- paths: cases that begin where another one has come to */
+
+enum { POINTS = 4 };
+
+/* parts: of cases a, b, ..., each after the one before it. */
+static uz_result **walk(const uz_scene *s, const double *parts, int n)
+{
+    uz_load_case cases[POINTS] = {{.p = NULL}};
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *s, .cases = cases, .n_cases = n};
+    const uz_settings settings = uz_settings_default();
+    uz_result **r = NULL;
+    uz_error err = {0};
+    for (int i = 0; i < n; i++) {
+        cases[i].name[0] = (char)('a' + i);
+        cases[i].after[0] = i > 0 ? (char)('a' + i - 1) : '\0';
+        cases[i].has_part = true;
+        cases[i].part = parts[i];
+    }
+    CHECK_MSG(uz_solve_cases(&r, &problem, &settings, NULL, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where,
+              err.message);
+    if (!r)
+        exit(1);
+    return r;
+}
+
+/* The block over the roller, which stands in it from the first. */
+TEST(a_path_over_a_roller_does_not_matter)
+{
+    static const double PARTS[] = {0, 0.5, 1};
+    uz_scene s = block("quad8", 4, 1, 16, 4, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "top", -2, 0, NAN);
+    uz_contact *roller = body_plane(&s, "bottom", (double[3]){1, -1.8, 0}, (double[3]){0, 1, 0});
+    roller->kind = UZ_OBSTACLE_ROUND;
+    roller->radius = 2;
+    uz_result **r = walk(&s, PARTS, 3);
+    for (int i = 0; i < 3; i++) {
+        CHECK_MSG(r[i]->summary.outcome == UZ_CONVERGED, "%s", r[i]->summary.message);
+        CHECK(r[i]->summary.finite.load == 1 && r[i]->summary.finite.part == PARTS[i]);
+        CHECK(r[i]->summary.finite.qps <= 20 && fabs(moved_by(r[i], 4, 1)[0] + 2 * PARTS[i]) < 1e-12);
+    }
+    CHECK_MSG(fabs(r[0]->summary.force[1] - 0.34405) < 0.003 * 0.34405, "%.7g", r[0]->summary.force[1]);
+    CHECK_MSG(fabs(r[1]->summary.force[1] - 0.36159) < 0.003 * 0.36159, "%.7g", r[1]->summary.force[1]);
+    CHECK_MSG(fabs(r[0]->summary.force[0] + r[2]->summary.force[0]) < 1e-8, "%.12g", r[2]->summary.force[0]);
+    CHECK_MSG(fabs(r[0]->summary.force[1] - r[2]->summary.force[1]) < 1e-8, "%.12g", r[2]->summary.force[1]);
+    uz_results_free(r, 3);
+    uz_scene_clear(&s);
+}
+
+/* The arch along a path: up to its limit load, 0.5747(5), and no further. */
+TEST(an_arch_ends_at_its_limit_load)
+{
+    static const double PARTS[] = {0.4, 0.56, 0.65, 0.7};
+    uz_scene s = block("quad8", 0.5, asin(10.0 / 26), 2, 16, UZ_ELASTIC_NEO_HOOKE);
+    s.materials[0].young = 1000;
+    s.box.origin[0] = 25.75;
+    body_give_mesh(&s, bend_arch);
+    body_hold(&s, "top", 0, 0, NAN);
+    body_hold(&s, "bottom", 0, NAN, NAN);
+    body_plane(&s, "left", (double[3]){0, -0.75, 0}, (double[3]){0, 1, 0});
+    body_load(&s, UZ_LOAD_FORCE, "bottom", 0, -0.5, 0);
+    uz_result **r = walk(&s, PARTS, 4);
+    for (int i = 0; i < 4; i++) {
+        const uz_summary *sum = &r[i]->summary;
+        CHECK_INT(sum->outcome, i < 2 ? UZ_CONVERGED : UZ_UNSTABLE);
+        CHECK_MSG(i < 2 ? sum->finite.part == PARTS[i] : fabs(sum->finite.part - 0.5747) < 0.0015, "%.6g",
+                  sum->finite.part);
+        CHECK(sum->force[1] == 0 && sum->finite.definite && sum->finite.residual <= sum->requested_error);
+        CHECK(fabs(r[i]->evaluation->supports[0].force[1] - 0.5 * sum->finite.part) < 1e-6);
+    }
+    CHECK(r[3]->summary.finite.load == 0 && strstr(r[3]->summary.message, "where it ended"));
+    uz_results_free(r, 4);
+    uz_scene_clear(&s);
+}
+
+TEST(a_path_that_leads_nowhere_is_refused)
+{
+    for (int k = 0; k < 3; k++) {
+        static const char *const WHERE[] = {"/cases/1/after", "/cases/1/part", "/cases/1/after"};
+        uz_scene s = squeezed("quad4", 1, UZ_ELASTIC_NEO_HOOKE, 0.9);
+        uz_load_case cases[2] = {{.name = "a"},
+                                 {.name = "b", .after = "b", .has_part = true, .part = k == 1 ? NAN : 1}};
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s, .cases = cases, .n_cases = 2};
+        const uz_settings settings = uz_settings_default();
+        uz_result **r = NULL;
+        uz_error err = {0};
+        if (k == 2) {
+            cases[1].after[0] = 'a';
+            problem.scene.kinematics = UZ_KINEMATICS_AUTO;
+        }
+        CHECK(uz_solve_cases(&r, &problem, &settings, NULL, NULL, NULL, &err) != UZ_OK);
+        CHECK_STR(err.where, WHERE[k]);
+        CHECK(!r);
+        uz_scene_clear(&s);
+    }
+}
+
 /* Nothing is strained: no norm to compare with. */
 TEST(a_body_that_is_carried_along)
 {
