@@ -7,7 +7,7 @@ _uzawa_ids() {
 
 _uzawa() {
     local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-    local command='' options='' words='' files='' i commands='submit upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor version help'
+    local command='' options='' words='' files='' i commands='submit import upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor version help'
     COMPREPLY=()
     if [[ $current == '=' ]]; then current=''; previous='='; fi
     if [[ $previous == '=' ]]; then
@@ -19,7 +19,8 @@ _uzawa() {
     done
     case $command in
     '') options='--server --timeout --retry --help --version'; words=$commands ;;
-    submit) options='--K --N --h --p --mesh --set --vary --wait --timeout --tag --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
+    submit) options='--K --N --h --p --mesh --leave-out --set --vary --wait --timeout --tag --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
+    import) options='--leave-out --output --quiet --json --server --timeout --retry --help --version ' ;;
     upload) options='--json --server --timeout --retry --help --version ' ;;
     status) options='--json --server --timeout --retry --help --version ' ;;
     wait) options='--timeout --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
@@ -57,6 +58,10 @@ _uzawa() {
     submit--tolerance) words='' ;;
     submit--server|submit-s) words='' ;;
     submit--retry) words='' ;;
+    import--output|import-o) files=1 ;;
+    import--server|import-s) words='' ;;
+    import--timeout|import-t) words='' ;;
+    import--retry) words='' ;;
     upload--server|upload-s) words='' ;;
     upload--timeout|upload-t) words='' ;;
     upload--retry) words='' ;;
@@ -152,6 +157,7 @@ _uzawa() {
     help--format|help-f) words='text man bash zsh fish json' ;;
     *)  if [[ $current == -* ]]; then words=$options; else case $command in
     submit) files=1 ;;
+    import) files=1 ;;
     upload) files=1 ;;
     status) words=$(_uzawa_ids) ;;
     wait) words=$(_uzawa_ids) ;;

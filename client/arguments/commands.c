@@ -15,6 +15,8 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
          CLIENT_OPERAND_ALLOWED,
          "FILE is a request in JSON, \"-\" is standard input. Prints the job's id, and with --wait its summary. A "
          "repeat after a lost connection never makes a second job.\n"
+         "FILE may be a deck of Abaqus or CalculiX (.inp): the service makes a scene of it, and what is not in that as it "
+         "was is told on stderr, line by line.\n"
          "A problem in matrices needs no FILE: --K, --N, --h and --p name files in Matrix Market form. With FILE they "
          "replace its matrices. Files of more than 64 KiB, and compressed or binary ones, are uploaded, unless the "
          "service has them already.\n"
@@ -24,6 +26,13 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
          "value, named by it. Of any other value it makes one job for each, with a common tag that is printed on "
          "stderr unless --tag gives one. Several --vary make every combination.\n",
          "with --wait: " OUTCOME_EXITS " Of several jobs the first that is not 0."},
+    [CLIENT_IMPORT] =
+        {"import", "import FILE [options]", "make a request of a deck of Abaqus or CalculiX", "FILE",
+         CLIENT_OPERAND_NEEDED,
+         "FILE is an .inp file, also packed. Writes the scene that submit would send for its first, static step: mesh, materials, supports, loads "
+         "and contact pairs. Each line of the deck that has no place in it is told on stderr. What would change the "
+         "answer is refused unless --leave-out is given.\n",
+         NULL},
     [CLIENT_UPLOAD] = {"upload", "upload FILE [options]", "send a file that requests then name", "FILE",
                        CLIENT_OPERAND_NEEDED,
                        "FILE is a matrix or vector in Matrix Market form or a Gmsh mesh, \"-\" is standard input; what "
@@ -94,7 +103,7 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
 #define MAKING      (IN(SUBMIT) | IN(REFINE))                      /* commands that make a job */
 #define STAYING     (MAKING | IN(VERIFY) | IN(WAIT))
 #define OF_A_CASE   (IN(PICTURE) | IN(HISTORY) | IN(PLOT))
-#define FILES       (IN(RESULT) | OF_A_CASE | IN(REPORT) | IN(REQUEST)) /* commands whose output may go to a file */
+#define FILES       (IN(IMPORT) | IN(RESULT) | OF_A_CASE | IN(REPORT) | IN(REQUEST)) /* whose output may go to a file */
 
 #define OPTION(NAME, LETTER, KIND, MEMBER, COMMANDS, ...)                                                              \
     {                                                                                                                  \
@@ -108,6 +117,8 @@ static const uz_option OPTIONS[] = {
     OPTION("p", 0, WORD, p, IN(SUBMIT), .value = "FILE", .about = "the load"),
     OPTION("mesh", 0, WORD, mesh, IN(SUBMIT), .value = "FILE",
            .about = "a Gmsh file (2.2 or 4.1) in place of the scene's mesh"),
+    OPTION("leave-out", 0, FLAG, leave_out, IN(SUBMIT) | IN(IMPORT),
+           .about = "of a deck, leave out what a scene has no words for, although the answer is another one with it"),
     OPTION("set", 0, WORDS, set, IN(SUBMIT), .most = CLIENT_MAX_WORDS, .value = "PATH=VALUE",
            .about = "put VALUE, as JSON or else as a string, at PATH of the request; may be repeated"),
     OPTION("vary", 0, WORDS, vary, IN(SUBMIT), .most = 8, .value = "PATH=VALUES",
@@ -193,6 +204,7 @@ static const uz_option OPTIONS[] = {
            .about = "at most N jobs (default 20)"),
     OPTION("progress", 0, FLAG, progress, STAYING, .about = "show progress on stderr even where it is no terminal"),
     OPTION("quiet", 'q', FLAG, quiet, MAKING, .about = "print the id and nothing else"),
+    OPTION("quiet", 'q', FLAG, quiet, IN(IMPORT), .about = "tell nothing of what is not in the request"),
     OPTION("quiet", 'q', FLAG, quiet, IN(LIST), .about = "print the ids and nothing else"),
     OPTION("quiet", 'q', FLAG, quiet, IN(DOCTOR), .about = "print only what is wrong"),
     OPTION("quiet", 'q', FLAG, quiet, IN(VERIFY) | IN(WAIT) | IN(CANCEL) | IN(DELETE),

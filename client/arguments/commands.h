@@ -13,6 +13,7 @@
 
 typedef enum {
     CLIENT_SUBMIT,
+    CLIENT_IMPORT,
     CLIENT_UPLOAD,
     CLIENT_STATUS,
     CLIENT_WAIT,

@@ -27,6 +27,10 @@ static const struct {
     {"Change values of a scene, and take its mesh from Gmsh:",
      "uzawa submit body.json --set materials.0.young=70e3 --set solver.accuracy=quick --wait\n"
      "uzawa submit part.json --mesh part.msh --wait"},
+    {"A deck of Abaqus or CalculiX, at once and by way of a scene to look at:",
+     "uzawa submit part.inp --wait\n"
+     "uzawa import part.inp -o deck.json\n"
+     "uzawa submit deck.json --set solver.accuracy=quick --wait"},
     {"Ten loads in one job, and the answer to one of them:",
      "job=$(uzawa submit body.json --vary loads.1.traction.0=0.1:1.0:10)\n"
      "uzawa wait $job\n"

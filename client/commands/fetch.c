@@ -1,5 +1,6 @@
 /* status, cancel, delete, request, result, picture, history: one question, one answer. */
 #include "commands/fetch.h"
+#include "request/build.h"
 #include "show/report.h"
 
 #include <stdlib.h>
@@ -189,6 +190,20 @@ client_exit client_picture(client_session *s)
                                   {"case", o->case_name},
                                   {NULL, NULL}};
     return fetch_and_deliver(s, client_path_with_query(s, "/deformed.svg", query));
+}
+
+client_exit client_import(client_session *s)
+{
+    json_t *request;
+    client_exit code = client_build_deck(s, &request, s->options->operand, true);
+    char *text = code == CLIENT_OK ? json_dumps(request, JSON_COMPACT) : NULL;
+    if (code == CLIENT_OK && !text)
+        code = client_complain(s, CLIENT_LOCAL, "no memory");
+    if (code == CLIENT_OK)
+        code = client_deliver(s, text, strlen(text));
+    free(text);
+    json_decref(request);
+    return code;
 }
 
 client_exit client_request_of(client_session *s)

@@ -14,6 +14,7 @@ client_exit client_contract(client_session *s, const json_t *job, const char *la
 
 /* The commands. */
 client_exit client_submit(client_session *s);
+client_exit client_import(client_session *s);
 client_exit client_refine(client_session *s);
 client_exit client_verify(client_session *s);
 client_exit client_wait(client_session *s);

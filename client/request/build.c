@@ -4,7 +4,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #define INLINE_MOST (64u << 10) /* larger files are uploaded: they are sent once, however many jobs name them */
 
@@ -34,8 +33,7 @@ static json_t *problem_of(client_session *s, json_t *request, const char *kind)
     return NULL;
 }
 
-/* The file as the text of a JSON string or as an upload. path NULL: nothing is put. */
-static client_exit put_file(client_session *s, json_t *to, const char *key, const char *path)
+client_exit client_put_file(client_session *s, json_t *to, const char *key, const char *path)
 {
     char message[512], id[65];
     client_buffer file;
@@ -60,8 +58,7 @@ static client_exit put_file(client_session *s, json_t *to, const char *key, cons
 /* The key of a mesh, by the name of its file; a Gmsh file may have any. */
 static const char *mesh_format(const char *path)
 {
-    const size_t length = strlen(path), end = length - (length > 3 && strcmp(path + length - 3, ".gz") == 0 ? 3 : 0);
-    return end > 4 && strncasecmp(path + end - 4, ".inp", 4) == 0 ? "abaqus" : "gmsh";
+    return client_is_deck(path) ? "abaqus" : "gmsh";
 }
 
 client_exit client_build_files(client_session *s, json_t *request)
@@ -73,7 +70,7 @@ client_exit client_build_files(client_session *s, json_t *request)
     client_exit code = CLIENT_OK;
     if (o->mesh) {
         json_t *problem = problem_of(s, request, "scene"), *mesh = json_object();
-        code = problem && mesh ? put_file(s, mesh, mesh_format(o->mesh), o->mesh) : CLIENT_USAGE;
+        code = problem && mesh ? client_put_file(s, mesh, mesh_format(o->mesh), o->mesh) : CLIENT_USAGE;
         if (problem)
             json_object_set(problem, "mesh", mesh);
         json_decref(mesh);
@@ -84,7 +81,7 @@ client_exit client_build_files(client_session *s, json_t *request)
     json_t *problem = problem_of(s, request, "matrices");
     code = problem ? CLIENT_OK : CLIENT_USAGE;
     for (size_t i = 0; code == CLIENT_OK && i < sizeof matrices / sizeof *matrices; i++)
-        code = put_file(s, problem, matrices[i].key, matrices[i].path);
+        code = client_put_file(s, problem, matrices[i].key, matrices[i].path);
     return code;
 }
 
@@ -134,14 +131,23 @@ static client_exit build_edited(client_session *s, client_bodies *out, const cli
     const client_options *o = s->options;
     char message[320];
     json_error_t error = {0};
-    json_t *request = o->operand ? json_loadb(file->data, file->len, JSON_REJECT_DUPLICATES, &error) : json_object();
+    json_t *request = NULL;
+    client_exit code = CLIENT_OK;
+    if (client_is_deck(o->operand))
+        code = client_build_deck(s, &request, o->operand, false);
+    else
+        request = o->operand ? json_loadb(file->data, file->len, JSON_REJECT_DUPLICATES, &error) : json_object();
+    if (code != CLIENT_OK) {
+        json_decref(request);
+        return code;
+    }
     if (!json_is_object(request)) {
         snprintf(message, sizeof message, "%.100s is no request in JSON: %s, line %d", o->operand ? o->operand : "",
                  request ? "it is no object" : error.text, request ? 1 : error.line);
         json_decref(request);
         return client_complain(s, CLIENT_LOCAL, message);
     }
-    client_exit code = client_build_files(s, request);
+    code = client_build_files(s, request);
     if (code == CLIENT_OK)
         code = client_build_values(s, request);
     if (code == CLIENT_OK) {
@@ -184,9 +190,9 @@ client_exit client_build(client_session *s, client_bodies *out)
     client_buffer file = {0};
     client_exit code;
     *out = (client_bodies){0};
-    if (o->operand && !client_file_read(&file, o->operand, message, sizeof message))
+    if (o->operand && !client_is_deck(o->operand) && !client_file_read(&file, o->operand, message, sizeof message))
         return client_complain(s, CLIENT_LOCAL, message);
-    if (o->K || o->N || o->h || o->p || o->mesh || o->set.count || o->vary.count) {
+    if (o->K || o->N || o->h || o->p || o->mesh || o->set.count || o->vary.count || client_is_deck(o->operand)) {
         code = build_edited(s, out, &file);
     } else {
         out->item = calloc(1, sizeof *out->item);

@@ -22,6 +22,13 @@ void client_bodies_clear(client_bodies *bodies);
 
 /* ---- the parts */
 
+/* The file as the text of a JSON string or as an upload, under the key. path NULL: nothing is put. */
+client_exit client_put_file(client_session *s, json_t *to, const char *key, const char *path);
+/* By its name: a deck of Abaqus or CalculiX. */
+bool client_is_deck(const char *path);
+/* The request that the service makes of a deck, new; what is not in it is told on s->err, with `all` also what does not
+ * matter. */
+client_exit client_build_deck(client_session *s, json_t **request, const char *path, bool all);
 /* Puts the files and the values of --set into the request. */
 client_exit client_build_files(client_session *s, json_t *request);
 client_exit client_build_values(client_session *s, json_t *request);

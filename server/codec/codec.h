@@ -77,6 +77,16 @@ void codec_request_clear(codec_request *request);
 /* Frees the problem and all numbers, and leaves what the store keeps beside the body. */
 void codec_request_strip(codec_request *request);
 
+/* A deck that is to be made a request; upload: the id of the one that it is, "": it came as text. */
+typedef struct {
+    uz_deck deck;
+    char upload[65];
+} codec_deck;
+/* Reads the body of POST /v1/decks. False: *problem. The caller clears *out, whatever happens. */
+bool codec_decode_deck(codec_deck *out, const char *body, size_t len, store *uploads, problem_details *problem);
+void codec_deck_clear(codec_deck *deck);
+char *codec_encode_deck(const codec_deck *deck); /* schemas/translation.json */
+
 /* How many reactions and displacements an answer has (a scene's: dim numbers for each node). False: *problem. */
 bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u, problem_details *problem);
 

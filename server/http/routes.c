@@ -22,6 +22,7 @@ static const route ROUTES[] = {
     {"GET", "/v1/jobs/{id}/events", NONE, events_get, false},
     {"GET", "/v1/events", NONE, events_get_all, false},
     {"POST", "/v1/verify", NONE, verify_submit, false},
+    {"POST", "/v1/decks", NONE, decks_translate, false},
     {"POST", "/v1/uploads", NONE, uploads_create, true},
     {"GET", "/v1/uploads/{digest}", NONE, uploads_get, false},
     {"DELETE", "/v1/uploads/{digest}", NONE, uploads_delete, false},

@@ -257,6 +257,32 @@ void uz_scene_clear(uz_scene *scene);
 /* Dimensions of the bodies that its model is for: 2 or 3. */
 int uz_scene_dim(const uz_scene *scene);
 
+/* What of a deck is not in the scene that it became. */
+typedef enum {
+    UZ_DECK_IRRELEVANT, /* says nothing about the answer of a static step: output, control of increments */
+    UZ_DECK_REPLACED,   /* what the scene has in its place is meant to be the same: hard contact for a stiff spring */
+    UZ_DECK_LEFT_OUT    /* the answer would be another one with it */
+} uz_deck_effect;
+typedef struct {
+    int64_t line;
+    uz_deck_effect effect;
+    char keyword[40]; /* with its asterisk, in capitals */
+    char text[200];   /* what becomes of it */
+} uz_deck_note;
+/* An input file of Abaqus or CalculiX as a scene: mesh, materials, supports, loads, and contacts between its parts. */
+typedef struct {
+    uz_scene scene;
+    uz_deck_note *notes; /* n_notes, by line */
+    int64_t n_notes;
+    int64_t *node_number; /* the deck's number of each node of the scene */
+} uz_deck;
+void uz_deck_clear(uz_deck *deck);
+/* Reads a whole deck: its first step, which has to be a static one, at its end. The mesh is as uz_abaqus_read has it,
+ * less the nodes that no element has, and with groups for what supports and loads name by number. leave_out: what a
+ * scene has no words for is left out; else it is refused (UZ_ERR_UNSUPPORTED), since the answer would be another one.
+ * Errors as those of uz_abaqus_read. *out is for uz_deck_clear, and empty on failure. */
+uz_status uz_deck_read(uz_deck *out, const char *text, size_t len, size_t max_bytes, bool leave_out, uz_error *err);
+
 /* Where a scene's unknowns live. */
 typedef struct {
     int dim;

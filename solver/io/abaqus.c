@@ -171,7 +171,7 @@ static uz_status read_nodes(abaqus_file *file, const abaqus_keyword *keyword)
             memset(file->xyz + 3 * n, 0, 3 * sizeof *file->xyz);
         for (; status == UZ_OK && abaqus_field(field, text); count++)
             if (count < 3) /* behind them is the direction of shells, which is not needed */
-                status = abaqus_real(&file->xyz[3 * n + count], field, text);
+                status = abaqus_real(&file->xyz[3 * n + count], field, "a coordinate", text);
         if (status == UZ_OK && count < 2)
             status = abaqus_fail(text, UZ_ERR_FORMAT, "node %lld has no coordinates", (long long)tag);
         if (status == UZ_OK)
@@ -385,9 +385,8 @@ static uz_status add_body(uz_given_mesh *out, const abaqus_file *file, int64_t *
     return UZ_OK;
 }
 
-static uz_status to_given(uz_given_mesh *out, abaqus_file *file)
+static uz_status to_given(uz_given_mesh *out, abaqus_file *file, int64_t **new_element)
 {
-    int64_t *new_element = NULL;
     uz_status status = abaqus_tags_sort(&file->nodes, "nodes", &file->text);
     if (status == UZ_OK)
         status = abaqus_tags_sort(&file->elements, "elements", &file->text);
@@ -395,13 +394,12 @@ static uz_status to_given(uz_given_mesh *out, abaqus_file *file)
         status = check_nodes(file);
     if (status == UZ_OK)
         status = choose_dim(&out->dim, file);
-    if (status == UZ_OK && !(new_element = uz_alloc(file->elements.count, sizeof *new_element)))
+    if (status == UZ_OK && !(*new_element = uz_alloc(file->elements.count, sizeof **new_element)))
         status = abaqus_no_memory(&file->text);
     if (status == UZ_OK)
-        status = add_body(out, file, new_element);
+        status = add_body(out, file, *new_element);
     if (status == UZ_OK)
-        status = abaqus_make_groups(out, file, new_element);
-    free(new_element);
+        status = abaqus_make_groups(out, file, *new_element);
     return status;
 }
 
@@ -413,10 +411,14 @@ bool uz_abaqus_recognises(const char *text, size_t len)
     return abaqus_next_line(&lines) && abaqus_is_keyword(&lines);
 }
 
-static void clear_file(abaqus_file *file)
+void abaqus_clear(abaqus_file *file)
 {
-    for (int64_t i = 0; i < file->n_sets; i++)
+    for (int64_t i = 0; i < file->n_sets; i++) {
         free(file->sets[i].item);
+        free(file->members ? file->members[i].index : NULL);
+        free(file->members ? file->members[i].face : NULL);
+    }
+    free(file->members);
     free(file->sets);
     free(file->nodes.tag);
     free(file->nodes.by_tag);
@@ -429,19 +431,26 @@ static void clear_file(abaqus_file *file)
     free(file->node);
 }
 
+uz_status abaqus_read_mesh(uz_given_mesh *out, abaqus_file *file, int64_t **new_element)
+{
+    uz_status status = UZ_OK;
+    *new_element = NULL;
+    memset(out, 0, sizeof *out);
+    if (!abaqus_next_line(&file->text) || !abaqus_is_keyword(&file->text))
+        status = abaqus_fail(&file->text, UZ_ERR_FORMAT, "an input file of Abaqus begins with a keyword such as *NODE");
+    while (status == UZ_OK && file->text.length > 0) /* each block ends before a keyword, or with the file */
+        status = read_block(file);
+    return status == UZ_OK ? to_given(out, file, new_element) : status;
+}
+
 uz_status uz_abaqus_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err)
 {
     abaqus_file file = {.text = {.at = text, .end = text + len, .err = err}, .max_bytes = max_bytes};
+    int64_t *new_element;
     uz_error_reset(err);
-    memset(out, 0, sizeof *out);
-    uz_status status = UZ_OK;
-    if (!abaqus_next_line(&file.text) || !abaqus_is_keyword(&file.text))
-        status = abaqus_fail(&file.text, UZ_ERR_FORMAT, "an input file of Abaqus begins with a keyword such as *NODE");
-    while (status == UZ_OK && file.text.length > 0) /* each block ends before a keyword, or with the file */
-        status = read_block(&file);
-    if (status == UZ_OK)
-        status = to_given(out, &file);
-    clear_file(&file);
+    const uz_status status = abaqus_read_mesh(out, &file, &new_element);
+    abaqus_clear(&file);
+    free(new_element);
     if (status != UZ_OK)
         uz_given_mesh_clear(out);
     return status;

@@ -49,9 +49,9 @@ uz_status abaqus_name(char out[ABAQUS_NAME], const abaqus_keyword *keyword, cons
 /* The next field of the current line without blanks and quotes, in field; false: there is no further one. A comma at
  * the end of a line has no field behind it. */
 bool abaqus_field(char field[ABAQUS_FIELD], abaqus_text *text);
-/* A field as a number. what: what it should be. */
+/* A field as a number; an empty one is 0.0. what: what it should be. */
 uz_status abaqus_int(int64_t *value, const char *field, const char *what, const abaqus_text *text);
-uz_status abaqus_real(double *value, const char *field, const abaqus_text *text);
+uz_status abaqus_real(double *value, const char *field, const char *what, const abaqus_text *text);
 
 /* ---- what a file says */
 
@@ -92,6 +92,13 @@ typedef struct {
     abaqus_item *item;
 } abaqus_set;
 
+/* Members of a set: indices of nodes or elements, ascending, each once; of a surface, with the side of each element, in
+ * the order given. */
+typedef struct {
+    int64_t count, room, face_room, *index;
+    unsigned char *face; /* of a surface; NULL: none */
+} abaqus_members;
+
 typedef struct {
     abaqus_text text;
     size_t max_bytes;
@@ -104,6 +111,7 @@ typedef struct {
     int64_t *node;       /* tags */
     abaqus_set *sets;
     int64_t n_sets, sets_room;
+    abaqus_members *members;    /* n_sets, by abaqus_make_groups; NULL: not yet */
     int32_t slot[ABAQUS_SLOTS]; /* by a hash of kind and name: index of a set + 1; 0: empty */
     int64_t n_parts, n_instances;
 } abaqus_file;
@@ -130,7 +138,17 @@ uz_status abaqus_set_add(abaqus_file *file, int64_t set, abaqus_item item);
 /* Blocks *NSET, *ELSET, *SURFACE, from behind the keyword to before the next one. */
 uz_status abaqus_read_set(abaqus_file *file, const abaqus_keyword *keyword, abaqus_set_kind kind);
 uz_status abaqus_read_surface(abaqus_file *file, const abaqus_keyword *keyword);
-/* Groups of the mesh, whose nodes are there. new_element (elements): the number of each in the mesh, -1: a side. */
+/* The corners of a side of an element, by their places in it from 1, as "1562"; NULL: it has no such side. */
+const char *abaqus_side(uz_element_kind kind, int face);
+/* Groups of the mesh, whose nodes are there, and file->members. new_element (elements): the number of each in the mesh,
+ * -1: a side. */
 uz_status abaqus_make_groups(uz_given_mesh *out, abaqus_file *file, const int64_t *new_element);
+
+/* ---- the file (abaqus.c) */
+
+/* The mesh of a whole file, and what the file has said; new_element as above, for free. The caller clears all of them,
+ * whatever happens. */
+uz_status abaqus_read_mesh(uz_given_mesh *out, abaqus_file *file, int64_t **new_element);
+void abaqus_clear(abaqus_file *file);
 
 #endif

@@ -176,9 +176,7 @@ uz_status abaqus_read_surface(abaqus_file *file, const abaqus_keyword *keyword)
                                      "a side of elements, S1 to S6, was expected behind \"%.40s\"%s", member,
                                      sided ? "" : "; give the sides of the surface one by one");
         }
-        if (status == UZ_OK && item.set == set)
-            status = abaqus_fail(&file->text, UZ_ERR_FORMAT, "the set \"%s\" is a member of itself", name);
-        if (status == UZ_OK)
+        if (status == UZ_OK && item.set != set) /* a surface of nodes may have the name of the set that it is */
             status = abaqus_set_add(file, set, item);
     }
     return status;
@@ -186,18 +184,11 @@ uz_status abaqus_read_surface(abaqus_file *file, const abaqus_keyword *keyword)
 
 /* ---- members */
 
-/* Indices of nodes or elements, ascending, each once; of a surface, with the side of each element, in the order given.
- */
-typedef struct {
-    int64_t count, room, face_room, *index;
-    unsigned char *face; /* of a surface; NULL: none */
-} member_list;
-
 typedef struct {
     abaqus_file *file;
     uz_given_mesh *out;
     const int64_t *new_element;
-    member_list *list;     /* n_sets */
+    abaqus_members *list;  /* n_sets */
     int64_t *seen;         /* as many as nodes or elements: the last set that has it, from 1 */
     uint64_t looked, most; /* members that were gone through, and how many may be */
 } set_work;
@@ -212,7 +203,7 @@ static uz_status fail_at(const set_work *w, int64_t line, uz_status status, cons
 
 static uz_status take(set_work *w, int64_t set, int64_t index, int face)
 {
-    member_list *to = &w->list[set];
+    abaqus_members *to = &w->list[set];
     const bool sides = w->file->sets[set].kind == ABAQUS_SURFACE;
     if (w->looked++ > w->most)
         return fail_at(w, w->file->text.number, UZ_ERR_LIMIT, "the sets need more memory than is allowed: \"%s\"",
@@ -255,7 +246,7 @@ static uz_status take_numbers(set_work *w, int64_t set, const abaqus_item *item,
 static uz_status take_set(set_work *w, int64_t set, const abaqus_item *item)
 {
     const abaqus_file *file = w->file;
-    const member_list *from = &w->list[item->set];
+    const abaqus_members *from = &w->list[item->set];
     uz_status status = UZ_OK;
     for (int64_t i = 0; i < from->count && status == UZ_OK; i++) {
         const int64_t e = from->index[i];
@@ -299,11 +290,11 @@ static const char *const SIDES[][6] = {
     {"1234", "5876", "1562", "2673", "3784", "4851"}, /* hexahedron */
 };
 
-static const char *side_corners(uz_element_kind kind, int face)
+const char *abaqus_side(uz_element_kind kind, int face)
 {
     const uz_element_type *type = uz_element_type_of(kind);
     const int row = type->dim == 2 ? type->corners - 3 : type->corners == 4 ? 2 : type->corners == 6 ? 3 : 4;
-    return SIDES[row][face - 1];
+    return face < 1 || face > 6 ? NULL : SIDES[row][face - 1];
 }
 
 static bool make_faces(uz_given_group *to, int64_t faces, int64_t nodes)
@@ -320,13 +311,12 @@ static bool make_faces(uz_given_group *to, int64_t faces, int64_t nodes)
 static uz_status add_surface(uz_given_group *to, const set_work *w, int64_t set)
 {
     const abaqus_file *file = w->file;
-    const member_list *list = &w->list[set];
+    const abaqus_members *list = &w->list[set];
     if (!make_faces(to, list->count, 4 * list->count))
         return abaqus_no_memory(&file->text);
     for (int64_t i = 0, used = 0; i < list->count; i++) {
         const int64_t e = list->index[i];
-        const char *corner =
-            w->new_element[e] >= 0 ? side_corners((uz_element_kind)file->type[e], list->face[i]) : NULL;
+        const char *corner = w->new_element[e] >= 0 ? abaqus_side((uz_element_kind)file->type[e], list->face[i]) : NULL;
         if (!corner)
             return fail_at(w, file->line[e], UZ_ERR_UNSUPPORTED,
                            "the surface \"%s\" has a side, S%lld, that this element has not", file->sets[set].name,
@@ -342,7 +332,7 @@ static uz_status add_surface(uz_given_group *to, const set_work *w, int64_t set)
 static uz_status add_elements(uz_given_group *to, const set_work *w, int64_t set, int drop)
 {
     const abaqus_file *file = w->file;
-    const member_list *list = &w->list[set];
+    const abaqus_members *list = &w->list[set];
     int64_t count = 0, nodes = 0;
     for (int64_t i = 0; i < list->count; i++)
         if (w->out->dim - abaqus_type_of(file->type[list->index[i]]).dim == drop) {
@@ -377,7 +367,7 @@ static uz_status add_elements(uz_given_group *to, const set_work *w, int64_t set
 }
 
 /* Are the nodes (ascending, each once) just those of the group's sides and elements? */
-static bool same_nodes(set_work *w, const member_list *nodes, const uz_given_group *sides,
+static bool same_nodes(set_work *w, const abaqus_members *nodes, const uz_given_group *sides,
                        const uz_given_group *elements)
 {
     const abaqus_file *file = w->file;
@@ -403,7 +393,7 @@ static bool same_nodes(set_work *w, const member_list *nodes, const uz_given_gro
 enum { BY_SIDES, BY_NODES, BY_ELEMENTS, WAYS };
 
 /* Names what of one name there is (uz_given_group WAYS), and drops what says nothing. */
-static uz_status name_groups(set_work *w, uz_given_group made[WAYS], const char *name, const member_list *nodes)
+static uz_status name_groups(set_work *w, uz_given_group made[WAYS], const char *name, const abaqus_members *nodes)
 {
     static const char *const SUFFIX[WAYS] = {"", ".nodes", ".elements"};
     const bool there[WAYS] = {made[BY_SIDES].n_faces > 0, made[BY_NODES].n_nodes > 0, made[BY_ELEMENTS].n_elements > 0};
@@ -436,7 +426,7 @@ static uz_status add_groups(set_work *w, int64_t s)
     const abaqus_file *file = w->file;
     const char *name = file->sets[s].name;
     uz_given_group made[WAYS] = {{.n_nodes = 0}};
-    const member_list *nodes = NULL;
+    const abaqus_members *nodes = NULL;
     uz_status status = UZ_OK;
     for (int64_t k = 0; k < file->n_sets && status == UZ_OK; k++) {
         if (strcasecmp(file->sets[k].name, name) != 0)
@@ -489,17 +479,12 @@ uz_status abaqus_make_groups(uz_given_mesh *out, abaqus_file *file, const int64_
     set_work w = {.file = file, .out = out, .new_element = new_element, .most = UINT64_MAX};
     if (file->max_bytes > 0)
         w.most = file->max_bytes / sizeof(int64_t);
-    w.list = uz_alloc_zero(file->n_sets, sizeof *w.list);
+    w.list = file->members = uz_alloc_zero(file->n_sets, sizeof *w.list);
     w.seen = uz_alloc(n_seen, sizeof *w.seen);
     out->groups = uz_alloc_zero(WAYS * file->n_sets, sizeof *out->groups);
     uz_status status = w.list && w.seen && out->groups ? list_members(&w) : abaqus_no_memory(&file->text);
     for (int64_t s = 0; s < file->n_sets && status == UZ_OK; s++)
         status = add_groups(&w, s);
-    for (int64_t s = 0; w.list && s < file->n_sets; s++) {
-        free(w.list[s].index);
-        free(w.list[s].face);
-    }
-    free(w.list);
     free(w.seen);
     return status;
 }

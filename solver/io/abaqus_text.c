@@ -175,7 +175,7 @@ uz_status abaqus_int(int64_t *value, const char *field, const char *what, const 
 }
 
 /* Fortran writes 1.5D3 for 1.5E3. */
-uz_status abaqus_real(double *value, const char *field, const abaqus_text *text)
+uz_status abaqus_real(double *value, const char *field, const char *what, const abaqus_text *text)
 {
     char word[ABAQUS_FIELD], told[28];
     size_t length = strlen(field);
@@ -183,6 +183,6 @@ uz_status abaqus_real(double *value, const char *field, const abaqus_text *text)
         word[i] = field[i] == 'd' || field[i] == 'D' ? 'e' : field[i];
     *value = 0;
     if (length > 0 && uz_parse_double(value, word, length) != length)
-        return abaqus_fail(text, UZ_ERR_FORMAT, "a coordinate was expected, found \"%s\"", shown(told, field, length));
-    return isfinite(*value) ? UZ_OK : abaqus_fail(text, UZ_ERR_NOT_FINITE, "a coordinate is not a finite number");
+        return abaqus_fail(text, UZ_ERR_FORMAT, "%s was expected, found \"%s\"", what, shown(told, field, length));
+    return isfinite(*value) ? UZ_OK : abaqus_fail(text, UZ_ERR_NOT_FINITE, "%s is not a finite number", what);
 }

@@ -84,7 +84,7 @@ class Reply:
 
 # What tells which schema a reply must meet: a member that only this kind of object has.
 KINDS = [("valid", "valid.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("limits", "limits.json"),
-         ("whole", "check.json"), ("rows", "history.json"), ("decades", "work-precision.json"), ("code", "problem-details.json"),
+         ("whole", "check.json"), ("notes", "translation.json"), ("rows", "history.json"), ("decades", "work-precision.json"), ("code", "problem-details.json"),
          ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json"), ("nodes", "nodes.json")]  # a result has nodes too
 
 

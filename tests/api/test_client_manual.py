@@ -13,7 +13,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
 from service import ROOT, Skip, check, options
 from terminal import Terminal
-from test_client_requests import GMSH
+from test_client_requests import DECK, GMSH
 
 BUILD = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "build").resolve()
 CLIENT = str(BUILD / "uzawa")
@@ -76,7 +76,7 @@ def fill(folder):
     part["problem"].update(supports=[{"on": "left", "ux": 0, "uy": 0}], contacts=[],
                            loads=[{"on": "right", "traction": [0.5, 0]}])
     files = {"body.json": json.dumps(paper), "matrices.json": json.dumps(springs), "part.json": json.dumps(part),
-             "part.msh": GMSH, "answer.json": (ROOT / "tests/data/verify.json").read_text()}
+             "part.msh": GMSH, "part.inp": DECK, "answer.json": (ROOT / "tests/data/verify.json").read_text()}
     for name in "KNhp":
         files[f"{name}.mtx"] = (ROOT / f"tests/data/springs_{name}.mtx").read_text()
     for name, text in files.items():

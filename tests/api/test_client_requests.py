@@ -151,6 +151,92 @@ def test_mesh_of_an_input_file(server):
     check(reply.status == 422 and reply.json["code"] == "abaqus_syntax" and reply.json["line"] == 20, reply)
 
 
+def test_a_whole_deck(server):
+    """Two squares on each other, pressed: the pressure goes through the contact as it is."""
+    path, out = os.path.join(server.folder, "squares.inp"), os.path.join(server.folder, "squares.json")
+
+    def write(text):
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+    write(DECK)
+    done = run(server.url, "submit", path, "--wait", "--json")
+    check(done.stderr.splitlines() == ["uzawa: line 30: *SURFACE BEHAVIOR: LINEAR: hard contact, without overclosure, in place of a spring "
+                                       "between the surfaces"], done.stderr)
+    summary = json.loads(done.stdout)["summary"]
+    check(summary["outcome"] == "converged" and abs(summary["contact"]["force"][1] / 20 - 1) < 1e-6, summary["contact"])
+    # the same by way of a file, which tells everything and may be changed
+    done = run(server.url, "import", path, "-o", out)
+    check("line 40: *NODE PRINT" in done.stderr and "says nothing about the answer" in done.stderr, done.stderr)
+    problem = json.load(open(out))["problem"]
+    check(problem["model"] == "plane_strain" and problem["contacts"] == [{"on": "SLAVE", "with": "MASTER"}], problem)
+    twice = job(server.url, out, "--set", "loads.0.pressure=20")["summary"]
+    check(abs(twice["contact"]["force"][1] / 40 - 1) < 1e-6, twice["contact"])
+    # what would change the answer is refused, with its line, and may be left out
+    write(DECK.replace("*STEP", "*FRICTION\n0.1\n*STEP", 1))
+    done = run(server.url, "submit", path, "--wait", code=4)
+    check("*FRICTION: the coefficient 0.1 is left out" in done.stderr and "line 32" in done.stderr, done.stderr)
+    done = run(server.url, "submit", path, "--leave-out", "--wait", "--json")
+    check("line 32: *FRICTION" in done.stderr and json.loads(done.stdout)["summary"]["energy"] == summary["energy"], done.stderr)
+    check(run(server.url, "import", path, "--leave-out", "--quiet").stderr == "")
+    # without the client, also uploaded and packed
+    reply = server.request("POST", "/v1/decks", {"abaqus": DECK})
+    check(reply.status == 200 and reply.json["request"]["problem"] == problem and reply.json["node_numbers"][4:6] == [11, 12], reply)
+    digest = server.request("POST", "/v1/uploads", DECK.encode()).json["id"]
+    check(server.request("POST", "/v1/decks", {"abaqus": {"upload": digest}}).json == reply.json)
+    with gzip.open(path + ".gz", "wb") as file:
+        file.write(DECK.encode())
+    run(server.url, "import", path + ".gz", "-o", out, "--quiet")
+    check(json.load(open(out))["problem"] == problem)
+    for body, status, code in (({"abaqus": "*NODE\n1, x\n"}, 422, "abaqus_syntax"), ({"abaqus": {"upload": "0" * 64}}, 422, "unknown_upload"),
+                               ({"abaqus": "x", "gmsh": "x"}, 422, "unknown_key"), ({}, 422, "missing_key")):
+        reply = server.request("POST", "/v1/decks", body)
+        check(reply.status == status and reply.json["code"] == code, body, reply)
+
+
+DECK = """*HEADING
+two squares
+*NODE
+1, 0, 0
+2, 2, 0
+3, 2, 1
+4, 0, 1
+11, 0, 1
+12, 2, 1
+13, 2, 2
+14, 0, 2
+*ELEMENT, TYPE=CPE4, ELSET=LOW
+1, 1, 2, 3, 4
+*ELEMENT, TYPE=CPE4, ELSET=HIGH
+2, 11, 12, 13, 14
+*NSET, NSET=SIDES
+1, 4, 11, 14
+*MATERIAL, NAME=EL
+*ELASTIC
+1000., 0.25
+*SOLID SECTION, ELSET=LOW, MATERIAL=EL
+*SOLID SECTION, ELSET=HIGH, MATERIAL=EL
+*SURFACE, NAME=SLAVE
+HIGH, S1
+*SURFACE, NAME=MASTER
+LOW, S3
+*CONTACT PAIR, INTERACTION=I1, TYPE=SURFACE TO SURFACE
+SLAVE, MASTER
+*SURFACE INTERACTION, NAME=I1
+*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR
+1.E7
+*STEP
+*STATIC
+*BOUNDARY
+SIDES, 1
+1, 2
+2, 2
+*DLOAD
+2, P3, 10.
+*NODE PRINT, NSET=SIDES
+U
+*END STEP
+"""
+
 INPUT_FILE = """*HEADING
 two quadrilaterals
 *NODE

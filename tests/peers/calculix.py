@@ -2,8 +2,8 @@
 usage: calculix.py BUILD_DIR OUTPUT.json [DECKS]
 
 Blocks on others whose meshes do not match, and press fits, with CalculiX's contact of surfaces with surfaces and of nodes
-with surfaces; and of CalculiX's own decks, where DECKS is a folder of them (they do not come with Debian's package), those
-that a scene can say (decks.py); these a second time with a stiff contact, as their own may give by per cents. Compared are the force through the contact, where it is known, displacements, and seconds of
+with surfaces; and of CalculiX's own decks, where DECKS is a folder of them (Debian: calculix-ccx-test), those that the
+daemon makes scenes of (decks.py); these a second time with a stiff contact, as their own may give by per cents. Compared are the force through the contact, where it is known, displacements, and seconds of
 processor of the whole: of CalculiX from deck to answer, of the daemon from request to answer. CalculiX's contact is a
 penalty, in what is made here of 100 E for each length of a side."""
 import json
@@ -148,13 +148,14 @@ def by_daemon(build, request, discretization):
         return own + sum(map(spent, " ".join(one.read_text(encoding="utf-8") for one in folder.glob("task/*/children")).split()))
     try:
         s.start()
-        problem = {**request["problem"], "contacts": [{**request["problem"]["contacts"][0], "discretization": discretization}]}
+        problem = {**request["problem"], "contacts": [{**one, "discretization": discretization} for one in request["problem"]["contacts"]]}
         before = spent()
         while time.sleep(0.5) or spent() > before:  # its process makes memory ready when it begins
             before = spent()
         job = s.solve({"problem": problem})
         seconds = spent() - before
-        assert job["summary"]["outcome"] == "converged", job
+        if job["status"] != "successful" or job["summary"]["outcome"] != "converged":
+            raise decks.Unsaid(job.get("error", {}).get("detail") or job["summary"]["outcome"])
         return s.get(f"/v1/jobs/{job['id']}/result?fields=displacements").json, seconds
     finally:
         s.stop()
@@ -175,7 +176,7 @@ def row_of(build, name, request, discretization, text, numbers=None):
         row["apart"] = apart(printed)
         row["calculix"] = None if numbers else force_on_slave(request["problem"], printed)
     shown = ["-" if f is None else " ".join(f"{t + 0.0:.5g}" if abs(t) > 1e-6 * max(map(abs, f)) else "0" for t in f) for f in (row["calculix"], row["ours"])]
-    stiff = numbers and by_calculix(decks.stiffened(text, STIFF))[0]
+    stiff = numbers and by_calculix(decks.stiffened(text, request, STIFF))[0]
     row["apart_stiff"] = apart(stiff) if stiff else None
     told = " ".join(f"{'-' if row[key] is None else format(row[key], '.2g'):>8s}" for key in ("apart", "apart_stiff"))
     print(f"{name:22s} {discretization:9s} {shown[0]:>28s} {shown[1]:>28s} {told} {their_s:8.2f} {our_s:8.2f} {their_s / max(our_s, 0.01):7.1f}", flush=True)
@@ -195,15 +196,20 @@ def main():
             request = make(size)
             for discretization in KINDS:
                 rows.append(row_of(sys.argv[1], f"{name} {size}", request, discretization, deck(request["problem"], discretization)))
-    for path in sorted(pathlib.Path(sys.argv[3]).glob("*.inp")) if len(sys.argv) > 3 else []:
-        text = path.read_text(encoding="latin-1")
+    given = list(decks.contact_decks(sys.argv[3])) if len(sys.argv) > 3 else []
+    reader = service.Service(sys.argv[1])
+    if given:
+        reader.start()
+    for name, text in given:
         try:
-            request, numbers = decks.scene(decks.read(text))
+            request, numbers, left = decks.translate(reader, text)
+            row = row_of(sys.argv[1], f"{name}.inp", request, "surfaces", decks.first_step(text, numbers), numbers)
+            rows.append({**row, "left": left})
         except decks.Unsaid as why:
-            unsaid[path.stem] = str(why)
-            continue
-        rows.append(row_of(sys.argv[1], f"{path.stem}.inp", request, "surfaces", text, numbers))
-    print(f"what scenes cannot say: {unsaid}" if unsaid else "")
+            unsaid[name] = str(why)
+    reader.stop()
+    print("\n".join(f"{name}.inp: {why}" for name, why in unsaid.items()))
+    print(f"{len(given)} decks with contact, {sum('left' in row for row in rows)} compared" if given else "")
     pathlib.Path(sys.argv[2]).write_text(json.dumps({"rows": rows, "unsaid": unsaid}), encoding="utf-8")
 
 

@@ -1,0 +1,791 @@
+/* abaqus_deck.c: the lines of a deck of Abaqus or CalculiX that say what is done with its mesh: materials, supports,
+ * loads, temperatures and contact pairs of the first step.
+ *
+ * Nothing is passed over in silence: a keyword is read, or says nothing about the answer, or is replaced by what is
+ * meant to be the same, or left out, and each of the last three makes a note with its line.
+ * Source: CalculiX CrunchiX user's manual, "Input deck format". */
+#include "io/abaqus_deck.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+enum { NOTES_MOST = 5000 };
+
+uz_status deck_note(abaqus_deck *d, int64_t line, const char *keyword, uz_deck_effect effect, const char *format, ...)
+{
+    uz_deck *out = d->out;
+    va_list args;
+    if (out->n_notes == NOTES_MOST)
+        return abaqus_fail(&d->text, UZ_ERR_UNSUPPORTED, "more than %d lines of the deck have no place in a scene",
+                           NOTES_MOST);
+    if (!uz_grow(&out->notes, out->n_notes, 1, &d->notes_room, sizeof *out->notes))
+        return abaqus_no_memory(&d->text);
+    uz_deck_note *note = &out->notes[out->n_notes++];
+    *note = (uz_deck_note){.line = line, .effect = effect};
+    snprintf(note->keyword, sizeof note->keyword, "*%.30s", keyword);
+    va_start(args, format);
+    vsnprintf(note->text, sizeof note->text, format, args);
+    va_end(args);
+    return UZ_OK;
+}
+
+/* ---- parts of blocks */
+
+static bool next_data(abaqus_deck *d)
+{
+    return abaqus_next_line(&d->text) && !abaqus_is_keyword(&d->text);
+}
+
+static void skip_data(abaqus_deck *d)
+{
+    while (next_data(d))
+        continue;
+}
+
+/* A number, or `otherwise` where the line has no such field. */
+static uz_status next_number(double *out, abaqus_deck *d, const char *what, double otherwise)
+{
+    char field[ABAQUS_FIELD];
+    *out = otherwise;
+    return abaqus_field(field, &d->text) && field[0] ? abaqus_real(out, field, what, &d->text) : UZ_OK;
+}
+
+/* Notes the parameters that are not in the list, which ends with NULL. */
+static uz_status check_parameters(abaqus_deck *d, const abaqus_keyword *keyword, const char *const *read)
+{
+    uz_status status = UZ_OK;
+    for (size_t at = strlen(keyword->text) + 1; at < keyword->length && status == UZ_OK;
+         at += strlen(keyword->text + at) + 1) {
+        const char *field = keyword->text + at;
+        const size_t length = strcspn(field, "=");
+        bool known = length == 0;
+        for (int i = 0; read[i] && !known; i++)
+            known = strlen(read[i]) == length && strncmp(read[i], field, length) == 0;
+        if (!known)
+            status =
+                deck_note(d, keyword->line, keyword->text, UZ_DECK_LEFT_OUT, "its parameter %.40s is left out", field);
+    }
+    return status;
+}
+
+/* What a line names: nodes by their indices, or elements by theirs in the file. */
+typedef struct {
+    int64_t count, one;
+    const int64_t *index; /* NULL: one */
+} targets;
+
+static int64_t target(const targets *t, int64_t i)
+{
+    return t->index ? t->index[i] : t->one;
+}
+
+static uz_status find_targets(targets *out, abaqus_deck *d, abaqus_set_kind kind, const char *field)
+{
+    const bool nodes = kind == ABAQUS_NSET;
+    *out = (targets){.count = 1};
+    if (field[0] >= '0' && field[0] <= '9') {
+        int64_t tag;
+        const uz_status status =
+            abaqus_int(&tag, field, nodes ? "the number of a node" : "the number of an element", &d->text);
+        if (status != UZ_OK)
+            return status;
+        out->one = abaqus_tags_find(nodes ? &d->file->nodes : &d->file->elements, tag);
+        return out->one >= 0 ? UZ_OK
+                             : abaqus_fail(&d->text, UZ_ERR_FORMAT, "%s %lld is not there", nodes ? "node" : "element",
+                                           (long long)tag);
+    }
+    const int64_t set = abaqus_set_find(d->file, kind, field);
+    if (set < 0)
+        return abaqus_fail(&d->text, UZ_ERR_FORMAT, "there is no set of %s \"%.60s\"", nodes ? "nodes" : "elements",
+                           field);
+    out->index = d->file->members[set].index;
+    out->count = d->file->members[set].count;
+    return UZ_OK;
+}
+
+/* ---- amplitudes */
+
+static uz_status read_amplitude(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const READ[] = {"NAME", "DEFINITION", "TIME", NULL}; /* one step: both times are the same */
+    char name[ABAQUS_NAME];
+    const char *definition = abaqus_parameter(keyword, "DEFINITION");
+    uz_status status = abaqus_name(name, keyword, "NAME", true, &d->text);
+    if (status == UZ_OK)
+        status = check_parameters(d, keyword, READ);
+    if (status == UZ_OK && definition && strcasecmp(definition, "TABULAR") != 0)
+        status =
+            abaqus_fail(&d->text, UZ_ERR_UNSUPPORTED, "amplitudes are read as tables only, not as %.40s", definition);
+    if (status == UZ_OK && !uz_grow(&d->amplitudes, d->n_amplitudes, 1, &d->amplitudes_room, sizeof *d->amplitudes))
+        status = abaqus_no_memory(&d->text);
+    if (status != UZ_OK)
+        return status;
+    deck_amplitude *to = &d->amplitudes[d->n_amplitudes++];
+    memcpy(to->name, name, sizeof name);
+    to->table = d->text;
+    skip_data(d);
+    return UZ_OK;
+}
+
+/* The value of a table of pairs of time and value, linear between them and constant beyond. */
+static uz_status amplitude_at(double *out, const abaqus_deck *d, const deck_amplitude *amplitude, double time)
+{
+    abaqus_text table = amplitude->table;
+    char field[2][ABAQUS_FIELD];
+    double before[2] = {0, 0}, now[2];
+    bool first = true;
+    *out = 0.0;
+    table.err = d->text.err;
+    while (abaqus_next_line(&table) && !abaqus_is_keyword(&table))
+        while (abaqus_field(field[0], &table) && abaqus_field(field[1], &table)) {
+            uz_status status = abaqus_real(&now[0], field[0], "a time", &table);
+            if (status == UZ_OK)
+                status = abaqus_real(&now[1], field[1], "a value of the amplitude", &table);
+            if (status != UZ_OK)
+                return status;
+            if (now[0] > time) {
+                *out = first ? now[1] : before[1] + (now[1] - before[1]) * (time - before[0]) / (now[0] - before[0]);
+                return UZ_OK;
+            }
+            *out = before[1] = now[1];
+            before[0] = now[0];
+            first = false;
+        }
+    return first ? abaqus_fail(&table, UZ_ERR_FORMAT, "the amplitude \"%.60s\" has no pairs of time and value",
+                               amplitude->name)
+                 : UZ_OK;
+}
+
+/* What the values of a block are multiplied by at the end of the step. */
+static uz_status block_factor(double *out, abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    const char *name = abaqus_parameter(keyword, "AMPLITUDE");
+    *out = 1.0;
+    for (int64_t i = d->n_amplitudes - 1; name && i >= 0; i--)
+        if (strcasecmp(d->amplitudes[i].name, name) == 0)
+            return amplitude_at(out, d, &d->amplitudes[i], d->period);
+    return name ? abaqus_fail(&d->text, UZ_ERR_FORMAT, "there is no amplitude \"%.60s\"", name) : UZ_OK;
+}
+
+/* Parameters of what acts on nodes and elements: OP=NEW would take back what is said before the step. */
+static uz_status begin_acting(double *factor, abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const READ[] = {"OP", "AMPLITUDE", "FIXED", NULL};
+    const char *op = abaqus_parameter(keyword, "OP");
+    uz_status status = check_parameters(d, keyword, READ);
+    if (status == UZ_OK && op && strcasecmp(op, "NEW") == 0)
+        status = deck_note(d, keyword->line, keyword->text, UZ_DECK_LEFT_OUT,
+                           "OP=NEW is left out: what was said before stays");
+    return status == UZ_OK ? block_factor(factor, d, keyword) : status;
+}
+
+/* ---- materials and sections */
+
+static uz_status read_material(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    deck_material *to;
+    if (!uz_grow(&d->materials, d->n_materials, 1, &d->materials_room, sizeof *d->materials))
+        return abaqus_no_memory(&d->text);
+    to = &d->materials[d->n_materials];
+    *to = (deck_material){.line = keyword->line};
+    const uz_status status = abaqus_name(to->name, keyword, "NAME", true, &d->text);
+    d->n_materials += status == UZ_OK;
+    skip_data(d);
+    return status;
+}
+
+/* The material whose data these are. */
+static uz_status current_material(deck_material **out, abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    const char *type = abaqus_parameter(keyword, "TYPE");
+    *out = d->n_materials > 0 ? &d->materials[d->n_materials - 1] : NULL;
+    if (!*out)
+        return abaqus_fail(&d->text, UZ_ERR_FORMAT, "*%.40s stands before any *MATERIAL", keyword->text);
+    if (type && strncasecmp(type, "ISO", 3) != 0)
+        return abaqus_fail(&d->text, UZ_ERR_UNSUPPORTED,
+                           "*%.40s, TYPE=%.20s is not modelled: materials are isotropic; give the constants of one",
+                           keyword->text, type);
+    return UZ_OK;
+}
+
+/* Up to two numbers of the first line; further lines are for other temperatures. */
+static uz_status read_constants(abaqus_deck *d, const abaqus_keyword *keyword, double *first, double *second)
+{
+    uz_status status = UZ_OK;
+    int lines = 0;
+    while (status == UZ_OK && next_data(d)) {
+        if (++lines == 2)
+            status = deck_note(d, d->text.number, keyword->text, UZ_DECK_LEFT_OUT,
+                               "what depends on temperature is left out: the first line holds for all");
+        if (lines > 1)
+            continue;
+        status = next_number(first, d, "a constant of the material", 0.0);
+        if (status == UZ_OK && second)
+            status = next_number(second, d, "a constant of the material", 0.0);
+    }
+    return status == UZ_OK && lines == 0 ? abaqus_fail(&d->text, UZ_ERR_FORMAT, "*%.40s has no data", keyword->text)
+                                         : status;
+}
+
+static uz_status read_elastic(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    deck_material *to;
+    uz_status status = current_material(&to, d, keyword);
+    if (status == UZ_OK)
+        status = read_constants(d, keyword, &to->young, &to->poisson);
+    if (status == UZ_OK)
+        to->elastic = true;
+    return status;
+}
+
+static uz_status read_density(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    deck_material *to;
+    const uz_status status = current_material(&to, d, keyword);
+    return status == UZ_OK ? read_constants(d, keyword, &to->density, NULL) : status;
+}
+
+/* The temperature of no strain, ZERO, cancels where the expansion is the same at all temperatures. */
+static uz_status read_expansion(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    deck_material *to;
+    const uz_status status = current_material(&to, d, keyword);
+    return status == UZ_OK ? read_constants(d, keyword, &to->expansion, NULL) : status;
+}
+
+static uz_status read_section(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const READ[] = {"ELSET", "MATERIAL", "ORIENTATION", "CONTROLS", NULL};
+    char name[ABAQUS_NAME], elements[ABAQUS_NAME];
+    targets at = {0};
+    int64_t material = -1;
+    uz_status status = check_parameters(d, keyword, READ);
+    if (status == UZ_OK)
+        status = abaqus_name(name, keyword, "MATERIAL", true, &d->text);
+    if (status == UZ_OK)
+        status = abaqus_name(elements, keyword, "ELSET", true, &d->text);
+    if (status == UZ_OK)
+        status = find_targets(&at, d, ABAQUS_ELSET, elements);
+    for (int64_t i = 0; i < d->n_materials && material < 0; i++)
+        material = strcasecmp(d->materials[i].name, name) == 0 ? i : -1;
+    if (status == UZ_OK && material < 0)
+        status = abaqus_fail(&d->text, UZ_ERR_FORMAT, "there is no material \"%.60s\" before this section", name);
+    for (int64_t i = 0; i < at.count && status == UZ_OK; i++) {
+        const int64_t e = d->new_element[target(&at, i)];
+        if (e >= 0)
+            d->material[e] = material;
+    }
+    if (status == UZ_OK && next_data(d)) {
+        double thickness;
+        status = next_number(&thickness, d, "a thickness", 0.0);
+        if (status == UZ_OK && d->mesh->dim == 2 && thickness > 0) {
+            if (d->thickness > 0 && d->thickness != thickness)
+                status = deck_note(d, d->text.number, keyword->text, UZ_DECK_LEFT_OUT,
+                                   "another thickness, %g, is left out: a scene has one", thickness);
+            d->thickness = d->thickness > 0 ? d->thickness : thickness;
+        }
+        skip_data(d);
+    }
+    return status;
+}
+
+/* Which model the elements are of, and how they are integrated. */
+static uz_status read_element_types(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const FAMILIES[] = {"CPS", "CPE", "CAX", "C3D"};
+    const char *type = abaqus_parameter(keyword, "TYPE");
+    uz_status status = UZ_OK;
+    for (int m = 0; m < 4 && type; m++)
+        if (strncasecmp(type, FAMILIES[m], 3) == 0) {
+            const char *digits = type + 3, *suffix = digits + strspn(digits, "0123456789");
+            const bool linear = suffix == digits + 1 && digits[0] == (m == UZ_SOLID ? '8' : '4');
+            const bool modes = strpbrk(suffix, "iI") != NULL;
+            d->models[m] = true;
+            d->incompatible = d->incompatible || (linear && modes);
+            d->plain_linear = d->plain_linear || (linear && !modes);
+            if (strpbrk(suffix, "rR") && !d->reduced) {
+                d->reduced = true;
+                status = deck_note(d, keyword->line, keyword->text, UZ_DECK_REPLACED,
+                                   "%.20s: integration that leaves no deformation without stiffness, in place of a "
+                                   "reduced one",
+                                   type);
+            }
+        }
+    skip_data(d);
+    return status;
+}
+
+/* ---- supports */
+
+/* What Abaqus calls some supports: components as bits. */
+static int named_support(const char *field, bool *rotations)
+{
+    static const struct {
+        const char *name;
+        int components;
+        bool rotations;
+    } NAMED[] = {
+        {"ENCASTRE", 7, true}, {"PINNED", 7, false}, {"XSYMM", 1, true}, {"YSYMM", 2, true}, {"ZSYMM", 4, true}};
+    for (size_t i = 0; i < sizeof NAMED / sizeof NAMED[0]; i++)
+        if (strcasecmp(NAMED[i].name, field) == 0) {
+            *rotations = NAMED[i].rotations;
+            return NAMED[i].components;
+        }
+    return 0;
+}
+
+static uz_status hold(abaqus_deck *d, const abaqus_keyword *keyword, const targets *at, double factor, bool *told)
+{
+    char field[ABAQUS_FIELD] = "";
+    bool rotations = false;
+    int64_t first = 0, last;
+    double value;
+    abaqus_field(field, &d->text);
+    const int components = named_support(field, &rotations);
+    if (components == 0) {
+        uz_status status = abaqus_int(&first, field, "a direction, 1 to 3", &d->text);
+        last = first;
+        if (status == UZ_OK && abaqus_field(field, &d->text) && field[0])
+            status = abaqus_int(&last, field, "a last direction", &d->text);
+        if (status == UZ_OK)
+            status = next_number(&value, d, "a displacement", 0.0);
+        if (status != UZ_OK)
+            return status;
+    } else {
+        first = 1;
+        last = 3;
+        value = 0;
+    }
+    for (int64_t c = first; c <= last && c <= d->mesh->dim; c++)
+        for (int64_t i = 0; c >= 1 && i < at->count; i++)
+            if (components == 0 || (components >> (c - 1)) % 2 == 1)
+                d->fixed[3 * target(at, i) + c - 1] = factor * value;
+    if (last <= d->mesh->dim || *told || components)
+        return UZ_OK;
+    *told = true;
+    return deck_note(d, d->text.number, keyword->text, UZ_DECK_IRRELEVANT,
+                     "direction %lld is passed over: nodes of this body have %d, and no rotations or temperatures",
+                     (long long)last, d->mesh->dim);
+}
+
+static uz_status read_boundary(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    char field[ABAQUS_FIELD];
+    double factor;
+    bool told = false;
+    targets at;
+    uz_status status = begin_acting(&factor, d, keyword);
+    while (status == UZ_OK && next_data(d)) {
+        abaqus_field(field, &d->text);
+        status = find_targets(&at, d, ABAQUS_NSET, field);
+        if (status == UZ_OK)
+            status = hold(d, keyword, &at, factor, &told);
+    }
+    return status;
+}
+
+/* ---- loads */
+
+static uz_status read_cload(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    char field[ABAQUS_FIELD];
+    double factor, value;
+    int64_t direction;
+    targets at;
+    uz_status status = begin_acting(&factor, d, keyword);
+    while (status == UZ_OK && next_data(d)) {
+        abaqus_field(field, &d->text);
+        status = find_targets(&at, d, ABAQUS_NSET, field);
+        if (status == UZ_OK) {
+            field[0] = '\0';
+            abaqus_field(field, &d->text);
+            status = abaqus_int(&direction, field, "a direction, 1 to 3", &d->text);
+        }
+        if (status == UZ_OK)
+            status = next_number(&value, d, "a force", 0.0);
+        if (status == UZ_OK && (direction < 1 || direction > d->mesh->dim)) {
+            if (value != 0.0)
+                status = deck_note(d, d->text.number, keyword->text, UZ_DECK_LEFT_OUT,
+                                   "the load in direction %lld is left out: forces have %d components",
+                                   (long long)direction, d->mesh->dim);
+            continue;
+        }
+        for (int64_t i = 0; i < at.count && status == UZ_OK; i++)
+            d->force[3 * target(&at, i) + direction - 1] += factor * value;
+    }
+    return status;
+}
+
+static uz_status add_pressure(abaqus_deck *d, deck_pressure pressure)
+{
+    if (!uz_grow(&d->pressures, d->n_pressures, 1, &d->pressures_room, sizeof *d->pressures))
+        return abaqus_no_memory(&d->text);
+    pressure.line = d->text.number;
+    d->pressures[d->n_pressures++] = pressure;
+    return UZ_OK;
+}
+
+static uz_status press_sides(abaqus_deck *d, const targets *at, int face, double value)
+{
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < at->count && status == UZ_OK; i++) {
+        const int64_t e = target(at, i);
+        if (d->new_element[e] < 0 || !abaqus_side((uz_element_kind)d->file->type[e], face))
+            status = abaqus_fail(&d->text, UZ_ERR_FORMAT, "element %lld has no side P%d",
+                                 (long long)d->file->elements.tag[e], face);
+        else
+            status = add_pressure(d, (deck_pressure){.element = e, .face = face, .value = value});
+    }
+    return status;
+}
+
+/* Adds to what acts in the volume of the elements. */
+static void pull(const abaqus_deck *d, double *to, const targets *at, const double v[3])
+{
+    for (int64_t i = 0; i < at->count; i++) {
+        const int64_t e = d->new_element[target(at, i)];
+        for (int c = 0; c < 3 && e >= 0; c++)
+            to[3 * e + c] += v[c];
+    }
+}
+
+static uz_status read_gravity(abaqus_deck *d, const targets *at, double value)
+{
+    double direction[3], length = 0;
+    uz_status status = UZ_OK;
+    for (int c = 0; c < 3 && status == UZ_OK; c++) {
+        status = next_number(&direction[c], d, "a direction of gravity", 0.0);
+        length += status == UZ_OK ? direction[c] * direction[c] : 0.0;
+    }
+    if (status == UZ_OK && !(length > 0))
+        status = abaqus_fail(&d->text, UZ_ERR_FORMAT, "GRAV needs a size and a direction of three numbers");
+    for (int c = 0; c < 3 && status == UZ_OK; c++)
+        direction[c] *= value / sqrt(length);
+    if (status == UZ_OK)
+        pull(d, d->gravity, at, direction);
+    return status;
+}
+
+static uz_status read_dload(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const BODY[] = {"BX", "BY", "BZ"};
+    char field[ABAQUS_FIELD], label[ABAQUS_FIELD];
+    double factor, value, v[3];
+    targets at;
+    uz_status status = begin_acting(&factor, d, keyword);
+    while (status == UZ_OK && next_data(d)) {
+        int body = -1;
+        abaqus_field(field, &d->text);
+        label[0] = '\0';
+        abaqus_field(label, &d->text);
+        for (int c = 0; c < d->mesh->dim; c++)
+            body = strcasecmp(label, BODY[c]) == 0 ? c : body;
+        const bool side = (label[0] == 'P' || label[0] == 'p') && label[1] >= '1' && label[1] <= '6' && !label[2];
+        const bool gravity = strcasecmp(label, "GRAV") == 0;
+        if (!side && !gravity && body < 0) {
+            status = deck_note(d, d->text.number, keyword->text, UZ_DECK_LEFT_OUT,
+                               "the load %.20s is left out; P1 to P6, GRAV, BX, BY and BZ are read", label);
+            continue;
+        }
+        status = find_targets(&at, d, ABAQUS_ELSET, field);
+        if (status == UZ_OK)
+            status = next_number(&value, d, "a load", 0.0);
+        if (status == UZ_OK && gravity)
+            status = read_gravity(d, &at, factor * value);
+        else if (status == UZ_OK && side)
+            status = press_sides(d, &at, label[1] - '0', factor * value);
+        for (int c = 0; c < 3; c++)
+            v[c] = c == body ? factor * value : 0.0;
+        if (status == UZ_OK && body >= 0)
+            pull(d, d->body_force, &at, v);
+    }
+    return status;
+}
+
+static uz_status read_dsload(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    char field[ABAQUS_FIELD], label[ABAQUS_FIELD];
+    double factor;
+    uz_status status = begin_acting(&factor, d, keyword);
+    while (status == UZ_OK && next_data(d)) {
+        deck_pressure pressure = {.element = -1};
+        abaqus_field(field, &d->text);
+        label[0] = '\0';
+        abaqus_field(label, &d->text);
+        if (strcasecmp(label, "P") != 0) {
+            status = deck_note(d, d->text.number, keyword->text, UZ_DECK_LEFT_OUT,
+                               "the load %.20s is left out; P, a pressure, is read", label);
+            continue;
+        }
+        snprintf(pressure.surface, sizeof pressure.surface, "%.63s", field);
+        status = next_number(&pressure.value, d, "a pressure", 0.0);
+        pressure.value *= factor;
+        if (status == UZ_OK)
+            status = add_pressure(d, pressure);
+    }
+    return status;
+}
+
+static uz_status read_temperatures(abaqus_deck *d, double *to, double factor)
+{
+    char field[ABAQUS_FIELD];
+    double value;
+    targets at;
+    uz_status status = UZ_OK;
+    while (status == UZ_OK && next_data(d)) {
+        abaqus_field(field, &d->text);
+        status = find_targets(&at, d, ABAQUS_NSET, field);
+        if (status == UZ_OK)
+            status = next_number(&value, d, "a temperature", 0.0);
+        for (int64_t i = 0; i < at.count && status == UZ_OK; i++)
+            to[target(&at, i)] = factor * value;
+    }
+    return status;
+}
+
+static uz_status read_temperature(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    double factor;
+    const uz_status status = begin_acting(&factor, d, keyword);
+    return status == UZ_OK ? read_temperatures(d, d->temperature, factor) : status;
+}
+
+static uz_status read_initial(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    const char *type = abaqus_parameter(keyword, "TYPE");
+    if (type && strcasecmp(type, "TEMPERATURE") == 0)
+        return read_temperatures(d, d->initial, 1.0);
+    const bool moves = type && (strcasecmp(type, "VELOCITY") == 0 || strcasecmp(type, "DISPLACEMENT") == 0);
+    skip_data(d);
+    return deck_note(d, keyword->line, keyword->text, moves ? UZ_DECK_IRRELEVANT : UZ_DECK_LEFT_OUT,
+                     "initial values of type %.40s are left out; TEMPERATURE is read", type ? type : "(none)");
+}
+
+/* ---- contact */
+
+static uz_status read_pair(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const READ[] = {"INTERACTION", "TYPE", "SMALL SLIDING", NULL};
+    uz_status status = check_parameters(d, keyword, READ);
+    while (status == UZ_OK && next_data(d)) {
+        char name[2][ABAQUS_FIELD] = {"", ""};
+        abaqus_field(name[0], &d->text);
+        if (!abaqus_field(name[1], &d->text) || !name[1][0])
+            memcpy(name[1], name[0], sizeof name[0]); /* it may touch itself */
+        if (strlen(name[0]) >= ABAQUS_NAME || strlen(name[1]) >= ABAQUS_NAME || !name[0][0])
+            return abaqus_fail(&d->text, UZ_ERR_FORMAT, "two names of surfaces were expected");
+        if (!uz_grow(&d->pairs, d->n_pairs, 1, &d->pairs_room, sizeof *d->pairs))
+            return abaqus_no_memory(&d->text);
+        deck_pair *to = &d->pairs[d->n_pairs++];
+        *to = (deck_pair){.line = d->text.number};
+        memcpy(to->slave, name[0], strlen(name[0]));
+        memcpy(to->master, name[1], strlen(name[1]));
+    }
+    return status;
+}
+
+static uz_status read_behavior(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    const char *kind = abaqus_parameter(keyword, "PRESSURE-OVERCLOSURE");
+    const bool stiff = kind && (strcasecmp(kind, "LINEAR") == 0 || strcasecmp(kind, "EXPONENTIAL") == 0);
+    skip_data(d);
+    if (!kind || strcasecmp(kind, "HARD") == 0)
+        return UZ_OK;
+    return deck_note(d, keyword->line, keyword->text, stiff ? UZ_DECK_REPLACED : UZ_DECK_LEFT_OUT,
+                     strcasecmp(kind, "TIED") == 0
+                         ? "%.20s: the surfaces are not tied, but may open and slide"
+                         : "%.20s: hard contact, without overclosure, in place of a spring between the surfaces",
+                     kind);
+}
+
+static uz_status read_friction(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    double coefficient = 0.0;
+    uz_status status = UZ_OK;
+    if (next_data(d)) {
+        status = next_number(&coefficient, d, "a coefficient of friction", 0.0);
+        skip_data(d);
+    }
+    return status == UZ_OK && coefficient > 0.0
+               ? deck_note(d, keyword->line, keyword->text, UZ_DECK_LEFT_OUT,
+                           "the coefficient %g is left out: contact is frictionless", coefficient)
+               : status;
+}
+
+/* ---- steps */
+
+static uz_status read_step(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    const char *large = abaqus_parameter(keyword, "NLGEOM");
+    uz_status status = UZ_OK;
+    if (++d->steps > 1) {
+        d->ended = true;
+        return deck_note(d, keyword->line, keyword->text, UZ_DECK_LEFT_OUT,
+                         "the second step is left out, and all behind it: a scene is one static step");
+    }
+    skip_data(d);
+    if (large && strcasecmp(large, "NO") != 0)
+        status = deck_note(d, keyword->line, keyword->text, UZ_DECK_REPLACED,
+                           "NLGEOM: strains and rotations are taken to be small, which the summary warns of where they "
+                           "are not; contact follows what moves");
+    if (status == UZ_OK && abaqus_parameter(keyword, "PERTURBATION"))
+        status = deck_note(d, keyword->line, keyword->text, UZ_DECK_LEFT_OUT,
+                           "PERTURBATION is left out: contact may open and close");
+    return status;
+}
+
+static uz_status read_static(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    double first;
+    uz_status status = UZ_OK;
+    (void)keyword;
+    d->is_static = true;
+    if (next_data(d)) {
+        status = next_number(&first, d, "a time", 1.0);
+        if (status == UZ_OK)
+            status = next_number(&d->period, d, "the time of the step", 1.0);
+        skip_data(d);
+    }
+    return status;
+}
+
+/* What a step may be beside a static one. */
+static bool is_procedure(const abaqus_keyword *keyword)
+{
+    static const char *const PROCEDURES[] = {"DYNAMIC",       "FREQUENCY",     "HEAT TRANSFER",       "BUCKLE",
+                                             "MODAL DYNAMIC", "STEADY STATE",  "COUPLED TEMPERATURE", "UNCOUPLED",
+                                             "ELECTROMAG",    "SUBSTRUCTURE",  "COMPLEX FREQUENCY",   "GREEN",
+                                             "VISCO",         "SENSITIVITY",   "FEASIBLE DIRECTION",  "CFD",
+                                             "CRACK",         "ROBUST DESIGN", "ROBUSTDESIGN",        "MASSLESS"};
+    for (size_t i = 0; i < sizeof PROCEDURES / sizeof PROCEDURES[0]; i++)
+        if (strncmp(keyword->text, PROCEDURES[i], strlen(PROCEDURES[i])) == 0)
+            return true;
+    return false;
+}
+
+/* ---- the table of keywords */
+
+static const struct {
+    const char *name;
+    uz_status (*read)(abaqus_deck *d, const abaqus_keyword *keyword); /* NULL: see silent and text */
+    bool silent;      /* a part of the mesh, or a bracket: nothing is to be told */
+    const char *text; /* what is told of one that is left out; NULL: it says nothing about the answer */
+} KEYWORDS[] = {
+    {"AMPLITUDE", read_amplitude, false, NULL},
+    {"MATERIAL", read_material, false, NULL},
+    {"ELASTIC", read_elastic, false, NULL},
+    {"DENSITY", read_density, false, NULL},
+    {"EXPANSION", read_expansion, false, NULL},
+    {"SOLID SECTION", read_section, false, NULL},
+    {"ELEMENT", read_element_types, false, NULL},
+    {"BOUNDARY", read_boundary, false, NULL},
+    {"CLOAD", read_cload, false, NULL},
+    {"DLOAD", read_dload, false, NULL},
+    {"DSLOAD", read_dsload, false, NULL},
+    {"TEMPERATURE", read_temperature, false, NULL},
+    {"INITIAL CONDITIONS", read_initial, false, NULL},
+    {"CONTACT PAIR", read_pair, false, NULL},
+    {"SURFACE BEHAVIOR", read_behavior, false, NULL},
+    {"FRICTION", read_friction, false, NULL},
+    {"STEP", read_step, false, NULL},
+    {"STATIC", read_static, false, NULL},
+    {"NODE", NULL, true, NULL},
+    {"NSET", NULL, true, NULL},
+    {"ELSET", NULL, true, NULL},
+    {"SURFACE", NULL, true, NULL},
+    {"SURFACE INTERACTION", NULL, true, NULL},
+    {"HEADING", NULL, true, NULL},
+    {"END STEP", NULL, true, NULL},
+    {"ENDSTEP", NULL, true, NULL},
+    {"PART", NULL, true, NULL},
+    {"END PART", NULL, true, NULL},
+    {"ASSEMBLY", NULL, true, NULL},
+    {"END ASSEMBLY", NULL, true, NULL},
+    {"INSTANCE", NULL, true, NULL},
+    {"END INSTANCE", NULL, true, NULL},
+    {"NODE PRINT", NULL, false, NULL},
+    {"NODE FILE", NULL, false, NULL},
+    {"NODE OUTPUT", NULL, false, NULL},
+    {"EL PRINT", NULL, false, NULL},
+    {"EL FILE", NULL, false, NULL},
+    {"ELEMENT OUTPUT", NULL, false, NULL},
+    {"CONTACT PRINT", NULL, false, NULL},
+    {"CONTACT FILE", NULL, false, NULL},
+    {"CONTACT OUTPUT", NULL, false, NULL},
+    {"FACE PRINT", NULL, false, NULL},
+    {"SECTION PRINT", NULL, false, NULL},
+    {"OUTPUT", NULL, false, NULL},
+    {"FILE FORMAT", NULL, false, NULL},
+    {"FILTER", NULL, false, NULL},
+    {"PREPRINT", NULL, false, NULL},
+    {"MONITOR", NULL, false, NULL},
+    {"PRINT", NULL, false, NULL},
+    {"RESTART", NULL, false, NULL},
+    {"CONTROLS", NULL, false, NULL},
+    {"TIME POINTS", NULL, false, NULL},
+    {"ORIENTATION", NULL, false, NULL},
+    {"CONDUCTIVITY", NULL, false, NULL},
+    {"SPECIFIC HEAT", NULL, false, NULL},
+    {"GAP CONDUCTANCE", NULL, false, NULL},
+    {"CONTACT DAMPING", NULL, false, NULL},
+    {"DAMPING", NULL, false, NULL},
+    {"PHYSICAL CONSTANTS", NULL, false, NULL},
+    {"SHELL SECTION", NULL, false, "shells are no part of the body, and are left out"},
+    {"BEAM SECTION", NULL, false, "beams are no part of the body, and are left out"},
+    {"MEMBRANE SECTION", NULL, false, "membranes are no part of the body, and are left out"},
+    {"EQUATION", NULL, false, "equations between displacements are left out"},
+    {"MPC", NULL, false, "constraints between displacements are left out"},
+    {"TIE", NULL, false, "ties are left out: the parts are not joined"},
+    {"TRANSFORM", NULL, false, "directions of nodes along other axes are left out: they are those of the file"},
+    {"CYCLIC SYMMETRY MODEL", NULL, false, "cyclic symmetry is left out"},
+    {"RIGID BODY", NULL, false, "rigid bodies are left out; a scene has obstacles for that"},
+    {"PRE-TENSION SECTION", NULL, false, "the pretension is left out"},
+    {"MODEL CHANGE", NULL, false, "contact pairs and elements are not taken away or added"},
+};
+enum { N_KEYWORDS = sizeof KEYWORDS / sizeof KEYWORDS[0] };
+
+static uz_status read_block(abaqus_deck *d)
+{
+    abaqus_keyword keyword;
+    uz_status status = abaqus_read_keyword(&keyword, &d->text);
+    int at = 0;
+    if (status != UZ_OK)
+        return status;
+    while (at < N_KEYWORDS && !abaqus_keyword_is(&keyword, KEYWORDS[at].name))
+        at++;
+    if (at < N_KEYWORDS && KEYWORDS[at].read)
+        return KEYWORDS[at].read(d, &keyword);
+    if (at == N_KEYWORDS && is_procedure(&keyword))
+        return abaqus_fail(&d->text, UZ_ERR_UNSUPPORTED, "the first step is *%.40s; a scene is a *STATIC one",
+                           keyword.text);
+    skip_data(d);
+    if (at == N_KEYWORDS)
+        return deck_note(d, keyword.line, keyword.text, UZ_DECK_LEFT_OUT,
+                         "a scene has no word for it, and it is left out");
+    if (KEYWORDS[at].silent)
+        return UZ_OK;
+    return KEYWORDS[at].text ? deck_note(d, keyword.line, keyword.text, UZ_DECK_LEFT_OUT, "%s", KEYWORDS[at].text)
+                             : deck_note(d, keyword.line, keyword.text, UZ_DECK_IRRELEVANT,
+                                         "it says nothing about the answer of a static step");
+}
+
+uz_status deck_read_lines(abaqus_deck *d)
+{
+    uz_status status = UZ_OK;
+    abaqus_next_line(&d->text);
+    while (status == UZ_OK && !d->ended && d->text.length > 0)
+        status = read_block(d);
+    if (status == UZ_OK && !d->is_static)
+        status =
+            abaqus_fail(&d->text, UZ_ERR_UNSUPPORTED,
+                        "there is no *STEP with *STATIC in it: the deck says what the body is, and not what is done "
+                        "with it");
+    return status;
+}
