@@ -19,7 +19,8 @@ bool codec_decode_deck(codec_deck *out, const char *body, size_t len, store *upl
     if (!json_scan(&tree, body, len, problem))
         return false;
     const json_value *source = json_get(tree.root, "abaqus");
-    bool good = schemas_check(decode_schemas(), "deck.json", tree.root, problem) && decode_source_open(&file, &d, source);
+    bool good =
+        schemas_check(decode_schemas(), "deck.json", tree.root, problem) && decode_source_open(&file, &d, source);
     if (good) {
         good = uz_deck_read(&out->deck, file.data, file.len, d.bound + 32 * file.len,
                             json_truth(json_get(tree.root, "leave_out")), &err) == UZ_OK;
@@ -93,7 +94,8 @@ static void put_groups(text *t, const uz_given_mesh *mesh, const int64_t *number
         if (group->n_faces > 0) {
             text_open(t, mesh->dim == 2 ? "edges" : "faces", '[');
             for (int64_t i = 0; i < group->n_faces; i++)
-                put_indices(t, group->face_node + group->face_first[i], group->face_first[i + 1] - group->face_first[i]);
+                put_indices(t, group->face_node + group->face_first[i],
+                            group->face_first[i + 1] - group->face_first[i]);
             text_close(t, ']');
         }
         if (group->n_elements > 0) {
@@ -161,9 +163,11 @@ static void put_supports(text *t, const uz_scene *scene)
 
 static void put_loads(text *t, const uz_scene *scene)
 {
-    static const char *const NAMES[UZ_LOAD_KINDS] = {
-        [UZ_LOAD_PRESSURE] = "pressure", [UZ_LOAD_FORCE] = "force",         [UZ_LOAD_BODY_FORCE] = "body_force",
-        [UZ_LOAD_GRAVITY] = "gravity",   [UZ_LOAD_TEMPERATURE] = "temperature"}; /* others are in no deck */
+    static const char *const NAMES[UZ_LOAD_KINDS] = {[UZ_LOAD_PRESSURE] = "pressure",
+                                                     [UZ_LOAD_FORCE] = "force",
+                                                     [UZ_LOAD_BODY_FORCE] = "body_force",
+                                                     [UZ_LOAD_GRAVITY] = "gravity",
+                                                     [UZ_LOAD_TEMPERATURE] = "temperature"}; /* others are in no deck */
     text_open(t, "loads", '[');
     for (int64_t i = 0; i < scene->n_loads; i++) {
         const uz_load *load = &scene->loads[i];
