@@ -15,7 +15,8 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
          CLIENT_OPERAND_ALLOWED,
          "FILE is a request in JSON, \"-\" is standard input. Prints the job's id, and with --wait its summary. A "
          "repeat after a lost connection never makes a second job.\n"
-         "FILE may be a deck of Abaqus or CalculiX (.inp): the service makes a scene of it, and what is not in that as it "
+         "FILE may be a deck of Abaqus or CalculiX (.inp): the service makes a scene of it, and what is not in that as "
+         "it "
          "was is told on stderr, line by line.\n"
          "A problem in matrices needs no FILE: --K, --N, --h and --p name files in Matrix Market form. With FILE they "
          "replace its matrices. Files of more than 64 KiB, and compressed or binary ones, are uploaded, unless the "
@@ -29,7 +30,8 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
     [CLIENT_IMPORT] =
         {"import", "import FILE [options]", "make a request of a deck of Abaqus or CalculiX", "FILE",
          CLIENT_OPERAND_NEEDED,
-         "FILE is an .inp file, also packed. Writes the scene that submit would send for its first, static step: mesh, materials, supports, loads "
+         "FILE is an .inp file, also packed. Writes the scene that submit would send for its first, static step: mesh, "
+         "materials, supports, loads "
          "and contact pairs. Each line of the deck that has no place in it is told on stderr. What would change the "
          "answer is refused unless --leave-out is given.\n",
          NULL},

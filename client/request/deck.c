@@ -18,7 +18,8 @@ static void tell(client_session *s, const json_t *notes, bool all)
 {
     const json_t *note;
     size_t i;
-    json_array_foreach (notes, i, note) {
+    json_array_foreach(notes, i, note)
+    {
         const char *effect = client_json_text(note, "effect");
         if (!all && strcmp(effect, "irrelevant") == 0)
             continue;
@@ -33,7 +34,8 @@ static void tell(client_session *s, const json_t *notes, bool all)
 client_exit client_build_deck(client_session *s, json_t **request, const char *path, bool all)
 {
     json_t *asked = json_object(), *reply = NULL;
-    client_exit code = asked ? client_put_file(s, asked, "abaqus", path) : client_complain(s, CLIENT_LOCAL, "no memory");
+    client_exit code =
+        asked ? client_put_file(s, asked, "abaqus", path) : client_complain(s, CLIENT_LOCAL, "no memory");
     *request = NULL;
     if (code == CLIENT_OK && s->options->leave_out)
         json_object_set_new(asked, "leave_out", json_true());
