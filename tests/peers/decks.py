@@ -10,8 +10,8 @@ import re
 
 # Sides by the places of their corners, S1 first.
 SIDES = {3: [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)], 2: [(0, 1), (1, 2), (2, 3), (3, 0)]}
-# Left out of a deck and of CalculiX's as well, they leave the same problem: later steps, what moves nodes at the start.
-LATER = ("*STEP: ", "*CONTACT PAIR: its parameter ADJUST")
+# Left out of a deck and of CalculiX's as well, they leave the same problem.
+LATER = ("*STEP: ",)
 
 
 class Unsaid(Exception):
@@ -42,10 +42,9 @@ def translate(s, text):
 
 
 def first_step(text, numbers):
-    """The deck as far as its first step ends, where the displacements of all nodes are printed. Nothing is adjusted."""
+    """The deck as far as its first step ends, where the displacements of all nodes are printed."""
     end = re.search(r"(?im)^\*end\s*step", text)
     head = re.sub(r"(?im)^\*(node|el|contact)\s*(print|file)[^\n]*\n(?:[^*\n][^\n]*\n)*", "", text[:end.start()])
-    head = re.sub(r"(?im)^(\*contact\s*pair[^\n]*?),\s*adjust\s*=\s*[^,\s]+", r"\1", head)
     step = re.search(r"(?im)^\*step", head).start()
     nodes = "\n".join(f"{number}," for number in numbers)
     return (f"{head[:step]}*NSET, NSET=COMPARED\n{nodes}\n{head[step:]}"
