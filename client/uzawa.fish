@@ -6,7 +6,7 @@ function __uzawa_ids
 end
 
 function __uzawa_commands
-    printf '%s\n' submit upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor version help
+    printf '%s\n' submit import upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor version help
 end
 
 # Is this the command of the line? "": there is none yet.
@@ -22,6 +22,7 @@ end
 
 complete -c uzawa -f
 complete -c uzawa -n '__uzawa_is ""' -a submit -d 'send a problem, and wait for its answer if told to'
+complete -c uzawa -n '__uzawa_is ""' -a import -d 'make a request of a deck of Abaqus or CalculiX'
 complete -c uzawa -n '__uzawa_is ""' -a upload -d 'send a file that requests then name'
 complete -c uzawa -n '__uzawa_is ""' -a status -d 'show a job'
 complete -c uzawa -n '__uzawa_is ""' -a wait -d 'wait until a job has ended, then print its summary'
@@ -52,6 +53,7 @@ complete -c uzawa -n '__uzawa_is submit' -l N -r -F -d 'the contact normals, a r
 complete -c uzawa -n '__uzawa_is submit' -l h -r -F -d 'the initial gaps'
 complete -c uzawa -n '__uzawa_is submit' -l p -r -F -d 'the load'
 complete -c uzawa -n '__uzawa_is submit' -l mesh -r -F -d 'a Gmsh file (2.2 or 4.1) in place of the scene'\''s mesh'
+complete -c uzawa -n '__uzawa_is submit' -l leave-out -d 'of a deck, leave out what a scene has no words for, although the answer is another one with it'
 complete -c uzawa -n '__uzawa_is submit' -l set -r -f -d 'put VALUE, as JSON or else as a string, at PATH of the request; may be repeated'
 complete -c uzawa -n '__uzawa_is submit' -l vary -r -f -d 'solve for each of VALUES at PATH: FIRST:LAST:COUNT in equal steps, or a list A,B,C; may be repeated'
 complete -c uzawa -n '__uzawa_is submit' -l wait -s w -d 'wait until the job has ended and print the summary'
@@ -68,6 +70,16 @@ complete -c uzawa -n '__uzawa_is submit' -l server -s s -r -f -d 'the service (d
 complete -c uzawa -n '__uzawa_is submit' -l retry -r -f -d 'keep trying to reach the server for S seconds (default 3; 30 while waiting)'
 complete -c uzawa -n '__uzawa_is submit' -l help -s h -d 'explain the command'
 complete -c uzawa -n '__uzawa_is submit' -l version -s V -d 'print the version'
+complete -c uzawa -n '__uzawa_is import' -F
+complete -c uzawa -n '__uzawa_is import' -l leave-out -d 'of a deck, leave out what a scene has no words for, although the answer is another one with it'
+complete -c uzawa -n '__uzawa_is import' -l output -s o -r -F -d 'write to FILE, whole or not at all'
+complete -c uzawa -n '__uzawa_is import' -l quiet -s q -d 'tell nothing of what is not in the request'
+complete -c uzawa -n '__uzawa_is import' -l json -s j -d 'print JSON, and what is wrong as JSON too'
+complete -c uzawa -n '__uzawa_is import' -l server -s s -r -f -d 'the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust'
+complete -c uzawa -n '__uzawa_is import' -l timeout -s t -r -f -d 'give up after S seconds; for wait and --wait: stop waiting'
+complete -c uzawa -n '__uzawa_is import' -l retry -r -f -d 'keep trying to reach the server for S seconds (default 3; 30 while waiting)'
+complete -c uzawa -n '__uzawa_is import' -l help -s h -d 'explain the command'
+complete -c uzawa -n '__uzawa_is import' -l version -s V -d 'print the version'
 complete -c uzawa -n '__uzawa_is upload' -F
 complete -c uzawa -n '__uzawa_is upload' -l json -s j -d 'print JSON, and what is wrong as JSON too'
 complete -c uzawa -n '__uzawa_is upload' -l server -s s -r -f -d 'the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust'

@@ -12,6 +12,7 @@ _uzawa_commands() {
     local -a commands
     commands=(
         'submit:send a problem, and wait for its answer if told to'
+        'import:make a request of a deck of Abaqus or CalculiX'
         'upload:send a file that requests then name'
         'status:show a job'
         'wait:wait until a job has ended, then print its summary'
@@ -54,6 +55,7 @@ _uzawa() {
             '--h[the initial gaps]:FILE:_files' \
             '--p[the load]:FILE:_files' \
             '--mesh[a Gmsh file (2.2 or 4.1) in place of the scene'\''s mesh]:FILE:_files' \
+            '--leave-out[of a deck, leave out what a scene has no words for, although the answer is another one with it]' \
             '*--set[put VALUE, as JSON or else as a string, at PATH of the request; may be repeated]:PATH=VALUE: ' \
             '*--vary[solve for each of VALUES at PATH\: FIRST\:LAST\:COUNT in equal steps, or a list A,B,C; may be repeated]:PATH=VALUES: ' \
             '(-w --wait)'{-w,--wait}'[wait until the job has ended and print the summary]' \
@@ -67,6 +69,18 @@ _uzawa() {
             '(-q --quiet)'{-q,--quiet}'[print the id and nothing else]' \
             '(-j --json)'{-j,--json}'[print the job as JSON, and what is wrong too]' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
+            '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
+            '(-h --help)'{-h,--help}'[explain the command]' \
+            '(-V --version)'{-V,--version}'[print the version]' \
+            '1:FILE:_files' ;;
+    import)
+        _arguments \
+            '--leave-out[of a deck, leave out what a scene has no words for, although the answer is another one with it]' \
+            '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
+            '(-q --quiet)'{-q,--quiet}'[tell nothing of what is not in the request]' \
+            '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
+            '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
             '(-h --help)'{-h,--help}'[explain the command]' \
             '(-V --version)'{-V,--version}'[print the version]' \
