@@ -278,7 +278,7 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
     if (status == UZ_OK && from)
         status = go_back(run, &last, 0, err);
     if (status == UZ_OK && from && !from->whole) {
-        *why = (uz_part)from->why;
+        *why = from->why;
         *tried = from->tried;
         run->stopped = from->stopped;
         step = 0;

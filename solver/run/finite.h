@@ -55,6 +55,15 @@ typedef struct {
     double violation; /* the sum of the gaps that are negative */
 } uz_finite_place;
 
+typedef enum {
+    UZ_PART_SETTLED,
+    UZ_PART_UNSETTLED,     /* no equilibrium was found */
+    UZ_PART_INDEFINITE,    /* one that is no minimum */
+    UZ_PART_INVERTED,      /* the way to it turns elements inside out */
+    UZ_PART_CONTRADICTORY, /* contact conditions that no displacement meets */
+    UZ_PART_STOPPED        /* by time, or by the caller, or by a limit on iterations: run->stopped */
+} uz_part;
+
 /* An equilibrium, from which a path goes on: what it is under, and why it is not under the whole load of its case. */
 struct uz_finite_point {
     double *u, *r, part; /* n, n_r; of prescribed displacements */
@@ -64,19 +73,10 @@ struct uz_finite_point {
     uz_finite_certificate certificate;
     uz_summary last; /* of the last contact problem; pointers are not to be read */
     bool whole;
-    int why; /* a uz_part */
+    uz_part why;
     double tried;
     uz_outcome stopped;
 };
-
-typedef enum {
-    UZ_PART_SETTLED,
-    UZ_PART_UNSETTLED,     /* no equilibrium was found */
-    UZ_PART_INDEFINITE,    /* one that is no minimum */
-    UZ_PART_INVERTED,      /* the way to it turns elements inside out */
-    UZ_PART_CONTRADICTORY, /* contact conditions that no displacement meets */
-    UZ_PART_STOPPED        /* by time, or by the caller, or by a limit on iterations: run->stopped */
-} uz_part;
 
 typedef struct {
     const uz_problem *problem; /* of one case */
