@@ -591,14 +591,30 @@ static uz_status read_pair(abaqus_deck *d, const abaqus_keyword *keyword)
     return status;
 }
 
+/* The springs of CalculiX: p = K d; p = p0 exp(d ln 100 / c0), whose slope at d = 0 is p0 ln 100 / c0. */
 static uz_status read_behavior(abaqus_deck *d, const abaqus_keyword *keyword)
 {
     const char *kind = abaqus_parameter(keyword, "PRESSURE-OVERCLOSURE");
-    const bool stiff = kind && (strcasecmp(kind, "LINEAR") == 0 || strcasecmp(kind, "EXPONENTIAL") == 0);
+    const bool linear = kind && strcasecmp(kind, "LINEAR") == 0;
+    double first = 0.0, second = 0.0;
+    if (linear || (kind && strcasecmp(kind, "EXPONENTIAL") == 0)) {
+        if (!next_data(d))
+            return abaqus_fail(&d->text, UZ_ERR_FORMAT, "the stiffness of %.20s was expected", kind);
+        uz_status status = next_number(&first, d, "what a spring between surfaces is made of", 0.0);
+        if (status == UZ_OK)
+            status = next_number(&second, d, "what a spring between surfaces is made of", 0.0);
+        if (status != UZ_OK)
+            return status;
+        skip_data(d);
+        if (!uz_grow(&d->springs, d->n_springs, 1, &d->springs_room, sizeof *d->springs))
+            return abaqus_no_memory(&d->text);
+        d->springs[d->n_springs++] = (deck_spring){keyword->line, linear ? first : second * log(100.0) / first};
+        return UZ_OK;
+    }
     skip_data(d);
     if (!kind || strcasecmp(kind, "HARD") == 0)
         return UZ_OK;
-    return deck_note(d, keyword->line, keyword->text, stiff ? UZ_DECK_REPLACED : UZ_DECK_LEFT_OUT,
+    return deck_note(d, keyword->line, keyword->text, UZ_DECK_LEFT_OUT,
                      strcasecmp(kind, "TIED") == 0
                          ? "%.20s: the surfaces are not tied, but may open and slide"
                          : "%.20s: hard contact, without overclosure, in place of a spring between the surfaces",

@@ -27,6 +27,12 @@ typedef struct {
     char slave[ABAQUS_NAME], master[ABAQUS_NAME];
 } deck_pair;
 
+/* What stands between surfaces in contact, in place of which a scene has nothing. */
+typedef struct {
+    int64_t line;
+    double stiffness; /* pressure per length where they begin to touch */
+} deck_spring;
+
 /* A pressure on a side of an element (of the file), or on a surface. */
 typedef struct {
     int64_t element, line; /* element -1: the surface */
@@ -54,9 +60,10 @@ typedef struct {
     deck_material *materials;
     deck_amplitude *amplitudes;
     deck_pair *pairs;
+    deck_spring *springs;
     deck_pressure *pressures;
-    int64_t n_materials, n_amplitudes, n_pairs, n_pressures;
-    int64_t materials_room, amplitudes_room, pairs_room, pressures_room;
+    int64_t n_materials, n_amplitudes, n_pairs, n_springs, n_pressures;
+    int64_t materials_room, amplitudes_room, pairs_room, springs_room, pressures_room;
 
     double *fixed, *force;         /* nodes x 3; fixed NaN: free */
     double *temperature, *initial; /* nodes; NaN: not said */

@@ -590,6 +590,36 @@ static uz_status make_contacts(abaqus_deck *d)
     return status;
 }
 
+/* Hard contact stands for springs that give way by less of what a body does; for softer ones it is another scene. */
+#define STIFF 0.05
+
+/* A spring of stiffness K gives way by p / K under a pressure p, a body of thickness L by about p L / E. */
+static uz_status note_springs(abaqus_deck *d)
+{
+    const uz_given_mesh *mesh = d->mesh;
+    double thickness = INFINITY, young = 0.0;
+    uz_status status = UZ_OK;
+    for (int axis = 0; axis < mesh->dim; axis++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int64_t a = 0; a < mesh->n_nodes; a++) {
+            low = fmin(low, mesh->xyz[a * mesh->dim + axis]);
+            high = fmax(high, mesh->xyz[a * mesh->dim + axis]);
+        }
+        thickness = fmin(thickness, high - low);
+    }
+    for (int64_t i = 0; i < d->n_materials; i++)
+        young = fmax(young, d->materials[i].young);
+    for (int64_t i = 0; i < d->n_springs && status == UZ_OK; i++) {
+        const double part = young / (d->springs[i].stiffness * thickness);
+        const bool stiff = part >= 0.0 && part < STIFF;
+        status = deck_note(d, d->springs[i].line, "SURFACE BEHAVIOR", stiff ? UZ_DECK_REPLACED : UZ_DECK_LEFT_OUT,
+                           "hard contact in place of a spring of %.3g between the surfaces, which gives way by about "
+                           "%.2g of what the body does",
+                           d->springs[i].stiffness, part);
+    }
+    return status;
+}
+
 /* ---- the whole */
 
 static uz_status choose_model(abaqus_deck *d)
@@ -636,7 +666,9 @@ uz_status deck_make_scene(abaqus_deck *d)
         status = for_alike(d, d->body_force, 3, false, "drawn", add_body_force);
     if (status == UZ_OK)
         status = make_temperatures(d);
-    return status == UZ_OK ? make_contacts(d) : status;
+    if (status == UZ_OK)
+        status = make_contacts(d);
+    return status == UZ_OK ? note_springs(d) : status;
 }
 
 static int by_line(const void *a, const void *b)
@@ -696,6 +728,7 @@ static void clear_deck(abaqus_deck *d)
     free(d->materials);
     free(d->amplitudes);
     free(d->pairs);
+    free(d->springs);
     free(d->pressures);
     free(d->fixed);
     free(d->force);

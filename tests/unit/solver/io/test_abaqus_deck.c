@@ -110,6 +110,8 @@ static const struct {
     {"*FRICTION\n.1\n" STEP, 1, "coefficient 0.1"},
     {"*EQUATION\n2\n1,1,1.,2,1,-1.\n" STEP, 1, "equations"},
     {"*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=TIED\n1.e7\n" STEP, 1, "not tied"},
+    {"*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR\n2.e3\n" STEP, 1, "a spring of 2e+03"}, /* 1000 / (2000 * 2) */
+    {"*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=EXPONENTIAL\n.1,50.\n" STEP, 1, "by about 0.22"},
     {"*PLASTIC\n1.,0.\n" STEP, 1, "no word for it"},
     {"*CONTACT PAIR,INTERACTION=I,ADJUST=.1\nSL,MA\n" STEP, 1, "ADJUST=.1"},
     {"*INITIAL CONDITIONS,TYPE=STRESS\n1,1,0.,0.\n" STEP, 1, "type STRESS"},
