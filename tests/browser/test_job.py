@@ -56,7 +56,7 @@ def test_whole_error_is_drawn(s, b):
         b.media("prefers-color-scheme", "dark" if dark else "light")
         b.open(s, f"jobs/{s.get('/v1/jobs').json['jobs'][0]['id']}")
         b.says(chart, "Whole error and its price")
-        check(b.near(f"{chart} .chart", "--series-1") > 150, width, "the curve has too few pixels")
+        check(b.near(f"{chart} .chart", "--series-1") > 60, width, "the curve has too few pixels")
         check(b.near(f"{chart} .chart", "--series-2") > 50, width, "what was asked for is not seen")
         # Numbers at the axis stand between its name and the axis.
         boxes = b.run("""const box = (e) => { const r = e.getBoundingClientRect(); return [r.left, r.right]; };
