@@ -281,7 +281,8 @@ static bool blend_entries(row_work *work, const uz_body_model *model)
 
 void uz_row_forces(double *f, const uz_body_model *model, const double *r)
 {
-    memcpy(f, r, (size_t)model->m * sizeof *f);
+    for (int64_t i = 0; i < model->m; i++)
+        f[i] = r[i];
     for (int64_t i = 0; i < model->m && model->row_ends; i++)
         if (model->row_ends[2 * i] >= 0)
             f[i] = r[i] / (1 - 2 * UZ_MIDDLE_SHARE);

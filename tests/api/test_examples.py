@@ -13,6 +13,7 @@ import xml.etree.ElementTree
 
 import service
 from service import ENDLESS, ROOT, SCENE, Skip, check, expect, options
+from test_client_requests import DECK
 
 SHARED = True  # one service for all tests
 
@@ -386,6 +387,7 @@ def test_the_guide_s_commands_are_those_of_the_client(s):
     check(len(commands) >= 4, commands)
     with tempfile.TemporaryDirectory() as folder:
         (pathlib.Path(folder) / "scene.json").write_text(BLOCK.search(GUIDE.read_text()).group(2))
+        (pathlib.Path(folder) / "part.inp").write_text(DECK)
         uzawa = str((pathlib.Path(sys.argv[1]) / "uzawa").resolve())
         job = run(s, uzawa, "submit", "scene.json", "--wait", "--quiet", cwd=folder).strip()
         for command in commands:
