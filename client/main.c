@@ -23,13 +23,13 @@ static void *allocate_or_end(size_t size)
 typedef client_exit (*command_run)(client_session *);
 
 static const command_run RUN[CLIENT_COMMANDS] = {
-    [CLIENT_SUBMIT] = client_submit, [CLIENT_STATUS] = client_status,   [CLIENT_WAIT] = client_wait,
-    [CLIENT_RESULT] = client_result, [CLIENT_HISTORY] = client_history, [CLIENT_LIST] = client_list,
-    [CLIENT_CANCEL] = client_delete, [CLIENT_REFINE] = client_refine,   [CLIENT_VERIFY] = client_verify,
-    [CLIENT_UPLOAD] = client_upload, [CLIENT_PICTURE] = client_picture, [CLIENT_PLOT] = client_plot,
-    [CLIENT_DELETE] = client_delete, [CLIENT_FACTORS] = client_factors, [CLIENT_NODES] = client_nodes,
-    [CLIENT_DOCTOR] = client_doctor, [CLIENT_REPORT] = client_report,   [CLIENT_REQUEST] = client_request_of,
-    [CLIENT_IMPORT] = client_import,
+    [CLIENT_SUBMIT] = client_submit,      [CLIENT_STATUS] = client_status,   [CLIENT_WAIT] = client_wait,
+    [CLIENT_RESULT] = client_result,      [CLIENT_HISTORY] = client_history, [CLIENT_LIST] = client_list,
+    [CLIENT_CANCEL] = client_delete,      [CLIENT_REFINE] = client_refine,   [CLIENT_VERIFY] = client_verify,
+    [CLIENT_UPLOAD] = client_upload,      [CLIENT_PICTURE] = client_picture, [CLIENT_PLOT] = client_plot,
+    [CLIENT_DELETE] = client_delete,      [CLIENT_FACTORS] = client_factors, [CLIENT_NODES] = client_nodes,
+    [CLIENT_DOCTOR] = client_doctor,      [CLIENT_MCP] = client_mcp,         [CLIENT_REPORT] = client_report,
+    [CLIENT_REQUEST] = client_request_of, [CLIENT_IMPORT] = client_import,
 };
 
 /* options: as far as they were understood; command HELP where none was named. */

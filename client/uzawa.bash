@@ -7,7 +7,7 @@ _uzawa_ids() {
 
 _uzawa() {
     local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-    local command='' options='' words='' files='' i commands='submit import upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor version help'
+    local command='' options='' words='' files='' i commands='submit import upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor mcp version help'
     COMPREPLY=()
     if [[ $current == '=' ]]; then current=''; previous='='; fi
     if [[ $previous == '=' ]]; then
@@ -38,6 +38,7 @@ _uzawa() {
     factors) options='--json --server --timeout --retry --help --version ' ;;
     nodes) options='--json --server --timeout --retry --help --version ' ;;
     doctor) options='--quiet --json --server --timeout --retry --help --version ' ;;
+    mcp) options='--json --server --timeout --retry --help --version ' ;;
     version) options='--json --help --version ' ;;
     help) options='--format --json --help --version ' ;;
     esac
@@ -154,6 +155,9 @@ _uzawa() {
     doctor--server|doctor-s) words='' ;;
     doctor--timeout|doctor-t) words='' ;;
     doctor--retry) words='' ;;
+    mcp--server|mcp-s) words='' ;;
+    mcp--timeout|mcp-t) words='' ;;
+    mcp--retry) words='' ;;
     help--format|help-f) words='text man bash zsh fish json' ;;
     *)  if [[ $current == -* ]]; then words=$options; else case $command in
     submit) files=1 ;;

@@ -6,7 +6,7 @@ function __uzawa_ids
 end
 
 function __uzawa_commands
-    printf '%s\n' submit import upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor version help
+    printf '%s\n' submit import upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor mcp version help
 end
 
 # Is this the command of the line? "": there is none yet.
@@ -40,6 +40,7 @@ complete -c uzawa -n '__uzawa_is ""' -a delete -d 'delete an ended job and its a
 complete -c uzawa -n '__uzawa_is ""' -a factors -d 'list the factors that the service keeps for the next job'
 complete -c uzawa -n '__uzawa_is ""' -a nodes -d 'list the daemons that share the service'\''s jobs, and what they hold'
 complete -c uzawa -n '__uzawa_is ""' -a doctor -d 'check the way to the service and the service itself'
+complete -c uzawa -n '__uzawa_is ""' -a mcp -d 'offer the service to a language model as tools'
 complete -c uzawa -n '__uzawa_is ""' -a version -d 'print the version'
 complete -c uzawa -n '__uzawa_is ""' -a help -d 'explain a command'
 complete -c uzawa -n '__uzawa_is ""' -l server -s s -r -f -d 'the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust'
@@ -254,6 +255,12 @@ complete -c uzawa -n '__uzawa_is doctor' -l timeout -s t -r -f -d 'give up after
 complete -c uzawa -n '__uzawa_is doctor' -l retry -r -f -d 'keep trying to reach the server for S seconds (default 3; 30 while waiting)'
 complete -c uzawa -n '__uzawa_is doctor' -l help -s h -d 'explain the command'
 complete -c uzawa -n '__uzawa_is doctor' -l version -s V -d 'print the version'
+complete -c uzawa -n '__uzawa_is mcp' -l json -s j -d 'print JSON, and what is wrong as JSON too'
+complete -c uzawa -n '__uzawa_is mcp' -l server -s s -r -f -d 'the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust'
+complete -c uzawa -n '__uzawa_is mcp' -l timeout -s t -r -f -d 'give up after S seconds; for wait and --wait: stop waiting'
+complete -c uzawa -n '__uzawa_is mcp' -l retry -r -f -d 'keep trying to reach the server for S seconds (default 3; 30 while waiting)'
+complete -c uzawa -n '__uzawa_is mcp' -l help -s h -d 'explain the command'
+complete -c uzawa -n '__uzawa_is mcp' -l version -s V -d 'print the version'
 complete -c uzawa -n '__uzawa_is version' -l json -s j -d 'print JSON, and what is wrong as JSON too'
 complete -c uzawa -n '__uzawa_is version' -l help -s h -d 'explain the command'
 complete -c uzawa -n '__uzawa_is version' -l version -s V -d 'print the version'

@@ -30,6 +30,7 @@ _uzawa_commands() {
         'factors:list the factors that the service keeps for the next job'
         'nodes:list the daemons that share the service'\''s jobs, and what they hold'
         'doctor:check the way to the service and the service itself'
+        'mcp:offer the service to a language model as tools'
         'version:print the version'
         'help:explain a command'
     )
@@ -287,6 +288,14 @@ _uzawa() {
     doctor)
         _arguments \
             '(-q --quiet)'{-q,--quiet}'[print only what is wrong]' \
+            '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
+            '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
+            '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
+            '(-h --help)'{-h,--help}'[explain the command]' \
+            '(-V --version)'{-V,--version}'[print the version]' ;;
+    mcp)
+        _arguments \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \

@@ -96,6 +96,11 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
                        "Prints a line for each thing checked: ok, or what is wrong and what helps.\n",
                        "0 all is well, or only warnings; 4 the token is missing, wrong or allows too little; 5 the "
                        "service is not well; 12 it cannot be reached."},
+    [CLIENT_MCP] = {"mcp", "mcp", "offer the service to a language model as tools", NULL, 0,
+                    "Speaks the Model Context Protocol over standard input and output, for programs that start it with "
+                    "the command line \"uzawa --server URL mcp\": submit_job, validate_request, wait_for_job, "
+                    "get_result, get_picture. It ends with its input.\n",
+                    NULL},
     [CLIENT_VERSION] = {"version", "version", "print the version", NULL, 0, "", NULL},
     [CLIENT_HELP] = {"help", "help [COMMAND]", "explain a command", "COMMAND", CLIENT_OPERAND_ALLOWED, "", NULL},
 };

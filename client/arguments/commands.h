@@ -31,6 +31,7 @@ typedef enum {
     CLIENT_FACTORS,
     CLIENT_NODES,
     CLIENT_DOCTOR,
+    CLIENT_MCP,
     CLIENT_VERSION,
     CLIENT_HELP,
     CLIENT_COMMANDS /* how many there are */

@@ -53,6 +53,9 @@ static const struct {
                     "uzawa list --quiet --limit 5\n"
                     "uzawa factors --json | jq .bytes\n"
                     "uzawa nodes --json | jq .nodes[].name"},
+    {"As tools of a language model, whose program says one line after another:",
+     "printf '%s\\n' '{\"jsonrpc\": \"2.0\", \"id\": 1, \"method\": \"tools/list\"}' | uzawa mcp | jq -r "
+     ".result.tools[].name"},
     {"When something is wrong:", "uzawa doctor"},
 };
 

@@ -18,6 +18,9 @@ char *client_path_with_query(client_session *s, const char *suffix, const client
 /* To --output or standard output, whole or not at all; with --json it says what was written. */
 client_exit client_deliver(client_session *s, const char *text, size_t len);
 
+/* A picture as PNG, by way of rsvg-convert, appended to *png; what is in the way is told on s->err. */
+client_exit client_picture_to_png(client_session *s, const client_buffer *svg, client_buffer *png);
+
 /* The fields ("a,b") of the job's answer as CSV. */
 client_exit client_table(client_session *s, const char *fields);
 /* A history in CSV as a drawing; it goes where the data would. */

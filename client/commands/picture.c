@@ -39,7 +39,7 @@ static pid_t start_converter(int *to, int *from)
     return pid;
 }
 
-static client_exit convert(client_session *s, const client_buffer *svg, client_buffer *png)
+client_exit client_picture_to_png(client_session *s, const client_buffer *svg, client_buffer *png)
 {
     int to, from, status = 0;
     struct sigaction ignore = {.sa_handler = SIG_IGN}, before;
@@ -132,7 +132,7 @@ client_exit client_plot(client_session *s)
     client_exit code = client_ask(s, &reply, &request);
     const bool as_png = output && strlen(output) > 4 && strcmp(output + strlen(output) - 4, ".png") == 0;
     if (code == CLIENT_OK && as_png)
-        code = convert(s, &reply.body, &png);
+        code = client_picture_to_png(s, &reply.body, &png);
     const client_buffer *picture = as_png ? &png : &reply.body;
     if (code == CLIENT_OK)
         code = client_deliver(s, picture->data, picture->len);

@@ -30,5 +30,6 @@ client_exit client_delete(client_session *s);
 client_exit client_factors(client_session *s);
 client_exit client_nodes(client_session *s);
 client_exit client_doctor(client_session *s);
+client_exit client_mcp(client_session *s);
 
 #endif
