@@ -229,10 +229,10 @@ static uz_status drop_nodes(abaqus_deck *d)
 static uz_status add_support(abaqus_deck *d, const char *group, const double key[3], int64_t count)
 {
     uz_scene *scene = &d->out->scene;
-    uz_support *to = uz_realloc(scene->supports, scene->n_supports + 1, sizeof *to);
     (void)count;
     if (scene->n_supports == LIST_MOST)
         return too_many(d, "supports");
+    uz_support *to = uz_realloc(scene->supports, scene->n_supports + 1, sizeof *to);
     if (!to)
         return abaqus_no_memory(&d->text);
     scene->supports = to;

@@ -189,6 +189,31 @@ TEST(refusals)
     }
 }
 
+/* Each node moved by another length: more supports than a scene may have. */
+TEST(too_many_supports_are_refused)
+{
+    enum { COLUMNS = 600 };
+    char *text = NULL;
+    size_t len = 0;
+    uz_deck deck;
+    uz_error err;
+    FILE *out = open_memstream(&text, &len);
+    fputs("*NODE\n", out);
+    for (int i = 0; i < COLUMNS; i++)
+        fprintf(out, "%d,%d,0\n%d,%d,1\n", 2 * i + 1, i, 2 * i + 2, i);
+    fputs("*ELEMENT,TYPE=CPE4,ELSET=LOW\n", out);
+    for (int i = 0; i + 1 < COLUMNS; i++)
+        fprintf(out, "%d,%d,%d,%d,%d\n", i + 1, 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2);
+    fputs(STEEL "*SOLID SECTION,ELSET=LOW,MATERIAL=EL\n*STEP\n*STATIC\n*BOUNDARY\n", out);
+    for (int i = 0; i < 2 * COLUMNS; i++)
+        fprintf(out, "%d,1,1,%d\n", i + 1, i);
+    fputs("*END STEP\n", out);
+    CHECK(fclose(out) == 0);
+    CHECK_MSG(read_deck(&deck, text, true, &err) == UZ_ERR_UNSUPPORTED && strstr(err.message, "more than"), "%s",
+              err.message);
+    free(text);
+}
+
 /* Whatever is cut off, the rest is read or refused. */
 TEST(every_beginning_of_a_deck)
 {
