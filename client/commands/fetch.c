@@ -124,7 +124,7 @@ bool client_append_words(client_buffer *out, const uz_words *words)
 }
 
 /* "/v1/jobs/ID/result?a=1&b=2"; a part without a name ends the list. The caller frees. NULL: no memory, said. */
-char *client_path_with_query(client_session *s, const char *suffix, const client_query *part)
+char *client_path_with_query(client_session *s, const char *id, const char *suffix, const client_query *part)
 {
     client_buffer query = {0};
     char *path = NULL;
@@ -135,7 +135,7 @@ char *client_path_with_query(client_session *s, const char *suffix, const client
         char *first = strchr(query.data, '&');
         if (first)
             *first = '?';
-        path = client_job_path(s, s->options->operand, query.data);
+        path = client_job_path(s, id, query.data);
     } else {
         client_complain(s, CLIENT_LOCAL, "no memory");
     }
@@ -173,8 +173,9 @@ client_exit client_result(client_session *s)
     if (strcmp(format, "csv") == 0)
         code = client_table(s, *fields ? fields : "reactions,gaps");
     else
-        code = fetch_and_deliver(
-            s, client_path_with_query(s, strcmp(format, "vtu") == 0 ? "/result.vtu" : "/result", query));
+        code =
+            fetch_and_deliver(s, client_path_with_query(s, s->options->operand,
+                                                        strcmp(format, "vtu") == 0 ? "/result.vtu" : "/result", query));
     free(text.data);
     return code;
 }
@@ -189,7 +190,7 @@ client_exit client_picture(client_session *s)
                                   {"width", o->width < 0 ? NULL : width},
                                   {"case", o->case_name},
                                   {NULL, NULL}};
-    return fetch_and_deliver(s, client_path_with_query(s, "/deformed.svg", query));
+    return fetch_and_deliver(s, client_path_with_query(s, s->options->operand, "/deformed.svg", query));
 }
 
 client_exit client_import(client_session *s)
@@ -216,7 +217,7 @@ client_exit client_history(client_session *s)
     client_reply reply;
     const client_options *o = s->options;
     const client_query query[] = {{"case", o->case_name}, {NULL, NULL}};
-    char *path = client_path_with_query(s, "/history", query);
+    char *path = client_path_with_query(s, s->options->operand, "/history", query);
     if (!path)
         return CLIENT_LOCAL;
     client_request request = client_request_new(s, "GET", path);

@@ -13,7 +13,7 @@ bool client_append_words(client_buffer *out, const uz_words *words);
 /* Appends "&name=value", escaped; nothing where value is NULL. False: no memory. */
 bool client_append_query(client_buffer *path, const char *name, const char *value);
 /* "/v1/jobs/ID/result?a=1&b=2"; a part without a name ends the list. The caller frees. NULL: no memory, said. */
-char *client_path_with_query(client_session *s, const char *suffix, const client_query *part);
+char *client_path_with_query(client_session *s, const char *id, const char *suffix, const client_query *part);
 
 /* To --output or standard output, whole or not at all; with --json it says what was written. */
 client_exit client_deliver(client_session *s, const char *text, size_t len);

@@ -34,16 +34,21 @@ static json_t *answer_text(const char *text, size_t len, bool error)
                      error || !item);
 }
 
+static json_t *answer_error(const char *why)
+{
+    return answer_text(why, strlen(why), true);
+}
+
 /* Sends it. NULL: *reply is a good one; else what the tool answers. The caller clears *reply. */
 static json_t *ask(client_session *s, client_reply *reply, const client_request *request)
 {
     const client_http_end end = client_http_send(s->http, reply, request);
     if (end != CLIENT_HTTP_ANSWERED)
-        return answer_text(reply->message, strlen(reply->message), true);
+        return answer_error(reply->message);
     if (reply->status >= 200 && reply->status < 300)
         return NULL;
     return reply->body.len ? answer_text(reply->body.data, reply->body.len, true)
-                           : answer_text("the service refused without a word", 34, true);
+                           : answer_error("the service refused without a word");
 }
 
 /* The reply's JSON, as text and, of an object, as structured content. */
@@ -54,7 +59,7 @@ static json_t *ask_json(client_session *s, const client_request *request)
     if (!answer) {
         json_t *value = reply.body.data ? json_loadb(reply.body.data, reply.body.len, 0, NULL) : NULL;
         answer = value ? answer_text(reply.body.data, reply.body.len, false)
-                       : answer_text("the reply is no JSON; is this the right server?", 47, true);
+                       : answer_error("the reply is no JSON; is this the right server?");
         if (json_is_object(value))
             json_object_set(answer, "structuredContent", value);
         json_decref(value);
@@ -74,7 +79,7 @@ static json_t *post(client_session *s, const char *path, const json_t *request, 
     http.headers[0] = header;
     http.repeatable = false; /* the model may ask again, and sees what there is */
     http.silence_s += PATIENCE_S;
-    json_t *answer = body ? ask_json(s, &http) : answer_text("no memory", 9, true);
+    json_t *answer = body ? ask_json(s, &http) : answer_error("no memory");
     free(body);
     return answer;
 }
@@ -91,26 +96,15 @@ static json_t *validate(client_session *s, const json_t *arguments)
     return post(s, "/v1/jobs?validate=true", arguments, NULL);
 }
 
-/* "/v1/jobs/ID" and what follows, with the arguments that are named as its query. NULL: no memory. */
-static char *path_of(client_session *s, const char *suffix, const json_t *arguments, const char *const *names)
+/* The text of an argument; NULL: it is not given. */
+static const char *given(const json_t *arguments, const char *name)
 {
-    client_buffer query = {0};
-    bool ok = client_buffer_append(&query, suffix, strlen(suffix));
-    for (; ok && *names; names++)
-        ok = client_append_query(&query, *names, json_string_value(json_object_get(arguments, *names)));
-    char *first = ok ? strchr(query.data, '&') : NULL, *path = NULL;
-    if (first)
-        *first = '?';
-    if (ok)
-        path = client_job_path(s, client_json_text(arguments, "id"), query.data);
-    free(query.data);
-    return path;
+    return json_string_value(json_object_get(arguments, name));
 }
 
 static json_t *wait_for(client_session *s, const json_t *arguments)
 {
-    static const char *const NONE[] = {NULL};
-    char header[40], *path = path_of(s, "", arguments, NONE);
+    char header[40], *path = client_job_path(s, client_json_text(arguments, "id"), "");
     const double asked = client_json_number(arguments, "timeout_s");
     const double seconds = isnan(asked) ? PATIENCE_S : fmin(fmax(asked, 0), LONGEST_S);
     if (!path)
@@ -126,8 +120,9 @@ static json_t *wait_for(client_session *s, const json_t *arguments)
 
 static json_t *result(client_session *s, const json_t *arguments)
 {
-    static const char *const QUERY[] = {"fields", "case", NULL};
-    char *path = path_of(s, "/result", arguments, QUERY);
+    const client_query query[] = {
+        {"fields", given(arguments, "fields")}, {"case", given(arguments, "case")}, {NULL, NULL}};
+    char *path = client_path_with_query(s, client_json_text(arguments, "id"), "/result", query);
     const client_request request = client_request_new(s, "GET", path);
     json_t *answer = path ? ask_json(s, &request) : NULL;
     free(path);
@@ -137,10 +132,11 @@ static json_t *result(client_session *s, const json_t *arguments)
 /* As PNG, which models see; where that cannot be made as SVG. */
 static json_t *picture(client_session *s, const json_t *arguments)
 {
-    static const char *const QUERY[] = {"colour", "case", NULL};
+    const client_query query[] = {
+        {"colour", given(arguments, "colour")}, {"case", given(arguments, "case")}, {NULL, NULL}};
     client_reply reply;
     client_buffer png = {0};
-    char *path = path_of(s, "/deformed.svg", arguments, QUERY), *text;
+    char *path = client_path_with_query(s, client_json_text(arguments, "id"), "/deformed.svg", query), *text;
     size_t len;
     if (!path)
         return NULL;
@@ -238,18 +234,18 @@ static json_t *error_of(int code, const char *message)
 static json_t *call_tool(client_session *s, const json_t *params)
 {
     const char *name = client_json_text(params, "name");
-    json_t *given = json_object_get(params, "arguments"), *none = json_object();
+    json_t *arguments = json_object_get(params, "arguments"), *none = json_object();
     json_t *answer = NULL;
     int which = 0;
     while (which < N_TOOLS && strcmp(TOOLS[which].name, name) != 0)
         which++;
-    if (which == N_TOOLS || (given && !json_is_object(given))) {
+    if (which == N_TOOLS || (arguments && !json_is_object(arguments))) {
         json_decref(none);
         return error_of(WRONG_PARAMS, which == N_TOOLS ? "there is no such tool" : "arguments are an object");
     }
-    answer = TOOLS[which].run(s, given ? given : none);
+    answer = TOOLS[which].run(s, arguments ? arguments : none);
     json_decref(none);
-    return json_pack("{s:o}", "result", answer ? answer : answer_text("no memory", 9, true));
+    return json_pack("{s:o}", "result", answer ? answer : answer_error("no memory"));
 }
 
 static json_t *initialize(const json_t *params)

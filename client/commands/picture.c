@@ -96,7 +96,8 @@ client_exit client_plot(client_session *s)
     if (s->options->trade) {
         json_t *trade;
         const client_query query[] = {{"case", s->options->case_name}, {NULL, NULL}};
-        client_exit code = client_get_json(s, &trade, client_path_with_query(s, "/work-precision", query));
+        client_exit code =
+            client_get_json(s, &trade, client_path_with_query(s, s->options->operand, "/work-precision", query));
         if (code == CLIENT_OK && !json_is_array(json_object_get(trade, "decades")))
             code = client_complain(s, CLIENT_SERVER_ERROR, "the reply has no decades; is this the right server?");
         else if (code == CLIENT_OK && s->options->json)
@@ -122,9 +123,9 @@ client_exit client_plot(client_session *s)
     const client_query curves[] = {
         {"case", o->case_name}, {"x", o->axis}, {"with", with.len ? with.data : NULL}, {NULL, NULL}};
     const client_query errors[] = {{"case", o->case_name}, {"width", o->width < 0 ? NULL : width}, {NULL, NULL}};
-    char *path = o->deformed      ? client_path_with_query(s, "/deformed.svg", deformed)
-                 : o->whole_error ? client_path_with_query(s, "/whole-error.svg", errors)
-                                  : client_path_with_query(s, "/convergence.svg", curves);
+    char *path = o->deformed      ? client_path_with_query(s, s->options->operand, "/deformed.svg", deformed)
+                 : o->whole_error ? client_path_with_query(s, s->options->operand, "/whole-error.svg", errors)
+                                  : client_path_with_query(s, s->options->operand, "/convergence.svg", curves);
     free(with.data);
     if (!path)
         return CLIENT_LOCAL;

@@ -174,7 +174,7 @@ static void put_warnings(const report *r)
 static client_exit put_picture(const report *r, const char *suffix, const char *colour, const char *caption)
 {
     const client_query query[] = {{"colour", colour}, {"case", r->case_name}, {NULL, NULL}};
-    char *path = client_path_with_query(r->s, suffix, query);
+    char *path = client_path_with_query(r->s, r->id, suffix, query);
     client_reply reply;
     if (!path)
         return CLIENT_LOCAL;

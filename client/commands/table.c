@@ -196,7 +196,7 @@ client_exit client_table(client_session *s, const char *fields)
         snprintf(wanted + used, sizeof wanted - used, ",%s", t.name[i]);
     }
     const client_query query[] = {{"fields", wanted}, {"case", s->options->case_name}, {NULL, NULL}};
-    code = client_get_json(s, &result, client_path_with_query(s, "/result", query));
+    code = client_get_json(s, &result, client_path_with_query(s, s->options->operand, "/result", query));
     t.to = code == CLIENT_OK ? open_memstream(&text, &len) : NULL;
     if (t.to) {
         const json_t *cases = json_object_get(result, "cases");

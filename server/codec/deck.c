@@ -51,14 +51,6 @@ static void put_name(text *t, const char *name)
     text_put(t, ":");
 }
 
-static void put_indices(text *t, const int64_t *index, int64_t n)
-{
-    text_open(t, NULL, '[');
-    for (int64_t i = 0; i < n && !t->failed; i++)
-        text_integer(t, NULL, index[i]);
-    text_close(t, ']');
-}
-
 /* Elements are numbered kind by kind in a request: number (elements) is where each comes to be. */
 static void put_elements(text *t, const uz_given_mesh *mesh, int64_t *number)
 {
@@ -72,7 +64,7 @@ static void put_elements(text *t, const uz_given_mesh *mesh, int64_t *number)
             if (next == before)
                 text_open(t, uz_element_name((uz_element_kind)k), '[');
             number[e] = next++;
-            put_indices(t, mesh->node + mesh->first[e], mesh->first[e + 1] - mesh->first[e]);
+            text_integers(t, NULL, mesh->node + mesh->first[e], mesh->first[e + 1] - mesh->first[e]);
         }
         if (next > before)
             text_close(t, ']');
@@ -87,15 +79,13 @@ static void put_groups(text *t, const uz_given_mesh *mesh, const int64_t *number
         const uz_given_group *group = &mesh->groups[g];
         put_name(t, group->name);
         text_open(t, NULL, '{');
-        if (group->n_nodes > 0) {
-            text_key(t, "nodes");
-            put_indices(t, group->node, group->n_nodes);
-        }
+        if (group->n_nodes > 0)
+            text_integers(t, "nodes", group->node, group->n_nodes);
         if (group->n_faces > 0) {
             text_open(t, mesh->dim == 2 ? "edges" : "faces", '[');
             for (int64_t i = 0; i < group->n_faces; i++)
-                put_indices(t, group->face_node + group->face_first[i],
-                            group->face_first[i + 1] - group->face_first[i]);
+                text_integers(t, NULL, group->face_node + group->face_first[i],
+                              group->face_first[i + 1] - group->face_first[i]);
             text_close(t, ']');
         }
         if (group->n_elements > 0) {
@@ -229,8 +219,7 @@ char *codec_encode_deck(const codec_deck *deck)
         text_close(&t, '}');
     }
     text_close(&t, ']');
-    text_key(&t, "node_numbers");
-    put_indices(&t, deck->deck.node_number, deck->deck.scene.given.n_nodes);
+    text_integers(&t, "node_numbers", deck->deck.node_number, deck->deck.scene.given.n_nodes);
     text_open(&t, "request", '{');
     put_scene(&t, &deck->deck.scene);
     text_close(&t, '}');

@@ -300,20 +300,12 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
     text_close(t, '}');
 }
 
-static void put_integers(text *t, const char *key, const int64_t *x, int64_t n)
-{
-    text_open(t, key, '[');
-    for (int64_t i = 0; i < n; i++)
-        text_integer(t, NULL, x[i]);
-    text_close(t, ']');
-}
-
 /* Cells that were chosen, elements that were bisected: the grids that were tried. */
 static void put_grids(text *t, const uz_grid_sequence *grids)
 {
     text_open(t, "mesh", '{');
     if (grids->cells[0] > 0)
-        put_integers(t, "cells", grids->cells, grids->dim);
+        text_integers(t, "cells", grids->cells, grids->dim);
     text_integer(t, "elements", grids->n_elements);
     text_bool(t, "refined", grids->refined);
     text_open(t, "ladder", '[');
@@ -321,7 +313,7 @@ static void put_grids(text *t, const uz_grid_sequence *grids)
         const uz_grid_level *level = &grids->level[i];
         text_open(t, NULL, '{');
         if (level->cells[0] > 0)
-            put_integers(t, "cells", level->cells, grids->dim);
+            text_integers(t, "cells", level->cells, grids->dim);
         text_integer(t, "elements", level->n_elements);
         text_integer(t, "d", level->d);
         text_integer(t, "iterations", level->iterations);
@@ -447,7 +439,7 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
         text_integer(&t, "free_modes", held->free_modes);
         text_integer(&t, "rounds", held->rounds);
         text_integer(&t, "held", held->held);
-        put_integers(&t, "held_by_rows", held->held_by, held->held < most ? held->held : most);
+        text_integers(&t, "held_by_rows", held->held_by, held->held < most ? held->held : most);
         text_close(&t, '}');
     }
     put_effort(&t, summary);

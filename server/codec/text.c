@@ -138,6 +138,14 @@ void text_numbers(text *t, const char *key, const double *x, int64_t n)
     text_close(t, ']');
 }
 
+void text_integers(text *t, const char *key, const int64_t *x, int64_t n)
+{
+    text_open(t, key, '[');
+    for (int64_t i = 0; i < n && !t->failed; i++)
+        text_integer(t, NULL, x[i]);
+    text_close(t, ']');
+}
+
 char *text_finish(text *t, size_t *len)
 {
     if (reserve(t, 0))

@@ -27,6 +27,7 @@ void text_number(text *t, const char *key, double value); /* shortest digits tha
 void text_bool(text *t, const char *key, bool value);
 void text_raw(text *t, const char *key, const char *json); /* JSON text embedded as it is; NULL becomes null */
 void text_numbers(text *t, const char *key, const double *x, int64_t n); /* an array */
+void text_integers(text *t, const char *key, const int64_t *x, int64_t n);
 void text_key(text *t, const char *key); /* the comma and the key only: the caller writes the value */
 
 /* The NUL-terminated text, owned by the caller; NULL if memory ran out. *len (may be NULL) without the NUL. */
