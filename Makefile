@@ -185,9 +185,11 @@ $(BUILD)/obj/%.o: %.c
 	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests -Itests/support) $(if $(filter tests/unit/%,$<),-O0) -c -o $@ $<
 
 # Contraction only saves roundings there; the double-double arithmetic of certificates must never have it.
-$(call obj,solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c $(wildcard solver/brick/*.c)): CFLAGS += -ffp-contract=fast
+CONTRACTED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c $(wildcard solver/brick/*.c)
+$(call obj,$(CONTRACTED)): CFLAGS += -ffp-contract=fast
 # Short loops of known length around the registers are unrolled.
-$(call obj,solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/post/*.c) solver/io/vtu.c): CFLAGS += -O3
+UNROLLED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/post/*.c) solver/io/vtu.c
+$(call obj,$(UNROLLED)): CFLAGS += -O3
 
 $(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS) $(BUILD)/gen/openapi.json
 	@mkdir -p $(@D)
@@ -278,27 +280,32 @@ $(BUILD)/%.so: tests/preload/%.c
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
         bench-size bench-deps peers peers-contact extremes theory roller trade figures numbers collect page-size
-test: deps-test ## build and pass every test; ONCE=1: but those of the daemon that make asan runs as they are
-	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
+test: deps-test ## build and pass every test; ONCE=1: but those that make asan runs as they are
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools $(BUILD)/guard \
+	    $(if $(ONCE),$(patsubst %,$(BUILD)/tests/%,$(notdir $(basename $(filter-out $(SAME_IN_ASAN),$(UNIT_SRC))))),unit-bins)
 	@tests/run.sh $(BUILD) "" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
 
 guard: deps-test ## instructions of small problems against those kept in tests/data/guard.json; KEEP=1: keep the new ones
 	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/guard
 	@$(PYTHON) -B tests/guard/guard.py $(BUILD) $(if $(KEEP),--keep)
 
-unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB)
+# What tests run besides both programs.
+.PHONY: test-tools
+test-tools: $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB)
+
+unit-bins: $(UNIT_BIN) test-tools
 
 test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 	@tests/run.sh $(BUILD) unit $(FILTER)
 
-test-api: all $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB) ## the tests that drive the real daemon and client; FILTER=name runs some
+test-api: all test-tools ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
 .PHONY: test-postgresql
 # In its short form some of them; test_daemons, test_database and the tests of the store are on it anyway.
 ON_POSTGRESQL ?= test_assert test_between test_client test_refine
 test-postgresql: deps-test ## tests of the daemon whose jobs are in PostgreSQL; ALL=1: all of them; FILTER=name runs some
-	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB)
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools
 	@UZAWA_STORE=postgresql tests/run.sh $(BUILD) api "$(FILTER)" "$(if $(ALL)$(FILTER),,$(ON_POSTGRESQL))"
 
 .PHONY: test-group
@@ -319,16 +326,19 @@ test-hygiene: ## formatting, static analysis, both compilers
 	@tests/run.sh $(BUILD) hygiene
 
 # Each sanitizer has a build of its own inside BUILD. Its reports need lines and no variables: with -g1 it compiles in
-# three quarters of the time.
-sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g1" SAN="$(2)"
+# three quarters of the time. Programs at a fixed address need not relocate the half a million pointers of what is
+# checked whenever one starts, and tests start them some thousand times.
+sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g1 -fno-pie" LDFLAGS=-no-pie SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that say
 # "not under ThreadSanitizer", or "not under sanitizers" at all.
 without_tsan = $(shell grep -L 'not under \(ThreadSanitizer\|sanitizers\)' $(1))
 TSAN_UNIT = $(notdir $(basename $(call without_tsan,$(shell grep -lE 'pthread_create|include "(http|base/log|store|work|core/aside)' $(UNIT_SRC)))))
 TSAN_API  = $(notdir $(basename $(call without_tsan,$(wildcard tests/api/test_*.py))))
 ASAN_API  = $(shell grep -L 'not under sanitizers' tests/api/test_*.py)
-# Of these, those that do no less there (tests/api/service.py) need not run in the ordinary build as well.
-SAME_IN_ASAN = $(shell grep -LE 'INSTRUMENTED|\<some\$(open)' $(ASAN_API))
+# Of these, those that do no less there (tests/api/service.py) need not run in the ordinary build as well; nor need C
+# tests, but for those of rooms whose sources the optimizer gets with flags of their own.
+TUNED_ROOMS = $(sort $(patsubst solver/%/,tests/unit/solver/%/%,$(dir $(CONTRACTED) $(UNROLLED))))
+SAME_IN_ASAN = $(shell grep -LE 'INSTRUMENTED|SANITIZED|\<some\$(open)' $(ASAN_API) $(filter-out $(TUNED_ROOMS),$(UNIT_SRC)))
 open := (
 # As tests/run.sh names them: KIND/NAME.
 programs = $(foreach test,$(1),$(word 2,$(subst /, ,$(test)))/$(notdir $(basename $(test))))

@@ -70,6 +70,8 @@ def test_killed_daemon_keeps_jobs(s):
 
 
 def test_signals_are_blocked_in_every_thread(s):
+    s.begins_masked = False
+    s.restart(signal.SIGTERM)
     s.solve(SCENE)
     # The first thread takes the signals: while it waits for them they are open there, and only there.
     for task in set(os.listdir(f"/proc/{s.process.pid}/task")) - {str(s.process.pid)}:

@@ -1,6 +1,7 @@
 """A bit that changes in the database file is found by its row's checksum: what is not what was written is never told as an
 answer, and everything else goes on. usage: test_damaged.py BUILD_DIR [FILTER]
 """
+# not under ThreadSanitizer: about a file, not about threads
 import pathlib
 import signal
 import struct

@@ -1,4 +1,5 @@
 """The files of server/deploy: they are well-formed, name what there is, and the programs that read them take them."""
+# not under ThreadSanitizer: about files, not about threads
 import json
 import os
 import pathlib

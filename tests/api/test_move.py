@@ -1,5 +1,6 @@
 """uzawad --move: a file's jobs in every state, results, uploads, keys, webhooks and owners come over into PostgreSQL, and
 the interface answers as before, byte for byte."""
+# not under ThreadSanitizer: about a program of one thread
 import contextlib
 import json
 import os

@@ -1,7 +1,7 @@
 """What a request gets does not depend on what others solved before: the short form of tests/soak/orders.py, with bodies
 whose outcome once did. usage: test_orders.py BUILD_DIR [FILTER]
 """
-# not under ThreadSanitizer: about answers, not about threads
+# not under sanitizers: about answers, of code that other tests run there
 import pathlib
 import sys
 

@@ -1,5 +1,6 @@
 """The whole error as a user sees it: grids with their price, estimates of peaks and areas, what is left of a search for a
 mesh, and pictures. usage: test_whole_error.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
 import math
