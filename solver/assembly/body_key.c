@@ -85,6 +85,23 @@ static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
     uz_buffer_put(key, hex, sizeof hex);
 }
 
+/* As large as a mesh. */
+static void put_triangles(uz_buffer *key, const uz_contact *contact)
+{
+    char hex[65] = "";
+    uz_digest *digest = uz_digest_new();
+    if (!digest) {
+        key->failed = true;
+        return;
+    }
+    add_array(digest, contact->x, contact->n_x, sizeof *contact->x);
+    add_array(digest, contact->y, contact->n_x, sizeof *contact->y);
+    add_array(digest, contact->z, contact->n_x, sizeof *contact->z);
+    if (!uz_digest_end(digest, hex))
+        key->failed = true;
+    uz_buffer_put(key, hex, sizeof hex);
+}
+
 /* Groups by where they are. All of them: what a load pushes on must be there in the body that is found. */
 static void put_selections(uz_buffer *key, const uz_scene *scene)
 {
@@ -170,9 +187,13 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
         put_doubles(key, contact->point, 3);
         put_double(key, contact->radius);
         put_int(key, contact->inside);
-        put_doubles(key, contact->x, n[0]);
-        put_doubles(key, contact->y, n[1]);
-        put_doubles(key, contact->z, n[2]);
+        if (contact->kind == UZ_OBSTACLE_SURFACE) {
+            put_triangles(key, contact);
+        } else {
+            put_doubles(key, contact->x, n[0]);
+            put_doubles(key, contact->y, n[1]);
+            put_doubles(key, contact->z, n[2]);
+        }
         put_name(key, contact->with, sizeof contact->with);
         put_names(key, &contact->with_groups);
         put_int(key, contact->between);

@@ -94,6 +94,25 @@ uz_status uz_abaqus_read(uz_given_mesh *out, const char *text, size_t len, size_
 uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,
                        uz_error *err);
 
+/* A surface in space: triangles by their corners, which go round counterclockwise seen from where their normals point.
+ */
+typedef struct {
+    int64_t n;         /* triangles */
+    double *x, *y, *z; /* 3 n: corners of triangle i are 3 i .. 3 i + 2 */
+    int64_t left_out;  /* triangles of the file without an area */
+} uz_triangles;
+void uz_triangles_clear(uz_triangles *triangles);
+/* Reads a surface: "stl" (ASCII or binary; normals follow from the order of corners, and a file in which most of those
+ * that it states contradict it is refused), or "obj" (Wavefront: v and f; polygons are divided into triangles from
+ * their first corner, names, materials, texture and normals are passed over; curves and free-form surfaces refused);
+ * NULL: by what it looks like. Corners that are no farther apart than 1e-6 of the surface's size are made one, as
+ * numbers in texts are rounded. max_bytes as of uz_gmsh_read. Errors: UZ_ERR_FORMAT, _UNSUPPORTED, _NOT_FINITE and
+ * _LIMIT with the line (of a binary file the message says the triangle), _MEMORY. */
+uz_status uz_triangles_read(uz_triangles *out, const char *format, const char *text, size_t len, size_t max_bytes,
+                            uz_error *err);
+/* Can it be an obstacle? As a scene with it is refused: see uz_obstacle_new. UZ_ERR_SCENE, UZ_ERR_MEMORY. */
+uz_status uz_triangles_check(const uz_triangles *triangles, bool inside, uz_error *err);
+
 /* What a selection is made of. */
 typedef enum {
     UZ_SELECT_WHAT_IS_THERE, /* sides, or where there are none, nodes */
@@ -181,6 +200,7 @@ typedef enum {
     UZ_OBSTACLE_CYLINDER, /* 3D: point on the axis, normal is the axis, radius, inside */
     UZ_OBSTACLE_POLYLINE, /* 2D: n_x points (x[i], y[i]), the obstacle on the right of the line as it goes on */
     UZ_OBSTACLE_HEIGHT,   /* z over x (2D: n_y = 0, z has n_x) or over x and y (z[j * n_x + i]): the obstacle below */
+    UZ_OBSTACLE_SURFACE,  /* 3D: n_x / 3 triangles, whose corners are (x[i], y[i], z[i]) in order; inside */
     UZ_OBSTACLE_BODY      /* the group `with` of the mesh, which may be or overlap `on`: the body may touch itself */
 } uz_obstacle_kind;
 /* Several groups that make one surface. */
@@ -203,7 +223,7 @@ typedef struct {
     uz_obstacle_kind kind;
     double point[3], normal[3];
     double radius;
-    bool inside; /* the body is within: a hole, a bowl */
+    bool inside; /* the body is within: a hole, a bowl, what a closed surface encloses */
     int64_t n_x, n_y;
     double *x, *y, *z;
     char with[64];

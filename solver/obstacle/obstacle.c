@@ -19,11 +19,10 @@
 /* In lengths of the way on which flanks are looked for: as close to both. */
 #define AS_CLOSE 1e-6
 
-static const uz_obstacle_shape *const shapes[] = {[UZ_OBSTACLE_PLANE] = &uz_shape_plane,
-                                                  [UZ_OBSTACLE_ROUND] = &uz_shape_round,
-                                                  [UZ_OBSTACLE_CYLINDER] = &uz_shape_cylinder,
-                                                  [UZ_OBSTACLE_POLYLINE] = &uz_shape_polyline,
-                                                  [UZ_OBSTACLE_HEIGHT] = &uz_shape_height};
+static const uz_obstacle_shape *const shapes[] = {
+    [UZ_OBSTACLE_PLANE] = &uz_shape_plane,       [UZ_OBSTACLE_ROUND] = &uz_shape_round,
+    [UZ_OBSTACLE_CYLINDER] = &uz_shape_cylinder, [UZ_OBSTACLE_POLYLINE] = &uz_shape_polyline,
+    [UZ_OBSTACLE_HEIGHT] = &uz_shape_height,     [UZ_OBSTACLE_SURFACE] = &uz_shape_surface};
 
 const uz_obstacle_shape *uz_obstacle_shape_of(uz_obstacle_kind kind)
 {
@@ -110,6 +109,7 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
         return status;
     scaled.gap /= o->scale; /* back to the caller's units */
     scaled.curvature *= o->scale;
+    scaled.facets /= o->scale;
     for (int c = 0; c < 3; c++)
         scaled.foot[c] /= o->scale;
     const double sum = scaled.gap + scaled.normal[0] + scaled.normal[1] + scaled.normal[2];

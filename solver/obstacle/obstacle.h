@@ -19,7 +19,9 @@
  *             clockwise, all but the polygon otherwise
  *   height    everything below the table: straight (2D) or bilinear (3D) between its values; beyond the table the
  *             values at its edge go on flat
- * The gap of the last two is the distance of the closest point, its foot. From a corner that juts out to x the normal
+ *   surface   what is behind the triangles (3D): what a closed surface encloses, or with `inside` everything but it;
+ *             behind an open one as far as it is closest, and beyond its rim nothing
+ * The gap of the last three is the distance of the closest point, its foot. From a corner that juts out to x the normal
  * is the direction from corner to x, turning from one side's normal to the other's; of several closest points (at a
  * concave corner) the one on the first segment, or the cell lowest in y and then in x, is taken. On a corner itself the
  * normal is the mean of those that meet there. */
@@ -40,6 +42,7 @@ typedef struct {
                        * says; < 0: it closes in, and sliding may lead into it unseen. INFINITY: a corner itself */
     double along[3];  /* solids: a unit tangent along which there is no curvature, of a cylinder its axis; 0: none */
     double foot[3];   /* the closest point of the obstacle's surface */
+    double facets;    /* a length: how far the facet there may be from the curve that it stands for; 0: it is none */
 } uz_gap;
 
 /* Refuses what is not an obstacle for this model, lines that cross or touch themselves too (they have no right side);

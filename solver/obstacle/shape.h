@@ -58,8 +58,8 @@ struct uz_obstacle_shape {
     /* The border in the plane, the obstacle on its right: its i-th point, and the way (any length) in which it goes on
      * beyond the first and the last one, zero where it does not. Returns how many points; 1: a line. NULL: in space. */
     int64_t (*outline)(double x[2], double way[2], const uz_contact *contact, int64_t i);
-    /* The surface in space: fills the shape's part of a patch (NULL: it has none); a point of it (NULL: in the plane).
-     */
+    /* The surface in space: fills the shape's part of a patch (NULL: it has none); a point of it (NULL: in the plane,
+     * and of triangles, which are in the lists). */
     void (*place)(uz_obstacle_patch *p);
     void (*surface)(double x[3], const uz_obstacle_patch *p, double s, double t);
 };
@@ -67,6 +67,7 @@ struct uz_obstacle_shape {
 /* NULL: UZ_OBSTACLE_BODY, which is none, and numbers that are no kind. */
 const uz_obstacle_shape *uz_obstacle_shape_of(uz_obstacle_kind kind);
 
-extern const uz_obstacle_shape uz_shape_plane, uz_shape_round, uz_shape_cylinder, uz_shape_polyline, uz_shape_height;
+extern const uz_obstacle_shape uz_shape_plane, uz_shape_round, uz_shape_cylinder, uz_shape_polyline, uz_shape_height,
+    uz_shape_surface;
 
 #endif

@@ -202,6 +202,30 @@ uz_status uz_scenery_paint_contacts(uz_raster *raster, const uz_scenery *scenery
 
 enum { CELLS = 40 };
 
+static void paint_triangle(uz_raster *raster, const uz_raster_point triangle[3])
+{
+    const uz_raster_point *o = &triangle[0], *p1 = &triangle[1], *p2 = &triangle[2];
+    const double a[3] = {p1->x - o->x, p1->y - o->y, p1->z - o->z};
+    const double b[3] = {p2->x - o->x, p2->y - o->y, p2->z - o->z};
+    double n[3];
+    uz_cross3(n, a, b);
+    uz_make_unit3(n, (const double[3]){0, 0, 1});
+    uz_raster_triangle(raster, triangle, 0.75 + 0.25 * fabs(n[2])); /* full where it faces the eye */
+}
+
+static void paint_triangles(uz_raster *raster, const uz_scenery *scenery, const uz_contact *contact)
+{
+    for (int64_t i = 0; i + 2 < contact->n_x; i += 3) {
+        uz_raster_point at[3];
+        for (int k = 0; k < 3; k++) {
+            const double x[3] = {contact->x[i + k], contact->y[i + k], contact->z[i + k]};
+            at[k] = uz_scenery_point(scenery, x);
+            at[k].value = NAN;
+        }
+        paint_triangle(raster, at);
+    }
+}
+
 static void paint_patch(uz_raster *raster, const uz_scenery *scenery, const uz_obstacle_patch *p)
 {
     const uz_obstacle_shape *shape = uz_obstacle_shape_of(p->contact->kind);
@@ -218,13 +242,7 @@ static void paint_patch(uz_raster *raster, const uz_scenery *scenery, const uz_o
             }
             for (int k = 0; k < 2; k++) {
                 const uz_raster_point triangle[3] = {at[CORNER[k][0]], at[CORNER[k][1]], at[CORNER[k][2]]};
-                const uz_raster_point *o = &triangle[0], *p1 = &triangle[1], *p2 = &triangle[2];
-                const double a[3] = {p1->x - o->x, p1->y - o->y, p1->z - o->z};
-                const double b[3] = {p2->x - o->x, p2->y - o->y, p2->z - o->z};
-                double n[3];
-                uz_cross3(n, a, b);
-                uz_make_unit3(n, (const double[3]){0, 0, 1});
-                uz_raster_triangle(raster, triangle, 0.75 + 0.25 * fabs(n[2])); /* full where it faces the eye */
+                paint_triangle(raster, triangle);
             }
         }
 }
@@ -253,7 +271,10 @@ bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery)
         memset(p.foot, 0, sizeof p.foot);
         if (shape->place)
             shape->place(&p);
-        paint_patch(raster, scenery, &p);
+        if (shape->surface)
+            paint_patch(raster, scenery, &p);
+        else
+            paint_triangles(raster, scenery, p.contact);
         painted = true;
     }
     return painted;

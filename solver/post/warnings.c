@@ -348,6 +348,37 @@ static void look_at_mismatch(const doubts *d, int64_t k, int64_t *row)
              contact->on, contact->with);
 }
 
+/* Before an obstacle of triangles: how far those that are pressed on may be from the curve that they stand for. */
+static uz_status look_at_triangles(const doubts *d, int64_t k, uz_error *err)
+{
+    const uz_body_model *model = d->model;
+    const uz_contact *contact = &d->scene->contacts[k];
+    const uz_law *law = model->law;
+    uz_obstacle *obstacle = NULL;
+    double most = 0;
+    const uz_status status =
+        contact->kind == UZ_OBSTACLE_SURFACE ? uz_obstacle_new(&obstacle, contact, k, d->scene->model, err) : UZ_OK;
+    for (int64_t row = 0; row < model->m && obstacle; row++) {
+        double x[3];
+        uz_gap there;
+        if (model->info.contact_of[row] != k || law->kind->active(law, NULL, &d->r[row], 1) == 0)
+            continue;
+        for (int c = 0; c < 3; c++) {
+            const int64_t i = model->info.contact_node[row] * 3 + c;
+            x[c] = model->mesh.xyz[i] + d->u[i];
+        }
+        if (uz_obstacle_gap(&there, obstacle, x, NULL) == UZ_OK)
+            most = fmax(most, there.facets);
+    }
+    uz_obstacle_free(obstacle);
+    if (most > MOST_FACETS * d->out->approach)
+        warn(d->out, "facets", most / d->out->approach,
+             "triangles of the obstacle of contact %lld are off the curve that they stand for by about %.2g, with an "
+             "approach of %.2g: take a finer file",
+             (long long)k, most, d->out->approach);
+    return status;
+}
+
 /* Have warnings with one of these codes been given? */
 static bool is_said(const uz_evaluation *out, const char *const code[], int codes)
 {
@@ -495,7 +526,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
         d.out->nonlinear = may_be_nonlinear(&d) ? uz_measure_nonlinear(model, result->u, d.out->strain_energy) : 0;
     look_at_mesh(&d);
     look_at_surfaces(&d);
-    const uz_status status = look_at_contact(&d, err);
+    uz_status status = look_at_contact(&d, err);
     for (int64_t k = 0, row = 0; k < scene->n_contacts && status == UZ_OK; k++) {
         const uz_overlap *o = &d.out->overlap[k];
         const double approach = d.out->approach, scale = fmax(approach, o->depth);
@@ -505,6 +536,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
                  "facets of contact %lld are off their smooth surface by %.2g, with an approach of %.2g and an overlap "
                  "of %.2g; smooth, or refine",
                  (long long)k, o->facets_left, approach, o->depth);
+        status = look_at_triangles(&d, k, err);
         look_at_overlap(&d, k);
     }
     look_at_peak(&d, result->pressure);

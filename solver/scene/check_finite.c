@@ -75,6 +75,10 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
                            "finite kinematics have contact with rigid obstacles only; give an obstacle, or use the "
                            "kinematics \"moving\"");
+        if (scene->contacts[i].kind == UZ_OBSTACLE_SURFACE)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "obstacle/surface"),
+                           "finite kinematics of solids have planes, spheres and cylinders for obstacles; use these, "
+                           "or the kinematics \"moving\"");
         if (scene->contacts[i].kind == UZ_OBSTACLE_HEIGHT && scene->model == UZ_SOLID) /* cells between values bend */
             return uz_fail(
                 err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "obstacle/height"),

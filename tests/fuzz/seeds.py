@@ -1,4 +1,4 @@
-"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/*, OUT/gmsh/* and OUT/abaqus/*, one seed a file, and
+"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/*, OUT/gmsh/*, OUT/abaqus/* and OUT/surface/*, one seed a file, and
 OUT/json.dict and the same of the others.
 
 Seeds come from tests/data, and from the shared cases where they are there; the words of the JSON dictionary are the
@@ -23,6 +23,7 @@ GMSH_WORDS = ["$MeshFormat", "$EndMeshFormat", "2.2 0 8", "4.1 0 8", "2.2 1 8", 
 ABAQUS_WORDS = ["*NODE", "*ELEMENT", "*NSET", "*ELSET", "*SURFACE", "*PART", "*INSTANCE", ", TYPE=", ", NSET=", ", ELSET=", ", NAME=", ", GENERATE",
                 ", ELSET=E", "CPS3", "CPE8R", "CAX4", "C3D4", "C3D20R", "C3D15", "S4", "T3D2", "S1", "S6", "\n", "\r\n", "**", "1e308", "1D3",
                 "9223372036854775807", '"a b"']
+SURFACE_WORDS = ["solid", "facet normal", "outer loop", "vertex", "endloop", "endfacet", "endsolid", "v ", "f ", "vn ", "1/1/1", "-1", "\n", "1e308"]
 JSON_WORDS = ["null", "true", "false", "1e400", "-0.0", "1e-320", "9223372036854775808", "[[", "]]", "{}", "\\u0000", "\\ud800"]
 
 
@@ -61,6 +62,17 @@ def abaqus_seeds():
     sets = "*NSET, NSET=A, GENERATE\n1,4,2\n*NSET, NSET=B\nA, 2\n*ELSET, ELSET=A\nE\n*SURFACE, NAME=S\nE, S1\n*SURFACE, NAME=T, TYPE=NODE\nB\n"
     for kind, of in (("CPS3", "1,2,4"), ("CPE4R", "1,2,3,4"), ("C3D4", "1,2,4,5"), ("C3D8", "1,2,3,4,5,6,7,8"), ("C3D6", "1,2,4,5,6,8")):
         yield f"** made\n{nodes}*ELEMENT, TYPE={kind}, ELSET=E\n10,{of}\n*ELEMENT, TYPE=T3D2, ELSET=L\n11,1,2\n{sets}*STEP\n*STATIC\n".encode()
+
+
+def surface_seeds():
+    """A tetrahedron in each form, closed, and without its last triangle."""
+    corner = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    for faces in ([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)], [(0, 2, 1), (0, 1, 3), (0, 3, 2)]):
+        yield ("solid a\n" + "".join("facet normal 0 0 0\nouter loop\n" + "".join("vertex {} {} {}\n".format(*corner[i]) for i in face) +
+                                     "endloop\nendfacet\n" for face in faces) + "endsolid a\n").encode()
+        yield bytes(80) + struct.pack("<I", len(faces)) + b"".join(
+            struct.pack("<12fH", 0, 0, 0, *(x for i in face for x in corner[i]), 0) for face in faces)
+        yield ("".join("v {} {} {}\n".format(*p) for p in corner) + "".join("f {}/1 {}//2 {}\n".format(*(i + 1 for i in face)) for face in faces)).encode()
 
 
 def gmsh_sections(version, binary, sections):
@@ -136,10 +148,12 @@ def main():
     write_seeds(out / "mm", mm_seeds())
     write_seeds(out / "gmsh", gmsh_seeds())
     write_seeds(out / "abaqus", abaqus_seeds())
+    write_seeds(out / "surface", surface_seeds())
     write_dictionary(out / "json.dict", [*(f'"{word}"' for word in words(schema)), *JSON_WORDS])
     write_dictionary(out / "mm.dict", MM_WORDS)
     write_dictionary(out / "gmsh.dict", GMSH_WORDS)
     write_dictionary(out / "abaqus.dict", ABAQUS_WORDS)
+    write_dictionary(out / "surface.dict", SURFACE_WORDS)
 
 
 main()

@@ -45,6 +45,19 @@ static void make_line(void)
     make(&(uz_contact){.kind = UZ_OBSTACLE_POLYLINE, .n_x = 3, .x = X, .y = Y}, UZ_PLANE_STRAIN);
 }
 
+/* A tetrahedron; its file. */
+static void make_surface(void)
+{
+    static const char *const FILE_TEXT = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    uz_triangles t;
+    uz_error err = {0};
+    const uz_status status = uz_triangles_read(&t, "obj", FILE_TEXT, strlen(FILE_TEXT), 0, &err);
+    CHECK_INT(status, heap.failed ? UZ_ERR_MEMORY : UZ_OK);
+    if (status == UZ_OK)
+        make(&(uz_contact){.kind = UZ_OBSTACLE_SURFACE, .n_x = 3 * t.n, .x = t.x, .y = t.y, .z = t.z}, UZ_SOLID);
+    uz_triangles_clear(&t);
+}
+
 /* Lines, an arc that is parted, and corners. */
 static void make_along(void)
 {
@@ -113,6 +126,7 @@ TEST(every_allocation_may_fail)
     CHECK_INT(fail_each(make_line), 7);
     CHECK_INT(fail_each(make_along), 12);
     CHECK_INT(fail_each(make_table), 8);
+    CHECK(fail_each(make_surface) > 15);
     CHECK_INT(fail_each(make_pairs), 9);
     CHECK_INT(fail_each(choose), 5);
 }
