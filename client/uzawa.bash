@@ -19,7 +19,7 @@ _uzawa() {
     done
     case $command in
     '') options='--server --timeout --retry --help --version'; words=$commands ;;
-    submit) options='--K --N --h --p --mesh --leave-out --set --vary --wait --timeout --tag --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
+    submit) options='--K --N --h --p --mesh --surface --leave-out --set --vary --wait --timeout --tag --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
     import) options='--leave-out --output --quiet --json --server --timeout --retry --help --version ' ;;
     upload) options='--json --server --timeout --retry --help --version ' ;;
     status) options='--json --server --timeout --retry --help --version ' ;;
@@ -49,6 +49,7 @@ _uzawa() {
     submit--h) files=1 ;;
     submit--p) files=1 ;;
     submit--mesh) files=1 ;;
+    submit--surface) files=1 ;;
     submit--set) words='' ;;
     submit--vary) words='' ;;
     submit--timeout|submit-t) words='' ;;

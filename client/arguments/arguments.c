@@ -115,8 +115,9 @@ static bool check_all(parser *p)
     if (!o->operand && page->operands & CLIENT_OPERAND_NEEDED)
         return fail(p, "%s wants %s %s", page->name, *page->operand == 'I' ? "an" : "a", page->operand);
     if (!o->operand && o->command == CLIENT_SUBMIT && !matrices)
-        return o->mesh ? fail(p, "--mesh wants a FILE with the scene whose mesh it replaces")
-                       : fail(p, "submit wants a FILE, or --K and --p");
+        return o->surface ? fail(p, "--surface wants a FILE with the scene whose obstacle it is")
+               : o->mesh  ? fail(p, "--mesh wants a FILE with the scene whose mesh it replaces")
+                          : fail(p, "submit wants a FILE, or --K and --p");
     if (!o->operand && o->command == CLIENT_SUBMIT && (!o->K || !o->p || !o->N != !o->h))
         return fail(p, "without a FILE submit wants --K and --p, and --N and --h both or neither");
     if (o->csv + o->plot + o->json > 1)
@@ -144,10 +145,12 @@ static bool check_all(parser *p)
         return fail(p, "--quiet and --json contradict each other");
     if (o->command == CLIENT_HISTORY && !o->plot && (o->width >= 0 || o->height >= 0 || o->ascii))
         return fail(p, "--width, --height and --ascii want --plot");
+    if (o->surface && matrices)
+        return fail(p, "--surface is of a scene, --K, --N, --h and --p of a problem in matrices: choose one");
     if (o->mesh && matrices)
         return fail(p, "--mesh is of a scene, --K, --N, --h and --p of a problem in matrices: choose one");
     /* At most one of the files is standard input. */
-    const char *files[] = {o->operand, o->K, o->N, o->h, o->p, o->mesh};
+    const char *files[] = {o->operand, o->K, o->N, o->h, o->p, o->mesh, o->surface};
     int count = 0;
     for (size_t i = 0; i < sizeof files / sizeof *files; i++)
         count += files[i] && strcmp(files[i], "-") == 0;

@@ -18,8 +18,8 @@ typedef struct {
     double timeout_s;    /* INFINITY: none */
     double retry_s;      /* how long to try to reach the server; < 0: chosen by the command */
     uz_words tags, set, vary, fields, with;
-    const char *K, *N, *h, *p, *mesh; /* files; NULL: not given */
-    bool leave_out;                   /* of a deck */
+    const char *K, *N, *h, *p, *mesh, *surface; /* files; NULL: not given */
+    bool leave_out;                             /* of a deck */
     const char *key, *format, *output, *status, *colour, *factor, *axis;
     const char *case_name, *accuracy;         /* accuracy: a number or a level, as written */
     double time_limit_s;                      /* NAN: not given */

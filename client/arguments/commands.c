@@ -124,6 +124,8 @@ static const uz_option OPTIONS[] = {
     OPTION("p", 0, WORD, p, IN(SUBMIT), .value = "FILE", .about = "the load"),
     OPTION("mesh", 0, WORD, mesh, IN(SUBMIT), .value = "FILE",
            .about = "a Gmsh file (2.2 or 4.1) in place of the scene's mesh"),
+    OPTION("surface", 0, WORD, surface, IN(SUBMIT), .value = "FILE",
+           .about = "an STL or OBJ file for each obstacle {\"surface\": {}} of the scene that names no file itself"),
     OPTION("leave-out", 0, FLAG, leave_out, IN(SUBMIT) | IN(IMPORT),
            .about = "of a deck, leave out what a scene has no words for, although the answer is another one with it"),
     OPTION("set", 0, WORDS, set, IN(SUBMIT), .most = CLIENT_MAX_WORDS, .value = "PATH=VALUE",

@@ -86,6 +86,12 @@ function height_patch(surface, { x, y, z }, size) {
   }, xs.length - 1, ys.length - 1);
 }
 
+/** Triangles by their corners, one after another. */
+function surface_patch(surface, { corners }) {
+  const points = new Float32Array(corners.flatMap((x) => to_body(surface, x)));
+  return { points, index: Uint32Array.from({ length: corners.length }, (_, i) => i) };
+}
+
 /** Obstacles in space as {points, index}. */
 export function obstacle_patches(surface) {
   const size = extent_of(surface);
@@ -93,6 +99,7 @@ export function obstacle_patches(surface) {
     if (obstacle.plane) return plane_patch(surface, obstacle.plane, size);
     if (obstacle.sphere) return sphere_patch(surface, obstacle.sphere, size);
     if (obstacle.cylinder) return cylinder_patch(surface, obstacle.cylinder, size);
+    if (obstacle.surface) return surface_patch(surface, obstacle.surface);
     return obstacle.height ? height_patch(surface, obstacle.height, size) : null;
   }).filter(Boolean);
 }

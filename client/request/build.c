@@ -4,6 +4,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #define INLINE_MOST (64u << 10) /* larger files are uploaded: they are sent once, however many jobs name them */
 
@@ -61,6 +62,37 @@ static const char *mesh_format(const char *path)
     return client_is_deck(path) ? "abaqus" : "gmsh";
 }
 
+/* The key of a surface, by the name of its file. */
+static const char *surface_format(const char *path)
+{
+    const size_t length = strlen(path), end = client_is_packed(path) ? length - 3 : length;
+    return end > 4 && strncasecmp(path + end - 4, ".obj", 4) == 0 ? "obj" : "stl";
+}
+
+/* The file for all obstacles that are surfaces without one. */
+static client_exit put_surface(client_session *s, json_t *request, const char *path)
+{
+    json_t *contact, *problem = json_object_get(request, "problem"), *sent = json_object();
+    const char *key = surface_format(path);
+    size_t i, count = 0;
+    client_exit code = sent ? client_put_file(s, sent, key, path) : client_complain(s, CLIENT_LOCAL, "no memory");
+    json_array_foreach(json_object_get(problem, "contacts"), i, contact)
+    {
+        json_t *surface = json_object_get(json_object_get(contact, "obstacle"), "surface");
+        if (code != CLIENT_OK || !json_is_object(surface) || json_object_get(surface, "stl") ||
+            json_object_get(surface, "obj"))
+            continue;
+        if (json_object_set(surface, key, json_object_get(sent, key)) != 0)
+            code = client_complain(s, CLIENT_LOCAL, "no memory");
+        count++;
+    }
+    json_decref(sent);
+    if (code == CLIENT_OK && count == 0)
+        code = client_complain(s, CLIENT_USAGE,
+                               "--surface: no contact of FILE has an obstacle {\"surface\": {}} without a file");
+    return code;
+}
+
 client_exit client_build_files(client_session *s, json_t *request)
 {
     const client_options *o = s->options;
@@ -74,8 +106,11 @@ client_exit client_build_files(client_session *s, json_t *request)
         if (problem)
             json_object_set(problem, "mesh", mesh);
         json_decref(mesh);
-        return code;
     }
+    if (o->surface && code == CLIENT_OK)
+        code = put_surface(s, request, o->surface);
+    if (o->mesh || o->surface)
+        return code;
     if (!o->K && !o->N && !o->h && !o->p)
         return CLIENT_OK;
     json_t *problem = problem_of(s, request, "matrices");
@@ -192,7 +227,8 @@ client_exit client_build(client_session *s, client_bodies *out)
     *out = (client_bodies){0};
     if (o->operand && !client_is_deck(o->operand) && !client_file_read(&file, o->operand, message, sizeof message))
         return client_complain(s, CLIENT_LOCAL, message);
-    if (o->K || o->N || o->h || o->p || o->mesh || o->set.count || o->vary.count || client_is_deck(o->operand)) {
+    if (o->K || o->N || o->h || o->p || o->mesh || o->surface || o->set.count || o->vary.count ||
+        client_is_deck(o->operand)) {
         code = build_edited(s, out, &file);
     } else {
         out->item = calloc(1, sizeof *out->item);

@@ -14,9 +14,9 @@ typedef struct {
     size_t count;
 } client_bodies;
 
-/* From FILE, --K and the like, --mesh, --set, --vary and --tag; large files are uploaded on the way. A FILE that
- * nothing is put into goes as it is, byte for byte but for tags. CLIENT_USAGE: a path or value is wrong; CLIENT_LOCAL:
- * a file is, or no memory; else what the upload ended with. Told on s->err. The caller clears *out. */
+/* From FILE, --K and the like, --mesh, --surface, --set, --vary and --tag; large files are uploaded on the way. A FILE
+ * that nothing is put into goes as it is, byte for byte but for tags. CLIENT_USAGE: a path or value is wrong;
+ * CLIENT_LOCAL: a file is, or no memory; else what the upload ended with. Told on s->err. The caller clears *out. */
 client_exit client_build(client_session *s, client_bodies *out);
 void client_bodies_clear(client_bodies *bodies);
 

@@ -46,7 +46,9 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
     static const struct {
         const char *where, *syntax, *unsupported;
     } MESHES[] = {{"/mesh/gmsh", "gmsh_syntax", "gmsh_unsupported"},
-                  {"/mesh/abaqus", "abaqus_syntax", "abaqus_unsupported"}};
+                  {"/mesh/abaqus", "abaqus_syntax", "abaqus_unsupported"},
+                  {"/surface/stl", "stl_syntax", "stl_unsupported"},
+                  {"/surface/obj", "obj_syntax", "obj_unsupported"}};
     const uz_status status = err->status;
     const char *where = err->where, *code = uz_status_name(status), *within = "/problem";
     /* The library reads several formats of text and has one status for all. */

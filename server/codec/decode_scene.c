@@ -4,6 +4,7 @@
 #include "codec/room.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -135,6 +136,54 @@ static bool read_height(const obstacle *o)
     return to->z || problem_no_memory(o->d->problem);
 }
 
+/* The file of a surface, its units and its place. */
+static bool read_surface(const obstacle *o)
+{
+    static const char *const FORMATS[] = {"stl", "obj"}; /* names of readers (solver/io/triangles.h) */
+    const double scale = json_number(json_get(o->shape, "scale"), 1);
+    const bool flip = json_truth(json_get(o->shape, "flip"));
+    double offset[3] = {0};
+    uz_triangles read = {.n = 0};
+    uz_error err = {.status = UZ_OK};
+    decode_source file;
+    if (o->dim == 3 && !decode_components(offset, o->d, o->shape, "offset", 0, 3, NULL))
+        return false;
+    size_t k = 0;
+    while (k + 1 < sizeof FORMATS / sizeof FORMATS[0] && !json_get(o->shape, FORMATS[k]))
+        k++;
+    const json_value *value = json_get(o->shape, FORMATS[k]);
+    if (!decode_source_open(&file, o->d, value))
+        return false;
+    const bool good =
+        uz_triangles_read(&read, FORMATS[k], file.data, file.len, o->d->bound + 32 * file.len, &err) == UZ_OK;
+    decode_source_close(&file);
+    if (!good) {
+        snprintf(err.where, sizeof err.where, "/surface/%s", FORMATS[k]);
+        codec_problem_from_error(o->d->problem, &err, UZ_PROBLEM_SCENE);
+        json_pointer(o->d->problem->pointer, sizeof o->d->problem->pointer, value);
+        return false;
+    }
+    double *const x[3] = {read.x, read.y, read.z};
+    for (int c = 0; c < 3; c++)
+        for (int64_t i = 0; i < 3 * read.n; i++)
+            x[c][i] = x[c][i] * scale + offset[c];
+    for (int c = 0; c < 3 && flip; c++)
+        for (int64_t i = 0; i < 3 * read.n; i += 3) {
+            const double second = x[c][i + 1];
+            x[c][i + 1] = x[c][i + 2];
+            x[c][i + 2] = second;
+        }
+    o->to->n_x = 3 * read.n;
+    o->to->x = read.x;
+    o->to->y = read.y;
+    o->to->z = read.z;
+    if (uz_triangles_check(&read, json_truth(json_get(o->shape, "inside")), &err) == UZ_OK)
+        return true;
+    codec_problem_from_error(o->d->problem, &err, UZ_PROBLEM_SCENE);
+    json_pointer(o->d->problem->pointer, sizeof o->d->problem->pointer, o->shape);
+    return false;
+}
+
 /* A shape has a point, a direction (what: that is not zero) and a radius, or a reader of its own. */
 static const struct {
     const char *key;
@@ -148,6 +197,7 @@ static const struct {
     {"cylinder", UZ_OBSTACLE_CYLINDER, "point", "axis", "it must be the direction of the axis", NULL},
     {"polyline", UZ_OBSTACLE_POLYLINE, NULL, NULL, NULL, read_polyline},
     {"height", UZ_OBSTACLE_HEIGHT, NULL, NULL, NULL, read_height},
+    {"surface", UZ_OBSTACLE_SURFACE, NULL, NULL, NULL, read_surface},
 };
 
 /* A group, or several by which a surface is named. */

@@ -176,9 +176,38 @@ static void put_drawn(text *t, const char *key, const uz_drawn *drawn, int acces
     text_close(t, '}');
 }
 
-/* An obstacle in the words of a request. */
-static void put_obstacle(text *t, const uz_contact *c, int dim)
+/* The triangles of a surface that are near the body, as corners one after another, as far as there is room. */
+static void put_triangles(text *t, const uz_contact *c, const uz_surface *s)
 {
+    enum { MOST = 20000 };
+    double low[3], high[3], size = 0;
+    for (int i = 0; i < 3; i++) { /* of the body, in the scene's coordinates, and as far beyond */
+        low[i] = s->origin[i] + s->unit * (double)s->low[i];
+        high[i] = s->origin[i] + s->unit * (double)s->high[i];
+        size = high[i] - low[i] > size ? high[i] - low[i] : size;
+    }
+    text_open(t, "surface", '{');
+    text_integer(t, "triangles", c->n_x / 3);
+    text_open(t, "corners", '[');
+    for (int64_t i = 0, put = 0; i + 2 < c->n_x && put < MOST; i += 3) {
+        const double *const x[3] = {c->x + i, c->y + i, c->z + i};
+        bool away = false;
+        for (int k = 0; k < 3; k++) {
+            const double least = low[k] - size, most = high[k] + size;
+            away = away || (x[k][0] < least && x[k][1] < least && x[k][2] < least) ||
+                   (x[k][0] > most && x[k][1] > most && x[k][2] > most);
+        }
+        for (int k = 0; k < 3 && !away; k++)
+            text_numbers(t, NULL, (const double[]){x[0][k], x[1][k], x[2][k]}, 3);
+        put += !away;
+    }
+    text_close(t, ']');
+}
+
+/* An obstacle in the words of a request. */
+static void put_obstacle(text *t, const uz_contact *c, const uz_surface *s)
+{
+    const int dim = s->dim;
     const bool cylinder = c->kind == UZ_OBSTACLE_CYLINDER;
     text_open(t, NULL, '{');
     text_string(t, "on", c->on);
@@ -210,6 +239,8 @@ static void put_obstacle(text *t, const uz_contact *c, int dim)
         } else {
             text_numbers(t, "z", c->z, c->n_x);
         }
+    } else if (c->kind == UZ_OBSTACLE_SURFACE) {
+        put_triangles(t, c, s);
     } else {
         text_open(t, cylinder ? "cylinder" : dim == 2 ? "circle" : "sphere", '{');
         text_numbers(t, cylinder ? "point" : "center", c->point, dim);
@@ -257,7 +288,7 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
     text_close(t, '}');
     text_open(t, "contacts", '[');
     for (int64_t k = 0; k < scene->n_contacts; k++)
-        put_obstacle(t, &scene->contacts[k], s->dim);
+        put_obstacle(t, &scene->contacts[k], s);
     text_close(t, ']');
     text_close(t, '}');
 }
