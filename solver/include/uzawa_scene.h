@@ -74,12 +74,12 @@ typedef struct {
 } uz_given_mesh;
 void uz_given_mesh_clear(uz_given_mesh *mesh);
 
-/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary. Nodes and elements are numbered from 0 in the order of
- * the file; only the elements of the highest dimension are elements. Physical groups of that dimension become groups of
- * elements, of one less groups of edges or faces, of still less groups of nodes; one without a name is "physical_7", or
- * "physical_7_dim1" if a nameless one of higher dimension has that number too. A flat mesh (all z equal) is plane;
- * other surfaces are refused. max_bytes (0: none) bounds what the result may take. Errors: UZ_ERR_FORMAT, _UNSUPPORTED,
- * _NOT_FINITE, _LIMIT with the line (of a binary file the message says the byte), _MEMORY.
+/* Reads a whole Gmsh file, version 2.2, 4.0 or 4.1, ASCII or binary. Nodes and elements are numbered from 0 in the
+ * order of the file; only the elements of the highest dimension are elements. Physical groups of that dimension become
+ * groups of elements, of one less groups of edges or faces, of still less groups of nodes; one without a name is
+ * "physical_7", or "physical_7_dim1" if a nameless one of higher dimension has that number too. A flat mesh (all z
+ * equal) is plane; other surfaces are refused. max_bytes (0: none) bounds what the result may take. Errors:
+ * UZ_ERR_FORMAT, _UNSUPPORTED, _NOT_FINITE, _LIMIT with the line (of a binary file the message says the byte), _MEMORY.
  * Source: Gmsh reference manual, section "Gmsh file formats". */
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 /* Reads the mesh of an input file of Abaqus or CalculiX: *NODE, *ELEMENT, *NSET, *ELSET, *SURFACE; the rest of the deck

@@ -297,17 +297,17 @@ static uz_status read_header(gmsh_file *file)
         status = gmsh_int_text(text, &binary, "the file type");
     if (status == UZ_OK)
         status = gmsh_int_text(text, &size, "the data size");
-    if (status == UZ_OK && version != 2.2 && version != 4.1)
-        status = gmsh_fail(text, UZ_ERR_UNSUPPORTED,
-                           "version %g of the format is not read; save as version 2.2 or 4.1 (Mesh.MshFileVersion)",
-                           version);
+    if (status == UZ_OK && version != 2.2 && version != 4.0 && version != 4.1)
+        status = gmsh_fail(
+            text, UZ_ERR_UNSUPPORTED,
+            "version %g of the format is not read; save as version 2.2, 4.0 or 4.1 (Mesh.MshFileVersion)", version);
     if (status == UZ_OK && binary != 0 && binary != 1)
         status =
             gmsh_fail(text, UZ_ERR_FORMAT, "the file type is %lld; it is 0 (ASCII) or 1 (binary)", (long long)binary);
     if (status == UZ_OK && size != 8)
         status =
             gmsh_fail(text, UZ_ERR_UNSUPPORTED, "numbers of %lld bytes are not read; only those of 8", (long long)size);
-    file->version = version == 2.2 ? 22 : 41;
+    file->version = version == 2.2 ? 22 : version == 4.0 ? 40 : 41;
     if (status == UZ_OK)
         status = gmsh_end_line(text);
     if (status != UZ_OK)
@@ -348,8 +348,11 @@ uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t 
             status = gmsh_read_nodes(&file);
         else if (strcmp(name, "Elements") == 0)
             status = gmsh_read_elements(&file);
-        else if (file.version == 41 && strcmp(name, "Entities") == 0)
+        else if (file.version >= 40 && strcmp(name, "Entities") == 0)
             status = gmsh_read_entities(&file, false);
+        else if (file.version == 40 && strcmp(name, "PartitionedEntities") == 0)
+            status = gmsh_fail(&file.text, UZ_ERR_UNSUPPORTED,
+                               "partitions of version 4.0 are not read: save as version 4.1");
         else if (file.version == 41 && strcmp(name, "PartitionedEntities") == 0)
             status = gmsh_read_entities(&file, true);
         else {

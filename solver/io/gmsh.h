@@ -1,6 +1,7 @@
 /* gmsh.h: a Gmsh file while it is read. Private to uz_gmsh_read.
  *
- * Source of the formats: Gmsh reference manual, sections "MSH file format" (4.1) and "MSH file format version 2". */
+ * Source of the formats: Gmsh reference manual, sections "MSH file format" (4.1) and "MSH file format version 2"; that
+ * of Gmsh 4.0 for 4.0, whose numbers of nodes and elements have 4 bytes, and whose heads another order. */
 #ifndef UZ_SCENE_GMSH_H
 #define UZ_SCENE_GMSH_H
 
@@ -32,9 +33,9 @@ uz_status gmsh_real_text(gmsh_text *text, double *value);
 /* A text in double quotes: at most 63 bytes of UTF-8 without control characters. */
 uz_status gmsh_quoted(gmsh_text *text, char out[64]);
 
-/* The head of a section in version 4.1: numbers of blocks and of items, the least and the largest tag. what: the
- * numbers of blocks, of items, and of one of them, for messages. */
-uz_status gmsh_head_4(gmsh_text *text, int64_t *blocks, int64_t *count, const char *const what[3]);
+/* The head of a section in version 4.0 and 4.1: numbers of blocks and of items, in 4.1 the least and the largest tag.
+ * what: the numbers of blocks, of items, and of one of them, for messages. */
+uz_status gmsh_head_4(gmsh_text *text, int version, int64_t *blocks, int64_t *count, const char *const what[3]);
 
 /* A count of items that take at least so many bytes each: refused if the file is too short for them. */
 uz_status gmsh_count(const gmsh_text *text, int64_t count, size_t each, const char *what);
@@ -58,7 +59,7 @@ typedef struct {
 /* By dimension, then by tag, for qsort and bsearch: keys, and what begins with one. */
 int gmsh_compare(const void *a, const void *b);
 
-/* What elements of one entity (4.1), or with one physical tag (2.2), belong to. */
+/* What elements of one entity (4.0, 4.1), or with one physical tag (2.2), belong to. */
 typedef struct {
     gmsh_key key;
     int64_t first, count; /* physical[first..first + count) */
@@ -72,7 +73,7 @@ typedef struct {
 
 typedef struct {
     gmsh_text text;
-    int version; /* 22 or 41 */
+    int version; /* 22, 40 or 41 */
     size_t max_bytes;
 
     int64_t n_nodes;

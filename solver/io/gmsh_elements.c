@@ -114,7 +114,7 @@ static uz_status read_element_nodes(gmsh_file *file, int64_t type, int64_t part_
     int64_t *node = file->node + file->first[file->n_elements], tag = 0;
     for (int i = 0; i < count; i++) {
         const gmsh_text before = *text;
-        const uz_status status = file->version == 22 ? gmsh_int(text, &tag, "the number of a node")
+        const uz_status status = file->version != 41 ? gmsh_int(text, &tag, "the number of a node")
                                                      : gmsh_size(text, &tag, "the number of a node");
         if (status != UZ_OK)
             return status;
@@ -167,14 +167,15 @@ static uz_status read_block_2(gmsh_file *file, int64_t count)
     return status;
 }
 
-/* entityDim entityTag type numElements, then for each of them: number nodes... */
+/* entityDim entityTag (in 4.0 the other way round) type numElements, then for each of them: number nodes... */
 static uz_status read_block_4(gmsh_file *file, int64_t count)
 {
     gmsh_text *text = &file->text;
     int64_t dim = 0, entity = 0, type = 0, n = 0, number = 0;
-    uz_status status = gmsh_int(text, &dim, "the dimension of a block of elements");
+    const bool early = file->version == 40;
+    uz_status status = gmsh_int(text, early ? &entity : &dim, "the head of a block of elements");
     if (status == UZ_OK)
-        status = gmsh_int(text, &entity, "the entity of a block of elements");
+        status = gmsh_int(text, early ? &dim : &entity, "the head of a block of elements");
     if (status == UZ_OK)
         status = gmsh_int(text, &type, "the type of a block of elements");
     if (status == UZ_OK)
@@ -187,11 +188,13 @@ static uz_status read_block_4(gmsh_file *file, int64_t count)
     if (status == UZ_OK && n > count - file->n_elements)
         status = gmsh_fail(text, UZ_ERR_FORMAT, "more elements than are announced");
     if (status == UZ_OK && n > 0)
-        status = gmsh_count(text, n, (size_t)gmsh_type_of(type).nodes * (text->binary ? 8 : 2), "elements");
+        status =
+            gmsh_count(text, n, (size_t)gmsh_type_of(type).nodes * (text->binary ? (early ? 4 : 8) : 2), "elements");
     if (status == UZ_OK && n > 0)
         status = make_room(file, 0, n * gmsh_type_of(type).nodes);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
-        status = gmsh_size(text, &number, "the number of an element");
+        status = early ? gmsh_int(text, &number, "the number of an element")
+                       : gmsh_size(text, &number, "the number of an element");
         if (status == UZ_OK)
             status = read_element_nodes(file, type, entity);
     }
@@ -210,11 +213,12 @@ uz_status gmsh_read_elements(gmsh_file *file)
         return gmsh_fail(text, UZ_ERR_FORMAT, "a second $Elements");
     file->elements_at = *text;
     const bool old = file->version == 22;
-    uz_status status = old ? gmsh_int_text(text, &count, WHAT[1]) : gmsh_head_4(text, &blocks, &count, WHAT);
+    uz_status status =
+        old ? gmsh_int_text(text, &count, WHAT[1]) : gmsh_head_4(text, file->version, &blocks, &count, WHAT);
     if (status == UZ_OK && old)
         status = gmsh_end_line(text);
     if (status == UZ_OK) /* at least "1 15 0 1"; a number and a node; 1 1 */
-        status = gmsh_count(text, count, old ? 8 : text->binary ? 16 : 3, "elements");
+        status = gmsh_count(text, count, old ? 8 : text->binary ? (file->version == 40 ? 8 : 16) : 3, "elements");
     if (status == UZ_OK)
         status = make_room(file, count, 0);
     while (old && file->n_elements < count && status == UZ_OK)

@@ -41,7 +41,7 @@ uz_status gmsh_read_names(gmsh_file *file)
     return status;
 }
 
-/* ---- entities (4.1) */
+/* ---- entities (4.0, 4.1) */
 
 static uz_status skip_ints(gmsh_text *text, int64_t count)
 {
@@ -52,7 +52,7 @@ static uz_status skip_ints(gmsh_text *text, int64_t count)
     return status;
 }
 
-/* tag [partition] box (a point for points) physical groups [bounding entities], a partition being
+/* tag [partition] box (in 4.1 a point for points) physical groups [bounding entities], a partition being
  * parentDim parentTag numPartitions partitionTag... */
 static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
 {
@@ -67,7 +67,7 @@ static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
     if (status == UZ_OK)
         status = skip_ints(text, partitions);
     if (status == UZ_OK)
-        status = gmsh_reals(text, dim == 0 ? 3 : 6, NULL);
+        status = gmsh_reals(text, dim == 0 && file->version == 41 ? 3 : 6, NULL);
     if (status == UZ_OK)
         status = gmsh_size(text, &groups, "the number of physical groups of an entity");
     if (status == UZ_OK)
@@ -199,7 +199,8 @@ uz_status gmsh_read_nodes(gmsh_file *file)
     gmsh_text *text = &file->text;
     const bool old = file->version == 22;
     int64_t blocks = 0, count = 0;
-    uz_status status = old ? gmsh_int_text(text, &count, WHAT[1]) : gmsh_head_4(text, &blocks, &count, WHAT);
+    uz_status status =
+        old ? gmsh_int_text(text, &count, WHAT[1]) : gmsh_head_4(text, file->version, &blocks, &count, WHAT);
     if (status == UZ_OK && old)
         status = gmsh_end_line(text);
     if (status == UZ_OK && file->tag)
@@ -220,7 +221,8 @@ uz_status gmsh_read_nodes(gmsh_file *file)
             status = gmsh_reals(text, 3, file->xyz + 3 * file->n_nodes);
     }
     for (int64_t b = 0; b < blocks && status == UZ_OK; b++) {
-        /* entityDim entityTag parametric numNodes, the tags of all, the coordinates of all. */
+        /* entityDim entityTag parametric numNodes, the tags of all, the coordinates of all; in 4.0 the first two
+         * the other way round, and each tag before its coordinates. */
         int64_t head[3] = {0}, n = 0;
         for (int i = 0; i < 3 && status == UZ_OK; i++)
             status = gmsh_int(text, &head[i], "the head of a block of nodes");
@@ -228,11 +230,19 @@ uz_status gmsh_read_nodes(gmsh_file *file)
             status = gmsh_size(text, &n, "the number of nodes of a block");
         if (status == UZ_OK && n > count - file->n_nodes)
             status = gmsh_fail(text, UZ_ERR_FORMAT, "more nodes than are announced");
-        if (status == UZ_OK && (head[0] < 0 || head[0] > 3))
+        if (status == UZ_OK && file->version == 41 && (head[0] < 0 || head[0] > 3))
             status = gmsh_fail(text, UZ_ERR_FORMAT, "a block of nodes has no such dimension");
-        for (int64_t i = 0; i < n && status == UZ_OK; i++)
+        if (status == UZ_OK && file->version == 40 && head[2])
+            status = gmsh_fail(text, UZ_ERR_UNSUPPORTED,
+                               "parametric nodes of version 4.0 are not read: save without (Mesh.SaveParametric)");
+        for (int64_t i = 0; i < n && file->version == 40 && status == UZ_OK; i++) {
+            status = gmsh_int(text, &file->tag[file->n_nodes + i], WHAT[2]);
+            if (status == UZ_OK)
+                status = gmsh_reals(text, 3, file->xyz + 3 * (file->n_nodes + i));
+        }
+        for (int64_t i = 0; i < n && file->version == 41 && status == UZ_OK; i++)
             status = gmsh_size(text, &file->tag[file->n_nodes + i], WHAT[2]);
-        for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        for (int64_t i = 0; i < n && file->version == 41 && status == UZ_OK; i++) {
             status = gmsh_reals(text, 3, file->xyz + 3 * (file->n_nodes + i));
             if (status == UZ_OK && head[2])
                 status = gmsh_reals(text, (int)head[0], NULL);

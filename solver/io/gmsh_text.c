@@ -170,13 +170,13 @@ uz_status gmsh_count(const gmsh_text *text, int64_t count, size_t each, const ch
 
 /* ---- sections */
 
-uz_status gmsh_head_4(gmsh_text *text, int64_t *blocks, int64_t *count, const char *const what[3])
+uz_status gmsh_head_4(gmsh_text *text, int version, int64_t *blocks, int64_t *count, const char *const what[3])
 {
     int64_t ends;
     uz_status status = gmsh_size(text, blocks, what[0]);
     if (status == UZ_OK)
         status = gmsh_size(text, count, what[1]);
-    for (int i = 0; i < 2 && status == UZ_OK; i++)
+    for (int i = 0; i < 2 && version == 41 && status == UZ_OK; i++)
         status = gmsh_size(text, &ends, what[2]);
     return status;
 }

@@ -13,7 +13,7 @@ enum { GMSH_TEXT_ROOM = 16384 };
 typedef struct {
     char text[GMSH_TEXT_ROOM];
     size_t len;
-    int version; /* 22 or 41 */
+    int version; /* 22, 40 or 41 */
     bool binary;
 } gmsh_writer;
 
@@ -76,7 +76,11 @@ static inline void write_header(gmsh_writer *w)
 {
     const int32_t one = 1;
     char line[64];
-    snprintf(line, sizeof line, "$MeshFormat\n%s %d 8\n", w->version == 22 ? "2.2" : "4.1", w->binary);
+    snprintf(line, sizeof line, "$MeshFormat\n%s %d 8\n",
+             w->version == 22   ? "2.2"
+             : w->version == 40 ? "4.0"
+                                : "4.1",
+             w->binary);
     put_text(w, line);
     if (w->binary) {
         put_bytes(w, &one, sizeof one);
@@ -129,7 +133,7 @@ static inline void write_entities(gmsh_writer *w, const gmsh_source *m)
             if (m->element[e].dim != dim)
                 continue;
             put_int(w, e + 1);
-            for (int k = 0; k < (dim ? 6 : 3); k++)
+            for (int k = 0; k < (dim || w->version == 40 ? 6 : 3); k++)
                 put_real(w, k);
             put_size(w, m->element[e].physical != 0);
             if (m->element[e].physical)
@@ -185,6 +189,40 @@ static inline void write_4(gmsh_writer *w, const gmsh_source *m)
     put_text(w, "\n$EndElements\n");
 }
 
+/* Version 4.0: numbers of nodes and elements have 4 bytes, heads are the other way round. */
+static inline void write_40(gmsh_writer *w, const gmsh_source *m)
+{
+    write_entities(w, m);
+    put_text(w, "$Nodes\n");
+    put_size(w, 1);
+    put_size(w, m->n_nodes);
+    put_int(w, 1);
+    put_int(w, 2);
+    put_int(w, 0);
+    put_size(w, m->n_nodes);
+    for (int i = 0; i < m->n_nodes; i++) {
+        put_int(w, m->tag[i]);
+        for (int c = 0; c < 3; c++)
+            put_real(w, m->xyz[i][c]);
+        put_text(w, w->binary ? "" : "\n");
+    }
+    put_text(w, "\n$EndNodes\n$Elements\n");
+    put_size(w, m->n_elements);
+    put_size(w, m->n_elements);
+    for (int e = 0; e < m->n_elements; e++) {
+        const struct gmsh_item *item = &m->element[e];
+        put_int(w, e + 1);
+        put_int(w, item->dim);
+        put_int(w, item->type);
+        put_size(w, 1);
+        put_int(w, 100 + e);
+        for (int i = 0; i < item->count; i++)
+            put_int(w, item->node[i]);
+        put_text(w, w->binary ? "" : "\n");
+    }
+    put_text(w, "\n$EndElements\n");
+}
+
 static inline void write_gmsh(gmsh_writer *w, const gmsh_source *m, int version, bool binary)
 {
     w->len = 0;
@@ -199,6 +237,8 @@ static inline void write_gmsh(gmsh_writer *w, const gmsh_source *m, int version,
     }
     if (version == 22)
         write_2(w, m);
+    else if (version == 40)
+        write_40(w, m);
     else
         write_4(w, m);
     put_text(w, "$Periodic\n0\n$EndPeriodic\n");

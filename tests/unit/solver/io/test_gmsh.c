@@ -118,11 +118,11 @@ static void check_tetrahedron(const uz_given_mesh *mesh)
 TEST(every_version_and_form)
 {
     static gmsh_writer w;
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < 6; k++) {
         uz_given_mesh given;
         uz_mesh mesh;
         uz_error err = {0};
-        write_gmsh(&w, &TET_SOURCE, k < 2 ? 22 : 41, k % 2);
+        write_gmsh(&w, &TET_SOURCE, k < 2 ? 22 : k < 4 ? 41 : 40, k % 2);
         CHECK_MSG(uz_gmsh_read(&given, w.text, w.len, 0, &err) == UZ_OK, "form %d: %s", k, err.message);
         check_tetrahedron(&given);
         CHECK_MSG(uz_mesh_from_given(&mesh, &given, 3, &err) == UZ_OK, "%s", err.message);
@@ -138,8 +138,8 @@ TEST(every_version_and_form)
 TEST(every_beginning_of_a_file_is_refused)
 {
     static gmsh_writer w;
-    for (int k = 0; k < 4; k++) {
-        write_gmsh(&w, &TET_SOURCE, k < 2 ? 22 : 41, k % 2);
+    for (int k = 0; k < 6; k++) {
+        write_gmsh(&w, &TET_SOURCE, k < 2 ? 22 : k < 4 ? 41 : 40, k % 2);
         const char *end = memmem(w.text, w.len, "$EndElements", 12);
         for (size_t len = 0; len < (size_t)(end - w.text) + 12; len++) {
             uz_given_mesh given;
@@ -189,7 +189,9 @@ static const struct {
     {"", UZ_ERR_FORMAT, 1, "begins with $MeshFormat"},
     {"$NOD\n1\n", UZ_ERR_FORMAT, 2, "version 1"},
     {"\n\nhello\n", UZ_ERR_FORMAT, 3, "a section such as $Nodes was expected, found \"hello\""},
-    {"$MeshFormat\n4.0 0 8\n$EndMeshFormat\n", UZ_ERR_UNSUPPORTED, 2, "version 4 of the format is not read"},
+    {"$MeshFormat\n3 0 8\n$EndMeshFormat\n", UZ_ERR_UNSUPPORTED, 2, "version 3 of the format is not read"},
+    {"$MeshFormat\n4.0 0 8\n$EndMeshFormat\n$PartitionedEntities\n", UZ_ERR_UNSUPPORTED, 5, "save as version 4.1"},
+    {"$MeshFormat\n4.0 0 8\n$EndMeshFormat\n$Nodes\n1 1\n1 2 1 1\n1 0 0 0\n", UZ_ERR_UNSUPPORTED, 6, "parametric"},
     {"$MeshFormat\n4.1 2 8\n", UZ_ERR_FORMAT, 2, "file type is 2"},
     {"$MeshFormat\n4.1 0 4\n", UZ_ERR_UNSUPPORTED, 2, "4 bytes"},
     {"$MeshFormat\n4.1 1 8\n\0\0\0\1", UZ_ERR_FORMAT, 0, "the number 1 was expected"},
@@ -382,8 +384,8 @@ TEST(readers_are_found_by_name_and_by_content)
     static gmsh_writer w;
     uz_given_mesh mesh;
     uz_error err = {0};
-    for (int k = 0; k < 4; k++) {
-        write_gmsh(&w, &TET_SOURCE, k < 2 ? 22 : 41, k % 2);
+    for (int k = 0; k < 6; k++) {
+        write_gmsh(&w, &TET_SOURCE, k < 2 ? 22 : k < 4 ? 41 : 40, k % 2);
         for (int named = 0; named < 2; named++) {
             CHECK_MSG(uz_mesh_read(&mesh, named ? "gmsh" : NULL, w.text, w.len, 0, &err) == UZ_OK, "%s", err.message);
             CHECK_INT(mesh.n_elements, 1);
