@@ -1,0 +1,399 @@
+/* row_turn.c: the derivative of the forces of rows between bodies, by central differences.
+ *
+ * A row of two surfaces turns with its slave side, and its shares of masters go over from one to the next as the bodies
+ * slide. All of that is found by moving nodes a little and finding the rows again, as far as they are near: the row of
+ * a place depends on the sides around its node, whose normals depend on the sides beside these, and on the sides that
+ * it faces. Nodes on which no row depends in common are moved together, which takes some tens of places whatever the
+ * mesh (Curtis, Powell and Reid, "On the estimation of sparse Jacobian matrices", J. Inst. Maths Applics 13 (1974)
+ * 117-119). */
+#include "assembly/row_turn.h"
+
+#include "assembly/parts.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/vector3.h"
+#include "linalg/linalg.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Nodes are moved by this part of the shortest side: the square is the error of differences, its inverse times the
+ * rounding of rows the other one. */
+#define MOVED_BY 1e-5
+/* What changes by less is rounding. */
+#define ROUNDING 1e-8
+
+typedef struct {
+    const uz_body_model *base, *rows;
+    const uz_scene *scene;
+    const double *r;
+    double least, by;
+    int64_t *beside_first, *beside; /* n_nodes + 1: nodes that have a side of a contact in common with each */
+    int64_t n_pressed, *pressed;    /* rows */
+    int64_t *near_first, *near;     /* n_pressed + 1: nodes on which each of them depends */
+    int64_t *seen_first, *seen;     /* n_nodes + 1: of the pressed ones those that depend on each */
+    int64_t *color, colors;         /* n_nodes: -1: none depends on it */
+    int64_t *mark;                  /* n_nodes */
+    double *u, *way, *sum;          /* n_nodes x dim; d; d */
+} work;
+
+bool uz_has_pairs(const uz_scene *scene)
+{
+    bool has = false;
+    for (int64_t k = 0; k < scene->n_contacts && !has; k++)
+        has = scene->contacts[k].kind == UZ_OBSTACLE_BODY;
+    return has;
+}
+
+/* ---- which rows depend on which nodes */
+
+/* Neighbours along the sides of contacts between bodies, each node among its own; the shortest of these sides. */
+static bool list_neighbours(work *w)
+{
+    const uz_mesh *mesh = &w->base->mesh;
+    const int dim = mesh->dim;
+    double shortest = INFINITY;
+    w->beside_first = uz_alloc_zero(mesh->n_nodes + 2, sizeof *w->beside_first);
+    for (int pass = 0; pass < 2 && w->beside_first; pass++) {
+        for (int64_t k = 0; k < w->scene->n_contacts; k++)
+            for (int g = 0; g < 2 && w->scene->contacts[k].kind == UZ_OBSTACLE_BODY; g++) {
+                const uz_contact *c = &w->scene->contacts[k];
+                const uz_group *group = uz_mesh_group(mesh, g == 0 ? c->on : c->with, "/contacts", NULL);
+                for (int64_t i = 0; group && i < group->n_faces; i++) {
+                    int64_t node[UZ_FACE_NODES];
+                    const int n = uz_mesh_face(node, mesh, group->face[i]);
+                    double x[2][3] = {{0}};
+                    for (int c2 = 0; c2 < 2 * dim; c2++) {
+                        const int64_t at = dim * node[c2 / dim] + c2 % dim;
+                        x[c2 / dim][c2 % dim] = mesh->xyz[at] + w->rows->place[at];
+                    }
+                    shortest = fmin(shortest, sqrt(uz_distance2(x[0], x[1], dim)));
+                    for (int a = 0; a < n; a++)
+                        for (int b = 0; b < n; b++)
+                            if (pass == 0)
+                                w->beside_first[node[a] + 2]++;
+                            else
+                                w->beside[w->beside_first[node[a] + 1]++] = node[b];
+                }
+            }
+        for (int64_t a = 0; a < mesh->n_nodes && pass == 0; a++)
+            w->beside_first[a + 2] += w->beside_first[a + 1];
+        if (pass == 0 && !(w->beside = uz_alloc(w->beside_first[mesh->n_nodes + 1], sizeof *w->beside)))
+            return false;
+    }
+    w->by = MOVED_BY * shortest;
+    return w->beside_first != NULL;
+}
+
+/* Adds the neighbours of a node, and `more` times theirs, that the label has not marked yet. near NULL: counts. */
+static int64_t gather(work *w, int64_t *near, int64_t n, int64_t node, int more, int64_t label)
+{
+    for (int64_t q = w->beside_first[node]; q < w->beside_first[node + 1]; q++) {
+        const int64_t b = w->beside[q];
+        if (w->mark[b] != label) {
+            w->mark[b] = label;
+            if (near)
+                near[n] = b;
+            n++;
+        }
+        if (more > 0 && b != node)
+            n = gather(w, near, n, b, more - 1, label);
+    }
+    return n;
+}
+
+/* The nodes on which each pressed row depends, and the reverse. */
+static bool list_dependences(work *w)
+{
+    const uz_body_model *rows = w->rows;
+    const int64_t n_nodes = rows->mesh.n_nodes;
+    int64_t label = 0;
+    w->near_first = uz_alloc_zero(w->n_pressed + 1, sizeof *w->near_first);
+    w->seen_first = uz_alloc_zero(n_nodes + 2, sizeof *w->seen_first);
+    if (!w->near_first || !w->seen_first)
+        return false;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int64_t j = 0; j < w->n_pressed; j++) {
+            const int64_t row = w->pressed[j], place = rows->row_place[row];
+            const uz_contact_sites *sites = &rows->sites[rows->info.contact_of[row]];
+            int64_t n = w->near_first[j];
+            label++;
+            n = gather(w, w->near, n, sites->at[place], 1, label);
+            for (int64_t q = sites->first[place]; q < sites->first[place + 1]; q++)
+                n = gather(w, w->near, n, sites->node[q], 0, label);
+            if (pass == 0)
+                w->near_first[j + 1] = n;
+        }
+        if (pass == 0 && !(w->near = uz_alloc(w->near_first[w->n_pressed], sizeof *w->near)))
+            return false;
+    }
+    const int64_t entries = w->near_first[w->n_pressed];
+    if (!(w->seen = uz_alloc(entries, sizeof *w->seen)))
+        return false;
+    for (int64_t q = 0; q < entries; q++)
+        w->seen_first[w->near[q] + 2]++;
+    for (int64_t a = 0; a < n_nodes; a++)
+        w->seen_first[a + 2] += w->seen_first[a + 1];
+    for (int64_t j = 0; j < w->n_pressed; j++)
+        for (int64_t q = w->near_first[j]; q < w->near_first[j + 1]; q++)
+            w->seen[w->seen_first[w->near[q] + 1]++] = j;
+    return true;
+}
+
+/* Each node gets the least color that none has on which a row of its own depends, too. */
+static bool color_nodes(work *w)
+{
+    const int64_t n_nodes = w->rows->mesh.n_nodes;
+    int64_t *taken = uz_alloc_zero(n_nodes + 1, sizeof *taken);
+    w->color = uz_alloc(n_nodes, sizeof *w->color);
+    if (!taken || !w->color) {
+        free(taken);
+        return false;
+    }
+    for (int64_t a = 0; a < n_nodes; a++)
+        w->color[a] = -1;
+    for (int64_t a = 0; a < n_nodes; a++) {
+        if (w->seen_first[a] == w->seen_first[a + 1])
+            continue;
+        for (int64_t s = w->seen_first[a]; s < w->seen_first[a + 1]; s++)
+            for (int64_t q = w->near_first[w->seen[s]]; q < w->near_first[w->seen[s] + 1]; q++)
+                if (w->color[w->near[q]] >= 0)
+                    taken[w->color[w->near[q]]] = 1 + a;
+        int64_t color = 0;
+        while (taken[color] == 1 + a)
+            color++;
+        w->color[a] = color;
+        w->colors = color + 1 > w->colors ? color + 1 : w->colors;
+    }
+    free(taken);
+    return true;
+}
+
+/* ---- differences */
+
+/* What is kept of the rows of a moved body: of each pressed one its number there, or -1, and its gap. */
+typedef struct {
+    uz_csc rows; /* N' */
+    int64_t *at;
+    double *gap;
+} moved_rows;
+
+static void match_rows(moved_rows *out, const work *w, const uz_body_model *moved)
+{
+    const uz_body_model *rows = w->rows;
+    int64_t next = 0;
+    for (int64_t j = 0; j < w->n_pressed; j++) { /* rows come contact by contact, places ascending */
+        const int64_t contact = rows->info.contact_of[w->pressed[j]], place = rows->row_place[w->pressed[j]];
+        while (next < moved->m && (moved->info.contact_of[next] < contact ||
+                                   (moved->info.contact_of[next] == contact && moved->row_place[next] < place)))
+            next++;
+        const bool same = next < moved->m && moved->info.contact_of[next] == contact && moved->row_place[next] == place;
+        out->at[j] = same ? next : -1;
+        out->gap[j] = moved->sites[contact].gap[place];
+    }
+}
+
+static bool add_entry(uz_entries *out, int64_t row, int64_t col, double value)
+{
+    if (out->n == out->room) {
+        const int64_t room = 2 * out->room + 4096;
+        if (!uz_triplets_grow(&out->row, &out->col, &out->val, room))
+            return false;
+        out->room = room;
+    }
+    out->row[out->n] = row;
+    out->col[out->n] = col;
+    out->val[out->n++] = value;
+    return true;
+}
+
+/* What two places on either side say of the pressed rows: each depends on one of the moved nodes at most. */
+static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2], int64_t color, int c)
+{
+    const uz_body_model *base = w->base;
+    const int dim = base->mesh.dim;
+    for (int64_t j = 0; j < w->n_pressed; j++) {
+        int64_t dof = -1;
+        for (int64_t q = w->near_first[j]; q < w->near_first[j + 1] && dof < 0; q++)
+            if (w->color[w->near[q]] == color)
+                dof = base->dof[dim * w->near[q] + c];
+        if (dof < 0)
+            continue;
+        if (side[0].at[j] < 0 || side[1].at[j] < 0) {
+            out->known = false;
+            return true;
+        }
+        const int64_t row = w->pressed[j], own = uz_csc_find(&w->rows->N, row, dof);
+        const double change = (side[1].gap[j] - side[0].gap[j]) / (2 * w->by),
+                     along = own < 0 ? 0 : w->rows->N.val[own];
+        if (fabs(change + along) > ROUNDING && !add_entry(&out->gap, row, dof, change + along))
+            return false;
+        for (int s = 0; s < 2; s++)
+            for (int64_t q = side[s].rows.ptr[side[s].at[j]]; q < side[s].rows.ptr[side[s].at[j] + 1]; q++)
+                w->sum[side[s].rows.idx[q]] += (s ? 1 : -1) * side[s].rows.val[q];
+        for (int s = 0; s < 2; s++)
+            for (int64_t q = side[s].rows.ptr[side[s].at[j]]; q < side[s].rows.ptr[side[s].at[j] + 1]; q++) {
+                const int64_t i = side[s].rows.idx[q];
+                const double slope = w->sum[i] / (2 * w->by);
+                w->sum[i] = 0;
+                if (fabs(slope) * w->by > ROUNDING * MOVED_BY && !add_entry(&out->force, i, dof, w->r[row] * slope))
+                    return false;
+            }
+    }
+    return true;
+}
+
+/* All nodes of a color along their dof c, there and back. */
+static uz_status move_color(uz_row_turn *out, work *w, moved_rows side[2], int64_t color, int c, uz_error *err)
+{
+    const uz_body_model *base = w->base;
+    const int dim = base->mesh.dim;
+    uz_scene scene = *w->scene;
+    uz_status status = UZ_OK;
+    bool any = false;
+    memset(w->way, 0, (size_t)base->d * sizeof *w->way);
+    for (int64_t a = 0; a < base->mesh.n_nodes; a++)
+        if (w->color[a] == color && base->dof[dim * a + c] >= 0) {
+            w->way[base->dof[dim * a + c]] = w->by;
+            any = true;
+        }
+    for (int s = 0; s < 2 && status == UZ_OK && any && out->known; s++) {
+        uz_body_model moved = {.d = 0};
+        uz_error own = {0};
+        for (int64_t j = 0; j < base->d; j++)
+            w->way[j] = s ? fabs(w->way[j]) : -w->way[j];
+        uz_recover_nodal(w->u, base, w->way, NULL);
+        for (int64_t i = 0; i < dim * base->mesh.n_nodes; i++)
+            w->u[i] += w->rows->place[i];
+        scene.place = w->u;
+        status = uz_body_model_move(&moved, base, &scene, &own);
+        if (status == UZ_OK) {
+            match_rows(&side[s], w, &moved);
+            status = uz_csc_transpose(&side[s].rows, &moved.N, &own);
+        }
+        uz_body_model_clear(&moved);
+        if (status == UZ_ERR_SCENE) { /* no contact can be found there */
+            out->known = false;
+            status = UZ_OK;
+        } else if (status != UZ_OK && err) {
+            *err = own;
+        }
+    }
+    if (status == UZ_OK && any && out->known && !add_differences(out, w, side, color, c))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how contact rows turn");
+    uz_csc_clear(&side[0].rows);
+    uz_csc_clear(&side[1].rows);
+    return status;
+}
+
+static bool list_pressed(work *w)
+{
+    const uz_body_model *rows = w->rows;
+    w->pressed = uz_alloc(rows->m, sizeof *w->pressed);
+    for (int64_t i = 0; i < rows->m && w->pressed; i++)
+        if (w->r[i] < -w->least && w->scene->contacts[rows->info.contact_of[i]].kind == UZ_OBSTACLE_BODY)
+            w->pressed[w->n_pressed++] = i;
+    return w->pressed != NULL;
+}
+
+uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz_body_model *rows,
+                           const uz_scene *scene, const double *r, double least, uz_error *err)
+{
+    const int dim = base->mesh.dim;
+    work w = {.base = base, .rows = rows, .scene = scene, .r = r, .least = least};
+    moved_rows side[2] = {{.at = NULL}, {.at = NULL}};
+    uz_status status = UZ_OK;
+    *out = (uz_row_turn){.known = true};
+    bool room = list_pressed(&w);
+    if (room && w.n_pressed > 0) {
+        w.mark = uz_alloc_zero(base->mesh.n_nodes, sizeof *w.mark);
+        w.u = uz_alloc(dim * base->mesh.n_nodes, sizeof *w.u);
+        w.way = uz_alloc(base->d, sizeof *w.way);
+        w.sum = uz_alloc_zero(base->d, sizeof *w.sum);
+        room = w.mark && w.u && w.way && w.sum && list_neighbours(&w) && list_dependences(&w) && color_nodes(&w);
+        for (int s = 0; s < 2; s++) {
+            side[s].at = uz_alloc(w.n_pressed, sizeof *side[s].at);
+            side[s].gap = uz_alloc(w.n_pressed, sizeof *side[s].gap);
+            room = room && side[s].at && side[s].gap;
+        }
+    }
+    if (!room)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how %lld contact rows turn", (long long)rows->m);
+    for (int64_t color = 0; color < w.colors && status == UZ_OK && out->known; color++)
+        for (int c = 0; c < dim && status == UZ_OK && out->known; c++)
+            status = move_color(out, &w, side, color, c, err);
+    if (!out->known)
+        out->force.n = out->gap.n = 0;
+    free(w.beside_first);
+    free(w.beside);
+    free(w.pressed);
+    free(w.near_first);
+    free(w.near);
+    free(w.seen_first);
+    free(w.seen);
+    free(w.color);
+    free(w.mark);
+    free(w.u);
+    free(w.way);
+    free(w.sum);
+    for (int s = 0; s < 2; s++) {
+        free(side[s].at);
+        free(side[s].gap);
+    }
+    return status;
+}
+
+static void clear_entries(uz_entries *e)
+{
+    free(e->row);
+    free(e->col);
+    free(e->val);
+    memset(e, 0, sizeof *e);
+}
+
+void uz_row_turn_clear(uz_row_turn *turn)
+{
+    clear_entries(&turn->force);
+    clear_entries(&turn->gap);
+}
+
+void uz_add_entries(double *y, const uz_entries *of, const double *x, bool skew)
+{
+    const double part = skew ? 0.5 : 1;
+    for (int64_t k = 0; k < of->n; k++) {
+        y[of->row[k]] += part * of->val[k] * x[of->col[k]];
+        if (skew)
+            y[of->col[k]] -= part * of->val[k] * x[of->row[k]];
+    }
+}
+
+/* ---- with a stiffness */
+
+uz_status uz_widen_by_rows(uz_csc *out, const uz_csc *K, const uz_csc *N, const double *r, double least,
+                           const uz_row_turn *turn, uz_error *err)
+{
+    uz_entries all = {.n = 0};
+    uz_csc rows = {0};
+    uz_status status = uz_csc_transpose(&rows, N, err);
+    bool room = true;
+    for (int64_t j = 0; j < K->cols && status == UZ_OK && room; j++)
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1] && room; q++)
+            room = add_entry(&all, K->idx[q], j, K->val[q]);
+    for (int64_t i = 0; i < N->rows && status == UZ_OK && room && r; i++)
+        for (int64_t p = rows.ptr[i]; p < rows.ptr[i + 1] && r[i] < -least; p++)
+            for (int64_t q = rows.ptr[i]; q <= p && room; q++)
+                room = add_entry(&all, rows.idx[p], rows.idx[q], 0);
+    for (int64_t k = 0; turn && k < turn->force.n && status == UZ_OK && room; k++) {
+        const int64_t i = turn->force.row[k], j = turn->force.col[k];
+        const double value = turn->force.val[k];
+        room = add_entry(&all, i > j ? i : j, i > j ? j : i, i == j ? -value : -0.5 * value);
+    }
+    if (status == UZ_OK && !room)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stiffness of %lld dofs", (long long)K->cols);
+    if (status == UZ_OK)
+        status = uz_csc_from_triplets(out, K->rows, K->cols, all.n, all.row, all.col, all.val, err);
+    clear_entries(&all);
+    uz_csc_clear(&rows);
+    return status;
+}

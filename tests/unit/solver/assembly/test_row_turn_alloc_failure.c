@@ -1,0 +1,52 @@
+/* How rows between bodies turn, each allocation on the way failing once. Linked with malloc, calloc, realloc and free
+ * wrapped. */
+#include "failing_heap.h"
+
+#include "assembly/row_turn.h"
+#include "linalg/linalg.h"
+#include "sanitized.h"
+#include "two_boxes.h"
+
+TEST(failures_are_told_and_leave_nothing)
+{
+    const box_part a = {{0, 0}, {2, 1}, {2, 1}, "quad4"}, b = {{0.3, 1}, {1, 1}, {1, 1}, "quad4"};
+    uz_scene s = two(UZ_PLANE_STRAIN, UZ_ELASTIC_NEO_HOOKE, &a, &b, NULL);
+    body_hold(&s, "abottom", 0, 0, NAN);
+    body_hold(&s, "btop", 0, 0, NAN);
+    touch(&s, "bbottom", "atop");
+    uz_body_model base = body_model(&s), at;
+    double *u = body_room(2 * base.mesh.n_nodes, sizeof *u), r[8];
+    uz_error first = {0};
+    s.place = u;
+    CHECK_INT(uz_body_model_move(&at, &base, &s, &first), UZ_OK);
+    s.place = NULL;
+    for (int i = 0; i < 8; i++)
+        r[i] = -1;
+    CHECK(at.m > 0 && at.m <= 8);
+    uz_status status = UZ_ERR_MEMORY;
+    long count = 0;
+    for (; status != UZ_OK && count < 20000; count = next_allocation(count)) {
+        uz_row_turn turn;
+        uz_csc wide = {0};
+        uz_error err = {0};
+        heap.live = 0;
+        heap.failed = false;
+        heap.until_failure = count;
+        heap.watching = true;
+        status = uz_row_turn_find(&turn, &base, &at, &s, r, 0, &err);
+        if (status == UZ_OK)
+            status = uz_widen_by_rows(&wide, &base.K, &at.N, r, 0, &turn, &err);
+        uz_row_turn_clear(&turn);
+        uz_csc_clear(&wide);
+        heap.watching = false;
+        CHECK_MSG(status == UZ_OK || status == UZ_ERR_MEMORY, "%ld: %s", count, err.message);
+        CHECK_MSG(heap.live == 0, "%ld: %d blocks are left", count, heap.live);
+        if (heap.live > 0)
+            break;
+    }
+    CHECK_MSG(count > 100 && status == UZ_OK && !heap.failed, "%ld allocations", count);
+    uz_body_model_clear(&at);
+    uz_body_model_clear(&base);
+    uz_scene_clear(&s);
+    free(u);
+}
