@@ -226,7 +226,9 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
             return false;
         to->kind = UZ_OBSTACLE_BODY;
         to->between = json_text_is(json_get(item, "discretization"), "nodes") ? UZ_CONTACT_NODES : UZ_CONTACT_SURFACES;
-        to->faceted = json_is(json_get(item, "smooth"), JSON_IS_BOOLEAN) && !json_truth(json_get(item, "smooth"));
+        const json_value *smooth = json_get(item, "smooth");
+        to->faceted =
+            json_is(smooth, JSON_IS_BOOLEAN) ? !json_truth(smooth) : out->kinematics == UZ_KINEMATICS_FINITE && !given;
         to->feature_angle = json_number(json_get(item, "feature_angle"), 0);
         for (size_t k = 0; k < sizeof SHAPES / sizeof SHAPES[0]; k++) {
             const obstacle o = {to, d, json_get(given, SHAPES[k].key), uz_scene_dim(out)};

@@ -2,7 +2,9 @@
 #include "certificate/finite.h"
 
 #include "assembly/parts.h"
+#include "assembly/row_turn.h"
 #include "certificate/envelope.h"
+#include "certificate/pair_gaps.h"
 #include "certificate/piola.h"
 #include "core/alloc.h"
 #include "core/error.h"
@@ -31,6 +33,7 @@ static const double ALONG[] = {1e2, 1e5};
 typedef struct {
     const uz_finite_answer *of;
     uz_body_model tangent;           /* borrows all but K's and K_fixed's values */
+    uz_csc wide;                     /* K with entries of rows between bodies, where there are any: it is tangent's */
     long double *force;              /* n_nodes x dim: internal */
     double *f, *room, *size;         /* d */
     long double energy, small, unit; /* small: of small strain; unit: of a strain of 1 */
@@ -206,7 +209,8 @@ static uz_status add_curvature(work *w, uz_obstacle *const *obstacle, double mos
         const int64_t *node;
         double x[3] = {0}, ke[9 * UZ_FACE_NODES * UZ_FACE_NODES];
         uz_gap at;
-        if (!(fabs(force[row]) > PRESSED * most) || model->sites[model->info.contact_of[row]].n == 0)
+        if (!(fabs(force[row]) > PRESSED * most) || !obstacle[model->info.contact_of[row]] ||
+            model->sites[model->info.contact_of[row]].n == 0)
             continue;
         const int n = row_nodes(&node, &share, model, row);
         for (int a = 0; a < n; a++)
@@ -284,6 +288,10 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double mo
     uz_obstacle **obstacle = uz_alloc_zero(n, sizeof *obstacle);
     uz_status status = obstacle ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the obstacles");
     for (int64_t k = 0; k < n && status == UZ_OK; k++) {
+        if (of->scene->contacts[k].kind == UZ_OBSTACLE_BODY) {
+            status = uz_pair_gaps(&out->least_gap, &out->least_part, of->model, of->scene, k, of->u, SAMPLES + 1, err);
+            continue;
+        }
         const uz_group *group = uz_mesh_group(&of->model->mesh, of->scene->contacts[k].on, "/contacts", err);
         status =
             group ? uz_obstacle_new(&obstacle[k], &of->scene->contacts[k], k, of->scene->model, err) : UZ_ERR_SCENE;
@@ -338,18 +346,43 @@ static uz_status leave_over(work *w, uz_error *err)
     return status;
 }
 
+/* Of rows between bodies the tangent has how they turn, and room for stiffness along them. *known: it could be found.
+ */
+static uz_status add_turn(bool *known, work *w, double most, uz_error *err)
+{
+    const uz_finite_answer *of = w->of;
+    uz_row_turn turn = {.known = true};
+    uz_csc wide = {0};
+    *known = true;
+    if (!uz_has_pairs(of->scene))
+        return UZ_OK;
+    uz_status status = uz_row_turn_find(&turn, of->rest, of->model, of->scene, of->r, PRESSED * most, err);
+    *known = turn.known;
+    if (status == UZ_OK)
+        status = uz_widen_by_rows(&wide, &w->tangent.K, &of->model->N, of->r, PRESSED * most, &turn, err);
+    uz_row_turn_clear(&turn);
+    if (status != UZ_OK) {
+        uz_csc_clear(&wide);
+        return status;
+    }
+    free(w->tangent.K.val);
+    w->tangent.K = w->wide = wide;
+    return UZ_OK;
+}
+
 /* The factor of H, and with it the residual. */
 static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_error *err)
 {
     const uz_body_model *model = w->of->model;
     const uz_csc *K = &w->tangent.K;
-    uz_status status = UZ_OK;
+    bool known;
     double stiffest = 0, work_left = 0, square = 0, there = 0;
-    for (int64_t j = 0; j < model->d; j++) {
+    uz_status status = add_turn(&known, w, most, err);
+    for (int64_t j = 0; j < model->d && status == UZ_OK; j++) {
         w->size[j] = fabs(K->val[K->ptr[j]]);
         stiffest = fmax(stiffest, w->size[j]);
     }
-    for (size_t k = 0; k < sizeof ALONG / sizeof ALONG[0] && status == UZ_OK && !out->definite; k++) {
+    for (size_t k = 0; k < sizeof ALONG / sizeof ALONG[0] && status == UZ_OK && !out->definite && known; k++) {
         uz_envelope factor = {0};
         status = add_along(w, ALONG[k] * stiffest - there, most, err);
         there = ALONG[k] * stiffest;
@@ -408,7 +441,10 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
         status = leave_over(&w, err);
     if (status == UZ_OK && out->least_det > 0)
         status = judge(out, &w, most, err);
-    free(w.tangent.K.val);
+    if (w.wide.ptr)
+        uz_csc_clear(&w.wide);
+    else
+        free(w.tangent.K.val);
     free(w.tangent.K_fixed.val);
     free(w.force);
     free(w.f);

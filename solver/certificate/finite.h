@@ -9,6 +9,7 @@
 
 typedef struct {
     const uz_body_model *model; /* at the place u: its rows are those that the answer has there */
+    const uz_body_model *rest;  /* the same before anything moves */
     const uz_scene *scene;      /* with the loads, supports and obstacles that the answer is for */
     const double *u;            /* n_nodes x dim */
     const double *r, *g;        /* m: reactions, and gaps at the place */

@@ -15,6 +15,7 @@
 #include "run/solve.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -106,9 +107,27 @@ static bool copy_lists(uz_scene *scene, const uz_scene *from, const uz_finite_po
     return true;
 }
 
-/* The certificate's factor is one within an envelope. */
-static uz_status check_size(const uz_body_model *base, uz_error *err)
+/* What checks of the scene alone could not see. The certificate's factor is one within an envelope. */
+static uz_status check_body(const uz_body_model *base, const uz_scene *scene, uz_error *err)
 {
+    char where[96];
+    for (int64_t k = 0; k < scene->n_contacts; k++) {
+        const uz_contact *contact = &scene->contacts[k];
+        if (contact->kind != UZ_OBSTACLE_BODY)
+            continue;
+        snprintf(where, sizeof where, "/contacts/%lld/with", (long long)k);
+        const uz_group *on = uz_mesh_group(&base->mesh, contact->on, where, err);
+        const uz_group *with = uz_mesh_group(&base->mesh, contact->with, where, err);
+        const int shared = on && with ? uz_groups_share_face(&base->mesh, on, with) : 0;
+        if (!on || !with)
+            return UZ_ERR_SCENE;
+        if (shared < 0)
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of two surfaces");
+        if (shared > 0)
+            return uz_fail(err, UZ_ERR_SCENE, where,
+                           "finite kinematics have no contact of a surface with itself; name two surfaces without "
+                           "common sides");
+    }
     if (base->kind != UZ_SOLID || base->d <= MOST_SOLID_DOFS)
         return UZ_OK;
     return uz_fail(err, UZ_ERR_SCENE, "/mesh",
@@ -120,6 +139,7 @@ static uz_status check_size(const uz_body_model *base, uz_error *err)
 static uz_status begin_load(uz_finite_run *run, uz_error *err)
 {
     const uz_mesh *mesh = &run->base.mesh;
+    run->pairs = uz_has_pairs(&run->scene);
     run->n = mesh->dim * mesh->n_nodes;
     run->d = run->base.d;
     for (int64_t j = 0; j < run->d; j++)
@@ -161,7 +181,7 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
     uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_SUPPORTED, err);
     if (status == UZ_OK)
-        status = check_size(&run->base, err);
+        status = check_body(&run->base, &run->scene, err);
     if (status == UZ_OK)
         status = begin_load(run, err);
     if (status == UZ_OK)
@@ -180,6 +200,7 @@ static void end(uz_finite_run *run)
     uz_finite_place_clear(&run->trial);
     uz_finite_tangent_clear(&run->tangent);
     uz_body_model_clear(&run->base);
+    uz_csc_clear(&run->wide);
     uz_cache_free(run->cache);
     uz_result_free(run->last);
     free(run->scene.supports);

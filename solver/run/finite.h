@@ -2,11 +2,13 @@
  *
  *     uz_solve_finite    finite.c          load cases; the load put on in parts
  *     uz_finite_settle   finite_newton.c   the equilibrium under one part: contact problems on tangents
+ *     uz_finite_correct  finite_pairs.c    what rows between bodies need in it
  *     uz_finite_report   finite_report.c   the answer as a result
  *     uz_solve_weighed   weigh.c           whether small deformation is enough (kinematics AUTO) */
 #ifndef UZ_RUN_FINITE_H
 #define UZ_RUN_FINITE_H
 
+#include "assembly/row_turn.h"
 #include "certificate/finite.h"
 #include "core/hooks.h"
 #include "finite/finite_body.h"
@@ -94,6 +96,9 @@ typedef struct {
      * supports and loads are; 0 until a part of the load is asked for */
     double *overlap;
     uz_body_model base, tangent;
+    bool pairs;      /* there is contact between bodies */
+    uz_csc wide;     /* the tangent's K with entries of their rows */
+    const uz_csc *K; /* of the last contact problem: that, or the tangent's own */
     int64_t n, d;
     double *loads;      /* n: forces under t */
     double *prescribed; /* n_fixed: under t */
@@ -121,6 +126,18 @@ void uz_finite_place_clear(uz_finite_place *place);
 /* From run->at to the equilibrium under run->load. On UZ_PART_SETTLED run->at, r and certificate are those of the
  * equilibrium; else run->at is somewhere. */
 uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
+
+/* The contact problem of run->K, p and at.h: run->last. */
+uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);
+
+/* Of rows between bodies. run->K becomes the tangent with how they turn, and, where `hold`, room for stiffness along
+ * those that were pressed. */
+uz_status uz_finite_widen(uz_finite_run *run, const uz_row_turn *turn, bool hold, uz_error *err);
+/* From the contact problem just solved to that on the whole tangent, which is not symmetric. */
+uz_status uz_finite_correct(uz_finite_run *run, const uz_row_turn *turn, uz_error *err);
+/* Reactions of the rows `from` stay with their places among those of run->at, where places come and go as bodies slide.
+ */
+uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *from, uz_error *err);
 
 /* *out: the answer run->at under run->load. why: of the part beyond it that was tried last, `tried`. */
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err);

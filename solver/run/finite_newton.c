@@ -43,6 +43,8 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3 };
 #define MORE_SHIFT  4.0
 #define LESS_SHIFT  16.0
 #define MOST_SHIFT  1e4
+/* Between bodies, whose rows are no derivatives of one energy, steps that are less than this are not measured by it. */
+#define NEAR 1e-2
 /* Steps that are more than this in the energy's norm may turn slender parts. */
 #define LARGE_STEP 0.3
 /* Along a path: how far its end may be from where the first tangent leads to, in ways there. */
@@ -173,7 +175,7 @@ static uz_status add_curvature(uz_finite_run *run, uz_error *err)
     uz_row_forces(force, rows, run->r);
     for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK; k++) {
         uz_obstacle *obstacle = NULL;
-        if (rows->sites[k].n == 0)
+        if (rows->sites[k].n == 0 || run->scene.contacts[k].kind == UZ_OBSTACLE_BODY) /* which turn: row_turn.h */
             continue;
         status = uz_obstacle_new(&obstacle, &run->scene.contacts[k], k, run->scene.model, err);
         for (int64_t i = 0; status == UZ_OK && i < rows->m && !uz_obstacle_has_edges(obstacle); i++) {
@@ -217,19 +219,18 @@ static void load_step(bool *moved, uz_finite_run *run)
             run->p[fixed->idx[q]] -= fixed->val[q] * way;
     }
     uz_restrict_nodal(run->v, model, at->u);
-    uz_csc_symv(run->p, &run->tangent.K, 1, run->v);
+    uz_csc_symv(run->p, run->K, 1, run->v);
 }
 
-static uz_status solve_qp(uz_finite_run *run, uz_error *err)
+uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err)
 {
-    const uz_problem qp = {.kind = UZ_PROBLEM_MATRICES, .qp = {run->tangent.K, run->at.rows.N, run->p, run->at.h}};
+    const uz_problem qp = {.kind = UZ_PROBLEM_MATRICES, .qp = {*run->K, run->at.rows.N, run->p, run->at.h}};
     uz_result *next = NULL;
     run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
     const uz_status status = uz_solve_rounds(&next, &qp, &run->settings, NULL, NULL, run->cache, &run->hooks, err);
     if (status != UZ_OK)
         return status;
     run->found.qps++;
-    run->step_qps++;
     uz_timings_add(&run->spent, &next->summary.timings);
     uz_result_free(run->last);
     run->last = next;
@@ -237,10 +238,11 @@ static uz_status solve_qp(uz_finite_run *run, uz_error *err)
 }
 
 /* Stiffness `factor` along the rows that were pressed, about their being closed: where they stay closed the answer is
- * the same. Dofs of a row are of one node, or of the nodes of one side, so that K has room for it. */
+ * the same. Dofs of a row are of one node, or of the nodes of one side, so that K has room for it; between bodies it
+ * has been widened. */
 static uz_status hold_rows(uz_finite_run *run, double factor, uz_error *err)
 {
-    uz_csc *K = &run->tangent.K, rows = {0};
+    uz_csc *K = run->pairs ? &run->wide : &run->tangent.K, rows = {0};
     const uz_body_model *model = &run->at.rows;
     uz_status status = UZ_OK;
     if (run->n_r != model->m || factor == 0)
@@ -283,9 +285,18 @@ static bool add_more(double *hold, double *shift, bool rows)
 
 static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
 {
-    const uz_csc *K = &run->tangent.K;
+    uz_csc *K = &run->tangent.K;
+    uz_row_turn turn = {.known = true};
     uz_error own = {0};
     uz_status status = UZ_ERR_NOT_SPD;
+    run->K = K;
+    if (run->pairs && run->n_r == run->at.rows.m) {
+        const uz_status found = uz_row_turn_find(&turn, &run->base, &run->at.rows, &run->scene, run->r, 0, err);
+        if (found != UZ_OK) {
+            uz_row_turn_clear(&turn);
+            return found;
+        }
+    }
     const double stiffest = run->stiffest;
     double hold = run->hold, shift = run->shift / LESS_SHIFT < FIRST_SHIFT ? 0 : run->shift / LESS_SHIFT;
     bool pressed = false, more = true;
@@ -300,22 +311,28 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u, step);
         uz_error_reset(&own);
         status = add_curvature(run, &own);
-        if (status == UZ_OK)
-            status = hold_rows(run, hold * stiffest, &own);
         for (int64_t q = 0; q < K->ptr[K->cols] && shift > 0; q++)
             K->val[q] += shift * run->base.K.val[q];
+        if (status == UZ_OK && run->pairs)
+            status = uz_finite_widen(run, &turn, hold > 0, &own);
+        if (status == UZ_OK)
+            status = hold_rows(run, hold * stiffest, &own);
         run->spent.assemble += uz_seconds() - start;
         if (status != UZ_OK)
             break;
         load_step(moved, run);
         load_rows(run, hold * stiffest);
-        status = solve_qp(run, &own);
+        status = uz_finite_solve_qp(run, &own);
+        run->step_qps += status == UZ_OK;
+        if (status == UZ_OK && turn.force.n > 0)
+            status = uz_finite_correct(run, &turn, &own);
         run->hold = hold;
         run->shift = shift;
         more = step || add_more(&hold, &shift, pressed);
         more = more && !(run->from && shift > 0); /* a path goes from one stable equilibrium to the next one */
         step = NULL;
     }
+    uz_row_turn_clear(&turn);
     if (status == UZ_OK) {
         run->found.held += run->hold > 0 && run->shift == 0;
         run->found.shifted += run->shift > 0;
@@ -374,7 +391,8 @@ static void take_trial(uz_finite_run *run)
 /* What the certificate says of run->at. *done: it is not to be iterated further. */
 static uz_status ask_certificate(bool *done, uz_part *out, uz_finite_run *run, uz_error *err)
 {
-    const uz_finite_answer answer = {&run->at.rows, &run->scene, run->at.u, run->r, run->at.gap, run->prescribed};
+    const uz_finite_answer answer = {&run->at.rows, &run->base,  &run->scene,    run->at.u,
+                                     run->r,        run->at.gap, run->prescribed};
     uz_finite_certificate *c = &run->certificate;
     const double start = uz_seconds();
     const uz_status status = uz_certify_finite(c, &answer, err);
@@ -428,12 +446,11 @@ static uz_status keep_reactions(uz_finite_run *run, uz_error *err)
 /* sqrt(v'K v) over the root of twice the energy, v the step; 0 where that energy is rounding. */
 static double step_norm(uz_finite_run *run)
 {
-    const uz_csc *K = &run->tangent.K;
     uz_restrict_nodal(run->v, &run->base, run->at.u);
     for (int64_t j = 0; j < run->d; j++)
         run->v[j] = run->last->u[j] - run->v[j];
     memset(run->Kv, 0, (size_t)run->d * sizeof *run->Kv);
-    uz_csc_symv(run->Kv, K, 1, run->v);
+    uz_csc_symv(run->Kv, run->K, 1, run->v);
     const double square = fmax(0, uz_dot(run->d, run->v, run->Kv));
     return square == 0 || run->at.body.energy <= 10 * run->grain ? 0 : sqrt(square / (2 * run->at.body.energy));
 }
@@ -501,7 +518,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);
         if (run->step_qps == 1)
             memcpy(led, to, (size_t)run->n * sizeof *led);
-        const bool free_step = moved || run->step_qps == 1;
+        const bool free_step = moved || run->step_qps == 1 || (run->pairs && norm < NEAR);
         if (!free_step) {
             memmove(before + 1, before, (REMEMBERED - 1) * sizeof *before);
             before[0] = merit(run, &run->at);
@@ -513,8 +530,12 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
                                                                                       : UZ_PART_UNSETTLED;
             break;
         }
-        const bool comparable = same_rows(&run->at.rows, &run->trial.rows);
+        bool comparable = same_rows(&run->at.rows, &run->trial.rows);
         take_trial(run);
+        if (!comparable && run->pairs) {
+            status = uz_finite_carry_reactions(run, &run->trial.rows, err);
+            comparable = status == UZ_OK;
+        }
         if (comparable && norm < ASKED_FROM)
             status = ask_certificate(&done, out, run, err);
     }

@@ -25,8 +25,8 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
     const char *of = run->from ? "the way from the load of the case before it" : "the load";
     if (s->outcome == UZ_MESH_LIMIT) {
         snprintf(text, size,
-                 "the obstacle stands %.3g of a side's length deep in it, between rows: use a finer mesh along the "
-                 "contact",
+                 "the obstacle, or another body, stands %.3g of a side's length deep in it, between rows: use a finer "
+                 "mesh along the contact",
                  -c->least_part);
         return;
     }

@@ -5,6 +5,8 @@
 #include "core/error.h"
 #include "scene/scene.h"
 
+#include <string.h>
+
 bool uz_has_finite_law(const uz_scene *scene)
 {
     bool has = false;
@@ -49,6 +51,32 @@ static uz_status check_laws(const uz_scene *scene, uz_error *err)
     return UZ_OK;
 }
 
+/* Contact between bodies. */
+static uz_status check_pair(const uz_scene *scene, int64_t i, uz_error *err)
+{
+    const uz_contact *contact = &scene->contacts[i];
+    char where[UZ_CHECK_POINTER];
+    if (scene->model == UZ_SOLID)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
+                       "finite kinematics of solids have contact with rigid obstacles only; give an obstacle, or use "
+                       "the kinematics \"moving\"");
+    if (scene->kinematics != UZ_KINEMATICS_FINITE)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
+                       "whether small deformation is enough is told before rigid obstacles only; of contact between "
+                       "bodies of such a law use the kinematics \"finite\"");
+    if (contact->between != UZ_CONTACT_SURFACES)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "discretization"),
+                       "finite kinematics have contact between bodies by surfaces; leave discretization out");
+    if (!contact->faceted)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "smooth"),
+                       "finite kinematics take sides of bodies as they are deformed; leave smooth out, and use quad8 "
+                       "or tri6 where surfaces are curved");
+    if (strcmp(contact->on, contact->with) == 0)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
+                       "finite kinematics have no contact of a surface with itself; name two surfaces");
+    return UZ_OK;
+}
+
 /* Whatever its laws. */
 static uz_status check_body(const uz_scene *scene, uz_error *err)
 {
@@ -71,10 +99,9 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "spring"),
                            "finite kinematics have no springs; mesh the ground, or prescribe displacements");
     for (int64_t i = 0; i < scene->n_contacts; i++) {
-        if (scene->contacts[i].kind == UZ_OBSTACLE_BODY)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
-                           "finite kinematics have contact with rigid obstacles only; give an obstacle, or use the "
-                           "kinematics \"moving\"");
+        const uz_status status = scene->contacts[i].kind == UZ_OBSTACLE_BODY ? check_pair(scene, i, err) : UZ_OK;
+        if (status != UZ_OK)
+            return status;
         if (scene->contacts[i].kind == UZ_OBSTACLE_SURFACE)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "obstacle/surface"),
                            "finite kinematics of solids have planes, spheres and cylinders for obstacles; use these, "

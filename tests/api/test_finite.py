@@ -178,8 +178,41 @@ def test_a_cube_on_a_ball(s):
         expect(s.get(f"/v1/jobs/{name}/{of}"), 200)
 
 
+def stacked(aside, **contact):
+    """A block of 3 by 2 elements on a longer one, pressed into it and moved along it by `aside`."""
+    nodes, quads, groups = [], [], {"foot": [], "lid": [], "lower": [], "upper": []}
+    for x0, y0, size, cells in ((0, 0, (3, 1), (9, 3)), (0.25, 1, (1, 0.5), (4, 2))):
+        first, wide = len(nodes), cells[0] + 1
+        nodes += [[x0 + size[0] * i / cells[0], y0 + size[1] * j / cells[1]] for j in range(cells[1] + 1) for i in range(wide)]
+        at = lambda i, j: first + j * wide + i
+        quads += [[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)] for j in range(cells[1]) for i in range(cells[0])]
+        ends = {"foot": (0, "lower", cells[1]), "lid": (cells[1], "upper", 0)}["foot" if y0 == 0 else "lid"]
+        groups["foot" if y0 == 0 else "lid"] = {"nodes": [at(i, ends[0]) for i in range(wide)]}
+        groups[ends[1]] = {"edges": [[at(i, ends[2]), at(i + 1, ends[2])] for i in range(cells[0])]}
+    return block(mesh={"nodes": nodes, "elements": {"quad4": quads}, "groups": groups},
+                 supports=[{"on": "foot", "ux": 0, "uy": 0}, {"on": "lid", "ux": aside, "uy": -0.1}],
+                 contacts=[{"on": "upper", "with": "lower", **contact}])
+
+
+def test_a_block_slides_over_another(s):
+    """By more than four elements, to the mirror image of where it began."""
+    here, there = (answer(s, stacked(aside)) for aside in (0, 1.5))
+    for _, found in (here, there):
+        summary = found["summary"]
+        check(summary["outcome"] == "converged" and summary["finite"]["steps"] == 1 and summary["finite"]["definite"], summary)
+        check(summary["resultants"]["imbalance"] < 1e-8 and -0.005 < summary["finite"]["least_gap"] < 0, summary["finite"])
+        check(max(found["pressure"]) > 0.05 and summary["contact"]["active"] == 5, summary["contact"])
+    force = [found["summary"]["resultants"]["supports"][1]["force"] for _, found in (here, there)]
+    check(force[0][1] < -0.05 and abs(force[0][1] - force[1][1]) < 1e-8 and abs(force[0][0] + force[1][0]) < 1e-8, force)
+    for of in ("result.vtu", "deformed.svg", "surface", "history", "result?fields=stress_gauss,von_mises,principal"):
+        expect(s.get(f"/v1/jobs/{there[0]}/{of}"), 200)
+
+
 def test_what_is_not_modelled_is_refused(s):
-    asked = [(block("linear"), "/problem/materials/0/law", "neo_hooke_isochoric"),
+    asked = [(stacked(0, smooth=True), "/problem/contacts/0/smooth", "quad8"),
+             (stacked(0, discretization="nodes"), "/problem/contacts/0/discretization", "leave discretization out"),
+             ({**stacked(0), "problem": {**stacked(0)["problem"], "kinematics": "auto"}}, "/problem/contacts/0/with", "\"finite\""),
+             (block("linear"), "/problem/materials/0/law", "neo_hooke_isochoric"),
              (block(kinematics="moving"), "/problem/materials/0/law", "\"auto\" or \"finite\""),
              (block(kinematics="auto", model="plane_stress"), "/problem/model", "plane_strain"),
              ({**block(kinematics="auto"), "quantities": [{"quantity": "contact.force"}]}, "/quantities", "compare meshes"),

@@ -56,7 +56,7 @@ static void give_back(answered *a)
 static uz_finite_certificate judge(const answered *a)
 {
     const uz_result *r = a->result;
-    const uz_finite_answer of = {&a->there, &a->scene, r->u, r->r, r->g, a->prescribed};
+    const uz_finite_answer of = {&a->there, &a->base, &a->scene, r->u, r->r, r->g, a->prescribed};
     uz_finite_certificate c;
     uz_error err = {0};
     CHECK_MSG(uz_certify_finite(&c, &of, &err) == UZ_OK, "%s", err.message);

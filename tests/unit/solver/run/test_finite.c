@@ -2,7 +2,7 @@
  * those of closed forms, or of finer meshes by an independent program. */
 #include "body_fixture.h"
 #include "core/vector3.h"
-#include "finite/finite_body.h"
+#include "energy_slope.h"
 #include "finite/hyperelastic.h"
 #include "qp_fixture.h"
 
@@ -754,46 +754,6 @@ static uz_scene random_solid(qp_random *rng)
     return s;
 }
 
-/* The slope of the energy along a motion that leaves all rows where they are and supports too, by the sizes of forces.
- */
-static double slope_along(const uz_result *r, const uz_scene *scene, qp_random *rng)
-{
-    uz_body_model model = body_model(scene);
-    const int dim = r->mesh.dim;
-    const int64_t n = dim * r->n_nodes;
-    double *u = body_room(n, sizeof *u), *v = body_room(n, sizeof *v), *f = body_room(n, sizeof *f), norm = 0, work = 0;
-    const double h = 1e-5; /* of fourth order, as flat elements have large third derivatives */
-    static const double WAY[] = {-2, -1, 1, 2};
-    uz_finite_measure at[4];
-    uz_error err = {0};
-    uz_scene part = *scene;
-    CHECK_INT(uz_nodal_loads(f, &model, &part, &err), UZ_OK);
-    for (int64_t i = 0; i < n; i++)
-        v[i] = model.dof[i] < 0 && !model.frame_of ? 0 : random_signed(rng);
-    for (int64_t a = 0; a < r->n_nodes; a++) { /* nodes of contacts stay, and held ones */
-        bool stays = r->mesh.xyz[dim * a + 1] < 1e-9;
-        for (int c = 0; c < dim; c++)
-            stays = stays || model.dof[dim * a + c] < 0;
-        for (int c = 0; c < dim; c++)
-            v[dim * a + c] *= !stays;
-    }
-    for (int s = 0; s < 4; s++) {
-        for (int64_t i = 0; i < n; i++)
-            u[i] = r->u[i] + WAY[s] * h * v[i];
-        uz_finite_body(&at[s], NULL, NULL, &model, u, NULL);
-    }
-    for (int64_t i = 0; i < n; i++) {
-        work += f[i] * v[i];
-        norm += v[i] * v[i];
-    }
-    free(u);
-    free(v);
-    free(f);
-    uz_body_model_clear(&model);
-    const double slope = (8 * (at[2].energy - at[1].energy) - (at[3].energy - at[0].energy)) / (12 * h);
-    return fabs(slope - work) / sqrt(norm);
-}
-
 TEST(what_converges_is_an_equilibrium)
 {
     enum { SCENES = 50 };
@@ -822,7 +782,11 @@ TEST(what_converges_is_an_equilibrium)
         if (sum->outcome == UZ_CONVERGED) {
             converged++;
             most = sum->finite.qps > most ? sum->finite.qps : most;
-            const double slope = slope_along(result, &s, &rng);
+            bool *stays = body_room(result->n_nodes, sizeof *stays);
+            for (int64_t i = 0; i < result->n_nodes; i++)
+                stays[i] = result->mesh.xyz[result->mesh.dim * i + 1] < 1e-9;
+            const double slope = energy_slope(result, &s, stays, &rng);
+            free(stays);
             /* the residual is relative to an energy of about 1, of rings of ten; flat elements are stiffer */
             CHECK_MSG(slope < (k % 4 == 3 ? 1e-7 : 1e-8) / sum->finite.least_det, "scene %d: %.3g", k, slope);
             CHECK(sum->finite.definite && sum->finite.least_det > 0 && sum->max_penetration < 1e-8);

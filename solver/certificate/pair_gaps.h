@@ -1,0 +1,14 @@
+/* pair_gaps.h: how far two deformed surfaces in the plane are apart. */
+#ifndef UZ_CERTIFICATE_PAIR_GAPS_H
+#define UZ_CERTIFICATE_PAIR_GAPS_H
+
+#include "assembly/assembly.h"
+
+/* Lowers *least to the least gap between points of the sides of contact k, displaced by u, and the other of its two
+ * surfaces, and *part to the least of these over the length of the longer one of both sides; < 0: the bodies overlap.
+ * Each side is looked at in `steps` equal steps along it. What faces no part of the other surface has no gap.
+ * Errors: UZ_ERR_SCENE (no such groups), UZ_ERR_MEMORY. */
+uz_status uz_pair_gaps(double *least, double *part, const uz_body_model *model, const uz_scene *scene, int64_t k,
+                       const double *u, int steps, uz_error *err);
+
+#endif

@@ -1,0 +1,176 @@
+/* finite_pairs.c: steps of two bodies that touch.
+ *
+ * Rows of two surfaces are those where the bodies are, with forces N(u)' r that turn and go over from node to node as
+ * they slide (assembly/row_turn.h). With T the derivative of these forces and E what the gaps' own derivative is off -N
+ * a step is the contact problem
+ *
+ *     (K - T) v = f + N' r,   h - N (u + v) + E v >= 0,   r <= 0,
+ *
+ * which is not that of an energy, as T is not symmetric. It is solved by contact problems on the symmetric part of
+ * K - T, to which the skew part and E are added at the last v: few, as both are small where the surfaces lie on each
+ * other, and each a back-substitution, as the matrix stays. Their v are mixed so that what the problem changes about
+ * them is least (D. Anderson, "Iterative procedures for nonlinear integral equations", J. ACM 12 (1965) 547-560), as
+ * what is skew would turn them about the answer for long. */
+#include "run/finite.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "linalg/blas.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Contact problems of a step, how many are mixed, and what may be left of a step: of the parts that Newton's method
+ * leaves it is one of the last. */
+enum { MOST_CORRECTIONS = 12, MIXED = 4 };
+#define CORRECTED 1e-4
+/* What rounding may change, in parts of the displacement. */
+#define ROUNDING 1e-12
+
+uz_status uz_finite_widen(uz_finite_run *run, const uz_row_turn *turn, bool hold, uz_error *err)
+{
+    const bool known = run->n_r == run->at.rows.m;
+    uz_csc_clear(&run->wide);
+    run->K = &run->wide;
+    return uz_widen_by_rows(&run->wide, &run->tangent.K, &run->at.rows.N, hold && known ? run->r : NULL, 0, turn, err);
+}
+
+uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *from, uz_error *err)
+{
+    const uz_body_model *to = &run->at.rows;
+    int64_t next = 0;
+    double *r = uz_alloc_zero(to->m, sizeof *r);
+    if (!r)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld reactions", (long long)to->m);
+    for (int64_t i = 0; i < to->m; i++) { /* rows come contact by contact, places ascending */
+        const int64_t contact = to->info.contact_of[i], place = to->row_place[i];
+        while (next < from->m && (from->info.contact_of[next] < contact ||
+                                  (from->info.contact_of[next] == contact && from->row_place[next] < place)))
+            next++;
+        if (next < from->m && from->info.contact_of[next] == contact && from->row_place[next] == place)
+            r[i] = run->r[next];
+    }
+    free(run->r);
+    run->r = r;
+    run->n_r = to->m;
+    return UZ_OK;
+}
+
+/* ---- the step */
+
+/* v that were asked, what came of each, and the changes; the last ones, in turn. */
+typedef struct {
+    int64_t d;
+    int n;
+    double *came[MIXED], *change[MIXED];
+} history;
+
+/* weight (k): the combination of the changes that is least, with the sum 1: the last one and multiples of differences
+ * from it, by their normal equations. */
+static void least_combination(double weight[MIXED], const history *past, int k, int last)
+{
+    double A[MIXED][MIXED + 1], sum = 0;
+    int at[MIXED], n = 0;
+    for (int i = 0; i < k; i++)
+        if (i != last)
+            at[n++] = i;
+    for (int i = 0; i < n; i++) {
+        const double *a = past->change[at[i]], *own = past->change[last];
+        for (int j = 0; j <= n; j++) {
+            const double *b = j < n ? past->change[at[j]] : NULL;
+            A[i][j] = 0;
+            for (int64_t q = 0; q < past->d; q++)
+                A[i][j] += (a[q] - own[q]) * (b ? b[q] - own[q] : -own[q]);
+        }
+        A[i][i] *= 1 + 1e-12;
+    }
+    for (int c = 0; c < n; c++)
+        for (int i = c + 1; i < n; i++) {
+            const double factor = A[c][c] > 0 ? A[i][c] / A[c][c] : 0;
+            for (int j = c; j <= n; j++)
+                A[i][j] -= factor * A[c][j];
+        }
+    for (int i = n - 1; i >= 0; i--) {
+        double value = A[i][n];
+        for (int j = i + 1; j < n; j++)
+            value -= A[i][j] * weight[at[j]];
+        weight[at[i]] = A[i][i] > 0 && isfinite(value / A[i][i]) ? value / A[i][i] : 0;
+        sum += weight[at[i]];
+    }
+    weight[last] = 1 - sum;
+}
+
+/* v becomes what is asked next, after `came` came of it. */
+static void mix(double *v, history *past, const double *came)
+{
+    const int last = past->n % MIXED, k = past->n < MIXED ? past->n + 1 : MIXED;
+    double weight[MIXED] = {0};
+    for (int64_t j = 0; j < past->d; j++) {
+        past->came[last][j] = came[j];
+        past->change[last][j] = came[j] - v[j];
+    }
+    past->n++;
+    least_combination(weight, past, k, last);
+    for (int64_t j = 0; j < past->d; j++) {
+        v[j] = 0;
+        for (int i = 0; i < k; i++)
+            v[j] += weight[i] * past->came[i][j];
+    }
+}
+
+/* room: 4 d + m. p and h are those of the symmetric part. */
+static uz_status iterate(uz_finite_run *run, const uz_row_turn *turn, double *room, history *past, uz_error *err)
+{
+    const int64_t d = run->d, m = run->at.rows.m;
+    double *p = room, *from = p + d, *v = from + d, *came = v + d, *h = came + d;
+    uz_status status = UZ_OK;
+    uz_restrict_nodal(from, &run->base, run->at.u);
+    for (int64_t j = 0; j < d; j++) {
+        p[j] = run->p[j];
+        v[j] = run->last->u[j] - from[j];
+    }
+    for (int64_t i = 0; i < m; i++)
+        h[i] = run->at.h[i];
+    for (int k = 0; k < MOST_CORRECTIONS && status == UZ_OK; k++) {
+        double change = 0;
+        for (int64_t j = 0; j < d; j++)
+            run->p[j] = p[j];
+        for (int64_t i = 0; i < m; i++)
+            run->at.h[i] = h[i];
+        uz_add_entries(run->p, &turn->force, v, true);
+        uz_add_entries(run->at.h, &turn->gap, v, false);
+        status = uz_finite_solve_qp(run, err);
+        if (status != UZ_OK ||
+            (run->last->summary.outcome != UZ_CONVERGED && run->last->summary.outcome != UZ_PRECISION_LIMIT))
+            break;
+        for (int64_t j = 0; j < d; j++) {
+            came[j] = run->last->u[j] - from[j];
+            change = hypot(change, came[j] - v[j]);
+        }
+        if (change <= CORRECTED * uz_norm(d, came) || change <= ROUNDING * uz_norm(d, run->last->u))
+            break;
+        mix(v, past, came);
+    }
+    for (int64_t i = 0; i < m; i++)
+        run->at.h[i] = h[i];
+    return status;
+}
+
+uz_status uz_finite_correct(uz_finite_run *run, const uz_row_turn *turn, uz_error *err)
+{
+    const int64_t d = run->d;
+    history past = {.d = d};
+    double *room = uz_alloc(4 * d + run->at.rows.m, sizeof *room), *kept = uz_alloc(2 * MIXED * d, sizeof *kept);
+    uz_status status =
+        room && kept ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld dofs", (long long)d);
+    for (int i = 0; i < MIXED && status == UZ_OK; i++) {
+        past.came[i] = kept + 2 * i * d;
+        past.change[i] = past.came[i] + d;
+    }
+    if (status == UZ_OK)
+        status = iterate(run, turn, room, &past, err);
+    free(room);
+    free(kept);
+    return status;
+}

@@ -1,0 +1,304 @@
+/* Finite kinematics of two bodies: patch test, mirror images, shrink fits of rings against closed forms, blocks that
+ * slide far against finer meshes, and what is refused. Groups of the two bodies are those of boxes with an a or a b. */
+#include "energy_slope.h"
+#include "two_boxes.h"
+
+static uz_result *solve_to(const uz_scene *s, double error)
+{
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *s};
+    uz_settings settings = uz_settings_default();
+    uz_result *result = NULL;
+    uz_error err = {0};
+    settings.relative_error = error;
+    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where, err.message);
+    if (!result)
+        exit(1);
+    return result;
+}
+
+static void give_back(uz_result *result, uz_scene *s)
+{
+    uz_result_free(result);
+    uz_scene_clear(s);
+}
+
+static void check_converged(const uz_result *r, int64_t steps, int64_t qps)
+{
+    const uz_finite *f = &r->summary.finite;
+    CHECK_MSG(r->summary.outcome == UZ_CONVERGED, "%s: %s", uz_choice_name(UZ_CHOICE_OUTCOME, r->summary.outcome),
+              r->summary.message);
+    CHECK_MSG(f->steps <= steps && f->qps <= qps, "%lld steps, %lld contact problems", (long long)f->steps,
+              (long long)f->qps);
+    CHECK(f->load == 1 && f->definite && f->residual <= r->summary.requested_error && f->least_det > 0);
+    CHECK(r->evaluation->imbalance < 1e-7);
+}
+
+static const double *moved_by(const uz_result *r, double x, double y)
+{
+    for (int64_t i = 0; i < r->n_nodes; i++)
+        if (hypot(r->mesh.xyz[2 * i] - x, r->mesh.xyz[2 * i + 1] - y) < 1e-9)
+            return r->u + 2 * i;
+    CHECK_MSG(false, "no node at %g, %g", x, y);
+    exit(1);
+}
+
+/* Two blocks of other meshes on each other, squeezed as one: the state is homogeneous, whichever is called `on`. */
+TEST(stacked_blocks_pass_the_patch_test)
+{
+    static const char *const ELEMENTS[] = {"quad4", "quad8", "tri3", "tri6"};
+    static const double FORCE[] = {0.19615385, 0.45842392, 0.47813424};
+    for (int law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF; law < UZ_ELASTICITIES; law++)
+        for (int k = 0; k < 8; k++) {
+            const box_part a = {{0, 0}, {1, 0.5}, {2, 1}, ELEMENTS[k / 2]};
+            const box_part b = {{0, 0.5}, {1, 0.5}, {3, 2}, ELEMENTS[3 - k / 2]};
+            uz_scene s = two(UZ_PLANE_STRAIN, (uz_elasticity)law, &a, &b, NULL);
+            body_hold(&s, "abottom", NAN, 0, NAN);
+            body_hold(&s, "aleft", 0, NAN, NAN);
+            body_hold(&s, "bleft", 0, NAN, NAN);
+            body_hold(&s, "btop", NAN, -0.3, NAN);
+            touch(&s, k % 2 ? "atop" : "bbottom", k % 2 ? "bbottom" : "atop");
+            uz_result *r = solve_to(&s, 1e-9);
+            check_converged(r, 1, 100); /* the corners of both are on the verge of each other's ends */
+            CHECK_MSG(fabs(r->evaluation->supports[0].force[1] - FORCE[law - 1]) < 1e-8, "%.9g",
+                      r->evaluation->supports[0].force[1]);
+            for (int64_t i = 0; i < r->n_nodes; i++)
+                CHECK_MSG(fabs(r->u[2 * i + 1] + 0.3 * r->mesh.xyz[2 * i + 1]) < 3e-9, "%.3g",
+                          r->u[2 * i + 1] + 0.3 * r->mesh.xyz[2 * i + 1]);
+            CHECK(fabs(r->summary.finite.least_gap) < 3e-9 && r->summary.max_penetration < 3e-9);
+            CHECK(fabs(r->evaluation->totals[0].normal_force - FORCE[law - 1]) < 1e-8);
+            give_back(r, &s);
+        }
+}
+
+static void bend(double x[3])
+{
+    const double r = x[0], angle = x[1];
+    x[0] = r * cos(angle);
+    x[1] = r * sin(angle);
+}
+
+/* A tube 1..2 of two that lie on each other at 1.4, its bore widened to 1.5: pressure there and outer radius are those
+ * of one tube, by quadrature. As bodies of revolution, and as quarters in the plane. */
+TEST(two_tubes_are_one)
+{
+    static const double PRESSURE = 0.15335612, OUTER = 2.34524417;
+    for (int k = 0; k < 3; k++) {
+        const bool ring = k == 0;
+        const double height = ring ? 0.25 : acos(0);
+        const int64_t along = ring ? 1 : 12;
+        const box_part a = {{1, 0}, {0.4, height}, {4, along}, "quad8"},
+                       b = {{1.4, 0}, {0.6, height}, {4, along + 1}, "quad8"};
+        uz_scene s = two(ring ? UZ_AXISYMMETRIC : UZ_PLANE_STRAIN, UZ_ELASTIC_NEO_HOOKE, &a, &b, ring ? NULL : bend);
+        const char *const held[] = {"abottom", "bbottom", "atop", "btop"};
+        for (int i = 0; i < 4; i++)
+            body_hold(&s, held[i], ring || i < 2 ? NAN : 0, ring || i < 2 ? 0 : NAN, NAN);
+        if (ring) {
+            body_hold(&s, "aleft", 0.5, NAN, NAN);
+        } else {
+            uz_contact *rod = body_plane(&s, "aleft", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+            rod->kind = UZ_OBSTACLE_ROUND;
+            rod->radius = 1.5;
+        }
+        touch(&s, k == 1 ? "bleft" : "aright", k == 1 ? "aright" : "bleft");
+        uz_result *r = solve_to(&s, 1e-8);
+        check_converged(r, 1, 90);
+        CHECK_MSG(ring || fabs(r->summary.max_pressure / PRESSURE - 1) < 1e-6, "%.8g", r->summary.max_pressure);
+        CHECK_MSG(fabs(2 + moved_by(r, 2, 0)[0] - OUTER) < 1e-7, "%.9g", 2 + moved_by(r, 2, 0)[0]);
+        give_back(r, &s);
+    }
+}
+
+/* A block on a longer one, pressed into it and moved along it. */
+static uz_scene slid(const char *element, int64_t cells, double way, bool turned)
+{
+    const box_part a = {{0, 0}, {4, 1}, {4 * cells, cells}, element};
+    const box_part b = {{0.5, 1}, {1, 1}, {cells + 1, cells + 1}, element};
+    uz_scene s = two(UZ_PLANE_STRAIN, UZ_ELASTIC_NEO_HOOKE, &a, &b, NULL);
+    body_hold(&s, "abottom", 0, 0, NAN);
+    body_hold(&s, "btop", way, -0.2, NAN);
+    touch(&s, turned ? "atop" : "bbottom", turned ? "bbottom" : "atop");
+    return s;
+}
+
+/* By eight elements and more, to the mirror image of where it began: the force is that of a finer mesh, and what it has
+ * slid over does not matter. */
+TEST(a_block_that_slides_over_another_is_mirrored)
+{
+    static const char *const ELEMENTS[] = {"quad4", "quad8", "tri6"};
+    for (int k = 0; k < 3; k++) {
+        uz_scene s[2];
+        uz_result *r[2];
+        for (int i = 0; i < 2; i++) {
+            s[i] = slid(ELEMENTS[k], 4, 2 * i, k == 1);
+            r[i] = solve_to(&s[i], 1e-10);
+            check_converged(r[i], 1, 50);
+        }
+        const double *here = r[0]->evaluation->supports[0].force, *there = r[1]->evaluation->supports[0].force;
+        if (k < 2) /* triangles of a box all lean to one side */
+            CHECK_MSG(fabs(here[0] + there[0]) < 1e-9 && fabs(here[1] - there[1]) < 1e-9, "%.12g %.12g, %.12g %.12g",
+                      here[0], here[1], there[0], there[1]);
+        CHECK_MSG(fabs(there[1] / 0.1477 - 1) < (k == 0 ? 0.03 : 0.01), "%.8g", there[1]);
+        for (int i = 0; i < 2; i++)
+            give_back(r[i], &s[i]);
+    }
+}
+
+static void lower_arch(double x[3])
+{
+    const double r = x[0], angle = x[1];
+    x[0] = r * cos(angle);
+    x[1] = r * sin(angle) - 3;
+}
+
+static void put_arches(double x[3])
+{
+    if (x[0] < 4) { /* the lower one */
+        lower_arch(x);
+        return;
+    }
+    const double r = x[0] - 3, angle = x[1];
+    x[0] = -r * cos(angle);
+    x[1] = 3 - r * sin(angle);
+}
+
+/* Two half rings that are pressed together and moved past each other: both bend, and the place where they touch goes
+ * along both. Forces of a mesh that is four times as fine. */
+TEST(rings_that_are_pressed_and_slide)
+{
+    static const double ASIDE[] = {-0.0075955, 0, 0.0075955}, UP[] = {0.035695, 0.04586, 0.035695};
+    for (int i = 0; i < 3; i++) {
+        const box_part a = {{2, 0}, {1, acos(-1)}, {2, 16}, "quad8"}, b = {{5, 0}, {1, acos(-1)}, {2, 18}, "quad8"};
+        uz_scene s = two(UZ_PLANE_STRAIN, UZ_ELASTIC_NEO_HOOKE, &a, &b, put_arches);
+        body_hold(&s, "abottom", 0, 0, NAN);
+        body_hold(&s, "atop", 0, 0, NAN);
+        body_hold(&s, "bbottom", i - 1, -0.6, NAN);
+        body_hold(&s, "btop", i - 1, -0.6, NAN);
+        touch(&s, "bright", "aright");
+        uz_result *r = solve_to(&s, 1e-8);
+        check_converged(r, 1, 45);
+        const uz_resultant *foot = r->evaluation->supports;
+        const double force[2] = {foot[0].force[0] + foot[1].force[0], foot[0].force[1] + foot[1].force[1]};
+        CHECK_MSG(fabs(fabs(force[1]) - UP[i]) < 0.015 * UP[i], "%.8g", force[1]);
+        CHECK_MSG(fabs(fabs(force[0]) - fabs(ASIDE[i])) < 0.015 * fabs(ASIDE[i]) + 1e-9, "%.8g", force[0]);
+        give_back(r, &s);
+    }
+}
+
+/* ---- generated scenes: whatever is called converged is an equilibrium by differences of the energy */
+
+static uz_scene random_pair(qp_random *rng, bool ring)
+{
+    static const char *const ELEMENTS[] = {"quad4", "quad8", "tri3", "tri6"};
+    const double length = 1.5 + 2 * random_unit(rng), width = 0.6 + random_unit(rng), from = ring ? 1 : 0;
+    const double at = from + (length - 0.5 * width) * random_unit(rng);
+    const int64_t cells = 2 + (int64_t)(3 * random_unit(rng)), others = 2 + (int64_t)(4 * random_unit(rng));
+    const box_part a = {
+        {from, 0}, {length, 1}, {(int64_t)((double)cells * length), cells}, ELEMENTS[(int)(4 * random_unit(rng))]};
+    const box_part b = {
+        {at, 1 + 0.1 * random_unit(rng)}, {width, 0.8}, {others, 2}, ELEMENTS[(int)(4 * random_unit(rng))]};
+    uz_scene s =
+        two(ring ? UZ_AXISYMMETRIC : UZ_PLANE_STRAIN, (uz_elasticity)(1 + (int)(3 * random_unit(rng))), &a, &b, NULL);
+    const bool turned = random_unit(rng) < 0.5;
+    s.materials[0].poisson = 0.4 * random_unit(rng);
+    body_hold(&s, "abottom", 0, 0, NAN);
+    body_hold(&s, "btop", 1.5 * random_signed(rng), -0.5 * random_unit(rng), NAN);
+    if (random_unit(rng) < 0.3) /* on its flank, too, where it may meet the other one's corner */
+        body_load(&s, UZ_LOAD_TRACTION, "bright", 0.05 * random_signed(rng), 0, 0);
+    touch(&s, turned ? "atop" : "bbottom", turned ? "bbottom" : "atop");
+    return s;
+}
+
+static bool *nodes_of_contacts(const uz_scene *s, const uz_result *r)
+{
+    bool *stays = body_room(r->n_nodes, sizeof *stays);
+    for (int64_t g = 0; g < s->given.n_groups; g++) {
+        const uz_given_group *group = &s->given.groups[g];
+        const bool named = strcmp(group->name, s->contacts[0].on) == 0 || strcmp(group->name, s->contacts[0].with) == 0;
+        for (int64_t q = 0; named && q < group->face_first[group->n_faces]; q++)
+            stays[group->face_node[q]] = true;
+    }
+    return stays;
+}
+
+TEST(what_converges_is_an_equilibrium)
+{
+    enum { SCENES = 24 };
+    int converged = 0;
+    int64_t most = 0;
+    for (int k = 0; k < SCENES; k++) {
+        qp_random rng = {(uint64_t)k + 1};
+        uz_scene s = random_pair(&rng, k % 4 == 3);
+        const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+        const uz_settings settings = uz_settings_default();
+        uz_result *r = NULL;
+        uz_error err = {0};
+        const uz_status status = uz_solve(&r, &problem, &settings, NULL, NULL, &err);
+        CHECK_MSG(status == UZ_OK, "scene %d: %s: %s", k, err.where, err.message);
+        if (status == UZ_OK && r->summary.outcome == UZ_CONVERGED) {
+            bool *stays = nodes_of_contacts(&s, r);
+            const double slope = energy_slope(r, &s, stays, &rng), least = r->summary.finite.least_det;
+            converged++;
+            most = r->summary.finite.qps > most ? r->summary.finite.qps : most;
+            CHECK_MSG(slope < (k % 4 == 3 ? 1e-7 : 1e-8) / least, "scene %d: %.3g", k, slope);
+            CHECK(r->summary.finite.definite && least > 0 && r->summary.max_penetration < 1e-8);
+            CHECK_MSG(r->summary.active == 0 || r->evaluation->imbalance < 1e-6, "scene %d: %.3g", k,
+                      r->evaluation->imbalance);
+            const uz_overlap *overlap = r->evaluation->overlap;
+            /* also counts what is beside the end of a surface by a twentieth of a side */
+            CHECK_MSG(overlap->depth < 0.15 * overlap->side + 1e-9, "scene %d: %.3g", k, overlap->depth);
+            free(stays);
+        }
+        if (r)
+            uz_result_free(r);
+        uz_scene_clear(&s);
+    }
+    printf("# %d of %d converged, in at most %lld contact problems\n", converged, SCENES, (long long)most);
+    CHECK(2 * converged > SCENES);
+}
+
+/* `with` becomes a group of the sides of both surfaces. */
+static void name_both(uz_given_mesh *mesh, uz_contact *c)
+{
+    uz_given_group *both = &mesh->groups[mesh->n_groups];
+    snprintf(both->name, sizeof both->name, "both");
+    both->face_first = body_room(64, sizeof *both->face_first);
+    both->face_node = body_room(64, sizeof *both->face_node);
+    for (int64_t g = 0; g < mesh->n_groups; g++) {
+        const uz_given_group *from = &mesh->groups[g];
+        if (strcmp(from->name, c->on) != 0 && strcmp(from->name, c->with) != 0)
+            continue;
+        for (int64_t i = 0; i < from->n_faces; i++) {
+            int64_t next = both->face_first[both->n_faces];
+            for (int64_t q = from->face_first[i]; q < from->face_first[i + 1]; q++)
+                both->face_node[next++] = from->face_node[q];
+            both->face_first[++both->n_faces] = next;
+        }
+    }
+    mesh->n_groups++;
+    snprintf(c->with, sizeof c->with, "both");
+}
+
+TEST(what_there_is_no_model_for_is_refused)
+{
+    static const char *const WHERE[] = {"/contacts/0/smooth", "/contacts/0/discretization", "/contacts/0/with",
+                                        "/contacts/0/with", "/contacts/0/with"};
+    for (int k = 0; k < 5; k++) {
+        uz_scene s = slid("quad4", 2, 0, false);
+        uz_contact *c = &s.contacts[0];
+        c->faceted = k != 0;
+        c->between = k == 1 ? UZ_CONTACT_NODES : UZ_CONTACT_SURFACES;
+        if (k == 2)
+            snprintf(c->with, sizeof c->with, "%s", c->on);
+        if (k == 3)
+            name_both(&s.given, c);
+        s.kinematics = k == 4 ? UZ_KINEMATICS_AUTO : UZ_KINEMATICS_FINITE;
+        const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+        const uz_settings settings = uz_settings_default();
+        uz_result *r = NULL;
+        uz_error err = {0};
+        CHECK_INT(uz_solve(&r, &problem, &settings, NULL, NULL, &err), UZ_ERR_SCENE);
+        CHECK_STR(err.where, WHERE[k]);
+        CHECK(!r);
+        uz_scene_clear(&s);
+    }
+}
