@@ -298,7 +298,7 @@ static bool list_pressed(work *w)
 }
 
 uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz_body_model *rows,
-                           const uz_scene *scene, const double *r, double least, uz_error *err)
+                           const uz_scene *scene, const double *r, double least, const uz_stop *stop, uz_error *err)
 {
     const int dim = base->mesh.dim;
     work w = {.base = base, .rows = rows, .scene = scene, .r = r, .least = least};
@@ -321,8 +321,11 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
     if (!room)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how %lld contact rows turn", (long long)rows->m);
     for (int64_t color = 0; color < w.colors && status == UZ_OK && out->known; color++)
-        for (int c = 0; c < dim && status == UZ_OK && out->known; c++)
-            status = move_color(out, &w, side, color, c, err);
+        for (int c = 0; c < dim && status == UZ_OK && out->known; c++) {
+            out->known = !uz_stop_is_due(stop);
+            if (out->known)
+                status = move_color(out, &w, side, color, c, err);
+        }
     if (!out->known)
         out->force.n = out->gap.n = 0;
     free(w.beside_first);

@@ -3,6 +3,7 @@
 #define UZ_ROW_TURN_H
 
 #include "assembly/assembly.h"
+#include "core/hooks.h"
 
 typedef struct {
     int64_t n, room, *row, *col;
@@ -21,10 +22,11 @@ typedef struct {
 /* Is there a contact between bodies? */
 bool uz_has_pairs(const uz_scene *scene);
 /* Of the rows between bodies whose reaction (r: rows->m) is less than -least. rows: the body that `base` is, moved to a
- * place (uz_body_model_move); scene: with the contacts. In the plane only. The caller clears *out in every case.
+ * place (uz_body_model_move); scene: with the contacts. In the plane only. stop (NULL: never) is asked at each
+ * place; where it is due nothing is known. The caller clears *out in every case.
  * UZ_ERR_MEMORY */
 uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz_body_model *rows,
-                           const uz_scene *scene, const double *r, double least, uz_error *err);
+                           const uz_scene *scene, const double *r, double least, const uz_stop *stop, uz_error *err);
 void uz_row_turn_clear(uz_row_turn *turn);
 /* y += A x; skew: that of the skew part of A alone. */
 void uz_add_entries(double *y, const uz_entries *of, const double *x, bool skew);

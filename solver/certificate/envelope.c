@@ -152,7 +152,7 @@ static bool eliminate(uz_envelope *f, int64_t block, const double *own, double l
 }
 
 uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, const double *size, double least,
-                             uz_error *err)
+                             const uz_stop *stop, uz_error *err)
 {
     const int64_t n = A->cols;
     *definite = false;
@@ -168,7 +168,7 @@ uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, 
         own[out->place[j]] = size[j];
     bool good = room;
     for (int64_t b = 0; b < out->blocks && good; b++)
-        good = eliminate(out, b, own, least);
+        good = !uz_stop_is_due(stop) && eliminate(out, b, own, least);
     free(own);
     *definite = good;
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the factor of %lld dofs", (long long)n);

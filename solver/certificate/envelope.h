@@ -2,6 +2,7 @@
 #ifndef UZ_CERTIFICATE_ENVELOPE_H
 #define UZ_CERTIFICATE_ENVELOPE_H
 
+#include "core/hooks.h"
 #include "uzawa.h"
 
 /* Columns of a block, of which all have room from its first row to the last one that the envelope has in any. */
@@ -16,10 +17,11 @@ typedef struct {
 /* A = L L' of a symmetric matrix given by its lower triangle, in the order of Cuthill and McKee reversed. *definite:
  * each pivot was more than `least` times its entry of `size` (n, positive), or there is no factor. Memory grows as n
  * times the bandwidth, time as n times its square, of a cube of n dofs in bricks as n^(7/3): 1e10 multiplications for
- * 14,000. Source: George and Liu, "Computer Solution of Large Sparse Positive Definite Systems", ch. 4. UZ_ERR_MEMORY.
- * The caller clears *out in every case. */
+ * 14,000. Source: George and Liu, "Computer Solution of Large Sparse Positive Definite Systems", ch. 4. stop (NULL:
+ * never) is asked before each block; where it is due there is no factor either. UZ_ERR_MEMORY. The caller clears *out
+ * in every case. */
 uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, const double *size, double least,
-                             uz_error *err);
+                             const uz_stop *stop, uz_error *err);
 /* x (n) becomes L^-1 x, in the order of the factor: x'x is then x' A^-1 x. */
 void uz_envelope_forward(double *x, const uz_envelope *factor, double *room);
 void uz_envelope_clear(uz_envelope *factor);

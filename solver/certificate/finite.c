@@ -19,6 +19,9 @@
 /* Points of each side, between its ends, at which gaps are looked at. */
 enum { SAMPLES = 7 }; /* in space along both of its directions */
 
+/* The caller is asked whether to go on after so many elements. */
+enum { ELEMENTS_BETWEEN = 64 };
+
 /* A row is pressed where its reaction is more than this part of the largest. */
 #define PRESSED 1e-12
 /* Pivots that are less than this part of the stiffness of their dof may be zero. */
@@ -32,6 +35,7 @@ static const double ALONG[] = {1e2, 1e5};
 
 typedef struct {
     const uz_finite_answer *of;
+    const uz_stop *stop;
     uz_body_model tangent;           /* borrows all but K's and K_fixed's values */
     uz_csc wide;                     /* K with entries of rows between bodies, where there are any: it is tangent's */
     long double *force;              /* n_nodes x dim: internal */
@@ -356,7 +360,7 @@ static uz_status add_turn(bool *known, work *w, double most, uz_error *err)
     *known = true;
     if (!uz_has_pairs(of->scene))
         return UZ_OK;
-    uz_status status = uz_row_turn_find(&turn, of->rest, of->model, of->scene, of->r, PRESSED * most, err);
+    uz_status status = uz_row_turn_find(&turn, of->rest, of->model, of->scene, of->r, PRESSED * most, w->stop, err);
     *known = turn.known;
     if (status == UZ_OK)
         status = uz_widen_by_rows(&wide, &w->tangent.K, &of->model->N, of->r, PRESSED * most, &turn, err);
@@ -387,7 +391,7 @@ static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_erro
         status = add_along(w, ALONG[k] * stiffest - there, most, err);
         there = ALONG[k] * stiffest;
         if (status == UZ_OK)
-            status = uz_envelope_factor(&factor, &out->definite, K, w->size, LEAST_PIVOT, err);
+            status = uz_envelope_factor(&factor, &out->definite, K, w->size, LEAST_PIVOT, w->stop, err);
         if (status == UZ_OK && out->definite) {
             for (int64_t j = 0; j < model->d; j++) /* the step also closes the pressed rows */
                 for (int64_t q = model->N.ptr[j]; q < model->N.ptr[j + 1]; q++)
@@ -397,6 +401,7 @@ static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_erro
         }
         uz_envelope_clear(&factor);
     }
+    out->stopped = status == UZ_OK && !out->definite && uz_stop_is_due(w->stop); /* and so not definite */
     for (int64_t j = 0; j < model->d; j++)
         square += w->f[j] * w->f[j];
     for (int64_t i = 0; i < model->m; i++)
@@ -410,11 +415,12 @@ static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_erro
     return status;
 }
 
-uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *answer, uz_error *err)
+uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *answer, const uz_stop *stop,
+                            uz_error *err)
 {
     const uz_body_model *model = answer->model;
     const int dim = model->mesh.dim;
-    work w = {.of = answer};
+    work w = {.of = answer, .stop = stop};
     double most = 0;
     *out = (uz_finite_certificate){.least_det = INFINITY,
                                    .residual = INFINITY,
@@ -432,14 +438,16 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
             out->worst_support = fmax(out->worst_support, fabs(uz_along_dof(model, i / dim, (int)(i % dim), u) -
                                                                answer->prescribed[-1 - model->dof[i]]));
     }
-    for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK; e++)
+    for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK && !out->stopped; e++) {
+        out->stopped = e % ELEMENTS_BETWEEN == 0 && uz_stop_is_due(stop);
         add_element(out, &w, e);
+    }
     out->energy = (double)w.energy;
-    if (status == UZ_OK)
+    if (status == UZ_OK && !out->stopped)
         status = look_at_contacts(out, &w, most, err);
-    if (status == UZ_OK && out->least_det > 0)
+    if (status == UZ_OK && !out->stopped && out->least_det > 0)
         status = leave_over(&w, err);
-    if (status == UZ_OK && out->least_det > 0)
+    if (status == UZ_OK && !out->stopped && out->least_det > 0)
         status = judge(out, &w, most, err);
     if (w.wide.ptr)
         uz_csc_clear(&w.wide);

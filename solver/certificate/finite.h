@@ -6,6 +6,7 @@
 #define UZ_CERTIFICATE_FINITE_H
 
 #include "assembly/assembly.h"
+#include "core/hooks.h"
 
 typedef struct {
     const uz_body_model *model; /* at the place u: its rows are those that the answer has there */
@@ -17,6 +18,7 @@ typedef struct {
 } uz_finite_answer;
 
 typedef struct {
+    bool stopped;     /* before the end: nothing else is told */
     double energy;    /* strain energy, of the law's W */
     double least_det; /* of F, at quadrature points and corners */
     /* (f' H^-1 f + 2 |r'g|)^(1/2) over the root of twice the energy: H is the second derivatives of the Lagrangian with
@@ -35,7 +37,9 @@ typedef struct {
     double least_at_rows;  /* of g */
 } uz_finite_certificate;
 
-/* Errors: UZ_ERR_MEMORY, and those of obstacles. */
-uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *answer, uz_error *err);
+/* stop (NULL: never) is asked between elements, blocks of the factor and places beside this one. Errors: UZ_ERR_MEMORY,
+ * and those of obstacles. */
+uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *answer, const uz_stop *stop,
+                            uz_error *err);
 
 #endif

@@ -286,12 +286,13 @@ static bool add_more(double *hold, double *shift, bool rows)
 static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
 {
     uz_csc *K = &run->tangent.K;
+    const uz_stop stop = {&run->hooks, run->deadline};
     uz_row_turn turn = {.known = true};
     uz_error own = {0};
     uz_status status = UZ_ERR_NOT_SPD;
     run->K = K;
     if (run->pairs && run->n_r == run->at.rows.m) {
-        const uz_status found = uz_row_turn_find(&turn, &run->base, &run->at.rows, &run->scene, run->r, 0, err);
+        const uz_status found = uz_row_turn_find(&turn, &run->base, &run->at.rows, &run->scene, run->r, 0, &stop, err);
         if (found != UZ_OK) {
             uz_row_turn_clear(&turn);
             return found;
@@ -395,13 +396,17 @@ static uz_status ask_certificate(bool *done, uz_part *out, uz_finite_run *run, u
                                      run->r,        run->at.gap, run->prescribed};
     uz_finite_certificate *c = &run->certificate;
     const double start = uz_seconds();
-    const uz_status status = uz_certify_finite(c, &answer, err);
+    const uz_stop stop = {&run->hooks, run->deadline};
+    const uz_status status = uz_certify_finite(c, &answer, &stop, err);
     run->spent.certify += uz_seconds() - start;
     const double length = 1e-9 * run->base.mesh.extent;
     *done = true;
     if (status != UZ_OK)
         return status;
-    if (!(c->least_det > 0))
+    if (c->stopped) {
+        run->stopped = uz_cancelled(&run->hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
+        *out = UZ_PART_STOPPED;
+    } else if (!(c->least_det > 0))
         *out = UZ_PART_INVERTED;
     else if (!c->definite)
         *out = UZ_PART_INDEFINITE;

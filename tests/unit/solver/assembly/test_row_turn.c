@@ -52,7 +52,7 @@ TEST(forces_and_gaps_change_as_differences_say)
         r = body_room(at.m, sizeof *r);
         for (int64_t i = 0; i < at.m; i++)
             r[i] = -random_unit(&rng);
-        CHECK_INT(uz_row_turn_find(&turn, &base, &at, &s, r, 0, &err), UZ_OK);
+        CHECK_INT(uz_row_turn_find(&turn, &base, &at, &s, r, 0, NULL, &err), UZ_OK);
         CHECK(turn.known && turn.force.n > 0 && turn.gap.n > 0 && at.m > 2);
         for (int64_t j = 0; j < d; j++)
             v[j] = random_signed(&rng);
@@ -103,7 +103,7 @@ TEST(a_stiffness_gets_the_symmetric_part)
     r = body_room(at.m, sizeof *r);
     for (int64_t i = 0; i < at.m; i++)
         r[i] = -10 * random_unit(&rng);
-    CHECK_INT(uz_row_turn_find(&turn, &base, &at, &s, r, 0, &err), UZ_OK);
+    CHECK_INT(uz_row_turn_find(&turn, &base, &at, &s, r, 0, NULL, &err), UZ_OK);
     CHECK_INT(uz_widen_by_rows(&wide, &base.K, &at.N, r, 0, &turn, &err), UZ_OK);
     for (int64_t j = 0; j < d; j++)
         v[j] = random_signed(&rng);

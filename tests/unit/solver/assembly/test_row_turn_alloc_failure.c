@@ -33,7 +33,7 @@ TEST(failures_are_told_and_leave_nothing)
         heap.failed = false;
         heap.until_failure = count;
         heap.watching = true;
-        status = uz_row_turn_find(&turn, &base, &at, &s, r, 0, &err);
+        status = uz_row_turn_find(&turn, &base, &at, &s, r, 0, NULL, &err);
         if (status == UZ_OK)
             status = uz_widen_by_rows(&wide, &base.K, &at.N, r, 0, &turn, &err);
         uz_row_turn_clear(&turn);

@@ -59,7 +59,7 @@ static uz_finite_certificate judge(const answered *a)
     const uz_finite_answer of = {&a->there, &a->base, &a->scene, r->u, r->r, r->g, a->prescribed};
     uz_finite_certificate c;
     uz_error err = {0};
-    CHECK_MSG(uz_certify_finite(&c, &of, &err) == UZ_OK, "%s", err.message);
+    CHECK_MSG(uz_certify_finite(&c, &of, NULL, &err) == UZ_OK, "%s", err.message);
     return c;
 }
 
@@ -113,6 +113,36 @@ TEST(an_answer_and_what_is_wrong_with_others)
     CHECK(c.least_det < 0 && isinf(c.residual) && !c.definite);
     u[1] -= 3;
     CHECK(judge(&a).residual <= 1e-8);
+    give_back(&a);
+}
+
+static bool stop_after(void *ctx)
+{
+    int *left = ctx;
+    return (*left)-- <= 0;
+}
+
+/* Wherever it is asked whether to go on it can end: then it says so, and no more. */
+TEST(a_certificate_that_is_stopped_says_so)
+{
+    const uz_scene s = on_a_ball();
+    answered a;
+    answer(&a, &s);
+    const uz_result *r = a.result;
+    const uz_finite_answer of = {&a.there, &a.base, &a.scene, r->u, r->r, r->g, a.prescribed};
+    int asked = 0, stopped = 0;
+    for (bool ended = false; !ended && asked < 100; asked++) {
+        int left = asked;
+        const uz_hooks hooks = {.ctx = &left, .cancelled = stop_after};
+        const uz_stop stop = {&hooks, INFINITY};
+        uz_finite_certificate c;
+        uz_error err = {0};
+        CHECK_INT(uz_certify_finite(&c, &of, &stop, &err), UZ_OK);
+        CHECK(c.stopped ? !c.definite && isinf(c.residual) : c.definite && c.residual < 1e-8);
+        stopped += c.stopped;
+        ended = !c.stopped;
+    }
+    CHECK_MSG(stopped >= 3 && stopped == asked - 1, "%d of %d", stopped, asked);
     give_back(&a);
 }
 
@@ -249,7 +279,7 @@ TEST(the_factor_is_one)
             sum += x[i] * b[i];
         }
         uz_csc A = csc_from_dense(dense, N, N, true);
-        CHECK_INT(uz_envelope_factor(&factor, &definite, &A, size, 1e-12, &err), UZ_OK);
+        CHECK_INT(uz_envelope_factor(&factor, &definite, &A, size, 1e-12, NULL, &err), UZ_OK);
         CHECK(definite);
         uz_envelope_forward(b, &factor, room);
         for (int i = 0; i < N; i++)
@@ -257,7 +287,7 @@ TEST(the_factor_is_one)
         CHECK_MSG(fabs(square - sum) < 1e-12 * sum, "%.15g, not %.15g", square, sum);
         uz_envelope_clear(&factor);
         A.val[A.ptr[k]] = -0.1; /* no longer */
-        CHECK_INT(uz_envelope_factor(&factor, &definite, &A, size, 1e-12, &err), UZ_OK);
+        CHECK_INT(uz_envelope_factor(&factor, &definite, &A, size, 1e-12, NULL, &err), UZ_OK);
         CHECK(!definite);
         uz_envelope_clear(&factor);
         uz_csc_clear(&A);
