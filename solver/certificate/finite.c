@@ -19,6 +19,9 @@
 /* Points of each side, between its ends, at which gaps are looked at. */
 enum { SAMPLES = 7 }; /* in space along both of its directions */
 
+/* Steps to the stretch across a plane. */
+enum { MOST_HALVINGS = 200 };
+
 /* The caller is asked whether to go on after so many elements. */
 enum { ELEMENTS_BETWEEN = 64 };
 
@@ -107,6 +110,49 @@ static long double deform(point_at *x, double *measure, const uz_element *elemen
     return plane * F[8] + F[2] * (F[3] * F[7] - F[4] * F[6]) - F[5] * (F[0] * F[7] - F[1] * F[6]);
 }
 
+/* In plane stress F has the stretch across the plane at which there is no stress across it: S = P / F there grows with
+ * F, and its root is between two that are divided in halves where Newton's step leaves them; A is then condensed, with
+ * no such stress. False: there is no root. */
+static bool thin(uz_piola *at, long double F[9], uz_elasticity law, const uz_lame *lame)
+{
+    long double low = 1e-4L, high = 1e4L;
+    F[8] = 1;
+    for (int k = 0; k < MOST_HALVINGS; k++) {
+        uz_piola_at(at, law, lame->lambda, lame->mu, F, true);
+        const long double S = at->P[8] / F[8], slope = (at->A[8][8] - S) / F[8];
+        *(S > 0 ? &high : &low) = F[8];
+        const long double newton = F[8] - S / slope;
+        const long double next = slope > 0 && newton > low && newton < high ? newton : sqrtl(low * high);
+        const bool settled = fabsl(next - F[8]) < 1e-18L * F[8] || high - low < 1e-18L * high;
+        F[8] = next;
+        if (settled)
+            break;
+    }
+    uz_piola_at(at, law, lame->lambda, lame->mu, F, true);
+    if (!(F[8] > 1.01e-4L && F[8] < 0.99e4L && at->A[8][8] > 0))
+        return false;
+    for (int i = 0; i < 8; i++)
+        for (int k = 0; k < 8; k++)
+            at->A[i][k] -= at->A[i][8] * at->A[8][k] / at->A[8][8];
+    for (int i = 0; i < 9; i++)
+        at->A[i][8] = at->A[8][i] = 0;
+    at->P[8] = 0;
+    return true;
+}
+
+/* The law at a point, which may change what F is across the plane, and with it *det. */
+static bool law_at(uz_piola *at, long double *det, point_at *x, const uz_element *element, const uz_lame *lame,
+                   uz_elasticity law)
+{
+    if (element->model != UZ_PLANE_STRESS) {
+        uz_piola_at(at, law, lame->lambda, lame->mu, x->F, x->dim == 2);
+        return true;
+    }
+    const bool found = thin(at, x->F, law, lame);
+    *det = found ? *det * x->F[8] : -INFINITY;
+    return found;
+}
+
 /* What the energy is compared with: that of a strain of 1, where displacements and F are as large as they are; and the
  * energy of small strain, rotations apart, as that of the law is lost in its own terms where strains are tiny. */
 static void add_unit(work *w, long double weight, const uz_lame *lame, const point_at *x, const double *u)
@@ -147,21 +193,27 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     uz_body_element(&element, xyz, model, e);
     const uz_element_type *type = uz_element_type_of(element.kind);
     const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
+    const uz_lame lame = uz_lame_in_space(element.model, element.lame);
+    const uz_elasticity law = uz_element_material(model, e)->law;
     const int n = dim * nodes;
     memset(ke, 0, (size_t)(n * n) * sizeof *ke);
     for (int i = 0; i < n; i++)
         u[i] = w->of->u[dim * node[i / dim] + i % dim];
-    for (int a = 0; a < type->corners; a++)
-        out->least_det = fmin(out->least_det, (double)deform(&x, &measure, &element, u, type->local[a]));
+    for (int a = 0; a < type->corners; a++) {
+        long double det = deform(&x, &measure, &element, u, type->local[a]);
+        if (det > 0 && element.model == UZ_PLANE_STRESS)
+            (void)law_at(&at, &det, &x, &element, &lame, law);
+        out->least_det = fmin(out->least_det, (double)det);
+    }
     for (int g = 0; g < rule->count; g++) {
-        const long double det = deform(&x, &measure, &element, u, rule->point[g].at);
+        long double det = deform(&x, &measure, &element, u, rule->point[g].at);
         const long double weight = (long double)rule->point[g].weight * measure;
+        const bool known = det > 0 && law_at(&at, &det, &x, &element, &lame, law);
         out->least_det = isnan(det) ? -INFINITY : fmin(out->least_det, (double)det);
-        if (!(det > 0))
+        if (!known)
             continue;
-        uz_piola_at(&at, uz_element_material(model, e)->law, element.lame.lambda, element.lame.mu, x.F, dim == 2);
         w->energy += weight * at.W;
-        add_unit(w, weight, &element.lame, &x, u);
+        add_unit(w, weight, &lame, &x, u);
         add_point(force, ke, weight, &x, &at);
     }
     for (int i = 0; i < n; i++) {

@@ -19,6 +19,13 @@ static int direct_count(uz_model model)
     return model == UZ_SOLID || model == UZ_AXISYMMETRIC ? 3 : 2;
 }
 
+uz_lame uz_lame_in_space(uz_model model, uz_lame lame)
+{
+    if (model == UZ_PLANE_STRESS)
+        lame.lambda = 2 * lame.mu * lame.lambda / (2 * lame.mu - lame.lambda);
+    return lame;
+}
+
 void uz_elastic_stress(double *stress, uz_model model, uz_lame lame, const double *strain)
 {
     const int n = uz_stress_count(model), direct = direct_count(model);

@@ -26,6 +26,8 @@ typedef struct {
 } uz_lame;
 
 uz_lame uz_lame_of(uz_model model, double young, double poisson);
+/* Of those in plane stress, which have no stress across the plane, the constants of the material itself. */
+uz_lame uz_lame_in_space(uz_model model, uz_lame lame);
 
 /* Components of stress of a model: 3, 4 or 6. */
 int uz_stress_count(uz_model model);

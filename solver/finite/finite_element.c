@@ -4,7 +4,8 @@
  * u_a is B_a = (F_i1 g_1, F_i2 g_2, F_i3 g_3, F_i1 g_2 + F_i2 g_1, F_i2 g_3 + F_i3 g_2, F_i3 g_1 + F_i1 g_3); in the
  * plane the third is z N / r, of rings only, along the radius, with the stretch z = 1 + u_r / r around; so that
  *     force_a = integral B_a'S,     K_ab = integral B_a' D B_b + (g_a . S g_b) I,
- * and along the radius S_zz N_a N_b / r^2 more.
+ * and along the radius S_zz N_a N_b / r^2 more. In plane stress the stretch across the plane is that without stress
+ * across it, at each point, and D what is left in the plane.
  * A step d by this tangent takes a slender part that turns along its tangent, which lengthens it by a strain that it
  * does not have in the end, and whose stress is all that the next tangent would see. So K's second part has S of the
  * strain that the step was made for, E - h'h / 2 with h = grad d: what stress would be as an unknown of its own. At the
@@ -20,6 +21,11 @@
 #include <string.h>
 
 enum { N_STRAINS = UZ_FINITE_STRAINS };
+
+/* Steps to the stretch across the plane, when its square is there to rounding, and the least one that is looked for. */
+enum { MOST_SETTLING = 60 };
+#define SETTLED         1e-13
+#define LEAST_THICKNESS 1e-8
 
 /* A point of an element: derivatives of shape functions, and N / r of rings; what an area, of solids a volume, stands
  * for. n: components of strain. */
@@ -75,6 +81,49 @@ static void cauchy_green(double C[N_STRAINS], double F[3][3], int dim)
         const int i = AXIS[c][0], j = AXIS[c][1];
         C[c] = dim == 2 && c > 3 ? 0 : F[0][i] * F[0][j] + F[1][i] * F[1][j] + F[2][i] * F[2][j];
     }
+}
+
+/* ---- the law at a point */
+
+/* Of C and F in plane stress the stretch across the plane at which there is no stress across it, from 1 on: C_zz by
+ * Newton's method, S_zz growing with it, but not past a quarter or four times in a step. False: there is none. */
+static bool settle_thickness(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS], uz_elasticity law,
+                             uz_lame lame, double C[N_STRAINS])
+{
+    bool settled = false;
+    C[2] = 1;
+    for (int k = 0; k <= MOST_SETTLING; k++) {
+        if (!(C[2] > LEAST_THICKNESS && C[2] < 1 / LEAST_THICKNESS) ||
+            !uz_hyperelastic(W, S, D, UZ_FINITE_PLANE_STRAINS, law, lame.lambda, lame.mu, C))
+            return false;
+        if (settled)
+            return true;
+        const double newton = D[2][2] > 0 ? C[2] - 2 * S[2] / D[2][2] : S[2] > 0 ? 0 : (double)INFINITY;
+        const double next = fmin(4 * C[2], fmax(0.25 * C[2], newton));
+        settled = fabs(next - C[2]) <= SETTLED * C[2];
+        C[2] = next;
+    }
+    return false;
+}
+
+/* Energy, stress and tangent at C, and what F and C are across the plane where that follows from them: in plane stress
+ * the tangent is that in the plane, condensed. */
+static bool law_at(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS], double F[3][3], double C[N_STRAINS],
+                   const uz_element *element, uz_elasticity law, int n)
+{
+    const uz_lame lame = uz_lame_in_space(element->model, element->lame);
+    if (element->model != UZ_PLANE_STRESS)
+        return uz_hyperelastic(W, S, D, n, law, lame.lambda, lame.mu, C);
+    if (!settle_thickness(W, S, D, law, lame, C))
+        return false;
+    F[2][2] = sqrt(C[2]);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n && i != 2; j++)
+            D[i][j] -= j == 2 ? 0 : D[i][2] * D[2][j] / D[2][2];
+    for (int i = 0; i < n; i++)
+        D[i][2] = D[2][i] = 0;
+    S[2] = 0;
+    return true;
 }
 
 static double least_det_at_corners(const uz_element *element, const double *u)
@@ -182,8 +231,10 @@ bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *elem
         deformation(F, &at, u);
         out->least_det = fmin(out->least_det, orientation(F, dim));
         cauchy_green(C, F, dim);
-        if (!(out->least_det > 0) || !uz_hyperelastic(&W, S, D, at.n, law, element->lame.lambda, element->lame.mu, C))
-            continue; /* the other points may be worse */
+        if (!(out->least_det > 0) || !law_at(&W, S, D, F, C, element, law, at.n)) {
+            out->least_det = fmin(out->least_det, 0); /* also where no stretch across a plane is without stress */
+            continue;                                 /* the other points may be worse */
+        }
         out->energy += weight * W;
         for (int p = 0; p < n; p++) {
             double work = 0;
@@ -215,9 +266,10 @@ void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elas
     deformation(F, &at, u);
     out->det = orientation(F, at.dim);
     cauchy_green(C, F, at.dim);
+    const bool good = out->det > 0 && law_at(&W, S, D, F, C, element, law, at.n);
+    out->det = orientation(F, at.dim);
     for (int c = 0; c < N_STRAINS; c++)
         out->strain[c] = 0.5 * (C[c] - (c < 3));
-    const bool good = out->det > 0 && uz_hyperelastic(&W, S, D, at.n, law, element->lame.lambda, element->lame.mu, C);
     const double full[3][3] = {{S[0], S[3], S[5]}, {S[3], S[1], S[4]}, {S[5], S[4], S[2]}};
     for (int c = 0; c < N_STRAINS; c++) { /* F S F' / J */
         double sum = 0;

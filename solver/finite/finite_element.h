@@ -10,9 +10,10 @@ typedef struct {
     double force[UZ_ELEMENT_DOFS]; /* internal forces: the gradient of the energy */
 } uz_finite_forces;
 
-/* Of an element of plane strain, of a ring or a solid, whose shape is good, displaced by u (nodes x dim). ke (NULL: not
+/* Of an element in the plane, of a ring or a solid, whose shape is good, displaced by u (nodes x dim). ke (NULL: not
  * wanted): the tangent, the energy's second derivatives, full and symmetric, as uz_element_stiffness has it; at u = 0
- * it is that of the standard formulation. False: det F <= 0 somewhere; least_det alone is then filled. step  nodes x
+ * it is that of the standard formulation. False: det F <= 0 somewhere, or
+ * in plane stress no stretch across the plane is without stress; least_det alone is then filled. step  nodes x
  * dim, the last change of u: in ke alone, what the stress does to turning parts is that of the strains that this change
  * was linear for. NULL: none */
 bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law, const double *u,

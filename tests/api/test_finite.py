@@ -178,6 +178,17 @@ def test_a_cube_on_a_ball(s):
         expect(s.get(f"/v1/jobs/{name}/{of}"), 200)
 
 
+def test_a_plate_that_is_squeezed_becomes_thicker(s):
+    """By as much as wider: without stress along both, Cauchy's along the height is the force over the deformed section."""
+    _, found = answer(s, block(model="plane_stress", thickness=0.5))
+    summary, width = found["summary"], 1 + max(u[0] for u in found["displacements"])
+    force = summary["contact"]["force"][1]
+    check(summary["outcome"] == "converged" and width > 1.08, summary)
+    check(all(abs(stress[1] + force / (0.5 * width * width)) < 1e-7 and abs(stress[0]) < 1e-7 for stress in found["stress"]), found["stress"][:2])
+    check(abs(summary["finite"]["least_det"] - 0.7 * width * width) < 1e-7, summary["finite"])
+    check(all(abs(p - force / (0.5 * width)) < 1e-7 for p in found["pressure"]), found["pressure"])
+
+
 def stacked(aside, **contact):
     """A block of 3 by 2 elements on a longer one, pressed into it and moved along it by `aside`."""
     nodes, quads, groups = [], [], {"foot": [], "lid": [], "lower": [], "upper": []}
@@ -214,9 +225,9 @@ def test_what_is_not_modelled_is_refused(s):
              ({**stacked(0), "problem": {**stacked(0)["problem"], "kinematics": "auto"}}, "/problem/contacts/0/with", "\"finite\""),
              (block("linear"), "/problem/materials/0/law", "neo_hooke_isochoric"),
              (block(kinematics="moving"), "/problem/materials/0/law", "\"auto\" or \"finite\""),
-             (block(kinematics="auto", model="plane_stress"), "/problem/model", "plane_strain"),
+             (block(kinematics="auto", model="plane_stress"), "/problem/kinematics", "\"finite\""),
              ({**block(kinematics="auto"), "quantities": [{"quantity": "contact.force"}]}, "/quantities", "compare meshes"),
-             (block(model="plane_stress"), "/problem/model", "plane_strain"),
+             (block(model="plane_stress", materials=[{"on": "all", "young": 1, "poisson": 0.5, "law": "neo_hooke"}]), "/problem/materials/0/poisson", "0.49"),
              (block(kinematics="auto", model="axisymmetric"), "/problem/kinematics", "\"finite\""),
              (block(kinematics="auto", model="solid", mesh=CUBE, supports=[{"on": "top", "ux": 0, "uy": -0.1, "uz": 0}], contacts=[]),
               "/problem/kinematics", "\"finite\""),

@@ -310,7 +310,7 @@ TEST(what_cannot_be_compared_stays)
 /* Laws of finite strain want all that finite kinematics want, also where the body is known from an answer before. */
 TEST(what_there_is_no_model_for_is_refused)
 {
-    static const char *const WHERE[] = {"/model", "/solver/accuracy", "/materials/0/law"};
+    static const char *const WHERE[] = {"/kinematics", "/solver/accuracy", "/materials/0/law"};
     uz_cache *cache = uz_cache_new(SIZE_MAX);
     for (int k = -1; k < 3; k++) {
         uz_scene s = squeezed(0.1);
