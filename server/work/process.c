@@ -166,7 +166,6 @@ int process_reap(process *p, bool *out_of_memory)
     p->pid = 0;
     forget(p);
     segment_rest(&p->outbox, SEGMENT_KEPT, true);
-    segment_rest(&p->inbox, SEGMENT_KEPT, true);
     return status;
 }
 

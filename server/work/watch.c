@@ -248,5 +248,7 @@ watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len,
             out->status = process_reap(p, &out->out_of_memory);
         }
     }
+    if (end == WATCH_DIED || end == WATCH_NOT_STARTED) /* not before: the next try reads the body there */
+        segment_rest(&p->inbox, SEGMENT_KEPT, true);
     return end;
 }

@@ -194,7 +194,9 @@ def test_an_idle_process_may_go(s):
     for _ in range(3):
         check(s.solve(MATRICES)["attempts"] == 1)
         os.kill(s.solvers()[0], signal.SIGKILL)
-    check(s.solve(MATRICES)["attempts"] == 1)
+    body = json.dumps(MATRICES).encode()[:-1] + b" " * (2 << 20) + b"}"  # more than what stays in memory between jobs
+    job = expect(s.request("POST", "/v1/jobs", body, {"Content-Type": "application/json", "Prefer": "wait=30"}), 200).json
+    check(job["status"] == "successful" and job["attempts"] == 1, job)
     check(s.events("process_died") == [])
 
 
