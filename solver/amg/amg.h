@@ -150,15 +150,18 @@ typedef struct {
     uz_amg_info info;
 } uz_amg;
 
-/* Of any multigrid for K, which is taken, also on failure. NOT_SPD where K is singular to working precision. */
-uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
+/* Of any multigrid for K, which is taken, also on failure. patience: LIMIT where so many steps do not bound the
+ * spectrum, as conjugate gradients would then be slow too; 0: as many as it takes. NOT_SPD where K is singular to
+ * working precision. */
+uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patience, const uz_hooks *hooks,
+                    uz_error *err);
 /* Finds info.least by solves with K that are checked here, so that what is certified by it needs no word of the program
  * that holds M. UNSUPPORTED: the solves are not those of K, or too rough. NOT_SPD: they show that K is not definite. */
 uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
-/* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD as
- * uz_amg_of. */
-uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
-                        uz_error *err);
+/* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD and
+ * LIMIT as uz_amg_of. With patience 0 aggregates of another kind are tried where the usual ones do badly. */
+uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, int patience,
+                        const uz_hooks *hooks, uz_error *err);
 void uz_amg_free(uz_amg *amg);
 
 /* The root of what rounding may have made negative; INFINITY of what is no number, so that overflow never looks like 0.

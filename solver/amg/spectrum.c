@@ -77,17 +77,18 @@ static void random_residual(uz_cg *cg, const uz_csc *K)
 /* M is K but for rounding where there is one level only, and steps are cheap. */
 #define NEAR_ONE 0.9
 
-/* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. */
-static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, const uz_csc *K, const uz_hooks *hooks,
-                             uz_error *err)
+/* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. patience: uz_amg_of. */
+static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, const uz_csc *K, int patience,
+                             const uz_hooks *hooks, uz_error *err)
 {
+    const int most = patience > 0 && patience < STEPS_MOST ? patience : STEPS_MOST;
     double share = LEAST_SHARE / sqrt(cg->mg->most), before = 0.0;
     info->lambda = 0.0;
     random_residual(cg, K);
     uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
     double square = uz_dot(cg->n, cg->r, cg->z);
     memcpy(cg->p, cg->z, (size_t)cg->n * sizeof *cg->p);
-    for (c->count = 0; status == UZ_OK && c->count < STEPS_MOST && square > 0.0;) {
+    for (c->count = 0; status == UZ_OK && c->count < most && square > 0.0;) {
         if (uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
         /* a step of conjugate gradients without the solution */
@@ -114,6 +115,9 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
             return status;
         before = info->lambda;
     }
+    if (status == UZ_OK && most < STEPS_MOST && c->count == most)
+        return uz_fail(err, UZ_ERR_LIMIT, "K", "conjugate gradients would take too many iterations: %d did not do",
+                       most);
     if (status == UZ_OK && info->lambda == 0.0) /* the residual may have vanished, too */
         info->lambda = excluded(c, sqrt(square) / share);
     return status;
@@ -151,7 +155,7 @@ static uz_status find_rcond(uz_amg_info *info, uz_cg *cg, const uz_csc *K, uz_er
                    info->rcond, (long long)info->iterations);
 }
 
-uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, const uz_hooks *hooks, uz_error *err)
+uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patience, const uz_hooks *hooks, uz_error *err)
 {
     const double start = uz_seconds();
     uz_amg *amg = uz_alloc_zero(1, sizeof *amg);
@@ -163,7 +167,7 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, const uz_ho
     if (status == UZ_OK) {
         amg->info.levels = mg->levels;
         amg->info.bytes = mg->bytes;
-        status = bound_below(&amg->info, c, &cg, K, hooks, err);
+        status = bound_below(&amg->info, c, &cg, K, patience, hooks, err);
     }
     if (status == UZ_OK)
         status = find_rcond(&amg->info, &cg, K, err);
@@ -189,7 +193,7 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, const uz_ho
 
 /* *levels: of the multigrid, also where K is refused for what iterations showed; 0: it was not made. */
 static uz_status try_threshold(uz_amg **out, int *levels, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
-                               const uz_hooks *hooks, uz_error *err)
+                               int patience, const uz_hooks *hooks, uz_error *err)
 {
     const uz_stop stop = {hooks, INFINITY};
     const double start = uz_seconds();
@@ -201,24 +205,25 @@ static uz_status try_threshold(uz_amg **out, int *levels, const uz_csc *K, const
     if (status != UZ_OK)
         return status;
     *levels = mg->levels;
-    status = uz_amg_of(out, mg, K, hooks, err);
+    status = uz_amg_of(out, mg, K, patience, hooks, err);
     if (status == UZ_OK)
         (*out)->info.create_s = create_s;
     return status;
 }
 
 /* The better of two thresholds; the first one's failure stands where the second fails too. */
-uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
-                        uz_error *err)
+uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, int patience,
+                        const uz_hooks *hooks, uz_error *err)
 {
     uz_amg *tried[2] = {NULL, NULL};
     uz_error failure[2] = {{.status = UZ_OK}};
     uz_status end[2] = {UZ_OK, UZ_ERR_INTERNAL}; /* the second: not tried */
     int levels = 0, ignored;
-    end[0] = try_threshold(&tried[0], &levels, K, modes, memory_limit, hooks, &failure[0]);
-    if (levels > 1 && (end[0] == UZ_OK ? tried[0]->info.lambda < BAD_LAMBDA : end[0] == UZ_ERR_NOT_SPD)) {
+    end[0] = try_threshold(&tried[0], &levels, K, modes, memory_limit, patience, hooks, &failure[0]);
+    if (patience == 0 && levels > 1 &&
+        (end[0] == UZ_OK ? tried[0]->info.lambda < BAD_LAMBDA : end[0] == UZ_ERR_NOT_SPD)) {
         modes->strong = SECOND_STRONG;
-        end[1] = try_threshold(&tried[1], &ignored, K, modes, memory_limit, hooks, &failure[1]);
+        end[1] = try_threshold(&tried[1], &ignored, K, modes, memory_limit, 0, hooks, &failure[1]);
     }
     uz_modes_clear(modes);
     const bool better =

@@ -137,8 +137,8 @@ bool uz_cost_is_one_to_one(const uz_csc *N, int64_t n_b)
 
 /* The model is trusted to this factor where it speaks against the form that measurements have chosen, and asked only
  * where there are seconds to win. */
-#define MUCH_CHEAPER 4.0
-#define WORTH_S      5.0
+#define MUCH_CHEAPER 2.0
+#define WORTH_S      2.0
 
 static double total(const uz_cost_estimate *e, const uz_cost_size *size)
 {

@@ -27,7 +27,7 @@ static bool open_pair(pair *p, uz_csc *K, uz_modes *modes, uz_error *err)
     memset(p, 0, sizeof *p);
     p->K = *K;
     memset(K, 0, sizeof *K);
-    if (uz_amg_create(&p->amg, &p->K, modes, 0, NULL, err) != UZ_OK)
+    if (uz_amg_create(&p->amg, &p->K, modes, 0, 0, NULL, err) != UZ_OK)
         return false;
     p->info = p->amg->info;
     CHECK(uz_cg_init(&p->cg, p->amg->mg, err) == UZ_OK);
@@ -301,7 +301,7 @@ static uz_status refusal(brick *b, bool with_mesh, uz_error *err)
     uz_status status = with_mesh ? uz_modes_of_body(&modes, b->xyz, b->dof, b->n_nodes, 3, b->d, err)
                                  : uz_modes_of_matrix(&modes, &b->K, err);
     CHECK(status == UZ_OK);
-    status = uz_amg_create(&amg, &b->K, &modes, 0, NULL, err);
+    status = uz_amg_create(&amg, &b->K, &modes, 0, 0, NULL, err);
     CHECK(amg == NULL);
     uz_amg_free(amg);
     return status;
@@ -374,7 +374,26 @@ TEST(memory_is_bounded)
     uz_amg *amg = NULL;
     uz_error err = {0};
     CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
-    CHECK_INT(uz_amg_create(&amg, &b.K, &modes, 100000, NULL, &err), UZ_ERR_LIMIT);
+    CHECK_INT(uz_amg_create(&amg, &b.K, &modes, 100000, 0, NULL, &err), UZ_ERR_LIMIT);
     CHECK(amg == NULL && strstr(err.message, "100000") != NULL);
     brick_free(&b);
+}
+
+/* A flat body's cells have ten times the length along two axes: the bound on the spectrum takes more steps than who has
+ * another way wants to wait for; one of cubes takes fewer. */
+TEST(patience_ends)
+{
+    enum { PATIENCE = 60 };
+    const double sizes[2][3] = {{1, 1, 1}, {1, 0.1, 1}};
+    for (int flat = 0; flat < 2; flat++) {
+        brick b = brick_make((int64_t[]){10, 10, 10}, sizes[flat], 0.3, true);
+        uz_modes modes;
+        uz_amg *amg = NULL;
+        uz_error err = {0};
+        CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
+        CHECK_INT(uz_amg_create(&amg, &b.K, &modes, 0, PATIENCE, NULL, &err), flat ? UZ_ERR_LIMIT : UZ_OK);
+        CHECK(flat ? amg == NULL && strstr(err.message, "60 ") != NULL : amg->info.iterations < PATIENCE);
+        uz_amg_free(amg);
+        brick_free(&b);
+    }
 }

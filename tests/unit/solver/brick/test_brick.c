@@ -232,7 +232,7 @@ static int64_t iterations(const uz_scene *scene, double *lambda)
     uz_cg cg = {0};
     uz_cg_info info;
     CHECK(uz_body_model_build(&model, scene, UZ_BODY_CELLS, &err) == UZ_OK);
-    CHECK(uz_amg_of(&amg, multigrid_of(&model), &model.K, NULL, &err) == UZ_OK);
+    CHECK(uz_amg_of(&amg, multigrid_of(&model), &model.K, 0, NULL, &err) == UZ_OK);
     CHECK(uz_cg_init(&cg, amg->mg, &err) == UZ_OK);
     double *x = vector(model.d), *b = vector(model.d);
     fill(b, model.d, 3);

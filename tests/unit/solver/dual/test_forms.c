@@ -31,7 +31,7 @@ static void open_subject(subject *s, const uz_qp *qp, int k)
         free(dofs);
     } else {
         CHECK_INT(uz_modes_of_matrix(&modes, &qp->K, &err), UZ_OK);
-        CHECK_INT(uz_amg_create(&s->amg, &qp->K, &modes, 0, NULL, &err), UZ_OK);
+        CHECK_INT(uz_amg_create(&s->amg, &qp->K, &modes, 0, 0, NULL, &err), UZ_OK);
     }
     uz_dual_source source = {s->can->op, &qp->N, s->factor, s->amg};
     CHECK_INT(uz_dual_create(&s->dual, &source, NULL, &err), UZ_OK);

@@ -1,5 +1,6 @@
 /* Whole solves without a factor: the answers of the other forms, bounds that hold at every accuracy, and the memory
  * rule that chooses this form. */
+#include "run/cost.h"
 #include "run/setup_cache.h"
 #include "harness.h"
 #include "membrane.h"
@@ -408,6 +409,32 @@ TEST(predicted_bytes_cover_what_is_used)
             uz_result_free(result);
             uz_problem_clear(&problem);
         }
+}
+
+/* Solids of a hundred thousand dofs with factors of more and more flops: the factor is made while it costs less than
+ * two seconds or than twice what the multigrid does, and not beyond. */
+TEST(a_factor_that_costs_twice_a_multigrid_is_not_made)
+{
+    const uz_cost_size size = {
+        .d = 100000, .m = 1000, .n_b = 1000, .k_entries = 4000000, .n_entries = 1000, .modes = 6, .bounds = true};
+    int made = 0, spared = 0;
+    for (double flops = 1e9; flops < 1e15; flops *= 1.3) {
+        const uz_factor_info factor = {.flops = flops, .nnz = 100000000, .bytes = 800000000};
+        uz_cost_plan plan;
+        uz_cost_decide(&plan, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+        double condensed = 0.0, matrix_free = 0.0;
+        for (int k = 0; k < plan.count; k++) {
+            const uz_cost_estimate *form = &plan.form[k];
+            condensed = form->op == UZ_OPERATOR_CONDENSED ? form->setup_s + form->case_s : condensed;
+            matrix_free = form->op == UZ_OPERATOR_MATRIX_FREE ? form->setup_s + form->case_s : matrix_free;
+        }
+        const bool by_factor = plan.form[plan.chosen].op == UZ_OPERATOR_CONDENSED;
+        CHECK_MSG(by_factor == (condensed < fmax(2.0, 2.0 * matrix_free)), "%g flops: %g s, %g s", flops, condensed,
+                  matrix_free);
+        made += by_factor;
+        spared += !by_factor;
+    }
+    CHECK(made > 0 && spared > 0);
 }
 
 /* The same membrane in other units: stiffer, or with larger displacements, and begun with reactions. Nothing but
