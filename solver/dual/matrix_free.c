@@ -329,12 +329,10 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     uz_sparse_multiply(load, x->right, held);
     for (int64_t j = 0; j < d; j++)
         x->right[j] = x->p[j] - x->right[j]; /* p - K u of the dofs that are held, and no others */
+    uz_sparse_multiply(load, box->force, box->u);
+    double square = uz_dot(d, box->u, box->force); /* u'K u */
     for (bool go_on = true; status == UZ_OK && go_on; tolerance = least) {
-        double square = 0.0;
-        uz_bounded_balance(&x->sparse);
-        for (int64_t j = 0; j < d; j++)
-            square += box->u[j] * (box->force[j] + box->p[j]);
-        double norm = fmin(uz_root(square), most > 0.0 ? most : INFINITY);
+        const double norm = fmin(uz_root(square), most > 0.0 ? most : INFINITY);
         /* from 0 the first residual has the size of the solution */
         uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : tolerance * root, tolerance * norm * root);
         uz_cg_info info;
@@ -342,6 +340,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
         if (status != UZ_OK)
             break;
         uz_bounded_balance(&x->sparse);
+        square = uz_dot(d, box->u, box->force) + uz_dot(d, box->u, box->p);
         uz_bounded_react(&x->sparse, g, active);
         go_on = info.met && tolerance > least;
         for (int64_t i = 0; go_on && i < m; i++)
