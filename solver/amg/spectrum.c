@@ -25,7 +25,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STEPS_MOST = 3000, CHECK_EVERY = 4, POWERS = 8 };
+enum { STEPS_MOST = 3000, CHECK_EVERY = 4, POWERS = 4 };
 
 /* 0.8 times this is 1e-12. */
 #define LEAST_SHARE 1.25e-12
