@@ -14,7 +14,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "api"))
 import decks  # noqa: E402  the path is set above
@@ -140,20 +139,12 @@ def force_on_slave(scene, printed):
 def by_daemon(build, request, discretization):
     """The answer of a new daemon, and its seconds of processor."""
     s = service.Service(build)
-
-    def spent(process=None):
-        """Of the daemon and of the processes that it solves in."""
-        folder = pathlib.Path(f"/proc/{process or s.process.pid}")
-        own = sum(map(int, (folder / "stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[11:15])) / 100
-        return own + sum(map(spent, " ".join(one.read_text(encoding="utf-8") for one in folder.glob("task/*/children")).split()))
     try:
         s.start()
         problem = {**request["problem"], "contacts": [{**one, "discretization": discretization} for one in request["problem"]["contacts"]]}
-        before = spent()
-        while time.sleep(0.5) or spent() > before:  # its process makes memory ready when it begins
-            before = spent()
+        before = s.settle()
         job = s.solve({"problem": problem})
-        seconds = spent() - before
+        seconds = s.spent() - before
         if job["status"] != "successful" or job["summary"]["outcome"] != "converged":
             raise decks.Unsaid(job.get("error", {}).get("detail") or job["summary"]["outcome"])
         return s.get(f"/v1/jobs/{job['id']}/result?fields=displacements").json, seconds

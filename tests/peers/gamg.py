@@ -1,0 +1,184 @@
+"""Solids in contact by the daemon, and the linear solve of the same K by PETSc's GAMG at its defaults.
+usage: gamg.py BUILD_DIR OUTPUT.json [CELLS=32]
+
+A cube of CELLS cells along a side, clamped on one side, pulled on the opposite one, pressed on a plane: as a box, as
+hex8 whose inner nodes were moved, as tet4. Of GAMG: making it and conjugate gradients to 1e-8, for K that is there; with
+the translations that it takes by itself or with all rigid motions, whichever takes less. Of the daemon: the whole, from request to answer, certified to 1e-6, with a body that it has not
+seen and with another load on it. Seconds of processor; a ratio is of runs one after the other, medians of RUNS."""
+import itertools
+import json
+import pathlib
+import statistics
+import sys
+import time
+
+import numpy
+import petsc4py
+
+petsc4py.init([])
+from petsc4py import PETSc  # noqa: E402  it reads the options when it is imported
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "api"))
+import service  # noqa: E402  the path is set above
+
+RUNS, SIDE, YOUNG, POISSON = 3, 40.0, 1000.0, 0.3
+NEIGHBOURS = 27  # of a node, itself among them
+CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]  # of hex8
+TETS = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
+SIDES = {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)}  # axis, end
+
+
+def mesh(kind, n):
+    """Nodes, elements, and faces of the four sides."""
+    line = numpy.arange(n + 1) * SIDE / n
+    z, y, x = numpy.meshgrid(line, line, line, indexing="ij")
+    nodes = numpy.stack([x, y, z], axis=-1).reshape(-1, 3)
+    if kind != "box":
+        moved = 0.15 * SIDE / n * numpy.random.default_rng(1).uniform(-1, 1, nodes.shape)
+        nodes = nodes + numpy.where((nodes > 0) & (nodes < SIDE * (1 - 1e-9)), moved, 0)
+    k, j, i = (t.ravel() for t in numpy.meshgrid(*3 * [numpy.arange(n)], indexing="ij"))
+    cells = numpy.stack([((k + c[2]) * (n + 1) + j + c[1]) * (n + 1) + i + c[0] for c in CORNERS], axis=1)
+    faces = {}
+    for side, (axis, end) in SIDES.items():
+        at = [c for c in range(8) if CORNERS[c][axis] == end]
+        at = [at[0], at[1], at[3], at[2]] if sum(a != b for a, b in zip(CORNERS[at[1]], CORNERS[at[2]])) == 2 else at
+        quads = cells[((i, j, k)[axis] == end * (n - 1))][:, at]
+        faces[side] = quads if kind != "tet4" else halves(quads, at)
+    return nodes, (cells[:, TETS].reshape(-1, 4) if kind == "tet4" else cells), faces
+
+
+def halves(quads, corners):
+    """Triangles along the diagonal that the tetrahedra have: it goes from the face's least corner to its greatest."""
+    order = sorted(range(4), key=lambda q: sum(CORNERS[corners[q]]))
+    first, last = order[0], order[3]
+    return numpy.concatenate([quads[:, [first, q, last]] for q in order[1:3]])
+
+
+def request(kind, n, nodes, elements, faces):
+    box = {"box": {"size": 3 * [SIDE], "cells": 3 * [n], "element": "hex8"}}
+    given = {"nodes": nodes.tolist(), "elements": {kind: elements.tolist()}, "groups": {side: {"faces": f.tolist()} for side, f in faces.items()}}
+    return {"problem": {"kind": "scene", "model": "solid", "mesh": box if kind == "box" else given,
+                        "materials": [{"on": "all", "young": YOUNG, "poisson": POISSON}],
+                        "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}],
+                        "loads": [{"on": "top", "traction": [0, -0.05, 0]}, {"on": "right", "traction": [0.5, 0, 0]}],
+                        "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}}]},
+            "solver": {"accuracy": {"relative_error": 1e-6}}}
+
+
+def stiffness(nodes, elements):
+    """Of each element, by Gauss points of its own: (elements, dofs, dofs)."""
+    lame, shear = YOUNG * POISSON / (1 + POISSON) / (1 - 2 * POISSON), YOUNG / 2 / (1 + POISSON)
+    corners = elements.shape[1]
+    points = [(t, 1 / 6) for t in [(0.25, 0.25, 0.25)]] if corners == 4 else \
+        [(t, 1 / 8) for t in itertools.product(*3 * [(0.5 - 12 ** -0.5, 0.5 + 12 ** -0.5)])]
+    K = numpy.zeros((len(elements), 3 * corners, 3 * corners))
+    for point, weight in points:
+        if corners == 4:
+            slopes = numpy.array([[-1, -1, -1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+        else:
+            part = [[(t if c[a] else 1 - t) for a, t in enumerate(point)] for c in CORNERS]
+            slopes = numpy.array([[(2 * c[a] - 1) * p[a - 2] * p[a - 1] for a in range(3)] for c, p in zip(CORNERS, part)])
+        J = numpy.einsum("ca,ecx->eax", slopes, nodes[elements])
+        g = numpy.einsum("exa,ca->ecx", numpy.linalg.inv(J), slopes)
+        w = weight * numpy.linalg.det(J)
+        own = numpy.einsum("e,ecx,edy->ecxdy", lame * w, g, g) + numpy.einsum("e,ecy,edx->ecxdy", shear * w, g, g)
+        own += numpy.einsum("ecd,xy->ecxdy", numpy.einsum("e,ecx,edx->ecd", shear * w, g, g), numpy.eye(3))
+        K += own.reshape(K.shape)
+    return K
+
+
+class Linear:
+    """K of the dofs that are not held, p, and the rigid motions."""
+
+    def __init__(self, nodes, elements, faces):
+        free = numpy.ones(len(nodes), bool)
+        free[faces["left"]] = False
+        number = numpy.where(free, numpy.cumsum(free) - 1, -1)
+        dof = 3 * number[elements][:, :, None] + numpy.arange(3)
+        dof = numpy.where(number[elements][:, :, None] < 0, -1, dof).reshape(len(elements), -1)
+        n = 3 * int(free.sum())
+        self.K = PETSc.Mat().createAIJ((n, n), bsize=3, nnz=3 * NEIGHBOURS, comm=PETSc.COMM_SELF)
+        dof = dof.astype(PETSc.IntType)
+        self.K.setValuesRCV(dof, dof, stiffness(nodes, elements).reshape(len(dof), -1), addv=True)
+        self.K.assemble()
+        self.K.setOption(PETSc.Mat.Option.SPD, True)
+        self.p, self.x = self.K.createVecLeft(), self.K.createVecRight()
+        force = numpy.zeros((len(nodes), 3))
+        for side, traction in (("top", (0, -0.05, 0)), ("right", (0.5, 0, 0))):
+            share = SIDE ** 2 / faces[side].size  # of a face's area to each of its nodes, all being about alike
+            numpy.add.at(force, faces[side].ravel(), share * numpy.array(traction))
+        self.p.setArray(force[free].ravel())
+        place = PETSc.Vec().createWithArray(nodes[free].ravel(), bsize=3, comm=PETSc.COMM_SELF)
+        self.motions = PETSc.NullSpace().createRigidBody(place)
+
+    def solve(self):
+        """Of the quicker way: seconds of making the multigrid and of the solve, and its iterations."""
+        return min((self.solve_with(motions) for motions in (None, self.motions)), key=lambda run: run[0] + run[1])
+
+    def solve_with(self, motions):
+        K = self.K.copy()  # nothing is kept of an earlier run
+        if motions:
+            K.setNearNullSpace(motions)
+        ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        ksp.setType("cg")
+        ksp.setOperators(K)
+        ksp.getPC().setType("gamg")
+        ksp.setTolerances(rtol=1e-8)
+        start = time.process_time()
+        ksp.setUp()
+        made = time.process_time()
+        ksp.solve(self.p, self.x)
+        end = time.process_time()
+        if ksp.getConvergedReason() <= 0:
+            raise RuntimeError(f"PETSc ended with reason {ksp.getConvergedReason()}")
+        return made - start, end - made, ksp.getIterationNumber()
+
+
+def by_daemon(build, asked):
+    """Seconds of a body that is new, and of another load on it; what was answered."""
+    s = service.Service(build, "--workers", "1")
+    seconds = []
+    try:
+        s.start()
+        for factor in (1.0, 1.03):
+            loads = [{**load, "traction": [factor * t for t in load["traction"]]} for load in asked["problem"]["loads"]]
+            before = s.settle()
+            job = s.solve({**asked, "problem": {**asked["problem"], "loads": loads}})
+            seconds.append(s.settle() - before)
+            if job["status"] != "successful" or job["summary"]["outcome"] != "converged":
+                raise RuntimeError(job.get("error") or job["summary"]["outcome"])
+        return seconds, job["summary"]
+    finally:
+        s.stop()
+
+
+def row_of(build, kind, n):
+    nodes, elements, faces = mesh(kind, n)
+    asked, linear, runs = request(kind, n, nodes, elements, faces), Linear(nodes, elements, faces), []
+    for _ in range(RUNS):
+        made, solved, iterations = linear.solve()
+        (cold, cached), summary = by_daemon(build, asked)
+        runs.append((made, solved, cold, cached, cold / (made + solved), cached / (made + solved)))
+    middle = [statistics.median(run[k] for run in runs) for k in range(6)]
+    spread = [min(run[4] for run in runs), max(run[4] for run in runs)]
+    row = {"mesh": kind, "unknowns": linear.p.getSize(), "gamg_setup_s": middle[0], "gamg_solve_s": middle[1], "gamg_iterations": iterations,
+           "cold_s": middle[2], "cached_s": middle[3], "cold_ratio": middle[4], "cached_ratio": middle[5], "cold_spread": spread,
+           "operator": summary["operator"], "certified": summary["certificate"]["relative_error"]}
+    if summary["problem"]["d"] != row["unknowns"]:
+        raise RuntimeError(f"{summary['problem']['d']} unknowns, of GAMG's K {row['unknowns']}")
+    print(f"{kind:6s} {row['unknowns']:9d} {middle[0]:10.2f} {middle[1]:10.2f} {iterations:5d} {middle[2]:8.2f} {middle[3]:8.2f} "
+          f"{middle[4]:7.2f} ({spread[0]:.2f} to {spread[1]:.2f}) {middle[5]:7.2f}  {row['operator']}", flush=True)
+    return row
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    n = int(sys.argv[3].split("=")[-1]) if len(sys.argv) > 3 else 32
+    print(f"{'mesh':6s} {'unknowns':>9s} {'GAMG made':>10s} {'solved':>10s} {'its':>5s} {'cold':>8s} {'cached':>8s} {'ratio':>7s} {'':15s} {'cached':>7s}")
+    rows = [row_of(sys.argv[1], kind, n) for kind in ("box", "hex8", "tet4")]
+    pathlib.Path(sys.argv[2]).write_text(json.dumps({"rows": rows}), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
