@@ -62,7 +62,7 @@ def check_all(daemon, name, posted):
         check(abs(abs(force_of(daemon, job)) - (1 + i / 1000)) < 1e-6, job, i, force_of(daemon, job))
     counts = dict(SERVER.sql(name, "SELECT status, jobs FROM uzawa.counted"))
     check(counts["0"] == counts["1"] == "0" and int(counts["2"]) >= len(posted), counts)
-    twice = SERVER.sql(name, "SELECT job FROM (SELECT job, name, count(DISTINCT token) AS n FROM uzawa.piece"
+    twice = SERVER.sql(name, "SELECT job FROM (SELECT job, name, count(DISTINCT token) AS n FROM uzawa.pieces"
                              " GROUP BY 1, 2) AS each WHERE n > 1")
     check(not twice, "two results:", twice)
     check(daemon.request("POST", "/v1/admin/check").json["whole"], "the database is not whole")
@@ -80,7 +80,7 @@ def test_a_role_with_the_rights_of_the_documents(s):
             check_all(other, name, posted)
             job = next(iter(posted))
             expect(other.request("DELETE", f"/v1/jobs/{job}"), 204)
-            check(not SERVER.sql(name, f"SELECT 1 FROM uzawa.piece WHERE job = '{job}'"), "a result is left")
+            check(not SERVER.sql(name, f"SELECT 1 FROM uzawa.pieces WHERE job = '{job}'"), "a result is left")
         finally:
             other.stop()
 
@@ -267,7 +267,7 @@ def test_one_is_stopped_past_its_lease(s):
         wait_until(lambda: stopped.events("result_not_wanted") or stopped.events("job_taken_over"), seconds=90)
         check(other.get(f"/v1/jobs/{job}/result").body == before, "an owner whose lease was over wrote")
         check(not stopped.events("job_ended"), stopped.events("job_ended"))
-        check(SERVER.sql(name, f"SELECT count(DISTINCT token) FROM uzawa.piece WHERE job = '{job}'") == [["1"]])
+        check(SERVER.sql(name, f"SELECT count(DISTINCT token) FROM uzawa.pieces WHERE job = '{job}'") == [["1"]])
         check(stopped.solve(numbered(1))["status"] == "successful", "it serves on")
 
 

@@ -74,12 +74,12 @@ def test_results_and_uploads_of_two_daemons(s):
     with daemons(s.build, 2) as ((a, b), name, place):
         job = solve(a)
         check(place.count("PUT") >= 1 and not [one for one in place.seen if one[3]], place.seen)
-        check(SERVER.sql(name, f"SELECT count(*) FROM uzawa.piece WHERE job = '{job}'") == [["0"]])
+        check(SERVER.sql(name, f"SELECT count(*) FROM uzawa.pieces WHERE job = '{job}'") == [["0"]])
         check(result_of(a, job) == result_of(b, job))
         cases = solve(a, {**LARGE, "cases": [{"name": n, "loads": SCENE["problem"]["loads"]} for n in "xy"]})
         check(expect(b.get(f"/v1/jobs/{cases}/result?case=y&fields=displacements"), 200).body)
         small = solve(b, MATRICES)
-        check(SERVER.sql(name, f"SELECT count(*) > 0 FROM uzawa.piece WHERE job = '{small}'") == [["t"]])
+        check(SERVER.sql(name, f"SELECT count(*) > 0 FROM uzawa.pieces WHERE job = '{small}'") == [["t"]])
         check(SERVER.sql(name, f"SELECT count(*) FROM uzawa.placed WHERE job = '{small}'") == [["0"]])
         # uploads: one that is small, one of several objects and an end that stays in the database
         for sent in (b"x" * 100, os.urandom(4096), os.urandom((9 << 20) + 100)):

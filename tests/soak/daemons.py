@@ -142,7 +142,7 @@ def account(daemons, server, name, posted, seconds, short=False):
     chance = random.Random(1)
     for job in chance.sample(sorted(posted), min(300, len(posted))):
         lost += status.get(job) == "2" and abs(abs(force_of(daemons[0], job)) - (1 + posted[job] / 1000)) > 1e-6
-    twice = len(server.sql(name, "SELECT job FROM (SELECT job, name, count(DISTINCT token) AS n FROM uzawa.piece"
+    twice = len(server.sql(name, "SELECT job FROM (SELECT job, name, count(DISTINCT token) AS n FROM uzawa.pieces"
                                  " GROUP BY 1, 2) AS each WHERE n > 1"))
     keys = len(server.sql(name, "SELECT tags FROM uzawa.job GROUP BY tags HAVING count(*) > 1"))
     ended = collections.Counter(event["job"] for one in daemons for event in one.events("job_ended"))

@@ -91,6 +91,7 @@ typedef struct {
     char name[32];
     int64_t number, part, encoding, header, size;
     double last;
+    char digest[65]; /* of one that is kept once for all jobs, in hexadecimal; "": its bytes are the bundle's */
 } kept_piece;
 typedef struct {
     link_to *link;

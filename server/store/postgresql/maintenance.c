@@ -45,8 +45,12 @@ static const struct {
      " sum <> uzawa.sum_of(uzawa.piece_keys(piece_row), data) LIMIT 20",
      "the %s is not what was written\n"},
     {"SELECT name || ' of job ' || job FROM uzawa.pieces WHERE NOT good AND job IN (SELECT b.job FROM uzawa.bundle AS b"
-     " WHERE b.sum <> uzawa.bundle_sum(b.job, b.n, b.list, b.data)) LIMIT 20",
+     " WHERE b.sum <> uzawa.bundle_sum(b.job, b.n, b.list, b.data) UNION ALL SELECT u.job FROM uzawa.common_use AS u"
+     " LEFT JOIN uzawa.common AS c USING (digest) WHERE c.digest IS NULL OR sha256(c.data) <> c.digest) LIMIT 20",
      "the %s is not what was written\n"},
+    {"SELECT encode(digest, 'hex') FROM uzawa.common AS c WHERE NOT EXISTS (SELECT 1 FROM uzawa.common_use AS u"
+     " JOIN uzawa.job ON job.id = u.job WHERE u.digest = c.digest) LIMIT 20",
+     "piece %s belongs to no result\n"},
     {"SELECT name || ' of job ' || job FROM uzawa.placed WHERE sum <> uzawa.sum_of(uzawa.placed_keys(placed), digest)"
      " LIMIT 20",
      "the place of the %s is not what was written\n"},

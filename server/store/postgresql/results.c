@@ -1,32 +1,41 @@
 /* results.c: the blobs of results in rows, in the transaction that ends the job: the pieces of several, as many as a
- * call holds, are one row with their bytes; those in an object store a row each, with the place where they are. */
+ * call holds, are one row with their bytes; those in an object store a row each, with the place where they are. Bytes
+ * of a vector that another job has too are kept once (uzawa.common). */
 #include "store/postgresql/objects.h"
 
+#include <gnutls/crypto.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Bytes of a vector's piece that are looked for among those of other jobs. Two of 5.4 KB
+ * each cost a small job 5 to 15 % of its processor time, though the database had them. */
+#define COMMON_LEAST 16384
 
 #define HISTORY "/" /* no vector has this name (result_blobs.h) */
 
 /* The lines of uzawa.bundle's list. */
 static void print_list(FILE *out, const result_place *place)
 {
-    enum { LISTS = 8 };
-    for (int k = 0; k < LISTS; k++) {
+    enum { NAMES = 1, LAST = 5, DIGESTS = 8, LISTS };
+    bool any = false;
+    for (size_t i = 0; i < place->n; i++)
+        any = any || place->kept[i].digest[0];
+    for (int k = 0; k < LISTS - !any; k++) {
         int64_t at = 0;
         for (size_t i = 0; i < place->n; i++) {
             const kept_piece *p = &place->kept[i];
-            const int64_t integers[LISTS] = {p->number, 0, p->part, p->encoding, p->header, 0, p->size, at};
+            const int64_t integers[LISTS] = {p->number, 0, p->part, p->encoding, p->header, 0, p->size, at, 0};
             fputc(i > 0 ? ',' : '{', out);
-            if (k == 1) /* names are words of the solver's */
-                fprintf(out, "\"%s\"", p->name);
-            else if (k == 5)
+            if (k == NAMES || k == DIGESTS) /* names are words of the solver's */
+                fprintf(out, "\"%s\"", k == NAMES ? p->name : p->digest);
+            else if (k == LAST)
                 fprintf(out, "%.17g", p->last);
             else
                 fprintf(out, "%lld", (long long)integers[k]);
-            at += p->size;
+            at += p->digest[0] ? 0 : p->size;
         }
-        fputs(k + 1 < LISTS ? "}\n" : "}", out);
+        fputs(k + 1 < LISTS - !any ? "}\n" : "}", out);
     }
 }
 
@@ -59,22 +68,45 @@ store_status postgresql_send_pieces(result_place *place)
     return place->link->status;
 }
 
+static store_status give_up(result_place *place, const char *cause)
+{
+    place->link->status = STORE_ERROR;
+    strcpy(place->link->message, cause);
+    return STORE_ERROR;
+}
+
+/* One that all jobs which have it share, by its digest; whether the database has it shows there. */
+static store_status send_common(result_place *place, const result_piece *piece, char hex[65])
+{
+    unsigned char digest[32];
+    call c = {.sql = "SELECT uzawa.use_common($1, $2, $3, $4)"};
+    if (gnutls_hash_fast(GNUTLS_DIG_SHA256, piece->data, (size_t)piece->size, digest) != 0)
+        return give_up(place, "the digest of a result failed");
+    for (size_t i = 0; i < sizeof digest; i++)
+        sprintf(hex + 2 * i, "%02x", digest[i]);
+    call_bytes(&c, digest, sizeof digest);
+    call_bytes(&c, piece->data, (size_t)piece->size);
+    call_text(&c, place->job);
+    call_integer(&c, (int64_t)place->token);
+    link_send(place->link, &c);
+    return place->link->status;
+}
+
 /* Kept until there is a call's worth of them. Failures of the database show at the end of the transaction. */
 static store_status put(void *transaction, const result_key *key, const result_piece *piece)
 {
     result_place *place = transaction;
-    if (place->n == PIECES_AT_ONCE || place->len + (size_t)piece->size > PLACE_ROOM) {
+    const bool common = key->name && piece->size >= COMMON_LEAST;
+    const size_t own = common ? 0 : (size_t)piece->size; /* bytes */
+    if (place->n == PIECES_AT_ONCE || place->len + own > PLACE_ROOM) {
         const store_status status = postgresql_send_pieces(place);
         if (status != STORE_OK)
             return status;
     }
     if (!place->bytes)
         place->bytes = malloc(PLACE_ROOM);
-    if (!place->bytes) {
-        place->link->status = STORE_ERROR;
-        strcpy(place->link->message, "no memory for a result");
-        return STORE_ERROR;
-    }
+    if (!place->bytes)
+        return give_up(place, "no memory for a result");
     kept_piece *p = &place->kept[place->n++];
     *p = (kept_piece){.number = key->number,
                       .part = piece->part,
@@ -83,10 +115,10 @@ static store_status put(void *transaction, const result_key *key, const result_p
                       .size = piece->size,
                       .last = piece->last};
     snprintf(p->name, sizeof p->name, "%s", key->name ? key->name : HISTORY);
-    if (piece->size > 0)
-        memcpy(place->bytes + place->len, piece->data, (size_t)piece->size);
-    place->len += (size_t)piece->size;
-    return STORE_OK;
+    if (own > 0)
+        memcpy(place->bytes + place->len, piece->data, own);
+    place->len += own;
+    return common ? send_common(place, piece, p->digest) : STORE_OK;
 }
 
 typedef struct {

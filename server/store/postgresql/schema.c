@@ -11,9 +11,10 @@ __asm__(".section .rodata\nschema_1: .incbin \"server/store/postgresql/schema_1.
         "schema_2: .incbin \"server/store/postgresql/schema_2.sql\"\n.byte 0\n"
         "schema_3: .incbin \"server/store/postgresql/schema_3.sql\"\n.byte 0\n"
         "schema_4: .incbin \"server/store/postgresql/schema_4.sql\"\n.byte 0\n"
-        "schema_5: .incbin \"server/store/postgresql/schema_5.sql\"\n.byte 0\n.text");
-extern const char schema_1[], schema_2[], schema_3[], schema_4[], schema_5[];
-static const char *const STEPS[SCHEMA_VERSION + 1] = {NULL, schema_1, schema_2, schema_3, schema_4, schema_5};
+        "schema_5: .incbin \"server/store/postgresql/schema_5.sql\"\n.byte 0\n"
+        "schema_6: .incbin \"server/store/postgresql/schema_6.sql\"\n.byte 0\n.text");
+extern const char schema_1[], schema_2[], schema_3[], schema_4[], schema_5[], schema_6[];
+static const char *const STEPS[SCHEMA_VERSION + 1] = {NULL, schema_1, schema_2, schema_3, schema_4, schema_5, schema_6};
 
 /* A database of another encoding could not keep every text. */
 #define LEAST_SERVER 150000

@@ -8,7 +8,7 @@
 
 #include "store/postgresql/connection.h"
 
-#define SCHEMA_VERSION 5
+#define SCHEMA_VERSION 6
 
 /* Brings the database to the present version where it is older or empty, under a lock, so that of several daemons that
  * start one does it. False: l->message has the cause and a remedy, and nothing was changed. */

@@ -194,7 +194,7 @@ TEST(an_end_that_is_sent_again_is_the_same)
     CHECK_INT(store_finish(two.a, &lease, &with_result, NULL), STORE_OK);
     CHECK_INT(store_finish(two.a, &lease, &with_result, NULL), STORE_OK);
     CHECK_INT(store_finish(two.a, &lease, &other, NULL), STORE_CONFLICT);
-    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 2);
+    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.pieces", &rows) && rows == 2);
     CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.answer", &rows) && rows == 1);
     CHECK_INT(store_get_vector(two.b, id, 1, "reactions", &got, &rows), STORE_OK);
     CHECK(got && rows == 2 && got[1] == -2.0);
@@ -202,11 +202,11 @@ TEST(an_end_that_is_sent_again_is_the_same)
     /* and with another lease it is another's */
     lease.token++;
     CHECK_INT(store_finish(two.a, &lease, &with_result, NULL), STORE_CONFLICT);
-    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 2);
+    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.pieces", &rows) && rows == 2);
     /* what belongs to a job goes with it */
     job_status was;
     CHECK_INT(store_dismiss(two.b, id, &was), STORE_OK);
-    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.piece", &rows) && rows == 0);
+    CHECK(postgresql_run(two.p.database, "SELECT count(*) FROM uzawa.pieces", &rows) && rows == 0);
     pair_end(&two);
 }
 
