@@ -4,6 +4,7 @@ that returns its figures as a dictionary (scenarios.py).
 import collections
 import concurrent.futures
 import contextlib
+import http.client
 import itertools
 import json
 import os
@@ -263,10 +264,14 @@ def upgrade(build, seconds=5, clients=8):
 # ---------------------------------------------------------------- many bodies
 
 def body_of(k, cells):
-    problem = json.loads(json.dumps(service.SCENE))
-    problem["problem"]["mesh"]["box"]["cells"] = cells
-    problem["problem"]["materials"][0]["young"] = 1e5 + k
-    return problem
+    """A solid part that is pressed onto a plane, by the default solver; k: its material."""
+    return {"problem": {"kind": "scene", "model": "solid",
+                        "mesh": {"box": {"size": [4, 4, 2.5], "cells": cells, "element": "hex8"}},
+                        "materials": [{"on": "all", "young": 1e5 + k, "poisson": 0.3}],
+                        "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}],
+                        "loads": [{"on": "top", "traction": [0, 0, -5]}],
+                        "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, -1e-4],
+                                                                             "normal": [0, 0, 1]}}}]}}
 
 
 def metric(daemon, name):
@@ -290,6 +295,32 @@ def processor(pids):
     return sum(seconds for pid, seconds in used.items() if is_below(pid))
 
 
+class Asker:
+    """One client of several daemons, on connections that it keeps: a new one for each request would take the daemons more
+    time than many a job."""
+
+    def __init__(self, daemons):
+        self.connections = [http.client.HTTPConnection(one.host, one.port, timeout=60) for one in daemons]
+
+    def __call__(self, daemon, method, path, body=None, key=None):
+        headers = {"Content-Type": "application/json", "Prefer": "wait=20", **({"Idempotency-Key": key} if key else {})}
+        connection = self.connections[daemon]
+        for again in (True, False):
+            try:
+                connection.request(method, path, json.dumps(body) if body else None, headers)
+                return json.loads(connection.getresponse().read())
+            except (OSError, http.client.HTTPException):
+                connection.close()  # the daemon may have closed it, as nobody used it
+                if not again:
+                    raise
+
+    def solve(self, daemon, body, key):
+        job = self(daemon, "POST", "/v1/jobs", body, key)
+        while job.get("status") in ("accepted", "running"):
+            job = self(daemon, "GET", f"/v1/jobs/{job['id']}")
+        return job
+
+
 def mixture(build, affinity_s, jobs, bodies, cells, cache, clients=16, seed=7):
     """Jobs of many bodies, few of which are asked for often (Zipf): seconds and processor seconds of all, factorizations."""
     chance = random.Random(seed)
@@ -300,16 +331,16 @@ def mixture(build, affinity_s, jobs, bodies, cells, cache, clients=16, seed=7):
         lock, errors = threading.Lock(), []
 
         def client():
+            asker = Asker(daemons)
             while True:
                 with lock:
                     i, k = next(turn, (None, None))
                 if i is None:
                     return
-                job = daemons[i % 3].post(body_of(k, cells)).json
-                while job["status"] in ("accepted", "running"):
-                    job = daemons[i % 3].get(f"/v1/jobs/{job['id']}", Prefer="wait=20").json
-                if job["status"] != "successful":
+                job = asker.solve(i % 3, body_of(k, cells), f"mixture{i}")
+                if job.get("status") != "successful":
                     errors.append(job)
+
         begun, before = time.monotonic(), processor(pids)
         with concurrent.futures.ThreadPoolExecutor(clients) as pool:
             for one in [pool.submit(client) for _ in range(clients)]:
@@ -318,10 +349,9 @@ def mixture(build, affinity_s, jobs, bodies, cells, cache, clients=16, seed=7):
                 "missed": sum(metric(one, "uzawad_cache_misses_total") for one in daemons), "asked": len(set(asked))}
 
 
-def zipf(build, jobs, bodies=200, cells=(120, 40), cache="640M"):
+def zipf(build, jobs, bodies=200, cells=(16, 16, 10), cache="3000M"):
     """The same jobs where the factor of their body is, and wherever it happens. A cache has room for a third of the bodies
-    (of 9.5 MB each), so that the three together have all of them once; few jobs of many bodies are mostly their first."""
-    service.jsonschema = None  # clients that check each reply would take more time than the daemons
+    (of 45 MB each), so that the three together have all of them once; few jobs of many bodies are mostly their first."""
     near = mixture(build, 5, jobs, bodies, list(cells), cache)
     far = mixture(build, 0, jobs, bodies, list(cells), cache)
     could = jobs - near["asked"]
