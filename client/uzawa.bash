@@ -19,7 +19,7 @@ _uzawa() {
     done
     case $command in
     '') options='--server --timeout --retry --help --version'; words=$commands ;;
-    submit) options='--K --N --h --p --mesh --surface --leave-out --set --vary --wait --timeout --tag --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
+    submit) options='--K --N --h --p --mesh --surface --leave-out --set --vary --wait --timeout --tag --name --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
     import) options='--leave-out --output --quiet --json --server --timeout --retry --help --version ' ;;
     upload) options='--json --server --timeout --retry --help --version ' ;;
     status) options='--json --server --timeout --retry --help --version ' ;;
@@ -32,7 +32,7 @@ _uzawa() {
     plot) options='--deformed --error --trade --x --with --colour --factor --width --ascii --case --output --json --server --timeout --retry --help --version ' ;;
     report) options='--case --output --json --server --timeout --retry --help --version ' ;;
     request) options='--output --json --server --timeout --retry --help --version ' ;;
-    list) options='--status --tag --limit --quiet --json --server --timeout --retry --help --version ' ;;
+    list) options='--status --tag --name --limit --quiet --json --server --timeout --retry --help --version ' ;;
     cancel) options='--quiet --json --server --timeout --retry --help --version ' ;;
     delete) options='--quiet --json --server --timeout --retry --help --version ' ;;
     factors) options='--json --server --timeout --retry --help --version ' ;;
@@ -54,6 +54,7 @@ _uzawa() {
     submit--vary) words='' ;;
     submit--timeout|submit-t) words='' ;;
     submit--tag) words='' ;;
+    submit--name) words='' ;;
     submit--key|submit-k) words='' ;;
     submit--junit) files=1 ;;
     submit--baseline) words=$(_uzawa_ids) ;;
@@ -137,6 +138,7 @@ _uzawa() {
     request--retry) words='' ;;
     list--status) words='accepted running successful failed dismissed' ;;
     list--tag) words='' ;;
+    list--name) words='' ;;
     list--limit|list-n) words='' ;;
     list--server|list-s) words='' ;;
     list--timeout|list-t) words='' ;;

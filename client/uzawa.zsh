@@ -63,6 +63,7 @@ _uzawa() {
             '(-w --wait)'{-w,--wait}'[wait until the job has ended and print the summary]' \
             '(-t --timeout)'{-t,--timeout}'[with --wait\: stop waiting after S seconds]:S: ' \
             '*--tag[label the job; may be repeated]:WORD: ' \
+            '--name[what to call the job in lists]:NAME: ' \
             '(-k --key)'{-k,--key}'[idempotency key (default\: random); the same key and request give the same job]:KEY: ' \
             '--junit[write a JUnit report\: whether the job converged, each assertion, each comparison]:FILE:_files' \
             '--baseline[compare with another job\: energy, reactions, pressure, displacements and what touches]:ID:_uzawa_ids' \
@@ -242,6 +243,7 @@ _uzawa() {
         _arguments \
             '--status[accepted, running, successful, failed or dismissed]:S:(accepted running successful failed dismissed)' \
             '*--tag[only jobs with this tag]:WORD: ' \
+            '--name[only jobs that are called so]:NAME: ' \
             '(-n --limit)'{-n,--limit}'[at most N jobs (default 20)]:N: ' \
             '(-q --quiet)'{-q,--quiet}'[print the ids and nothing else]' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \

@@ -20,7 +20,7 @@ typedef struct {
     uz_words tags, set, vary, fields, with;
     const char *K, *N, *h, *p, *mesh, *surface; /* files; NULL: not given */
     bool leave_out;                             /* of a deck */
-    const char *key, *format, *output, *status, *colour, *factor, *axis;
+    const char *name, *key, *format, *output, *status, *colour, *factor, *axis;
     const char *case_name, *accuracy;         /* accuracy: a number or a level, as written */
     double time_limit_s;                      /* NAN: not given */
     const char *junit, *baseline;             /* a file; a job */

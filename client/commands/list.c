@@ -26,6 +26,7 @@ client_exit client_list(client_session *s)
         snprintf(start, sizeof start, "/v1/jobs?limit=%ld", left < PAGE_JOBS ? left : PAGE_JOBS);
         if (client_buffer_append(&path, start, strlen(start)) && client_append_query(&path, "status", o->status) &&
             client_append_query(&path, "tag", o->tags.count ? o->tags.item[0] : NULL) &&
+            client_append_query(&path, "name", o->name) &&
             client_append_query(&path, "cursor", *cursor ? cursor : NULL)) {
             code = client_get_json(s, &page, path.data);
         } else {
@@ -47,13 +48,15 @@ client_exit client_list(client_session *s)
             fputc('\n', s->out);
         }
     } else if (code == CLIENT_OK) {
-        fprintf(s->out, "%-32s  %-10s  %-15s  %-24s  %s\n", "id", "status", "outcome", "created", "tags");
+        fprintf(s->out, "%-32s  %-10s  %-15s  %-24s  %-20s  %s\n", "id", "status", "outcome", "created", "name",
+                "tags");
         for (size_t i = 0; i < json_array_size(jobs); i++) {
             const json_t *job = json_array_get(jobs, i);
             client_print_cell(s->out, client_json_text(job, "id"), 32);
             client_print_cell(s->out, client_json_text(job, "status"), 10);
             client_print_cell(s->out, client_json_text(job, "summary.outcome"), 15);
             client_print_cell(s->out, client_json_text(job, "created"), 24);
+            client_print_cell(s->out, client_json_text(job, "name"), 20);
             client_print_tags(s->out, job, ",");
             fputc('\n', s->out);
         }

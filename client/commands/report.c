@@ -61,6 +61,7 @@ typedef struct {
     const char *head, *key;
     const char *otherwise; /* the key of a text that stands for one that is not there */
     enum { CELL_TEXT, CELL_NUMBER, CELL_VECTOR } kind;
+    const char *unit, *power; /* "length", "force" or "stress", by which problem.units calls it, NULL: none; "\u00b2" */
 } column;
 
 static void put_table(const report *r, const char *caption, const char *list_at, const column *columns, size_t count)
@@ -70,8 +71,13 @@ static void put_table(const report *r, const char *caption, const char *list_at,
     if (json_array_size(list) == 0)
         return;
     uz_buffer_print(r->to, "<h2>%s</h2><table><tr>", caption);
-    for (size_t k = 0; k < count; k++)
-        uz_buffer_print(r->to, "<th>%s</th>", columns[k].head);
+    for (size_t k = 0; k < count; k++) {
+        const char *key = columns[k].unit;
+        const char *unit = key ? client_json_text(client_json_at(r->summary, "problem.units"), key) : "";
+        uz_buffer_print(r->to, "<th>%s%s", columns[k].head, *unit ? ", " : "");
+        uz_buffer_put_escaped(r->to, unit);
+        uz_buffer_print(r->to, "%s</th>", *unit && columns[k].power ? columns[k].power : "");
+    }
     put(r->to, "</tr>\n");
     json_array_foreach(list, i, one)
     {
@@ -130,23 +136,23 @@ static void put_verdict(const report *r, const json_t *job)
 
 static void put_tables(const report *r)
 {
-    static const column QUANTITIES[] = {{"Name", "name", NULL, CELL_TEXT},
-                                        {"Value", "value", NULL, CELL_NUMBER},
-                                        {"From", "low", NULL, CELL_NUMBER},
-                                        {"To", "high", NULL, CELL_NUMBER},
-                                        {"On this mesh", "on_this_mesh", NULL, CELL_NUMBER},
-                                        {"How sure", "kind", NULL, CELL_TEXT}},
-                        CONTACTS[] = {{"On", "on", NULL, CELL_TEXT},
-                                      {"Force", "force", NULL, CELL_VECTOR},
-                                      {"Normal force", "normal_force", NULL, CELL_NUMBER},
-                                      {"Mean pressure", "mean_pressure", NULL, CELL_NUMBER},
-                                      {"Largest", "max_pressure", NULL, CELL_NUMBER},
-                                      {"Area", "area", NULL, CELL_NUMBER},
-                                      {"Center of pressure", "center", NULL, CELL_VECTOR}},
-                        ASSERTIONS[] = {{"Result", "result", NULL, CELL_TEXT},
-                                        {"Quantity", "name", "quantity", CELL_TEXT},
-                                        {"Value", "value", NULL, CELL_NUMBER},
-                                        {"Why", "reason", NULL, CELL_TEXT}};
+    static const column QUANTITIES[] = {{"Name", "name", NULL, CELL_TEXT, NULL, NULL},
+                                        {"Value", "value", NULL, CELL_NUMBER, NULL, NULL},
+                                        {"From", "low", NULL, CELL_NUMBER, NULL, NULL},
+                                        {"To", "high", NULL, CELL_NUMBER, NULL, NULL},
+                                        {"On this mesh", "on_this_mesh", NULL, CELL_NUMBER, NULL, NULL},
+                                        {"How sure", "kind", NULL, CELL_TEXT, NULL, NULL}},
+                        CONTACTS[] = {{"On", "on", NULL, CELL_TEXT, NULL, NULL},
+                                      {"Force", "force", NULL, CELL_VECTOR, "force", NULL},
+                                      {"Normal force", "normal_force", NULL, CELL_NUMBER, "force", NULL},
+                                      {"Mean pressure", "mean_pressure", NULL, CELL_NUMBER, "stress", NULL},
+                                      {"Largest", "max_pressure", NULL, CELL_NUMBER, "stress", NULL},
+                                      {"Area", "area", NULL, CELL_NUMBER, "length", "\u00b2"},
+                                      {"Center of pressure", "center", NULL, CELL_VECTOR, "length", NULL}},
+                        ASSERTIONS[] = {{"Result", "result", NULL, CELL_TEXT, NULL, NULL},
+                                        {"Quantity", "name", "quantity", CELL_TEXT, NULL, NULL},
+                                        {"Value", "value", NULL, CELL_NUMBER, NULL, NULL},
+                                        {"Why", "reason", NULL, CELL_TEXT, NULL, NULL}};
     put_table(r, "Quantities", "quantities", QUANTITIES, sizeof QUANTITIES / sizeof QUANTITIES[0]);
     put_table(r, "Contacts, on this mesh", "resultants.contacts", CONTACTS, sizeof CONTACTS / sizeof CONTACTS[0]);
     put_table(r, "Assertions", "assertions", ASSERTIONS, sizeof ASSERTIONS / sizeof ASSERTIONS[0]);

@@ -185,6 +185,8 @@ static client_exit build_edited(client_session *s, client_bodies *out, const cli
     code = client_build_files(s, request);
     if (code == CLIENT_OK)
         code = client_build_values(s, request);
+    if (code == CLIENT_OK && o->name && json_object_set_new(request, "name", json_string(o->name)) != 0)
+        code = client_complain(s, CLIENT_USAGE, "the value of --name is not UTF-8");
     if (code == CLIENT_OK) {
         char common[32] = "";
         json_t *requests = NULL, *labels = NULL;
@@ -227,7 +229,7 @@ client_exit client_build(client_session *s, client_bodies *out)
     *out = (client_bodies){0};
     if (o->operand && !client_is_deck(o->operand) && !client_file_read(&file, o->operand, message, sizeof message))
         return client_complain(s, CLIENT_LOCAL, message);
-    if (o->K || o->N || o->h || o->p || o->mesh || o->surface || o->set.count || o->vary.count ||
+    if (o->K || o->N || o->h || o->p || o->mesh || o->surface || o->set.count || o->vary.count || o->name ||
         client_is_deck(o->operand)) {
         code = build_edited(s, out, &file);
     } else {

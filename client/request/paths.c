@@ -7,8 +7,8 @@
 bool client_path_read(client_path *out, const json_t *request, const char *text, size_t len, char *message, size_t size)
 {
     /* What a request may have at its top (schemas/request.json). */
-    static const char *const TOP[] = {"problem",       "cases",   "solver", "tags",  "priority",
-                                      "queue_limit_s", "webhook", "assert", "answer"};
+    static const char *const TOP[] = {"problem",  "cases",         "solver",  "name",   "tags",
+                                      "priority", "queue_limit_s", "webhook", "assert", "answer"};
     size_t room = sizeof out->text;
     *out = (client_path){0};
     if (len >= room || !len) {

@@ -28,6 +28,17 @@ static int places(double value)
     return value > 0 ? (int)fmin(6, fmax(0, 1 - floor(log10(value)))) : 0;
 }
 
+/* " MPa": what the scene calls the unit of this ("length", "force" or "stress"), or nothing. power: "^2" of an area. */
+static void print_unit(FILE *to, const json_t *summary, const char *of, const char *power)
+{
+    const char *unit = client_json_text(client_json_at(summary, "problem.units"), of);
+    if (!*unit)
+        return;
+    fputc(' ', to);
+    client_print_safe(to, unit);
+    fputs(power, to);
+}
+
 static void label(FILE *to, const char *text)
 {
     fprintf(to, "%-12s", text);
@@ -242,8 +253,10 @@ static void print_contact(FILE *to, const json_t *summary)
     label(to, "contact");
     fprintf(to, "%s of %s candidates touch", number_in_words(text, summary, "contact.active", 9),
             number_in_words(more, summary, "contact.candidates", 9));
-    if (json_is_number(client_json_at(summary, "contact.area")))
+    if (json_is_number(client_json_at(summary, "contact.area"))) {
         fprintf(to, ", on an area of %s", number_in_words(text, summary, "contact.area", 6));
+        print_unit(to, summary, "length", "^2");
+    }
     if (kept < candidates)
         fprintf(to, "; solved with %.0f, the others are proved not to matter", kept);
     if (added > 0) /* candidates that had to be taken back */
@@ -259,15 +272,20 @@ static void print_contact(FILE *to, const json_t *summary)
     }
     label(to, "reactions");
     fprintf(to, "sum %s", number_in_words(text, summary, "contact.reaction_sum", 10));
+    print_unit(to, summary, "force", "");
     print_vector(to, ", force ", client_json_at(summary, "contact.force"));
+    print_unit(to, summary, "force", "");
     if (json_is_number(client_json_at(summary, "contact.max_pressure"))) {
         fprintf(to, ", largest pressure %s", number_in_words(text, summary, "contact.max_pressure", 6));
+        print_unit(to, summary, "stress", "");
         print_vector(to, " at ", client_json_at(summary, "contact.max_pressure_at.x"));
     }
     fputc('\n', to);
     print_trends(to, client_json_at(summary, "contact.estimates"));
     label(to, "penetration");
-    fprintf(to, "%s at most\n", number_in_words(text, summary, "contact.max_penetration", 3));
+    fputs(number_in_words(text, summary, "contact.max_penetration", 3), to);
+    print_unit(to, summary, "length", "");
+    fputs(" at most\n", to);
     /* What facets are taken for: "shaft: cylinder of radius 20, 0.027 off the facets, which turn by 6 degrees". */
     const json_t *list = client_json_at(summary, "contact.surfaces");
     for (size_t i = 0; i < json_array_size(list); i++) {
@@ -284,13 +302,16 @@ static void print_contact(FILE *to, const json_t *summary)
 }
 
 /* The largest stress, and what is left to the yield stress. */
-static void print_stress(FILE *to, const json_t *stress)
+static void print_stress(FILE *to, const json_t *summary)
 {
+    const json_t *stress = client_json_at(summary, "stress");
     char text[32];
     if (!json_is_object(stress))
         return;
     label(to, "stress");
-    fprintf(to, "von Mises %s at most,", number_in_words(text, stress, "von_mises", 6));
+    fprintf(to, "von Mises %s", number_in_words(text, stress, "von_mises", 6));
+    print_unit(to, summary, "stress", "");
+    fputs(" at most,", to);
     print_vector(to, " at ", client_json_at(stress, "at.x"));
     if (json_is_number(json_object_get(stress, "safety"))) {
         fprintf(to, "; safety factor %s", number_in_words(text, stress, "safety", 4));
@@ -317,10 +338,15 @@ static void print_resultants(FILE *to, const json_t *summary)
             fputs(LISTS[k][1], to);
             client_print_safe(to, client_json_text(one, "on"));
             print_vector(to, " ", client_json_at(one, "force"));
+            print_unit(to, summary, "force", "");
             if (k == 0 && isfinite(client_json_number(one, "mean_pressure"))) {
-                fprintf(to, "\n%14spressure %s on average, ", "", number_in_words(text, one, "mean_pressure", 5));
-                fprintf(to, "%s at most, ", number_in_words(text, one, "max_pressure", 5));
-                fprintf(to, "on %s around", number_in_words(text, one, "area", 5));
+                fprintf(to, "\n%14spressure %s", "", number_in_words(text, one, "mean_pressure", 5));
+                print_unit(to, summary, "stress", "");
+                fprintf(to, " on average, %s", number_in_words(text, one, "max_pressure", 5));
+                print_unit(to, summary, "stress", "");
+                fprintf(to, " at most, on %s", number_in_words(text, one, "area", 5));
+                print_unit(to, summary, "length", "^2");
+                fputs(" around", to);
                 print_vector(to, " ", client_json_at(one, "center"));
             }
             fputc('\n', to);
@@ -488,7 +514,7 @@ void client_print_summary(FILE *to, const json_t *job)
     print_method(to, summary);
     if (json_is_object(json_object_get(summary, "contact")))
         print_contact(to, summary);
-    print_stress(to, client_json_at(summary, "stress"));
+    print_stress(to, summary);
     print_resultants(to, summary);
     json_array_foreach(json_object_get(summary, "warnings"), i, warning)
     {

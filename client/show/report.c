@@ -147,6 +147,10 @@ void client_print_job(FILE *to, const json_t *job)
     double progress = client_json_number(job, "progress");
     fputs("job         ", to);
     client_print_safe(to, client_json_text(job, "id"));
+    if (*client_json_text(job, "name")) {
+        fputs("\nname        ", to);
+        client_print_safe(to, client_json_text(job, "name"));
+    }
     fputs("\nstatus      ", to);
     client_print_safe(to, client_json_text(job, "status"));
     if (!client_job_ended(job) && isfinite(progress))

@@ -65,6 +65,10 @@ typedef struct {
     char *webhook;        /* address to tell of the end, or NULL */
 } codec_request;
 
+/* A job's name is kept as the first of its tags, behind a character that no tag has: so every store finds jobs by it.
+ */
+#define CODEC_NAME_TAG "\x1f"
+
 /* What a body may be: the one that a route takes, or any that the store may hold. */
 typedef enum { CODEC_SOLVE, CODEC_VERIFY, CODEC_STORED } codec_kind;
 
@@ -130,6 +134,7 @@ typedef struct {
 /* What is known of the run around a summary. */
 typedef struct {
     const char *started_from; /* "zero", "warm", "continued"; NULL: not said */
+    const uz_units *units;    /* NULL, or without words: not said */
     const codec_cases *cases; /* a job with cases: `summary` is what they come to together; else NULL */
 } codec_run;
 char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind,

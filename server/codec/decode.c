@@ -207,9 +207,10 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
     const json_value *solver = json_get(root, "solver"), *start = json_get(solver, "warm_start");
     const json_value *of = json_get(start, "case"), *reactions = json_get(start, "reactions");
     const json_value *problem = json_get(root, "problem"), *answer = json_get(root, "answer");
-    const json_value *tags = json_get(root, "tags");
+    const json_value *tags = json_get(root, "tags"), *name = json_get(root, "name");
     const char *webhook = json_text(json_get(json_get(root, "webhook"), "url")),
                *from = json_text(json_get(start, "job"));
+    char word[64];
     text t = {0};
     decode_settings(&out->settings, solver);
     out->priority = (int)json_number(json_get(root, "priority"), 0);
@@ -220,6 +221,15 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
 
     /* Tags are compared as C strings by the store, and shown in terminals. */
     text_open(&t, NULL, '[');
+    if (name) {
+        char as_tag[sizeof CODEC_NAME_TAG + 64];
+        if (!decode_label(word, d, name, name->text, name->count, "The name of a job")) {
+            free(t.data);
+            return false;
+        }
+        snprintf(as_tag, sizeof as_tag, "%s%s", CODEC_NAME_TAG, word);
+        text_string(&t, NULL, as_tag);
+    }
     for (size_t i = 0; i < json_size(tags); i++) {
         const json_value *tag = &tags->items[i];
         if (decode_unsafe(tag->text, tag->count)) {

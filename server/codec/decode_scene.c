@@ -261,6 +261,36 @@ static int word_of(const json_value *value, const char *const words[WORDS_MOST])
     return 0;
 }
 
+/* That of a stress follows from the others: a word that did not agree with them would be wrong beside every number. */
+static bool decode_units(uz_units *out, decoding *d, const json_value *object)
+{
+    static const struct {
+        const char *force, *length, *stress;
+    } KNOWN[] = {{"N", "mm", "MPa"}, {"N", "m", "Pa"},    {"kN", "m", "kPa"},
+                 {"MN", "m", "MPa"}, {"kN", "mm", "GPa"}, {"lbf", "in", "psi"}};
+    const struct {
+        const char *key;
+        char *to;
+        size_t room;
+    } WORDS[] = {{"length", out->length, sizeof out->length}, {"force", out->force, sizeof out->force}};
+    char word[64];
+    if (!object)
+        return true;
+    for (size_t i = 0; i < sizeof WORDS / sizeof WORDS[0]; i++) {
+        const json_value *value = json_get(object, WORDS[i].key);
+        if (!decode_label(word, d, value, value->text, value->count, "The name of a unit"))
+            return false;
+        if (strlen(word) >= WORDS[i].room)
+            return decode_refuse(d, "out_of_range", value, "is too long for the name of a unit: 31 bytes at most.");
+        memcpy(WORDS[i].to, word, strlen(word) + 1);
+    }
+    snprintf(out->stress, sizeof out->stress, "%s/%s\u00b2", out->force, out->length);
+    for (size_t i = 0; i < sizeof KNOWN / sizeof KNOWN[0]; i++)
+        if (strcmp(KNOWN[i].force, out->force) == 0 && strcmp(KNOWN[i].length, out->length) == 0)
+            snprintf(out->stress, sizeof out->stress, "%s", KNOWN[i].stress);
+    return true;
+}
+
 bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
 {
     static const char *const MODELS[WORDS_MOST] = {"plane_stress", "plane_strain", "axisymmetric", "solid"};
@@ -275,6 +305,8 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     out->kinematics = (uz_kinematics)word_of(json_get(object, "kinematics"), KINEMATICS);
     out->thickness = json_number(json_get(object, "thickness"), 1);
     out->all_candidates = json_text_is(json_get(object, "candidates"), "all");
+    if (!decode_units(&out->units, d, json_get(object, "units")))
+        return false;
     if (box ? !decode_box(out, d, box) : !decode_mesh(out, d, mesh))
         return false;
     out->refine = json_get(mesh, "refine") != NULL; /* "auto" is all that it can be */

@@ -78,6 +78,26 @@ static void put_grid(text *t, const job_grid *grid)
     text_close(t, '}');
 }
 
+/* The tags, of which the first may be the name (CODEC_NAME_TAG): JSON as codec_decode has written it. */
+static void put_labels(text *t, const char *tags)
+{
+    static const char NAMED[] = "[\"\\u001f"; /* CODEC_NAME_TAG in JSON */
+    if (strncmp(tags, NAMED, sizeof NAMED - 1) != 0) {
+        text_raw(t, "tags", tags);
+        return;
+    }
+    const char *name = tags + sizeof NAMED - 1, *end = name;
+    while (*end && *end != '"')
+        end += *end == '\\' && end[1] ? 2 : 1;
+    text_key(t, "name");
+    text_bytes(t, "\"", 1);
+    text_bytes(t, name, (size_t)(end - name) + (*end == '"'));
+    text_key(t, "tags");
+    text_bytes(t, "[", 1);
+    end += *end == '"';
+    text_put(t, end + (*end == ','));
+}
+
 static void put_job(text *t, const job *j)
 {
     size_t len; /* each case has a history of its own, under its name */
@@ -94,7 +114,7 @@ static void put_job(text *t, const job *j)
     text_integer(t, "priority", j->priority);
     if (j->client[0])
         text_string(t, "owner", j->client);
-    text_raw(t, "tags", j->tags ? j->tags : "[]");
+    put_labels(t, j->tags ? j->tags : "[]");
     text_raw(t, "summary", j->summary);
     if (j->damaged) {
         problem_details problem;

@@ -407,6 +407,13 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     text_string(&t, "kind", scene ? "scene" : "matrices");
     text_integer(&t, "d", summary->d);
     text_integer(&t, "m", summary->m);
+    if (run && run->units && run->units->length[0]) {
+        text_open(&t, "units", '{');
+        text_string(&t, "length", run->units->length);
+        text_string(&t, "force", run->units->force);
+        text_string(&t, "stress", run->units->stress);
+        text_close(&t, '}');
+    }
     text_close(&t, '}');
     put_contact(&t, summary, scene);
     if (summary->evaluation)

@@ -344,7 +344,10 @@ static bool read_time(const http_request *rq, const char *key, double *out, prob
 
 /* ---- the query */
 
-static bool read_query(const http_request *rq, store_query *query, problem_details *problem)
+enum { LONGEST_NAME = 65 }; /* bytes, with the mark before it and the NUL behind */
+
+/* name: where that of the jobs asked for is kept as the tag that it is. */
+static bool read_query(const http_request *rq, store_query *query, char name[LONGEST_NAME], problem_details *problem)
 {
     int64_t limit = 50;
     const char *status = target_value(&rq->target, "status"), *order = target_value(&rq->target, "order");
@@ -366,11 +369,15 @@ static bool read_query(const http_request *rq, store_query *query, problem_detai
     if (!read_time(rq, "since", &query->since, problem) || !read_time(rq, "until", &query->until, problem))
         return false;
     for (size_t i = 0, count = 0; i < rq->target.count; i++) {
-        if (strcmp(rq->target.parameters[i].key, "tag") != 0)
+        const char *key = rq->target.parameters[i].key, *value = rq->target.parameters[i].value;
+        const bool named = strcmp(key, "name") == 0;
+        if (!named && strcmp(key, "tag") != 0)
             continue;
         if (count > STORE_MORE_TAGS)
-            return refuse_query(problem, "at most 4 tags may be asked for");
-        *(count == 0 ? &query->tag : &query->more[count - 1]) = rq->target.parameters[i].value;
+            return refuse_query(problem, "at most 4 tags may be asked for, a name among them");
+        if (named && snprintf(name, LONGEST_NAME, CODEC_NAME_TAG "%s", value) >= LONGEST_NAME)
+            return refuse_query(problem, "name must be that of a job, of at most 63 bytes");
+        *(count == 0 ? &query->tag : &query->more[count - 1]) = named ? name : value;
         count++;
     }
     return true;
@@ -383,7 +390,8 @@ void jobs_list(api *context, http_request *rq, http_reply *reply)
     job *jobs = NULL;
     size_t count = 0;
     bool more = false;
-    if (!read_query(rq, &query, &problem)) {
+    char name[LONGEST_NAME];
+    if (!read_query(rq, &query, name, &problem)) {
         reply_problem(reply, &problem);
         return;
     }

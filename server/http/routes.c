@@ -10,7 +10,7 @@
 
 static const char *const NONE[] = {NULL};
 static const char *const SUBMIT[] = {"validate", NULL};
-static const char *const LIST[] = {"status", "limit", "cursor", "tag", "since", "until", "order", NULL};
+static const char *const LIST[] = {"status", "limit", "cursor", "tag", "name", "since", "until", "order", NULL};
 
 static const route ROUTES[] = {
     {"POST", "/v1/jobs", SUBMIT, jobs_submit, false},

@@ -90,7 +90,8 @@ static bool build_one(answers *a, int64_t i, uz_result *const *results, const co
     bool is_scene = request->problem.kind == UZ_PROBLEM_SCENE;
     bool has_earlier = from->histories != NULL && result->summary.origin == UZ_FROM_STATE;
     answer_parts *parts = &a->parts[i];
-    codec_run run = {.started_from = request->answer.u ? NULL : ORIGINS[result->summary.origin]};
+    codec_run run = {.started_from = request->answer.u ? NULL : ORIGINS[result->summary.origin],
+                     .units = &request->problem.scene.units};
     parts->summary = codec_encode_summary(&result->summary, request->problem.kind, &run);
     add_vector(parts, "reactions", result->r, result->m);
     add_vector(parts, "gaps", result->g, result->m);
@@ -169,7 +170,9 @@ bool answers_build(answers *out, store_outcome *outcome, uz_result *const *resul
         return false;
     overall_summary(&overall, &counts, results, &request->problem);
     add_waiting(&overall.timings, queue_s, parse_s);
-    codec_run run = {.started_from = ORIGINS[results[first]->summary.origin], .cases = &counts};
+    codec_run run = {.started_from = ORIGINS[results[first]->summary.origin],
+                     .units = &request->problem.scene.units,
+                     .cases = &counts};
     out->shared.summary = codec_encode_summary(&overall, request->problem.kind, &run);
     if (!out->shared.summary || !judge(&out->shared.summary, request, NULL, true, out->findings) ||
         !add_places(out, &out->shared, results[0], is_scene))

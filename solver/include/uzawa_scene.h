@@ -244,8 +244,14 @@ typedef enum {
     UZ_KINEMATICS_FINITE  /* there, too, and rotations and strains are as large as they are */
 } uz_kinematics;
 
+/* What a person calls the units of a scene: words that stand beside numbers, and nothing else. "": not said. */
+typedef struct {
+    char length[32], force[32], stress[72];
+} uz_units;
+
 typedef struct {
     uz_model model;
+    uz_units units;
     uz_formulation formulation;
     double thickness; /* plane models */
     uz_mesh_source source;

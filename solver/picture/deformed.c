@@ -83,6 +83,7 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
         for (int64_t i = 0; i < scenery->model->m; i++)
             scenery->largest_push = fmax(scenery->largest_push, pressure[i]);
         scenery->contacts_only = how->colour == UZ_FIELD_PRESSURE;
+        scenery->is_length = how->colour == UZ_FIELD_DISPLACEMENTS;
         scenery->low = scenery->contacts_only ? 0 : INFINITY;
         scenery->high = scenery->contacts_only ? 0 : -INFINITY;
         for (int64_t a = 0; a < scenery->model->mesh.n_nodes; a++) {

@@ -402,12 +402,22 @@ void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
     uz_buffer_print(svg, "\"/>\n");
 }
 
+/* As the scene calls it, behind this; nothing where it does not. */
+static void put_unit(uz_buffer *svg, const char *before, const char *unit)
+{
+    if (!unit[0])
+        return;
+    uz_buffer_print(svg, "%s", before);
+    uz_buffer_put_escaped(svg, unit);
+}
+
 void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title)
 {
     /* The text on the left takes up to 160 pixels; below the bar three texts need 210. */
     enum { LEFT = 180, LEAST = 210, MOST = 300, STOPS = 8 };
     const int room = scenery->width - 20 - LEFT, bar = room < LEAST ? LEAST : room < MOST ? room : MOST;
     const int y = scenery->height + 12, x = scenery->width - bar - 20;
+    const uz_units *units = &scenery->scene->units;
     uz_buffer_print(svg, "<defs><linearGradient id=\"scale\">");
     for (int i = 0; i <= STOPS; i++) {
         unsigned char rgb[3];
@@ -421,13 +431,16 @@ void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char
                     x, y, bar);
     uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\">%.3g</text><text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.3g</text>",
                     x, y + 26, scenery->low, x + bar, y + 26, scenery->high);
-    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", x + bar / 2, y + 26,
-                    scenery->what);
+    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s", x + bar / 2, y + 26, scenery->what);
+    put_unit(svg, ", ", scenery->is_length ? units->length : units->stress);
+    uz_buffer_print(svg, "</text>\n");
     uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", y + 10);
     uz_buffer_put_escaped(svg, title ? title : "");
     uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g", y + 26, scenery->factor);
-    if (scenery->largest_push > 0)
+    if (scenery->largest_push > 0) {
         uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure %.3g", y + 42,
                         scenery->largest_push);
+        put_unit(svg, " ", units->stress);
+    }
     uz_buffer_print(svg, "</text>\n");
 }

@@ -15,6 +15,7 @@ typedef struct {
     const double *value;    /* n_nodes: what is coloured */
     double low, high;       /* range of it */
     const char *what;       /* its name */
+    bool is_length;         /* is it one? A stress otherwise */
     bool contacts_only;     /* `value` is there on sides of contacts alone, NaN elsewhere: they alone are coloured */
     const double *pressure; /* m: of each contact row, NaN where it has no area */
     double largest_push;    /* of these; at least 0 */
