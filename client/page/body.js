@@ -130,13 +130,19 @@ class BodyView {
         button("Show all", "Show all of the body", () => this.home()), button("SVG", "Save as a picture for a report", () => this.save())));
   }
 
+  /** ", MPa": what the scene calls the unit of a quantity. */
+  unit(id) {
+    const { units } = this.options;
+    return units ? `, ${id === "von_mises" || id === "pressure" ? units.stress : units.length}` : "";
+  }
+
   /** The colour bar with its numbers. */
   draw_legend() {
     const [low, high] = this.range(), id = `body-scale-${this.number}`;
     const stops = Array.from({ length: 9 }, (_, i) => s("stop", { offset: i / 8, "stop-color": `rgb(${viridis(i / 8).join(" ")})` }));
     const name = quantities(this.surface).find((one) => one.id === this.quantity).name;
     const texts = [[0, "start", low], [0.5, "middle", low + (high - low) / 2], [1, "end", high]];
-    show(this.legend, h("div", { class: "body-quantity" }, name), s("svg", { viewBox: "0 0 320 30", width: 320, height: 30, role: "img", "aria-label": `${name}: colours from ${exact(low)} to ${exact(high)}` },
+    show(this.legend, h("div", { class: "body-quantity" }, name + this.unit(this.quantity)), s("svg", { viewBox: "0 0 320 30", width: 320, height: 30, role: "img", "aria-label": `${name}: colours from ${exact(low)} to ${exact(high)}` },
       s("defs", null, s("linearGradient", { id }, stops)), s("rect", { width: 320, height: 12, fill: `url(#${id})` }),
       texts.map(([t, anchor, value]) => s("text", { x: 320 * t, y: 26, "text-anchor": anchor }, exact(value)))),
       this.quantity === "pressure" ? h("span", { class: "muted" }, "grey: nothing to touch") : null);
@@ -191,7 +197,7 @@ class BodyView {
   async show_pressure() {
     this.pressure?.destroy();
     this.pressure = null;
-    const pressure = await mountPressure(this.pressure_place, this.api, this.job, { case: this.case_name, on_node: (vertex) => this.mark(vertex) });
+    const pressure = await mountPressure(this.pressure_place, this.api, this.job, { case: this.case_name, units: this.options.units, on_node: (vertex) => this.mark(vertex) });
     if (this.ends.signal.aborted) pressure.destroy();
     else this.pressure = pressure;
   }

@@ -92,7 +92,7 @@ export class Convergence {
     try {
       const job = await this.api.get(`/v1/jobs/${id}`, { signal: this.ends.signal });
       const method = job.summary ? job.summary.method.replace(/_/g, " ") : "";
-      const history = new History(this.api, id, `${short_id(id)} ${method}`.trim());
+      const history = new History(this.api, id, `${job.name || short_id(id)} ${method}`.trim());
       await history.more(this.ends.signal);
       this.histories.push(history);
     } catch (error) {

@@ -1,5 +1,6 @@
 // job.js: one job, live while it waits and runs: progress, convergence, then the answer in words and pictures.
 
+import { mountCases } from "./cases.js";
 import { Convergence } from "./convergence.js";
 import { announce, h, pause, show } from "./dom.js";
 import { download_buttons, files_of } from "./download.js";
@@ -7,12 +8,13 @@ import { draft } from "./examples.js";
 import { elapsed, moment, number, number_towards, seconds, short_id } from "./format.js";
 import { pretty } from "./json_locate.js";
 import { status_chip, sure_button } from "./list.js";
+import { menu_button } from "./menu.js";
 import { show_precision } from "./precision.js";
 import { refine_form } from "./refine.js";
 import { timings_bar } from "./timings.js";
 import { failure_card, verdict_card } from "./verdict.js";
 import { show_whole_error } from "./whole_error.js";
-import { grid_words, has_ended } from "./words.js";
+import { grid_words, has_ended, state_words, title_of } from "./words.js";
 
 const HISTORY_MS = 700, MOST_CASES = 10000, MOST_TIDIED = 200000;
 
@@ -31,8 +33,11 @@ class JobView {
     this.whole = h("section", { "aria-label": "Whole error and its price", id: "whole", hidden: true });
     this.body = h("section", { "aria-label": "Body", hidden: true });
     this.downloads = h("section", { "aria-label": "Downloads", hidden: true });
-    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.whole, this.convergence_place,
-      this.body, this.precision, this.timings, this.downloads));
+    this.cases_place = h("section", { "aria-label": "Load cases", id: "cases", hidden: true });
+    this.request_place = h("section", { "aria-label": "Request", id: "request" });
+    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.cases_place, this.whole, this.convergence_place,
+      this.body, this.precision, this.timings, this.request_place, this.downloads));
+    this.show_request();
   }
 
   complain(error) {
@@ -46,24 +51,39 @@ class JobView {
   show_head() {
     const { job } = this, ended = has_ended(job);
     const refines = job.links.find((link) => link.rel === "refines");
-    const stop = sure_button(ended ? "Delete" : "Cancel", async () => {
-      try {
-        const now = ended ? null : await this.api.get(`/v1/jobs/${this.id}`);
-        if (now && has_ended(now)) return this.take(now); // it ended meanwhile: nobody asked to delete it
-        const left = await this.api.remove(`/v1/jobs/${this.id}`);
-        if (left) this.take(left);
-        else location.hash = "#/";
-      } catch (error) {
-        this.complain(error);
-      }
-    });
+    const end = async () => {
+      const now = ended ? null : await this.api.get(`/v1/jobs/${this.id}`);
+      if (now && has_ended(now)) return this.take(now); // it ended meanwhile: nobody asked to delete it
+      const left = await this.api.remove(`/v1/jobs/${this.id}`);
+      if (left) this.take(left);
+      else location.hash = "#/";
+      return undefined;
+    };
+    const stop = ended ? menu_button("More about this job", () => [{ label: "Delete", sure: "Delete for good", act: end }], (error) => this.complain(error))
+      : sure_button("Cancel", () => end().catch((error) => this.complain(error)));
     stop.id = "stop";
     const again = job.summary?.outcome?.endsWith("verified") ? null
       : h("button", { type: "button", class: "small", id: "edit", onclick: () => this.edit() }, "Edit and resubmit");
     const actions = h("div", { class: "actions" }, again, job.status === "successful" ? refine_form(this.api, job) : null, stop);
-    show(this.head, h("h1", { title: this.id }, "Job ", h("code", null, short_id(this.id))), status_chip(job.status, job.summary?.outcome),
+    document.title = `${title_of(job)}: ${state_words(job.status, job.summary?.outcome)} · Contact solver`;
+    show(this.head, h("h1", { title: this.id }, job.name ? job.name : ["Job ", h("code", null, short_id(this.id))]), status_chip(job.status, job.summary?.outcome),
       h("span", { class: "muted" }, moment(job.created)), job.tags.map((tag) => h("span", { class: "tag" }, tag)),
       refines ? h("a", { href: `#/jobs/${refines.href.split("/").pop()}` }, `refines ${short_id(refines.href.split("/").pop())}`) : null, actions);
+  }
+
+  /** What was asked, fetched when somebody looks. */
+  show_request() {
+    const place = h("pre", { class: "request-text", tabindex: "0", "aria-label": "The request in JSON" });
+    const details = h("details", { ontoggle: async () => {
+      if (!details.open || place.textContent) return;
+      try {
+        const text = await this.api.text(`/v1/jobs/${this.id}/request`, { signal: this.ends.signal });
+        place.textContent = text.length > MOST_TIDIED ? `${text.slice(0, MOST_TIDIED)}\n… (${text.length} characters: see Downloads)` : pretty(JSON.parse(text));
+      } catch (error) {
+        this.complain(error);
+      }
+    } }, h("summary", null, "Request: what was asked"), place);
+    show(this.request_place, details);
   }
 
   /** The job's request goes into the editor. */
@@ -163,12 +183,18 @@ class JobView {
     this.case_field.hidden = false;
     show(this.case_field, h("label", { for: "case" }, `Load case, of ${this.cases.length}`), select,
       h("span", { class: "muted" }, `The worst is ${this.case_name}.`));
+    this.cases_place.hidden = false;
+    this.case_table = mountCases(this.cases_place, this.cases, this.case_name, (name) => {
+      select.value = name;
+      this.choose_case(name);
+    });
     this.convergence?.destroy();
     this.convergence = null;
   }
 
   choose_case(name) {
     this.case_name = name;
+    this.case_table?.mark(name);
     this.convergence?.destroy();
     this.convergence = null;
     this.finish();
@@ -196,7 +222,8 @@ class JobView {
       open.disabled = true;
       try {
         const { mountBody } = await import("./body.js");
-        const body = await mountBody(place, this.api, this.id, { cases: this.cases.map((one) => one.name), case: this.case_name });
+        const body = await mountBody(place, this.api, this.id, { cases: this.cases.map((one) => one.name), case: this.case_name,
+          units: this.summary().problem.units });
         this.parts.push(() => body.destroy());
       } catch (error) {
         open.disabled = false;
@@ -248,6 +275,7 @@ class JobView {
   destroy() {
     this.ends.abort();
     this.convergence?.destroy();
+    this.case_table?.destroy();
     this.parts.forEach((end) => end());
   }
 }

@@ -2,7 +2,7 @@
 // GET /v1/events or, where the service has no such stream, by asking again.
 
 import { pause } from "./dom.js";
-import { has_ended, result_words } from "./words.js";
+import { error_of, has_ended, result_words, state_words, title_of } from "./words.js";
 
 const FIRST = 100, PAGE = 500, POLL_MS = 2000;
 
@@ -10,8 +10,8 @@ const FIRST = 100, PAGE = 500, POLL_MS = 2000;
 function slim(job) {
   const summary = job.summary || {};
   return {
-    id: job.id, status: job.status, progress: job.progress, created: job.created, tags: job.tags, ended: has_ended(job),
-    result: result_words(job), total: summary.timings_s?.total ?? null, outcome: summary.outcome || null,
+    id: job.id, name: job.name || "", title: title_of(job), status: job.status, progress: job.progress, created: job.created, tags: job.tags,
+    ended: has_ended(job), state: state_words(job.status, summary.outcome), result: result_words(job), error: error_of(job.summary), total: summary.timings_s?.total ?? null, outcome: summary.outcome || null,
     d: summary.problem?.d ?? null, m: summary.problem?.m ?? null, kind: summary.problem?.kind ?? null,
   };
 }
@@ -82,6 +82,11 @@ export class JobsSource {
     if (this.next === null || this.loading) return this.loading;
     this.loading = this.settled(() => this.load()).finally(() => (this.loading = null));
     return this.loading;
+  }
+
+  /** Loads so many jobs, or all there are: to search and to sort them. */
+  async all(most) {
+    while (this.next && this.rows.length < most && !this.ends.signal.aborted) await this.more();
   }
 
   /** Loads pages by f; a page may be older than a change that came while it was on its way: that is then made again. */

@@ -5,7 +5,7 @@ import { h } from "./dom.js";
 
 const KEY = "shortcuts";
 const LIST = [
-  ["l", "all jobs"], ["n", "new job"], ["c", "compare accuracies"], ["/", "to the filter of the list"],
+  ["l", "all jobs"], ["n", "new job"], ["c", "compare accuracies"], ["/", "to the search of the list"],
   ["j, k", "next and previous job of the list; Enter opens it"], ["t", "light, dark, as the system"], ["?", "this list"],
 ];
 
@@ -41,7 +41,7 @@ function writing(target) {
 }
 
 function to_filter() {
-  const filter = document.getElementById("filter-tag");
+  const filter = document.getElementById("search");
   filter?.focus();
   return Boolean(filter);
 }

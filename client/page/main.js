@@ -16,6 +16,7 @@ const VIEWS = [
   { pattern: /^$/, home: "", title: "Jobs", load: async () => show_list },
   { pattern: /^new(?:\/(\w+))?$/, home: "new", title: "New job", load: async () => (await import("./editor.js")).show_editor },
   { pattern: /^compare(?:\/([\w.-]+))?$/, home: "compare", title: "Compare accuracies", load: async () => (await import("./compare.js")).show_compare },
+  { pattern: /^side\/([0-9a-f]{32}(?:\.[0-9a-f]{32}){0,5})$/, home: "", title: "Jobs side by side", load: async () => (await import("./side.js")).show_side },
   { pattern: /^jobs\/([0-9a-f]{32})$/, home: "", title: "Job", load: async () => (await import("./job.js")).show_job },
 ];
 

@@ -22,8 +22,8 @@ export async function mountPressure(element, api, jobId, options = {}) {
 }
 
 class PressureView {
-  constructor(element, surface, { on_node = () => {} }) {
-    Object.assign(this, { element, surface, on_node, what: surface.rows.pressure ? "pressure" : "reaction", along: "arc" });
+  constructor(element, surface, { on_node = () => {}, units = null }) {
+    Object.assign(this, { element, surface, on_node, units, what: surface.rows.pressure ? "pressure" : "reaction", along: "arc" });
     if (surface.rows.count === 0) return void show(element);
     this.order = this.sort_rows();
     this.place = h("div", { class: "pressure-place" });
@@ -85,7 +85,7 @@ class PressureView {
       return { name: many ? `${contacts[contact].on}, piece ${rows.part[list[0]] + 1}` : contacts[contact].on, colour: 1 + (i % 6), points, dots: list.length <= 120, size: 2.5 };
     });
     const name = WHAT.find((one) => one.id === this.what).name, x = { arc: "length along the sides", 0: "x", 1: "y" }[this.along];
-    this.chart.update({ x: { label: x }, y: { label: name, from_zero: true }, series, label: this.describe(name) });
+    this.chart.update({ x: { label: x + (this.units ? `, ${this.units.length}` : "") }, y: { label: name + (this.units ? `, ${this.units[{ pressure: "stress", gap: "length", reaction: "force" }[this.what]]}` : ""), from_zero: true }, series, label: this.describe(name) });
   }
 
   describe(name) {

@@ -3,6 +3,7 @@
 import { h } from "./dom.js";
 import { draft } from "./examples.js";
 import { count, counted, number, number_towards, percent_up, seconds } from "./format.js";
+import { unit_of } from "./units.js";
 import { certificate_words, kinematics_words, method_words, outcome_words, problem_words, trend_words, whole_words } from "./words.js";
 
 function vector(values) {
@@ -12,25 +13,26 @@ function vector(values) {
 /** [name, value] pairs that are known. */
 function facts_of(summary) {
   const { contact, energy, certificate, stress } = summary;
-  const at = contact?.max_pressure_at?.x;
+  const at = contact?.max_pressure_at?.x, unit = (of) => unit_of(summary, of);
+  const trend = (one, of) => (one && `${trend_words(one)}${Number.isFinite(one.high) && unit(of) ? ` (in${unit(of)})` : ""}`);
   return [
     ["Problem", problem_words(summary)],
     ["Method", method_words(summary)],
     ["Asked for", summary.requested_error === 0 ? "rounding level" : `≤ ${percent_up(summary.requested_error)}`],
     ["Residual, relative", certificate ? number(certificate.relative_residual.total) : null],
     ["In contact", contact ? `${count(contact.active)} of ${counted(contact.candidates, "candidate")}` : null],
-    ["Contact force", contact ? vector(contact.force) || number(contact.reaction_sum, 6) : null],
-    ["Largest pressure on this mesh", Number.isFinite(contact?.max_pressure) ? `${number(contact.max_pressure, 4)}${at ? ` at ${vector(at)}` : ""}` : null],
-    ["Contact area on this mesh", Number.isFinite(contact?.area) ? number(contact.area, 4) : null],
-    ["Largest pressure, estimated", trend_words(contact?.estimates?.max_pressure)],
-    ["Contact area, estimated", trend_words(contact?.estimates?.area)],
-    ["Largest von Mises stress on this mesh", stress ? `${number(stress.von_mises, 4)} at ${vector(stress.at.x)}` : null],
-    ["Largest von Mises stress, estimated", trend_words(stress?.estimates.von_mises)],
+    ["Contact force", contact ? `${vector(contact.force) || number(contact.reaction_sum, 6)}${unit("force")}` : null],
+    ["Largest pressure on this mesh", Number.isFinite(contact?.max_pressure) ? `${number(contact.max_pressure, 4)}${unit("stress")}${at ? ` at ${vector(at)}` : ""}` : null],
+    ["Contact area on this mesh", Number.isFinite(contact?.area) ? `${number(contact.area, 4)}${unit("area")}` : null],
+    ["Largest pressure, estimated", trend(contact?.estimates?.max_pressure, "stress")],
+    ["Contact area, estimated", trend(contact?.estimates?.area, "area")],
+    ["Largest von Mises stress on this mesh", stress ? `${number(stress.von_mises, 4)}${unit("stress")} at ${vector(stress.at.x)}` : null],
+    ["Largest von Mises stress, estimated", trend(stress?.estimates.von_mises, "stress")],
     ["Safety factor on this mesh", Number.isFinite(stress?.safety) ? `${number(stress.safety, 4)} at ${vector(stress.weakest_at.x)}` : null],
     ["Safety factor, estimated", trend_words(stress?.estimates.safety)],
-    ["Largest penetration", contact ? number(contact.max_penetration) : null],
-    ["Energy", energy ? `${number(energy.primal, 6)} (at least ${number_towards(energy.dual, 6, -1)})` : null],
-    ["Potential energy of the body", Number.isFinite(energy?.potential) ? number(energy.potential, 6) : null],
+    ["Largest penetration", contact ? `${number(contact.max_penetration)}${unit("length")}` : null],
+    ["Energy", energy ? `${number(energy.primal, 6)} (at least ${number_towards(energy.dual, 6, -1)})${unit("energy")}` : null],
+    ["Potential energy of the body", Number.isFinite(energy?.potential) ? `${number(energy.potential, 6)}${unit("energy")}` : null],
     ["Imbalance of all forces", summary.resultants ? number(summary.resultants.imbalance) : null],
     ["Expected", summary.cost?.predicted ? `${seconds(summary.cost.predicted.seconds)} after the assembly; it took ${seconds(summary.cost.actual?.seconds)}` : null],
   ].filter(([, value]) => value);
@@ -83,7 +85,8 @@ function contacts_of(summary) {
   const pressed = (summary.resultants?.contacts || []).filter((one) => Number.isFinite(one.mean_pressure));
   if ((summary.resultants?.contacts || []).length < 2 || !pressed.length) return null;
   return h("table", { class: "assertions", id: "contacts" }, h("caption", null, "Contacts on this mesh"),
-    h("thead", null, h("tr", null, ["On", "Force", "Mean pressure", "Largest", "Area", "Center of pressure"].map((name) => h("th", { scope: "col" }, name)))),
+    h("thead", null, h("tr", null, [["On"], ["Force", "force"], ["Mean pressure", "stress"], ["Largest", "stress"], ["Area", "area"], ["Center of pressure", "length"]].map(([name, of]) =>
+      h("th", { scope: "col" }, name, unit_of(summary, of) && `,${unit_of(summary, of)}`)))),
     h("tbody", null, pressed.map((one) => h("tr", null, h("td", null, one.on), h("td", null, vector(one.force)),
       ...[one.mean_pressure, one.max_pressure, one.area].map((value) => h("td", null, number(value, 4))), h("td", null, vector(one.center))))));
 }

@@ -1,11 +1,21 @@
 // words.js: what a job's status, outcome and certificate mean, in sentences.
 
-import { count, counted, number, number_towards, percent_up, seconds } from "./format.js";
+import { count, counted, number, number_towards, percent_up, seconds, short_id } from "./format.js";
 
 export const STATUSES = ["accepted", "running", "successful", "failed", "dismissed"];
 export const STATUS_WORDS = {
   accepted: "waiting", running: "running", successful: "successful", failed: "failed", dismissed: "dismissed",
 };
+
+/** What a job is, in a word or two: how good its answer is where it has one. */
+export function state_words(status, outcome) {
+  return (status === "successful" && outcome && (OUTCOMES[outcome]?.[1].toLowerCase() || outcome.replace(/_/g, " "))) || STATUS_WORDS[status];
+}
+
+/** What to call a job: its name, or else the end of its id. */
+export function title_of(job) {
+  return job.name || short_id(job.id);
+}
 
 export function has_ended(job) {
   return job.status !== "accepted" && job.status !== "running";
@@ -114,14 +124,24 @@ export function method_words(summary) {
     `${summary.restarts ? `, ${counted(summary.restarts, "restart")}` : ""}, ${seconds(t.total)}${cached}`;
 }
 
-/** The shortest that tells how good an ended job is, for a line of a list. */
+/** The whole error of an answer, or its bound where that is all of it; null: there is none. */
+export function error_of(summary) {
+  if (!summary || has_no_answer(summary) || bound_of(summary) === null) return null;
+  const total = has_mesh(summary) ? summary.error.total : null;
+  return Number.isFinite(total) ? total : bound_of(summary);
+}
+
+/** The same in words: "≈ 2.2 %" by estimate, "≤ 2.2 %" of a bound. */
+export function error_words(summary) {
+  const error = error_of(summary);
+  if (error === null) return has_no_answer(summary) ? "no answer" : "no bound";
+  const estimated = has_mesh(summary) && !is_bounded(summary) && Number.isFinite(summary.error.total);
+  return `${estimated ? "≈" : "≤"} ${percent_up(error)}`;
+}
+
+/** How good an ended job is, for a line of a list that says its outcome beside. */
 export function result_words(job) {
   if (job.status === "failed") return job.error?.title || "failed";
-  const summary = job.summary;
-  if (!summary) return "";
-  const bound = bound_of(summary);
-  if (has_no_answer(summary)) return OUTCOMES[summary.outcome][1].toLowerCase();
-  const total = has_mesh(summary) ? summary.error.total : null;
-  const error = bound === null ? "no bound" : Number.isFinite(total) ? `${is_bounded(summary) ? "≤" : "≈"} ${percent_up(total)}` : `≤ ${percent_up(bound)}`;
-  return summary.outcome === "converged" || summary.outcome === "verified" ? error : `${OUTCOMES[summary.outcome]?.[1].toLowerCase() || summary.outcome}, ${error}`;
+  if (!job.summary) return "";
+  return error_words(job.summary) + (job.summary.assertions_passed === false ? ", an assertion fails" : "");
 }

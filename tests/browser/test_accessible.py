@@ -45,9 +45,21 @@ def views(s, b):
     """Every view, with something in it: (name, once it stands there)."""
     job = s.solve({**SCENE, "tags": ["demo"]})
     failed = s.solve({"problem": {"kind": "matrices", "K": "%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 -1\n", "p": [1]}})
+    cases = s.solve({**SCENE, "name": "Two cases", "cases": [{"name": "one", "loads": SCENE["problem"]["loads"]}, {"name": "two", "loads": []}]})
     b.open(s)
     b.one(".sizer .row")
+    for box in b.all(".sizer .row .choice input"):
+        box.click()
     yield "list"
+    b.click(".sizer .row .menu-button")
+    yield "menu"
+    b.open(s, f"side/{job['id']}.{failed['id']}")
+    b.one("#side-requests")
+    yield "side by side"
+    b.open(s, f"jobs/{cases['id']}")
+    b.one("#cases-table")
+    b.click("#request summary")
+    yield "load cases"
     b.open(s, f"jobs/{job['id']}")
     b.wait("curves", "return document.querySelector('#convergence path.line') && document.querySelector('.downloads button')")
     b.click("#refine")

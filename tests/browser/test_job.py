@@ -73,6 +73,37 @@ def test_whole_error_is_drawn(s, b):
     check(b.run(f"return document.querySelector('{chart} path.line').getAttribute('d')") != unknowns, "the same curve over seconds")
 
 
+def test_cases_are_a_table_and_a_curve(s, b):
+    loads = {f"pull {t}": [{"on": "top", "traction": [0, -0.05]}, {"on": "right", "traction": [t, 0]}] for t in (0.2, 1.2, 0.5, 0.8)}
+    problem = {**SCENE["problem"], "units": {"length": "mm", "force": "N"}}
+    job = s.solve({**SCENE, "name": "Four pulls", "problem": problem, "cases": [{"name": name, "loads": one} for name, one in loads.items()]})
+    cases = {one["name"]: one["summary"] for one in s.get(f"/v1/jobs/{job['id']}/result?fields=summary").json["cases"]}
+    b.open(s, f"jobs/{job['id']}")
+    b.says("h1", "Four pulls")
+    b.one("#cases-table")
+    names = "return [...document.querySelectorAll('#cases-table tbody th')].map((one) => one.innerText)"
+    check(b.run(names) == list(cases), b.run(names))
+    check("MPa" in b.text("#cases-table thead") and "mm²" in b.text("#cases-table thead"), b.text("#cases-table thead"))
+    for wanted in (True, False):
+        b.click("#cases-table [data-by=active] button")
+        check(b.run(names) == sorted(cases, key=lambda name: cases[name]["contact"]["active"], reverse=wanted), wanted, b.run(names))
+    # The curve is over the number in the names, from left to right.
+    marks = "return [...document.querySelectorAll('#cases circle.series-1')].map((one) => [+one.getAttribute('cx'), +one.getAttribute('cy')])"
+    at = b.wait("a dot for each", marks)
+    pressed = [cases[name]["contact"]["max_pressure"] for name in sorted(cases, key=lambda name: float(name.split()[1]))]
+    check(len(at) == 4 and at == sorted(at), at)
+    check([low > high for (_, low), (_, high) in zip(at, at[1:])] == [a < c for a, c in zip(pressed, pressed[1:])], at, pressed)
+    b.run("[...document.querySelectorAll('#cases-table button.link')].find((one) => one.innerText === 'pull 0.2').click()")
+    b.wait("the case is chosen", "return document.querySelector('#case').value === 'pull 0.2' && document.querySelector('tr.here').innerText.includes('pull 0.2')")
+    b.says(".facts", f"{cases['pull 0.2']['contact']['active']} of 30")
+    b.click("#request summary")
+    b.says("#request", '"Four pulls"')
+    b.click("#stop")
+    b.click(".menu [data-label=Delete]")
+    b.click(".menu [data-label=Delete]")
+    b.says(".empty", "No jobs yet")
+
+
 def test_convergence_is_drawn(s, b):
     job = s.solve(SCENE)
     b.open(s, f"jobs/{job['id']}")

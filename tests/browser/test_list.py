@@ -3,7 +3,7 @@ import json
 import sqlite3
 
 import browser
-from browser import check, options
+from browser import Keys, check, options
 from service import ENDLESS, MATRICES, SCENE, expect
 
 MANY = 10000
@@ -33,7 +33,7 @@ def test_is_live(s, b):
     expect(s.request("DELETE", f"/v1/jobs/{job['id']}"), 200)
     s.wait_status(waiting["id"], "successful")
     b.wait("both ended", "return !document.querySelector('.chip.running, .chip.accepted')")
-    check("successful" in rows(b)[0] and "≤" in rows(b)[0], rows(b))
+    check("converged" in rows(b)[0] and "≤" in rows(b)[0], rows(b))
     expect(s.request("DELETE", f"/v1/jobs/{waiting['id']}"), 204)
     has_rows(b, 1)
 
@@ -43,16 +43,24 @@ def test_cancels_and_deletes(s, b):
     job = s.post(ENDLESS).json
     b.open(s)
     b.says(".sizer .row .status", "running")
-    b.click(".sizer .row .action button")
-    b.says(".sizer .row .action button", "Cancel?")
+    b.click(".sizer .row .menu-button")
+    b.click(".menu [data-label=Cancel]")
+    b.says(".menu", "Cancel it now")
     check(s.get(f"/v1/jobs/{job['id']}").json["status"] == "running", "one press was enough")
-    b.click(".sizer .row .action button")
+    b.click(".menu [data-label=Cancel]")
     s.wait_status(job["id"], "dismissed", "successful")
-    b.says(".sizer .row .action button", "Delete")
-    b.wait("a button to press", "return !document.querySelector('.sizer .row .action button').innerText.includes('?')")
-    b.click(".sizer .row .action button")
-    b.says(".sizer .row .action button", "Delete?")
-    b.click(".sizer .row .action button")
+    b.says(".sizer .row .status", "dismissed")
+    b.one(".sizer .row .menu-button").send_keys(Keys.ENTER)  # by the keyboard alone
+    b.one(".menu")
+    b.driver.switch_to.active_element.send_keys(Keys.ARROW_DOWN)
+    b.driver.switch_to.active_element.send_keys(Keys.ENTER)
+    b.says(".menu", "Delete for good")
+    b.driver.switch_to.active_element.send_keys(Keys.ESCAPE)
+    b.wait("it is closed", "return !document.querySelector('.menu') && document.activeElement.matches('.menu-button')")
+    check(s.get(f"/v1/jobs/{job['id']}").status == 200, "it was deleted all the same")
+    b.click(".sizer .row .menu-button")
+    b.click(".menu [data-label=Delete]")
+    b.click(".menu [data-label=Delete]")
     b.says(".empty", "No jobs yet")
     check(s.get(f"/v1/jobs/{job['id']}").status == 404, "it is still there")
 
@@ -78,6 +86,52 @@ def test_filters(s, b):
     has_rows(b, 1)  # as it was left
     b.write("#filter-tag", "nothing")
     b.says(".empty", "No job is like that")
+
+
+def titles(b):
+    return b.run("""return [...document.querySelectorAll('.sizer .row')].sort((a, b) => a.ariaRowIndex - b.ariaRowIndex)
+                      .map((row) => row.querySelector('.job').innerText)""")
+
+
+def test_searches_sorts_and_compares(s, b):
+    heavy = {**SCENE["problem"], "loads": [{"on": "right", "traction": [1, 0]}, {"on": "top", "traction": [0, -0.05]}]}
+    first = s.solve({**SCENE, "name": "Light beam", "problem": {**SCENE["problem"], "units": {"length": "mm", "force": "N"}}})
+    second = s.solve({**SCENE, "name": "Heavy beam", "problem": heavy, "tags": ["heavy"]})
+    s.solve({**SCENE, "solver": {"method": "uzawa", "max_iterations": 3}})
+    b.open(s)
+    check("iteration limit" in has_rows(b, 3)[0], rows(b))
+    check(titles(b)[1:] == ["Heavy beam", "Light beam"], titles(b))
+    b.click("[data-by=title] button")
+    b.wait("sorted by name", "return document.querySelector('[data-by=title]').ariaSort === 'ascending'")
+    b.wait("the order", "return [...document.querySelectorAll('.sizer .row')].find((r) => r.ariaRowIndex === '3' || r.getAttribute('aria-rowindex') === '3')?.innerText.includes('eam')")
+    check(sorted(titles(b), key=str.lower) == titles(b), titles(b))
+    b.click("[data-by=error] button")
+    b.wait("the largest error first", """return [...document.querySelectorAll('.sizer .row')].sort((a, b) => a.getAttribute('aria-rowindex') - b.getAttribute('aria-rowindex'))[0]
+        .innerText.includes('iteration limit')""")
+    b.write("#search", "beam conv")
+    has_rows(b, 2)
+    b.says("#list-total", "2 jobs")
+    b.click(".sizer .row .choice input")
+    b.says(".chosen-bar", "1 job is chosen")
+    check(b.run("return document.querySelector('#compare-chosen').disabled"), "one job alone is compared with nothing")
+    b.run("[...document.querySelectorAll('.sizer .row .choice input')].find((box) => !box.checked).click()")
+    b.says(".chosen-bar", "2 jobs are chosen")
+    b.click("#compare-chosen")
+    b.one("#side-requests")
+    check({first["id"], second["id"]} == set(b.driver.current_url.split("/")[-1].split(".")), b.driver.current_url)
+    asked = b.text("#side-requests")
+    check("problem.loads" in asked and "problem.units.length" in asked and "problem.materials" not in asked, asked)
+    answers = b.text("#side-answers")
+    check("MPa" in answers and "%" in answers and "Light beam" in answers, answers)
+    b.wait("both curves", "return new Set([...document.querySelectorAll('path.line')].map((one) => one.dataset.series.split(':')[0])).size === 2")
+    b.open(s)
+    b.write("#search", "")
+    has_rows(b, 3)
+    for _ in range(3):
+        b.run("[...document.querySelectorAll('.sizer .row .choice input')].find((box) => !box.checked).click()")
+    for _ in range(2):
+        b.click("#delete-chosen")
+    b.says(".empty", "No jobs yet")
 
 
 @options(None)
