@@ -212,6 +212,9 @@ extern const char *const CODEC_HISTORY_NAMES[CODEC_HISTORY_COLUMNS];
 void codec_history_row(double out[CODEC_HISTORY_COLUMNS], const uz_history_row *row);
 char *codec_encode_history(const char *case_name, const double *rows, int64_t count, size_t *len); /* NULL: no case */
 char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len);
+/* Fields along a path: JSON, and the same as CSV with a row for each point. case_name NULL: the job has no cases. */
+char *codec_encode_path(const uz_path *path, const char *job_id, const char *case_name, size_t *len);
+char *codec_encode_path_csv(const uz_path *path, size_t *len);
 
 /* What accuracy took a run, and what its summary says of its errors; NaN: not known. */
 typedef struct {

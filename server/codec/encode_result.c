@@ -120,6 +120,25 @@ char *codec_encode_history(const char *case_name, const double *rows, int64_t co
     return text_finish(&t, len);
 }
 
+/* CSV has no null: what is not finite is written as inf, -inf or nan, which every reader of numbers understands. */
+static void put_cell(text *t, double x)
+{
+    char digits[UZ_DOUBLE_ROOM];
+    if (isfinite(x))
+        text_bytes(t, digits, uz_format_double(digits, x));
+    else
+        text_put(t, isnan(x) ? "nan" : x < 0 ? "-inf" : "inf");
+}
+
+/* From the first point of a path. */
+static double path_distance(const uz_path *path, int64_t i)
+{
+    double sum = 0;
+    for (int c = 0; c < path->dim; c++)
+        sum = hypot(sum, path->point[i * path->dim + c] - path->point[c]);
+    return sum;
+}
+
 char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len)
 {
     text t = {0};
@@ -131,16 +150,65 @@ char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len)
     for (int64_t i = 0; i < count && !t.failed; i++)
         for (int j = 0; j < CODEC_HISTORY_COLUMNS; j++) {
             text_put(&t, j ? "," : "");
-            /* CSV has no null: what is not finite is written as inf, -inf or nan, which every reader of numbers
-             * understands. */
-            double x = rows[i * CODEC_HISTORY_COLUMNS + j];
-            char digits[UZ_DOUBLE_ROOM];
-            if (isfinite(x))
-                text_bytes(&t, digits, uz_format_double(digits, x));
-            else
-                text_put(&t, isnan(x) ? "nan" : x < 0 ? "-inf" : "inf");
+            put_cell(&t, rows[i * CODEC_HISTORY_COLUMNS + j]);
             text_put(&t, j + 1 < CODEC_HISTORY_COLUMNS ? "" : "\n");
         }
+    return text_finish(&t, len);
+}
+
+/* ---- along a path */
+
+char *codec_encode_path(const uz_path *path, const char *job_id, const char *case_name, size_t *len)
+{
+    const char *const *component = uz_field_components(path->dim);
+    text t = {0};
+    text_open(&t, NULL, '{');
+    text_string(&t, "job", job_id);
+    if (case_name)
+        text_string(&t, "case", case_name);
+    text_open(&t, "components", '[');
+    for (int i = 0; i < path->components; i++)
+        text_string(&t, NULL, component[i]);
+    text_close(&t, ']');
+    text_open(&t, "distance", '[');
+    for (int64_t i = 0; i < path->count; i++)
+        text_number(&t, NULL, path_distance(path, i));
+    text_close(&t, ']');
+    put_vector(&t, "points", path->point, path->count * path->dim, path->dim);
+    put_vector(&t, "displacements", path->u, path->count * path->dim, path->dim);
+    put_vector(&t, "stress", path->stress, path->count * path->components, path->components);
+    put_vector(&t, "von_mises", path->von_mises, path->count, 0);
+    text_close(&t, '}');
+    return text_finish(&t, len);
+}
+
+char *codec_encode_path_csv(const uz_path *path, size_t *len)
+{
+    static const char *const AXES[] = {"x", "y", "z"};
+    const char *const *component = uz_field_components(path->dim);
+    text t = {0};
+    text_put(&t, "distance");
+    for (int c = 0; c < path->dim; c++)
+        text_format(&t, ",%s", AXES[c]);
+    for (int c = 0; c < path->dim; c++)
+        text_format(&t, ",u%s", AXES[c]);
+    for (int c = 0; c < path->components; c++)
+        text_format(&t, ",stress_%s", component[c]);
+    text_put(&t, ",von_mises\n");
+    for (int64_t i = 0; i < path->count && !t.failed; i++) {
+        put_cell(&t, path_distance(path, i));
+        const struct {
+            const double *values;
+            int count;
+        } PARTS[] = {
+            {path->point, path->dim}, {path->u, path->dim}, {path->stress, path->components}, {path->von_mises, 1}};
+        for (size_t k = 0; k < sizeof PARTS / sizeof PARTS[0]; k++)
+            for (int c = 0; c < PARTS[k].count; c++) {
+                text_put(&t, ",");
+                put_cell(&t, PARTS[k].values[i * PARTS[k].count + c]);
+            }
+        text_put(&t, "\n");
+    }
     return text_finish(&t, len);
 }
 

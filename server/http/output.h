@@ -11,6 +11,7 @@
 typedef struct {
     unsigned fields; /* uz_field bits: `fields`, or the row's own choice */
     uz_picture picture;
+    uz_path_line path;
 } output_options;
 
 /* What an output is written from. */

@@ -4,6 +4,8 @@
 #include "http/output.h"
 #include "http/results.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -77,6 +79,72 @@ static bool read_picture(output_options *out, const http_request *rq, problem_de
     return true;
 }
 
+static uz_status follow_path(uz_path *path, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    const uz_path_line *line = &of->options->path;
+    const bool flat = uz_scene_dim(of->scene) == 2;
+    *path = (uz_path){.point = NULL};
+    if (flat ? !isnan(line->from[2]) || !isnan(line->to[2]) : isnan(line->from[2]) || isnan(line->to[2])) {
+        snprintf(err->message, sizeof err->message, "from and to are points of %d numbers: the model is %s",
+                 flat ? 2 : 3, flat ? "one in the plane" : "solid");
+        return err->status = UZ_ERR_SCENE;
+    }
+    return uz_path_compute(path, of->scene, of->answer, line, hooks, err);
+}
+
+static uz_status write_path(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    uz_path path;
+    const uz_status status = follow_path(&path, of, hooks, err);
+    *file = status == UZ_OK ? codec_encode_path(&path, of->job_id, of->case_name, len) : NULL;
+    uz_path_clear(&path);
+    return status == UZ_OK && !*file ? UZ_ERR_MEMORY : status;
+}
+
+static uz_status write_path_csv(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    uz_path path;
+    const uz_status status = follow_path(&path, of, hooks, err);
+    *file = status == UZ_OK ? codec_encode_path_csv(&path, len) : NULL;
+    uz_path_clear(&path);
+    return status == UZ_OK && !*file ? UZ_ERR_MEMORY : status;
+}
+
+/* "0,20" or "0,20,5"; the third NaN where there is none. */
+static bool read_point(double out[3], const char *text)
+{
+    int n = 0;
+    out[2] = (double)NAN;
+    while (text && n < 3) {
+        const size_t used = uz_parse_double(&out[n], text, strlen(text));
+        if (used == 0 || !isfinite(out[n++]) || (text[used] != ',' && text[used] != '\0'))
+            return false;
+        if (text[used] == '\0')
+            return n >= 2;
+        text += used + 1;
+    }
+    return false;
+}
+
+/* Both ends of the line and how many points it has. */
+static bool read_path(output_options *out, const http_request *rq, problem_details *problem)
+{
+    static const char *const ENDS[] = {"from", "to"};
+    double *const to[] = {out->path.from, out->path.to};
+    bool apart = false;
+    for (int i = 0; i < 2; i++)
+        if (!read_point(to[i], target_value(&rq->target, ENDS[i])))
+            return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                                "%s is a point, two numbers or three with commas between: from=0,0&to=60,20", ENDS[i]);
+    for (int c = 0; c < 3; c++)
+        apart = apart || out->path.from[c] < out->path.to[c] || out->path.from[c] > out->path.to[c];
+    if (!apart)
+        return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                            "from and to are the same point: a path leads from one to another");
+    out->path.count = 101;
+    return request_integer(rq, "count", 2, 10000, &out->path.count, problem);
+}
+
 /* ---- the table */
 
 #define IN_VTU ((STORED | COMPUTED | (unsigned)UZ_FIELD_MATERIALS) & ~(unsigned)UZ_FIELD_STRESS_GAUSS)
@@ -88,6 +156,7 @@ static bool read_picture(output_options *out, const http_request *rq, problem_de
 static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
 static const char *const FILE_OF[] = {"fields", "case", NULL};
 static const char *const PICTURE[] = {"colour", "factor", "width", "case", NULL};
+static const char *const PATH[] = {"from", "to", "count", "case", NULL};
 static const char *const HISTORY[] = {"after", "case", NULL};
 static const char *const OF_CASE[] = {"case", NULL};
 static const char *const CURVES[] = {"case", "x", "with", "theme", "width", NULL};
@@ -106,6 +175,9 @@ const output OUTPUTS[] = {
      IN_SURFACE, NULL, false},
     {OUTPUT("deformed.svg", PICTURE, output_get), "image/svg+xml", OUTPUT_OF_ANSWER, write_picture, 0, 0, read_picture,
      false},
+    {OUTPUT("path", PATH, output_get), "application/json", OUTPUT_OF_ANSWER, write_path, 0, 0, read_path, true},
+    {OUTPUT("path.csv", PATH, output_get), "text/csv; charset=utf-8; header=present", OUTPUT_OF_ANSWER, write_path_csv,
+     0, 0, read_path, false},
     {OUTPUT("history", HISTORY, output_get), "application/json", OUTPUT_OF_HISTORY, write_history, 0, 0, NULL, true},
     {OUTPUT("history.csv", HISTORY, output_get), "text/csv; charset=utf-8; header=present", OUTPUT_OF_HISTORY,
      write_history_csv, 0, 0, NULL, false},

@@ -65,6 +65,26 @@ void uz_fields_clear(uz_fields *fields);
 uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                        const uz_hooks *hooks, uz_error *err);
 
+/* ------------------------------------------------------------------- paths */
+
+/* Equally spaced points of a line through the body before anything moved: count of them, at least 2, with both ends. */
+typedef struct {
+    double from[3], to[3];
+    int64_t count;
+} uz_path_line;
+/* What is there at each point; NaN outside of the body. Components of the stress as in uz_fields. */
+typedef struct {
+    int dim, components;
+    int64_t count;
+    double *point, *u; /* x dim */
+    double *stress;    /* x components: between nodes as the shape functions are */
+    double *von_mises; /* of that stress */
+} uz_path;
+/* Errors: those of uz_fields_compute. *out is empty then; the caller clears it otherwise. */
+uz_status uz_path_compute(uz_path *out, const uz_scene *scene, const uz_field_source *answer, const uz_path_line *line,
+                          const uz_hooks *hooks, uz_error *err);
+void uz_path_clear(uz_path *path);
+
 /* ---------------------------------------------------------------- pictures */
 
 /* How a deformed body is drawn. */

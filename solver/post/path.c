@@ -1,0 +1,223 @@
+/* path.c: displacement and stress along a line through a body.
+ *
+ * A point of the line is looked for in the elements whose boxes the line crosses there, by Newton's iteration on their
+ * shape functions; between nodes displacement and stress go as these do. The stress is that of the nodes (uz_fields),
+ * continuous from element to element, and von Mises' is that of the tensor there and not a mean of those of nodes. */
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hooks.h"
+#include "post/parts.h"
+#include "scene/scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* How far outside of an element, in its local coordinates, a point still counts as its own: rounding, and the sagitta
+ * between a body's true border and its mesh has no place here. */
+#define OUTSIDE 1e-8
+enum { MOST_STEPS = 30 };
+
+/* Is a local point in the element? The sides are plane in local coordinates, and the centre lies within all. */
+static bool is_within(const uz_element_type *type, const double point[3])
+{
+    for (int s = 0; s < type->sides; s++) {
+        const int *node = type->side[s].node;
+        const double *o = type->local[node[0]], *a = type->local[node[1]];
+        double n[3] = {0}, to_point = 0, to_centre = 0, size = 0;
+        if (type->dim == 2) {
+            n[0] = a[1] - o[1];
+            n[1] = o[0] - a[0];
+        } else {
+            const double *b = type->local[node[2]];
+            for (int c = 0; c < 3; c++)
+                n[c] = (a[(c + 1) % 3] - o[(c + 1) % 3]) * (b[(c + 2) % 3] - o[(c + 2) % 3]) -
+                       (a[(c + 2) % 3] - o[(c + 2) % 3]) * (b[(c + 1) % 3] - o[(c + 1) % 3]);
+        }
+        for (int c = 0; c < type->dim; c++) {
+            to_point += n[c] * (point[c] - o[c]);
+            to_centre += n[c] * (type->centre[c] - o[c]);
+            size = hypot(size, n[c]);
+        }
+        if ((to_centre > 0 ? to_point : -to_point) < -OUTSIDE * size)
+            return false;
+    }
+    return true;
+}
+
+/* Solves J step = rest by Cramer's rule. False: the element has no size there. */
+static bool solve_small(double step[3], double J[3][3], const double rest[3], int dim)
+{
+    if (dim == 2) {
+        const double det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
+        step[0] = (rest[0] * J[1][1] - J[0][1] * rest[1]) / det;
+        step[1] = (J[0][0] * rest[1] - rest[0] * J[1][0]) / det;
+        return isfinite(step[0]) && isfinite(step[1]);
+    }
+    double cofactor[3][3], det = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            cofactor[i][j] = J[(i + 1) % 3][(j + 1) % 3] * J[(i + 2) % 3][(j + 2) % 3] -
+                             J[(i + 1) % 3][(j + 2) % 3] * J[(i + 2) % 3][(j + 1) % 3];
+    for (int j = 0; j < 3; j++)
+        det += J[0][j] * cofactor[0][j];
+    for (int j = 0; j < 3; j++) {
+        step[j] = 0;
+        for (int i = 0; i < 3; i++)
+            step[j] += cofactor[i][j] * rest[i] / det;
+    }
+    return isfinite(step[0]) && isfinite(step[1]) && isfinite(step[2]);
+}
+
+/* The shape functions of an element at a place x; xyz: of its nodes. False: it is not in there. */
+static bool find_within(double N[UZ_ELEMENT_NODES], const uz_element_type *type, const double *xyz, double extent,
+                        const double x[3])
+{
+    double slope[UZ_ELEMENT_NODES][3], point[3], step[3];
+    memcpy(point, type->centre, sizeof point);
+    for (int k = 0; k < MOST_STEPS; k++) {
+        double J[3][3] = {{0}}, rest[3], off = 0, moved = 0;
+        type->shape(type, N, slope, point);
+        for (int c = 0; c < type->dim; c++) {
+            rest[c] = x[c];
+            for (int a = 0; a < type->nodes; a++) {
+                rest[c] -= N[a] * xyz[a * type->dim + c];
+                for (int axis = 0; axis < type->dim; axis++)
+                    J[c][axis] += slope[a][axis] * xyz[a * type->dim + c];
+            }
+            off = fmax(off, fabs(rest[c]));
+        }
+        if (!solve_small(step, J, rest, type->dim))
+            return false;
+        for (int c = 0; c < type->dim; c++) {
+            point[c] += step[c];
+            moved = fmax(moved, fabs(step[c]));
+        }
+        if (moved > 1e3) /* far outside, where the map may fold */
+            return false;
+        if (moved < 1e-12 || off < 1e-15 * extent)
+            break;
+    }
+    if (!is_within(type, point))
+        return false;
+    type->shape(type, N, NULL, point);
+    return true;
+}
+
+/* What is known at a place in an element. */
+static void take_values(uz_path *out, int64_t sample, const double *N, const int64_t *node, int count, const double *u,
+                        const double *stress)
+{
+    double *to_u = out->u + sample * out->dim, *to_s = out->stress + sample * out->components;
+    memset(to_u, 0, (size_t)out->dim * sizeof *to_u);
+    memset(to_s, 0, (size_t)out->components * sizeof *to_s);
+    for (int a = 0; a < count; a++) {
+        for (int c = 0; c < out->dim; c++)
+            to_u[c] += N[a] * u[node[a] * out->dim + c];
+        for (int c = 0; c < out->components; c++)
+            to_s[c] += N[a] * stress[node[a] * out->components + c];
+    }
+    out->von_mises[sample] = uz_von_mises(to_s, out->components);
+}
+
+/* The samples that lie in the box of an element: first to before last. */
+static void samples_in_box(int64_t *first, int64_t *last, const uz_path *out, const double *xyz, int count)
+{
+    double from = 0, to = 1;
+    for (int c = 0; c < out->dim; c++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int a = 0; a < count; a++) {
+            low = fmin(low, xyz[a * out->dim + c]);
+            high = fmax(high, xyz[a * out->dim + c]);
+        }
+        /* Quadratic sides may bulge out of the box of their nodes, by an eighth of it at most where they are valid. */
+        const double room = 0.25 * (high - low), begin = out->point[c];
+        const double way = out->point[(out->count - 1) * out->dim + c] - begin;
+        const double a = (low - room - begin) / way, b = (high + room - begin) / way;
+        if (way > 0 || way < 0) {
+            from = fmax(from, fmin(a, b));
+            to = fmin(to, fmax(a, b));
+        } else if (begin < low - room || begin > high + room) {
+            to = -1;
+        }
+    }
+    *first = to < from ? 0 : (int64_t)ceil(from * (double)(out->count - 1) - 1e-6);
+    *last = to < from ? 0 : (int64_t)floor(to * (double)(out->count - 1) + 1e-6) + 1;
+    *first = *first < 0 ? 0 : *first;
+    *last = *last > out->count ? out->count : *last;
+}
+
+static uz_status fill(uz_path *out, const uz_field_body *body, const uz_field_source *answer, const uz_hooks *hooks,
+                      uz_error *err)
+{
+    const uz_body_model *model = body->model;
+    uz_fields fields;
+    uz_status status = uz_fields_of_body(&fields, body, answer, UZ_FIELD_STRESS, hooks, err);
+    for (int64_t e = 0; status == UZ_OK && e < model->mesh.n_elements; e++) {
+        double xyz[3 * UZ_ELEMENT_NODES], N[UZ_ELEMENT_NODES];
+        int64_t first, last;
+        int count;
+        const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
+        if (e % 4096 == 0 && uz_cancelled(hooks))
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the path was followed");
+        for (int k = 0; k < count * out->dim;
+             k++) /* of the mesh: uz_body_element moves equal boxes */
+            xyz[k] = model->mesh.xyz[node[k / out->dim] * out->dim + k % out->dim];
+        samples_in_box(&first, &last, out, xyz, count);
+        for (int64_t i = first; i < last; i++)
+            if (isnan(out->von_mises[i]) && find_within(N, uz_element_type_of((uz_element_kind)model->mesh.kind[e]),
+                                                        xyz, model->mesh.extent, out->point + i * out->dim))
+                take_values(out, i, N, node, count, answer->u, fields.stress);
+    }
+    uz_fields_clear(&fields);
+    return status;
+}
+
+uz_status uz_path_compute(uz_path *out, const uz_scene *scene, const uz_field_source *answer, const uz_path_line *line,
+                          const uz_hooks *hooks, uz_error *err)
+{
+    uz_body_model model;
+    uz_field_body body = {.scene = scene};
+    uz_error_reset(err);
+    *out = (uz_path){.dim = uz_scene_dim(scene), .count = line->count};
+    uz_status status = uz_body_model_build(&model, scene, UZ_BODY_OUTLINE, err);
+    if (status == UZ_OK)
+        status = uz_field_body_init(&body, scene, &model, err);
+    if (status == UZ_OK && (!answer->u || answer->n_u != model.mesh.n_nodes * out->dim))
+        status = uz_fail(err, UZ_ERR_SIZE, "u", "a path needs the displacements of all nodes");
+    out->components = body.components;
+    if (status == UZ_OK) {
+        out->point = uz_alloc(line->count * out->dim, sizeof *out->point);
+        out->u = uz_alloc(line->count * out->dim, sizeof *out->u);
+        out->stress = uz_alloc(line->count * out->components, sizeof *out->stress);
+        out->von_mises = uz_alloc(line->count, sizeof *out->von_mises);
+        if (!out->point || !out->u || !out->stress || !out->von_mises)
+            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a path of %lld points", (long long)line->count);
+    }
+    for (int64_t i = 0; status == UZ_OK && i < line->count; i++) {
+        const double t = (double)i / (double)(line->count - 1);
+        out->von_mises[i] = NAN;
+        for (int c = 0; c < out->dim; c++) {
+            out->point[i * out->dim + c] = (1 - t) * line->from[c] + t * line->to[c];
+            out->u[i * out->dim + c] = NAN;
+        }
+        for (int c = 0; c < out->components; c++)
+            out->stress[i * out->components + c] = NAN;
+    }
+    if (status == UZ_OK)
+        status = fill(out, &body, answer, hooks, err);
+    if (status != UZ_OK)
+        uz_path_clear(out);
+    uz_field_body_clear(&body);
+    uz_body_model_clear(&model);
+    return status;
+}
+
+void uz_path_clear(uz_path *path)
+{
+    free(path->point);
+    free(path->u);
+    free(path->stress);
+    free(path->von_mises);
+    *path = (uz_path){.point = NULL};
+}
