@@ -564,7 +564,7 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
         uz_quantity_found *q = &result->evaluation->quantities[i];
         if (!q->guaranteed && !*q->unproved)
             snprintf(q->unproved, sizeof q->unproved, "%s",
-                     out->proved ? "there was no time for it, or no memory"
+                     out->proved ? "it was stopped before it was proved, or had no memory"
                                  : "the whole error is not guaranteed (error.why)");
     }
     out->seconds = uz_seconds() - began;

@@ -591,17 +591,21 @@ static uz_status look_at_pair(proving *v, uz_quantity_found *out, double *half, 
     return status;
 }
 
-/* What the narrowest pair proves. */
+/* What the narrowest pair proves. It is not stopped, as that is one solve on a factor that is there, and all that was
+ * tried for the pair would be lost. */
 static uz_status weigh(proving *v, uz_quantity_found *out, uz_error *err)
 {
     const uz_guaranteed *g = v->g;
+    uz_guaranteed unstopped = *g;
     uz_bound_interval interval;
     double own = INFINITY;
     const uz_bound_pair pair = {&v->adjoint, v->best_w, v->best_stress, v->wanted, v->best_share};
+    unstopped.hooks = (uz_hooks){.ctx = NULL};
+    unstopped.stop = (uz_stop){NULL, INFINITY};
     uz_status status = uz_bound_weigh(&interval, &pair, &g->body, &g->problem->scene, g->dof, g->qp.K.cols,
                                       g->admissible ? g->admissible : v->result->u, g->stress, g->shown, err);
     if (status == UZ_OK)
-        status = uz_measure_residual(&own, g, interval.residual, err);
+        status = uz_measure_residual(&own, &unstopped, interval.residual, err);
     const double half = status == UZ_OK ? uz_bound_half(&interval, g->shown, g->rho, own) : (double)INFINITY;
     if (isfinite(half)) {
         out->value = interval.middle;
@@ -682,7 +686,11 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
         uz_attempts_add(&tried, share, apart, half);
         share = primal->m == 0 ? 0 : uz_attempts_next(&tried, share, v->ball);
     }
-    return status == UZ_OK && isfinite(v->best) ? weigh(v, out, err) : status;
+    if (isfinite(v->best) && (status == UZ_OK || status == UZ_ERR_CANCELLED)) {
+        const uz_status weighed = weigh(v, out, err);
+        status = status == UZ_OK ? weighed : status;
+    }
+    return status;
 }
 
 /* The strain energy is the potential energy, which two energies enclose, and the work f(u) of the loads. */
@@ -950,7 +958,9 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
                 prove_energy(out, &result->summary.guarantee);
             uz_functional_clear(&of);
         }
-        if (!out->guaranteed && (why || !*out->unproved))
+        if (!out->guaranteed && !why && uz_stop_is_due(&g->stop)) /* whatever half a solve has said */
+            say(out, "it was stopped before it was proved");
+        else if (!out->guaranteed && (why || !*out->unproved))
             say(out, why ? why : "its interval could not be made");
     }
     end_rows(&v.primal, g->cache);

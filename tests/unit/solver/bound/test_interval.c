@@ -95,6 +95,60 @@ TEST(intervals_of_all_grids_have_something_in_common)
     }
 }
 
+typedef struct {
+    int64_t asked, stop_at;
+} patience;
+
+static bool is_over(void *ctx)
+{
+    patience *p = ctx;
+    return p->asked++ >= p->stop_at;
+}
+
+/* A run that is stopped while shares are tried for a quantity keeps the narrowest interval so far. */
+TEST(what_a_stopped_search_found_stays)
+{
+    enum { STOPS = 30 };
+    uz_quantity quantities[QUANTITIES];
+    uz_scene scene = block("tri6", 6, ROUND);
+    const uz_problem problem = {
+        .kind = UZ_PROBLEM_SCENE, .scene = scene, .quantities = quantities, .n_quantities = 1};
+    uz_settings settings = uz_settings_default();
+    uz_error err = {0};
+    patience p = {.stop_at = INT64_MAX};
+    const uz_hooks hooks = {.ctx = &p, .cancelled = is_over};
+    uz_result *whole, *stopped;
+    int kept = 0, wider = 0, without = 0;
+    ask(quantities);
+    settings.guaranteed = true;
+    CHECK(uz_solve(&whole, &problem, &settings, NULL, &hooks, &err) == UZ_OK);
+    const uz_quantity_found *best = whole->evaluation->quantities;
+    CHECK_MSG(best->guaranteed, "%s", best->unproved);
+    const int64_t all = p.asked;
+    for (int k = 1; k <= STOPS; k++) {
+        p = (patience){.stop_at = all - k};
+        if (uz_solve(&stopped, &problem, &settings, NULL, &hooks, &err) != UZ_OK)
+            continue;
+        const uz_quantity_found *q = stopped->evaluation->quantities;
+        if (q->guaranteed) {
+            const double narrower = best->high - best->low, now = q->high - q->low;
+            CHECK_MSG(stopped->summary.guarantee.proved, "%s", stopped->summary.guarantee.why);
+            CHECK_MSG(q->low <= best->high && q->high >= best->low && now >= (1 - 1e-9) * narrower,
+                      "%g .. %g, %g .. %g", q->low, q->high, best->low, best->high);
+            CHECK_MSG(without == 0, "stopped later it was lost"); /* stops come earlier and earlier */
+            kept++;
+            wider += now > (1 + 1e-6) * narrower;
+        } else {
+            CHECK_STR(q->unproved, "it was stopped before it was proved");
+            without++;
+        }
+        uz_result_free(stopped);
+    }
+    CHECK_MSG(kept > 0 && wider > 0 && without > 0, "%d kept, %d of them wider, %d without one", kept, wider, without);
+    uz_result_free(whole);
+    uz_scene_clear(&scene);
+}
+
 /* What a mesh of a body is asked and answered with. */
 typedef struct {
     uz_scene scene;
