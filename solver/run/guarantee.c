@@ -19,6 +19,9 @@
  */
 #define FINE     1.05
 #define EXPECTED 1.2
+/* The square of a bound by the gap alone over the same, from which on much of it is where the stress presses and the
+ * answer does not touch. */
+#define FAR_OFF 1.05
 /* An obstacle that is off a line by less, of the largest displacement, is one. */
 #define SEEN 1e-2
 /* So often what holds a body that only obstacles hold is chosen anew; what its answer presses by beside a stress that
@@ -328,7 +331,9 @@ static uz_status prove_on(uz_guaranteed *closer, const uz_guaranteed *g, const u
     if (status == UZ_OK && !push)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for what presses on %lld nodes", (long long)n);
     if (status == UZ_OK) {
-        const uz_standing answer = {.u = mesh->u, .push = push, .open = push + 2 * n};
+        const uz_bound_check_result *c = &closer->checked;
+        const uz_standing answer = {
+            .u = mesh->u, .push = push, .open = push + 2 * n, .stands_off = 2 * c->gap > FAR_OFF * c->least};
         uz_bound_push(push, push + 2 * n, &closer->body, closer->checked.pressure, mesh->u);
         status = uz_lift_out(closer, &answer, err);
     }

@@ -37,6 +37,7 @@ typedef struct {
     const double *u;           /* n_nodes x 2 */
     const double *r, *gap;     /* by its rows; NULL: it has no rows there, but ... */
     const double *push, *open; /* n_nodes x 2, n_nodes: as uz_bound_push */
+    bool stands_off; /* ... so far from obstacles that press in the stress that less of it is looked for, too */
 } uz_standing;
 
 /* intervals.c: what takes an answer out of obstacles that it stands in between its nodes: g->lift, g->cheap. Nothing is

@@ -887,9 +887,10 @@ static uz_status lift_out(double **out, double *depth, uz_guaranteed *g, rows_pr
     int steps = 0;
     memset(depth, 0, (size_t)n * sizeof *depth);
     for (; steps < MOST_LIFTS && solved && status == UZ_OK &&
-           look_for_depth(depth, depth + n, depth + 2 * n, &g->body, answer->u, lift);
+           (look_for_depth(depth, depth + n, depth + 2 * n, &g->body, answer->u, lift) ||
+            (steps == 0 && cheaply && answer->stands_off));
          steps++) {
-        if (steps == 0 && cheaply && own->any) /* coefficients take it out, but for what is no polynomial */
+        if (steps == 0 && cheaply) /* rows take it out, but for what is between them */
             memset(depth, 0, (size_t)n * sizeof *depth);
         status = (cheaply ? lift_cheaply : lift_least)(lift, x, own, answer, depth, &solved, err);
     }
@@ -908,7 +909,8 @@ uz_status uz_lift_out(uz_guaranteed *g, const uz_standing *answer, uz_error *err
     rows_problem x = {.setup = NULL};
     uz_status status =
         depth ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to take %lld nodes out", (long long)n);
-    bool any = depth && look_for_depth(depth, depth + n, depth + 2 * n, &g->body, answer->u, depth + 4 * n);
+    bool any = depth && (answer->stands_off ||
+                         look_for_depth(depth, depth + n, depth + 2 * n, &g->body, answer->u, depth + 4 * n));
     const bool loose = g->body.n_loose > 0;
     if (any && loose) /* the least norm would be a motion's, which costs what presses */
         status = begin_held_rows(&own, &any, g, answer, err);

@@ -230,6 +230,24 @@ TEST(never_below_the_truth_where_round_obstacles_hold)
     CHECK_MSG(mean < 1.4, "%g", mean);
 }
 
+/* Linear elements touch a disc at one node, or two, where what presses in the stress is spread: their distance to the
+ * obstacle there is the work of a displacement that brings them closer, which costs less. */
+TEST(answers_that_stand_off_where_stress_presses_cost_little)
+{
+    static const double AS_IT_STANDS[4] = {0.6476, 0.5529, 2.2834e-4, 2.0057e-4};
+    for (int k = 0; k < 4; k++) {
+        uz_scene scene = bound_scene(k < 2 ? 3 : 16, BOUND_PERCHED, BOUND_ELEMENTS[k % 2], 4);
+        scene.box.grading[0] = 1;
+        scene.box.cells[0] = 4 * (int64_t)(scene.box.size[0] / scene.box.size[1] + 0.5);
+        scene.formulation = UZ_FORMULATION_STANDARD;
+        scene.kinematics = UZ_KINEMATICS_FIXED;
+        const uz_guarantee g = bound_of(&scene);
+        CHECK_MSG(g.proved && g.dual < g.primal, "%s: %g %g", g.why, g.dual, g.primal);
+        CHECK_MSG(g.bound < 0.9 * AS_IT_STANDS[k], "%d: %g", k, g.bound);
+        uz_scene_clear(&scene);
+    }
+}
+
 /* Polylines and tables, flat and not, with teeth and without. */
 TEST(never_below_the_truth_before_lines)
 {
