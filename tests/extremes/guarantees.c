@@ -1,6 +1,13 @@
 /* guarantees.c: guaranteed bounds on the whole error of generated bodies, on meshes of every plane element, against
  * each other and a finer one: a row for each body. `ratio` is the least of its bounds over the error by energies; where
- * answers enter the obstacle, with the finer answer's own bound added, over the difference to that. */
+ * answers enter the obstacle, with the finer answer's own bound added, over the difference to that.
+ *
+ * Medians are over two numbers that the error is between: what the finest mesh tells of it, and the same with all that
+ * this mesh may be off by itself. Where stress is singular the first one is too small by far: with an order of a half a
+ * mesh that is finer by two has seven tenths of the error. A bound may be below the difference to a finer answer and
+ * right all the same, where that errs to the other side: before a disc by standing off where a coarse one stands in
+ * (round 31: 0.97 of the difference with 16 cells, 1.07 with 32). What may not be below 1 has its bound added.
+ */
 #include "extremes.h"
 
 #include "bound_shapes.h"
@@ -17,7 +24,7 @@ static int by_size(const void *a, const void *b)
 static void run_kind(suite *all, int kind, const char *what)
 {
     static const char *const KINDS[] = {"linear", "quadratic"};
-    static double effect[2][8 * BODIES];
+    static double effect[2][8 * BODIES], less[2][8 * BODIES];
     int count[2] = {0}, unproved = 0;
     /* quadratic sides rise between nodes, too */
     const bool differences = kind > BOUND_STRAIGHT && kind != BOUND_SPRINGS;
@@ -30,6 +37,7 @@ static void run_kind(suite *all, int kind, const char *what)
         char name[64];
         for (int k = 0; k < 2; k++)
             for (int i = 0; i < x.count[k]; i++) {
+                less[k][count[k]] = x.less[k][i];
                 effect[k][count[k]++] = x.effect[k][i];
                 j.ratio = isnan(j.ratio) ? x.effect[k][i] : fmin(j.ratio, x.effect[k][i]);
             }
@@ -47,10 +55,11 @@ static void run_kind(suite *all, int kind, const char *what)
     }
     for (int k = 0; k < 2 && count[k] > 0; k++) {
         qsort(effect[k], (size_t)count[k], sizeof effect[k][0], by_size);
-        printf("guaranteed, %s: %d bounds of %s elements over the error: least %.4f, median %.3f, 19 of 20 below %.3f, "
-               "most %.3f\n",
-               what, count[k], KINDS[k], effect[k][0], effect[k][count[k] / 2], effect[k][count[k] * 19 / 20],
-               effect[k][count[k] - 1]);
+        qsort(less[k], (size_t)count[k], sizeof less[k][0], by_size);
+        printf("guaranteed, %s: %d bounds of %s elements over the error by the finest mesh: least %.4f, median %.3f "
+               "(with what that may be off by %.3f), 19 of 20 below %.3f (%.3f), most %.3f\n",
+               what, count[k], KINDS[k], effect[k][0], effect[k][count[k] / 2], less[k][count[k] / 2],
+               effect[k][count[k] * 19 / 20], less[k][count[k] * 19 / 20], effect[k][count[k] - 1]);
     }
     printf("guaranteed, %s: %d answers without a proof\n", what, unproved);
 }

@@ -29,8 +29,10 @@ typedef struct {
     double size;            /* of an energy */
     int count[2];           /* of linear and of quadratic elements: bounds */
     double least;           /* what may not be below 1, of sweep_differences */
-    /* and what they are of the error by energies, sqrt(2 (J(u_h) - J)), of the answer or what is out of obstacles */
-    double effect[2][8];
+    /* and what they are of the error by energies, sqrt(2 (J(u_h) - J)), of the answer or what is out of obstacles: at
+     * most, were the lowest energy found the body's, and at least, were the highest bound below it; of differences,
+     * were the finer answer exact, and were its bound its error, as errors of nested answers are about orthogonal */
+    double effect[2][8], less[2][8];
     char why[160]; /* where one was not proved */
 } bound_sweep;
 
@@ -321,9 +323,11 @@ static inline bound_sweep sweep_meshes(bound_maker make, uint64_t seed, int kind
         uz_scene_clear(&scene);
     }
     for (int i = 0; i < n; i++) {
-        const double error = sqrt(2 * fmax(0, primal[i] - x.lowest));
-        if (primal[i] - x.lowest > 1e-9 * x.size)
-            x.effect[linear[i]][x.count[linear[i]]++] = bound[i] / error;
+        const double error = sqrt(2 * fmax(0, primal[i] - x.lowest)), more = sqrt(2 * fmax(0, primal[i] - x.highest));
+        if (primal[i] - x.lowest <= 1e-9 * x.size)
+            continue;
+        x.less[linear[i]][x.count[linear[i]]] = bound[i] / more;
+        x.effect[linear[i]][x.count[linear[i]]++] = bound[i] / error;
     }
     return x;
 }
@@ -423,6 +427,7 @@ static inline bound_sweep sweep_differences(uint64_t seed, bound_kind kind, int6
                 if (uz_strain_energy(&energy, &fine, apart, true, &err) == UZ_OK) {
                     const double difference = sqrt(2 * energy), off = reference->summary.guarantee.bound;
                     if (difference > 1e-6 * reference->summary.certificate.energy_norm) {
+                        x.less[quadratic][x.count[quadratic]] = g.bound / hypot(difference, off);
                         x.effect[quadratic][x.count[quadratic]++] = g.bound / difference;
                         x.least = fmin(x.least, (g.bound + off) / difference);
                     }
