@@ -160,8 +160,7 @@ static uz_status fill(uz_path *out, const uz_field_body *body, const uz_field_so
         const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
         if (e % 4096 == 0 && uz_cancelled(hooks))
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the path was followed");
-        for (int k = 0; k < count * out->dim;
-             k++) /* of the mesh: uz_body_element moves equal boxes */
+        for (int k = 0; k < count * out->dim; k++) /* of the mesh: uz_body_element moves equal boxes */
             xyz[k] = model->mesh.xyz[node[k / out->dim] * out->dim + k % out->dim];
         samples_in_box(&first, &last, out, xyz, count);
         for (int64_t i = first; i < last; i++)

@@ -68,7 +68,8 @@ PHRASES = {
     "With a p of 0.4 to 4": constant(0.4, r"LEAST_ORDER ([\d.]+)"), "1.25 times the way": constant(1.25, r"#define SAFE +([\d.]+)"),
     "Aplikace matematiky 27, 1982": None, "J. Computational Physics 262, 2014": None,
     # addresses, versions, requests of examples
-    "Gmsh file (2.2 or 4.1)": None, "file of version 2.2 or 4.1,": None, "waiting up to 30 s for its end": None, "Apache License 2.0": None,
+    "Gmsh file (2.2, 4.0 or 4.1)": None, "file of version 2.2, 4.0 or 4.1,": None, "| Gmsh `.msh` 2.2, 4.0, 4.1, ASCII": None,
+    "partitions (of 4.0: refused)": None, "Corners closer than 1e-6 of the size": constant(1e-6, r"#define SAME_CORNER ([\d.e-]+)"), "- 100,000 triangles are found by a tree": None, "waiting up to 30 s for its end": None, "Apache License 2.0": None,
     "GPL-3.0-or-later": None, "GPL-2.0-or-later": None, "## 0.1": None, "(RFC 9457)": None, "published on 127.0.0.1.": None,
     "aluminium shaft 0.05 mm too thick": None, "a traction of 0.05 on a side of 60": None,
     # published: units, materials, the paper and its example
@@ -142,12 +143,12 @@ PHRASES = {
     "bytes (256 KiB) into an object store": lambda program: program.limits is None or program.limits["object_least"]["value"] == 256 << 10,
     "on the ports 8081 to 8083": None,
     # an estimate, of counts that were taken once
-    "### On paper: 10,000 cores, 1,000,000,000 unknowns, 1,000,000 jobs a day": None, "9 kB of log and 8 kB of the database": None,
-    "69 kB of log and 67 kB of the database": None, "1 to 2 ms of PostgreSQL's processor": None,
+    "### On paper: 10,000 cores, 1,000,000,000 unknowns, 1,000,000 jobs a day": None, "a small job takes 9 commits, 7 new rows, 9 kB of log and 5 kB of the database": None,
+    "pieces of 2 kB of what is large, 26 kB of log and 23 kB of the database": None, "1 to 2 ms of PostgreSQL's processor": None,
     "One body of 1,000,000,000 unknowns**: refused, a scene may have 20 million": constant(20e6, r"UZ_SCENE_MAX_DOFS (\d+)"),
     "displacements alone are 8 GB, 1,908 objects": constant(4, r"#define OBJECT_MOST +\((\d+) << 20\)"),
     "1,000,000 results of the 600 x 200 body": None, "10,000 cores are 313 daemons of 32 workers and 2,817 connections": None,
-    "make 940 commits a second": None, "**1,000,000 jobs a day** are 12 a second, 2 % of a processor of PostgreSQL and 9 to 70 GB of log": None,
+    "make 940 commits a second": None, "**1,000,000 jobs a day** are 12 a second, 2 % of a processor of PostgreSQL and 9 to 26 GB of log": None,
     # limits
     "A request body may have 64 MiB": limit("max_body", 64 << 20), "an upload 1 GiB": limit("max_upload", 1 << 30),
     "three quarters of `--max-connections` (1,024)": limit("max_connections", 1024),

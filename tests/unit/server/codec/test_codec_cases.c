@@ -304,7 +304,8 @@ TEST(summaries_of_cases)
 {
     uz_summary summary = {.outcome = UZ_ITERATION_LIMIT};
     codec_cases counts = {.count = 3, .outcomes = {[UZ_CONVERGED] = 2, [UZ_ITERATION_LIMIT] = 1}, .worst = "b"};
-    char *written = codec_encode_summary(&summary, UZ_PROBLEM_SCENE, &(codec_run){"warm", &counts});
+    char *written =
+        codec_encode_summary(&summary, UZ_PROBLEM_SCENE, &(codec_run){.started_from = "warm", .cases = &counts});
     CHECK(written && strstr(written, "\"started_from\":\"warm\",\"cases\":{\"count\":3,\"worst\":\"b\",\"converged\":2,"
                                      "\"iteration_limit\":1}"));
     free(written);
