@@ -13,10 +13,10 @@ CURVES = """return [...document.querySelectorAll('#convergence path.line')].map(
 
 
 def file_saved(b, name, seconds=20):
-    """The bytes of a file that the page saved."""
+    """The bytes of a file that the page saved; a browser first puts an empty one in its place."""
     path = pathlib.Path(b.downloads, name)
     end = time.monotonic() + seconds
-    while not path.exists():
+    while not path.exists() or not path.stat().st_size:
         check(time.monotonic() < end, name, "is not among", list(pathlib.Path(b.downloads).iterdir()))
         time.sleep(0.05)
     return path.read_bytes()

@@ -107,7 +107,7 @@ def test_keys(s, b):
         b.all("body")[0].send_keys(key)
         b.says("h1", title)
     b.all("body")[0].send_keys("/")
-    b.wait("focus on the filter", "return document.activeElement.id === 'filter-tag'")
+    b.wait("focus on the search", "return document.activeElement.id === 'search'")
     keys.active_element.send_keys("n")
     check(b.text("h1") == "Jobs" and b.run("return document.activeElement.value") == "n", "a letter of a word was taken for a key")
     b.click("#keys")
