@@ -56,17 +56,36 @@ client_exit client_put_file(client_session *s, json_t *to, const char *key, cons
     return code;
 }
 
-/* The key of a mesh, by the name of its file; a Gmsh file may have any. */
+static bool ends_in(const char *path, const char *ending)
+{
+    const size_t all = strlen(path), length = strlen(ending), end = client_is_packed(path) ? all - 3 : all;
+    return end > length && strncasecmp(path + end - length, ending, length) == 0;
+}
+
+/* The key of a mesh, by the name of its file; with another name by how it begins. What can't be told is sent as Gmsh's,
+ * and the service says what is wrong with it. */
 static const char *mesh_format(const char *path)
 {
-    return client_is_deck(path) ? "abaqus" : "gmsh";
+    static const struct {
+        const char *ending, *key;
+    } NAMES[] = {{".msh", "gmsh"},    {".inp", "abaqus"},  {".bdf", "nastran"},
+                 {".nas", "nastran"}, {".dat", "nastran"}, {".fem", "nastran"}};
+    char begin[4096];
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
+        if (ends_in(path, NAMES[i].ending))
+            return NAMES[i].key;
+    FILE *file = fopen(path, "rb");
+    const size_t length = file ? fread(begin, 1, sizeof begin - 1, file) : 0;
+    if (file)
+        fclose(file);
+    begin[length] = '\0';
+    return begin[0] == '*' ? "abaqus" : strcasestr(begin, "BEGIN BULK") || strstr(begin, "\nGRID") ? "nastran" : "gmsh";
 }
 
 /* The key of a surface, by the name of its file. */
 static const char *surface_format(const char *path)
 {
-    const size_t length = strlen(path), end = client_is_packed(path) ? length - 3 : length;
-    return end > 4 && strncasecmp(path + end - 4, ".obj", 4) == 0 ? "obj" : "stl";
+    return ends_in(path, ".obj") ? "obj" : "stl";
 }
 
 /* The file for all obstacles that are surfaces without one. */

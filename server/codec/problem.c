@@ -26,6 +26,8 @@ static const struct {
     {"gmsh_unsupported", "A kind of Gmsh file or element that is not read here"},
     {"abaqus_syntax", "An input file of Abaqus or CalculiX is malformed"},
     {"abaqus_unsupported", "Something in an input file of Abaqus or CalculiX that is not read here"},
+    {"nastran_syntax", "A NASTRAN file is malformed"},
+    {"nastran_unsupported", "Something in a NASTRAN file that is not read here"},
     {"stl_syntax", "An STL file is malformed"},
     {"stl_unsupported", "A kind of STL file that is not read here"},
     {"obj_syntax", "An OBJ file is malformed"},

@@ -7,6 +7,7 @@
 static const uz_mesh_reader READERS[] = {
     {"gmsh", uz_gmsh_recognises, uz_gmsh_read},
     {"abaqus", uz_abaqus_recognises, uz_abaqus_read},
+    {"nastran", uz_nastran_recognises, uz_nastran_read},
 };
 
 uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,

@@ -151,6 +151,33 @@ def test_mesh_of_an_input_file(server):
     check(reply.status == 422 and reply.json["code"] == "abaqus_syntax" and reply.json["line"] == 20, reply)
 
 
+def test_meshes_of_other_programs(server):
+    """Hexahedra that meshio has written, known by the name of the file and by what is in it."""
+    path, body = os.path.join(server.folder, "part.txt"), scene()
+    problem = body["problem"]
+    del problem["mesh"], problem["thickness"]
+    problem.update(model="solid", contacts=[])
+
+    def same(sent, names, stdin):
+        told = job(server.url, "-", "--mesh", sent, stdin=json.dumps(stdin))["summary"]
+        # a bar of two cubes, pulled by 0.5 / (1 * 1) at its upper face
+        check(told["outcome"] == "converged" and told["problem"]["d"] == 3 * (32 - 8), sent, names, told)
+        return told["energy"]["primal"]
+
+    for ending, left, top in ((".bdf", "property_3", "property_4"),):
+        problem["supports"] = [{"on": left, "ux": 0, "uy": 0, "uz": 0}]
+        problem["loads"] = [{"on": top, "pressure": 0.5}]
+        file = f"tests/data/meshes/meshio_hex20{ending}"
+        with open(file, "rb") as given, open(path, "wb") as other:
+            other.write(given.read())
+        energies = [same(sent, left, body) for sent in (file, path)]
+        check(energies[0] == energies[1], energies)
+    problem["mesh"] = {"nastran": "GRID,1,5,0.,0.\n"}
+    reply = server.post(body, query="?validate=true")
+    check(reply.status == 422 and reply.json["code"] == "nastran_unsupported" and reply.json["line"] == 1, reply)
+    check(reply.json["pointer"] == "/problem/mesh/nastran", reply)
+
+
 def test_a_whole_deck(server):
     """Two squares on each other, pressed: the pressure goes through the contact as it is."""
     path, out = os.path.join(server.folder, "squares.inp"), os.path.join(server.folder, "squares.json")

@@ -1,5 +1,5 @@
-"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/*, OUT/gmsh/*, OUT/abaqus/* and OUT/surface/*, one seed a file, and
-OUT/json.dict and the same of the others.
+"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/*, OUT/gmsh/*, OUT/abaqus/*, OUT/nastran/* and
+OUT/surface/*, one seed a file, and OUT/json.dict and the same of the others.
 
 Seeds come from tests/data, and from the shared cases where they are there; the words of the JSON dictionary are the
 member names and values that the schemas know.
@@ -23,6 +23,8 @@ GMSH_WORDS = ["$MeshFormat", "$EndMeshFormat", "2.2 0 8", "4.1 0 8", "2.2 1 8", 
 ABAQUS_WORDS = ["*NODE", "*ELEMENT", "*NSET", "*ELSET", "*SURFACE", "*PART", "*INSTANCE", ", TYPE=", ", NSET=", ", ELSET=", ", NAME=", ", GENERATE",
                 ", ELSET=E", "CPS3", "CPE8R", "CAX4", "C3D4", "C3D20R", "C3D15", "S4", "T3D2", "S1", "S6", "\n", "\r\n", "**", "1e308", "1D3",
                 "9223372036854775807", '"a b"']
+NASTRAN_WORDS = ["GRID", "GRID*", "CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTETRA", "CPENTA", "CHEXA", "CBAR", "PLOTEL", "SET3", "ELEM", "PROP",
+                 "THRU", "BEGIN BULK", "ENDDATA", "+", "*", ",", "\n", "\t", "$", "1.5-3", "1D3", "999999999999999999"]
 SURFACE_WORDS = ["solid", "facet normal", "outer loop", "vertex", "endloop", "endfacet", "endsolid", "v ", "f ", "vn ", "1/1/1", "-1", "\n", "1e308"]
 JSON_WORDS = ["null", "true", "false", "1e400", "-0.0", "1e-320", "9223372036854775808", "[[", "]]", "{}", "\\u0000", "\\ud800"]
 
@@ -62,6 +64,19 @@ def abaqus_seeds():
     sets = "*NSET, NSET=A, GENERATE\n1,4,2\n*NSET, NSET=B\nA, 2\n*ELSET, ELSET=A\nE\n*SURFACE, NAME=S\nE, S1\n*SURFACE, NAME=T, TYPE=NODE\nB\n"
     for kind, of in (("CPS3", "1,2,4"), ("CPE4R", "1,2,3,4"), ("C3D4", "1,2,4,5"), ("C3D8", "1,2,3,4,5,6,7,8"), ("C3D6", "1,2,4,5,6,8")):
         yield f"** made\n{nodes}*ELEMENT, TYPE={kind}, ELSET=E\n10,{of}\n*ELEMENT, TYPE=T3D2, ELSET=L\n11,1,2\n{sets}*STEP\n*STATIC\n".encode()
+
+
+def nastran_seeds():
+    """Small files of some elements in each form of fields with all that is read of a file."""
+    points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    forms = ("".join("GRID,{},,{}.,{}.,{}.\n".format(i + 1, *p) for i, p in enumerate(points)),
+             "".join("GRID    {:<8}        {:<8.1f}{:<8.1f}{:<8.1f}\n".format(i + 1, *p) for i, p in enumerate(points)),
+             "".join("GRID*   {:<16}                {:<16.1f}{:<16.1f}*\n*       {:<16.1f}\n".format(i + 1, *p) for i, p in enumerate(points)))
+    rest = "PLOTEL,11,1,2\nSET3,1,GRID,1,THRU,4\nSET3,2,ELEM,10,11\nSET3,3,PROP,7\nENDDATA\n"
+    for kind, of in (("CTRIA3", "1,2,4"), ("CQUAD4", "1,2,3,4"), ("CTETRA", "1,2,4,5"), ("CHEXA", "1,2,3,4,5,6,\n,7,8"), ("CPENTA", "1,2,4,5,6,8")):
+        for form in forms:
+            yield f"$ made\nBEGIN BULK\n{form}{kind},10,7,{of}\n{rest}".encode()
+    yield (DATA / "meshes" / "meshio_hex20.bdf").read_bytes()
 
 
 def surface_seeds():
@@ -148,11 +163,13 @@ def main():
     write_seeds(out / "mm", mm_seeds())
     write_seeds(out / "gmsh", gmsh_seeds())
     write_seeds(out / "abaqus", abaqus_seeds())
+    write_seeds(out / "nastran", nastran_seeds())
     write_seeds(out / "surface", surface_seeds())
     write_dictionary(out / "json.dict", [*(f'"{word}"' for word in words(schema)), *JSON_WORDS])
     write_dictionary(out / "mm.dict", MM_WORDS)
     write_dictionary(out / "gmsh.dict", GMSH_WORDS)
     write_dictionary(out / "abaqus.dict", ABAQUS_WORDS)
+    write_dictionary(out / "nastran.dict", NASTRAN_WORDS)
     write_dictionary(out / "surface.dict", SURFACE_WORDS)
 
 

@@ -3,6 +3,7 @@
 #include "failing_heap.h"
 #include "gmsh_text.h"
 #include "harness.h"
+#include "io/mesh_reader.h"
 #include "scene/mesh.h"
 #include "scene/subdivide.h"
 
@@ -75,6 +76,22 @@ static uz_status read_abaqus(uz_error *err)
 TEST(abaqus_files)
 {
     CHECK(fail_each(read_abaqus) > 25);
+}
+
+static uz_status read_nastran(uz_error *err)
+{
+    static const char text[] = "GRID,9,,0.,0.\nGRID,2,,1.,0.\nGRID,3,,0.,1.\nCTRIA3,7,1,9,2,3\nPLOTEL,3,9,2\n"
+                               "SET3,1,GRID,9,2\nSET3,2,ELEM,3,THRU,7\n";
+    uz_given_mesh given;
+    const uz_status status = uz_nastran_read(&given, text, sizeof text - 1, 0, err);
+    CHECK((given.xyz != NULL) == (status == UZ_OK));
+    uz_given_mesh_clear(&given);
+    return status;
+}
+
+TEST(nastran_files)
+{
+    CHECK(fail_each(read_nastran) > 25);
 }
 
 static uz_status read_deck(uz_error *err)

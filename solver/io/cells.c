@@ -1,0 +1,304 @@
+/* cells.c: from the cells of a file to a body with its groups. */
+#include "io/cells.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "scene/given.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+int cells_dim(int shape)
+{
+    if (shape < UZ_ELEMENT_KINDS)
+        return uz_element_type_of((uz_element_kind)shape)->dim;
+    return shape == CELLS_POINT ? 0 : 1;
+}
+
+int cells_nodes(int shape)
+{
+    if (shape < UZ_ELEMENT_KINDS)
+        return uz_element_type_of((uz_element_kind)shape)->nodes;
+    return 1 + shape - CELLS_POINT;
+}
+
+/* ---- what is added */
+
+static uz_status check_size(const cells *mesh, int64_t line)
+{
+    const uint64_t bytes = 8 * (uint64_t)(4 * mesh->n_nodes + 3 * mesh->n_cells + 2 * mesh->n_members +
+                                          (mesh->n_cells > 0 ? mesh->first[mesh->n_cells] : 0));
+    return mesh->max_bytes == 0 || bytes <= mesh->max_bytes
+               ? UZ_OK
+               : uz_fail_line(mesh->err, UZ_ERR_LIMIT, line, "the mesh needs more memory than is allowed");
+}
+
+uz_status cells_add_node(cells *mesh, const double x[3], int64_t line)
+{
+    if (!uz_grow(&mesh->xyz, 3 * mesh->n_nodes, 3, &mesh->xyz_room, sizeof *mesh->xyz))
+        return uz_no_memory(mesh->err, "the mesh");
+    memcpy(mesh->xyz + 3 * mesh->n_nodes++, x, 3 * sizeof *x);
+    return check_size(mesh, line);
+}
+
+uz_status cells_add(cells *mesh, int shape, const int64_t *node, int64_t line)
+{
+    const int64_t n = mesh->n_cells, from = n > 0 ? mesh->first[n] : 0;
+    const int nodes = cells_nodes(shape);
+    if (!uz_grow(&mesh->shape, n, 1, &mesh->shape_room, sizeof *mesh->shape) ||
+        !uz_grow(&mesh->line, n, 1, &mesh->line_room, sizeof *mesh->line) ||
+        !uz_grow(&mesh->first, n, 2, &mesh->first_room, sizeof *mesh->first) ||
+        !uz_grow(&mesh->node, from, nodes, &mesh->node_room, sizeof *mesh->node))
+        return uz_no_memory(mesh->err, "the mesh");
+    mesh->shape[n] = (unsigned char)shape;
+    mesh->line[n] = line;
+    mesh->first[n] = from;
+    mesh->first[n + 1] = from + nodes;
+    memcpy(mesh->node + from, node, (size_t)nodes * sizeof *node);
+    mesh->n_cells++;
+    return check_size(mesh, line);
+}
+
+uz_status cells_add_set(int64_t *set, cells *mesh, const char *name, bool nodes, int64_t line)
+{
+    if (mesh->n_sets >= UZ_MESH_MAX_GROUPS)
+        return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, line, "there are more than %d groups", UZ_MESH_MAX_GROUPS);
+    if (!uz_grow(&mesh->sets, mesh->n_sets, 1, &mesh->sets_room, sizeof *mesh->sets))
+        return uz_no_memory(mesh->err, "the mesh");
+    cells_set *to = &mesh->sets[ *set = mesh->n_sets];
+    *to = (cells_set){.nodes = nodes, .line = line};
+    if (snprintf(to->name, sizeof to->name, "%s", name) >= (int)sizeof to->name)
+        return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, line, "the name of a group has more than 63 bytes");
+    for (int64_t i = 0; i < mesh->n_sets; i++)
+        if (mesh->sets[i].nodes == nodes && strcmp(mesh->sets[i].name, name) == 0)
+            return uz_fail_line(mesh->err, UZ_ERR_FORMAT, line, "there is a second group \"%s\"", name);
+    mesh->n_sets++;
+    return UZ_OK;
+}
+
+uz_status cells_add_member(cells *mesh, int64_t set, int64_t index, int64_t line)
+{
+    cells_set *to = &mesh->sets[set];
+    if (!uz_grow(&to->index, to->count, 1, &to->room, sizeof *to->index))
+        return uz_no_memory(mesh->err, "the mesh");
+    to->index[to->count++] = index;
+    mesh->n_members++;
+    return check_size(mesh, line);
+}
+
+typedef struct {
+    int64_t value, index;
+} valued;
+
+static int compare_valued(const void *a, const void *b)
+{
+    const valued *x = a, *y = b;
+    return x->value != y->value ? (x->value > y->value) - (x->value < y->value)
+                                : (x->index > y->index) - (x->index < y->index);
+}
+
+uz_status cells_add_values(cells *mesh, const char *name, const int64_t *value, bool nodes, int64_t most, int64_t line)
+{
+    const int64_t n = nodes ? mesh->n_nodes : mesh->n_cells;
+    int64_t count = 0, values = 0, set = -1;
+    valued *list = uz_alloc(n, sizeof *list);
+    uz_status status = list ? UZ_OK : uz_no_memory(mesh->err, "the mesh");
+    for (int64_t i = 0; i < n && status == UZ_OK; i++)
+        if (value[i] != CELLS_NO_VALUE)
+            list[count++] = (valued){value[i], i};
+    if (count > 1)
+        qsort(list, (size_t)count, sizeof *list, compare_valued);
+    for (int64_t i = 0; i < count; i++)
+        values += i == 0 || list[i].value != list[i - 1].value;
+    if (most > 0 && values > most)
+        count = 0;
+    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
+        char full[160];
+        snprintf(full, sizeof full, "%.120s_%lld", name, (long long)list[i].value);
+        if (i == 0 || list[i].value != list[i - 1].value)
+            status = cells_add_set(&set, mesh, full, nodes, line);
+        if (status == UZ_OK)
+            status = cells_add_member(mesh, set, list[i].index, line);
+    }
+    free(list);
+    return status;
+}
+
+/* ---- the body */
+
+/* The highest dimension; a plane body is one with z constant but for rounding. */
+static uz_status choose_dim(int *dim, const cells *mesh, const char *advice)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    int64_t at = 0;
+    *dim = 0;
+    for (int64_t e = 0; e < mesh->n_cells; e++) {
+        at = cells_dim(mesh->shape[e]) > *dim ? e : at;
+        *dim = cells_dim(mesh->shape[at]);
+    }
+    const int64_t line = mesh->n_cells > 0 ? mesh->line[at] : 1;
+    if (*dim < 2)
+        return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, line, "there are no elements of a body; %s", advice);
+    for (int64_t e = 0; *dim == 2 && e < mesh->n_cells; e++)
+        for (int64_t q = mesh->first[e]; q < mesh->first[e + 1] && cells_dim(mesh->shape[e]) == 2; q++)
+            for (int c = 0; c < 3; c++) {
+                low[c] = fmin(low[c], mesh->xyz[3 * mesh->node[q] + c]);
+                high[c] = fmax(high[c], mesh->xyz[3 * mesh->node[q] + c]);
+            }
+    if (*dim == 2 && !(high[2] - low[2] <= 1e-9 * hypot(high[0] - low[0], high[1] - low[1])))
+        return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, line,
+                            "there are only surfaces, and they do not lie in a plane z = constant; shells are not "
+                            "modelled: %s, or turn a plane body into the plane of x and y",
+                            advice);
+    return UZ_OK;
+}
+
+/* new_cell: the number of each cell among the elements, -1: it is none. */
+static uz_status add_body(uz_given_mesh *out, const cells *mesh, int64_t *new_cell)
+{
+    int64_t places = 0;
+    for (int64_t e = 0; e < mesh->n_cells; e++) {
+        const bool body = cells_dim(mesh->shape[e]) == out->dim;
+        new_cell[e] = body ? out->n_elements++ : -1;
+        places += body ? mesh->first[e + 1] - mesh->first[e] : 0;
+    }
+    out->n_nodes = mesh->n_nodes;
+    out->xyz = uz_alloc(out->n_nodes * out->dim, sizeof *out->xyz);
+    out->kind = uz_alloc(out->n_elements, sizeof *out->kind);
+    out->first = uz_alloc(out->n_elements + 1, sizeof *out->first);
+    out->node = uz_alloc(places, sizeof *out->node);
+    if (!out->xyz || !out->kind || !out->first || !out->node)
+        return uz_no_memory(mesh->err, "the mesh");
+    for (int64_t i = 0; i < out->n_nodes; i++)
+        memcpy(out->xyz + i * out->dim, mesh->xyz + 3 * i, (size_t)out->dim * sizeof(double));
+    out->first[0] = 0;
+    for (int64_t e = 0; e < mesh->n_cells; e++) {
+        const int64_t to = new_cell[e], count = mesh->first[e + 1] - mesh->first[e];
+        if (to < 0)
+            continue;
+        out->kind[to] = mesh->shape[e];
+        out->first[to + 1] = out->first[to] + count;
+        memcpy(out->node + out->first[to], mesh->node + mesh->first[e], (size_t)count * sizeof *out->node);
+    }
+    return UZ_OK;
+}
+
+/* ---- groups */
+
+enum { BY_ELEMENTS, BY_SIDES, BY_NODES, WAYS };
+
+/* How a member of a set belongs to a group. */
+static int way_of(const cells *mesh, const cells_set *set, int64_t i, int dim)
+{
+    const int its_dim = set->nodes ? 0 : cells_dim(mesh->shape[set->index[i]]);
+    return set->nodes || its_dim < dim - 1 ? BY_NODES : its_dim == dim ? BY_ELEMENTS : BY_SIDES;
+}
+
+static uz_status add_group(uz_given_mesh *out, const cells *mesh, const cells_set *set, const int64_t *new_cell,
+                           int way)
+{
+    uz_given_group *to = &out->groups[out->n_groups];
+    int64_t items = 0, places = 0;
+    for (int64_t i = 0; i < set->count; i++)
+        if (way_of(mesh, set, i, out->dim) == way) {
+            items++;
+            places += set->nodes ? 1 : mesh->first[set->index[i] + 1] - mesh->first[set->index[i]];
+        }
+    if (items == 0)
+        return UZ_OK;
+    out->n_groups++;
+    if (way == BY_ELEMENTS)
+        to->element = uz_alloc(items, sizeof *to->element);
+    if (way == BY_NODES)
+        to->node = uz_alloc(places, sizeof *to->node);
+    if (way == BY_SIDES) {
+        to->face_first = uz_alloc_zero(items + 1, sizeof *to->face_first);
+        to->face_node = uz_alloc(places, sizeof *to->face_node);
+    }
+    if (way == BY_ELEMENTS ? !to->element : way == BY_NODES ? !to->node : !to->face_first || !to->face_node)
+        return uz_no_memory(mesh->err, "the mesh");
+    for (int64_t i = 0; i < set->count; i++) {
+        const int64_t index = set->index[i];
+        if (way_of(mesh, set, i, out->dim) != way)
+            continue;
+        if (way == BY_ELEMENTS) {
+            to->element[to->n_elements++] = new_cell[index];
+        } else if (set->nodes) {
+            to->node[to->n_nodes++] = index;
+        } else {
+            const int64_t *node = mesh->node + mesh->first[index], n = mesh->first[index + 1] - mesh->first[index];
+            int64_t *at = way == BY_NODES ? to->node + to->n_nodes : to->face_node + to->face_first[to->n_faces];
+            memcpy(at, node, (size_t)n * sizeof *node);
+            if (way == BY_NODES) {
+                to->n_nodes += n;
+            } else {
+                to->face_first[to->n_faces + 1] = to->face_first[to->n_faces] + n;
+                to->n_faces++;
+            }
+        }
+    }
+    return UZ_OK;
+}
+
+static bool is_taken(const uz_given_mesh *out, const char *name)
+{
+    for (int64_t i = 0; i < out->n_groups; i++)
+        if (strcmp(out->groups[i].name, name) == 0)
+            return true;
+    return false;
+}
+
+static uz_status add_groups(uz_given_mesh *out, const cells *mesh, const int64_t *new_cell)
+{
+    static const char *const SUFFIX[WAYS] = {".elements", ".sides", ".nodes"};
+    if (!(out->groups = uz_alloc_zero(WAYS * mesh->n_sets, sizeof *out->groups)))
+        return uz_no_memory(mesh->err, "the mesh");
+    for (int64_t s = 0; s < mesh->n_sets; s++)
+        for (int way = 0; way < WAYS; way++) {
+            char name[80];
+            const int64_t before = out->n_groups;
+            const uz_status status = add_group(out, mesh, &mesh->sets[s], new_cell, way);
+            if (status != UZ_OK)
+                return status;
+            if (out->n_groups == before)
+                continue;
+            snprintf(name, sizeof name, "%s", mesh->sets[s].name);
+            if (is_taken(out, name))
+                snprintf(name, sizeof name, "%s%s", mesh->sets[s].name, SUFFIX[way]);
+            if (is_taken(out, name) || strlen(name) >= sizeof out->groups->name)
+                return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, mesh->sets[s].line,
+                                    "\"%s\" is the name of two groups, or too long for another one", name);
+            memcpy(out->groups[before].name, name, strlen(name) + 1);
+        }
+    return UZ_OK;
+}
+
+uz_status cells_to_given(uz_given_mesh *out, const cells *mesh, const char *from_file, const char *advice)
+{
+    int64_t *new_cell = uz_alloc(mesh->n_cells, sizeof *new_cell);
+    memset(out, 0, sizeof *out);
+    uz_status status = new_cell ? choose_dim(&out->dim, mesh, advice) : uz_no_memory(mesh->err, "the mesh");
+    if (status == UZ_OK)
+        status = add_body(out, mesh, new_cell);
+    if (status == UZ_OK)
+        status = add_groups(out, mesh, new_cell);
+    free(new_cell);
+    out->from_file = from_file;
+    if (status != UZ_OK)
+        uz_given_mesh_clear(out);
+    return status;
+}
+
+void cells_clear(cells *mesh)
+{
+    for (int64_t i = 0; i < mesh->n_sets; i++)
+        free(mesh->sets[i].index);
+    free(mesh->sets);
+    free(mesh->xyz);
+    free(mesh->shape);
+    free(mesh->line);
+    free(mesh->first);
+    free(mesh->node);
+}
