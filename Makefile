@@ -15,7 +15,7 @@ PREFIX ?= /usr/local
 PYTHON ?= /usr/bin/python3
 
 PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
-            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libdeflate-dev libpng-dev libgmp-dev \
+            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libdeflate-dev libexpat1-dev libpng-dev libgmp-dev \
             libpq-dev
 TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev valgrind \
                  postgresql pgbouncer haproxy python3-yaml nodejs git mandoc librsvg2-bin libgmp-dev zsh fish
@@ -40,7 +40,7 @@ INC  := -Isolver/include -Isolver -Iserver -Iclient -I$(BUILD)/gen
 # Package flags are asked for once, when first needed, so that `make deps` works on a bare machine.
 pkg = $(shell pkg-config $(1) 2>/dev/null)
 SERVER_CFLAGS = $(call pkg,--cflags libmicrohttpd jansson sqlite3 libcurl gnutls libpq)
-SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp -lsuitesparseconfig $(call pkg,--libs gnutls) -lgmp -lpng -ldeflate -lz -lm
+SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp -lsuitesparseconfig $(call pkg,--libs gnutls) -lgmp -lpng -ldeflate -lexpat -lz -lm
 SERVER_LIBS   = $(call pkg,--libs libmicrohttpd sqlite3 libcurl libpq) $(SOLVER_LIBS) -lpthread
 CLIENT_LIBS   = $(call pkg,--libs libcurl jansson gnutls) -lm
 CFLAGS_ALL    = $(STD) $(OPT) $(WARN) $(SAN) -fno-omit-frame-pointer -pthread -MMD -MP $(INC) $(SERVER_CFLAGS) $(CFLAGS)

@@ -53,7 +53,7 @@ complete -c uzawa -n '__uzawa_is submit' -l K -r -F -d 'the stiffness matrix, in
 complete -c uzawa -n '__uzawa_is submit' -l N -r -F -d 'the contact normals, a row for each contact'
 complete -c uzawa -n '__uzawa_is submit' -l h -r -F -d 'the initial gaps'
 complete -c uzawa -n '__uzawa_is submit' -l p -r -F -d 'the load'
-complete -c uzawa -n '__uzawa_is submit' -l mesh -r -F -d 'a mesh file (Gmsh, Abaqus, CalculiX, NASTRAN) in place of the scene'\''s mesh'
+complete -c uzawa -n '__uzawa_is submit' -l mesh -r -F -d 'a mesh file (Gmsh, Abaqus, CalculiX, NASTRAN, VTK) in place of the scene'\''s mesh'
 complete -c uzawa -n '__uzawa_is submit' -l surface -r -F -d 'an STL or OBJ file for each obstacle {"surface": {}} of the scene that names no file itself'
 complete -c uzawa -n '__uzawa_is submit' -l leave-out -d 'of a deck, leave out what a scene has no words for, although the answer is another one with it'
 complete -c uzawa -n '__uzawa_is submit' -l set -r -f -d 'put VALUE, as JSON or else as a string, at PATH of the request; may be repeated'

@@ -123,7 +123,7 @@ static const uz_option OPTIONS[] = {
     OPTION("h", 0, WORD, h, IN(SUBMIT), .value = "FILE", .about = "the initial gaps"),
     OPTION("p", 0, WORD, p, IN(SUBMIT), .value = "FILE", .about = "the load"),
     OPTION("mesh", 0, WORD, mesh, IN(SUBMIT), .value = "FILE",
-           .about = "a mesh file (Gmsh, Abaqus, CalculiX, NASTRAN) in place of the scene's mesh"),
+           .about = "a mesh file (Gmsh, Abaqus, CalculiX, NASTRAN, VTK) in place of the scene's mesh"),
     OPTION("surface", 0, WORD, surface, IN(SUBMIT), .value = "FILE",
            .about = "an STL or OBJ file for each obstacle {\"surface\": {}} of the scene that names no file itself"),
     OPTION("leave-out", 0, FLAG, leave_out, IN(SUBMIT) | IN(IMPORT),

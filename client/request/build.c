@@ -68,8 +68,8 @@ static const char *mesh_format(const char *path)
 {
     static const struct {
         const char *ending, *key;
-    } NAMES[] = {{".msh", "gmsh"},    {".inp", "abaqus"},  {".bdf", "nastran"},
-                 {".nas", "nastran"}, {".dat", "nastran"}, {".fem", "nastran"}};
+    } NAMES[] = {{".msh", "gmsh"},    {".inp", "abaqus"},  {".bdf", "nastran"}, {".nas", "nastran"},
+                 {".dat", "nastran"}, {".fem", "nastran"}, {".vtu", "vtk"},     {".vtk", "vtk"}};
     char begin[4096];
     for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
         if (ends_in(path, NAMES[i].ending))
@@ -79,7 +79,11 @@ static const char *mesh_format(const char *path)
     if (file)
         fclose(file);
     begin[length] = '\0';
-    return begin[0] == '*' ? "abaqus" : strcasestr(begin, "BEGIN BULK") || strstr(begin, "\nGRID") ? "nastran" : "gmsh";
+    if (begin[0] == '*')
+        return "abaqus";
+    if (begin[0] == '<' || strncmp(begin, "# vtk", 5) == 0)
+        return "vtk";
+    return strcasestr(begin, "BEGIN BULK") || strstr(begin, "\nGRID") ? "nastran" : "gmsh";
 }
 
 /* The key of a surface, by the name of its file. */

@@ -48,6 +48,7 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
     } MESHES[] = {{"/mesh/gmsh", "gmsh_syntax", "gmsh_unsupported"},
                   {"/mesh/abaqus", "abaqus_syntax", "abaqus_unsupported"},
                   {"/mesh/nastran", "nastran_syntax", "nastran_unsupported"},
+                  {"/mesh/vtk", "vtk_syntax", "vtk_unsupported"},
                   {"/surface/stl", "stl_syntax", "stl_unsupported"},
                   {"/surface/obj", "obj_syntax", "obj_unsupported"}};
     const uz_status status = err->status;

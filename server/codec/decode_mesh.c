@@ -134,7 +134,8 @@ static bool read_file(uz_given_mesh *to, decoding *d, const char *format, const 
 
 bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh)
 {
-    static const char *const FORMATS[] = {"gmsh", "abaqus", "nastran"}; /* names of readers (solver/io/mesh_reader.h) */
+    static const char *const FORMATS[] = {"gmsh", "abaqus", "nastran",
+                                          "vtk"}; /* names of readers (solver/io/mesh_reader.h) */
     const json_value *nodes = json_get(mesh, "nodes");
     const int dim = uz_scene_dim(out);
     uz_given_mesh *to = &out->given;

@@ -28,6 +28,8 @@ static const struct {
     {"abaqus_unsupported", "Something in an input file of Abaqus or CalculiX that is not read here"},
     {"nastran_syntax", "A NASTRAN file is malformed"},
     {"nastran_unsupported", "Something in a NASTRAN file that is not read here"},
+    {"vtk_syntax", "A VTK file is malformed"},
+    {"vtk_unsupported", "A kind of VTK file or cell that is not read here"},
     {"stl_syntax", "An STL file is malformed"},
     {"stl_unsupported", "A kind of STL file that is not read here"},
     {"obj_syntax", "An OBJ file is malformed"},

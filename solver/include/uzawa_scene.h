@@ -88,7 +88,7 @@ uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t 
  * keep it, then nodes, and the others get ".nodes" or ".elements" behind it.
  * Source: CalculiX CrunchiX user's manual. */
 uz_status uz_abaqus_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
-/* The same of a file in any format that there is a reader for (io/mesh_reader.h): "gmsh", "abaqus", "nastran";
+/* The same of a file in any format that there is a reader for (io/mesh_reader.h): "gmsh", "abaqus", "nastran", "vtk";
  * NULL: by what it looks like.
  * UZ_ERR_UNSUPPORTED: there is none. */
 uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,

@@ -7,6 +7,7 @@
 static const uz_mesh_reader READERS[] = {
     {"gmsh", uz_gmsh_recognises, uz_gmsh_read},
     {"abaqus", uz_abaqus_recognises, uz_abaqus_read},
+    {"vtk", uz_vtk_recognises, uz_vtk_read},
     {"nastran", uz_nastran_recognises, uz_nastran_read},
 };
 

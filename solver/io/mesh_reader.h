@@ -20,6 +20,8 @@ typedef struct {
 /* Rows of the table. */
 bool uz_gmsh_recognises(const char *text, size_t len);
 bool uz_abaqus_recognises(const char *text, size_t len);
+bool uz_vtk_recognises(const char *text, size_t len);
+uz_status uz_vtk_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 bool uz_nastran_recognises(const char *text, size_t len);
 uz_status uz_nastran_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 

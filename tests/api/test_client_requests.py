@@ -164,14 +164,16 @@ def test_meshes_of_other_programs(server):
         check(told["outcome"] == "converged" and told["problem"]["d"] == 3 * (32 - 8), sent, names, told)
         return told["energy"]["primal"]
 
-    for ending, left, top in ((".bdf", "property_3", "property_4"),):
+    told = []
+    for ending, left, top in ((".bdf", "property_3", "property_4"), (".vtu", "part_3", "part_4"), ("_zlib.vtu", "part_3", "part_4"),
+                              (".vtk", "part_3", "part_4")):
         problem["supports"] = [{"on": left, "ux": 0, "uy": 0, "uz": 0}]
         problem["loads"] = [{"on": top, "pressure": 0.5}]
         file = f"tests/data/meshes/meshio_hex20{ending}"
         with open(file, "rb") as given, open(path, "wb") as other:
             other.write(given.read())
-        energies = [same(sent, left, body) for sent in (file, path)]
-        check(energies[0] == energies[1], energies)
+        told += [same(sent, left, body) for sent in (file, path)]
+    check(max(told) - min(told) < 1e-12 * abs(told[0]), told)
     problem["mesh"] = {"nastran": "GRID,1,5,0.,0.\n"}
     reply = server.post(body, query="?validate=true")
     check(reply.status == 422 and reply.json["code"] == "nastran_unsupported" and reply.json["line"] == 1, reply)

@@ -69,7 +69,7 @@ PHRASES = {
     "Aplikace matematiky 27, 1982": None, "J. Computational Physics 262, 2014": None,
     # addresses, versions, requests of examples
     "Gmsh file (2.2, 4.0 or 4.1)": None, "file of version 2.2, 4.0 or 4.1,": None, "| Gmsh `.msh` 2.2, 4.0, 4.1, ASCII": None,
-    "partitions (of 4.0: refused)": None, "Corners closer than 1e-6 of the size": constant(1e-6, r"#define SAME_CORNER ([\d.e-]+)"), "- 100,000 triangles are found by a tree": None, "waiting up to 30 s for its end": None, "Apache License 2.0": None,
+    "partitions (of 4.0: refused)": None, "| VTK legacy `.vtk` to 5.1, ASCII": None, "Corners closer than 1e-6 of the size": constant(1e-6, r"#define SAME_CORNER ([\d.e-]+)"), "- 100,000 triangles are found by a tree": None, "waiting up to 30 s for its end": None, "Apache License 2.0": None,
     "GPL-3.0-or-later": None, "GPL-2.0-or-later": None, "## 0.1": None, "(RFC 9457)": None, "published on 127.0.0.1.": None,
     "aluminium shaft 0.05 mm too thick": None, "a traction of 0.05 on a side of 60": None,
     # published: units, materials, the paper and its example

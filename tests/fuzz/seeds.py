@@ -1,5 +1,5 @@
-"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/*, OUT/gmsh/*, OUT/abaqus/*, OUT/nastran/* and
-OUT/surface/*, one seed a file, and OUT/json.dict and the same of the others.
+"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/*, OUT/gmsh/*, OUT/abaqus/*, OUT/nastran/*,
+OUT/vtk/* and OUT/surface/*, one seed a file, and OUT/json.dict and the same of the others.
 
 Seeds come from tests/data, and from the shared cases where they are there; the words of the JSON dictionary are the
 member names and values that the schemas know.
@@ -25,6 +25,10 @@ ABAQUS_WORDS = ["*NODE", "*ELEMENT", "*NSET", "*ELSET", "*SURFACE", "*PART", "*I
                 "9223372036854775807", '"a b"']
 NASTRAN_WORDS = ["GRID", "GRID*", "CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTETRA", "CPENTA", "CHEXA", "CBAR", "PLOTEL", "SET3", "ELEM", "PROP",
                  "THRU", "BEGIN BULK", "ENDDATA", "+", "*", ",", "\n", "\t", "$", "1.5-3", "1D3", "999999999999999999"]
+VTK_WORDS = ["<VTKFile", 'type="UnstructuredGrid"', "<Piece", 'NumberOfPoints="4"', 'NumberOfCells="1"', "<DataArray", 'type="Int64"', 'format="appended"',
+             'offset="0"', "<AppendedData", 'encoding="raw"', ">_", "</DataArray>", 'header_type="UInt64"', 'compressor="vtkZLibDataCompressor"',
+             "BINARY", "ASCII", "POINTS", "CELLS", "OFFSETS vtktypeint64", "CONNECTIVITY", "CELL_TYPES", "CELL_DATA", "SCALARS", "LOOKUP_TABLE", "FIELD",
+             "METADATA", "AQAAAA==", "\n", "99999999999"]
 SURFACE_WORDS = ["solid", "facet normal", "outer loop", "vertex", "endloop", "endfacet", "endsolid", "v ", "f ", "vn ", "1/1/1", "-1", "\n", "1e308"]
 JSON_WORDS = ["null", "true", "false", "1e400", "-0.0", "1e-320", "9223372036854775808", "[[", "]]", "{}", "\\u0000", "\\ud800"]
 
@@ -77,6 +81,24 @@ def nastran_seeds():
         for form in forms:
             yield f"$ made\nBEGIN BULK\n{form}{kind},10,7,{of}\n{rest}".encode()
     yield (DATA / "meshes" / "meshio_hex20.bdf").read_bytes()
+
+
+def vtk_seeds():
+    """What meshio has written, and each form that it does not write."""
+    for path in sorted((DATA / "meshes").glob("*.vt?")):
+        yield path.read_bytes()
+    head = "# vtk DataFile Version 5.1\na\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\n"
+    yield (head + "METADATA\nINFORMATION 0\n\nCELLS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\n"
+           "SCALARS part int 1\nLOOKUP_TABLE default\n7\nFIELD FieldData 1\na 1 1 int\n3\nPOINT_DATA 4\nVECTORS v double\n0 0 0 0 0 0 0 0 0 0 0 0\n").encode()
+    arrays = [("Points", "", "Float32", struct.pack("<12f", 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1)), ("Cells", "connectivity", "Int32", struct.pack("<4i", 0, 1, 2, 3)),
+              ("Cells", "offsets", "Int32", struct.pack("<i", 4)), ("Cells", "types", "UInt8", b"\x0a"), ("CellData", "part", "Int8", b"\x07")]
+    text, data = "", b""
+    for place, name, kind, content in arrays:
+        count = 3 if place == "Points" else 1
+        text += f'<{place}><DataArray type="{kind}" Name="{name}" NumberOfComponents="{count}" format="appended" offset="{len(data)}"/></{place}>'
+        data += struct.pack("<I", len(content)) + content
+    yield (f'<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="4" NumberOfCells="1">{text}</Piece></UnstructuredGrid>'
+           '<AppendedData encoding="raw">_').encode() + data + b"</AppendedData></VTKFile>"
 
 
 def surface_seeds():
@@ -164,12 +186,14 @@ def main():
     write_seeds(out / "gmsh", gmsh_seeds())
     write_seeds(out / "abaqus", abaqus_seeds())
     write_seeds(out / "nastran", nastran_seeds())
+    write_seeds(out / "vtk", vtk_seeds())
     write_seeds(out / "surface", surface_seeds())
     write_dictionary(out / "json.dict", [*(f'"{word}"' for word in words(schema)), *JSON_WORDS])
     write_dictionary(out / "mm.dict", MM_WORDS)
     write_dictionary(out / "gmsh.dict", GMSH_WORDS)
     write_dictionary(out / "abaqus.dict", ABAQUS_WORDS)
     write_dictionary(out / "nastran.dict", NASTRAN_WORDS)
+    write_dictionary(out / "vtk.dict", VTK_WORDS)
     write_dictionary(out / "surface.dict", SURFACE_WORDS)
 
 

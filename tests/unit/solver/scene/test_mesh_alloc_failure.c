@@ -94,6 +94,33 @@ TEST(nastran_files)
     CHECK(fail_each(read_nastran) > 25);
 }
 
+static uz_status read_vtk(uz_error *err)
+{
+    static const char xml[] =
+        "<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"3\" NumberOfCells=\"1\"><Points>"
+        "<DataArray type=\"Int8\" NumberOfComponents=\"3\">0 0 0 1 0 0 0 1 0</DataArray></Points>"
+        "<Cells><DataArray type=\"Int8\" Name=\"connectivity\" format=\"binary\">AwAAAA==AAEC"
+        "</DataArray><DataArray type=\"Int8\" Name=\"offsets\">3</DataArray><DataArray type=\"Int8\" "
+        "Name=\"types\">5</DataArray></Cells><CellData><DataArray type=\"Int8\" Name=\"a\">1"
+        "</DataArray></CellData></Piece></VTKFile>";
+    static const char old[] =
+        "# vtk DataFile Version 3.0\na\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 int\n0 0 0 1 0 0 "
+        "0 1 0\nCELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\nPOINT_DATA 3\nSCALARS a int\n1 2 2\n";
+    uz_given_mesh given;
+    uz_status status = uz_vtk_read(&given, xml, sizeof xml - 1, 0, err);
+    CHECK((given.xyz != NULL) == (status == UZ_OK));
+    uz_given_mesh_clear(&given);
+    if (status == UZ_OK)
+        status = uz_vtk_read(&given, old, sizeof old - 1, 0, err);
+    uz_given_mesh_clear(&given);
+    return status;
+}
+
+TEST(vtk_files)
+{
+    CHECK(fail_each(read_vtk) > 40);
+}
+
 static uz_status read_deck(uz_error *err)
 {
     static const char text[] =
