@@ -188,7 +188,7 @@ static uz_status begin_acting(double *factor, abaqus_deck *d, const abaqus_keywo
 
 /* ---- materials and sections */
 
-static uz_status read_material(abaqus_deck *d, const abaqus_keyword *keyword)
+static uz_status add_material(abaqus_deck *d, const abaqus_keyword *keyword)
 {
     deck_material *to;
     if (!uz_grow(&d->materials, d->n_materials, 1, &d->materials_room, sizeof *d->materials))
@@ -197,15 +197,39 @@ static uz_status read_material(abaqus_deck *d, const abaqus_keyword *keyword)
     *to = (deck_material){.line = keyword->line};
     const uz_status status = abaqus_name(to->name, keyword, "NAME", true, &d->text);
     d->n_materials += status == UZ_OK;
-    skip_data(d);
     return status;
+}
+
+/* The names of all materials of the deck: a section may stand before the one that it names. */
+static uz_status list_materials(abaqus_deck *d)
+{
+    const abaqus_text begin = d->text;
+    abaqus_keyword keyword;
+    uz_status status = UZ_OK;
+    while (status == UZ_OK && abaqus_next_line(&d->text)) {
+        if (!abaqus_is_keyword(&d->text))
+            continue;
+        status = abaqus_read_keyword(&keyword, &d->text);
+        if (status == UZ_OK && abaqus_keyword_is(&keyword, "MATERIAL"))
+            status = add_material(d, &keyword);
+    }
+    d->text = begin;
+    return status;
+}
+
+static uz_status read_material(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    (void)keyword;
+    d->n_met++;
+    skip_data(d);
+    return UZ_OK;
 }
 
 /* The material whose data these are. */
 static uz_status current_material(deck_material **out, abaqus_deck *d, const abaqus_keyword *keyword)
 {
     const char *type = abaqus_parameter(keyword, "TYPE");
-    *out = d->n_materials > 0 ? &d->materials[d->n_materials - 1] : NULL;
+    *out = d->n_met > 0 ? &d->materials[d->n_met - 1] : NULL;
     if (!*out)
         return abaqus_fail(&d->text, UZ_ERR_FORMAT, "*%.40s stands before any *MATERIAL", keyword->text);
     if (type && strncasecmp(type, "ISO", 3) != 0)
@@ -276,7 +300,7 @@ static uz_status read_section(abaqus_deck *d, const abaqus_keyword *keyword)
     for (int64_t i = 0; i < d->n_materials && material < 0; i++)
         material = strcasecmp(d->materials[i].name, name) == 0 ? i : -1;
     if (status == UZ_OK && material < 0)
-        status = abaqus_fail(&d->text, UZ_ERR_FORMAT, "there is no material \"%.60s\" before this section", name);
+        status = abaqus_fail(&d->text, UZ_ERR_FORMAT, "there is no material \"%.60s\"", name);
     for (int64_t i = 0; i < at.count && status == UZ_OK; i++) {
         const int64_t e = d->new_element[target(&at, i)];
         if (e >= 0)
@@ -794,7 +818,7 @@ static uz_status read_block(abaqus_deck *d)
 
 uz_status deck_read_lines(abaqus_deck *d)
 {
-    uz_status status = UZ_OK;
+    uz_status status = list_materials(d);
     abaqus_next_line(&d->text);
     while (status == UZ_OK && !d->ended && d->text.length > 0)
         status = read_block(d);

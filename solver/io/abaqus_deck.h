@@ -65,6 +65,8 @@ typedef struct {
     int64_t n_materials, n_amplitudes, n_pairs, n_springs, n_pressures;
     int64_t materials_room, amplitudes_room, pairs_room, springs_room, pressures_room;
 
+    int64_t n_met; /* materials that the lines read so far begin: data are of the last of them */
+
     double *fixed, *force;         /* nodes x 3; fixed NaN: free */
     double *temperature, *initial; /* nodes; NaN: not said */
     int64_t *material;             /* elements of the body: index, -1: none */

@@ -153,6 +153,18 @@ TEST(nothing_is_left_out_in_silence)
     }
 }
 
+/* As CalculiX takes them: a section before the material that it names. */
+TEST(sections_before_their_materials)
+{
+    uz_deck deck;
+    must_read(&deck, BODIES "*SOLID SECTION,ELSET=LOW,MATERIAL=EL\n*SOLID SECTION,ELSET=HIGH,MATERIAL=soft\n" STEEL
+                            "*MATERIAL,NAME=SOFT\n*ELASTIC\n500.,0.\n" STEP);
+    const uz_scene *s = &deck.scene;
+    CHECK(s->n_materials == 2 && strcmp(s->materials[0].on, "LOW") == 0 && s->materials[0].young == 1000.0 &&
+          s->materials[0].density == 2.0 && strcmp(s->materials[1].on, "HIGH") == 0 && s->materials[1].young == 500.0);
+    uz_deck_clear(&deck);
+}
+
 static const struct {
     const char *text;
     const char *says;
