@@ -247,7 +247,7 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
     return out->contacts != NULL;
 }
 
-/* ---- the whole */
+/* ---- materials and supports */
 
 enum { WORDS_MOST = 4 };
 _Static_assert(UZ_ELASTICITIES == (int)WORDS_MOST, "each law has a word");
@@ -260,6 +260,77 @@ static int word_of(const json_value *value, const char *const words[WORDS_MOST])
             return i;
     return 0;
 }
+
+#define PER_DEGREE (3.14159265358979323846 / 180)
+
+static bool decode_orthotropic(uz_orthotropic *to, decoding *d, const json_value *given)
+{
+    const json_value *axes = json_get(given, "axes"), *angle = json_get(given, "angle");
+    if (!decode_components(to->young, d, given, "young", 0, 3, NULL) ||
+        !decode_components(to->poisson, d, given, "poisson", 0, 3, NULL) ||
+        !decode_components(to->shear, d, given, "shear", 0, 3, NULL) ||
+        !decode_components(to->expansion, d, given, "expansion", 0, 3, NULL))
+        return false;
+    if (axes)
+        return decode_components(to->axes[0], d, axes, "x", 0, 3, "it must be the direction of the material's x") &&
+               decode_components(to->axes[1], d, axes, "y", 0, 3, "it must be the direction of the material's y");
+    if (angle) {
+        const double turn = PER_DEGREE * json_number(angle, 0), c = cos(turn), s = sin(turn);
+        memcpy(to->axes, (double[2][3]){{c, s, 0}, {-s, c, 0}}, sizeof to->axes);
+    }
+    return true;
+}
+
+static bool decode_materials(uz_scene *out, decoding *d, const json_value *list)
+{
+    static const char *const LAWS[WORDS_MOST] = {"linear", "st_venant_kirchhoff", "neo_hooke", "neo_hooke_isochoric"};
+    out->materials = decode_room(d, list, sizeof *out->materials, &out->n_materials);
+    for (int64_t i = 0; i < out->n_materials; i++) {
+        const json_value *item = &list->items[i], *orthotropic = json_get(item, "orthotropic");
+        uz_material *to = &out->materials[i];
+        if (!decode_group(to->on, d, json_get(item, "on"), GROUP_OF_ELEMENTS))
+            return false;
+        to->law = (uz_elasticity)word_of(json_get(item, "law"), LAWS);
+        to->young = json_number(json_get(item, "young"), 0);
+        to->poisson = json_number(json_get(item, "poisson"), 0);
+        to->density = json_number(json_get(item, "density"), 0);
+        to->expansion = json_number(json_get(item, "expansion"), 0);
+        to->yield = json_number(json_get(item, "yield"), 0);
+        to->is_orthotropic = orthotropic != NULL;
+        if (orthotropic && !decode_orthotropic(&to->orthotropic, d, orthotropic))
+            return false;
+    }
+    return out->materials != NULL;
+}
+
+static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
+{
+    static const char *const COMPONENTS[] = {"ux", "uy", "uz"};
+    const int dim = uz_scene_dim(out);
+    out->supports = decode_room(d, list, sizeof *out->supports, &out->n_supports);
+    for (int64_t i = 0; i < out->n_supports; i++) {
+        const json_value *item = &list->items[i];
+        uz_support *to = &out->supports[i];
+        if (!decode_group(to->on, d, json_get(item, "on"), GROUP_OF_ANY))
+            return false;
+        for (int c = 0; c < 3; c++)
+            to->u[c] = json_number(json_get(item, COMPONENTS[c]), (double)NAN);
+        to->kind = UZ_SUPPORT_COMPONENTS;
+        if (json_get(item, "normal")) {
+            to->kind = UZ_SUPPORT_NORMAL;
+            to->value = json_number(json_get(item, "u"), 0);
+            if (!decode_components(to->normal, d, item, "normal", 0, dim, "it must be the direction that is held"))
+                return false;
+        } else if (json_get(item, "spring")) {
+            to->kind = UZ_SUPPORT_SPRING;
+            if (!decode_components(to->spring, d, item, "spring", 0, dim, NULL))
+                return false;
+        }
+    }
+    return out->supports != NULL;
+}
+
+/* ---- the whole */
 
 /* That of a stress follows from the others: a word that did not agree with them would be wrong beside every number. */
 static bool decode_units(uz_units *out, decoding *d, const json_value *object)
@@ -296,10 +367,7 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     static const char *const MODELS[WORDS_MOST] = {"plane_stress", "plane_strain", "axisymmetric", "solid"};
     static const char *const FORMULATIONS[WORDS_MOST] = {"auto", "standard", "bbar", "incompatible_modes"};
     static const char *const KINEMATICS[WORDS_MOST] = {"auto", "fixed", "moving", "finite"};
-    static const char *const LAWS[WORDS_MOST] = {"linear", "st_venant_kirchhoff", "neo_hooke", "neo_hooke_isochoric"};
-    static const char *const COMPONENTS[] = {"ux", "uy", "uz"};
     const json_value *mesh = json_get(object, "mesh"), *box = json_get(mesh, "box");
-    const json_value *materials = json_get(object, "materials"), *supports = json_get(object, "supports");
     out->model = (uz_model)word_of(json_get(object, "model"), MODELS);
     out->formulation = (uz_formulation)word_of(json_get(object, "formulation"), FORMULATIONS);
     out->kinematics = (uz_kinematics)word_of(json_get(object, "kinematics"), KINEMATICS);
@@ -313,39 +381,8 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     d->scene = out;
     if (!decode_selections(out, d, json_get(object, "groups")))
         return false;
-    const int dim = uz_scene_dim(out);
-    out->materials = decode_room(d, materials, sizeof *out->materials, &out->n_materials);
-    for (int64_t i = 0; i < out->n_materials; i++) {
-        const json_value *item = &materials->items[i];
-        uz_material *to = &out->materials[i];
-        if (!decode_group(to->on, d, json_get(item, "on"), GROUP_OF_ELEMENTS))
-            return false;
-        to->law = (uz_elasticity)word_of(json_get(item, "law"), LAWS);
-        to->young = json_number(json_get(item, "young"), 0);
-        to->poisson = json_number(json_get(item, "poisson"), 0);
-        to->density = json_number(json_get(item, "density"), 0);
-        to->expansion = json_number(json_get(item, "expansion"), 0);
-        to->yield = json_number(json_get(item, "yield"), 0);
-    }
-    bool good = out->materials && (out->supports = decode_room(d, supports, sizeof *out->supports, &out->n_supports));
-    for (int64_t i = 0; i < out->n_supports && good; i++) {
-        const json_value *item = &supports->items[i];
-        uz_support *to = &out->supports[i];
-        good = decode_group(to->on, d, json_get(item, "on"), GROUP_OF_ANY);
-        for (int c = 0; c < 3; c++)
-            to->u[c] = json_number(json_get(item, COMPONENTS[c]), (double)NAN);
-        to->kind = UZ_SUPPORT_COMPONENTS;
-        if (!good)
-            break;
-        if (json_get(item, "normal")) {
-            to->kind = UZ_SUPPORT_NORMAL;
-            to->value = json_number(json_get(item, "u"), 0);
-            good = decode_components(to->normal, d, item, "normal", 0, dim, "it must be the direction that is held");
-        } else if (json_get(item, "spring")) {
-            to->kind = UZ_SUPPORT_SPRING;
-            good = decode_components(to->spring, d, item, "spring", 0, dim, NULL);
-        }
-    }
-    return good && decode_loads(&out->loads, &out->n_loads, d, json_get(object, "loads"), dim) &&
+    return decode_materials(out, d, json_get(object, "materials")) &&
+           decode_supports(out, d, json_get(object, "supports")) &&
+           decode_loads(&out->loads, &out->n_loads, d, json_get(object, "loads"), uz_scene_dim(out)) &&
            decode_contacts(out, d, json_get(object, "contacts"));
 }

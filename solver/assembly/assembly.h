@@ -29,8 +29,9 @@
 /* A material as the elements need it. */
 typedef struct {
     uz_lame lame;
-    double poisson, density, expansion;
+    double poisson, density, expansion; /* with directions: that of uz_anisotropy, and 1 where anything expands */
     uz_elasticity law;
+    uz_anisotropy general; /* what lame refers to where it has directions */
 } uz_body_material;
 
 /* A place inside a side of a group, where rows at its nodes alone would let a rigid obstacle in (node_to_obstacle.c).

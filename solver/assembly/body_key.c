@@ -240,6 +240,10 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
         put_double(&key, scene->materials[i].poisson);
         put_double(&key, scene->materials[i].density); /* not in K, but kept with the body */
         put_double(&key, scene->materials[i].expansion);
+        put_int(&key, scene->materials[i].is_orthotropic);
+        if (scene->materials[i].is_orthotropic)
+            put_doubles(&key, (const double *)&scene->materials[i].orthotropic,
+                        sizeof(uz_orthotropic) / sizeof(double));
     }
     put_supports(&key, scene, dim);
     put_contacts(&key, scene, dim);

@@ -20,14 +20,15 @@ static bool has_bounds_only(const uz_body_model *model)
     return single;
 }
 
-/* A box of equal hex8 of one material, its dofs along the axes, held by supports alone. */
+/* A box of equal hex8 of one isotropic material, its dofs along the axes, held by supports alone. */
 static bool has_equal_cells(const uz_body_model *model, const uz_scene *scene)
 {
     const uz_mesh *mesh = &model->mesh;
     const int64_t *cells = scene->box.cells;
     return scene->source == UZ_MESH_BOX && model->kind == UZ_SOLID && mesh->uniform && !mesh->hangs &&
-           mesh->kind[0] == UZ_HEX8 && mesh->n_elements == cells[0] * cells[1] * cells[2] && !model->material_of &&
-           !model->spring && model->info.n_rotated == 0 && !model->place;
+           mesh->kind[0] == UZ_HEX8 && !model->materials[0].lame.general &&
+           mesh->n_elements == cells[0] * cells[1] * cells[2] && !model->material_of && !model->spring &&
+           model->info.n_rotated == 0 && !model->place;
 }
 
 uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, uz_error *err)

@@ -20,8 +20,18 @@ uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_erro
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld materials", (long long)scene->n_materials);
     for (int64_t k = 0; k < scene->n_materials; k++) {
         const uz_material *from = &scene->materials[k];
-        model->materials[k] = (uz_body_material){uz_lame_of(scene->model, from->young, from->poisson), from->poisson,
-                                                 from->density, from->expansion, from->law};
+        uz_body_material *to = &model->materials[k];
+        *to = (uz_body_material){.density = from->density, .expansion = from->expansion, .law = from->law};
+        if (from->is_orthotropic) {
+            const double *expansion = from->orthotropic.expansion;
+            uz_orthotropic_make(&to->general, scene->model, &from->orthotropic);
+            to->lame = uz_lame_general(&to->general);
+            to->poisson = to->general.poisson;
+            to->expansion = expansion[0] != 0 || expansion[1] != 0 || expansion[2] != 0;
+        } else {
+            to->lame = uz_lame_of(scene->model, from->young, from->poisson);
+            to->poisson = from->poisson;
+        }
     }
     const int64_t n = model->mesh.n_elements;
     if (scene->n_materials <= 1)

@@ -14,9 +14,12 @@ enum { LANES = UZ_STRAIN_LANES };
 
 INLINE void take_material(uz_strain_group *g, const uz_strain_source *from)
 {
-    const uz_lame *lame[LANES];
-    for (int l = 0; l < LANES; l++)
+    const uz_lame **lame = g->lame;
+    g->general = false;
+    for (int l = 0; l < LANES; l++) {
         lame[l] = &uz_element_material(from->model, g->element[l])->lame;
+        g->general = g->general || lame[l]->general;
+    }
     g->material.lambda = (uz_lanes){lame[0]->lambda, lame[1]->lambda, lame[2]->lambda, lame[3]->lambda};
     g->material.mu = (uz_lanes){lame[0]->mu, lame[1]->mu, lame[2]->mu, lame[3]->mu};
     g->free_strain = g->thermal = (uz_lanes){0};
@@ -36,6 +39,25 @@ INLINE void gather(uz_lanes *out, const uz_strain_group *g, const double *value,
                                          value + g->node[2][a] * dim, value + g->node[3][a] * dim};
         for (int c = 0; c < dim; c++)
             *out++ = (uz_lanes){at[0][c], at[1][c], at[2][c], at[3][c]};
+    }
+}
+
+/* Incompatible modes take the shape of least energy, which has to do with directions: one element after the other. */
+static void strains_of_each(uz_strain_group *g, const uz_body_model *model)
+{
+    for (int l = 0; l < LANES; l++) {
+        double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], strain[UZ_ELEMENT_STRESSES];
+        uz_element element;
+        uz_element_motion motion;
+        uz_body_element(&element, xyz, model, g->element[l]);
+        for (int i = 0; i < g->rule.nodes * g->rule.dim; i++)
+            u[i] = g->u[i][l];
+        uz_element_move(&motion, &element, u);
+        for (int p = 0; p < g->rule.points; p++) {
+            uz_element_strain(strain, &motion, g->rule.point[p]);
+            for (int c = 0; c < g->rule.stresses; c++)
+                g->strain[p][c][l] = strain[c];
+        }
     }
 }
 
@@ -62,7 +84,10 @@ INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
         uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
         g->shaped = equal;
     }
-    uz_lane_strains(g->strain, &g->rule, &g->shape, &g->material, g->u);
+    if (!g->general || g->rule.formulation != UZ_FORMULATION_INCOMPATIBLE)
+        uz_lane_strains(g->strain, &g->rule, &g->shape, &g->material, g->u);
+    else
+        strains_of_each(g, from->model);
 }
 
 INLINE void load_in_space(uz_strain_group *g, const uz_strain_source *from)

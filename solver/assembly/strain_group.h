@@ -15,8 +15,10 @@ typedef struct {
     const int64_t *node[UZ_STRAIN_LANES]; /* of each element */
     uz_strain_rule rule;
     uz_lane_shape shape;
-    uz_lane_material material;
+    uz_lane_material material;     /* NaN in lanes of a material with directions */
     uz_lanes free_strain, thermal; /* expansion times rise of temperature; what it is in each direct strain */
+    const uz_lame *lame[UZ_STRAIN_LANES];
+    bool general; /* one of them has directions: `thermal` and `material` are not for any */
     uz_lanes x[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS];
     uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES];
 } uz_strain_group;

@@ -220,6 +220,42 @@ INLINE void add_of_model(double *rows, const uz_strain_group *g, const int64_t *
         add(rows, g, place, share, 6, 3, MOST_ROW);
 }
 
+/* Of a material with directions, one element after the other: what compare() sums up. */
+static void compare_each(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
+                         const int64_t *const place[LANES], int size)
+{
+    const int n = g->rule.stresses;
+    for (int l = 0; l < g->count; l++) {
+        double eta = 0, energy[2] = {0};
+        double thermal[UZ_ELEMENT_STRESSES];
+        uz_thermal_strain(thermal, g->rule.model, *g->lame[l], g->free_strain[l]);
+        for (int p = 0; p < g->rule.asked; p++) {
+            double strain[2][UZ_ELEMENT_STRESSES], stress[2][UZ_ELEMENT_STRESSES], jump[UZ_ELEMENT_STRESSES];
+            for (int c = 0; c < n; c++) {
+                strain[1][c] = g->strain[p][c][l];
+                strain[0][c] = strain[1][c] - thermal[c];
+            }
+            for (int whole = 0; whole < 2; whole++)
+                uz_elastic_stress(stress[whole], g->rule.model, *g->lame[l], strain[whole]);
+            for (int c = 0; c < n; c++) {
+                jump[c] = -stress[0][c];
+                for (int a = 0; a < g->rule.nodes; a++)
+                    jump[c] += g->rule.N[p][a] * rows[place[l][a] * size + c];
+            }
+            eta += g->shape.volume[p][l] * uz_stress_work(g->rule.model, *g->lame[l], jump);
+            for (int whole = 0; whole < 2; whole++)
+                for (int c = 0; c < n; c++)
+                    energy[whole] += g->shape.volume[p][l] * stress[whole][c] * strain[whole][c];
+        }
+        eta *= sums->times[l];
+        sums->eta2 += eta;
+        if (sums->eta2_of)
+            sums->eta2_of[g->element[l]] = eta;
+        sums->stress += energy[0];
+        sums->whole += energy[1];
+    }
+}
+
 INLINE void compare_of_model(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
                              const int64_t *const place[LANES], int size)
 {
@@ -254,5 +290,8 @@ void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
 void uz_stress_rows_compare(uz_stress_sums *sums, const double *rows, int size, const uz_strain_group *group,
                             const int64_t *const place[UZ_STRAIN_LANES])
 {
-    (uz_cpu_has_avx2_fma() ? compare_fused : compare_of_model)(sums, rows, group, place, size);
+    if (group->general)
+        compare_each(sums, rows, group, place, size);
+    else
+        (uz_cpu_has_avx2_fma() ? compare_fused : compare_of_model)(sums, rows, group, place, size);
 }

@@ -52,6 +52,9 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
     out->depth = out->rings ? 2 * PI : model->thickness;
     if (model->kind == UZ_SOLID)
         refuse(out, "in three dimensions there are no equilibrium elements here", "");
+    for (int64_t k = 0; k < model->n_materials; k++)
+        if (model->materials[k].lame.general)
+            refuse(out, "of orthotropic materials no energy is bounded here", "");
     for (int64_t e = 0; e < mesh->n_elements && !*out->why; e++)
         if (uz_element_type_of((uz_element_kind)mesh->kind[e])->nodes >
             uz_element_type_of((uz_element_kind)mesh->kind[e])->corners)

@@ -19,13 +19,34 @@
 
 /* ---------------------------------------------------------------- material */
 
+/* Linear elasticity of a material with directions, over the strains that a model has. */
+typedef struct {
+    double C[6][6], S[6][6]; /* stress = C strain, strain = S stress */
+    double expansion[6];     /* strain of a free body for a rise of temperature by 1, as of uz_thermal_strain */
+    /* Across a plane model, of plane strain the stress, of plane stress the strain: across . (xx, yy, xy) of stress
+     * and warmed for a rise by 1. */
+    double across[3], warmed;
+    double poisson; /* of the isotropic material that is as compressible, and as stiff in shear in the mean */
+} uz_anisotropy;
+
 /* Isotropic linear elasticity of a model: stress = lambda trace(strain) I + 2 mu strain, over the strains that the
- * model has. In plane stress lambda is E nu / (1 - nu^2), in the others Lame's own E nu / ((1 + nu)(1 - 2 nu)). */
+ * model has. In plane stress lambda is E nu / (1 - nu^2), in the others Lame's own E nu / ((1 + nu)(1 - 2 nu)).
+ * general (borrowed) is NULL then; of another material lambda and mu are NaN, so that whoever takes it for an isotropic
+ * one gets no number. */
 typedef struct {
     double lambda, mu;
+    const uz_anisotropy *general;
 } uz_lame;
 
 uz_lame uz_lame_of(uz_model model, double young, double poisson);
+/* Poisson's ratios and axes must be such that every strain has a positive energy: uz_orthotropic_energy. */
+void uz_orthotropic_make(uz_anisotropy *out, uz_model model, const uz_orthotropic *from);
+/* The determinant of the compliance for direct strains, each over the root of its moduli: (1 + nu)^2 (1 - 2 nu) of an
+ * isotropic material. With it the three 1 - nu_ij nu_ji, in the order xy, yz, xz, must be positive. */
+double uz_orthotropic_energy(double pair[3], const uz_orthotropic *from);
+uz_lame uz_lame_general(const uz_anisotropy *general);
+/* A bound on strain' C strain for strains of length 1. */
+double uz_most_stiffness(uz_lame lame);
 /* Of those in plane stress, which have no stress across the plane, the constants of the material itself. */
 uz_lame uz_lame_in_space(uz_model model, uz_lame lame);
 
@@ -35,12 +56,18 @@ int uz_stress_count(uz_model model);
 /* stress = C strain, each uz_stress_count(model) numbers; the two may be the same array. */
 void uz_elastic_stress(double *stress, uz_model model, uz_lame lame, const double *strain);
 
+/* stress' C^-1 stress. */
+double uz_stress_work(uz_model model, uz_lame lame, const double *stress);
+
 /* The strain of a free body whose temperature rose, `free_strain` = expansion * rise: that in each direct component.
- * In plane strain (1 + nu) times it, for what the held third direction adds. */
+ * In plane strain (1 + nu) times it, for what the held third direction adds. Of a material with directions
+ * `free_strain` is the rise alone. */
 void uz_thermal_strain(double *strain, uz_model model, uz_lame lame, double free_strain);
 
 /* The third direct stress of a plane model: 0 in plane stress, in plane strain nu (xx + yy) - E free_strain. */
 double uz_stress_zz(uz_model model, uz_lame lame, const double *stress, double free_strain);
+/* The third direct strain: 0 in plane strain, in plane stress free_strain - nu / E (xx + yy). */
+double uz_strain_zz(uz_model model, uz_lame lame, const double *stress, double free_strain);
 
 /* --------------------------------------------------------- reference element */
 

@@ -14,6 +14,8 @@
  * that is -2 mu / n in lambda's place, and one more rank-one update. n is 3; in plane strain 2, so that the third
  * direction keeps its strain of zero.
  *
+ * Of a material with directions (lame.general) B'CB is formed, with the same strains.
+ *
  * Incompatible modes are further shape functions without nodes (element_private.h), condensed at once. */
 #include "element/element_private.h"
 
@@ -85,6 +87,89 @@ static int flatten(double *v, double grad[][3], int count, int dim)
     return size;
 }
 
+/* Strains at a point by the size unknowns, of which v has the gradients; hoop: of rings. */
+static void strain_rows(double B[UZ_ELEMENT_STRESSES][MOST], uz_model model, const double *v, const double *hoop,
+                        int size, int dim)
+{
+    const int shear = model == UZ_SOLID || model == UZ_AXISYMMETRIC ? 3 : 2;
+    memset(B, 0, UZ_ELEMENT_STRESSES * sizeof B[0]);
+    for (int a = 0; a < size; a += dim) {
+        for (int c = 0; c < dim; c++)
+            B[c][a + c] = v[a + c];
+        B[shear][a] = v[a + 1];
+        B[shear][a + 1] = v[a];
+        if (model == UZ_AXISYMMETRIC)
+            B[2][a] = hoop[a];
+        if (dim < 3)
+            continue;
+        B[4][a + 1] = B[5][a] = v[a + 2];
+        B[4][a + 2] = v[a + 1];
+        B[5][a + 2] = v[a];
+    }
+}
+
+/* Mean dilatation: each of n direct strains gets an n-th of what the dilatation lacks of its mean. */
+static void take_mean(double B[UZ_ELEMENT_STRESSES][MOST], const double *mean, int dofs, int n)
+{
+    for (int i = 0; i < dofs; i++) {
+        double own = 0;
+        for (int k = 0; k < n; k++)
+            own += B[k][i];
+        for (int k = 0; k < n; k++)
+            B[k][i] += (mean[i] - own) / n;
+    }
+}
+
+/* A point's part of B'CB. */
+static void add_general(double *K, double B[UZ_ELEMENT_STRESSES][MOST], const uz_element *element, double volume,
+                        int size)
+{
+    const int n = uz_stress_count(element->model);
+    for (int i = 0; i < size; i++) {
+        double stress[UZ_ELEMENT_STRESSES];
+        for (int k = 0; k < n; k++)
+            stress[k] = B[k][i];
+        uz_elastic_stress(stress, element->model, element->lame, stress);
+        for (int j = 0; j <= i; j++)
+            for (int k = 0; k < n; k++)
+                K[i * MOST + j] += volume * stress[k] * B[k][j];
+    }
+}
+
+/* integrate() of a material with directions, but for the last step. */
+static void integrate_general(double *K, const uz_element *element, int size)
+{
+    double B[UZ_ELEMENT_STRESSES][MOST], centre[3][3], mode[3][3], v[MOST], mean[MOST], hoop[MOST] = {0};
+    double centre_det = 1;
+    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_rule(element->kind, element->model)->count, dofs = nodes * dim;
+    const bool averaged = element->formulation == UZ_FORMULATION_BBAR;
+    if (size > dofs)
+        centre_det = uz_centre_jacobian(centre, element);
+    if (averaged) {
+        double means[UZ_ELEMENT_NODES][3];
+        uz_mean_gradients(means, element);
+        flatten(mean, means, nodes, dim);
+    }
+    for (int g = 0; g < count; g++) {
+        uz_gauss_state state;
+        uz_gauss_state_at(&state, element, g);
+        flatten(v, state.grad, nodes, dim);
+        if (size > dofs) {
+            uz_mode_gradients(mode, centre, centre_det, dim, state.point, state.det);
+            flatten(v + dofs, mode, dim, dim);
+        }
+        for (int a = 0; a < nodes && element->model == UZ_AXISYMMETRIC; a++)
+            hoop[2 * a] = state.N[a] / state.radius;
+        strain_rows(B, element->model, v, hoop, size, dim);
+        if (averaged)
+            take_mean(B, mean, dofs, element->model == UZ_PLANE_STRAIN ? 2 : 3);
+        add_general(K, B, element, state.volume, size);
+    }
+}
+
+static void factor_modes(double *K, int dofs, int size);
+
 /* Lower triangle, with the internal parameters last; rows MOST apart. Of their block A there is L, A = L L'. Returns
  * the size. */
 static int integrate(double *K, const uz_element *element)
@@ -100,6 +185,11 @@ static int integrate(double *K, const uz_element *element)
     for (int i = 0; i < size; i++)
         for (int j = 0; j <= i; j++)
             S[i * MOST + j] = K[i * MOST + j] = 0;
+    if (element->lame.general) {
+        integrate_general(K, element, size);
+        factor_modes(K, dofs, size);
+        return size;
+    }
     if (modes)
         centre_det = uz_centre_jacobian(centre, element);
     for (int g = 0; g < count; g++) {
@@ -132,6 +222,12 @@ static int integrate(double *K, const uz_element *element)
         flatten(v, means, nodes, dim);
         add_product(K, dofs, (element->lame.lambda + share) * volume, v);
     }
+    factor_modes(K, dofs, size);
+    return size;
+}
+
+static void factor_modes(double *K, int dofs, int size)
+{
     for (int i = dofs; i < size; i++)
         for (int j = dofs; j <= i; j++) {
             double sum = K[i * MOST + j];
@@ -139,7 +235,6 @@ static int integrate(double *K, const uz_element *element)
                 sum -= K[i * MOST + k] * K[j * MOST + k];
             K[i * MOST + j] = i == j ? sqrt(sum) : sum / K[j * MOST + j];
         }
-    return size;
 }
 
 void uz_internal_parameters(double internal[UZ_ELEMENT_INTERNAL], const uz_element *element, const double *u)

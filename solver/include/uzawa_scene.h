@@ -154,10 +154,24 @@ typedef enum {
     UZ_ELASTICITIES                 /* how many */
 } uz_elasticity;
 
+/* Three planes of symmetry, as of wood, rolled sheet or fibres in one direction. A number with two axes i, j has first
+ * that which is pulled: poisson is -strain j over strain i under a stress along i, so that poisson_ij / young_i is the
+ * same for ij and ji. */
+typedef struct {
+    double young[3];     /* along the material's own axes */
+    double poisson[3];   /* xy, yz, xz */
+    double shear[3];     /* xy, yz, xz */
+    double expansion[3]; /* strain per unit of temperature */
+    double axes[2][3];   /* its x and y, of any length, across each other; plane models and rings: in the plane. All 0:
+                          * those of the scene */
+} uz_orthotropic;
+
 typedef struct {
     char on[64];
     uz_elasticity law; /* kinematics FINITE: any but the linear one; FIXED, MOVING: that one */
     double young, poisson;
+    bool is_orthotropic; /* of the linear law; young, poisson and expansion are not read, and yield is 0 */
+    uz_orthotropic orthotropic;
     double density;   /* mass per volume: 0 where no gravity asks for it */
     double expansion; /* strain per unit of temperature */
     double yield;     /* von Mises' stress that it may bear; 0: not known */

@@ -109,8 +109,7 @@ void uz_field_state_of_strain(uz_field_state *out, uz_model model, const uz_body
     }
     /* What a plane model leaves out: stress and strain across the plane. */
     const double zz = uz_stress_zz(model, material->lame, stress, free_strain);
-    const double poisson = material->poisson, young = 2 * material->lame.mu * (1 + poisson);
-    const double strain_zz = model == UZ_PLANE_STRESS ? free_strain - poisson / young * (stress[0] + stress[1]) : 0;
+    const double strain_zz = uz_strain_zz(model, material->lame, stress, free_strain);
     memcpy(out->stress, (double[4]){stress[0], stress[1], zz, stress[2]}, 4 * sizeof *stress);
     memcpy(out->strain, (double[4]){strain[0], strain[1], strain_zz, strain[2]}, 4 * sizeof *strain);
 }

@@ -17,32 +17,51 @@
 
 #include <math.h>
 
+#define PI 3.14159265358979323846
+
 typedef struct {
     double squares, along, law, turns, gradient; /* integrals */
     double stress[3], modulus;                   /* the same; xx, yy, xy */
 } sums;
 
+/* The least modulus of a strip, whatever its direction. */
+static double strip_modulus(const uz_lame *lame)
+{
+    enum { DIRECTIONS = 24 };
+    double softest = 0;
+    if (!lame->general)
+        return 4 * lame->mu * (lame->lambda + lame->mu) / (lame->lambda + 2 * lame->mu);
+    for (int k = 0; k < DIRECTIONS; k++) {
+        const double c = cos(PI * k / DIRECTIONS), s = sin(PI * k / DIRECTIONS), pull[3] = {c * c, s * s, c * s};
+        softest = fmax(softest, uz_stress_work(UZ_PLANE_STRAIN, *lame, pull));
+    }
+    return 1 / softest;
+}
+
 static void add_point(sums *to, double weight, const uz_lame *lame, double H[2][2])
 {
-    double Q[3], e[3]; /* xx, yy, xy */
+    double Q[3], e[3], of_Q[3], of_e[3], work[3] = {0}; /* xx, yy, xy; of C Q : Q, C e : Q, C e : e */
     for (int k = 0; k < 3; k++) {
         const int i = k == 1, j = k > 0;
-        Q[k] = H[0][i] * H[0][j] + H[1][i] * H[1][j];
-        e[k] = 0.5 * (H[i][j] + H[j][i]);
+        Q[k] = (k == 2 ? 2 : 1) * (H[0][i] * H[0][j] + H[1][i] * H[1][j]);
+        e[k] = (k == 2 ? 1 : 0.5) * (H[i][j] + H[j][i]);
     }
-    const double spread = Q[0] + Q[1], trace = e[0] + e[1];
+    uz_elastic_stress(of_Q, UZ_PLANE_STRAIN, *lame, Q);
+    uz_elastic_stress(of_e, UZ_PLANE_STRAIN, *lame, e);
+    for (int k = 0; k < 3; k++) {
+        work[0] += of_Q[k] * Q[k];
+        work[1] += of_e[k] * Q[k];
+        work[2] += of_e[k] * e[k];
+    }
     const double size = H[0][0] * H[0][0] + H[0][1] * H[0][1] + H[1][0] * H[1][0] + H[1][1] * H[1][1];
-    to->squares +=
-        0.25 * weight * (lame->lambda * spread * spread + 2 * lame->mu * (Q[0] * Q[0] + Q[1] * Q[1] + 2 * Q[2] * Q[2]));
-    to->along +=
-        weight * (lame->lambda * trace * spread + 2 * lame->mu * (e[0] * Q[0] + e[1] * Q[1] + 2 * e[2] * Q[2]));
+    to->squares += 0.25 * weight * work[0];
+    to->along += weight * work[1];
     to->gradient += weight * size;
     to->turns += 0.5 * weight * (H[1][0] - H[0][1]) * (H[1][0] - H[0][1]);
     for (int k = 0; k < 3; k++)
-        to->stress[k] += weight * (2 * lame->mu * e[k] + (k < 2 ? lame->lambda * trace : 0));
-    to->modulus += weight * 4 * lame->mu * (lame->lambda + lame->mu) / (lame->lambda + 2 * lame->mu);
-    to->law +=
-        weight * size * (lame->lambda * trace * trace + 2 * lame->mu * (e[0] * e[0] + e[1] * e[1] + 2 * e[2] * e[2]));
+        to->stress[k] += weight * of_e[k];
+    to->modulus += weight * strip_modulus(lame);
+    to->law += weight * size * work[2];
 }
 
 double uz_least_buckling_strain(const uz_body_model *model)

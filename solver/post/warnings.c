@@ -161,10 +161,23 @@ static bool may_be_nonlinear(const doubts *d)
     const double U = d->out->strain_energy, extent = d->model->mesh.extent;
     double stiffest = 0;
     for (int64_t k = 0; k < d->model->n_materials; k++)
-        stiffest = fmax(stiffest, d->model->materials[k].lame.lambda + 2 * d->model->materials[k].lame.mu);
+        stiffest = fmax(stiffest, uz_most_stiffness(d->model->materials[k].lame));
     const double most = sqrt(stiffest * extent * extent * d->model->thickness), least = 0.25 * UZ_SURELY_SMALL;
     const double buckles = UZ_SURELY_SMALL * uz_least_buckling_strain(d->model);
     return U > 0 && is_steep(d, 0.25 * fmin(buckles, fmin(least, sqrt(2 * least * sqrt(2 * U) / most))));
+}
+
+/* Of orthotropic materials there is no law of finite strain that the answer could be compared with. */
+static void look_at_materials(const doubts *d)
+{
+    bool has = false;
+    for (int64_t k = 0; k < d->model->n_materials; k++)
+        has = has || d->model->materials[k].lame.general;
+    if (has && d->out->nonlinear > UZ_MOST_SLIDING)
+        warn(d->out, "large_deformation", d->out->nonlinear,
+             "small deformation errs by some %.2g %% as rotations are large, and orthotropic materials have no other: "
+             "put less load on it",
+             100 * d->out->nonlinear);
 }
 
 void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)
@@ -524,6 +537,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     if (scene->kinematics == UZ_KINEMATICS_AUTO && scene->model == UZ_PLANE_STRAIN && uz_has_finite_model(scene) &&
         (uz_has_finite_law(scene) || model->d <= UZ_MOST_COMPARED))
         d.out->nonlinear = may_be_nonlinear(&d) ? uz_measure_nonlinear(model, result->u, d.out->strain_energy) : 0;
+    look_at_materials(&d);
     look_at_mesh(&d);
     look_at_surfaces(&d);
     uz_status status = look_at_contact(&d, err);

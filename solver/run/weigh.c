@@ -39,6 +39,9 @@ static bool is_asked(const uz_result *result, const uz_problem *one, bool own_la
         return false;
     if (own_laws)
         return e->nonlinear > UZ_SURELY_SMALL || s->geometry.sliding > SLIDES;
+    for (int64_t k = 0; k < one->scene.n_materials; k++)
+        if (one->scene.materials[k].is_orthotropic) /* there is no law to compare with: a warning has told */
+            return false;
     return e->nonlinear > UZ_SURELY_SMALL && s->semicoercive.free_modes == 0;
 }
 

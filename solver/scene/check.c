@@ -145,7 +145,7 @@ static uz_status check_on_elements(const uz_scene *scene, const uz_mesh *mesh, i
                        LOAD_KEY[load->kind]);
     for (int64_t k = 0; k < scene->n_materials; k++) {
         density = density || scene->materials[k].density != 0;
-        expansion = expansion || scene->materials[k].expansion != 0;
+        expansion = expansion || uz_expands(&scene->materials[k]);
     }
     if (load->kind == UZ_LOAD_GRAVITY && !density)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "gravity"),

@@ -38,6 +38,10 @@ static uz_status check_laws(const uz_scene *scene, uz_error *err)
         if (law >= UZ_ELASTICITIES)
             return uz_fail(err, UZ_ERR_SCENE, where,
                            "unknown law; use linear, st_venant_kirchhoff, neo_hooke or neo_hooke_isochoric");
+        if (finite && scene->materials[i].is_orthotropic)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "orthotropic"),
+                           "orthotropic materials are linear, which says nothing of finite strain: use the kinematics "
+                           "\"moving\", or isotropic ones, all of such a law");
         if (finite && law == UZ_ELASTIC_LINEAR)
             return uz_fail(err, UZ_ERR_SCENE, where,
                            "the linear law says nothing of finite strain, and which law is taken decides the answer "

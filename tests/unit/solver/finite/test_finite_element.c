@@ -111,7 +111,7 @@ static uz_element bent_element(double *xyz, uz_element_kind kind, qp_random *rng
     return (uz_element){.kind = kind,
                         .model = type->dim == 2 ? UZ_PLANE_STRAIN : UZ_SOLID,
                         .formulation = UZ_FORMULATION_STANDARD,
-                        .lame = {LAMBDA, MU},
+                        .lame = {LAMBDA, MU, NULL},
                         .thickness = 1.5,
                         .xyz = xyz};
 }
