@@ -303,19 +303,43 @@ static bool decode_materials(uz_scene *out, decoding *d, const json_value *list)
     return out->materials != NULL;
 }
 
+/* Where no component is given all are held. */
+static bool decode_rotation(uz_support *to, decoding *d, const json_value *given, int dim)
+{
+    const double angle = PER_DEGREE * json_number(json_get(given, "angle"), 0);
+    const json_value *axis = json_get(given, "axis");
+    double along[3] = {0, 0, 1}, length = 0;
+    if (!decode_components(to->about, d, given, "about", 0, dim, NULL))
+        return false;
+    if (axis && !decode_components(along, d, given, "axis", 0, 3, "it must be the direction of the axis"))
+        return false;
+    for (int c = 0; c < 3; c++)
+        length = hypot(length, along[c]);
+    for (int c = 0; c < 3; c++)
+        to->turn[c] = angle * (along[c] / length);
+    bool any = false;
+    for (int c = 0; c < dim; c++)
+        any = any || !isnan(to->u[c]);
+    for (int c = 0; c < dim && !any; c++)
+        to->u[c] = 0;
+    return true;
+}
+
 static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
 {
     static const char *const COMPONENTS[] = {"ux", "uy", "uz"};
     const int dim = uz_scene_dim(out);
     out->supports = decode_room(d, list, sizeof *out->supports, &out->n_supports);
     for (int64_t i = 0; i < out->n_supports; i++) {
-        const json_value *item = &list->items[i];
+        const json_value *item = &list->items[i], *rotation = json_get(item, "rotation");
         uz_support *to = &out->supports[i];
         if (!decode_group(to->on, d, json_get(item, "on"), GROUP_OF_ANY))
             return false;
         for (int c = 0; c < 3; c++)
             to->u[c] = json_number(json_get(item, COMPONENTS[c]), (double)NAN);
         to->kind = UZ_SUPPORT_COMPONENTS;
+        if (rotation && !decode_rotation(to, d, rotation, dim))
+            return false;
         if (json_get(item, "normal")) {
             to->kind = UZ_SUPPORT_NORMAL;
             to->value = json_number(json_get(item, "u"), 0);

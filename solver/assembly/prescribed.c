@@ -7,6 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -22,6 +23,25 @@ typedef struct {
     int64_t *source; /* n_fixed: 1 + the support that gave it, 0: none yet */
 } prescription;
 
+/* What a support's turn does at x: a x r of small deformation, r = x - about; exactly, with the unit axis e and the
+ * angle t, sin t (e x r) - (1 - cos t) (r - (e . r) e) (Rodrigues). */
+static void turned(double out[3], const uz_support *support, const double *x, int dim, bool exactly)
+{
+    const double *a = support->turn, angle = hypot(hypot(a[0], a[1]), a[2]);
+    double r[3] = {0}, along = 0;
+    for (int c = 0; c < dim; c++) {
+        r[c] = x[c] - support->about[c];
+        along += angle > 0 ? r[c] * a[c] / angle : 0;
+    }
+    const double sine = exactly && angle > 0 ? sin(angle) / angle : 1, half = sin(angle / 2);
+    for (int c = 0; c < 3; c++) {
+        const int d = (c + 1) % 3, e = (c + 2) % 3;
+        out[c] = sine * (a[d] * r[e] - a[e] * r[d]);
+        if (exactly && angle > 0)
+            out[c] -= 2 * half * half * (r[c] - along * a[c] / angle);
+    }
+}
+
 #define OTHER_BODY "the scene's supports are not those of this body"
 
 static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c, double value, uz_error *err)
@@ -36,7 +56,13 @@ static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c
         return uz_fail(err, UZ_ERR_SCENE, "/supports",
                        "node %lld of \"%.63s\" is on the axis of rotation and cannot leave it: ux = %g must be 0",
                        (long long)node, p->scene->supports[support].on, value);
-    if (p->source[fixed] && p->value[fixed] != value) {
+    const uz_support *own = &p->scene->supports[support];
+    /* turns about different points may do the same, to rounding */
+    const double rounding =
+        uz_support_turns(own)
+            ? AGREE * (fabs(value) + p->model->mesh.extent * fabs(own->turn[0] + own->turn[1] + own->turn[2]))
+            : 0;
+    if (p->source[fixed] && fabs(p->value[fixed] - value) > rounding) {
         char where[96];
         const char axis = "xyz"[c];
         const int64_t earlier = p->source[fixed] - 1;
@@ -106,8 +132,13 @@ uz_status uz_prescribed_values(double *value, const uz_body_model *model, const 
         status = group ? UZ_OK : UZ_ERR_SCENE;
         uz_support_values(u, support, mesh->dim);
         for (int c = 0; c < mesh->dim && !inclined; c++)
-            for (int64_t i = 0; i < count && status == UZ_OK && !isnan(u[c]); i++)
-                status = prescribe(&p, k, uz_group_node_at(group, i), c, u[c], err);
+            for (int64_t i = 0; i < count && status == UZ_OK && !isnan(u[c]); i++) {
+                const int64_t node = uz_group_node_at(group, i);
+                double moved[3] = {0};
+                if (uz_support_turns(support))
+                    turned(moved, support, mesh->xyz + node * mesh->dim, mesh->dim, uz_is_finite_answer(scene));
+                status = prescribe(&p, k, node, c, u[c] + moved[c], err);
+            }
         const bool along = inclined && uz_support_is_inclined(n, support, mesh->dim);
         for (int64_t i = 0; along && i < count && status == UZ_OK; i++)
             status = prescribe_along(&p, k, uz_group_node_at(group, i), n, err);

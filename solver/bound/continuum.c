@@ -260,6 +260,8 @@ static void take_supports(survey *x)
     static const double AXIS[2][3] = {{1, 0, 0}, {0, 1, 0}};
     for (int64_t k = 0; k < x->scene->n_supports; k++) {
         const uz_support *support = &x->scene->supports[k];
+        if (uz_support_turns(support))
+            refuse(x->body, "the support on \"%s\" rotates, and edges here are moved without turning", support->on);
         if (!find_group(x, support->on))
             refuse(x->body, "the support on \"%s\" holds single nodes, which the continuum does not feel", support->on);
         for (int64_t i = 0; i < x->n_found; i++) {

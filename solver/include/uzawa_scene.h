@@ -185,7 +185,10 @@ typedef enum {
 typedef struct {
     uz_support_kind kind;
     char on[64];
-    double u[3];             /* components; NaN: that direction is free */
+    double u[3]; /* components; NaN: that direction is free */
+    /* Components: to u comes what a turn about this point does, by an angle (radians) along its axis, of plane models
+     * z; 0: none. It is linear in the angle, a x (x - about), but exact where the answer is of finite kinematics. */
+    double about[3], turn[3];
     double normal[3], value; /* normal: u . normal / ||normal|| = value */
     double spring[3];        /* force per length, of the whole group, spread over it by area; >= 0 */
 } uz_support;

@@ -13,7 +13,7 @@
 #include <string.h>
 
 /* A rotation by w makes strains of w^2 / 2 that are not there: at 0.1 half a per cent. */
-static const double MOST_ROTATION = 0.1, MOST_STRAIN = 0.05;
+static const double MOST_ROTATION = 0.1, MOST_STRAIN = 0.05, MOST_TURN = 0.05;
 /* The least cosine between normals that point the same way: not those of faces along the obstacle. */
 static const double AWAY = 0.1;
 
@@ -165,6 +165,20 @@ static bool may_be_nonlinear(const doubts *d)
     const double most = sqrt(stiffest * extent * extent * d->model->thickness), least = 0.25 * UZ_SURELY_SMALL;
     const double buckles = UZ_SURELY_SMALL * uz_least_buckling_strain(d->model);
     return U > 0 && is_steep(d, 0.25 * fmin(buckles, fmin(least, sqrt(2 * least * sqrt(2 * U) / most))));
+}
+
+/* Small deformation takes a turn for a x r, which stretches what turns by a^2 / 2. */
+static void look_at_turns(const doubts *d)
+{
+    for (int64_t k = 0; k < d->scene->n_supports && !uz_is_finite_answer(d->scene); k++) {
+        const uz_support *support = &d->scene->supports[k];
+        const double angle = hypot(hypot(support->turn[0], support->turn[1]), support->turn[2]);
+        if (uz_support_turns(support) && angle > MOST_TURN)
+            warn(d->out, "large_rotation", angle,
+                 "support %lld rotates \"%.63s\" by %.2g rad, which small deformation takes for %.2g %% of stretch: "
+                 "take a law of finite strain and the kinematics \"finite\"",
+                 (long long)k, support->on, angle, 100 * (hypot(1, angle) - 1));
+    }
 }
 
 /* Of orthotropic materials there is no law of finite strain that the answer could be compared with. */
@@ -538,6 +552,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
         (uz_has_finite_law(scene) || model->d <= UZ_MOST_COMPARED))
         d.out->nonlinear = may_be_nonlinear(&d) ? uz_measure_nonlinear(model, result->u, d.out->strain_energy) : 0;
     look_at_materials(&d);
+    look_at_turns(&d);
     look_at_mesh(&d);
     look_at_surfaces(&d);
     uz_status status = look_at_contact(&d, err);

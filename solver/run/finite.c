@@ -76,8 +76,10 @@ static uz_status put_on(uz_finite_run *run, double t, uz_error *err)
     const double moved = (1 - t) * (run->from ? run->from->part : 0) + t * run->part;
     run->load = t;
     for (int64_t i = 0; i < whole->n_supports; i++) {
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++) {
             run->scene.supports[i].u[c] = moved * whole->supports[i].u[c]; /* NaN where free */
+            run->scene.supports[i].turn[c] = moved * whole->supports[i].turn[c];
+        }
         run->scene.supports[i].value = moved * whole->supports[i].value;
     }
     for (int64_t i = 0; i < run->scene.n_loads; i++) /* its own, and then those that it goes away from */

@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "element/element_type.h"
 #include "scene/mesh.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -86,6 +87,12 @@ uz_status uz_choose_rows(uz_candidates *rows, const double *h, int64_t m, const 
         double u = 0;
         for (int c = 0; c < info->dim && s->kind == UZ_SUPPORT_COMPONENTS; c++)
             u = isnan(s->u[c]) ? u : hypot(u, s->u[c]);
+        if (uz_support_turns(s)) { /* no node is farther from what it turns about than this */
+            double away = 0;
+            for (int c = 0; c < info->dim && info->n_nodes > 0; c++)
+                away = hypot(away, info->xyz[c] - s->about[c]);
+            u += (away + sqrt(square)) * hypot(hypot(s->turn[0], s->turn[1]), s->turn[2]);
+        }
         most = fmax(most, s->kind == UZ_SUPPORT_NORMAL ? fabs(s->value) : u);
     }
     uz_status status = uz_candidates_first(rows, h, m, UZ_CANDIDATES_REACH * sqrt(square) + most, err);

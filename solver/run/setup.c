@@ -84,6 +84,8 @@ uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz
         for (int64_t i = 0; omits && i < scene->n_supports; i++) {
             uz_digest_add(state, scene->supports[i].u, sizeof scene->supports[i].u);
             uz_digest_add(state, &scene->supports[i].value, sizeof scene->supports[i].value);
+            uz_digest_add(state, scene->supports[i].about, sizeof scene->supports[i].about);
+            uz_digest_add(state, scene->supports[i].turn, sizeof scene->supports[i].turn);
         }
         if (omits && wanted && wanted->in)
             uz_digest_add(state, wanted->in, (size_t)wanted->m);

@@ -19,11 +19,15 @@ const uz_group *uz_check_sides(char where[UZ_CHECK_POINTER], const uz_mesh *mesh
 uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i, const char *key, uz_error *err);
 uz_status uz_check_number(double value, const char *list, int64_t i, const char *key, uz_error *err);
 
+/* Radians; a group that turns by more in small deformation would be stretched by more than an eighth. */
+#define UZ_MOST_LINEAR_TURN 0.5
 /* Group, directions and values of support i; groups and directions of contact i, whose sides no
  * contact before it may have named for each other. */
 uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err);
 uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err);
 /* What finite kinematics have no model for, and laws that need them (check_finite.c): of the body, and of its loads. */
+/* Finite kinematics may be what it is solved with. */
+bool uz_may_be_finite(const uz_scene *scene);
 uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err);
 uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err);
 /* Does a temperature do anything to it? */

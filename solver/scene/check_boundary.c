@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define DEGREE (180 / 3.14159265358979323846)
+
 bool uz_unit_normal(double out[3], const double normal[3], int dim)
 {
     double largest = 0, norm = 0;
@@ -42,6 +44,38 @@ static uz_status check_direction(const double normal[3], int dim, const char *li
     return status;
 }
 
+bool uz_support_turns(const uz_support *support)
+{
+    return support->kind == UZ_SUPPORT_COMPONENTS &&
+           (support->turn[0] != 0 || support->turn[1] != 0 || support->turn[2] != 0);
+}
+
+static uz_status check_turn(const uz_scene *scene, int64_t i, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    const uz_support *support = &scene->supports[i];
+    const double *turn = support->turn, angle = hypot(hypot(turn[0], turn[1]), turn[2]);
+    uz_status status = uz_check_vector(support->about, 3, "supports", i, "rotation/about", err);
+    if (status == UZ_OK)
+        status = uz_check_number(angle, "supports", i, "rotation/angle", err);
+    if (status != UZ_OK)
+        return status;
+    if (scene->model == UZ_AXISYMMETRIC)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rotation"),
+                       "a body of revolution stays one, and nothing of it can rotate; prescribe ux and uy, or mesh it "
+                       "as a solid");
+    if (scene->model != UZ_SOLID && (turn[0] != 0 || turn[1] != 0))
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rotation/axis"),
+                       "a plane body rotates about z only; leave the axis out");
+    if (angle > UZ_MOST_LINEAR_TURN && !uz_may_be_finite(scene))
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rotation/angle"),
+                       "a rotation by %g degrees is not small, and small deformation would stretch the group by %.2g "
+                       "%%; use a law of finite strain (st_venant_kirchhoff, neo_hooke) with the kinematics "
+                       "\"finite\", or at most %.3g degrees",
+                       angle * DEGREE, 100 * (hypot(1, angle) - 1), UZ_MOST_LINEAR_TURN * DEGREE);
+    return UZ_OK;
+}
+
 uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
@@ -60,6 +94,8 @@ uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i
                                "the prescribed displacement is not a finite number");
             any = any || !isnan(support->u[c]);
         }
+        if (any && uz_support_turns(support))
+            return check_turn(scene, i, err);
         return any ? UZ_OK
                    : uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, NULL),
                              "this support holds no direction; give %s",

@@ -21,8 +21,7 @@ bool uz_is_finite_answer(const uz_scene *scene)
            (scene->kinematics == UZ_KINEMATICS_AUTO && scene->place && uz_has_finite_law(scene));
 }
 
-/* Finite kinematics may be what it is solved with. */
-static bool may_be_finite(const uz_scene *scene)
+bool uz_may_be_finite(const uz_scene *scene)
 {
     return scene->kinematics == UZ_KINEMATICS_FINITE ||
            (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_law(scene));
@@ -30,7 +29,7 @@ static bool may_be_finite(const uz_scene *scene)
 
 static uz_status check_laws(const uz_scene *scene, uz_error *err)
 {
-    const bool finite = may_be_finite(scene);
+    const bool finite = uz_may_be_finite(scene);
     char where[UZ_CHECK_POINTER];
     for (int64_t i = 0; i < scene->n_materials; i++) {
         const uz_elasticity law = scene->materials[i].law;
@@ -139,13 +138,13 @@ static uz_status check_loads(const uz_scene *scene, uz_error *err)
 uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err)
 {
     const uz_status status = check_laws(scene, err);
-    return status == UZ_OK && may_be_finite(scene) ? check_body(scene, err) : status;
+    return status == UZ_OK && uz_may_be_finite(scene) ? check_body(scene, err) : status;
 }
 
 uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err)
 {
     const uz_status status = uz_check_finite_body(scene, err); /* the body may be one of other kinematics */
-    return status == UZ_OK && may_be_finite(scene) ? check_loads(scene, err) : status;
+    return status == UZ_OK && uz_may_be_finite(scene) ? check_loads(scene, err) : status;
 }
 
 bool uz_has_finite_model(const uz_scene *scene)

@@ -20,6 +20,9 @@ bool uz_is_finite_answer(const uz_scene *scene);
 /* Is there a model of large deformation for it, with laws of finite strain? (check_finite.c) */
 bool uz_has_finite_model(const uz_scene *scene);
 
+/* Does it turn its group? */
+bool uz_support_turns(const uz_support *support);
+
 /* normal / ||normal||, whatever its length. A component that is zero but for rounding becomes zero: it would make a
  * contact row out of noise. False where there is no direction (zero, NaN, Inf). */
 bool uz_unit_normal(double out[3], const double normal[3], int dim);
