@@ -96,7 +96,7 @@ static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *e
     if (!(s->largest / s->unit < FAR))
         return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacements are %g times the body's size: cannot be drawn",
                        s->largest / s->unit);
-    s->factor = uz_show_factor(w->scene, mesh, w->answer->u);
+    s->factor = uz_show_factor(w->scene, w->model, w->answer);
     return UZ_OK;
 }
 

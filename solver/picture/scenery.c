@@ -13,6 +13,7 @@
 
 /* ---- from the body's coordinates to pixels */
 
+#define UNSEEN 0.005 /* of the size of the body */
 enum { MARGIN = 50, LEAST_HEIGHT = 160, MOST_HEIGHT = 1600 };
 
 uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x)
@@ -38,14 +39,40 @@ uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double 
     return point;
 }
 
-double uz_show_factor(const uz_scene *scene, const uz_mesh *mesh, const double *u)
+/* The largest distance that displacements closed, or opened, between what touches now. */
+static double largest_closed_gap(const uz_body_model *model, const uz_field_source *answer)
 {
+    const int dim = model->mesh.dim;
+    double largest = 0;
+    for (int64_t i = 0; answer->r && i < model->m; i++) {
+        if (!(answer->r[i] < 0))
+            continue;
+        const uz_contact_sites *sites = &model->sites[model->info.contact_of[i]];
+        double gap = 0;
+        if (sites->n > 0 && !model->place) {
+            gap = sites->gap[model->row_place[i]];
+        } else { /* before a plane; or the gap of the sites is not that before anything moved */
+            const double *u = answer->u + model->info.contact_node[i] * dim;
+            for (int c = 0; c < dim; c++)
+                gap += model->info.contact_normal[i * dim + c] * u[c];
+        }
+        largest = fmax(largest, fabs(gap));
+    }
+    return largest;
+}
+
+double uz_show_factor(const uz_scene *scene, const uz_body_model *model, const uz_field_source *answer)
+{
+    const uz_mesh *mesh = &model->mesh;
     double largest = 0;
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
-        largest = fmax(largest, fabs(u[i]));
-    const double ideal = 0.06 * mesh->extent / largest;
-    if (!(largest > 0 && isfinite(ideal)) || uz_is_finite_answer(scene))
+        largest = fmax(largest, fabs(answer->u[i]));
+    if (!(largest > 0 && isfinite(0.06 * mesh->extent / largest)) || uz_is_finite_answer(scene))
         return 1; /* larger rotations are not small rotations times a number */
+    /* What closed a gap would be drawn into the obstacle by the gap times the factor less one, what gave way to an
+     * overlap away from it: up to what a line's width hides. */
+    const double ideal =
+        fmin(0.06 * mesh->extent / largest, 1 + UNSEEN * mesh->extent / largest_closed_gap(model, answer));
     /* A power of ten times 1, 2 or 5: a factor that reads well. */
     const double power = pow(10, floor(log10(ideal))), rest = ideal / power;
     return fmax(power * (rest < 2 ? 1 : rest < 5 ? 2 : 5), 1);
@@ -62,7 +89,7 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
     memcpy(scenery->axes, scenery->model->mesh.dim == 2 ? PLANE : solid, sizeof scenery->axes);
     scenery->extent = scenery->model->mesh.extent;
     if (!(scenery->factor > 0))
-        scenery->factor = uz_show_factor(scenery->scene, &scenery->model->mesh, scenery->answer->u);
+        scenery->factor = uz_show_factor(scenery->scene, scenery->model, scenery->answer);
     scenery->scale = 1;
     scenery->offset[0] = scenery->offset[1] = 0;
     /* where the nodes are before and after, in lengths */

@@ -157,6 +157,24 @@ TEST(an_arrow_for_each_node_that_touches_and_the_obstacle)
     drop(&s);
 }
 
+/* A node that came from 2e-5 above the plane would be drawn that much times the factor into it. */
+TEST(what_touches_does_not_seem_to_overlap)
+{
+    uz_scene scene = box_scene(60, 20, 30, 10);
+    add_support(&scene, "left", 0, 0);
+    add_load(&scene, "top", 0, -0.05);
+    add_load(&scene, "right", 0.5, 0);
+    add_plane(&scene, "bottom", 0, -2e-5, 0, 1);
+    solved s = solve_scene(scene);
+    char *svg = draw(&s, (uz_picture){.colour = UZ_FIELD_DISPLACEMENTS});
+    const char *told = strstr(svg, "displacements \u00d7 ");
+    const double factor = told ? atof(told + strlen("displacements \u00d7 ")) : 0;
+    CHECK(s.result->summary.active > 0);
+    CHECK_MSG(factor >= 2000 && factor * 2e-5 < 0.005 * 70, "%g", factor);
+    free(svg);
+    drop(&s);
+}
+
 /* Tall, flat, far from the origin, not deformed at all, in other units: always a picture of bounded size. */
 static int count_of(const char *text, const char *word)
 {
