@@ -1,9 +1,9 @@
 // body.js: the deformed body of a job, and the contact pressure along its surface.
 
-import { Camera } from "./body_camera.js";
+import { Camera, VIEWS } from "./body_camera.js";
 import { listen } from "./body_input.js";
 import { Overlay } from "./body_overlay.js";
-import { add_stress, displacement_of, forget_surface, load_surface, node_of, place_of, quantities, rows_by_vertex, shades_of, values_of, viridis } from "./body_surface.js";
+import { add_stress, displacement_of, forget_surface, load_surface, node_of, place_of, push_of, quantities, rows_by_vertex, shades_of, values_of, viridis } from "./body_surface.js";
 import { announce, h, s, show } from "./dom.js";
 import { number } from "./format.js";
 import { mountPressure } from "./pressure.js";
@@ -51,7 +51,7 @@ function choice(label, entries, value, change) {
 class BodyView {
   constructor(element, api, job, options) {
     Object.assign(this, { element, api, job, options, case_name: options.case || options.cases?.[0] || "", ends: new AbortController() });
-    Object.assign(this, { quantity: "displacement", factor: 0, marked: -1, held: -1, frame: 0, frames: 0, number: ++mounts });
+    Object.assign(this, { quantity: "", limits: null, factor: 0, marked: -1, held: -1, frame: 0, frames: 0, number: ++mounts });
     this.shown = { wire: true, before: true, obstacles: true, forces: true };
   }
 
@@ -127,7 +127,8 @@ class BodyView {
         button("auto", "Draw displacements so that they show", () => this.scale(surface.factor))),
       h("span", { class: "body-parts" }, parts),
       h("span", { class: "body-buttons" }, button("+", "Larger", () => (this.view.zoom(1.25), this.redraw())), button("−", "Smaller", () => (this.view.zoom(0.8), this.redraw())),
-        button("Show all", "Show all of the body", () => this.home()), button("SVG", "Save as a picture for a report", () => this.save())));
+        button("Show all", "Show all of the body", () => this.home()), this.pressed.length ? button("Contact", "Show where it touches", () => this.look()) : null,
+        surface.dim === 3 ? VIEWS.map(([name, ...turn]) => button(name, `See it from the ${name.toLowerCase()}`, () => this.turn(...turn))) : null, button("SVG", "Save as a picture for a report", () => this.save())));
   }
 
   /** ", MPa": what the scene calls the unit of a quantity. */
@@ -145,13 +146,37 @@ class BodyView {
     show(this.legend, h("div", { class: "body-quantity" }, name + this.unit(this.quantity)), s("svg", { viewBox: "0 0 320 30", width: 320, height: 30, role: "img", "aria-label": `${name}: colours from ${exact(low)} to ${exact(high)}` },
       s("defs", null, s("linearGradient", { id }, stops)), s("rect", { width: 320, height: 12, fill: `url(#${id})` }),
       texts.map(([t, anchor, value]) => s("text", { x: 320 * t, y: 26, "text-anchor": anchor }, exact(value)))),
+      h("span", { class: "body-range" }, ["low", "high"].map((end, k) => h("input", { type: "number", step: "any", value: Number([low, high][k].toPrecision(5)), class: `body-${end}`,
+        "aria-label": `Colours ${k ? "end" : "begin"} at`, onchange: (event) => this.limit(k, event.target.valueAsNumber) })),
+        this.limits ? h("button", { type: "button", class: "small", title: "Colours from the least to the largest value", onclick: () => this.limit(0, NaN) }, "all values") : null),
       this.quantity === "pressure" ? h("span", { class: "muted" }, "grey: nothing to touch") : null);
   }
 
-  /** Of the values; what is zero but for rounding is told as 0. */
+  /** Of the values, or what was chosen; what is zero but for rounding is told as 0. */
   range() {
+    if (this.limits) return this.limits;
     const { low, high } = this.values, least = 1e-9 * Math.max(Math.abs(low), Math.abs(high));
     return [low, high].map((value) => (Math.abs(value) < least ? 0 : value));
+  }
+
+  shades() {
+    const [low, high] = this.range();
+    return shades_of(this.surface, { ...this.values, low, high });
+  }
+
+  /** One end of the colours; no number, or what leaves nothing between them: as the values are. */
+  limit(end, value) {
+    const limits = [...this.range()];
+    limits[end] = value;
+    this.limits = limits[0] < limits[1] ? limits : null;
+    this.recolour();
+  }
+
+  recolour() {
+    this.gl.colour(this.shades());
+    this.draw_legend();
+    this.redraw();
+    announce(this.summary());
   }
 
   summary() {
@@ -169,20 +194,24 @@ class BodyView {
     const first = !this.surface, same = !first && this.surface.position.length === surface.position.length;
     this.surface = surface;
     if (first) this.shown.wire = surface.elements <= MOST_LINED[surface.dim];
-    const wanted = quantities(surface).some((one) => one.id === this.quantity) ? this.quantity : "displacement";
+    const push = push_of(surface);
+    this.pressed = Array.from(push.keys()).filter((row) => push[row] > 0);
+    const known = quantities(surface).map((one) => one.id), first_wanted = this.pressed.length && known.includes("pressure") ? "pressure" : "displacement";
+    const wanted = known.includes(this.quantity) ? this.quantity : first_wanted;
     this.quantity = wanted === "von_mises" && !surface.von_mises ? "displacement" : wanted;
+    this.limits = null;
     this.values = values_of(surface, this.quantity);
     this.rows = rows_by_vertex(surface);
     this.marked = this.held = -1;
     if (first || !same) this.view = new Camera(surface.dim);
     if (first) this.factor = surface.factor;
-    this.gl.take(surface, shades_of(surface, this.values));
+    this.gl.take(surface, this.shades());
     this.overlay.take(surface);
     this.gl.show(this.shown);
     this.take_colours();
     this.build_tools();
     this.resize();
-    if (first || !same) this.home();
+    if (first || !same) this.look();
     this.scale(this.factor);
     this.draw_legend();
     show(this.keys, surface.dim === 3 ? "Drag to turn, with Shift to move; with the picture in focus the wheel enlarges, arrows turn, Shift and arrows move, + and − enlarge, 0 shows all."
@@ -208,10 +237,8 @@ class BodyView {
     if (id === "von_mises" && !surface.von_mises && !(await this.fetch_stress())) return;
     if (this.quantity !== id || this.surface !== surface || this.ends.signal.aborted) return;
     this.values = values_of(surface, id);
-    this.gl.colour(shades_of(surface, this.values));
-    this.draw_legend();
-    this.redraw();
-    announce(this.summary());
+    this.limits = null;
+    this.recolour();
   }
 
   /** False where it does not come, which is said. */
@@ -246,6 +273,21 @@ class BodyView {
   home() {
     this.view.turn_home();
     this.view.fit(this.surface, this.factor);
+    this.redraw();
+  }
+
+  turn(azimuth, elevation) {
+    this.view.turn(azimuth, elevation);
+    this.view.fit(this.surface, this.factor);
+    this.redraw();
+  }
+
+  /** Where it touches, seen from outside of the body. */
+  look() {
+    const { rows } = this.surface, out = [0, 1, 2].map((c) => -this.pressed.reduce((sum, row) => sum + rows.normal[3 * row + c], 0));
+    this.view.turn_home();
+    if (Math.hypot(...out) > 0.3 * this.pressed.length && this.pressed.length) this.view.turn_to(out);
+    this.view.fit_part(this.surface, this.factor, this.pressed.map((row) => rows.vertex[row]));
     this.redraw();
   }
 

@@ -1,7 +1,10 @@
 // body_camera.js: from the body's coordinates to pixels and back: an orthographic view, turned about the vertical.
 
 const TURN = { azimuth: Math.PI / 6, elevation: (25 / 180) * Math.PI }; // as in the service's own pictures
+const STEEP = (35 / 180) * Math.PI; // what is above or below is seen from there, and still aslant
 const MARGIN = 46;
+const LEAST_PART = 0.25; // of the body, that is seen around its contact
+export const VIEWS = [["Front", 0, 0], ["Side", Math.PI / 2, 0], ["Top", 0, Math.PI / 2]];
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
@@ -13,9 +16,19 @@ export class Camera {
   }
 
   turn_home() {
-    this.azimuth = this.dim === 3 ? TURN.azimuth : 0;
-    this.elevation = this.dim === 3 ? TURN.elevation : 0;
+    this.turn(TURN.azimuth, TURN.elevation);
+  }
+
+  turn(azimuth, elevation) {
+    this.azimuth = this.dim === 3 ? azimuth : 0;
+    this.elevation = this.dim === 3 ? elevation : 0;
     this.orient();
+  }
+
+  /** Towards where a side looks that has this direction out of the body. */
+  turn_to([x, y, z]) {
+    const aslant = Math.abs(y) > 0.5 * Math.hypot(x, y, z);
+    this.turn(Math.hypot(x, z) > 0.3 * Math.abs(y) ? Math.atan2(x, z) - TURN.azimuth : TURN.azimuth, aslant ? Math.sign(y) * STEEP : TURN.elevation);
   }
 
   /** axes: to the right, upwards, towards the eye. */
@@ -55,20 +68,49 @@ export class Camera {
     this.pan(right, down);
   }
 
-  /** Puts all of the body, as it was and as it is drawn, into the picture. */
-  fit(surface, factor) {
+  /** [low, high] of both axes of the picture, of some vertices or all, as they were and as they are drawn. */
+  extent(surface, factor, vertices = null) {
     const low = [Infinity, Infinity], high = [-Infinity, -Infinity], { position: x, displacement: u } = surface;
-    for (let i = 0; i < x.length; i += 3)
+    for (let n = 0, most = vertices ? vertices.length : x.length / 3; n < most; n++) {
+      const i = 3 * (vertices ? vertices[n] : n);
       for (const times of [0, factor])
         for (let k = 0; k < 2; k++) {
           const a = this.axes[k], at = a[0] * (x[i] + times * u[i]) + a[1] * (x[i + 1] + times * u[i + 1]) + a[2] * (x[i + 2] + times * u[i + 2]);
           if (at < low[k]) low[k] = at;
           if (at > high[k]) high[k] = at;
         }
+    }
+    return [low, high];
+  }
+
+  /** Puts what is between two corners of `extent` into the picture. */
+  frame([low, high]) {
     const middle = [0, 1].map((k) => (low[k] + high[k]) / 2), size = [0, 1].map((k) => Math.max(high[k] - low[k], 1e-9));
     for (let c = 0; c < 3; c++) this.target[c] = middle[0] * this.axes[0][c] + middle[1] * this.axes[1][c];
     this.scale = Math.min(Math.max(this.width - 2 * MARGIN, 40) / size[0], Math.max(this.height - 2 * MARGIN, 40) / size[1]);
+  }
+
+  /** Puts all of the body, as it was and as it is drawn, into the picture. */
+  fit(surface, factor) {
+    this.frame(this.extent(surface, factor));
     this.home_scale = this.scale;
+  }
+
+  /** Puts some vertices and half as much around them into the picture; all of the body where that is most of it. */
+  fit_part(surface, factor, vertices) {
+    this.fit(surface, factor);
+    if (!vertices.length) return;
+    const target = [...this.target], [low, high] = this.extent(surface, factor, vertices), [first, last] = this.extent(surface, factor);
+    const most = Math.max(last[0] - first[0], last[1] - first[1]);
+    for (let k = 0; k < 2; k++) {
+      const around = Math.max(0.5 * Math.max(high[0] - low[0], high[1] - low[1]), (LEAST_PART * most - (high[k] - low[k])) / 2);
+      low[k] -= around;
+      high[k] += around;
+    }
+    this.frame([low, high]);
+    if (this.scale > 1.2 * this.home_scale) return;
+    this.scale = this.home_scale;
+    this.target = target;
   }
 
   /** A new size of the picture: what is in the middle stays, and as much of it as before is seen. */

@@ -4,7 +4,7 @@
 import { obstacle_lines } from "./body_obstacles.js";
 import { push_of } from "./body_surface.js";
 
-const TICK = 9, ARROW = 55, MOST_ARROWS = 80, EDGE = 40;
+const TICK = 9, ARROW = 55, MOST_ARROWS = 80, EDGE = 40, TRIAD = 28;
 
 /** The part of a..b, as [t0, t1] of 0..1, in the picture and a little around it (Liang and Barsky 1984); null: none. */
 function clip(a, b, width, height) {
@@ -89,6 +89,7 @@ export class Overlay {
         draw_border(pen, line.map(([x, y]) => view.project(x, y, 0)), width, height);
     }
     if (forces && this.largest > 0) this.draw_forces(pen, view, factor, colours.push);
+    this.draw_triad(pen, view, colours);
     if (marked >= 0) this.draw_mark(pen, this.place(view, factor, marked), colours);
   }
 
@@ -98,10 +99,35 @@ export class Overlay {
     pen.lineWidth = 1.5;
     pen.beginPath();
     for (const i of this.arrows) {
-      const way = view.project_way(...rows.normal.subarray(3 * i, 3 * i + 3)).map((x) => x / view.scale), size = Math.hypot(...way);
+      const normal = rows.normal.subarray(3 * i, 3 * i + 3), eye = view.axes[2];
+      if (view.dim === 3 && normal[0] * eye[0] + normal[1] * eye[1] + normal[2] * eye[2] > 0) continue; // the body is before it
+      const way = view.project_way(...normal).map((x) => x / view.scale), size = Math.hypot(...way);
       if (size > 0.02) draw_arrow(pen, this.place(view, factor, rows.vertex[i]), way.map((x) => x / size), (ARROW * size * this.push[i]) / this.largest);
     }
     pen.stroke();
+  }
+
+  /** The axes in a corner; the one that looks towards the eye comes last. */
+  draw_triad(pen, view, { ink, paper }) {
+    const { dim, axisymmetric } = this.surface, [x, y] = [TRIAD + 16, this.height - TRIAD - 16];
+    const ways = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].slice(0, dim).map((axis, c) => ({ name: axisymmetric && c === 0 ? "r" : "xyz"[c],
+      way: view.project_way(...axis).map((v) => v / view.scale), near: view.axes[2][c] }));
+    pen.font = "12px system-ui, sans-serif";
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    for (const { name, way: [dx, dy], near } of ways.sort((a, b) => a.near - b.near)) {
+      const size = Math.hypot(dx, dy), [ux, uy] = size > 0.1 ? [dx / size, dy / size] : [0.7, -0.7], at = [x + TRIAD * dx + 9 * ux, y + TRIAD * dy + 9 * uy];
+      pen.strokeStyle = ink;
+      pen.lineWidth = 1.5;
+      pen.beginPath();
+      if (size > 0.1) draw_arrow(pen, [x + TRIAD * dx, y + TRIAD * dy], [dx / size, dy / size], TRIAD * size);
+      pen.stroke();
+      pen.lineWidth = 3;
+      pen.strokeStyle = paper;
+      pen.strokeText(name, ...at);
+      pen.fillStyle = ink;
+      pen.fillText(name, ...at);
+    }
   }
 
   draw_mark(pen, [x, y], { ink, paper }) {

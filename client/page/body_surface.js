@@ -171,12 +171,12 @@ export function values_of(surface, id) {
   return { at, low, high };
 }
 
-/** By vertex: 0..1 between low and high, -1 where there is no value. */
+/** By vertex: 0..1 between low and high and beyond them, -1 where there is no value. */
 export function shades_of(surface, { at, low, high }) {
   const shades = new Float32Array(surface.position.length / 3), range = high - low;
   for (let v = 0; v < shades.length; v++) {
     const x = at(v);
-    shades[v] = Number.isNaN(x) ? -1 : range > 0 ? (x - low) / range : 0.5;
+    shades[v] = Number.isNaN(x) ? -1 : range > 0 ? Math.min(Math.max((x - low) / range, 0), 1) : 0.5;
   }
   return shades;
 }

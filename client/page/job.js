@@ -17,6 +17,7 @@ import { show_whole_error } from "./whole_error.js";
 import { grid_words, has_ended, state_words, title_of } from "./words.js";
 
 const HISTORY_MS = 700, MOST_CASES = 10000, MOST_TIDIED = 200000;
+const MOST_UNASKED = 100000; // unknowns of a body that is drawn before somebody asks for it
 
 class JobView {
   constructor(main, api, id) {
@@ -35,8 +36,8 @@ class JobView {
     this.downloads = h("section", { "aria-label": "Downloads", hidden: true });
     this.cases_place = h("section", { "aria-label": "Load cases", id: "cases", hidden: true });
     this.request_place = h("section", { "aria-label": "Request", id: "request" });
-    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.cases_place, this.whole, this.convergence_place,
-      this.body, this.precision, this.timings, this.request_place, this.downloads));
+    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.body, this.cases_place, this.whole, this.convergence_place,
+      this.precision, this.timings, this.request_place, this.downloads));
     this.show_request();
   }
 
@@ -215,7 +216,7 @@ class JobView {
     }
   }
 
-  /** Drawn when it is asked for, by code that is loaded then. */
+  /** By code that is loaded then; a large one when it is asked for. */
   show_body() {
     const place = h("div", { class: "body", id: "body" });
     const open = h("button", { type: "button", id: "open-body", class: "primary", onclick: async () => {
@@ -233,6 +234,7 @@ class JobView {
     this.body.hidden = false;
     show(place, open);
     show(this.body, h("h2", null, "Body"), place);
+    if (this.summary().problem.d <= MOST_UNASKED) open.click();
   }
 
   // ---- the loop

@@ -73,7 +73,6 @@ def take_all(s, b, folder):
     b.says("main", "All four are solved")
     keep(b, folder, "compare")
     b.open(s, f"jobs/{ids['bracket']}")
-    b.click("#open-body")
     b.wait("the body", "return document.querySelector('#body canvas, #body img')")
     time.sleep(2)
     b.run("document.querySelector('#body').closest('section').scrollIntoView({block: 'start'})")

@@ -64,7 +64,6 @@ def views(s, b):
     b.wait("curves", "return document.querySelector('#convergence path.line') && document.querySelector('.downloads button')")
     b.click("#refine")
     yield "job"
-    b.click("#open-body")
     b.wait("the body", "return document.querySelector('.body-canvas')?.dataset.frames > 0 && document.querySelector('.body-pressure .chart')")
     b.click(".pressure-table summary")
     yield "body"

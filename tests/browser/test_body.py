@@ -21,9 +21,17 @@ def show(s, b, request):
     job = s.solve(request)
     check(job["status"] == "successful", job)
     b.open(s, f"jobs/{job['id']}")
-    b.click("#open-body")
     drawn(b)
+    b.one(".body-pressure .chart, .body-pressure .pressure-map")
     return job["id"]
+
+
+def show_all(s, b, request):
+    """The same, all of it, coloured by its displacement."""
+    job = show(s, b, request)
+    set_value(b, ".body-colour", "displacement", "change")
+    after(b, lambda: press(b, "0"))
+    return job
 
 
 def drawn(b, more_than=0):
@@ -83,7 +91,7 @@ def press(b, key, shift=False):
 
 def test_a_plane_body(s, b):
     """Colours, arrows and obstacle are seen; the slider moves the body; other quantities have their own numbers."""
-    job = show(s, b, SCENE)
+    job = show_all(s, b, SCENE)
     found = coloured(b)
     check(min(found) > 2000, "pixels of each colour:", found)
     check(b.near(".body-frame", "--push", 60) > 200 and b.near(".body-frame", "--obstacle", 30) > 300, "arrows, obstacle")
@@ -123,7 +131,7 @@ def node_under_pointer(b):
 
 
 def test_nodes_parts_and_the_contact_along_the_surface(s, b):
-    job = show(s, b, SCENE)
+    job = show_all(s, b, SCENE)
     answer = s.get(f"/v1/jobs/{job}/result?fields=nodes,pressure").json
     said = node_under_pointer(b)
     check(said and int(said["node"]) in answer["contact_nodes"], said)
@@ -146,7 +154,7 @@ def test_nodes_parts_and_the_contact_along_the_surface(s, b):
 
 
 def test_a_solid_is_turned_enlarged_and_moved(s, b):
-    show(s, b, SOLID)
+    show_all(s, b, SOLID)
     first = b.pixels(".body-frame")
     check(sum(coloured(b)) > 5000, coloured(b))
     check(b.near(".body-frame", "#c8c8c8", 45) > 5000, "the sphere")
@@ -170,7 +178,7 @@ def test_cases_are_chosen_and_a_lost_graphics_card_comes_back(s, b):
     request = copy.deepcopy(SCENE)
     request["cases"] = [{"name": "pressed", "loads": [{"on": "top", "traction": [0, -1]}]},
                         {"name": "pulled", "loads": [{"on": "right", "traction": [1, 0]}]}]
-    show(s, b, request)
+    show_all(s, b, request)
     before = b.text(".body-legend")
     b.run("""const field = [...document.querySelectorAll('.body-tools select')].find((one) => [...one.options].some((o) => o.value === 'pulled'));
              field.value = 'pulled'; field.dispatchEvent(new Event('change', {bubbles: true}));""")
@@ -190,10 +198,47 @@ def test_cases_are_chosen_and_a_lost_graphics_card_comes_back(s, b):
 def test_dark_and_narrow_and_sharp(s, b):
     b.media("prefers-color-scheme", "dark")
     b.command("Emulation.setDeviceMetricsOverride", width=360, height=740, deviceScaleFactor=2, mobile=True)
-    show(s, b, SCENE)
+    show_all(s, b, SCENE)
     size = b.run("const c = document.querySelector('.body-canvas'); return [c.width, c.clientWidth, document.documentElement.scrollWidth]")
     check(size[0] == 2 * size[1] and size[2] <= 360, size)
     check(min(coloured(b)) > 500 and b.near(".body-frame", "--paper", 12) > 5000, coloured(b))
+
+
+def press_button(b, text):
+    after(b, lambda: b.run("[...document.querySelectorAll('.body-buttons button')].find((one) => one.innerText === arguments[0]).click()", text))
+
+
+def test_it_begins_where_it_touches(s, b):
+    """Coloured by the pressure, near, and from below where that is; the arrows are hidden from above."""
+    request = copy.deepcopy(SCENE)
+    request["problem"]["contacts"][0]["obstacle"] = {"circle": {"center": [30, -100], "radius": 100}}
+    request["problem"]["supports"] = [{"on": "top", "ux": 0, "uy": -0.01}]
+    request["problem"]["loads"] = []
+    show(s, b, request)
+    check("Contact pressure" in b.text(".body-legend"), b.text(".body-legend"))
+    near, home = b.near(".body-frame", "--push", 60), b.pixels(".body-frame")
+    press_button(b, "Show all")
+    check(near > 10 and b.pixels(".body-frame") != home, "all of it is no other picture")
+    press_button(b, "Contact")
+    check(b.pixels(".body-frame") == home, "where it touches")
+    show(s, b, SOLID)
+    below = b.near(".body-frame", "--push", 60)
+    press_button(b, "Top")
+    check(below > 100 and b.near(".body-frame", "--push", 60) == 0, "arrows from below and above", below)
+    press_button(b, "Front")
+    check(b.near(".body-frame", "--push", 60) > 50, "arrows from the front")
+
+
+def test_colours_between_other_values(s, b):
+    show_all(s, b, SCENE)
+    before = coloured(b)
+    after(b, lambda: set_value(b, ".body-high", 0.00005, "change"))
+    now = coloured(b)
+    check(now[-1] > 2 * before[-1] and "5×10⁻⁵" in b.text(".body-legend"), before, now, b.text(".body-legend"))
+    after(b, lambda: b.click(".body-range button"))
+    check(coloured(b) == before and not b.run("return document.querySelector('.body-range button')"), before, coloured(b))
+    after(b, lambda: set_value(b, ".body-low", 10, "change"))
+    check(coloured(b) == before, "what leaves nothing between both ends")
 
 
 def test_without_webgl_the_service_draws(s, b):
@@ -203,7 +248,6 @@ def test_without_webgl_the_service_draws(s, b):
     try:
         job = s.solve(SCENE)
         b.open(s, f"jobs/{job['id']}")
-        b.click("#open-body")
         b.wait("the picture", "const i = document.querySelector('#body img'); return i && i.complete && i.naturalWidth > 100")
         b.one(".body-pressure .chart")
     finally:
