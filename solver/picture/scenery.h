@@ -32,8 +32,8 @@ uz_status uz_scenery_check_answer(const uz_field_source *answer, const uz_body_m
 /* axes, scale, offset, height and extent from the mesh, displacements and width. UZ_ERR_NOT_FINITE. */
 uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err);
 
-/* How many times as large displacements are drawn to be seen, but so that what touches does not look as if it overlapped
- * or stood apart: at least 1; it reads well. */
+/* How many times as large displacements are drawn to be seen, but so that what touches does not look as if it
+ * overlapped or stood apart: at least 1; it reads well. */
 double uz_show_factor(const uz_scene *scene, const uz_body_model *model, const uz_field_source *answer);
 
 /* Where a point (dim coordinates) is. */
