@@ -59,7 +59,7 @@ def test_faults_of_daemons_and_database(s):
 @options(None)
 def test_jobs_of_many_bodies(s):
     """By chance three daemons would factor most bodies two or three times."""
-    run = daemons.mixture(s.build, 5, 60, 10, [6, 6, 4], "256M", clients=6)
+    run = daemons.mixture(s.build, 5, 60, 10, [10, 10, 6], "256M", clients=6)
     check(run["errors"] == 0 and run["missed"] <= 1.4 * run["asked"], run)
 
 
