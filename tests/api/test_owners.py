@@ -57,6 +57,7 @@ def test_jobs(s):
     paths = [path.replace("{id}", job) for path in s.get("/openapi.json").json["paths"] if "/jobs/{id}" in path]
     check(len(paths) >= 10, paths)
     for path in paths:
+        path += "?from=0,10&to=60,10" if path.endswith(("/path", "/path.csv")) else ""
         if path.endswith("/refine"):
             expect(ask(s, BOB, "POST", path, {}), 404, "not_found")
             expect(ask(s, NEW, "POST", path, {"accuracy": {"relative_error": 1e-9}}), 202)

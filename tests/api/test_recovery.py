@@ -306,7 +306,7 @@ def test_terminated_while_metis_orders(s):
     ids, delays = [], (0.0, 0.02, 0.04, 0.06, 0.1, 0.14, 0.18, 0.25)[::3 if INSTRUMENTED else 1]
     for round_, delay in enumerate(delays):
         # Other meshes each time, so that nothing is cached and both workers order.
-        ids += [s.post(scene(((120 if INSTRUMENTED else 240) + 2 * round_ + i, 80), ordering="metis")).json["id"] for i in range(2)]
+        ids += [s.post(scene(((120 if INSTRUMENTED else 240) + 2 * round_ + i, 80), ordering="metis", operator="condensed")).json["id"] for i in range(2)]
         time.sleep(delay)
         status = s.restart(signal.SIGTERM)
         check(status == 0, "exit status", status, "after", delay, s.log()[-3000:])

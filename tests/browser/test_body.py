@@ -77,6 +77,11 @@ def columns(b):
     return (min(seen), max(seen)) if seen else (-1, -1)
 
 
+def alike(some, others):
+    """Counts of pixels; a few at edges are drawn one way or another."""
+    return all(abs(a - b) <= 50 + 0.01 * b for a, b in zip(some, others))
+
+
 def brightness(b):
     """Of all pixels of the picture, 0..255."""
     pixels = b.pixels(".body-frame")
@@ -216,11 +221,11 @@ def test_it_begins_where_it_touches(s, b):
     request["problem"]["loads"] = []
     show(s, b, request)
     check("Contact pressure" in b.text(".body-legend"), b.text(".body-legend"))
-    near, home = b.near(".body-frame", "--push", 60), b.pixels(".body-frame")
+    near, home = b.near(".body-frame", "--push", 60), coloured(b)
     press_button(b, "Show all")
-    check(near > 10 and b.pixels(".body-frame") != home, "all of it is no other picture")
+    check(near > 10 and not alike(coloured(b), home), "all of it is no other picture")
     press_button(b, "Contact")
-    check(b.pixels(".body-frame") == home, "where it touches")
+    check(alike(coloured(b), home), "where it touches", coloured(b), home)
     show(s, b, SOLID)
     below = b.near(".body-frame", "--push", 60)
     press_button(b, "Top")
@@ -236,9 +241,9 @@ def test_colours_between_other_values(s, b):
     now = coloured(b)
     check(now[-1] > 2 * before[-1] and "5×10⁻⁵" in b.text(".body-legend"), before, now, b.text(".body-legend"))
     after(b, lambda: b.click(".body-range button"))
-    check(coloured(b) == before and not b.run("return document.querySelector('.body-range button')"), before, coloured(b))
+    check(alike(coloured(b), before) and not b.run("return document.querySelector('.body-range button')"), before, coloured(b))
     after(b, lambda: set_value(b, ".body-low", 10, "change"))
-    check(coloured(b) == before, "what leaves nothing between both ends")
+    check(alike(coloured(b), before), "what leaves nothing between both ends")
 
 
 def test_without_webgl_the_service_draws(s, b):
