@@ -3,7 +3,7 @@
 import { Camera, VIEWS } from "./body_camera.js";
 import { listen } from "./body_input.js";
 import { Overlay } from "./body_overlay.js";
-import { add_stress, displacement_of, forget_surface, load_surface, node_of, place_of, push_of, quantities, rows_by_vertex, shades_of, values_of, viridis } from "./body_surface.js";
+import { add_stress, displacement_of, forget_surface, load_surface, node_of, place_of, quantities, rows_by_vertex, shades_of, values_of, viridis } from "./body_surface.js";
 import { announce, h, s, show } from "./dom.js";
 import { number } from "./format.js";
 import { mountPressure } from "./pressure.js";
@@ -127,7 +127,7 @@ class BodyView {
         button("auto", "Draw displacements so that they show", () => this.scale(surface.factor))),
       h("span", { class: "body-parts" }, parts),
       h("span", { class: "body-buttons" }, button("+", "Larger", () => (this.view.zoom(1.25), this.redraw())), button("−", "Smaller", () => (this.view.zoom(0.8), this.redraw())),
-        button("Show all", "Show all of the body", () => this.home()), this.pressed.length ? button("Contact", "Show where it touches", () => this.look()) : null,
+        button("Show all", "Show all of the body", () => this.home()), this.overlay.pressed.length ? button("Contact", "Show where it touches", () => this.look()) : null,
         surface.dim === 3 ? VIEWS.map(([name, ...turn]) => button(name, `See it from the ${name.toLowerCase()}`, () => this.turn(...turn))) : null, button("SVG", "Save as a picture for a report", () => this.save())));
   }
 
@@ -194,9 +194,8 @@ class BodyView {
     const first = !this.surface, same = !first && this.surface.position.length === surface.position.length;
     this.surface = surface;
     if (first) this.shown.wire = surface.elements <= MOST_LINED[surface.dim];
-    const push = push_of(surface);
-    this.pressed = Array.from(push.keys()).filter((row) => push[row] > 0);
-    const known = quantities(surface).map((one) => one.id), first_wanted = this.pressed.length && known.includes("pressure") ? "pressure" : "displacement";
+    this.overlay.take(surface);
+    const known = quantities(surface).map((one) => one.id), first_wanted = this.overlay.pressed.length && known.includes("pressure") ? "pressure" : "displacement";
     const wanted = known.includes(this.quantity) ? this.quantity : first_wanted;
     this.quantity = wanted === "von_mises" && !surface.von_mises ? "displacement" : wanted;
     this.limits = null;
@@ -206,7 +205,6 @@ class BodyView {
     if (first || !same) this.view = new Camera(surface.dim);
     if (first) this.factor = surface.factor;
     this.gl.take(surface, this.shades());
-    this.overlay.take(surface);
     this.gl.show(this.shown);
     this.take_colours();
     this.build_tools();
@@ -284,10 +282,10 @@ class BodyView {
 
   /** Where it touches, seen from outside of the body. */
   look() {
-    const { rows } = this.surface, out = [0, 1, 2].map((c) => -this.pressed.reduce((sum, row) => sum + rows.normal[3 * row + c], 0));
+    const { rows } = this.surface, { pressed } = this.overlay, out = [0, 1, 2].map((c) => -pressed.reduce((sum, row) => sum + rows.normal[3 * row + c], 0));
     this.view.turn_home();
-    if (Math.hypot(...out) > 0.3 * this.pressed.length && this.pressed.length) this.view.turn_to(out);
-    this.view.fit_part(this.surface, this.factor, this.pressed.map((row) => rows.vertex[row]));
+    if (Math.hypot(...out) > 0.3 * pressed.length) this.view.turn_to(out);
+    this.view.fit_part(this.surface, this.factor, pressed.map((row) => rows.vertex[row]));
     this.redraw();
   }
 

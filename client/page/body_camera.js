@@ -90,17 +90,19 @@ export class Camera {
     this.scale = Math.min(Math.max(this.width - 2 * MARGIN, 40) / size[0], Math.max(this.height - 2 * MARGIN, 40) / size[1]);
   }
 
-  /** Puts all of the body, as it was and as it is drawn, into the picture. */
+  /** Puts all of the body, as it was and as it is drawn, into the picture; returns its extent. */
   fit(surface, factor) {
-    this.frame(this.extent(surface, factor));
+    const extent = this.extent(surface, factor);
+    this.frame(extent);
     this.home_scale = this.scale;
+    return extent;
   }
 
   /** Puts some vertices and half as much around them into the picture; all of the body where that is most of it. */
   fit_part(surface, factor, vertices) {
-    this.fit(surface, factor);
+    const [first, last] = this.fit(surface, factor);
     if (!vertices.length) return;
-    const target = [...this.target], [low, high] = this.extent(surface, factor, vertices), [first, last] = this.extent(surface, factor);
+    const target = [...this.target], [low, high] = this.extent(surface, factor, vertices);
     const most = Math.max(last[0] - first[0], last[1] - first[1]);
     for (let k = 0; k < 2; k++) {
       const around = Math.max(0.5 * Math.max(high[0] - low[0], high[1] - low[1]), (LEAST_PART * most - (high[k] - low[k])) / 2);

@@ -62,9 +62,9 @@ export class Overlay {
     this.surface = surface;
     this.push = push_of(surface);
     this.largest = this.push.reduce((most, x) => Math.max(most, x), 0);
-    const pressed = Array.from(this.push.keys()).filter((i) => this.push[i] > 0);
-    const every = Math.ceil(pressed.length / MOST_ARROWS);
-    this.arrows = pressed.filter((_, i) => i % every === 0);
+    this.pressed = Array.from(this.push.keys()).filter((i) => this.push[i] > 0);
+    const every = Math.ceil(this.pressed.length / MOST_ARROWS);
+    this.arrows = this.pressed.filter((_, i) => i % every === 0);
   }
 
   resize(width, height, ratio) {

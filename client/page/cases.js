@@ -4,6 +4,7 @@ import { h, show } from "./dom.js";
 import { count, number, percent_up, seconds } from "./format.js";
 import { Chart } from "./plot.js";
 import { unit_of } from "./units.js";
+import { sorted_by } from "./view_order.js";
 import { error_of, error_words, state_words } from "./words.js";
 
 const MOST_ROWS = 500, MOST_DOTS = 200;
@@ -62,14 +63,9 @@ export function mountCases(element, cases, chosen, on_choose) {
   }
 
   function sorted() {
-    const column = columns.find((one) => one.key === order.by), way = order.up ? 1 : -1;
+    const column = columns.find((one) => one.key === order.by);
     const key = order.by === "name" ? (one) => one.name : order.by === "outcome" ? (one) => one.summary.outcome : column ? (one) => column.value(one.summary) : null;
-    if (!key) return cases;
-    return [...cases].sort((a, b) => {
-      const [x, y] = [key(a), key(b)];
-      if (x === null || y === null) return (x === null) - (y === null);
-      return x === y ? 0 : x < y ? -way : way;
-    });
+    return key ? sorted_by(cases, key, order.up) : cases;
   }
 
   function heading(key, name, right) {

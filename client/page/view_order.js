@@ -26,8 +26,13 @@ export function arrange(rows, order) {
   const wanted = order.words.toLowerCase().split(/\s+/).filter(Boolean), key = KEYS[order.by];
   const found = wanted.length ? rows.filter((row) => wanted.every((word) => text_of(row).includes(word))) : [...rows];
   if (order.by === "created") return order.up ? found.reverse() : found;
-  const values = new Map(found.map((row) => [row, key(row)])), way = order.up ? 1 : -1;
-  return found.sort((a, b) => {
+  return sorted_by(found, key, order.up);
+}
+
+/** A copy in the order of key(item), text or a number; null goes last whichever way. */
+export function sorted_by(items, key, up) {
+  const values = new Map(items.map((item) => [item, key(item)])), way = up ? 1 : -1;
+  return [...items].sort((a, b) => {
     const [x, y] = [values.get(a), values.get(b)];
     if (x === null || y === null) return (x === null) - (y === null);
     return x === y ? 0 : x < y ? -way : way;
