@@ -109,19 +109,15 @@ static void make_turns(double M[6][6], double N[6][6], double a[3][3])
         }
 }
 
-/* Of a symmetric positive definite matrix of three rows. */
+/* Of the first three rows and columns. */
 static void invert(double out[6][6], double A[6][6])
 {
-    double cofactor[3][3], det = 0;
+    double block[3][3], inverse[3][3];
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            cofactor[i][j] = A[(i + 1) % 3][(j + 1) % 3] * A[(i + 2) % 3][(j + 2) % 3] -
-                             A[(i + 1) % 3][(j + 2) % 3] * A[(i + 2) % 3][(j + 1) % 3];
-    for (int j = 0; j < 3; j++)
-        det += A[0][j] * cofactor[0][j];
+        memcpy(block[i], A[i], sizeof block[i]);
+    uz_invert_small(inverse, block, 3);
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            out[i][j] = cofactor[i][j] / det;
+        memcpy(out[i], inverse[i], sizeof inverse[i]);
 }
 
 /* Of the isotropic material of the same bulk modulus under pressure (Reuss) and the mean of its shear moduli (Voigt).

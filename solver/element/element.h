@@ -108,6 +108,9 @@ const char *uz_shape_fault_text(uz_shape_fault fault);
  * so that neither units nor flat elements matter. Everything below needs a good shape. */
 uz_shape_fault uz_element_check(const uz_element *element);
 
+/* The inverse of a matrix of dim rows, 2 or 3, by its cofactors; returns its determinant. Singular: not finite. */
+double uz_invert_small(double inverse[3][3], double J[3][3], int dim);
+
 /* Derivatives by x, y [, z] of the shape functions at a local point: grad[node][direction]. Returns the Jacobian's
  * determinant. */
 double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3]);

@@ -6,8 +6,6 @@
 
 /* J[axis][x]: derivatives of position by the reference coordinates, from those of the shape functions. */
 void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEMENT_NODES][3]);
-/* inverse[x][axis] of J, of size dim; returns the determinant of J. */
-double uz_invert_jacobian(double inverse[3][3], double J[3][3], int dim);
 
 /* The radius at a point with these shape functions; at most UZ_AXIS of the largest it counts as on the axis. */
 #define UZ_AXIS 1e-12

@@ -54,7 +54,7 @@ static double determinant(double J[3][3], int dim)
            J[0][2] * (J[1][0] * J[2][1] - J[1][1] * J[2][0]);
 }
 
-double uz_invert_jacobian(double inverse[3][3], double J[3][3], int dim)
+double uz_invert_small(double inverse[3][3], double J[3][3], int dim)
 {
     const double det = determinant(J, dim), scale = 1 / det;
     if (dim == 2) {
@@ -79,7 +79,7 @@ double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *
     const uz_element_type *type = uz_element_type_of(element->kind);
     type->shape(type, NULL, local, point);
     uz_jacobian(J, element, local);
-    const double det = uz_invert_jacobian(inverse, J, dim);
+    const double det = uz_invert_small(inverse, J, dim);
     for (int a = 0; a < nodes; a++)
         for (int j = 0; j < dim; j++) {
             grad[a][j] = 0;
@@ -175,7 +175,7 @@ double uz_centre_jacobian(double inverse[3][3], const uz_element *element)
     const uz_element_type *type = uz_element_type_of(element->kind);
     type->shape(type, NULL, local, CENTRE);
     uz_jacobian(J, element, local);
-    return uz_invert_jacobian(inverse, J, uz_element_type_of(element->kind)->dim);
+    return uz_invert_small(inverse, J, uz_element_type_of(element->kind)->dim);
 }
 
 void uz_mode_gradients(double grad[3][3], double centre[3][3], double centre_det, int dim, const double point[3],

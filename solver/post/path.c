@@ -45,38 +45,14 @@ static bool is_within(const uz_element_type *type, const double point[3])
     return true;
 }
 
-/* Solves J step = rest by Cramer's rule. False: the element has no size there. */
-static bool solve_small(double step[3], double J[3][3], const double rest[3], int dim)
-{
-    if (dim == 2) {
-        const double det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
-        step[0] = (rest[0] * J[1][1] - J[0][1] * rest[1]) / det;
-        step[1] = (J[0][0] * rest[1] - rest[0] * J[1][0]) / det;
-        return isfinite(step[0]) && isfinite(step[1]);
-    }
-    double cofactor[3][3], det = 0;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            cofactor[i][j] = J[(i + 1) % 3][(j + 1) % 3] * J[(i + 2) % 3][(j + 2) % 3] -
-                             J[(i + 1) % 3][(j + 2) % 3] * J[(i + 2) % 3][(j + 1) % 3];
-    for (int j = 0; j < 3; j++)
-        det += J[0][j] * cofactor[0][j];
-    for (int j = 0; j < 3; j++) {
-        step[j] = 0;
-        for (int i = 0; i < 3; i++)
-            step[j] += cofactor[i][j] * rest[i] / det;
-    }
-    return isfinite(step[0]) && isfinite(step[1]) && isfinite(step[2]);
-}
-
 /* The shape functions of an element at a place x; xyz: of its nodes. False: it is not in there. */
 static bool find_within(double N[UZ_ELEMENT_NODES], const uz_element_type *type, const double *xyz, double extent,
                         const double x[3])
 {
-    double slope[UZ_ELEMENT_NODES][3], point[3], step[3];
+    double slope[UZ_ELEMENT_NODES][3], point[3];
     memcpy(point, type->centre, sizeof point);
     for (int k = 0; k < MOST_STEPS; k++) {
-        double J[3][3] = {{0}}, rest[3], off = 0, moved = 0;
+        double J[3][3] = {{0}}, inverse[3][3], rest[3] = {0}, off = 0, moved = 0;
         type->shape(type, N, slope, point);
         for (int c = 0; c < type->dim; c++) {
             rest[c] = x[c];
@@ -87,14 +63,16 @@ static bool find_within(double N[UZ_ELEMENT_NODES], const uz_element_type *type,
             }
             off = fmax(off, fabs(rest[c]));
         }
-        if (!solve_small(step, J, rest, type->dim))
-            return false;
+        uz_invert_small(inverse, J, type->dim);
         for (int c = 0; c < type->dim; c++) {
-            point[c] += step[c];
-            moved = fmax(moved, fabs(step[c]));
+            double step = 0;
+            for (int i = 0; i < type->dim; i++)
+                step += inverse[c][i] * rest[i];
+            if (!(fabs(step) <= 1e3)) /* far outside, where the map may fold; or the element has no size there */
+                return false;
+            point[c] += step;
+            moved = fmax(moved, fabs(step));
         }
-        if (moved > 1e3) /* far outside, where the map may fold */
-            return false;
         if (moved < 1e-12 || off < 1e-15 * extent)
             break;
     }
