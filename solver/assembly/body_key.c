@@ -50,20 +50,26 @@ static void put_doubles(uz_buffer *key, const double *x, int64_t n)
 static void add_array(uz_digest *digest, const void *array, int64_t count, size_t size)
 {
     const int64_t n = array ? count : 0;
+    if (!digest)
+        return;
     uz_digest_add(digest, &n, sizeof n);
     if (n > 0)
         uz_digest_add(digest, array, (size_t)n * size);
 }
 
-/* A mesh in numbers is as large as a request may be: its digest stands for it. */
-static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
+/* Ends a digest, which stands for numbers that are as large as a mesh. NULL: there was no memory for it. */
+static void put_digest(uz_buffer *key, uz_digest *digest)
 {
     char hex[65] = "";
-    uz_digest *digest = uz_digest_new();
-    if (!digest) {
+    if (!digest || !uz_digest_end(digest, hex))
         key->failed = true;
-        return;
-    }
+    uz_buffer_put(key, hex, sizeof hex);
+}
+
+/* A mesh in numbers is as large as a request may be. */
+static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
+{
+    uz_digest *digest = uz_digest_new();
     add_array(digest, mesh->xyz, mesh->n_nodes * mesh->dim, sizeof *mesh->xyz);
     add_array(digest, mesh->kind, mesh->n_elements, sizeof *mesh->kind);
     add_array(digest, mesh->first, mesh->n_elements + 1, sizeof *mesh->first);
@@ -77,29 +83,19 @@ static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
         add_array(digest, group->face_node, faces > 0 ? group->face_first[faces] : 0, sizeof *group->face_node);
         add_array(digest, group->element, group->n_elements, sizeof *group->element);
     }
-    if (!uz_digest_end(digest, hex))
-        key->failed = true;
     put_int(key, mesh->dim);
     put_int(key, mesh->n_groups);
     put_int(key, mesh->from_file != NULL);
-    uz_buffer_put(key, hex, sizeof hex);
+    put_digest(key, digest);
 }
 
-/* As large as a mesh. */
 static void put_triangles(uz_buffer *key, const uz_contact *contact)
 {
-    char hex[65] = "";
     uz_digest *digest = uz_digest_new();
-    if (!digest) {
-        key->failed = true;
-        return;
-    }
     add_array(digest, contact->x, contact->n_x, sizeof *contact->x);
     add_array(digest, contact->y, contact->n_x, sizeof *contact->y);
     add_array(digest, contact->z, contact->n_x, sizeof *contact->z);
-    if (!uz_digest_end(digest, hex))
-        key->failed = true;
-    uz_buffer_put(key, hex, sizeof hex);
+    put_digest(key, digest);
 }
 
 /* Groups by where they are. All of them: what a load pushes on must be there in the body that is found. */

@@ -179,17 +179,22 @@ typedef struct {
     double *gap;
 } moved_rows;
 
+int64_t uz_next_row(int64_t *next, const uz_body_model *rows, int64_t contact, int64_t place)
+{
+    while (*next < rows->m && (rows->info.contact_of[*next] < contact ||
+                               (rows->info.contact_of[*next] == contact && rows->row_place[*next] < place)))
+        ++*next;
+    const bool found = *next < rows->m && rows->info.contact_of[*next] == contact && rows->row_place[*next] == place;
+    return found ? *next : -1;
+}
+
 static void match_rows(moved_rows *out, const work *w, const uz_body_model *moved)
 {
     const uz_body_model *rows = w->rows;
     int64_t next = 0;
-    for (int64_t j = 0; j < w->n_pressed; j++) { /* rows come contact by contact, places ascending */
+    for (int64_t j = 0; j < w->n_pressed; j++) {
         const int64_t contact = rows->info.contact_of[w->pressed[j]], place = rows->row_place[w->pressed[j]];
-        while (next < moved->m && (moved->info.contact_of[next] < contact ||
-                                   (moved->info.contact_of[next] == contact && moved->row_place[next] < place)))
-            next++;
-        const bool same = next < moved->m && moved->info.contact_of[next] == contact && moved->row_place[next] == place;
-        out->at[j] = same ? next : -1;
+        out->at[j] = uz_next_row(&next, moved, contact, place);
         out->gap[j] = moved->sites[contact].gap[place];
     }
 }

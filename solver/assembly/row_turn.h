@@ -21,6 +21,10 @@ typedef struct {
 
 /* Is there a contact between bodies? */
 bool uz_has_pairs(const uz_scene *scene);
+
+/* The row of a place of a contact; -1: there is none. Rows come contact by contact, places ascending, and so do those
+ * that are asked for one after the other: *next is 0 at first, and where the search goes on. */
+int64_t uz_next_row(int64_t *next, const uz_body_model *rows, int64_t contact, int64_t place);
 /* Of the rows between bodies whose reaction (r: rows->m) is less than -least. rows: the body that `base` is, moved to a
  * place (uz_body_model_move); scene: with the contacts. In the plane only. stop (NULL: never) is asked at each
  * place; where it is due nothing is known. The caller clears *out in every case.

@@ -43,13 +43,10 @@ uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *fro
     double *r = uz_alloc_zero(to->m, sizeof *r);
     if (!r)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld reactions", (long long)to->m);
-    for (int64_t i = 0; i < to->m; i++) { /* rows come contact by contact, places ascending */
-        const int64_t contact = to->info.contact_of[i], place = to->row_place[i];
-        while (next < from->m && (from->info.contact_of[next] < contact ||
-                                  (from->info.contact_of[next] == contact && from->row_place[next] < place)))
-            next++;
-        if (next < from->m && from->info.contact_of[next] == contact && from->row_place[next] == place)
-            r[i] = run->r[next];
+    for (int64_t i = 0; i < to->m; i++) {
+        const int64_t row = uz_next_row(&next, from, to->info.contact_of[i], to->row_place[i]);
+        if (row >= 0)
+            r[i] = run->r[row];
     }
     free(run->r);
     run->r = r;
