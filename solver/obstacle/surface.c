@@ -54,8 +54,8 @@ static void clear(uz_obstacle *o)
 typedef struct {
     double normal[3]; /* unit; the mean of those that meet there */
     bool flat;        /* there is one plane there */
-    bool rim;
-    bool hollow; /* the triangles around rise above the plane of `normal` */
+    bool rim;         /* or the fold of a sheet onto itself, which has no side either */
+    bool hollow;      /* the triangles around rise above the plane of `normal` */
 } surroundings;
 
 static surroundings look_around(const uz_triangulation *t, const uz_triangle_place *at)
@@ -72,6 +72,10 @@ static surroundings look_around(const uz_triangulation *t, const uz_triangle_pla
         s.rim = there < 0;
         for (int c = 0; c < 3 && !s.rim; c++)
             s.normal[c] += t->normal[3 * there + c];
+        if (uz_dot3(s.normal, s.normal) < UZ_SAME_DIRECTION * UZ_SAME_DIRECTION) {
+            memcpy(s.normal, n, sizeof s.normal);
+            s.rim = true;
+        }
         bare = !s.rim && uz_dot3(t->normal + 3 * there, t->normal + 3 * there) == 0;
         for (int k = 0; k < 3 && !s.rim; k++)
             for (int c = 0; c < 3; c++)

@@ -9,6 +9,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "obstacle/pieces.h"
 
 #include <float.h>
 #include <math.h>
@@ -234,7 +235,8 @@ static void make_normals(uz_triangulation *t)
         }
     }
     for (int64_t i = 0; i < t->n_points; i++)
-        uz_unit3(t->point_normal + 3 * i);
+        if (uz_unit3(t->point_normal + 3 * i) < UZ_SAME_DIRECTION) /* the corner of a sheet folded onto itself */
+            memset(t->point_normal + 3 * i, 0, 3 * sizeof *t->point_normal);
     for (int64_t i = 0; i < 3 * t->n; i++)
         if (t->beside[i] < 0) {
             memset(t->point_normal + 3 * way_from(t, i), 0, 3 * sizeof *t->point_normal);

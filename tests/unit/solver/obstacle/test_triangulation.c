@@ -224,3 +224,23 @@ TEST(memory_is_bounded_and_every_beginning_of_a_file_read_or_refused)
     uz_triangles_clear(&t);
     CHECK(uz_triangles_read(&t, "obj", FILE_TEXT, strlen(FILE_TEXT), 100, &err) == UZ_ERR_LIMIT && err.line == 6);
 }
+
+/* A square written with two corners swapped is two triangles, one the other way round: found by the fuzzer. */
+TEST(the_fold_of_a_sheet_has_a_direction)
+{
+    static const char FOLDED[] = "v 10 0 0\nv 1 1 0\nv 0 1 0\nv 0.2 0 0\nf 1 2 4 3\n";
+    static const double ON[3][3] = {{10, 0, 0}, {5, 0, 0}, {0.2, 0, 0}};
+    uz_triangles t;
+    uz_error err = {0};
+    const uz_status status = uz_triangles_read(&t, "obj", FOLDED, sizeof FOLDED - 1, 0, &err);
+    CHECK_MSG(status == UZ_OK && t.n == 2, "%s", err.message);
+    uz_obstacle *o = made(&(uz_contact){.kind = UZ_OBSTACLE_SURFACE, .n_x = 3 * t.n, .x = t.x, .y = t.y, .z = t.z});
+    for (int i = 0; i < 3; i++) {
+        const uz_gap gap = gap_of(o, ON[i]);
+        const double *n = gap.normal;
+        CHECK_MSG(gap.gap == 0 && fabs(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1) < 1e-14, "%d: %g", i, gap.gap);
+    }
+    CHECK(fabs(gap_of(o, (double[3]){5, -2, 0}).gap - 2) < 1e-14);
+    uz_obstacle_free(o);
+    uz_triangles_clear(&t);
+}
