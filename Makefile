@@ -338,7 +338,7 @@ ASAN_API  = $(shell grep -L 'not under sanitizers' tests/api/test_*.py)
 # Of these, those that do no less there (tests/api/service.py) need not run in the ordinary build as well; nor need C
 # tests, but for those of rooms whose sources the optimizer gets with flags of their own.
 TUNED_ROOMS = $(sort $(patsubst solver/%/,tests/unit/solver/%/%,$(dir $(CONTRACTED) $(UNROLLED))))
-SAME_IN_ASAN = $(shell grep -LE 'INSTRUMENTED|SANITIZED|\<some\$(open)' $(ASAN_API) $(filter-out $(TUNED_ROOMS),$(UNIT_SRC)))
+SAME_IN_ASAN = $(shell grep -LE 'INSTRUMENTED|SANITIZED|sanitized\.h|\<some\$(open)' $(ASAN_API) $(filter-out $(TUNED_ROOMS),$(UNIT_SRC)))
 open := (
 # As tests/run.sh names them: KIND/NAME.
 programs = $(foreach test,$(1),$(word 2,$(subst /, ,$(test)))/$(notdir $(basename $(test))))

@@ -216,7 +216,7 @@ def test_the_client_prints_them(s):
 
 def test_generated_scenes(s):
     """Of the generator's scenes a few: it makes as many as are asked for."""
-    numbers = some(range(1000, 1005))
+    numbers = some(range(1000, 1005), 5)
     found = generated_quantities.run(s, numbers, lambda *said, **_: None)
     off = [r for r in found["rows"] if r["low"] is not None and abs(r["true"] - r["value"]) > 3 * r["reference"] + 1e-7 * abs(r["true"])]
     check(not found["failures"] and len(found["rows"]) > 3 * len(numbers), found["failures"])
@@ -235,7 +235,7 @@ def test_intervals_are_counted(_s):
 
 def test_scenes_whose_intervals_were_too_narrow(s):
     """Heat, a mean over a window, a reaction that springs leave of a larger force; and a body that just does not touch."""
-    found = generated_quantities.run(s, some((30373, 46, 5027, 5102, 5243, 20136)), lambda *said, **_: None)
+    found = generated_quantities.run(s, some((30373, 46, 5027, 5102, 5243, 20136), 5), lambda *said, **_: None)
     check(not found["failures"], found["failures"])
     for r in found["rows"]:
         check(r["low"] is None and r["number"] == 30373 and "whether one of them should" in r["why"]

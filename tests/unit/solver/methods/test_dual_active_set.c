@@ -4,6 +4,7 @@
 #include "harness.h"
 #include "judge.h"
 #include "qp_fixture.h"
+#include "sanitized.h"
 #include "scene_fixture.h"
 
 #include <float.h>
@@ -84,7 +85,7 @@ static beam generated_beam(qp_random *rng, int k)
 TEST(generated_beams_are_solved)
 {
     qp_random rng = {42};
-    for (int k = 0; k < 12; k++) {
+    for (int k = 0; k < 12; k += step_of_cases()) {
         const beam b = generated_beam(&rng, k);
         uz_problem problem = beam_problem(&b);
         double energy = NAN;
