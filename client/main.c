@@ -29,7 +29,7 @@ static const command_run RUN[CLIENT_COMMANDS] = {
     [CLIENT_UPLOAD] = client_upload,      [CLIENT_PICTURE] = client_picture, [CLIENT_PLOT] = client_plot,
     [CLIENT_DELETE] = client_delete,      [CLIENT_FACTORS] = client_factors, [CLIENT_NODES] = client_nodes,
     [CLIENT_DOCTOR] = client_doctor,      [CLIENT_MCP] = client_mcp,         [CLIENT_REPORT] = client_report,
-    [CLIENT_REQUEST] = client_request_of, [CLIENT_IMPORT] = client_import,
+    [CLIENT_REQUEST] = client_request_of, [CLIENT_IMPORT] = client_import,   [CLIENT_PATH] = client_path,
 };
 
 /* options: as far as they were understood; command HELP where none was named. */

@@ -7,7 +7,7 @@ _uzawa_ids() {
 
 _uzawa() {
     local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-    local command='' options='' words='' files='' i commands='submit import upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor mcp version help'
+    local command='' options='' words='' files='' i commands='submit import upload status wait refine verify result path picture history plot report request list cancel delete factors nodes doctor mcp version help'
     COMPREPLY=()
     if [[ $current == '=' ]]; then current=''; previous='='; fi
     if [[ $previous == '=' ]]; then
@@ -27,6 +27,7 @@ _uzawa() {
     refine) options='--accuracy --max-iterations --time-limit --wait --timeout --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
     verify) options='--timeout --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
     result) options='--format --fields --field --case --output --json --server --timeout --retry --help --version ' ;;
+    path) options='--format --from --to --count --case --output --json --server --timeout --retry --help --version ' ;;
     picture) options='--colour --factor --width --case --output --json --server --timeout --retry --help --version ' ;;
     history) options='--csv --plot --width --height --ascii --case --output --json --server --timeout --retry --help --version ' ;;
     plot) options='--deformed --error --trade --x --with --colour --factor --width --ascii --case --output --json --server --timeout --retry --help --version ' ;;
@@ -102,6 +103,15 @@ _uzawa() {
     result--server|result-s) words='' ;;
     result--timeout|result-t) words='' ;;
     result--retry) words='' ;;
+    path--format|path-f) words='table csv json' ;;
+    path--from) words='' ;;
+    path--to) words='' ;;
+    path--count|path-n) words='' ;;
+    path--case|path-c) words='' ;;
+    path--output|path-o) files=1 ;;
+    path--server|path-s) words='' ;;
+    path--timeout|path-t) words='' ;;
+    path--retry) words='' ;;
     picture--colour) words='von_mises displacements pressure' ;;
     picture--factor) words='' ;;
     picture--width) words='' ;;
@@ -171,6 +181,7 @@ _uzawa() {
     refine) words=$(_uzawa_ids) ;;
     verify) files=1 ;;
     result) words=$(_uzawa_ids) ;;
+    path) words=$(_uzawa_ids) ;;
     picture) words=$(_uzawa_ids) ;;
     history) words=$(_uzawa_ids) ;;
     plot) words=$(_uzawa_ids) ;;

@@ -6,7 +6,7 @@ function __uzawa_ids
 end
 
 function __uzawa_commands
-    printf '%s\n' submit import upload status wait refine verify result picture history plot report request list cancel delete factors nodes doctor mcp version help
+    printf '%s\n' submit import upload status wait refine verify result path picture history plot report request list cancel delete factors nodes doctor mcp version help
 end
 
 # Is this the command of the line? "": there is none yet.
@@ -29,6 +29,7 @@ complete -c uzawa -n '__uzawa_is ""' -a wait -d 'wait until a job has ended, the
 complete -c uzawa -n '__uzawa_is ""' -a refine -d 'go on where an ended job stopped, to a new accuracy'
 complete -c uzawa -n '__uzawa_is ""' -a verify -d 'certify an answer from elsewhere'
 complete -c uzawa -n '__uzawa_is ""' -a result -d 'fetch the answer as JSON, a table, or a file for ParaView'
+complete -c uzawa -n '__uzawa_is ""' -a path -d 'tabulate displacement and stress along a line'
 complete -c uzawa -n '__uzawa_is ""' -a picture -d 'draw the deformed body of a scene as SVG'
 complete -c uzawa -n '__uzawa_is ""' -a history -d 'fetch or draw the convergence history'
 complete -c uzawa -n '__uzawa_is ""' -a plot -d 'draw the convergence, the body or the price of accuracy'
@@ -151,6 +152,19 @@ complete -c uzawa -n '__uzawa_is result' -l timeout -s t -r -f -d 'give up after
 complete -c uzawa -n '__uzawa_is result' -l retry -r -f -d 'keep trying to reach the server for S seconds (default 3; 30 while waiting)'
 complete -c uzawa -n '__uzawa_is result' -l help -s h -d 'explain the command'
 complete -c uzawa -n '__uzawa_is result' -l version -s V -d 'print the version'
+complete -c uzawa -n '__uzawa_is path' -f -a '(__uzawa_ids)'
+complete -c uzawa -n '__uzawa_is path' -l format -s f -r -f -a 'table csv json' -d 'table (default) with five digits, csv or json with all'
+complete -c uzawa -n '__uzawa_is path' -l from -r -f -d 'the first point, such as 0,20'
+complete -c uzawa -n '__uzawa_is path' -l to -r -f -d 'the last point'
+complete -c uzawa -n '__uzawa_is path' -l count -s n -r -f -d 'how many points, both ends among them (default 101)'
+complete -c uzawa -n '__uzawa_is path' -l case -s c -r -f -d 'of this load case; needed where the job has some'
+complete -c uzawa -n '__uzawa_is path' -l output -s o -r -F -d 'write to FILE, whole or not at all'
+complete -c uzawa -n '__uzawa_is path' -l json -s j -d 'print JSON, and what is wrong as JSON too'
+complete -c uzawa -n '__uzawa_is path' -l server -s s -r -f -d 'the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust'
+complete -c uzawa -n '__uzawa_is path' -l timeout -s t -r -f -d 'give up after S seconds; for wait and --wait: stop waiting'
+complete -c uzawa -n '__uzawa_is path' -l retry -r -f -d 'keep trying to reach the server for S seconds (default 3; 30 while waiting)'
+complete -c uzawa -n '__uzawa_is path' -l help -s h -d 'explain the command'
+complete -c uzawa -n '__uzawa_is path' -l version -s V -d 'print the version'
 complete -c uzawa -n '__uzawa_is picture' -f -a '(__uzawa_ids)'
 complete -c uzawa -n '__uzawa_is picture' -l colour -r -f -a 'von_mises displacements pressure' -d 'von_mises (default), displacements or pressure'
 complete -c uzawa -n '__uzawa_is picture' -l factor -r -f -d 'displacements are drawn X times as large (default: so that they show)'

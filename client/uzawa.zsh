@@ -19,6 +19,7 @@ _uzawa_commands() {
         'refine:go on where an ended job stopped, to a new accuracy'
         'verify:certify an answer from elsewhere'
         'result:fetch the answer as JSON, a table, or a file for ParaView'
+        'path:tabulate displacement and stress along a line'
         'picture:draw the deformed body of a scene as SVG'
         'history:fetch or draw the convergence history'
         'plot:draw the convergence, the body or the price of accuracy'
@@ -160,6 +161,21 @@ _uzawa() {
             '*--fields[such as displacements, reactions, gaps, pressure, stress, von_mises (default\: reactions,gaps; of vtu\: everything useful)]:A,B:(summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss)' \
             '*--field[one of them; may be repeated]:NAME:(summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss)' \
             '(-c --case)'{-c,--case}'[of this load case alone]:NAME: ' \
+            '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
+            '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
+            '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
+            '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
+            '(-h --help)'{-h,--help}'[explain the command]' \
+            '(-V --version)'{-V,--version}'[print the version]' \
+            '1:ID:_uzawa_ids' ;;
+    path)
+        _arguments \
+            '(-f --format)'{-f,--format}'[table (default) with five digits, csv or json with all]:F:(table csv json)' \
+            '--from[the first point, such as 0,20]:P: ' \
+            '--to[the last point]:P: ' \
+            '(-n --count)'{-n,--count}'[how many points, both ends among them (default 101)]:N: ' \
+            '(-c --case)'{-c,--case}'[of this load case; needed where the job has some]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \

@@ -130,6 +130,8 @@ static bool check_all(parser *p)
         return fail(p, "help --format %s is of all commands together", o->format);
     if (o->command == CLIENT_REFINE && !o->accuracy)
         return fail(p, "refine wants --accuracy: a relative error such as 1e-8, or quick, balanced, precise, exact");
+    if (o->command == CLIENT_PATH && (!o->from || !o->to))
+        return fail(p, "path wants --from and --to, points such as 0,20 or, of a solid, 0,20,5");
     if (o->command == CLIENT_LIST && o->tags.count > 1)
         return fail(p, "list filters by one --tag");
     /* Options that change nothing without another. */
@@ -171,7 +173,8 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             .max_iterations = -1,
                             .limit = 20,
                             .width = -1,
-                            .height = -1};
+                            .height = -1,
+                            .count = -1};
     parser p = {.options = out, .message = message, .size = size};
     for (int i = 1; i < argc; i++) /* known also where the line is not understood */
         out->json = out->json || strcmp(argv[i], "--json") == 0 || strcmp(argv[i], "-j") == 0;

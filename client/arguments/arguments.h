@@ -20,12 +20,13 @@ typedef struct {
     uz_words tags, set, vary, fields, with;
     const char *K, *N, *h, *p, *mesh, *surface; /* files; NULL: not given */
     bool leave_out;                             /* of a deck */
+    const char *from, *to;                      /* points, as written */
     const char *name, *key, *format, *output, *status, *colour, *factor, *axis;
-    const char *case_name, *accuracy;         /* accuracy: a number or a level, as written */
-    double time_limit_s;                      /* NAN: not given */
-    const char *junit, *baseline;             /* a file; a job */
-    double tolerance;                         /* of the baseline; -1: not given */
-    int limit, width, height, max_iterations; /* -1: not given */
+    const char *case_name, *accuracy;                /* accuracy: a number or a level, as written */
+    double time_limit_s;                             /* NAN: not given */
+    const char *junit, *baseline;                    /* a file; a job */
+    double tolerance;                                /* of the baseline; -1: not given */
+    int limit, width, height, count, max_iterations; /* -1: not given */
     bool wait, quiet, json, progress, csv, plot, ascii, deformed, whole_error, trade, help, version;
 } client_options;
 

@@ -61,6 +61,12 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
                        "those of contacts (reactions, gaps, pressure, contact_status), or for each unknown of a "
                        "problem in matrices; first its number and, of scenes, its coordinates.\n",
                        NULL},
+    [CLIENT_PATH] = {"path", "path ID --from P --to P [options]", "tabulate displacement and stress along a line", "ID",
+                     CLIENT_OPERAND_NEEDED,
+                     "A P is a point of the body before it was deformed, in the scene's coordinates: 0,20 or, of a "
+                     "solid, 0,20,5. A row for each of equally spaced points: distance from the first, place, "
+                     "displacement, stress, von Mises stress; nothing where a point is not in the body.\n",
+                     NULL},
     [CLIENT_PICTURE] = {"picture", "picture ID [options]", "draw the deformed body of a scene as SVG", "ID",
                         CLIENT_OPERAND_NEEDED, "", NULL},
     [CLIENT_HISTORY] = {"history", "history ID [options]", "fetch or draw the convergence history", "ID",
@@ -109,7 +115,7 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
 #define ASKING      (CLIENT_EVERYWHERE & ~IN(VERSION) & ~IN(HELP)) /* commands that talk to the server */
 #define MAKING      (IN(SUBMIT) | IN(REFINE))                      /* commands that make a job */
 #define STAYING     (MAKING | IN(VERIFY) | IN(WAIT))
-#define OF_A_CASE   (IN(PICTURE) | IN(HISTORY) | IN(PLOT))
+#define OF_A_CASE   (IN(PATH) | IN(PICTURE) | IN(HISTORY) | IN(PLOT))
 #define FILES       (IN(IMPORT) | IN(RESULT) | OF_A_CASE | IN(REPORT) | IN(REQUEST)) /* whose output may go to a file */
 
 #define OPTION(NAME, LETTER, KIND, MEMBER, COMMANDS, ...)                                                              \
@@ -152,6 +158,12 @@ static const uz_option OPTIONS[] = {
     OPTION("key", 'k', WORD, key, STAYING & ~IN(WAIT), .value = "KEY", .about = "idempotency key (default: random)"),
     OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json csv vtu",
            .about = "json (default), csv: a table, or vtu: scenes only"),
+    OPTION("format", 'f', CHOICE, format, IN(PATH), .value = "F", .choices = "table csv json",
+           .about = "table (default) with five digits, csv or json with all"),
+    OPTION("from", 0, WORD, from, IN(PATH), .value = "P", .about = "the first point, such as 0,20"),
+    OPTION("to", 0, WORD, to, IN(PATH), .value = "P", .about = "the last point"),
+    OPTION("count", 'n', INTEGER, count, IN(PATH), .least = 2, .most = 10000, .value = "N",
+           .about = "how many points, both ends among them (default 101)"),
     OPTION("format", 'f', CHOICE, format, IN(HELP), .value = "F", .choices = "text man bash zsh fish json",
            .about =
                "text (default); of all commands together: man, a manual page, bash, zsh, fish, a completion, or json"),

@@ -18,6 +18,7 @@ static const struct {
                       "uzawa result $job --format csv --fields displacements,von_mises -o nodes.csv\n"
                       "uzawa result $job --format csv --field reactions --field pressure\n"
                       "uzawa result $job --format vtu -o body.vtu\n"
+                      "uzawa path $job --from 0,10 --to 60,10 --count 7\n"
                       "uzawa plot $job -o convergence.svg\n"
                       "uzawa plot $job --deformed -o body.svg\n"
                       "uzawa report $job -o report.html\n"

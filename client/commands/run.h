@@ -21,6 +21,7 @@ client_exit client_wait(client_session *s);
 client_exit client_status(client_session *s);
 client_exit client_list(client_session *s);
 client_exit client_result(client_session *s);
+client_exit client_path(client_session *s);
 client_exit client_picture(client_session *s);
 client_exit client_history(client_session *s);
 client_exit client_plot(client_session *s);

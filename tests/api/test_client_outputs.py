@@ -190,6 +190,35 @@ def test_names_in_a_table_are_quoted(_):
     check(done.stdout == 'case,contact,reactions\n"a,""b""",0,1\n"a,""b""",1,\n', done.stdout)
 
 
+def test_fields_along_a_line(server):
+    job, ends = solved(server), ("--from", "-2,10", "--to", "58,10", "--count", "31")
+    want = server.get(f"/v1/jobs/{job}/path?from=-2,10&to=58,10&count=31").json
+    check(json.loads(run(server, "path", job, *ends, "--json").stdout) == want == json.loads(run(server, "path", job, *ends, "-f", "json").stdout))
+    rows = list(csv.DictReader(io.StringIO(run(server, "path", job, *ends, "--format", "csv").stdout)))
+    check([float(row["von_mises"]) for row in rows[1:]] == want["von_mises"][1:] and rows[0]["ux"] == "nan", rows[:2])
+    lines = run(server, "path", job, *ends).stdout.splitlines()
+    check(lines[0].split() == list(rows[0]) and len({len(line) for line in lines}) == 1 and len(lines) == 32, lines[:3])
+    check(lines[1].split() == ["0", "-2", "10"] + 7 * ["-"], lines[1])
+    for line, row in zip(lines[2:], rows[1:]):
+        check(all(abs(float(cell) - float(value)) <= 6e-5 * abs(float(value)) for cell, value in zip(line.split(), row.values())), line, row)
+    target = os.path.join(server.folder, "along.csv")
+    run(server, "path", job, *ends, "--format", "csv", "--output", target)
+    check(open(target, encoding="utf-8").read().startswith("distance,x,y,ux,uy,stress_xx"))
+
+
+def test_lines_that_cannot_be(server):
+    check("wants --from and --to" in run(server, "path", ID, "--from", "0,0", code=2).stderr)
+    check("from 2 to 10000" in run(server, "path", ID, "--from", "0,0", "--to", "1,1", "--count", "1", code=2).stderr)
+    check("contradict" in run(server, "path", ID, "--from", "0,0", "--to", "1,1", "--json", "-f", "csv", code=2).stderr)
+    job = solved(server)
+    check("points of 2 numbers" in run(server, "path", job, "--from", "0,0,0", "--to", "1,1,1", code=4).stderr)
+    check("from is a point" in run(server, "path", job, "--from", "left", "--to", "1,1", code=4).stderr)
+    cases = solved(server, PAPER, "--vary", "loads.1.traction.0=0.1,0.2")
+    words = ("path", cases, "--from", "0,10", "--to", "60,10", "-f", "csv")
+    check("case" in run(server, *words, code=4).stderr)
+    check(run(server, *words, "--case", "0.1").stdout != run(server, *words, "--case", "0.2").stdout)
+
+
 # ---------------------------------------------------------------- pictures
 
 
