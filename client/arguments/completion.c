@@ -4,6 +4,32 @@
 
 #include <string.h>
 
+/* What a value or an operand is, by what it is called. */
+typedef enum { VALUE_FILE, VALUE_ID, VALUE_COMMAND, VALUE_OTHER } value_kind;
+
+static value_kind kind_of(const char *value)
+{
+    return strcmp(value, "FILE") == 0      ? VALUE_FILE
+           : strcmp(value, "ID") == 0      ? VALUE_ID
+           : strcmp(value, "COMMAND") == 0 ? VALUE_COMMAND
+                                           : VALUE_OTHER;
+}
+
+/* ---- bash */
+
+/* " words=... ;;" of what may stand there. */
+static void print_bash_value(FILE *to, const char *value, const char *choices)
+{
+    static const char *const WORDS[] = {[VALUE_FILE] = "files=1",
+                                        [VALUE_ID] = "words=$(_uzawa_ids)",
+                                        [VALUE_COMMAND] = "words=$commands",
+                                        [VALUE_OTHER] = "words=''"};
+    if (choices)
+        fprintf(to, ") words='%s' ;;\n", choices);
+    else
+        fprintf(to, ") %s ;;\n", WORDS[kind_of(value)]);
+}
+
 /* Patterns of `case $command$previous`: what may follow an option. */
 static void print_values(FILE *to, client_command command)
 {
@@ -15,18 +41,9 @@ static void print_values(FILE *to, client_command command)
         fprintf(to, "    %s--%s", CLIENT_PAGES[command].name, o->name);
         if (o->letter)
             fprintf(to, "|%s-%c", CLIENT_PAGES[command].name, o->letter);
-        if (o->choices)
-            fprintf(to, ") words='%s' ;;\n", o->choices);
-        else if (strcmp(o->value, "FILE") == 0)
-            fputs(") files=1 ;;\n", to);
-        else if (strcmp(o->value, "ID") == 0)
-            fputs(") words=$(_uzawa_ids) ;;\n", to);
-        else
-            fputs(") words='' ;;\n", to);
+        print_bash_value(to, o->value, o->choices);
     }
 }
-
-/* ---- bash */
 
 static void print_bash(FILE *to)
 {
@@ -69,13 +86,8 @@ static void print_bash(FILE *to)
         const client_page *p = &CLIENT_PAGES[i];
         if (!p->operand)
             continue;
-        fprintf(to, "    %s) ", p->name);
-        if (strcmp(p->operand, "FILE") == 0)
-            fputs("files=1 ;;\n", to);
-        else if (strcmp(p->operand, "ID") == 0)
-            fputs("words=$(_uzawa_ids) ;;\n", to);
-        else
-            fputs("words=$commands ;;\n", to);
+        fprintf(to, "    %s", p->name);
+        print_bash_value(to, p->operand, NULL);
     }
     fputs("        esac; fi ;;\n    esac\n"
           "    if [[ $files ]]; then\n"
@@ -90,16 +102,6 @@ static void print_bash(FILE *to)
 }
 
 /* ---- what zsh and fish share */
-
-typedef enum { VALUE_FILE, VALUE_ID, VALUE_COMMAND, VALUE_OTHER } value_kind;
-
-static value_kind kind_of(const char *value)
-{
-    return strcmp(value, "FILE") == 0      ? VALUE_FILE
-           : strcmp(value, "ID") == 0      ? VALUE_ID
-           : strcmp(value, "COMMAND") == 0 ? VALUE_COMMAND
-                                           : VALUE_OTHER;
-}
 
 /* Within single quotes: those of the text become '\'', and bytes of `escaped` get a backslash before them. */
 static void print_quoted(FILE *to, const char *text, const char *escaped)
