@@ -1,34 +1,14 @@
 // cases.js: the load cases of a job as a table to sort, and any of its numbers as a curve over the cases.
 
+import { Curve } from "./curve.js";
 import { h, show } from "./dom.js";
-import { count, number, percent_up, seconds } from "./format.js";
-import { Chart } from "./plot.js";
-import { unit_of } from "./units.js";
+import { count } from "./format.js";
+import { numbers_of } from "./numbers.js";
 import { sorted_by } from "./view_order.js";
-import { error_of, error_words, state_words } from "./words.js";
+import { error_words, state_words } from "./words.js";
 
 const MOST_ROWS = 500, MOST_DOTS = 200;
-const at = (path) => (summary) => path.split(".").reduce((value, key) => value?.[key], summary) ?? null;
-const force = (axis) => (summary) => summary.contact?.force?.[axis] ?? null;
-
-// [key, heading, value of a summary, what its unit is of, how it is written]
-const NUMBERS = [
-  ["error", "Whole error", error_of, null, percent_up], ["max_pressure", "Largest pressure", at("contact.max_pressure"), "stress"],
-  ["area", "Contact area", at("contact.area"), "area"], ["active", "In contact", at("contact.active"), null, count],
-  ["force_x", "Force along x", force(0), "force"], ["force_y", "Force along y", force(1), "force"], ["force_z", "Force along z", force(2), "force"],
-  ["reaction_sum", "Sum of reactions", at("contact.reaction_sum"), "force"], ["von_mises", "Largest von Mises", at("stress.von_mises"), "stress"],
-  ["safety", "Safety factor", at("stress.safety"), null], ["penetration", "Largest penetration", at("contact.max_penetration"), "length"],
-  ["energy", "Energy", at("energy.primal"), "energy"], ["iterations", "Iterations", at("iterations"), null, count],
-  ["time", "Iterated for", at("timings_s.iterate"), null, seconds],
-];
 const IN_TABLE = ["error", "max_pressure", "area", "active", "reaction_sum", "von_mises", "safety"];
-
-/** Numbers asked for by name, quantities of the request, are columns too. */
-function columns_of(cases) {
-  const named = (cases[0].summary.quantities || []).map(({ name }) => [`quantity ${name}`, name, (summary) => summary.quantities?.find((one) => one.name === name)?.value ?? null, null]);
-  return [...NUMBERS, ...named].map(([key, name, value, of, words]) => ({ key, name, value, unit: unit_of(cases[0].summary, of), words: words || ((x) => number(x, 5)) }))
-    .filter((column) => cases.some((one) => Number.isFinite(column.value(one.summary))));
-}
 
 /** Where a case stands on the axis: the number that its name is or ends with, if all have one; else its number. */
 function places_of(cases) {
@@ -42,25 +22,18 @@ function places_of(cases) {
  * Returns {mark(name), destroy()}.
  */
 export function mountCases(element, cases, chosen, on_choose) {
-  const columns = columns_of(cases), table_columns = columns.filter((one) => IN_TABLE.includes(one.key) || one.key.startsWith("quantity "));
+  const columns = numbers_of(cases.map((one) => one.summary)), table_columns = columns.filter((one) => IN_TABLE.includes(one.key) || one.key.startsWith("quantity "));
   const places = places_of(cases);
   let order = { by: "", up: true }, here = chosen;
-  const place = h("div"), table_place = h("div", { class: "scrolled", tabindex: "0", role: "region", "aria-label": "Load cases" });
-  const field = h("select", { id: "case-curve", onchange: () => draw_curve() }, columns.map((one) => h("option", { value: one.key }, one.name)));
-  field.value = columns.some((one) => one.key === "max_pressure") ? "max_pressure" : columns[0]?.key || "";
-  show(element, h("h2", null, `${count(cases.length)} load cases`), h("div", { class: "body-tools" }, h("label", null, "Curve of", field)), place, table_place);
-  const chart = new Chart(place, 240);
-
-  function draw_curve() {
-    const column = columns.find((one) => one.key === field.value);
-    if (!column) return;
+  const table_place = h("div", { class: "scrolled", tabindex: "0", role: "region", "aria-label": "Load cases" });
+  const curve = new Curve("case-curve", (column) => {
     const points = cases.map((one, i) => [places.values[i], column.value(one.summary), one.name]).sort((a, b) => a[0] - b[0]);
     const now = cases.findIndex((one) => one.name === here);
     const series = [{ name: column.name, colour: 1, points, dots: points.length <= MOST_DOTS, size: 3 }];
     if (now >= 0) series.push({ name: here, colour: 2, line: false, size: 6, points: [[places.values[now], column.value(cases[now].summary)]] });
-    chart.update({ x: { label: places.label, whole: places.whole, from_zero: false }, y: { label: `${column.name}${column.unit && `,${column.unit}`}`, format: column.words }, series,
-      label: `${column.name} of ${cases.length} load cases` });
-  }
+    return { x: { label: places.label, whole: places.whole, from_zero: false }, series, label: `${column.name} of ${cases.length} load cases` };
+  });
+  show(element, h("h2", null, `${count(cases.length)} load cases`), h("div", { class: "body-tools" }, curve.choice), curve.place, table_place);
 
   function sorted() {
     const column = columns.find((one) => one.key === order.by);
@@ -88,13 +61,13 @@ export function mountCases(element, cases, chosen, on_choose) {
   }
 
   draw_table();
-  draw_curve();
+  curve.take(columns, "max_pressure");
   return {
     mark: (name) => {
       here = name;
       draw_table();
-      draw_curve();
+      curve.draw();
     },
-    destroy: () => chart.destroy(),
+    destroy: () => curve.destroy(),
   };
 }

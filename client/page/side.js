@@ -2,21 +2,15 @@
 
 import { Convergence } from "./convergence.js";
 import { h, show } from "./dom.js";
-import { count, moment, number, percent, seconds, short_id } from "./format.js";
+import { count, moment, percent, seconds, short_id } from "./format.js";
 import { status_chip } from "./list.js";
+import { numbers_of } from "./numbers.js";
 import { error_words, method_words, problem_words, title_of } from "./words.js";
 import { unit_of } from "./units.js";
 
 const MOST_LEAVES = 20000, MOST_SHOWN = 60;
 
-const value_of = (object, path) => path.split(".").reduce((at, key) => at?.[key], object);
-
-/** Numbers of a summary: [name, path, what its unit is of, as units.js has it]. */
-const NUMBERS = [
-  ["Largest contact pressure", "contact.max_pressure", "stress"], ["Contact area", "contact.area", "area"], ["Largest von Mises stress", "stress.von_mises", "stress"],
-  ["Safety factor", "stress.safety", null], ["Points in contact", "contact.active", null], ["Sum of the reactions", "contact.reaction_sum", "force"],
-  ["Largest penetration", "contact.max_penetration", "length"], ["Energy", "energy.primal", "energy"],
-];
+const COMPARED = ["max_pressure", "area", "von_mises", "safety", "active", "reaction_sum", "penetration", "energy"];
 
 /** Paths and values of all that a request says, but long lists, which count as one. */
 function leaves_of(value, path, into) {
@@ -43,12 +37,12 @@ function table_of(id, caption, jobs, rows) {
 }
 
 /** A number, and by how much it is off the first job's. */
-function cells_of(jobs, path, of) {
-  const values = jobs.map((job) => value_of(job.summary, path)), first = values[0];
+function cells_of(jobs, { value: value_of, of, words }) {
+  const values = jobs.map((job) => value_of(job.summary)), first = values[0];
   return values.map((value, i) => {
     if (!Number.isFinite(value)) return "–";
     const off = i > 0 && Number.isFinite(first) && first !== 0 && value !== first ? ` (${value > first ? "+" : ""}${percent((value - first) / Math.abs(first))})` : "";
-    return [`${number(value, 5)}${unit_of(jobs[i].summary, of)}`, h("span", { class: "muted" }, off)];
+    return [`${words(value)}${unit_of(jobs[i].summary, of)}`, h("span", { class: "muted" }, off)];
   });
 }
 
@@ -57,7 +51,7 @@ function answers_of(jobs) {
   const rows = [["Outcome", jobs.map((job) => status_chip(job.status, job.summary?.outcome))], ["Whole error", summaries(error_words)], ["Problem", summaries(problem_words)],
     ["Method", summaries(method_words)], ["Time", summaries((summary) => seconds(summary.timings_s?.total))], ["Created", jobs.map((job) => moment(job.created))],
     ["Load cases", summaries((summary) => (summary.cases ? count(summary.cases.count) : "–"))]];
-  for (const [name, path, of] of NUMBERS) if (jobs.some((job) => Number.isFinite(value_of(job.summary, path)))) rows.push([name, cells_of(jobs, path, of)]);
+  for (const one of numbers_of(jobs.map((job) => job.summary))) if (COMPARED.includes(one.key) || one.key.startsWith("quantity ")) rows.push([one.name, cells_of(jobs, one)]);
   return rows;
 }
 
