@@ -2,10 +2,12 @@
 
 import { Camera, VIEWS } from "./body_camera.js";
 import { listen } from "./body_input.js";
+import { to_body } from "./body_obstacles.js";
 import { Overlay } from "./body_overlay.js";
 import { add_stress, displacement_of, forget_surface, load_surface, node_of, place_of, quantities, rows_by_vertex, shades_of, values_of, viridis } from "./body_surface.js";
 import { announce, h, s, show } from "./dom.js";
 import { number } from "./format.js";
+import { mountPath } from "./path.js";
 import { mountPressure } from "./pressure.js";
 import { colour } from "./theme.js";
 
@@ -102,8 +104,9 @@ class BodyView {
     this.tools = h("div", { class: "body-tools" });
     this.legend = h("div", { class: "body-legend" });
     this.keys = h("p", { class: "muted body-keys", id: `body-keys-${this.number}` });
+    this.path_place = h("div", { class: "body-path" });
     this.pressure_place = h("div", { class: "body-pressure" });
-    show(this.element, this.tools, this.frame_box, this.legend, this.keys, this.pressure_place);
+    show(this.element, this.tools, this.frame_box, this.legend, this.keys, this.path_place, this.pressure_place);
     this.overlay = new Overlay(this.overlay_canvas);
   }
 
@@ -215,10 +218,20 @@ class BodyView {
     show(this.keys, surface.dim === 3 ? "Drag to turn, with Shift to move; with the picture in focus the wheel enlarges, arrows turn, Shift and arrows move, + and − enlarge, 0 shows all."
       : "Drag to move; with the picture in focus the wheel enlarges, arrows move, + and − enlarge, 0 shows all.");
     if (this.options.pressure !== false) this.show_pressure();
+    this.show_path();
     if (wanted === "von_mises" && !surface.von_mises) {
       this.tools.querySelector(".body-colour").value = wanted;
       this.choose(wanted);
     }
+  }
+
+  show_path() {
+    const { surface } = this, { dim, unit } = surface;
+    this.path?.destroy();
+    this.line = null;
+    const shown = (points) => points && points.map(({ at, u }) => [...to_body(surface, at), ...(dim === 2 ? [0] : []), ...u.map((x) => x / unit), ...(dim === 2 ? [0] : [])]);
+    this.path = mountPath(this.path_place, this.api, this.job, { case: this.case_name, units: this.options.units, surface,
+      on_line: (points) => ((this.line = shown(points)), this.redraw()), pick: (act) => (this.picked = act) });
   }
 
   async show_pressure() {
@@ -295,7 +308,8 @@ class BodyView {
     if (x === null) this.mark(this.held);
     else {
       const vertex = this.view.pick(this.surface, this.factor, x, y, REACH);
-      if (is_tap) this.held = vertex;
+      if (is_tap && vertex >= 0 && this.picked) this.picked(vertex);
+      else if (is_tap) this.held = vertex;
       this.mark(vertex >= 0 ? vertex : this.held);
     }
   }
@@ -345,7 +359,7 @@ class BodyView {
     this.frame = 0;
     if (!this.gl || this.ends.signal.aborted) return;
     this.gl.render(this.view, this.factor);
-    this.overlay.draw(this.view, this.factor, { colours: this.colours, obstacles: this.shown.obstacles, forces: this.shown.forces, marked: this.marked });
+    this.overlay.draw(this.view, this.factor, { colours: this.colours, obstacles: this.shown.obstacles, forces: this.shown.forces, marked: this.marked, line: this.line });
     this.canvas.setAttribute("aria-label", this.summary());
     this.canvas.dataset.frames = ++this.frames;
     if (this.frames > 1) return;
@@ -411,6 +425,7 @@ class BodyView {
     cancelAnimationFrame(this.frame);
     this.sizes?.disconnect();
     this.pressure?.destroy();
+    this.path?.destroy();
     this.gl?.dispose();
     this.gl = null;
     if (this.address) URL.revokeObjectURL(this.address);

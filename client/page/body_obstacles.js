@@ -20,14 +20,20 @@ export function to_body(surface, x) {
   return x.map((value, c) => (value - surface.origin[c]) / surface.unit);
 }
 
-/** Diagonal of the body's box, in its own units. */
-export function extent_of(surface) {
+/** The corners of the body's box, in its own units. */
+export function box_of(surface) {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], { position } = surface;
   for (let i = 0; i < position.length; i++) {
     if (position[i] < low[i % 3]) low[i % 3] = position[i];
     if (position[i] > high[i % 3]) high[i % 3] = position[i];
   }
-  return length(low.map((x, c) => high[c] - x)) || 1;
+  return [low, high];
+}
+
+/** Diagonal of that box. */
+export function extent_of(surface) {
+  const [low, high] = box_of(surface);
+  return length(add(high, low, -1)) || 1;
 }
 
 /** (CELLS + 1)^2 points of at(s, t), s and t in -1..1, as triangles. */

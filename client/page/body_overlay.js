@@ -79,7 +79,8 @@ export class Overlay {
     return view.project(p[i] + factor * u[i], p[i + 1] + factor * u[i + 1], p[i + 2] + factor * u[i + 2]);
   }
 
-  draw(view, factor, { colours, obstacles, forces, marked }) {
+  /** line: points of a path, each with its displacement: six numbers. */
+  draw(view, factor, { colours, obstacles, forces, marked, line }) {
     const pen = this.canvas.getContext("2d"), { surface, width, height, ratio } = this;
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
@@ -89,6 +90,7 @@ export class Overlay {
         draw_border(pen, line.map(([x, y]) => view.project(x, y, 0)), width, height);
     }
     if (forces && this.largest > 0) this.draw_forces(pen, view, factor, colours.push);
+    if (line?.length) this.draw_line(pen, line.map(([x, y, z, ux, uy, uz]) => view.project(x + factor * ux, y + factor * uy, z + factor * uz)), colours);
     this.draw_triad(pen, view, colours);
     if (marked >= 0) this.draw_mark(pen, this.place(view, factor, marked), colours);
   }
@@ -128,6 +130,17 @@ export class Overlay {
       pen.fillStyle = ink;
       pen.fillText(name, ...at);
     }
+  }
+
+  draw_line(pen, points, { ink, paper }) {
+    for (const [width, colour] of [[5, paper], [2, ink]]) {
+      pen.lineWidth = width;
+      pen.strokeStyle = colour;
+      pen.beginPath();
+      points.forEach((point, i) => (i ? pen.lineTo(...point) : pen.moveTo(...point)));
+      pen.stroke();
+    }
+    for (const end of [points[0], points[points.length - 1]]) this.draw_mark(pen, end, { ink, paper });
   }
 
   draw_mark(pen, [x, y], { ink, paper }) {

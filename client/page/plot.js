@@ -34,9 +34,9 @@ export function thin(points, most) {
   return kept;
 }
 
-/** Those that an axis can show: finite, and above 0 on a logarithmic one. */
-function visible(points, x_log, y_log) {
-  return points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y) && (!x_log || x > 0) && (!y_log || y > 0));
+/** Those that an axis can show: finite, and above 0 on a logarithmic one; with gaps, those that interrupt the line too. */
+function visible(points, x_log, y_log, gaps) {
+  return points.filter(([x, y]) => Number.isFinite(x) && (gaps || Number.isFinite(y)) && (!x_log || x > 0) && (!y_log || y > 0));
 }
 
 function extent(values) {
@@ -125,7 +125,7 @@ function draw_series(svg, one, points, scales) {
     return;
   }
   if (one.line !== false && points.length > 1) {
-    const path = line().x(([x]) => scales.x(x)).y(([, y]) => scales.y(y));
+    const path = line().defined(([, y]) => Number.isFinite(y)).x(([x]) => scales.x(x)).y(([, y]) => scales.y(y));
     svg.append(s("path", { class: `line ${colour}`, "stroke-dasharray": one.dash || null, d: path(points), "data-series": one.name }));
   }
   if (one.line === false || points.length === 1 || one.dots)
@@ -149,7 +149,7 @@ function nearest(points, x) {
 /**
  * A chart in an element, as wide as that is. update({x, y, series, label}) draws it; x, y: {label, log, from_zero, whole:
  * numbers only without fractions, format}; series: [{name, colour: 1 to 6, points: [[x, y, text]], dash, line: false for
- * dots alone, across: a level over the whole width, dots, texts, size}], points in the order of x unless line is false;
+ * dots alone, across: a level over the whole width, gaps: NaN interrupts it, dots, texts, size}], points in the order of x unless line is false;
  * label: what it shows, for screen readers.
  */
 export class Chart {
@@ -176,7 +176,7 @@ export class Chart {
     const width = Math.round(this.element.clientWidth);
     if (!this.what || width < 60) return;
     const { x, y, series, label } = this.what, size = { width, height: this.height };
-    this.shown = series.map((one) => ({ one, points: visible(one.points, x.log, y.log) }));
+    this.shown = series.map((one) => ({ one, points: visible(one.points, x.log, y.log, one.gaps) }));
     const all = this.shown.flatMap(({ points }) => points);
     const y_scale = scale_of(y, all.map((p) => p[1]), [this.height - MARGIN.bottom, MARGIN.top]);
     const y_ticks = ticks_of(y_scale, y, Math.max(3, Math.floor(this.height / 34)));
@@ -187,7 +187,7 @@ export class Chart {
     this.svg.setAttribute("aria-label", label);
     show(this.svg);
     draw_axes(this.svg, { x, y }, this.scales, y_ticks, size);
-    if (!all.length) this.svg.append(s("text", { class: "label", x: width / 2, y: this.height / 2, "text-anchor": "middle" }, "nothing to show yet"));
+    if (!all.some(([, value]) => Number.isFinite(value))) this.svg.append(s("text", { class: "label", x: width / 2, y: this.height / 2, "text-anchor": "middle" }, "nothing to show yet"));
     const texts_last = [...this.shown].sort((a, b) => Boolean(a.one.texts) - Boolean(b.one.texts));
     for (const { one, points } of texts_last) draw_series(this.svg, one, thin(points, 4 * width), this.scales);
     this.cursor = s("line", { class: "cursor", y1: MARGIN.top, y2: this.height - MARGIN.bottom, visibility: "hidden" });

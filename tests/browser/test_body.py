@@ -274,4 +274,46 @@ def test_a_large_body_sends_only_what_is_drawn_and_matrices_have_none(s, b):
     check(not b.run("return document.querySelector('#open-body')?.checkVisibility()"), b.text("main"))
 
 
+def test_fields_along_a_line(s, b):
+    """The ends are typed or clicked, the curve is what the service says, and the line is seen on the body."""
+    job = show_all(s, b, {**SCENE, "problem": {**SCENE["problem"], "units": {"length": "mm", "force": "N"}}})
+    ink = b.near(".body-frame", "--ink", 30)
+    b.click(".path summary")
+    curve = "return document.querySelector('.path path.line')?.getAttribute('d')"
+    first = b.wait("a curve", curve)
+    check(b.run("return [document.querySelector('#path-from').value, document.querySelector('#path-to').value]") == ["0, 10", "60, 10"], "through the middle")
+    check(b.near(".body-frame", "--ink", 30) > ink + 300, "no line on the body")
+    said = b.run("return document.querySelector('.path .chart').textContent")
+    check("von Mises stress, MPa" in said and "from (0, 10), mm" in said, said)
+    set_value(b, "#path-curve", "u0", "change")
+    b.wait("another curve", curve.replace("return ", "return arguments[0] !== "), first)
+    # A line that leaves the body is interrupted: the body ends at 60.
+    set_value(b, "#path-to", "120, 10", "change")
+    b.wait("half a curve", """const d = document.querySelector('.path path.line').getBoundingClientRect(), c = document.querySelector('.path .chart').getBoundingClientRect();
+        return d.width < 0.55 * c.width && d.width > 0.4 * c.width""")
+    set_value(b, "#path-to", "nowhere", "change")
+    b.says(".path [role=alert]", "to is a point")
+    check(all("400" in text for _, text in b.console()), "no other word")
+    # Two clicks on the body.
+    after(b, lambda: set_value(b, ".body-scale", 0, "input"))
+    b.click("#path-pick")
+    for share in (0.3, 0.7):
+        b.run("document.querySelector('.body-frame').scrollIntoView({block: 'center'})")
+        b.run("""const c = document.querySelector('.body-canvas'), r = c.getBoundingClientRect();
+            for (const name of ['pointerdown', 'pointerup'])
+                c.dispatchEvent(new PointerEvent(name, {clientX: r.left + arguments[0] * r.width, clientY: r.top + r.height / 2, pointerId: 7, bubbles: true}));""", share)
+    b.wait("ends", "return document.querySelector('#path-to').value !== 'nowhere' && document.querySelector('#path-pick').getAttribute('aria-pressed') === 'false'")
+    ends = b.run("return [document.querySelector('#path-from').value, document.querySelector('#path-to').value]")
+    nodes = s.get(f"/v1/jobs/{job}/result?fields=nodes").json["nodes"]
+    places = [[float(x) for x in end.split(", ")] for end in ends]
+    check(all(place in nodes for place in places) and places[0][0] < places[1][0], places)
+    b.wait("no complaint", "return document.querySelector('.path [role=alert]').hidden")
+    for width, phone, dark in ((1200, False, False), (760, False, True), (360, True, False)):
+        b.size(width, 800, phone)
+        b.media("prefers-color-scheme", "dark" if dark else "light")
+        b.wait("drawn anew", "return document.querySelector('.path .chart').getBoundingClientRect().right <= innerWidth")
+        check(b.run("return document.documentElement.scrollWidth <= innerWidth"), width, "the page is wider than the screen")
+        check(b.near(".path .chart", "--series-1") > 60, width, "the curve has too few pixels")
+
+
 browser.main(globals())
