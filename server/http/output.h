@@ -12,6 +12,7 @@ typedef struct {
     unsigned fields; /* uz_field bits: `fields`, or the row's own choice */
     uz_picture picture;
     uz_path_line path;
+    uz_plane plane;
 } output_options;
 
 /* What an output is written from. */

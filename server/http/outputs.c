@@ -35,18 +35,34 @@ static uz_status write_vtu(char **file, size_t *len, const output_source *of, co
     return uz_vtu_write(file, len, of->scene, of->answer, of->options->fields, hooks, err);
 }
 
-static uz_status write_surface(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+/* Clears the surface. */
+static uz_status encode_surface(char **file, size_t *len, uz_surface *surface, const output_source *of,
+                                uz_status status)
 {
-    uz_surface surface;
     *file = NULL;
-    uz_status status = uz_surface_compute(&surface, of->scene, of->answer, of->options->fields, MOST_BYTES, hooks, err);
     if (status == UZ_OK) {
-        const codec_surface what = {&surface, of->scene, of->job_id, of->case_name};
+        const codec_surface what = {surface, of->scene, of->job_id, of->case_name};
         *file = codec_encode_surface(&what, len);
         status = *file ? UZ_OK : UZ_ERR_MEMORY;
     }
-    uz_surface_clear(&surface);
+    uz_surface_clear(surface);
     return status;
+}
+
+static uz_status write_surface(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    uz_surface surface;
+    const uz_status status =
+        uz_surface_compute(&surface, of->scene, of->answer, of->options->fields, MOST_BYTES, hooks, err);
+    return encode_surface(file, len, &surface, of, status);
+}
+
+static uz_status write_section(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    uz_surface surface;
+    const uz_status status = uz_section_compute(&surface, of->scene, of->answer, &of->options->plane,
+                                                of->options->fields, MOST_BYTES, hooks, err);
+    return encode_surface(file, len, &surface, of, status);
 }
 
 static uz_status write_picture(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
@@ -126,6 +142,22 @@ static bool read_point(double out[3], const char *text)
     return false;
 }
 
+/* A point of the plane and its normal. */
+static bool read_plane(output_options *out, const http_request *rq, problem_details *problem)
+{
+    static const char *const KEYS[] = {"point", "normal"};
+    double *const to[] = {out->plane.point, out->plane.normal};
+    for (int i = 0; i < 2; i++)
+        if (!read_point(to[i], target_value(&rq->target, KEYS[i])) || isnan(to[i][2]))
+            return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                                "%s is three numbers with commas between: point=0,0,5&normal=0,0,1", KEYS[i]);
+    const double *n = out->plane.normal, length = hypot(hypot(n[0], n[1]), n[2]);
+    if (!(length > 0 && isfinite(length)))
+        return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                            "normal is the direction across the plane, and 0,0,0 is none");
+    return true;
+}
+
 /* Both ends of the line and how many points it has. */
 static bool read_path(output_options *out, const http_request *rq, problem_details *problem)
 {
@@ -151,11 +183,13 @@ static bool read_path(output_options *out, const http_request *rq, problem_detai
 #define VTU_BY_DEFAULT                                                                                                 \
     ((unsigned)(UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE | UZ_FIELD_GAPS |    \
                 UZ_FIELD_CONTACT_STATUS | UZ_FIELD_MATERIALS))
+#define IN_SECTION ((unsigned)(UZ_FIELD_DISPLACEMENTS | UZ_FIELD_VON_MISES))
 #define IN_SURFACE ((unsigned)(UZ_FIELD_DISPLACEMENTS | UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE))
 
 static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
 static const char *const FILE_OF[] = {"fields", "case", NULL};
 static const char *const PICTURE[] = {"colour", "factor", "width", "case", NULL};
+static const char *const SECTION[] = {"point", "normal", "fields", "case", NULL};
 static const char *const PATH[] = {"from", "to", "count", "case", NULL};
 static const char *const HISTORY[] = {"after", "case", NULL};
 static const char *const OF_CASE[] = {"case", NULL};
@@ -173,6 +207,8 @@ const output OUTPUTS[] = {
      NULL, false},
     {OUTPUT("surface", FILE_OF, output_get), "model/gltf-binary", OUTPUT_OF_ANSWER, write_surface, IN_SURFACE,
      IN_SURFACE, NULL, false},
+    {OUTPUT("section", SECTION, output_get), "model/gltf-binary", OUTPUT_OF_ANSWER, write_section, IN_SECTION,
+     IN_SECTION, read_plane, false},
     {OUTPUT("deformed.svg", PICTURE, output_get), "image/svg+xml", OUTPUT_OF_ANSWER, write_picture, 0, 0, read_picture,
      false},
     {OUTPUT("path", PATH, output_get), "application/json", OUTPUT_OF_ANSWER, write_path, 0, 0, read_path, true},

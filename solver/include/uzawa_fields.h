@@ -150,6 +150,19 @@ uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_fi
                              size_t most_bytes, const uz_hooks *hooks, uz_error *err);
 void uz_surface_clear(uz_surface *surface);
 
+/* A plane through a solid before anything moved. */
+typedef struct {
+    double point[3], normal[3]; /* any length but 0 */
+} uz_plane;
+/* What a viewer draws where it cuts the body: triangles in the plane, counter-clockwise as seen from where the normal
+ * points, lines where it cuts the sides of elements, with the displacement and, asked for by which, von Mises' stress
+ * of the tensor that is between nodes as the shape functions are. Vertices are no nodes; there are no rows of contact.
+ * Errors: those of uz_surface_compute; _SCENE where the model is no solid or the plane does not cut it. The caller
+ * clears *out by uz_surface_clear. */
+uz_status uz_section_compute(uz_surface *out, const uz_scene *scene, const uz_field_source *answer,
+                             const uz_plane *plane, unsigned which, size_t most_bytes, const uz_hooks *hooks,
+                             uz_error *err);
+
 /* A history as a curve: `count` rows, `stride` doubles from a row to the next, so that a table of rows or columns alone
  * will do. */
 enum { UZ_CURVES = 8 };

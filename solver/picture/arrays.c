@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "picture/arc.h"
+#include "picture/arrays.h"
 #include "picture/scenery.h"
 #include "picture/skin.h"
 #include "post/parts.h"
@@ -49,16 +50,8 @@ static unsigned *as_vertices(const surface_work *w, const int64_t *node, int64_t
 
 /* ---------------------------------------------------------------- vertices */
 
-static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *err)
+void uz_surface_frame(uz_surface *s, const uz_mesh *mesh)
 {
-    const uz_mesh *mesh = &w->model->mesh;
-    const bool renumbered = s->n_vertices < s->n_nodes;
-    s->position = uz_alloc_zero(3 * s->n_vertices, sizeof *s->position);
-    s->displacement = uz_alloc_zero(3 * s->n_vertices, sizeof *s->displacement);
-    s->node = renumbered ? uz_alloc(s->n_vertices, sizeof *s->node) : NULL;
-    if (!s->position || !s->displacement || (renumbered && !s->node))
-        return uz_no_memory(err, UZ_OF_SKIN);
-    /* The middle of the body and the size of what is drawn. */
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
         low[i % mesh->dim] = fmin(low[i % mesh->dim], mesh->xyz[i]);
@@ -68,40 +61,59 @@ static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *e
         s->origin[c] = 0.5 * low[c] + 0.5 * high[c];
     s->unit = unit_of(mesh->extent);
     for (int c = 0; c < 3; c++) {
-        s->least[c] = c < s->dim ? INFINITY : 0;
-        s->most[c] = c < s->dim ? -INFINITY : 0;
+        s->low[c] = s->least[c] = c < s->dim ? INFINITY : 0;
+        s->high[c] = s->most[c] = c < s->dim ? -INFINITY : 0;
     }
+}
+
+void uz_surface_put(uz_surface *s, int64_t vertex, const double *x, const double *u)
+{
+    double length = 0;
+    for (int c = 0; c < s->dim; c++) {
+        const float at = (float)((x[c] - s->origin[c]) / s->unit), by = (float)(u[c] / s->unit);
+        s->position[3 * vertex + c] = at;
+        s->displacement[3 * vertex + c] = by;
+        s->low[c] = fminf(s->low[c], at);
+        s->high[c] = fmaxf(s->high[c], at);
+        s->least[c] = fminf(s->least[c], by);
+        s->most[c] = fmaxf(s->most[c], by);
+        length = hypot(length, u[c]);
+    }
+    s->largest = fmax(s->largest, length);
+}
+
+uz_status uz_surface_scale(uz_surface *s, const uz_scene *scene, const uz_body_model *model,
+                           const uz_field_source *answer, uz_error *err)
+{
+    if (!(s->largest / s->unit < FAR))
+        return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacements are %g times the body's size: cannot be drawn",
+                       s->largest / s->unit);
+    s->factor = uz_show_factor(scene, model, answer);
+    return UZ_OK;
+}
+
+static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *err)
+{
+    const uz_mesh *mesh = &w->model->mesh;
+    const bool renumbered = s->n_vertices < s->n_nodes;
+    s->position = uz_alloc_zero(3 * s->n_vertices, sizeof *s->position);
+    s->displacement = uz_alloc_zero(3 * s->n_vertices, sizeof *s->displacement);
+    s->node = renumbered ? uz_alloc(s->n_vertices, sizeof *s->node) : NULL;
+    if (!s->position || !s->displacement || (renumbered && !s->node))
+        return uz_no_memory(err, UZ_OF_SKIN);
+    uz_surface_frame(s, mesh);
     for (int64_t a = 0; a < s->n_nodes; a++) {
         const int64_t vertex = w->vertex_of[a];
         if (vertex < 0)
             continue;
-        /* The middle of the body is at 0, so that low <= 0 <= high from the beginning. */
-        const double *x = mesh->xyz + a * s->dim;
-        const double *u = w->answer->u + a * s->dim;
-        double length = 0;
-        for (int c = 0; c < s->dim; c++) {
-            const float at = (float)((x[c] - s->origin[c]) / s->unit), by = (float)(u[c] / s->unit);
-            s->position[3 * vertex + c] = at;
-            s->displacement[3 * vertex + c] = by;
-            s->low[c] = fminf(s->low[c], at);
-            s->high[c] = fmaxf(s->high[c], at);
-            s->least[c] = fminf(s->least[c], by);
-            s->most[c] = fmaxf(s->most[c], by);
-            length = hypot(length, u[c]);
-        }
-        s->largest = fmax(s->largest, length);
+        uz_surface_put(s, vertex, mesh->xyz + a * s->dim, w->answer->u + a * s->dim);
         if (renumbered)
             s->node[vertex] = (float)a;
     }
-    if (!(s->largest / s->unit < FAR))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacements are %g times the body's size: cannot be drawn",
-                       s->largest / s->unit);
-    s->factor = uz_show_factor(w->scene, w->model, w->answer);
-    return UZ_OK;
+    return uz_surface_scale(s, w->scene, w->model, w->answer, err);
 }
 
-/* value[place[i]], or value[i]; NaN becomes -unit. */
-static uz_status draw_values(uz_drawn *out, const double *value, const int64_t *place, int64_t count, uz_error *err)
+uz_status uz_draw_values(uz_drawn *out, const double *value, const int64_t *place, int64_t count, uz_error *err)
 {
     out->x = uz_alloc(count, sizeof *out->x);
     if (!out->x)
@@ -146,11 +158,11 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
         for (int c = 0; c < s->dim; c++)
             s->row_normal[3 * i + c] = (float)info->contact_normal[row * s->dim + c];
     }
-    uz_status status = draw_values(&s->reaction, w->answer->r, w->drawn, s->n_rows, err);
+    uz_status status = uz_draw_values(&s->reaction, w->answer->r, w->drawn, s->n_rows, err);
     if (status == UZ_OK && w->answer->g)
-        status = draw_values(&s->gap, w->answer->g, w->drawn, s->n_rows, err);
+        status = uz_draw_values(&s->gap, w->answer->g, w->drawn, s->n_rows, err);
     if (status == UZ_OK && w->fields.pressure)
-        status = draw_values(&s->pressure, w->fields.pressure, w->drawn, s->n_rows, err);
+        status = uz_draw_values(&s->pressure, w->fields.pressure, w->drawn, s->n_rows, err);
     if (status != UZ_OK || s->dim != 2)
         return status;
     w->arc = uz_alloc(m, sizeof *w->arc);
@@ -161,7 +173,7 @@ static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
     status = uz_contact_arc(w->arc, w->part, w->model, w->scene, err);
     for (int64_t i = 0; status == UZ_OK && i < s->n_rows; i++)
         s->row_part[i] = w->part[w->drawn[i]];
-    return status == UZ_OK ? draw_values(&s->arc, w->arc, w->drawn, s->n_rows, err) : status;
+    return status == UZ_OK ? uz_draw_values(&s->arc, w->arc, w->drawn, s->n_rows, err) : status;
 }
 
 /* ------------------------------------------------------------------- whole */
@@ -229,7 +241,7 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
         if (w->vertex_of[a] >= 0) /* moves only to the front: vertices are numbered like nodes */
             stress[w->vertex_of[a]] = stress[a];
     if (status == UZ_OK && stress)
-        status = draw_values(&s->von_mises, stress, NULL, s->n_vertices, err);
+        status = uz_draw_values(&s->von_mises, stress, NULL, s->n_vertices, err);
     bool pair = false; /* else rows say it all */
     for (int64_t k = 0; k < w->scene->n_contacts; k++)
         pair = pair || w->scene->contacts[k].kind == UZ_OBSTACLE_BODY;
@@ -241,7 +253,7 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
             if (w->vertex_of[a] >= 0)
                 touch[w->vertex_of[a]] = touch[a];
         if (status == UZ_OK)
-            status = draw_values(&s->touch, touch, NULL, s->n_vertices, err);
+            status = uz_draw_values(&s->touch, touch, NULL, s->n_vertices, err);
         free(touch);
     }
     return status == UZ_OK ? fill_rows(s, w, err) : status;

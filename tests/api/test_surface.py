@@ -331,4 +331,52 @@ def test_body_without_a_surface(s):
     check(400 <= problem.status < 500 and "no surface" in problem.json["detail"], problem.status, problem.json)
 
 
+# ------------------------------------------------------------- sections
+
+PULL = 3.0  # of a bar whose side is free: the stress is uniform, the displacement linear, in every mesh
+
+
+def bar(element):
+    return {"problem": {"kind": "scene", "model": "solid",
+                        "mesh": {"box": {"size": [4, 2, 1], "cells": [4, 3, 2], "element": element, "grading": [1.5, 1, 1]}},
+                        "materials": [{"on": "all", "young": 1000.0, "poisson": 0.25}],
+                        "supports": [{"on": name, key: 0} for name, key in (("left", "ux"), ("bottom", "uy"), ("back", "uz"))],
+                        "loads": [{"on": "right", "traction": [PULL, 0, 0]}]},
+            "solver": {"accuracy": "exact"}}
+
+
+def test_sections_of_every_solid_element(s):
+    """Their area and what stands in them are known; a plane between cells, and one across, cut as any other."""
+    planes = (((1.37, 0, 0), (2, 0, 0), 2), ((0, 0.7, 9), (0, -1, 0), 4), ((0, 0, 0.5), (0, 0, 1), 8), ((0, 0.75, 0.75), (0, 1, 1), 4 * math.sqrt(2)))
+    for element in ("tet4", "hex8", "tet10", "hex20", "wedge6", "wedge15"):
+        job = solved(s, bar(element))
+        for point, normal, area in planes:
+            words = "&".join(f"{key}={','.join(map(str, value))}" for key, value in (("point", point), ("normal", normal)))
+            got = Surface(expect(s.get(f"/v1/jobs/{job}/section?{words}"), 200).body)
+            places, moved = got.places(), [tuple(got.extras["unit"] * x for x in u) for u in got.array(got.extras["displacement"])]
+            check(all(abs(sum(n * (x - p) for n, x, p in zip(normal, place, point))) < 1e-5 for place in places), element, normal, "off the plane")
+            check(all(abs(u[0] - PULL / 1000 * x[0]) < 1e-8 and abs(u[1] + 0.25 * PULL / 1000 * x[1]) < 1e-8 for x, u in zip(places, moved)), element)
+            check(all(abs(value - PULL) < 1e-5 for value in got.values(got.extras["von_mises"])), element)
+            total = 0
+            for a, b, c in ([places[i] for i in triangle] for triangle in got.indices(0, TRIANGLES)):
+                across = [(b[i - 2] - a[i - 2]) * (c[i - 1] - a[i - 1]) - (b[i - 1] - a[i - 1]) * (c[i - 2] - a[i - 2]) for i in range(3)]
+                total += sum(n * x for n, x in zip(normal, across)) / 2 / math.hypot(*normal)
+            check(abs(total - area) < 1e-4, element, normal, "has the area", total, "not", area)
+            check(len(got.indices(0, LINES)) == len(got.indices(0, TRIANGLES)) and got.contact["rows"] == 0, element)
+    only = Surface(expect(s.get(f"/v1/jobs/{job}/section?{words}&fields=displacements"), 200).body)
+    check("von_mises" not in only.extras and len(only.places()) == len(places), "what was not asked for")
+
+
+def test_sections_that_are_none(s):
+    job = solved(s, bar("hex8"))
+    for query in ("", "point=0,0,0", "point=0,0&normal=0,0,1", "point=0,0,0&normal=0,0,0", "point=0,0,0&normal=1,2", "point=0,0,0&normal=nan,0,1",
+                  "point=0,0,0&normal=0,0,1&fields=pressure", "point=0,0,0&normal=0,0,1&count=3"):
+        check(s.get(f"/v1/jobs/{job}/section?{query}").status == 400, query)
+    missed = s.get(f"/v1/jobs/{job}/section?point=0,0,1.5&normal=0,0,1")
+    check(missed.status == 422 and "does not cut" in missed.json["detail"], missed.body)
+    flat = s.get(f"/v1/jobs/{solved(s, SCENE)}/section?point=0,0,0&normal=0,1,0")
+    check(flat.status == 422 and "of a solid" in flat.json["detail"], flat.body)
+    check(s.get(f"/v1/jobs/{s.solve(MATRICES)['id']}/section?point=0,0,0&normal=0,1,0").status == 409, "matrices have no body")
+
+
 service.main(globals())

@@ -54,6 +54,17 @@ static uz_status surface(const uz_scene *scene, const uz_field_source *answer, u
     return status;
 }
 
+static const uz_plane MIDDLE = {{1, 1.1, 2}, {0.1, 1, 0}};
+
+static uz_status section(const uz_scene *scene, const uz_field_source *answer, uz_error *err)
+{
+    uz_surface out;
+    uz_status status = uz_section_compute(&out, scene, answer, &MIDDLE, EVERYTHING, 0, NULL, err);
+    CHECK((out.position != NULL) == (status == UZ_OK) && (out.von_mises.x != NULL) == (status == UZ_OK));
+    uz_surface_clear(&out);
+    return status;
+}
+
 static uz_status picture(const uz_scene *scene, const uz_field_source *answer, uz_error *err)
 {
     char *svg;
@@ -156,6 +167,7 @@ TEST(every_allocation_of_a_solid_may_fail)
     for (int i = 0; i < 20; i++)
         r[i] = -i;
     CHECK(fail_each(picture, &s, &answer) > 20);
+    CHECK(fail_each(section, &s, &answer) > 10);
     uz_surface out;
     uz_error err = {0};
     for (long n = 0;; n++) {
