@@ -1,6 +1,7 @@
 // body.js: the deformed body of a job, and the contact pressure along its surface.
 
 import { Camera, VIEWS } from "./body_camera.js";
+import { Cut } from "./body_cut.js";
 import { listen } from "./body_input.js";
 import { to_body } from "./body_obstacles.js";
 import { Overlay } from "./body_overlay.js";
@@ -128,6 +129,7 @@ class BodyView {
       colours.label,
       h("span", { class: "body-times" }, "Displacements ×", this.factor_field, this.slider, button("×1", "Draw displacements as they are", () => this.scale(1)),
         button("auto", "Draw displacements so that they show", () => this.scale(surface.factor))),
+      this.cut?.tools,
       h("span", { class: "body-parts" }, parts),
       h("span", { class: "body-buttons" }, button("+", "Larger", () => (this.view.zoom(1.25), this.redraw())), button("−", "Smaller", () => (this.view.zoom(0.8), this.redraw())),
         button("Show all", "Show all of the body", () => this.home()), this.overlay.pressed.length ? button("Contact", "Show where it touches", () => this.look()) : null,
@@ -167,6 +169,16 @@ class BodyView {
     return shades_of(this.surface, { ...this.values, low, high });
   }
 
+  /** The plane that cuts, and what stands there in the colours of the body. */
+  show_cut(error) {
+    const { plane, section } = this.cut, [low, high] = this.range(), known = section && (this.quantity !== "von_mises" || section.von_mises);
+    this.cut.want(this.quantity === "von_mises");
+    const at = known && this.quantity !== "pressure" ? values_of(section, this.quantity).at : () => NaN;
+    this.gl.cut(plane, section, section && shades_of(section, { at, low, high }));
+    if (error) this.say(error.message);
+    this.redraw();
+  }
+
   /** One end of the colours; no number, or what leaves nothing between them: as the values are. */
   limit(end, value) {
     const limits = [...this.range()];
@@ -177,6 +189,7 @@ class BodyView {
 
   recolour() {
     this.gl.colour(this.shades());
+    if (this.cut) this.show_cut(null);
     this.draw_legend();
     this.redraw();
     announce(this.summary());
@@ -208,6 +221,8 @@ class BodyView {
     if (first || !same) this.view = new Camera(surface.dim);
     if (first) this.factor = surface.factor;
     this.gl.take(surface, this.shades());
+    this.cut?.destroy();
+    this.cut = surface.dim === 3 ? new Cut(this.api, this.job, surface, this.case_name, (error) => this.show_cut(error)) : null;
     this.gl.show(this.shown);
     this.take_colours();
     this.build_tools();
@@ -426,6 +441,7 @@ class BodyView {
     this.sizes?.disconnect();
     this.pressure?.destroy();
     this.path?.destroy();
+    this.cut?.destroy();
     this.gl?.dispose();
     this.gl = null;
     if (this.address) URL.revokeObjectURL(this.address);

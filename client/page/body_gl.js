@@ -1,7 +1,7 @@
 // body_gl.js: the body drawn by WebGL through three.js. Everything is on the graphics card once; a frame sets a few
 // numbers: the factor of the displacements, the camera.
 
-import { BufferAttribute, BufferGeometry, Color, DoubleSide, LineSegments, Mesh, OrthographicCamera, Scene, ShaderMaterial, Vector3,
+import { BufferAttribute, BufferGeometry, Color, DoubleSide, LineSegments, Mesh, OrthographicCamera, Scene, ShaderMaterial, Vector3, Vector4,
   WebGLRenderer } from "three";
 import { obstacle_patches } from "./body_obstacles.js";
 import { VIRIDIS } from "./body_surface.js";
@@ -9,7 +9,18 @@ import { VIRIDIS } from "./body_surface.js";
 const MOVE = `
   attribute vec3 displacement;
   uniform float factor;
-  vec4 moved() { return modelViewMatrix * vec4(position + factor * displacement, 1.0); }`;
+  varying vec3 v_before;
+  vec4 moved() {
+    v_before = position;
+    return modelViewMatrix * vec4(position + factor * displacement, 1.0);
+  }`;
+
+// What lies beyond the plane, before the body was deformed, is not there.
+const CUT = `
+  uniform vec4 cut;
+  varying vec3 v_before;
+  void stay() { if (dot(v_before, cut.xyz) > cut.w) discard; }`;
+const NOWHERE = new Vector4(0, 0, 0, 1);
 
 // Flat shading: the normal of a triangle is that of its plane as the pixels see it. A shade below 0 is "no value".
 const BODY = {
@@ -23,13 +34,14 @@ const BODY = {
       v_place = place.xyz;
       gl_Position = projectionMatrix * place;
     }`,
-  fragmentShader: `
+  fragmentShader: `${CUT}
     uniform vec3 stops[${VIRIDIS.length}];
     uniform vec3 none;
     uniform float lit;
     varying float v_shade;
     varying vec3 v_place;
     void main() {
+      stay();
       float at = clamp(v_shade, 0.0, 1.0) * ${(VIRIDIS.length - 1).toFixed(1)};
       vec3 colour = stops[0];
       for (int i = 1; i < ${VIRIDIS.length}; i++) colour = mix(colour, stops[i], clamp(at - float(i - 1), 0.0, 1.0));
@@ -43,10 +55,10 @@ const BODY = {
 const LINE = {
   vertexShader: `${MOVE}
     void main() { gl_Position = projectionMatrix * moved(); }`,
-  fragmentShader: `
+  fragmentShader: `${CUT}
     uniform vec3 ink;
     uniform float opacity;
-    void main() { gl_FragColor = vec4(ink, opacity); }`,
+    void main() { stay(); gl_FragColor = vec4(ink, opacity); }`,
 };
 
 const PATCH = {
@@ -86,32 +98,38 @@ export class BodyGL {
     this.clear();
     this.surface = surface;
     this.scene = new Scene();
-    const position = new BufferAttribute(surface.position, 3), displacement = new BufferAttribute(surface.displacement, 3);
+    const part = parts_of(surface), add = (object) => this.add(object), faces = part(surface.triangle);
     this.shade = new BufferAttribute(shades, 1);
-    const part = (index) => {
-      const geometry = new BufferGeometry();
-      geometry.setAttribute("position", position);
-      geometry.setAttribute("displacement", displacement);
-      geometry.setIndex(new BufferAttribute(index, 1));
-      return geometry;
-    };
-    const add = (object) => {
-      object.frustumCulled = false; // its bounds do not know of the displacements
-      this.scene.add(object);
-      return object;
-    };
-    const faces = part(surface.triangle);
     faces.setAttribute("shade", this.shade);
-    this.body = add(new Mesh(faces, new ShaderMaterial({
-      ...BODY, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, extensions: { derivatives: true },
-      uniforms: {
-        factor: { value: 0 }, lit: { value: surface.dim === 3 ? 1 : 0 }, none: { value: new Color(0x8a8f96) },
-        stops: { value: VIRIDIS.map((rgb) => new Vector3(...rgb.map((x) => x / 255))) },
-      },
-    })));
-    this.wire = add(new LineSegments(part(surface.line), line_material(0.35)));
-    this.before = add(new LineSegments(part(surface.outline), line_material(1)));
+    this.plane = new Vector4().copy(NOWHERE);
+    this.body = add(new Mesh(faces, body_material(surface.dim === 3, this.plane)));
+    this.wire = add(new LineSegments(part(surface.line), line_material(0.35, this.plane)));
+    this.cap = [];
+    this.before = add(new LineSegments(part(surface.outline), line_material(1, NOWHERE)));
     this.patches = (surface.dim === 3 ? obstacle_patches(surface) : []).map((one) => add(patch_mesh(one)));
+  }
+
+  add(object) {
+    object.frustumCulled = false; // its bounds do not know of the displacements
+    this.scene.add(object);
+    return object;
+  }
+
+  /** Leaves out what lies beyond a plane, [normal, offset], or nothing (null); section: what stands in the plane, with its shades. */
+  cut(plane, section, shades) {
+    if (plane) this.plane.set(...plane[0], plane[1]);
+    else this.plane.copy(NOWHERE);
+    for (const object of this.cap) {
+      this.scene.remove(object);
+      free(object);
+    }
+    this.cap = [];
+    if (!section) return;
+    const part = parts_of(section), faces = part(section.triangle);
+    faces.setAttribute("shade", new BufferAttribute(shades, 1));
+    this.cap = [this.add(new Mesh(faces, body_material(false, NOWHERE))), this.add(new LineSegments(part(section.line), line_material(0.35, NOWHERE)))];
+    this.cap[1].material.uniforms.ink.value.set(0x282830);
+    this.cap[1].visible = this.wire.visible;
   }
 
   /** Changes the values by vertex. */
@@ -129,6 +147,7 @@ export class BodyGL {
 
   show({ wire, before, obstacles }) {
     this.wire.visible = wire;
+    if (this.cap[1]) this.cap[1].visible = wire;
     this.before.visible = before;
     for (const patch of this.patches) patch.visible = obstacles;
   }
@@ -142,7 +161,7 @@ export class BodyGL {
     const { camera } = this, [right, up, eye] = view.axes.map((axis) => new Vector3(...axis));
     const far = 4 + 2 * factor * (this.surface.largest_displacement / this.surface.unit) + view.width / view.scale;
     this.body.material.uniforms.factor.value = factor;
-    this.wire.material.uniforms.factor.value = factor;
+    for (const one of [this.wire, ...this.cap]) one.material.uniforms.factor.value = factor;
     camera.left = -view.width / 2 / view.scale;
     camera.right = -camera.left;
     camera.top = view.height / 2 / view.scale;
@@ -156,10 +175,7 @@ export class BodyGL {
   }
 
   clear() {
-    this.scene?.traverse((object) => {
-      object.geometry?.dispose();
-      object.material?.dispose();
-    });
+    this.scene?.traverse(free);
     this.scene = null;
   }
 
@@ -170,8 +186,35 @@ export class BodyGL {
   }
 }
 
-function line_material(opacity) {
-  return new ShaderMaterial({ ...LINE, transparent: opacity < 1, uniforms: { factor: { value: 0 }, ink: { value: new Color() }, opacity: { value: opacity } } });
+function free(object) {
+  object.geometry?.dispose();
+  object.material?.dispose();
+}
+
+/** Geometries on the vertices of a surface, each with indices of its own. */
+function parts_of(surface) {
+  const position = new BufferAttribute(surface.position, 3), displacement = new BufferAttribute(surface.displacement, 3);
+  return (index) => {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", position);
+    geometry.setAttribute("displacement", displacement);
+    geometry.setIndex(new BufferAttribute(index, 1));
+    return geometry;
+  };
+}
+
+function body_material(lit, cut) {
+  return new ShaderMaterial({
+    ...BODY, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, extensions: { derivatives: true },
+    uniforms: {
+      factor: { value: 0 }, lit: { value: lit ? 1 : 0 }, none: { value: new Color(0x8a8f96) }, cut: { value: cut },
+      stops: { value: VIRIDIS.map((rgb) => new Vector3(...rgb.map((x) => x / 255))) },
+    },
+  });
+}
+
+function line_material(opacity, cut) {
+  return new ShaderMaterial({ ...LINE, transparent: opacity < 1, uniforms: { cut: { value: cut }, factor: { value: 0 }, ink: { value: new Color() }, opacity: { value: opacity } } });
 }
 
 function patch_mesh({ points, index }) {

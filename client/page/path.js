@@ -42,7 +42,7 @@ export function mountPath(element, api, job, { case: case_name, units, surface, 
   const picker = h("button", { type: "button", class: "small", id: "path-pick", "aria-pressed": "false", onclick: () => pick_end(picker.getAttribute("aria-pressed") === "true" ? 2 : 0) }, "Click both in the picture");
   const file = h("button", { type: "button", class: "small", title: "Save all numbers", onclick: () =>
     api.blob(address("path.csv"), { signal: ends.signal }).then((blob) => save(blob, `path-${job.slice(-8)}.csv`), complain) }, "CSV");
-  const curve = new Curve("path-curve", (column) => ({ x: { label: `from (${typed[0].value})${unit_of({ problem: { units } }, "length").replace(" ", ", ")}` },
+  const curve = new Curve("path-curve", (column) => ({ x: { label: `distance from (${typed[0].value})${unit_of({ problem: { units } }, "length").replace(" ", ", ")}` },
     series: [{ name: column.name, colour: 1, gaps: true, points: got.distance.map((x, i) => [x, column.values[i] ?? NaN]) }],
     label: `${column.name} along the line from (${typed[0].value}) to (${typed[1].value})` }));
   const details = h("details", { class: "path", ontoggle: () => (details.open ? load() : (pick_end(2), on_line(null))) }, h("summary", null, "Along a line through the body"),

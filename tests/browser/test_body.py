@@ -316,4 +316,37 @@ def test_fields_along_a_line(s, b):
         check(b.near(".path .chart", "--series-1") > 60, width, "the curve has too few pixels")
 
 
+def test_a_plane_cuts_a_solid(s, b):
+    """What lies beyond is gone, the section stands in the colours of the body, and moves with the plane."""
+    job = show_all(s, b, SOLID)
+    whole = b.near(".body-frame", "--paper", 6)
+    after(b, lambda: set_value(b, ".body-cut", "2 1", "change"))
+    section = "return performance.getEntriesByType('resource').filter((e) => e.name.includes('/section')).length"
+    count = b.wait("a section", section)
+    b.wait("the section is drawn", "return new Promise((done) => setTimeout(() => done(true), 300))")
+    check(b.near(".body-frame", "--paper", 6) > whole + 2000 and sum(coloured(b)) > 10000, "half of the body", coloured(b))
+    press_button(b, "Front")
+    front = b.picture(".body-frame")
+    after(b, lambda: set_value(b, ".body-cut-at", 30, "input"))
+    b.wait("another section", section.replace(".length", f".length > {count}"))
+    b.wait("the section is drawn", "return new Promise((done) => setTimeout(() => done(true), 300))")
+    check(b.picture(".body-frame") != front, "the plane moved")
+    # From the front the cut is seen alone, in the values of the service: no pixel is grey, one is of the largest stress.
+    after(b, lambda: set_value(b, ".body-colour", "von_mises", "change"))
+    b.wait("its stress", "return performance.getEntriesByType('resource').some((e) => e.name.includes('/section') && e.name.includes('von_mises'))")
+    b.wait("the section is drawn", "return new Promise((done) => setTimeout(() => done(true), 300))")
+    grey = b.near(".body-frame", "#8a8f96", 12)
+    check(sum(n > 100 for n in coloured(b)) >= 3 and grey < 500, coloured(b), grey)
+    after(b, lambda: set_value(b, ".body-colour", "pressure", "change"))
+    check(b.near(".body-frame", "#8a8f96", 12) > grey + 5000, "there is no contact pressure within")
+    after(b, lambda: set_value(b, ".body-colour", "displacement", "change"))
+    after(b, lambda: set_value(b, ".body-cut", "", "change"))
+    press_button(b, "Show all")
+    check(abs(b.near(".body-frame", "--paper", 6) - whole) < 500, "all of it again", whole)
+    for width, phone, dark in ((760, False, True), (360, True, False)):
+        b.size(width, 800, phone)
+        b.media("prefers-color-scheme", "dark" if dark else "light")
+        check(b.run("return document.documentElement.scrollWidth <= innerWidth"), width, "the page is wider than the screen")
+
+
 browser.main(globals())
