@@ -1,7 +1,7 @@
 // convergence.js: the convergence history of a job, while it runs and after, with other jobs laid over it.
 
 import { debounce, h, show } from "./dom.js";
-import { counted, seconds, short_id } from "./format.js";
+import { counted, number, seconds, short_id } from "./format.js";
 import { Chart } from "./plot.js";
 
 const QUANTITIES = [
@@ -9,6 +9,7 @@ const QUANTITIES = [
   { key: "residual_total", name: "total residual", dash: "6 3" },
   { key: "dual_objective", name: "dual objective, distance to the last", dash: "2 3" },
 ];
+const LEVELS = { quick: 1e-2, precise: 1e-8 }; // what these say as a relative error; the others depend on the problem
 const MOST_OVERLAYS = 5;
 const MANY = 30; // iterations: then their axis is logarithmic unless one chooses
 
@@ -36,9 +37,34 @@ class History {
     return this.rows.slice(0, -1).map((row) => [row[xs], Math.abs(last - row[ys])]);
   }
 
+  /** ||u||_K as the energy of a row tells it: what a relative error is relative to. */
+  scale(row) {
+    return Math.sqrt(2 * Math.abs(row[this.at.dual_objective]));
+  }
+
+  /**
+   * {relative: the bound of the last row, left: seconds until it is the error that was asked for, by the slope of its
+   * logarithm over the last half of the rows; NaN: unknown}, null before there is a row.
+   */
+  outlook(asked) {
+    const { at, rows } = this, last = rows[rows.length - 1];
+    if (!last) return null;
+    const relative = last[at.error_bound] / this.scale(last), first = rows[Math.floor(rows.length / 2)];
+    const seconds = last[at.seconds] - first[at.seconds], fallen = Math.log(first[at.error_bound] / last[at.error_bound]);
+    const known = asked > 0 && rows.length >= 8 && seconds > 0.2 && fallen > 0;
+    return { relative, left: known ? Math.max(0, (Math.log(relative / asked) * seconds) / fallen) : NaN };
+  }
+
   restarts(x) {
     return this.rows.filter((row) => row[this.at.restart]).map((row) => [row[this.at[x]], row[this.at.error_bound]]);
   }
+}
+
+/** The relative error that a request asks for, where it is a number beforehand; null: it is none. */
+export function asked_of({ solver } = {}) {
+  const { accuracy } = solver || {};
+  if (solver?.stopping === "paper") return null;
+  return accuracy === undefined ? LEVELS.precise : LEVELS[accuracy] ?? accuracy?.relative_error ?? null;
 }
 
 function choices(name, options, on_change) {
@@ -67,6 +93,16 @@ export class Convergence {
     show(element, this.place, this.said, this.form, this.trouble);
     this.chart = new Chart(this.place, 320);
     this.draw_soon = debounce(() => this.draw(), 30);
+  }
+
+  /** What was asked for, as a relative error: a line in the picture. */
+  set_asked(asked) {
+    this.asked = asked;
+    this.draw();
+  }
+
+  outlook() {
+    return this.histories[0].outlook(this.asked);
   }
 
   overlay_field() {
@@ -133,6 +169,9 @@ export class Convergence {
     if (restarts.length && !several && data.getAll("show").includes("error_bound"))
       series.push({ name: "restart of the momentum", colour: 6, line: false, size: 3, points: restarts });
     const rows = this.histories[0].rows;
+    const level = this.asked * this.histories[0].scale(rows[rows.length - 1] || []);
+    if (level > 0 && !several && data.getAll("show").includes("error_bound"))
+      series.push({ name: `asked for: a relative error of ${number(this.asked)}`, colour: 5, dash: "6 3", across: true, points: [[rows[rows.length - 1][this.histories[0].at[x]], level]] });
     const label = x === "seconds" ? "time" : "iteration";
     this.chart.update({ x: { label, log, from_zero: true, whole: x !== "seconds", format: x === "seconds" ? seconds : null }, y: { label: "in the units of the problem", log: true }, series,
       label: `Convergence over ${label === "time" ? label : "iterations"}: ${shown.map((q) => q.name).join(", ")}` });

@@ -1,7 +1,7 @@
 // job.js: one job, live while it waits and runs: progress, convergence, then the answer in words and pictures.
 
 import { mountCases } from "./cases.js";
-import { Convergence } from "./convergence.js";
+import { asked_of, Convergence } from "./convergence.js";
 import { announce, h, pause, show } from "./dom.js";
 import { download_buttons, files_of } from "./download.js";
 import { draft } from "./examples.js";
@@ -107,6 +107,9 @@ class JobView {
     if (grid) words.push(grid);
     if (row?.iteration !== undefined && row.iteration !== null) words.push(`iteration ${number(row.iteration, 9)}`);
     if (Number.isFinite(row?.error_bound)) words.push(`certified bound ${number_towards(row.error_bound, 3, 1)}`);
+    const outlook = !grid && this.convergence?.outlook();
+    if (outlook && Number.isFinite(outlook.relative))
+      words.push(`relative ${number(outlook.relative, 2)}${this.asked ? ` of the ${number(this.asked)} asked for` : ""}`, `time left ${Number.isFinite(outlook.left) ? `about ${seconds(outlook.left)}` : "unknown"}`);
     if (Number.isFinite(row?.residual_total)) words.push(`residual ${number(row.residual_total)}`);
     show(this.progress, h("progress", { value: job.progress, max: 100, "aria-label": "Progress" }), h("span", { id: "progress-text" }, words.join(", ")));
   }
@@ -133,6 +136,17 @@ class JobView {
     show(this.convergence_place, h("h2", null, "Convergence"), place);
     this.convergence = new Convergence(place, this.api, this.id, this.case_name, async () =>
       (await this.api.get("/v1/jobs?status=successful&limit=20")).jobs.filter((job) => job.id !== this.id && !job.summary?.cases));
+    if (this.job.status === "running") this.find_asked();
+  }
+
+  /** The line that the bound must reach. */
+  async find_asked() {
+    try {
+      this.asked = asked_of(await this.api.get(`/v1/jobs/${this.id}/request`, { signal: this.ends.signal }));
+      this.convergence?.set_asked(this.asked);
+    } catch (error) {
+      this.complain(error);
+    }
   }
 
   async refresh_convergence() {

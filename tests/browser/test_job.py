@@ -1,6 +1,7 @@
 """A job's page: live, plots, words, files. usage: test_job.py BUILD_DIR [FILTER]"""
 import copy
 import json
+import math
 import pathlib
 import time
 import xml.etree.ElementTree
@@ -11,6 +12,11 @@ from service import ENDLESS, MATRICES, SCENE
 
 CURVES = """return [...document.querySelectorAll('#convergence path.line')].map((path) =>
     [path.dataset.series, path.getAttribute('d').split(/[ML]/).length - 1])"""
+
+
+def plain(text):
+    """A number as the page writes it."""
+    return float(text.replace("×10", "e").replace(",", "").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
 
 
 def file_saved(b, name, seconds=20):
@@ -36,7 +42,17 @@ def test_is_watched_live_from_the_editor_on(s, b):
     rows = "return document.querySelector('#convergence p[role=status]').innerText"
     said = b.run(rows)
     b.wait("more iterations", rows.replace("return ", "return arguments[0] !== "), said)
-    check(len(first) == 3, first)
+    check({one[0] for one in first} >= {"certified bound", "total residual"}, first)
+    # What is asked for is a line, the bound is told relative to the answer, and how long that may take.
+    b.wait("the line", "return [...document.querySelectorAll('#convergence path.line')].some((path) => path.dataset.series.startsWith('asked for'))")
+    check("asked for: a relative error of 1×10⁻⁸" in b.text("#convergence .legend"), b.text("#convergence .legend"))
+    b.says("#progress-text", "asked for, time left")
+    words = b.text("#progress-text")
+    row = s.get(f"/v1/jobs/{s.get('/v1/jobs?tag=watched').json['jobs'][0]['id']}/history").json
+    last = dict(zip(row["columns"], row["rows"][-1]))
+    relative = last["error_bound"] / math.sqrt(2 * abs(last["dual_objective"]))
+    check(relative / 30 < plain(words.split("relative ")[1].split(" of the")[0]) < 1e4 * relative, words, relative)
+    check("time left unknown" in words or "time left about" in words, words)
     b.click("#stop")
     b.says("#stop", "Cancel?")
     b.click("#stop")
