@@ -103,8 +103,9 @@ class Editor {
   /** Shows what the service refused at the key that it is about. */
   refused(error, reveal) {
     const problem = error.problem || {};
+    this.field.unmark();
+    if (problem.mistakes) return void this.say_all(problem.mistakes);
     if (problem.pointer === undefined && problem.code !== "json_syntax") {
-      this.field.unmark();
       this.say("bad", error.message);
       return;
     }
@@ -115,6 +116,17 @@ class Editor {
     }
     const place = this.field.mark(found.range, reveal);
     this.say("bad", problem.line ? `${error.message} (line ${problem.line} of the text there)` : error.message, { ...place, at: found.range[0] });
+  }
+
+  /** Several mistakes: a list, and a mark at each. */
+  say_all(mistakes) {
+    const places = mistakes.map((one) => {
+      const { range } = locate(this.field.text, one.pointer);
+      return { ...one, ...this.field.mark(range, false), at: range[0] };
+    });
+    this.say("bad", `${places.length} mistakes:`);
+    this.verdict.append(h("ul", { class: "mistakes" }, places.map((one) => h("li", null,
+      h("button", { type: "button", class: "small", onclick: () => this.field.put_caret(one.at) }, `Line ${one.line}, column ${one.column}`), " ", one.detail))));
   }
 
   async check() {

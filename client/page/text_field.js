@@ -1,4 +1,4 @@
-// text_field.js: a field for JSON text with line numbers and one marked place.
+// text_field.js: a field for JSON text with line numbers and marked places.
 
 import { h, show } from "./dom.js";
 import { place_of } from "./json_locate.js";
@@ -18,8 +18,7 @@ export class TextField {
     this.area = h("textarea", { id, class: "code", spellcheck: "false", autocomplete: "off", autocapitalize: "off", wrap: "off",
       "aria-label": label, "aria-describedby": described_by });
     this.gutter = h("div", { class: "gutter", "aria-hidden": "true" });
-    this.marker = h("div", { class: "marker", hidden: true });
-    this.layer = h("div", { class: "marks", "aria-hidden": "true" }, this.marker);
+    this.layer = h("div", { class: "marks", "aria-hidden": "true" });
     this.element = h("div", { class: "text-field" }, this.gutter, h("div", { class: "paper" }, this.layer, this.area));
     this.lines = 0;
     this.area.addEventListener("input", () => {
@@ -46,8 +45,6 @@ export class TextField {
     if (lines === this.lines) return;
     this.lines = lines;
     show(this.gutter, h("pre", null, Array.from({ length: lines }, (_, i) => i + 1).join("\n")));
-    this.bad_line = h("div", { class: "bad-line", hidden: true });
-    this.gutter.append(this.bad_line);
     this.follow();
   }
 
@@ -57,16 +54,18 @@ export class TextField {
     if (this.gutter.firstChild) for (const child of this.gutter.children) child.style.transform = `translateY(${-scrollTop}px)`;
   }
 
-  /** Marks [from, to) and says where that is: {line, column} from 1. reveal: also scrolls there. */
+  /** Marks [from, to) beside what is marked, and says where that is: {line, column} from 1. reveal: also scrolls there. */
   mark([from, to], reveal) {
     const start = place_of(this.text, from), line = this.text.split("\n")[start.line];
     const left = width_of(line, start.column), end = width_of(line, Math.min(line.length, start.column + Math.max(1, to - from)));
-    this.marker.hidden = false;
-    this.marker.style.top = `calc(${start.line} * var(--line-height))`;
-    this.marker.style.left = `${left}ch`;
-    this.marker.style.width = `${Math.max(1, end - left)}ch`;
-    this.bad_line.hidden = false;
-    this.bad_line.style.top = `calc(${start.line} * var(--line-height) + .5rem)`;
+    const marker = h("div", { class: "marker" }), bad_line = h("div", { class: "bad-line" });
+    marker.style.top = `calc(${start.line} * var(--line-height))`;
+    marker.style.left = `${left}ch`;
+    marker.style.width = `${Math.max(1, end - left)}ch`;
+    bad_line.style.top = `calc(${start.line} * var(--line-height) + .5rem)`;
+    this.layer.append(marker);
+    this.gutter.append(bad_line);
+    this.follow();
     this.area.setAttribute("aria-invalid", "true");
     if (reveal) this.reveal(start.line);
     return { line: start.line + 1, column: start.column + 1 };
@@ -80,8 +79,8 @@ export class TextField {
   }
 
   unmark() {
-    this.marker.hidden = true;
-    if (this.bad_line) this.bad_line.hidden = true;
+    this.layer.replaceChildren();
+    for (const one of this.gutter.querySelectorAll(".bad-line")) one.remove();
     this.area.removeAttribute("aria-invalid");
   }
 

@@ -77,6 +77,9 @@ typedef enum { CODEC_SOLVE, CODEC_VERIFY, CODEC_STORED } codec_kind;
  * the caller clears *out. */
 bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
                   problem_details *problem);
+/* All that the schema has against a body that codec_decode refuses, as problem+json whose `mistakes` they are. NULL: it
+ * has no more than one thing against it, or there is no memory: what codec_decode says is all. */
+char *codec_mistakes(const char *body, size_t len);
 void codec_request_clear(codec_request *request);
 /* Frees the problem and all numbers, and leaves what the store keeps beside the body. */
 void codec_request_strip(codec_request *request);
@@ -115,6 +118,7 @@ bool codec_decode_problem(problem_details *out, const char *json);
 
 /* ---- replies */
 char *codec_encode_problem(const problem_details *problem); /* application/problem+json */
+char *codec_encode_mistakes(const problem_details *list, size_t count); /* the first, with a list of all */
 char *codec_encode_job(const job *j);
 char *codec_encode_jobs(const job *jobs, size_t count,
                         bool more); /* {"jobs": [...], "next": cursor or null, "links": ...} */

@@ -288,6 +288,19 @@ bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t 
     return good;
 }
 
+char *codec_mistakes(const char *body, size_t len)
+{
+    enum { MOST = 20 };
+    json_tree tree;
+    problem_details list[MOST];
+    schema_mistakes all = {.list = list, .most = MOST};
+    if (!json_scan(&tree, body, len, &list[0]))
+        return NULL;
+    schemas_check_all(loaded, "request.json", tree.root, &all);
+    json_clear(&tree);
+    return all.count > 1 ? codec_encode_mistakes(list, all.count) : NULL;
+}
+
 void codec_request_strip(codec_request *request)
 {
     codec_request kept = {.tags = request->tags,

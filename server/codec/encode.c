@@ -12,20 +12,43 @@
 
 /* ------------------------------------------------------------- problems */
 
+/* All but the bracket that closes it. */
+static void put_problem(text *t, const problem_details *problem)
+{
+    text_open(t, NULL, '{');
+    text_key(t, "type");
+    text_format(t, "\"/schemas/problem-details.json#%s\"", problem->code);
+    text_string(t, "title", problem->title);
+    text_integer(t, "status", problem->status);
+    text_string(t, "code", problem->code);
+    text_string(t, "detail", problem->detail);
+    if (problem->pointer[0] || problem->status == 422)
+        text_string(t, "pointer", problem->pointer);
+    if (problem->line > 0)
+        text_integer(t, "line", problem->line);
+}
+
 char *codec_encode_problem(const problem_details *problem)
 {
     text t = {0};
-    text_open(&t, NULL, '{');
-    text_key(&t, "type");
-    text_format(&t, "\"/schemas/problem-details.json#%s\"", problem->code);
-    text_string(&t, "title", problem->title);
-    text_integer(&t, "status", problem->status);
-    text_string(&t, "code", problem->code);
-    text_string(&t, "detail", problem->detail);
-    if (problem->pointer[0] || problem->status == 422)
-        text_string(&t, "pointer", problem->pointer);
-    if (problem->line > 0)
-        text_integer(&t, "line", problem->line);
+    put_problem(&t, problem);
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_mistakes(const problem_details *list, size_t count)
+{
+    text t = {0};
+    put_problem(&t, &list[0]);
+    text_open(&t, "mistakes", '[');
+    for (size_t i = 0; i < count; i++) {
+        text_open(&t, NULL, '{');
+        text_string(&t, "code", list[i].code);
+        text_string(&t, "detail", list[i].detail);
+        text_string(&t, "pointer", list[i].pointer);
+        text_close(&t, '}');
+    }
+    text_close(&t, ']');
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }

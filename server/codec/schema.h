@@ -32,6 +32,14 @@ void schemas_free(schemas *all);
  * missing_key, wrong_type, out_of_range, not_allowed, and a pointer. May be called from many threads. */
 bool schemas_check(const schemas *all, const char *name, const json_value *value, problem_details *problem);
 
+/* Violations, the first of each value that has some: at most `most` in a list of the caller's. */
+typedef struct {
+    problem_details *list;
+    size_t count, most;
+} schema_mistakes;
+/* All of them, in the order of the schema, within out->most; count 0: there are none, or no such file. */
+void schemas_check_all(const schemas *all, const char *name, const json_value *value, schema_mistakes *out);
+
 /* ---- shared by schema.c (loading), schema_check.c (checking) and quantity.c */
 
 /* A schema and the file that its references start from. */

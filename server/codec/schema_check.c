@@ -1,4 +1,5 @@
-/* schema_check.c: checking: one rule per keyword, in the order of the table, until the first violation. */
+/* schema_check.c: checking: one rule per keyword, in the order of the table, until the first violation; or on to other
+ * members, where all are wanted. */
 #include "codec/problem.h"
 #include "codec/schema.h"
 #include "text/edit_distance.h"
@@ -15,6 +16,7 @@ typedef struct {
     problem_details *problem; /* NULL: only the verdict is wanted */
     schema_at at;
     const json_value *value;
+    schema_mistakes *more; /* NULL: the first violation ends it */
 } visit;
 
 /* A keyword; the rule is NULL for an annotation, or one that another rule uses. One that bounds a number says of what
@@ -29,6 +31,13 @@ typedef struct keyword {
 } keyword;
 
 static bool check(const visit *v);
+
+/* Keeps what *v->problem says. */
+static void keep(const visit *v)
+{
+    if (v->more->count < v->more->most)
+        v->more->list[v->more->count++] = *v->problem;
+}
 
 /* ------------------------------------------------------------- refusals */
 
@@ -253,6 +262,7 @@ static bool rule_items(const visit *v, const json_value *argument, const keyword
     const size_t columns = list->columns ? list->columns : 1;
     const bool table = list->columns > 0, numbers = list->kind == JSON_IS_NUMBERS;
     const number_range r = numbers ? range_of(items, table) : (number_range){.plain = false};
+    bool good = true;
     json_value room;
     (void)k;
     for (size_t i = 0; json_is_list(list) && i < list->count; i++) {
@@ -262,10 +272,11 @@ static bool rule_items(const visit *v, const json_value *argument, const keyword
         for (size_t c = 0; fits && c < columns; c++)
             fits = x[c] >= r.least && x[c] > r.above && x[c] <= r.most && x[c] < r.below &&
                    (!r.whole || x[c] == floor(x[c]));
-        if (!fits && !check(&(visit){v->problem, items, json_item(list, i, &room)}))
+        good = (fits || check(&(visit){v->problem, items, json_item(list, i, &room), v->more})) && good;
+        if (!good && (!v->more || v->more->count == v->more->most))
             return false;
     }
-    return true;
+    return good;
 }
 
 /* Quadratic: loading demands a maxItems beside it. */
@@ -278,7 +289,7 @@ static bool rule_unique_items(const visit *v, const json_value *argument, const 
         for (size_t j = 0; j < i; j++) {
             const json_value *item = json_item(v->value, i, &room);
             if (json_same(item, json_item(v->value, j, &other)))
-                return refuse(&(visit){v->problem, v->at, item}, "not_allowed",
+                return refuse(&(visit){v->problem, v->at, item, NULL}, "not_allowed",
                               "repeats item %zu; each may stand only once.", j);
         }
     return true;
@@ -289,13 +300,15 @@ static bool rule_unique_items(const visit *v, const json_value *argument, const 
 static bool rule_additional_properties(const visit *v, const json_value *argument, const keyword *k)
 {
     const json_value *properties = json_get(v->at.node, "properties");
+    bool good = true;
     (void)k;
     for (size_t i = 0; json_is(v->value, JSON_IS_OBJECT) && i < v->value->count; i++) {
         const json_value *member = &v->value->items[i];
         if (json_get_n(properties, member->key, member->place))
             continue;
         if (!json_is(argument, JSON_IS_BOOLEAN) || argument->truth) {
-            if (!check(&(visit){v->problem, schema_child(v->at, argument), member}))
+            good = check(&(visit){v->problem, schema_child(v->at, argument), member, v->more}) && good;
+            if (!good && !v->more)
                 return false;
             continue;
         }
@@ -306,13 +319,17 @@ static bool rule_additional_properties(const visit *v, const json_value *argumen
         for (; count < json_size(properties) && count < MAX_NAMES; count++)
             names[count] = properties->items[count].key;
         problem_quote(shown, sizeof shown, member->key, member->place);
-        refuse(&(visit){v->problem, v->at, member}, "unknown_key", "is not known: there is no key %s here.", shown);
+        refuse(&(visit){v->problem, v->at, member, NULL}, "unknown_key", "is not known: there is no key %s here.",
+               shown);
         suggest(v, member->key, member->place, names, count);
         if (count > 0)
             add_names(v, " Known: ", names, count, ".");
-        return false;
+        if (!v->more)
+            return false;
+        keep(v);
+        good = false;
     }
-    return true;
+    return good;
 }
 
 /* A list of keys, or for each of some keys the list of those that go with it. */
@@ -349,13 +366,15 @@ static bool rule_count(const visit *v, const json_value *argument, const keyword
 
 static bool rule_properties(const visit *v, const json_value *argument, const keyword *k)
 {
+    bool good = true;
     (void)k;
     for (size_t i = 0; i < json_size(argument); i++) {
         const json_value *schema = &argument->items[i], *value = json_get_n(v->value, schema->key, schema->place);
-        if (value && !check(&(visit){v->problem, schema_child(v->at, schema), value}))
+        good = (!value || check(&(visit){v->problem, schema_child(v->at, schema), value, v->more})) && good;
+        if (!good && !v->more)
             return false;
     }
-    return true;
+    return good;
 }
 
 /* -------------------------------------------------------- combinations */
@@ -364,7 +383,7 @@ static bool rule_ref(const visit *v, const json_value *argument, const keyword *
 {
     (void)argument;
     (void)k;
-    return check(&(visit){v->problem, schema_resolve(v->at), v->value});
+    return check(&(visit){v->problem, schema_resolve(v->at), v->value, v->more});
 }
 
 /* The one branch that has the value's type; among several, which are all objects, the one whose const it names. */
@@ -389,7 +408,7 @@ static bool rule_choice(const visit *v, const json_value *argument, const keywor
     if (fitting == 0)
         return refuse_type(v, all);
     if (fitting == 1)
-        return check(&(visit){v->problem, chosen, v->value});
+        return check(&(visit){v->problem, chosen, v->value, v->more});
     for (size_t i = 0; i < argument->count; i++) {
         const schema_at at = schema_resolve(schema_child(v->at, json_item(argument, i, &room)));
         const char *key = schema_discriminator(at, &wanted);
@@ -399,13 +418,13 @@ static bool rule_choice(const visit *v, const json_value *argument, const keywor
         if (!named)
             return refuse(v, "missing_key", "has no \"%s\", which is required.", key);
         if (same_scalar(named, wanted))
-            return check(&(visit){v->problem, at, v->value});
+            return check(&(visit){v->problem, at, v->value, v->more});
         if (json_text(wanted) && count < MAX_NAMES)
             names[count++] = json_text(wanted);
     }
     if (!named)
         return false;
-    const visit here = {v->problem, v->at, named};
+    const visit here = {v->problem, v->at, named, NULL};
     if (named->kind != JSON_IS_STRING)
         return refuse_type(&here, SCHEMA_STRING);
     refuse(&here, "not_allowed", "must be one of ");
@@ -417,10 +436,10 @@ static bool rule_choice(const visit *v, const json_value *argument, const keywor
 /* "then" and "else" say in their description why they ask for more; it is added to what they refuse. */
 static bool rule_if(const visit *v, const json_value *argument, const keyword *k)
 {
-    const bool holds = check(&(visit){NULL, schema_child(v->at, argument), v->value});
+    const bool holds = check(&(visit){NULL, schema_child(v->at, argument), v->value, NULL});
     const json_value *branch = json_get(v->at.node, holds ? "then" : "else");
     (void)k;
-    if (!branch || check(&(visit){v->problem, schema_child(v->at, branch), v->value}))
+    if (!branch || check(&(visit){v->problem, schema_child(v->at, branch), v->value, NULL}))
         return true;
     const char *why = json_text(json_get(branch, "description"));
     if (why && v->problem)
@@ -484,12 +503,20 @@ static bool check(const visit *v)
 {
     if (json_is(v->at.node, JSON_IS_BOOLEAN))
         return v->at.node->truth || refuse(v, "not_allowed", "is not allowed here.");
+    bool good = true;
     for (size_t i = 0; i < KEYWORD_COUNT; i++) {
-        const json_value *argument = KEYWORDS[i].rule ? json_get(v->at.node, KEYWORDS[i].name) : NULL;
-        if (argument && !KEYWORDS[i].rule(v, argument, &KEYWORDS[i]))
+        const keyword *k = &KEYWORDS[i];
+        const json_value *argument = k->rule ? json_get(v->at.node, k->name) : NULL;
+        const size_t kept = v->more ? v->more->count : 0;
+        if (!argument || (!good && k->rule != rule_properties) || k->rule(v, argument, k))
+            continue;
+        if (!v->more)
             return false;
+        if (v->more->count == kept) /* a rule that looks at members has kept what they violate */
+            keep(v);
+        good = false; /* a second mistake of the same value may follow from the first; those of its members do not */
     }
-    return true;
+    return good;
 }
 
 bool schemas_check(const schemas *all, const char *name, const json_value *value, problem_details *problem)
@@ -497,7 +524,16 @@ bool schemas_check(const schemas *all, const char *name, const json_value *value
     const schema_at root = schema_root(all, name);
     *problem = (problem_details){0};
     if (root.node)
-        return check(&(visit){problem, root, value});
+        return check(&(visit){problem, root, value, NULL});
     problem_set(problem, 500, "internal", NULL, "There is no schema %s.", name);
     return false;
+}
+
+void schemas_check_all(const schemas *all, const char *name, const json_value *value, schema_mistakes *out)
+{
+    problem_details problem = {0};
+    const schema_at root = schema_root(all, name);
+    out->count = 0;
+    if (root.node)
+        check(&(visit){&problem, root, value, out});
 }

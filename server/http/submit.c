@@ -258,7 +258,10 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
            codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
            check_uploads(context, rq, &request, &problem) && check_start(context, &request, rq, &problem) &&
            check_allowed(context, rq, request.webhook, request.priority, &problem);
-    if (!good) {
+    char *mistakes = !good && validate_only ? codec_mistakes(rq->body ? rq->body : "", rq->body_len) : NULL;
+    if (mistakes) {
+        reply_mistakes(reply, mistakes);
+    } else if (!good) {
         /* a problem, or the job that the request became when it came before */
         if (!find_repeat(context, rq, validate_only ? NULL : key, &j))
             reply_problem(reply, &problem);

@@ -510,5 +510,28 @@ def test_body_that_never_comes(s):
     is_well(s)
 
 
+def test_validation_tells_all_mistakes(s):
+    ask = lambda body: s.post(body, query="?validate=true")  # noqa: E731
+    wrong = copy.deepcopy(SCENE)
+    wrong["problem"]["materials"][0]["poison"] = wrong["problem"]["materials"][0].pop("poisson")
+    wrong["problem"]["thickness"] = -1
+    wrong["problem"]["loads"] += [{"on": "top"}, {"on": 3, "traction": [1, 0]}]
+    wrong["solver"] = {"method": "magic", "accuracy": {"relative_error": 0}, "acuracy": 1}
+    reply = ask(wrong)
+    check(reply.status == 422 and reply.headers["content-type"] == "application/problem+json", reply.status, reply.headers)
+    got = {one["pointer"]: one["code"] for one in reply.json["mistakes"]}
+    check(got == {"/problem/materials/0/poison": "unknown_key", "/problem/thickness": "out_of_range", "/problem/loads/2": "missing_key", "/problem/loads/3/on": "wrong_type",
+                  "/solver/method": "not_allowed", "/solver/accuracy/relative_error": "out_of_range", "/solver/acuracy": "unknown_key"}, reply.json)
+    first = reply.json["mistakes"][0]
+    check(all(reply.json[key] == first[key] for key in first), reply.json)
+    check("mistakes" not in s.post(wrong).json, "a job is refused by the first")
+    wrong = copy.deepcopy(SCENE)
+    wrong["problem"]["thickness"] = -1
+    check("mistakes" not in ask(wrong).json, "one is told as it always is")
+    wrong["problem"]["loads"] = [{}] * 500
+    check(len(ask(wrong).json["mistakes"]) == 20, "no more than twenty")
+
+
+
 if __name__ == "__main__":
     service.main(globals())

@@ -7,7 +7,7 @@ from service import ROOT, SCENE
 
 TEXT = json.dumps(SCENE, indent=2)
 MARKED = """const marker = document.querySelector('.marker'), area = document.querySelector('#job-text');
-if (marker.hidden) return null;
+if (!marker) return null;
 const box = marker.getBoundingClientRect(), field = area.getBoundingClientRect(), style = getComputedStyle(area);
 const height = parseFloat(style.lineHeight);
 const line = Math.round((box.top - field.top - parseFloat(style.paddingTop) + area.scrollTop) / height);
@@ -154,6 +154,25 @@ def test_a_job_that_fails_leads_back_to_its_text(s, b):
     b.says(".verdict h2", "The body is free to move")
     b.click(".verdict a")
     check('"left", "uy": 0' in b.one("#job-text").get_property("value"), "the text is gone")
+
+
+def test_all_mistakes_at_once(s, b):
+    """Of independent members each is told, marked, and a button leads there."""
+    b.open(s, "new")
+    b.says("#verdict", "Valid")
+    text = b.run("return document.querySelector('#job-text').value")
+    b.write("#job-text", text.replace('"poisson": 0.3', '"poison": 0.3').replace('"left"', "7").replace('"thickness": 5', '"thickness": -5'))
+    b.says("#verdict", "3 mistakes")
+    said = b.text("#verdict")
+    for word in ("/problem/materials/0/poison is not known", 'Did you mean "poisson"', "/problem/supports/0/on must be", "/problem/thickness must be greater than 0"):
+        check(word in said, word, said)
+    check(len(b.all(".marker")) == 3 and len(b.all(".bad-line")) == 3, "marks")
+    b.run("[...document.querySelectorAll('.mistakes li')].find((one) => one.innerText.includes('poison is')).querySelector('button').click()")
+    check(b.run("const a = document.querySelector('#job-text'); return a.value.slice(a.selectionStart).startsWith('\"poison\"')"), "the caret is at the key")
+    b.write("#job-text", text)
+    b.says("#verdict", "Valid")
+    check(not b.all(".marker") and not b.all(".mistakes"), "nothing is marked")
+    check(all("422" in line for _, line in b.console()), "no other word")
 
 
 browser.main(globals())

@@ -90,6 +90,11 @@ void reply_problem(http_reply *reply, const problem_details *problem)
     reply_text(reply, problem->status, PROBLEM_TYPE, text, text ? strlen(text) : 0);
 }
 
+void reply_mistakes(http_reply *reply, char *text)
+{
+    reply_text(reply, 422, PROBLEM_TYPE, text, strlen(text));
+}
+
 void reply_refuse(http_reply *reply, int status, const char *code, const char *title, const char *format, ...)
 {
     char detail[sizeof((problem_details *)0)->detail];

@@ -126,6 +126,7 @@ void reply_text(http_reply *reply, int status, const char *type, char *text, siz
 /* Takes ownership of fd. */
 void reply_file(http_reply *reply, int status, const char *type, int fd, size_t len);
 void reply_problem(http_reply *reply, const problem_details *problem);
+void reply_mistakes(http_reply *reply, char *text); /* 422 with this problem+json, which it takes */
 void reply_refuse(http_reply *reply, int status, const char *code, const char *title, const char *format, ...)
     __attribute__((format(printf, 5, 6)));
 void reply_no_memory(http_reply *reply);
