@@ -132,6 +132,22 @@ export class Overlay {
     }
   }
 
+  /** Where a support, a load or a contact of a scene is: dots, or arrows along its way. */
+  draw_places(view, { vertices, way }, colour) {
+    const pen = this.canvas.getContext("2d"), every = Math.ceil(vertices.length / MOST_ARROWS), along = way && view.project_way(...way), size = along && Math.hypot(...along);
+    pen.strokeStyle = pen.fillStyle = colour;
+    pen.lineWidth = 1.5;
+    for (const vertex of vertices.filter((_, i) => i % every === 0)) {
+      const [x, y] = this.place(view, 0, vertex);
+      pen.beginPath();
+      const arrow = way && size > 1e-6 * Math.hypot(...way) * view.scale;
+      if (arrow) draw_arrow(pen, [x, y], along.map((x) => x / size), 0.5 * ARROW);
+      else pen.arc(x, y, 4, 0, 2 * Math.PI);
+      if (arrow) pen.stroke();
+      else pen.fill();
+    }
+  }
+
   draw_line(pen, points, { ink, paper }) {
     for (const [width, colour] of [[5, paper], [2, ink]]) {
       pen.lineWidth = width;

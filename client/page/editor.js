@@ -5,6 +5,7 @@ import { idempotency_key } from "./api.js";
 import { announce, debounce, h, show } from "./dom.js";
 import { draft, EXAMPLES, example_text } from "./examples.js";
 import { bytes, counted, seconds } from "./format.js";
+import { matrices_form } from "./matrices.js";
 import { locate, tokens_at } from "./json_locate.js";
 import { help_of, path_words } from "./schema_help.js";
 import { TextField } from "./text_field.js";
@@ -27,6 +28,7 @@ class Editor {
     this.examples = h("select", { id: "example", onchange: () => (location.hash = `#/new/${this.examples.value}`) },
       h("option", { value: "", disabled: true }, "choose"), EXAMPLES.map((one) => h("option", { value: one.name }, one.text)));
     this.check_soon = debounce(() => this.check(), CHECK_MS);
+    this.preview_place = h("div", { class: "preview", id: "preview", hidden: true });
     this.help = h("p", { id: "key-help", class: "muted" });
     const help_soon = debounce(() => this.show_help(), HELP_MS);
     for (const event of ["keyup", "click", "input", "focus"]) this.field.area.addEventListener(event, help_soon);
@@ -36,7 +38,7 @@ class Editor {
       h("div", { class: "title" }, h("h1", null, "New job")),
       h("div", { class: "editor-tools" }, h("label", { for: "example" }, "Start from"), this.examples,
         file, h("label", { for: "file", class: "button" }, "Open a file"), this.submit),
-      this.verdict, this.field.element, this.help,
+      this.verdict, matrices_form(api, (text) => this.set(text)), this.preview_place, this.field.element, this.help,
       h("p", { class: "muted" }, "Ctrl + Enter submits. Every key is explained in the ", h("a", { href: "/schemas/request.json" }, "schema"), "."));
     form.addEventListener("keydown", (event) => {
       if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) form.requestSubmit();
@@ -129,6 +131,22 @@ class Editor {
       h("button", { type: "button", class: "small", onclick: () => this.field.put_caret(one.at) }, `Line ${one.line}, column ${one.column}`), " ", one.detail))));
   }
 
+  /** Draws the scene, by code that is loaded then; without WebGL there is no picture of it. */
+  async show_preview(text) {
+    if (text.length > LONG) return;
+    const request = JSON.parse(text);
+    if (request?.problem?.kind !== "scene") return void (this.preview_place.hidden = true);
+    this.preview_place.hidden = false;
+    try {
+      this.preview ??= import("./preview.js").then(({ Preview }) => new Preview(this.preview_place));
+      const preview = await this.preview;
+      if (this.ends.signal.aborted) preview.destroy();
+      else preview.take(request);
+    } catch {
+      this.preview_place.hidden = true;
+    }
+  }
+
   async check() {
     const { text } = this.field;
     const found = locate(text);
@@ -136,6 +154,7 @@ class Editor {
       this.mistake(found.mistake.at, found.mistake.message, false);
       return;
     }
+    this.show_preview(text);
     this.checking?.abort();
     this.checking = new AbortController();
     const { signal } = this.checking;
@@ -171,6 +190,7 @@ class Editor {
     this.ends.abort();
     this.checking?.abort();
     this.check_soon.cancel();
+    this.preview?.then((one) => one.destroy(), () => {});
   }
 }
 

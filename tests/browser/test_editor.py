@@ -175,4 +175,59 @@ def test_all_mistakes_at_once(s, b):
     check(all("422" in line for _, line in b.console()), "no other word")
 
 
+def pixels_of(b, kind):
+    return b.near("#preview .body-frame", {"support": "--series-1", "load": "--push", "contact": "--series-3"}[kind], 30)
+
+
+def test_the_scene_is_drawn_while_it_is_typed(s, b):
+    """Body, supports, loads, contacts and obstacle; what goes from the text goes from the picture."""
+    b.open(s, "new")
+    b.says("#verdict", "Valid")
+    b.says("#preview", "1 support, 2 loads, 1 contact")
+    check(all(pixels_of(b, kind) > 40 for kind in ("support", "load", "contact")), [pixels_of(b, kind) for kind in ("support", "load", "contact")])
+    check(b.near("#preview .body-frame", "#8a8f96", 12) > 5000, "the body")
+    request = json.loads(b.run("return document.querySelector('#job-text').value"))
+    request["problem"]["loads"] = []
+    b.write("#job-text", json.dumps(request))
+    b.says("#preview", "0 loads")
+    check(pixels_of(b, "load") < 20 and pixels_of(b, "support") > 40, "a load is still seen")
+    b.write("#job-text", '{"problem": {"kind": "scene", "mesh"')
+    b.says("#verdict", "This is not JSON")
+    check(pixels_of(b, "support") > 40, "the last picture stays while one types")
+    # A mesh of numbers, and a solid.
+    request["problem"].update(mesh={"nodes": [[0, 0], [2, 0], [2, 1], [0, 1]], "elements": {"quad4": [[0, 1, 2, 3]]}, "groups": {"left": {"nodes": [0, 3]}, "bottom": {"edges": [[0, 1]]}}})
+    b.write("#job-text", json.dumps(request))
+    b.says("#preview", "1 support, 0 loads, 1 contact.")
+    check(pixels_of(b, "support") > 10 and b.near("#preview .body-frame", "#8a8f96", 12) > 5000, "a mesh of numbers")
+    solid = {"problem": {"kind": "scene", "model": "solid", "mesh": {"box": {"size": [4, 2, 4], "cells": [6, 3, 6], "element": "hex8"}},
+                         "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "+y", "ux": 0, "uy": -0.2, "uz": 0}], "loads": [],
+                         "contacts": [{"on": "bottom", "obstacle": {"sphere": {"center": [2, -10, 2], "radius": 10}}}]}}
+    b.write("#job-text", json.dumps(solid))
+    b.says("#verdict", "Valid")
+    b.says("#preview", "1 support, 0 loads, 1 contact.")
+    check(pixels_of(b, "support") > 40 and b.near("#preview .body-frame", "#c8c8c8", 45) > 2000, "the solid and its sphere")
+    for width, phone, dark in ((760, False, True), (360, True, False)):
+        b.size(width, 800, phone)
+        b.media("prefers-color-scheme", "dark" if dark else "light")
+        check(b.run("return document.documentElement.scrollWidth <= innerWidth"), width, "the page is wider than the screen")
+    b.console()
+
+
+def test_a_problem_in_matrices_from_four_files(s, b):
+    b.open(s, "new")
+    b.says("#verdict", "Valid")
+    b.click(".matrices summary")
+    for name in "KNhp":
+        b.one(f"#matrix-{name}").send_keys(str(browser.ROOT / f"tests/data/springs_{name}.mtx"))
+        b.says(".matrices [role=status]", "The job names the files" if name == "p" else "Still to come")
+    b.says("#verdict", "Valid")
+    check(not b.run("return document.querySelector('#preview').checkVisibility()"), "there is no body")
+    b.click("#submit")
+    b.says(".verdict h2", "Converged")
+    b.open(s, "new")
+    b.click(".matrices summary")
+    b.one("#matrix-K").send_keys(str(browser.ROOT / "tests/data/small_matrices.json"))
+    b.says(".matrices [role=status]", "Still to come: p.")
+
+
 browser.main(globals())
