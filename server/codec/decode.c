@@ -132,6 +132,34 @@ static bool check_limits(const codec_request *request, problem_details *problem)
     return true;
 }
 
+/* What the solver would refuse a scene for, as far as that takes milliseconds: mesh, materials, supports, loads and
+ * contacts, but nothing of K. Whether something holds the body depends on the settings and is left to the run, and so
+ * are large meshes and the loads of cases but the first. */
+static bool check_scene(const codec_request *request, problem_details *problem)
+{
+    enum { MOST_NODES = 100000 };
+    const uz_problem *p = &request->problem;
+    const uz_box *box = &p->scene.box;
+    const bool is_box = p->scene.source == UZ_MESH_BOX;
+    double nodes = is_box ? 1 : (double)p->scene.given.n_nodes;
+    for (int i = 0; is_box && i < box->dim; i++)
+        nodes *= (double)box->cells[i] + 1.0;
+    if (p->kind != UZ_PROBLEM_SCENE || p->scene.refine || nodes > MOST_NODES)
+        return true;
+    char where[sizeof((uz_error *)0)->where] = "";
+    uz_error err = {.status = UZ_OK};
+    const uz_scene first = uz_scene_of_case(p, 0);
+    const uz_status status = uz_scene_check(&first, &err);
+    if (status != UZ_ERR_SCENE && status != UZ_ERR_NOT_FINITE)
+        return true;
+    if (p->n_cases > 0 && strncmp(err.where, "/loads", 6) == 0)
+        snprintf(where, sizeof where, "/cases/0%.80s", err.where);
+    if (where[0])
+        memcpy(err.where, where, sizeof where);
+    codec_problem_from_error(problem, &err, p->kind);
+    return false;
+}
+
 /* Vectors that came with the request, as long as the problem wants them. */
 static bool check_sizes(const codec_request *request, problem_details *problem)
 {
@@ -280,7 +308,8 @@ bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t 
     request.uploads = d.uploads;
     request.n_uploads = d.n_uploads;
     json_clear(&tree);
-    good = good && (kind == CODEC_STORED || check_limits(&request, problem)) && check_sizes(&request, problem);
+    good = good && (kind == CODEC_STORED || (check_limits(&request, problem) && check_scene(&request, problem))) &&
+           check_sizes(&request, problem);
     if (good)
         *out = request;
     else

@@ -22,12 +22,6 @@ def refused(s, request, code, pointer, says):
     check(problem["pointer"] == pointer and says in problem["detail"], problem)
 
 
-def failed(s, request, pointer, says):
-    """What only the mesh tells is the answer of the job."""
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "failed" and job["error"]["pointer"] == pointer and says in job["error"]["detail"], job)
-
-
 def by_place(**groups):
     """The paper's body, with places where it has names."""
     request = copy.deepcopy(SCENE)
@@ -116,13 +110,13 @@ def test_what_is_nowhere_is_said_with_its_distance(s):
         request = copy.deepcopy(SCENE)
         request["problem"][key][0]["on"] = place
         return request
-    failed(s, on({"where": {"x": -1}}), "/problem/supports/0/on/where",
+    refused(s, on({"where": {"x": -1}}), "bad_scene", "/problem/supports/0/on/where",
            "no node lies there: the nearest node, 0 at (0, 0), is 1 away (the tolerance is 6.32e-05); the body reaches from "
            "(0, 0) to (60, 20)")
-    failed(s, on({"where": {"x": 60, "y": 20}}, "contacts"), "/problem/contacts/0/on", '"x=60 y=20" is made of nodes')
+    refused(s, on({"where": {"x": 60, "y": 20}}, "contacts"), "bad_scene", "/problem/contacts/0/on", '"x=60 y=20" is made of nodes')
     request = copy.deepcopy(SCENE)
     request["cases"] = [{"name": "a", "loads": [{"on": {"where": {"y": 21}}, "pressure": 1}]}]
-    failed(s, request, "/cases/0/loads/0/on/where", "is 1 away")
+    refused(s, request, "bad_scene", "/cases/0/loads/0/on/where", "is 1 away")
     refused(s, on({"where": {}}), "missing_key", "/problem/supports/0/on/where", "")
     refused(s, on({"where": {"w": 1}}), "unknown_key", "/problem/supports/0/on/where/w", "")
     refused(s, on({"at": [0, 0]}), "unknown_key", "/problem/supports/0/on/at", "")
@@ -130,7 +124,7 @@ def test_what_is_nowhere_is_said_with_its_distance(s):
     refused(s, on("topp", "loads"), "not_allowed", "/problem/loads/0/on", 'Did you mean "top"?')
     request = copy.deepcopy(SCENE)
     request["problem"]["groups"] = [{"name": "left", "where": {"x": 60}}]
-    failed(s, request, "/problem/groups/0/where", 'has a group "left" already')
+    refused(s, request, "bad_scene", "/problem/groups/0/where", 'has a group "left" already')
 
 
 service.main(globals())
