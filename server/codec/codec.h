@@ -117,7 +117,7 @@ void codec_problem_damaged(problem_details *out, const char *id);
 bool codec_decode_problem(problem_details *out, const char *json);
 
 /* ---- replies */
-char *codec_encode_problem(const problem_details *problem); /* application/problem+json */
+char *codec_encode_problem(const problem_details *problem);             /* application/problem+json */
 char *codec_encode_mistakes(const problem_details *list, size_t count); /* the first, with a list of all */
 char *codec_encode_job(const job *j);
 char *codec_encode_jobs(const job *jobs, size_t count,
