@@ -1,5 +1,6 @@
 /* uzawa: the command line client of the contact solver service. It speaks HTTP and nothing else. */
 #include "commands/run.h"
+#include "local/contexts.h"
 #include "request/build.h"
 #include "session/find_job.h"
 
@@ -48,9 +49,27 @@ static client_exit complain_usage(const char *message, const client_options *opt
     return CLIENT_USAGE;
 }
 
+/* The service: what the command line says, else what the context that it or the
+ * environment names has, else the rest of the environment, else the context that the file itself chooses. */
+static bool choose_service(client_options *options, client_context *context, char *message, size_t size)
+{
+    const char *env = getenv("UZAWA_SERVER");
+    const bool said = options->server != env && options->server != CLIENT_DEFAULT_SERVER;
+    const char *name = options->context ? options->context : getenv("UZAWA_CONTEXT");
+    name = name && *name ? name : NULL;
+    memset(context, 0, sizeof *context);
+    if (options->context && said)
+        return snprintf(message, size, "--context and --server both name the service: choose one") < 0;
+    if (!said && (name || !env || !*env) && !client_context_find(context, name, message, size))
+        return false;
+    if (context->server[0])
+        options->server = context->server;
+    return true;
+}
+
 static client_exit run_command(client_options *options)
 {
-    char message[256];
+    char message[512];
     if (options->version || options->command == CLIENT_VERSION) {
         puts(options->json ? "{\"version\": \"" CLIENT_VERSION_TEXT "\"}" : "uzawa " CLIENT_VERSION_TEXT);
         return CLIENT_OK;
@@ -76,8 +95,12 @@ static client_exit run_command(client_options *options)
     }
     client_session session = {
         .options = options, .out = stdout, .err = stderr, .deadline = client_clock() + options->timeout_s};
-    session.http =
-        client_http_open(options->server, getenv("UZAWA_TOKEN"), getenv("UZAWA_CA"), message, sizeof message);
+    client_context context;
+    if (!choose_service(options, &context, message, sizeof message))
+        return complain_usage(message, options);
+    const bool named = context.server[0] != '\0'; /* the token of the environment is not for that service */
+    session.http = client_http_open(options->server, named ? context.token : getenv("UZAWA_TOKEN"),
+                                    named ? context.ca : getenv("UZAWA_CA"), message, sizeof message);
     if (!session.http)
         return complain_usage(message, options);
     client_found_jobs found;

@@ -42,6 +42,7 @@ _uzawa() {
     local curcontext=$curcontext state line
     typeset -A opt_args
     _arguments -C \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -72,6 +73,7 @@ _uzawa() {
             '--progress[show progress on stderr even where it is no terminal]' \
             '(-q --quiet)'{-q,--quiet}'[print the id and nothing else]' \
             '(-j --json)'{-j,--json}'[print the job as JSON, and what is wrong too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
             '(-h --help)'{-h,--help}'[explain the command]' \
@@ -83,6 +85,7 @@ _uzawa() {
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-q --quiet)'{-q,--quiet}'[tell nothing of what is not in the request]' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -92,6 +95,7 @@ _uzawa() {
     upload)
         _arguments \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -101,6 +105,7 @@ _uzawa() {
     status)
         _arguments \
             '(-j --json)'{-j,--json}'[print the job as JSON, and what is wrong too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -116,6 +121,7 @@ _uzawa() {
             '--progress[show progress on stderr even where it is no terminal]' \
             '(-q --quiet)'{-q,--quiet}'[print nothing; the exit status tells]' \
             '(-j --json)'{-j,--json}'[print the job as JSON, and what is wrong too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
             '(-h --help)'{-h,--help}'[explain the command]' \
@@ -135,6 +141,7 @@ _uzawa() {
             '--progress[show progress on stderr even where it is no terminal]' \
             '(-q --quiet)'{-q,--quiet}'[print the id and nothing else]' \
             '(-j --json)'{-j,--json}'[print the job as JSON, and what is wrong too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
             '(-h --help)'{-h,--help}'[explain the command]' \
@@ -150,6 +157,7 @@ _uzawa() {
             '--progress[show progress on stderr even where it is no terminal]' \
             '(-q --quiet)'{-q,--quiet}'[print nothing; the exit status tells]' \
             '(-j --json)'{-j,--json}'[print the job as JSON, and what is wrong too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
             '(-h --help)'{-h,--help}'[explain the command]' \
@@ -163,6 +171,7 @@ _uzawa() {
             '(-c --case)'{-c,--case}'[of this load case alone]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -178,6 +187,7 @@ _uzawa() {
             '(-c --case)'{-c,--case}'[of this load case; needed where the job has some]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -192,6 +202,7 @@ _uzawa() {
             '(-c --case)'{-c,--case}'[of this load case; needed where the job has some]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-j --json)'{-j,--json}'[with --output\: print what was written as JSON]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -208,6 +219,7 @@ _uzawa() {
             '(-c --case)'{-c,--case}'[of this load case; needed where the job has some]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -228,6 +240,7 @@ _uzawa() {
             '(-c --case)'{-c,--case}'[of this load case; needed where the job has some]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-j --json)'{-j,--json}'[with --output\: print what was written as JSON; with --trade\: print the numbers]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -239,6 +252,7 @@ _uzawa() {
             '(-c --case)'{-c,--case}'[of this load case (default\: the worst)]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-j --json)'{-j,--json}'[with --output\: print what was written as JSON]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -249,6 +263,7 @@ _uzawa() {
         _arguments \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
             '(-j --json)'{-j,--json}'[with --output\: print what was written as JSON]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -263,6 +278,7 @@ _uzawa() {
             '(-n --limit)'{-n,--limit}'[at most N jobs (default 20)]:N: ' \
             '(-q --quiet)'{-q,--quiet}'[print the ids and nothing else]' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -272,6 +288,7 @@ _uzawa() {
         _arguments \
             '(-q --quiet)'{-q,--quiet}'[print nothing; the exit status tells]' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -282,6 +299,7 @@ _uzawa() {
         _arguments \
             '(-q --quiet)'{-q,--quiet}'[print nothing; the exit status tells]' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -291,6 +309,7 @@ _uzawa() {
     factors)
         _arguments \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -299,6 +318,7 @@ _uzawa() {
     nodes)
         _arguments \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -308,6 +328,7 @@ _uzawa() {
         _arguments \
             '(-q --quiet)'{-q,--quiet}'[print only what is wrong]' \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \
@@ -316,6 +337,7 @@ _uzawa() {
     mcp)
         _arguments \
             '(-j --json)'{-j,--json}'[print JSON, and what is wrong as JSON too]' \
+            '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \
             '--retry[keep trying to reach the server for S seconds (default 3; 30 while waiting)]:S: ' \

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+const char CLIENT_DEFAULT_SERVER[] = "http://127.0.0.1:8080";
+
 typedef struct {
     client_options *options;
     bool have_command;
@@ -165,7 +167,7 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             size_t size)
 {
     *out = (client_options){.command = CLIENT_HELP,
-                            .server = env_server && *env_server ? env_server : "http://127.0.0.1:8080",
+                            .server = env_server && *env_server ? env_server : CLIENT_DEFAULT_SERVER,
                             .timeout_s = INFINITY,
                             .retry_s = -1,
                             .time_limit_s = NAN,

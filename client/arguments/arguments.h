@@ -14,6 +14,7 @@
 typedef struct {
     client_command command;
     const char *operand; /* FILE, ID or COMMAND; NULL: none given */
+    const char *context; /* a service by its name; NULL: not given */
     const char *server;  /* URL, never NULL */
     double timeout_s;    /* INFINITY: none */
     double retry_s;      /* how long to try to reach the server; < 0: chosen by the command */
@@ -29,6 +30,8 @@ typedef struct {
     int limit, width, height, count, max_iterations; /* -1: not given */
     bool wait, quiet, json, progress, csv, plot, ascii, deformed, whole_error, trade, help, version;
 } client_options;
+
+extern const char CLIENT_DEFAULT_SERVER[];
 
 /* Fills *out. env_server: value of UZAWA_SERVER or NULL. False: the command line is wrong and message says how.
  * --help and --version anywhere win over what else is wrong with operands. */

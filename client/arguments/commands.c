@@ -239,6 +239,10 @@ static const uz_option OPTIONS[] = {
     OPTION("json", 'j', FLAG, json, IN(PLOT),
            .about = "with --output: print what was written as JSON; with --trade: print the numbers"),
     OPTION("json", 'j', FLAG, json, CLIENT_EVERYWHERE, .about = "print JSON, and what is wrong as JSON too"),
+    OPTION("context", 0, WORD, context, ASKING, .value = "NAME",
+           .about =
+               "the service that ~/.config/uzawa/config has under this name, with its token (default: $UZAWA_CONTEXT, "
+               "else what the file says; $UZAWA_SERVER and --server come before that)"),
     OPTION("server", 's', WORD, server, ASKING, .value = "URL",
            .about = "the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080); $UZAWA_TOKEN is sent as the "
                     "token; $UZAWA_CA is a file of certificates to trust"),

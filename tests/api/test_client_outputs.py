@@ -219,6 +219,42 @@ def test_lines_that_cannot_be(server):
     check(run(server, *words, "--case", "0.1").stdout != run(server, *words, "--case", "0.2").stdout)
 
 
+# ---------------------------------------------------------------- contexts
+
+
+def in_context(folder, text, *words, code=0, **environment):
+    """The client with this configuration file, and no --server."""
+    place = os.path.join(folder, "uzawa")
+    os.makedirs(place, exist_ok=True)
+    with open(os.path.join(place, "config"), "w", encoding="utf-8", opener=lambda path, flags: os.open(path, flags, 0o600)) as file:
+        file.write(text)
+    clean = {key: value for key, value in os.environ.items() if not key.startswith("UZAWA_")}
+    done = subprocess.run([CLIENT, *words], capture_output=True, text=True, timeout=60, env={**clean, "XDG_CONFIG_HOME": folder, **environment})
+    check(done.returncode == code, f"{words}: exit {done.returncode}, want {code}\n{done.stdout}{done.stderr}")
+    return done
+
+
+@options(None)
+def test_contexts_name_services(_):
+    with tempfile.TemporaryDirectory() as folder, Fake(*[(200, {"jobs": [], "next": None})] * 20) as lab, Fake(*[(200, {"jobs": [], "next": None})] * 20) as far:
+        text = f"# services\ncontext = lab\n\n[lab]\nserver = {lab.url}\ntoken = secret\n[far]\n  server={far.url}\n"
+        in_context(folder, text, "list")
+        check(len(lab.requests) == 1 and lab.requests[0].headers["Authorization"] == "Bearer secret", lab.requests)
+        in_context(folder, text, "list", "--context", "far", UZAWA_TOKEN="of another")
+        check(len(far.requests) == 1 and "Authorization" not in far.requests[0].headers, "the token of the environment is not for it")
+        in_context(folder, text, "list", UZAWA_CONTEXT="far", UZAWA_SERVER=lab.url)
+        in_context(folder, text, "list", UZAWA_SERVER=far.url)
+        in_context(folder, text, "--server", far.url, "list")
+        check((len(lab.requests), len(far.requests)) == (1, 4), "who was asked")
+        for wrong, says, words in ((text, "no context [home]", ("--context", "home")), (text, "both name", ("--context", "lab", "--server", "http://h")),
+                                   ("[lab]\nsever = x\n", 'line 2: "sever"', ()), ("[lab]\nserver\n", "no [name] and no key", ()),
+                                   ("context = lab\n[lab]\ntoken = x\n", "has no server", ())):
+            check(says in in_context(folder, wrong, "list", *words, code=2).stderr, says)
+        os.chmod(os.path.join(folder, "uzawa", "config"), 0o644)
+        check("chmod 600" in in_context(folder, text, "list", code=2).stderr, "others may read the token")
+        check("where contexts are" in in_context(folder, "", "list", "--context", "lab", code=2, XDG_CONFIG_HOME=folder + "/none").stderr)
+
+
 # ---------------------------------------------------------------- pictures
 
 
