@@ -74,7 +74,7 @@ static int cut_sides(point (*cut)[2], const section *w, const uz_element_type *t
     for (int s = 0; s < type->sides; s++) {
         const uz_element_side *side = &type->side[s];
         const int rim = side->nodes;
-        point centre = {{0}}, around[UZ_SIDE_NODES];
+        point centre = {{0}}, around[UZ_SIDE_NODES] = {{{0}}};
         for (int k = 0; k < rim; k++) { /* corners and middles in turn */
             const bool middles = rim > side->corners;
             const int at = !middles ? k : k % 2 == 0 ? k / 2 : side->corners + k / 2;
