@@ -258,10 +258,10 @@ typedef struct {
     int64_t n_quantities;
     uz_quantity_found *quantities; /* in the problem's order */
     double asked;                  /* uz_settings.quantity_error */
-    /* Where the mesh is refined: by node the displacement of the adjoint of the first quantity, if one is asked for;
-     * what each element has of the square of the error and of that of this adjoint, as parts of their sums, where both
-     * are proved. NULL: neither. */
-    double *adjoint, *share;
+    /* Where the mesh is refined: what each element has of the half width of the interval of the first quantity, if one
+     * is asked for, as parts of its sum; or of the square of the error and of that of its adjoint, where both are
+     * proved. NULL: neither. */
+    double *share;
 } uz_evaluation;
 void uz_evaluation_free(uz_evaluation *evaluation);
 
@@ -299,8 +299,9 @@ typedef struct {
     int64_t n_elements;
     bool refined;
     int64_t n_bisected, *bisected; /* refined: makes its mesh, by uz_scene.bisected, from that which was given; round
-                                    * after round how many elements, then which of them are to be bisected; those that
-                                    * become 4 or 8 of their kind are told by -1 before all rounds */
+                                    * after round how many elements, then which of them are to be bisected, once where
+                                    * -2 stands before how many; those that become 4 or 8 of their kind are told by -1
+                                    * before all rounds */
 } uz_grid_sequence;
 
 typedef struct {

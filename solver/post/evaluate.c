@@ -22,7 +22,6 @@ void uz_evaluation_free(uz_evaluation *evaluation)
     free(evaluation->overlap);
     free(evaluation->surfaces);
     free(evaluation->quantities);
-    free(evaluation->adjoint);
     free(evaluation->share);
     free(evaluation);
 }

@@ -13,7 +13,6 @@
 #define BULK  0.5
 #define LEAST 0.05 /* one more grid is worth its while */
 #define AIM   0.95 /* missing it by a hair would take another grid */
-#define APART 0.5  /* errors are at different places that have less than so much of the product of their norms */
 
 typedef struct {
     double share;
@@ -80,28 +79,6 @@ static double weight_of(const uz_result *result)
     return s->evaluation->asked > 0 ? error : error * error;
 }
 
-/* A quantity is off by the sum of products of two errors, of the answer and of its adjoint; where they are at different
- * places rows of contacts that change are more than that, and by a part of the product of both norms (quantities.c): of
- * the first elements have their product, of the second both as parts of their sums. -> eta2. False: there is no
- * adjoint, or no error of it. */
-static bool add_adjoint(double *eta2, double *other, const uz_body_model *body, const uz_result *result)
-{
-    const int64_t n = body->mesh.n_elements;
-    double sum[2] = {0}, products = 0;
-    if (!result->evaluation->adjoint ||
-        !isfinite(uz_estimate_mesh_error(other, NULL, body, NULL, result->evaluation->adjoint)))
-        return false;
-    for (int64_t e = 0; e < n; e++) {
-        sum[0] += eta2[e];
-        sum[1] += other[e];
-        products += sqrt(eta2[e] * other[e]);
-    }
-    const bool apart = !(products > APART * sqrt(sum[0] * sum[1]));
-    for (int64_t e = 0; e < n && sum[1] > 0; e++)
-        eta2[e] = apart ? eta2[e] / sum[0] + other[e] / sum[1] : sqrt(eta2[e] / sum[0] * (other[e] / sum[1]));
-    return sum[1] > 0;
-}
-
 uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body, const uz_problem *problem,
                            uz_result *const *results, double left, bool subdivided, uz_error *err)
 {
@@ -109,7 +86,7 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
     const uz_element_type *type = uz_element_type_of((uz_element_kind)body->mesh.kind[0]);
     const int order = type->nodes > type->corners ? 2 : 1;
     indicator *all = uz_alloc(n_elements, sizeof *all);
-    double *eta2 = uz_alloc(2 * n_elements, sizeof *eta2), *room = uz_alloc_zero(2 * body->mesh.n_nodes, sizeof *room),
+    double *eta2 = uz_alloc(n_elements, sizeof *eta2), *room = uz_alloc_zero(2 * body->mesh.n_nodes, sizeof *room),
            sum = 0, part = 0;
     int64_t count = 0;
     bool done = all && eta2 && room, squared = false, proved = false; /* is the error one of second order? */
@@ -119,12 +96,12 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
         const uz_scene scene = uz_scene_of_case(problem, i);
         squared = squared || (results[i]->evaluation && results[i]->evaluation->asked > 0);
         const double *known = results[i]->evaluation ? results[i]->evaluation->share : NULL;
+        proved = proved || results[i]->summary.guarantee.proved;
         double seen = 0;
         if (uz_has_no_answer(&results[i]->summary))
             continue;
         for (int64_t e = 0; e < n_elements && known; e++)
             all[e].share = fmax(all[e].share, known[e] * weight_of(results[i]));
-        proved = proved || known;
         if (known)
             continue;
         const double error = uz_estimate_mesh_error(eta2, NULL, body, &scene, results[i]->u);
@@ -134,9 +111,8 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
         add_contact(eta2, room, body, &scene, results[i]);
         if (!(seen > 0) || !isfinite(error))
             continue;
-        const bool product = add_adjoint(eta2, eta2 + n_elements, body, results[i]);
         for (int64_t e = 0; e < n_elements; e++)
-            all[e].share = fmax(all[e].share, eta2[e] * (product ? weight_of(results[i]) : error * error / seen));
+            all[e].share = fmax(all[e].share, eta2[e] * error * error / seen);
     }
     for (int64_t e = 0; e < n_elements && done; e++)
         sum += all[e].share;

@@ -7,6 +7,8 @@
  *     value = found + a(e_u, e_z) + depth, within parts of both, of |e_u| |e_z| summed over elements, and of what the
  *             ends of contacts leave
  *
+ * Where a mesh is refined for it, elements are told what each has of that.
+ *
  * The parts cover the errors of generated scenes (tests/extremes/generated_quantities.py; docs/accuracy.md has the
  * figures). To these comes what the certificate leaves of the equations: |z|_K times its bound, and the
  * residual in z. */
@@ -198,8 +200,9 @@ static double depth_shift(const adjoint *x, const uz_functional *of, const doubl
 }
 
 /* What the end of a contact amid a side leaves open: of each side with rows that press and others that do not, what it
- * would come to if the open ones were closed by force, or the pressing ones let go. */
-static double end_error(const adjoint *x)
+ * would come to if the open ones were closed by force, or the pressing ones let go. -> part, of its element, and sum.
+ */
+static double end_error(double *part, const adjoint *x)
 {
     const uz_body_model *model = x->work->model;
     const uz_mesh *mesh = &model->mesh;
@@ -226,7 +229,8 @@ static double end_error(const adjoint *x)
                         slip = fmax(slip, fabs(x->slip[i]));
                     }
                 }
-                sum += y * gap + r * slip;
+                sum += OF_END * (y * gap + r * slip);
+                part[group->face[f].element] += OF_END * (y * gap + r * slip);
             }
         }
     return sum;
@@ -242,19 +246,6 @@ static bool is_about_to_touch(const adjoint *x, double mesh_error)
     for (int64_t i = 0; i < model->mesh.n_nodes * model->mesh.dim; i++)
         farthest = fmax(farthest, fabs(x->answer->u[i]));
     return x->answer->summary.active == 0 && nearest <= mesh_error * farthest;
-}
-
-/* Of the quantity that is asked for: where to refine. */
-static uz_status keep_adjoint(uz_quantity_found *out, const adjoint *x, int64_t n, uz_error *err)
-{
-    uz_evaluation *e = x->answer->evaluation;
-    if (out != e->quantities || !(x->work->settings->quantity_error > 0) || !x->work->problem->scene.refine)
-        return UZ_OK;
-    e->adjoint = uz_alloc(n, sizeof *e->adjoint);
-    if (!e->adjoint)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the adjoint's %lld displacements", (long long)n);
-    memcpy(e->adjoint, x->z, (size_t)n * sizeof *e->adjoint);
-    return UZ_OK;
 }
 
 /* Of |e_u| |e_z|, what is taken of an element's part, and of what that has beyond OUTSTANDING times the mean. Beside
@@ -280,27 +271,60 @@ static void product_factors(double factor[2], uz_element_kind kind)
 
 /* |e_u| |e_z|, summed over elements with their factors: what is far off in the one need not be where the other is. Rows
  * of contacts may change on finer meshes, which no element's own part knows: it is no less than of a part of the
- * product of the norms, and of all of that where temperature presses the body into its obstacles. scale: z's. */
-static double product_of_errors(const adjoint *x, double scale)
+ * product of the norms, and of all of that where temperature presses the body into its obstacles. scale: z's. -> part,
+ * which is room for three of each element and has what it is made of: each element's; where errors are at different
+ * places, of what the product of the norms falls by with its own. */
+static double product_of_errors(double *part, const adjoint *x, double scale)
 {
     const int64_t n = x->work->model->mesh.n_elements;
-    double *product = x->of_elements + n; /* in place of what it is made of */
-    double sum = 0, weighted = 0, square[2] = {0}, factor[2] = {0};
+    double *other = part + n, sum = 0, weighted = 0, square[2] = {0}, factor[2] = {0};
     for (int64_t e = 0; e < n; e++) {
-        const double both = x->of_elements[n + e] + x->of_elements[2 * n + e];
-        const double own[2] = {x->of_elements[e], fmax(0, 0.5 * both - x->of_elements[e])};
-        product[e] = sqrt(own[0] * own[1]);
-        sum += product[e];
-        for (int k = 0; k < 2; k++)
-            square[k] += own[k];
+        const double own = x->of_elements[e];
+        other[e] = fmax(0, 0.5 * (part[e] + other[e]) - own);
+        part[e] = sqrt(own * other[e]);
+        sum += part[e];
+        square[0] += own;
+        square[1] += other[e];
     }
-    const double usual = OUTSTANDING * sum / (double)n;
+    const double usual = OUTSTANDING * sum / (double)n, norms = sqrt(square[0] * square[1]);
     for (int64_t e = 0; e < n; e++) {
         product_factors(factor, (uz_element_kind)x->work->model->mesh.kind[e]);
-        weighted += factor[0] * fmin(product[e], usual) + factor[1] * fmax(0, product[e] - usual);
+        part[e] = factor[0] * fmin(part[e], usual) + factor[1] * fmax(0, part[e] - usual);
+        weighted += part[e];
     }
-    const double least = (x->free_strain ? 1 : OF_PRODUCT) * sqrt(square[0] * square[1]);
-    return (sum > 0 ? weighted * fmax(1, least / sum) : factor[1] * least) / scale;
+    const double least = (x->free_strain ? 1 : OF_PRODUCT) * norms;
+    const double whole = (sum > 0 ? weighted * fmax(1, least / sum) : factor[1] * least) / scale;
+    for (int64_t e = 0; e < n; e++)
+        part[e] = sum > OF_PRODUCT * norms ? whole * part[e] / weighted
+                  : norms > 0              ? whole * (x->of_elements[e] / square[0] + other[e] / square[1]) / 2
+                                           : 0;
+    return whole;
+}
+
+/* Where to refine for the quantity that is asked for? */
+static bool steers(const adjoint *x, const uz_quantity_found *out)
+{
+    return out == x->answer->evaluation->quantities && x->work->settings->quantity_error > 0 &&
+           x->work->problem->scene.refine;
+}
+
+/* part: of the half width, by element. second: what of it falls with the square of the answer's own error. */
+static uz_status keep_shares(const adjoint *x, const double *part, double second, uz_error *err)
+{
+    uz_evaluation *e = x->answer->evaluation;
+    const int64_t n = x->work->model->mesh.n_elements;
+    double sum = 0;
+    double *share = uz_alloc(n, sizeof *share);
+    if (!share)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the errors of %lld elements", (long long)n);
+    for (int64_t i = 0; i < n; i++) {
+        share[i] = part[i] + (x->own_error > 0 ? second * x->of_elements[i] / x->own_error : 0);
+        sum += share[i];
+    }
+    for (int64_t i = 0; i < n && sum > 0; i++)
+        share[i] /= sum;
+    e->share = share;
+    return UZ_OK;
 }
 
 static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functional *of, uz_error *err)
@@ -320,9 +344,7 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
         snprintf(out->why, sizeof out->why, "the rows in contact could not be held for its adjoint problem");
         return UZ_OK;
     }
-    status = keep_adjoint(out, x, n, err);
-    if (status == UZ_OK)
-        status = uz_strain_energy(&norm, model, x->z, true, err);
+    status = uz_strain_energy(&norm, model, x->z, true, err);
     if (status == UZ_OK)
         status = uz_strain_energy(&strain, model, u, true, err);
     const double scale = norm > 0 && strain > 0 ? sqrt(strain / norm) : 1; /* both of one size */
@@ -344,11 +366,16 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     const double depth = depth_shift(x, of, x->depth), bulge = depth_shift(x, of, x->bulge);
     const double shift = (both[0] - both[1]) / (4 * scale);
     const double times = !pressed ? OF_OTHER : x->free_strain ? OF_HEAT : OF_CONTACT;
-    out->mesh = OF_ESTIMATE * fabs(shift) + product_of_errors(x, scale) + OF_DEPTH * fabs(depth) + fabs(bulge) +
-                OF_END * end_error(x) + of->blur;
+    double *part = x->of_elements + model->mesh.n_elements;
+    out->mesh = OF_ESTIMATE * fabs(shift) + product_of_errors(part, x, scale) + OF_DEPTH * fabs(depth) + fabs(bulge) +
+                end_error(part, x) + of->blur;
     double whole = fabs(out->found); /* a reaction may be what large forces leave of each other */
     for (int64_t i = 0; i < model->m && out->kind == UZ_QUANTITY_REACTION; i++)
         whole += fabs(x->answer->r[i]);
+    if (steers(x, out))
+        status = keep_shares(x, part, OF_SECOND * share * whole / times, err);
+    if (status != UZ_OK || out->why[0])
+        return status;
     out->mesh = times * out->mesh + OF_SECOND * share * whole;
     /* where z is a rigid motion, of forces that are in balance, the residual at free nodes is what is left */
     out->equations = sqrt(2 * fmax(0, norm)) * x->answer->summary.certificate.absolute_error +
@@ -387,15 +414,17 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
             uz_functional_make(&of, asked, where, work->model, work->scene, answer, work->h, work->prescribed, err);
         out->value = out->found = of.found;
         memcpy(out->why, of.why, sizeof out->why);
+        bool coarse = false;
         for (int k = 0; k < e->n_warnings && !out->why[0]; k++)
-            if (strcmp(e->warnings[k].code, UZ_WARN_COARSE) == 0)
+            if ((coarse = strcmp(e->warnings[k].code, UZ_WARN_COARSE) == 0))
                 snprintf(out->why, sizeof out->why, "the mesh can't tell how wide the contact is (coarse_contact)");
         for (int k = 0; k < e->n_warnings && !out->why[0] && answer->summary.active == 0; k++)
             if (strcmp(e->warnings[k].code, UZ_WARN_OVERLAP) == 0)
                 snprintf(out->why, sizeof out->why, "surfaces stand in each other, and no row of a contact presses");
         if (!work->dual && !out->why[0])
             snprintf(out->why, sizeof out->why, "no rows are proved to hold the body");
-        if (status == UZ_OK && !out->why[0])
+        /* an interval has to wait for a finer mesh, and where that is to be finer its adjoint tells */
+        if (status == UZ_OK && (!out->why[0] || (coarse && work->dual && steers(&x, out))))
             status = estimate(out, &x, &of, err);
         uz_functional_clear(&of);
         e->n_quantities = i + 1;

@@ -220,8 +220,7 @@ TEST(marks_have_half_of_the_error)
     uz_scene_clear(&s);
 }
 
-/* What is proved of elements is what they are marked by; of a quantity both the answer's error and the adjoint's are.
- */
+/* What is known of elements is what they are marked by. */
 TEST(marked_by_what_is_asked_for)
 {
     uz_scene s = l_shape();
@@ -229,40 +228,14 @@ TEST(marked_by_what_is_asked_for)
     uz_result *result = body_solve(&s, 1e-8);
     const uz_problem problem = problem_of_scene(&s);
     uz_body_model body;
-    int64_t *list = NULL, n = 0, best = 0;
+    int64_t *list = NULL, n = 0;
     CHECK_INT(uz_body_model_build(&body, &s, UZ_BODY_OUTLINE, NULL), UZ_OK);
-    double eta2[6], other[6], sum[2] = {0}, share[6] = {0.1, 0, 0, 0.2, 0.7, 0};
+    double share[6] = {0.1, 0, 0, 0.2, 0.7, 0};
     uz_evaluation *e = result->evaluation;
     e->share = share;
     CHECK_INT(uz_mark_elements(&list, &n, &body, &problem, &result, 1e-9, false, NULL), UZ_OK);
     CHECK(n == 2 && list[0] == 1 && list[1] == 4);
     e->share = NULL;
-    e->asked = 0.1;
-    e->adjoint = malloc((size_t)(2 * body.mesh.n_nodes) * sizeof *e->adjoint);
-    for (int64_t i = 0; i < body.mesh.n_nodes; i++) { /* bent at one end */
-        const double x = body.mesh.xyz[2 * i] - 0.25;
-        e->adjoint[2 * i] = 0;
-        e->adjoint[2 * i + 1] = x < 0 ? 0 : x * x * x;
-    }
-    const double error = uz_estimate_mesh_error(eta2, NULL, &body, &s, result->u);
-    CHECK(error > 0 && uz_estimate_mesh_error(other, NULL, &body, NULL, e->adjoint) > 0);
-    for (int k = 0; k < 6; k++) {
-        sum[0] += eta2[k];
-        sum[1] += other[k];
-    }
-    for (int k = 0; k < 6; k++) {
-        share[k] = eta2[k] / sum[0] + other[k] / sum[1];
-        best = share[k] > share[best] ? k : best;
-    }
-    n = 0;
-    CHECK_INT(uz_mark_elements(&list, &n, &body, &problem, &result, 1e-9, false, NULL), UZ_OK);
-    double marked = 0, least = INFINITY;
-    for (int64_t i = 1; i < n; i++) {
-        marked += share[list[i]];
-        least = fmin(least, share[list[i]]);
-    }
-    CHECK(list[1] == best);
-    CHECK_MSG(marked >= 1 && marked - least < 1, "%g of 2", marked);
     free(list);
     uz_body_model_clear(&body);
     uz_result_free(result);
