@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "run/problem.h"
 #include "run/results.h"
+#include "scene/bisect.h"
 #include "scene/subdivide.h"
 
 #include <math.h>
@@ -13,6 +14,7 @@
 #define BULK  0.5
 #define LEAST 0.05 /* one more grid is worth its while */
 #define AIM   0.95 /* missing it by a hair would take another grid */
+#define NEAR  0.5  /* left of the error: from then on triangles are halved once */
 
 typedef struct {
     double share;
@@ -118,17 +120,20 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
         sum += all[e].share;
     if (done)
         qsort(all, (size_t)n_elements, sizeof *all, by_share);
-    /* what is bisected once along each direction keeps 4^-order of the square of its error; what else is in intervals
-     * by estimate, of the ends of contacts, falls faster */
+    const bool once = body->mesh.dim == 2 && !subdivided && (squared ? sqrt(left) : left) > NEAR;
+    /* what is bisected once along each direction keeps 4^-order of the square of its error, of triangles that are
+     * halved 2^-order; what else is in intervals by estimate, of the ends of contacts, falls faster */
     const double kept = squared ? (proved ? AIM : 1) * left : AIM * AIM * left * left,
-                 needed = (1 - kept) / (1 - pow(4, -order)), bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
+                 needed = (1 - kept) / (1 - pow(once ? 2 : 4, -order)), bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
     while (done && count < n_elements && part < bulk && all[count].share > 0)
         part += all[count++].share;
-    int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 2 + count, sizeof *grown) : NULL;
+    int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 3 + count, sizeof *grown) : NULL;
     if (grown) {
         *list = grown;
         if (*n == 0 && subdivided)
             grown[(*n)++] = UZ_SUBDIVIDED;
+        if (once)
+            grown[(*n)++] = UZ_HALVED_ONCE;
         grown[(*n)++] = count;
         for (int64_t i = 0; i < count; i++)
             grown[(*n)++] = all[i].element;

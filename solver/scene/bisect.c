@@ -73,12 +73,14 @@ uz_status uz_mesh_bisect(uz_mesh *mesh, const int64_t *marked, int64_t n, uz_err
     bool listed = true;
     x.all.failed = !begin(&x, mesh);
     for (int64_t i = 0; i < n && listed && !x.all.failed && !x.all.too_many; i += 1 + marked[i]) {
+        const bool once = marked[i] == UZ_HALVED_ONCE && i + 1 < n;
+        i += once;
         listed = marked[i] >= 0 && marked[i] < n - i;
         for (int64_t k = i + 1; listed && k <= i + marked[i]; k++) {
             listed = marked[k] >= 0 && marked[k] < x.parts;
             if (!listed)
                 break;
-            x.part[marked[k]].due = (unsigned char)x.dim;
+            x.part[marked[k]].due = (unsigned char)(once ? 1 : x.dim);
             if (x.part[marked[k]].corners > x.dim + 1)
                 cut(&x, marked[k]);
         }

@@ -363,6 +363,32 @@ TEST(curved_sides_stay_the_curves_that_they_are)
     }
 }
 
+/* A round of elements that are halved once, among others: two triangles of four sides with one diagonal, three nodes
+ * more of quadratic ones for each side that is halved. */
+TEST(rounds_of_single_bisections)
+{
+    uz_mesh mesh = mesh_of("tri3", 1);
+    const double area = whole(&mesh);
+    CHECK_INT(uz_mesh_bisect(&mesh, (int64_t[]){UZ_HALVED_ONCE, 1, 0}, 3, NULL), UZ_OK);
+    CHECK_INT(mesh.n_elements, 4); /* both have the longest edge */
+    CHECK_INT(mesh.n_nodes, 5);
+    CHECK_REL(whole(&mesh), area, 1e-14);
+    uz_mesh_clear(&mesh);
+    mesh = mesh_of("tri6", 1);
+    CHECK_INT(uz_mesh_bisect(&mesh, (int64_t[]){1, 0, UZ_HALVED_ONCE, 2, 0, 1}, 6, NULL), UZ_OK);
+    uz_mesh twice = mesh_of("tri6", 1);
+    CHECK_INT(uz_mesh_bisect(&twice, (int64_t[]){1, 0}, 2, NULL), UZ_OK);
+    CHECK(mesh.n_elements >= twice.n_elements + 2 && mesh.n_elements < twice.n_elements + 6);
+    CHECK_REL(outside(&mesh), outside(&twice), 1e-14);
+    uz_mesh_clear(&twice);
+    uz_mesh_clear(&mesh);
+    mesh = mesh_of("tet4", 1);
+    const int64_t before = mesh.n_elements;
+    CHECK_INT(uz_mesh_bisect(&mesh, (int64_t[]){UZ_HALVED_ONCE, 1, 0}, 3, NULL), UZ_OK);
+    CHECK(mesh.n_elements > before && mesh.n_elements <= 2 * before);
+    uz_mesh_clear(&mesh);
+}
+
 TEST(what_can_not_be_bisected_is_refused)
 {
     uz_box box = box_of("tet10", 1);
@@ -374,10 +400,14 @@ TEST(what_can_not_be_bisected_is_refused)
     CHECK(strcmp(err.where, "/mesh/refine") == 0 && strstr(err.message, "hex20") && strstr(err.message, "tet10"));
     CHECK_INT(uz_mesh_bisect(&mesh, (int64_t[]){1, 0}, 2, NULL), UZ_ERR_SCENE);
     uz_mesh_clear(&mesh);
-    static const int64_t LISTS[][3] = {{1, 2, 0}, {3, 0, 1}, {-1, 0, 0}, {1, -1, 0}};
-    for (int i = 0; i < 4; i++) {
+    static const int64_t LISTS[][3] = {
+        {1, 2, 0}, {3, 0, 1}, {-1, 0, 0}, {1, -1, 0}, {UZ_HALVED_ONCE, 1, 2}, {UZ_HALVED_ONCE, UZ_HALVED_ONCE, 0}};
+    for (int i = 0; i < 6; i++) {
         mesh = mesh_of("tri3", 1);
-        CHECK_INT(uz_mesh_bisect(&mesh, LISTS[i], 2, NULL), UZ_ERR_ARGUMENT);
+        CHECK_INT(uz_mesh_bisect(&mesh, LISTS[i], i < 4 ? 2 : 3, NULL), UZ_ERR_ARGUMENT);
+        uz_mesh_clear(&mesh);
+        mesh = mesh_of("tri3", 1);
+        CHECK_INT(uz_mesh_bisect(&mesh, (int64_t[]){UZ_HALVED_ONCE}, 1, NULL), UZ_ERR_ARGUMENT);
         uz_mesh_clear(&mesh);
     }
 }
