@@ -175,7 +175,7 @@ nothing: it was not reached in the time that each job had, at most two minutes. 
 order is that of the error in unknowns: 0.5 and 1 are the best that linear and quadratic elements can do in the plane. Bodies that press on each other along curves have no guarantee. Times are of a machine on
 which others worked; unknowns are what counts."""
 
-FORCES = """`{"quantity": "contact.force", "relative": 0.02}` on a coarse mesh with `refine`: `auto` (`make trade FILTER=force`): the unknowns of the last mesh, the force
+FORCES = """`{"quantity": "contact.force", "relative": 0.02}` on a coarse mesh with `refine`: `auto` (`make trade FILTER=force`): the unknowns of the first mesh and of the last, the force
 and its interval by estimate; the true force is that of a mesh many times finer. By hand: the least unknowns of many meshes of `quad8` and `tri6`, graded towards the
 contact, whose own force is within 2 % of the true one, and stays so where the mesh is made finer, as only somebody can tell who knows it; and of the same meshes the least unknowns that are told to be within it, by the same
 estimate."""

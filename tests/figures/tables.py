@@ -349,9 +349,9 @@ def trade(data):
 
 def forces(data):
     """What a contact force within 2 % takes, beside the best mesh found by hand."""
-    rows = [[row["body"], row["element"], f"{row['d']:,}", row["grids"], f"{row['value']:.5g}", f"{row['low']:.5g} .. {row['high']:.5g}", f"{row['true']:.5g}",
+    rows = [[row["body"], row["element"], f"{row['first']:,}", f"{row['d']:,}", row["grids"], f"{row['value']:.5g}", f"{row['low']:.5g} .. {row['high']:.5g}", f"{row['true']:.5g}",
              f"{row['hand']:,} {row['hand_element']}", sig(row["d"] / row["hand"]), f"{row['sure']:,}" if row["sure"] else "none"] for row in (data.get("trade") or {}).get("forces", [])]
-    return table(["body", "elements", "unknowns", "grids", "force", "interval", "true", "by hand, known", "unknowns over those", "by hand, told"], rows) if rows else None
+    return table(["body", "elements", "of the first mesh", "unknowns", "grids", "force", "interval", "true", "by hand, known", "unknowns over those", "by hand, told"], rows) if rows else None
 
 
 def solids(data):
