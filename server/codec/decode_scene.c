@@ -217,6 +217,9 @@ static bool decode_groups(char name[64], uz_names *groups, decoding *d, const js
 
 static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
 {
+    bool finite = out->kinematics == UZ_KINEMATICS_FINITE; /* or may become so */
+    for (int64_t i = 0; i < out->n_materials && out->kinematics == UZ_KINEMATICS_AUTO; i++)
+        finite = finite || out->materials[i].law != UZ_ELASTIC_LINEAR;
     out->contacts = decode_room(d, list, sizeof *out->contacts, &out->n_contacts);
     for (int64_t i = 0; i < out->n_contacts; i++) {
         const json_value *item = &list->items[i], *given = json_get(item, "obstacle");
@@ -227,8 +230,7 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
         to->kind = UZ_OBSTACLE_BODY;
         to->between = json_text_is(json_get(item, "discretization"), "nodes") ? UZ_CONTACT_NODES : UZ_CONTACT_SURFACES;
         const json_value *smooth = json_get(item, "smooth");
-        to->faceted =
-            json_is(smooth, JSON_IS_BOOLEAN) ? !json_truth(smooth) : out->kinematics == UZ_KINEMATICS_FINITE && !given;
+        to->faceted = json_is(smooth, JSON_IS_BOOLEAN) ? !json_truth(smooth) : finite && !given;
         to->feature_angle = json_number(json_get(item, "feature_angle"), 0);
         for (size_t k = 0; k < sizeof SHAPES / sizeof SHAPES[0]; k++) {
             const obstacle o = {to, d, json_get(given, SHAPES[k].key), uz_scene_dim(out)};

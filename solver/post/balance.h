@@ -33,9 +33,9 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
 /* About how much of the forces of the answer u small deformation leaves out: squares of its gradient in the strains, by
  * the energy norm; stress that turns with the body, along u; strains and rotations in the law itself, weighted by the
  * energy (U, > 0). Relative to its energy norm; and what the mean stress does to a strip that bends, see nonlinear.c.
- * Plane strain only. NaN: elements are not of the standard formulation, the only one that large deformation has. */
+ * NaN: elements are not of the standard formulation, the only one that large deformation has. */
 double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy);
-/* The strain from which on a strip as flat as the body may buckle, by Euler; plane bodies. */
+/* The strain from which on a strip as flat as the body may buckle, by Euler. */
 double uz_least_buckling_strain(const uz_body_model *model);
 /* Warns that small deformation is off by `error` (uz_small) under a linear law. */
 void uz_doubt_deformation(uz_evaluation *out, const uz_small *small);

@@ -158,13 +158,21 @@ static void look_at_elements(const doubts *d)
  * and the body's energy norm is known. */
 static bool may_be_nonlinear(const doubts *d)
 {
-    const double U = d->out->strain_energy, extent = d->model->mesh.extent;
-    double stiffest = 0;
+    const uz_mesh *mesh = &d->model->mesh;
+    const bool ring = d->model->kind == UZ_AXISYMMETRIC;
+    const double U = d->out->strain_energy, extent = mesh->extent;
+    double stiffest = 0, depth = mesh->dim == 3 ? extent : d->model->thickness, around = 0;
     for (int64_t k = 0; k < d->model->n_materials; k++)
         stiffest = fmax(stiffest, uz_most_stiffness(d->model->materials[k].lame));
-    const double most = sqrt(stiffest * extent * extent * d->model->thickness), least = 0.25 * UZ_SURELY_SMALL;
+    for (int64_t i = 0; ring && i < mesh->n_nodes; i++) {
+        const double r = mesh->xyz[2 * i];
+        depth = fmax(depth, 2 * acos(-1) * r);
+        around = fmax(around, r > 0 ? fabs(d->u[2 * i]) / r : 0); /* on the axis it is a slope */
+    }
+    const double most = sqrt(stiffest * extent * extent * depth), least = 0.25 * UZ_SURELY_SMALL;
     const double buckles = UZ_SURELY_SMALL * uz_least_buckling_strain(d->model);
-    return U > 0 && is_steep(d, 0.25 * fmin(buckles, fmin(least, sqrt(2 * least * sqrt(2 * U) / most))));
+    const double steep = 0.25 * fmin(buckles, fmin(least, sqrt(2 * least * sqrt(2 * U) / most)));
+    return U > 0 && (around > steep || is_steep(d, steep));
 }
 
 /* Small deformation takes a turn for a x r, which stretches what turns by a^2 / 2. */
@@ -548,7 +556,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     if (is_steep(&d, 0.25 * fmin(MOST_STRAIN, MOST_ROTATION)))
         look_at_elements(&d);
     d.out->nonlinear = NAN;
-    if (scene->kinematics == UZ_KINEMATICS_AUTO && scene->model == UZ_PLANE_STRAIN && uz_has_finite_model(scene) &&
+    if (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_model(scene) &&
         (uz_has_finite_law(scene) || model->d <= UZ_MOST_COMPARED))
         d.out->nonlinear = may_be_nonlinear(&d) ? uz_measure_nonlinear(model, result->u, d.out->strain_energy) : 0;
     look_at_materials(&d);

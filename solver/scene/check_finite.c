@@ -63,10 +63,6 @@ static uz_status check_pair(const uz_scene *scene, int64_t i, uz_error *err)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
                        "finite kinematics of solids have contact with rigid obstacles only; give an obstacle, or use "
                        "the kinematics \"moving\"");
-    if (scene->kinematics != UZ_KINEMATICS_FINITE)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
-                       "whether small deformation is enough is told before rigid obstacles only; of contact between "
-                       "bodies of such a law use the kinematics \"finite\"");
     if (contact->between != UZ_CONTACT_SURFACES)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "discretization"),
                        "finite kinematics have contact between bodies by surfaces; leave discretization out");
@@ -88,13 +84,6 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
         if (scene->materials[i].poisson == 0.5)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "poisson"),
                            "finite kinematics have no material that keeps its volume; use less than 0.5, such as 0.49");
-    if (scene->model != UZ_PLANE_STRAIN && scene->kinematics != UZ_KINEMATICS_FINITE) /* weigh.c has no measure of it */
-        return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
-                       "whether small deformation is enough is told of plane_strain only; for a %s of such a law use "
-                       "the kinematics \"finite\"",
-                       scene->model == UZ_SOLID          ? "solid"
-                       : scene->model == UZ_PLANE_STRESS ? "body in plane stress"
-                                                         : "body of revolution");
     if (scene->formulation != UZ_FORMULATION_AUTO && scene->formulation != UZ_FORMULATION_STANDARD)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                        "finite kinematics have the standard formulation only; use auto, and quad8 or tri6 for bending "
