@@ -106,7 +106,7 @@ typedef struct {
     double *r; /* reactions of the rows that the last contact problem had, n_r of them */
     int64_t n_r;
     double *p, *v, *Kv;          /* d: room */
-    double *step, norm;          /* n: the last step; in the energy's norm, 0: not known */
+    double *step, norm;          /* n: the last step; in the energy's norm, 0: not known, infinite: the first */
     double penalty, hold, shift; /* of merits; what the last tangent had added, see finite_newton.c */
     double stiffest, grain;      /* of the undeformed body: its stiffest dof; what rounding may leave of an energy */
     int64_t step_qps;

@@ -492,6 +492,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     const int64_t shifted = run->found.shifted;
     *out = UZ_PART_UNSETTLED;
     run->penalty = run->hold = run->shift = 0;
+    run->norm = INFINITY;
     run->step_qps = 0;
     if (status == UZ_OK)
         memcpy(begun, run->at.u, (size_t)run->n * sizeof *begun);

@@ -21,10 +21,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Contact problems of a step, how many are mixed, and what may be left of a step: of the parts that Newton's method
- * leaves it is one of the last. */
+/* Contact problems of a step, how many are mixed, and what may be left of a step: no more than a part of what Newton's
+ * method leaves of it, which is about what the step before was in the energy's norm (S. Eisenstat and H. Walker,
+ * "Choosing the forcing terms in an inexact Newton method", SIAM J. Sci. Comput. 17 (1996) 16-32). */
 enum { MOST_CORRECTIONS = 12, MIXED = 4 };
-#define CORRECTED 1e-4
+#define CORRECTED 1e-3
+#define ROUGHLY   0.1
+#define PART_LEFT 0.3
 /* What rounding may change, in parts of the displacement. */
 #define ROUNDING 1e-12
 
@@ -121,6 +124,8 @@ static uz_status iterate(uz_finite_run *run, const uz_row_turn *turn, double *ro
 {
     const int64_t d = run->d, m = run->at.rows.m;
     double *p = room, *from = p + d, *v = from + d, *came = v + d, *h = came + d;
+    /* of the first step the norm is infinite */
+    const double left = fmin(ROUGHLY, fmax(CORRECTED, PART_LEFT * run->norm));
     uz_status status = UZ_OK;
     uz_restrict_nodal(from, &run->base, run->at.u);
     for (int64_t j = 0; j < d; j++) {
@@ -145,7 +150,7 @@ static uz_status iterate(uz_finite_run *run, const uz_row_turn *turn, double *ro
             came[j] = run->last->u[j] - from[j];
             change = hypot(change, came[j] - v[j]);
         }
-        if (change <= CORRECTED * uz_norm(d, came) || change <= ROUNDING * uz_norm(d, run->last->u))
+        if (change <= left * uz_norm(d, came) || change <= ROUNDING * uz_norm(d, run->last->u))
             break;
         mix(v, past, came);
     }
