@@ -31,7 +31,7 @@ TEST_PACKAGES += python3-numpy python3-pip python3-setuptools python3-wheel
 GROUP_PACKAGES := libpetsc-real-dev openmpi-bin
 
 PEER_PACKAGES := coinor-libipopt-dev coinor-libclp-dev python3-numpy python3-cvxopt octave python3-siconos python3-petsc4py \
-                 calculix-ccx
+                 calculix-ccx python3-getfem++
 
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE
@@ -279,7 +279,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers peers-contact peers-space extremes theory roller trade figures numbers collect page-size
+        bench-size bench-deps peers peers-contact peers-large peers-space extremes theory roller trade figures numbers collect page-size
 test: deps-test ## build and pass every test; ONCE=1: but those that make asan runs as they are
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools $(BUILD)/guard \
 	    $(if $(ONCE),$(patsubst %,$(BUILD)/tests/%,$(notdir $(basename $(filter-out $(SAME_IN_ASAN),$(UNIT_SRC))))),unit-bins)
@@ -407,10 +407,13 @@ bench-deps: ## install the Debian packages that only comparisons with other solv
 peers: deps bench-deps ## the same problems by what Debian has, one certificate for all: tables and build/peers.json; SIZES="30 60", TIME=20, ONLY=, PROBLEMS=
 	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
-	@$(if $(SIZES)$(ONLY)$(PROBLEMS),,$(MAKE) --no-print-directory -s peers-contact peers-space)
+	@$(if $(SIZES)$(ONLY)$(PROBLEMS),,$(MAKE) --no-print-directory -s peers-contact peers-large peers-space)
 
 peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json; DECKS=folder: CalculiX's own decks, too
 	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json $(DECKS)
+
+peers-large: bench-deps $(BUILD)/uzawad ## large deformation by CalculiX, GetFEM and the daemon: a table and build/peers-large.json; ONLY=part of a name
+	@/usr/bin/python3 -B tests/peers/large.py $(BUILD) $(BUILD)/peers-large.json $(if $(ONLY),ONLY="$(ONLY)")
 
 peers-space: bench-deps $(BUILD)/uzawad ## solids in contact by the daemon against the linear solve of the same K by PETSc's GAMG: a table and build/peers-space.json; CELLS=32 along a side
 	@OMP_THREAD_LIMIT=1 OMP_NUM_THREADS=1 /usr/bin/python3 -B tests/peers/gamg.py $(BUILD) $(BUILD)/peers-space.json $(if $(CELLS),CELLS=$(CELLS))
