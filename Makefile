@@ -279,7 +279,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers peers-contact peers-large peers-space extremes theory roller trade figures numbers collect page-size
+        bench-size bench-deps peers peers-contact peers-large peers-space extremes theory roller arch trade figures numbers collect page-size
 test: deps-test ## build and pass every test; ONCE=1: but those that make asan runs as they are
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools $(BUILD)/guard \
 	    $(if $(ONCE),$(patsubst %,$(BUILD)/tests/%,$(notdir $(basename $(filter-out $(SAME_IN_ASAN),$(UNIT_SRC))))),unit-bins)
@@ -433,6 +433,9 @@ theory: deps ## stress and contact pressure against theory on finer and finer me
 
 roller: $(BUILD)/uzawad ## a roller pushed into a block, graded meshes, from either side: the force that contact that moves converges to; minutes
 	@$(PYTHON) -B tests/theory/roller.py $(BUILD)
+
+arch: $(BUILD)/uzawad ## a clamped arch that goes through, finer and finer meshes: its limit load; seconds
+	@$(PYTHON) -B tests/theory/arch.py $(BUILD)
 
 trade: $(BUILD)/uzawad ## what a whole error of 10, 5, 2 and 1 % costs, by estimate and guaranteed, and a contact force within 2 %: tables and build/trade.json; minutes; FILTER=words: bodies by their names, "force" of forces alone
 	@$(call measured,trade $(if $(FILTER),--part)) $(PYTHON) -B tests/figures/trade.py $(BUILD) $(BUILD)/trade.json $(FILTER)

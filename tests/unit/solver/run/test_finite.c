@@ -533,8 +533,8 @@ static void bend_arch(double x[3])
     x[1] = r * cos(angle) - 24;
 }
 
-/* Half an arch of span 20 and rise 2, whose limit load is 0.5747: below it bears, above it has gone through and lies on
- * the plane. Both are minima. */
+/* Half an arch of span 20 and rise 2, whose limit load is 0.5730 (make arch): below it bears, above it has gone through
+ * and lies on the plane. Both are minima. */
 TEST(an_arch_bears_or_has_gone_through)
 {
     static const double LOAD[] = {0.56, 1.0};
@@ -603,7 +603,7 @@ TEST(a_path_over_a_roller_does_not_matter)
     uz_scene_clear(&s);
 }
 
-/* The arch along a path: up to its limit load, 0.5747(5), and no further. */
+/* The arch along a path: up to its limit load, 0.5742 on this mesh and 0.5730 on fine ones, and no further. */
 TEST(an_arch_ends_at_its_limit_load)
 {
     static const double PARTS[] = {0.4, 0.56, 0.65, 0.7};
@@ -619,7 +619,7 @@ TEST(an_arch_ends_at_its_limit_load)
     for (int i = 0; i < 4; i++) {
         const uz_summary *sum = &r[i]->summary;
         CHECK_INT(sum->outcome, i < 2 ? UZ_CONVERGED : UZ_UNSTABLE);
-        CHECK_MSG(i < 2 ? sum->finite.part == PARTS[i] : fabs(sum->finite.part - 0.5747) < 0.0015, "%.6g",
+        CHECK_MSG(i < 2 ? sum->finite.part == PARTS[i] : fabs(sum->finite.part - 0.5742) < 0.0003, "%.6g",
                   sum->finite.part);
         CHECK(sum->force[1] == 0 && sum->finite.definite && sum->finite.residual <= sum->requested_error);
         CHECK(fabs(r[i]->evaluation->supports[0].force[1] - 0.5 * sum->finite.part) < 1e-6);
