@@ -162,12 +162,17 @@ static void put_arches(double x[3])
 }
 
 /* Two half rings that are pressed together and moved past each other: both bend, and the place where they touch goes
- * along both. Forces of a mesh that is four times as fine. */
+ * along both. Forces of a mesh that is four times as fine: what this one is off by is the mesh's, 1.3 %, of twice as
+ * many cells each way 0.1 %. */
 TEST(rings_that_are_pressed_and_slide)
 {
     static const double ASIDE[] = {-0.0075955, 0, 0.0075955}, UP[] = {0.035695, 0.04586, 0.035695};
-    for (int i = 0; i < 3; i++) {
-        const box_part a = {{2, 0}, {1, acos(-1)}, {2, 16}, "quad8"}, b = {{5, 0}, {1, acos(-1)}, {2, 18}, "quad8"};
+    for (int k = 0; k < 4; k++) {
+        const int i = k % 3;
+        const int64_t n = k < 3 ? 2 : 4;
+        const double face = k < 3 ? 0.015 : 0.001;
+        const box_part a = {{2, 0}, {1, acos(-1)}, {n, 8 * n}, "quad8"};
+        const box_part b = {{5, 0}, {1, acos(-1)}, {n, 9 * n}, "quad8"};
         uz_scene s = two(UZ_PLANE_STRAIN, UZ_ELASTIC_NEO_HOOKE, &a, &b, put_arches);
         body_hold(&s, "abottom", 0, 0, NAN);
         body_hold(&s, "atop", 0, 0, NAN);
@@ -178,8 +183,8 @@ TEST(rings_that_are_pressed_and_slide)
         check_converged(r, 1, 24);
         const uz_resultant *foot = r->evaluation->supports;
         const double force[2] = {foot[0].force[0] + foot[1].force[0], foot[0].force[1] + foot[1].force[1]};
-        CHECK_MSG(fabs(fabs(force[1]) - UP[i]) < 0.015 * UP[i], "%.8g", force[1]);
-        CHECK_MSG(fabs(fabs(force[0]) - fabs(ASIDE[i])) < 0.015 * fabs(ASIDE[i]) + 1e-9, "%.8g", force[0]);
+        CHECK_MSG(fabs(fabs(force[1]) - UP[i]) < face * UP[i], "%.8g", force[1]);
+        CHECK_MSG(fabs(fabs(force[0]) - fabs(ASIDE[i])) < face * fabs(ASIDE[i]) + 1e-9, "%.8g", force[0]);
         give_back(r, &s);
     }
 }
