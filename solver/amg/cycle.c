@@ -154,53 +154,51 @@ static inline __attribute__((always_inline)) void prolong_from(float *x, const u
     }
 }
 
-/* One level of a cycle. */
-typedef struct {
-    const uz_level *level;
-    const float *inverse, *b;
-    float *x, *t, *coarse; /* coarse: the next level's right-hand side on the way down, its answer on the way up */
-    int k;
-} step;
-
-static inline __attribute__((always_inline)) void down(const step *s, int b, int k)
+static inline __attribute__((always_inline)) void take_parts(const uz_level_step *s, int parts, int b, int k)
 {
-    sweep_down(s->x, s->t, s->level, s->inverse, s->b, b);
-    restrict_to(s->coarse, s->level, s->inverse, s->t, b, k);
-}
-
-static inline __attribute__((always_inline)) void up(const step *s, int b, int k)
-{
-    prolong_from(s->x, s->level, s->inverse, s->coarse, b, k);
-    memset(s->t, 0, (size_t)(s->level->A.nodes * uz_width(b)) * sizeof *s->t);
-    sweep_up(s->x, s->t, s->level, s->inverse, s->b, b);
+    if (parts & UZ_STEP_SWEEP_DOWN)
+        sweep_down(s->x, s->t, s->level, s->inverse, s->b, b);
+    if (parts & UZ_STEP_RESTRICT)
+        restrict_to(s->coarse, s->level, s->inverse, s->t, b, k);
+    if (parts & UZ_STEP_PROLONG)
+        prolong_from(s->x, s->level, s->inverse, s->coarse, b, k);
+    if (parts & UZ_STEP_SWEEP_UP) {
+        memset(s->t, 0, (size_t)(s->level->A.nodes * uz_width(b)) * sizeof *s->t);
+        sweep_up(s->x, s->t, s->level, s->inverse, s->b, b);
+    }
 }
 
 /* For each size of blocks its own loops. */
-static inline __attribute__((always_inline)) void pass(const step *s, bool downwards)
+static inline __attribute__((always_inline)) void take_step(const uz_level_step *s, int parts)
 {
     const int b = s->level->A.b, k = s->k;
     if (b == 3 && k == 6)
-        downwards ? down(s, 3, 6) : up(s, 3, 6);
+        take_parts(s, parts, 3, 6);
     else if (b == 6)
-        downwards ? down(s, 6, 6) : up(s, 6, 6);
+        take_parts(s, parts, 6, 6);
     else if (b == 2 && k == 3)
-        downwards ? down(s, 2, 3) : up(s, 2, 3);
+        take_parts(s, parts, 2, 3);
     else if (b == 3 && k == 3)
-        downwards ? down(s, 3, 3) : up(s, 3, 3);
+        take_parts(s, parts, 3, 3);
     else if (b == 2)
-        downwards ? down(s, 2, 2) : up(s, 2, 2);
+        take_parts(s, parts, 2, 2);
     else
-        downwards ? down(s, b, k) : up(s, b, k);
+        take_parts(s, parts, b, k);
 }
 
-UZ_AVX2_FMA static void pass_fused(const step *s, bool downwards)
+UZ_AVX2_FMA static void take_step_fused(const uz_level_step *s, int parts)
 {
-    pass(s, downwards);
+    take_step(s, parts);
 }
 
-static void pass_plain(const step *s, bool downwards)
+static void take_step_plain(const uz_level_step *s, int parts)
 {
-    pass(s, downwards);
+    take_step(s, parts);
+}
+
+void uz_level_take_step(const uz_level_step *s, int parts)
+{
+    (uz_cpu_has_avx2_fma() ? take_step_fused : take_step_plain)(s, parts);
 }
 
 static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room, float *x, const float *b,
@@ -244,7 +242,6 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
     const int last = base->levels - 1, width = uz_width(mg->level[0].A.b), b = mg->level[0].A.b;
-    void (*const run)(const step *, bool) = uz_cpu_has_avx2_fma() ? pass_fused : pass_plain;
     (void)K;
     if (last == 0)
         return apply_alone(mg, room, z, r, err);
@@ -264,7 +261,7 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
         const int64_t s = mg->slot[j];
         room->b[0][s / b * width + s % b] = (float)(mg->scale[j] * r[j] / unit);
     }
-    step at[UZ_LEVELS_MOST];
+    uz_level_step at[UZ_LEVELS_MOST];
     uz_level now[UZ_LEVELS_MOST];
     for (int l = 0; l < last; l++) {
         uz_level *level = &now[l];
@@ -275,13 +272,13 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
             level->off = room->own[l].off;
             level->diag = room->own[l].diag;
         }
-        at[l] = (step){level, level->inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k};
-        run(&at[l], true);
+        at[l] = (uz_level_step){level, level->inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k};
+        uz_level_take_step(&at[l], UZ_STEP_SWEEP_DOWN | UZ_STEP_RESTRICT);
     }
     const uz_status status = solve_coarsest(mg, room, room->x[last], room->b[last], err);
     for (int l = last - 1; l >= 0; l--) {
         at[l].coarse = room->x[l + 1];
-        run(&at[l], false);
+        uz_level_take_step(&at[l], UZ_STEP_PROLONG | UZ_STEP_SWEEP_UP);
     }
     for (int64_t j = 0; j < base->n; j++) {
         const int64_t s = mg->slot[j];

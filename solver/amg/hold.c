@@ -92,8 +92,7 @@ static void weigh(double *held, double *rest, const float *inverse, int b)
     }
 }
 
-/* What level 1 loses with the dofs of level 0 that have no inverse. */
-static void find_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
+void uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
 {
     const uz_blocks *A = &fine->A;
     const int b = A->b;
@@ -208,12 +207,59 @@ void uz_release_levels(uz_multigrid_room *room)
     room->coarsest = NULL;
 }
 
+/* room->own from level `from` on, whose loss stands in `loss`, which is taken. */
+static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from, uz_blocks *loss, size_t *bytes,
+                      const uz_stop *stop, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    for (int l = from; status == UZ_OK && l < mg->base.levels; l++) {
+        uz_blocks next = {0};
+        if (l > from && !init_loss(&next, &mg->level[l]))
+            status = fail_memory(mg->base.n, err);
+        else if (uz_stop_is_due(stop))
+            status = uz_fail_stopped(err);
+        else if (l > from)
+            pass_on(&next, loss, &mg->level[l - 1]);
+        if (l > from) {
+            free(loss->off);
+            free(loss->diag);
+            *loss = next;
+        }
+        if (status == UZ_OK && !subtract(&room->own[l], &mg->level[l], loss, bytes))
+            status = fail_memory(mg->base.n, err);
+    }
+    if (status == UZ_OK)
+        status = factor(room, &mg->level[mg->base.levels - 1], loss, stop ? stop->hooks : NULL, err);
+    if (status == UZ_OK && room->coarsest)
+        *bytes += uz_factor_describe(room->coarsest).bytes;
+    free(loss->off);
+    free(loss->diag);
+    return status;
+}
+
+uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blocks *loss, uz_error *err)
+{
+    const uz_aggregates *mg = (const uz_aggregates *)base;
+    const uz_level *level = &mg->level[0];
+    const int b = level->A.b;
+    size_t bytes = 0;
+    for (int64_t j = 0; j < base->n; j++) /* slots are numbered as dofs are: see there */
+        for (int64_t e = level->A.ptr[mg->slot[j] / b] - 1; e < level->A.ptr[mg->slot[j] / b + 1]; e++) {
+            const int64_t i = mg->slot[j] / b, c = e < level->A.ptr[i] ? i : level->A.idx[e];
+            double *row = (c == i ? loss->diag + i * b * b : loss->off + e * b * b) + mg->slot[j] % b * b;
+            for (int q = 0; q < b; q++)
+                row[q] *= mg->scale[j] * mg->scale[c * b + q];
+        }
+    uz_release_levels(room);
+    return lose(room, mg, 0, loss, &bytes, NULL, err);
+}
+
 uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const bool *held, size_t *bytes,
                          const uz_stop *stop, uz_error *err)
 {
     const uz_level *finest = &mg->level[0];
     const int64_t slots = finest->A.nodes * finest->A.b;
-    uz_blocks loss = {0}, next = {0};
+    uz_blocks loss = {0};
     float *inverse = room->own[0].inverse = uz_alloc(slots, sizeof *inverse);
     uz_status status = inverse ? UZ_OK : fail_memory(mg->base.n, err);
     for (int64_t j = 0; inverse && j < slots; j++)
@@ -222,27 +268,13 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
         if (held[j])
             inverse[mg->slot[j]] = 0.0F;
     *bytes += 4 * (size_t)slots;
-    for (int l = 1; status == UZ_OK && l < mg->base.levels; l++) {
-        if (!init_loss(&next, &mg->level[l]))
-            status = fail_memory(mg->base.n, err);
-        else if (uz_stop_is_due(stop))
-            status = uz_fail_stopped(err);
-        else if (l == 1)
-            find_loss(&next, finest, inverse);
-        else
-            pass_on(&next, &loss, &mg->level[l - 1]);
-        if (status == UZ_OK && !subtract(&room->own[l], &mg->level[l], &next, bytes))
-            status = fail_memory(mg->base.n, err);
+    if (status == UZ_OK && !init_loss(&loss, &mg->level[1])) {
         free(loss.off);
         free(loss.diag);
-        loss = next;
-        next = (uz_blocks){0};
+        return fail_memory(mg->base.n, err);
     }
-    if (status == UZ_OK)
-        status = factor(room, &mg->level[mg->base.levels - 1], &loss, stop ? stop->hooks : NULL, err);
-    if (status == UZ_OK && room->coarsest)
-        *bytes += uz_factor_describe(room->coarsest).bytes;
-    free(loss.off);
-    free(loss.diag);
-    return status;
+    if (status != UZ_OK)
+        return status;
+    uz_level_loss(&loss, finest, inverse);
+    return lose(room, mg, 1, &loss, bytes, stop, err);
 }

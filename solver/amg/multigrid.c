@@ -33,8 +33,7 @@ static uz_status fail_soft(uz_error *err)
                    "Support the body so that it can't move freely, or check the signs of K.");
 }
 
-/* The level's matrix in single precision. */
-static uz_status round_level(uz_level *level, uz_error *err)
+uz_status uz_level_round(uz_level *level, uz_error *err)
 {
     const uz_blocks *A = &level->A;
     const int b = A->b;
@@ -59,15 +58,13 @@ static uz_status round_level(uz_level *level, uz_error *err)
     return UZ_OK;
 }
 
-/* *range: lambda_max(D^-1 A), a little too large: powers reach it within some per cent from below. */
-static uz_status find_range(double *range, const uz_level *level, const uz_below *below, uz_error *err)
+uz_status uz_level_range(double *range, const uz_level *level, uz_error *err)
 {
     const uz_blocks *A = &level->A;
     const int b = A->b;
     const int64_t n = A->nodes * b, size = (int64_t)b * b;
     double *x = uz_alloc(n, sizeof *x), *y = uz_alloc(n, sizeof *y);
     uint64_t state = 1;
-    (void)below;
     *range = 1.0;
     for (int64_t i = 0; x && i < n; i++)
         x[i] = level->inverse[i] > 0.0F ? uz_uniform(&state) - 0.5 : 0.0;
@@ -119,13 +116,13 @@ static uz_status coarsen(uz_level *level, bool *done, float **modes, double thre
         if (status == UZ_OK)
             status = uz_tentative(basis, coarse, *modes, aggregate, A->nodes, A->b, level->aggregates, k, err);
         if (status == UZ_OK)
-            status = find_range(&range, level, &below, err);
+            status = uz_level_range(&range, level, err);
         if (status == UZ_OK)
             status = uz_prolong_smoothed(level, &below, basis, aggregate, 4.0 / 3.0 / range, k, stop, err);
         if (status == UZ_OK)
             status = uz_galerkin(&level[1].A, level, &below, k, stop, err);
         if (status == UZ_OK)
-            status = round_level(level + 1, err);
+            status = uz_level_round(level + 1, err);
         free(*modes);
         *modes = coarse;
     }
@@ -228,7 +225,7 @@ static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes
         node_of_group ? uz_blocks_of_matrix(mg, node_of_group, K, modes, err) : fail_memory(K->cols, err);
     free(node_of_group);
     if (status == UZ_OK)
-        status = round_level(&mg->level[0], err);
+        status = uz_level_round(&mg->level[0], err);
     if (status == UZ_OK && !(of_level = scale_modes(mg, modes)))
         status = fail_memory(K->cols, err);
     while (status == UZ_OK && !done) {

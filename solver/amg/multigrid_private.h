@@ -72,12 +72,26 @@ struct uz_multigrid_room {
 uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const bool *held, size_t *bytes,
                          const uz_stop *stop, uz_error *err);
 void uz_release_levels(uz_multigrid_room *room);
+/* Less of the matrix that the multigrid was made of, K, which had `b` dofs for each node, in order: loss, in the places
+ * of its level 0, which is taken. More levels than one. The room is for K - loss then, until it is told again. */
+uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *mg, uz_blocks *loss, uz_error *err);
 
 /* Vectors of a level have `width` numbers for each node. */
 static inline int uz_width(int b)
 {
     return b > 4 ? 8 : 4;
 }
+
+/* One level of a cycle, or parts of that: on the way down x = (D + L)^-1 b, t = b - A x and coarse = P't; on the way up
+ * x += P coarse and x = (D + L')^-1 (b - L x), t being room. Dofs without an inverse take no part. */
+typedef struct {
+    const uz_level *level;
+    const float *inverse, *b;
+    float *x, *t, *coarse; /* coarse: the next level's right-hand side on the way down, its answer on the way up */
+    int k;
+} uz_level_step;
+enum { UZ_STEP_SWEEP_DOWN = 1, UZ_STEP_RESTRICT = 2, UZ_STEP_PROLONG = 4, UZ_STEP_SWEEP_UP = 8 };
+void uz_level_take_step(const uz_level_step *step, int parts);
 
 /* Takes K apart into level 0: slot, scale, level[0].A; *node_of_group (modes->n_nodes): where its nodes went, -1:
  * nowhere. Errors: NOT_SPD where a diagonal entry or a pair of dofs shows it. */
@@ -102,6 +116,13 @@ uz_status uz_tentative(float *basis, float *coarse, const float *modes, const in
 /* Fills the prolongation (I - omega D^-1 A) basis of the level. */
 uz_status uz_prolong_smoothed(uz_level *level, const uz_below *below, const float *basis, const int32_t *aggregate,
                               double omega, int k, const uz_stop *stop, uz_error *err);
+/* off, diag and inverse of the level, from A in double precision. NOT_SPD where a diagonal entry is negative. */
+uz_status uz_level_round(uz_level *level, uz_error *err);
+/* *range: lambda_max(D^-1 A), a little too large: powers reach it within some per cent from below. */
+uz_status uz_level_range(double *range, const uz_level *level, uz_error *err);
+/* What the next level loses, in the places of its matrix (`loss`, zeros at entry), with the dofs of this one that have
+ * no inverse here, but do in the level. */
+void uz_level_loss(uz_blocks *loss, const uz_level *level, const float *inverse);
 /* coarse = P'A P. */
 uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_stop *stop,
                       uz_error *err);
