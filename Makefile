@@ -176,8 +176,8 @@ $(BUILD)/uzawa: $(CLIENT_OBJ) $(BUILD)/libuzawa.a
 GROUP_FLAGS = $(patsubst -I%,-isystem %,$(filter -I%,$(call pkg,--cflags petsc ompi-c))) -Wno-sign-conversion
 $(GROUP_OBJ): CFLAGS += $(GROUP_FLAGS) -O3
 $(GROUP_OBJ): override SAN =
-$(BUILD)/uzawa-group: $(GROUP_OBJ)
-	$(CC) $(GOLD) $(LDFLAGS) -o $@ $^ $(call pkg,--libs petsc ompi-c) -lm
+$(BUILD)/uzawa-group: $(GROUP_OBJ) $(BUILD)/libuzawa.a
+	$(CC) $(GOLD) $(LDFLAGS) -o $@ $^ $(call pkg,--libs petsc ompi-c) $(SOLVER_LIBS) -lpthread
 
 # Unit tests are a third of what is compiled, and run as fast without optimization: the time is the solver's.
 $(BUILD)/obj/%.o: %.c

@@ -133,7 +133,7 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
 typedef struct {
     int levels;
     size_t bytes;
-    double lambda;      /* <= lambda_min(M^-1 K), but for a probability below 1e-12 */
+    double lambda;      /* <= lambda_min(M^-1 K), but for a probability below 1e-12; of uz_amg_of_definite a guess */
     double rcond;       /* estimate of lambda_min(diag(K)^-1 K), rather too small */
     double create_s;    /* seconds of the multigrid */
     double spectrum_s;  /* and of the bounds */
@@ -155,8 +155,12 @@ typedef struct {
  * working precision. */
 uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patience, const uz_hooks *hooks,
                     uz_error *err);
+/* The same where K is known to be definite, as that of a body is by its assembly: without bounds, which uz_amg_probe
+ * finds then. */
+uz_status uz_amg_of_definite(uz_amg **out, uz_multigrid *mg, uz_error *err);
 /* Finds info.least by solves with K that are checked here, so that what is certified by it needs no word of the program
- * that holds M. UNSUPPORTED: the solves are not those of K, or too rough. NOT_SPD: they show that K is not definite. */
+ * that holds M; and a guess at info.lambda, where there is none yet. UNSUPPORTED: the solves are not those of K, or too
+ * rough. NOT_SPD: they show that K is not definite. */
 uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
 /* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD and
  * LIMIT as uz_amg_of. With patience 0 aggregates of another kind are tried where the usual ones do badly. */

@@ -63,9 +63,20 @@ static uz_status find_rounding(double *rounding, const uz_csc *K, uz_error *err)
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)K->cols);
 }
 
+/* By the rate q of a solve, of which the bound is (1 - sqrt(lambda)) / (1 + sqrt(lambda)) where 1 is the largest
+ * eigenvalue: (1 - q)^2 / (1 + q)^2. */
+static double guess_lambda(const uz_cg_info *info)
+{
+    if (info->iterations == 0 || !(info->last > 0.0) || !(info->last < info->first))
+        return 1.0;
+    const double rate = pow(info->last / info->first, 1.0 / (double)info->iterations);
+    const double root = (1.0 - rate) / (1.0 + rate);
+    return root * root;
+}
+
 /* One trial: *reach = ||D^1/2 y||, *missed >= ||D^-1/2 q||. */
-static uz_status try_once(double *reach, double *missed, double *y, double *b, uz_cg *cg, const uz_csc *K,
-                          uint64_t *state, double rounding, const uz_cg_stop *stop, uz_error *err)
+static uz_status try_once(uz_amg_info *amg, double *reach, double *missed, double *y, double *b, uz_cg *cg,
+                          const uz_csc *K, uint64_t *state, const uz_cg_stop *stop, uz_error *err)
 {
     uz_cg_info info;
     double wide = 0.0, left = 0.0, size = 0.0, work = 0.0;
@@ -78,6 +89,8 @@ static uz_status try_once(double *reach, double *missed, double *y, double *b, u
     const uz_status status = uz_cg_solve(&info, y, cg, K, b, stop, err);
     if (status != UZ_OK)
         return status;
+    if (!(amg->lambda > 0.0))
+        amg->lambda = guess_lambda(&info);
     for (int64_t j = 0; j < cg->n; j++) {
         const double own = K->val[K->ptr[j]];
         wide += own * y[j] * y[j];
@@ -85,7 +98,7 @@ static uz_status try_once(double *reach, double *missed, double *y, double *b, u
         work += y[j] * (b[j] + cg->r[j]); /* b'K^-1 b, but for q'K^-1 q */
     }
     *reach = isnan(wide) ? INFINITY : sqrt(wide);
-    *missed = (isnan(left) ? INFINITY : sqrt(left)) + rounding * *reach + DBL_EPSILON * sqrt(size);
+    *missed = (isnan(left) ? INFINITY : sqrt(left)) + amg->rounding * *reach + DBL_EPSILON * sqrt(size);
     if (*missed < 1.0 && !(work > 0.0))
         return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                        "K is not positive definite: a force does negative work on the displacement that it causes. "
@@ -126,7 +139,7 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_e
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
             break;
         }
-        status = try_once(&wide, &left, y, b, &cg, K, &state, amg->info.rounding, &stop, err);
+        status = try_once(&amg->info, &wide, &left, y, b, &cg, K, &state, &stop, err);
         reach = fmax(reach, wide);
         missed = fmax(missed, left);
         if (status == UZ_OK && k >= PROBES_LEAST && missed <= LEFT * t)

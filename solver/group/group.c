@@ -428,7 +428,8 @@ static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes 
         group->processes = head.a;
     }
     body->id = group->next_id++;
-    head = (uz_wire_head){.kind = UZ_WIRE_BODY, .id = body->id, .a = map->nodes, .b = map->bs, .c = map->modes};
+    head = (uz_wire_head){
+        .kind = UZ_WIRE_BODY, .id = body->id, .a = map->nodes, .b = map->bs, .c = map->modes, .x = modes->strong};
     if (!ask(group, head) || !put(group, map->offset, (size_t)(map->nodes + 1) * sizeof *map->offset) ||
         !put(group, map->neighbour, (size_t)map->offset[map->nodes] * sizeof *map->neighbour) ||
         !hear(group, &head, UZ_WIRE_PARTS) || !take(group, map->part, (size_t)map->nodes * sizeof *map->part))

@@ -4,7 +4,8 @@
  * stands below. The client asks, the group answers each question with one message; ROWS and FREE have no answer.
  *
  *     <- HELLO                       a: processes
- *     -> BODY    a: nodes n, b: dofs of each, c: modes; n + 1 offsets and the neighbours of each node (int32)
+ *     -> BODY    a: nodes n, b: dofs of each, c: modes, x: uz_modes.strong; n + 1 offsets and the neighbours of each
+ *                node (int32)
  *     <- PARTS   a: processes; of each node the process that is to have it (n int32)
  *     -> ROWS    a: nodes, b: blocks, c: their process; number of blocks of each node (int32), the blocks' columns
  *                (int32), their values (row by row, double), the modes of the nodes' dofs (float). Nodes come by
@@ -43,7 +44,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 2
+#define UZ_WIRE_VERSION 3
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

@@ -104,7 +104,8 @@ static uz_status spread(making *m, uz_modes *modes, uz_error *err)
     uz_modes_clear(modes);
     const double made = uz_seconds();
     if (status == UZ_OK)
-        status = uz_amg_of(&m->setup->amg, mg, m->K, 0, m->hooks, err);
+        status = m->setup->is_scene ? uz_amg_of_definite(&m->setup->amg, mg, err)
+                                    : uz_amg_of(&m->setup->amg, mg, m->K, 0, m->hooks, err);
     if (status == UZ_OK) {
         m->setup->amg->info.create_s = made - start;
         status = uz_amg_probe(m->setup->amg, m->K, m->hooks, err);

@@ -95,7 +95,7 @@ def needs_group(test):
 
 
 @needs_group
-@options("--workers", "1", "--group-command", PAIR + " -pc_gamg_coarse_eq_limit 40")  # levels also of small bodies
+@options("--workers", "1", "--group-command", PAIR + "")
 def test_answers_are_those_of_one_process(s):
     """The paper's body, a cube on a sphere and on a plane, two bodies, matrices: certified, and the same."""
     for request in (BEAM, CUBE, ON_PLANE, two_bodies(), MATRICES):
@@ -114,6 +114,18 @@ def test_answers_are_those_of_one_process(s):
                           input=json.dumps({**MATRICES, "solver": {"operator": "distributed"}}), capture_output=True, text=True,
                           timeout=PATIENT_S)
     check(done.returncode == 0 and "none: coarse levels of" in done.stdout, done)
+
+
+@needs_group
+@options("--workers", "1", "--group-command", PAIR.replace("2", "3"))
+def test_levels_of_a_larger_body(s):
+    """Three processes, which have the next level whole: of 20,577 dofs that is a multigrid itself, also where dofs are held."""
+    larger = copy.deepcopy(ON_PLANE)
+    larger["problem"]["mesh"]["box"]["cells"] = [18, 18, 18]
+    alone, group = (solve(s, by(operator, larger))["summary"] for operator in ("matrix_free", "distributed"))
+    check(group["outcome"] == "converged" and group["certificate"]["relative_error"] <= 1e-6, group)
+    check(group["contact"]["active"] == alone["contact"]["active"] > 0, alone["contact"], group["contact"])
+    check(abs(alone["energy"]["primal"] - group["energy"]["primal"]) <= 1e-11 * abs(alone["energy"]["primal"]), alone, group)
 
 
 def waiting_in_group(s, request):

@@ -6,9 +6,10 @@
 #include "stream.h"
 #include "worker.h"
 
-#include "../wire.h"
+#include "group/wire.h"
 
 #include <limits.h>
+#include <petscmat.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,12 +22,10 @@ typedef struct {
     PetscInt nodes, bs, modes, arrived;
     PetscMPIInt *count, *first; /* dofs of each process, and the first of them */
     int64_t blocks;             /* of the rows here */
-    PetscInt here, filled;      /* nodes here, and those that have come; entries that have come: row[filled * bs] */
-    PetscInt *row, *column;     /* until the matrix is made: its rows here */
-    double *value;
-    float *mode; /* here x bs x modes */
-    linear_system system[2];
-    bool made[2];
+    PetscInt here, filled;      /* nodes here, and those that have come */
+    spread_rows rows;           /* until the levels are made */
+    spread_system system;
+    bool made[VARIANTS];
 } body;
 
 typedef struct {
@@ -39,7 +38,7 @@ typedef struct {
 
 #define IS_FIRST(g) ((g)->rank == 0)
 
-static void give_up(const char *why)
+void end_group(const char *why)
 {
     fprintf(stderr, "uzawa-group: %s\n", why);
     MPI_Abort(PETSC_COMM_WORLD, 1);
@@ -48,13 +47,13 @@ static void give_up(const char *why)
 static void take(group *g, void *to, size_t size)
 {
     if (!stream_read(g->stream, to, size))
-        give_up("the stream ended in the middle of a message");
+        end_group("the stream ended in the middle of a message");
 }
 
 static void put(group *g, const void *from, size_t size)
 {
     if (!stream_write(g->stream, from, size))
-        give_up("nobody reads the answer");
+        end_group("nobody reads the answer");
 }
 
 static void answer(group *g, uz_wire_head head)
@@ -69,7 +68,7 @@ static body *find(group *g, int64_t id)
     for (int k = 0; k < UZ_WIRE_BODIES; k++)
         if (g->body[k].id == id)
             return &g->body[k];
-    give_up("no such body, or too many");
+    end_group("no such body, or too many");
     return NULL;
 }
 
@@ -136,9 +135,10 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
     int32_t *offset = NULL, *neighbour = NULL, *part = NULL;
     PetscInt *nodes, *blocks, mine[2];
     PetscFunctionBeginUser;
-    PetscCheck(m->a > 0 && m->b > 0 && m->b <= 6 && m->c > 0 && m->c <= 6 && m->a * m->b < INT_MAX, PETSC_COMM_WORLD,
+    PetscCheck(m->a > 0 && m->b > 0 && m->b <= 3 && m->c > 0 && m->c <= 6 && m->a * m->b < INT_MAX, PETSC_COMM_WORLD,
                PETSC_ERR_ARG_OUTOFRANGE, "a body of %lld nodes", (long long)m->a);
     *b = (body){.id = m->id, .nodes = (PetscInt)m->a, .bs = (PetscInt)m->b, .modes = (PetscInt)m->c};
+    b->rows = (spread_rows){.b = b->bs, .k = b->modes, .strong = m->x};
     PetscCall(PetscCalloc2(2 * g->size, &nodes, 2 * g->size, &blocks));
     if (IS_FIRST(g)) {
         PetscCall(PetscMalloc1(b->nodes + 1, &offset));
@@ -164,12 +164,10 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
     PetscCall(PetscFree2(nodes, blocks));
     b->here = mine[0];
     b->blocks = mine[1];
-    PetscCheck(b->blocks * b->bs * b->bs < INT_MAX, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-               "more than 2^31 - 1 entries of K for one process: take more processes");
-    PetscCall(PetscMalloc1(b->here * b->bs + 1, &b->row));
-    PetscCall(PetscMalloc2(b->blocks * b->bs * b->bs, &b->column, b->blocks * b->bs * b->bs, &b->value));
-    PetscCall(PetscMalloc1(b->here * b->bs * b->modes, &b->mode));
-    b->row[0] = 0;
+    b->rows.ptr = new_zeros(b->here + 1, sizeof *b->rows.ptr);
+    b->rows.column = new_zeros(b->blocks, sizeof *b->rows.column);
+    b->rows.value = new_zeros(b->blocks * b->bs * b->bs, sizeof *b->rows.value);
+    b->rows.mode = new_zeros(b->here * b->bs * b->modes, sizeof *b->rows.mode);
     answer(g, (uz_wire_head){.kind = UZ_WIRE_PARTS, .id = b->id, .a = g->size});
     if (IS_FIRST(g))
         put(g, part, (size_t)b->nodes * sizeof *part);
@@ -179,50 +177,40 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
     PetscFunctionReturn(0);
 }
 
-/* Bytes that a system takes, on all processes: its matrices. */
-static PetscErrorCode count_bytes(int64_t *bytes, const linear_system *s)
+static void tell_made(group *g, const body *b, int which, double start)
 {
-    MatInfo info;
-    PetscFunctionBeginUser;
-    *bytes = 0;
-    for (int k = 0; k < s->levels; k++) {
-        PetscCall(MatGetInfo(s->level[k].A, MAT_GLOBAL_SUM, &info));
-        *bytes += (int64_t)(12.0 * info.nz_allocated);
-        if (!s->level[k].P)
-            continue;
-        PetscCall(MatGetInfo(s->level[k].P, MAT_GLOBAL_SUM, &info));
-        *bytes += (int64_t)(12.0 * info.nz_allocated);
-    }
-    PetscFunctionReturn(0);
+    int64_t bytes = system_bytes(&b->system, which);
+    MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_INT64_T, MPI_SUM, PETSC_COMM_WORLD);
+    answer(g, (uz_wire_head){.kind = UZ_WIRE_MADE,
+                             .id = b->id,
+                             .a = system_levels(&b->system, which),
+                             .b = bytes,
+                             .x = b->system.most,
+                             .y = MPI_Wtime() - start});
 }
 
-static PetscErrorCode make_system(group *g, body *b, int which, Mat A, const float *modes)
+static void free_rows(spread_rows *rows)
+{
+    free(rows->ptr);
+    free(rows->column);
+    free(rows->value);
+    free(rows->mode);
+    *rows = (spread_rows){0};
+}
+
+/* All rows have come. */
+static void make_system(group *g, body *b)
 {
     const double start = MPI_Wtime();
-    linear_system *s = &b->system[which];
-    int64_t bytes;
-    PetscFunctionBeginUser;
-    PetscCall(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
-    PetscCall(MatSetOption(A, MAT_SPD, PETSC_TRUE));
-    PetscCall(system_create(s, A, modes, b->modes));
-    b->made[which] = true;
-    PetscCall(count_bytes(&bytes, s));
-    answer(g,
-           (uz_wire_head){
-               .kind = UZ_WIRE_MADE, .id = b->id, .a = s->levels, .b = bytes, .x = s->most, .y = MPI_Wtime() - start});
-    PetscFunctionReturn(0);
-}
-
-/* Values of a matrix from its rows, of type MPIAIJ also on one process. */
-static PetscErrorCode make_matrix(Mat *A, const body *b, PetscInt rows)
-{
-    PetscFunctionBeginUser;
-    PetscCall(MatCreate(PETSC_COMM_WORLD, A));
-    PetscCall(MatSetSizes(*A, rows, rows, b->nodes * b->bs, b->nodes * b->bs));
-    PetscCall(MatSetType(*A, MATMPIAIJ));
-    PetscCall(MatSetBlockSize(*A, b->bs));
-    PetscCall(MatMPIAIJSetPreallocationCSR(*A, b->row, b->column, b->value));
-    PetscFunctionReturn(0);
+    int32_t *first = new_zeros(g->size + 1, sizeof *first);
+    for (int k = 0; k < g->size; k++)
+        first[k + 1] = first[k] + b->count[k] / b->bs;
+    b->rows.first = first;
+    system_create(&b->system, &b->rows);
+    b->made[VARIANT_WHOLE] = true;
+    free(first);
+    free_rows(&b->rows);
+    tell_made(g, b, VARIANT_WHOLE, start);
 }
 
 static PetscErrorCode take_rows(group *g, const uz_wire_head *m)
@@ -257,130 +245,97 @@ static PetscErrorCode take_rows(group *g, const uz_wire_head *m)
             PetscCallMPI(MPI_Recv(mode, of, MPI_FLOAT, 0, 6, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
         }
         if (g->rank == owner) {
-            PetscInt at = b->row[b->filled * bs], block = 0;
-            PetscCheck(b->filled + nodes <= b->here && at + blocks * bs * bs <= b->blocks * bs * bs, PETSC_COMM_SELF,
+            const int64_t at = b->rows.ptr[b->filled], size = (int64_t)bs * bs;
+            PetscCheck(b->filled + nodes <= b->here && at + blocks <= b->blocks, PETSC_COMM_SELF,
                        PETSC_ERR_ARG_OUTOFRANGE, "more rows than were told of");
-            PetscCall(PetscArraycpy(b->value + at, value, blocks * bs * bs));
-            PetscCall(PetscArraycpy(b->mode + b->filled * bs * b->modes, mode, of));
-            for (PetscInt i = 0; i < nodes; block += count[i++])
-                for (PetscInt c = 0; c < bs; c++) {
-                    for (PetscInt k = 0; k < count[i]; k++)
-                        for (PetscInt e = 0; e < bs; e++)
-                            b->column[at++] = column[block + k] * bs + e;
-                    b->row[(b->filled + i) * bs + c + 1] = at;
-                }
-            b->filled += nodes;
+            memcpy(b->rows.column + at, column, (size_t)blocks * sizeof *column);
+            memcpy(b->rows.value + at * size, value, (size_t)(blocks * size) * sizeof *value);
+            memcpy(b->rows.mode + b->filled * bs * b->modes, mode, (size_t)of * sizeof *mode);
+            for (PetscInt i = 0; i < nodes; i++, b->filled++)
+                b->rows.ptr[b->filled + 1] = b->rows.ptr[b->filled] + count[i];
         }
         PetscCall(PetscFree4(count, column, value, mode));
     }
-    if (b->arrived == b->nodes) {
-        Mat A;
-        PetscCall(make_matrix(&A, b, b->here * bs));
-        PetscCall(PetscFree2(b->column, b->value));
-        PetscCall(PetscFree(b->row));
-        PetscCall(make_system(g, b, UZ_WIRE_WHOLE, A, b->mode));
-    }
+    if (b->arrived == b->nodes)
+        make_system(g, b);
     PetscFunctionReturn(0);
 }
 
 static PetscErrorCode free_body(body *b)
 {
     PetscFunctionBeginUser;
-    for (int which = 0; which < 2; which++)
-        if (b->made[which])
-            PetscCall(system_free(&b->system[which]));
-    PetscCall(PetscFree2(b->column, b->value));
-    PetscCall(PetscFree(b->row));
-    PetscCall(PetscFree(b->mode));
+    system_free(&b->system);
+    free_rows(&b->rows);
     PetscCall(PetscFree2(b->count, b->first));
     *b = (body){.id = 0};
     PetscFunctionReturn(0);
 }
 
-/* K_FF: rows and columns of held dofs become those of the unit matrix. */
-static PetscErrorCode hold(group *g, body *b)
+/* K_FF: without the dofs that are held. */
+static void hold(group *g, body *b)
 {
-    const PetscInt n = b->here * b->bs;
-    char *whole = NULL, *held;
-    PetscInt *which, first, count = 0;
-    float *modes;
-    Mat A;
-    PetscFunctionBeginUser;
-    if (b->made[UZ_WIRE_FREE_DOFS])
-        PetscCall(system_free(&b->system[UZ_WIRE_FREE_DOFS]));
-    b->made[UZ_WIRE_FREE_DOFS] = false;
-    PetscCall(PetscMalloc3(n, &held, n, &which, n * b->modes, &modes));
+    const double start = MPI_Wtime();
+    const int n = b->here * b->bs;
+    char *whole = NULL, *held = new_zeros(n, 1);
     if (IS_FIRST(g)) {
-        PetscCall(PetscMalloc1(b->nodes * b->bs, &whole));
+        whole = new_zeros((int64_t)b->nodes * b->bs, 1);
         take(g, whole, (size_t)(b->nodes * b->bs));
     }
-    PetscCallMPI(MPI_Scatterv(whole, b->count, b->first, MPI_CHAR, held, n, MPI_CHAR, 0, PETSC_COMM_WORLD));
-    PetscCall(PetscFree(whole));
-    PetscCall(MatDuplicate(b->system[UZ_WIRE_WHOLE].A, MAT_COPY_VALUES, &A));
-    PetscCall(MatGetOwnershipRange(A, &first, NULL));
-    for (PetscInt i = 0; i < n; i++) {
-        for (PetscInt k = 0; k < b->modes; k++)
-            modes[i * b->modes + k] = held[i] ? 0.0F : b->mode[i * b->modes + k];
-        if (held[i])
-            which[count++] = first + i;
-    }
-    PetscCall(MatZeroRowsColumns(A, count, which, 1.0, NULL, NULL));
-    PetscCall(make_system(g, b, UZ_WIRE_FREE_DOFS, A, modes));
-    PetscCall(PetscFree3(held, which, modes));
-    PetscFunctionReturn(0);
+    MPI_Scatterv(whole, b->count, b->first, MPI_CHAR, held, n, MPI_CHAR, 0, PETSC_COMM_WORLD);
+    free(whole);
+    system_hold(&b->system, held);
+    b->made[VARIANT_HELD] = true;
+    free(held);
+    tell_made(g, b, VARIANT_HELD, start);
 }
 
 /* ---- vectors and steps */
 
-static PetscErrorCode take_vector(group *g, const body *b, Vec v)
+/* In the solver's order a node has bs numbers, in ours four; ours are of S^-1 u and S f. */
+static void take_vector(group *g, const body *b, double *v, bool displacement)
 {
-    PetscScalar *to;
     const size_t n = (size_t)(b->nodes * b->bs);
-    PetscFunctionBeginUser;
+    const int mine = b->count[g->rank];
+    double *own = b->system.q;
     if (IS_FIRST(g) && g->room < n) {
         free(g->whole);
-        g->whole = malloc(n * sizeof *g->whole);
+        g->whole = new_zeros((int64_t)n, sizeof *g->whole);
         g->room = n;
-        PetscCheck(g->whole, PETSC_COMM_SELF, PETSC_ERR_MEM, "no memory for a vector");
     }
     if (IS_FIRST(g))
         take(g, g->whole, n * sizeof *g->whole);
-    PetscCall(VecGetArrayWrite(v, &to));
-    PetscCallMPI(
-        MPI_Scatterv(g->whole, b->count, b->first, MPI_DOUBLE, to, b->count[g->rank], MPI_DOUBLE, 0, PETSC_COMM_WORLD));
-    PetscCall(VecRestoreArrayWrite(v, &to));
-    PetscFunctionReturn(0);
+    MPI_Scatterv(g->whole, b->count, b->first, MPI_DOUBLE, own, mine, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
+    for (int64_t i = 0; i < mine; i++) {
+        const double scale = b->system.scale[i];
+        v[i / b->bs * 4 + i % b->bs] = displacement ? own[i] / scale : own[i] * scale;
+    }
 }
 
-static PetscErrorCode put_vector(group *g, const body *b, Vec v)
+static void put_displacement(group *g, const body *b, const double *v)
 {
-    const PetscScalar *from;
-    PetscFunctionBeginUser;
-    PetscCall(VecGetArrayRead(v, &from));
-    PetscCallMPI(MPI_Gatherv(from, b->count[g->rank], MPI_DOUBLE, g->whole, b->count, b->first, MPI_DOUBLE, 0,
-                             PETSC_COMM_WORLD));
-    PetscCall(VecRestoreArrayRead(v, &from));
+    const int mine = b->count[g->rank];
+    double *own = b->system.q;
+    for (int64_t i = 0; i < mine; i++)
+        own[i] = v[i / b->bs * 4 + i % b->bs] * b->system.scale[i];
+    MPI_Gatherv(own, mine, MPI_DOUBLE, g->whole, b->count, b->first, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
     answer(g, (uz_wire_head){.kind = UZ_WIRE_VECTOR, .id = b->id});
     if (IS_FIRST(g))
         put(g, g->whole, (size_t)(b->nodes * b->bs) * sizeof *g->whole);
-    PetscFunctionReturn(0);
 }
 
-static PetscErrorCode make_steps(group *g, linear_system *s, const uz_wire_head *m)
+static PetscErrorCode make_steps(group *g, spread_system *s, const uz_wire_head *m)
 {
     double square = m->y;
-    int made;
     bool flat;
     PetscFunctionBeginUser;
     PetscCheck(m->b > 0 && m->b <= UZ_WIRE_STEPS_MOST, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "too many steps");
-    PetscCall(system_steps(s, &square, &made, &flat, (int)m->b, m->x));
+    const int made = system_steps(s, (int)m->a, &square, &flat, (int)m->b, m->x);
     answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .a = made, .b = flat, .x = square});
     PetscFunctionReturn(0);
 }
 
 static PetscErrorCode obey(group *g, const uz_wire_head *m)
 {
-    double square = 0.0;
     PetscFunctionBeginUser;
     if (m->kind == UZ_WIRE_BODY) {
         PetscCall(begin_body(g, m));
@@ -396,26 +351,28 @@ static PetscErrorCode obey(group *g, const uz_wire_head *m)
         PetscFunctionReturn(0);
     }
     if (m->kind == UZ_WIRE_HOLD) {
-        PetscCall(hold(g, b));
+        PetscCheck(b->made[VARIANT_WHOLE], PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONGSTATE, "no such system");
+        hold(g, b);
         PetscFunctionReturn(0);
     }
     PetscCheck((m->a == 0 || m->a == 1) && b->made[m->a], PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONGSTATE, "no such system");
-    linear_system *s = &b->system[m->a];
+    spread_system *s = &b->system;
+    const int which = (int)m->a;
     if (m->kind == UZ_WIRE_BEGIN) {
-        PetscCall(take_vector(g, b, s->x));
-        PetscCall(take_vector(g, b, s->b));
+        take_vector(g, b, s->u, true);
+        take_vector(g, b, s->f, false);
     }
     if (m->kind == UZ_WIRE_BEGIN || m->kind == UZ_WIRE_AGAIN) {
-        PetscCall(system_begin(s, &square));
+        const double square = system_begin(s, which);
         answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .x = square});
     } else if (m->kind == UZ_WIRE_STEPS) {
         PetscCall(make_steps(g, s, m));
     } else if (m->kind == UZ_WIRE_FETCH) {
-        PetscCall(put_vector(g, b, s->x));
+        put_displacement(g, b, s->u);
     } else if (m->kind == UZ_WIRE_APPLY) {
-        PetscCall(take_vector(g, b, s->r));
-        PetscCall(system_precondition(s, s->z, s->r));
-        PetscCall(put_vector(g, b, s->z));
+        take_vector(g, b, s->r, false);
+        system_precondition(s, which, s->z, s->r);
+        put_displacement(g, b, s->z);
     } else {
         SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "message of kind %d", m->kind);
     }
@@ -472,34 +429,6 @@ static PetscErrorCode serve(group *g)
     PetscFunctionReturn(0);
 }
 
-/* What is not on the command line. Levels are smoothed by this program: PETSc's own smoothers only need to be cheap to
- * set up. The coarsest level stays on one process; where its modes depend on each other it has pivots of 0. */
-static PetscErrorCode set_defaults(void)
-{
-    static const char *const DEFAULTS[][2] = {
-        {"-mg_levels_ksp_type", "richardson"},
-        {"-mg_levels_pc_type", "none"},
-        {"-mg_levels_ksp_norm_type", "none"},
-        {"-mg_coarse_sub_pc_type", "cholesky"},
-        {"-mg_coarse_sub_pc_factor_shift_type", "nonzero"},
-        {"-pc_gamg_type", "agg"},
-        {"-pc_gamg_agg_nsmooths", "1"},
-        {"-pc_gamg_coarse_eq_limit", "1000"},
-        {"-pc_gamg_threshold", "0.01"},
-        {"-pc_gamg_aggressive_coarsening", "1"},
-        {"-pc_gamg_esteig_ksp_type", "cg"},
-        {"-pc_gamg_esteig_ksp_max_it", "10"},
-    };
-    PetscFunctionBeginUser;
-    for (size_t k = 0; k < sizeof DEFAULTS / sizeof DEFAULTS[0]; k++) {
-        PetscBool given;
-        PetscCall(PetscOptionsHasName(NULL, NULL, DEFAULTS[k][0], &given));
-        if (!given)
-            PetscCall(PetscOptionsSetValue(NULL, DEFAULTS[k][0], DEFAULTS[k][1]));
-    }
-    PetscFunctionReturn(0);
-}
-
 int main(int argc, char **argv)
 {
     static const char HELP[] = "uzawa-group SOCKET [PETSC OPTIONS]: how uzawad solves with `operator` distributed\n";
@@ -511,8 +440,10 @@ int main(int argc, char **argv)
     MPI_Comm_rank(PETSC_COMM_WORLD, &g.rank);
     MPI_Comm_size(PETSC_COMM_WORLD, &g.size);
     if (IS_FIRST(&g) && (g.stream = stream_open(where)) < 0)
-        give_up("there is nobody at the socket: this is a program that uzawad starts");
-    if (set_defaults() || serve(&g))
+        end_group("there is nobody at the socket: this is a program that uzawad starts");
+    uz_process_init(2); /* one thread of BLAS: the processes are the parallelism */
+    uz_thread_init();
+    if (serve(&g))
         MPI_Abort(PETSC_COMM_WORLD, 1);
     return PetscFinalize() ? 1 : 0;
 }

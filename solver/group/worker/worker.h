@@ -1,47 +1,91 @@
-/* worker.h: the parts of uzawa-group: a multigrid whose rows are spread over the processes of a group, and conjugate
- * gradients with it. All functions are collective. They are PETSc's kind: PETSc's error handler ends the group. */
+/* worker.h: the parts of uzawa-group: a multigrid whose finest level is spread over the processes of a group, and
+ * conjugate gradients with it. All functions are collective, but for those that say so; what goes wrong ends the group.
+ *
+ * Vectors have four numbers for each node, the surplus ones 0, first those of this process's nodes and then those of
+ * its ghosts: nodes of others that its own ones are coupled with. */
 #ifndef UZ_GROUP_WORKER_H
 #define UZ_GROUP_WORKER_H
 
-#include <petscksp.h>
+#include "amg/multigrid_private.h"
+
+#include <mpi.h>
 #include <stdbool.h>
+#include <stdint.h>
 
-enum { LEVELS_MOST = 24 };
+/* For any process alone. */
+void end_group(const char *why);
+void *new_zeros(int64_t count, size_t size); /* zeros */
 
-/* One level, the finest first, and the way to the next. Its smoother sweeps over the rows of each process with D' in
- * place of the diagonal: D plus the absolute sums of what is coupled with other processes. */
+/* Who has which nodes, and what passes between neighbours. */
 typedef struct {
-    Mat A, own, other;  /* whole; of this process's columns, and of the others': parts of A */
-    Mat P;              /* from the next level; NULL: the coarsest */
-    PetscInt n;         /* rows here */
-    PetscInt *diagonal; /* n: where it stands in its row of `own` */
-    double *inverse;    /* n: 1 / D', 0 where D' is 0 */
-    double *outside;    /* n: D' - D */
-    VecScatter fetch;
-    Vec ghosts; /* what `other` is multiplied with */
-    Vec x, b, r;
-} level;
+    int rank, size;
+    int64_t here, ghosts, sent;
+    int32_t *number;                                        /* ghosts: their numbers in the body, ascending */
+    int32_t *send;                                          /* sent: own nodes that are others' ghosts, by process */
+    int *send_count, *send_first, *take_count, *take_first; /* size: of send and of the ghosts */
+    char *packed;
+    size_t room;
+    MPI_Request *request; /* 2 size */
+} neighbours;
+/* first (size + 1): the first node of each process. ptr (here + 1), column: neighbours of the own nodes, by number. */
+void neighbours_init(neighbours *n, const int32_t *first, const int64_t *ptr, const int32_t *column);
+/* ghosts' numbers of a node, `each` bytes, from those of the own nodes. */
+void neighbours_fetch(neighbours *n, void *ghosts, const void *own, size_t each);
+void neighbours_free(neighbours *n);
 
-/* A symmetric positive definite system and room for conjugate gradients. */
+/* What is coarser than the finest level, each process has whole. */
 typedef struct {
-    Mat A;
-    PC pc;        /* has made the levels and keeps them */
-    KSP coarsest; /* where there are more levels than one */
-    int levels;
-    level level[LEVELS_MOST];
-    double most; /* a bound on lambda_max(diag(K)^-1 M) */
-    Vec x, b, r, z, p, q;
-} linear_system;
+    float *inverse;     /* (here + ghosts) x b, of the finest level: 0 at dofs that are held */
+    uz_multigrid *base; /* NULL: there is none */
+    uz_multigrid_room *room;
+} variant;
 
-/* Takes A. modes: of the dofs of this process, row by row, `count` each. */
-PetscErrorCode system_create(linear_system *s, Mat A, const float *modes, PetscInt count);
-PetscErrorCode system_free(linear_system *s);
+enum { VARIANT_WHOLE, VARIANT_HELD, VARIANTS };
+
+typedef struct {
+    neighbours near;
+    int b, k;
+    double strong;
+    double *scale;  /* here x b: powers of two that make the diagonal about 1 */
+    uz_level level; /* own nodes, then ghosts, whose rows are what couples them with the own ones */
+    int64_t faces;  /* own nodes with ghosts, */
+    int32_t *face;  /* which */
+    float *outside; /* here x b: the absolute sums of what is coupled with ghosts */
+    uz_blocks part; /* where this process's share of the next matrix has numbers */
+    uz_blocks next; /* the next matrix */
+    float *modes;   /* next.nodes x k x k: of that */
+    variant variant[VARIANTS];
+    float *rhs, *x, *t, *coarse;
+    double *coarse_r, *coarse_z;   /* next.nodes x k */
+    double *u, *f, *r, *z, *p, *q; /* vectors */
+    double most;                   /* a bound on lambda_max(diag(K)^-1 M) */
+    double unit;                   /* of the residual that a solve began with */
+} spread_system;
+
+/* Rows of the own nodes: a node's blocks are those of its neighbours and its own, columns ascending, row by row of the
+ * matrix. modes (here x b x k). */
+typedef struct {
+    const int32_t *first; /* size + 1 */
+    int64_t *ptr;
+    int32_t *column;
+    double *value;
+    float *mode;
+    int b, k;
+    double strong;
+} spread_rows;
+void system_create(spread_system *s, const spread_rows *rows);
+/* From now on VARIANT_HELD is without the dofs that held (here x b) marks. */
+void system_hold(spread_system *s, const char *held);
+void system_free(spread_system *s);
+int64_t system_bytes(const spread_system *s, int which); /* of this process */
+int system_levels(const spread_system *s, int which);
+
 /* z = M^-1 r: one V-cycle. */
-PetscErrorCode system_precondition(linear_system *s, Vec z, Vec r);
-/* From x and b: r = b - A x, z = M^-1 r, p = z; *square = r'z. */
-PetscErrorCode system_begin(linear_system *s, double *square);
-/* Steps of conjugate gradients until *square <= goal2; *made of them. *flat: the last one
- * was not made, as p'A p was not positive. */
-PetscErrorCode system_steps(linear_system *s, double *square, int *made, bool *flat, int most, double goal2);
+void system_precondition(spread_system *s, int which, double *z, const double *r);
+/* From u and f: r = f - K u, z = M^-1 r, p = z; the square r'z. */
+double system_begin(spread_system *s, int which);
+/* Steps of conjugate gradients until *square <= goal2; how many. *flat: the last one was not made, as p'K p was not
+ * positive. */
+int system_steps(spread_system *s, int which, double *square, bool *flat, int most, double goal2);
 
 #endif

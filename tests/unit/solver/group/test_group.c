@@ -250,6 +250,6 @@ TEST(small_systems_by_processes)
         test_skip("uzawa-group needs PETSc and Open MPI (make deps-group), and no sanitizer");
         return;
     }
-    check_program("exec mpirun --oversubscribe -n 1 {program} -pc_gamg_coarse_eq_limit 4"); /* levels, too */
+    check_program("exec mpirun --oversubscribe -n 1 {program}");
     check_program("exec mpirun --oversubscribe -n 2 {program}");
 }

@@ -1,0 +1,621 @@
+/* levels.c: the finest level by the rows of each process, the next matrix as a sum over processes, and what follows
+ * from it on each of them: smoothed aggregates as in amg/multigrid.c, of which all but what passes between processes is
+ * used here.
+ *
+ * Aggregates are of nodes of one process. The prolongation is smoothed across processes: for that each knows of its
+ * ghosts their aggregates and basis. Then A_next = P'A P is the sum of P_e' A_e P_e, e the own nodes and the ghosts of
+ * a process, A_e its own blocks and half of those that couple it with others, which the other side has, too. */
+#include "worker.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void *new_zeros(int64_t count, size_t size)
+{
+    void *made = calloc(count > 0 ? (size_t)count : 1, size);
+    if (!made)
+        end_group("no memory");
+    return made;
+}
+
+static void must(uz_status status, const uz_error *err)
+{
+    if (status != UZ_OK)
+        end_group(err->message);
+}
+
+/* ---- the finest level */
+
+static int64_t place_of_ghost(const neighbours *near, int32_t number)
+{
+    int64_t low = 0, high = near->ghosts - 1;
+    while (low < high) {
+        const int64_t middle = (low + high) / 2;
+        if (near->number[middle] < number)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static void find_places(spread_system *s, const spread_rows *rows)
+{
+    uz_blocks *A = &s->level.A;
+    const neighbours *near = &s->near;
+    const int32_t begin = rows->first[near->rank];
+    const int64_t here = near->here, size = (int64_t)s->b * s->b;
+    *A = (uz_blocks){.nodes = here + near->ghosts, .b = s->b};
+    A->ptr = new_zeros(A->nodes + 2, sizeof *A->ptr);
+    for (int64_t i = 0; i < here; i++)
+        for (int64_t e = rows->ptr[i]; e < rows->ptr[i + 1]; e++) {
+            const int64_t j = rows->column[e] - (int64_t)begin;
+            if (j >= 0 && j < i)
+                A->ptr[i + 1]++;
+            else if (j < 0 || j >= here)
+                A->ptr[here + place_of_ghost(near, rows->column[e]) + 1]++;
+        }
+    for (int64_t i = 0; i < A->nodes; i++)
+        A->ptr[i + 1] += A->ptr[i];
+    A->idx = new_zeros(A->ptr[A->nodes], sizeof *A->idx);
+    A->off = new_zeros(A->ptr[A->nodes] * size + 4, sizeof *A->off);
+    A->diag = new_zeros(A->nodes * size + 4, sizeof *A->diag);
+}
+
+/* Blocks as they come, times the scales of their rows and columns. */
+static void fill_level(spread_system *s, const spread_rows *rows, const double *scale_of_ghosts)
+{
+    uz_blocks *A = &s->level.A;
+    const neighbours *near = &s->near;
+    const int b = s->b;
+    const int64_t here = near->here, size = (int64_t)b * b;
+    int64_t *next = new_zeros(A->nodes, sizeof *next);
+    memcpy(next, A->ptr, (size_t)A->nodes * sizeof *next);
+    for (int64_t i = 0; i < here; i++) {
+        const int64_t width = (rows->ptr[i + 1] - rows->ptr[i]) * b;
+        for (int64_t e = rows->ptr[i]; e < rows->ptr[i + 1]; e++) {
+            const int64_t j = rows->column[e] - (int64_t)rows->first[near->rank];
+            const bool own = j >= 0 && j < here;
+            const int64_t ghost = own ? 0 : place_of_ghost(near, rows->column[e]);
+            const double *of_column = own ? s->scale + j * b : scale_of_ghosts + ghost * b;
+            double *to = A->diag + i * size;
+            if (own && j > i)
+                continue;
+            if (j != i) {
+                const int64_t at = next[own ? i : here + ghost]++;
+                A->idx[at] = (int32_t)(own ? j : i);
+                to = A->off + at * size;
+            }
+            for (int r = 0; r < b; r++)
+                for (int c = 0; c < b; c++)
+                    to[own ? r * b + c : c * b + r] =
+                        s->scale[i * b + r] * of_column[c] *
+                        rows->value[rows->ptr[i] * size + r * width + (e - rows->ptr[i]) * b + c];
+        }
+    }
+    free(next);
+}
+
+static void find_scale(spread_system *s, const spread_rows *rows)
+{
+    const int b = s->b;
+    const int32_t begin = rows->first[s->near.rank];
+    s->scale = new_zeros(s->near.here * b, sizeof *s->scale);
+    for (int64_t i = 0; i < s->near.here; i++) {
+        const int64_t from = rows->ptr[i], width = (rows->ptr[i + 1] - from) * b;
+        for (int64_t e = from; e < rows->ptr[i + 1]; e++)
+            for (int r = 0; rows->column[e] - begin == i && r < b; r++) {
+                const double own = rows->value[from * b * b + r * width + (e - from) * b + r];
+                s->scale[i * b + r] = own > 0.0 ? ldexp(1.0, -ilogb(own) / 2) : 1.0;
+            }
+    }
+}
+
+/* Sweeps have the sums of what couples processes on their diagonal. */
+static void add_sums(spread_system *s)
+{
+    const uz_blocks *A = &s->level.A;
+    const int b = s->b;
+    const int64_t here = s->near.here;
+    s->outside = new_zeros(here * b, sizeof *s->outside);
+    s->face = new_zeros(here, sizeof *s->face);
+    for (int64_t i = here; i < A->nodes; i++)
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+            for (int r = 0; r < b; r++)
+                for (int c = 0; c < b; c++)
+                    s->outside[A->idx[e] * b + c] += fabsf(s->level.off[(e * b + r) * b + c]);
+    for (int64_t i = 0; i < here; i++) {
+        bool any = false;
+        for (int c = 0; c < b; c++) {
+            float *own = &s->level.diag[(i * b + c) * b + c];
+            any = any || s->outside[i * b + c] > 0.0F;
+            *own += s->outside[i * b + c];
+            s->level.inverse[i * b + c] = 1.0F / *own;
+        }
+        if (any)
+            s->face[s->faces++] = (int32_t)i;
+    }
+}
+
+/* The norm of D^-1/2 L D^-1/2 is at most the root of its largest row sum times its largest column sum. */
+static void bound_by_diagonal(spread_system *s)
+{
+    const uz_blocks *A = &s->level.A;
+    const int b = s->b;
+    const int64_t here = s->near.here, size = (int64_t)b * b;
+    double *row = new_zeros(here * b, sizeof *row), *column = new_zeros(here * b, sizeof *column);
+    double most[3] = {0.0, 0.0, 1.0}; /* of a row, of a column, of D'/D */
+    for (int64_t i = 0; i < here; i++)
+        for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
+            const int64_t j = e < A->ptr[i] ? i : A->idx[e];
+            const double *block = e < A->ptr[i] ? A->diag + i * size : A->off + e * size;
+            for (int r = 0; r < b; r++)
+                for (int c = 0; c < (j == i ? r : b); c++) {
+                    const double scaled = fabs(block[r * b + c]) / sqrt(A->diag[i * size + r * b + r]) /
+                                          sqrt(A->diag[j * size + c * b + c]);
+                    row[i * b + r] += scaled;
+                    column[j * b + c] += scaled;
+                }
+        }
+    for (int64_t i = 0; i < here * b; i++) {
+        const double own = A->diag[i / b * size + i % b * b + i % b];
+        most[0] = fmax(most[0], row[i]);
+        most[1] = fmax(most[1], column[i]);
+        most[2] = fmax(most[2], (own + (double)s->outside[i]) / own);
+    }
+    free(row);
+    free(column);
+    MPI_Allreduce(MPI_IN_PLACE, most, 3, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
+    const double root = sqrt(most[2]) + sqrt(most[0] * most[1]);
+    s->most = root * root;
+}
+
+static void make_finest(spread_system *s, const spread_rows *rows)
+{
+    uz_error err = {0};
+    double *scale_of_ghosts = new_zeros(s->near.ghosts * s->b, sizeof *scale_of_ghosts);
+    find_places(s, rows);
+    find_scale(s, rows);
+    neighbours_fetch(&s->near, scale_of_ghosts, s->scale, (size_t)s->b * sizeof *s->scale);
+    fill_level(s, rows, scale_of_ghosts);
+    free(scale_of_ghosts);
+    must(uz_level_round(&s->level, &err), &err);
+    add_sums(s);
+    bound_by_diagonal(s);
+}
+
+/* ---- the way to the next one */
+
+/* of_level (here x b x k): the modes of S K S are S^-1 times K's, here times the least of S, so that none overflows. */
+static float *scale_modes(const spread_system *s, const spread_rows *rows)
+{
+    float *scaled = new_zeros(s->near.here * s->b * s->k, sizeof *scaled);
+    double least = INFINITY;
+    for (int64_t i = 0; i < s->near.here * s->b; i++)
+        least = fmin(least, s->scale[i]);
+    MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPI_DOUBLE, MPI_MIN, MPI_COMM_WORLD);
+    for (int64_t i = 0; i < s->near.here * s->b; i++)
+        for (int c = 0; c < s->k; c++)
+            scaled[i * s->k + c] = (float)(least / s->scale[i] * (double)rows->mode[i * s->k + c]);
+    return scaled;
+}
+
+/* All processes' numbers one after the other. */
+static void *gather(const void *own, int64_t count, size_t each, int64_t *total)
+{
+    int size, *counts, *firsts, mine = (int)((size_t)count * each);
+    if ((size_t)count * each > INT32_MAX)
+        end_group("the next matrix is too large: take fewer processes, or a smaller body");
+    MPI_Comm_size(MPI_COMM_WORLD, &size);
+    counts = new_zeros(size, sizeof *counts);
+    firsts = new_zeros(size, sizeof *firsts);
+    MPI_Allgather(&mine, 1, MPI_INT, counts, 1, MPI_INT, MPI_COMM_WORLD);
+    int64_t bytes = 0;
+    for (int p = 0; p < size; bytes += counts[p++])
+        firsts[p] = (int)bytes;
+    if (bytes > INT32_MAX)
+        end_group("the next matrix is too large for each process to have it");
+    void *all = new_zeros(bytes, 1);
+    MPI_Allgatherv(own, mine, MPI_BYTE, all, counts, firsts, MPI_BYTE, MPI_COMM_WORLD);
+    free(counts);
+    free(firsts);
+    *total = bytes / (int64_t)each;
+    return all;
+}
+
+/* aggregate, basis: of own nodes and ghosts, the former numbered over all processes. */
+static void aggregate_nodes(spread_system *s, const spread_rows *rows, int32_t *aggregate, float *basis)
+{
+    uz_error err = {0};
+    uz_blocks own = s->level.A;
+    uz_below below;
+    const int64_t here = s->near.here, size = (int64_t)s->b * s->k;
+    int64_t count = 0, before = 0, all = 0;
+    float *modes = scale_modes(s, rows);
+    own.nodes = here;
+    if (!uz_below_init(&below, &own))
+        end_group("no memory");
+    must(uz_aggregate(aggregate, &count, &own, &below, s->level.inverse, s->strong, &err), &err);
+    uz_below_clear(&below);
+    float *coarse = new_zeros(count * s->k * s->k, sizeof *coarse);
+    if (count > 0)
+        must(uz_tentative(basis, coarse, modes, aggregate, here, s->b, count, s->k, &err), &err);
+    free(modes);
+    MPI_Exscan(&count, &before, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    if (s->near.rank == 0)
+        before = 0;
+    for (int64_t i = 0; i < here; i++)
+        aggregate[i] += aggregate[i] >= 0 ? (int32_t)before : 0;
+    s->modes = gather(coarse, count * s->k * s->k, sizeof *coarse, &all);
+    free(coarse);
+    s->level.aggregates = all / (s->k * s->k);
+    neighbours_fetch(&s->near, aggregate + here, aggregate, sizeof *aggregate);
+    neighbours_fetch(&s->near, basis + here * size, basis, (size_t)size * sizeof *basis);
+}
+
+/* Rows of the prolongation of ghosts, from those who have them. */
+static void fetch_prolongation(spread_system *s)
+{
+    neighbours *near = &s->near;
+    uz_level *level = &s->level;
+    const int64_t here = near->here, size = (int64_t)s->b * s->k;
+    int64_t most = 0, *count = new_zeros(here + near->ghosts, sizeof *count);
+    for (int64_t i = 0; i < here; i++) {
+        count[i] = level->ptr[i + 1] - level->ptr[i];
+        most = count[i] > most ? count[i] : most;
+    }
+    MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_INT64_T, MPI_MAX, MPI_COMM_WORLD);
+    neighbours_fetch(near, count + here, count, sizeof *count);
+    /* as many as the longest, so that all are alike */
+    const size_t each = (size_t)most * (sizeof(int32_t) + (size_t)size * sizeof(float));
+    char *own = new_zeros(here, each), *others = new_zeros(near->ghosts, each);
+    for (int64_t s_ = 0; s_ < near->sent; s_++) {
+        const int64_t i = near->send[s_];
+        memcpy(own + (size_t)i * each, level->block + level->ptr[i], (size_t)count[i] * sizeof(int32_t));
+        memcpy(own + (size_t)i * each + (size_t)most * sizeof(int32_t), level->value + level->ptr[i] * size,
+               (size_t)(count[i] * size) * sizeof(float));
+    }
+    neighbours_fetch(near, others, own, each);
+    int64_t total = level->ptr[here];
+    for (int64_t g = 0; g < near->ghosts; g++)
+        total += count[here + g];
+    int32_t *block = realloc(level->block, ((size_t)total + 1) * sizeof *block);
+    float *value = realloc(level->value, (size_t)(total * size + 8) * sizeof *value);
+    if (!block || !value)
+        end_group("no memory");
+    level->block = block;
+    level->value = value;
+    for (int64_t g = 0; g < near->ghosts; g++) {
+        const int64_t at = level->ptr[here + g];
+        memcpy(block + at, others + (size_t)g * each, (size_t)count[here + g] * sizeof *block);
+        memcpy(value + at * size, others + (size_t)g * each + (size_t)most * sizeof(int32_t),
+               (size_t)(count[here + g] * size) * sizeof *value);
+        level->ptr[here + g + 1] = at + count[here + g];
+    }
+    memset(value + total * size, 0, 8 * sizeof *value);
+    free(own);
+    free(others);
+    free(count);
+}
+
+static void scale_ghosts(spread_system *s, double factor)
+{
+    const int64_t size = (int64_t)s->b * s->b;
+    uz_blocks *A = &s->level.A;
+    for (int64_t e = A->ptr[s->near.here] * size; e < A->ptr[A->nodes] * size; e++)
+        A->off[e] *= factor;
+}
+
+/* ---- sums over processes */
+
+/* Blocks that are not 0 of all processes. */
+typedef struct {
+    int64_t count;
+    int32_t *at;   /* count x 2: row and column */
+    double *value; /* count x k x k */
+} block_list;
+
+static bool is_zero(const double *block, int64_t size)
+{
+    int64_t c = 0;
+    while (c < size && block[c] == 0.0)
+        c++;
+    return c == size;
+}
+
+static void list_block(block_list *list, int64_t row, int64_t column, const double *block, int64_t size)
+{
+    if (is_zero(block, size))
+        return;
+    list->at[2 * list->count] = (int32_t)row;
+    list->at[2 * list->count + 1] = (int32_t)column;
+    memcpy(list->value + list->count++ * size, block, (size_t)size * sizeof *block);
+}
+
+static block_list gather_blocks(const uz_blocks *part)
+{
+    const int64_t size = (int64_t)part->b * part->b, most = part->nodes + part->ptr[part->nodes];
+    block_list own = {.at = new_zeros(2 * most, sizeof *own.at), .value = new_zeros(most * size, sizeof *own.value)},
+               all;
+    for (int64_t a = 0; a < part->nodes; a++) {
+        for (int64_t e = part->ptr[a]; e < part->ptr[a + 1]; e++)
+            list_block(&own, a, part->idx[e], part->off + e * size, size);
+        list_block(&own, a, a, part->diag + a * size, size);
+    }
+    all.at = gather(own.at, 2 * own.count, sizeof *own.at, &all.count);
+    all.value = gather(own.value, own.count * size, sizeof *own.value, &all.count);
+    all.count /= size;
+    free(own.at);
+    free(own.value);
+    return all;
+}
+
+static void free_list(block_list *list)
+{
+    free(list->at);
+    free(list->value);
+}
+
+static void add_list(uz_blocks *to, const block_list *list, double factor)
+{
+    const int64_t size = (int64_t)to->b * to->b;
+    for (int64_t q = 0; q < list->count; q++) {
+        const int32_t row = list->at[2 * q], column = list->at[2 * q + 1];
+        double *block = row == column ? to->diag + row * size : to->off + uz_blocks_find(to, row, column) * size;
+        for (int64_t c = 0; c < size; c++)
+            block[c] += factor * list->value[q * size + c];
+    }
+}
+
+static int ascending(const void *a, const void *b)
+{
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void sum_lists(uz_blocks *sum, const block_list *list, int64_t nodes, int k)
+{
+    const int64_t size = (int64_t)k * k;
+    int64_t *start = new_zeros(nodes + 2, sizeof *start), count = 0;
+    *sum = (uz_blocks){.nodes = nodes, .b = k, .ptr = new_zeros(nodes + 1, sizeof *sum->ptr)};
+    for (int64_t q = 0; q < list->count; q++)
+        start[list->at[2 * q] + 2] += list->at[2 * q] != list->at[2 * q + 1];
+    for (int64_t a = 0; a < nodes; a++)
+        start[a + 2] += start[a + 1];
+    sum->idx = new_zeros(start[nodes + 1], sizeof *sum->idx);
+    for (int64_t q = 0; q < list->count; q++)
+        if (list->at[2 * q] != list->at[2 * q + 1])
+            sum->idx[start[list->at[2 * q] + 1]++] = list->at[2 * q + 1];
+    for (int64_t a = 0; a < nodes; a++) { /* sorted, each once */
+        qsort(sum->idx + start[a], (size_t)(start[a + 1] - start[a]), sizeof *sum->idx, ascending);
+        for (int64_t e = start[a]; e < start[a + 1]; e++)
+            if (e == start[a] || sum->idx[e] != sum->idx[e - 1])
+                sum->idx[count++] = sum->idx[e];
+        sum->ptr[a + 1] = count;
+    }
+    free(start);
+    sum->off = new_zeros(count * size + 4, sizeof *sum->off);
+    sum->diag = new_zeros(nodes * size + 4, sizeof *sum->diag);
+    add_list(sum, list, 1.0);
+}
+
+/* ---- what each process has whole */
+
+/* A function on held dofs but for so much of its energy is left out. */
+#define LOST 1e-5
+
+/* Of the next matrix, or of what holding dofs leaves of it. NULL where rounding has made that indefinite. */
+static uz_multigrid *make_coarse(const spread_system *s, const uz_blocks *A)
+{
+    const int k = s->k;
+    const int64_t n = A->nodes * k;
+    float *there = new_zeros(n, sizeof *there);
+    uz_csc columns = {0};
+    uz_modes modes = {.count = k, .n_nodes = A->nodes, .value = s->modes, .strong = 0.5 * s->strong};
+    uz_multigrid *made = NULL;
+    uz_error err = {0};
+    modes.node = new_zeros(n, sizeof *modes.node);
+    for (int64_t i = 0; i < n; i++) {
+        const int64_t at = i / k * k * k + i % k * k + i % k;
+        modes.node[i] = (int32_t)(i / k);
+        there[i] = A->diag[at] > LOST * s->next.diag[at] ? 1.0F : 0.0F;
+    }
+    must(uz_blocks_to_columns(&columns, A, there, &err), &err);
+    const uz_status status = uz_multigrid_create(&made, &columns, &modes, 0, NULL, &err);
+    if (status != UZ_OK && status != UZ_ERR_NOT_SPD)
+        end_group(err.message);
+    uz_csc_clear(&columns);
+    free(modes.node);
+    free(there);
+    return made;
+}
+
+static void set_coarse(variant *v, uz_multigrid *made)
+{
+    size_t bytes;
+    v->base = made;
+    v->room = made ? made->kind->room(made, &bytes) : NULL;
+    if (made && !v->room)
+        end_group("no memory");
+}
+
+/* HELD may share WHOLE's multigrid. */
+static void free_variant(spread_system *s, int which)
+{
+    variant *v = &s->variant[which];
+    free(v->inverse);
+    if (v->base)
+        v->base->kind->free_room(v->room);
+    if (v->base && (which == VARIANT_WHOLE || v->base != s->variant[VARIANT_WHOLE].base))
+        uz_multigrid_free(v->base);
+    *v = (variant){0};
+}
+
+static void coarsen(spread_system *s, const spread_rows *rows)
+{
+    uz_level *level = &s->level;
+    uz_error err = {0};
+    uz_below below;
+    const int64_t nodes = level->A.nodes, here = s->near.here;
+    int32_t *aggregate = new_zeros(nodes, sizeof *aggregate);
+    float *basis = new_zeros(nodes * s->b * s->k, sizeof *basis);
+    double range;
+    aggregate_nodes(s, rows, aggregate, basis);
+    if (level->aggregates == 0) {
+        free(aggregate);
+        free(basis);
+        return;
+    }
+    if (!uz_below_init(&below, &level->A))
+        end_group("no memory");
+    level->A.nodes = here;
+    must(uz_level_range(&range, level, &err), &err);
+    level->A.nodes = nodes;
+    MPI_Allreduce(MPI_IN_PLACE, &range, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
+    must(uz_prolong_smoothed(level, &below, basis, aggregate, 4.0 / 3.0 / range, s->k, NULL, &err), &err);
+    free(aggregate);
+    free(basis);
+    fetch_prolongation(s);
+    scale_ghosts(s, 0.5);
+    must(uz_galerkin(&s->part, level, &below, s->k, NULL, &err), &err);
+    scale_ghosts(s, 2.0);
+    uz_below_clear(&below);
+    block_list list = gather_blocks(&s->part);
+    sum_lists(&s->next, &list, level->aggregates, s->k);
+    free_list(&list);
+    free(s->part.off);
+    free(s->part.diag);
+    s->part.off = s->part.diag = NULL;
+}
+
+static void make_room(spread_system *s)
+{
+    const int64_t size = 4 * s->level.A.nodes, coarse = s->next.nodes;
+    double **vectors[] = {&s->u, &s->f, &s->r, &s->z, &s->p, &s->q};
+    for (size_t v = 0; v < sizeof vectors / sizeof vectors[0]; v++)
+        *vectors[v] = new_zeros(size, sizeof(double));
+    s->rhs = new_zeros(size, sizeof *s->rhs);
+    s->x = new_zeros(size, sizeof *s->x);
+    s->t = new_zeros(size, sizeof *s->t);
+    s->coarse = new_zeros(coarse * uz_width(s->k), sizeof *s->coarse);
+    s->coarse_r = new_zeros(coarse * s->k, sizeof *s->coarse_r);
+    s->coarse_z = new_zeros(coarse * s->k, sizeof *s->coarse_z);
+}
+
+void system_create(spread_system *s, const spread_rows *rows)
+{
+    *s = (spread_system){.b = rows->b, .k = rows->k, .strong = rows->strong};
+    neighbours_init(&s->near, rows->first, rows->ptr, rows->column);
+    make_finest(s, rows);
+    coarsen(s, rows);
+    const int64_t ghosts = s->near.here * s->b, end = s->level.A.nodes * s->b;
+    for (int64_t i = ghosts; i < end; i++) /* they are there */
+        s->level.inverse[i] = 1.0F;
+    s->variant[VARIANT_WHOLE].inverse = new_zeros(end, sizeof(float));
+    memcpy(s->variant[VARIANT_WHOLE].inverse, s->level.inverse, (size_t)end * sizeof(float));
+    if (s->next.nodes > 0)
+        set_coarse(&s->variant[VARIANT_WHOLE], make_coarse(s, &s->next));
+    make_room(s);
+}
+
+static uz_blocks zeros_like(const uz_blocks *A)
+{
+    const int64_t size = (int64_t)A->b * A->b;
+    uz_blocks made = *A;
+    made.off = new_zeros(A->ptr[A->nodes] * size + 4, sizeof *made.off);
+    made.diag = new_zeros(A->nodes * size + 4, sizeof *made.diag);
+    return made;
+}
+
+/* What is coarser than the finest level, less what holding dofs takes from it. One level alone is factored anew. */
+static void lose(spread_system *s, variant *v, const block_list *list)
+{
+    const variant *whole = &s->variant[VARIANT_WHOLE];
+    uz_blocks A = zeros_like(&s->next);
+    uz_error err = {0};
+    if (whole->base->levels > 1) {
+        size_t bytes;
+        v->room = whole->base->kind->room(whole->base, &bytes);
+        if (!v->room)
+            end_group("no memory");
+        v->base = whole->base;
+        add_list(&A, list, 1.0);
+        must(uz_hold_loss(v->room, v->base, &A, &err), &err);
+        return;
+    }
+    const int64_t size = (int64_t)A.b * A.b;
+    memcpy(A.off, s->next.off, (size_t)(A.ptr[A.nodes] * size) * sizeof *A.off);
+    memcpy(A.diag, s->next.diag, (size_t)(A.nodes * size) * sizeof *A.diag);
+    add_list(&A, list, -1.0);
+    set_coarse(v, make_coarse(s, &A));
+    free(A.off);
+    free(A.diag);
+}
+
+void system_hold(spread_system *s, const char *held)
+{
+    variant *v = &s->variant[VARIANT_HELD];
+    const int b = s->b;
+    const int64_t here = s->near.here;
+    char *all = new_zeros(s->level.A.nodes, (size_t)b);
+    free_variant(s, VARIANT_HELD);
+    v->inverse = new_zeros(s->level.A.nodes * b, sizeof *v->inverse);
+    memcpy(all, held, (size_t)(here * b));
+    neighbours_fetch(&s->near, all + here * b, all, (size_t)b);
+    for (int64_t i = 0; i < s->level.A.nodes * b; i++)
+        v->inverse[i] = all[i] ? 0.0F : s->level.inverse[i];
+    free(all);
+    if (!s->variant[VARIANT_WHOLE].base)
+        return;
+    uz_blocks loss = zeros_like(&s->part);
+    scale_ghosts(s, 0.5);
+    uz_level_loss(&loss, &s->level, v->inverse);
+    scale_ghosts(s, 2.0);
+    block_list list = gather_blocks(&loss);
+    free(loss.off);
+    free(loss.diag);
+    lose(s, v, &list);
+    free_list(&list);
+}
+
+static int64_t blocks_bytes(const uz_blocks *A)
+{
+    const int64_t size = (int64_t)A->b * A->b;
+    return A->ptr ? A->ptr[A->nodes] * (4 + 8 * size) + A->nodes * (8 + 8 * size) : 0;
+}
+
+int64_t system_bytes(const spread_system *s, int which)
+{
+    const int64_t nodes = s->level.A.nodes, size = (int64_t)s->b * s->b;
+    const uz_multigrid *base = s->variant[which].base;
+    const int64_t coarse = base ? (int64_t)base->bytes : 0;
+    if (which != VARIANT_WHOLE)
+        return coarse;
+    const int64_t prolongation = s->level.ptr ? s->level.ptr[nodes] * (4 + 4 * s->b * s->k) : 0;
+    return coarse + blocks_bytes(&s->level.A) + blocks_bytes(&s->next) + prolongation +
+           4 * size * (s->level.A.ptr[nodes] + nodes) + nodes * (8 + 60 * 4);
+}
+
+int system_levels(const spread_system *s, int which)
+{
+    return 1 + (s->variant[which].base ? s->variant[which].base->levels : 0);
+}
+
+void system_free(spread_system *s)
+{
+    uz_level *level = &s->level;
+    void *own[] = {s->scale,    level->off,  level->diag, level->inverse, level->ptr, level->block, level->value,
+                   s->face,     s->outside,  s->modes,    s->rhs,         s->x,       s->t,         s->coarse,
+                   s->coarse_r, s->coarse_z, s->u,        s->f,           s->r,       s->z,         s->p,
+                   s->q};
+    free_variant(s, VARIANT_HELD);
+    free_variant(s, VARIANT_WHOLE);
+    for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
+        free(own[k]);
+    uz_blocks_clear(&level->A);
+    uz_blocks_clear(&s->part);
+    uz_blocks_clear(&s->next);
+    neighbours_free(&s->near);
+    memset(s, 0, sizeof *s);
+}

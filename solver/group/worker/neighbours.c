@@ -1,0 +1,90 @@
+/* neighbours.c: ghosts, and the exchange of what is known of nodes. */
+#include "worker.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static int ascending(const void *a, const void *b)
+{
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void list_ghosts(neighbours *n, int32_t begin, int32_t end, const int64_t *ptr, const int32_t *column)
+{
+    int64_t count = 0;
+    for (int64_t e = 0; e < ptr[n->here]; e++)
+        count += column[e] < begin || column[e] >= end;
+    n->number = new_zeros(count, sizeof *n->number);
+    count = 0;
+    for (int64_t e = 0; e < ptr[n->here]; e++)
+        if (column[e] < begin || column[e] >= end)
+            n->number[count++] = column[e];
+    qsort(n->number, (size_t)count, sizeof *n->number, ascending);
+    for (int64_t g = 0; g < count; g++)
+        if (g == 0 || n->number[g] != n->number[g - 1])
+            n->number[n->ghosts++] = n->number[g];
+}
+
+static void sum_up(int *first, const int *count, int size)
+{
+    first[0] = 0;
+    for (int p = 1; p < size; p++)
+        first[p] = first[p - 1] + count[p - 1];
+}
+
+void neighbours_init(neighbours *n, const int32_t *first, const int64_t *ptr, const int32_t *column)
+{
+    MPI_Comm_rank(MPI_COMM_WORLD, &n->rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &n->size);
+    n->here = first[n->rank + 1] - first[n->rank];
+    list_ghosts(n, first[n->rank], first[n->rank + 1], ptr, column);
+    int **each[] = {&n->send_count, &n->send_first, &n->take_count, &n->take_first};
+    for (size_t k = 0; k < sizeof each / sizeof each[0]; k++)
+        *each[k] = new_zeros(n->size, sizeof(int));
+    n->request = new_zeros(2 * (int64_t)n->size, sizeof *n->request);
+    for (int64_t g = 0, p = 0; g < n->ghosts; g++) {
+        while (n->number[g] >= first[p + 1])
+            p++;
+        n->take_count[p]++;
+    }
+    MPI_Alltoall(n->take_count, 1, MPI_INT, n->send_count, 1, MPI_INT, MPI_COMM_WORLD);
+    sum_up(n->take_first, n->take_count, n->size);
+    sum_up(n->send_first, n->send_count, n->size);
+    n->sent = n->send_first[n->size - 1] + n->send_count[n->size - 1];
+    n->send = new_zeros(n->sent, sizeof *n->send);
+    MPI_Alltoallv(n->number, n->take_count, n->take_first, MPI_INT32_T, n->send, n->send_count, n->send_first,
+                  MPI_INT32_T, MPI_COMM_WORLD);
+    for (int64_t s = 0; s < n->sent; s++)
+        n->send[s] -= first[n->rank];
+}
+
+void neighbours_fetch(neighbours *n, void *ghosts, const void *own, size_t each)
+{
+    int requests = 0;
+    if (n->room < (size_t)n->sent * each) {
+        free(n->packed);
+        n->room = (size_t)n->sent * each;
+        n->packed = new_zeros((int64_t)n->room, 1);
+    }
+    for (int p = 0; p < n->size; p++)
+        if (n->take_count[p] > 0)
+            MPI_Irecv((char *)ghosts + (size_t)n->take_first[p] * each, (int)((size_t)n->take_count[p] * each),
+                      MPI_BYTE, p, 7, MPI_COMM_WORLD, &n->request[requests++]);
+    for (int64_t s = 0; s < n->sent; s++)
+        memcpy(n->packed + (size_t)s * each, (const char *)own + (size_t)n->send[s] * each, each);
+    for (int p = 0; p < n->size; p++)
+        if (n->send_count[p] > 0)
+            MPI_Isend(n->packed + (size_t)n->send_first[p] * each, (int)((size_t)n->send_count[p] * each), MPI_BYTE, p,
+                      7, MPI_COMM_WORLD, &n->request[requests++]);
+    MPI_Waitall(requests, n->request, MPI_STATUSES_IGNORE);
+}
+
+void neighbours_free(neighbours *n)
+{
+    void *own[] = {n->number,     n->send,       n->send_count, n->send_first,
+                   n->take_count, n->take_first, n->packed,     n->request};
+    for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
+        free(own[k]);
+    memset(n, 0, sizeof *n);
+}
