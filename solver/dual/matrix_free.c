@@ -488,7 +488,7 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
 }
 
 /* The same on so many processes of equal speed; here are K, its rows on their way, and the vectors. With what is done
- * here it took 1.1 to 1.2 times the processor time of ours on the way to an answer (hex8, 104,000 and 346,000 dofs):
+ * here it took 1.1 to 1.4 times the processor time of ours on the way to an answer (hex8, 104,000 and 346,000 dofs):
  * half as many cycles again, for bounds that need no word of theirs. */
 #define PROCESSES 2.0
 #define SLOWER    2.4
