@@ -47,6 +47,13 @@ static bool is_asked(const uz_result *result, const uz_problem *one, bool own_la
 
 /* ---- the comparison */
 
+/* What one of them tells counts the other one's time, and its memory: what made the small answer is still there. */
+static void count_both(uz_summary *told, const uz_summary *other)
+{
+    uz_timings_add(&told->timings, &other->timings);
+    told->cost.actual_bytes += other->cost.actual_bytes;
+}
+
 /* Of the linear law: by what it is in the strain of Green and Lagrange. */
 static uz_status compare_linear(uz_result *result, const uz_problem *one, const uz_hooks *hooks, double deadline,
                                 uz_error *err)
@@ -75,7 +82,7 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
         return UZ_OK;
     const uz_outcome outcome = large->summary.outcome;
     const bool ended = outcome == UZ_UNSTABLE || outcome == UZ_INVERTED || large->summary.small.load == 1;
-    uz_timings_add(&result->summary.timings, &large->summary.timings);
+    count_both(&result->summary, &large->summary);
     if (ended)
         result->summary.small = large->summary.small;
     if (ended && !(large->summary.small.error <= TOLERABLE))
@@ -96,7 +103,7 @@ static uz_status choose(uz_result **result, const uz_problem *one, const uz_sett
     const bool enough = large->summary.small.error <= TOLERABLE;
     left = enough ? *result : large;
     left->summary.small = large->summary.small;
-    uz_timings_add(&left->summary.timings, enough ? &large->summary.timings : &(*result)->summary.timings);
+    count_both(&left->summary, enough ? &large->summary : &(*result)->summary);
     uz_result_free(enough ? large : *result);
     *result = left;
     return UZ_OK;

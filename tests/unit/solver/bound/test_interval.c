@@ -112,6 +112,7 @@ TEST(what_a_stopped_search_found_stays)
     enum { STOPS = 30 };
     uz_quantity quantities[QUANTITIES];
     uz_scene scene = block("tri6", 6, ROUND);
+    scene.kinematics = UZ_KINEMATICS_FIXED; /* the search comes last then */
     const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene, .quantities = quantities, .n_quantities = 1};
     uz_settings settings = uz_settings_default();
     uz_error err = {0};
