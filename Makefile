@@ -172,11 +172,12 @@ $(BUILD)/uzawa: $(CLIENT_OBJ) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(CLIENT_LIBS)
 
 # PETSc's macros for memory convert signed sizes in whoever uses them. It has a heap and handlers of its own, and runs
-# under mpirun: no sanitizer.
+# under mpirun: no sanitizer, and what it has of the solver is that of the ordinary build in PLAIN.
+PLAIN ?= $(BUILD)
 GROUP_FLAGS = $(patsubst -I%,-isystem %,$(filter -I%,$(call pkg,--cflags petsc ompi-c))) -Wno-sign-conversion
 $(GROUP_OBJ): CFLAGS += $(GROUP_FLAGS) -O3
 $(GROUP_OBJ): override SAN =
-$(BUILD)/uzawa-group: $(GROUP_OBJ) $(BUILD)/libuzawa.a
+$(BUILD)/uzawa-group: $(GROUP_OBJ) $(PLAIN)/libuzawa.a
 	$(CC) $(GOLD) $(LDFLAGS) -o $@ $^ $(call pkg,--libs petsc ompi-c) $(SOLVER_LIBS) -lpthread
 
 # Unit tests are a third of what is compiled, and run as fast without optimization: the time is the solver's.
@@ -328,7 +329,8 @@ test-hygiene: ## formatting, static analysis, both compilers
 # Each sanitizer has a build of its own inside BUILD. Its reports need lines and no variables: with -g1 it compiles in
 # three quarters of the time. Programs at a fixed address need not relocate the half a million pointers of what is
 # checked whenever one starts, and tests start them some thousand times.
-sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g1 -fno-pie" LDFLAGS=-no-pie SAN="$(2)"
+sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/libuzawa.a && \
+            $(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) PLAIN=$(BUILD) OPT="-O1 -g1 -fno-pie" LDFLAGS=-no-pie SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that say
 # "not under ThreadSanitizer", or "not under sanitizers" at all.
 without_tsan = $(shell grep -L 'not under \(ThreadSanitizer\|sanitizers\)' $(1))
@@ -365,8 +367,8 @@ valgrind: deps-test ## the C tests under valgrind, VALGRIND_SECONDS (default 60)
 	@tests/valgrind.sh $(BUILD) $(FILTER)
 
 fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each
-	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/libparts.a $(BUILD)/libuzawa.a
-	$(call sanitized,fuzzing,-fsanitize=address$(comma)undefined$(comma)fuzzer-no-link -fno-sanitize-recover=undefined) CC=clang PLAIN=$(BUILD) fuzz-bins
+	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/libparts.a
+	$(call sanitized,fuzzing,-fsanitize=address$(comma)undefined$(comma)fuzzer-no-link -fno-sanitize-recover=undefined) CC=clang fuzz-bins
 	@tests/fuzz/run.sh $(BUILD)/fuzzing $${FUZZ_SECONDS:-30}
 
 ci: ## what continuous integration runs: test, asan, tsan, fuzz, and one count over all
@@ -376,7 +378,6 @@ ci: ## what continuous integration runs: test, asan, tsan, fuzz, and one count o
 # ordinary build in PLAIN.
 FUZZED := $(wildcard $(addsuffix /*.c,server/codec $(addprefix solver/,assembly core element io law linalg obstacle scene text))) \
           server/store/uploads.c solver/methods/method.c solver/run/problem.c solver/run/settings.c
-PLAIN ?= $(BUILD)
 .PHONY: fuzz-bins
 fuzz-bins: $(FUZZ_BIN)
 $(BUILD)/libfuzzed.a: $(call obj,$(FUZZED)) $(BUILD)/obj/gen/embedded.o
