@@ -79,12 +79,22 @@ static bool is_believed(const fit *f, const uz_trend_point *p, int n, double dif
            fabs(f->q0 - p[n - 1].value) <= 2 * differ;
 }
 
+/* Is each more than all those of elements at least twice as large? Those between are of another shape where triangles
+ * are halved once, and what stress they see is another part of what there is. */
+static bool does_grow(const uz_trend_point *p, int n)
+{
+    bool grows = true;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < i; k++)
+            grows = grows && (p[k].size < 2 * (1 - ALIKE) * p[i].size || p[i].value > p[k].value);
+    return grows && p[n - 1].value > p[0].value;
+}
+
 void uz_trend_fit(uz_trend *out, const uz_trend_point *point, int count, double here, double grain)
 {
     uz_trend_point p[LAST];
     const int n = choose(p, point, count);
     double least = INFINITY, most = -INFINITY;
-    bool grows = true;
     fit best = {.misfit = INFINITY};
     *out = (uz_trend){.value = here, .low = NAN, .high = NAN, .order = NAN, .grids = n};
     if (n < 3) {
@@ -97,13 +107,13 @@ void uz_trend_fit(uz_trend *out, const uz_trend_point *point, int count, double 
     for (int i = 0; i < n; i++) {
         least = fmin(least, p[i].value);
         most = fmax(most, p[i].value);
-        grows = grows && (i == 0 || p[i].value > p[i - 1].value);
     }
     for (double order = LEAST_ORDER / 2; order < MOST_ORDER + ORDER_STEP; order += ORDER_STEP) {
         const fit one = fit_of(p, n, order);
         best = one.misfit < best.misfit ? one : best;
     }
     const double differ = most - least;
+    const bool grows = does_grow(p, n);
     double half = 0;
     for (int i = n - 3; i < n; i++) /* coarser ones may hardly have seen the contact */
         for (int k = n - 3; k < i; k++)
@@ -124,7 +134,7 @@ void uz_trend_fit(uz_trend *out, const uz_trend_point *point, int count, double 
     out->low = out->value - half;
     out->high = out->value + half;
     if (isnan(out->order) && grows && best.order < LEAST_ORDER) {
-        out->low = p[n - 2].value;
+        out->low = fmin(p[n - 2].value, p[n - 1].value);
         out->high = INFINITY;
     }
     if (!(least < 0)) /* what is of one sign stays so */

@@ -69,6 +69,13 @@ TEST(what_does_not_settle_has_no_order)
     const uz_trend t = of_law(0.0, 1.0, -0.3, 0.5, 6);
     CHECK_MSG(isnan(t.order) && isinf(t.high) && t.low < 2.83 && strstr(t.why, "no limit"), "order %g to %g", t.order,
               t.high);
+    /* Triangles halved once are of another shape, and see another part of it. */
+    const uz_trend_point halved[] = {{0.0156, 2.05},  {0.0078, 2.53},  {0.0039, 3.11},
+                                     {0.00276, 3.01}, {0.00195, 3.82}, {0.00138, 3.7}};
+    uz_trend h;
+    uz_trend_fit(&h, halved, 6, 3.7, 0);
+    CHECK_MSG(isnan(h.order) && isinf(h.high) && h.low <= 3.7 && strstr(h.why, "no limit"), "%g to %g: %s", h.low,
+              h.high, h.why);
     const uz_trend_point jumps[] = {{1, 5}, {0.5, 9}, {0.25, 4}, {0.125, 8}};
     uz_trend j;
     uz_trend_fit(&j, jumps, 4, 8, 0);
