@@ -69,6 +69,8 @@ def run_blocks(found, root, address):
         script += f". ./.block{i} >.out{i} 2>.err{i}\ntouch .done{i}\n"
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS")) and name not in OF_MAKE}
     environment["UZAWA_SERVER"] = "http://" + address
+    if service.INSTRUMENTED:  # what is linked without the sanitizer
+        environment["PLAIN"] = str(pathlib.Path(sys.argv[1]).resolve().parent)
     done = subprocess.run(["bash", "-c", script], cwd=root, env=environment, timeout=120)
     return done.returncode
 
