@@ -1,4 +1,5 @@
 """Surfaces of triangles (STL, OBJ) as rigid obstacles, as their users send them."""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import math
 import os
