@@ -66,8 +66,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!request.tags || (request.problem.kind == UZ_PROBLEM_MATRICES && !request.problem.qp.p) ||
         (json_member_text(body, size, "answer", &answer_len) != NULL) != (request.answer.u != NULL))
         abort();
-    if (!request.answer.u)
-        check_refined(body, size, &request);
+    const bool solves = !request.answer.u;
+    codec_request_clear(&request);
+    if (!solves)
+        return 0;
+    /* A new one is looked at more closely than what is stored already. */
+    if (!codec_decode(&request, CODEC_SOLVE, body, size, NULL, &problem)) {
+        check_problem(&problem);
+        return 0;
+    }
+    check_refined(body, size, &request);
     codec_request_clear(&request);
     return 0;
 }
