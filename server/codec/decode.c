@@ -2,6 +2,7 @@
 #include "codec/decode.h"
 #include "codec/problem.h"
 #include "codec/text.h"
+#include "run/problem.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -146,16 +147,13 @@ static bool check_scene(const codec_request *request, problem_details *problem)
         nodes *= (double)box->cells[i] + 1.0;
     if (p->kind != UZ_PROBLEM_SCENE || p->scene.refine || nodes > MOST_NODES)
         return true;
-    char where[sizeof((uz_error *)0)->where] = "";
     uz_error err = {.status = UZ_OK};
     const uz_scene first = uz_scene_of_case(p, 0);
     const uz_status status = uz_scene_check(&first, &err);
     if (status != UZ_ERR_SCENE && status != UZ_ERR_NOT_FINITE)
         return true;
     if (p->n_cases > 0 && strncmp(err.where, "/loads", 6) == 0)
-        snprintf(where, sizeof where, "/cases/0%.80s", err.where);
-    if (where[0])
-        memcpy(err.where, where, sizeof where);
+        uz_error_name_case(&err, 0);
     codec_problem_from_error(problem, &err, p->kind);
     return false;
 }
