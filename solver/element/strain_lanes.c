@@ -216,6 +216,18 @@ INLINE void take_mean_dilatation(uz_lanes strain[][UZ_ELEMENT_STRESSES], const u
             strain[g][i] += (mean - own[g]) / n;
 }
 
+/* Of a ring u_r / r; on the axis the radial strain. */
+INLINE void strain_around(uz_lanes *around, const uz_lanes *radial, const uz_strain_rule *rule,
+                          const uz_lane_shape *shape, const uz_lanes *u, int g)
+{
+    const lane_bits on_axis = (lane_bits)(shape->per_radius[g] == 0);
+    uz_lanes displacement = {0};
+    for (int a = 0; a < rule->nodes; a++)
+        displacement += rule->N[g][a] * u[2 * a];
+    displacement *= shape->per_radius[g];
+    *around = (uz_lanes)((on_axis & (lane_bits)*radial) | (~on_axis & (lane_bits)displacement));
+}
+
 INLINE void strain_of_gradient(uz_lanes *strain, uz_lanes H[3][3], const uz_strain_rule *rule,
                                const uz_lane_shape *shape, const uz_lanes *u, int g, int dim)
 {
@@ -227,13 +239,7 @@ INLINE void strain_of_gradient(uz_lanes *strain, uz_lanes H[3][3], const uz_stra
         strain[4] = H[1][2] + H[2][1];
         strain[5] = H[2][0] + H[0][2];
     } else if (rule->model == UZ_AXISYMMETRIC) {
-        /* u_r / r; on the axis the radial strain */
-        const lane_bits on_axis = (lane_bits)(shape->per_radius[g] == 0);
-        uz_lanes displacement = {0};
-        for (int a = 0; a < rule->nodes; a++)
-            displacement += rule->N[g][a] * u[2 * a];
-        displacement *= shape->per_radius[g];
-        strain[2] = (uz_lanes)((on_axis & (lane_bits)H[0][0]) | (~on_axis & (lane_bits)displacement));
+        strain_around(&strain[2], &H[0][0], rule, shape, u, g);
         strain[3] = H[0][1] + H[1][0];
     } else {
         strain[2] = H[0][1] + H[1][0];
@@ -275,6 +281,18 @@ INLINE void strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_r
         take_mean_dilatation(strain, rule, shape);
 }
 
+INLINE void gradients_of(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u,
+                         int dim)
+{
+    for (int g = 0; g < rule->points; g++) {
+        for (int c = 0; c < 3 && dim == 2; c++)
+            H[g][c][2] = H[g][2][c] = (uz_lanes){0};
+        gradient_at(H[g], rule, shape, u, g, dim);
+        if (rule->model == UZ_AXISYMMETRIC)
+            strain_around(&H[g][2][2], &H[g][0][0], rule, shape, u, g);
+    }
+}
+
 /* ---- for each kind of processor */
 
 INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
@@ -294,6 +312,15 @@ INLINE void strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_st
         strains_of(strain, rule, shape, material, u, 3);
 }
 
+INLINE void gradients_in_space(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                               const uz_lanes *u)
+{
+    if (rule->dim == 2)
+        gradients_of(H, rule, shape, u, 2);
+    else
+        gradients_of(H, rule, shape, u, 3);
+}
+
 UZ_AVX2_FMA static void shape_fused(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x,
                                     double thickness)
 {
@@ -306,6 +333,12 @@ UZ_AVX2_FMA static void strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES], co
     strains_in_space(strain, rule, shape, material, u);
 }
 
+UZ_AVX2_FMA static void gradients_fused(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                                        const uz_lanes *u)
+{
+    gradients_in_space(H, rule, shape, u);
+}
+
 void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
 {
     (uz_cpu_has_avx2_fma() ? shape_fused : shape_in_space)(shape, rule, x, thickness);
@@ -315,4 +348,10 @@ void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], con
                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
 {
     (uz_cpu_has_avx2_fma() ? strains_fused : strains_in_space)(strain, rule, shape, material, u);
+}
+
+void uz_lane_gradients(uz_lanes H[UZ_ELEMENT_GAUSS][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                       const uz_lanes *u)
+{
+    (uz_cpu_has_avx2_fma() ? gradients_fused : gradients_in_space)(H, rule, shape, u);
 }

@@ -30,11 +30,13 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
 /* Adds to the warnings of result->evaluation what makes the answer doubtful. Reads its overlap and approach, and the
  * summary's geometry.sliding and discretization_error. */
 uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
-/* About how much of the forces of the answer u small deformation leaves out: squares of its gradient in the strains, by
- * the energy norm; stress that turns with the body, along u; strains and rotations in the law itself, weighted by the
- * energy (U, > 0). Relative to its energy norm; and what the mean stress does to a strip that bends, see nonlinear.c.
- * NaN: elements are not of the standard formulation, the only one that large deformation has. */
-double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy);
+/* *part: about how much of the forces of the answer u small deformation leaves out: squares of its gradient in the
+ * strains, by the energy norm; stress that turns with the body, along u; strains and rotations in the law itself,
+ * weighted by the energy (U, > 0). Relative to its energy norm; and what the mean stress does to a strip that bends,
+ * see nonlinear.c (buckling: uz_least_buckling_strain). NaN: elements are not of the standard formulation, the only one
+ * that large deformation has. UZ_ERR_MEMORY. */
+uz_status uz_measure_nonlinear(double *part, const uz_body_model *model, const double *u, double energy,
+                               double buckling, uz_error *err);
 /* The strain from which on a strip as flat as the body may buckle, by Euler. */
 double uz_least_buckling_strain(const uz_body_model *model);
 /* Warns that small deformation is off by `error` (uz_small) under a linear law. */

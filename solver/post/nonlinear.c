@@ -16,11 +16,14 @@
 #include "post/balance.h"
 
 #include "assembly/parts.h"
+#include "assembly/strain_group.h"
+#include "core/cpu.h"
 #include "post/parts.h"
 
 #include <math.h>
 
-#define PI 3.14159265358979323846
+#define PI     3.14159265358979323846
+#define INLINE static inline __attribute__((always_inline))
 
 enum { N = UZ_ELEMENT_STRESSES };
 /* Axes of the components of a symmetric matrix, xx yy zz xy yz zx, and which of these strains of a model are. */
@@ -28,10 +31,13 @@ static const int AXIS[N][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
 static const int PLANE[N] = {0, 1, 3}, SPACE[N] = {0, 1, 2, 3, 4, 5};
 
 typedef struct {
-    uz_model model;
-    const int *part;                             /* of AXIS, by component of strain */
-    double squares, along, law, turns, gradient; /* integrals */
-    double stress[N], modulus;                   /* the same; stress by AXIS */
+    const uz_body_model *model;
+    const int *part;   /* of AXIS, by component of strain */
+    bool nonstandard;  /* some element is not of the standard formulation */
+    const uz_lame *of; /* whose strip_modulus `modulus_of` is */
+    double modulus_of;
+    uz_lanes squares, along, law, turns, gradient; /* integrals, over every fourth element in each lane */
+    uz_lanes stress[N], modulus;                   /* the same; stress by AXIS */
 } sums;
 
 /* The least modulus of a strip, whatever its direction in the plane; of materials with directions in space, in any of
@@ -53,25 +59,60 @@ static double strip_modulus(uz_model model, const uz_lame *lame)
     return 1 / softest;
 }
 
-static void add_point(sums *to, double weight, const uz_lame *lame, double H[3][3])
+/* stress = C strain in each lane. */
+INLINE void stress_of(uz_lanes *stress, const uz_strain_group *group, const uz_lanes *strain)
 {
-    double Q[N], e[N], of_Q[N], of_e[N], work[3] = {0}, size = 0; /* work: of C Q : Q, C e : Q, C e : e */
-    const int n = uz_stress_count(to->model);
+    const uz_strain_rule *rule = &group->rule;
+    if (group->general) {
+        for (int l = 0; l < UZ_STRAIN_LANES; l++) {
+            double one[N];
+            for (int k = 0; k < rule->stresses; k++)
+                one[k] = strain[k][l];
+            uz_elastic_stress(one, rule->model, *group->lame[l], one);
+            for (int k = 0; k < rule->stresses; k++)
+                stress[k][l] = one[k];
+        }
+        return;
+    }
+    uz_lanes trace = strain[0] + strain[1];
+    if (rule->direct == 3)
+        trace += strain[2];
+    for (int k = 0; k < rule->stresses; k++)
+        stress[k] = k < rule->direct ? group->material.lambda * trace + 2 * group->material.mu * strain[k]
+                                     : group->material.mu * strain[k];
+}
+
+/* Of plane stress, where nothing holds the body across the plane. */
+INLINE void strain_across(uz_lanes *across, const uz_strain_group *group, const uz_lanes *stress)
+{
+    *across = (uz_lanes){0};
+    for (int l = 0; l < UZ_STRAIN_LANES && group->rule.model == UZ_PLANE_STRESS; l++)
+        (*across)[l] =
+            uz_strain_zz(UZ_PLANE_STRESS, *group->lame[l], (double[]){stress[0][l], stress[1][l], stress[2][l]}, 0);
+}
+
+INLINE void add_point(sums *to, const uz_strain_group *group, const uz_lanes *volume, uz_lanes H[3][3])
+{
+    const uz_lanes weight = *volume;
+    uz_lanes across, Q[N], e[N], of_Q[N], of_e[N], size = {0};
+    uz_lanes work[3] = {{0}}; /* of C Q : Q, C e : Q, C e : e */
+    const int n = group->rule.stresses;
     for (int k = 0; k < n; k++) {
         const int i = AXIS[to->part[k]][0], j = AXIS[to->part[k]][1];
         Q[k] = (i == j ? 1 : 2) * (H[0][i] * H[0][j] + H[1][i] * H[1][j] + H[2][i] * H[2][j]);
         e[k] = (i == j ? 0.5 : 1) * (H[i][j] + H[j][i]);
     }
-    uz_elastic_stress(of_Q, to->model, *lame, Q);
-    uz_elastic_stress(of_e, to->model, *lame, e);
-    const double across = uz_strain_zz(to->model, *lame, of_e, 0);
+    stress_of(of_Q, group, Q);
+    stress_of(of_e, group, e);
+    strain_across(&across, group, of_e);
     for (int k = 0; k < n; k++) {
         work[0] += of_Q[k] * Q[k];
         work[1] += of_e[k] * Q[k];
         work[2] += of_e[k] * e[k];
+        to->stress[to->part[k]] += weight * of_e[k];
     }
     for (int i = 0; i < 3; i++) {
-        const double turn = H[(i + 1) % 3][i] - H[i][(i + 1) % 3];
+        const uz_lanes turn = H[(i + 1) % 3][i] - H[i][(i + 1) % 3];
         to->turns += 0.5 * weight * turn * turn;
         for (int j = 0; j < 3; j++)
             size += H[i][j] * H[i][j];
@@ -80,10 +121,54 @@ static void add_point(sums *to, double weight, const uz_lame *lame, double H[3][
     to->squares += 0.25 * weight * work[0];
     to->along += weight * work[1];
     to->gradient += weight * size;
-    for (int k = 0; k < n; k++)
-        to->stress[to->part[k]] += weight * of_e[k];
-    to->modulus += weight * strip_modulus(to->model, lame);
     to->law += weight * size * work[2];
+}
+
+INLINE void add_group(sums *to, const uz_strain_group *group, const uz_lanes *modulus)
+{
+    uz_lanes H[UZ_ELEMENT_GAUSS][3][3];
+    uz_lane_gradients(H, &group->rule, &group->shape, group->u);
+    for (int g = 0; g < group->rule.asked; g++) {
+        uz_lanes weight = group->shape.volume[g];
+        for (int l = group->count; l < UZ_STRAIN_LANES; l++)
+            weight[l] = 0;
+        add_point(to, group, &weight, H[g]);
+        to->modulus += weight * *modulus;
+    }
+}
+
+UZ_AVX2_FMA static void add_group_fused(sums *to, const uz_strain_group *group, const uz_lanes *modulus)
+{
+    add_group(to, group, modulus);
+}
+
+static void take(void *ctx, const uz_strain_group *group)
+{
+    sums *to = ctx;
+    uz_lanes modulus;
+    for (int l = 0; l < UZ_STRAIN_LANES; l++) {
+        if (group->lame[l] != to->of) {
+            to->of = group->lame[l];
+            to->modulus_of = strip_modulus(to->model->kind, to->of);
+        }
+        modulus[l] = to->modulus_of;
+    }
+    (uz_cpu_has_avx2_fma() ? add_group_fused : add_group)(to, group, &modulus);
+}
+
+static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
+{
+    sums *to = ctx;
+    to->nonstandard = to->nonstandard || formulation != UZ_FORMULATION_STANDARD;
+    uz_strain_rule_at(rule, kind, to->model->kind, UZ_FORMULATION_STANDARD, NULL, NULL, 0);
+}
+
+static double total(const uz_lanes *of)
+{
+    double sum = 0;
+    for (int l = 0; l < UZ_STRAIN_LANES; l++)
+        sum += (*of)[l];
+    return sum;
 }
 
 /* (h / L)^2 of a plane body. */
@@ -103,41 +188,55 @@ static double flatness_in_plane(const uz_mesh *mesh)
     return flat * flat;
 }
 
+/* Volume of an element, and its second moments (by AXIS) about its middle over its volume, by its corners. */
+static double element_moments(double own[N], const uz_body_model *model, int64_t e, const double middle[3])
+{
+    double xyz[3 * UZ_ELEMENT_NODES], grad[UZ_ELEMENT_NODES][3], amid[3] = {0}, volume = 0;
+    uz_element element;
+    uz_body_element(&element, xyz, model, e);
+    const int corners = uz_element_type_of(element.kind)->corners;
+    const double share = (corners == 8 ? 1 / 3.0 : corners == 4 ? 0.2 : 0.25) / corners;
+    const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
+    for (int g = 0; g < rule->count; g++) {
+        volume += rule->point[g].weight;
+        for (int c = 0; c < 3; c++)
+            amid[c] += rule->point[g].at[c] / rule->count;
+    }
+    for (int k = 0; k < N; k++) {
+        const int i = AXIS[k][0], j = AXIS[k][1];
+        own[k] = 0;
+        for (int a = 0; a < corners; a++)
+            own[k] += share * (xyz[3 * a + i] - middle[i]) * (xyz[3 * a + j] - middle[j]);
+    }
+    return volume * uz_element_gradients(grad, &element, amid);
+}
+
 /* The same of a solid: the least of its moments of second order over the largest one, of each element by its corners
  * and its volume, as they are of a parallelepiped, a tetrahedron, about so of a prism. */
 static double flatness_in_space(const uz_body_model *model)
 {
     const uz_mesh *mesh = &model->mesh;
-    double volume = 0, first[3] = {0}, second[N] = {0}, principal[3];
+    double all = 0, first[3] = {0}, second[N] = {0}, principal[3], volume = 0, own[N];
     for (int64_t e = 0; e < mesh->n_elements; e++) {
-        double xyz[3 * UZ_ELEMENT_NODES], grad[UZ_ELEMENT_NODES][3], amid[3] = {0}, weight = 0, mean[3] = {0};
-        uz_element element;
-        uz_body_element(&element, xyz, model, e);
-        const int corners = uz_element_type_of(element.kind)->corners;
-        const double share = (corners == 8 ? 1 / 3.0 : corners == 4 ? 0.2 : 0.25) / corners;
-        const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
-        for (int g = 0; g < rule->count; g++) {
-            weight += rule->point[g].weight;
-            for (int c = 0; c < 3; c++)
-                amid[c] += rule->point[g].at[c] / rule->count;
-        }
-        weight *= uz_element_gradients(grad, &element, amid);
+        int nodes;
+        const int64_t *node = uz_mesh_element(mesh, e, &nodes);
+        const int corners = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
+        double middle[3] = {0}, from[3]; /* from: the first node */
         for (int a = 0; a < corners; a++)
             for (int c = 0; c < 3; c++)
-                mean[c] += (xyz[3 * a + c] - mesh->xyz[c]) / corners; /* from the first node */
-        volume += weight;
-        for (int c = 0; c < 3; c++)
-            first[c] += weight * mean[c];
-        for (int k = 0; k < N; k++) {
-            const int i = AXIS[k][0], j = AXIS[k][1];
-            double own = 0;
-            for (int a = 0; a < corners; a++)
-                own += share * (xyz[3 * a + i] - mesh->xyz[i] - mean[i]) * (xyz[3 * a + j] - mesh->xyz[j] - mean[j]);
-            second[k] += weight * (mean[i] * mean[j] + own);
+                middle[c] += mesh->xyz[3 * node[a] + c] / corners;
+        if (e == 0 || !mesh->uniform)
+            volume = element_moments(own, model, e, middle);
+        all += volume;
+        for (int c = 0; c < 3; c++) {
+            from[c] = middle[c] - mesh->xyz[c];
+            first[c] += volume * from[c];
         }
+        for (int k = 0; k < N; k++)
+            second[k] += volume * (from[AXIS[k][0]] * from[AXIS[k][1]] + own[k]);
     }
     for (int k = 0; k < N; k++)
-        second[k] -= first[AXIS[k][0]] * first[AXIS[k][1]] / volume;
+        second[k] -= first[AXIS[k][0]] * first[AXIS[k][1]] / all;
     uz_principal(principal, second, N);
     return fmax(0, principal[2] / principal[0]);
 }
@@ -150,39 +249,28 @@ double uz_least_buckling_strain(const uz_body_model *model)
 /* The mean stress along the axis in which it is most, as a strain. */
 static double mean_strain(const sums *of)
 {
-    double principal[3];
-    uz_principal(principal, of->stress, N);
-    return of->modulus > 0 ? fmax(fabs(principal[0]), fabs(principal[2])) / of->modulus : 0;
+    double principal[3], stress[N];
+    for (int k = 0; k < N; k++)
+        stress[k] = total(&of->stress[k]);
+    uz_principal(principal, stress, N);
+    const double modulus = total(&of->modulus);
+    return modulus > 0 ? fmax(fabs(principal[0]), fabs(principal[2])) / modulus : 0;
 }
 
-double uz_measure_nonlinear(const uz_body_model *model, const double *u, double energy)
+uz_status uz_measure_nonlinear(double *out, const uz_body_model *model, const double *u, double energy, double buckling,
+                               uz_error *err)
 {
-    const int dim = model->mesh.dim;
-    sums all = {.model = model->kind, .part = uz_stress_count(model->kind) == 3 ? PLANE : SPACE};
-    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-        double xyz[3 * UZ_ELEMENT_NODES], grad[UZ_ELEMENT_NODES][3], around[UZ_ELEMENT_NODES];
-        uz_element element;
-        int nodes;
-        const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
-        uz_body_element(&element, xyz, model, e);
-        if (element.formulation != UZ_FORMULATION_STANDARD)
-            return NAN;
-        const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
-        for (int g = 0; g < rule->count; g++) {
-            double H[3][3] = {{0}};
-            const double det = uz_element_gradients(grad, &element, rule->point[g].at);
-            const double depth = uz_element_around(around, &element, grad, rule->point[g].at);
-            for (int a = 0; a < nodes; a++) { /* from the first: a translation leaves no rounding */
-                for (int i = 0; i < dim; i++)
-                    for (int j = 0; j < dim; j++)
-                        H[i][j] += (u[dim * node[a] + i] - u[dim * node[0] + i]) * grad[a][j];
-                H[2][2] += model->kind == UZ_AXISYMMETRIC ? u[dim * node[a]] * around[a] : 0;
-            }
-            add_point(&all, rule->point[g].weight * det * depth, &element.lame, H);
-        }
-    }
-    const double part = mean_strain(&all) / uz_least_buckling_strain(model);
-    const double aside = all.gradient > 0 ? sqrt(all.turns / all.gradient) : 0;
-    return fmax(part * fmax(2 * UZ_SURELY_SMALL, aside),
-                (sqrt(all.squares) + sqrt(all.law)) / sqrt(2 * energy) + fabs(all.along) / (2 * energy));
+    sums all = {.model = model, .part = uz_stress_count(model->kind) == 3 ? PLANE : SPACE};
+    const uz_strain_source from = {.model = model, .nodal = u};
+    const uz_strain_work work = {make_rule, take, &all};
+    const uz_status status = uz_strain_groups(&work, &from, NULL, err);
+    *out = NAN;
+    if (status != UZ_OK || all.nonstandard)
+        return status;
+    const double part = mean_strain(&all) / buckling, gradient = total(&all.gradient);
+    const double aside = gradient > 0 ? sqrt(total(&all.turns) / gradient) : 0;
+    *out = fmax(part * fmax(2 * UZ_SURELY_SMALL, aside),
+                (sqrt(total(&all.squares)) + sqrt(total(&all.law))) / sqrt(2 * energy) +
+                    fabs(total(&all.along)) / (2 * energy));
+    return UZ_OK;
 }

@@ -156,7 +156,7 @@ static void look_at_elements(const doubts *d)
 
 /* Could uz_measure_nonlinear come to anything? Gradients are at most about four times the slope that is_steep finds,
  * and the body's energy norm is known. */
-static bool may_be_nonlinear(const doubts *d)
+static bool may_be_nonlinear(const doubts *d, double buckling)
 {
     const uz_mesh *mesh = &d->model->mesh;
     const bool ring = d->model->kind == UZ_AXISYMMETRIC;
@@ -170,8 +170,7 @@ static bool may_be_nonlinear(const doubts *d)
         around = fmax(around, r > 0 ? fabs(d->u[2 * i]) / r : 0); /* on the axis it is a slope */
     }
     const double most = sqrt(stiffest * extent * extent * depth), least = 0.25 * UZ_SURELY_SMALL;
-    const double buckles = UZ_SURELY_SMALL * uz_least_buckling_strain(d->model);
-    const double steep = 0.25 * fmin(buckles, fmin(least, sqrt(2 * least * sqrt(2 * U) / most)));
+    const double steep = 0.25 * fmin(UZ_SURELY_SMALL * buckling, fmin(least, sqrt(2 * least * sqrt(2 * U) / most)));
     return U > 0 && (around > steep || is_steep(d, steep));
 }
 
@@ -555,15 +554,22 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
         model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
     if (is_steep(&d, 0.25 * fmin(MOST_STRAIN, MOST_ROTATION)))
         look_at_elements(&d);
+    uz_status status = UZ_OK;
     d.out->nonlinear = NAN;
     if (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_model(scene) &&
-        (uz_has_finite_law(scene) || model->d <= UZ_MOST_COMPARED))
-        d.out->nonlinear = may_be_nonlinear(&d) ? uz_measure_nonlinear(model, result->u, d.out->strain_energy) : 0;
+        (uz_has_finite_law(scene) || model->d <= UZ_MOST_COMPARED)) {
+        const double buckling = uz_least_buckling_strain(model);
+        d.out->nonlinear = 0;
+        if (may_be_nonlinear(&d, buckling))
+            status = uz_measure_nonlinear(&d.out->nonlinear, model, result->u, d.out->strain_energy, buckling, err);
+    }
+    if (status != UZ_OK)
+        return status;
     look_at_materials(&d);
     look_at_turns(&d);
     look_at_mesh(&d);
     look_at_surfaces(&d);
-    uz_status status = look_at_contact(&d, err);
+    status = look_at_contact(&d, err);
     for (int64_t k = 0, row = 0; k < scene->n_contacts && status == UZ_OK; k++) {
         const uz_overlap *o = &d.out->overlap[k];
         const double approach = d.out->approach, scale = fmax(approach, o->depth);

@@ -75,11 +75,35 @@ static void compare_lane(const four_elements *f, const uz_strain_rule *rule, con
     }
 }
 
+/* Derivatives of the displacements alone, whatever the formulation adds to them. */
+static void compare_gradients(const four_elements *f, const uz_strain_rule *rule, uz_lanes H[POINTS][3][3], int l)
+{
+    const uz_element *element = &f->element[l];
+    for (int g = 0; g < rule->points; g++) {
+        double grad[NODES][3], around[NODES], want[3][3] = {{0}}, size = 0;
+        const double *point = uz_element_rule(rule->kind, rule->model)->point[g].at;
+        uz_element_gradients(grad, element, point);
+        uz_element_around(around, element, grad, point);
+        for (int a = 0; a < rule->nodes; a++) {
+            for (int c = 0; c < rule->dim; c++)
+                for (int j = 0; j < rule->dim; j++)
+                    want[c][j] += f->u[l][a * rule->dim + c] * grad[a][j];
+            want[2][2] += rule->model == UZ_AXISYMMETRIC ? f->u[l][a * rule->dim] * around[a] : 0;
+        }
+        for (int i = 0; i < 9; i++)
+            size = fmax(size, fabs(want[i / 3][i % 3]));
+        for (int i = 0; i < 9; i++)
+            CHECK_MSG(fabs(H[g][i / 3][i % 3][l] - want[i / 3][i % 3]) < 1e-12 * size,
+                      "kind %d, model %d: derivative %d is %.17g, not %.17g", rule->kind, rule->model, i,
+                      H[g][i / 3][i % 3][l], want[i / 3][i % 3]);
+    }
+}
+
 TEST(strains_in_lanes_are_those_of_single_elements)
 {
     static const uz_formulation ASKED[] = {UZ_FORMULATION_STANDARD, UZ_FORMULATION_BBAR, UZ_FORMULATION_INCOMPATIBLE};
     qp_random rng = {2024};
-    uz_lanes strain[POINTS][STRESSES];
+    uz_lanes strain[POINTS][STRESSES], H[POINTS][3][3];
     for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
         for (int k = 0; k < 9; k++) {
             four_elements f;
@@ -90,8 +114,11 @@ TEST(strains_in_lanes_are_those_of_single_elements)
             uz_strain_rule_at(&rule, f.element[0].kind, f.element[0].model, f.element[0].formulation, NULL, NULL, 0);
             uz_lane_shape_of(&shape, &rule, f.x, f.element[0].thickness);
             uz_lane_strains(strain, &rule, &shape, &f.material, f.displacement);
-            for (int l = 0; l < LANES; l++)
+            uz_lane_gradients(H, &rule, &shape, f.displacement);
+            for (int l = 0; l < LANES; l++) {
                 compare_lane(&f, &rule, &shape, strain, l);
+                compare_gradients(&f, &rule, H, l);
+            }
         }
 }
 
