@@ -18,7 +18,7 @@ PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-
             libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libdeflate-dev libexpat1-dev libpng-dev libgmp-dev \
             libpq-dev
 TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev valgrind \
-                 postgresql pgbouncer haproxy python3-yaml nodejs git mandoc librsvg2-bin libgmp-dev zsh fish
+                 postgresql pgbouncer haproxy python3-yaml nodejs git mandoc librsvg2-bin gmsh libgmp-dev zsh fish
 
 # The web page's bundler and libraries; the browser that tests it.
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape

@@ -19,7 +19,7 @@ _uzawa() {
     done
     case $command in
     '') options='--server --timeout --retry --help --version'; words=$commands ;;
-    submit) options='--K --N --h --p --mesh --surface --leave-out --set --vary --wait --timeout --tag --name --key --junit --baseline --tolerance --progress --quiet --json --context --server --retry --help --version ' ;;
+    submit) options='--K --N --h --p --mesh --size --surface --leave-out --set --vary --wait --timeout --tag --name --key --junit --baseline --tolerance --progress --quiet --json --context --server --retry --help --version ' ;;
     import) options='--leave-out --output --quiet --json --context --server --timeout --retry --help --version ' ;;
     upload) options='--json --context --server --timeout --retry --help --version ' ;;
     status) options='--json --context --server --timeout --retry --help --version ' ;;
@@ -50,6 +50,7 @@ _uzawa() {
     submit--h) files=1 ;;
     submit--p) files=1 ;;
     submit--mesh) files=1 ;;
+    submit--size) words='' ;;
     submit--surface) files=1 ;;
     submit--set) words='' ;;
     submit--vary) words='' ;;

@@ -57,7 +57,8 @@ _uzawa() {
             '--N[the contact normals, a row for each contact]:FILE:_files' \
             '--h[the initial gaps]:FILE:_files' \
             '--p[the load]:FILE:_files' \
-            '--mesh[a mesh file (Gmsh, Abaqus, CalculiX, NASTRAN, VTK) in place of the scene'\''s mesh]:FILE:_files' \
+            '--mesh[a mesh file (Gmsh, Abaqus, CalculiX, NASTRAN, VTK) or a part from CAD (STEP, IGES, BREP) in place of the scene'\''s mesh]:FILE:_files' \
+            '--size[of a part from CAD\: the length of its elements, in mm]:H: ' \
             '--surface[an STL or OBJ file for each obstacle {"surface"\: {}} of the scene that names no file itself]:FILE:_files' \
             '--leave-out[of a deck, leave out what a scene has no words for, although the answer is another one with it]' \
             '*--set[put VALUE, as JSON or else as a string, at PATH of the request; may be repeated]:PATH=VALUE: ' \

@@ -16,8 +16,12 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
          "FILE is a request in JSON, \"-\" is standard input. Prints the job's id, and with --wait its summary. A "
          "repeat after a lost connection never makes a second job.\n"
          "FILE may be a deck of Abaqus or CalculiX (.inp): the service makes a scene of it, and what is not in that as "
-         "it "
-         "was is told on stderr, line by line.\n"
+         "it was is told on stderr, line by line.\n"
+         "FILE, or the file of --mesh, may be a part from CAD (.step, .stp, .iges, .igs, .brep), of which the program "
+         "gmsh (Debian: gmsh) makes quadratic tetrahedra of the length --size, in mm. Its groups are face1, face2, "
+         "..., "
+         "which are listed on stderr with where they are, and body1, ...; materials, supports, loads and contacts come "
+         "by --set, or are those of a scene in FILE.\n"
          "A problem in matrices needs no FILE: --K, --N, --h and --p name files in Matrix Market form. With FILE they "
          "replace its matrices. Files of more than 64 KiB, and compressed or binary ones, are uploaded, unless the "
          "service has them already.\n"
@@ -129,7 +133,10 @@ static const uz_option OPTIONS[] = {
     OPTION("h", 0, WORD, h, IN(SUBMIT), .value = "FILE", .about = "the initial gaps"),
     OPTION("p", 0, WORD, p, IN(SUBMIT), .value = "FILE", .about = "the load"),
     OPTION("mesh", 0, WORD, mesh, IN(SUBMIT), .value = "FILE",
-           .about = "a mesh file (Gmsh, Abaqus, CalculiX, NASTRAN, VTK) in place of the scene's mesh"),
+           .about = "a mesh file (Gmsh, Abaqus, CalculiX, NASTRAN, VTK) or a part from CAD (STEP, IGES, BREP) in place "
+                    "of the scene's mesh"),
+    OPTION("size", 0, NUMBER, size, IN(SUBMIT), .value = "H", .unit = "mm",
+           .about = "of a part from CAD: the length of its elements, in mm"),
     OPTION("surface", 0, WORD, surface, IN(SUBMIT), .value = "FILE",
            .about = "an STL or OBJ file for each obstacle {\"surface\": {}} of the scene that names no file itself"),
     OPTION("leave-out", 0, FLAG, leave_out, IN(SUBMIT) | IN(IMPORT),

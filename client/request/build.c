@@ -2,6 +2,7 @@
 #include "request/paths.h"
 #include "request/tags.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -116,23 +117,46 @@ static client_exit put_surface(client_session *s, json_t *request, const char *p
     return code;
 }
 
+/* The file that the mesh is of, and what --size has to do with it. */
+static client_exit find_mesh(client_session *s, const char **of_mesh)
+{
+    const client_options *o = s->options;
+    const bool cad = client_is_cad(o->operand) || client_is_cad(o->mesh);
+    *of_mesh = client_is_cad(o->operand) ? o->operand : o->mesh;
+    if (client_is_cad(o->operand) && o->mesh)
+        return client_complain(s, CLIENT_USAGE,
+                               "a FILE from CAD is the mesh: leave --mesh out, or let FILE be the scene");
+    if (cad && !(o->size > 0))
+        return client_complain(s, CLIENT_USAGE, "a part from CAD wants --size, the length of its elements in mm");
+    if (!cad && !isnan(o->size))
+        return client_complain(s, CLIENT_USAGE, "--size is of a part from CAD, such as a STEP file");
+    return CLIENT_OK;
+}
+
 client_exit client_build_files(client_session *s, json_t *request)
 {
     const client_options *o = s->options;
     const struct {
         const char *key, *path;
     } matrices[] = {{"K", o->K}, {"N", o->N}, {"h", o->h}, {"p", o->p}};
-    client_exit code = CLIENT_OK;
-    if (o->mesh) {
+    const char *of_mesh;
+    client_exit code = find_mesh(s, &of_mesh);
+    if (code != CLIENT_OK)
+        return code;
+    if (of_mesh) {
         json_t *problem = problem_of(s, request, "scene"), *mesh = json_object();
-        code = problem && mesh ? client_put_file(s, mesh, mesh_format(o->mesh), o->mesh) : CLIENT_USAGE;
+        if (!problem || !mesh)
+            code = CLIENT_USAGE;
+        else
+            code = client_is_cad(of_mesh) ? client_put_cad(s, mesh, of_mesh)
+                                          : client_put_file(s, mesh, mesh_format(of_mesh), of_mesh);
         if (problem)
             json_object_set(problem, "mesh", mesh);
         json_decref(mesh);
     }
     if (o->surface && code == CLIENT_OK)
         code = put_surface(s, request, o->surface);
-    if (o->mesh || o->surface)
+    if (of_mesh || o->surface)
         return code;
     if (!o->K && !o->N && !o->h && !o->p)
         return CLIENT_OK;
@@ -193,6 +217,8 @@ static client_exit build_edited(client_session *s, client_bodies *out, const cli
     client_exit code = CLIENT_OK;
     if (client_is_deck(o->operand))
         code = client_build_deck(s, &request, o->operand, false);
+    else if (client_is_cad(o->operand)) /* the rest of the scene is that of --set */
+        request = json_pack("{s:{s:s, s:s}}", "problem", "kind", "scene", "model", "solid");
     else
         request = o->operand ? json_loadb(file->data, file->len, JSON_REJECT_DUPLICATES, &error) : json_object();
     if (code != CLIENT_OK) {
@@ -250,10 +276,11 @@ client_exit client_build(client_session *s, client_bodies *out)
     client_buffer file = {0};
     client_exit code;
     *out = (client_bodies){0};
-    if (o->operand && !client_is_deck(o->operand) && !client_file_read(&file, o->operand, message, sizeof message))
+    const bool made = client_is_deck(o->operand) || client_is_cad(o->operand); /* a request is made of it */
+    if (o->operand && !made && !client_file_read(&file, o->operand, message, sizeof message))
         return client_complain(s, CLIENT_LOCAL, message);
     if (o->K || o->N || o->h || o->p || o->mesh || o->surface || o->set.count || o->vary.count || o->name ||
-        client_is_deck(o->operand)) {
+        !isnan(o->size) || made) {
         code = build_edited(s, out, &file);
     } else {
         out->item = calloc(1, sizeof *out->item);

@@ -24,6 +24,11 @@ void client_bodies_clear(client_bodies *bodies);
 
 /* The file as the text of a JSON string or as an upload, under the key. path NULL: nothing is put. */
 client_exit client_put_file(client_session *s, json_t *to, const char *key, const char *path);
+/* By its name: a part from a CAD program (STEP, IGES, BREP). */
+bool client_is_cad(const char *path);
+/* Puts the mesh that gmsh makes of the part, in elements of the length options->size, and tells of its faces on s->err.
+ * CLIENT_LOCAL: gmsh is not installed, makes no mesh, or takes more than it may. */
+client_exit client_put_cad(client_session *s, json_t *mesh, const char *path);
 /* By its name: a deck of Abaqus or CalculiX. */
 bool client_is_deck(const char *path);
 /* The request that the service makes of a deck, new; what is not in it is told on s->err, with `all` also what does not

@@ -20,7 +20,7 @@ Architecture: $architecture
 Maintainer: $(git log -1 --format='%an <%ae>' 2>/dev/null || echo nobody)
 Installed-Size: $(du -sk --exclude=DEBIAN "$root" | cut -f1)
 Depends: $depends
-Suggests: librsvg2-bin
+Suggests: gmsh, librsvg2-bin
 Section: science
 Priority: optional
 Description: contact solver service

@@ -145,7 +145,7 @@ UZ_AVX2_FMA static void add_group_fused(sums *to, const uz_strain_group *group, 
 static void take(void *ctx, const uz_strain_group *group)
 {
     sums *to = ctx;
-    uz_lanes modulus;
+    uz_lanes modulus = {0};
     for (int l = 0; l < UZ_STRAIN_LANES; l++) {
         if (group->lame[l] != to->of) {
             to->of = group->lame[l];

@@ -93,6 +93,7 @@ PHRASES = {
     "A ring of 9.5..10.5 that is squeezed by a twentieth of its height errs by 7.7 % and turns by less than 0.1 rad": None,  # test_weigh
     "a cantilever of 10 x 0.2 errs by 3.5 % where its end turns by 0.06.": None,  # the same
     "no row is closer than -1e-9 of the body's extent": None, "no deeper than 0.03 of the side": constant(0.03, r"#define CUTS_IN +([\d.]+)"),
+    "It runs for ten minutes of processor time and in 8 GiB at most.": lambda program: all(one in (program.root / "client/request/cad.c").read_text() for one in ("MOST_SECONDS 600", "(rlim_t)8 << 30")),
     "(rows leave 0.01 at most": constant(0.01, r"#define SLACK ([\d.]+)"),
     "are off the circle by 0.004, where the overlap that makes all of the stress is 0.05": None,  # of its geometry
     "Finite Element Analysis, 2nd edition, 2008": None, "Numerical Optimization, 2nd edition, 2006": None,
