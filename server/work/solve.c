@@ -115,24 +115,15 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
     solve_count(&out->figures, out->results, out->n);
 }
 
-/* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */
-#define ASSEMBLY_BYTES 1000.0
-/* Beyond it a prediction takes minutes. */
-#define PREDICTED_MOST 4e6
-
 bool solve_predict(uz_prediction *out, const solve_with *with, char *body, size_t body_len)
 {
     codec_request request = {0};
     problem_details ignored = {0};
     uz_error err = {.status = UZ_OK};
-    const size_t limit = with->memory_limit;
-    int64_t m, n_u;
     bool known = codec_decode(&request, CODEC_STORED, body, body_len, with->source, &ignored);
     free(body);
-    request.settings.memory_limit = limit;
+    request.settings.memory_limit = with->memory_limit;
     known = known && !request.settings.semidefinite && !request.problem.scene.refine &&
-            codec_request_sizes(&request, &m, &n_u, &ignored) && (double)n_u < PREDICTED_MOST &&
-            (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit) &&
             uz_predict(out, &request.problem, &request.settings, with->hooks, &err) == UZ_OK;
     codec_request_clear(&request);
     return known;

@@ -114,8 +114,8 @@ uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u,
 
 /* What a solve will take after the assembly, by the same model that chooses the operator (summary.cost): from the
  * pattern of the matrices, nothing is factored. Takes as long as assembly and symbolic analysis do. Errors: those of
- * uz_scene_to_qp; UZ_ERR_CANCELLED. A body that only the obstacle holds is UZ_ERR_FREE_BODY: no model counts its
- * rounds. */
+ * uz_scene_to_qp; UZ_ERR_CANCELLED; UZ_ERR_LIMIT: matrices that take minutes to analyse, or more than the memory
+ * limit. A body that only the obstacle holds is UZ_ERR_FREE_BODY: no model counts its rounds. */
 typedef struct {
     int64_t d, m, factor_nnz; /* factor_nnz 0: no factor is made, or not known */
     double bytes, seconds;    /* matrices, factor and vectors together; all load cases */

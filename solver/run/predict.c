@@ -8,6 +8,7 @@
 #include "run/rows.h"
 #include "run/settings.h"
 #include "run/setup.h"
+#include "scene/box.h"
 #include "uzawa.h"
 
 #include <stdlib.h>
@@ -71,12 +72,35 @@ static uz_status find_rows(uz_csc *N, int64_t *all, const uz_body_model *model, 
     return status;
 }
 
+/* Of matrices that have to be assembled, or analysed: about so many bytes for each dof, and up to so many dofs, beyond
+ * which it takes minutes. */
+#define ASSEMBLY_BYTES 1000.0
+#define MOST_ASSEMBLED 4e6
+
+static uz_status refuse_large(const uz_problem *problem, const uz_settings *settings, uz_error *err)
+{
+    const uz_scene *scene = &problem->scene;
+    const bool is_box = scene->source == UZ_MESH_BOX;
+    double dofs = (double)problem->qp.K.cols;
+    if (problem->kind == UZ_PROBLEM_SCENE) {
+        if (uz_setup_extent(problem, settings) == UZ_BODY_CELLS)
+            return UZ_OK;
+        dofs = uz_scene_dim(scene) * (is_box ? uz_box_node_count(&scene->box) : (double)scene->given.n_nodes);
+    }
+    if (dofs < MOST_ASSEMBLED &&
+        (settings->memory_limit == 0 || dofs * ASSEMBLY_BYTES < (double)settings->memory_limit))
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_LIMIT, "", "%.0f unknowns are too many for a prediction", dofs);
+}
+
 uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                      uz_error *err)
 {
     const bool scene = problem->kind == UZ_PROBLEM_SCENE;
     *out = (uz_prediction){.d = 0};
     uz_status status = uz_check_settings(settings, err);
+    if (status == UZ_OK)
+        status = refuse_large(problem, settings, err);
     if (status == UZ_OK && scene) {
         uz_body_model model;
         uz_csc N = {0};

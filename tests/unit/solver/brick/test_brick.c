@@ -5,6 +5,7 @@
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
+#include "sanitized.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -409,6 +410,27 @@ TEST(auto_takes_boxes_of_many_cells_and_tells_their_memory)
     result = solve_problem(&problem, &settings);
     CHECK_INT(result->summary.op, UZ_OPERATOR_CONDENSED);
     uz_result_free(result);
+    uz_scene_clear(&scene);
+}
+
+/* Boxes by their cells up to the largest scenes; what has to be assembled up to where that takes minutes, or more than
+ * the limit. */
+TEST(what_is_predicted_of_large_boxes)
+{
+    uz_scene scene = block_scene(112, 112, 112, 0.3);
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene};
+    uz_settings settings = uz_settings_default();
+    uz_prediction predicted;
+    uz_error err = {0};
+    if (!SANITIZED) {
+        CHECK_INT(uz_predict(&predicted, &problem, &settings, NULL, &err), UZ_OK);
+        CHECK(predicted.op == UZ_OPERATOR_MATRIX_FREE && predicted.d > 4000000 && predicted.d < 3 * 113 * 113 * 113);
+    }
+    problem.scene.box.grading[0] = 2;
+    CHECK_INT(uz_predict(&predicted, &problem, &settings, NULL, &err), UZ_ERR_LIMIT);
+    memcpy(problem.scene.box.cells, (int64_t[3]){50, 50, 50}, sizeof problem.scene.box.cells);
+    settings.memory_limit = (size_t)100 << 20;
+    CHECK_INT(uz_predict(&predicted, &problem, &settings, NULL, &err), UZ_ERR_LIMIT);
     uz_scene_clear(&scene);
 }
 
