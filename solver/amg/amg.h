@@ -115,6 +115,8 @@ typedef struct uz_cg_stop {
     int64_t max_iterations;
     const uz_hooks *hooks; /* asked in each iteration; may be NULL */
     double deadline;       /* uz_seconds() */
+    bool unchecked; /* the caller looks at the residual himself: where the recurrence meets the tolerance, its own
+                       is told in `last` and cg->r, and the true one is not computed. Kinds that solve may */
 } uz_cg_stop;
 
 typedef struct uz_cg_info {

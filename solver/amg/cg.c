@@ -107,5 +107,10 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
                 cg->p[j] = cg->z[j] + square / last * cg->p[j];
             info->iterations++;
         }
+        if (stop->unchecked && square <= goal * goal) {
+            info->last = uz_root(square);
+            info->met = true;
+            return UZ_OK;
+        }
     }
 }

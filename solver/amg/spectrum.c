@@ -72,8 +72,11 @@ static void random_residual(uz_cg *cg, const uz_csc *K)
         cg->r[j] = sqrt(K->val[K->ptr[j]]) * uz_normal(&state);
 }
 
-/* More steps would make the bound sharper by less than this. */
-#define ENOUGH 1.5
+/* The bound is sharp enough where it is this share of the least Ritz value, as the least eigenvalue is no larger than
+ * that, and where as many steps as between two checks make it sharper by less than the factor. Tolerances go by its
+ * root: further steps would not spare each solve a tenth of one. */
+#define NEAR_RITZ 0.4
+#define ENOUGH    1.5
 /* M is K but for rounding where there is one level only, and steps are cheap. */
 #define NEAR_ONE 0.9
 
@@ -108,12 +111,13 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
         c->alpha[c->count] = alpha;
         c->beta[c->count++] = beta;
         info->iterations = c->count;
-        if (status != UZ_OK || c->count % CHECK_EVERY != 0 || sqrt(square) >= share)
+        if (status != UZ_OK || sqrt(square) >= share)
             continue;
         info->lambda = excluded(c, sqrt(square) / share);
-        if (info->lambda > NEAR_ONE || (info->lambda > 0.0 && info->lambda < ENOUGH * before))
+        const bool checked = c->count % CHECK_EVERY == 0 && info->lambda > 0.0 && info->lambda < ENOUGH * before;
+        if (info->lambda > NEAR_ONE || info->lambda >= NEAR_RITZ * excluded(c, 0.0) || checked)
             return status;
-        before = info->lambda;
+        before = c->count % CHECK_EVERY == 0 ? info->lambda : before;
     }
     if (status == UZ_OK && most < STEPS_MOST && c->count == most)
         return uz_fail(err, UZ_ERR_LIMIT, "K", "conjugate gradients would take too many iterations: %d did not do",

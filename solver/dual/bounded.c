@@ -88,8 +88,8 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
  * times its diagonal. */
 #define ROW_SUM 4.0
 
-/* Where K has its diagonal only: the force by its product, and for size what a row of a mesh of equal cells may add up
- * to with the largest displacement that there is. */
+/* Where K has its diagonal only, or roughly does: the force by its product, and for size what a row of a mesh of equal
+ * cells may add up to with the largest displacement that there is. */
 static void balance_by_product(const uz_sparse_load *x)
 {
     uz_bounded *box = x->box;
@@ -104,12 +104,12 @@ static void balance_by_product(const uz_sparse_load *x)
     }
 }
 
-/* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to. */
-void uz_bounded_balance(const uz_sparse_load *x)
+/* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to; roughly: by an estimate of it. */
+void uz_bounded_balance(const uz_sparse_load *x, bool roughly)
 {
     uz_bounded *box = x->box;
     const uz_csc *K = x->load.K;
-    if (!uz_sparse_has_entries(x->load.dual)) {
+    if (roughly || !uz_sparse_has_entries(x->load.dual)) {
         balance_by_product(x);
         return;
     }

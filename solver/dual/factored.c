@@ -97,13 +97,13 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     solved = solved && x->part;
     most = uz_principal_bytes(x->part) + uz_principal_bytes(x->held);
     load->most = most > load->most ? most : load->most;
-    uz_bounded_balance(&x->sparse);
+    uz_bounded_balance(&x->sparse, false);
     for (int pass = 0; status == UZ_OK && solved && !wrong && pass < PASSES; pass++) {
         if ((solved = !uz_stop_is_due(&load->stop)))
             status = uz_principal_solve(box->force, x->part, err);
         for (int64_t j = 0; status == UZ_OK && solved && j < d; j++)
             box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
-        uz_bounded_balance(&x->sparse);
+        uz_bounded_balance(&x->sparse, false);
         if (one_tells && solved && pass + 1 < PASSES) {
             uz_bounded_react(&x->sparse, g, active);
             for (int64_t i = 0; !wrong && i < m; i++) {

@@ -309,7 +309,9 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err
 #define STARTED_TOLERANCE 1e-3
 #define NEXT_TOLERANCE    0.1
 /* Of the aim: below this a solve is as good as exact. */
-#define ACTIVE_FLOOR 0.2
+#define ACTIVE_FLOOR 0.5
+/* As far the residual of conjugate gradients is that of their answer, which is looked at afterwards anyway. */
+#define NO_DRIFT 1e-8
 
 /* u, r, g and active: at the coarse tolerance of the energy norm, and, while the guess still looks right, at the one
  * that is as good as exact. */
@@ -336,10 +338,11 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
         /* from 0 the first residual has the size of the solution */
         uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : tolerance * root, tolerance * norm * root);
         uz_cg_info info;
+        stop.unchecked = tolerance >= NO_DRIFT;
         status = uz_cg_solve(&info, box->u, cg, load->K, x->right, &stop, err);
         if (status != UZ_OK)
             break;
-        uz_bounded_balance(&x->sparse);
+        uz_bounded_balance(&x->sparse, tolerance > least);
         square = uz_dot(d, box->u, box->force) + uz_dot(d, box->u, box->p);
         uz_bounded_react(&x->sparse, g, active);
         go_on = info.met && tolerance > least;
@@ -355,12 +358,18 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     if (status != UZ_OK)
         return status;
     /* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears.
-     */
+     * Nobody bounds an answer by rows that pull. */
+    bool pulls = false;
     memcpy(e, box->force, (size_t)d * sizeof *e);
-    for (int64_t i = 0; i < m; i++)
+    for (int64_t i = 0; i < m; i++) {
         e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
-    status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
-    x->sparse.slack = x->held_slack = uz_root(uz_dot(d, e, x->cg.z) / load->dual->amg->info.lambda);
+        pulls = pulls || uz_reaction_pulls(box->r[i]);
+    }
+    x->sparse.slack = x->held_slack = INFINITY;
+    if (!pulls) {
+        status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
+        x->sparse.slack = x->held_slack = uz_root(uz_dot(d, e, x->cg.z) / load->dual->amg->info.lambda);
+    }
     /* psi(r) by u where no base tells it: -u'K u / 2 + r'h, u'K u = u'p + r'(h - g) */
     if (isinf(x->base_aim))
         load->psi0 = 0.5 * (uz_dot(m, box->r, load->h) - uz_dot(m, box->r, load->g0) - uz_dot(d, box->u, x->p));

@@ -231,6 +231,60 @@ TEST(plane_bodies_take_the_same_iterations_on_every_mesh)
     }
 }
 
+static int64_t cycles; /* of a counting kind */
+
+static uz_status count_cycles(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,
+                              const double *r, uz_error *err)
+{
+    cycles++;
+    return uz_aggregates_kind.apply(mg, K, room, z, r, err);
+}
+
+/* What a solve ends with: the cycles that it took, *last as it tells it, and the same of the true residual. */
+static int64_t cycles_of_solve(double *last, double *actual, pair *p, bool unchecked)
+{
+    const int64_t n = p->K.cols;
+    double *b = random_vector(n, 3), *x = vector(n), *z = vector(n);
+    uz_error err = {0};
+    uz_cg_info info;
+    const uz_cg_stop stop = {.relative = 1e-6, .max_iterations = 100, .deadline = INFINITY, .unchecked = unchecked};
+    cycles = 0;
+    CHECK(uz_cg_solve(&info, x, &p->cg, &p->K, b, &stop, &err) == UZ_OK && info.met);
+    const int64_t count = cycles;
+    CHECK(info.last <= 1e-6 * info.first);
+    *last = info.last;
+    uz_csc_symv(b, &p->K, -1.0, x);
+    CHECK(uz_multigrid_apply(p->amg->mg, &p->K, p->cg.room, z, b, &err) == UZ_OK);
+    *actual = sqrt(dot(z, b, n));
+    free(b);
+    free(x);
+    free(z);
+    return count;
+}
+
+TEST(a_residual_that_others_look_at_is_not_looked_at_twice)
+{
+    pair p = open_plane(paper_scene(60, 20), true);
+    uz_multigrid_kind counting = uz_aggregates_kind;
+    double last, actual;
+    counting.apply = count_cycles;
+    p.amg->mg->kind = &counting;
+    const int64_t checked = cycles_of_solve(&last, &actual, &p, false);
+    CHECK_REL(last, actual, 1e-8);
+    CHECK_INT(cycles_of_solve(&last, &actual, &p, true), checked - 1);
+    CHECK_REL(last, actual, 1e-6); /* the recurrence's has hardly drifted */
+    p.amg->mg->kind = &uz_aggregates_kind;
+    close_pair(&p);
+}
+
+TEST(bounds_end_near_the_least_ritz_value)
+{
+    pair p = open_brick((const int64_t[]){10, 10, 10}, (const double[]){1, 1, 1}, 0.3);
+    CHECK_MSG(p.info.iterations <= 25, "%lld steps for the bound", (long long)p.info.iterations);
+    check_bound(&p, 0.2);
+    close_pair(&p);
+}
+
 TEST(plane_bodies_known_by_their_matrix_alone)
 {
     pair p = open_plane(paper_scene(60, 20), false);
