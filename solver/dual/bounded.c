@@ -64,7 +64,7 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
     const int64_t d = x->load.dual->d, m = x->load.dual->m;
     if (box->contradictory)
         return false;
-    box->has_exact = false;
+    x->known_u = x->known_r = NULL;
     for (int64_t j = 0; j < d; j++)
         box->holder[j] = -1;
     for (int64_t i = 0; i < m; i++) {
@@ -365,7 +365,7 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
     if (!box || box->contradictory || !uz_sparse_has_entries(load->dual)) /* sweeps go by the entries of K */
         return false;
     /* The energy only falls, so the points converge to the solution whatever the exact steps do. */
-    const bool there = approach(box, K, box->has_exact ? box->u : x->base, x->work);
+    const bool there = approach(box, K, x->known_u ? box->u : x->base, x->work);
     (void)energy(box, K, box->point);
     const bool room = enter_region(&near, box, K, !there);
     int64_t before = -1;

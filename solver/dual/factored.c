@@ -83,7 +83,8 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     bool solved = true, wrong = false;
     if (!box)
         return uz_multipliers_solve(&x->sparse, x->ws, end, r, g, active, err);
-    const bool again = box->has_exact, one_tells = again && uz_factor_describe(load->dual->factor).rcond > LEAST_RCOND;
+    const bool again = x->sparse.known_u != NULL,
+               one_tells = again && uz_factor_describe(load->dual->factor).rcond > LEAST_RCOND;
     if (!uz_bounded_hold(&x->sparse, active, again)) {
         *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
         return UZ_OK;
@@ -119,7 +120,8 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
         return status;
     uz_bounded_react(&x->sparse, g, active);
     memcpy(r, box->r, (size_t)m * sizeof *r);
-    box->has_exact = true;
+    x->sparse.known_u = box->u;
+    x->sparse.known_r = box->r;
     *end = UZ_ACTIVE_SOLVED;
     return UZ_OK;
 }

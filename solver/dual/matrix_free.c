@@ -48,7 +48,7 @@ typedef struct {
     uz_stop stop;
     double base_slack; /* of base = K^-1 p, */
     double base_aim;   /* and what it was solved for; INFINITY: not at all, it is 0 */
-    double held_slack; /* of box->u, while box->has_exact */
+    double held_slack; /* of known_u, while it is there */
     int refused;       /* guesses that were left to steps of the active set */
     bool asked;        /* for D r, before */
     bool started;      /* on coarser grids */
@@ -150,17 +150,17 @@ static void probe(uz_dual_load *load, bool begin, double accuracy)
 static bool apply_known(free_load *x, double *Dr, const double *r)
 {
     uz_dual_load *load = &x->sparse.load;
-    const uz_bounded *box = x->sparse.box;
+    const double *u = x->sparse.known_u;
     const int64_t d = load->dual->d, m = load->dual->m;
-    bool zero = !x->probing, guessed = !x->probing && box && box->has_exact;
+    bool zero = !x->probing, guessed = !x->probing && u;
     for (int64_t i = 0; i < m && (zero || guessed); i++) {
         zero = zero && r[i] == 0.0;
-        guessed = guessed && r[i] == box->r[i];
+        guessed = guessed && r[i] == x->sparse.known_r[i];
     }
     if (!zero && !guessed)
         return false;
     for (int64_t j = 0; j < d; j++)
-        x->sparse.response[j] = guessed ? box->u[j] - x->sparse.base[j] : 0.0;
+        x->sparse.response[j] = guessed ? u[j] - x->sparse.base[j] : 0.0;
     memset(Dr, 0, (size_t)m * sizeof *Dr);
     uz_csc_gaxpy(Dr, &load->dual->N, 1.0, x->sparse.response);
     x->sparse.slack = guessed ? x->held_slack : x->base_slack;
@@ -389,7 +389,8 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     if (x->coarse <= 0.0)
         x->coarse = FIRST_TOLERANCE;
     const uz_status status = solve_stepwise(x, r, g, active, err);
-    box->has_exact = status == UZ_OK;
+    x->sparse.known_u = status == UZ_OK ? box->u : NULL;
+    x->sparse.known_r = status == UZ_OK ? box->r : NULL;
     *end = status == UZ_OK ? UZ_ACTIVE_SOLVED : UZ_ACTIVE_UNSOLVED;
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }

@@ -169,11 +169,11 @@ uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool
     int64_t d = load->dual->d;
     uz_status status = UZ_OK;
     /* The displacement of the last guess if r is its answer: no error of K^-1 on the whole body is in it. */
-    bool guessed = x->box && x->box->has_exact;
+    bool guessed = x->known_u != NULL;
     for (int64_t i = 0; guessed && i < load->dual->m; i++)
-        guessed = r[i] == x->box->r[i];
+        guessed = r[i] == x->known_r[i];
     if (guessed) {
-        memcpy(u, x->box->u, (size_t)d * sizeof *u);
+        memcpy(u, x->known_u, (size_t)d * sizeof *u);
     } else {
         status = load->dual->form->apply(load, x->work, r, err);
         for (int64_t j = 0; j < d; j++)

@@ -20,7 +20,6 @@ typedef struct {
     bool contradictory;     /* some bottom lies above its top */
     int64_t *holder;        /* d: the row that holds the dof in the current guess, -1: free */
     bool *fixed;            /* d: holder >= 0 */
-    bool has_exact;         /* u and r are those of the last guess, to rounding */
     double *u, *r;          /* d, m */
     double *force, *size;   /* d: a residual of equilibrium and what its rounding is in proportion to */
     double *point;          /* d: where the sweeps ended; energy INFINITY before the first */
@@ -36,13 +35,15 @@ typedef struct {
 /* Corrections are c (d). */
 typedef struct {
     uz_dual_load load;
-    double *base;            /* d: u0 = K^-1 p */
-    double *response;        /* d: K^-1 N'r of the last apply */
-    double *work, *work2;    /* max(d, m) each */
-    double *weight;          /* d: 1 / K_ii: the metric in which penetrating rows are lifted */
-    double slack;            /* how far u(r) is from what the last apply or solve_active left, in the energy norm */
-    uz_bounded *box;         /* with bounds, else NULL */
-    uz_multigrid_room *room; /* the form's, who frees it; NULL: it has none */
+    double *base;         /* d: u0 = K^-1 p */
+    double *response;     /* d: K^-1 N'r of the last apply */
+    double *work, *work2; /* max(d, m) each */
+    double *weight;       /* d: 1 / K_ii: the metric in which penetrating rows are lifted */
+    double slack;         /* how far u(r) is from what the last apply or solve_active left, in the energy norm */
+    uz_bounded *box;      /* with bounds, else NULL */
+    const double *known_u, *known_r; /* d, m: the displacement and reactions of the last guess of the active rows; NULL:
+                                      * it has no answer */
+    uz_multigrid_room *room;         /* the form's, who frees it; NULL: it has none */
 } uz_sparse_load;
 
 /* Operations, or most of them: create, clear; load: with a base of zeros, and then from the base. */
