@@ -12,7 +12,8 @@
  * operator (an aim of 0) the share is EXACT_CHANGE, which no test of a step or its direction can tell from 0.
  *
  * Given rows as equations, where each row bounds a single dof: conjugate gradients on the dofs that are free, with the
- * others held in the multigrid of the whole body. */
+ * others held in the multigrid of the whole body; other rows: on the displacements that obey them (projected.h). */
+#include "dual/projected.h"
 #include "dual/sparse.h"
 
 #include "core/alloc.h"
@@ -57,7 +58,18 @@ typedef struct {
     bool probing;      /* r is a vector of any size: the answer's says nothing about how accurate D r must be */
     double coarse;     /* accuracy at which the next guess of the active rows is judged */
     double *right;     /* d: a right-hand side */
+    double *u, *r;     /* d, m: the last answer of rows of many entries; NULL: none was asked for */
+    int guesses;       /* of these rows so far, most of which were wrong */
 } free_load;
+
+/* Guesses of rows of many entries that are solved for before iterations do better. */
+enum { GUESSES_MOST = 40 };
+
+/* Have the rows an active set, so that answers need not come from the base? */
+static bool may_hold(const free_load *x)
+{
+    return x->sparse.box || (!x->cg.mg->kind->solve && !x->cg.mg->knows_K && x->guesses < GUESSES_MOST);
+}
 
 static uz_cg_stop stop_at(const free_load *x, double relative, double absolute)
 {
@@ -125,6 +137,8 @@ static void unload(uz_dual_load *load)
     uz_cg_clear(&x->cg);
     free(x->p);
     free(x->right);
+    free(x->u);
+    free(x->r);
     uz_sparse_unload(&x->sparse);
 }
 
@@ -134,7 +148,7 @@ static uz_status aim_at(uz_dual_load *load, double relative_error, uz_error *err
     x->tight = relative_error > 0.0 ? CHANGE_KEPT : EXACT_CHANGE;
     x->aim = relative_error > 0.0 ? relative_error : EXACT_AIM;
     x->stop = load->stop;
-    return x->sparse.box ? UZ_OK : solve_base(x, BASE_FLOOR * x->aim, err);
+    return may_hold(x) ? UZ_OK : solve_base(x, BASE_FLOOR * x->aim, err);
 }
 
 static void probe(uz_dual_load *load, bool begin, double accuracy)
@@ -313,6 +327,22 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err
 /* As far the residual of conjugate gradients is that of their answer, which is looked at afterwards anyway. */
 #define NO_DRIFT 1e-8
 
+/* What u misses of K u = p + N'r, in the norm of K^-1; e (d): force - N'r. Nobody bounds an answer by rows that pull.
+ */
+static uz_status measure_slack(free_load *x, const double *e, const double *r, uz_error *err)
+{
+    const uz_dual *dual = x->sparse.load.dual;
+    bool pulls = false;
+    for (int64_t i = 0; i < dual->m; i++)
+        pulls = pulls || uz_reaction_pulls(r[i]);
+    x->sparse.slack = x->held_slack = INFINITY;
+    if (pulls)
+        return UZ_OK;
+    const uz_status status = uz_multigrid_apply(x->cg.mg, x->sparse.load.K, x->cg.room, x->cg.z, e, err);
+    x->sparse.slack = x->held_slack = uz_root(uz_dot(dual->d, e, x->cg.z) / dual->amg->info.lambda);
+    return status;
+}
+
 /* u, r, g and active: at the coarse tolerance of the energy norm, and, while the guess still looks right, at the one
  * that is as good as exact. */
 static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active, uz_error *err)
@@ -357,37 +387,130 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     status = status == UZ_OK ? freed : status;
     if (status != UZ_OK)
         return status;
-    /* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears.
-     * Nobody bounds an answer by rows that pull. */
-    bool pulls = false;
+    /* the forces on free dofs, and on held ones what no row bears */
     memcpy(e, box->force, (size_t)d * sizeof *e);
-    for (int64_t i = 0; i < m; i++) {
+    for (int64_t i = 0; i < m; i++)
         e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
-        pulls = pulls || uz_reaction_pulls(box->r[i]);
-    }
-    x->sparse.slack = x->held_slack = INFINITY;
-    if (!pulls) {
-        status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
-        x->sparse.slack = x->held_slack = uz_root(uz_dot(d, e, x->cg.z) / load->dual->amg->info.lambda);
-    }
+    status = measure_slack(x, e, box->r, err);
     /* psi(r) by u where no base tells it: -u'K u / 2 + r'h, u'K u = u'p + r'(h - g) */
     if (isinf(x->base_aim))
         load->psi0 = 0.5 * (uz_dot(m, box->r, load->h) - uz_dot(m, box->r, load->g0) - uz_dot(d, box->u, x->p));
     return status;
 }
 
+/* Reactions that pull by less than this of the largest, times the tolerance, are what the solve has left. */
+#define WEAK 0.1
+
+/* From x->u, which obeys the rows, to K u = p + N'r on them: u, r, g, and e = K u - p - N'r in cg->q. *right: no row is
+ * seen to be wrong. */
+static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, double *g, const bool *active,
+                                 double tolerance, double norm, uz_error *err)
+{
+    uz_dual_load *load = &x->sparse.load;
+    const uz_dual *dual = load->dual;
+    const double root = sqrt(dual->amg->info.lambda);
+    uz_cg cg = x->cg;
+    uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : tolerance * root, tolerance * norm * root);
+    uz_cg_info info;
+    double largest = 0.0, *e = x->cg.q;
+    cg.mg = uz_projected_multigrid(part);
+    stop.unchecked = tolerance >= NO_DRIFT;
+    memcpy(x->right, x->p, (size_t)dual->d * sizeof *x->p);
+    uz_csc_gaxpy_t(x->right, &dual->N, 1.0, x->r); /* what the rows are known to bear is no residual */
+    uz_status status = uz_cg_solve(&info, x->u, &cg, load->K, x->right, &stop, err);
+    if (status == UZ_OK)
+        status = uz_projected_close(part, x->u, load->h, err);
+    if (status != UZ_OK)
+        return status;
+    uz_sparse_multiply(load, e, x->u);
+    uz_axpy(dual->d, -1.0, x->p, e);
+    status = uz_projected_react(part, x->r, e, err);
+    for (int64_t i = 0; i < dual->m; i++)
+        largest = fmax(largest, fabs(x->r[i]));
+    memcpy(g, load->h, (size_t)dual->m * sizeof *g);
+    uz_csc_gaxpy(g, &dual->N, -1.0, x->u);
+    *right = info.met;
+    for (int64_t i = 0; i < dual->m; i++) {
+        if (uz_reaction_pulls(x->r[i]) && fabs(x->r[i]) <= WEAK * tolerance * largest)
+            x->r[i] = 0.0;
+        g[i] = active[i] ? 0.0 : g[i];
+        *right = *right && !(active[i] ? uz_reaction_pulls(x->r[i]) : uz_gap_penetrates(g[i]));
+    }
+    uz_csc_gaxpy_t(e, &dual->N, -1.0, x->r);
+    return status;
+}
+
+/* Rows of many entries. *solved false: they depend on each other, or there were too many guesses. */
+static uz_status solve_rows(free_load *x, bool *solved, double *g, const bool *active, uz_error *err)
+{
+    uz_dual_load *load = &x->sparse.load;
+    const uz_dual *dual = load->dual;
+    const double least = ACTIVE_FLOOR * x->aim, most = uz_root(-2.0 * load->psi0);
+    double tolerance = fmax(least, x->coarse);
+    uz_projected *part = NULL;
+    *solved = false;
+    if (!x->u) {
+        x->u = uz_alloc(dual->d, sizeof *x->u);
+        x->r = uz_alloc_zero(dual->m, sizeof *x->r);
+        if (!x->u || !x->r)
+            return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows as equations", (long long)dual->m);
+        memcpy(x->u, x->sparse.base, (size_t)dual->d * sizeof *x->u);
+    }
+    uz_status status = uz_projected_create(&part, x->cg.mg, dual, x->sparse.weight, active, x->stop.hooks, err);
+    if (!part)
+        return status;
+    for (int64_t i = 0; i < dual->m; i++)
+        x->r[i] = active[i] ? x->r[i] : 0.0;
+    status = uz_projected_close(part, x->u, load->h, err);
+    for (bool right = true; status == UZ_OK && right; tolerance = least) {
+        uz_sparse_multiply(load, x->cg.q, x->u);
+        const double norm = fmin(uz_root(uz_dot(dual->d, x->u, x->cg.q)), most > 0.0 ? most : INFINITY);
+        status = solve_projected(x, part, &right, g, active, tolerance, norm, err);
+        right = right && tolerance > least;
+    }
+    if (status == UZ_OK)
+        status = measure_slack(x, x->cg.q, x->r, err);
+    x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
+    const size_t bytes = uz_projected_bytes(part) + 8 * (size_t)(dual->d + dual->m);
+    load->most = bytes > load->most ? bytes : load->most;
+    uz_projected_free(part);
+    *solved = status == UZ_OK;
+    return status;
+}
+
+static uz_status solve_active_rows(free_load *x, uz_active_end *end, double *r, double *g, const bool *active,
+                                   uz_error *err)
+{
+    bool solved = false;
+    uz_status status = UZ_OK;
+    x->sparse.known_u = x->sparse.known_r = NULL;
+    if (may_hold(x)) {
+        x->guesses++;
+        status = solve_rows(x, &solved, g, active, err);
+    }
+    if (!solved) {
+        x->guesses = GUESSES_MOST; /* from here on it iterates, from a base that is good enough for that */
+        return status == UZ_ERR_CANCELLED || status == UZ_OK ? solve_base(x, BASE_FLOOR * x->aim, err) : status;
+    }
+    memcpy(r, x->r, (size_t)x->sparse.load.dual->m * sizeof *r);
+    x->sparse.known_u = x->u;
+    x->sparse.known_r = x->r;
+    *end = UZ_ACTIVE_SOLVED;
+    return UZ_OK;
+}
+
 static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active, uz_error *err)
 {
     free_load *x = (free_load *)load;
     uz_bounded *box = x->sparse.box;
+    if (x->coarse <= 0.0)
+        x->coarse = FIRST_TOLERANCE;
     if (!box)
-        return UZ_OK;
+        return solve_active_rows(x, end, r, g, active, err);
     if (!uz_bounded_hold(&x->sparse, active, true)) {
         *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
         return UZ_OK;
     }
-    if (x->coarse <= 0.0)
-        x->coarse = FIRST_TOLERANCE;
     const uz_status status = solve_stepwise(x, r, g, active, err);
     x->sparse.known_u = status == UZ_OK ? box->u : NULL;
     x->sparse.known_r = status == UZ_OK ? box->r : NULL;

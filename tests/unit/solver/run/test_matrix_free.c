@@ -7,6 +7,7 @@
 #include "qp_fixture.h"
 #include "sanitized.h"
 #include "scene_fixture.h"
+#include "two_boxes.h"
 
 __attribute__((constructor)) static void settle_threads(void)
 {
@@ -491,4 +492,48 @@ TEST(the_dual_objective_of_the_history_is_that_of_the_other_forms)
     uz_result_free(results[0]);
     uz_result_free(results[1]);
     uz_problem_clear(&problem);
+}
+
+/* One block on another, whose top is turned: rows between two meshes, of which some touch. clamped: the lower one is
+ * held on the left, too, where rows at the corner have few free dofs. */
+static uz_problem pair_problem(bool clamped, double turn)
+{
+    const box_part a = {{0, 0}, {40, 20}, {40, 20}, "quad4"}, b = {{10, 20}, {20, 20}, {27, 27}, "quad4"};
+    uz_scene s = two(UZ_PLANE_STRAIN, UZ_ELASTIC_LINEAR, &a, &b, NULL);
+    s.kinematics = UZ_KINEMATICS_FIXED;
+    touch(&s, "bbottom", "atop");
+    body_hold(&s, "abottom", 0, 0, NAN);
+    if (clamped)
+        body_hold(&s, "aleft", 0, 0, NAN);
+    uz_support *top = body_hold(&s, "btop", 0, -0.02, NAN);
+    top->about[0] = 20;
+    top->about[1] = 40;
+    top->turn[2] = turn;
+    return (uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = s};
+}
+
+/* Which rows touch is guessed between two bodies as on an obstacle: a few solves, each with the rows as equations. */
+TEST(rows_between_two_bodies_have_an_active_set)
+{
+    for (int k = 0; k < 3; k++) {
+        const double asked[] = {1e-3, 1e-6, 1e-9};
+        uz_problem problem = pair_problem(k == 1, 0.004);
+        uz_settings exactly = settings_for(UZ_OPERATOR_CONDENSED, UZ_METHOD_AUTO, 1e-11),
+                    freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, asked[k]);
+        uz_result *exact = solve_problem(&problem, &exactly), *got = solve_problem(&problem, &freely);
+        if (exact && got) {
+            const uz_certificate *c = &got->summary.certificate;
+            CHECK_INT(got->summary.outcome, UZ_CONVERGED);
+            CHECK_INT(got->summary.method, UZ_METHOD_ACTIVE_SET);
+            CHECK_MSG(got->summary.iterations <= 12, "%lld guesses", (long long)got->summary.iterations);
+            CHECK(c->relative_error <= asked[k]);
+            CHECK(exact->summary.active > 3 && exact->summary.active < exact->summary.m);
+            CHECK_REL(got->summary.reaction_sum, exact->summary.reaction_sum, 10 * asked[k]);
+            CHECK(c->energy_dual <= exact->summary.certificate.energy_primal + 1e-12 * fabs(c->energy_primal));
+            CHECK(c->energy_primal >= exact->summary.certificate.energy_dual - 1e-12 * fabs(c->energy_primal));
+        }
+        uz_result_free(exact);
+        uz_result_free(got);
+        uz_problem_clear(&problem);
+    }
 }

@@ -332,6 +332,8 @@ TEST(matrix_free)
     check_scenario("matrix-free scene", fine, UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE, UZ_ORDERING_AUTO, false);
     check_scenario("matrix-free rows", dependent_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE, UZ_ORDERING_AUTO,
                    true);
+    check_scenario("matrix-free independent rows", leaning_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE,
+                   UZ_ORDERING_AUTO, false);
 }
 
 TEST(dependent_rows)
