@@ -61,6 +61,12 @@ bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list
             if (LOADS[k].vector && !decode_components(to->v, d, item, LOADS[k].key, 0, dim, NULL))
                 return false;
         }
+        to->has_point = json_get(item, "at") != NULL;
+        if (to->has_point && !decode_components(to->point, d, item, "at", 0, dim, NULL))
+            return false;
+        if (json_get(item, "moment") &&
+            !decode_components(to->moment + (dim == 2 ? 2 : 0), d, item, "moment", 0, dim == 2 ? 1 : 3, NULL))
+            return false;
         if (node) {
             to->kind = UZ_LOAD_NODE_FORCE;
             to->node = node->number < 1e15 ? (int64_t)node->number : INT64_MAX; /* no mesh has that one */
@@ -327,6 +333,17 @@ static bool decode_rotation(uz_support *to, decoding *d, const json_value *given
     return true;
 }
 
+static bool decode_rigid(uz_support *to, decoding *d, const json_value *given, int dim)
+{
+    static const char *const MOTIONS[] = {"ux", "uy", "uz", "rx", "ry", "rz"};
+    to->kind = UZ_SUPPORT_RIGID;
+    for (int c = 0; c < 3; c++) {
+        to->u[c] = json_number(json_get(given, MOTIONS[c]), (double)NAN);
+        to->turn[c] = PER_DEGREE * json_number(json_get(given, MOTIONS[3 + c]), (double)NAN);
+    }
+    return decode_components(to->about, d, given, "point", 0, dim, NULL);
+}
+
 static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
 {
     static const char *const COMPONENTS[] = {"ux", "uy", "uz"};
@@ -341,6 +358,8 @@ static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
             to->u[c] = json_number(json_get(item, COMPONENTS[c]), (double)NAN);
         to->kind = UZ_SUPPORT_COMPONENTS;
         if (rotation && !decode_rotation(to, d, rotation, dim))
+            return false;
+        if (json_get(item, "rigid") && !decode_rigid(to, d, json_get(item, "rigid"), dim))
             return false;
         if (json_get(item, "normal")) {
             to->kind = UZ_SUPPORT_NORMAL;

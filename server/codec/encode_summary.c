@@ -40,6 +40,17 @@ static void put_resultant(text *t, const char *key, const uz_resultant *r, const
                   4);
         text_numbers(t, "center", total->center, dim);
     }
+    if (r->rigid) {
+        double turned[3]; /* degrees */
+        for (int c = 0; c < 3; c++)
+            turned[c] = r->turned[c] * (180 / 3.14159265358979323846);
+        text_open(t, "rigid", '{');
+        text_numbers(t, "point", r->point, dim);
+        text_numbers(t, "displacement", r->moved, dim);
+        text_numbers(t, "rotation", dim == 2 ? turned + 2 : turned, dim == 2 ? 1 : 3);
+        text_numbers(t, "moment", dim == 2 ? r->about + 2 : r->about, dim == 2 ? 1 : 3);
+        text_close(t, '}');
+    }
     text_close(t, '}');
 }
 

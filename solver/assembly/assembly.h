@@ -81,13 +81,35 @@ typedef struct {
     uz_contact_surface surface[2]; /* what `on` and `with` are taken for */
 } uz_contact_sites;
 
+/* A group that moves as a rigid body: support UZ_SUPPORT_RIGID of the scene. */
+typedef struct {
+    int64_t support;
+    /* Nodes of it that tell its motion, -1: not needed. In the places of the first in `dof` is its translation at
+     * `point`, in those of the second its rotation times `size` (plane: in the first place; rings: none). */
+    int64_t anchor[3];
+    double point[3], size;
+} uz_rigid_group;
+
+/* Displacements along the axes of nodes that follow others': of node a the sum of share[k] (dim x dim, by rows) times
+ * the dofs of node[k], first[a] <= k < first[a + 1]; none: it has dofs of its own. */
+typedef struct {
+    int64_t *first; /* n_nodes + 1; NULL: nobody follows but hanging nodes (uz_mesh_amid) */
+    int64_t *node;
+    double *share;
+} uz_followers;
+
 typedef struct {
     int64_t d, m, n_fixed;
     uz_csc K;        /* d x d, lower triangle; of a brick only the diagonal */
     uz_brick *brick; /* what K is then; NULL: K has its entries, and K_fixed */
     uz_csc N;        /* m x d */
     uz_csc K_fixed;  /* d x n_fixed: what supported dofs do to free ones; p loses K_fixed times the prescribed values */
-    int64_t *dof;    /* n_nodes x dim: number of a free dof, -1 - k for supported dof k, UZ_NO_DOF at hanging nodes */
+    int64_t *dof;    /* n_nodes x dim: number of a free dof, -1 - k for supported dof k, UZ_NO_DOF at hanging nodes, and
+                      * at those of rigid groups but where their motions stand */
+    int64_t n_rigid;
+    uz_rigid_group *rigid;
+    int32_t *rigid_of; /* n_nodes: 1 + its rigid group; NULL: there are none */
+    uz_followers follow;
     int64_t *frame_of; /* n_nodes: 1 + place in info.rotated_node, <= 0: along the axes. NULL: all of them are */
     uz_mesh mesh;
     uz_mesh_info info; /* as uz_scene_to_qp gives it; its xyz is the mesh's own array */
@@ -171,6 +193,15 @@ void uz_gather_nodal(double *p, const uz_body_model *model, const double *f);
 
 /* The component of a vector at a node (dim) along its dof c; "x", "y", "z" or "its normal". */
 double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v);
+/* Is the node of a rigid group? Which; NULL: of none. */
+bool uz_is_rigid(const uz_body_model *model, int64_t node);
+const uz_rigid_group *uz_rigid_group_of(const uz_body_model *model, int64_t node);
+/* The nodes whose dofs carry node a, and their shares (uz_followers); 0: it has its own, or hangs in a body without
+ * rigid groups. */
+int64_t uz_carriers(const int64_t **node, const double **share, const uz_body_model *model, int64_t a);
+/* The motion of a group whose nodes have these displacements (n_nodes x dim): t at its point, w in radians. */
+void uz_rigid_motion(double t[3], double w[3], const uz_body_model *model, const uz_rigid_group *group,
+                     const double *nodal);
 /* Does the node stand on the axis of revolution? */
 bool uz_is_on_axis(const uz_body_model *model, int64_t node);
 const char *uz_dof_name(const uz_body_model *model, int64_t node, int c);

@@ -147,16 +147,23 @@ static void put_supports(uz_buffer *key, const uz_scene *scene, int dim)
     }
     put_int(key, -1);
     free(sorted);
-    /* What stands in no axis's way: springs, and inclined normals, which turn nodes in their order. */
+    /* What stands in no axis's way: springs, rigid groups, and inclined normals, which turn nodes in
+     * their order. */
     double n[3] = {0};
     for (int64_t i = 0; i < scene->n_supports; i++) {
         const uz_support *support = &scene->supports[i];
         const bool inclined = uz_support_is_inclined(n, support, dim);
-        if (!inclined && support->kind != UZ_SUPPORT_SPRING)
+        if (!inclined && support->kind != UZ_SUPPORT_SPRING && support->kind != UZ_SUPPORT_RIGID)
             continue;
         put_int(key, support->kind);
         put_name(key, support->on, sizeof support->on);
-        put_doubles(key, inclined ? n : support->spring, dim);
+        if (support->kind == UZ_SUPPORT_RIGID) {
+            int free = 0; /* which of its motions are */
+            for (int c = 0; c < 6; c++)
+                free |= isnan(c < 3 ? support->u[c] : support->turn[c - 3]) ? 1 << c : 0;
+            put_int(key, free);
+        }
+        put_doubles(key, inclined ? n : support->kind == UZ_SUPPORT_RIGID ? support->about : support->spring, dim);
     }
     put_int(key, -1);
 }

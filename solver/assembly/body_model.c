@@ -73,6 +73,9 @@ void uz_body_model_clear(uz_body_model *model)
         free(model->materials);
         free(model->material_of);
         free(model->spring);
+        free(model->rigid);
+        free(model->rigid_of);
+        uz_followers_clear(&model->follow);
     }
     memset(model, 0, sizeof *model);
 }
@@ -94,6 +97,8 @@ size_t uz_body_model_bytes(const uz_body_model *model)
         bytes += mesh->hangs ? nodes + elements : 0;
         bytes += (size_t)model->info.n_rotated * 8 * (1 + dim * dim);
         bytes += (size_t)model->d * (size_t)model->n_modes * 8;
+        bytes += (size_t)model->n_rigid * sizeof *model->rigid + (model->rigid_of ? 12 * nodes : 0);
+        bytes += model->follow.first ? (size_t)model->follow.first[nodes] * 8 * (1 + dim * dim) : 0;
     }
     for (int64_t k = 0; k < model->n_sites; k++) {
         const uz_contact_sites *s = &model->sites[k];
@@ -147,6 +152,8 @@ uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_bo
         status = uz_find_sites(model, NULL, scene, err);
     if (status == UZ_OK)
         status = uz_choose_frames(model, scene, err);
+    if (status == UZ_OK)
+        status = uz_find_followers(model, err);
     if (status == UZ_OK && scene->place) {
         const uz_body_model rest = *model;
         status = displace(model, &rest, scene, err);

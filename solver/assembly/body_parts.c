@@ -46,27 +46,91 @@ double uz_part_size(const uz_part *p)
     return size > 0 ? 0.5 * size : 1;
 }
 
-void uz_place_in_part(double place[3], const uz_part *p, const uz_mesh *mesh, int64_t node)
+static void place_in_part(double place[3], const uz_part *p, const double *x, int dim)
 {
     for (int c = 0; c < 3; c++) {
         const double centre = 0.5 * p->low[c] + 0.5 * p->high[c];
-        place[c] = c < mesh->dim ? (mesh->xyz[node * mesh->dim + c] - centre) / uz_part_size(p) : 0;
+        place[c] = c < dim ? (x[c] - centre) / uz_part_size(p) : 0;
     }
 }
 
-void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n)
+void uz_place_in_part(double place[3], const uz_part *p, const uz_mesh *mesh, int64_t node)
 {
-    uz_part *p = &parts->list[parts->of[node]];
-    double at[3], row[UZ_MOTIONS] = {0}, allowed[UZ_MOTIONS] = {0};
+    place_in_part(place, p, mesh->xyz + node * mesh->dim, mesh->dim);
+}
+
+/* This combination of motions is held. */
+static void hold_row(uz_parts *parts, uz_part *p, const double row[UZ_MOTIONS])
+{
+    double allowed[UZ_MOTIONS] = {0};
     if (p->rank == parts->motions)
         return;
-    uz_place_in_part(at, p, mesh, node);
-    memcpy(row, n, (size_t)mesh->dim * sizeof *n);
-    uz_cross3(row + 3, at, row);
     for (int k = 0; k < parts->motions; k++)
         for (int c = 0; c < UZ_MOTIONS; c++)
             allowed[c] += parts->unit[k][c] * row[c];
     uz_extend_rows(p->held, &p->rank, allowed);
+}
+
+/* The direction n at x is held. */
+static void hold_at(uz_parts *parts, uz_part *p, const double *x, const double *n)
+{
+    double at[3], row[UZ_MOTIONS] = {0};
+    place_in_part(at, p, x, parts->dim);
+    memcpy(row, n, (size_t)parts->dim * sizeof *n);
+    uz_cross3(row + 3, at, row);
+    hold_row(parts, p, row);
+}
+
+void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n)
+{
+    hold_at(parts, &parts->list[parts->of[node]], mesh->xyz + node * mesh->dim, n);
+}
+
+/* The motions of rigid groups that supports prescribe. */
+static void hold_rigid(uz_parts *parts, const uz_body_model *model)
+{
+    const int dim = parts->dim;
+    for (int64_t g = 0; g < model->n_rigid; g++) {
+        const uz_rigid_group *group = &model->rigid[g];
+        uz_part *p = &parts->list[parts->of[group->anchor[0]]];
+        for (int c = 0; c < 2 * dim; c++) {
+            const int64_t node = group->anchor[c / dim], dof = node < 0 ? UZ_NO_DOF : model->dof[node * dim + c % dim];
+            double row[UZ_MOTIONS] = {0};
+            if (dof >= 0 || dof == UZ_NO_DOF)
+                continue;
+            row[c < dim ? c : dim == 2 ? 5 : c] = 1;
+            if (c < dim)
+                hold_at(parts, p, group->point, row);
+            else
+                hold_row(parts, p, row);
+        }
+    }
+}
+
+/* What a rigid group has nodes of is one part. False: no memory. */
+static bool join_parts(uz_parts *parts, const uz_body_model *model)
+{
+    int64_t *to = uz_alloc(parts->count, sizeof *to), kept = 0;
+    for (int64_t i = 0; to && i < parts->count; i++)
+        to[i] = i;
+    for (int64_t g = 0; to && g < model->n_rigid; g++)
+        for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+            if (model->rigid_of[a] != g + 1)
+                continue;
+            int64_t i = parts->of[a], k = parts->of[model->rigid[g].anchor[0]];
+            while (to[i] != i)
+                i = to[i];
+            while (to[k] != k)
+                k = to[k];
+            to[i > k ? i : k] = i > k ? k : i;
+        }
+    for (int64_t i = 0; to && i < parts->count; i++) /* those before have their new numbers already */
+        to[i] = to[i] == i ? kept++ : to[to[i]];
+    for (int64_t a = 0; to && a < model->mesh.n_nodes; a++)
+        parts->of[a] = to[parts->of[a]];
+    parts->count = kept;
+    free(to);
+    return to != NULL;
 }
 
 void uz_parts_clear(uz_parts *parts)
@@ -88,6 +152,8 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
         parts->unit[k][which[k]] = 1;
     parts->of = uz_alloc(mesh->n_nodes, sizeof *parts->of);
     parts->count = parts->of ? uz_mesh_number_parts(parts->of, mesh) : -1;
+    if (parts->count > 0 && model->n_rigid > 0 && !join_parts(parts, model))
+        parts->count = -1;
     parts->list = parts->count >= 0 ? uz_alloc_zero(parts->count, sizeof *parts->list) : NULL;
     if (!parts->list)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of %lld nodes", (long long)mesh->n_nodes);
@@ -108,11 +174,12 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
         const int64_t a = i / mesh->dim, c = i % mesh->dim;
         const double *Q = uz_node_frame(model, a);
-        if (model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF)
+        if (model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF && !uz_is_rigid(model, a))
             uz_hold_part(parts, mesh, a, Q ? Q + c * mesh->dim : axis[c]);
         if (model->spring && model->spring[i] > 0)
             uz_hold_part(parts, mesh, a, axis[c]);
     }
+    hold_rigid(parts, model);
     return UZ_OK;
 }
 

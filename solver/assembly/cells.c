@@ -28,7 +28,7 @@ static bool has_equal_cells(const uz_body_model *model, const uz_scene *scene)
     return scene->source == UZ_MESH_BOX && model->kind == UZ_SOLID && mesh->uniform && !mesh->hangs &&
            mesh->kind[0] == UZ_HEX8 && !model->materials[0].lame.general &&
            mesh->n_elements == cells[0] * cells[1] * cells[2] && !model->material_of && !model->spring &&
-           model->info.n_rotated == 0 && !model->place;
+           model->info.n_rotated == 0 && !model->place && model->n_rigid == 0;
 }
 
 uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, uz_error *err)

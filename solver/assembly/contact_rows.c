@@ -21,12 +21,28 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* What dof c of carrier k has in n . u (uz_followers). */
+static double carried_share(const double *share, int64_t k, int c, const double n[3], int dim)
+{
+    double sum = 0;
+    for (int i = 0; i < dim; i++)
+        sum += n[i] * share[(k * dim + i) * dim + c];
+    return sum;
+}
+
 bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3])
 {
     const int dim = model->mesh.dim;
     double share[3];
     const int64_t *from;
     const double *of;
+    const int64_t carriers = uz_carriers(&from, &of, model, node);
+    for (int64_t i = 0; i < carriers * dim; i++)
+        if (model->dof[from[i / dim] * dim + i % dim] >= 0 &&
+            fabs(carried_share(of, i / dim, (int)(i % dim), normal, dim)) > UZ_DEPENDENT)
+            return true;
+    if (carriers > 0)
+        return false;
     for (int k = uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &of, &model->mesh, node) : 0; k > 0; k--)
         if (uz_is_contact_row(model, from[k - 1], normal))
             return true;
@@ -54,6 +70,9 @@ static int64_t count_entries(const uz_body_model *model, int64_t node)
 {
     const int64_t *from;
     const double *share;
+    const int64_t carriers = uz_carriers(&from, &share, model, node);
+    if (carriers > 0)
+        return model->mesh.dim * carriers;
     return model->mesh.dim * (uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &share, &model->mesh, node) : 1);
 }
 
@@ -99,6 +118,18 @@ static void add_entries(row_work *work, const uz_body_model *model, int64_t row,
     double share[3];
     const int64_t *from;
     const double *of;
+    const int64_t carriers = uz_carriers(&from, &of, model, node);
+    for (int64_t i = 0; i < carriers * dim; i++) {
+        const int64_t dof = model->dof[from[i / dim] * dim + i % dim];
+        const double part = dof < 0 ? 0 : carried_share(of, i / dim, (int)(i % dim), normal, dim);
+        if (fabs(part) <= 16 * DBL_EPSILON || factor == 0)
+            continue;
+        work->row[work->count] = row;
+        work->col[work->count] = dof;
+        work->val[work->count++] = factor * part;
+    }
+    if (carriers > 0)
+        return;
     for (int k = uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &of, &model->mesh, node) : 0; k > 0; k--)
         add_entries(work, model, row, from[k - 1], normal, factor * of[k - 1]);
     uz_free_shares(share, model, node, normal);
@@ -351,12 +382,17 @@ static void prescribed_at(double u[3], const uz_body_model *model, const uz_cont
     const int dim = model->mesh.dim;
     const int64_t *from;
     const double *share;
-    for (int c = 0; c < dim; c++) {
+    const bool carried = uz_have_carriers(model, &node, 1);
+    if (carried)
+        uz_carried(u, model, node, NULL, prescribed);
+    for (int c = 0; c < dim && !carried; c++) {
         const int64_t dof = model->dof[node * dim + c];
         u[c] = dof < 0 && dof != UZ_NO_DOF ? prescribed[-1 - dof] : 0;
     }
-    uz_from_frame(u, model, node);
-    for (int k = uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &share, &model->mesh, node) : 0; k > 0; k--) {
+    if (!carried)
+        uz_from_frame(u, model, node);
+    for (int k = uz_mesh_hangs(&model->mesh, node) && !carried ? uz_mesh_amid(&from, &share, &model->mesh, node) : 0;
+         k > 0; k--) {
         double at[3];
         prescribed_at(at, model, &(uz_contact_row){.place = NULL}, from[k - 1], prescribed);
         for (int c = 0; c < dim; c++)

@@ -85,12 +85,15 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
         }
     if (status != UZ_OK)
         return status;
+    status = uz_number_rigid(model, scene, err);
+    if (status != UZ_OK)
+        return status;
     const int64_t total = mesh->n_nodes * mesh->dim;
     model->d = model->n_fixed = 0;
     for (int64_t i = 0; i < total; i++)
         if (uz_mesh_hangs(mesh, i / mesh->dim)) /* one of a group that is held lies amid nodes of it */
             model->dof[i] = UZ_NO_DOF;
-        else
+        else if (model->dof[i] != UZ_NO_DOF)
             model->dof[i] = model->dof[i] < 0 ? -1 - model->n_fixed++ : model->d++;
     if (model->d == 0)
         return uz_fail(err, UZ_ERR_SCENE, "/supports", "the supports hold every node: nothing is left to move");

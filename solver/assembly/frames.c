@@ -182,7 +182,7 @@ uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error
             uz_contact_row row;
             if (!uz_contact_row_at(&row, &in, i) || row.slaves > 1) /* a row of several nodes has none of its own */
                 continue;
-            if (chosen[row.node] || !uz_is_contact_row(model, row.node, row.normal))
+            if (chosen[row.node] || uz_is_rigid(model, row.node) || !uz_is_contact_row(model, row.node, row.normal))
                 continue;
             chosen[row.node] = true;
             uz_hold_direction(model, row.node, row.normal);

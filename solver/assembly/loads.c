@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -20,6 +21,59 @@ static void add_to_nodes(const loading *x, const double *f, const int64_t *node,
     const int dim = x->model->mesh.dim;
     for (int i = 0; i < count * dim; i++)
         x->f[node[i / dim] * dim + i % dim] += f[i];
+}
+
+/* Where the shares (of 1) have their centre, and J w = sum s r x (w x r) about it. */
+static void second_moments(double centre[3], double J[3][3], const uz_mesh *mesh, const double *share)
+{
+    memset(centre, 0, 3 * sizeof *centre);
+    memset(J, 0, 3 * sizeof *J);
+    for (int pass = 0; pass < 2; pass++)
+        for (int64_t a = 0; a < mesh->n_nodes; a++) {
+            double r[3] = {0};
+            for (int c = 0; c < mesh->dim; c++)
+                r[c] = mesh->xyz[a * mesh->dim + c] - (pass == 0 ? 0 : centre[c]);
+            for (int i = 0; i < 3 && share[a] != 0; i++) {
+                centre[i] += pass == 0 ? share[a] * r[i] : 0;
+                for (int j = 0; j < 3 && pass == 1; j++)
+                    J[i][j] += share[a] * ((i == j ? uz_dot3(r, r) : 0) - r[i] * r[j]);
+            }
+        }
+}
+
+/* A force at a point with a moment: f = s (v + w x r), so that sum f = v and sum r x f = J w. */
+static uz_status add_at_point(const loading *x, const double *share, const uz_group *group, const char *where,
+                              uz_error *err)
+{
+    const uz_mesh *mesh = &x->model->mesh;
+    double centre[3], J[3][3], rows[3][3], arm[3], moment[3], w[3] = {0}, det, size = 0;
+    second_moments(centre, J, mesh, share);
+    for (int c = 0; c < 3; c++)
+        arm[c] = c < mesh->dim ? x->load->point[c] - centre[c] : 0;
+    uz_cross3(moment, arm, x->load->v);
+    for (int c = 0; c < 3; c++) {
+        moment[c] += x->load->moment[c];
+        uz_cross3(rows[c], J[(c + 1) % 3], J[(c + 2) % 3]);
+        size = fmax(size, fabs(J[c][c]));
+    }
+    det = uz_dot3(J[0], rows[0]);
+    if (mesh->dim == 2 ? !(J[2][2] > 0) : !(det > 1e-12 * size * size * size))
+        return uz_fail(err, UZ_ERR_SCENE, where,
+                       "\"%s\" is %s, and bears no moment: leave at and moment out, or name more of the body",
+                       group->name, mesh->dim == 2 ? "one point" : "on a line");
+    for (int i = 0; i < 3 && mesh->dim == 3; i++)
+        w[i] = (rows[0][i] * moment[0] + rows[1][i] * moment[1] + rows[2][i] * moment[2]) / det;
+    if (mesh->dim == 2)
+        w[2] = moment[2] / J[2][2];
+    for (int64_t a = 0; a < mesh->n_nodes; a++) {
+        double r[3] = {0}, turned[3];
+        for (int c = 0; c < mesh->dim; c++)
+            r[c] = mesh->xyz[a * mesh->dim + c] - centre[c];
+        uz_cross3(turned, w, r);
+        for (int c = 0; c < mesh->dim && share[a] != 0; c++)
+            x->f[a * mesh->dim + c] += share[a] * (x->load->v[c] + turned[c]);
+    }
+    return UZ_OK;
 }
 
 static uz_status add_load(const loading *x, const char *where, uz_error *err)
@@ -58,8 +112,10 @@ static uz_status add_load(const loading *x, const char *where, uz_error *err)
         double *share = uz_alloc_zero(mesh->n_nodes, sizeof *share);
         if (!share)
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force on %lld nodes", (long long)group->n_nodes);
-        const uz_status status = uz_spread_over_group(share, x->model, group, false, where, err);
-        for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && status == UZ_OK; i++)
+        uz_status status = uz_spread_over_group(share, x->model, group, false, where, err);
+        if (status == UZ_OK && x->load->has_point)
+            status = add_at_point(x, share, group, where, err);
+        for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && status == UZ_OK && !x->load->has_point; i++)
             x->f[i] += share[i / mesh->dim] * x->load->v[i % mesh->dim];
         free(share);
         return status;

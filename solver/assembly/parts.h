@@ -13,6 +13,28 @@
  * lose most of its size. */
 uz_status uz_smooth_refined(uz_mesh *mesh, const uz_scene *scene, uz_error *err);
 
+/* ---- rigid groups (rigid.c) */
+
+/* mesh, dof as the other supports have it -> rigid, rigid_of, and places of dofs: -1 for prescribed motions, UZ_NO_DOF
+ * for what follows them. UZ_ERR_SCENE: nodes of two groups, or too few to be turned. */
+uz_status uz_number_rigid(uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* value (n_fixed): those of the prescribed motions. */
+void uz_rigid_values(double *value, const uz_body_model *model, const uz_scene *scene);
+/* rigid, frames -> follow. */
+uz_status uz_find_followers(uz_body_model *model, uz_error *err);
+void uz_followers_clear(uz_followers *follow);
+/* Does one of these nodes follow others? */
+bool uz_have_carriers(const uz_body_model *model, const int64_t *node, int count);
+/* uz_add_stiffness for nodes of which one does. */
+void uz_add_carried(uz_body_model *model, const double *ke, const int64_t *node, int count);
+/* u along the axes of a node that follows others, from the free dofs and the prescribed values (NULL: zero). */
+void uz_carried(double u[3], const uz_body_model *model, int64_t a, const double *free, const double *prescribed);
+/* The free dofs u (d) of a group get a motion: t at its point, w in radians. */
+void uz_set_motion(double *u, const uz_body_model *model, const uz_rigid_group *group, const double t[3],
+                   const double w[3]);
+/* What a component of a rigid node's displacement may have of rounding. */
+double uz_carried_error(const uz_body_model *model, int64_t a, const double *nodal);
+
 /* Scene -> kind, formulation, thickness, materials, material_of. UZ_ERR_SCENE names an element without material. */
 uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_error *err);
 

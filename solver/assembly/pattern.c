@@ -14,10 +14,11 @@ typedef struct {
     uz_mesh tied;          /* the mesh, but for hanging nodes: elements have those in their place that these lie amid */
     int64_t *first, *node; /* its own of these; NULL: there are no hanging nodes */
     int64_t *start;        /* n_nodes + 1, into around */
-    int64_t *around;       /* as many as the elements have nodes */
+    int64_t *around;       /* as many as the elements have of these */
     int64_t *seen;         /* n_nodes: 1 + the last node whose neighbours it was counted among */
     int64_t *near;         /* neighbours of the node at hand, itself included, ascending; most_near of them */
     int64_t n_near;
+    int64_t most_nodes; /* of an element, or in the place of its nodes */
 } neighbours;
 
 /* Free dofs >= first among the neighbours; written to out unless it is NULL. Returns how many. */
@@ -81,12 +82,50 @@ static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, int64_t *ptr
     return status;
 }
 
+/* The same where nodes follow others, any number of them. */
+static bool carry(neighbours *n)
+{
+    const uz_mesh *mesh = &n->model->mesh;
+    const int64_t *from;
+    const double *share;
+    int64_t room = 0, at = 0;
+    for (int64_t k = 0; k < mesh->first[mesh->n_elements]; k++) {
+        const int64_t carriers = uz_carriers(&from, &share, n->model, mesh->node[k]);
+        room += carriers > 0 ? carriers : 1;
+    }
+    n->first = uz_alloc_zero(mesh->n_elements + 1, sizeof *n->first);
+    n->node = uz_alloc(room, sizeof *n->node);
+    if (!n->first || !n->node)
+        return false;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        for (int64_t k = mesh->first[e]; k < mesh->first[e + 1]; k++) {
+            const int64_t carriers = uz_carriers(&from, &share, n->model, mesh->node[k]);
+            for (int64_t i = 0; i < (carriers > 0 ? carriers : 1); i++) {
+                const int64_t node = carriers > 0 ? from[i] : mesh->node[k];
+                int64_t earlier = n->first[e];
+                while (earlier < at && n->node[earlier] != node)
+                    earlier++;
+                n->node[at] = node;
+                at += earlier == at;
+            }
+        }
+        n->first[e + 1] = at;
+        n->most_nodes = at - n->first[e] > n->most_nodes ? at - n->first[e] : n->most_nodes;
+    }
+    n->tied.first = n->first;
+    n->tied.node = n->node;
+    return true;
+}
+
 /* n->tied. False: no memory. */
 static bool tie(neighbours *n)
 {
     const uz_mesh *mesh = &n->model->mesh;
     uz_ties ties;
     n->tied = *mesh;
+    n->most_nodes = UZ_ELEMENT_NODES;
+    if (n->model->follow.first)
+        return carry(n);
     if (!mesh->hangs)
         return true;
     n->first = uz_alloc_zero(mesh->n_elements + 1, sizeof *n->first);
@@ -110,16 +149,17 @@ uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
     const uz_mesh *mesh = &model->mesh;
     neighbours n = {.model = model,
                     .start = uz_alloc(mesh->n_nodes + 1, sizeof *n.start),
-                    .around = uz_alloc(mesh->first[mesh->n_elements], sizeof *n.around),
                     .seen = uz_alloc_zero(mesh->n_nodes, sizeof *n.seen)};
     uz_status status = UZ_ERR_MEMORY;
     int64_t *ptr = uz_alloc_zero(model->d + 1, sizeof *ptr), most = 0;
     int64_t *ptr_fixed = uz_alloc_zero(model->n_fixed + 1, sizeof *ptr_fixed);
-    if (tie(&n) && n.start && n.around && n.seen) {
+    if (tie(&n))
+        n.around = uz_alloc(n.tied.first[mesh->n_elements], sizeof *n.around);
+    if (n.start && n.around && n.seen) {
         uz_mesh_list_around(n.start, n.around, &n.tied);
         for (int64_t a = 0; a < mesh->n_nodes; a++)
             most = n.start[a + 1] - n.start[a] > most ? n.start[a + 1] - n.start[a] : most;
-        n.near = uz_alloc(most * UZ_ELEMENT_NODES + 1, sizeof *n.near); /* each counted for every element it shares */
+        n.near = uz_alloc(most * n.most_nodes + 1, sizeof *n.near); /* each counted for every element it shares */
     }
     if (!n.near || !ptr || !ptr_fixed) {
         uz_fail(err, status, "", "no memory for the pattern of %lld unknowns", (long long)model->d);

@@ -44,9 +44,48 @@ static void turned(double out[3], const uz_support *support, const double *x, in
 
 #define OTHER_BODY "the scene's supports are not those of this body"
 
+/* A node of a rigid group has what the group's motion makes of n . u: what another support gives it, too, has to be
+ * that, and nothing of it may be free. */
+static uz_status agree_with_group(const prescription *p, int64_t support, int64_t node, const double n[3], double value,
+                                  uz_error *err)
+{
+    const uz_body_model *model = p->model;
+    const int dim = model->mesh.dim;
+    const uz_rigid_group *group = uz_rigid_group_of(model, node);
+    const int64_t *from;
+    const double *share;
+    const int64_t count = uz_carriers(&from, &share, model, node);
+    double u[3], along = 0, size = fabs(value);
+    char where[96];
+    bool moves = false;
+    for (int64_t k = 0; k < count; k++)
+        for (int c = 0; c < dim; c++) {
+            double part = 0;
+            for (int i = 0; i < dim; i++)
+                part += n[i] * share[(k * dim + i) * dim + c];
+            moves = moves || (model->dof[from[k] * dim + c] >= 0 && fabs(part) > AGREE);
+        }
+    uz_carried(u, model, node, NULL, p->value);
+    for (int c = 0; c < dim; c++) {
+        along += n[c] * u[c];
+        size += fabs(n[c] * u[c]);
+    }
+    if (!moves && fabs(along - value) <= AGREE * size)
+        return UZ_OK;
+    snprintf(where, sizeof where, "/supports/%lld/on", (long long)support);
+    return uz_fail(err, UZ_ERR_SCENE, where,
+                   "node %lld of \"%.63s\" is of the rigid group \"%.63s\", which %s: prescribe that motion of the "
+                   "group, or leave the node out of one of them",
+                   (long long)node, p->scene->supports[support].on, p->scene->supports[group->support].on,
+                   moves ? "is free to move it along what is held here" : "moves it otherwise");
+}
+
 static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c, double value, uz_error *err)
 {
     const int64_t dof = p->model->dof[node * p->model->mesh.dim + c];
+    const double along[3] = {c == 0, c == 1, c == 2};
+    if (uz_is_rigid(p->model, node))
+        return agree_with_group(p, support, node, along, value, err);
     if (dof == UZ_NO_DOF)
         return UZ_OK;
     if (dof >= 0)
@@ -87,6 +126,8 @@ static uz_status prescribe_along(prescription *p, int64_t support, int64_t node,
     const int64_t *dof = p->model->dof + node * p->model->mesh.dim;
     double known = 0, size = 0, share[3]; /* what the dofs given so far make of n . u */
     int own = -1;                         /* the held dof that n has its own share in */
+    if (uz_is_rigid(p->model, node))
+        return agree_with_group(p, support, node, n, value, err);
     if (uz_mesh_hangs(&p->model->mesh, node))
         return UZ_OK;
     uz_to_frame(share, p->model, node, n);
@@ -122,6 +163,7 @@ uz_status uz_prescribed_values(double *value, const uz_body_model *model, const 
     if (!p.source)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld supported dofs", (long long)model->n_fixed);
     memset(value, 0, (size_t)model->n_fixed * sizeof *value);
+    uz_rigid_values(value, model, scene);
     for (int64_t turn = 0; turn < 2 * scene->n_supports && status == UZ_OK; turn++) { /* axes first */
         const int64_t k = turn % scene->n_supports;
         const bool inclined = turn >= scene->n_supports;

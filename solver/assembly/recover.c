@@ -21,12 +21,20 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
     }
     for (int64_t i = 0; i < model->info.n_rotated; i++)
         uz_from_frame(nodal + model->info.rotated_node[i] * dim, model, model->info.rotated_node[i]);
-    for (int64_t i = model->mesh.n_given * dim; i < total && model->mesh.hangs; i++)
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->follow.first; a++) {
+        double carried[3];
+        if (uz_have_carriers(model, &a, 1)) {
+            uz_carried(carried, model, a, u, prescribed);
+            memcpy(nodal + a * dim, carried, (size_t)dim * sizeof *nodal);
+        }
+    }
+    for (int64_t i = model->mesh.n_given * dim; i < total && model->mesh.hangs && !model->follow.first; i++)
         if (model->dof[i] == UZ_NO_DOF)
             nodal[i] = uz_mesh_value_amid(&model->mesh, i / dim, nodal + i % dim, dim);
 }
 
-void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal)
+/* What is along each free dof of a node; in the places of rigid motions it means nothing. */
+static void restrict_by_node(double *u, const uz_body_model *model, const double *nodal)
 {
     const int dim = model->mesh.dim;
     const int64_t total = model->mesh.n_nodes * dim;
@@ -42,11 +50,43 @@ void uz_restrict_nodal(double *u, const uz_body_model *model, const double *noda
     }
 }
 
+void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal)
+{
+    restrict_by_node(u, model, nodal);
+    for (int64_t g = 0; g < model->n_rigid; g++) {
+        double t[3], w[3];
+        uz_rigid_motion(t, w, model, &model->rigid[g], nodal);
+        uz_set_motion(u, model, &model->rigid[g], t, w);
+    }
+}
+
+/* Forces of nodes that follow others, on what these follow. */
+static void gather_carried(double *p, const uz_body_model *model, const double *f)
+{
+    static const double NOTHING[3] = {0};
+    const int dim = model->mesh.dim;
+    for (int64_t g = 0; g < model->n_rigid; g++)
+        uz_set_motion(p, model, &model->rigid[g], NOTHING, NOTHING);
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+        const int64_t *node;
+        const double *share;
+        const int64_t count = uz_carriers(&node, &share, model, a);
+        for (int64_t k = 0; k < count; k++)
+            for (int c = 0; c < dim; c++)
+                for (int i = 0; i < dim && model->dof[node[k] * dim + c] >= 0; i++)
+                    p[model->dof[node[k] * dim + c]] += share[(k * dim + i) * dim + c] * f[a * dim + i];
+    }
+}
+
 void uz_gather_nodal(double *p, const uz_body_model *model, const double *f)
 {
     const uz_mesh *mesh = &model->mesh;
     const int dim = mesh->dim;
-    uz_restrict_nodal(p, model, f);
+    restrict_by_node(p, model, f);
+    if (model->follow.first) {
+        gather_carried(p, model, f);
+        return;
+    }
     for (int64_t i = mesh->n_given; i < mesh->n_nodes && mesh->hangs; i++) {
         const int64_t *from;
         const double *share;
@@ -82,6 +122,8 @@ double uz_turning_error(const uz_body_model *model, int64_t node, const double *
     const bool hangs = uz_mesh_hangs(&model->mesh, node);
     const int64_t *from = &node;
     const double whole = 1, *share = &whole;
+    if (uz_is_rigid(model, node) && !hangs)
+        return uz_carried_error(model, node, nodal);
     const int count = hangs ? uz_mesh_amid(&from, &share, &model->mesh, node) : 1;
     double size = 0;
     for (int k = 0; k < count; k++)

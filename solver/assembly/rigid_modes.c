@@ -105,6 +105,29 @@ static uz_status hold_by_bodies(uz_parts *parts, const uz_body_model *model, con
     return UZ_OK;
 }
 
+/* What the motions of its part make of a rigid group's own. */
+static void set_rigid_modes(double *z, const uz_parts *parts, const uz_body_model *model, const uz_rigid_group *group)
+{
+    double mode[UZ_MOTIONS][UZ_MOTIONS], at[3], t[3], w[3];
+    for (int64_t i = 0, column = 0; i < parts->count; i++) {
+        const uz_part *p = &parts->list[i];
+        const int own = uz_free_motions(mode, parts, p);
+        uz_place_in_part(at, p, &model->mesh, group->anchor[0]);
+        for (int c = 0; c < model->mesh.dim; c++)
+            at[c] += (group->point[c] - model->mesh.xyz[group->anchor[0] * model->mesh.dim + c]) / uz_part_size(p);
+        for (int k = 0; k < own; k++, column++) {
+            if (parts->of[group->anchor[0]] != i)
+                continue;
+            uz_cross3(t, mode[k] + 3, at);
+            for (int c = 0; c < 3; c++) {
+                t[c] += mode[k][c];
+                w[c] = mode[k][3 + c] / uz_part_size(p);
+            }
+            uz_set_motion(z + column * model->d, model, group, t, w);
+        }
+    }
+}
+
 uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *model, uz_error *err)
 {
     const int dim = model->mesh.dim;
@@ -136,7 +159,9 @@ uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *mo
                         z[at * model->d + model->dof[a * dim + c]] = local[c];
             }
     }
-    if (status == UZ_OK && n > 0 && model->n_pair_rows > 0) {
+    for (int64_t g = 0; status == UZ_OK && g < model->n_rigid; g++)
+        set_rigid_modes(z, &parts, model, &model->rigid[g]);
+    if (status == UZ_OK && n > 0 && (model->n_pair_rows > 0 || model->n_rigid > 0)) {
         status = hold_by_bodies(&parts, model, z, n, err);
     } else if (status == UZ_OK) {
         /* An obstacle stands in the way of one combination of the motions of its part, from one side. */

@@ -129,6 +129,10 @@ void uz_add_stiffness(uz_body_model *model, const double *ke, const int64_t *nod
     const int64_t *dof[UZ_ELEMENT_NODES];
     uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
     const int dim = model->mesh.dim;
+    if (uz_have_carriers(model, node, count)) {
+        uz_add_carried(model, ke, node, count);
+        return;
+    }
     if (model->mesh.hangs)
         uz_tie_nodes(&ties, &model->mesh, node, count);
     if (model->mesh.hangs && ties.hangs) {
@@ -201,9 +205,10 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
         double own[9] = {0};
         for (int c = 0; c < dim; c++)
             own[c * dim + c] = k[c];
-        if (uz_mesh_hangs(&model->mesh, a))
+        const bool follows = uz_mesh_hangs(&model->mesh, a) || uz_is_rigid(model, a);
+        if (follows)
             uz_add_stiffness(model, own, &a, 1);
-        for (int j = 0; j < dim && !uz_mesh_hangs(&model->mesh, a); j++)
+        for (int j = 0; j < dim && !follows; j++)
             for (int i = 0; i < dim; i++) {
                 double value = Q || i != j ? 0 : k[i];
                 for (int c = 0; Q && c < dim; c++)
@@ -365,7 +370,7 @@ uz_status uz_turning_energy(double *energy, const uz_body_model *model, const do
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         bool turned = uz_are_rotated(model, node, count);
         for (int a = 0; a < count; a++)
-            turned = turned || uz_mesh_hangs(mesh, node[a]);
+            turned = turned || uz_mesh_hangs(mesh, node[a]) || uz_is_rigid(model, node[a]);
         if (!turned)
             continue;
         status = source_get(&ke, &source, e, err);

@@ -260,6 +260,8 @@ static void take_supports(survey *x)
     static const double AXIS[2][3] = {{1, 0, 0}, {0, 1, 0}};
     for (int64_t k = 0; k < x->scene->n_supports; k++) {
         const uz_support *support = &x->scene->supports[k];
+        if (support->kind == UZ_SUPPORT_RIGID)
+            refuse(x->body, "\"%s\" is a rigid group, whose forces are not bounded here", support->on);
         if (uz_support_turns(support))
             refuse(x->body, "the support on \"%s\" rotates, and edges here are moved without turning", support->on);
         if (!find_group(x, support->on))
@@ -352,6 +354,8 @@ static void take_loads(survey *x)
         const bool on_edges = load->kind == UZ_LOAD_TRACTION || load->kind == UZ_LOAD_PRESSURE ||
                               (load->kind == UZ_LOAD_FORCE && !in_elements);
         double area = 0, volume = 0;
+        if (load->has_point)
+            refuse(body, "the force on \"%s\" is at a point, and forces here are spread evenly", load->on);
         if (load->kind == UZ_LOAD_NODE_FORCE || (on_edges && (!group || group->kind != UZ_GROUP_FACES))) {
             refuse(body, "a force on single nodes does infinite work in the continuum", "");
             return;

@@ -110,6 +110,11 @@ typedef enum { UZ_FROM_ZERO, UZ_FROM_REACTIONS, UZ_FROM_STATE } uz_origin;
 typedef struct {
     char on[64];
     double force[3], moment[3];
+    /* A support UZ_SUPPORT_RIGID: how its point is moved and the group turned (radians), and the moment about the
+     * point.
+     */
+    bool rigid;
+    double point[3], moved[3], turned[3], about[3];
 } uz_resultant;
 
 /* How one contact presses, whichever way it looks. Of a contact between bodies: on the sides that have the rows. */

@@ -180,7 +180,10 @@ typedef struct {
 typedef enum {
     UZ_SUPPORT_COMPONENTS, /* u along the axes */
     UZ_SUPPORT_NORMAL,     /* u along one direction: a symmetry plane, a slide */
-    UZ_SUPPORT_SPRING      /* elastic ground along the axes */
+    UZ_SUPPORT_SPRING,     /* elastic ground along the axes */
+    /* The group moves as a rigid body: `about` is its point, u how that moves, turn how the group turns (radians), each
+     * NaN where it is free; rings have u[1] alone, plane bodies turn[2]. */
+    UZ_SUPPORT_RIGID
 } uz_support_kind;
 typedef struct {
     uz_support_kind kind;
@@ -208,6 +211,10 @@ typedef struct {
     char on[64];
     int64_t node;
     double v[3], value;
+    /* FORCE: at this point, and with this moment (plane: [2]) about it, spread so that the group bears both as a rigid
+     * body would pass them on: by its shares s, f = s (v + w x (x - c)), c their centre. Else at c, without one. */
+    bool has_point;
+    double point[3], moment[3];
 } uz_load;
 
 /* A new obstacle: docs/architecture/obstacle.md. */

@@ -239,7 +239,10 @@ static void add_reaction(balance *b, int64_t node)
         const int64_t i = node * b->dim + c;
         R[c] = b->inner[i] - b->load[i] - b->contact[i] + (b->model->spring ? b->model->spring[i] * b->u[i] : 0);
     }
-    for (int64_t i = b->first[node]; i < b->first[node + 1]; i++) {
+    const uz_rigid_group *rigid = uz_rigid_group_of(b->model, node);
+    if (rigid)
+        add_force(b, &b->out->supports[rigid->support], node, R);
+    for (int64_t i = b->first[node]; i < b->first[node + 1] && !rigid; i++) {
         const uz_support *support = &b->scene->supports[b->support[i]];
         double n[DIM] = {0}, u[DIM] = {NAN, NAN, NAN};
         if (uz_support_is_inclined(n, support, b->dim)) {
@@ -322,7 +325,7 @@ static uz_status energy_of(double *energy, const balance *b, uz_error *err)
     const uz_body_model *model = b->model;
     bool carried = model->n_modes > 0;
     for (int64_t i = 0; i < model->mesh.n_nodes * b->dim && !carried; i++)
-        carried = model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF && b->u[i] != 0;
+        carried = ((model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF) || uz_is_rigid(model, i / b->dim)) && b->u[i] != 0;
     return uz_strain_energy(energy, model, b->u, carried, err);
 }
 
@@ -373,6 +376,16 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     for (int64_t a = 0; a < n && status == UZ_OK; a++)
         if (b.held[a] && !uz_mesh_hangs(&model->mesh, a))
             add_reaction(&b, a);
+    for (int64_t g = 0; g < model->n_rigid && status == UZ_OK; g++) {
+        uz_resultant *to = &out->supports[model->rigid[g].support];
+        double across[DIM];
+        to->rigid = true;
+        uz_cross3(across, model->rigid[g].point, to->force);
+        for (int c = 0; c < DIM && model->kind != UZ_AXISYMMETRIC; c++)
+            to->about[c] = to->moment[c] - across[c];
+        memcpy(to->point, model->rigid[g].point, sizeof to->point);
+        uz_rigid_motion(to->moved, to->turned, model, &model->rigid[g], u);
+    }
     if (status == UZ_OK)
         status = add_springs(&b, err);
     if (status == UZ_OK)

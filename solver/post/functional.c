@@ -315,6 +315,18 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
 
 /* ---- supports */
 
+/* The same of a rigid group: its force goes with the translation. */
+static void take_translation(const making *k, const uz_support *support, bool asked)
+{
+    const uz_body_model *model = k->model;
+    for (int64_t g = 0; g < model->n_rigid && asked; g++)
+        for (int c = 0; c < k->dim; c++) {
+            const int64_t dof = model->dof[model->rigid[g].anchor[0] * k->dim + c];
+            if (&k->scene->supports[model->rigid[g].support] == support && dof < 0 && dof != UZ_NO_DOF)
+                k->out->held[-1 - dof] = k->quantity->direction[c];
+        }
+}
+
 /* held becomes the direction on the dofs that the support holds and none before it did. */
 static void take_directions(const making *k, const uz_support *support, const uz_group *group, bool asked, bool *taken)
 {
@@ -323,11 +335,16 @@ static void take_directions(const making *k, const uz_support *support, const uz
     const bool inclined = uz_support_is_inclined(n, support, dim);
     if (!inclined)
         uz_support_values(u, support, dim);
+    if (support->kind == UZ_SUPPORT_RIGID) {
+        take_translation(k, support, asked);
+        return;
+    }
     for (int64_t i = 0; i < uz_group_node_count(&k->model->mesh, group) * dim * dim; i++) {
         const int64_t node = uz_group_node_at(group, i / (dim * dim)), dof = k->model->dof[node * dim + i / dim % dim];
         const int c = (int)(i % dim), of = (int)(i / dim % dim);
         double e[DIM] = {c == 0, c == 1, c == 2}, along, value = 0;
-        if (dof >= 0 || dof == UZ_NO_DOF || taken[-1 - dof] || (inclined ? c > 0 : isnan(u[c])))
+        if (dof >= 0 || dof == UZ_NO_DOF || uz_is_rigid(k->model, node) || taken[-1 - dof] ||
+            (inclined ? c > 0 : isnan(u[c])))
             continue;
         along = uz_along_dof(k->model, node, of, inclined ? n : e);
         if (fabs(along) < 0.7) /* it is another support's */

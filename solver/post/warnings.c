@@ -179,8 +179,10 @@ static void look_at_turns(const doubts *d)
 {
     for (int64_t k = 0; k < d->scene->n_supports && !uz_is_finite_answer(d->scene); k++) {
         const uz_support *support = &d->scene->supports[k];
-        const double angle = hypot(hypot(support->turn[0], support->turn[1]), support->turn[2]);
-        if (uz_support_turns(support) && angle > MOST_TURN)
+        double angle = 0; /* what is free of a rigid group's rotation is NaN */
+        for (int c = 0; c < 3; c++)
+            angle = isnan(support->turn[c]) ? angle : hypot(angle, support->turn[c]);
+        if ((uz_support_turns(support) || support->kind == UZ_SUPPORT_RIGID) && angle > MOST_TURN)
             warn(d->out, "large_rotation", angle,
                  "support %lld rotates \"%.63s\" by %.2g rad, which small deformation takes for %.2g %% of stretch: "
                  "take a law of finite strain and the kinematics \"finite\"",
@@ -188,17 +190,18 @@ static void look_at_turns(const doubts *d)
     }
 }
 
-/* Of orthotropic materials there is no law of finite strain that the answer could be compared with. */
-static void look_at_materials(const doubts *d)
+/* Of some scenes there is no answer of finite strain that this one could be compared with. */
+static void look_at_small_only(const doubts *d)
 {
-    bool has = false;
+    const char *what = d->model->n_rigid > 0 ? "rigid groups" : NULL;
     for (int64_t k = 0; k < d->model->n_materials; k++)
-        has = has || d->model->materials[k].lame.general;
-    if (has && d->out->nonlinear > UZ_MOST_SLIDING)
+        what = d->model->materials[k].lame.general ? "orthotropic materials" : what;
+    for (int64_t k = 0; k < d->scene->n_loads; k++)
+        what = d->scene->loads[k].has_point ? "forces at a point" : what;
+    if (what && d->out->nonlinear > UZ_MOST_SLIDING)
         warn(d->out, "large_deformation", d->out->nonlinear,
-             "small deformation errs by some %.2g %% as rotations are large, and orthotropic materials have no other: "
-             "put less load on it",
-             100 * d->out->nonlinear);
+             "small deformation errs by some %.2g %% as rotations are large, and %s have no other: put less load on it",
+             100 * d->out->nonlinear, what);
 }
 
 void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)
@@ -565,7 +568,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     }
     if (status != UZ_OK)
         return status;
-    look_at_materials(&d);
+    look_at_small_only(&d);
     look_at_turns(&d);
     look_at_mesh(&d);
     look_at_surfaces(&d);

@@ -11,6 +11,35 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* The modes of a rigid group's own motion, in units of the others: rotations by one over the body's longest side. */
+static void take_rigid(uz_modes *modes, const uz_body_model *model, const uz_rigid_group *group)
+{
+    const int dim = model->mesh.dim;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, size = 0.0, r[3];
+    for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++) {
+        low[i % dim] = fmin(low[i % dim], model->info.xyz[i]);
+        high[i % dim] = fmax(high[i % dim], model->info.xyz[i]);
+    }
+    for (int axis = 0; axis < dim; axis++)
+        size = fmax(size, high[axis] - low[axis]);
+    for (int axis = 0; axis < 3; axis++)
+        r[axis] = axis < dim ? (group->point[axis] - 0.5 * (low[axis] + high[axis])) / size : 0.0;
+    for (int c = 0; c < 2 * dim; c++) {
+        const int64_t node = group->anchor[c / dim], dof = node < 0 ? UZ_NO_DOF : model->dof[node * dim + c % dim];
+        const int axis = c % dim;
+        float *value = modes->value + dof * modes->count;
+        for (int k = 0; k < modes->count && dof >= 0; k++) {
+            const int turn = dim == 2 ? 2 : k - 3, a = (turn + 1) % 3, b = (turn + 2) % 3;
+            if (k < dim)
+                value[k] = c < dim && axis == k ? 1.0F : 0.0F;
+            else if (c < dim)
+                value[k] = (float)(axis == a ? -r[b] : axis == b ? r[a] : 0.0);
+            else
+                value[k] = dim == 2 || axis == turn ? (float)(group->size / size) : 0.0F;
+        }
+    }
+}
+
 /* The near-null space: rigid-body modes where the mesh is known. At a node whose dofs are along its normal and tangents
  * they are turned there from the axes: numbered for this are all dofs of a rotated node, also those that are held. */
 static uz_status find_modes(uz_modes *modes, const uz_setup *setup, const uz_csc *K, uz_error *err)
@@ -21,6 +50,8 @@ static uz_status find_modes(uz_modes *modes, const uz_setup *setup, const uz_csc
     if (!setup->is_scene)
         return uz_modes_of_matrix(modes, K, err);
     uz_status status = uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, dim, model->d, err);
+    for (int64_t g = 0; status == UZ_OK && g < model->n_rigid; g++)
+        take_rigid(modes, model, &model->rigid[g]);
     if (status != UZ_OK || n_rotated == 0)
         return status;
     uz_modes axes = {0};

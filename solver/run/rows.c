@@ -85,13 +85,15 @@ uz_status uz_choose_rows(uz_candidates *rows, const double *h, int64_t m, const 
          i++) { /* the farthest that one pushes nodes, and perhaps the whole body */
         const uz_support *s = &scene->supports[i];
         double u = 0;
-        for (int c = 0; c < info->dim && s->kind == UZ_SUPPORT_COMPONENTS; c++)
+        const bool rigid = s->kind == UZ_SUPPORT_RIGID;
+        for (int c = 0; c < info->dim && (s->kind == UZ_SUPPORT_COMPONENTS || rigid); c++)
             u = isnan(s->u[c]) ? u : hypot(u, s->u[c]);
-        if (uz_support_turns(s)) { /* no node is farther from what it turns about than this */
+        if (uz_support_turns(s) || rigid) { /* no node is farther from what it turns about than this */
             double away = 0;
             for (int c = 0; c < info->dim && info->n_nodes > 0; c++)
                 away = hypot(away, info->xyz[c] - s->about[c]);
-            u += (away + sqrt(square)) * hypot(hypot(s->turn[0], s->turn[1]), s->turn[2]);
+            for (int c = 0; c < 3; c++)
+                u += isnan(s->turn[c]) ? 0 : (away + sqrt(square)) * fabs(s->turn[c]);
         }
         most = fmax(most, s->kind == UZ_SUPPORT_NORMAL ? fabs(s->value) : u);
     }

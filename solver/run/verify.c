@@ -3,6 +3,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "core/vector3.h"
 #include "linalg/linalg.h"
 #include "run/problem.h"
 #include "run/run.h"
@@ -12,6 +13,27 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* What a component of a rigid node's displacement has to be: by the motion that the anchors of its group tell, but for
+ * what is prescribed of it. */
+static double rigid_at(const uz_run *run, const double *u, int64_t node, int c)
+{
+    const uz_body_model *model = &run->asked->setup->model;
+    const uz_support *supports = run->asked->problem->scene.supports;
+    const uz_rigid_group *group = uz_rigid_group_of(model, node);
+    const uz_support *support = &supports[group->support];
+    double t[3], w[3], r[3] = {0}, turned[3];
+    uz_rigid_motion(t, w, model, group, u);
+    for (int k = 0; k < 3; k++) {
+        t[k] = isnan(support->u[k]) ? t[k] : ldexp(support->u[k], -run->load.exponent);
+        w[k] = isnan(support->turn[k]) ? w[k] : ldexp(support->turn[k], -run->load.exponent);
+        r[k] = k < model->mesh.dim ? model->mesh.xyz[node * model->mesh.dim + k] - group->point[k] : 0;
+    }
+    if (model->kind == UZ_AXISYMMETRIC)
+        return c == 1 ? t[1] : 0;
+    uz_cross3(turned, w, r);
+    return t[c] + turned[c];
+}
 
 /* The free dofs of a nodal u. Supported ones must be where the scene holds them, and hanging nodes where those are that
  * they lie amid: the error that is bounded is one among displacements that do so, and no other has an energy that could
@@ -25,9 +47,15 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
         int64_t dof = model->dof[i], node = i / dim;
         double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
         double rounding = 2 * uz_turning_error(model, node, u); /* there and back */
-        const double held = dof == UZ_NO_DOF ? uz_mesh_value_amid(&model->mesh, node, u + i % dim, dim)
-                            : dof < 0        ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent)
-                                             : given;
+        const double held = uz_is_rigid(model, node) ? rigid_at(run, u, node, (int)(i % dim))
+                            : dof == UZ_NO_DOF       ? uz_mesh_value_amid(&model->mesh, node, u + i % dim, dim)
+                            : dof < 0                ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent)
+                                                     : given;
+        if (!(fabs(given - held) <= rounding) && uz_is_rigid(model, node))
+            return uz_fail(err, UZ_ERR_SCENE, "u",
+                           "node %lld is of a rigid group: as the group is held and moves, its displacement along %s "
+                           "must be %.17g, it is given as %.17g",
+                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), held, given);
         if (!(fabs(given - held) <= rounding) && dof == UZ_NO_DOF)
             return uz_fail(err, UZ_ERR_SCENE, "u",
                            "node %lld hangs amid others: its displacement along %s must be %.17g, it is given as %.17g",

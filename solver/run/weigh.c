@@ -42,6 +42,12 @@ static bool is_asked(const uz_result *result, const uz_problem *one, bool own_la
     for (int64_t k = 0; k < one->scene.n_materials; k++)
         if (one->scene.materials[k].is_orthotropic) /* there is no law to compare with: a warning has told */
             return false;
+    for (int64_t k = 0; k < one->scene.n_supports; k++)
+        if (one->scene.supports[k].kind == UZ_SUPPORT_RIGID)
+            return false;
+    for (int64_t k = 0; k < one->scene.n_loads; k++)
+        if (one->scene.loads[k].has_point)
+            return false;
     return e->nonlinear > UZ_SURELY_SMALL && s->semicoercive.free_modes == 0;
 }
 

@@ -157,7 +157,7 @@ static uz_status check_on_elements(const uz_scene *scene, const uz_mesh *mesh, i
 }
 
 /* On sides, or on points: what a load on a part of the boundary may be. */
-static uz_status check_on_boundary(const uz_load *load, const uz_mesh *mesh, int64_t i, uz_error *err)
+static uz_status check_on_boundary(const uz_load *load, const uz_mesh *mesh, uz_model kind, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
     if (load->kind == UZ_LOAD_NODE_FORCE) {
@@ -187,6 +187,15 @@ static uz_status check_on_boundary(const uz_load *load, const uz_mesh *mesh, int
                        "the group \"%s\" is made of elements; a force is spread over sides or nodes: use body_force "
                        "(force per volume), or name sides",
                        group->name);
+    for (int c = 0; c < 6 && load->has_point; c++) {
+        const double *vector = c < 3 ? load->point : load->moment;
+        if (!isfinite(vector[c % 3]))
+            return uz_check_vector(vector, 3, "loads", i, c < 3 ? "at" : "moment", err);
+    }
+    if (load->has_point && kind == UZ_AXISYMMETRIC)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, NULL),
+                       "in a body of revolution forces are of the whole ring, at its axis, and there are no moments: "
+                       "leave at and moment out");
     if (pressure && group->n_inner > 0)
         return uz_fail(err, UZ_ERR_SCENE, where,
                        "%lld faces of \"%s\" lie between two elements, where there is no outward normal; use a "
@@ -208,7 +217,7 @@ uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_err
         if (load->kind == UZ_LOAD_BODY_FORCE || load->kind == UZ_LOAD_GRAVITY || load->kind == UZ_LOAD_TEMPERATURE)
             status = check_on_elements(scene, mesh, i, err);
         else
-            status = check_on_boundary(load, mesh, i, err);
+            status = check_on_boundary(load, mesh, scene->model, i, err);
         if (status == UZ_OK && (load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_TEMPERATURE))
             status = uz_check_number(load->value, "loads", i, LOAD_KEY[load->kind], err);
         else if (status == UZ_OK)

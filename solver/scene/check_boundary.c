@@ -76,6 +76,38 @@ static uz_status check_turn(const uz_scene *scene, int64_t i, uz_error *err)
     return UZ_OK;
 }
 
+/* A group that moves as a rigid body; what is left out of its motions is NaN. */
+static uz_status check_rigid(const uz_scene *scene, int64_t i, uz_error *err)
+{
+    static const char *const KEYS[] = {"rigid/ux", "rigid/uy", "rigid/uz", "rigid/rx", "rigid/ry", "rigid/rz"};
+    char where[UZ_CHECK_POINTER];
+    const uz_support *support = &scene->supports[i];
+    const bool ring = scene->model == UZ_AXISYMMETRIC, plane = scene->model != UZ_SOLID;
+    const uz_status status = uz_check_vector(support->about, 3, "supports", i, "rigid/point", err);
+    if (status != UZ_OK)
+        return status;
+    for (int k = 0; k < 6; k++) {
+        const double value = k < 3 ? support->u[k] : support->turn[k - 3];
+        uz_check_place(where, "supports", i, KEYS[k]);
+        if (isnan(value))
+            continue;
+        if (isinf(value))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, where, "the prescribed motion is not a finite number");
+        if (ring && k != 1)
+            return uz_fail(err, UZ_ERR_SCENE, where,
+                           "a rigid group of a body of revolution moves along its axis only, and so does the body as a "
+                           "whole: give uy, or nothing");
+        if (plane && k >= 2 && k != 5)
+            return uz_fail(err, UZ_ERR_SCENE, where, "in the plane a rigid group has ux, uy and rz");
+        if (k >= 3 && fabs(value) > UZ_MOST_LINEAR_TURN)
+            return uz_fail(err, UZ_ERR_SCENE, where,
+                           "a rotation by %g degrees is not small, and rigid groups are of small deformation: at most "
+                           "%.3g degrees",
+                           value * DEGREE, UZ_MOST_LINEAR_TURN * DEGREE);
+    }
+    return UZ_OK;
+}
+
 uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
@@ -121,6 +153,8 @@ uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i
                             "a spring is spread over sides by area: name the sides that stand on it", err))
             return UZ_ERR_SCENE;
         return UZ_OK;
+    case UZ_SUPPORT_RIGID:
+        return check_rigid(scene, i, err);
     }
     return uz_fail(err, UZ_ERR_ARGUMENT, uz_check_place(where, "supports", i, NULL), "an unknown kind of support");
 }

@@ -89,6 +89,11 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
                        "finite kinematics have the standard formulation only; use auto, and quad8 or tri6 for bending "
                        "and nearly incompressible bodies");
     for (int64_t i = 0; i < scene->n_supports; i++)
+        if (scene->supports[i].kind == UZ_SUPPORT_RIGID)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rigid"),
+                           "rigid groups are of small deformation, and finite kinematics have none: prescribe a "
+                           "rotation, or use the kinematics \"moving\"");
+    for (int64_t i = 0; i < scene->n_supports; i++)
         if (scene->supports[i].kind == UZ_SUPPORT_SPRING)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "spring"),
                            "finite kinematics have no springs; mesh the ground, or prescribe displacements");
@@ -117,6 +122,10 @@ static uz_status check_loads(const uz_scene *scene, uz_error *err)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "pressure"),
                            "a pressure turns with the side that it acts on, and finite kinematics have loads that do "
                            "not: use traction or force");
+        if (scene->loads[i].has_point)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "at"),
+                           "what turns is not where it was, and finite kinematics have forces that stay: leave at and "
+                           "moment out, or use the kinematics \"moving\"");
         if (scene->loads[i].kind == UZ_LOAD_TEMPERATURE)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
                            "finite kinematics have no temperature: leave it out, or use the kinematics \"moving\"");
