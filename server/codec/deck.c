@@ -184,6 +184,20 @@ static void put_contacts(text *t, const uz_scene *scene)
     text_close(t, ']');
 }
 
+static void put_ties(text *t, const uz_scene *scene)
+{
+    text_open(t, "ties", '[');
+    for (int64_t i = 0; i < scene->n_ties; i++) {
+        text_open(t, NULL, '{');
+        text_string(t, "on", scene->ties[i].on);
+        text_string(t, "to", scene->ties[i].to);
+        if (scene->ties[i].tolerance > 0.0)
+            text_number(t, "tolerance", scene->ties[i].tolerance);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+}
+
 static void put_scene(text *t, const uz_scene *scene)
 {
     static const char *const MODELS[] = {"plane_stress", "plane_strain", "axisymmetric", "solid"};
@@ -198,6 +212,8 @@ static void put_scene(text *t, const uz_scene *scene)
     put_materials(t, scene);
     put_supports(t, scene);
     put_loads(t, scene);
+    if (scene->n_ties > 0)
+        put_ties(t, scene);
     put_contacts(t, scene);
     put_mesh(t, &scene->given); /* last: whoever reads it sees the rest first */
     text_close(t, '}');

@@ -255,6 +255,22 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
     return out->contacts != NULL;
 }
 
+static bool decode_ties(uz_scene *out, decoding *d, const json_value *list)
+{
+    if (!list)
+        return true;
+    out->ties = decode_room(d, list, sizeof *out->ties, &out->n_ties);
+    for (int64_t i = 0; i < out->n_ties; i++) {
+        uz_tie *to = &out->ties[i];
+        const json_value *item = &list->items[i];
+        if (!decode_group(to->on, d, json_get(item, "on"), GROUP_OF_SIDES) ||
+            !decode_group(to->to, d, json_get(item, "to"), GROUP_OF_SIDES))
+            return false;
+        to->tolerance = json_number(json_get(item, "tolerance"), 0);
+    }
+    return out->ties != NULL;
+}
+
 /* ---- materials and supports */
 
 enum { WORDS_MOST = 4 };
@@ -429,5 +445,5 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     return decode_materials(out, d, json_get(object, "materials")) &&
            decode_supports(out, d, json_get(object, "supports")) &&
            decode_loads(&out->loads, &out->n_loads, d, json_get(object, "loads"), uz_scene_dim(out)) &&
-           decode_contacts(out, d, json_get(object, "contacts"));
+           decode_ties(out, d, json_get(object, "ties")) && decode_contacts(out, d, json_get(object, "contacts"));
 }

@@ -90,6 +90,11 @@ typedef struct {
     double point[3], size;
 } uz_rigid_group;
 
+/* Nodes of tied surfaces: what node a has no dofs for is the sum of shares times the displacements of masters. */
+typedef struct {
+    uz_csc share; /* n_nodes x n_nodes: masters in the column of each slave; ptr NULL: there are none */
+} uz_tied;
+
 /* Displacements along the axes of nodes that follow others': of node a the sum of share[k] (dim x dim, by rows) times
  * the dofs of node[k], first[a] <= k < first[a + 1]; none: it has dofs of its own. */
 typedef struct {
@@ -109,6 +114,7 @@ typedef struct {
     int64_t n_rigid;
     uz_rigid_group *rigid;
     int32_t *rigid_of; /* n_nodes: 1 + its rigid group; NULL: there are none */
+    uz_tied tied;
     uz_followers follow;
     int64_t *frame_of; /* n_nodes: 1 + place in info.rotated_node, <= 0: along the axes. NULL: all of them are */
     uz_mesh mesh;
@@ -196,8 +202,12 @@ double uz_along_dof(const uz_body_model *model, int64_t node, int c, const doubl
 /* Is the node of a rigid group? Which; NULL: of none. */
 bool uz_is_rigid(const uz_body_model *model, int64_t node);
 const uz_rigid_group *uz_rigid_group_of(const uz_body_model *model, int64_t node);
+/* Does the node follow the masters of a tie? */
+bool uz_is_tied(const uz_body_model *model, int64_t node);
+/* What such a node has of a value (n_nodes x stride). */
+double uz_tied_value(const uz_body_model *model, int64_t a, const double *value, int64_t stride);
 /* The nodes whose dofs carry node a, and their shares (uz_followers); 0: it has its own, or hangs in a body without
- * rigid groups. */
+ * rigid groups and ties. */
 int64_t uz_carriers(const int64_t **node, const double **share, const uz_body_model *model, int64_t a);
 /* The motion of a group whose nodes have these displacements (n_nodes x dim): t at its point, w in radians. */
 void uz_rigid_motion(double t[3], double w[3], const uz_body_model *model, const uz_rigid_group *group,

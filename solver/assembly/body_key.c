@@ -116,6 +116,16 @@ static void put_selections(uz_buffer *key, const uz_scene *scene)
     }
 }
 
+static void put_ties(uz_buffer *key, const uz_scene *scene)
+{
+    put_int(key, scene->n_ties);
+    for (int64_t i = 0; i < scene->n_ties; i++) {
+        put_name(key, scene->ties[i].on, sizeof scene->ties[i].on);
+        put_name(key, scene->ties[i].to, sizeof scene->ties[i].to);
+        put_double(key, scene->ties[i].tolerance);
+    }
+}
+
 static int by_group(const void *a, const void *b)
 {
     const uz_support *const *left = a, *const *right = b;
@@ -250,6 +260,7 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
     }
     put_supports(&key, scene, dim);
     put_contacts(&key, scene, dim);
+    put_ties(&key, scene);
     if (uz_buffer_finish(&text, len, &key, NULL) != UZ_OK)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the key of a body");
     *out = (unsigned char *)text;

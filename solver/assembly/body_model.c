@@ -26,24 +26,29 @@ void uz_mesh_info_clear(uz_mesh_info *info)
     memset(info, 0, sizeof *info);
 }
 
+void uz_contact_sites_clear(uz_contact_sites *sites)
+{
+    free(sites->gap);
+    free(sites->normal);
+    free(sites->first);
+    free(sites->node);
+    free(sites->weight);
+    free(sites->face);
+    free(sites->at);
+    free(sites->area);
+    free(sites->ends);
+    free(sites->zone);
+    free(sites->rank);
+    free(sites->of);
+    free(sites->inner);
+    free(sites->flank);
+    *sites = (uz_contact_sites){.n = 0};
+}
+
 static void free_sites(uz_contact_sites *sites, int64_t n)
 {
-    for (int64_t k = 0; sites && k < n; k++) {
-        free(sites[k].gap);
-        free(sites[k].normal);
-        free(sites[k].first);
-        free(sites[k].node);
-        free(sites[k].weight);
-        free(sites[k].face);
-        free(sites[k].at);
-        free(sites[k].area);
-        free(sites[k].ends);
-        free(sites[k].zone);
-        free(sites[k].rank);
-        free(sites[k].of);
-        free(sites[k].inner);
-        free(sites[k].flank);
-    }
+    for (int64_t k = 0; sites && k < n; k++)
+        uz_contact_sites_clear(&sites[k]);
     free(sites);
 }
 
@@ -76,6 +81,7 @@ void uz_body_model_clear(uz_body_model *model)
         free(model->rigid);
         free(model->rigid_of);
         uz_followers_clear(&model->follow);
+        uz_csc_clear(&model->tied.share);
     }
     memset(model, 0, sizeof *model);
 }
@@ -98,6 +104,7 @@ size_t uz_body_model_bytes(const uz_body_model *model)
         bytes += (size_t)model->info.n_rotated * 8 * (1 + dim * dim);
         bytes += (size_t)model->d * (size_t)model->n_modes * 8;
         bytes += (size_t)model->n_rigid * sizeof *model->rigid + (model->rigid_of ? 12 * nodes : 0);
+        bytes += uz_csc_bytes(&model->tied.share);
         bytes += model->follow.first ? (size_t)model->follow.first[nodes] * 8 * (1 + dim * dim) : 0;
     }
     for (int64_t k = 0; k < model->n_sites; k++) {
@@ -142,6 +149,8 @@ uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_bo
     model->info.n_elements = model->mesh.n_elements;
     model->info.xyz = model->mesh.xyz;
     status = uz_take_materials(model, scene, err);
+    if (status == UZ_OK)
+        status = uz_find_tied(model, scene, err);
     if (status == UZ_OK)
         status = uz_number_dofs(model, scene, err);
     if (status == UZ_OK)

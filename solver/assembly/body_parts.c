@@ -107,23 +107,29 @@ static void hold_rigid(uz_parts *parts, const uz_body_model *model)
     }
 }
 
-/* What a rigid group has nodes of is one part. False: no memory. */
+static void join(int64_t *to, int64_t i, int64_t k)
+{
+    while (to[i] != i)
+        i = to[i];
+    while (to[k] != k)
+        k = to[k];
+    to[i > k ? i : k] = i > k ? k : i;
+}
+
+/* What a rigid group has nodes of is one part, and so is what is tied. False: no memory. */
 static bool join_parts(uz_parts *parts, const uz_body_model *model)
 {
     int64_t *to = uz_alloc(parts->count, sizeof *to), kept = 0;
     for (int64_t i = 0; to && i < parts->count; i++)
         to[i] = i;
     for (int64_t g = 0; to && g < model->n_rigid; g++)
-        for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-            if (model->rigid_of[a] != g + 1)
-                continue;
-            int64_t i = parts->of[a], k = parts->of[model->rigid[g].anchor[0]];
-            while (to[i] != i)
-                i = to[i];
-            while (to[k] != k)
-                k = to[k];
-            to[i > k ? i : k] = i > k ? k : i;
-        }
+        for (int64_t a = 0; a < model->mesh.n_nodes; a++)
+            if (model->rigid_of[a] == g + 1)
+                join(to, parts->of[a], parts->of[model->rigid[g].anchor[0]]);
+    const uz_csc *tied = &model->tied.share;
+    for (int64_t a = 0; to && tied->ptr && a < model->mesh.n_nodes; a++)
+        for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1]; q++)
+            join(to, parts->of[a], parts->of[tied->idx[q]]);
     for (int64_t i = 0; to && i < parts->count; i++) /* those before have their new numbers already */
         to[i] = to[i] == i ? kept++ : to[to[i]];
     for (int64_t a = 0; to && a < model->mesh.n_nodes; a++)
@@ -152,7 +158,7 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
         parts->unit[k][which[k]] = 1;
     parts->of = uz_alloc(mesh->n_nodes, sizeof *parts->of);
     parts->count = parts->of ? uz_mesh_number_parts(parts->of, mesh) : -1;
-    if (parts->count > 0 && model->n_rigid > 0 && !join_parts(parts, model))
+    if (parts->count > 0 && (model->n_rigid > 0 || model->tied.share.ptr) && !join_parts(parts, model))
         parts->count = -1;
     parts->list = parts->count >= 0 ? uz_alloc_zero(parts->count, sizeof *parts->list) : NULL;
     if (!parts->list)

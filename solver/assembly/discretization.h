@@ -55,6 +55,9 @@ typedef struct {
 /* The one that a contact asks for. */
 const uz_contact_discretization *uz_discretization_of(const uz_contact *contact);
 
+/* Frees what they have, and makes them zero. */
+void uz_contact_sites_clear(uz_contact_sites *sites);
+
 /* Its input but for `room`. UZ_ERR_SCENE: the groups are not there. */
 uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, const uz_scene *scene, int64_t index,
                               uz_error *err);

@@ -86,6 +86,8 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
     if (status != UZ_OK)
         return status;
     status = uz_number_rigid(model, scene, err);
+    if (status == UZ_OK)
+        status = uz_number_tied(model, err);
     if (status != UZ_OK)
         return status;
     const int64_t total = mesh->n_nodes * mesh->dim;

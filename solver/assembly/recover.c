@@ -126,10 +126,12 @@ double uz_turning_error(const uz_body_model *model, int64_t node, const double *
         return uz_carried_error(model, node, nodal);
     const int count = hangs ? uz_mesh_amid(&from, &share, &model->mesh, node) : 1;
     double size = 0;
+    for (int c = 0; c < dim && uz_is_tied(model, node); c++)
+        size += fabs(uz_tied_value(model, node, nodal + c, dim));
     for (int k = 0; k < count; k++)
         for (int c = 0; c < dim && (hangs || uz_node_frame(model, node)); c++)
             size += fabs(share[k] * nodal[from[k] * dim + c]);
-    return (hangs ? 4 + count : 4) * DBL_EPSILON * size;
+    return (hangs ? 4 + count : uz_is_tied(model, node) ? 32 : 4) * DBL_EPSILON * size;
 }
 
 static void *duplicate(const void *from, int64_t count, size_t size)

@@ -232,7 +232,32 @@ static void append(uz_followers *f, int64_t start, int64_t *n, int dim, int64_t 
         f->share[at * dim * dim + i] += times * share[i];
 }
 
-/* Nodes of rigid groups, and hanging ones, which may lie amid such. */
+/* A slave of a tie: the carriers of its masters, and itself for what supports hold of it. */
+static void append_tied(uz_followers *f, int64_t *n, const uz_body_model *model, int64_t a)
+{
+    const uz_csc *tied = &model->tied.share;
+    const int dim = model->mesh.dim;
+    const int64_t *dof = model->dof + a * dim;
+    double own[2][9], held[9] = {0};
+    int64_t node[2];
+    bool any = false;
+    for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1]; q++) {
+        const int carriers = own_carriers(node, own, model, tied->idx[q]);
+        for (int k = 0; k < carriers; k++) {
+            for (int i = 0; i < dim * dim; i++)
+                own[k][i] = dof[i / dim] == UZ_NO_DOF ? own[k][i] : 0;
+            append(f, f->first[a], n, dim, node[k], own[k], tied->val[q]);
+        }
+    }
+    for (int c = 0; c < dim; c++) {
+        held[c * dim + c] = dof[c] == UZ_NO_DOF ? 0 : 1;
+        any = any || dof[c] != UZ_NO_DOF;
+    }
+    if (any)
+        append(f, f->first[a], n, dim, a, held, 1);
+}
+
+/* Nodes of rigid groups and tied ones, and hanging ones, which may lie amid such. */
 uz_status uz_find_followers(uz_body_model *model, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
@@ -240,12 +265,13 @@ uz_status uz_find_followers(uz_body_model *model, uz_error *err)
     uz_followers *f = &model->follow;
     int64_t most = 0, n = 0, node[2];
     double own[2][9];
-    if (model->n_rigid == 0)
+    if (model->n_rigid == 0 && !model->tied.share.ptr)
         return UZ_OK;
     for (int64_t a = 0; a < mesh->n_nodes; a++) {
         const int64_t *from;
         const double *share;
         most += 2 * (uz_mesh_hangs(mesh, a) ? uz_mesh_amid(&from, &share, mesh, a) : uz_is_rigid(model, a));
+        most += uz_is_tied(model, a) ? 2 * (model->tied.share.ptr[a + 1] - model->tied.share.ptr[a]) + 1 : 0;
     }
     f->first = uz_alloc_zero(mesh->n_nodes + 1, sizeof *f->first);
     f->node = uz_alloc(most, sizeof *f->node);
@@ -258,6 +284,8 @@ uz_status uz_find_followers(uz_body_model *model, uz_error *err)
         const bool hangs = uz_mesh_hangs(mesh, a);
         const int parents = hangs ? uz_mesh_amid(&from, &amid, mesh, a) : uz_is_rigid(model, a);
         f->first[a] = n;
+        if (uz_is_tied(model, a))
+            append_tied(f, &n, model, a);
         for (int p = 0; p < parents; p++) {
             const int carriers = own_carriers(node, own, model, from[p]);
             for (int k = 0; k < carriers; k++)

@@ -161,7 +161,7 @@ uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *mo
     }
     for (int64_t g = 0; status == UZ_OK && g < model->n_rigid; g++)
         set_rigid_modes(z, &parts, model, &model->rigid[g]);
-    if (status == UZ_OK && n > 0 && (model->n_pair_rows > 0 || model->n_rigid > 0)) {
+    if (status == UZ_OK && n > 0 && (model->n_pair_rows > 0 || model->follow.first)) {
         status = hold_by_bodies(&parts, model, z, n, err);
     } else if (status == UZ_OK) {
         /* An obstacle stands in the way of one combination of the motions of its part, from one side. */

@@ -205,7 +205,7 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
         double own[9] = {0};
         for (int c = 0; c < dim; c++)
             own[c * dim + c] = k[c];
-        const bool follows = uz_mesh_hangs(&model->mesh, a) || uz_is_rigid(model, a);
+        const bool follows = uz_mesh_hangs(&model->mesh, a) || uz_have_carriers(model, &a, 1);
         if (follows)
             uz_add_stiffness(model, own, &a, 1);
         for (int j = 0; j < dim && !follows; j++)
@@ -370,7 +370,7 @@ uz_status uz_turning_energy(double *energy, const uz_body_model *model, const do
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         bool turned = uz_are_rotated(model, node, count);
         for (int a = 0; a < count; a++)
-            turned = turned || uz_mesh_hangs(mesh, node[a]) || uz_is_rigid(model, node[a]);
+            turned = turned || uz_mesh_hangs(mesh, node[a]) || uz_have_carriers(model, &node[a], 1);
         if (!turned)
             continue;
         status = source_get(&ke, &source, e, err);

@@ -55,6 +55,8 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
     for (int64_t k = 0; k < model->n_materials; k++)
         if (model->materials[k].lame.general)
             refuse(out, "of orthotropic materials no energy is bounded here", "");
+    if (model->tied.share.ptr)
+        refuse(out, "parts are tied, which the continuum here is not", "");
     for (int64_t e = 0; e < mesh->n_elements && !*out->why; e++)
         if (uz_element_type_of((uz_element_kind)mesh->kind[e])->nodes >
             uz_element_type_of((uz_element_kind)mesh->kind[e])->corners)

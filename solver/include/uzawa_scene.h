@@ -256,6 +256,12 @@ typedef struct {
     double feature_angle; /* surfaces: those that turn by more keep their corner; degrees, 0: 40 */
 } uz_contact;
 
+/* Two surfaces that stay together where they are near each other, in all directions. */
+typedef struct {
+    char on[64], to[64];
+    double tolerance; /* how far apart they may be where they are tied; 0: a tenth of the longest edge there */
+} uz_tie;
+
 typedef enum { UZ_MESH_BOX, UZ_MESH_GIVEN } uz_mesh_source;
 
 /* Where gaps, normals and what faces what are taken. */
@@ -296,6 +302,8 @@ typedef struct {
     int64_t n_loads;
     uz_contact *contacts;
     int64_t n_contacts;
+    uz_tie *ties;
+    int64_t n_ties;
     bool all_candidates; /* solve with every contact row, also those far from any obstacle */
     bool peak_stress;    /* the evaluation tells the largest stress, as it does where a material has a yield stress */
     uz_kinematics kinematics;

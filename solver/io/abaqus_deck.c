@@ -594,10 +594,10 @@ static uz_status read_initial(abaqus_deck *d, const abaqus_keyword *keyword)
 
 /* ---- contact */
 
-static uz_status read_pair(abaqus_deck *d, const abaqus_keyword *keyword)
+/* Lines of two surfaces, in contact or tied. */
+static uz_status read_surfaces(abaqus_deck *d, const char *interaction, bool tie, double tolerance)
 {
-    static const char *const READ[] = {"INTERACTION", "TYPE", "SMALL SLIDING", NULL};
-    uz_status status = check_parameters(d, keyword, READ);
+    uz_status status = UZ_OK;
     while (status == UZ_OK && next_data(d)) {
         char name[2][ABAQUS_FIELD] = {"", ""};
         abaqus_field(name[0], &d->text);
@@ -608,11 +608,61 @@ static uz_status read_pair(abaqus_deck *d, const abaqus_keyword *keyword)
         if (!uz_grow(&d->pairs, d->n_pairs, 1, &d->pairs_room, sizeof *d->pairs))
             return abaqus_no_memory(&d->text);
         deck_pair *to = &d->pairs[d->n_pairs++];
-        *to = (deck_pair){.line = d->text.number};
+        *to = (deck_pair){.line = d->text.number, .tie = tie, .tolerance = tolerance};
+        snprintf(to->interaction, sizeof to->interaction, "%s", interaction ? interaction : "");
         memcpy(to->slave, name[0], strlen(name[0]));
         memcpy(to->master, name[1], strlen(name[1]));
     }
     return status;
+}
+
+static uz_status read_pair(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const READ[] = {"INTERACTION", "TYPE", "SMALL SLIDING", NULL};
+    const uz_status status = check_parameters(d, keyword, READ);
+    return status == UZ_OK ? read_surfaces(d, abaqus_parameter(keyword, "INTERACTION"), false, 0.0) : status;
+}
+
+/* Nodes that it would move to the other surface stay where they are. */
+static uz_status read_tie(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const READ[] = {"NAME", "POSITION TOLERANCE", "ADJUST", NULL};
+    const char *given = abaqus_parameter(keyword, "POSITION TOLERANCE");
+    double tolerance = 0.0;
+    uz_status status = check_parameters(d, keyword, READ);
+    if (status == UZ_OK && given)
+        status = abaqus_real(&tolerance, given, "a tolerance", &d->text);
+    return status == UZ_OK ? read_surfaces(d, NULL, true, tolerance) : status;
+}
+
+bool deck_is_tied(const abaqus_deck *d, const char *interaction)
+{
+    bool tied = false;
+    for (int64_t i = 0; i < d->n_tied; i++)
+        tied = tied || strcasecmp(d->tied[i].name, interaction) == 0;
+    return tied;
+}
+
+static uz_status read_interaction(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    const char *name = abaqus_parameter(keyword, "NAME");
+    snprintf(d->interaction, sizeof d->interaction, "%s", name ? name : "");
+    skip_data(d);
+    return UZ_OK;
+}
+
+/* What holds tied surfaces together: across them, and (behind the coefficient of friction) along them. */
+static uz_status read_tied_spring(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    double stiffness;
+    const uz_status status = next_number(&stiffness, d, "the stiffness of a tie", 0.0);
+    if (status != UZ_OK)
+        return status;
+    skip_data(d);
+    if (!uz_grow(&d->springs, d->n_springs, 1, &d->springs_room, sizeof *d->springs))
+        return abaqus_no_memory(&d->text);
+    d->springs[d->n_springs++] = (deck_spring){.line = keyword->line, .stiffness = stiffness, .tie = true};
+    return UZ_OK;
 }
 
 /* The springs of CalculiX: p = K d; p = p0 exp(d ln 100 / c0), whose slope at d = 0 is p0 ln 100 / c0. */
@@ -632,17 +682,21 @@ static uz_status read_behavior(abaqus_deck *d, const abaqus_keyword *keyword)
         skip_data(d);
         if (!uz_grow(&d->springs, d->n_springs, 1, &d->springs_room, sizeof *d->springs))
             return abaqus_no_memory(&d->text);
-        d->springs[d->n_springs++] = (deck_spring){keyword->line, linear ? first : second * log(100.0) / first};
+        d->springs[d->n_springs++] =
+            (deck_spring){.line = keyword->line, .stiffness = linear ? first : second * log(100.0) / first};
         return UZ_OK;
+    }
+    if (kind && strcasecmp(kind, "TIED") == 0) {
+        if (!uz_grow(&d->tied, d->n_tied, 1, &d->tied_room, sizeof *d->tied))
+            return abaqus_no_memory(&d->text);
+        memcpy(d->tied[d->n_tied++].name, d->interaction, sizeof d->interaction);
+        return next_data(d) ? read_tied_spring(d, keyword) : UZ_OK;
     }
     skip_data(d);
     if (!kind || strcasecmp(kind, "HARD") == 0)
         return UZ_OK;
     return deck_note(d, keyword->line, keyword->text, UZ_DECK_LEFT_OUT,
-                     strcasecmp(kind, "TIED") == 0
-                         ? "%.20s: the surfaces are not tied, but may open and slide"
-                         : "%.20s: hard contact, without overclosure, in place of a spring between the surfaces",
-                     kind);
+                     "%.20s: hard contact, without overclosure, in place of a spring between the surfaces", kind);
 }
 
 static uz_status read_friction(abaqus_deck *d, const abaqus_keyword *keyword)
@@ -651,6 +705,8 @@ static uz_status read_friction(abaqus_deck *d, const abaqus_keyword *keyword)
     uz_status status = UZ_OK;
     if (next_data(d)) {
         status = next_number(&coefficient, d, "a coefficient of friction", 0.0);
+        if (status == UZ_OK && deck_is_tied(d, d->interaction)) /* which do not slide whatever it is */
+            return read_tied_spring(d, keyword);
         skip_data(d);
     }
     return status == UZ_OK && coefficient > 0.0
@@ -732,6 +788,8 @@ static const struct {
     {"TEMPERATURE", read_temperature, false, NULL},
     {"INITIAL CONDITIONS", read_initial, false, NULL},
     {"CONTACT PAIR", read_pair, false, NULL},
+    {"TIE", read_tie, false, NULL},
+    {"SURFACE INTERACTION", read_interaction, false, NULL},
     {"SURFACE BEHAVIOR", read_behavior, false, NULL},
     {"FRICTION", read_friction, false, NULL},
     {"STEP", read_step, false, NULL},
@@ -740,7 +798,6 @@ static const struct {
     {"NSET", NULL, true, NULL},
     {"ELSET", NULL, true, NULL},
     {"SURFACE", NULL, true, NULL},
-    {"SURFACE INTERACTION", NULL, true, NULL},
     {"HEADING", NULL, true, NULL},
     {"END STEP", NULL, true, NULL},
     {"ENDSTEP", NULL, true, NULL},
@@ -782,7 +839,6 @@ static const struct {
     {"MEMBRANE SECTION", NULL, false, "membranes are no part of the body, and are left out"},
     {"EQUATION", NULL, false, "equations between displacements are left out"},
     {"MPC", NULL, false, "constraints between displacements are left out"},
-    {"TIE", NULL, false, "ties are left out: the parts are not joined"},
     {"TRANSFORM", NULL, false, "directions of nodes along other axes are left out: they are those of the file"},
     {"CYCLIC SYMMETRY MODEL", NULL, false, "cyclic symmetry is left out"},
     {"RIGID BODY", NULL, false, "rigid bodies are left out; a scene has obstacles for that"},

@@ -25,12 +25,21 @@ typedef struct {
 typedef struct {
     int64_t line;
     char slave[ABAQUS_NAME], master[ABAQUS_NAME];
+    char interaction[ABAQUS_NAME]; /* of contact; one that is tied makes a tie of the pair */
+    bool tie;
+    double tolerance; /* of a tie; 0: not given */
 } deck_pair;
+
+/* *SURFACE INTERACTION with TIED behavior. */
+typedef struct {
+    char name[ABAQUS_NAME];
+} deck_tied;
 
 /* What stands between surfaces in contact, in place of which a scene has nothing. */
 typedef struct {
     int64_t line;
     double stiffness; /* pressure per length where they begin to touch */
+    bool tie;         /* of tied ones, across or along them */
 } deck_spring;
 
 /* A pressure on a side of an element (of the file), or on a surface. */
@@ -60,10 +69,12 @@ typedef struct {
     deck_material *materials;
     deck_amplitude *amplitudes;
     deck_pair *pairs;
+    deck_tied *tied;
+    char interaction[ABAQUS_NAME]; /* the one that is being read */
     deck_spring *springs;
     deck_pressure *pressures;
-    int64_t n_materials, n_amplitudes, n_pairs, n_springs, n_pressures;
-    int64_t materials_room, amplitudes_room, pairs_room, springs_room, pressures_room;
+    int64_t n_materials, n_amplitudes, n_pairs, n_tied, n_springs, n_pressures;
+    int64_t materials_room, amplitudes_room, pairs_room, tied_room, springs_room, pressures_room;
 
     int64_t n_met; /* materials that the lines read so far begin: data are of the last of them */
 
@@ -76,6 +87,8 @@ typedef struct {
 /* Adds a note of at most 199 bytes, about a keyword ("*FRICTION"). */
 uz_status deck_note(abaqus_deck *d, int64_t line, const char *keyword, uz_deck_effect effect, const char *format, ...)
     __attribute__((format(printf, 5, 6)));
+/* Has a *SURFACE INTERACTION of this name TIED behavior, as far as the lines are read? */
+bool deck_is_tied(const abaqus_deck *d, const char *interaction);
 /* Goes through the lines (abaqus_deck.c). */
 uz_status deck_read_lines(abaqus_deck *d);
 /* Makes of them what the scene has beside the mesh (abaqus_scene.c). */

@@ -562,6 +562,11 @@ static uz_status surface_of(char name[64], abaqus_deck *d, int64_t line, const c
     return sides_of_nodes(name, d, line, &copy);
 }
 
+static bool is_tied(const abaqus_deck *d, const deck_pair *pair)
+{
+    return pair->tie || deck_is_tied(d, pair->interaction);
+}
+
 static uz_status make_contacts(abaqus_deck *d)
 {
     uz_scene *scene = &d->out->scene;
@@ -569,23 +574,32 @@ static uz_status make_contacts(abaqus_deck *d)
     if (d->n_pairs > LIST_MOST)
         return too_many(d, "contact pairs");
     scene->contacts = uz_alloc_zero(d->n_pairs, sizeof *scene->contacts);
-    if (!scene->contacts)
+    scene->ties = uz_alloc_zero(d->n_pairs, sizeof *scene->ties);
+    if (!scene->contacts || !scene->ties)
         return abaqus_no_memory(&d->text);
     for (int64_t i = 0; i < d->n_pairs && status == UZ_OK; i++) {
         const deck_pair *pair = &d->pairs[i];
-        uz_contact *to = &scene->contacts[scene->n_contacts];
-        *to = (uz_contact){.kind = UZ_OBSTACLE_BODY, .between = UZ_CONTACT_SURFACES};
+        const bool tie = is_tied(d, pair);
+        uz_contact *contact = &scene->contacts[scene->n_contacts];
+        uz_tie *to = &scene->ties[scene->n_ties];
+        *to = (uz_tie){.tolerance = pair->tolerance};
         status = surface_of(to->on, d, pair->line, pair->slave);
         if (status == UZ_OK)
-            status = surface_of(to->with, d, pair->line, pair->master);
+            status = surface_of(to->to, d, pair->line, pair->master);
         if (status != UZ_OK)
             break;
-        if (to->on[0] && to->with[0])
+        if (!to->on[0] || !to->to[0]) {
+            status = deck_note(d, pair->line, pair->tie ? "TIE" : "CONTACT PAIR", UZ_DECK_LEFT_OUT,
+                               "the %s is left out: the nodes of \"%.60s\" make no side of the body",
+                               tie ? "tie" : "contact", to->on[0] ? pair->master : pair->slave);
+        } else if (tie) {
+            scene->n_ties++;
+        } else {
+            *contact = (uz_contact){.kind = UZ_OBSTACLE_BODY, .between = UZ_CONTACT_SURFACES};
+            memcpy(contact->on, to->on, sizeof contact->on);
+            memcpy(contact->with, to->to, sizeof contact->with);
             scene->n_contacts++;
-        else
-            status = deck_note(d, pair->line, "CONTACT PAIR", UZ_DECK_LEFT_OUT,
-                               "the contact is left out: the nodes of \"%.60s\" make no side of the body",
-                               to->on[0] ? pair->master : pair->slave);
+        }
     }
     return status;
 }
@@ -612,10 +626,11 @@ static uz_status note_springs(abaqus_deck *d)
     for (int64_t i = 0; i < d->n_springs && status == UZ_OK; i++) {
         const double part = young / (d->springs[i].stiffness * thickness);
         const bool stiff = part >= 0.0 && part < STIFF;
-        status = deck_note(d, d->springs[i].line, "SURFACE BEHAVIOR", stiff ? UZ_DECK_REPLACED : UZ_DECK_LEFT_OUT,
-                           "hard contact in place of a spring of %.3g between the surfaces, which gives way by about "
-                           "%.2g of what the body does",
-                           d->springs[i].stiffness, part);
+        status =
+            deck_note(d, d->springs[i].line, "SURFACE BEHAVIOR", stiff ? UZ_DECK_REPLACED : UZ_DECK_LEFT_OUT,
+                      "%s in place of a spring of %.3g between the surfaces, which gives way by about %.2g of what "
+                      "the body does",
+                      d->springs[i].tie ? "a tie" : "hard contact", d->springs[i].stiffness, part);
     }
     return status;
 }
@@ -728,6 +743,7 @@ static void clear_deck(abaqus_deck *d)
     free(d->materials);
     free(d->amplitudes);
     free(d->pairs);
+    free(d->tied);
     free(d->springs);
     free(d->pressures);
     free(d->fixed);

@@ -146,6 +146,12 @@ static bool list_supports(balance *b)
     return true;
 }
 
+/* Do other nodes bear what acts on this one? */
+static bool leaves(const balance *b, int64_t node)
+{
+    return uz_mesh_hangs(&b->model->mesh, node) || uz_is_tied(b->model, node);
+}
+
 /* f_int at held nodes, of the elements that touch one, and at hanging nodes. */
 static void add_elements(balance *b)
 {
@@ -160,7 +166,7 @@ static void add_elements(balance *b)
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         bool touches = false;
         for (int a = 0; a < count; a++)
-            touches = touches || b->held[node[a]] || uz_mesh_hangs(mesh, node[a]);
+            touches = touches || b->held[node[a]] || leaves(b, node[a]);
         if (!touches)
             continue;
         if (!alike || made != uz_element_material(model, e)) {
@@ -171,7 +177,7 @@ static void add_elements(balance *b)
         const int dim = b->dim, n = count * dim;
         for (int i = 0; i < n; i++) {
             double sum = 0;
-            if (!b->held[node[i / dim]] && !uz_mesh_hangs(mesh, node[i / dim]))
+            if (!b->held[node[i / dim]] && !leaves(b, node[i / dim]))
                 continue;
             for (int j = 0; j < n; j++)
                 sum += ke[i * n + j] * b->u[node[j / dim] * dim + j % dim];
@@ -195,6 +201,22 @@ static void leave_hanging(balance *b)
             b->inner[to] += share[k / b->dim] * (b->inner[own] + spring);
             b->load[to] += share[k / b->dim] * b->load[own];
             b->contact[to] += share[k / b->dim] * b->contact[own];
+        }
+    }
+}
+
+/* And those at slaves of ties to their masters. */
+static void leave_tied(balance *b)
+{
+    const uz_csc *tied = &b->model->tied.share;
+    for (int64_t i = 0; tied->ptr && i < b->model->mesh.n_nodes * b->dim; i++) {
+        const int64_t a = i / b->dim;
+        const double spring = b->model->spring ? b->model->spring[i] * b->u[i] : 0;
+        for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1] && b->model->dof[i] == UZ_NO_DOF; q++) {
+            const int64_t to = tied->idx[q] * b->dim + i % b->dim;
+            b->inner[to] += tied->val[q] * (b->inner[i] + spring);
+            b->load[to] += tied->val[q] * b->load[i];
+            b->contact[to] += tied->val[q] * b->contact[i];
         }
     }
 }
@@ -371,8 +393,10 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         take_inner(&b, known->inner);
     else if (status == UZ_OK)
         add_elements(&b);
-    if (status == UZ_OK)
+    if (status == UZ_OK) {
         leave_hanging(&b);
+        leave_tied(&b);
+    }
     for (int64_t a = 0; a < n && status == UZ_OK; a++)
         if (b.held[a] && !uz_mesh_hangs(&model->mesh, a))
             add_reaction(&b, a);

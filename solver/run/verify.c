@@ -47,14 +47,19 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
         int64_t dof = model->dof[i], node = i / dim;
         double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
         double rounding = 2 * uz_turning_error(model, node, u); /* there and back */
-        const double held = uz_is_rigid(model, node) ? rigid_at(run, u, node, (int)(i % dim))
-                            : dof == UZ_NO_DOF       ? uz_mesh_value_amid(&model->mesh, node, u + i % dim, dim)
-                            : dof < 0                ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent)
-                                                     : given;
+        const double held = uz_is_rigid(model, node)                      ? rigid_at(run, u, node, (int)(i % dim))
+                            : dof == UZ_NO_DOF && uz_is_tied(model, node) ? uz_tied_value(model, node, u + i % dim, dim)
+                            : dof == UZ_NO_DOF ? uz_mesh_value_amid(&model->mesh, node, u + i % dim, dim)
+                            : dof < 0          ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent)
+                                               : given;
         if (!(fabs(given - held) <= rounding) && uz_is_rigid(model, node))
             return uz_fail(err, UZ_ERR_SCENE, "u",
                            "node %lld is of a rigid group: as the group is held and moves, its displacement along %s "
                            "must be %.17g, it is given as %.17g",
+                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), held, given);
+        if (!(fabs(given - held) <= rounding) && dof == UZ_NO_DOF && uz_is_tied(model, node))
+            return uz_fail(err, UZ_ERR_SCENE, "u",
+                           "node %lld is tied: its displacement along %s must be %.17g, it is given as %.17g",
                            (long long)node, uz_dof_name(model, node, (int)(i % dim)), held, given);
         if (!(fabs(given - held) <= rounding) && dof == UZ_NO_DOF)
             return uz_fail(err, UZ_ERR_SCENE, "u",

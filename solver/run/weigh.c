@@ -42,6 +42,8 @@ static bool is_asked(const uz_result *result, const uz_problem *one, bool own_la
     for (int64_t k = 0; k < one->scene.n_materials; k++)
         if (one->scene.materials[k].is_orthotropic) /* there is no law to compare with: a warning has told */
             return false;
+    if (one->scene.n_ties > 0)
+        return false;
     for (int64_t k = 0; k < one->scene.n_supports; k++)
         if (one->scene.supports[k].kind == UZ_SUPPORT_RIGID)
             return false;

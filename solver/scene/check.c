@@ -62,6 +62,17 @@ uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i,
 
 /* ---- the whole */
 
+static uz_status check_tie(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    const uz_tie *tie = &scene->ties[i];
+    for (int k = 0; k < 2; k++)
+        if (!uz_check_sides(where, mesh, k == 0 ? tie->on : tie->to, "ties", i, k == 0 ? "on" : "to",
+                            "surfaces are tied: name sides", err))
+            return UZ_ERR_SCENE;
+    return uz_check_number(tie->tolerance, "ties", i, "tolerance", err);
+}
+
 static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     enum { MOST = 1000 }; /* each item costs work on every node of its group */
@@ -71,6 +82,7 @@ static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mes
     } lists[] = {{"/supports", scene->n_supports},
                  {"/loads", scene->n_loads},
                  {"/contacts", scene->n_contacts},
+                 {"/ties", scene->n_ties},
                  {"/materials", scene->n_materials}};
     uz_status status = UZ_OK;
     for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++)
@@ -81,6 +93,8 @@ static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mes
         status = uz_check_support(scene, mesh, i, err);
     for (int64_t i = 0; i < scene->n_contacts && status == UZ_OK; i++)
         status = uz_check_contact(scene, mesh, i, err);
+    for (int64_t i = 0; i < scene->n_ties && status == UZ_OK; i++)
+        status = check_tie(scene, mesh, i, err);
     return status;
 }
 

@@ -40,6 +40,7 @@ void uz_scene_clear(uz_scene *scene)
     free(scene->supports);
     free(scene->loads);
     free(scene->contacts);
+    free(scene->ties);
     memset(scene, 0, sizeof *scene);
 }
 

@@ -109,7 +109,6 @@ static const struct {
 } LEFT[] = {
     {"*FRICTION\n.1\n" STEP, 1, "coefficient 0.1"},
     {"*EQUATION\n2\n1,1,1.,2,1,-1.\n" STEP, 1, "equations"},
-    {"*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=TIED\n1.e7\n" STEP, 1, "not tied"},
     {"*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR\n2.e3\n" STEP, 1, "a spring of 2e+03"}, /* 1000 / (2000 * 2) */
     {"*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=EXPONENTIAL\n.1,50.\n" STEP, 1, "by about 0.22"},
     {"*PLASTIC\n1.,0.\n" STEP, 1, "no word for it"},
@@ -151,6 +150,29 @@ TEST(nothing_is_left_out_in_silence)
         CHECK_MSG(told, "%zu", i);
         uz_deck_clear(&deck);
     }
+}
+
+/* By name, and by the behavior of a contact pair that comes before it. */
+TEST(ties)
+{
+    uz_deck deck;
+    must_read(&deck, BODIES STEEL SECTIONS "*SURFACE,NAME=SL\n2,S1\n*SURFACE,NAME=MA\n1,S3\n"
+                                           "*TIE,NAME=T,POSITION TOLERANCE=0.25\nSL,MA\n" STEP);
+    CHECK(deck.scene.n_contacts == 0 && deck.scene.n_ties == 1 && deck.n_notes == 0);
+    CHECK(strcmp(deck.scene.ties[0].on, "SL") == 0 && strcmp(deck.scene.ties[0].to, "MA") == 0 &&
+          deck.scene.ties[0].tolerance == 0.25);
+    uz_deck_clear(&deck);
+#define GLUED                                                                                                          \
+    BODIES STEEL SECTIONS "*SURFACE,NAME=SL\n2,S1\n*SURFACE,NAME=MA\n1,S3\n*CONTACT PAIR,INTERACTION=glue\nSL,MA\n"    \
+                          "*SURFACE INTERACTION,NAME=GLUE\n*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=TIED\n1.e7\n"
+    must_read(&deck, GLUED "*FRICTION\n1.e30,1.e7\n" STEP);
+    CHECK(deck.scene.n_contacts == 0 && deck.scene.n_ties == 1 && deck.scene.ties[0].tolerance == 0.0);
+    CHECK(deck.n_notes == 2 && deck.notes[1].effect == UZ_DECK_REPLACED && deck.notes[0].effect == UZ_DECK_REPLACED &&
+          strstr(deck.notes[0].text, "a tie in place of a spring"));
+    uz_deck_clear(&deck);
+    uz_error err; /* soft along the surfaces */
+    CHECK(read_deck(&deck, GLUED "*FRICTION\n1.e30,1.e3\n" STEP, false, &err) == UZ_ERR_UNSUPPORTED &&
+          strstr(err.message, "a spring of 1e+03"));
 }
 
 /* As CalculiX takes them: a section before the material that it names. */

@@ -1,0 +1,165 @@
+"""Parts that are tied, whatever their meshes: patch tests of every element, supports and rigid groups beside, refusals."""
+# not under ThreadSanitizer: about answers, not about threads
+import service
+from service import check, expect
+from two_bodies import PLANE, SOLID, body
+
+SHARED = True  # one service for all tests
+
+E, NU, PULL = 1000.0, 0.3, 2.0
+TIE = [{"on": "roof", "to": "floor"}]
+
+
+def answer(s, request):
+    job = s.post(request)
+    expect(job, 202)
+    ended = s.wait_status(job.json["id"], "successful", "failed", seconds=60)
+    check(ended["status"] == "successful", ended)
+    found = s.get(f"/v1/jobs/{job.json['id']}/result?fields=summary,displacements,nodes,reactions").json
+    check(found["summary"]["outcome"] == "converged", found["summary"]["outcome"])
+    check(found["summary"]["resultants"]["imbalance"] < 1e-9, found["summary"]["resultants"])
+    return found
+
+
+def refused(s, request, pointer, word):
+    reply = s.post(request)
+    found = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", "successful")["error"]
+    check(found["pointer"] == f"/problem{pointer}" and word in found["detail"], found)
+
+
+def stacked(kinds, gap=0.0, cells=None, lean=0.0, **scene):
+    """A unit body on another one, neither mesh a part of the other; the surface between them may lean."""
+    solid = kinds[0] in SOLID
+    sides = {"foot": [(0, "z0" if solid else "bottom")], "roof": [(0, "z1" if solid else "top")],
+             "floor": [(1, "z0" if solid else "bottom")], "head": [(1, "z1" if solid else "top")],
+             "left": [(0, "x0" if solid else "left"), (1, "x0" if solid else "left")],
+             "right": [(0, "x1" if solid else "right"), (1, "x1" if solid else "right")]}
+    if solid:
+        sides["side"] = [(0, "y0"), (1, "y0")]
+        places = [lambda x, y, z: (x, y, z * (1 + lean * x)), lambda x, y, z: (x, y, 1 + lean * x + gap + z * (1 - lean * x))]
+        cells = cells or [(2, 2, 2), (3, 3, 2)]
+    else:
+        places = [lambda x, y: (x, y * (1 + lean * x)), lambda x, y: (x, 1 + lean * x + gap + y * (1 - lean * x))]
+        cells = cells or [(2, 2), (3, 2)]
+    model = "solid" if solid else "plane_strain"
+    scene = {"model": model, "materials": [{"on": "all", "young": E, "poisson": NU}], "ties": TIE, **scene}
+    return body(kinds, cells, places, sides, **scene)
+
+
+def pulled(kinds, **more):
+    """Between planes of symmetry and a traction on top: the stress is the same everywhere."""
+    solid = kinds[0] in SOLID
+    supports = [{"on": "foot", "uz" if solid else "uy": 0}, {"on": "left", "ux": 0}] + ([{"on": "side", "uy": 0}] if solid else [])
+    return stacked(kinds, supports=supports, loads=[{"on": "head", "traction": [0, 0, PULL] if solid else [0, PULL]}], **more)
+
+
+def check_linear(found, field, off=1e-10):
+    for x, u in zip(found["nodes"], found["displacements"]):
+        check(all(abs(a - b) < off * PULL / E for a, b in zip(u, field(x))), x, u, field(x))
+
+
+def test_constant_stress_passes_every_element(s):
+    for kind in PLANE:
+        high, wide = PULL * (1 - NU ** 2) / E, -PULL * NU * (1 + NU) / E
+        check_linear(answer(s, pulled([kind, kind])), lambda x: [wide * x[0], high * x[1]])
+    for kind in SOLID:
+        check_linear(answer(s, pulled([kind, kind])), lambda x: [-NU * PULL / E * x[0], -NU * PULL / E * x[1], PULL / E * x[2]])
+
+
+def test_elements_may_be_of_two_types_and_the_surface_lean(s):
+    for kinds in (["quad4", "tri6"], ["quad8", "tri3"]):
+        high, wide = PULL * (1 - NU ** 2) / E, -PULL * NU * (1 + NU) / E
+        check_linear(answer(s, pulled(kinds, lean=0.2)), lambda x: [wide * x[0], high * x[1]])
+    for kinds in (["hex8", "tet4"], ["hex20", "tet10"]):
+        check_linear(answer(s, pulled(kinds, lean=0.2)), lambda x: [-NU * PULL / E * x[0], -NU * PULL / E * x[1], PULL / E * x[2]])
+
+
+def test_shear_passes_too(s):
+    """What contact could not bear: the same stress across the surface, along it."""
+    slope = PULL * 2 * (1 + NU) / E
+    for kind in ("quad4", "quad8", "hex8", "hex20", "tet10"):
+        solid = kind in SOLID
+        hold = {"ux": 0, "uy": 0, **({"uz": 0} if solid else {})}
+        loads = [{"on": "head", "traction": [PULL, 0, 0] if solid else [PULL, 0]},
+                 {"on": "right", "traction": [0, 0, PULL] if solid else [0, PULL]}, {"on": "left", "traction": [0, 0, -PULL] if solid else [0, -PULL]}]
+        found = answer(s, stacked([kind, kind], supports=[{"on": "foot", **hold}], loads=loads))
+        check_linear(found, lambda x: [slope * x[-1]] + [0] * (len(x) - 1))
+
+
+def test_which_is_on_does_not_matter_and_what_is_held_balances(s):
+    one = answer(s, pulled(["quad4", "quad4"]))
+    two = answer(s, pulled(["quad4", "quad4"], ties=[{"on": "floor", "to": "roof"}]))
+    check(one["displacements"] == two["displacements"])
+    foot = one["summary"]["resultants"]["supports"][0]["force"]
+    check(abs(foot[1] + PULL) < 1e-9, foot)
+
+
+def test_a_tied_beam_is_the_beam_of_one_mesh(s):
+    """Bent by a force at its end, in two halves side by side whose meshes do not match."""
+    def beam(cells):
+        sides = {"clamp": [(0, "left")], "tip": [(1, "right")], "roof": [(0, "right")], "floor": [(1, "left")]}
+        return body(["quad8", "quad8"], cells, [lambda x, y: (3 * x, y), lambda x, y: (3 + 3 * x, y)], sides, model="plane_stress", ties=TIE,
+                    materials=[{"on": "all", "young": E, "poisson": NU}], supports=[{"on": "clamp", "ux": 0, "uy": 0}],
+                    loads=[{"on": "tip", "force": [0, -0.1]}])
+
+    def tip(found):
+        return min(u[1] for u in found["displacements"])
+    whole = answer(s, {"problem": {"kind": "scene", "model": "plane_stress", "mesh": {"box": {"size": [6, 1], "cells": [24, 4], "element": "quad8"}},
+                                   "materials": [{"on": "all", "young": E, "poisson": NU}], "supports": [{"on": "left", "ux": 0, "uy": 0}],
+                                   "loads": [{"on": "right", "force": [0, -0.1]}]}})
+    tied = answer(s, beam([(12, 4), (15, 5)]))
+    check(abs(tip(tied) / tip(whole) - 1) < 1e-3, tip(tied), tip(whole))
+    check(tied["summary"]["error"]["kind"] == "estimated", tied["summary"]["error"])
+
+
+def test_contact_beside_a_tie(s):
+    """The lower part stands on an obstacle that gives way where it is pulled: rows meet nodes that are tied."""
+    request = stacked(["quad4", "quad4"], supports=[{"on": "left", "ux": 0}, {"on": "head", "uy": -0.01}],
+                      contacts=[{"on": "foot", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}},
+                                {"on": "right", "obstacle": {"plane": {"point": [1.001, 0], "normal": [-1, 0]}}}])
+    found = answer(s, request)["summary"]
+    check(found["contact"]["active"] > 5 and found["certificate"]["relative_error"] < 1e-7, found["contact"])
+    high = 0.01 / 2
+    wide = high * NU / (1 - NU)  # it would widen by more than the gap, and is held there
+    check(wide > 0.001)
+    strain = [0.001, -high]
+    factor = E / ((1 + NU) * (1 - 2 * NU))
+    pressed = -factor * ((1 - NU) * strain[1] + NU * strain[0])
+    force = found["resultants"]["contacts"][0]["force"][1]
+    check(abs(force - pressed) < 1e-6 * pressed, force, pressed)
+
+
+def test_a_rigid_head_and_an_answer_verified(s):
+    request = pulled(["hex8", "hex8"])
+    request["problem"]["supports"].append({"on": "head", "rigid": {"point": [0, 0, 2], "ux": 0, "uy": 0, "rx": 0, "ry": 0, "rz": 0}})
+    request["problem"]["supports"][1:3] = [{"on": "left", "ux": 0}, {"on": "side", "uy": 0}]
+    found = answer(s, request)
+    given = {"displacements": found["displacements"], "reactions": found["reactions"]}
+    reply = expect(s.request("POST", "/v1/verify", {"problem": request["problem"], "answer": given}), 200)
+    check(reply.json["summary"]["outcome"] == "verified", reply.json)
+    floor = next(i for i, x in enumerate(found["nodes"]) if i > 26 and abs(x[2] - 1) < 1e-12 and 0 < x[0] < 1 and 0 < x[1] < 1)
+    given["displacements"][floor][2] += 1e-6
+    reply = expect(s.request("POST", "/v1/verify", {"problem": request["problem"], "answer": given}), 422)
+    check("tied" in reply.json["detail"], reply.json)
+
+
+def test_a_gap_within_the_tolerance(s):
+    check(answer(s, pulled(["quad4", "quad4"], gap=0.01)))
+    far = pulled(["quad4", "quad4"], gap=0.3)
+    refused(s, far, "/ties/0", "0.3 apart")
+    far["problem"]["ties"] = [{"on": "roof", "to": "floor", "tolerance": 0.31}]
+    answer(s, far)
+
+
+def test_refusals(s):
+    refused(s, pulled(["quad4", "quad4"], ties=[{"on": "roof", "to": "wall"}]), "/ties/0/to", "wall")
+    finite = pulled(["quad4", "quad4"], kinematics="finite")
+    finite["problem"]["materials"][0]["law"] = "neo_hooke"
+    refused(s, finite, "/ties", "small deformation")
+    loose = pulled(["quad4", "quad4"])
+    del loose["problem"]["ties"]
+    refused(s, loose, "/supports", "free")
+
+
+if __name__ == "__main__":
+    service.main(globals())
