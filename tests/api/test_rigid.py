@@ -197,7 +197,7 @@ def test_refined_meshes_and_hanging_nodes(s):
         body = beam([0, -0.01], [12, 0.5])
         box = body["problem"]["mesh"]["box"]
         body["problem"]["mesh"] = {"box": dict(box, cells=[10, 2], element=element), "refine": "auto"}
-        body["solver"] = {"accuracy": {"total": 0.04}}
+        body["solver"] = {"accuracy": {"total": 0.1}}
         found = answer(s, body)
         plate = found["summary"]["resultants"]["supports"][1]["rigid"]
         turned = math.radians(plate["rotation"][0])
@@ -206,7 +206,7 @@ def test_refined_meshes_and_hanging_nodes(s):
         for x, u in on_plate:
             near(u, [plate["displacement"][0] - turned * (x[1] - 0.5), plate["displacement"][1]], 1e-10)
         fine = answer(s, beam([0, -0.01], [12, 0.5]))["summary"]["resultants"]["supports"][1]["rigid"]
-        check(0 < 1 - plate["displacement"][1] / fine["displacement"][1] < 0.01, plate, fine)
+        check(0 < 1 - plate["displacement"][1] / fine["displacement"][1] < 0.05, plate, fine)
 
 
 def test_bodies_without_a_factor(s):
