@@ -280,7 +280,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers peers-contact peers-large peers-space extremes theory roller arch trade figures numbers collect page-size
+        bench-size bench-deps peers peers-contact peers-decks peers-large peers-space extremes theory roller arch trade figures numbers collect page-size
 test: deps-test ## build and pass every test; ONCE=1: but those that make asan runs as they are
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools $(BUILD)/guard \
 	    $(if $(ONCE),$(patsubst %,$(BUILD)/tests/%,$(notdir $(basename $(filter-out $(SAME_IN_ASAN),$(UNIT_SRC))))),unit-bins)
@@ -410,8 +410,13 @@ peers: deps bench-deps ## the same problems by what Debian has, one certificate 
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 	@$(if $(SIZES)$(ONLY)$(PROBLEMS),,$(MAKE) --no-print-directory -s peers-contact peers-large peers-space)
 
-peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json; DECKS=folder: CalculiX's own decks, too
-	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json $(DECKS)
+peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json
+	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json
+
+DECKS ?= /usr/share/doc/calculix-ccx-test/examples/test
+peers-decks: $(BUILD)/uzawad ## CalculiX's own decks with contact or ties by CalculiX and by the daemon: a table and build/decks.json; DECKS=folder
+	@tests/deps.sh calculix-ccx calculix-ccx-test
+	@$(call measured,decks) $(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/decks.json $(DECKS)
 
 peers-large: bench-deps $(BUILD)/uzawad ## large deformation by CalculiX, GetFEM and the daemon: a table and build/peers-large.json; ONLY=part of a name
 	@/usr/bin/python3 -B tests/peers/large.py $(BUILD) $(BUILD)/peers-large.json $(if $(ONLY),ONLY="$(ONLY)")

@@ -102,12 +102,18 @@ def quantities(raw):
     return {"scenes": raw["scenes"], "told": raw["told"], "held": raw["held"]}
 
 
+def decks(raw):
+    """What was compared; of the others that their reasons are."""
+    keys = ("problem", "ties", "unknowns", "apart", "apart_stiff", "calculix_s", "ours_s")
+    return {"decks": raw["decks"], "rows": [{key: row[key] for key in keys} for row in raw["rows"]], "unsaid": raw["unsaid"]}
+
+
 def alone(make):
     return lambda raw, old, when: make(raw)
 
 
 KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": bench_size, "extremes": alone(extremes),
-         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "quantities": alone(quantities), "bounds": alone(dict), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
+         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "quantities": alone(quantities), "bounds": alone(dict), "decks": alone(decks), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
 
 
 def dump(value):

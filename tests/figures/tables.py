@@ -360,6 +360,27 @@ def solids(data):
     return table(["element", "meshes", "told over true: median", "least", "largest"], rows) if rows else None
 
 
+def decks(data):
+    """CalculiX's own decks by both, and why others are not compared."""
+    found = data.get("decks")
+    if not found:
+        return None
+    rows = [[f"`{row['problem']}`", "tie" if row["ties"] else "contact", f"{row['unknowns']:,}", sig(row["apart"]) if row["apart"] is not None else NONE,
+             sig(row["apart_stiff"]) if row["apart_stiff"] is not None else NONE, duration(row["calculix_s"]), duration(row["ours_s"])] for row in found["rows"]]
+    why = {}
+    for name, text in found["unsaid"].items():
+        reason = next((said for word, said in REASONS if word in text), text)
+        why.setdefault(reason, []).append(f"`{name}`")
+    return table(["deck", "of", "unknowns", "apart", "with stiff contact", "CalculiX", "this service"], rows) + [
+        "", f"{len(found['rows'])} of {found['decks']} are compared. Of the others:", "",
+        *(f"- {reason}: {', '.join(names)}" for reason, names in sorted(why.items(), key=lambda one: -len(one[1])))]
+
+
+REASONS = (("first step is", "the first step is no static one"), ("FRICTION", "friction"), ("EQUATION", "equations between displacements"),
+           ("SPRINGA", "springs"), ("in place of a spring", "contact softer than a twentieth of the body"),
+           ("PLASTIC", "plasticity"), ("TRANSFORM", "turned axes of nodes"), ("CYCLIC", "cyclic symmetry"))
+
+
 def bounds(data):
     """Guaranteed bounds over true errors."""
     rows = (data.get("bounds") or {}).get("rows", [])

@@ -2,8 +2,8 @@
 usage: calculix.py BUILD_DIR OUTPUT.json [DECKS]
 
 Blocks on others whose meshes do not match, and press fits, with CalculiX's contact of surfaces with surfaces and of nodes
-with surfaces; and of CalculiX's own decks, where DECKS is a folder of them (Debian: calculix-ccx-test), those that the
-daemon makes scenes of (decks.py); these a second time with a stiff contact, as their own may give by per cents. Compared are the force through the contact, where it is known, displacements, and seconds of
+with surfaces; or of CalculiX's own decks with contact or ties, where DECKS is a folder of them (Debian: calculix-ccx-test), those that
+the daemon makes scenes of (decks.py); these a second time with a stiff contact, as their own may give by per cents. Compared are the force through the contact, where it is known, displacements, and seconds of
 processor of the whole: of CalculiX from deck to answer, of the daemon from request to answer. CalculiX's contact is a
 penalty, in what is made here of 100 E for each length of a side."""
 import json
@@ -157,7 +157,7 @@ def row_of(build, name, request, discretization, text, numbers=None):
     ours, our_s = by_daemon(build, request, discretization)
     printed, their_s = by_calculix(text)
     row = {"problem": name, "contact": discretization, "unknowns": ours["summary"]["problem"]["d"], "calculix": None, "apart": None,
-           "ours": ours["summary"]["resultants"]["contacts"][0]["force"], "calculix_s": their_s, "ours_s": our_s}
+           "ours": (ours["summary"]["resultants"]["contacts"] or [{"force": None}])[0]["force"], "calculix_s": their_s, "ours_s": our_s}
     place = {number: k for k, number in enumerate(numbers or range(1, len(ours["displacements"]) + 1))}
 
     def apart(printed):
@@ -167,11 +167,39 @@ def row_of(build, name, request, discretization, text, numbers=None):
         row["apart"] = apart(printed)
         row["calculix"] = None if numbers else force_on_slave(request["problem"], printed)
     shown = ["-" if f is None else " ".join(f"{t + 0.0:.5g}" if abs(t) > 1e-6 * max(map(abs, f)) else "0" for t in f) for f in (row["calculix"], row["ours"])]
-    stiff = numbers and by_calculix(decks.stiffened(text, request, STIFF))[0]
+    stiff = numbers and request["problem"]["contacts"] and by_calculix(decks.stiffened(text, request, STIFF))[0]
     row["apart_stiff"] = apart(stiff) if stiff else None
     told = " ".join(f"{'-' if row[key] is None else format(row[key], '.2g'):>8s}" for key in ("apart", "apart_stiff"))
     print(f"{name:22s} {discretization:9s} {shown[0]:>28s} {shown[1]:>28s} {told} {their_s:8.2f} {our_s:8.2f} {their_s / max(our_s, 0.01):7.1f}", flush=True)
     return row
+
+
+def of_scenes(build):
+    rows = []
+    for name, make, sizes in (("block", block, (8, 16)), ("press fit", fit, (15, 30)), ("press fit, hex20", lambda n: fit(n, "hex20"), (15,)),
+                              ("squares", pushed, (60,))):
+        for size in sizes:
+            request = make(size)
+            for discretization in KINDS:
+                rows.append(row_of(build, f"{name} {size}", request, discretization, deck(request["problem"], discretization)))
+    return rows
+
+
+def of_decks(build, folder):
+    rows, unsaid, given = [], {}, list(decks.contact_decks(folder))
+    reader = service.Service(build)
+    reader.start()
+    for name, text in given:
+        try:
+            request, numbers, left = decks.translate(reader, text)
+            row = row_of(build, f"{name}.inp", request, "surfaces", decks.first_step(text, numbers), numbers)
+            rows.append({**row, "ties": len(request["problem"].get("ties", [])), "left": left})
+        except (decks.Unsaid, subprocess.TimeoutExpired) as why:
+            unsaid[name] = str(why)
+    reader.stop()
+    print("\n".join(f"{name}.inp: {why}" for name, why in unsaid.items()))
+    print(f"{len(given)} decks with contact or ties, {len(rows)} compared")
+    return {"decks": len(given), "rows": rows, "unsaid": unsaid}
 
 
 def main():
@@ -179,29 +207,9 @@ def main():
         sys.exit(__doc__)
     if not shutil.which("ccx"):
         sys.exit("ccx is not installed: make bench-deps")
-    rows, unsaid = [], {}
     print(f"{'problem':22s} {'contact':9s} {'force, CalculiX':>28s} {'force, ours':>28s} {'apart':>8s} {'stiff':>8s} {'s':>8s} {'ours, s':>8s} {'ratio':>7s}")
-    for name, make, sizes in (("block", block, (8, 16)), ("press fit", fit, (15, 30)), ("press fit, hex20", lambda n: fit(n, "hex20"), (15,)),
-                              ("squares", pushed, (60,))):
-        for size in sizes:
-            request = make(size)
-            for discretization in KINDS:
-                rows.append(row_of(sys.argv[1], f"{name} {size}", request, discretization, deck(request["problem"], discretization)))
-    given = list(decks.contact_decks(sys.argv[3])) if len(sys.argv) > 3 else []
-    reader = service.Service(sys.argv[1])
-    if given:
-        reader.start()
-    for name, text in given:
-        try:
-            request, numbers, left = decks.translate(reader, text)
-            row = row_of(sys.argv[1], f"{name}.inp", request, "surfaces", decks.first_step(text, numbers), numbers)
-            rows.append({**row, "left": left})
-        except decks.Unsaid as why:
-            unsaid[name] = str(why)
-    reader.stop()
-    print("\n".join(f"{name}.inp: {why}" for name, why in unsaid.items()))
-    print(f"{len(given)} decks with contact, {sum('left' in row for row in rows)} compared" if given else "")
-    pathlib.Path(sys.argv[2]).write_text(json.dumps({"rows": rows, "unsaid": unsaid}), encoding="utf-8")
+    found = of_decks(sys.argv[1], sys.argv[3]) if len(sys.argv) > 3 else {"rows": of_scenes(sys.argv[1])}
+    pathlib.Path(sys.argv[2]).write_text(json.dumps(found), encoding="utf-8")
 
 
 if __name__ == "__main__":

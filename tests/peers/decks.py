@@ -19,11 +19,12 @@ class Unsaid(Exception):
 
 
 def contact_decks(folder):
-    """(name, text) of those that have a contact pair; some are packed."""
+    """(name, text) of those that have a contact pair or a tie, but ties of a sector to itself; some are packed."""
     for path in sorted(pathlib.Path(folder).iterdir()):
         if path.name.endswith((".inp", ".inp.gz")):
             text = (gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()).decode("latin-1")
-            if re.search(r"(?im)^\*contact\s*pair", text):
+            tie = re.search(r"(?im)^\*tie", text) and not re.search(r"(?im)^\*cyclic\s*symmetry", text)
+            if re.search(r"(?im)^\*contact\s*pair", text) or tie:
                 yield path.name.split(".")[0], text
 
 
