@@ -8,7 +8,8 @@
  *
  * which bounds ||A|| = 1 / min |lambda(D^-1 K)| where the residuals are below t. It is the bound by a random start of
  * Kuczynski and Wozniakowski, SIAM J. Matrix Anal. Appl. 13 (1992), after one step of inverse iteration, for inexact
- * solves. Good solves need two trials, rougher ones more: t = 1e-12^(1/k) / 0.8, 1e-6 for two, 0.1 for twelve.
+ * solves. Good solves need two trials, rougher ones more: 0.8 t is the k-th root of the chance that is taken, t 1e-6
+ * for two, 0.1 for twelve.
  *
  * No probability is spent on how M came to be: a solve that misses a dof leaves what s has there as its residual, and
  * one of another matrix leaves its difference. */
@@ -27,27 +28,31 @@
 
 enum { PROBES_LEAST = 2, PROBES_MOST = 12, STEPS_MOST = 1000 };
 
-/* Of all that may be claimed after any number of trials, and what a share of t may be left by residuals. */
-#define CHANCE 1e-13
-#define LEFT   0.5
-/* What solves are asked for leaves room for what M makes of it. */
-#define ASKED 0.1
+/* Of what is claimed after the fewest trials, and after each more of them: 1e-12 in all. */
+#define CHANCE      8e-13
+#define CHANCE_MORE 1e-14
+/* What a share of t may be left by residuals, */
+#define LEFT 0.5
+/* and is asked of solves, whose norm is another one: by M, as a rule somewhat larger than that by diag(K). */
+#define ASKED 0.25
 
 static double threshold(int trials)
 {
-    return pow(CHANCE, 1.0 / trials) / 0.8;
+    return pow(trials > PROBES_LEAST ? CHANCE_MORE : CHANCE, 1.0 / trials) / 0.8;
 }
 
 /* The norm of D^-1/2 |K| D^-1/2, at most: its largest sum of a row; times what summing the longest row rounds. */
 static uz_status find_rounding(double *rounding, const uz_csc *K, uz_error *err)
 {
-    double *sum = uz_alloc_zero(K->cols, sizeof *sum), most = 0.0;
+    double *sum = uz_alloc_zero(K->cols, sizeof *sum), *root = uz_alloc(K->cols, sizeof *root), most = 0.0;
     int64_t *count = uz_alloc_zero(K->cols, sizeof *count), longest = 0;
-    const bool ok = sum && count;
+    const bool ok = sum && root && count;
+    for (int64_t j = 0; ok && j < K->cols; j++)
+        root[j] = sqrt(1.0 / K->val[K->ptr[j]]);
     for (int64_t j = 0; ok && j < K->cols; j++)
         for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
             const int64_t i = K->idx[k];
-            const double scaled = fabs(K->val[k]) / sqrt(K->val[K->ptr[i]]) / sqrt(K->val[K->ptr[j]]);
+            const double scaled = fabs(K->val[k]) * root[i] * root[j];
             sum[j] += scaled;
             count[j]++;
             sum[i] += i != j ? scaled : 0.0;
@@ -59,6 +64,7 @@ static uz_status find_rounding(double *rounding, const uz_csc *K, uz_error *err)
     }
     *rounding = DBL_EPSILON * (double)(longest + 1) * most;
     free(sum);
+    free(root);
     free(count);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)K->cols);
 }
@@ -74,31 +80,49 @@ static double guess_lambda(const uz_cg_info *info)
     return root * root;
 }
 
-/* One trial: *reach = ||D^1/2 y||, *missed >= ||D^-1/2 q||. */
-static uz_status try_once(uz_amg_info *amg, double *reach, double *missed, double *y, double *b, uz_cg *cg,
-                          const uz_csc *K, uint64_t *state, const uz_cg_stop *stop, uz_error *err)
+/* ||D^1/2 y|| -> *reach, *missed >= ||D^-1/2 q||, b = D^1/2 s; *work = b'K^-1 b, but for q'K^-1 q. */
+static void measure(double *reach, double *missed, double *work, const uz_amg_info *amg, const double *y,
+                    const double *b, const double *q, const uz_csc *K)
 {
-    uz_cg_info info;
-    double wide = 0.0, left = 0.0, size = 0.0, work = 0.0;
-    for (int64_t j = 0; j < cg->n; j++) {
-        const double s = uz_normal(state);
-        b[j] = sqrt(K->val[K->ptr[j]]) * s;
-        y[j] = 0.0;
-        size += s * s;
-    }
-    const uz_status status = uz_cg_solve(&info, y, cg, K, b, stop, err);
-    if (status != UZ_OK)
-        return status;
-    if (!(amg->lambda > 0.0))
-        amg->lambda = guess_lambda(&info);
-    for (int64_t j = 0; j < cg->n; j++) {
+    double wide = 0.0, left = 0.0, size = 0.0;
+    *work = 0.0;
+    for (int64_t j = 0; j < K->cols; j++) {
         const double own = K->val[K->ptr[j]];
         wide += own * y[j] * y[j];
-        left += cg->r[j] * cg->r[j] / own;
-        work += y[j] * (b[j] + cg->r[j]); /* b'K^-1 b, but for q'K^-1 q */
+        left += q[j] * q[j] / own;
+        size += b[j] * b[j] / own;
+        *work += y[j] * (b[j] + q[j]);
     }
     *reach = isnan(wide) ? INFINITY : sqrt(wide);
     *missed = (isnan(left) ? INFINITY : sqrt(left)) + amg->rounding * *reach + DBL_EPSILON * sqrt(size);
+}
+
+enum { TIGHTENED_MOST = 3 };
+
+/* One trial, of which the residual is to be below `most`. */
+static uz_status try_once(uz_amg_info *amg, double *reach, double *missed, double *y, double *b, uz_cg *cg,
+                          const uz_csc *K, uint64_t *state, double most, const uz_hooks *hooks, uz_error *err)
+{
+    uz_cg_stop stop = {
+        .absolute = ASKED / LEFT * most, .max_iterations = STEPS_MOST, .hooks = hooks, .deadline = INFINITY};
+    uz_cg_info info;
+    double work = 0.0, before = INFINITY;
+    for (int64_t j = 0; j < cg->n; j++) {
+        b[j] = sqrt(K->val[K->ptr[j]]) * uz_normal(state);
+        y[j] = 0.0;
+    }
+    for (int k = 0; k < TIGHTENED_MOST; k++) {
+        const uz_status status = uz_cg_solve(&info, y, cg, K, b, &stop, err);
+        if (status != UZ_OK)
+            return status;
+        if (!(amg->lambda > 0.0))
+            amg->lambda = guess_lambda(&info);
+        measure(reach, missed, &work, amg, y, b, cg->r, K);
+        if (*missed <= most || !(*missed < 0.5 * before) || !info.met)
+            break;
+        before = *missed;
+        stop.absolute *= 0.5 * most / *missed;
+    }
     if (*missed < 1.0 && !(work > 0.0))
         return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                        "K is not positive definite: a force does negative work on the displacement that it causes. "
@@ -130,16 +154,12 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_e
     amg->info.least = 0.0;
     for (int k = 1; status == UZ_OK && k <= PROBES_MOST && !(amg->info.least > 0.0); k++) {
         const double t = threshold(k), aim = threshold(k < PROBES_LEAST ? PROBES_LEAST : k);
-        const uz_cg_stop stop = {.absolute = ASKED * aim / sqrt(fmax(1.0, amg->mg->most)),
-                                 .max_iterations = STEPS_MOST,
-                                 .hooks = hooks,
-                                 .deadline = INFINITY};
         double wide = INFINITY, left = INFINITY;
         if (uz_cancelled(hooks)) {
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
             break;
         }
-        status = try_once(&amg->info, &wide, &left, y, b, &cg, K, &state, &stop, err);
+        status = try_once(&amg->info, &wide, &left, y, b, &cg, K, &state, LEFT * aim, hooks, err);
         reach = fmax(reach, wide);
         missed = fmax(missed, left);
         if (status == UZ_OK && k >= PROBES_LEAST && missed <= LEFT * t)

@@ -70,6 +70,9 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, const double 
  * that pays for it may be as sharp as was asked for nevertheless. */
 #define AFFORDABLE 0.5
 
+/* Times the square of half of what is asked for: half of its square. */
+#define ENOUGH 2.0
+
 uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_input *in, double *e, int64_t d,
                               double weighted, double energy, const uz_energy_sums *energies, uz_error *err)
 {
@@ -79,7 +82,7 @@ uz_status uz_certify_distance(double *square, bool *spared, const uz_certify_inp
     *square = inverse * weighted;
     *spared = in->spares && doubt <= UZ_BOUND_HARMLESS && *square <= harmless;
     if (!*spared) {
-        status = in->inverse_norm(in->ctx, square, e, err);
+        status = in->inverse_norm(in->ctx, square, e, ENOUGH * harmless, err);
         if (!in->measure_doubt) {
             /* The solve is one of conjugate gradients, whose rounding is that of products with K. A residual is
              * rounding, in all directions alike: e'K^-1 e / e'W e is the mean of d eigenvalues. */

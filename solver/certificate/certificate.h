@@ -20,8 +20,9 @@
 #include "certificate/bound.h"
 #include "uzawa.h"
 
-/* *value = e'K^-1 e for e (d, may be overwritten), within the accuracy of a factorization of K. */
-typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, double *e, uz_error *err);
+/* *value = e'K^-1 e for e (d, may be overwritten), within the accuracy of a factorization of K; any bound on it that is
+ * not above `enough` serves as well. */
+typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, double *e, double enough, uz_error *err);
 
 /* *doubt: how much the factorization's rounding may falsify that, relative (uz_distrust). */
 typedef uz_status (*uz_measure_doubt)(void *ctx, double *doubt, uz_error *err);

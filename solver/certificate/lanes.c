@@ -308,9 +308,9 @@ typedef struct {
     double square; /* INFINITY: unknown */
 } lane_solve;
 
-static uz_status lane_norm(void *ctx, double *value, double *e, uz_error *err)
+static uz_status lane_norm(void *ctx, double *value, double *e, double enough, uz_error *err)
 {
-    (void)e, (void)err;
+    (void)e, (void)enough, (void)err;
     *value = ((lane_solve *)ctx)->square;
     return *value < INFINITY ? UZ_OK : UZ_ERR_CANCELLED;
 }

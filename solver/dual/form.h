@@ -63,9 +63,9 @@ struct uz_dual_form {
     uz_status (*solve_active)(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active,
                               uz_error *err);               /* *end: UNSOLVED at entry */
     bool (*guess_active)(uz_dual_load *load, bool *active); /* NULL: none */
-    /* *value >= e'K^-1 e, sharp to a hundredth where time allows; e (d) becomes K^-1 e, about. load: a uz_dual_load.
+    /* As a uz_inverse_norm, sharp to a hundredth where time allows and it is not below `enough`. load: a uz_dual_load.
      * NULL: has a factor. */
-    uz_status (*inverse_norm)(void *load, double *value, double *e, uz_error *err);
+    uz_status (*inverse_norm)(void *load, double *value, double *e, double enough, uz_error *err);
 
     /* can.lanes; y = L^-1 P p, whose entry k stands at y[k stride], and x (d) is room: g0 and the rest as `load`, and
      * y += L^-1 P N'r and, where corrected, the kept correction. */

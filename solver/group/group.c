@@ -176,7 +176,7 @@ static bool put_vector(const far_system *s, const double *x)
 {
     const far_multigrid *body = s->body;
     memset(body->wide, 0, (size_t)body->map.size * sizeof *body->wide);
-    for (int64_t j = 0; x && j < body->map.d; j++)
+    for (int64_t j = 0; j < body->map.d; j++)
         if (!s->room->held || !s->room->held[j])
             body->wide[body->map.place[j]] = x[j];
     return put(body->group, body->wide, (size_t)body->map.size * sizeof *body->wide);
@@ -224,10 +224,13 @@ static uz_status apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_roo
     return done ? UZ_OK : fail_lost(err);
 }
 
-/* x NULL: from 0. */
 static bool begin(const far_system *s, const double *x, const double *b)
 {
-    return ask_of(s, (uz_wire_head){.kind = UZ_WIRE_BEGIN}) && put_vector(s, x) && put_vector(s, b) && hear_square(s);
+    bool zero = true;
+    for (int64_t j = 0; zero && j < s->body->map.d; j++)
+        zero = x[j] == 0.0 || (s->room->held && s->room->held[j]);
+    return ask_of(s, (uz_wire_head){.kind = UZ_WIRE_BEGIN, .b = zero}) && (zero || put_vector(s, x)) &&
+           put_vector(s, b) && hear_square(s);
 }
 
 /* Up to `most` steps while the square is above goal2. */
@@ -246,10 +249,11 @@ static bool make_steps(const far_system *s, int *made, bool *flat, int most, dou
     return true;
 }
 
-/* ---- conjugate gradients, as amg/cg.c has them: the recurrence is begun again from the true residual until that meets
- * the goal too, or gains nothing more */
+/* ---- conjugate gradients, as amg/cg.c has them: where the recurrence has gone so far that rounding may have led it
+ * away from the true residual, it is begun again from that until that meets the goal too, or gains nothing more */
 
 enum { RESTARTS_MOST = 4 };
+#define DRIFTS 1e-10
 
 /* The group's residual and the one found here are alike but for rounding: a share that says that they are not, and the
  * rounding of a product, relative. */
@@ -327,7 +331,9 @@ static bool solve_there(const far_system *s, uz_cg_info *info, bool *flat, doubl
             break;
         before = info->last;
         done = run_steps(s, info, flat, stop, goal * goal);
-        if (*flat)
+        info->last = uz_root(s->room->square);
+        info->met = info->last <= goal;
+        if (*flat || (info->met && info->last > DRIFTS * info->first))
             break;
     }
     return done && ask_of(s, (uz_wire_head){.kind = UZ_WIRE_FETCH}) && take_vector(s, x, false);

@@ -12,7 +12,8 @@
  *                process, and are numbered so from now on; a message has nodes of one process only
  *     <- MADE    after the last of them. a: levels, b: bytes, x: `most`, y: seconds
  *     -> HOLD    a byte for each dof: held or not           <- MADE
- *     -> BEGIN   a: system; start, right-hand side (double) <- STATE   x: r'M^-1 r
+ *     -> BEGIN   a: system, b: 1: from 0; else the start (double); right-hand side (double)
+ *                                                        <- STATE   x: r'M^-1 r
  *     -> STEPS   a: system, b: at most so many, x: until r'M^-1 r is not above it, y: what it is now
  *     <- STATE   a: made, fewer where there is no more to gain, b: 1 where p'K p was not positive, x: r'M^-1 r
  *     -> AGAIN   a: system; from the true residual          <- STATE   x: r'M^-1 r
@@ -44,7 +45,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 3
+#define UZ_WIRE_VERSION 4
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

@@ -42,8 +42,9 @@ uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
 }
 
 /* e'K^-1 e = ||L^-1 P e||^2: half a linear solve. Without a factor it is the operator's affair. */
-static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
+static uz_status inverse_norm(void *ctx, double *value, double *e, double enough, uz_error *err)
 {
+    (void)enough;
     uz_run *run = ctx;
     const uz_factor *factor = run->asked->setup->factor;
     double *x = run->work.scratch;

@@ -100,9 +100,9 @@ uz_status uz_semi_check_pressed(const uz_semi *s, bool strict, uz_error *err)
 }
 
 /* The singular K bounds nothing by its inverse. */
-static uz_status no_inverse(void *ctx, double *value, double *e, uz_error *err)
+static uz_status no_inverse(void *ctx, double *value, double *e, double enough, uz_error *err)
 {
-    (void)ctx, (void)e, (void)err;
+    (void)ctx, (void)e, (void)enough, (void)err;
     *value = INFINITY;
     return UZ_OK;
 }

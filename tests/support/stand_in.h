@@ -31,8 +31,9 @@ typedef struct {
     int stream, honest_solves; /* the fault begins after so many solves */
     stand_in_fault fault;
     pthread_t thread;
-    double most; /* what it says that diag(K)^-1 M is bounded by */
-    int64_t nodes, bs, modes, n, at, solves;
+    double most;                                           /* what it says that diag(K)^-1 M is bounded by */
+    double weak;                                           /* M is so many times the diagonal; 0: once */
+    int64_t nodes, bs, modes, n, at, solves, steps, again; /* again: residuals that were found anew */
     double K[2][STAND_IN_MOST][STAND_IN_MOST];
     double x[STAND_IN_MOST], b[STAND_IN_MOST], r[STAND_IN_MOST], z[STAND_IN_MOST], p[STAND_IN_MOST];
 } stand_in;
@@ -75,7 +76,7 @@ static inline double stand_in_cycle(stand_in *s, int which, double *z, const dou
 {
     double square = 0.0;
     for (int64_t i = 0; i < s->n; i++)
-        z[i] = r[i] / s->K[which][i][i];
+        z[i] = r[i] / s->K[which][i][i] / (s->weak > 0.0 ? s->weak : 1.0);
     if (stand_in_is_wrong(s, STAND_IN_DROPS))
         z[0] = 0.0;
     if (stand_in_is_wrong(s, STAND_IN_NEGATIVE))
@@ -134,6 +135,7 @@ static inline void stand_in_steps(stand_in *s, const uz_wire_head *m)
             s->p[i] = s->z[i] + beta * s->p[i];
         made++;
     }
+    s->steps += made;
     stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_STATE, .a = made, .b = flat, .x = square});
 }
 
@@ -222,11 +224,13 @@ static inline bool stand_in_obey(stand_in *s, const uz_wire_head *m)
         return stand_in_hold(s);
     case UZ_WIRE_BEGIN:
         s->solves++;
-        if (!stand_in_take(s, s->x, size) || !stand_in_take(s, s->b, size))
+        memset(s->x, 0, sizeof s->x);
+        if ((m->b == 0 && !stand_in_take(s, s->x, size)) || !stand_in_take(s, s->b, size))
             return false;
         stand_in_begin(s, which);
         return true;
     case UZ_WIRE_AGAIN:
+        s->again++;
         stand_in_begin(s, which);
         return true;
     case UZ_WIRE_STEPS:

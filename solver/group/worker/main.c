@@ -9,6 +9,7 @@
 #include "group/wire.h"
 
 #include <limits.h>
+#include <malloc.h>
 #include <petscmat.h>
 #include <sched.h>
 #include <stdio.h>
@@ -358,12 +359,16 @@ static PetscErrorCode obey(group *g, const uz_wire_head *m)
     PetscCheck((m->a == 0 || m->a == 1) && b->made[m->a], PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONGSTATE, "no such system");
     spread_system *s = &b->system;
     const int which = (int)m->a;
+    const bool from_zero = m->kind == UZ_WIRE_BEGIN && m->b == 1;
     if (m->kind == UZ_WIRE_BEGIN) {
-        take_vector(g, b, s->u, true);
+        if (from_zero)
+            memset(s->u, 0, 4 * (size_t)s->near.here * sizeof *s->u);
+        else
+            take_vector(g, b, s->u, true);
         take_vector(g, b, s->f, false);
     }
     if (m->kind == UZ_WIRE_BEGIN || m->kind == UZ_WIRE_AGAIN) {
-        const double square = system_begin(s, which);
+        const double square = system_begin(s, which, from_zero);
         answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .x = square});
     } else if (m->kind == UZ_WIRE_STEPS) {
         PetscCall(make_steps(g, s, m));
@@ -441,6 +446,8 @@ int main(int argc, char **argv)
     MPI_Comm_size(PETSC_COMM_WORLD, &g.size);
     if (IS_FIRST(&g) && (g.stream = stream_open(where)) < 0)
         end_group("there is nobody at the socket: this is a program that uzawad starts");
+    mallopt(M_MMAP_MAX, 0); /* what is freed is taken again: fresh pages are dear */
+    mallopt(M_TRIM_THRESHOLD, INT_MAX);
     uz_process_init(2); /* one thread of BLAS: the processes are the parallelism */
     uz_thread_init();
     if (serve(&g))

@@ -121,12 +121,13 @@ static void multiply(spread_system *s, int which, double *y, double *x)
                 y[4 * i + c] = 0.0;
 }
 
-double system_begin(spread_system *s, int which)
+double system_begin(spread_system *s, int which, bool u_is_zero)
 {
     const int64_t n = 4 * s->near.here;
-    multiply(s, which, s->q, s->u);
+    if (!u_is_zero)
+        multiply(s, which, s->q, s->u);
     for (int64_t i = 0; i < n; i++)
-        s->r[i] = s->f[i] - s->q[i];
+        s->r[i] = s->f[i] - (u_is_zero ? 0.0 : s->q[i]);
     s->unit = unit_of(s, s->r);
     cycle(s, which, s->z, s->r, s->unit);
     memcpy(s->p, s->z, (size_t)n * sizeof *s->p);

@@ -82,8 +82,8 @@ int system_levels(const spread_system *s, int which);
 
 /* z = M^-1 r: one V-cycle. */
 void system_precondition(spread_system *s, int which, double *z, const double *r);
-/* From u and f: r = f - K u, z = M^-1 r, p = z; the square r'z. */
-double system_begin(spread_system *s, int which);
+/* From u and f: r = f - K u, z = M^-1 r, p = z; the square r'z. u_is_zero: as is K u then. */
+double system_begin(spread_system *s, int which, bool u_is_zero);
 /* Steps of conjugate gradients until *square <= goal2; how many. *flat: the last one was not made, as p'K p was not
  * positive. */
 int system_steps(spread_system *s, int which, double *square, bool *flat, int most, double goal2);

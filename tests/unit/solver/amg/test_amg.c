@@ -164,7 +164,7 @@ static void check_norm(pair *p)
     memcpy(w, e, (size_t)n * sizeof *w);
     solve_exactly(p, w);
     double exact = dot(e, w, n);
-    CHECK(dual->form->inverse_norm(load, &value, e, &err) == UZ_OK);
+    CHECK(dual->form->inverse_norm(load, &value, e, 0.0, &err) == UZ_OK);
     CHECK_MSG(value >= exact * (1.0 - 1e-12) && value <= 1.02 * exact, "%.17g for %.17g", value, exact);
     uz_dual_load_free(load);
     uz_dual_free(dual);

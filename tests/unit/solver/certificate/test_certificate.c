@@ -64,10 +64,11 @@ static void free_inverse(inverse *f)
     free(f->L);
 }
 
-static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
+static uz_status inverse_norm(void *ctx, double *value, double *e, double enough, uz_error *err)
 {
     const inverse *f = ctx;
     uz_status status = half_solve(ctx, e, 1, false, err);
+    (void)enough;
     *value = 0;
     for (int64_t i = 0; i < f->d; i++)
         *value += e[i] * e[i];

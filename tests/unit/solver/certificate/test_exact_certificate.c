@@ -8,9 +8,9 @@ typedef struct {
     double k, p, h[2];
 } spring;
 
-static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
+static uz_status inverse_norm(void *ctx, double *value, double *e, double enough, uz_error *err)
 {
-    (void)err;
+    (void)enough, (void)err;
     *value = e[0] * e[0] / *(double *)ctx;
     return UZ_OK;
 }

@@ -23,10 +23,11 @@ static linear factor_of(const uz_csc *K)
     return x;
 }
 
-static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
+static uz_status inverse_norm(void *ctx, double *value, double *e, double enough, uz_error *err)
 {
     const linear *f = ctx;
     double *x = vector(f->d);
+    (void)enough;
     CHECK(!f->spared);
     uz_factor_permute(f->factor, x, e);
     uz_status status = uz_factor_solve_one(f->factor, f->ws, x, true, err);

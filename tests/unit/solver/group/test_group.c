@@ -1,5 +1,6 @@
 /* Solves by other processes: what is certified holds whatever they answer. Small systems that were once certified
  * wrongly (K = diag(2, 1), whose multigrid had one level that left a dof alone), by a stand-in and by uzawa-group. */
+#include "dual/form.h"
 #include "group/group.h"
 #include "harness.h"
 #include "qp_fixture.h"
@@ -158,6 +159,127 @@ TEST(solves_that_go_wrong_later_are_not_certified)
         for (int honest = 2; honest < 9; honest++)
             for (int k = 0; k < 2; k++)
                 check_stand_in((stand_in_fault)fault, honest, k == 0 ? 1.0 : ANYTHING, MAY_END);
+}
+
+/* A body on a stand-in, with a load and no rows. */
+typedef struct {
+    stand_in *s;
+    uz_process_group *group;
+    uz_qp qp;
+    uz_amg *amg;
+    uz_csc no_rows;
+    uz_dual *dual;
+    uz_dual_load *load;
+    double none;
+} far_body;
+
+static void far_begin(far_body *b, double weak)
+{
+    uz_error err = {0};
+    uz_modes modes;
+    uz_multigrid *mg;
+    qp_random rng = {5};
+    memset(b, 0, sizeof *b);
+    b->s = malloc(sizeof *b->s);
+    b->group = uz_process_group_new(stand_in_start(b->s, STAND_IN_HONEST, 0, fmax(1.0, weak)));
+    b->s->weak = weak;
+    b->qp = random_qp(&rng, &(qp_kind){.d = 40, .m = 1, .condition = 300.0});
+    CHECK(uz_csc_init(&b->no_rows, 0, 40, 0, &err) == UZ_OK);
+    CHECK(uz_modes_of_matrix(&modes, &b->qp.K, &err) == UZ_OK);
+    CHECK(uz_group_multigrid(&mg, b->group, &b->qp.K, &modes, &err) == UZ_OK);
+    uz_modes_clear(&modes);
+    CHECK(uz_amg_of_definite(&b->amg, mg, &err) == UZ_OK);
+    CHECK_MSG(uz_amg_probe(b->amg, &b->qp.K, NULL, &err) == UZ_OK, "%s", err.message);
+    const uz_dual_source source = {UZ_OPERATOR_DISTRIBUTED, &b->no_rows, NULL, b->amg};
+    CHECK(uz_dual_create(&b->dual, &source, NULL, &err) == UZ_OK);
+    CHECK(uz_dual_load_create(&b->load, b->dual, &b->qp.K, b->qp.p, &b->none, &err) == UZ_OK);
+}
+
+static void far_end(far_body *b)
+{
+    uz_dual_load_free(b->load);
+    uz_dual_free(b->dual);
+    uz_amg_free(b->amg);
+    uz_csc_clear(&b->no_rows);
+    uz_process_group_free(b->group);
+    pthread_join(b->s->thread, NULL);
+    free(b->s);
+    uz_qp_clear(&b->qp);
+}
+
+/* Its bound on e'K^-1 e, e = K w for a w whose energy is `exact`, and the steps that it takes. */
+static double bound_of(far_body *b, int which, double enough, double *exact, int64_t *steps)
+{
+    const int64_t d = b->qp.K.cols, before = b->s->steps;
+    double *w = vector(d), *e = vector(d), value = NAN;
+    uz_error err = {0};
+    qp_random rng = {(uint64_t)which};
+    *exact = 0.0;
+    for (int64_t j = 0; j < d; j++)
+        w[j] = random_signed(&rng);
+    uz_csc_symv(e, &b->qp.K, 1.0, w);
+    for (int64_t j = 0; j < d; j++)
+        *exact += w[j] * e[j];
+    CHECK(b->dual->form->inverse_norm(b->load, &value, e, enough * *exact, &err) == UZ_OK);
+    CHECK_MSG(value >= *exact * (1.0 - 1e-12), "%.17g for %.17g", value, *exact);
+    *steps = b->s->steps - before;
+    free(w);
+    free(e);
+    return value;
+}
+
+TEST(a_bound_is_as_sharp_as_it_has_to_be_and_found_once)
+{
+    far_body b;
+    double exact;
+    int64_t sharp, blunt, steps;
+    far_begin(&b, 1.0);
+    const double first = bound_of(&b, 17, 0.0, &exact, &sharp);
+    CHECK_MSG(first <= 1.02 * exact, "%g for %g", first, exact);
+    CHECK(bound_of(&b, 17, 0.0, &exact, &steps) == first);
+    CHECK_INT(steps, 0);
+    CHECK(bound_of(&b, 18, 100.0, &exact, &blunt) <= 100.0 * exact);
+    CHECK_MSG(blunt < sharp, "%lld and %lld steps", (long long)blunt, (long long)sharp);
+    CHECK(bound_of(&b, 18, 200.0, &exact, &steps) <= 200.0 * exact); /* it was good enough for less */
+    CHECK_INT(steps, 0);
+    CHECK(bound_of(&b, 18, 0.0, &exact, &steps) <= 1.02 * exact); /* but not for this */
+    CHECK(steps > 0);
+    far_end(&b);
+}
+
+/* The norm that steps stop by says nothing of diag(K): two trials do all the same. */
+TEST(trials_go_on_until_their_residuals_are_small)
+{
+    far_body b[2];
+    far_begin(&b[0], 1.0);
+    far_begin(&b[1], 1e16);
+    CHECK_MSG(b[1].amg->info.least >= 0.1 * b[0].amg->info.least, "%g and %g", b[1].amg->info.least,
+              b[0].amg->info.least);
+    far_end(&b[0]);
+    far_end(&b[1]);
+}
+
+/* Only where rounding may have led the recurrence away from it. */
+TEST(a_residual_is_found_anew_where_steps_may_have_drifted)
+{
+    static const double RELATIVE[] = {1e-4, 1e-13};
+    far_body b;
+    far_begin(&b, 1.0);
+    for (int k = 0; k < 2; k++) {
+        double *x = vector(b.qp.K.cols);
+        const int64_t before = b.s->again;
+        const uz_cg_stop stop = {.relative = RELATIVE[k], .max_iterations = 1000, .deadline = INFINITY};
+        uz_cg cg;
+        uz_cg_info info;
+        uz_error err = {0};
+        CHECK(uz_cg_init(&cg, b.amg->mg, &err) == UZ_OK);
+        CHECK(uz_cg_solve(&info, x, &cg, &b.qp.K, b.qp.p, &stop, &err) == UZ_OK);
+        CHECK(info.met && info.last <= RELATIVE[k] * info.first);
+        CHECK(k == 0 ? b.s->again == before : b.s->again > before);
+        uz_cg_clear(&cg);
+        free(x);
+    }
+    far_end(&b);
 }
 
 /* With a positive diagonal, and a negative eigenvalue between the others. */
