@@ -188,22 +188,33 @@ static int64_t find_block(const uz_spread_rows *rows, int64_t row, int32_t colum
     return low;
 }
 
-/* Entry (i, j), dofs by their places, if row i is one of the process's. *block, *pair: of the entry before, which is
- * often a neighbour of this one. */
-static void put_entry(uz_spread_rows *rows, const uz_spread *map, int64_t i, int64_t j, double value, int64_t *block,
-                      int64_t pair[2])
+/* A dof: the number of its node, counted from the first of the process, and which of its dofs it is. */
+typedef struct {
+    int64_t node, place;
+} dof_place;
+
+static inline dof_place place_of(const uz_spread_rows *rows, const uz_spread *map, int64_t dof)
 {
-    const int64_t bs = map->bs, row = i / bs - rows->first, column = j / bs;
-    if (row < 0 || row >= rows->end - rows->first)
+    const int64_t number = map->number[map->node[dof]];
+    return (dof_place){number - rows->first, map->place[dof] - number * map->bs};
+}
+
+/* Entry (i, j), if row i is one of the process's. *block, pair: of the entry before, which is often a neighbour of this
+ * one. */
+static inline void put_entry(uz_spread_rows *rows, const uz_spread *map, dof_place i, dof_place j, double value,
+                             int64_t *block, int64_t pair[2])
+{
+    const int64_t bs = map->bs;
+    if (i.node < 0 || i.node >= rows->end - rows->first)
         return;
-    if (pair[0] != row || pair[1] != column) {
-        pair[0] = row;
-        pair[1] = column;
-        *block = find_block(rows, row, (int32_t)column);
+    if (pair[0] != i.node || pair[1] != j.node) {
+        pair[0] = i.node;
+        pair[1] = j.node;
+        *block = find_block(rows, i.node, (int32_t)(j.node + rows->first));
     }
-    /* the matrix row i % bs of the node follows the one before as in a matrix by rows */
-    const int64_t before = rows->from[row], width = (rows->from[row + 1] - before) * bs;
-    rows->values[before * bs * bs + i % bs * width + (*block - before) * bs + j % bs] = value;
+    /* the matrix row i.place of the node follows the one before as in a matrix by rows */
+    const int64_t before = rows->from[i.node], width = (rows->from[i.node + 1] - before) * bs;
+    rows->values[before * bs * bs + i.place * width + (*block - before) * bs + j.place] = value;
 }
 
 uz_status uz_spread_fill(uz_spread_rows *rows, const uz_spread *map, const uz_csc *K, const uz_modes *modes,
@@ -242,13 +253,14 @@ uz_status uz_spread_fill(uz_spread_rows *rows, const uz_spread *map, const uz_cs
     }
     int64_t block[2] = {0, 0}, pair[2][2] = {{-1, -1}, {-1, -1}};
     for (int64_t j = 0; j < map->d; j++) {
-        const int64_t to = map->place[j], node = to / bs - rows->first;
+        const dof_place to = place_of(rows, map, j);
         for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
-            put_entry(rows, map, map->place[K->idx[k]], to, K->val[k], &block[0], pair[0]);
-            put_entry(rows, map, to, map->place[K->idx[k]], K->val[k], &block[1], pair[1]);
+            const dof_place from = place_of(rows, map, K->idx[k]);
+            put_entry(rows, map, from, to, K->val[k], &block[0], pair[0]);
+            put_entry(rows, map, to, from, K->val[k], &block[1], pair[1]);
         }
-        for (int64_t c = 0; node >= 0 && node < nodes && c < map->modes; c++)
-            rows->mode_values[(node * bs + to % bs) * map->modes + c] = modes->value[j * map->modes + c];
+        for (int64_t c = 0; to.node >= 0 && to.node < nodes && c < map->modes; c++)
+            rows->mode_values[(to.node * bs + to.place) * map->modes + c] = modes->value[j * map->modes + c];
     }
     for (int64_t i = 0; i < nodes; i++) { /* dofs that the node does not have */
         const int64_t before = rows->from[i], width = (rows->from[i + 1] - before) * bs;
