@@ -223,6 +223,31 @@ static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room
     return status;
 }
 
+uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, uz_error *err)
+{
+    const int last = mg->base.levels - 1;
+    uz_level_step at[UZ_LEVELS_MOST];
+    uz_level now[UZ_LEVELS_MOST];
+    for (int l = from; l < last; l++) {
+        uz_level *level = &now[l];
+        *level = mg->level[l];
+        if (room->own[l].inverse)
+            level->inverse = room->own[l].inverse;
+        if (room->own[l].off) {
+            level->off = room->own[l].off;
+            level->diag = room->own[l].diag;
+        }
+        at[l] = (uz_level_step){level, level->inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k};
+        uz_level_take_step(&at[l], UZ_STEP_SWEEP_DOWN | UZ_STEP_RESTRICT);
+    }
+    const uz_status status = solve_coarsest(mg, room, room->x[last], room->b[last], err);
+    for (int l = last - 1; l >= from; l--) {
+        at[l].coarse = room->x[l + 1];
+        uz_level_take_step(&at[l], UZ_STEP_PROLONG | UZ_STEP_SWEEP_UP);
+    }
+    return status;
+}
+
 static uz_status apply_alone(const uz_aggregates *mg, uz_multigrid_room *room, double *z, const double *r,
                              uz_error *err)
 {
@@ -261,25 +286,7 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
         const int64_t s = mg->slot[j];
         room->b[0][s / b * width + s % b] = (float)(mg->scale[j] * r[j] / unit);
     }
-    uz_level_step at[UZ_LEVELS_MOST];
-    uz_level now[UZ_LEVELS_MOST];
-    for (int l = 0; l < last; l++) {
-        uz_level *level = &now[l];
-        *level = mg->level[l];
-        if (room->own[l].inverse)
-            level->inverse = room->own[l].inverse;
-        if (room->own[l].off) {
-            level->off = room->own[l].off;
-            level->diag = room->own[l].diag;
-        }
-        at[l] = (uz_level_step){level, level->inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k};
-        uz_level_take_step(&at[l], UZ_STEP_SWEEP_DOWN | UZ_STEP_RESTRICT);
-    }
-    const uz_status status = solve_coarsest(mg, room, room->x[last], room->b[last], err);
-    for (int l = last - 1; l >= 0; l--) {
-        at[l].coarse = room->x[l + 1];
-        uz_level_take_step(&at[l], UZ_STEP_PROLONG | UZ_STEP_SWEEP_UP);
-    }
+    const uz_status status = uz_cycle_below(mg, room, 0, err);
     for (int64_t j = 0; j < base->n; j++) {
         const int64_t s = mg->slot[j];
         z[j] = mg->scale[j] * (double)room->x[0][s / b * width + s % b] * unit;

@@ -93,6 +93,9 @@ typedef struct {
 enum { UZ_STEP_SWEEP_DOWN = 1, UZ_STEP_RESTRICT = 2, UZ_STEP_PROLONG = 4, UZ_STEP_SWEEP_UP = 8 };
 void uz_level_take_step(const uz_level_step *step, int parts);
 
+/* A V-cycle from level `from` down, more levels than one: room->x[from] = M^-1 room->b[from]. */
+uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, uz_error *err);
+
 /* Takes K apart into level 0: slot, scale, level[0].A; *node_of_group (modes->n_nodes): where its nodes went, -1:
  * nowhere. Errors: NOT_SPD where a diagonal entry or a pair of dofs shows it. */
 uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes,

@@ -431,13 +431,15 @@ static uz_multigrid *make_coarse(const spread_system *s, const uz_blocks *A)
     return made;
 }
 
-static void set_coarse(variant *v, uz_multigrid *made)
+static void set_coarse(variant *v, uz_multigrid *made, const neighbours *near)
 {
     size_t bytes;
     v->base = made;
     v->room = made ? made->kind->room(made, &bytes) : NULL;
     if (made && !v->room)
         end_group("no memory");
+    if (made)
+        shared_init(&v->shared, made, v->room, near);
 }
 
 /* HELD may share WHOLE's multigrid. */
@@ -445,6 +447,7 @@ static void free_variant(spread_system *s, int which)
 {
     variant *v = &s->variant[which];
     free(v->inverse);
+    shared_clear(&v->shared);
     if (v->base)
         v->base->kind->free_room(v->room);
     if (v->base && (which == VARIANT_WHOLE || v->base != s->variant[VARIANT_WHOLE].base))
@@ -515,7 +518,7 @@ void system_create(spread_system *s, const spread_rows *rows)
     s->variant[VARIANT_WHOLE].inverse = new_zeros(end, sizeof(float));
     memcpy(s->variant[VARIANT_WHOLE].inverse, s->level.inverse, (size_t)end * sizeof(float));
     if (s->next.nodes > 0)
-        set_coarse(&s->variant[VARIANT_WHOLE], make_coarse(s, &s->next));
+        set_coarse(&s->variant[VARIANT_WHOLE], make_coarse(s, &s->next), &s->near);
     make_room(s);
 }
 
@@ -542,13 +545,14 @@ static void lose(spread_system *s, variant *v, const block_list *list)
         v->base = whole->base;
         add_list(&A, list, 1.0);
         must(uz_hold_loss(v->room, v->base, &A, &err), &err);
+        shared_init(&v->shared, v->base, v->room, &s->near);
         return;
     }
     const int64_t size = (int64_t)A.b * A.b;
     memcpy(A.off, s->next.off, (size_t)(A.ptr[A.nodes] * size) * sizeof *A.off);
     memcpy(A.diag, s->next.diag, (size_t)(A.nodes * size) * sizeof *A.diag);
     add_list(&A, list, -1.0);
-    set_coarse(v, make_coarse(s, &A));
+    set_coarse(v, make_coarse(s, &A), &s->near);
     free(A.off);
     free(A.diag);
 }

@@ -9,7 +9,8 @@
  *     S + S' - S'A S = S'(D' + (D' + L + L' - A)) S >= S'D'S > 0:   the cycle M^-1 is symmetric positive definite,
  *     M <= (D' + L) D'^-1 (D' + L'),                                which bounds lambda_max(diag(K)^-1 M).
  *
- * Coarser levels each process has whole: right-hand sides are summed, and all find the same correction. */
+ * Coarser levels each process has whole: right-hand sides are summed, and all find the same correction, for which the
+ * sweeps on the next level are divided (shared.c). */
 #include "worker.h"
 
 #include <float.h>
@@ -43,6 +44,11 @@ static void correct(spread_system *s, const variant *v, const uz_level_step *ste
     uz_error err = {0};
     uz_level_take_step(step, UZ_STEP_RESTRICT);
     MPI_Allreduce(MPI_IN_PLACE, s->coarse, (int)(nodes * width), MPI_FLOAT, MPI_SUM, MPI_COMM_WORLD);
+    if (v->shared.divided) {
+        shared_apply(&v->shared, v->base, v->room, s->coarse);
+        uz_level_take_step(step, UZ_STEP_PROLONG);
+        return;
+    }
     for (int64_t a = 0; a < nodes; a++)
         for (int c = 0; c < k; c++)
             s->coarse_r[a * k + c] = (double)s->coarse[a * width + c];

@@ -33,11 +33,28 @@ void neighbours_init(neighbours *n, const int32_t *first, const int64_t *ptr, co
 void neighbours_fetch(neighbours *n, void *ghosts, const void *own, size_t each);
 void neighbours_free(neighbours *n);
 
+/* This process's part of the sweeps on a level that each has whole. */
+typedef struct {
+    bool divided; /* false: there is nothing to divide, and the rest is empty */
+    int size;
+    int64_t begin, end;   /* its nodes */
+    int *count, *first;   /* size: numbers of each process in a vector of the level */
+    uz_level level;       /* own nodes among each other; the prolongation is that of the whole level */
+    int64_t *outside_ptr; /* end - begin + 1: blocks that couple them with others' nodes, */
+    int32_t *outside_idx; /* which, */
+    float *outside, *sum; /* the blocks, and their absolute sums, b for each node */
+} shared_level;
+void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid_room *room, const neighbours *near);
+void shared_clear(shared_level *own);
+/* z = M^-1 z, vectors of the level as uz_level_step has them. */
+void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigrid_room *room, float *z);
+
 /* What is coarser than the finest level, each process has whole. */
 typedef struct {
     float *inverse;     /* (here + ghosts) x b, of the finest level: 0 at dofs that are held */
     uz_multigrid *base; /* NULL: there is none */
     uz_multigrid_room *room;
+    shared_level shared; /* of base */
 } variant;
 
 enum { VARIANT_WHOLE, VARIANT_HELD, VARIANTS };

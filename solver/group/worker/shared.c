@@ -1,0 +1,177 @@
+/* shared.c: a cycle of the multigrid that each process has whole, with the sweeps of its finest level divided: they are
+ * half of what a process would do for itself in a cycle. Nodes are divided evenly in the order of their numbers, in
+ * which those of a process follow each other. Sweeps are those of steps.c, over the own rows, with the sums of what
+ * couples them with others' on the diagonal; so the cycle is as symmetric and positive definite as that one. What is
+ * coarser all processes find alike, from a sum. */
+#include "worker.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Blocks (i, j) of the own nodes i with others' nodes j, whichever triangle they stand in: two passes, the first of
+ * which counts. */
+static void list_outside(shared_level *own, const uz_level *level, bool fill)
+{
+    const uz_blocks *A = &level->A;
+    const int b = A->b;
+    int64_t *next = new_zeros(own->end - own->begin + 1, sizeof *next);
+    for (int64_t i = 0; fill && i < own->end - own->begin; i++)
+        next[i] = own->outside_ptr[i];
+    for (int64_t i = own->begin; i < A->nodes; i++)
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+            const int64_t j = A->idx[e];
+            const bool has_i = i < own->end, has_j = j >= own->begin && j < own->end;
+            if (has_i == has_j)
+                continue;
+            const int64_t row = (has_i ? i : j) - own->begin;
+            if (!fill) {
+                own->outside_ptr[row + 1]++;
+                continue;
+            }
+            const int64_t at = next[row]++;
+            own->outside_idx[at] = (int32_t)(has_i ? j : i);
+            for (int r = 0; r < b; r++)
+                for (int c = 0; c < b; c++)
+                    own->outside[(at * b + r) * b + c] = level->off[e * b * b + (has_i ? r * b + c : c * b + r)];
+        }
+    free(next);
+}
+
+static void copy_own_rows(shared_level *own, const uz_level *level)
+{
+    const uz_blocks *A = &level->A;
+    uz_level *to = &own->level;
+    const int64_t nodes = own->end - own->begin, size = (int64_t)A->b * A->b;
+    int64_t count = 0;
+    to->A = (uz_blocks){.nodes = nodes, .b = A->b, .ptr = new_zeros(nodes + 1, sizeof *to->A.ptr)};
+    for (int64_t i = 0; i < nodes; i++) {
+        for (int64_t e = A->ptr[own->begin + i]; e < A->ptr[own->begin + i + 1]; e++)
+            count += A->idx[e] >= own->begin;
+        to->A.ptr[i + 1] = count;
+    }
+    to->A.idx = new_zeros(count, sizeof *to->A.idx);
+    to->off = new_zeros(count * size + 8, sizeof *to->off);
+    to->diag = new_zeros(nodes * size + 8, sizeof *to->diag);
+    memcpy(to->diag, level->diag + own->begin * size, (size_t)(nodes * size) * sizeof *to->diag);
+    count = 0;
+    for (int64_t e = A->ptr[own->begin]; e < A->ptr[own->end]; e++)
+        if (A->idx[e] >= own->begin) {
+            to->A.idx[count] = (int32_t)(A->idx[e] - own->begin);
+            memcpy(to->off + count++ * size, level->off + e * size, (size_t)size * sizeof *to->off);
+        }
+}
+
+/* Dofs that are not there stay so. */
+static void add_sums(shared_level *own, const float *inverse)
+{
+    const int b = own->level.A.b;
+    const int64_t nodes = own->end - own->begin;
+    own->sum = new_zeros(nodes * b, sizeof *own->sum);
+    own->level.inverse = new_zeros(nodes * b, sizeof *own->level.inverse);
+    for (int64_t i = 0; i < nodes; i++)
+        for (int r = 0; r < b; r++) {
+            float *diagonal = &own->level.diag[(i * b + r) * b + r];
+            for (int64_t e = own->outside_ptr[i]; e < own->outside_ptr[i + 1]; e++)
+                for (int c = 0; c < b; c++)
+                    own->sum[i * b + r] += fabsf(own->outside[(e * b + r) * b + c]);
+            *diagonal += own->sum[i * b + r];
+            own->level.inverse[i * b + r] = inverse[(own->begin + i) * b + r] > 0.0F ? 1.0F / *diagonal : 0.0F;
+        }
+}
+
+void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid_room *room, const neighbours *near)
+{
+    const uz_aggregates *mg = (const uz_aggregates *)base;
+    *own = (shared_level){.size = near->size};
+    if (near->size == 1 || base->levels == 1)
+        return;
+    uz_level level = mg->level[0];
+    if (room->own[0].off) {
+        level.off = room->own[0].off;
+        level.diag = room->own[0].diag;
+        level.inverse = room->own[0].inverse;
+    }
+    const int b = level.A.b, width = uz_width(b);
+    own->count = new_zeros(near->size, sizeof *own->count);
+    own->first = new_zeros(near->size, sizeof *own->first);
+    for (int p = 0; p < near->size; p++) {
+        own->first[p] = (int)(level.A.nodes * p / near->size) * width;
+        own->count[p] = (int)(level.A.nodes * (p + 1) / near->size) * width - own->first[p];
+    }
+    own->begin = own->first[near->rank] / width;
+    own->end = own->begin + own->count[near->rank] / width;
+    own->outside_ptr = new_zeros(own->end - own->begin + 1, sizeof *own->outside_ptr);
+    list_outside(own, &level, false);
+    for (int64_t i = 0; i < own->end - own->begin; i++)
+        own->outside_ptr[i + 1] += own->outside_ptr[i];
+    const int64_t blocks = own->outside_ptr[own->end - own->begin];
+    own->outside_idx = new_zeros(blocks, sizeof *own->outside_idx);
+    own->outside = new_zeros(blocks * b * b, sizeof *own->outside);
+    list_outside(own, &level, true);
+    copy_own_rows(own, &level);
+    add_sums(own, level.inverse);
+    own->level.ptr = level.ptr + own->begin; /* borrowed, as are the next two */
+    own->level.block = level.block;
+    own->level.value = level.value;
+    own->level.aggregates = level.aggregates;
+    own->divided = true;
+}
+
+void shared_clear(shared_level *own)
+{
+    void *made[] = {own->count,       own->first,       own->outside_ptr, own->outside_idx, own->outside,      own->sum,
+                    own->level.A.ptr, own->level.A.idx, own->level.off,   own->level.diag,  own->level.inverse};
+    for (size_t k = 0; k < sizeof made / sizeof made[0]; k++)
+        free(made[k]);
+    *own = (shared_level){0};
+}
+
+/* All processes' numbers of x, and to (of the own nodes) += (D' - D) x - O x: see steps.c. */
+static void meet(const shared_level *own, float *x, float *to)
+{
+    const int b = own->level.A.b, width = uz_width(b);
+    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, x, own->count, own->first, MPI_FLOAT, MPI_COMM_WORLD);
+    for (int64_t i = 0; to && i < own->end - own->begin; i++) {
+        const float *here = x + (own->begin + i) * width;
+        if (own->outside_ptr[i] == own->outside_ptr[i + 1])
+            continue;
+        for (int r = 0; r < b; r++)
+            to[i * width + r] += own->sum[i * b + r] * here[r];
+        for (int64_t e = own->outside_ptr[i]; e < own->outside_ptr[i + 1]; e++) {
+            const float *block = own->outside + e * b * b, *there = x + (int64_t)own->outside_idx[e] * width;
+            for (int r = 0; r < b; r++)
+                for (int c = 0; c < b; c++)
+                    to[i * width + r] -= block[r * b + c] * there[c];
+        }
+    }
+}
+
+void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigrid_room *room, float *z)
+{
+    const uz_aggregates *mg = (const uz_aggregates *)base;
+    const uz_level *level = &mg->level[0];
+    const int b = level->A.b, width = uz_width(b);
+    const int64_t from = own->begin * width;
+    uz_error err = {0};
+    for (int64_t i = 0; i < level->A.nodes; i++) /* dofs are numbered as they stand there */
+        for (int r = 0; r < b; r++)
+            room->b[0][i * width + r] = (float)mg->scale[i * b + r] * z[i * width + r];
+    uz_level_step step = {
+        &own->level, own->level.inverse, room->b[0] + from, room->x[0] + from, room->t[0] + from, room->b[1], mg->k};
+    uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
+    meet(own, room->x[0], room->t[0] + from);
+    uz_level_take_step(&step, UZ_STEP_RESTRICT);
+    MPI_Allreduce(MPI_IN_PLACE, room->b[1], (int)(level->aggregates * uz_width(mg->k)), MPI_FLOAT, MPI_SUM,
+                  MPI_COMM_WORLD);
+    if (uz_cycle_below(mg, room, 1, &err) != UZ_OK)
+        end_group(err.message);
+    step.coarse = room->x[1];
+    uz_level_take_step(&step, UZ_STEP_PROLONG);
+    meet(own, room->x[0], room->b[0] + from);
+    uz_level_take_step(&step, UZ_STEP_SWEEP_UP);
+    meet(own, room->x[0], NULL);
+    for (int64_t i = 0; i < level->A.nodes; i++)
+        for (int r = 0; r < width; r++)
+            z[i * width + r] = r < b ? (float)mg->scale[i * b + r] * room->x[0][i * width + r] : 0.0F;
+}
