@@ -84,11 +84,18 @@ struct uz_multigrid {
     bool knows_K; /* without being handed it: of that only the diagonal is read, and need be there */
 };
 
-/* A V-cycle on smoothed aggregates for K (lower triangle).
+/* Processes that make the same of the same: sums over nodes they divide. sum: x (n) becomes the sum of all members', to
+ * the last bit the same for each. */
+typedef struct {
+    int member, members;
+    void (*sum)(double *x, int64_t n);
+} uz_team;
+
+/* A V-cycle on smoothed aggregates for K (lower triangle). team: NULL: there is one process alone.
  * Errors: NOT_SPD where a diagonal entry or the coarsest matrix shows it; LIMIT where memory_limit (0: none) would be
  * passed; CANCELLED where it had to stop (stop NULL: never). */
-uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
-                              const uz_stop *stop, uz_error *err);
+uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const uz_team *team,
+                              size_t memory_limit, const uz_stop *stop, uz_error *err);
 void uz_multigrid_free(uz_multigrid *mg);
 /* kind->apply. */
 uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,

@@ -201,10 +201,10 @@ static void add_plain(const product *x, int64_t i, int k)
     add_any(x, i, k);
 }
 
-uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_stop *stop,
-                      uz_error *err)
+uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_team *team,
+                      const uz_stop *stop, uz_error *err)
 {
-    const int64_t nodes = level->A.nodes, aggregates = level->aggregates;
+    const int64_t nodes = level->A.nodes, aggregates = level->aggregates, end = uz_team_first(team, 1, nodes);
     columns AP = {0};
     product x = {.coarse = coarse, .level = level, .below = below, .AP = &AP};
     bool over = false;
@@ -223,8 +223,11 @@ uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *
         ok = x.row && coarse->off && coarse->diag;
     }
     void (*const add)(const product *, int64_t, int) = uz_cpu_has_avx2_fma() ? add_fused : add_plain;
-    for (int64_t i = 0; ok && !(over = i % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop)) && i < nodes; i++)
+    for (int64_t i = uz_team_first(team, 0, nodes);
+         ok && !(over = i % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop)) && i < end; i++)
         add(&x, i, k);
+    if (ok && !over)
+        uz_team_sum(team, coarse);
     free(AP.ptr);
     free(AP.column);
     free(x.place);

@@ -126,17 +126,19 @@ static bool is_zero(const double *block, int64_t size)
 }
 
 /* What the next level loses: P'(loss) P. */
-static void pass_on(uz_blocks *next, const uz_blocks *loss, const uz_level *level)
+static void pass_on(uz_blocks *next, const uz_blocks *loss, const uz_level *level, const uz_team *team)
 {
     static const double all[SIZE_MOST] = {1, 1, 1, 1, 1, 1}, half[SIZE_MOST] = {.5, .5, .5, .5, .5, .5};
     const int64_t size = (int64_t)loss->b * loss->b;
-    for (int64_t i = 0; i < loss->nodes; i++) {
+    const int64_t end = uz_team_first(team, 1, loss->nodes);
+    for (int64_t i = uz_team_first(team, 0, loss->nodes); i < end; i++) {
         if (!is_zero(loss->diag + i * size, size))
             add_coupling(next, level, &(coupling){loss->diag + i * size, false, i, i, all, half});
         for (int64_t e = loss->ptr[i]; e < loss->ptr[i + 1]; e++)
             if (!is_zero(loss->off + e * size, size))
                 add_coupling(next, level, &(coupling){loss->off + e * size, false, i, loss->idx[e], all, all});
     }
+    uz_team_sum(team, next);
 }
 
 /* The level without what it loses, in arrays of its own. */
@@ -209,7 +211,7 @@ void uz_release_levels(uz_multigrid_room *room)
 
 /* room->own from level `from` on, whose loss stands in `loss`, which is taken. */
 static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from, uz_blocks *loss, size_t *bytes,
-                      const uz_stop *stop, uz_error *err)
+                      const uz_team *team, const uz_stop *stop, uz_error *err)
 {
     uz_status status = UZ_OK;
     for (int l = from; status == UZ_OK && l < mg->base.levels; l++) {
@@ -219,7 +221,7 @@ static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from
         else if (uz_stop_is_due(stop))
             status = uz_fail_stopped(err);
         else if (l > from)
-            pass_on(&next, loss, &mg->level[l - 1]);
+            pass_on(&next, loss, &mg->level[l - 1], team);
         if (l > from) {
             free(loss->off);
             free(loss->diag);
@@ -237,7 +239,8 @@ static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from
     return status;
 }
 
-uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blocks *loss, uz_error *err)
+uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blocks *loss, const uz_team *team,
+                       uz_error *err)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
     const uz_level *level = &mg->level[0];
@@ -251,7 +254,7 @@ uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blo
                 row[q] *= mg->scale[j] * mg->scale[c * b + q];
         }
     uz_release_levels(room);
-    return lose(room, mg, 0, loss, &bytes, NULL, err);
+    return lose(room, mg, 0, loss, &bytes, team, NULL, err);
 }
 
 uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const bool *held, size_t *bytes,
@@ -276,5 +279,5 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
     if (status != UZ_OK)
         return status;
     uz_level_loss(&loss, finest, inverse);
-    return lose(room, mg, 1, &loss, bytes, stop, err);
+    return lose(room, mg, 1, &loss, bytes, NULL, stop, err);
 }

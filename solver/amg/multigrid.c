@@ -97,8 +97,8 @@ uz_status uz_level_range(double *range, const uz_level *level, uz_error *err)
 }
 
 /* The prolongation of the level, the next matrix, and *modes, which become its own. *done: it can't be coarsened. */
-static uz_status coarsen(uz_level *level, bool *done, float **modes, double threshold, int k, const uz_stop *stop,
-                         uz_error *err)
+static uz_status coarsen(uz_level *level, bool *done, float **modes, double threshold, int k, const uz_team *team,
+                         const uz_stop *stop, uz_error *err)
 {
     const uz_blocks *A = &level->A;
     const int64_t n = A->nodes * A->b;
@@ -120,7 +120,7 @@ static uz_status coarsen(uz_level *level, bool *done, float **modes, double thre
         if (status == UZ_OK)
             status = uz_prolong_smoothed(level, &below, basis, aggregate, 4.0 / 3.0 / range, k, stop, err);
         if (status == UZ_OK)
-            status = uz_galerkin(&level[1].A, level, &below, k, stop, err);
+            status = uz_galerkin(&level[1].A, level, &below, k, team, stop, err);
         if (status == UZ_OK)
             status = uz_level_round(level + 1, err);
         free(*modes);
@@ -215,8 +215,8 @@ static float *scale_modes(const uz_aggregates *mg, const uz_modes *modes)
     return scaled;
 }
 
-static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
-                       const uz_stop *stop, uz_error *err)
+static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes, const uz_team *team,
+                       size_t memory_limit, const uz_stop *stop, uz_error *err)
 {
     int32_t *node_of_group = uz_alloc(modes->n_nodes, sizeof *node_of_group);
     float *of_level = NULL;
@@ -236,7 +236,7 @@ static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes
             break;
         status = uz_stop_is_due(stop)
                      ? uz_fail_stopped(err)
-                     : coarsen(level, &done, &of_level, modes->strong * ldexp(1.0, -l), mg->k, stop, err);
+                     : coarsen(level, &done, &of_level, modes->strong * ldexp(1.0, -l), mg->k, team, stop, err);
         mg->base.levels += level[1].A.ptr != NULL && level[1].inverse != NULL;
         if (status == UZ_OK && memory_limit > 0 && count_bytes(mg) > memory_limit)
             status = uz_fail(err, UZ_ERR_LIMIT, "K", "the levels of the multigrid take more than the %zu bytes allowed",
@@ -246,8 +246,8 @@ static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes
     return status;
 }
 
-uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, size_t memory_limit,
-                              const uz_stop *stop, uz_error *err)
+uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const uz_team *team,
+                              size_t memory_limit, const uz_stop *stop, uz_error *err)
 {
     const int64_t n = K->cols;
     *out = NULL;
@@ -259,7 +259,7 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
         return fail_memory(n, err);
     mg->k = modes->count;
     mg->base = (uz_multigrid){.kind = &uz_aggregates_kind, .n = n, .levels = 1};
-    uz_status status = n > ALONE ? build(mg, K, modes, memory_limit, stop, err) : UZ_OK;
+    uz_status status = n > ALONE ? build(mg, K, modes, team, memory_limit, stop, err) : UZ_OK;
     if (status == UZ_OK)
         status = factor_last(mg, K, memory_limit, stop, err);
     for (int l = 1; l + 1 < mg->base.levels; l++) { /* only products with K and the last level need them again */

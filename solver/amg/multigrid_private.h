@@ -74,7 +74,8 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
 void uz_release_levels(uz_multigrid_room *room);
 /* Less of the matrix that the multigrid was made of, K, which had `b` dofs for each node, in order: loss, in the places
  * of its level 0, which is taken. More levels than one. The room is for K - loss then, until it is told again. */
-uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *mg, uz_blocks *loss, uz_error *err);
+uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *mg, uz_blocks *loss, const uz_team *team,
+                       uz_error *err);
 
 /* Vectors of a level have `width` numbers for each node. */
 static inline int uz_width(int b)
@@ -127,8 +128,22 @@ uz_status uz_level_range(double *range, const uz_level *level, uz_error *err);
  * no inverse here, but do in the level. */
 void uz_level_loss(uz_blocks *loss, const uz_level *level, const float *inverse);
 /* coarse = P'A P. */
-uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_stop *stop,
-                      uz_error *err);
+uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_team *team,
+                      const uz_stop *stop, uz_error *err);
+/* The first of the nodes whose part of a sum is the member's `ahead` places after this one; nodes: of the last one. */
+static inline int64_t uz_team_first(const uz_team *team, int ahead, int64_t nodes)
+{
+    return team ? nodes * (team->member + ahead) / team->members : ahead * nodes;
+}
+/* The numbers of A, of which each member has its nodes' part. */
+static inline void uz_team_sum(const uz_team *team, uz_blocks *A)
+{
+    const int64_t size = (int64_t)A->b * A->b;
+    if (!team)
+        return;
+    team->sum(A->off, A->ptr[A->nodes] * size);
+    team->sum(A->diag, A->nodes * size);
+}
 
 /* Nodes between two questions whether to go on: a millisecond or so. */
 enum { UZ_ROWS_AT_ONCE = 512 };

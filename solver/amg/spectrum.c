@@ -216,7 +216,7 @@ static uz_status try_threshold(uz_amg **out, int *levels, const uz_csc *K, const
     uz_multigrid *mg = NULL;
     *out = NULL;
     *levels = 0;
-    uz_status status = uz_multigrid_create(&mg, K, modes, memory_limit, &stop, err);
+    uz_status status = uz_multigrid_create(&mg, K, modes, NULL, memory_limit, &stop, err);
     const double create_s = uz_seconds() - start;
     if (status != UZ_OK)
         return status;

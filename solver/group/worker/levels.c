@@ -402,6 +402,25 @@ static void sum_lists(uz_blocks *sum, const block_list *list, int64_t nodes, int
 
 /* ---- what each process has whole */
 
+/* Not MPI_Allreduce, which promises no process the bits of another: aggregates follow from these numbers, and all have
+ * to have the same. */
+static void sum_up(double *x, int64_t n)
+{
+    enum { AT_ONCE = 1 << 24 };
+    int rank;
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    for (int64_t from = 0; from < n; from += AT_ONCE) {
+        const int count = (int)(n - from < AT_ONCE ? n - from : AT_ONCE);
+        MPI_Reduce(rank == 0 ? MPI_IN_PLACE : x + from, x + from, count, MPI_DOUBLE, MPI_SUM, 0, MPI_COMM_WORLD);
+        MPI_Bcast(x + from, count, MPI_DOUBLE, 0, MPI_COMM_WORLD);
+    }
+}
+
+static uz_team team_of(const spread_system *s)
+{
+    return (uz_team){s->near.rank, s->near.size, sum_up};
+}
+
 /* A function on held dofs but for so much of its energy is left out. */
 #define LOST 1e-5
 
@@ -422,7 +441,8 @@ static uz_multigrid *make_coarse(const spread_system *s, const uz_blocks *A)
         there[i] = A->diag[at] > LOST * s->next.diag[at] ? 1.0F : 0.0F;
     }
     must(uz_blocks_to_columns(&columns, A, there, &err), &err);
-    const uz_status status = uz_multigrid_create(&made, &columns, &modes, 0, NULL, &err);
+    const uz_team team = team_of(s);
+    const uz_status status = uz_multigrid_create(&made, &columns, &modes, &team, 0, NULL, &err);
     if (status != UZ_OK && status != UZ_ERR_NOT_SPD)
         end_group(err.message);
     uz_csc_clear(&columns);
@@ -481,7 +501,7 @@ static void coarsen(spread_system *s, const spread_rows *rows)
     free(basis);
     fetch_prolongation(s);
     scale_ghosts(s, 0.5);
-    must(uz_galerkin(&s->part, level, &below, s->k, NULL, &err), &err);
+    must(uz_galerkin(&s->part, level, &below, s->k, NULL, NULL, &err), &err);
     scale_ghosts(s, 2.0);
     uz_below_clear(&below);
     block_list list = gather_blocks(&s->part);
@@ -544,7 +564,8 @@ static void lose(spread_system *s, variant *v, const block_list *list)
             end_group("no memory");
         v->base = whole->base;
         add_list(&A, list, 1.0);
-        must(uz_hold_loss(v->room, v->base, &A, &err), &err);
+        const uz_team team = team_of(s);
+        must(uz_hold_loss(v->room, v->base, &A, &team, &err), &err);
         shared_init(&v->shared, v->base, v->room, &s->near);
         return;
     }

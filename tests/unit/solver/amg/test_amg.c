@@ -7,6 +7,8 @@
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 
+#include <pthread.h>
+
 /* A matrix, its modes, and both ways to solve with it. */
 typedef struct {
     uz_csc K;
@@ -455,7 +457,7 @@ TEST(a_loss_of_the_matrix)
     CHECK(p.info.levels > 1);
     CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, before, r, &err) == UZ_OK);
     half_of(&half, &p);
-    CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, &err) == UZ_OK);
+    CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, NULL, &err) == UZ_OK);
     CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, after, r, &err) == UZ_OK);
     for (int64_t j = 0; j < n; j++) {
         most = fmax(most, fabs(before[j]));
@@ -466,6 +468,89 @@ TEST(a_loss_of_the_matrix)
     free(before);
     free(after);
     close_pair(&p);
+}
+
+/* Two threads in the place of processes. What they have to sum lies in one place until both have come. */
+static pthread_barrier_t both_are_there;
+static double *of_member[2];
+static __thread int member;
+
+static void sum_of_both(double *x, int64_t n)
+{
+    of_member[member] = x;
+    pthread_barrier_wait(&both_are_there);
+    for (int64_t k = 0; member == 0 && k < n; k++)
+        of_member[0][k] = of_member[1][k] = of_member[0][k] + of_member[1][k];
+    pthread_barrier_wait(&both_are_there);
+}
+
+typedef struct {
+    const pair *p;
+    const uz_modes *modes;
+    const double *r;
+    double *z[2]; /* M^-1 r, of K and of what is left of it */
+    int member;
+} team_mate;
+
+static void *make_in_team(void *arg)
+{
+    const team_mate *x = arg;
+    const uz_team team = {x->member, 2, sum_of_both};
+    uz_multigrid *mg;
+    uz_blocks half;
+    size_t bytes;
+    uz_error err = {0};
+    member = x->member;
+    CHECK(uz_multigrid_create(&mg, &x->p->K, x->modes, &team, 0, NULL, &err) == UZ_OK);
+    uz_multigrid_room *room = mg->kind->room(mg, &bytes);
+    CHECK(uz_multigrid_apply(mg, &x->p->K, room, x->z[0], x->r, &err) == UZ_OK);
+    half_of(&half, x->p);
+    CHECK(uz_hold_loss(room, mg, &half, &team, &err) == UZ_OK);
+    CHECK(uz_multigrid_apply(mg, &x->p->K, room, x->z[1], x->r, &err) == UZ_OK);
+    mg->kind->free_room(room);
+    uz_multigrid_free(mg);
+    return NULL;
+}
+
+/* Those who divide the sums get the multigrid of one alone, each the same to the last bit. */
+TEST(a_multigrid_by_two)
+{
+    brick b = brick_make((int64_t[]){11, 9, 7}, (double[]){1, 1, 1}, 0.3, true);
+    pair p;
+    uz_modes modes, same;
+    uz_error err = {0};
+    CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
+    CHECK(uz_modes_of_body(&same, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
+    CHECK(open_pair(&p, &b.K, &modes, &err));
+    const int64_t n = p.K.cols;
+    double *r = random_vector(n, 3), *alone = vector(n);
+    team_mate mate[2];
+    pthread_t thread[2];
+    CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, alone, r, &err) == UZ_OK);
+    pthread_barrier_init(&both_are_there, NULL, 2);
+    for (int k = 0; k < 2; k++) {
+        mate[k] = (team_mate){&p, &same, r, {vector(n), vector(n)}, k};
+        CHECK(pthread_create(&thread[k], NULL, make_in_team, &mate[k]) == 0);
+    }
+    for (int k = 0; k < 2; k++)
+        pthread_join(thread[k], NULL);
+    pthread_barrier_destroy(&both_are_there);
+    for (int which = 0; which < 2; which++) {
+        double most = 0.0, off = 0.0;
+        for (int64_t j = 0; j < n; j++) {
+            most = fmax(most, fabs(alone[j]));
+            off = fmax(off, fabs(mate[0].z[which][j] - (which == 0 ? 1.0 : 2.0) * alone[j]));
+        }
+        CHECK_MSG(off <= 1e-4 * most, "%g of %g", off, most);
+        CHECK(memcmp(mate[0].z[which], mate[1].z[which], (size_t)n * sizeof *alone) == 0);
+        free(mate[0].z[which]);
+        free(mate[1].z[which]);
+    }
+    free(r);
+    free(alone);
+    uz_modes_clear(&same);
+    close_pair(&p);
+    brick_free(&b);
 }
 
 TEST(memory_is_bounded)
