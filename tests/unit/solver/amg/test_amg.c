@@ -1,4 +1,5 @@
-/* Multigrid and conjugate gradients against a factor of the same matrix, in two and three dimensions. */
+/* Multigrid and conjugate gradients against a factor of the same matrix, in two and three dimensions.
+ * not under ThreadSanitizer: two threads stand for processes, and meet at barriers alone */
 #include "brick.h"
 #include "factor_fixture.h"
 #include "harness.h"
