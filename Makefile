@@ -24,8 +24,8 @@ TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl local
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
 TEST_PACKAGES += chromium chromium-driver python3-selenium python3-pil
 
-# The Python package, and what builds its wheel.
-TEST_PACKAGES += python3-numpy python3-pip python3-setuptools python3-wheel
+# The Python package, and what builds its wheel; files of SciPy's.
+TEST_PACKAGES += python3-numpy python3-scipy python3-pip python3-setuptools python3-wheel
 
 # One body on many machines: uzawa-group is built where these are, and nothing else needs them.
 GROUP_PACKAGES := libpetsc-real-dev openmpi-bin

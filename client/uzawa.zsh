@@ -53,7 +53,7 @@ _uzawa() {
     case $words[1] in
     submit)
         _arguments \
-            '--K[the stiffness matrix, in Matrix Market form]:FILE:_files' \
+            '--K[the stiffness matrix\: .mtx, .npy or .npz]:FILE:_files' \
             '--N[the contact normals, a row for each contact]:FILE:_files' \
             '--h[the initial gaps]:FILE:_files' \
             '--p[the load]:FILE:_files' \
@@ -166,7 +166,7 @@ _uzawa() {
             '1:FILE:_files' ;;
     result)
         _arguments \
-            '(-f --format)'{-f,--format}'[json (default), csv\: a table, or vtu\: scenes only]:F:(json csv vtu)' \
+            '(-f --format)'{-f,--format}'[json (default), csv\: a table, npz\: arrays for NumPy, or vtu\: scenes only]:F:(json csv vtu npz)' \
             '*--fields[such as displacements, reactions, gaps, pressure, stress, von_mises (default\: reactions,gaps; of vtu\: everything useful)]:A,B:(summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss)' \
             '*--field[one of them; may be repeated]:NAME:(summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss)' \
             '(-c --case)'{-c,--case}'[of this load case alone]:NAME: ' \

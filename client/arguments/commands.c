@@ -22,8 +22,9 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
          "..., "
          "which are listed on stderr with where they are, and body1, ...; materials, supports, loads and contacts come "
          "by --set, or are those of a scene in FILE.\n"
-         "A problem in matrices needs no FILE: --K, --N, --h and --p name files in Matrix Market form. With FILE they "
-         "replace its matrices. Files of more than 64 KiB, and compressed or binary ones, are uploaded, unless the "
+         "A problem in matrices needs no FILE: --K, --N, --h and --p name files in Matrix Market form, or of NumPy "
+         "and SciPy (.npy, .npz). With FILE they replace its matrices. Files of more than 64 KiB, and compressed or "
+         "binary ones, are uploaded, unless the "
          "service has them already.\n"
          "A PATH is the way to a value by keys and indices (from 0) with dots between them, such as "
          "problem.loads.1.traction.0; it may begin inside the problem: loads.1.traction.0.\n"
@@ -39,12 +40,12 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
          "and contact pairs. Each line of the deck that has no place in it is told on stderr. What would change the "
          "answer is refused unless --leave-out is given.\n",
          NULL},
-    [CLIENT_UPLOAD] = {"upload", "upload FILE [options]", "send a file that requests then name", "FILE",
-                       CLIENT_OPERAND_NEEDED,
-                       "FILE is a matrix or vector in Matrix Market form or a Gmsh mesh, \"-\" is standard input; what "
-                       "ends in .gz is stored unpacked. Prints its id, which may stand in a request as "
-                       "{\"upload\": \"ID\"} in place of the text. The same bytes always have the same id.\n",
-                       NULL},
+    [CLIENT_UPLOAD] =
+        {"upload", "upload FILE [options]", "send a file that requests then name", "FILE", CLIENT_OPERAND_NEEDED,
+         "FILE is a matrix or vector in Matrix Market form or of NumPy's, or a mesh, \"-\" is standard input; what "
+         "ends in .gz is stored unpacked. Prints its id, which may stand in a request as "
+         "{\"upload\": \"ID\"} in place of the text. The same bytes always have the same id.\n",
+         NULL},
     [CLIENT_STATUS] = {"status", "status ID [options]", "show a job", "ID", CLIENT_OPERAND_NEEDED, "",
                        "0 whatever became of the job."},
     [CLIENT_WAIT] = {"wait", "wait ID [options]", "wait until a job has ended, then print its summary", "ID",
@@ -128,7 +129,7 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
         .places = COMMANDS, __VA_ARGS__                                                                                \
     }
 static const uz_option OPTIONS[] = {
-    OPTION("K", 0, WORD, K, IN(SUBMIT), .value = "FILE", .about = "the stiffness matrix, in Matrix Market form"),
+    OPTION("K", 0, WORD, K, IN(SUBMIT), .value = "FILE", .about = "the stiffness matrix: .mtx, .npy or .npz"),
     OPTION("N", 0, WORD, N, IN(SUBMIT), .value = "FILE", .about = "the contact normals, a row for each contact"),
     OPTION("h", 0, WORD, h, IN(SUBMIT), .value = "FILE", .about = "the initial gaps"),
     OPTION("p", 0, WORD, p, IN(SUBMIT), .value = "FILE", .about = "the load"),
@@ -163,8 +164,8 @@ static const uz_option OPTIONS[] = {
     OPTION("key", 'k', WORD, key, IN(SUBMIT), .value = "KEY",
            .about = "idempotency key (default: random); the same key and request give the same job"),
     OPTION("key", 'k', WORD, key, STAYING & ~IN(WAIT), .value = "KEY", .about = "idempotency key (default: random)"),
-    OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json csv vtu",
-           .about = "json (default), csv: a table, or vtu: scenes only"),
+    OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json csv vtu npz",
+           .about = "json (default), csv: a table, npz: arrays for NumPy, or vtu: scenes only"),
     OPTION("format", 'f', CHOICE, format, IN(PATH), .value = "F", .choices = "table csv json",
            .about = "table (default) with five digits, csv or json with all"),
     OPTION("from", 0, WORD, from, IN(PATH), .value = "P", .about = "the first point, such as 0,20"),

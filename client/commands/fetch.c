@@ -105,7 +105,7 @@ client_exit client_deliver(client_session *s, const char *text, size_t len)
     const char *path = s->options->output ? s->options->output : "-";
     if (!client_file_write(path, text ? text : "", len, message, sizeof message))
         return client_complain(s, CLIENT_LOCAL, message);
-    if (strcmp(path, "-") == 0 && len && text[len - 1] != '\n')
+    if (strcmp(path, "-") == 0 && len && text[len - 1] != '\n' && !memchr(text, '\0', len)) /* no archive */
         fputc('\n', s->out);
     if (strcmp(path, "-") == 0 || !s->options->json)
         return CLIENT_OK;
@@ -169,13 +169,12 @@ client_exit client_result(client_session *s)
     }
     const char *fields = text.data;
     const client_query query[] = {{"fields", *fields ? fields : NULL}, {"case", o->case_name}, {NULL, NULL}};
-    client_exit code;
-    if (strcmp(format, "csv") == 0)
-        code = client_table(s, *fields ? fields : "reactions,gaps");
-    else
-        code =
-            fetch_and_deliver(s, client_path_with_query(s, s->options->operand,
-                                                        strcmp(format, "vtu") == 0 ? "/result.vtu" : "/result", query));
+    const char *const at = strcmp(format, "vtu") == 0   ? "/result.vtu"
+                           : strcmp(format, "npz") == 0 ? "/result.npz"
+                                                        : "/result";
+    const client_exit code = strcmp(format, "csv") == 0
+                                 ? client_table(s, *fields ? fields : "reactions,gaps")
+                                 : fetch_and_deliver(s, client_path_with_query(s, o->operand, at, query));
     free(text.data);
     return code;
 }

@@ -194,6 +194,10 @@ typedef struct {
     const uz_fields *fields; /* scenes: what was computed; its pressure is not written. NULL: nothing */
 } codec_result;
 char *codec_encode_result(const codec_result *result, size_t *len);
+/* The same as an archive of NumPy's: an array for each vector, of points with a column for each number, and the rest
+ * as result.json. Of Gauss points there are stress_gauss_elements, _points and _stress. NaN stays NaN. NULL: no
+ * memory, or more than such a file can hold. */
+char *codec_encode_result_npz(const codec_result *result, size_t *len);
 
 /* Pieces of such a text, for the answers of many cases in one, of which only one case's vectors need be there at a
  * time: an item of "cases", which has all but the job, nodes and contact_nodes (unless own_rows); and these, once for

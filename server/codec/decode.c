@@ -46,19 +46,20 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
                                                                                    "/quantities"};
     static const struct {
         const char *where, *syntax, *unsupported;
-    } MESHES[] = {{"/mesh/gmsh", "gmsh_syntax", "gmsh_unsupported"},
-                  {"/mesh/abaqus", "abaqus_syntax", "abaqus_unsupported"},
-                  {"/mesh/nastran", "nastran_syntax", "nastran_unsupported"},
-                  {"/mesh/vtk", "vtk_syntax", "vtk_unsupported"},
-                  {"/surface/stl", "stl_syntax", "stl_unsupported"},
-                  {"/surface/obj", "obj_syntax", "obj_unsupported"}};
+    } FILES[] = {{"/numpy", "numpy_syntax", "numpy_unsupported"},
+                 {"/mesh/gmsh", "gmsh_syntax", "gmsh_unsupported"},
+                 {"/mesh/abaqus", "abaqus_syntax", "abaqus_unsupported"},
+                 {"/mesh/nastran", "nastran_syntax", "nastran_unsupported"},
+                 {"/mesh/vtk", "vtk_syntax", "vtk_unsupported"},
+                 {"/surface/stl", "stl_syntax", "stl_unsupported"},
+                 {"/surface/obj", "obj_syntax", "obj_unsupported"}};
     const uz_status status = err->status;
     const char *where = err->where, *code = uz_status_name(status), *within = "/problem";
-    /* The library reads several formats of text and has one status for all. */
-    for (size_t i = 0; i < sizeof MESHES / sizeof MESHES[0]; i++)
-        if (strcmp(where, MESHES[i].where) == 0)
-            code = status == UZ_ERR_FORMAT        ? MESHES[i].syntax
-                   : status == UZ_ERR_UNSUPPORTED ? MESHES[i].unsupported
+    /* The library reads several formats and has one status for all. */
+    for (size_t i = 0; i < sizeof FILES / sizeof FILES[0]; i++)
+        if (strcmp(where, FILES[i].where) == 0)
+            code = status == UZ_ERR_FORMAT        ? FILES[i].syntax
+                   : status == UZ_ERR_UNSUPPORTED ? FILES[i].unsupported
                                                   : code;
     if (strncmp(where, "/cases/", 7) == 0) {
         /* A load case has these; an error about anything else of it is one of the body that all cases share. */

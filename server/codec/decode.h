@@ -53,6 +53,8 @@ bool decode_assertions(codec_request *out, decoding *d, const json_value *list);
 /* 422 with "POINTER message" about the value; returns false. */
 bool decode_refuse(decoding *d, const char *code, const json_value *at, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
+/* What the library says of the matrix or the vector at `at`; returns false. */
+bool decode_refuse_file(decoding *d, const uz_error *err, const json_value *at);
 /* Room for the items of a list that may be absent, zeroed; NULL: no memory, and the problem says so. */
 void *decode_room(decoding *d, const json_value *list, size_t size, int64_t *count);
 /* A group's name; one that no mesh has (too long, or with a NUL in it) becomes "". */
@@ -66,7 +68,7 @@ bool decode_label(char out[64], decoding *d, const json_value *at, const char *l
  * dim numbers, or if it is zero where it must not be: what: "it must point out of the obstacle", or NULL. */
 bool decode_components(double out[3], decoding *d, const json_value *object, const char *key, double otherwise, int dim,
                        const char *what);
-/* A text of the request: a string's bytes, or those of the upload that it names. */
+/* A text or file of the request: a string's bytes, or those of the upload that it names. */
 typedef struct {
     const char *data; /* not NUL-terminated */
     size_t len;
@@ -75,7 +77,7 @@ typedef struct {
 } decode_source;
 bool decode_source_open(decode_source *out, decoding *d, const json_value *value);
 void decode_source_close(decode_source *source);
-/* An array of numbers, or Matrix Market text. The caller frees *out also on failure. */
+/* An array of numbers, Matrix Market text, or a file of NumPy's. The caller frees *out also on failure. */
 bool decode_vector(double **out, int64_t *n, decoding *d, const json_value *value);
 /* The same for an array whose items may be points; *columns is their size, 0 for numbers; *n counts numbers. */
 bool decode_points(double **out, int64_t *n, int *columns, decoding *d, const json_value *value);

@@ -16,15 +16,16 @@ static bool refuse_call(decoding *d, uz_error *err, const char *name)
     return false;
 }
 
-static bool read_matrix(uz_csc *out, uz_mm_info *info, decoding *d, const json_value *value, const char *name)
+static bool read_matrix(uz_csc *out, uz_mm_symmetry *symmetry, decoding *d, const json_value *value)
 {
     uz_error err = {.status = UZ_OK};
-    decode_source text;
-    if (!decode_source_open(&text, d, value))
+    decode_source source;
+    if (!decode_source_open(&source, d, value))
         return false;
-    const bool good = uz_mm_read(out, info, text.data, text.len, d->bound + 32 * text.len, &err) == UZ_OK;
-    decode_source_close(&text);
-    return good || refuse_call(d, &err, name);
+    const size_t bound = d->bound + 32 * source.len;
+    const bool good = uz_matrix_read(out, symmetry, source.data, source.len, bound, &err) == UZ_OK;
+    decode_source_close(&source);
+    return good || decode_refuse_file(d, &err, value);
 }
 
 /* A symmetric file gave its lower triangle; N is general, so the mirror image of each entry off the diagonal is added.
@@ -65,19 +66,19 @@ static bool add_upper_half(decoding *d, uz_csc *A)
 
 bool decode_matrices(uz_qp *out, decoding *d, const json_value *object)
 {
-    uz_mm_info info;
+    uz_mm_symmetry symmetry;
     uz_error err = {.status = UZ_OK};
     const json_value *of_K = json_get(object, "K"), *of_N = json_get(object, "N");
     const json_value *p = json_get(object, "p"), *h = json_get(object, "h");
     uz_csc *K = &out->K, *N = &out->N;
     int64_t n = 0, m = 0;
-    if (!read_matrix(K, &info, d, of_K, "K"))
+    if (!read_matrix(K, &symmetry, d, of_K))
         return false;
     if (K->rows != K->cols || K->rows == 0)
         return decode_refuse(d, "size_mismatch", of_K,
                              "is %lld x %lld, but a stiffness matrix is square and not empty.", (long long)K->rows,
                              (long long)K->cols);
-    if (info.symmetry != UZ_MM_SYMMETRIC && uz_symmetric_lower(K, &err) != UZ_OK)
+    if (symmetry != UZ_MM_SYMMETRIC && uz_symmetric_lower(K, &err) != UZ_OK)
         return refuse_call(d, &err, "K");
     if (!decode_vector(&out->p, &n, d, p))
         return false;
@@ -88,13 +89,13 @@ bool decode_matrices(uz_qp *out, decoding *d, const json_value *object)
     /* without N there are no contacts */
     if (!of_N && uz_csc_init(N, 0, K->cols, 0, &err) != UZ_OK)
         return refuse_call(d, &err, "N");
-    if (of_N && !read_matrix(N, &info, d, of_N, "N"))
+    if (of_N && !read_matrix(N, &symmetry, d, of_N))
         return false;
     if (N->cols != K->cols)
         return decode_refuse(d, "size_mismatch", of_N,
                              "is %lld x %lld, but K is %lld x %lld; they must have as many columns.",
                              (long long)N->rows, (long long)N->cols, (long long)K->rows, (long long)K->cols);
-    if (of_N && info.symmetry != UZ_MM_GENERAL && !add_upper_half(d, N))
+    if (of_N && symmetry != UZ_MM_GENERAL && !add_upper_half(d, N))
         return false;
     if (h ? !decode_vector(&out->h, &m, d, h) : !(out->h = room_for(0, sizeof(double))))
         return h ? false : problem_no_memory(d->problem);

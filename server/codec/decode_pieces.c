@@ -21,6 +21,13 @@ bool decode_refuse(decoding *d, const char *code, const json_value *at, const ch
     return false;
 }
 
+bool decode_refuse_file(decoding *d, const uz_error *err, const json_value *at)
+{
+    codec_problem_from_error(d->problem, err, UZ_PROBLEM_MATRICES);
+    json_pointer(d->problem->pointer, sizeof d->problem->pointer, at);
+    return false;
+}
+
 void *decode_room(decoding *d, const json_value *list, size_t size, int64_t *count)
 {
     void *room = calloc(json_size(list) + 1, size);
@@ -135,24 +142,27 @@ void decode_source_close(decode_source *source)
 
 /* ---- vectors */
 
-bool decode_vector(double **out, int64_t *n, decoding *d, const json_value *value)
+/* columns: NULL, or where the size of a point goes. */
+static bool read_vector(double **out, int64_t *n, int *columns, decoding *d, const json_value *value)
 {
     uz_error err = {.status = UZ_OK};
-    decode_source text;
+    decode_source source;
     if (json_is_list(value)) { /* one of anything but numbers is empty: the schema saw to it */
         *n = (int64_t)value->count;
         *out = value->kind == JSON_IS_NUMBERS ? json_take_numbers(value) : room_for(0, sizeof **out);
         return *out || problem_no_memory(d->problem);
     }
-    if (!decode_source_open(&text, d, value))
+    if (!decode_source_open(&source, d, value))
         return false;
-    const bool good = uz_mm_read_vector(out, n, text.data, text.len, d->bound + 32 * text.len, &err) == UZ_OK;
-    decode_source_close(&text);
-    if (!good) {
-        codec_problem_from_error(d->problem, &err, UZ_PROBLEM_MATRICES);
-        json_pointer(d->problem->pointer, sizeof d->problem->pointer, value);
-    }
-    return good;
+    const size_t bound = d->bound + 32 * source.len;
+    const bool good = uz_vector_read(out, n, columns, source.data, source.len, bound, &err) == UZ_OK;
+    decode_source_close(&source);
+    return good || decode_refuse_file(d, &err, value);
+}
+
+bool decode_vector(double **out, int64_t *n, decoding *d, const json_value *value)
+{
+    return read_vector(out, n, NULL, d, value);
 }
 
 bool decode_points(double **out, int64_t *n, int *columns, decoding *d, const json_value *value)
@@ -167,7 +177,7 @@ bool decode_points(double **out, int64_t *n, int *columns, decoding *d, const js
             return decode_refuse(d, "wrong_type", item,
                                  "is not what the items before it are: give numbers, or points of the same size.");
     }
-    if (!decode_vector(out, n, d, value))
+    if (!read_vector(out, n, columns, d, value))
         return false;
     if (json_is(value, JSON_IS_NUMBERS) && value->columns > 0) {
         *columns = (int)value->columns;

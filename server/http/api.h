@@ -98,6 +98,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply);
 void verify_submit(api *context, http_request *rq, http_reply *reply);
 void decks_translate(api *context, http_request *rq, http_reply *reply);
 void results_get(api *context, http_request *rq, http_reply *reply);
+void results_get_arrays(api *context, http_request *rq, http_reply *reply);
 void uploads_create(api *context, http_request *rq, http_reply *reply);
 void uploads_get(api *context, http_request *rq, http_reply *reply);
 void uploads_delete(api *context, http_request *rq, http_reply *reply);

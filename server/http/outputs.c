@@ -203,6 +203,7 @@ static const char *const ERRORS[] = {"case", "theme", "width", NULL};
 
 const output OUTPUTS[] = {
     {OUTPUT("result", RESULT, results_get), "application/json", OUTPUT_OWN, NULL, 0, 0, NULL, false},
+    {OUTPUT("result.npz", RESULT, results_get_arrays), "application/zip", OUTPUT_OWN, NULL, 0, 0, NULL, false},
     {OUTPUT("result.vtu", FILE_OF, output_get), "application/xml", OUTPUT_OF_ANSWER, write_vtu, VTU_BY_DEFAULT, IN_VTU,
      NULL, false},
     {OUTPUT("surface", FILE_OF, output_get), "model/gltf-binary", OUTPUT_OF_ANSWER, write_surface, IN_SURFACE,

@@ -172,8 +172,16 @@ static codec_result as_encoded(const place *at, const vectors *own, const vector
     return r;
 }
 
+/* A form of the answer of one case. */
+typedef struct {
+    const char *type;
+    char *(*encode)(const codec_result *result, size_t *len);
+} form;
+static const form AS_JSON = {"application/json", codec_encode_result},
+                  AS_ARRAYS = {"application/zip", codec_encode_result_npz};
+
 /* rq may be NULL where nothing is to be computed. */
-static void reply_one(api *context, const http_request *rq, const place *at, const field_list *fields,
+static void reply_one(api *context, const http_request *rq, const place *at, const field_list *fields, const form *as,
                       http_reply *reply)
 {
     const unsigned which = fields->which & COMPUTED;
@@ -196,8 +204,8 @@ static void reply_one(api *context, const http_request *rq, const place *at, con
     if (status == STORE_OK) {
         const uz_fields part = cut_computed(&computed, fields);
         codec_result result = as_encoded(at, &own, &shared, which ? &part : NULL, fields);
-        char *body = codec_encode_result(&result, &len);
-        reply_text(reply, 200, "application/json", body, len);
+        char *body = as->encode(&result, &len);
+        reply_text(reply, 200, as->type, body, len);
     } else {
         reply_store_failure(context, status, reply);
     }
@@ -355,29 +363,37 @@ bool results_known(const http_request *rq, const job *j, http_reply *reply)
     return reply_unchanged(rq, reply);
 }
 
+/* Fields and the part of them that the query asks for. */
+static bool read_query(field_list *out, const http_request *rq, http_reply *reply)
+{
+    problem_details problem;
+    const bool good = fields_parse(out, target_value(&rq->target, "fields"), BY_DEFAULT, STORED | COMPUTED, &problem);
+    out->from = 0;
+    out->count = INT64_MAX;
+    out->part = target_value(&rq->target, "from") || target_value(&rq->target, "count");
+    if (good && request_integer(rq, "from", 0, INT64_MAX, &out->from, &problem) &&
+        request_integer(rq, "count", 0, INT64_MAX, &out->count, &problem))
+        return true;
+    reply_problem(reply, &problem);
+    return false;
+}
+
 void results_get(api *context, http_request *rq, http_reply *reply)
 {
     field_list fields;
-    problem_details problem;
     job j = {0};
     store_case *cases = NULL;
     size_t count = 0;
     const char *name = target_value(&rq->target, "case");
-    bool good = fields_parse(&fields, target_value(&rq->target, "fields"), BY_DEFAULT, STORED | COMPUTED, &problem);
-    fields.from = 0;
-    fields.count = INT64_MAX;
-    fields.part = target_value(&rq->target, "from") || target_value(&rq->target, "count");
-    if (!good || !request_integer(rq, "from", 0, INT64_MAX, &fields.from, &problem) ||
-        !request_integer(rq, "count", 0, INT64_MAX, &fields.count, &problem)) {
-        reply_problem(reply, &problem);
+    if (!read_query(&fields, rq, reply))
         return;
-    }
     if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply) &&
         find_cases(context, &j, name, &cases, &count, reply)) {
         if (count == 0)
-            reply_one(context, rq, &(place){.j = &j, .summary = j.summary}, &fields, reply);
+            reply_one(context, rq, &(place){.j = &j, .summary = j.summary}, &fields, &AS_JSON, reply);
         else if (name)
-            reply_one(context, rq, &(place){&j, cases[0].number, cases[0].name, cases[0].summary}, &fields, reply);
+            reply_one(context, rq, &(place){&j, cases[0].number, cases[0].name, cases[0].summary}, &fields, &AS_JSON,
+                      reply);
         else if (check_room(context, &j, count, &fields, 0, reply))
             reply_cases(context, rq, &j, cases, count, &fields, reply);
         store_cases_free(cases, count);
@@ -386,10 +402,25 @@ void results_get(api *context, http_request *rq, http_reply *reply)
     job_clear(&j);
 }
 
+void results_get_arrays(api *context, http_request *rq, http_reply *reply)
+{
+    field_list fields;
+    job j = {0};
+    results_place at = {.cases = NULL};
+    if (!read_query(&fields, rq, reply))
+        return;
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply) &&
+        results_one(&at, context, &j, target_value(&rq->target, "case"), "a file", reply))
+        reply_one(context, rq, &(place){&j, at.number, at.name, at.summary}, &fields, &AS_ARRAYS, reply);
+    store_cases_free(at.cases, at.count);
+    jobs_check_still_there(context, &j, reply);
+    job_clear(&j);
+}
+
 void results_reply(api *context, const job *j, http_reply *reply)
 {
     const field_list fields = {.which = BY_DEFAULT};
-    reply_one(context, NULL, &(place){.j = j, .summary = j->summary}, &fields, reply);
+    reply_one(context, NULL, &(place){.j = j, .summary = j->summary}, &fields, &AS_JSON, reply);
     jobs_check_still_there(context, j, reply);
 }
 

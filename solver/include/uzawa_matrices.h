@@ -63,6 +63,37 @@ uz_status uz_mm_write(char **text, size_t *len, const uz_csc *A, uz_mm_symmetry 
 /* Writes array text, n x 1. */
 uz_status uz_mm_write_vector(char **text, size_t *len, const double *x, int64_t n, uz_error *err);
 
+/* ----------------------------------------------------------------- NumPy */
+
+/* A matrix or a vector in any format that is read, told by how the bytes begin: an array as numpy.save writes it, or
+ * the only one of an archive (numpy.savez); a matrix also as scipy.sparse.save_npz writes it (csr, csc or coo, entries
+ * of one place added up); else Matrix Market text, as above. Real and whole numbers of 32 and 64 bits, and whole ones
+ * of 8 and 16, in either order of bytes. Zeros of a dense array are left out. *symmetry (of text: what it says, else
+ * general) and *n are set; columns: NULL, or an array of two dimensions is taken too, its rows one after the other, and
+ * *columns is their length (0: a vector). Errors: those of uz_mm_read; of NumPy's files without a line, and where is
+ * "/numpy". */
+uz_status uz_matrix_read(uz_csc *out, uz_mm_symmetry *symmetry, const char *data, size_t len, size_t max_bytes,
+                         uz_error *err);
+uz_status uz_vector_read(double **out, int64_t *n, int *columns, const char *data, size_t len, size_t max_bytes,
+                         uz_error *err);
+
+/* A member of an archive: an array of rows (columns 0) or of rows x columns numbers, in the file as doubles, or as
+ * 64-bit integers where they are whole; or a text. One without numbers and text is left out. */
+typedef struct {
+    const char *name; /* of an array without ".npy" */
+    const double *x;
+    int64_t rows;
+    int columns;
+    bool whole;
+    const char *text;
+} uz_npz_array;
+enum { UZ_NPZ_ARRAYS = 32 };
+/* An archive as numpy.savez writes it: numpy.load reads it. *file: malloc'ed, the caller frees it. Errors: _MEMORY,
+ * _LIMIT (more than 4 GB). */
+uz_status uz_npz_write(char **file, size_t *len, const uz_npz_array *list, size_t n, uz_error *err);
+
+/* ------------------------------------------------------------- numbers as text */
+
 /* Reads the decimal number at the start of text[0..len): digits, one '.', an exponent, a sign; no NaN, Inf or hex.
  * Returns the bytes used, 0 if there is no number; *value is correctly rounded, +-Inf on overflow. */
 size_t uz_parse_double(double *value, const char *text, size_t len);

@@ -14,7 +14,7 @@ targets=("$@")
 [ $# -gt 0 ] || for source in tests/fuzz/fuzz_*.c; do targets+=("$(basename "$source" .c)"); done
 
 kind() { # TARGET: what its inputs are
-    case $1 in fuzz_mm*) echo mm ;; fuzz_gmsh*) echo gmsh ;; fuzz_abaqus*) echo abaqus ;; fuzz_nastran*) echo nastran ;; fuzz_vtk*) echo vtk ;; fuzz_surface*) echo surface ;; *) echo json ;; esac
+    case $1 in fuzz_mm*) echo mm ;; fuzz_gmsh*) echo gmsh ;; fuzz_abaqus*) echo abaqus ;; fuzz_nastran*) echo nastran ;; fuzz_vtk*) echo vtk ;; fuzz_surface*) echo surface ;; fuzz_numpy*) echo numpy ;; *) echo json ;; esac
 }
 statistic() { # NAME LOG
     sed -n "s/^stat::$1: *//p" "$2"

@@ -1,14 +1,16 @@
 """Writes what the fuzz targets start from: OUT/json/*, OUT/mm/*, OUT/gmsh/*, OUT/abaqus/*, OUT/nastran/*,
-OUT/vtk/* and OUT/surface/*, one seed a file, and OUT/json.dict and the same of the others.
+OUT/vtk/*, OUT/surface/* and OUT/numpy/*, one seed a file, and OUT/json.dict and the same of the others.
 
 Seeds come from tests/data, and from the shared cases where they are there; the words of the JSON dictionary are the
 member names and values that the schemas know.
 """
 import hashlib
+import io
 import json
 import pathlib
 import struct
 import sys
+import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 DATA = ROOT / "tests" / "data"
@@ -30,6 +32,8 @@ VTK_WORDS = ["<VTKFile", 'type="UnstructuredGrid"', "<Piece", 'NumberOfPoints="4
              "BINARY", "ASCII", "POINTS", "CELLS", "OFFSETS vtktypeint64", "CONNECTIVITY", "CELL_TYPES", "CELL_DATA", "SCALARS", "LOOKUP_TABLE", "FIELD",
              "METADATA", "AQAAAA==", "\n", "99999999999"]
 SURFACE_WORDS = ["solid", "facet normal", "outer loop", "vertex", "endloop", "endfacet", "endsolid", "v ", "f ", "vn ", "1/1/1", "-1", "\n", "1e308"]
+NUMPY_WORDS = ["'descr': ", "'fortran_order': ", "'shape': ", "True", "False", "(2, 2)", "(2,)", "()", "<f8", ">f4", "|u1", "<i8", "|S3", "<U3", ", }",
+               "csr", "csc", "coo", "format.npy", "shape.npy", "data.npy", "indices.npy", "indptr.npy", "row.npy", "col.npy", "PK"]
 JSON_WORDS = ["null", "true", "false", "1e400", "-0.0", "1e-320", "9223372036854775808", "[[", "]]", "{}", "\\u0000", "\\ud800"]
 
 
@@ -112,6 +116,28 @@ def surface_seeds():
         yield ("".join("v {} {} {}\n".format(*p) for p in corner) + "".join("f {}/1 {}//2 {}\n".format(*(i + 1 for i in face)) for face in faces)).encode()
 
 
+def npy(descr, shape, data, fortran=False, version=1):
+    head = f"{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY" + bytes([version, 0]) + struct.pack("<H" if version == 1 else "<I", len(head)) + head + data
+
+
+def numpy_seeds():
+    """Arrays of all types, and archives of sparse matrices, stored: a checksum of what is packed is seldom guessed."""
+    for code, descr in (("d", "<f8"), ("f", "<f4"), ("q", "<i8"), ("i", "<i4"), ("h", "<i2"), ("b", "|i1"), ("B", "|u1"), ("H", "<u2"), ("I", "<u4"), ("Q", "<u8")):
+        yield npy(descr, "(2, 2)", struct.pack("<4" + code, 2, 0, 1, 3), code == "d", 2 if code == "f" else 1)
+        yield npy(descr.replace("<", ">"), "(3,)", struct.pack(">3" + code, 2, 0, 1))
+    whole = [npy("<i4", f"({n},)", struct.pack(f"<{n}i", *range(n))) for n in (1, 2, 3)]
+    for kind, names in ((b"csr", ("indices", "indptr")), (b"csc", ("indices", "indptr")), (b"coo", ("row", "col"))):
+        parts = [("format", npy("|S3", "()", kind)), ("shape", npy("<i8", "(2,)", struct.pack("<2q", 2, 2))),
+                 ("data", npy("<f8", "(2,)", struct.pack("<2d", 2, 1))), (names[0], whole[1]), (names[1], whole[1 if kind == b"coo" else 2])]
+        for how in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            file = io.BytesIO()
+            with zipfile.ZipFile(file, "w", how) as archive:
+                for name, content in parts:
+                    archive.writestr(name + ".npy", content)
+            yield file.getvalue()
+
+
 def gmsh_sections(version, binary, sections):
     """Each section a list of (struct code, values): numbers as bytes or as words; text is text in both."""
     out = f"$MeshFormat\n{version} {int(binary)} 8\n".encode() + (struct.pack("<i", 1) + b"\n" if binary else b"") + b"$EndMeshFormat\n"
@@ -188,6 +214,7 @@ def main():
     write_seeds(out / "nastran", nastran_seeds())
     write_seeds(out / "vtk", vtk_seeds())
     write_seeds(out / "surface", surface_seeds())
+    write_seeds(out / "numpy", numpy_seeds())
     write_dictionary(out / "json.dict", [*(f'"{word}"' for word in words(schema)), *JSON_WORDS])
     write_dictionary(out / "mm.dict", MM_WORDS)
     write_dictionary(out / "gmsh.dict", GMSH_WORDS)
@@ -195,6 +222,7 @@ def main():
     write_dictionary(out / "nastran.dict", NASTRAN_WORDS)
     write_dictionary(out / "vtk.dict", VTK_WORDS)
     write_dictionary(out / "surface.dict", SURFACE_WORDS)
+    write_dictionary(out / "numpy.dict", NUMPY_WORDS)
 
 
 main()

@@ -3,6 +3,7 @@
  */
 #include "failing_heap.h"
 #include "harness.h"
+#include "numpy_files.h"
 #include "uzawa.h"
 
 enum { MOST_ALLOCATIONS = 100000 };
@@ -178,6 +179,47 @@ static uz_status write_vector(uz_error *err)
     CHECK(status == UZ_OK || (!text && len == 0));
     free(text);
     return status;
+}
+
+/* ------------------------------------------------------------------ NumPy */
+
+static uz_status write_arrays(uz_error *err)
+{
+    char *file;
+    size_t len;
+    const double x[2] = {1, 2};
+    const uz_npz_array list[] = {{.name = "a.json", .text = "{}"}, {.name = "x", .x = x, .rows = 2}};
+    const uz_status status = uz_npz_write(&file, &len, list, 2, err);
+    CHECK(status == UZ_OK || (!file && len == 0));
+    free(file);
+    return status;
+}
+
+static uz_status read_numpy_vector(uz_error *err)
+{
+    double *x;
+    int64_t n;
+    const uz_status status = uz_vector_read(&x, &n, NULL, NUMPY_PACKED, sizeof NUMPY_PACKED - 1, 0, err);
+    CHECK(status == UZ_OK ? n == 2 && x[1] == 2 : !x && n == 0);
+    free(x);
+    return status;
+}
+
+static uz_status read_numpy_matrix(uz_error *err)
+{
+    uz_csc A;
+    uz_mm_symmetry symmetry;
+    const uz_status status = uz_matrix_read(&A, &symmetry, NUMPY_SPARSE, sizeof NUMPY_SPARSE - 1, 0, err);
+    CHECK(status == UZ_OK ? A.rows == 2 && A.ptr[2] == 2 : !A.ptr);
+    uz_csc_clear(&A);
+    return status;
+}
+
+TEST(numpy)
+{
+    FAIL_EACH_ALLOCATION(write_arrays, 3);
+    FAIL_EACH_ALLOCATION(read_numpy_vector, 2);
+    FAIL_EACH_ALLOCATION(read_numpy_matrix, 10);
 }
 
 TEST(matrix_market)
