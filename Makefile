@@ -207,13 +207,13 @@ $(BUILD)/gen/page.c: $(PAGE_SRC)
 	@mkdir -p $(@D)
 	@client/page/bundle.sh $(BUILD)
 
-# References of openapi.json are to files beside it; the service also has it one folder higher.
-$(BUILD)/gen/openapi.json: schemas/openapi.json
+# References of openapi.json are to files beside it; the service has it in one piece.
+$(BUILD)/gen/openapi.json: schemas/bundle.awk $(SCHEMAS)
 	@mkdir -p $(@D)
-	@sed -E 's#("\$$ref": ")([a-z-]+\.json)#\1schemas/\2#g' $< > $@
+	@awk -f $< $(filter-out schemas/openapi.json,$(SCHEMAS)) schemas/openapi.json > $@
 
-# Every schema file becomes bytes in the daemon, found by name (server/codec/embedded.h); that last one as /openapi.json.
-EMBEDDED = $(SCHEMAS) $(BUILD)/gen/openapi.json
+# Every schema file becomes bytes in the daemon, found by name (server/codec/embedded.h).
+EMBEDDED = $(filter-out schemas/openapi.json,$(SCHEMAS)) $(BUILD)/gen/openapi.json
 $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 	@mkdir -p $(@D)
 	@{ echo '#include "codec/embedded.h"'; \
@@ -222,8 +222,8 @@ $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 	     echo "extern const char embedded_$$n[], embedded_$${n}_end[];"; done; \
 	   echo 'size_t embedded_count(void) { return '$$n'; }'; \
 	   echo 'embedded_file embedded_at(size_t i) {'; \
-	   n=0; for f in $(EMBEDDED); do n=$$((n+1)); name=$${f#schemas/}; \
-	     echo "    if (i == $$((n-1))) return (embedded_file){\"$${name#$(BUILD)/gen}\", embedded_$$n, (size_t)(embedded_$${n}_end - embedded_$$n)};"; done; \
+	   n=0; for f in $(EMBEDDED); do n=$$((n+1)); \
+	     echo "    if (i == $$((n-1))) return (embedded_file){\"$${f##*/}\", embedded_$$n, (size_t)(embedded_$${n}_end - embedded_$$n)};"; done; \
 	   echo '    return (embedded_file){0, 0, 0};'; echo '}'; } > $@
 
 # A test program stands in BUILD/tests by its name alone, wherever its source is.

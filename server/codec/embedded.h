@@ -5,7 +5,7 @@
 #include <stddef.h>
 
 typedef struct {
-    const char *name; /* "request.json"; "/openapi.json": what stands one folder higher than the others */
+    const char *name; /* "request.json"; "openapi.json": with all others in it (schemas/bundle.awk) */
     const char *text; /* not NUL-terminated */
     size_t len;
 } embedded_file;

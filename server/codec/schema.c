@@ -36,7 +36,7 @@ schemas *schemas_load(const embedded_file *files, size_t count, char *message, s
         fail(&f, "", "no memory for", "the schemas");
     for (size_t i = 0; i < n && !f.failed; i++) {
         const embedded_file file = files ? files[i] : embedded_at(i);
-        if (!files && strstr(file.name, "openapi.json"))
+        if (!files && strcmp(file.name, "openapi.json") == 0)
             continue;
         schema_file *to = &all->files[all->count++];
         to->name = file.name;

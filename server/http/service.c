@@ -157,7 +157,7 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
 
 void service_schema(api *context, http_request *rq, http_reply *reply)
 {
-    const char *name = rq->name[0] ? rq->name : "/openapi.json"; /* refers to /schemas/NAME, not to files beside it */
+    const char *name = rq->name[0] ? rq->name : "openapi.json";
     (void)context;
     for (size_t i = 0; i < embedded_count(); i++) {
         const embedded_file file = embedded_at(i);

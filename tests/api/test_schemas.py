@@ -6,6 +6,7 @@ Each schema is itself valid, its examples are, references resolve, and the reque
 # not under ThreadSanitizer: about answers, not about threads
 import json
 import pathlib
+import subprocess
 import sys
 
 import service
@@ -130,6 +131,40 @@ def test_openapi_is_consistent():
             at(SCHEMAS[file] if file else OPENAPI, fragment)
     names = OPENAPI["paths"]["/schemas/{name}"]["parameters"][0]["schema"]["enum"]
     assert set(names) == set(SCHEMAS) | {"openapi.json"}
+
+
+def test_openapi_in_one_piece():
+    """What the daemon serves: each reference leads to what it leads to in the files."""
+    names = [str(ROOT / "schemas" / name) for name in [*sorted(SCHEMAS), "openapi.json"]]
+    made = subprocess.run(["awk", "-f", str(ROOT / "schemas" / "bundle.awk"), *names], capture_output=True, text=True, check=True)
+    whole, seen = json.loads(made.stdout), set()
+
+    def same(old, file, new):
+        if isinstance(old, dict) and isinstance(old.get("$ref"), str):
+            name, _, fragment = old["$ref"].partition("#")
+            file = name or file
+            assert new["$ref"].startswith("#/components/"), new
+            assert {key: value for key, value in old.items() if key != "$ref"} == {key: value for key, value in new.items() if key != "$ref"}
+            if (file, fragment) not in seen:
+                seen.add((file, fragment))
+                same(at(SCHEMAS[file] if file in SCHEMAS else OPENAPI, fragment), file, at(whole, new["$ref"][1:]))
+        elif isinstance(old, dict):
+            root = file in SCHEMAS and old is SCHEMAS[file]
+            rest = set(old) - ({"$schema", "$id", "$defs"} if root else set())
+            assert rest == set(new) - ({"schemas"} if old is OPENAPI["components"] else set()), (rest, set(new))
+            for key in rest:
+                same(old[key], file, new[key])
+        elif isinstance(old, list):
+            assert len(old) == len(new)
+            for one, other in zip(old, new):
+                same(one, file, other)
+        else:
+            assert old == new, (old, new)
+    same(OPENAPI, "openapi.json", whole)
+    assert len(seen) > 60, len(seen)
+    parts = whole["components"]["schemas"]
+    assert set(SCHEMAS) == {f"{name}.json" for name in parts if "." not in name}, parts.keys()
+    assert not any("$defs" in part or "$id" in part for part in parts.values())
 
 
 def main():
