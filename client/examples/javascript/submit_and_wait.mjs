@@ -1,7 +1,7 @@
 // Solves the request in a file and says where it touches, how hard, and how sure that is.
 // usage: node submit_and_wait.mjs REQUEST.json     exit status 0: certified as asked, and every assertion passes
 import { readFile } from "node:fs/promises";
-import { Uzawa } from "./uzawa.mjs";
+import { Uzawa } from "../../javascript/uzawa.mjs";
 
 const [path] = process.argv.slice(2);
 if (!path) {

@@ -1,6 +1,6 @@
 // The same body with ever more cells, on which the largest pressure and the estimate of the mesh's own error settle.
 // usage: node sweep.mjs [LEVELS]
-import { Uzawa } from "./uzawa.mjs";
+import { Uzawa } from "../../javascript/uzawa.mjs";
 
 const levels = Number(process.argv[2] ?? 3);
 const service = new Uzawa();

@@ -3,7 +3,7 @@
 //
 // The method is the projected gradient on the displacements, which the stops bound from above; too few steps give an
 // answer that the certificate does not take.
-import { Uzawa } from "./uzawa.mjs";
+import { Uzawa } from "../../javascript/uzawa.mjs";
 
 const steps = Number(process.argv[2] ?? 5000);
 const n = 12, stiffness = 1000, force = 0.4, gap = 0.02;

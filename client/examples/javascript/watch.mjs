@@ -1,7 +1,7 @@
 // Watches a job while it runs, by Server-Sent Events.
 // usage: node watch.mjs REQUEST.json [SECONDS]     it is dismissed after so many seconds, with its best answer so far
 import { readFile } from "node:fs/promises";
-import { Uzawa } from "./uzawa.mjs";
+import { Uzawa } from "../../javascript/uzawa.mjs";
 
 const [path, seconds] = process.argv.slice(2);
 if (!path) {
