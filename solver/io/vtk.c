@@ -95,8 +95,13 @@ int64_t vtk_line(const char *text, const char *at)
 
 /* ---- cells */
 
+/* Pixels and voxels, which are along the axes: as quad4 and hex8 with the last two nodes of each side the other way. */
+enum { VTK_PIXEL = 8, VTK_VOXEL = 11 };
+
 static int shape_of(int64_t type)
 {
+    if (type == VTK_PIXEL || type == VTK_VOXEL)
+        return type == VTK_PIXEL ? UZ_QUAD4 : UZ_HEX8;
     for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
         if (uz_element_type_of((uz_element_kind)k)->vtk == type)
             return k;
@@ -123,6 +128,15 @@ static void turn_wedge(int64_t *node, int shape, const double *xyz)
         node[i] = given[type->abaqus_node[i]];
 }
 
+static void turn_sides(int64_t *node, int nodes)
+{
+    for (int i = 2; i < nodes; i += 4) {
+        const int64_t third = node[i];
+        node[i] = node[i + 1];
+        node[i + 1] = third;
+    }
+}
+
 uz_status vtk_add_grid(cells *mesh, const vtk_grid *grid)
 {
     const int64_t n_points = grid->points.n / 3, n_cells = grid->types.n;
@@ -136,14 +150,17 @@ uz_status vtk_add_grid(cells *mesh, const vtk_grid *grid)
                      : uz_fail_line(mesh->err, UZ_ERR_NOT_FINITE, grid->line, "point %lld is not finite", (long long)i);
     }
     for (int64_t e = 0, from = 0; e < n_cells && status == UZ_OK; e++) {
-        const int shape = shape_of(grid->types.integer[e]);
+        const int64_t type = grid->types.integer[e];
+        const int shape = shape_of(type);
         const int64_t to = grid->ends.integer[e];
         int64_t node[UZ_ELEMENT_NODES];
         if (shape < 0)
-            return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, grid->line,
-                                "cell %lld is of type %lld, which is not read; save triangles, quadrilaterals, "
-                                "tetrahedra, wedges or hexahedra of order 1 or 2 (types 5, 9, 10, 12, 13, 22 to 26)",
-                                (long long)e, (long long)grid->types.integer[e]);
+            return uz_fail_line(
+                mesh->err, UZ_ERR_UNSUPPORTED, grid->line,
+                "cell %lld is of type %lld, which is not read; save triangles, quadrilaterals, "
+                "tetrahedra, wedges or hexahedra of order 1 or 2, or pixels or voxels (types 5, 8 to 13, 22 "
+                "to 26)",
+                (long long)e, (long long)type);
         if (to < from || to > grid->connectivity.n || to - from != cells_nodes(shape))
             return uz_fail_line(mesh->err, UZ_ERR_FORMAT, grid->line, "cell %lld has not the %d nodes of its type",
                                 (long long)e, cells_nodes(shape));
@@ -156,6 +173,8 @@ uz_status vtk_add_grid(cells *mesh, const vtk_grid *grid)
         }
         if (shape == UZ_WEDGE6 || shape == UZ_WEDGE15)
             turn_wedge(node, shape, mesh->xyz);
+        if (type == VTK_PIXEL || type == VTK_VOXEL)
+            turn_sides(node, cells_nodes(shape));
         status = cells_add(mesh, shape, node, grid->line);
         from = to;
     }

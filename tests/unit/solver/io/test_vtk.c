@@ -188,6 +188,32 @@ static const struct {
     {X XP XC("0 1 2 3", "4", "10.5") XE, UZ_ERR_FORMAT, 7, "something else"},
 };
 
+/* Cells of a grid along the axes, as VTK numbers them: their nodes by x, then y, then z. */
+TEST(pixels_and_voxels)
+{
+    static const char VOXEL[] = "# vtk DataFile Version 3.0\na\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n"
+                                "0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1\n"
+                                "CELLS 2 14\n8 0 1 2 3 4 5 6 7\n4 0 1 2 3\nCELL_TYPES 2\n11\n8\n"
+                                "CELL_DATA 2\nSCALARS part int 1\nLOOKUP_TABLE default\n1\n2\n";
+    static const char PIXEL[] = "# vtk DataFile Version 3.0\na\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n"
+                                "0 0 0 1 0 0 0 1 0 1 1 0\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n8\n";
+    static const int64_t AROUND[8] = {0, 1, 3, 2, 4, 5, 7, 6};
+    for (int dim = 2; dim <= 3; dim++) {
+        const char *text = dim == 3 ? VOXEL : PIXEL;
+        uz_given_mesh given;
+        uz_mesh mesh;
+        uz_error err = {0};
+        CHECK_MSG(uz_mesh_read(&given, NULL, text, strlen(text), 0, &err) == UZ_OK, "%s", err.message);
+        CHECK(given.n_elements == 1 && given.kind[0] == (dim == 3 ? UZ_HEX8 : UZ_QUAD4));
+        CHECK(memcmp(given.node, AROUND, (dim == 3 ? 8 : 4) * sizeof *AROUND) == 0);
+        if (dim == 3)
+            CHECK_INT(find_given(&given, "part_2")->n_faces, 1);
+        CHECK_MSG(uz_mesh_from_given(&mesh, &given, dim, &err) == UZ_OK, "%s", err.message);
+        uz_mesh_clear(&mesh);
+        uz_given_mesh_clear(&given);
+    }
+}
+
 TEST(refusals_say_where)
 {
     for (size_t i = 0; i < sizeof REFUSALS / sizeof REFUSALS[0]; i++) {
