@@ -96,11 +96,11 @@ typedef struct {
 } uz_picture;
 
 /* The deformed body in colour over its undeformed outline, the obstacles, an arrow for the contact pressure at each
- * node that touches (at most some 80 of them), a colour bar: as SVG, with the body's colours as a PNG image in it, so
- * that the size does not grow with the mesh. Solids are seen from the front, the right and above; obstacles stand
- * behind. Of a solid in the colours of the pressure only the sides of the contacts are filled, with the edges of the
- * bodies around them; in the plane a band along those sides is coloured. *svg is NUL-terminated, the caller frees it.
- * Errors: those of uz_fields_compute, _ARGUMENT. */
+ * node that touches (at most some 80 of them), a colour bar with round numbers, the axes and a round length: as SVG,
+ * with the body's colours as a PNG image in it, so that the size does not grow with the mesh. Solids are seen from the
+ * front, the right and above; obstacles stand behind. Of a solid in the colours of the pressure only the sides of the
+ * contacts are filled, with the edges of the bodies around them; in the plane a band along those sides is coloured.
+ * *svg is NUL-terminated, the caller frees it. Errors: those of uz_fields_compute, _ARGUMENT. */
 uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,
                               const uz_picture *how, const uz_hooks *hooks, uz_error *err);
 

@@ -6,12 +6,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LEGEND = 64, WIDTH = 900 };
+enum { WIDTH = 900 };
 
 static const char STYLE[] =
     "<style>text{font:12px system-ui,sans-serif;fill:#333}.title{font-weight:600}path{fill:none}"
     ".before{stroke:#9aa0a8;stroke-dasharray:4 3}.obstacle{stroke:#555;stroke-width:2}.ticks{stroke:#888}"
-    ".push{stroke:#c2255c;stroke-width:1.5}</style>\n";
+    ".push{stroke:#c2255c;stroke-width:1.5}.axis{stroke:#333}"
+    ".mark{paint-order:stroke;stroke:#fff;stroke-width:3}</style>\n";
 
 static const struct {
     uz_field field;
@@ -96,7 +97,7 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
         status = uz_scenery_fit(scenery, err);
     }
     if (status == UZ_OK) {
-        const int height = scenery->height + LEGEND;
+        const int height = scenery->height + uz_scenery_legend_height(scenery);
         uz_buffer_print(svg,
                         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
                         "role=\"img\">\n<title>",
@@ -110,6 +111,7 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
     if (status == UZ_OK) {
         uz_scenery_put_obstacles(svg, scenery);
         uz_scenery_put_arrows(svg, scenery);
+        uz_scenery_put_axes(svg, scenery);
         uz_buffer_print(svg, "</svg>\n");
         uz_scenery_put_legend(svg, scenery, how->title);
         uz_buffer_print(svg, "</svg>\n");

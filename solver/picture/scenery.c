@@ -7,6 +7,7 @@
 #include "obstacle/shape.h"
 #include "obstacle/vectors.h"
 #include "scene/scene.h"
+#include "text/axis.h"
 
 #include <math.h>
 #include <string.h>
@@ -397,6 +398,40 @@ void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
     }
 }
 
+/* As the scene calls it, behind this; nothing where it does not. */
+static void put_unit(uz_buffer *svg, const char *before, const char *unit)
+{
+    if (!unit[0])
+        return;
+    uz_buffer_print(svg, "%s", before);
+    uz_buffer_put_escaped(svg, unit);
+}
+
+/* Where the axes point, and how long a round length is, in the corner below: of a solid what stands across its view. */
+void uz_scenery_put_axes(uz_buffer *svg, const uz_scenery *scenery)
+{
+    static const char *const NAMES[] = {"x", "y", "z"};
+    enum { LENGTH = 22, LEAST_BAR = 48, LEFT = 30, BELOW = 14, DEPTH = 10 };
+    const double x0 = LEFT, y0 = scenery->height - BELOW - (scenery->model->mesh.dim == 3 ? DEPTH : 0);
+    const double length = uz_round_step(LEAST_BAR / scenery->scale);
+    const double pixels = scenery->scale * length, from = x0 + 2 * LENGTH;
+    for (int c = 0; c < scenery->model->mesh.dim; c++) {
+        const double dx = LENGTH * scenery->axes[0][c], dy = -LENGTH * scenery->axes[1][c];
+        uz_buffer_print(svg,
+                        "<path class=\"axis\" d=\"M%.1f %.1fl%.1f %.1f\"/><text class=\"mark\" x=\"%.1f\" y=\"%.1f\" "
+                        "text-anchor=\"middle\">%s</text>",
+                        x0, y0, dx, dy, x0 + 1.45 * dx, y0 + 1.45 * dy + 4, NAMES[c]);
+    }
+    if (!(isfinite(length) && from + pixels < scenery->width))
+        return;
+    uz_buffer_print(svg,
+                    "<path class=\"axis\" d=\"M%.1f %.1fv-6v3h%.1fv-3v6\"/><text class=\"mark\" x=\"%.1f\" y=\"%.1f\" "
+                    "text-anchor=\"middle\">%.6g",
+                    from, y0 + 3, pixels, from + 0.5 * pixels, y0 - 5, length);
+    put_unit(svg, " ", scenery->scene->units.length);
+    uz_buffer_print(svg, "</text>\n");
+}
+
 void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
 {
     const uz_mesh_info *info = &scenery->model->info;
@@ -429,21 +464,39 @@ void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
     uz_buffer_print(svg, "\"/>\n");
 }
 
-/* As the scene calls it, behind this; nothing where it does not. */
-static void put_unit(uz_buffer *svg, const char *before, const char *unit)
+/* Round numbers below the colours, `bar` pixels from x on. */
+static void put_ticks(uz_buffer *svg, const uz_scenery *scenery, int x, int y, int bar)
 {
-    if (!unit[0])
-        return;
-    uz_buffer_print(svg, "%s", before);
-    uz_buffer_put_escaped(svg, unit);
+    enum { ROOM = 56, MOST = 8 }; /* pixels of a number */
+    const double low = scenery->low, range = scenery->high - low;
+    const double step = range > 0 ? uz_round_step(range * ROOM / bar) : 0, first = ceil(low / step - 1e-9);
+    for (int i = 0; step > 0 && isfinite(first) && i < MOST && (first + i) * step <= scenery->high + 1e-9 * step; i++) {
+        const double value = (first + i) * step, at = x + bar * fmin(1, fmax(0, (value - low) / range));
+        uz_buffer_print(svg,
+                        "<path class=\"axis\" d=\"M%.1f %dv4\"/><text x=\"%.1f\" y=\"%d\" "
+                        "text-anchor=\"middle\">%.6g</text>",
+                        at, y, at, y + 15, value);
+    }
+}
+
+/* Too narrow for the words of the picture beside the bar: they stand below it. */
+static bool is_narrow(const uz_scenery *scenery)
+{
+    return scenery->width < 420;
+}
+
+int uz_scenery_legend_height(const uz_scenery *scenery)
+{
+    return is_narrow(scenery) ? 112 : 64;
 }
 
 void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title)
 {
-    /* The text on the left takes up to 160 pixels; below the bar three texts need 210. */
-    enum { LEFT = 180, LEAST = 210, MOST = 300, STOPS = 8 };
-    const int room = scenery->width - 20 - LEFT, bar = room < LEAST ? LEAST : room < MOST ? room : MOST;
-    const int y = scenery->height + 12, x = scenery->width - bar - 20;
+    /* The words on the left take up to 160 pixels. */
+    enum { LEFT = 180, MOST = 300, STOPS = 8, BAR = 12, BELOW = 48 };
+    const bool narrow = is_narrow(scenery);
+    const int room = scenery->width - 20 - (narrow ? 20 : LEFT), bar = room < MOST ? room : MOST;
+    const int y = scenery->height + 12, x = scenery->width - bar - 20, words = y + (narrow ? BELOW : 0);
     const uz_units *units = &scenery->scene->units;
     uz_buffer_print(svg, "<defs><linearGradient id=\"scale\">");
     for (int i = 0; i <= STOPS; i++) {
@@ -453,19 +506,18 @@ void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char
                         rgb[2]);
     }
     uz_buffer_print(svg,
-                    "</linearGradient></defs>\n<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"12\" "
+                    "</linearGradient></defs>\n<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" "
                     "fill=\"url(#scale)\"/>\n",
-                    x, y, bar);
-    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\">%.3g</text><text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.3g</text>",
-                    x, y + 26, scenery->low, x + bar, y + 26, scenery->high);
-    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s", x + bar / 2, y + 26, scenery->what);
+                    x, y, bar, BAR);
+    put_ticks(svg, scenery, x, y + BAR, bar);
+    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%s", x + bar, y + 42, scenery->what);
     put_unit(svg, ", ", scenery->is_length ? units->length : units->stress);
-    uz_buffer_print(svg, "</text>\n");
-    uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", y + 10);
+    uz_buffer_print(svg, ": %.3g to %.3g</text>\n", scenery->low, scenery->high);
+    uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", words + 10);
     uz_buffer_put_escaped(svg, title ? title : "");
-    uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g", y + 26, scenery->factor);
+    uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g", words + 26, scenery->factor);
     if (scenery->largest_push > 0) {
-        uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure %.3g", y + 42,
+        uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure %.3g", words + 42,
                         scenery->largest_push);
         put_unit(svg, " ", units->stress);
     }

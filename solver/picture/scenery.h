@@ -55,7 +55,10 @@ bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery);
  * edges of a solid: UZ_ERR_MEMORY. */
 uz_status uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, uz_error *err);
 void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery); /* plane models */
+void uz_scenery_put_axes(uz_buffer *svg, const uz_scenery *scenery);
 void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery);
+/* The legend is below the picture, of this height in pixels. */
+int uz_scenery_legend_height(const uz_scenery *scenery);
 void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title);
 
 #endif

@@ -135,7 +135,7 @@ TEST(the_pressure_stands_on_the_sides_of_contacts)
     }
     CHECK_MSG(coloured > 4000 && coloured < 8 * 800 && most > 100 && plain > 100000, "%ld, %ld and %ld pixels",
               coloured, most, plain);
-    CHECK(strstr(svg, ">contact pressure<"));
+    CHECK(strstr(svg, ">contact pressure: 0 to "));
     free(pixels);
     free(svg);
     drop(&s);
@@ -153,6 +153,32 @@ TEST(an_arrow_for_each_node_that_touches_and_the_obstacle)
     free(svg);
     svg = draw(&s, (uz_picture){.colour = UZ_FIELD_DISPLACEMENTS, .width = 300});
     CHECK(strstr(svg, "viewBox=\"0 0 300 "));
+    free(svg);
+    drop(&s);
+}
+
+/* The stress goes from 0.401 to 0.708 over 300 pixels; a millimetre has 13.33 pixels, or 3.33 in a narrow
+ * picture, less where the body is drawn longer than it is. */
+TEST(round_numbers_and_a_round_length)
+{
+    solved s = solve_scene(paper_scene(30, 10));
+    char *svg = draw(&s, (uz_picture){.colour = UZ_FIELD_VON_MISES});
+    const char *bar = strstr(svg, "v-6v3h");
+    CHECK(strstr(svg, ">0.5</text>") && strstr(svg, ">0.6</text>") && strstr(svg, ">0.7</text>") &&
+          !strstr(svg, ">0.4</text>"));
+    CHECK(strstr(svg, ">von Mises stress: 0.401 to 0.708<"));
+    CHECK(bar && fabs(atof(bar + 6) * 60 / (5 * 800) - 1) < 0.1 && strstr(svg, ">5</text>"));
+    CHECK(strstr(svg, ">x</text>") && strstr(svg, ">y</text>") && !strstr(svg, ">z</text>"));
+    free(svg);
+    svg = draw(&s, (uz_picture){.colour = UZ_FIELD_PRESSURE, .width = 300});
+    bar = strstr(svg, "v-6v3h");
+    CHECK(bar && fabs(atof(bar + 6) * 60 / (20 * 200) - 1) < 0.1 && strstr(svg, ">20</text>"));
+    /* What is said of the picture stands below what is said of the colours. */
+    const char *colours = strstr(svg, ": 0 to "), *words = strstr(svg, "displacements \u00d7");
+    int above = 0, below = 0;
+    for (const char *at = svg; colours && words && (at = strstr(at, "y=\"")) && at < words; at++)
+        *(at < colours ? &above : &below) = atoi(at + 3);
+    CHECK_MSG(below > above + 10, "%d and %d", above, below);
     free(svg);
     drop(&s);
 }
