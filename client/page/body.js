@@ -120,7 +120,7 @@ class BodyView {
     this.factor_field = h("input", { type: "number", min: 0, step: "any", class: "body-factor", "aria-label": "Factor of the displacements",
       onchange: () => this.scale(Math.min(Math.max(Number(this.factor_field.value) || 0, 0), 1e12)) });
     const part = (name, text) => tick(text, this.shown[name], (on) => ((this.shown[name] = on), this.gl.show(this.shown), this.redraw())).label;
-    const button = (text, label, act) => h("button", { type: "button", class: "small", "aria-label": label, title: label, onclick: act }, text);
+    const button = (text, label, act) => h("button", { type: "button", class: "small", title: label, onclick: act }, text);
     const parts = [part("wire", "Elements"), part("before", "Undeformed")];
     if (surface.contacts.some((one) => one.obstacle)) parts.push(part("obstacles", "Obstacle"));
     if (surface.rows.count) parts.push(part("forces", "Contact forces"));
