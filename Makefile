@@ -323,6 +323,10 @@ screenshots: deps-test ## the pictures of the web page in docs, from the running
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all
 	@$(PYTHON) -B tests/browser/screenshots.py $(BUILD) client/page/screenshots
 
+.PHONY: test-image
+test-image: ## build server/Containerfile and solve in it (buildah; mmdebstrap where no registry can be reached): minutes
+	@mkdir -p $(BUILD) && tests/image.sh $(BUILD)
+
 test-hygiene: ## formatting, static analysis, both compilers
 	@tests/run.sh $(BUILD) hygiene
 
