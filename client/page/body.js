@@ -157,10 +157,13 @@ class BodyView {
       this.quantity === "pressure" ? h("span", { class: "muted" }, "grey: nothing to touch") : null);
   }
 
-  /** Of the values, or what was chosen; what is zero but for rounding is told as 0. */
+  /** Of the values, those within the body among them where it is cut, or what was chosen; what is zero but for rounding is
+   * told as 0. */
   range() {
     if (this.limits) return this.limits;
-    const { low, high } = this.values, least = 1e-9 * Math.max(Math.abs(low), Math.abs(high));
+    const all = this.inside?.quantity === this.quantity ? [this.values, this.inside] : [this.values];
+    const low = Math.min(...all.map((one) => one.low)), high = Math.max(...all.map((one) => one.high));
+    const least = 1e-9 * Math.max(Math.abs(low), Math.abs(high));
     return [low, high].map((value) => (Math.abs(value) < least ? 0 : value));
   }
 
@@ -169,13 +172,29 @@ class BodyView {
     return shades_of(this.surface, { ...this.values, low, high });
   }
 
-  /** The plane that cuts, and what stands there in the colours of the body. */
+  /** The cut is another one; error: what is said against it. */
   show_cut(error) {
-    const { plane, section } = this.cut, [low, high] = this.range(), known = section && (this.quantity !== "von_mises" || section.von_mises);
-    this.cut.want(this.quantity === "von_mises");
-    const at = known && this.quantity !== "pressure" ? values_of(section, this.quantity).at : () => NaN;
-    this.gl.cut(plane, section, section && shades_of(section, { at, low, high }));
     if (error) this.say(error.message);
+    this.paint();
+  }
+
+  /** The plane that cuts, and what stands there in the colours of the body. The section that comes next has most likely the
+   * range of the last: until then the colours stay. */
+  take_section() {
+    const { plane, section } = this.cut;
+    this.cut.want(this.quantity === "von_mises");
+    const values = section && this.quantity !== "pressure" && (this.quantity !== "von_mises" || section.von_mises) ? values_of(section, this.quantity) : null;
+    if (values) this.inside = { quantity: this.quantity, ...values };
+    else if (!plane) this.inside = null;
+    const [low, high] = this.range(), at = values ? values.at : () => NaN;
+    this.gl.cut(plane, section, section && shades_of(section, { at, low, high }));
+  }
+
+  /** All that is coloured, and the bar. */
+  paint() {
+    if (this.cut) this.take_section();
+    this.gl.colour(this.shades());
+    this.draw_legend();
     this.redraw();
   }
 
@@ -188,10 +207,7 @@ class BodyView {
   }
 
   recolour() {
-    this.gl.colour(this.shades());
-    if (this.cut) this.show_cut(null);
-    this.draw_legend();
-    this.redraw();
+    this.paint();
     announce(this.summary());
   }
 
@@ -214,7 +230,7 @@ class BodyView {
     const known = quantities(surface).map((one) => one.id), first_wanted = this.overlay.pressed.length && known.includes("pressure") ? "pressure" : "displacement";
     const wanted = known.includes(this.quantity) ? this.quantity : first_wanted;
     this.quantity = wanted === "von_mises" && !surface.von_mises ? "displacement" : wanted;
-    this.limits = null;
+    this.limits = this.inside = null;
     this.values = values_of(surface, this.quantity);
     this.rows = rows_by_vertex(surface);
     this.marked = this.held = -1;
@@ -374,7 +390,8 @@ class BodyView {
     this.frame = 0;
     if (!this.gl || this.ends.signal.aborted) return;
     this.gl.render(this.view, this.factor);
-    this.overlay.draw(this.view, this.factor, { colours: this.colours, obstacles: this.shown.obstacles, forces: this.shown.forces, marked: this.marked, line: this.line });
+    this.overlay.draw(this.view, this.factor, { colours: this.colours, obstacles: this.shown.obstacles, forces: this.shown.forces,
+      plane: this.cut?.plane, marked: this.marked, line: this.line });
     this.canvas.setAttribute("aria-label", this.summary());
     this.canvas.dataset.frames = ++this.frames;
     if (this.frames > 1) return;

@@ -79,8 +79,9 @@ export class Overlay {
     return view.project(p[i] + factor * u[i], p[i + 1] + factor * u[i + 1], p[i + 2] + factor * u[i + 2]);
   }
 
-  /** line: points of a path, each with its displacement: six numbers. */
-  draw(view, factor, { colours, obstacles, forces, marked, line }) {
+  /** plane: beyond which the body is cut off, [normal, offset], or none; line: points of a path, each with its
+   * displacement: six numbers. */
+  draw(view, factor, { colours, obstacles, forces, plane, marked, line }) {
     const pen = this.canvas.getContext("2d"), { surface, width, height, ratio } = this;
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
@@ -89,18 +90,19 @@ export class Overlay {
       for (const line of obstacle_lines(surface, view.target, (width + height) / view.scale))
         draw_border(pen, line.map(([x, y]) => view.project(x, y, 0)), width, height);
     }
-    if (forces && this.largest > 0) this.draw_forces(pen, view, factor, colours.push);
+    if (forces && this.largest > 0) this.draw_forces(pen, view, factor, plane, colours.push);
     if (line?.length) this.draw_line(pen, line.map(([x, y, z, ux, uy, uz]) => view.project(x + factor * ux, y + factor * uy, z + factor * uz)), colours);
     this.draw_triad(pen, view, colours);
     if (marked >= 0) this.draw_mark(pen, this.place(view, factor, marked), colours);
   }
 
-  draw_forces(pen, view, factor, colour) {
-    const { rows } = this.surface;
+  draw_forces(pen, view, factor, plane, colour) {
+    const { rows, position: p } = this.surface, beyond = (i) => plane && plane[0].reduce((sum, n, c) => sum + n * p[i + c], 0) > plane[1];
     pen.strokeStyle = colour;
     pen.lineWidth = 1.5;
     pen.beginPath();
     for (const i of this.arrows) {
+      if (beyond(3 * rows.vertex[i])) continue;
       const normal = rows.normal.subarray(3 * i, 3 * i + 3), eye = view.axes[2];
       if (view.dim === 3 && normal[0] * eye[0] + normal[1] * eye[1] + normal[2] * eye[2] > 0) continue; // the body is before it
       const way = view.project_way(...normal).map((x) => x / view.scale), size = Math.hypot(...way);

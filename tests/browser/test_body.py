@@ -349,4 +349,32 @@ def test_a_plane_cuts_a_solid(s, b):
         check(b.run("return document.documentElement.scrollWidth <= innerWidth"), width, "the page is wider than the screen")
 
 
+def test_a_section_has_its_range_and_no_arrows_of_what_is_gone(s, b):
+    """A hot core within: the largest stress is not on the surface, and the bar of colours has it while it is to be seen."""
+    core = {**{axis: {"min": 2.5, "max": 7.5} for axis in "xyz"}, "of": "elements"}
+    body = {"problem": {"kind": "scene", "model": "solid", "mesh": {"box": {"size": [10, 10, 10], "cells": [8, 8, 8], "element": "hex8"}},
+                        "materials": [{"on": "all", "young": 1000, "poisson": 0.3, "expansion": 1e-4}],
+                        "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}], "loads": [{"on": "top", "traction": [0, -1, 0]}, {"on": {"where": core}, "temperature": 100}],
+                        "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}}]}}
+    job = show_all(s, b, body)
+    answer = s.get(f"/v1/jobs/{job}/result?fields=von_mises,nodes").json
+    surface = max(v for v, x in zip(answer["von_mises"], answer["nodes"]) if any(c in (0, 10) for c in x))
+    inside = max(v for v, x in zip(answer["von_mises"], answer["nodes"]) if x[2] == 5)
+    check(inside > 1.05 * surface, inside, surface)
+    high = "return Number(document.querySelector('.body-high').value)"
+    after(b, lambda: set_value(b, ".body-colour", "von_mises", "change"))
+    b.wait("the surface's", high.replace("return", "return Math.abs(1 -") + f" / {surface}) < 1e-4")
+    after(b, lambda: set_value(b, ".body-cut", "2 1", "change"))
+    b.wait("the section's", high.replace("return", "return Math.abs(1 -") + f" / {inside}) < 1e-4")
+    after(b, lambda: set_value(b, ".body-cut", "", "change"))
+    b.wait("the surface's again", high.replace("return", "return Math.abs(1 -") + f" / {surface}) < 1e-4")
+    press_button(b, "Contact")
+    arrows = b.near(".body-frame", "--push", 12)
+    for way in ("1 1", "1 -1"):  # above the contact, and the contact itself
+        after(b, lambda: set_value(b, ".body-cut", way, "change"))
+        b.wait("the cut is drawn", "return new Promise((done) => setTimeout(() => done(true), 300))")
+        left = b.near(".body-frame", "--push", 12)
+        check(left > 0.5 * arrows if way == "1 1" else left < 0.1 * arrows, way, left, arrows)
+
+
 browser.main(globals())
