@@ -464,6 +464,12 @@ void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
     uz_buffer_print(svg, "\"/>\n");
 }
 
+/* Three digits, and all before the point. */
+static void put_short(uz_buffer *svg, double x)
+{
+    uz_buffer_print(svg, fabs(x) >= 1000 && fabs(x) < 1e6 ? "%.0f" : "%.3g", x);
+}
+
 /* Round numbers below the colours, `bar` pixels from x on. */
 static void put_ticks(uz_buffer *svg, const uz_scenery *scenery, int x, int y, int bar)
 {
@@ -512,13 +518,17 @@ void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char
     put_ticks(svg, scenery, x, y + BAR, bar);
     uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%s", x + bar, y + 42, scenery->what);
     put_unit(svg, ", ", scenery->is_length ? units->length : units->stress);
-    uz_buffer_print(svg, ": %.3g to %.3g</text>\n", scenery->low, scenery->high);
+    uz_buffer_print(svg, ": ");
+    put_short(svg, scenery->low);
+    uz_buffer_print(svg, " to ");
+    put_short(svg, scenery->high);
+    uz_buffer_print(svg, "</text>\n");
     uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", words + 10);
     uz_buffer_put_escaped(svg, title ? title : "");
     uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g", words + 26, scenery->factor);
     if (scenery->largest_push > 0) {
-        uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure %.3g", words + 42,
-                        scenery->largest_push);
+        uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure ", words + 42);
+        put_short(svg, scenery->largest_push);
         put_unit(svg, " ", units->stress);
     }
     uz_buffer_print(svg, "</text>\n");
