@@ -60,12 +60,15 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
                        "says of the answer.\n",
                        "0 verified, 6 the job failed, 7 not verified, 9 dismissed, 10 --timeout passed (the job goes "
                        "on), 130 interrupted (the job goes on)."},
-    [CLIENT_RESULT] = {"result", "result ID [options]", "fetch the answer as JSON, a table, or a file for ParaView",
-                       "ID", CLIENT_OPERAND_NEEDED,
-                       "A table in CSV has a row for each node, or for each contact where the fields asked for are "
-                       "those of contacts (reactions, gaps, pressure, contact_status), or for each unknown of a "
-                       "problem in matrices; first its number and, of scenes, its coordinates.\n",
-                       NULL},
+    [CLIENT_RESULT] =
+        {"result", "result ID [options]", "fetch the answer as JSON, a table, or a file for ParaView", "ID",
+         CLIENT_OPERAND_NEEDED,
+         "A table in CSV has a row for each node, or for each contact where the fields asked for are "
+         "those of contacts (reactions, gaps, pressure, contact_status), or for each unknown of a "
+         "problem in matrices; first its number and, of scenes, its coordinates. With --fields summary it has a "
+         "row for each load case instead, with its numbers: of a path of loads the part of the load, "
+         "displacement and forces.\n",
+         NULL},
     [CLIENT_PATH] = {"path", "path ID --from P --to P [options]", "tabulate displacement and stress along a line", "ID",
                      CLIENT_OPERAND_NEEDED,
                      "A P is a point of the body before it was deformed, in the scene's coordinates: 0,20 or, of a "
@@ -164,8 +167,9 @@ static const uz_option OPTIONS[] = {
     OPTION("key", 'k', WORD, key, IN(SUBMIT), .value = "KEY",
            .about = "idempotency key (default: random); the same key and request give the same job"),
     OPTION("key", 'k', WORD, key, STAYING & ~IN(WAIT), .value = "KEY", .about = "idempotency key (default: random)"),
-    OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json csv vtu npz",
-           .about = "json (default), csv: a table, npz: arrays for NumPy, or vtu: scenes only"),
+    OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json csv npz vtu pvd",
+           .about = "json (default), csv: a table, npz: arrays for NumPy; scenes only: vtu, or pvd: a vtu of each load "
+                    "case, as one series"),
     OPTION("format", 'f', CHOICE, format, IN(PATH), .value = "F", .choices = "table csv json",
            .about = "table (default) with five digits, csv or json with all"),
     OPTION("from", 0, WORD, from, IN(PATH), .value = "P", .about = "the first point, such as 0,20"),

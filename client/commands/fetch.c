@@ -172,9 +172,15 @@ client_exit client_result(client_session *s)
     const char *const at = strcmp(format, "vtu") == 0   ? "/result.vtu"
                            : strcmp(format, "npz") == 0 ? "/result.npz"
                                                         : "/result";
-    const client_exit code = strcmp(format, "csv") == 0
-                                 ? client_table(s, *fields ? fields : "reactions,gaps")
-                                 : fetch_and_deliver(s, client_path_with_query(s, o->operand, at, query));
+    client_exit code;
+    if (strcmp(format, "pvd") == 0)
+        code = client_series_of_files(s, *fields ? fields : NULL);
+    else if (strcmp(format, "csv") == 0 && strcmp(fields, "summary") == 0)
+        code = client_numbers(s);
+    else if (strcmp(format, "csv") == 0)
+        code = client_table(s, *fields ? fields : "reactions,gaps");
+    else
+        code = fetch_and_deliver(s, client_path_with_query(s, o->operand, at, query));
     free(text.data);
     return code;
 }

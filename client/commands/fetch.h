@@ -23,6 +23,10 @@ client_exit client_picture_to_png(client_session *s, const client_buffer *svg, c
 
 /* The fields ("a,b") of the job's answer as CSV. */
 client_exit client_table(client_session *s, const char *fields);
+/* The numbers of the answer, or of each of its cases, as CSV. */
+client_exit client_numbers(client_session *s);
+/* FILE.pvd, which --output names, and FILE-1.vtu, ... of the cases, with these fields (NULL: those by default). */
+client_exit client_series_of_files(client_session *s, const char *fields);
 /* A history in CSV as a drawing; it goes where the data would. */
 client_exit client_draw_history(client_session *s, const char *csv);
 /* What each digit took (work-precision.json), as a table with bars. */

@@ -23,7 +23,7 @@ const exact = (value) => number(value, 5);
 /**
  * Shows the body of a job in an element.
  * api: of api.js (fetch, get, bytes, blob: with the token). options: {cases: names of its load cases, case: the one
- * that is shown first, pressure: false where the chart of the contact pressure is not wanted}. Colours are the variables
+ * that is shown first, path: they are points of a path, pressure: false where the chart of the contact pressure is not wanted}. Colours are the variables
  * of page.css; the document's event "themechange" tells that they changed. Returns {destroy()}, which stops everything
  * and frees what was made. Throws what the service answers where there is no body.
  */
@@ -107,8 +107,22 @@ class BodyView {
     this.keys = h("p", { class: "muted body-keys", id: `body-keys-${this.number}` });
     this.path_place = h("div", { class: "body-path" });
     this.pressure_place = h("div", { class: "body-pressure" });
-    show(this.element, this.tools, this.frame_box, this.legend, this.keys, this.path_place, this.pressure_place);
+    this.way = this.options.path ? this.build_way() : null;
+    show(this.element, this.tools, this.way, this.frame_box, this.legend, this.keys, this.path_place, this.pressure_place);
     this.overlay = new Overlay(this.overlay_canvas);
+  }
+
+  /** Along the cases of a path. It stands by itself, as the other tools are made anew for each surface that comes. */
+  build_way() {
+    const { cases } = this.options, told = h("output", { class: "muted" });
+    const range = h("input", { type: "range", min: 0, max: cases.length - 1, step: 1, "aria-label": "Point of the path", oninput: () => this.change_case(cases[range.value]) });
+    this.show_way = () => {
+      range.value = cases.indexOf(this.case_name);
+      range.setAttribute("aria-valuetext", this.case_name);
+      told.value = this.case_name;
+    };
+    this.show_way();
+    return h("div", { class: "body-tools body-way" }, h("span", null, "Along the path"), range, told);
   }
 
   build_tools() {
@@ -304,6 +318,7 @@ class BodyView {
 
   async change_case(name) {
     this.case_name = name;
+    this.show_way?.();
     try {
       const surface = await load_surface(this.api, this.job, name);
       if (name === this.case_name && !this.ends.signal.aborted) this.take(surface);

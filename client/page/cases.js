@@ -8,13 +8,28 @@ import { sorted_by } from "./view_order.js";
 import { error_words, state_words } from "./words.js";
 
 const MOST_ROWS = 500, MOST_DOTS = 200;
-const IN_TABLE = ["error", "max_pressure", "area", "active", "reaction_sum", "von_mises", "safety"];
+const IN_TABLE = ["part", "displacement", "error", "max_pressure", "area", "active", "reaction_sum", "von_mises", "safety"];
 
 /** Where a case stands on the axis: the number that its name is or ends with, if all have one; else its number. */
 function places_of(cases) {
   const numbers = cases.map((one) => Number(/(-?\d+(?:\.\d*)?(?:e[-+]?\d+)?)$/i.exec(one.name)?.[1] ?? NaN));
   const good = numbers.every(Number.isFinite) && new Set(numbers).size === numbers.length;
   return { label: good ? "number in the name of the case" : "case", values: good ? numbers : cases.map((_, i) => i + 1), whole: !good };
+}
+
+/** Are the cases points of a path of loads? */
+export function is_path(cases) {
+  return cases.length > 1 && cases.every((one) => Number.isFinite(one.summary?.finite?.part));
+}
+
+/** Of a path the force that changes most along it, by key; else "max_pressure". */
+function first_curve(cases, columns) {
+  const spread = ({ value }) => {
+    const all = cases.map((one) => value(one.summary)).filter(Number.isFinite);
+    return Math.max(...all) - Math.min(...all);
+  };
+  const forces = is_path(cases) ? columns.filter((one) => /^(force|support)_/.test(one.key)) : [];
+  return forces.sort((a, b) => spread(b) - spread(a))[0]?.key || (is_path(cases) ? "part" : "max_pressure");
 }
 
 /**
@@ -26,14 +41,19 @@ export function mountCases(element, cases, chosen, on_choose) {
   const places = places_of(cases);
   let order = { by: "", up: true }, here = chosen;
   const table_place = h("div", { class: "scrolled", tabindex: "0", role: "region", "aria-label": "Load cases" });
+  const over = h("select", { id: "case-over", onchange: () => curve.draw() }, h("option", { value: "" }, places.label), columns.map((one) => h("option", { value: one.key }, one.name)));
+  over.value = is_path(cases) ? "displacement" : "";
   const curve = new Curve("case-curve", (column) => {
-    const points = cases.map((one, i) => [places.values[i], column.value(one.summary), one.name]).sort((a, b) => a[0] - b[0]);
+    const across = columns.find((one) => one.key === over.value), x_of = (i) => (across ? across.value(cases[i].summary) : places.values[i]);
+    const points = cases.map((one, i) => [x_of(i), column.value(one.summary), one.name]);
+    if (!across) points.sort((a, b) => a[0] - b[0]); // a path may come back
     const now = cases.findIndex((one) => one.name === here);
     const series = [{ name: column.name, colour: 1, points, dots: points.length <= MOST_DOTS, size: 3 }];
-    if (now >= 0) series.push({ name: here, colour: 2, line: false, size: 6, points: [[places.values[now], column.value(cases[now].summary)]] });
-    return { x: { label: places.label, whole: places.whole, from_zero: false }, series, label: `${column.name} of ${cases.length} load cases` };
+    if (now >= 0) series.push({ name: here, colour: 2, line: false, size: 6, points: [[x_of(now), column.value(cases[now].summary)]] });
+    const x = across ? { label: `${across.name}${across.unit && `,${across.unit}`}`, format: across.words } : { label: places.label, whole: places.whole };
+    return { x: { ...x, from_zero: false }, series, label: `${column.name} of ${cases.length} load cases` };
   });
-  show(element, h("h2", null, `${count(cases.length)} load cases`), h("div", { class: "body-tools" }, curve.choice), curve.place, table_place);
+  show(element, h("h2", null, `${count(cases.length)} load cases`), h("div", { class: "body-tools" }, curve.choice, h("label", null, "over", over)), curve.place, table_place);
 
   function sorted() {
     const column = columns.find((one) => one.key === order.by);
@@ -61,7 +81,7 @@ export function mountCases(element, cases, chosen, on_choose) {
   }
 
   draw_table();
-  curve.take(columns, "max_pressure");
+  curve.take(columns, first_curve(cases, columns));
   return {
     mark: (name) => {
       here = name;

@@ -1,6 +1,6 @@
 // job.js: one job, live while it waits and runs: progress, convergence, then the answer in words and pictures.
 
-import { mountCases } from "./cases.js";
+import { is_path, mountCases } from "./cases.js";
 import { asked_of, Convergence } from "./convergence.js";
 import { announce, h, pause, show } from "./dom.js";
 import { download_buttons, files_of } from "./download.js";
@@ -237,7 +237,7 @@ class JobView {
       open.disabled = true;
       try {
         const { mountBody } = await import("./body.js");
-        const body = await mountBody(place, this.api, this.id, { cases: this.cases.map((one) => one.name), case: this.case_name,
+        const body = await mountBody(place, this.api, this.id, { cases: this.cases.map((one) => one.name), case: this.case_name, path: is_path(this.cases),
           units: this.summary().problem.units });
         this.parts.push(() => body.destroy());
       } catch (error) {

@@ -63,7 +63,7 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
                                                   : code;
     if (strncmp(where, "/cases/", 7) == 0) {
         /* A load case has these; an error about anything else of it is one of the body that all cases share. */
-        static const char *const OWN[] = {"/p", "/h", "/part", "/after"};
+        static const char *const OWN[] = {"/p", "/h", "/part", "/after", "/steps"};
         const char *rest = where + 7 + strspn(where + 7, "0123456789");
         bool own = !*rest || strncmp(rest, "/loads", 6) == 0;
         for (size_t i = 0; i < sizeof OWN / sizeof OWN[0]; i++)
@@ -154,7 +154,7 @@ static bool check_scene(const codec_request *request, problem_details *problem)
     if (status != UZ_ERR_SCENE && status != UZ_ERR_NOT_FINITE)
         return true;
     if (p->n_cases > 0 && strncmp(err.where, "/loads", 6) == 0)
-        uz_error_name_case(&err, 0);
+        uz_error_name_case(&err, p, 0);
     codec_problem_from_error(problem, &err, p->kind);
     return false;
 }

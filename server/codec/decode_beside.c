@@ -12,6 +12,8 @@
 
 /* ---- cases */
 
+#define MOST_CASES 10000 /* of a job */
+
 static int compare_names(const void *a, const void *b)
 {
     const uz_load_case *const *x = a, *const *y = b;
@@ -33,35 +35,65 @@ static bool take_vector(double **out, decoding *d, const json_value *item, const
                           (long long)n, (long long)wanted, matrix));
 }
 
-bool decode_cases(uz_problem *problem, decoding *d, const json_value *list)
+/* One item of the list into the case *out, of a path its last point. */
+static bool decode_case(uz_load_case *out, decoding *d, const uz_problem *problem, const json_value *item)
 {
-    if (json_size(list) == 0)
-        return true;
-    problem->cases = decode_room(d, list, sizeof *problem->cases, &problem->n_cases);
-    for (int64_t i = 0; i < problem->n_cases; i++) {
-        const json_value *item = &list->items[i];
-        const json_value *name = json_get(item, "name");
-        uz_load_case *out = &problem->cases[i];
-        if (!decode_label(out->name, d, name, name->text, name->count, "A name of a case"))
-            return false;
-        const json_value *after = json_get(item, "after"), *part = json_get(item, "part");
-        if (after && !decode_label(out->after, d, after, after->text, after->count, "A name of a case"))
-            return false;
-        out->has_part = part != NULL;
-        out->part = json_number(part, 1);
-        const bool own_loads = json_get(item, "loads") != NULL;
-        const bool good = problem->kind == UZ_PROBLEM_SCENE
-                              ? !own_loads || decode_loads(&out->loads, &out->n_loads, d, json_get(item, "loads"),
-                                                           uz_scene_dim(&problem->scene))
-                              : take_vector(&out->p, d, item, "p", problem->qp.K.rows, "K") &&
-                                    take_vector(&out->h, d, item, "h", problem->qp.N.rows, "N");
-        if (!good)
-            return false;
-    }
-    if (!problem->cases)
+    const json_value *name = json_get(item, "name"), *after = json_get(item, "after"), *part = json_get(item, "part");
+    const json_value *steps = json_get(item, "steps"), *loads = json_get(item, "loads");
+    if (!decode_label(out->name, d, name, name->text, name->count, "A name of a case") ||
+        (after && !decode_label(out->after, d, after, after->text, after->count, "A name of a case")))
         return false;
+    if (steps && part)
+        return decode_refuse(d, "not_allowed", part, "is said by the last of steps: leave it out.");
+    out->has_part = part || steps;
+    out->part = steps ? steps->numbers[steps->count - 1] : json_number(part, 1);
+    if (steps && problem->scene.kinematics != UZ_KINEMATICS_FINITE)
+        return decode_refuse(d, "bad_scene", steps,
+                             "is a path, and paths of loads are those of the kinematics \"finite\": use these, or give "
+                             "each load a case.");
+    return problem->kind == UZ_PROBLEM_SCENE
+               ? !loads || decode_loads(&out->loads, &out->n_loads, d, loads, uz_scene_dim(&problem->scene))
+               : take_vector(&out->p, d, item, "p", problem->qp.K.rows, "K") &&
+                     take_vector(&out->h, d, item, "h", problem->qp.N.rows, "N");
+}
 
-    /* the first case whose name an earlier one has is refused */
+/* The n points of a path, of which the last one, point[n - 1], is there: NAME 1, NAME 2, ... before it, each after the
+ * one before. */
+static bool add_points(uz_load_case *point, decoding *d, const json_value *item, int64_t n)
+{
+    uz_load_case *last = &point[n - 1];
+    const json_value *steps = json_get(item, "steps");
+    char name[sizeof last->name + 24];
+    for (int64_t i = 0; i < n - 1; i++) {
+        const int len = snprintf(name, sizeof name, "%s %lld", last->name, (long long)i + 1);
+        if (!decode_label(point[i].name, d, json_get(item, "name"), name, (size_t)len, "A point of a path"))
+            return false;
+        memcpy(point[i].after, i == 0 ? last->after : point[i - 1].name, sizeof point[i].after);
+        point[i].has_part = true;
+        point[i].part = steps->numbers[i];
+        point[i].surplus = last->surplus - n + 1 + i;
+        if (!last->loads)
+            continue;
+        point[i].loads = room_for((size_t)last->n_loads, sizeof *last->loads);
+        if (!point[i].loads)
+            return problem_no_memory(d->problem);
+        point[i].n_loads = last->n_loads;
+        memcpy(point[i].loads, last->loads, (size_t)last->n_loads * sizeof *last->loads);
+    }
+    if (n > 1)
+        memcpy(last->after, point[n - 2].name, sizeof last->after);
+    return true;
+}
+
+static int64_t points_of(const json_value *item)
+{
+    const json_value *steps = json_get(item, "steps");
+    return steps ? (int64_t)steps->count : 1;
+}
+
+/* The first case whose name an earlier one has is refused. */
+static bool check_names(const uz_problem *problem, decoding *d, const json_value *list)
+{
     int64_t found = problem->n_cases, earlier = 0;
     const uz_load_case **sorted = room_for((size_t)problem->n_cases, sizeof *sorted);
     if (!sorted)
@@ -79,8 +111,35 @@ bool decode_cases(uz_problem *problem, decoding *d, const json_value *list)
         return true;
     char shown[80];
     problem_quote(shown, sizeof shown, problem->cases[found].name, strlen(problem->cases[found].name));
-    return decode_refuse(d, "not_allowed", json_get(&list->items[found], "name"),
-                         "is %s, which is the name of case %lld already.", shown, (long long)earlier);
+    return decode_refuse(d, "not_allowed", json_get(&list->items[found - problem->cases[found].surplus], "name"),
+                         "is %s, which is the name of case %lld already.", shown,
+                         (long long)(earlier - problem->cases[earlier].surplus));
+}
+
+bool decode_cases(uz_problem *problem, decoding *d, const json_value *list)
+{
+    int64_t all = 0, at = 0;
+    for (size_t i = 0; i < json_size(list); i++)
+        all += points_of(&list->items[i]);
+    if (all == 0)
+        return true;
+    if (all > MOST_CASES)
+        return decode_refuse(d, "not_allowed", list, "has %lld cases with the points of their paths; at most %d.",
+                             (long long)all, MOST_CASES);
+    problem->cases = calloc((size_t)all, sizeof *problem->cases);
+    if (!problem->cases)
+        return problem_no_memory(d->problem);
+    problem->n_cases = all;
+    for (size_t i = 0; i < json_size(list); i++) {
+        const json_value *item = &list->items[i];
+        const int64_t points = points_of(item);
+        at += points;
+        problem->cases[at - 1].surplus = at - 1 - (int64_t)i;
+        if (!decode_case(&problem->cases[at - 1], d, problem, item) ||
+            !add_points(&problem->cases[at - points], d, item, points))
+            return false;
+    }
+    return check_names(problem, d, list);
 }
 
 /* ---- settings */

@@ -249,11 +249,13 @@ static void put_finite(text *t, const uz_finite *f)
     text_open(t, "finite", '{');
     for (size_t k = 0; k < sizeof COUNTS / sizeof *COUNTS; k++)
         text_integer(t, COUNTS[k].key, COUNTS[k].value);
-    put_named(
-        t, NULL,
-        (named[]){
-            {"load", f->load}, {"least_det", f->least_det}, {"residual", f->residual}, {"least_gap", f->least_gap}},
-        4);
+    put_named(t, NULL,
+              (named[]){{"load", f->load},
+                        {"displacement", f->displacement},
+                        {"least_det", f->least_det},
+                        {"residual", f->residual},
+                        {"least_gap", f->least_gap}},
+              5);
     if (!isnan(f->part))
         put_named(t, NULL, (named[]){{"part", f->part}}, 1);
     text_bool(t, "definite", f->definite);

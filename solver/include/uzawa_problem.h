@@ -23,6 +23,9 @@ typedef struct {
     char after[64];
     bool has_part; /* loads and prescribed displacements are `part` times as large */
     double part;
+    /* In the list of whoever made the problem one item may stand for several cases, the points of a path: so many more
+     * cases than items there are before this one. Refusals name the item. */
+    int64_t surplus;
 } uz_load_case;
 
 /* One number that a scene is solved for. */

@@ -188,7 +188,8 @@ typedef struct {
     double residual;  /* by which the answer's own Newton step would change it: in the norm of the tangent, relative to
                        * the root of twice the strain energy. An estimate of its error, not a bound */
     double least_gap; /* of points sampled on the deformed sides of the contacts: a length, < 0: within the obstacle */
-    bool definite;    /* the tangent is positive definite among motions that leave the pressed rows closed */
+    double displacement; /* the largest of a node: a length */
+    bool definite;       /* the tangent is positive definite among motions that leave the pressed rows closed */
 } uz_finite;
 
 /* Scenes of kinematics AUTO whose rotations or strains were not surely small: what large deformation makes of them, by

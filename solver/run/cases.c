@@ -32,7 +32,7 @@ static void name_case(uz_error *err, const uz_problem *problem, int64_t i)
 {
     if (problem->n_cases > 0 && err &&
         (strcmp(err->where, "p") == 0 || strcmp(err->where, "start") == 0 || strncmp(err->where, "/loads", 6) == 0))
-        uz_error_name_case(err, i);
+        uz_error_name_case(err, problem, i);
 }
 
 uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_problem *problem, const uz_settings *settings,

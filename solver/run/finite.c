@@ -425,7 +425,7 @@ static uz_status solve_case(uz_result **out, uz_finite_point **points, const uz_
                                  last_after(problem, i) > 0 ? &points[i] : NULL};
     const uz_status status = uz_solve_finite_load(out, &one, settings, hooks, deadline, NULL, &path, err);
     if (status != UZ_OK)
-        uz_error_name_case(err, i);
+        uz_error_name_case(err, problem, i);
     if (status == UZ_OK && (own->has_part || before >= 0)) {
         const double from = before >= 0 ? points[before]->part : 0;
         (*out)->summary.finite.part = from + (*out)->summary.finite.load * (path.part - from);

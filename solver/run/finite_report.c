@@ -91,6 +91,10 @@ static void summarize(uz_summary *s, const uz_finite_run *run, uz_part why, doub
     s->finite.least_det = known ? c->least_det : 1;
     s->finite.residual = known ? c->residual : 0;
     s->finite.definite = known && c->definite;
+    s->finite.displacement = 0;
+    const int dim = run->base.mesh.dim;
+    for (int64_t i = 0; i < run->n; i += dim)
+        s->finite.displacement = fmax(s->finite.displacement, sqrt(uz_distance2(run->at.u + i, (double[3]){0}, dim)));
     s->finite.least_gap = known && isfinite(c->least_gap) ? c->least_gap : (double)NAN;
     s->geometry = (uz_geometry){.kind = UZ_KINEMATICS_FINITE, .passes = run->found.qps, .change = NAN, .sliding = NAN};
     s->requested_error = run->requested;

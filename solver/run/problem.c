@@ -135,7 +135,7 @@ uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
         const uz_load_case *one = &problem->cases[i];
         status = check_path(problem, i, err);
         if (status != UZ_OK) {
-            uz_error_name_case(err, i);
+            uz_error_name_case(err, problem, i);
             break;
         }
         if (scene ? one->p || one->h : one->loads != NULL)
@@ -147,18 +147,19 @@ uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
         if (status == UZ_OK)
             status = uz_check_finite(one->h, problem->qp.N.rows, "h", err);
         if (status != UZ_OK)
-            uz_error_name_case(err, i);
+            uz_error_name_case(err, problem, i);
     }
     return status;
 }
 
-void uz_error_name_case(uz_error *err, int64_t i)
+void uz_error_name_case(uz_error *err, const uz_problem *problem, int64_t i)
 {
     char prefix[32];
     if (!err)
         return;
     bool pointer = err->where[0] == '/' || err->where[0] == '\0';
-    size_t length = (size_t)snprintf(prefix, sizeof prefix, "/cases/%lld%s", (long long)i, pointer ? "" : "/");
+    size_t length = (size_t)snprintf(prefix, sizeof prefix, "/cases/%lld%s", (long long)(i - problem->cases[i].surplus),
+                                     pointer ? "" : "/");
     memmove(err->where + length, err->where, sizeof err->where - length);
     memcpy(err->where, prefix, length);
     err->where[sizeof err->where - 1] = '\0';

@@ -14,9 +14,9 @@ const char *uz_quantity_place(char where[UZ_QUANTITY_POINTER], const uz_problem 
 /* Load case i (from 0) as a problem of its own, which borrows all it has. Without load cases it is the problem. */
 uz_problem uz_problem_of_case(const uz_problem *problem, int64_t i);
 
-/* Says which case an error is about: /loads/0/on becomes /cases/3/loads/0/on. Pointers too long are cut. err may be
- * NULL. */
-void uz_error_name_case(uz_error *err, int64_t i);
+/* Says which case an error is about: /loads/0/on becomes /cases/3/loads/0/on, by the number that case i has in its
+ * list (uz_load_case.surplus). Pointers too long are cut. err may be NULL. */
+void uz_error_name_case(uz_error *err, const uz_problem *problem, int64_t i);
 
 /* The case that case i is after; -1: there is none of that name before it. */
 int64_t uz_case_before(const uz_problem *problem, int64_t i);

@@ -197,7 +197,7 @@ static uz_status solve_in_blocks(batch *b, uz_error *err)
             asked[k] = request_of(b, first + k, true);
         status = uz_block_solve(block, asked, count, &failed, err);
         if (status != UZ_OK && b->problem->n_cases > 0)
-            uz_error_name_case(err, asked[failed].index);
+            uz_error_name_case(err, b->problem, asked[failed].index);
         for (int64_t k = 0; k < count; k++) {
             if (status == UZ_OK)
                 status = close_case(&runs[k], b, status, err);
@@ -229,7 +229,7 @@ static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *e
         b->results[i] = result;
         run->result = NULL;
     } else if (b->problem->n_cases > 0) {
-        uz_error_name_case(err, i);
+        uz_error_name_case(err, b->problem, i);
     }
     return status;
 }

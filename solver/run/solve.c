@@ -49,7 +49,7 @@ uz_status uz_solve_given(uz_result **results, const uz_problem *problem, const u
         const uz_problem one = uz_problem_of_case(problem, i);
         status = uz_weigh_deformation(&results[i], &one, settings, hooks, started, err);
         if (status != UZ_OK && problem->n_cases > 0)
-            uz_error_name_case(err, i);
+            uz_error_name_case(err, problem, i);
     }
     return status;
 }

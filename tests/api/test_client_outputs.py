@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import urllib.parse
 import xml.etree.ElementTree
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -174,9 +175,34 @@ def test_tables_of_other_kinds(server):
     check(open(target, encoding="utf-8").read() == run(server, "result", job, "--format", "csv").stdout)
 
 
+def test_a_path_is_a_table_and_a_series(server):
+    """A row for each point, and a file for each that ParaView opens as one series."""
+    block = {"problem": {"kind": "scene", "model": "plane_strain", "kinematics": "finite", "mesh": {"box": {"size": [1, 1], "cells": [2, 2], "element": "quad8"}},
+                         "materials": [{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke"}],
+                         "supports": [{"on": "left", "ux": 0}, {"on": "top", "uy": -1}],
+                         "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]},
+             "cases": [{"name": 'a "way"', "steps": [0.1, 0.2, 0.3]}]}
+    job = solved(server, "-", stdin=json.dumps(block))
+    rows = table(server, job, "--fields", "summary")
+    check([row["case"] for row in rows] == ['a "way" 1', 'a "way" 2', 'a "way"'] and [row["part"] for row in rows] == ["0.10000000000000001", "0.20000000000000001", "0.29999999999999999"], rows)
+    check(all(abs(float(row["contact_force_y"]) + float(row["support_1_force_y"])) < 1e-8 and row["outcome"] == "converged" for row in rows), rows)
+    check(abs(float(rows[2]["contact_force_y"]) - 0.45842392) < 1e-7 and float(rows[2]["displacement"]) > 0.3, rows[2])
+    check([row["outcome"] for row in table(server, job, "--fields", "summary", "--case", 'a "way"')] == ["converged"])
+    check(list(table(server, solved(server, SPRINGS), "--fields", "summary")[0])[0] == "outcome")
+    with tempfile.TemporaryDirectory() as folder:
+        run(server, "result", job, "--format", "pvd", "-o", os.path.join(folder, "x.pvd"))
+        series = xml.etree.ElementTree.parse(os.path.join(folder, "x.pvd")).getroot().findall("Collection/DataSet")
+        check([(one.get("timestep"), one.get("file")) for one in series] == [("0.1", "x-1.vtu"), ("0.2", "x-2.vtu"), ("0.3", "x-3.vtu")], series)
+        for one, row in zip(series, rows):
+            kept = open(os.path.join(folder, one.get("file")), "rb").read()
+            check(kept == server.get(f"/v1/jobs/{job}/result.vtu?case={urllib.parse.quote(row['case'])}").body, row)
+    for words in ((), ("-o", "-"), ("-o", "x.pvd", "--case", "a")):
+        check("FILE.pvd" in run(server, "result", job, "--format", "pvd", *words, code=2).stderr)
+
+
 def test_tables_that_cannot_be(server):
     job = solved(server)
-    for fields, says in (("reactions,displacements", "is not of the same"), ("nonsense", "no field"), ("summary", "no field")):
+    for fields, says in (("reactions,displacements", "is not of the same"), ("nonsense", "no field"), ("summary,reactions", "no field")):
         done = run(server, "result", job, "--format", "csv", "--fields", fields, code=2)
         check(says in done.stderr and done.stdout == "", done)
     run(server, "result", solved(server, SPRINGS), "--format", "csv", "--field", "stress", code=4)

@@ -2,6 +2,7 @@
 computed from an answer."""
 # not under ThreadSanitizer: about answers, not about threads
 import copy
+import math
 
 import service
 from service import check, expect
@@ -110,6 +111,44 @@ def test_a_path_begins_where_the_case_before_has_come_to(s):
     reply = s.post(body)
     found = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", seconds=60)["error"]
     check(found["pointer"] == "/cases/1/after" and "earlier in the list" in found["detail"], found)
+
+
+def test_every_point_of_a_path_is_answered(s):
+    """Parts by steps are the cases that they stand for, forces at them have closed forms, and refusals name the item."""
+    body = block()
+    body["problem"]["supports"][1]["uy"] = -1
+    body["cases"] = [{"name": "down", "steps": [0.1, 0.2, 0.3]}, {"name": "up", "steps": [0.2, 0.1], "after": "down"}]
+    long = block()
+    long["problem"]["supports"][1]["uy"] = -1
+    long["cases"] = [{"name": "down 1", "part": 0.1}, {"name": "down 2", "part": 0.2, "after": "down 1"}, {"name": "down", "part": 0.3, "after": "down 2"},
+                     {"name": "up 1", "part": 0.2, "after": "down"}, {"name": "up", "part": 0.1, "after": "up 1"}]
+    found = []
+    for one in (body, long):
+        job = s.post(one)
+        check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job.json)
+        found.append(s.get(f"/v1/jobs/{job.json['id']}/result?fields=displacements").json["cases"])
+    check([case["name"] for case in found[0]] == [case["name"] for case in long["cases"]], [case["name"] for case in found[0]])
+    check([case["displacements"] for case in found[0]] == [case["displacements"] for case in found[1]], "the same cases")
+    for case, part in zip(found[0], (0.1, 0.2, 0.3, 0.2, 0.1)):
+        summary = case["summary"]
+        check(summary["outcome"] == "converged" and summary["finite"]["part"] == part, summary["finite"])
+        widest = max(abs(x) for x in (part, max(u[0] for u in case["displacements"])))
+        most = max(math.hypot(*u) for u in case["displacements"])
+        check(abs(summary["finite"]["displacement"] - most) <= 1e-12 and most >= widest, summary["finite"], most)
+    there, back = ([case["summary"]["contact"]["force"][1] for case in cases] for cases in (found[0][:2], found[0][:2:-1]))
+    check(all(abs(a - b) < 1e-8 for a, b in zip(there, back)), there, back)
+    check(abs(found[0][2]["summary"]["contact"]["force"][1] - 0.45842392) < 1e-7, found[0][2]["summary"]["contact"])
+    for change, pointer, remedy in (({"after": "nobody"}, "/cases/1/after", "earlier in the list"), ({"part": 1}, "/cases/1/part", "leave it out"),
+                                    ({"name": "down 2"}, "/cases/1/name", "case 0"), ({"name": "n" * 62}, "/cases/1/name", "longer")):
+        wrong = copy.deepcopy(body)
+        wrong["cases"][1].update(change)
+        reply = s.post(wrong)
+        told = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", seconds=60)["error"]
+        check(told["pointer"] == pointer and remedy in told["detail"], pointer, told)
+    for wrong, pointer in (({**body, "cases": [{"name": "p", "steps": [0.1] * 1000}] * 11}, "/cases"),
+                           ({**block(kinematics="auto"), "cases": body["cases"]}, "/cases/0/steps")):
+        reply = s.post(wrong)
+        check(reply.status == 422 and reply.json["pointer"] == pointer, reply.json)
 
 
 def test_auto_takes_the_model_that_the_deformation_needs(s):

@@ -121,6 +121,31 @@ def test_cases_are_a_table_and_a_curve(s, b):
     b.says(".empty", "No jobs yet")
 
 
+def test_a_path_is_a_curve_and_a_slider(s, b):
+    """Force against displacement in the order of the path, and the body at each of its points."""
+    problem = {"kind": "scene", "model": "plane_strain", "kinematics": "finite", "mesh": {"box": {"size": [1, 1], "cells": [2, 2], "element": "quad8"}},
+               "materials": [{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke"}], "supports": [{"on": "left", "ux": 0}, {"on": "top", "uy": -1}],
+               "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]}
+    job = s.solve({"problem": problem, "cases": [{"name": "way", "steps": [0.1, 0.2, 0.3, 0.15]}]})
+    summaries = [one["summary"] for one in s.get(f"/v1/jobs/{job['id']}/result?fields=summary").json["cases"]]
+    b.open(s, f"jobs/{job['id']}")
+    b.one("#cases-table")
+    fields = b.run("return ['#case-curve', '#case-over'].map((one) => document.querySelector(one).value)")
+    check(fields[0] in ("force_y", "support_1_y") and fields[1] == "displacement", fields)
+    at = b.wait("a dot for each", "return [...document.querySelectorAll('#cases circle.series-1')].map((one) => [+one.getAttribute('cx'), +one.getAttribute('cy')])")
+    moved = [one["finite"]["displacement"] for one in summaries]
+    check(len(at) == 4 and [a[0] < c[0] for a, c in zip(at, at[1:])] == [a < c for a, c in zip(moved, moved[1:])] == [True, True, False], at, moved)
+    b.one(".body-way input")
+    b.wait("the worst case is shown", "return document.querySelector('.body-way output').value === document.querySelector('#case').value")
+    for point, name in ((0, "way 1"), (2, "way 3"), (3, "way")):
+        before = b.text(".body-legend")
+        b.run(f"""const range = document.querySelector('.body-way input');
+                  range.value = {point}; range.dispatchEvent(new Event('input', {{bubbles: true}}));""")
+        b.wait("the point is named", f"return document.querySelector('.body-way output').value === '{name}'")
+        b.wait("the body is drawn there", f"return [...document.querySelectorAll('.body-tools select')].some((one) => one.value === '{name}')")
+        check(point == 0 or b.wait("other values", "return document.querySelector('.body-legend').innerText !== arguments[0]", before), point)
+
+
 def test_convergence_is_drawn(s, b):
     job = s.solve(SCENE)
     b.open(s, f"jobs/{job['id']}")
