@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +14,8 @@
 typedef struct {
     const uz_body_model *model;
     const uz_load *load;
-    double *f; /* n_nodes x dim */
+    double *f;   /* n_nodes x dim */
+    bool follow; /* pressures follow the body, and are for finite/follower.h */
 } loading;
 
 static void add_to_nodes(const loading *x, const double *f, const int64_t *node, int count)
@@ -92,6 +94,8 @@ static uz_status add_load(const loading *x, const char *where, uz_error *err)
     const uz_group *group = uz_mesh_group(mesh, x->load->on, where, err);
     if (!group)
         return UZ_ERR_SCENE;
+    if (x->follow && x->load->kind == UZ_LOAD_PRESSURE)
+        return UZ_OK;
     switch (x->load->kind) {
     case UZ_LOAD_TRACTION:
     case UZ_LOAD_PRESSURE:
@@ -148,7 +152,7 @@ uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *
     uz_status status = UZ_OK;
     memset(f, 0, (size_t)(model->mesh.n_nodes * model->mesh.dim) * sizeof *f);
     for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
-        const loading x = {model, &scene->loads[i], f};
+        const loading x = {model, &scene->loads[i], f, uz_is_finite_answer(scene)};
         char where[96];
         snprintf(where, sizeof where, "/loads/%lld/%s", (long long)i,
                  scene->loads[i].kind == UZ_LOAD_NODE_FORCE ? "node" : "on");

@@ -6,6 +6,7 @@
 #include "certificate/envelope.h"
 #include "certificate/pair_gaps.h"
 #include "certificate/piola.h"
+#include "certificate/pressed_side.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
@@ -222,6 +223,36 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
             ke[k * n + i] = ke[i * n + k];
     }
     uz_add_stiffness(&w->tangent, ke, node, nodes);
+}
+
+/* Pressures, where the sides are that they act on: what they do is taken off the internal forces. */
+static uz_status add_pressures(work *w, uz_error *err)
+{
+    const uz_body_model *model = w->of->model;
+    const uz_scene *scene = w->of->scene;
+    const int dim = model->mesh.dim;
+    for (int64_t i = 0; i < scene->n_loads; i++) {
+        const uz_load *load = &scene->loads[i];
+        if (load->kind != UZ_LOAD_PRESSURE)
+            continue;
+        const uz_group *group = uz_mesh_group(&model->mesh, load->on, "/loads", err);
+        for (int64_t k = 0; group && k < group->n_faces; k++) {
+            uz_side side;
+            double xyz[3 * UZ_FACE_NODES], ke[9 * UZ_FACE_NODES * UZ_FACE_NODES];
+            long double x[3 * UZ_FACE_NODES], force[3 * UZ_FACE_NODES];
+            int64_t node[UZ_FACE_NODES];
+            uz_body_side(&side, xyz, node, model, group->face[k]);
+            for (int c = 0; c < dim * side.nodes; c++)
+                x[c] = (long double)xyz[c] + w->of->u[dim * node[c / dim] + c % dim];
+            uz_pressed_side(force, ke, &side, x, load->value);
+            for (int c = 0; c < dim * side.nodes; c++)
+                w->force[dim * node[c / dim] + c % dim] -= force[c];
+            uz_add_stiffness(&w->tangent, ke, node, side.nodes);
+        }
+        if (!group)
+            return UZ_ERR_SCENE;
+    }
+    return UZ_OK;
 }
 
 /* ---- contact */
@@ -495,6 +526,8 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
         add_element(out, &w, e);
     }
     out->energy = (double)w.energy;
+    if (status == UZ_OK && !out->stopped)
+        status = add_pressures(&w, err);
     if (status == UZ_OK && !out->stopped)
         status = look_at_contacts(out, &w, most, err);
     if (status == UZ_OK && !out->stopped && out->least_det > 0)

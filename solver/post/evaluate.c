@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "finite/follower.h"
 #include "core/hooks.h"
 #include "post/balance.h"
 #include "post/overlap.h"
@@ -216,6 +217,8 @@ uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, cons
     if (status == UZ_OK)
         status = uz_nodal_loads(load, model, scene, err);
     if (status == UZ_OK)
+        status = uz_follower_loads(load, model, scene, result->u, err);
+    if (status == UZ_OK)
         status = uz_displaced(&displaced, model, result->u, err);
     if (status == UZ_OK)
         status = uz_contact_pressure(result->pressure, &displaced, scene, result->r, err);
@@ -230,6 +233,8 @@ uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, cons
         status = uz_measure_overlap(result->evaluation->overlap, model, scene, result->u, err);
     if (status == UZ_OK)
         status = uz_find_peak_stress(result->evaluation, model, scene, result->u, err);
+    if (status == UZ_OK && uz_has_followers(scene)) /* their work is not their force times the displacement */
+        result->evaluation->potential_energy = NAN;
     if (status == UZ_OK)
         result->evaluation->approach =
             uz_contact_approach(energy, pressed, result->evaluation->overlap, scene->n_contacts);

@@ -142,6 +142,7 @@ static uz_status begin_load(uz_finite_run *run, uz_error *err)
 {
     const uz_mesh *mesh = &run->base.mesh;
     run->pairs = uz_has_pairs(&run->scene);
+    run->follows = uz_has_followers(&run->scene);
     run->n = mesh->dim * mesh->n_nodes;
     run->d = run->base.d;
     for (int64_t j = 0; j < run->d; j++)
@@ -203,6 +204,7 @@ static void end(uz_finite_run *run)
     uz_finite_tangent_clear(&run->tangent);
     uz_body_model_clear(&run->base);
     uz_csc_clear(&run->wide);
+    uz_csc_clear(&run->skew);
     uz_cache_free(run->cache);
     uz_result_free(run->last);
     free(run->scene.supports);

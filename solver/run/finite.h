@@ -12,6 +12,7 @@
 #include "certificate/finite.h"
 #include "core/hooks.h"
 #include "finite/finite_body.h"
+#include "finite/follower.h"
 #include "uzawa.h"
 
 /* The kind of run (solve.c): results as those of uz_solve_rounds. Every case is answered with its whole load, or with
@@ -50,7 +51,8 @@ uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings 
 
 /* A displacement, and what follows from it. Its rows are those of the body there. */
 typedef struct {
-    double *u, *force; /* n: displacements by node, internal forces */
+    double *u, *force, *loads; /* n: displacements by node, internal forces, loads: some may follow the body */
+    double work;               /* of loads that follow, on the way here: they have no potential that is known */
     uz_finite_measure body;
     uz_body_model rows;
     double *h, *gap;  /* m of rows */
@@ -100,7 +102,9 @@ typedef struct {
     uz_csc wide;     /* the tangent's K with entries of their rows */
     const uz_csc *K; /* of the last contact problem: that, or the tangent's own */
     int64_t n, d;
-    double *loads;      /* n: forces under t */
+    double *loads;      /* n: forces under t, but those that follow the body */
+    bool follows;       /* there are such, */
+    uz_csc skew;        /* and of the last tangent the skew part of their derivative (finite/follower.h) */
     double *prescribed; /* n_fixed: under t */
     uz_finite_place at, trial;
     double *r; /* reactions of the rows that the last contact problem had, n_r of them */

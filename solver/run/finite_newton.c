@@ -13,7 +13,8 @@
  * the steps where slender parts turn; where it is not positive definite with that the body's own comes next. Steps are
  * shortened until no element turns inside out and the potential energy, with a penalty on negative gaps that exceeds
  * the reactions (ibid., ch. 18.3), is less than it was at one of the last places; but that which moves the supports,
- * whose place has no energy to compare. The end is the certificate's to say. */
+ * whose place has no energy to compare, and those under pressures that follow the body without one: their tangent has
+ * a skew part, and steps as in finite_pairs.c. The end is the certificate's to say. */
 #include "run/finite.h"
 
 #include "core/alloc.h"
@@ -43,7 +44,8 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3 };
 #define MORE_SHIFT  4.0
 #define LESS_SHIFT  16.0
 #define MOST_SHIFT  1e4
-/* Between bodies, whose rows are no derivatives of one energy, steps that are less than this are not measured by it. */
+/* Between bodies, whose rows are no derivatives of one energy, steps that are less
+ * than this are not measured by it. */
 #define NEAR 1e-2
 /* Steps that are more than this in the energy's norm may turn slender parts. */
 #define LARGE_STEP 0.3
@@ -56,9 +58,11 @@ uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run,
 {
     place->u = uz_alloc_zero(run->n, sizeof *place->u);
     place->force = uz_alloc_zero(run->n, sizeof *place->force);
-    return place->u && place->force ? UZ_OK
-                                    : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the place of %lld nodes",
-                                              (long long)run->base.mesh.n_nodes);
+    place->loads = uz_alloc_zero(run->n, sizeof *place->loads);
+    return place->u && place->force && place->loads
+               ? UZ_OK
+               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the place of %lld nodes",
+                         (long long)run->base.mesh.n_nodes);
 }
 
 static void forget_rows(uz_finite_place *place)
@@ -74,6 +78,7 @@ void uz_finite_place_clear(uz_finite_place *place)
     forget_rows(place);
     free(place->u);
     free(place->force);
+    free(place->loads);
     memset(place, 0, sizeof *place);
 }
 
@@ -107,6 +112,9 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
     *fits = place->body.least_det > 0 && isfinite(place->body.energy);
     if (!*fits)
         return UZ_OK;
+    memcpy(place->loads, run->loads, (size_t)run->n * sizeof *place->loads);
+    if (run->follows && uz_follower_loads(place->loads, &run->base, &run->scene, place->u, err) != UZ_OK)
+        return UZ_ERR_SCENE;
     run->scene.place = place->u;
     uz_status status = uz_body_model_move(&place->rows, &run->base, &run->scene, &own);
     if (status == UZ_OK)
@@ -204,7 +212,7 @@ static void load_step(bool *moved, uz_finite_run *run)
     *moved = false;
     double *rest = run->trial.force; /* it is free until the next place is looked at */
     for (int64_t i = 0; i < run->n; i++)
-        rest[i] = run->loads[i] - at->force[i];
+        rest[i] = at->loads[i] - at->force[i];
     uz_gather_nodal(run->p, model, rest);
     for (int64_t i = 0; i < run->n; i++) {
         const int64_t dof = model->dof[i];
@@ -312,6 +320,8 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u, step);
         uz_error_reset(&own);
         status = add_curvature(run, &own);
+        if (status == UZ_OK && run->follows)
+            status = uz_follower_tangent(&run->tangent, &run->skew, &run->scene, run->at.u, &own);
         for (int64_t q = 0; q < K->ptr[K->cols] && shift > 0; q++)
             K->val[q] += shift * run->base.K.val[q];
         if (status == UZ_OK && run->pairs)
@@ -325,7 +335,7 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         load_rows(run, hold * stiffest);
         status = uz_finite_solve_qp(run, &own);
         run->step_qps += status == UZ_OK;
-        if (status == UZ_OK && turn.force.n > 0)
+        if (status == UZ_OK && (turn.force.n > 0 || run->skew.ptr))
             status = uz_finite_correct(run, &turn, &own);
         run->hold = hold;
         run->shift = shift;
@@ -347,10 +357,20 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
 
 static double merit(const uz_finite_run *run, const uz_finite_place *place)
 {
-    double work = 0;
-    for (int64_t i = 0; i < run->n; i++)
+    double work = place->work;
+    for (int64_t i = 0; i < run->n && !run->follows; i++)
         work += run->loads[i] * place->u[i];
     return place->body.energy - work + run->penalty * place->violation;
+}
+
+/* Of loads that follow, on the straight way from `at`, by their mean. */
+static void find_work(uz_finite_run *run)
+{
+    uz_finite_place *to = &run->trial;
+    const uz_finite_place *from = &run->at;
+    to->work = from->work;
+    for (int64_t i = 0; i < run->n && run->follows; i++)
+        to->work += 0.5 * (from->loads[i] + to->loads[i]) * (to->u[i] - from->u[i]);
 }
 
 /* trial becomes a part of the way from `at` to `to`, the largest that is let. before: merits of the last places, of
@@ -368,6 +388,7 @@ static uz_status step_towards(bool *found, bool *inverted, uz_finite_run *run, c
             run->trial.u[i] = part == 1 ? to[i] : run->at.u[i] + part * (to[i] - run->at.u[i]);
         status = uz_finite_place_find(found, &run->trial, run, err);
         *inverted = status == UZ_OK && !*found;
+        find_work(run);
         if (status == UZ_OK && *found && before)
             *found = merit(run, &run->trial) <= most + 1e-10 * (fabs(most) + run->trial.body.energy) + run->grain;
     }
@@ -494,6 +515,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     run->penalty = run->hold = run->shift = 0;
     run->norm = INFINITY;
     run->step_qps = 0;
+    run->at.work = 0;
     if (status == UZ_OK)
         memcpy(begun, run->at.u, (size_t)run->n * sizeof *begun);
     if (status == UZ_OK)
@@ -524,7 +546,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);
         if (run->step_qps == 1)
             memcpy(led, to, (size_t)run->n * sizeof *led);
-        const bool free_step = moved || run->step_qps == 1 || (run->pairs && norm < NEAR);
+        const bool free_step = moved || run->step_qps == 1 || run->skew.ptr || (run->pairs && norm < NEAR);
         if (!free_step) {
             memmove(before + 1, before, (REMEMBERED - 1) * sizeof *before);
             before[0] = merit(run, &run->at);

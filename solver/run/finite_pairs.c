@@ -1,4 +1,4 @@
-/* finite_pairs.c: steps of two bodies that touch.
+/* finite_pairs.c: steps of two bodies that touch, and of others whose tangent is not symmetric.
  *
  * Rows of two surfaces are those where the bodies are, with forces N(u)' r that turn and go over from node to node as
  * they slide (assembly/row_turn.h). With T the derivative of these forces and E what the gaps' own derivative is off -N
@@ -10,7 +10,8 @@
  * K - T, to which the skew part and E are added at the last v: few, as both are small where the surfaces lie on each
  * other, and each a back-substitution, as the matrix stays. Their v are mixed so that what the problem changes about
  * them is least (D. Anderson, "Iterative procedures for nonlinear integral equations", J. ACM 12 (1965) 547-560), as
- * what is skew would turn them about the answer for long. */
+ * what is skew would turn them about the answer for long. The skew part of pressures that follow the body
+ * (finite/follower.h) is added like that of T. */
 #include "run/finite.h"
 
 #include "core/alloc.h"
@@ -119,11 +120,25 @@ static void mix(double *v, history *past, const double *came)
     }
 }
 
-/* room: 4 d + m. p and h are those of the symmetric part. */
+/* What the skew part of loads that follow makes of v. nodal: 2 n. */
+static void add_followers(uz_finite_run *run, const double *v, double *nodal)
+{
+    if (!run->skew.ptr)
+        return;
+    double *f = nodal + run->n;
+    memset(f, 0, (size_t)run->n * sizeof *f);
+    uz_recover_nodal(nodal, &run->base, v, NULL);
+    uz_csc_gaxpy(f, &run->skew, 1, nodal);
+    uz_gather_nodal(nodal, &run->base, f);
+    for (int64_t j = 0; j < run->d; j++)
+        run->p[j] += nodal[j];
+}
+
+/* room: 4 d + m + 2 n. p and h are those of the symmetric part. */
 static uz_status iterate(uz_finite_run *run, const uz_row_turn *turn, double *room, history *past, uz_error *err)
 {
     const int64_t d = run->d, m = run->at.rows.m;
-    double *p = room, *from = p + d, *v = from + d, *came = v + d, *h = came + d;
+    double *p = room, *from = p + d, *v = from + d, *came = v + d, *h = came + d, *nodal = h + m;
     /* of the first step the norm is infinite */
     const double left = fmin(ROUGHLY, fmax(CORRECTED, PART_LEFT * run->norm));
     uz_status status = UZ_OK;
@@ -141,6 +156,7 @@ static uz_status iterate(uz_finite_run *run, const uz_row_turn *turn, double *ro
         for (int64_t i = 0; i < m; i++)
             run->at.h[i] = h[i];
         uz_add_entries(run->p, &turn->force, v, true);
+        add_followers(run, v, nodal);
         uz_add_entries(run->at.h, &turn->gap, v, false);
         status = uz_finite_solve_qp(run, err);
         if (status != UZ_OK ||
@@ -163,7 +179,8 @@ uz_status uz_finite_correct(uz_finite_run *run, const uz_row_turn *turn, uz_erro
 {
     const int64_t d = run->d;
     history past = {.d = d};
-    double *room = uz_alloc(4 * d + run->at.rows.m, sizeof *room), *kept = uz_alloc(2 * MIXED * d, sizeof *kept);
+    double *room = uz_alloc(4 * d + run->at.rows.m + 2 * run->n, sizeof *room),
+           *kept = uz_alloc(2 * MIXED * d, sizeof *kept);
     uz_status status =
         room && kept ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld dofs", (long long)d);
     for (int i = 0; i < MIXED && status == UZ_OK; i++) {

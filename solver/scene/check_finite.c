@@ -122,10 +122,6 @@ static uz_status check_loads(const uz_scene *scene, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
     for (int64_t i = 0; i < scene->n_loads; i++) {
-        if (scene->loads[i].kind == UZ_LOAD_PRESSURE)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "pressure"),
-                           "a pressure turns with the side that it acts on, and finite kinematics have loads that do "
-                           "not: use traction or force");
         if (scene->loads[i].has_point)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "at"),
                            "what turns is not where it was, and finite kinematics have forces that stay: leave at and "

@@ -201,6 +201,21 @@ def test_a_ring_over_a_rod(s):
     check(abs(2 + found["displacements"][found["nodes"].index([2, 0])][0] - 2.34524417) < 1e-6, found["displacements"][-1])
 
 
+def test_a_pressure_follows_the_body(s):
+    """A tube from 1 to 2 that is blown up to a bore of 1.5, under finite kinematics and where auto finds that it takes them."""
+    ring = block(model="axisymmetric", mesh={"box": {"origin": [1, 0], "size": [1, 0.25], "cells": [16, 1], "element": "quad8"}},
+                 supports=[{"on": "bottom", "uy": 0}, {"on": "top", "uy": 0}], contacts=[], loads=[{"on": "left", "pressure": 0.15335612}])
+    for kinematics in ("finite", "auto"):
+        ring["problem"]["kinematics"] = kinematics
+        _, found = answer(s, ring, "summary,displacements,stress,nodes")
+        summary, at = found["summary"], {tuple(x): i for i, x in enumerate(found["nodes"])}
+        check(summary["outcome"] == "converged" and summary["resultants"]["imbalance"] < 1e-8, summary)
+        check(abs(1 + found["displacements"][at[1, 0]][0] - 1.5) < 1e-5 and abs(2 + found["displacements"][at[2, 0]][0] - 2.34524417) < 1e-5, found["displacements"][at[2, 0]])
+        check(abs(found["stress"][at[1, 0]][0] / -0.15335612 - 1) < 5e-3 and abs(found["stress"][at[1, 0]][2] / 0.48507586 - 1) < 2e-3, found["stress"][at[1, 0]])
+        check(summary["contact"]["candidates"] == 0 and summary["energy"]["potential"] is None, summary["energy"])
+        check(kinematics == "finite" or summary["small_deformation"]["error"] > 0.05, summary)
+
+
 def test_a_cube_on_a_ball(s):
     """A solid: fields have six components, and all that is computed from an answer is there."""
     cube = block(model="solid", mesh={"box": {"size": [1, 1, 1], "cells": [2, 2, 2], "element": "hex20"}},
@@ -291,7 +306,8 @@ def test_what_is_not_modelled_is_refused(s):
                     contacts=[{"on": "bottom", "obstacle": {"height": {"x": [0, 1], "y": [0, 1], "z": [[0, 0], [0, 0]]}}}]),
               "/problem/contacts/0/obstacle/height", "cylinders"),
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
-             (block(loads=[{"on": "right", "pressure": 1}]), "/problem/loads/0/pressure", "traction"),
+             (block(loads=[{"on": "all", "temperature": 1}]), "/problem/loads/0/temperature", "moving"),
+             (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
              (block(supports=[{"on": "left", "ux": 0}, {"on": "top", "spring": [1, 1]}]), "/problem/supports/1/spring", "prescribe"),
              (block(mesh={"box": {"size": [1, 1], "cells": "auto"}}), "/problem/mesh/box/cells", "give their numbers"),
              (block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "/problem/mesh/refine", "give a mesh"),
