@@ -270,6 +270,8 @@ char *codec_encode_valid(const uz_prediction *predicted)
         text_integer(&t, "factor_nnz", predicted->factor_nnz);
         text_number(&t, "bytes", predicted->bytes);
         text_number(&t, "seconds", predicted->seconds);
+        if (predicted->compared_bytes > 0)
+            text_number(&t, "compared_bytes", predicted->compared_bytes);
         text_bool(&t, "fits", predicted->fits);
         text_close(&t, '}');
     }

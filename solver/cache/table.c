@@ -75,18 +75,22 @@ static void use(uz_cache *cache, uz_item *item)
     push_newest(cache, item);
 }
 
+static uz_item *take_out(uz_cache *cache, uz_item *item, uz_item *before)
+{
+    unlink_item(cache, item);
+    cache->bytes -= item->bytes;
+    item->older = before;
+    return item;
+}
+
 /* Takes unused objects out, oldest first, until the rest fits; they are a list by `older`. */
 static uz_item *evict(uz_cache *cache)
 {
     uz_item *out = NULL, *item = cache->oldest;
     while (item && cache->bytes > cache->max_bytes) {
         uz_item *newer = item->newer;
-        if (item->users == 0) {
-            unlink_item(cache, item);
-            cache->bytes -= item->bytes;
-            item->older = out;
-            out = item;
-        }
+        if (item->users == 0)
+            out = take_out(cache, item, out);
         item = newer;
     }
     return out;
@@ -161,6 +165,19 @@ uz_status uz_table_acquire(uz_item **item, bool *create, uz_cache *cache, uz_ite
 done:
     pthread_mutex_unlock(&cache->mutex);
     return status;
+}
+
+void uz_table_forget(uz_cache *cache, uz_item_kind kind)
+{
+    uz_item *out = NULL;
+    pthread_mutex_lock(&cache->mutex);
+    for (uz_item *item = cache->oldest, *newer; item; item = newer) {
+        newer = item->newer;
+        if (item->users == 0 && item->kind == kind)
+            out = take_out(cache, item, out);
+    }
+    pthread_mutex_unlock(&cache->mutex);
+    destroy_all(out);
 }
 
 void uz_table_expect(uz_cache *cache, uz_item *item, size_t bytes)

@@ -23,6 +23,8 @@ void uz_table_abandon(uz_cache *cache, uz_item *item);
 /* Between acquire and publish: the object will take about so many bytes, which what nobody uses makes room for now, so
  * that the object can lie where that was. */
 void uz_table_expect(uz_cache *cache, uz_item *item, size_t bytes);
+/* Destroys what nobody uses of this kind. */
+void uz_table_forget(uz_cache *cache, uz_item_kind kind);
 /* NULL is fine. */
 void uz_table_release(uz_cache *cache, uz_item *item);
 

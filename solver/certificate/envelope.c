@@ -97,8 +97,8 @@ static int64_t columns(const uz_envelope *f, int64_t block)
     return first + UZ_ENVELOPE_BLOCK < f->n ? UZ_ENVELOPE_BLOCK : f->n - first;
 }
 
-/* Where the envelope ends below each block, and room for all of them. */
-static bool make_room(uz_envelope *f, const uz_csc *A)
+/* Where the envelope ends below each block, and where that begins in L. */
+static void find_envelope(uz_envelope *f, const uz_csc *A)
 {
     for (int64_t b = 0; b < f->blocks; b++)
         f->end[b] = b * UZ_ENVELOPE_BLOCK + columns(f, b);
@@ -114,8 +114,6 @@ static bool make_room(uz_envelope *f, const uz_csc *A)
             f->end[b] = f->end[b - 1];
         f->start[b + 1] = f->start[b] + columns(f, b) * (f->end[b] - b * UZ_ENVELOPE_BLOCK);
     }
-    f->L = uz_alloc_zero(f->start[f->blocks], sizeof *f->L);
-    return f->L != NULL;
 }
 
 static void fill(uz_envelope *f, const uz_csc *A)
@@ -151,17 +149,42 @@ static bool eliminate(uz_envelope *f, int64_t block, const double *own, double l
     return good;
 }
 
+/* All but L. */
+static bool order(uz_envelope *out, const uz_csc *A)
+{
+    const int64_t n = A->cols;
+    *out = (uz_envelope){.n = n, .blocks = (n + UZ_ENVELOPE_BLOCK - 1) / UZ_ENVELOPE_BLOCK};
+    out->place = uz_alloc(n, sizeof *out->place);
+    out->end = uz_alloc(out->blocks, sizeof *out->end);
+    out->start = uz_alloc(out->blocks + 1, sizeof *out->start);
+    if (!out->place || !out->end || !out->start || !order_dofs(out->place, A))
+        return false;
+    find_envelope(out, A);
+    return true;
+}
+
+double uz_envelope_bytes(const uz_envelope *f)
+{
+    return f->start ? 8.0 * (double)(2 * f->n + 2 * f->blocks + f->start[f->blocks]) : 0;
+}
+
+double uz_envelope_predict(const uz_csc *A)
+{
+    uz_envelope f;
+    const double bytes = order(&f, A) ? uz_envelope_bytes(&f) : 0;
+    uz_envelope_clear(&f);
+    return bytes;
+}
+
 uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, const double *size, double least,
                              const uz_stop *stop, uz_error *err)
 {
     const int64_t n = A->cols;
     *definite = false;
-    *out = (uz_envelope){.n = n, .blocks = (n + UZ_ENVELOPE_BLOCK - 1) / UZ_ENVELOPE_BLOCK};
-    out->place = uz_alloc(n, sizeof *out->place);
-    out->end = uz_alloc(out->blocks, sizeof *out->end);
-    out->start = uz_alloc(out->blocks + 1, sizeof *out->start);
-    double *own = uz_alloc(n, sizeof *own);
-    const bool room = out->place && out->end && out->start && own && order_dofs(out->place, A) && make_room(out, A);
+    const bool ordered = order(out, A);
+    double *own = ordered ? uz_alloc(n, sizeof *own) : NULL;
+    out->L = own ? uz_alloc_zero(out->start[out->blocks], sizeof *out->L) : NULL;
+    const bool room = out->L != NULL;
     if (room)
         fill(out, A);
     for (int64_t j = 0; j < n && room; j++)

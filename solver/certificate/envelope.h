@@ -25,5 +25,8 @@ uz_status uz_envelope_factor(uz_envelope *out, bool *definite, const uz_csc *A, 
 /* x (n) becomes L^-1 x, in the order of the factor: x'x is then x' A^-1 x. */
 void uz_envelope_forward(double *x, const uz_envelope *factor, double *room);
 void uz_envelope_clear(uz_envelope *factor);
+/* What it takes, with what finds its order: of a factor, or of that which A would have; 0: no memory to tell. */
+double uz_envelope_bytes(const uz_envelope *factor);
+double uz_envelope_predict(const uz_csc *A);
 
 #endif

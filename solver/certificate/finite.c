@@ -457,6 +457,13 @@ static uz_status add_turn(bool *known, work *w, double most, uz_error *err)
     return UZ_OK;
 }
 
+double uz_finite_certificate_bytes(const uz_body_model *model, const uz_csc *K)
+{
+    const double nodal = (double)(model->mesh.dim * model->mesh.n_nodes);
+    return 8.0 * (double)(K->ptr[K->cols] + model->K_fixed.ptr[model->K_fixed.cols]) + 24.0 * nodal +
+           24.0 * (double)model->d;
+}
+
 /* The factor of H, and with it the residual. */
 static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_error *err)
 {
@@ -482,6 +489,7 @@ static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_erro
                         w->f[j] += there * model->N.val[q] * w->of->g[model->N.idx[q]];
             uz_envelope_forward(w->f, &factor, w->room);
         }
+        out->bytes = uz_envelope_bytes(&factor) + uz_finite_certificate_bytes(model, K);
         uz_envelope_clear(&factor);
     }
     out->stopped = status == UZ_OK && !out->definite && uz_stop_is_due(w->stop); /* and so not definite */

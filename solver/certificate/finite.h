@@ -19,6 +19,7 @@ typedef struct {
 
 typedef struct {
     bool stopped;     /* before the end: nothing else is told */
+    double bytes;     /* what its tangent and its factor took */
     double energy;    /* strain energy, of the law's W */
     double least_det; /* of F, at quadrature points and corners */
     /* (f' H^-1 f + 2 |r'g|)^(1/2) over the root of twice the energy: H is the second derivatives of the Lagrangian with
@@ -41,5 +42,8 @@ typedef struct {
  * and those of obstacles. */
 uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *answer, const uz_stop *stop,
                             uz_error *err);
+
+/* What a certificate takes with the tangent K, but for its factor (envelope.h). */
+double uz_finite_certificate_bytes(const uz_body_model *model, const uz_csc *K);
 
 #endif

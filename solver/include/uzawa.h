@@ -121,6 +121,9 @@ typedef struct {
     double bytes, seconds;    /* matrices, factor and vectors together; all load cases */
     uz_operator op;
     bool fits; /* settings->memory_limit */
+    /* Bytes of an answer of kinematics AUTO that is compared with large deformation, which only the answer of small
+     * deformation tells; of kinematics FINITE `bytes` are those of it. 0: that is never done */
+    double compared_bytes;
 } uz_prediction;
 uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                      uz_error *err);

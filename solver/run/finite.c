@@ -21,7 +21,7 @@
 
 /* Parts are doubled after at most FEW contact problems. The smallest one, of the whole load while none of it is borne.
  */
-enum { FEW = 4, MOST_PARTS = 200, MOST_SOLID_DOFS = 20000 };
+enum { FEW = 4, MOST_PARTS = 200 };
 #define LEAST_PART (1.0 / 1024)
 /* Orderings and factors of tangents that are kept. */
 #define CACHE_BYTES ((size_t)256 << 20)
@@ -109,7 +109,7 @@ static bool copy_lists(uz_scene *scene, const uz_scene *from, const uz_finite_po
     return true;
 }
 
-/* What checks of the scene alone could not see. The certificate's factor is one within an envelope. */
+/* What checks of the scene alone could not see. */
 static uz_status check_body(const uz_body_model *base, const uz_scene *scene, uz_error *err)
 {
     char where[96];
@@ -130,12 +130,7 @@ static uz_status check_body(const uz_body_model *base, const uz_scene *scene, uz
                            "finite kinematics have no contact of a surface with itself; name two surfaces without "
                            "common sides");
     }
-    if (base->kind != UZ_SOLID || base->d <= MOST_SOLID_DOFS)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_SCENE, "/mesh",
-                   "finite kinematics of solids have at most %d dofs, and this mesh has %lld: use a coarser one, or "
-                   "the kinematics \"moving\"",
-                   MOST_SOLID_DOFS, (long long)base->d);
+    return UZ_OK;
 }
 
 static uz_status begin_load(uz_finite_run *run, uz_error *err)

@@ -33,6 +33,9 @@ uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const
 uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const uz_settings *settings,
                                const uz_hooks *hooks, double started, uz_error *err);
 
+/* May an answer with d dofs be one of large deformation, or be compared with it? */
+bool uz_may_be_compared(const uz_scene *scene, int64_t d);
+
 /* ---- shared by the files above */
 
 /* One load. small: an answer that is to be compared, in the result's summary.small; NULL: none. */
@@ -145,6 +148,9 @@ uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *fro
 
 /* *out: the answer run->at under run->load. why: of the part beyond it that was tried last, `tried`. */
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err);
+/* What a run holds, beside the largest of what its contact problems and its certificates take. rows: a body moved to a
+ * place, NULL: not there yet. */
+double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, bool pairs);
 /* How far the answer `small` is off from *result, that of run (uz_small). */
 uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, const uz_result *small);
 

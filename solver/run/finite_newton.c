@@ -23,6 +23,7 @@
 #include "linalg/blas.h"
 #include "linalg/linalg.h"
 #include "assembly/parts.h"
+#include "cache/table.h"
 #include "obstacle/obstacle.h"
 #include "run/solve.h"
 
@@ -291,6 +292,13 @@ static bool add_more(double *hold, double *shift, bool rows)
     return *shift <= MOST_SHIFT;
 }
 
+/* Another tangent has another factor; its ordering stays. */
+static void forget_factors(uz_finite_run *run)
+{
+    uz_table_forget(run->cache, UZ_ITEM_SETUP); /* which use factors */
+    uz_table_forget(run->cache, UZ_ITEM_FACTOR);
+}
+
 static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
 {
     uz_csc *K = &run->tangent.K;
@@ -317,6 +325,7 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         pressed = pressed || run->r[i] < 0;
     while (more && (status == UZ_ERR_NOT_SPD || status == UZ_ERR_FREE_BODY)) {
         const double start = uz_seconds();
+        forget_factors(run);
         uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u, step);
         uz_error_reset(&own);
         status = add_curvature(run, &own);
@@ -418,6 +427,7 @@ static uz_status ask_certificate(bool *done, uz_part *out, uz_finite_run *run, u
     uz_finite_certificate *c = &run->certificate;
     const double start = uz_seconds();
     const uz_stop stop = {&run->hooks, run->deadline};
+    forget_factors(run); /* its own takes more */
     const uz_status status = uz_certify_finite(c, &answer, &stop, err);
     run->spent.certify += uz_seconds() - start;
     const double length = 1e-9 * run->base.mesh.extent;

@@ -5,6 +5,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "linalg/linalg.h"
 #include "post/evaluate.h"
 #include "run/results.h"
 
@@ -142,6 +143,17 @@ static uz_status take_rows(uz_result *result, const uz_finite_run *run, uz_error
     return uz_mesh_info_copy(&result->mesh, &rows->info, m, err);
 }
 
+double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, bool pairs)
+{
+    enum { NODAL = 16, FREE = 12 }; /* places, steps and what is gone back to, by node and by dof */
+    uz_body_model place = rows ? *rows : *base;
+    const double n = (double)(base->mesh.dim * base->mesh.n_nodes),
+                 values = (double)(base->K.ptr[base->d] + base->K_fixed.ptr[base->K_fixed.cols]);
+    place.is_place = true;
+    return (double)uz_body_model_bytes(base) + 2 * (double)uz_body_model_bytes(&place) + 8 * values +
+           (pairs ? (double)uz_csc_bytes(&base->K) : 0) + 8 * (NODAL * n + FREE * (double)base->d);
+}
+
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err)
 {
     uz_result *result = uz_alloc_zero(1, sizeof *result);
@@ -152,6 +164,8 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
     else if (run->from)
         result->summary = run->from->last;
     summarize(&result->summary, run, why, tried);
+    double *bytes = &result->summary.cost.actual_bytes;
+    *bytes = fmax(*bytes, run->certificate.bytes) + uz_finite_bytes(&run->base, &run->at.rows, run->pairs);
     uz_status status = take_rows(result, run, err);
     if (status == UZ_OK)
         status = uz_evaluate_finite(result, &run->at.rows, &run->scene, run->at.force, run->at.body.energy, err);

@@ -2,7 +2,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "dual/form.h"
+#include "certificate/envelope.h"
 #include "run/cost.h"
+#include "run/finite.h"
 #include "dual/dual.h"
 #include "factor/factor.h"
 #include "run/rows.h"
@@ -52,6 +54,20 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, c
     if (!uz_dual_form_of(out->op)->can.needs_factor)
         out->factor_nnz = 0;
     return UZ_OK;
+}
+
+/* What large deformation takes: the largest of its contact problems, about as that of small deformation, and of its
+ * certificate. */
+static void predict_finite(uz_prediction *out, const uz_body_model *model, const uz_scene *scene)
+{
+    if (model->brick || !uz_may_be_compared(scene, model->d))
+        return;
+    const double certificate = uz_envelope_predict(&model->K) + uz_finite_certificate_bytes(model, &model->K);
+    const double bytes = uz_finite_bytes(model, NULL, uz_has_pairs(scene)) + fmax(out->bytes, certificate);
+    if (scene->kinematics == UZ_KINEMATICS_FINITE)
+        out->bytes = bytes;
+    else
+        out->compared_bytes = out->bytes + bytes;
 }
 
 /* N of a scene with the rows that its solve begins with; *all: how many there are. */
@@ -115,6 +131,8 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
             status =
                 predict(out, &model.K, &N, model.brick, problem->scene.box.dim, problem->n_cases, settings, hooks, err);
         }
+        if (status == UZ_OK)
+            predict_finite(out, &model, &problem->scene);
         uz_csc_clear(&N);
         uz_body_model_clear(&model);
     } else if (status == UZ_OK) {

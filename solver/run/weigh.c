@@ -30,6 +30,21 @@
 
 /* ---- which answers are looked at */
 
+static bool has_orthotropic(const uz_scene *scene)
+{
+    bool has = false;
+    for (int64_t k = 0; k < scene->n_materials && !has; k++)
+        has = scene->materials[k].is_orthotropic;
+    return has;
+}
+
+bool uz_may_be_compared(const uz_scene *scene, int64_t d)
+{
+    const bool small = scene->model != UZ_SOLID || d <= UZ_MOST_FINITE_DOFS;
+    return small && uz_has_finite_model(scene) && !has_orthotropic(scene) &&
+           (scene->kinematics == UZ_KINEMATICS_FINITE || scene->kinematics == UZ_KINEMATICS_AUTO);
+}
+
 static bool is_asked(const uz_result *result, const uz_problem *one, bool own_laws)
 {
     const uz_summary *s = &result->summary;
@@ -39,9 +54,8 @@ static bool is_asked(const uz_result *result, const uz_problem *one, bool own_la
         return false;
     if (own_laws)
         return e->nonlinear > UZ_SURELY_SMALL || s->geometry.sliding > SLIDES;
-    for (int64_t k = 0; k < one->scene.n_materials; k++)
-        if (one->scene.materials[k].is_orthotropic) /* there is no law to compare with: a warning has told */
-            return false;
+    if (has_orthotropic(&one->scene)) /* there is no law to compare with: a warning has told */
+        return false;
     if (one->scene.n_ties > 0)
         return false;
     for (int64_t k = 0; k < one->scene.n_supports; k++)

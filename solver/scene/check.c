@@ -134,7 +134,9 @@ uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_err
     uz_status status = uz_check_finite_body(scene, err);
     if (status == UZ_OK)
         status = uz_check_materials(scene, mesh, err);
-    return status == UZ_OK ? check_supports_and_contacts(scene, mesh, err) : status;
+    if (status == UZ_OK)
+        status = check_supports_and_contacts(scene, mesh, err);
+    return status == UZ_OK ? uz_check_finite_size(scene, mesh, err) : status;
 }
 
 /* ---- loads */

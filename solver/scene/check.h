@@ -34,4 +34,8 @@ uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err);
 bool uz_expands(const uz_material *material);
 uz_status uz_check_materials(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
 
+/* Solids that are or may become ones of finite kinematics: not more dofs than those have. The groups of supports are
+ * there. */
+uz_status uz_check_finite_size(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
+
 #endif

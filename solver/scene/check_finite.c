@@ -2,9 +2,12 @@
  * what a scene has would be a wrong one. */
 #include "scene/check.h"
 
+#include "core/alloc.h"
 #include "core/error.h"
 #include "scene/scene.h"
 
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 bool uz_has_finite_law(const uz_scene *scene)
@@ -137,6 +140,35 @@ uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err)
 {
     const uz_status status = check_laws(scene, err);
     return status == UZ_OK && uz_may_be_finite(scene) ? check_body(scene, err) : status;
+}
+
+uz_status uz_check_finite_size(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
+{
+    int64_t d = 3 * mesh->n_nodes;
+    if (scene->model != UZ_SOLID || !uz_may_be_finite(scene) || d <= UZ_MOST_FINITE_DOFS)
+        return UZ_OK;
+    unsigned char *held = uz_alloc_zero(mesh->n_nodes, sizeof *held); /* bits of axes; the fourth: of a direction */
+    if (!held)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the supports of %lld nodes", (long long)mesh->n_nodes);
+    for (int64_t k = 0; k < scene->n_supports; k++) {
+        const uz_support *support = &scene->supports[k];
+        const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", NULL);
+        unsigned axes = support->kind == UZ_SUPPORT_NORMAL ? 8 : 0;
+        for (int c = 0; c < 3; c++)
+            axes |= support->kind == UZ_SUPPORT_COMPONENTS && !isnan(support->u[c]) ? 1u << c : 0u;
+        for (int64_t i = 0; group && i < uz_group_node_count(mesh, group); i++)
+            held[uz_group_node_at(group, i)] |= (unsigned char)axes;
+    }
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        for (unsigned axes = held[a]; axes; axes >>= 1)
+            d -= axes & 1;
+    free(held);
+    if (d <= UZ_MOST_FINITE_DOFS)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_SCENE, "/mesh",
+                   "finite kinematics of solids have at most %d dofs, and this mesh has %lld: use a coarser one, or "
+                   "the linear law with the kinematics \"moving\"",
+                   UZ_MOST_FINITE_DOFS, (long long)d);
 }
 
 uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err)

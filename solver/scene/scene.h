@@ -20,6 +20,9 @@ bool uz_is_finite_answer(const uz_scene *scene);
 /* Is there a model of large deformation for it, with laws of finite strain? (check_finite.c) */
 bool uz_has_finite_model(const uz_scene *scene);
 
+/* Of solids: the certificate's factor is one within an envelope. */
+#define UZ_MOST_FINITE_DOFS 20000
+
 /* Does it turn its group? */
 bool uz_support_turns(const uz_support *support);
 

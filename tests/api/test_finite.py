@@ -273,6 +273,22 @@ def test_a_block_slides_over_another(s):
         expect(s.get(f"/v1/jobs/{there[0]}/{of}"), 200)
 
 
+def test_what_a_comparison_takes_is_predicted(s):
+    """By ?validate=true, within a fifth of what is counted: of finite kinematics, and of auto where it compares."""
+    cube = block(model="solid", mesh={"box": {"size": [1, 1, 1], "cells": [10, 10, 10]}}, supports=[{"on": "top", "ux": 0, "uy": -0.2, "uz": 0}],
+                 contacts=[{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}}])
+    for law, kinematics in (("neo_hooke", "finite"), ("neo_hooke", "auto"), ("linear", "auto")):
+        cube["problem"]["kinematics"] = kinematics
+        cube["problem"]["materials"][0]["law"] = law
+        predicted = expect(s.post(cube, query="?validate=true"), 200).json["predicted"]
+        counted = answer(s, cube, "summary")[1]["summary"]["cost"]["actual"]["bytes"]
+        told = predicted["bytes" if kinematics == "finite" else "compared_bytes"]
+        check(counted / 1.2 < told < 1.2 * counted, law, kinematics, predicted, counted)
+        check(("compared_bytes" in predicted) == (kinematics == "auto"), predicted)
+    cube["problem"]["kinematics"] = "fixed"
+    check("compared_bytes" not in expect(s.post(cube, query="?validate=true"), 200).json["predicted"])
+
+
 def test_auto_is_there_for_all_models(s):
     """Squeezed by 30 % and by 0.2 %: a plate, a ring, a cube, and one body on another."""
     def scene(model, by):
@@ -313,6 +329,11 @@ def test_what_is_not_modelled_is_refused(s):
              (block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "/problem/mesh/refine", "give a mesh"),
              ({**block(), "solver": {"accuracy": {"total": 0.1}}}, "/solver/accuracy", "compare meshes"),
              ({**block(), "quantities": [{"quantity": "contact.force"}]}, "/quantities", "compare meshes")]
+    large = {"model": "solid", "mesh": {"box": {"size": [1, 1, 1], "cells": [20, 20, 20]}}, "supports": [{"on": "top", "ux": 0, "uy": -0.1, "uz": 0}],
+             "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}}]}
+    for kinematics in ("auto", "finite"):
+        reply = s.post(block(kinematics=kinematics, **large))
+        check(reply.status == 422 and reply.json["pointer"] == "/problem/mesh" and "at most 20000 dofs, and this mesh has 26460" in reply.json["detail"], reply.json)
     for body, pointer, remedy in asked:
         reply = s.post(body)
         if reply.status == 202:

@@ -462,3 +462,48 @@ TEST(what_there_is_no_model_for_is_refused)
     }
     uz_cache_free(cache);
 }
+
+/* ---- memory */
+
+/* Of this process, in bytes: "VmRSS", "VmHWM". */
+static double resident(const char *key)
+{
+    char line[200];
+    double kilobytes = 0;
+    FILE *file = fopen("/proc/self/status", "r");
+    while (file && fgets(line, sizeof line, file))
+        if (strncmp(line, key, strlen(key)) == 0)
+            kilobytes = strtod(line + strlen(key) + 1, NULL);
+    if (file)
+        fclose(file);
+    return 1024 * kilobytes;
+}
+
+/* What is told is what the process grows by: bodies, tangent and certificate, with one factor at a time. */
+TEST(what_a_comparison_takes_is_counted)
+{
+    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){1, 1, 1}, (int64_t[3]){12, 12, 12});
+    s.materials[0].young = 1;
+    s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+    body_hold(&s, "top", 0, -0.2, 0);
+    body_plane(&s, "bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+    const uz_settings settings = uz_settings_default();
+    uz_prediction predicted;
+    uz_result *result = NULL;
+    uz_error err = {0};
+    uz_cache *cache = uz_cache_new((size_t)1 << 30);
+    CHECK(uz_predict(&predicted, &problem, &settings, NULL, &err) == UZ_OK);
+    FILE *reset = fopen("/proc/self/clear_refs", "w"); /* 5: the highest is what there is now */
+    const bool known = reset && fputs("5", reset) >= 0 && fclose(reset) == 0 && !SANITIZED;
+    const double before = resident("VmRSS");
+    CHECK_MSG(uz_solve(&result, &problem, &settings, cache, NULL, &err) == UZ_OK, "%s", err.message);
+    const double grown = resident("VmHWM") - before, counted = result->summary.cost.actual_bytes;
+    CHECK(result->summary.small.compared);
+    CHECK_MSG(!known || (grown < 1.25 * counted && counted < 1.25 * grown), "%g grown, %g counted", grown, counted);
+    CHECK_MSG(predicted.compared_bytes < 1.2 * counted && counted < 1.2 * predicted.compared_bytes,
+              "%g predicted, %g counted", predicted.compared_bytes, counted);
+    uz_result_free(result);
+    uz_cache_free(cache);
+    uz_scene_clear(&s);
+}
