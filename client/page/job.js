@@ -12,7 +12,7 @@ import { menu_button } from "./menu.js";
 import { show_precision } from "./precision.js";
 import { refine_form } from "./refine.js";
 import { timings_bar } from "./timings.js";
-import { failure_card, verdict_card } from "./verdict.js";
+import { failure_card, numbers_card, verdict_card } from "./verdict.js";
 import { show_whole_error } from "./whole_error.js";
 import { grid_words, has_ended, state_words, title_of } from "./words.js";
 
@@ -33,10 +33,11 @@ class JobView {
     this.precision = h("section", { "aria-label": "Time against certified error", id: "precision", hidden: true });
     this.whole = h("section", { "aria-label": "Whole error and its price", id: "whole", hidden: true });
     this.body = h("section", { "aria-label": "Body", hidden: true });
+    this.numbers = h("section", { "aria-label": "Numbers", hidden: true });
     this.downloads = h("section", { "aria-label": "Downloads", hidden: true });
     this.cases_place = h("section", { "aria-label": "Load cases", id: "cases", hidden: true });
     this.request_place = h("section", { "aria-label": "Request", id: "request" });
-    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.body, this.cases_place, this.whole, this.convergence_place,
+    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.body, this.numbers, this.cases_place, this.whole, this.convergence_place,
       this.precision, this.timings, this.request_place, this.downloads));
     this.show_request();
   }
@@ -166,6 +167,8 @@ class JobView {
     if (job.summary?.cases && !this.cases.length) await this.load_cases().catch((error) => this.complain(error));
     show(this.verdict, job.status === "failed" ? failure_card(job) : this.summary() ? verdict_card(this.summary())
       : h("p", { class: "muted" }, "It was stopped before there was an answer."));
+    this.numbers.hidden = !this.summary();
+    if (this.summary()) show(this.numbers, numbers_card(this.summary()));
     if (this.summary()?.timings_s) {
       this.timings.hidden = false;
       show(this.timings, h("h2", null, `Where ${seconds(this.summary().timings_s.total)} went`), timings_bar(this.summary().timings_s));

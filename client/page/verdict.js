@@ -100,8 +100,13 @@ export function verdict_card(summary) {
     h("p", { class: whole ? "" : "certificate", id: "certificate" }, certificate_words(summary)),
     kinematics ? h("p", { id: "kinematics" }, kinematics) : null,
     h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
-    quantities_of(summary), contacts_of(summary), hint_of(summary), warnings_of(summary), assertions_of(summary),
-    h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));
+    quantities_of(summary), hint_of(summary), warnings_of(summary), assertions_of(summary));
+}
+
+/** What else is known of it: less than the body itself tells. */
+export function numbers_card(summary) {
+  return [h("h2", null, "Numbers"), contacts_of(summary),
+    h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value))))];
 }
 
 /** The card of a job that has no answer. */
