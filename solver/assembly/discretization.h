@@ -33,8 +33,7 @@ typedef struct {
     double gap;                /* before anything moves, but for n . offset, which waits for the load */
     double offset[3], from[3]; /* offset is the node's place less `from`; both 0 where the gap is known */
     int slaves, masters;
-    const int64_t *slave,
-        *master; /* they live as long as the sites, or are the row's own `node`: rows are not copied */
+    const int64_t *slave, *master; /* live as long as the sites, or are the row's own `node`: rows are not copied */
     const double *slave_share, *master_share; /* D_j and M_k */
     const double *place; /* n_nodes x dim: the displacement at which the gap is taken, along the axes; NULL: none */
 } uz_contact_row;
@@ -45,8 +44,7 @@ typedef struct {
     /* Once per body and place: fills the sites (zeroed), from which rows follow. On failure they are cleared by the
      * caller. */
     uz_status (*find)(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err);
-    /* The row of a place, for the contact of this load; false: there is none. One at a hanging node is taken for none.
-     */
+    /* The row of a place, for the contact of this load; false: there is none, as at a hanging node. */
     bool (*row)(uz_contact_row *row, const uz_contact_input *in, const uz_contact_sites *sites, int64_t place);
     /* area (places): the part of the surface that the reaction of each place acts on. False: no memory. */
     bool (*areas)(double *area, const uz_contact_input *in);

@@ -172,7 +172,7 @@ static void check_active(subject *s, bool bounds)
     const int64_t d = s->dual->d, m = s->dual->m;
     double *r = vector(m), *g = vector(m), *Dr = vector(m), *gap = vector(m), *u = vector(d);
     bool *active = calloc((size_t)m, sizeof *active);
-    uz_active_end end;
+    uz_active_end end = UZ_ACTIVE_UNSOLVED;
     uz_error err = {0};
     int64_t count = 0;
     if (!uz_dual_load_guess_active(s->load, active))
