@@ -11,7 +11,8 @@ typedef struct {
     int64_t k_entries; /* of K's lower triangle */
     int64_t n_entries; /* of N */
     int modes;         /* of the near-null space */
-    bool bounds;       /* the active set is to solve with the free dofs only */
+    bool active_set;   /* the active set is to solve */
+    bool bounds;       /* and with the free dofs only */
     double by_cells;   /* bytes of a multigrid on equal cells, where K has its diagonal only; else 0 */
     int64_t cases;     /* loads on the body */
 } uz_cost_size;

@@ -605,6 +605,8 @@ static bool guess_active(uz_dual_load *load, bool *active)
 #define STEP_CYCLES     11.0
 #define SWEPT_CYCLES    30.0
 #define CHANGE_CYCLES   6.0
+/* Of a guess of rows between two bodies, whose answer is found within them. */
+#define GUESS_CYCLES 22.0
 /* As UZ_COST_VECTORS, with conjugate gradients; not all of them at the time of what a guess of bounds takes. */
 #define VECTORS        62.0
 #define BOUNDS_VECTORS 53.0
@@ -635,9 +637,10 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     }
     double cycle = CYCLE_PASSES * (double)size->k_entries * rates->entry_s, setup = CREATE_CYCLES + SPECTRUM_CYCLES;
     const bool sweeps = size->bounds && !are_few(size->m, size->d);
-    double load = SOLVE_CYCLES + (size->m == 0   ? 0.0
-                                  : size->bounds ? STEPS * (sweeps ? SWEPT_CYCLES : STEP_CYCLES)
-                                                 : UZ_COST_ITERATIONS * CHANGE_CYCLES);
+    double load = SOLVE_CYCLES + (size->m == 0       ? 0.0
+                                  : size->bounds     ? STEPS * (sweeps ? SWEPT_CYCLES : STEP_CYCLES)
+                                  : size->active_set ? STEPS * GUESS_CYCLES
+                                                     : UZ_COST_ITERATIONS * CHANGE_CYCLES);
     double levels = uz_amg_predict_bytes(size->d, size->k_entries, size->modes);
     cost->setup_s += setup * cycle;
     cost->case_s += load * cycle;
@@ -658,7 +661,9 @@ static void add_cost_distributed(uz_cost_estimate *cost, const uz_cost_size *siz
                                  const uz_cost_rates *rates)
 {
     uz_cost_estimate alone = *cost;
-    add_cost(&alone, size, factor, rates);
+    uz_cost_size iterated = *size; /* it has no answers within rows between two bodies */
+    iterated.active_set = size->bounds;
+    add_cost(&alone, &iterated, factor, rates);
     cost->setup_s += (alone.setup_s - cost->setup_s) * SLOWER / PROCESSES;
     cost->case_s += (alone.case_s - cost->case_s) * SLOWER / PROCESSES;
     cost->flops = alone.flops;

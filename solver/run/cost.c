@@ -123,6 +123,7 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_brick *b
                           .k_entries = K->ptr[K->cols],
                           .n_entries = N->ptr[N->cols],
                           .modes = dim == 3 ? 6 : 3,
+                          .active_set = by_active_set,
                           .bounds = by_active_set && uz_dual_bounds_dofs(N),
                           .by_cells = brick ? uz_brick_predict_bytes(brick) : 0.0,
                           .cases = cases};
