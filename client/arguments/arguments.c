@@ -171,7 +171,6 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             .timeout_s = INFINITY,
                             .retry_s = -1,
                             .time_limit_s = NAN,
-                            .size = NAN,
                             .tolerance = -1,
                             .max_iterations = -1,
                             .limit = 20,

@@ -21,7 +21,7 @@ typedef struct {
     uz_words tags, set, vary, fields, with;
     const char *K, *N, *h, *p, *mesh, *surface; /* files; NULL: not given */
     bool leave_out;                             /* of a deck */
-    double size;                                /* of elements, of a part from CAD; NAN: not given */
+    double size;                                /* of elements, of a part from CAD; 0: not given */
     const char *from, *to;                      /* points, as written */
     const char *name, *key, *format, *output, *status, *colour, *factor, *axis;
     const char *case_name, *accuracy;                /* accuracy: a number or a level, as written */

@@ -2,7 +2,6 @@
 #include "request/paths.h"
 #include "request/tags.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -128,7 +127,7 @@ static client_exit find_mesh(client_session *s, const char **of_mesh)
                                "a FILE from CAD is the mesh: leave --mesh out, or let FILE be the scene");
     if (cad && !(o->size > 0))
         return client_complain(s, CLIENT_USAGE, "a part from CAD wants --size, the length of its elements in mm");
-    if (!cad && !isnan(o->size))
+    if (!cad && o->size > 0)
         return client_complain(s, CLIENT_USAGE, "--size is of a part from CAD, such as a STEP file");
     return CLIENT_OK;
 }
@@ -280,7 +279,7 @@ client_exit client_build(client_session *s, client_bodies *out)
     if (o->operand && !made && !client_file_read(&file, o->operand, message, sizeof message))
         return client_complain(s, CLIENT_LOCAL, message);
     if (o->K || o->N || o->h || o->p || o->mesh || o->surface || o->set.count || o->vary.count || o->name ||
-        !isnan(o->size) || made) {
+        o->size > 0 || made) {
         code = build_edited(s, out, &file);
     } else {
         out->item = calloc(1, sizeof *out->item);
