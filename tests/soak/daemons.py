@@ -349,9 +349,9 @@ def mixture(build, affinity_s, jobs, bodies, cells, cache, clients=16, seed=7):
                 "missed": sum(metric(one, "uzawad_cache_misses_total") for one in daemons), "asked": len(set(asked))}
 
 
-def zipf(build, jobs, bodies=200, cells=(16, 16, 10), cache="3000M"):
+def zipf(build, jobs, bodies=200, cells=(20, 20, 12), cache="6000M"):
     """The same jobs where the factor of their body is, and wherever it happens. A cache has room for a third of the bodies
-    (of 45 MB each), so that the three together have all of them once; few jobs of many bodies are mostly their first."""
+    (of 93 MB each), so that the three together have all of them once; few jobs of many bodies are mostly their first."""
     near = mixture(build, 5, jobs, bodies, list(cells), cache)
     far = mixture(build, 0, jobs, bodies, list(cells), cache)
     could = jobs - near["asked"]

@@ -46,7 +46,7 @@ RUNS = [
     ("three daemons and PostgreSQL: 500 faults, 16 posting clients", lambda b: daemons.faults(b, 500)),
     ("two daemons: one dies", daemons.node_dies),
     ("three daemons: upgrade from the version before", daemons.upgrade),
-    ("three daemons: 1,500 jobs of 200 bodies", lambda b: daemons.zipf(b, 1500)),
+    ("three daemons: 1,500 jobs of 200 bodies", lambda b: daemons.zipf(b, 1500, cells=(16, 16, 10), cache="3000M")),
     ("30 x 10 body, default solver, PostgreSQL", lambda b: daemons.throughput(b, 20, True)),
     ("1,000 power losses, faults at every write, 1,000 damaged files", lambda b: unit(b, "test_store_faults", 10)),
     ("1,000 slow clients, /healthz", lambda b: scenarios.slow_clients(b, 1000, 20)),
