@@ -128,29 +128,14 @@ bool uz_mortar_add_point(uz_mortar_points *points, const uz_mortar_point *p)
 
 /* ---- rows */
 
-/* The integrals that rows are made of, by place; the masters' by entries. */
+/* The integrals that rows are made of, by place. */
 typedef struct {
     double *D, *whole, *gap; /* whole: of the shape function over all of its sides ... */
     double *around;          /* ... and their areas */
     double *least;           /* gaps below it are none that points of the place's sides have */
     double *most;            /* the largest share that a master side has, by which the row is told */
-    int64_t entries, room, *place, *node;
-    double *value;
+    uz_entries masters;      /* node, place */
 } integrals;
-
-static bool add_master(integrals *to, int64_t place, int64_t node, double value)
-{
-    if (to->entries == to->room) {
-        const int64_t room = 2 * to->room + 1024;
-        if (!uz_triplets_grow(&to->place, &to->node, &to->value, room))
-            return false;
-        to->room = room;
-    }
-    to->place[to->entries] = place;
-    to->node[to->entries] = node;
-    to->value[to->entries++] = value;
-    return true;
-}
 
 /* Orthonormal columns by Gram and Schmidt, twice for rounding: A (count x n, by columns) = Q R, R by columns. False: a
  * column is nothing new but for rounding. */
@@ -248,7 +233,7 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_pai
             double sum = 0;
             for (int b = 0; b < other->nodes; b++) {
                 sum += M[a][b];
-                if (!add_master(to, place, other->node[b], M[a][b]))
+                if (!uz_entries_add(&to->masters, other->node[b], place, M[a][b]))
                     return false;
             }
             if (fabs(sum) > to->most[place]) {
@@ -326,8 +311,8 @@ static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const 
     const int dim = model->mesh.dim;
     uz_csc M = {0};
     int64_t kept = 0, most = 0;
-    uz_status status =
-        uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, of->entries, of->node, of->place, of->value, err);
+    uz_status status = uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, of->masters.n, of->masters.row,
+                                            of->masters.col, of->masters.val, err);
     if (status != UZ_OK)
         return status;
     /* Where what covers a part of a side is far and steep, as the arm of a fold over its bend, the gap at the other end
@@ -411,9 +396,7 @@ static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_err
     const uz_status status =
         room ? fill_sites(sites, &of, &pair->surface, model, err) : uz_no_memory(err, UZ_OF_SURFACES);
     free(of.D);
-    free(of.place);
-    free(of.node);
-    free(of.value);
+    uz_entries_clear(&of.masters);
     return status;
 }
 

@@ -199,20 +199,6 @@ static void match_rows(moved_rows *out, const work *w, const uz_body_model *move
     }
 }
 
-static bool add_entry(uz_entries *out, int64_t row, int64_t col, double value)
-{
-    if (out->n == out->room) {
-        const int64_t room = 2 * out->room + 4096;
-        if (!uz_triplets_grow(&out->row, &out->col, &out->val, room))
-            return false;
-        out->room = room;
-    }
-    out->row[out->n] = row;
-    out->col[out->n] = col;
-    out->val[out->n++] = value;
-    return true;
-}
-
 /* What two places on either side say of the pressed rows: each depends on one of the moved nodes at most. */
 static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2], int64_t color, int c)
 {
@@ -232,7 +218,7 @@ static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2],
         const int64_t row = w->pressed[j], own = uz_csc_find(&w->rows->N, row, dof);
         const double change = (side[1].gap[j] - side[0].gap[j]) / (2 * w->by),
                      along = own < 0 ? 0 : w->rows->N.val[own];
-        if (fabs(change + along) > ROUNDING && !add_entry(&out->gap, row, dof, change + along))
+        if (fabs(change + along) > ROUNDING && !uz_entries_add(&out->gap, row, dof, change + along))
             return false;
         for (int s = 0; s < 2; s++)
             for (int64_t q = side[s].rows.ptr[side[s].at[j]]; q < side[s].rows.ptr[side[s].at[j] + 1]; q++)
@@ -242,7 +228,8 @@ static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2],
                 const int64_t i = side[s].rows.idx[q];
                 const double slope = w->sum[i] / (2 * w->by);
                 w->sum[i] = 0;
-                if (fabs(slope) * w->by > ROUNDING * MOVED_BY && !add_entry(&out->force, i, dof, w->r[row] * slope))
+                if (fabs(slope) * w->by > ROUNDING * MOVED_BY &&
+                    !uz_entries_add(&out->force, i, dof, w->r[row] * slope))
                     return false;
             }
     }
@@ -352,18 +339,10 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
     return status;
 }
 
-static void clear_entries(uz_entries *e)
-{
-    free(e->row);
-    free(e->col);
-    free(e->val);
-    memset(e, 0, sizeof *e);
-}
-
 void uz_row_turn_clear(uz_row_turn *turn)
 {
-    clear_entries(&turn->force);
-    clear_entries(&turn->gap);
+    uz_entries_clear(&turn->force);
+    uz_entries_clear(&turn->gap);
 }
 
 void uz_add_entries(double *y, const uz_entries *of, const double *x, bool skew)
@@ -387,21 +366,21 @@ uz_status uz_widen_by_rows(uz_csc *out, const uz_csc *K, const uz_csc *N, const 
     bool room = true;
     for (int64_t j = 0; j < K->cols && status == UZ_OK && room; j++)
         for (int64_t q = K->ptr[j]; q < K->ptr[j + 1] && room; q++)
-            room = add_entry(&all, K->idx[q], j, K->val[q]);
+            room = uz_entries_add(&all, K->idx[q], j, K->val[q]);
     for (int64_t i = 0; i < N->rows && status == UZ_OK && room && r; i++)
         for (int64_t p = rows.ptr[i]; p < rows.ptr[i + 1] && r[i] < -least; p++)
             for (int64_t q = rows.ptr[i]; q <= p && room; q++)
-                room = add_entry(&all, rows.idx[p], rows.idx[q], 0);
+                room = uz_entries_add(&all, rows.idx[p], rows.idx[q], 0);
     for (int64_t k = 0; turn && k < turn->force.n && status == UZ_OK && room; k++) {
         const int64_t i = turn->force.row[k], j = turn->force.col[k];
         const double value = turn->force.val[k];
-        room = add_entry(&all, i > j ? i : j, i > j ? j : i, i == j ? -value : -0.5 * value);
+        room = uz_entries_add(&all, i > j ? i : j, i > j ? j : i, i == j ? -value : -0.5 * value);
     }
     if (status == UZ_OK && !room)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stiffness of %lld dofs", (long long)K->cols);
     if (status == UZ_OK)
         status = uz_csc_from_triplets(out, K->rows, K->cols, all.n, all.row, all.col, all.val, err);
-    clear_entries(&all);
+    uz_entries_clear(&all);
     uz_csc_clear(&rows);
     return status;
 }

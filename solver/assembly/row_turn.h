@@ -4,11 +4,7 @@
 
 #include "assembly/assembly.h"
 #include "core/hooks.h"
-
-typedef struct {
-    int64_t n, room, *row, *col;
-    double *val;
-} uz_entries;
+#include "linalg/linalg.h"
 
 /* force: the derivative of N(u)' r in the free dofs, r fixed, d x d and not symmetric: rows of two surfaces
  * (assembly/mortar.h) are not the derivatives of one energy. gap: what the derivative of the gaps, m x d, is off -N, of

@@ -24,26 +24,6 @@
 /* Shares below this are rounding. */
 #define ROUNDING 1e-13
 
-/* Slave, master, area times weight. */
-typedef struct {
-    int64_t n, room, *master, *slave;
-    double *value;
-} entries;
-
-static bool add_entry(entries *to, int64_t slave, int64_t master, double value)
-{
-    if (to->n == to->room) {
-        const int64_t room = 2 * to->room + 1024;
-        if (!uz_triplets_grow(&to->master, &to->slave, &to->value, room))
-            return false;
-        to->room = room;
-    }
-    to->master[to->n] = master;
-    to->slave[to->n] = slave;
-    to->value[to->n++] = value;
-    return true;
-}
-
 static double longest_edge(const uz_body_model *model, uz_face face)
 {
     uz_side side;
@@ -81,7 +61,8 @@ static uz_status find_sites(uz_contact_sites *sites, const uz_body_model *model,
     return status;
 }
 
-static uz_status add_tie(entries *to, const uz_body_model *model, const uz_tie *tie, int64_t k, uz_error *err)
+/* Adds the masters of each slave, by area times weight. */
+static uz_status add_tie(uz_entries *to, const uz_body_model *model, const uz_tie *tie, int64_t k, uz_error *err)
 {
     uz_contact_sites sites = {.n = 0};
     char where[64];
@@ -94,7 +75,7 @@ static uz_status add_tie(entries *to, const uz_body_model *model, const uz_tie *
         const double near = tie->tolerance > 0 ? tie->tolerance : NEAR * longest_edge(model, sites.face[p]);
         nearest = fmin(nearest, fabs(sites.gap[p]));
         for (int64_t q = sites.first[p]; q < sites.first[p + 1] && fabs(sites.gap[p]) <= near; q++)
-            if (!add_entry(to, sites.at[p], sites.node[q], sites.area[p] * sites.weight[q]))
+            if (!uz_entries_add(to, sites.node[q], sites.at[p], sites.area[p] * sites.weight[q]))
                 status = uz_no_memory(err, "ties");
     }
     snprintf(where, sizeof where, "/ties/%lld", (long long)k);
@@ -128,7 +109,7 @@ uz_status uz_find_tied(uz_body_model *model, const uz_scene *scene, uz_error *er
 {
     const int64_t n = model->mesh.n_nodes;
     uz_tied *tied = &model->tied;
-    entries all = {.n = 0};
+    uz_entries all = {.n = 0};
     uz_status status = UZ_OK;
     if (scene->n_ties == 0)
         return UZ_OK;
@@ -139,10 +120,8 @@ uz_status uz_find_tied(uz_body_model *model, const uz_scene *scene, uz_error *er
     for (int64_t k = 0; k < scene->n_ties && status == UZ_OK; k++)
         status = add_tie(&all, model, &scene->ties[k], k, err);
     if (status == UZ_OK)
-        status = uz_csc_from_triplets(&tied->share, n, n, all.n, all.master, all.slave, all.value, err);
-    free(all.master);
-    free(all.slave);
-    free(all.value);
+        status = uz_csc_from_triplets(&tied->share, n, n, all.n, all.row, all.col, all.val, err);
+    uz_entries_clear(&all);
     for (int64_t a = 0; a < n && status == UZ_OK; a++) { /* by area, where several places or ties have the node */
         double sum = 0, *value = tied->share.val;
         for (int64_t q = tied->share.ptr[a]; q < tied->share.ptr[a + 1]; q++)

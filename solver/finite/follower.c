@@ -94,33 +94,21 @@ uz_status uz_follower_loads(double *f, const uz_body_model *model, const uz_scen
     return UZ_OK;
 }
 
-typedef struct {
-    int64_t n, room, *row, *col;
-    double *val, largest;
-} entries;
-
-static bool add_skew(entries *out, const double *ke, const loaded *x)
+static bool add_skew(uz_entries *out, const double *ke, const loaded *x)
 {
     const int dim = x->side.dim, n = dim * x->side.nodes;
-    if (out->n + n * n > out->room) {
-        const int64_t room = 2 * out->room + 4096;
-        if (!uz_triplets_grow(&out->row, &out->col, &out->val, room))
-            return false;
-        out->room = room;
-    }
+    bool room = true;
     for (int p = 0; p < n; p++)
-        for (int q = 0; q < n; q++) {
-            if (p == q)
-                continue;
-            out->row[out->n] = dim * x->node[p / dim] + p % dim;
-            out->col[out->n] = dim * x->node[q / dim] + q % dim;
-            out->val[out->n++] = 0.5 * (ke[p * n + q] - ke[q * n + p]);
-        }
-    return true;
+        for (int q = 0; q < n && room; q++)
+            if (p != q)
+                room = uz_entries_add(out, dim * x->node[p / dim] + p % dim, dim * x->node[q / dim] + q % dim,
+                                      0.5 * (ke[p * n + q] - ke[q * n + p]));
+    return room;
 }
 
 /* What is left of the sides' skew parts, which cancel between neighbours; of dofs that are held nothing counts. */
-static uz_status gather_skew(uz_csc *out, const uz_body_model *model, const entries *from, uz_error *err)
+static uz_status gather_skew(uz_csc *out, const uz_body_model *model, const uz_entries *from, double largest,
+                             uz_error *err)
 {
     const int64_t n = model->mesh.dim * model->mesh.n_nodes;
     const uz_status status = uz_csc_from_triplets(out, n, n, from->n, from->row, from->col, from->val, err);
@@ -131,7 +119,7 @@ static uz_status gather_skew(uz_csc *out, const uz_body_model *model, const entr
         for (int64_t q = out->ptr[j]; q < out->ptr[j + 1]; q++) {
             const bool held = !model->frame_of && (model->dof[j] < 0 || model->dof[out->idx[q]] < 0) &&
                               model->dof[j] != UZ_NO_DOF && model->dof[out->idx[q]] != UZ_NO_DOF;
-            if (held || fabs(out->val[q]) <= ROUNDING * from->largest)
+            if (held || fabs(out->val[q]) <= ROUNDING * largest)
                 out->val[q] = 0;
             any = any || out->val[q] != 0;
         }
@@ -143,8 +131,8 @@ static uz_status gather_skew(uz_csc *out, const uz_body_model *model, const entr
 uz_status uz_follower_tangent(uz_body_model *tangent, uz_csc *skew, const uz_scene *scene, const double *u,
                               uz_error *err)
 {
-    entries all = {.n = 0};
-    double ke[SIDE_DOFS * SIDE_DOFS] = {0}, sum[SIDE_DOFS * SIDE_DOFS];
+    uz_entries all = {.n = 0};
+    double ke[SIDE_DOFS * SIDE_DOFS] = {0}, sum[SIDE_DOFS * SIDE_DOFS], largest = 0;
     uz_status status = UZ_OK;
     uz_csc_clear(skew);
     for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
@@ -156,7 +144,7 @@ uz_status uz_follower_tangent(uz_body_model *tangent, uz_csc *skew, const uz_sce
             loaded x;
             find_side(&x, tangent, group->face[k], scene->loads[i].value, u);
             const int n = x.side.dim * x.side.nodes;
-            differentiate(ke, &all.largest, &x);
+            differentiate(ke, &largest, &x);
             for (int p = 0; p < n; p++)
                 for (int q = 0; q < n; q++)
                     sum[p * n + q] = -0.5 * (ke[p * n + q] + ke[q * n + p]);
@@ -167,9 +155,7 @@ uz_status uz_follower_tangent(uz_body_model *tangent, uz_csc *skew, const uz_sce
         }
     }
     if (status == UZ_OK)
-        status = gather_skew(skew, tangent, &all, err);
-    free(all.row);
-    free(all.col);
-    free(all.val);
+        status = gather_skew(skew, tangent, &all, largest, err);
+    uz_entries_clear(&all);
     return status;
 }

@@ -220,3 +220,25 @@ bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room)
     *val = vals ? vals : *val;
     return rows && cols && vals;
 }
+
+bool uz_entries_add(uz_entries *to, int64_t row, int64_t col, double value)
+{
+    if (to->n == to->room) {
+        const int64_t room = 2 * to->room + 1024;
+        if (!uz_triplets_grow(&to->row, &to->col, &to->val, room))
+            return false;
+        to->room = room;
+    }
+    to->row[to->n] = row;
+    to->col[to->n] = col;
+    to->val[to->n++] = value;
+    return true;
+}
+
+void uz_entries_clear(uz_entries *entries)
+{
+    free(entries->row);
+    free(entries->col);
+    free(entries->val);
+    *entries = (uz_entries){.n = 0};
+}

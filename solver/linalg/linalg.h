@@ -19,4 +19,14 @@ int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column);
 /* Room for so many triplets in each of three arrays. False: no memory, and all that is there stays. */
 bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room);
 
+/* Triplets that come one by one, for uz_csc_from_triplets; zeroed at first. */
+typedef struct {
+    int64_t n, room, *row, *col;
+    double *val;
+} uz_entries;
+/* False: no memory, and all that is there stays. */
+bool uz_entries_add(uz_entries *to, int64_t row, int64_t col, double value);
+/* Frees what they have, and makes them zero. */
+void uz_entries_clear(uz_entries *entries);
+
 #endif
