@@ -190,10 +190,10 @@ client_exit client_put_cad(client_session *s, json_t *mesh, const char *path)
     const char *room = getenv("TMPDIR");
     const double size = s->options->size;
     char folder[512], made[PATH_MAX], error[400], message[512];
-    client_buffer whole = {0};
-    if (!client_file_read(&whole, path, message, sizeof message)) /* says what is wrong with it */
+    if (access(path, R_OK) != 0) {
+        snprintf(message, sizeof message, "cannot read %.400s: %s", path, strerror(errno));
         return client_complain(s, CLIENT_LOCAL, message);
-    free(whole.data);
+    }
     snprintf(folder, sizeof folder, "%.480s/uzawa-XXXXXX", room && *room ? room : "/tmp");
     if (!mkdtemp(folder))
         return client_complain(s, CLIENT_LOCAL, "cannot make a temporary folder for gmsh");
