@@ -72,19 +72,24 @@ run_program() { # KIND NAME
     esac
 }
 
-# Rows, each of which takes the next program that nobody has: most keep one core busy, many wait for a browser or a
-# clock, two fifths of their time, so there are two rows more than cores. The long ones come first.
-for kind in browser api hygiene guard unit; do
+# Rows, each of which takes the next program that nobody has. A row for each core begins with those that compute, the
+# longest first, and as many begin with those that wait for a browser, a clock or a database half of their time, so that
+# there is something to compute meanwhile; a row that is through with its own goes on with the others'.
+for kind in browser api guard unit hygiene; do
     if [[ " $kinds " == *" $kind "* ]]; then list_kind "$kind"; fi
-done >"$work/programs"
-run_row() {
+done >"$work/waiting"
+tac "$work/waiting" >"$work/computing"
+run_row() { # LIST
     local kind name
     while read -r kind name <&3; do
         if mkdir "$work/$kind.$name" 2>/dev/null; then run_program "$kind" "$name" 3<&-; fi
-    done 3<"$work/programs"
+    done 3<"$work/$1"
 }
 SECONDS=0
-for ((row = 0; row < $(nproc) + 2; row++)); do run_row & done
+for ((row = 0; row < $(nproc); row++)); do
+    run_row computing &
+    run_row waiting &
+done
 wait
 cat "$work"/*.time 2>/dev/null | awk -v cores="$(nproc)" -v wall="$SECONDS" \
     '{used += $1 + $2} END {printf "%.0f s of processor in %d s on %d cores\n", used, wall, cores}'
