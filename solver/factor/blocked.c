@@ -7,6 +7,7 @@
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 
@@ -220,7 +221,7 @@ uz_status uz_factor_solve_shares(const uz_factor *factor, double *X, double *Y, 
         trade_columns(factor, X, Y, true);
     else
         substitute(&x, UZ_REST, false);
-    uz_run_shares(substitute_share, &x);
+    uz_aside_share(substitute_share, &x, UZ_REST);
     if (forward) {
         trade_columns(factor, X, Y, false);
         substitute(&x, UZ_REST, false);

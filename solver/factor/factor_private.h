@@ -27,8 +27,6 @@ enum { UZ_REST = 2, UZ_SHARES };
 unsigned char *uz_share_tree(const cholmod_factor *L);
 /* Worth two threads' time for itself. */
 bool uz_is_large(int64_t columns, int64_t rows);
-/* run(ctx, 0) and run(ctx, 1): on two threads, where the process has an idle one (core/aside.h). */
-void uz_run_shares(void (*run)(void *ctx, int share), void *ctx);
 
 /* As uz_factor_solve_lanes of one block, by the shares: what both take from the rest is added up in another order. X
  * and Y: n x UZ_LANES; Y is room. */

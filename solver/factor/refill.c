@@ -10,6 +10,7 @@
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 #include "linalg/blas.h"
@@ -397,16 +398,16 @@ static inline __attribute__((always_inline)) bool make_together(pair *p, int64_t
 {
     const double c = (double)columns, r = (double)p->rows, half = (c * r - c * c / 2) / 2;
     p->middle = half > c * c / 2 ? (int64_t)(half / c + c / 2) : (int64_t)sqrt(2 * half); /* of its entries */
-    uz_run_shares(take_band, p);
+    uz_aside_share(take_band, p, UZ_REST);
     for (p->begin = 0; p->begin < columns; p->begin = p->end) {
         p->end = columns - p->begin > PANEL ? p->begin + PANEL : columns;
         p->middle = p->end > (p->begin + p->rows) / 2 ? p->end : (p->begin + p->rows) / 2;
         if (p->begin > 0)
-            uz_run_shares(update_band, p);
+            uz_aside_share(update_band, p, UZ_REST);
         if (!uz_block_factor(p->end - p->begin, 0, p->block + p->begin * (p->rows + 1), p->rows))
             return false;
         p->middle = (p->end + p->rows) / 2;
-        uz_run_shares(divide_band, p);
+        uz_aside_share(divide_band, p, UZ_REST);
     }
     return true;
 }
@@ -489,7 +490,7 @@ uz_status uz_refill_run(bool *positive, uz_refill *x, uz_factor *factor, uz_erro
         return status;
     x->L = &factor->L;
     x->share = factor->analysis->share;
-    uz_run_shares(fill_share, x);
+    uz_aside_share(fill_share, x, UZ_REST);
     if (x->of[0].positive && x->of[1].positive) {
         make_all(x, UZ_REST);
         *positive = x->of[UZ_REST].positive;

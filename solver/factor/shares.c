@@ -6,7 +6,6 @@
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
-#include "core/aside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -127,26 +126,4 @@ unsigned char *uz_share_tree(const cholmod_factor *L)
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return ok ? share : NULL;
-}
-
-typedef struct {
-    void (*run)(void *ctx, int share);
-    void *ctx;
-    int share;
-} turn;
-
-static void run_turn(void *ctx)
-{
-    const turn *t = ctx;
-    t->run(t->ctx, t->share);
-}
-
-void uz_run_shares(void (*run)(void *ctx, int share), void *ctx)
-{
-    turn first = {run, ctx, 0};
-    uz_aside_task task = {.run = run_turn, .ctx = &first};
-    uz_aside_start(&task);
-    run(ctx, 1);
-    if (!uz_aside_finish(&task))
-        run(ctx, 0);
 }

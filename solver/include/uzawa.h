@@ -131,10 +131,12 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
 /* Process-wide settings that a library must not choose alone: BLAS threads. Call once from main before threads start;
  * `workers` is how many threads will call uz_solve at once. */
 void uz_process_init(int workers);
-/* After it: so many threads may be used in a large factorization from now on, while no solve runs. */
+/* After it: so many threads may be used in solves from now on, that of the caller among them, while no solve runs. */
 void uz_process_threads(int threads);
-/* Lets BLAS allocate now what it works in, for each of its threads: later, where memory has ended, it would try for
- * ever. */
+/* The same while a solve runs, but for a factorization by BLAS that has begun. From any thread. */
+void uz_process_threads_now(int threads);
+/* Starts the threads of solves, and lets BLAS allocate now what it works in, for each of its threads: later, where
+ * memory has ended, it would try for ever. */
 void uz_process_warm(void);
 /* After it, at most once: factors are made in the reserve, which has to outlive them. */
 void uz_process_reserve(uz_reserve *reserve);

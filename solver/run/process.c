@@ -29,10 +29,15 @@ void uz_process_init(int workers)
 void uz_process_threads(int threads)
 {
     uz_factor_use_threads(threads);
-    uz_aside_allow(threads > 1);
+    uz_aside_allow(threads);
 }
 
-/* Also the thread on which a solve has something computed aside: a process that is confined later can start none. */
+void uz_process_threads_now(int threads)
+{
+    uz_aside_allow(threads);
+}
+
+/* Also the threads that compute aside: a process that is confined later can start none. */
 void uz_process_warm(void)
 {
     enum { N = 512, K = 128 };
@@ -42,7 +47,7 @@ void uz_process_warm(void)
     if (Z && C)
         uz_block_syrk_t(N, K, Z, K, C);
     openblas_set_num_threads(1);
-    uz_aside_begin();
+    uz_aside_begin(threads);
     free(Z);
     free(C);
 }

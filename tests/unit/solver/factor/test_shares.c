@@ -78,15 +78,15 @@ static uz_factor *factor_with(const uz_csc *K, const uz_analysis *analysis, bool
 {
     uz_factor *factor = NULL;
     uz_error err;
-    CHECK(uz_aside_begin());
-    uz_aside_allow(allowed);
+    CHECK_INT(uz_aside_begin(2), 2);
+    uz_aside_allow(allowed ? 2 : 1);
     if (again) {
         CHECK_INT(uz_factor_new(&factor, analysis, &err), UZ_OK);
         CHECK_INT(uz_factor_again(factor, K, &err), wanted);
     } else {
         CHECK_INT(uz_factor_create(&factor, K, analysis, 0, NULL, &err), wanted);
     }
-    uz_aside_allow(false);
+    uz_aside_allow(1);
     return factor;
 }
 
@@ -184,8 +184,8 @@ TEST(substitutions_by_shares)
     CHECK_INT(factor_by(&factor, &qp.K, NULL, 0, UZ_ORDERING_AUTO, 0, &err), UZ_OK);
     double *X = vector(n * UZ_LANES), *Y = vector(n * UZ_LANES), *room = vector(n * UZ_LANES);
     qp_random rng = {3};
-    CHECK(uz_aside_begin());
-    uz_aside_allow(true);
+    CHECK_INT(uz_aside_begin(2), 2);
+    uz_aside_allow(2);
     for (int64_t i = 0; i < n * UZ_LANES; i++)
         X[i] = Y[i] = random_signed(&rng);
     for (int back = 0; back < 2; back++) {
@@ -198,7 +198,7 @@ TEST(substitutions_by_shares)
         }
         CHECK_MSG(size > 0 && off <= 1e-10 * size, "%s: %g of %g", back ? "back" : "forward", off, size);
     }
-    uz_aside_allow(false);
+    uz_aside_allow(1);
     uz_factor_free(factor);
     uz_qp_clear(&qp);
     free(X);
