@@ -2,7 +2,7 @@
 #include "amg/amg.h"
 
 #include "core/alloc.h"
-#include "linalg/blas.h"
+#include "linalg/pieces.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
@@ -49,6 +49,44 @@ static void clear_held(double *x, const uz_cg *cg)
         x[j] = cg->held[j] ? 0.0 : x[j];
 }
 
+/* What a step does to vectors, in pieces that threads share. */
+typedef struct {
+    uz_cg *cg;
+    double *x;
+    const double *b;
+    double factor;
+} update;
+
+static void find_residual(void *ctx, int64_t begin, int64_t end)
+{
+    const update *u = ctx;
+    const double *restrict b = u->b, *restrict q = u->cg->q;
+    double *restrict r = u->cg->r;
+    for (int64_t j = begin; j < end; j++)
+        r[j] = b[j] - q[j];
+}
+
+static void take_step(void *ctx, int64_t begin, int64_t end)
+{
+    const update *u = ctx;
+    const bool *held = u->cg->held;
+    const double alpha = u->factor, *restrict p = u->cg->p, *restrict q = u->cg->q;
+    double *restrict x = u->x, *restrict r = u->cg->r;
+    for (int64_t j = begin; j < end; j++) {
+        x[j] += held && held[j] ? 0.0 : alpha * p[j];
+        r[j] -= alpha * q[j];
+    }
+}
+
+static void turn_direction(void *ctx, int64_t begin, int64_t end)
+{
+    const update *u = ctx;
+    const double beta = u->factor, *restrict z = u->cg->z;
+    double *restrict p = u->cg->p;
+    for (int64_t j = begin; j < end; j++)
+        p[j] = z[j] + beta * p[j];
+}
+
 static bool should_stop(const uz_cg_info *info, const uz_cg_stop *stop)
 {
     return info->iterations >= stop->max_iterations || uz_cancelled(stop->hooks) || uz_seconds() >= stop->deadline;
@@ -61,6 +99,7 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
 {
     const int64_t n = cg->n;
     double goal = 0.0, before = INFINITY;
+    update u = {.cg = cg, .x = x, .b = b};
     memset(info, 0, sizeof *info);
     if (cg->mg->kind->solve)
         return cg->mg->kind->solve(cg->mg, K, cg->room, info, x, cg->r, b, stop, err);
@@ -69,11 +108,10 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
         memcpy(cg->p, x, (size_t)n * sizeof *x);
         clear_held(cg->p, cg);
         cg->mg->kind->multiply(cg->mg, K, cg->room, cg->q, cg->p);
-        for (int64_t j = 0; j < n; j++)
-            cg->r[j] = b[j] - cg->q[j];
+        uz_by_pieces(find_residual, &u, n);
         clear_held(cg->r, cg);
         uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
-        double square = uz_dot(n, cg->r, cg->z);
+        double square = uz_long_dot(n, cg->r, cg->z);
         info->last = uz_root(square);
         if (k == 0) {
             info->first = info->last;
@@ -88,23 +126,21 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
         while (square > goal * goal && !should_stop(info, stop)) {
             cg->mg->kind->multiply(cg->mg, K, cg->room, cg->q, cg->p);
             clear_held(cg->q, cg);
-            const double curvature = uz_dot(n, cg->p, cg->q), alpha = square / curvature, last = square;
+            const double curvature = uz_long_dot(n, cg->p, cg->q), alpha = square / curvature, last = square;
             if (fabs(curvature) < DBL_MIN) /* underflow: there is no more to gain */
                 break;
             if (!(curvature > 0.0))
                 return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                                "K is not positive definite: conjugate gradients met a direction that it does not "
                                "resist. Support the body so that it can't move freely, or check the signs of K.");
-            for (int64_t j = 0; j < n; j++) {
-                x[j] += cg->held && cg->held[j] ? 0.0 : alpha * cg->p[j];
-                cg->r[j] -= alpha * cg->q[j];
-            }
+            u.factor = alpha;
+            uz_by_pieces(take_step, &u, n);
             status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
             if (status != UZ_OK)
                 return status;
-            square = uz_dot(n, cg->r, cg->z);
-            for (int64_t j = 0; j < n; j++)
-                cg->p[j] = cg->z[j] + square / last * cg->p[j];
+            square = uz_long_dot(n, cg->r, cg->z);
+            u.factor = square / last;
+            uz_by_pieces(turn_direction, &u, n);
             info->iterations++;
         }
         if (stop->unchecked && square <= goal * goal) {

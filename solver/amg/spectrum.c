@@ -15,6 +15,7 @@
 
 #include "core/alloc.h"
 #include "linalg/blas.h"
+#include "linalg/pieces.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
@@ -89,14 +90,14 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
     info->lambda = 0.0;
     random_residual(cg, K);
     uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
-    double square = uz_dot(cg->n, cg->r, cg->z);
+    double square = uz_long_dot(cg->n, cg->r, cg->z);
     memcpy(cg->p, cg->z, (size_t)cg->n * sizeof *cg->p);
     for (c->count = 0; status == UZ_OK && c->count < most && square > 0.0;) {
         if (uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
         /* a step of conjugate gradients without the solution */
         cg->mg->kind->multiply(cg->mg, K, cg->room, cg->q, cg->p);
-        const double curvature = uz_dot(cg->n, cg->p, cg->q), last = square;
+        const double curvature = uz_long_dot(cg->n, cg->p, cg->q), last = square;
         if (!(curvature > 0.0))
             return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                            "K is not positive definite: conjugate gradients met a direction that it does not resist. "
@@ -104,7 +105,7 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
         const double alpha = square / curvature;
         uz_axpy(cg->n, -alpha, cg->q, cg->r);
         status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
-        square = uz_dot(cg->n, cg->r, cg->z);
+        square = uz_long_dot(cg->n, cg->r, cg->z);
         const double beta = square / last;
         for (int64_t j = 0; j < cg->n; j++)
             cg->p[j] = cg->z[j] + beta * cg->p[j];

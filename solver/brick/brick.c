@@ -101,61 +101,92 @@ uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
 
 /* --------------------------------------------------------------- the product */
 
+/* Numbers of all planes of a slab, at least: some 20 microseconds. */
+enum { SLAB_LEAST = 8192, PLANES_LEAST = 4 };
+
+int uz_brick_slabs(int64_t planes, int64_t numbers, int most)
+{
+    if (most < 2 || planes < 2 * PLANES_LEAST || numbers < 2 * SLAB_LEAST)
+        return 1;
+    const int threads = uz_aside_threads();
+    most = threads < most ? threads : most;
+    most = numbers / SLAB_LEAST < most ? (int)(numbers / SLAB_LEAST) : most;
+    return planes / PLANES_LEAST < most ? (int)(planes / PLANES_LEAST) : most;
+}
+
 bool uz_brick_product_init(uz_brick_product *room, const uz_brick *brick)
 {
     room->stride = uz_brick_stride(brick->cells[0]);
     room->plane = room->stride * (brick->cells[1] + 1);
+    room->most = uz_aside_count();
     const int64_t n = 3 * room->plane + 2 * UZ_BRICK_PAD;
-    for (int k = 0; k < 2; k++) {
-        room->in[k] = uz_alloc_zero(n, sizeof(double));
-        room->out[k] = uz_alloc_zero(n, sizeof(double));
+    bool ok = true;
+    for (int part = 0; part < room->most; part++) {
+        struct uz_brick_product_room *of = &room->of[part];
+        for (int k = 0; k < 2; k++) {
+            of->in[k] = uz_alloc_zero(n, sizeof(double));
+            of->out[k] = uz_alloc_zero(n, sizeof(double));
+            ok = ok && of->in[k] && of->out[k];
+        }
+        of->sums = uz_alloc_zero(FIELDS * line_room(room->stride), sizeof(double));
+        ok = ok && of->sums;
     }
-    room->sums = uz_alloc_zero(FIELDS * line_room(room->stride), sizeof(double));
-    return room->in[0] && room->in[1] && room->out[0] && room->out[1] && room->sums;
+    return ok;
 }
 
 void uz_brick_product_clear(uz_brick_product *room)
 {
-    for (int k = 0; k < 2; k++) {
-        free(room->in[k]);
-        free(room->out[k]);
+    for (int part = 0; part < room->most; part++) {
+        for (int k = 0; k < 2; k++) {
+            free(room->of[part].in[k]);
+            free(room->of[part].out[k]);
+        }
+        free(room->of[part].sums);
     }
-    free(room->sums);
     memset(room, 0, sizeof *room);
 }
 
+/* A product as the threads that share it see it. */
+typedef struct {
+    double *y;
+    const uz_brick *brick;
+    const double *block, *x, *value;
+    uz_brick_product *room;
+    int slabs;
+    void (*layer)(const uz_brick_product *, struct uz_brick_product_room *, const uz_brick *, const double *);
+} product;
+
 /* A plane of nodes by component, of the dofs. */
-static void unpack(double *plane, const uz_brick *brick, const uz_brick_product *room, int64_t k, const double *x,
-                   const double *value)
+static void unpack(double *plane, const product *p, int64_t k)
 {
-    const int64_t line = brick->cells[0] + 1, lines = brick->cells[1] + 1;
-    const int64_t *dof = brick->dof + 3 * line * lines * k;
+    const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1;
+    const int64_t *dof = p->brick->dof + 3 * line * lines * k;
+    const double *x = p->x, *value = p->value;
     for (int64_t j = 0; j < lines; j++) {
-        double *to = plane + j * room->stride;
+        double *to = plane + j * p->room->stride;
         for (int64_t i = 0; i < line; i++, dof += 3)
             for (int c = 0; c < 3; c++)
-                to[c * room->plane + i] = dof[c] >= 0 ? (x ? x[dof[c]] : 0.0) : value ? value[-1 - dof[c]] : 0.0;
+                to[c * p->room->plane + i] = dof[c] >= 0 ? (x ? x[dof[c]] : 0.0) : value ? value[-1 - dof[c]] : 0.0;
     }
 }
 
-/* The free dofs of a plane, which is cleared. */
-static void pack(double *y, const uz_brick *brick, const uz_brick_product *room, int64_t k, double *plane)
+/* The free dofs of a plane. */
+static void pack(const product *p, int64_t k, const double *plane)
 {
-    const int64_t line = brick->cells[0] + 1, lines = brick->cells[1] + 1;
-    const int64_t *dof = brick->dof + 3 * line * lines * k;
+    const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1;
+    const int64_t *dof = p->brick->dof + 3 * line * lines * k;
     for (int64_t j = 0; j < lines; j++) {
-        const double *from = plane + j * room->stride;
+        const double *from = plane + j * p->room->stride;
         for (int64_t i = 0; i < line; i++, dof += 3)
             for (int c = 0; c < 3; c++)
                 if (dof[c] >= 0)
-                    y[dof[c]] = from[c * room->plane + i];
+                    p->y[dof[c]] = from[c * p->room->plane + i];
     }
-    memset(plane, 0, (size_t)(3 * room->plane) * sizeof *plane);
 }
 
 /* The rows of cells between two planes of nodes. */
-static inline __attribute__((always_inline)) void layer(uz_brick_product *room, const uz_brick *brick,
-                                                        const double *block)
+static inline __attribute__((always_inline)) void layer(const uz_brick_product *room, struct uz_brick_product_room *of,
+                                                        const uz_brick *brick, const double *block)
 {
     for (int64_t j = 0; j < brick->cells[1]; j++) {
         const double *in[COMPONENTS * LINES];
@@ -163,45 +194,70 @@ static inline __attribute__((always_inline)) void layer(uz_brick_product *room, 
         for (int m = 0; m < COMPONENTS; m++)
             for (int q = 0; q < LINES; q++) {
                 const int64_t at = m * room->plane + (j + q % 2) * room->stride;
-                in[m * LINES + q] = room->in[q / 2] + at;
-                out[m * LINES + q] = room->out[q / 2] + at;
+                in[m * LINES + q] = of->in[q / 2] + at;
+                out[m * LINES + q] = of->out[q / 2] + at;
             }
-        cells_of_line(room->sums, in, brick->cells[0], room->stride, block);
-        nodes_of_line(out, room->sums, room->stride);
+        cells_of_line(of->sums, in, brick->cells[0], room->stride, block);
+        nodes_of_line(out, of->sums, room->stride);
     }
 }
 
-UZ_AVX2_FMA static void layer_wide(uz_brick_product *room, const uz_brick *brick, const double *block)
+UZ_AVX2_FMA static void layer_wide(const uz_brick_product *room, struct uz_brick_product_room *of,
+                                   const uz_brick *brick, const double *block)
 {
-    layer(room, brick, block);
+    layer(room, of, brick, block);
 }
 
-static void layer_narrow(uz_brick_product *room, const uz_brick *brick, const double *block)
+static void layer_narrow(const uz_brick_product *room, struct uz_brick_product_room *of, const uz_brick *brick,
+                         const double *block)
 {
-    layer(room, brick, block);
+    layer(room, of, brick, block);
 }
 
-static void swap(double *pair[2])
+/* The next plane becomes the present one; the one after it has no sums yet. */
+static void go_up(const uz_brick_product *room, struct uz_brick_product_room *of)
 {
-    double *const first = pair[0];
-    pair[0] = pair[1];
-    pair[1] = first;
+    double *const in = of->in[0], *const out = of->out[0];
+    of->in[0] = of->in[1];
+    of->in[1] = in;
+    of->out[0] = of->out[1];
+    of->out[1] = out;
+    memset(out, 0, (size_t)(3 * room->plane) * sizeof *out);
+}
+
+static void multiply_slab(void *ctx, int slab)
+{
+    const product *p = ctx;
+    const int64_t cells = p->brick->cells[2], first = uz_brick_slab(cells + 1, slab, p->slabs),
+                  end = uz_brick_slab(cells + 1, slab + 1, p->slabs);
+    struct uz_brick_product_room *of = &p->room->of[slab];
+    for (int64_t k = first > 0 ? first - 1 : 0; k < end; k++) {
+        if (k == 0 || k + 1 == first)
+            unpack(of->in[0], p, k);
+        if (k < cells) {
+            unpack(of->in[1], p, k + 1);
+            p->layer(p->room, of, p->brick, p->block);
+        }
+        if (k >= first)
+            pack(p, k, of->out[0]);
+        go_up(p->room, of);
+    }
+    memset(of->out[0], 0, (size_t)(3 * p->room->plane) * sizeof(double));
 }
 
 void uz_brick_multiply(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x,
                        const double *value)
 {
-    void (*const of_layer)(uz_brick_product *, const uz_brick *, const double *) =
-        uz_cpu_has_avx2_fma() ? layer_wide : layer_narrow;
-    unpack(room->in[0], brick, room, 0, x, value);
-    for (int64_t k = 0; k < brick->cells[2]; k++) {
-        unpack(room->in[1], brick, room, k + 1, x, value);
-        of_layer(room, brick, block);
-        pack(y, brick, room, k, room->out[0]);
-        swap(room->in);
-        swap(room->out);
-    }
-    pack(y, brick, room, brick->cells[2], room->out[0]);
+    const int64_t planes = brick->cells[2] + 1;
+    product p = {y,
+                 brick,
+                 block,
+                 x,
+                 value,
+                 room,
+                 uz_brick_slabs(planes, planes * room->plane, room->most),
+                 uz_cpu_has_avx2_fma() ? layer_wide : layer_narrow};
+    uz_aside_share(multiply_slab, &p, p.slabs);
 }
 
 uz_status uz_brick_subtract_moved(double *p, const uz_brick *brick, const double *value, uz_error *err)

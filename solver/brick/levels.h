@@ -20,7 +20,7 @@ typedef struct {
 typedef struct {
     int64_t cells[3];
     double cell[3];
-    int64_t stride, plane, size; /* numbers in a line, a plane, and in all of one component */
+    int64_t stride, plane, size; /* numbers in a line, a plane with a register more, and in all of one component */
     float block[9 * UZ_BRICK_PARITIES];
     float diagonal[3];   /* what one cell gives to a node */
     double most;         /* a bound on the largest eigenvalue of diag(K)^-1 K */
@@ -43,10 +43,17 @@ typedef struct {
     const float *inverse;
 } uz_brick_vectors;
 
-/* Room of a product: two planes, the sums of a line, and a line. */
+/* Room of a product, for each thread that may share it: two planes, the sums of a line, a line, and a plane as it was
+ * before a step. */
 typedef struct {
-    float *plane[2], *sums, *line;
+    int most;
+    struct uz_brick_room {
+        float *plane[2], *sums, *line, *edge;
+    } of[UZ_ASIDE_MOST];
 } uz_brick_planes;
+/* false: no memory; clear it all the same. *bytes: of it. */
+bool uz_brick_planes_init(uz_brick_planes *room, const uz_brick_level *level, size_t *bytes);
+void uz_brick_planes_clear(uz_brick_planes *room);
 
 /* One step of a polynomial smoother: d = p d + q inverse (b - K x), x += d. */
 void uz_brick_step(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room, float p,

@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "linalg/blas.h"
+#include "linalg/pieces.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -63,7 +64,9 @@ static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit
 {
     double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS], block[9 * UZ_BRICK_PARITIES];
     level->stride = uz_brick_stride(level->cells[0]);
-    level->plane = level->stride * (level->cells[1] + 1);
+    /* what is read beyond its last line, and counts for nothing, is not of the next plane, which another thread may
+     * have */
+    level->plane = level->stride * (level->cells[1] + 1) + UZ_BRICK_PAD;
     level->size = level->plane * (level->cells[2] + 1);
     if (!uz_brick_stiffness(ke, brick, level->cell))
         return false;
@@ -263,6 +266,22 @@ static void solve_coarsest(const uz_brick_grids *mg, const uz_multigrid_room *ro
                 }
 }
 
+/* The first step of a smoother that begins at x = 0. */
+typedef struct {
+    const uz_brick_vectors *v;
+    float q;
+} first_step;
+
+static void take_first_step(void *ctx, int64_t begin, int64_t end)
+{
+    const first_step *s = ctx;
+    const float q = s->q;
+    float *restrict x = s->v->x, *restrict d = s->v->d;
+    const float *restrict b = s->v->b, *restrict inverse = s->v->inverse;
+    for (int64_t i = begin; i < end; i++)
+        x[i] = d[i] = q * inverse[i] * b[i];
+}
+
 void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int first)
 {
     const int last = mg->base.levels - 1;
@@ -270,9 +289,8 @@ void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int
         const uz_brick_level *level = &mg->level[l];
         const uz_brick_vectors *v = &room->v[l];
         const polynomial s = polynomial_of(level->most);
-        const int64_t n = 3 * level->size;
-        for (int64_t i = 0; i < n; i++)
-            v->x[i] = v->d[i] = s.q0 * v->inverse[i] * v->b[i];
+        first_step begin = {v, s.q0};
+        uz_by_pieces(take_first_step, &begin, 3 * level->size);
         uz_brick_step(level, v, &room->planes, s.p1, s.q1);
         uz_brick_residual(level, v, &room->planes);
         uz_brick_restrict(level, level + 1, v, v + 1, &room->planes);
@@ -288,40 +306,69 @@ void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int
     }
 }
 
+/* A vector of dofs on its way to the first grid, or back. */
+typedef struct {
+    const uz_brick_grids *mg;
+    const uz_brick_vectors *v;
+    double factor;
+    const double *r;
+    double *z;
+    int slabs;
+} passage;
+
+static void read_slab(void *ctx, int slab)
+{
+    const passage *p = ctx;
+    const double factor = p->factor;
+    const uz_brick_level *level = &p->mg->level[0];
+    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1, planes = level->cells[2] + 1;
+    const int64_t first = uz_brick_slab(planes, slab, p->slabs), end = uz_brick_slab(planes, slab + 1, p->slabs);
+    const int64_t *dof = p->mg->brick->dof + 3 * line * lines * first;
+    for (int64_t k = first; k < end; k++)
+        for (int64_t j = 0; j < lines; j++) {
+            float *b = p->v->b + k * level->plane + j * level->stride;
+            const float *inverse = p->v->inverse + k * level->plane + j * level->stride;
+            for (int64_t i = 0; i < line; i++, dof += 3)
+                for (int c = 0; c < 3; c++) {
+                    const int64_t at = c * level->size + i;
+                    b[at] = inverse[at] != 0.0F ? (float)(factor * p->r[dof[c]]) : 0.0F;
+                }
+        }
+}
+
+static void write_slab(void *ctx, int slab)
+{
+    const passage *p = ctx;
+    const double factor = p->factor;
+    const uz_brick_level *level = &p->mg->level[0];
+    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1, planes = level->cells[2] + 1;
+    const int64_t first = uz_brick_slab(planes, slab, p->slabs), end = uz_brick_slab(planes, slab + 1, p->slabs);
+    const int64_t *dof = p->mg->brick->dof + 3 * line * lines * first;
+    for (int64_t k = first; k < end; k++)
+        for (int64_t j = 0; j < lines; j++) {
+            const float *x = p->v->x + k * level->plane + j * level->stride;
+            for (int64_t i = 0; i < line; i++, dof += 3)
+                for (int c = 0; c < 3; c++)
+                    if (dof[c] >= 0)
+                        p->z[dof[c]] = factor * (double)x[c * level->size + i];
+        }
+}
+
 static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
                        uz_error *err)
 {
     const uz_brick_grids *mg = (const uz_brick_grids *)base;
     const uz_brick_level *level = &mg->level[0];
-    const uz_brick_vectors *v = &room->v[0];
-    const int64_t *dof = mg->brick->dof;
-    double most = 0.0;
+    const double most = uz_long_max(base->n, r);
     (void)K;
     (void)err;
-    for (int64_t j = 0; j < base->n; j++)
-        most = fabs(r[j]) > most ? fabs(r[j]) : most;
     /* by a power of two, so that single precision holds it whatever the units are */
-    const double down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 1.0, up = 1.0 / (down * mg->unit);
-    for (int64_t k = 0; k <= level->cells[2]; k++)
-        for (int64_t j = 0; j <= level->cells[1]; j++) {
-            float *b = v->b + k * level->plane + j * level->stride;
-            const float *inverse = v->inverse + k * level->plane + j * level->stride;
-            for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
-                for (int c = 0; c < 3; c++) {
-                    const int64_t at = c * level->size + i;
-                    b[at] = inverse[at] != 0.0F ? (float)(down * r[dof[c]]) : 0.0F;
-                }
-        }
+    const double down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 1.0;
+    passage p = {mg, &room->v[0], down, r, z, uz_brick_slabs(level->cells[2] + 1, level->size, room->planes.most)};
+    uz_aside_share(read_slab, &p, p.slabs);
     uz_brick_cycle(mg, room, 0);
-    dof = mg->brick->dof;
-    for (int64_t k = 0; k <= level->cells[2]; k++)
-        for (int64_t j = 0; j <= level->cells[1]; j++) {
-            const float *x = v->x + k * level->plane + j * level->stride;
-            for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
-                for (int c = 0; c < 3; c++)
-                    if (dof[c] >= 0)
-                        z[dof[c]] = up * (double)x[c * level->size + i];
-        }
+    p.factor = 1.0 / (down * mg->unit);
+    uz_aside_share(write_slab, &p, p.slabs);
     return UZ_OK;
 }
 
@@ -346,10 +393,7 @@ static void free_room(uz_multigrid_room *room)
         free(room->held[l]);
     }
     free(room->held_coarsest);
-    free(room->planes.plane[0]);
-    free(room->planes.plane[1]);
-    free(room->planes.sums);
-    free(room->planes.line);
+    uz_brick_planes_clear(&room->planes);
     free(room->coarse);
     uz_brick_product_clear(&room->product);
     free(room);
@@ -358,13 +402,12 @@ static void free_room(uz_multigrid_room *room)
 static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
 {
     const uz_brick_grids *mg = (const uz_brick_grids *)base;
-    const uz_brick_level *first = &mg->level[0];
     uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
     if (!room)
         return NULL;
     *bytes = sizeof *room;
     bool ok = uz_brick_product_init(&room->product, mg->brick);
-    *bytes += 96 * (size_t)room->product.plane;
+    *bytes += 96 * (size_t)(room->product.plane * room->product.most);
     room->levels = base->levels;
     for (int l = 0; l < base->levels; l++) {
         uz_brick_vectors *v = &room->v[l];
@@ -375,15 +418,10 @@ static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
         v->inverse = mg->inverse[l];
         *bytes += 16 * (size_t)n;
     }
-    const int64_t plane = 3 * first->plane + 2 * UZ_BRICK_PAD, sums = 24 * (first->stride + 2 * UZ_BRICK_PAD),
-                  line = 2 * (first->stride + UZ_BRICK_PAD);
-    room->planes.plane[0] = uz_alloc_zero(plane, sizeof(float));
-    room->planes.plane[1] = uz_alloc_zero(plane, sizeof(float));
-    room->planes.sums = uz_alloc_zero(sums, sizeof(float));
-    room->planes.line = uz_alloc_zero(line, sizeof(float));
+    ok = uz_brick_planes_init(&room->planes, &mg->level[0], bytes) && ok;
     room->coarse = uz_alloc(mg->n_coarsest, sizeof(double));
-    *bytes += 4 * (size_t)(2 * plane + sums + line) + 8 * (size_t)mg->n_coarsest;
-    ok = ok && room->planes.plane[0] && room->planes.plane[1] && room->planes.sums && room->planes.line && room->coarse;
+    *bytes += 8 * (size_t)mg->n_coarsest;
+    ok = ok && room->coarse;
     if (ok)
         return room;
     free_room(room);

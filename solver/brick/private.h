@@ -3,6 +3,7 @@
 #define UZ_BRICK_PRIVATE_H
 
 #include "brick/brick.h"
+#include "core/aside.h"
 
 /* Lines of nodes begin so many nodes apart from each other or a multiple of it: registers of either precision. */
 enum { UZ_BRICK_PAD = 8 };
@@ -18,10 +19,23 @@ double uz_brick_blocks(double block[9 * UZ_BRICK_PARITIES], const double *ke, do
 /* ke of a cell of another size; false: it is out of range. */
 bool uz_brick_stiffness(double *ke, const uz_brick *brick, const double size[3]);
 
-/* K times a vector in double precision, plane by plane. One room per thread. */
+/* Slabs of planes of nodes, or of layers of cells, that threads share (core/aside.h): so many of them where there are
+ * so many planes with so many numbers together, at most `most`. A slab does what lies below it once more, which takes a
+ * quarter of it at most. */
+int uz_brick_slabs(int64_t planes, int64_t numbers, int most);
+/* The first plane of a slab; that of the slab after the last one is the number of planes. */
+static inline int64_t uz_brick_slab(int64_t planes, int slab, int slabs)
+{
+    return planes * slab / slabs;
+}
+
+/* K times a vector in double precision, plane by plane. One room per solve, for `most` threads; out: zeros. */
 typedef struct {
     int64_t stride, plane; /* numbers in a line and in a plane of nodes, of one component */
-    double *in[2], *out[2], *sums;
+    int most;
+    struct uz_brick_product_room {
+        double *in[2], *out[2], *sums;
+    } of[UZ_ASIDE_MOST];
 } uz_brick_product;
 bool uz_brick_product_init(uz_brick_product *room, const uz_brick *brick); /* false: no memory; clear it all the same */
 void uz_brick_product_clear(uz_brick_product *room);

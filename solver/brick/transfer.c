@@ -73,15 +73,23 @@ static inline __attribute__((always_inline)) void gather(float *restrict out, co
     }
 }
 
-static inline __attribute__((always_inline)) void restrict_all(const uz_brick_level *f, const uz_brick_level *c,
-                                                               const uz_brick_vectors *v,
-                                                               const uz_brick_vectors *coarse,
-                                                               const uz_brick_planes *room)
+/* From a grid to the next coarser one or back, as the threads that share it see it. */
+typedef struct {
+    const uz_brick_level *f, *c;
+    const uz_brick_vectors *v, *coarse;
+    const uz_brick_planes *room;
+    int slabs;
+} transfer;
+
+/* Of the coarse planes from `first` to `end`. */
+static inline __attribute__((always_inline)) void restrict_all(const transfer *t, float *line, int64_t first,
+                                                               int64_t end)
 {
+    const uz_brick_level *f = t->f, *c = t->c;
+    const uz_brick_vectors *v = t->v, *coarse = t->coarse;
     const uz_brick_axis *to = f->to;
-    float *const line = room->line;
     for (int m = 0; m < 3; m++)
-        for (int64_t K = 0; K <= c->cells[2]; K++)
+        for (int64_t K = first; K < end; K++)
             for (int64_t J = 0; J <= c->cells[1]; J++) {
                 const int64_t at = m * c->size + K * c->plane + J * c->stride;
                 const float *inverse = coarse->inverse + at;
@@ -120,14 +128,16 @@ static inline __attribute__((always_inline)) void spread(float *restrict out, co
     }
 }
 
-static inline __attribute__((always_inline)) void prolong_all(const uz_brick_level *f, const uz_brick_level *c,
-                                                              const uz_brick_vectors *v, const uz_brick_vectors *coarse,
-                                                              const uz_brick_planes *room)
+/* To the fine planes from `first` to `end`. */
+static inline __attribute__((always_inline)) void prolong_all(const transfer *t, float *line, int64_t first,
+                                                              int64_t end)
 {
+    const uz_brick_level *f = t->f, *c = t->c;
+    const uz_brick_vectors *v = t->v, *coarse = t->coarse;
     const uz_brick_axis *to = f->to;
-    float *const line = room->line, *const out = room->line + f->stride + UZ_BRICK_PAD;
+    float *const out = line + f->stride + UZ_BRICK_PAD;
     for (int m = 0; m < 3; m++)
-        for (int64_t k = 0; k <= f->cells[2]; k++)
+        for (int64_t k = first; k < end; k++)
             for (int64_t j = 0; j <= f->cells[1]; j++) {
                 const int64_t at = m * f->size + k * f->plane + j * f->stride;
                 const float *restrict inverse = v->inverse + at, z = to[2].beyond[k], y = to[1].beyond[j];
@@ -146,32 +156,42 @@ static inline __attribute__((always_inline)) void prolong_all(const uz_brick_lev
             }
 }
 
-UZ_AVX2_FMA static void restrict_wide(const uz_brick_level *f, const uz_brick_level *c, const uz_brick_vectors *v,
-                                      const uz_brick_vectors *coarse, const uz_brick_planes *room)
+UZ_AVX2_FMA static void restrict_wide(const transfer *t, float *line, int64_t first, int64_t end)
 {
-    restrict_all(f, c, v, coarse, room);
+    restrict_all(t, line, first, end);
 }
 
-UZ_AVX2_FMA static void prolong_wide(const uz_brick_level *f, const uz_brick_level *c, const uz_brick_vectors *v,
-                                     const uz_brick_vectors *coarse, const uz_brick_planes *room)
+UZ_AVX2_FMA static void prolong_wide(const transfer *t, float *line, int64_t first, int64_t end)
 {
-    prolong_all(f, c, v, coarse, room);
+    prolong_all(t, line, first, end);
+}
+
+static void restrict_slab(void *ctx, int slab)
+{
+    const transfer *t = ctx;
+    const int64_t planes = t->c->cells[2] + 1;
+    (uz_cpu_has_avx2_fma() ? restrict_wide : restrict_all)(
+        t, t->room->of[slab].line, uz_brick_slab(planes, slab, t->slabs), uz_brick_slab(planes, slab + 1, t->slabs));
+}
+
+static void prolong_slab(void *ctx, int slab)
+{
+    const transfer *t = ctx;
+    const int64_t planes = t->f->cells[2] + 1;
+    (uz_cpu_has_avx2_fma() ? prolong_wide : prolong_all)(
+        t, t->room->of[slab].line, uz_brick_slab(planes, slab, t->slabs), uz_brick_slab(planes, slab + 1, t->slabs));
 }
 
 void uz_brick_restrict(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
                        const uz_brick_vectors *coarse, const uz_brick_planes *room)
 {
-    if (uz_cpu_has_avx2_fma())
-        restrict_wide(level, next, v, coarse, room);
-    else
-        restrict_all(level, next, v, coarse, room);
+    transfer t = {level, next, v, coarse, room, uz_brick_slabs(next->cells[2] + 1, level->size, room->most)};
+    uz_aside_share(restrict_slab, &t, t.slabs);
 }
 
 void uz_brick_prolong(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
                       const uz_brick_vectors *coarse, const uz_brick_planes *room)
 {
-    if (uz_cpu_has_avx2_fma())
-        prolong_wide(level, next, v, coarse, room);
-    else
-        prolong_all(level, next, v, coarse, room);
+    transfer t = {level, next, v, coarse, room, uz_brick_slabs(level->cells[2] + 1, level->size, room->most)};
+    uz_aside_share(prolong_slab, &t, t.slabs);
 }

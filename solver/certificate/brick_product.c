@@ -4,6 +4,7 @@
 
 #include "certificate/double_double.h"
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 
@@ -18,33 +19,49 @@ enum { LANES = 4, NODES = UZ_BRICK_NODES, DOFS = UZ_BRICK_DOFS };
 static const int CORNER[NODES][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                      {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
-/* Planes of nodes, component by component, lines padded to whole lanes and one more. */
+/* Planes of nodes, component by component, lines padded to whole lanes and one more; a room for each thread. */
 typedef struct {
-    const uz_brick *brick;
-    int64_t stride, plane;
     double *x[2], *hi[2], *lo[2]; /* of the nodes below and above a layer of cells */
 } planes;
 
-static bool make(planes *w, const uz_brick *brick)
+typedef struct {
+    const uz_brick *brick;
+    int64_t stride, plane;
+    const double *x;
+    double *hi, *lo;
+    int slabs;
+    planes of[UZ_ASIDE_MOST];
+} whole;
+
+/* Planes of a slab at least: what lies below it is computed once more. */
+enum { SLAB_LEAST = 4 };
+
+static bool make(whole *w, const uz_brick *brick)
 {
-    *w = (planes){.brick = brick, .stride = (brick->cells[0] / LANES + 2) * LANES};
+    const int64_t most = (brick->cells[2] + 1) / SLAB_LEAST;
+    const int threads = most < 2 ? 1 : uz_aside_threads();
+    *w = (whole){.brick = brick, .stride = (brick->cells[0] / LANES + 2) * LANES};
     w->plane = w->stride * (brick->cells[1] + 1);
+    w->slabs = threads < most ? threads : most < 2 ? 1 : (int)most;
     bool ok = true;
-    for (int k = 0; k < 2; k++) {
-        double **all[] = {&w->x[k], &w->hi[k], &w->lo[k]};
-        for (int i = 0; i < 3; i++)
-            ok = (*all[i] = uz_alloc_zero(3 * w->plane + LANES, sizeof(double))) && ok;
-    }
+    for (int slab = 0; slab < w->slabs; slab++)
+        for (int k = 0; k < 2; k++) {
+            planes *of = &w->of[slab];
+            double **all[] = {&of->x[k], &of->hi[k], &of->lo[k]};
+            for (int i = 0; i < 3; i++)
+                ok = (*all[i] = uz_alloc_zero(3 * w->plane + LANES, sizeof(double))) && ok;
+        }
     return ok;
 }
 
-static void clear(planes *w)
+static void clear(whole *w)
 {
-    for (int k = 0; k < 2; k++) {
-        free(w->x[k]);
-        free(w->hi[k]);
-        free(w->lo[k]);
-    }
+    for (int slab = 0; slab < w->slabs; slab++)
+        for (int k = 0; k < 2; k++) {
+            free(w->of[slab].x[k]);
+            free(w->of[slab].hi[k]);
+            free(w->of[slab].lo[k]);
+        }
 }
 
 /* Row by row, hi + lo = ke v for four cells; of these `count` are cells. */
@@ -74,7 +91,7 @@ static inline __attribute__((always_inline)) void multiply(four *hi, four *lo, c
     }
 }
 
-static inline __attribute__((always_inline)) void layer(const planes *w, int fused)
+static inline __attribute__((always_inline)) void layer(const whole *w, const planes *p, int fused)
 {
     const int64_t *cells = w->brick->cells;
     for (int64_t j = 0; j < cells[1]; j++)
@@ -83,13 +100,13 @@ static inline __attribute__((always_inline)) void layer(const planes *w, int fus
             for (int row = 0; row < DOFS; row++) {
                 const int *corner = CORNER[row / 3];
                 v[row] =
-                    *(const four *)(w->x[corner[2]] + row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0]);
+                    *(const four *)(p->x[corner[2]] + row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0]);
             }
             multiply(hi, lo, w->brick->ke, v, cells[0] - i < LANES ? (int)(cells[0] - i) : LANES, fused);
             for (int row = 0; row < DOFS; row++) {
                 const int *corner = CORNER[row / 3];
                 const int64_t at = row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0];
-                four *to = (four *)(w->hi[corner[2]] + at), *low = (four *)(w->lo[corner[2]] + at);
+                four *to = (four *)(p->hi[corner[2]] + at), *low = (four *)(p->lo[corner[2]] + at);
                 const four before = *to, sum = before + hi[row], back = sum - before;
                 *low += ((before - (sum - back)) + (hi[row] - back)) + lo[row];
                 *to = sum;
@@ -97,28 +114,28 @@ static inline __attribute__((always_inline)) void layer(const planes *w, int fus
         }
 }
 
-UZ_AVX2_FMA static void layer_fused(const planes *w)
+UZ_AVX2_FMA static void layer_fused(const whole *w, const planes *p)
 {
-    layer(w, 1);
+    layer(w, p, 1);
 }
 
-static void layer_split(const planes *w)
+static void layer_split(const whole *w, const planes *p)
 {
-    layer(w, 0);
+    layer(w, p, 0);
 }
 
-static void read_plane(const planes *w, double *plane, int64_t k, const double *x)
+static void read_plane(const whole *w, double *plane, int64_t k)
 {
     const int64_t line = w->brick->cells[0] + 1, lines = w->brick->cells[1] + 1;
     const int64_t *dof = w->brick->dof + 3 * line * lines * k;
     for (int64_t j = 0; j < lines; j++)
         for (int64_t i = 0; i < line; i++, dof += 3)
             for (int c = 0; c < 3; c++)
-                plane[c * w->plane + j * w->stride + i] = dof[c] >= 0 ? x[dof[c]] : 0.0;
+                plane[c * w->plane + j * w->stride + i] = dof[c] >= 0 ? w->x[dof[c]] : 0.0;
 }
 
-/* The plane's sums go to the dofs, and it begins anew. */
-static void write_plane(const planes *w, double *hi, double *lo, int64_t k)
+/* The plane's sums go to the dofs. */
+static void write_plane(const whole *w, const planes *p, int64_t k)
 {
     const int64_t line = w->brick->cells[0] + 1, lines = w->brick->cells[1] + 1;
     const int64_t *dof = w->brick->dof + 3 * line * lines * k;
@@ -128,11 +145,9 @@ static void write_plane(const planes *w, double *hi, double *lo, int64_t k)
                 const int64_t at = c * w->plane + j * w->stride + i;
                 if (dof[c] < 0)
                     continue;
-                hi[dof[c]] = w->hi[0][at];
-                lo[dof[c]] = w->lo[0][at];
+                w->hi[dof[c]] = p->hi[0][at];
+                w->lo[dof[c]] = p->lo[0][at];
             }
-    memset(w->hi[0], 0, (size_t)(3 * w->plane) * sizeof(double));
-    memset(w->lo[0], 0, (size_t)(3 * w->plane) * sizeof(double));
 }
 
 static void swap(double *pair[2])
@@ -140,6 +155,37 @@ static void swap(double *pair[2])
     double *const first = pair[0];
     pair[0] = pair[1];
     pair[1] = first;
+}
+
+/* The next plane becomes the present one, and the one after it begins anew. */
+static void go_up(const whole *w, planes *p)
+{
+    swap(p->x);
+    swap(p->hi);
+    swap(p->lo);
+    memset(p->hi[1], 0, (size_t)(3 * w->plane) * sizeof(double));
+    memset(p->lo[1], 0, (size_t)(3 * w->plane) * sizeof(double));
+}
+
+/* Threads share the planes of nodes in slabs. */
+static void multiply_slab(void *ctx, int slab)
+{
+    whole *w = ctx;
+    void (*const of_layer)(const whole *, const planes *) = uz_cpu_has_avx2_fma() ? layer_fused : layer_split;
+    const int64_t cells = w->brick->cells[2], first = (cells + 1) * slab / w->slabs,
+                  end = (cells + 1) * (slab + 1) / w->slabs;
+    planes *p = &w->of[slab];
+    for (int64_t k = first > 0 ? first - 1 : 0; k < end; k++) {
+        if (k == 0 || k + 1 == first)
+            read_plane(w, p->x[0], k);
+        if (k < cells) {
+            read_plane(w, p->x[1], k + 1);
+            of_layer(w, p);
+        }
+        if (k >= first)
+            write_plane(w, p, k);
+        go_up(w, p);
+    }
 }
 
 /* y += K c, of the cells where c is not zero. */
@@ -172,22 +218,14 @@ static void add_sparse(double *y, const uz_brick *brick, const double *c)
 uz_status uz_brick_precise_product(double *hi, double *lo, double *y, const uz_brick *brick, const double *x,
                                    const double *c, uz_error *err)
 {
-    void (*const of_layer)(const planes *) = uz_cpu_has_avx2_fma() ? layer_fused : layer_split;
-    planes w;
+    whole w;
     const bool ok = make(&w, brick);
     bool any = false;
-    for (int64_t k = 0; ok && k <= brick->cells[2]; k++) {
-        if (k == 0)
-            read_plane(&w, w.x[0], 0, x);
-        if (k < brick->cells[2]) {
-            read_plane(&w, w.x[1], k + 1, x);
-            of_layer(&w);
-        }
-        write_plane(&w, hi, lo, k);
-        swap(w.x);
-        swap(w.hi);
-        swap(w.lo);
-    }
+    w.x = x;
+    w.hi = hi;
+    w.lo = lo;
+    if (ok)
+        uz_aside_share(multiply_slab, &w, w.slabs);
     clear(&w);
     memset(y, 0, (size_t)brick->d * sizeof *y);
     for (int64_t j = 0; j < brick->d && !any; j++)

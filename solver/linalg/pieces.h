@@ -1,0 +1,16 @@
+/* pieces.h: loops over long vectors, which threads share (core/aside.h). Every number is computed alike whoever does
+ * it, and sums are made of pieces that the length alone decides, in order: results do not depend on how many threads
+ * there are. */
+#ifndef UZ_LINALG_PIECES_H
+#define UZ_LINALG_PIECES_H
+
+#include <stdint.h>
+
+/* run(ctx, begin, end) for ranges that make up 0..n; of a short vector for all of it. */
+void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n);
+/* x'y. */
+double uz_long_dot(int64_t n, const double *x, const double *y);
+/* The largest |x_j|, but for those that are no numbers; 0 where there is none. */
+double uz_long_max(int64_t n, const double *x);
+
+#endif
