@@ -2,9 +2,12 @@
 #include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -120,14 +123,17 @@ static bool find_pattern(uz_blocks *coarse, int32_t *seen, const uz_level *level
     return ok;
 }
 
-/* What the numbers of a node's rows are made with. */
+/* What the numbers of a node's rows are made with. Threads share the rows of the coarse matrix: each adds to those of
+ * its aggregates, in the order of the nodes, and goes through all nodes that have a part in them. So few nodes are gone
+ * through by two, as aggregates are numbered much as nodes are. */
 typedef struct {
     uz_blocks *coarse;
     const uz_level *level;
     const uz_below *below;
     const columns *AP;
-    int32_t *place; /* aggregates: where its columns stand in row */
-    double *row;    /* the node's rows of A P: a block for each of its columns */
+    int32_t *place;     /* aggregates: where its columns stand in row */
+    double *row;        /* the node's rows of A P: a block for each of its columns */
+    int32_t first, end; /* aggregates */
 } product;
 
 /* to += block P_j, a column of blocks after the other; or with the block transposed. */
@@ -153,6 +159,13 @@ static inline __attribute__((always_inline)) void add_node(const product *x, int
     const uz_blocks *A = &level->A;
     const int32_t *column = x->AP->column + x->AP->ptr[i];
     const int64_t count = x->AP->ptr[i + 1] - x->AP->ptr[i], square = (int64_t)b * b;
+    int64_t begin = level->ptr[i], end = level->ptr[i + 1]; /* its blocks, by aggregates */
+    while (begin < end && level->block[begin] < x->first)
+        begin++;
+    while (begin < end && level->block[end - 1] >= x->end)
+        end--;
+    if (begin == end)
+        return;
     for (int64_t s = 0; s < count; s++)
         x->place[column[s]] = (int32_t)s;
     memset(x->row, 0, (size_t)(count * b * k) * sizeof *x->row);
@@ -161,7 +174,7 @@ static inline __attribute__((always_inline)) void add_node(const product *x, int
         add_product(x, A->off + e * square, false, A->idx[e], b, k);
     for (int64_t e = x->below->ptr[i]; e < x->below->ptr[i + 1]; e++)
         add_product(x, A->off + x->below->at[e] * square, true, x->below->node[e], b, k);
-    for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) { /* coarse += (rows of P)' rows of A P */
+    for (int64_t e = begin; e < end; e++) { /* coarse += (rows of P)' rows of A P */
         const int32_t a = level->block[e];
         const float *P = level->value + e * b * k;
         for (int64_t s = 0; s < count && column[s] <= a; s++) {
@@ -201,37 +214,100 @@ static void add_plain(const product *x, int64_t i, int k)
     add_any(x, i, k);
 }
 
+/* All numbers, as the threads that share them see that. */
+typedef struct {
+    product of[UZ_ASIDE_MOST];
+    int parts, k;
+    int64_t first, end; /* nodes */
+    pthread_t owner;    /* who asks whether it has to stop: hooks are called from the solving thread */
+    const uz_stop *stop;
+    atomic_bool over; /* it had to */
+} numbers;
+
+static void add_part(void *ctx, int part)
+{
+    numbers *n = ctx;
+    void (*const add)(const product *, int64_t, int) = uz_cpu_has_avx2_fma() ? add_fused : add_plain;
+    for (int64_t i = n->first; i < n->end; i++) {
+        if (i % UZ_ROWS_AT_ONCE == 0) {
+            if (pthread_equal(pthread_self(), n->owner) && uz_stop_is_due(n->stop))
+                atomic_store(&n->over, true);
+            if (atomic_load(&n->over))
+                return;
+        }
+        add(&n->of[part], i, n->k);
+    }
+}
+
+/* So that each part has as many blocks of P. count: room for the aggregates. */
+static void share_out(numbers *n, const uz_level *level, int32_t *count)
+{
+    const int64_t all = level->ptr[level->A.nodes];
+    int64_t so_far = 0;
+    int part = 0;
+    memset(count, 0, (size_t)level->aggregates * sizeof *count);
+    for (int64_t e = 0; n->parts > 1 && e < all; e++)
+        count[level->block[e]]++;
+    for (int64_t a = 0; a < level->aggregates; a++) {
+        for (; part + 1 < n->parts && so_far * n->parts >= all * (part + 1); part++)
+            n->of[part].end = n->of[part + 1].first = (int32_t)a;
+        so_far += count[a];
+    }
+    for (; part < n->parts; part++) {
+        n->of[part].end = (int32_t)level->aggregates;
+        if (part + 1 < n->parts)
+            n->of[part + 1].first = (int32_t)level->aggregates;
+    }
+}
+
+/* Nodes of a part, at least. */
+enum { PART_LEAST = 4096 };
+
 uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_team *team,
                       const uz_stop *stop, uz_error *err)
 {
-    const int64_t nodes = level->A.nodes, aggregates = level->aggregates, end = uz_team_first(team, 1, nodes);
+    const int64_t nodes = level->A.nodes, aggregates = level->aggregates;
+    const int threads = nodes < 2 * PART_LEAST ? 1 : uz_aside_threads();
     columns AP = {0};
-    product x = {.coarse = coarse, .level = level, .below = below, .AP = &AP};
-    bool over = false;
+    numbers n = {.parts = nodes / PART_LEAST < threads ? (int)(nodes / PART_LEAST) : threads,
+                 .k = k,
+                 .first = uz_team_first(team, 0, nodes),
+                 .end = uz_team_first(team, 1, nodes),
+                 .owner = pthread_self(),
+                 .stop = stop};
+    n.parts = n.parts > 1 ? n.parts : 1;
     *coarse = (uz_blocks){.nodes = aggregates, .b = k};
-    x.place = uz_alloc(aggregates, sizeof *x.place);
-    bool ok = x.place && find_columns(&AP, x.place, level, below) && find_pattern(coarse, x.place, level, &AP);
+    bool ok = true;
+    for (int part = 0; part < n.parts; part++) {
+        n.of[part] = (product){.coarse = coarse, .level = level, .below = below, .AP = &AP};
+        ok = (n.of[part].place = uz_alloc(aggregates, sizeof(int32_t))) && ok;
+    }
+    int32_t *seen = n.of[0].place;
+    ok = ok && find_columns(&AP, seen, level, below) && find_pattern(coarse, seen, level, &AP);
     if (ok) {
         int64_t longest = 1;
         for (int64_t i = 0; i < nodes; i++)
             longest = AP.ptr[i + 1] - AP.ptr[i] > longest ? AP.ptr[i + 1] - AP.ptr[i] : longest;
         int32_t *idx = uz_realloc(coarse->idx, coarse->ptr[aggregates], sizeof *idx);
         coarse->idx = idx ? idx : coarse->idx;
-        x.row = uz_alloc(longest * level->A.b * k, sizeof *x.row);
+        for (int part = 0; part < n.parts; part++)
+            ok = (n.of[part].row = uz_alloc(longest * level->A.b * k, sizeof(double))) && ok;
         coarse->off = uz_alloc_zero(coarse->ptr[aggregates] * k * k + 4, sizeof *coarse->off);
         coarse->diag = uz_alloc_zero(aggregates * k * k + 4, sizeof *coarse->diag);
-        ok = x.row && coarse->off && coarse->diag;
+        ok = ok && coarse->off && coarse->diag;
+        share_out(&n, level, seen);
     }
-    void (*const add)(const product *, int64_t, int) = uz_cpu_has_avx2_fma() ? add_fused : add_plain;
-    for (int64_t i = uz_team_first(team, 0, nodes);
-         ok && !(over = i % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop)) && i < end; i++)
-        add(&x, i, k);
+    if (ok)
+        uz_aside_share(add_part, &n, n.parts);
+    const bool over = atomic_load(&n.over);
     if (ok && !over)
         uz_team_sum(team, coarse);
     free(AP.ptr);
     free(AP.column);
-    free(x.place);
-    free(x.row);
+    for (int part = 0; part < n.parts; part++) {
+        free(n.of[part].place);
+        free(n.of[part].row);
+    }
     if (over)
         return uz_fail_stopped(err);
     return ok ? UZ_OK

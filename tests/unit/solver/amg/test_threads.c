@@ -1,0 +1,54 @@
+/* A multigrid of any mesh that threads share is that of one thread, to the last bit: the numbers of its levels show in
+ * a cycle, and so do sweeps and products. */
+#include "amg/multigrid_private.h"
+#include "brick.h"
+#include "core/aside.h"
+#include "harness.h"
+
+#include <string.h>
+
+enum { THREADS = 3 };
+
+/* M^-1 x and K x by so many threads. */
+static void make_and_apply(double *z, double *y, const brick *b, const double *x, int threads)
+{
+    uz_multigrid *mg;
+    uz_modes modes;
+    uz_cg cg;
+    uz_error err = {0};
+    uz_aside_allow(threads);
+    (void)uz_aside_used();
+    CHECK_INT(uz_modes_of_body(&modes, b->xyz, b->dof, b->n_nodes, 3, b->d, &err), UZ_OK);
+    CHECK_INT(uz_multigrid_create(&mg, &b->K, &modes, NULL, 0, NULL, &err), UZ_OK);
+    CHECK_INT(uz_aside_used(), threads);
+    CHECK(mg->levels > 2);
+    CHECK_INT(uz_cg_init(&cg, mg, &err), UZ_OK);
+    CHECK_INT(uz_multigrid_apply(mg, &b->K, cg.room, z, x, &err), UZ_OK);
+    mg->kind->multiply(mg, &b->K, cg.room, y, x);
+    uz_cg_clear(&cg);
+    uz_multigrid_free(mg);
+    uz_modes_clear(&modes);
+    uz_aside_allow(1);
+}
+
+TEST(threads_give_the_same_bits)
+{
+    brick b = brick_make((int64_t[3]){25, 24, 23}, (double[3]){1, 1, 1}, 0.3, true);
+    const size_t bytes = (size_t)b.d * sizeof(double);
+    double *x = malloc(bytes), *z[2] = {malloc(bytes), malloc(bytes)}, *y[2] = {malloc(bytes), malloc(bytes)};
+    CHECK(x && z[0] && z[1] && y[0] && y[1]);
+    CHECK_INT(uz_aside_begin(THREADS), THREADS);
+    for (int64_t j = 0; j < b.d; j++)
+        x[j] = (double)(j * 7919 % 1000 - 500);
+    make_and_apply(z[0], y[0], &b, x, 1);
+    for (int threads = 2; threads <= THREADS; threads++) {
+        make_and_apply(z[1], y[1], &b, x, threads);
+        CHECK(memcmp(z[0], z[1], bytes) == 0 && memcmp(y[0], y[1], bytes) == 0);
+    }
+    for (int k = 0; k < 2; k++) {
+        free(z[k]);
+        free(y[k]);
+    }
+    free(x);
+    brick_free(&b);
+}
