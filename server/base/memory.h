@@ -1,4 +1,4 @@
-/* memory.h: how much memory this process may use. */
+/* memory.h: how much memory and how many processors this process may use. */
 #ifndef SERVER_MEMORY_H
 #define SERVER_MEMORY_H
 
@@ -6,6 +6,9 @@
 
 /* Bytes of the machine, or of the control group (version 2 or 1) where that allows less. */
 size_t memory_available(void);
+/* Processors that it may run on, or the time of so many, where its control group (version 2) allows less; at least 1.
+ */
+int processors_available(void);
 
 /* What is freed stays in one heap, touched: a page given back to the system is dear to get again, and each of glibc's
  * eight arenas for each processor would keep pages of its own. Who calls this sees to it that not too much lies free.

@@ -365,7 +365,10 @@ static void put_effort(text *t, const uz_summary *s)
     text_close(t, '}');
     text_open(t, "cost", '{');
     put_named(t, "predicted", (named[]){{"seconds", c->seconds}, {"bytes", c->bytes}, {"flops", c->flops}}, 3);
-    put_named(t, "actual", (named[]){{"seconds", c->actual_seconds}, {"bytes", c->actual_bytes}}, 2);
+    put_named(
+        t, "actual",
+        (named[]){{"seconds", c->actual_seconds}, {"bytes", c->actual_bytes}, {"threads", (double)c->actual_threads}},
+        3);
     text_open(t, "considered", '[');
     for (int k = 0; k < c->n_considered; k++) {
         const uz_cost_option *form = &c->considered[k];

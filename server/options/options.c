@@ -153,13 +153,13 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
     char name[64];
     const uz_option_table table = DAEMON_OPTIONS;
     const uz_option *config = row_of("config");
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    const int cores = processors_available();
     memset(out, 0, sizeof *out);
     for (size_t i = 0; i < table.count; i++)
         if (table.rows[i].normal && table.rows[i].normal[0])
             uz_option_set(out, &table.rows[i], table.rows[i].normal);
     out->max_client_connections = -1;
-    out->workers = cores < 1 ? 1 : cores > 1024 ? 1024 : (int)cores;
+    out->workers = cores > 1024 ? 1024 : cores;
     options_verdict verdict = read_flags(&f, argc, argv, message, size);
     if (verdict == OPTIONS_WRONG || verdict == OPTIONS_HELP || verdict == OPTIONS_VERSION)
         return verdict;

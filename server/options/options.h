@@ -35,7 +35,7 @@ typedef struct {
         audit_log[OPTION_PATH];
     bool insecure_public;
     /* work */
-    int workers, lanes, max_attempts;
+    int workers, lanes, threads, max_attempts;
     size_t cache, memory;            /* bytes; memory: of one solve */
     double max_solve_s;              /* of one job; 0: no limit */
     char group_command[OPTION_PATH]; /* "": none */

@@ -75,6 +75,10 @@ static const uz_option ROWS[] = {
             .otherwise = "as many as there are processors", .unit = "threads", .about = "problems solved at once"),
     SETTING("lanes", INTEGER, lanes, .value = "N", .most = 64, .normal = "1", .unit = "threads",
             .about = "more workers, which solve small problems only, while all others are busy"),
+    SETTING(
+        "threads", INTEGER, threads, .value = "N", .most = 1024, .normal = "0", .unit = "threads", .zero_is_off = true,
+        .about = "of one solve, at most, where processors are idle, which jobs that run share out evenly; 0: all of "
+                 "them"),
     SETTING("cache", BYTES, cache, .value = "BYTES", .least = 1, .normal = "1G", .unit = "bytes",
             .about = "memory for factors that are kept; a quarter of it lies ready for the next one"),
     SETTING("memory", BYTES, memory, .value = "BYTES", .least = 1,

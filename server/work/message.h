@@ -24,6 +24,7 @@
 typedef struct {
     atomic_bool stop;    /* by the daemon: the job is to end with its best answer so far */
     atomic_bool heard;   /* by the process: it has seen that, and makes its answer */
+    atomic_int threads;  /* by the daemon: that the job may take now; 0: none runs, and it may take one */
     atomic_bool starved; /* by the process: it dies because there was no memory */
     live live;           /* by the process */
 } board;
@@ -57,8 +58,7 @@ typedef struct {
             uint64_t size; /* of the text */
             double queue_s, max_solve_s;
             uint64_t memory;
-            int32_t threads; /* that a large factorization may take */
-        } job;               /* of PREDICT the size and the memory */
+        } job; /* of PREDICT the size and the memory */
         struct {
             ask_kind what;
             char id[65]; /* of the upload, or of the job */

@@ -1,7 +1,7 @@
 /* solver_process.c: the life of a process that solves: its limits, then one job after another, with a cache that stays.
  *
- * One thread, besides those of BLAS, one that touches pages ahead and one that computes aside. It may be killed at any
- * instruction: nothing outlives it but what it has put into shared memory. */
+ * One thread, besides those of BLAS, one that touches pages ahead and those that compute with it. It may be killed at
+ * any instruction: nothing outlives it but what it has put into shared memory. */
 #include "work/solver_process.h"
 #include "base/clock.h"
 #include "base/memory.h"
@@ -56,10 +56,12 @@ typedef struct {
 
 /* ---- what the solver asks and tells */
 
+/* It asks often; other jobs may have begun or ended meanwhile. */
 static bool is_stopped(void *ctx)
 {
     const solver *s = ctx;
     const bool stop = atomic_load_explicit(&s->board->stop, memory_order_relaxed);
+    uz_process_threads_now(atomic_load_explicit(&s->board->threads, memory_order_relaxed));
     if (stop)
         atomic_store_explicit(&s->board->heard, true, memory_order_relaxed);
     return stop;
@@ -191,7 +193,7 @@ static void run_job(solver *s, const packet *m)
     s->names = 0;
     s->queue_s = m->u.job.queue_s;
     s->given_at = clock_seconds(CLOCK_MONOTONIC);
-    uz_process_threads(m->u.job.threads);
+    uz_process_threads(atomic_load(&s->board->threads));
     if (body || m->u.job.damaged) {
         solve_job(&solved, &with, m->u.job.id, body, (size_t)m->u.job.size);
         if (s->group && uz_process_group_is_lost(s->group))

@@ -195,10 +195,6 @@ watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len,
     work *all = me->w;
     process *p = me->process;
     const work_options *o = &all->options;
-    /* A job that waits for nobody gets the processors that nobody uses; where all workers are busy each has its share.
-     */
-    const int busy = work_busy(all);
-    const int threads = busy < o->workers ? all->processors - (busy - 1) : all->processors / o->workers;
     watch w = {.me = me,
                .p = p,
                .job = claimed,
@@ -215,8 +211,7 @@ watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len,
                           .size = body_len,
                           .queue_s = queue_s,
                           .max_solve_s = o->max_solve_s,
-                          .memory = o->solve_bytes,
-                          .threads = threads > 1 ? threads : 1}};
+                          .memory = o->solve_bytes}};
     memcpy(m.u.job.id, claimed->id, sizeof m.u.job.id);
     const bool room = segment_reach(&p->inbox, body_len, true);
     if (room && body_len > 0 && body)

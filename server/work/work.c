@@ -1,11 +1,11 @@
 /* work.c: the threads: workers that claim, a keeper that renews their leases, and those who wait for a job. */
+#include "base/memory.h"
 #include "store/engine_base.h"
 #include "store/nodes.h"
 #include "work/housekeeping.h"
 #include "work/internal.h"
 
 #include <math.h>
-#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -72,6 +72,15 @@ static void call_worker(work *w, bool several)
         (several ? pthread_cond_broadcast : pthread_cond_signal)(&w->crowd);
 }
 
+/* Under work.lock, when a job begins or has ended: each has as many processors, from now on, in the middle of a solve
+ * too. Those of the lanes have one. */
+static void share_processors(work *w)
+{
+    const int each = w->processors / (w->busy > 1 ? w->busy : 1), most = w->options.threads;
+    for (int i = 0; i < w->options.workers; i++)
+        atomic_store(&w->processes[i].board->threads, most > 0 && most < each ? most : each);
+}
+
 static void *work_loop(void *arg)
 {
     worker *me = arg;
@@ -120,6 +129,7 @@ static void *work_loop(void *arg)
             continue;
         metrics_add(w->options.metrics, METRIC_LANE, me->lane);
         w->busy += !me->lane;
+        share_processors(w);
         if (w->busy == w->options.workers)
             pthread_cond_signal(&w->crowd);
         if (w->probe == PROBE_ASKED)
@@ -132,6 +142,7 @@ static void *work_loop(void *arg)
         feed_changed(w->feed, id, NULL); /* ended, or put back */
         pthread_mutex_lock(&w->lock);
         w->busy -= !me->lane;
+        share_processors(w);
         if (me->lane) /* what it puts back is for another one */
             call_worker(w, false);
         seen = w->submitted - 1;
@@ -247,8 +258,7 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     clock_condition(&w->probed);
     clock_condition(&w->idle);
     clock_condition(&w->tick);
-    cpu_set_t may_use;
-    w->processors = sched_getaffinity(0, sizeof may_use, &may_use) == 0 ? CPU_COUNT(&may_use) : 1;
+    w->processors = processors_available();
     w->feed = feed_new();
     w->ends = ends_new();
     w->workers = calloc((size_t)w->n, sizeof *w->workers);

@@ -37,6 +37,7 @@ typedef struct {
     const char *version; /* NULL: "" */
     int workers;
     int lanes;           /* workers beside those, which take small jobs only, while all of those are busy */
+    int threads;         /* that one solve may take, where processors are idle; 0: all of those */
     const char *program; /* of the processes that solve; NULL: this one. It must call solver_process */
     int max_attempts;    /* runs begun before a job that keeps killing its process is failed */
     size_t cache_bytes;  /* factor caches of all processes, with their reserves */

@@ -97,6 +97,7 @@ typedef struct {
 typedef struct {
     double seconds, bytes, flops;
     double actual_seconds, actual_bytes;
+    int actual_threads; /* that shared in some part of it, at most; that of the caller among them */
     uz_cost_option considered[4];
     int n_considered;
 } uz_cost;

@@ -2,6 +2,7 @@
 #include "run/run.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "linalg/linalg.h"
@@ -73,6 +74,7 @@ static void report_cost(uz_run *run)
         cost->flops = form->flops;
     }
     cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
+    cost->actual_threads = uz_aside_used();
     const uz_setup *setup = run->asked->setup;
     const bool shared = setup->factor && setup->shared.item; /* setup->bytes has no factor then */
     const uz_csc *K = uz_setup_K(setup, run->asked->problem);

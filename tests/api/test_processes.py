@@ -35,6 +35,28 @@ def busy(s, request):
     return job
 
 
+@options("--workers", "2", "--threads", "2")
+def test_idle_processors_help(s):
+    processors = len(os.sched_getaffinity(0))
+    if processors < 2:
+        raise service.Skip("one processor")
+    box = cube(30, operator="matrix_free")
+    alone = s.solve(box)["summary"]
+    check(alone["cost"]["actual"]["threads"] == 2, alone["cost"])
+    other = s.post(ENDLESS).json["id"]
+    s.wait_status(other, "running")
+    beside = s.solve({**box, "tags": ["beside"]})["summary"]
+    check(beside["cost"]["actual"]["threads"] == min(2, processors // 2), beside["cost"])
+    check(beside["energy"] == alone["energy"] and beside["certificate"] == alone["certificate"], beside, alone)
+    expect(s.request("DELETE", f"/v1/jobs/{other}"), 200)
+    s.wait_status(other, "dismissed")
+
+
+@options("--workers", "2", "--threads", "1")
+def test_threads_can_be_bounded(s):
+    check(s.solve(cube(30, operator="matrix_free"))["summary"]["cost"]["actual"]["threads"] == 1)
+
+
 @options("--workers", "1")
 def test_dismissed_while_it_factors(s):
     job = busy(s, LONG)
