@@ -2,6 +2,7 @@
 #include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 
@@ -61,8 +62,60 @@ void uz_below_clear(uz_below *below)
 
 /* ------------------------------------------------------------------ from a matrix */
 
-/* The nodes that have dofs, in the order of their first ones, and the place of each dof. false: no memory. */
-static bool number_slots(uz_aggregates *mg, int32_t *node_of_group, const uz_modes *modes)
+/* Nodes of a part at least: some 0.2 ms of a sweep. A rest that is more of all nodes is not worth it. */
+#define PART_LEAST 8192
+#define MOST_REST  0.2
+
+/* The part of each group, by its number in the order of first dofs, `nodes` of them: ranges of that, and the rest
+ * (`parts`), which has whoever has a neighbour in an earlier range. Returns how many are of the rest. */
+static int64_t find_parts(int8_t *part, int parts, const int32_t *number, int64_t nodes, const uz_csc *K,
+                          const uz_modes *modes)
+{
+    int64_t rest = 0;
+    for (int64_t g = 0; g < modes->n_nodes; g++)
+        part[g] = (int8_t)(number[g] < 0 ? 0 : number[g] * (int64_t)parts / nodes);
+    for (int64_t j = 0; j < K->cols; j++)
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
+            const int32_t I = modes->node[K->idx[q]], J = modes->node[j], later = number[I] > number[J] ? I : J;
+            if (part[I] == part[J] || part[I] == parts || part[J] == parts)
+                continue;
+            part[later] = (int8_t)parts;
+            rest++;
+        }
+    return rest;
+}
+
+/* Numbers the nodes by parts, where there are enough of them. false: no memory. */
+static bool number_by_parts(uz_blocks *A, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes)
+{
+    const int64_t nodes = A->nodes, most = nodes / PART_LEAST;
+    const int parts = most < UZ_PARTS_MOST ? (int)most : UZ_PARTS_MOST;
+    if (parts < 2)
+        return true;
+    int8_t *part = uz_alloc(modes->n_nodes, sizeof *part);
+    int32_t *group = uz_alloc(nodes, sizeof *group); /* by number */
+    const bool ok = part && group;
+    if (ok && (double)find_parts(part, parts, node_of_group, nodes, K, modes) <= MOST_REST * (double)nodes) {
+        for (int64_t g = 0; g < modes->n_nodes; g++)
+            if (node_of_group[g] >= 0)
+                group[node_of_group[g]] = (int32_t)g;
+        int32_t next = 0;
+        A->parts = parts;
+        for (int p = 0; p <= parts; p++) {
+            A->part[p] = next;
+            for (int64_t i = 0; i < nodes; i++)
+                if (part[group[i]] == p)
+                    node_of_group[group[i]] = next++;
+        }
+    }
+    free(part);
+    free(group);
+    return ok;
+}
+
+/* The nodes that have dofs, in the order of their first ones or by parts, and the place of each dof. false: no memory.
+ */
+static bool number_slots(uz_aggregates *mg, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes, bool parted)
 {
     uz_blocks *A = &mg->level[0].A;
     int32_t *places = uz_alloc_zero(modes->n_nodes, sizeof *places);
@@ -76,10 +129,11 @@ static bool number_slots(uz_aggregates *mg, int32_t *node_of_group, const uz_mod
         mg->slot[j] = places[group]++;
         A->b = places[group] > A->b ? places[group] : A->b;
     }
-    for (int64_t j = 0; j < mg->base.n; j++)
+    const bool ok = !parted || number_by_parts(A, node_of_group, K, modes);
+    for (int64_t j = 0; ok && j < mg->base.n; j++)
         mg->slot[j] += (int64_t)node_of_group[modes->node[j]] * A->b;
     free(places);
-    return true;
+    return ok;
 }
 
 static int compare_columns(const void *a, const void *b)
@@ -184,12 +238,12 @@ static uz_status fill(uz_aggregates *mg, const uz_csc *K, uz_error *err)
 }
 
 uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes,
-                              uz_error *err)
+                              bool parted, uz_error *err)
 {
     uz_blocks *A = &mg->level[0].A;
     mg->slot = uz_alloc(K->cols, sizeof *mg->slot);
     mg->scale = uz_alloc(K->cols, sizeof *mg->scale);
-    bool ok = mg->slot && mg->scale && number_slots(mg, node_of_group, modes) && find_pattern(mg, K);
+    bool ok = mg->slot && mg->scale && number_slots(mg, node_of_group, K, modes, parted) && find_pattern(mg, K);
     if (ok) {
         const int64_t size = (int64_t)A->b * A->b;
         A->off = uz_alloc_zero(A->ptr[A->nodes] * size + 4, sizeof *A->off);
@@ -240,9 +294,10 @@ typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
 /* Each block is read once, for both triangles. Rows of a block are read as four numbers: what follows them counts for
  * nothing, as the fourth number of a node is 0. */
-static inline __attribute__((always_inline)) void multiply(double *y, const uz_blocks *A, const double *x, int b)
+static inline __attribute__((always_inline)) void multiply(double *y, const uz_blocks *A, const double *x,
+                                                           int64_t first, int64_t end, int b)
 {
-    for (int64_t i = 0; i < A->nodes; i++) {
+    for (int64_t i = first; i < end; i++) {
         const double *own = A->diag + i * b * b;
         const four xi = *(const four *)(x + 4 * i);
         four sum[3], back = {0};
@@ -265,27 +320,45 @@ static inline __attribute__((always_inline)) void multiply(double *y, const uz_b
     }
 }
 
-static inline __attribute__((always_inline)) void multiply_any(double *y, const uz_blocks *A, const double *x)
+/* What the nodes from `first` to `end` know of A x, after those that they have blocks with. */
+static inline __attribute__((always_inline)) void multiply_any(double *y, const uz_blocks *A, const double *x,
+                                                               int64_t first, int64_t end)
 {
     if (A->b == 3)
-        multiply(y, A, x, 3);
+        multiply(y, A, x, first, end, 3);
     else if (A->b == 2)
-        multiply(y, A, x, 2);
+        multiply(y, A, x, first, end, 2);
     else
-        multiply(y, A, x, 1);
+        multiply(y, A, x, first, end, 1);
 }
 
-UZ_AVX2_FMA static void multiply_fused(double *y, const uz_blocks *A, const double *x)
+UZ_AVX2_FMA static void multiply_fused(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end)
 {
-    multiply_any(y, A, x);
+    multiply_any(y, A, x, first, end);
 }
 
-static void multiply_plain(double *y, const uz_blocks *A, const double *x)
+static void multiply_plain(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end)
 {
-    multiply_any(y, A, x);
+    multiply_any(y, A, x, first, end);
+}
+
+typedef struct {
+    double *y;
+    const uz_blocks *A;
+    const double *x;
+    void (*multiply)(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end);
+} product;
+
+static void multiply_part(void *ctx, int part)
+{
+    const product *p = ctx;
+    p->multiply(p->y, p->A, p->x, p->A->part[part], p->A->part[part + 1]);
 }
 
 void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x)
 {
-    (uz_cpu_has_avx2_fma() ? multiply_fused : multiply_plain)(y, A, x);
+    product p = {y, A, x, uz_cpu_has_avx2_fma() ? multiply_fused : multiply_plain};
+    if (A->parts > 0)
+        uz_aside_share(multiply_part, &p, A->parts);
+    p.multiply(y, A, x, A->parts > 0 ? A->part[A->parts] : 0, A->nodes);
 }

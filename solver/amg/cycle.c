@@ -8,9 +8,11 @@
 #include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "linalg/pieces.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -59,12 +61,18 @@ static inline __attribute__((always_inline)) void scatter(float *t, const uz_lev
     }
 }
 
-/* x = (D + L)^-1 b, t = b - A x, of which L'x alone is not 0. */
+/* Nodes, or aggregates where a step is one to these: what of it is to be done. */
+typedef struct {
+    int64_t first, end;
+} range;
+
+/* x = (D + L)^-1 b, t = b - A x, of which L'x alone is not 0; of nodes whose blocks are among themselves, or with those
+ * that are done. */
 static inline __attribute__((always_inline)) void sweep_down(float *x, float *t, const uz_level *level,
-                                                             const float *inverse, const float *rhs, int b)
+                                                             const float *inverse, const float *rhs, range of, int b)
 {
     const int width = uz_width(b);
-    for (int64_t i = 0; i < level->A.nodes; i++) {
+    for (int64_t i = of.first; i < of.end; i++) {
         const float *own = level->diag + i * b * b;
         float s[ROWS_MOST] = {0}, value[ROWS_MOST] = {0}, left[ROWS_MOST] = {0};
         for (int r = 0; r < b; r++)
@@ -90,12 +98,12 @@ static inline __attribute__((always_inline)) void sweep_down(float *x, float *t,
     }
 }
 
-/* x = (D + L')^-1 (b - L x). t: zeros at entry. */
+/* x = (D + L')^-1 (b - L x), likewise, those after them being done. t: zeros before the first of all. */
 static inline __attribute__((always_inline)) void sweep_up(float *x, float *t, const uz_level *level,
-                                                           const float *inverse, const float *rhs, int b)
+                                                           const float *inverse, const float *rhs, range of, int b)
 {
     const int width = uz_width(b);
-    for (int64_t i = level->A.nodes - 1; i >= 0; i--) {
+    for (int64_t i = of.end - 1; i >= of.first; i--) {
         const float *own = level->diag + i * b * b;
         float s[ROWS_MOST] = {0}, value[ROWS_MOST] = {0};
         for (int r = 0; r < b; r++) {
@@ -114,14 +122,16 @@ static inline __attribute__((always_inline)) void sweep_up(float *x, float *t, c
     }
 }
 
-/* coarse = P't, but for rows of held dofs. */
-static inline __attribute__((always_inline)) void restrict_to(float *coarse, const uz_level *level,
-                                                              const float *inverse, const float *t, int b, int k)
+/* coarse = P't, but for rows of held dofs; of these aggregates, whose nodes are looked for among all. */
+static inline __attribute__((always_inline)) void
+restrict_to(float *coarse, const uz_level *level, const float *inverse, const float *t, range of, int b, int k)
 {
     const int width = uz_width(b), parts = k > 4 ? 2 : 1;
-    memset(coarse, 0, (size_t)(level->aggregates * uz_width(k)) * sizeof *coarse);
+    memset(coarse + of.first * uz_width(k), 0, (size_t)((of.end - of.first) * uz_width(k)) * sizeof *coarse);
     for (int64_t i = 0; i < level->A.nodes; i++)
-        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
+        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1] && level->block[e] < of.end; e++) {
+            if (level->block[e] < of.first)
+                continue;
             const float *P = level->value + e * b * k;
             float *to = coarse + (int64_t)level->block[e] * 4 * parts;
             for (int q = 0; q < parts; q++) {
@@ -135,10 +145,10 @@ static inline __attribute__((always_inline)) void restrict_to(float *coarse, con
 
 /* x += P coarse, but at held dofs. */
 static inline __attribute__((always_inline)) void prolong_from(float *x, const uz_level *level, const float *inverse,
-                                                               const float *coarse, int b, int k)
+                                                               const float *coarse, range of, int b, int k)
 {
     const int width = uz_width(b), parts = k > 4 ? 2 : 1;
-    for (int64_t i = 0; i < level->A.nodes; i++) {
+    for (int64_t i = of.first; i < of.end; i++) {
         four sum[ROWS_MOST] = {{0}};
         for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
             const float *P = level->value + e * b * k, *from = coarse + (int64_t)level->block[e] * 4 * parts;
@@ -154,51 +164,97 @@ static inline __attribute__((always_inline)) void prolong_from(float *x, const u
     }
 }
 
-static inline __attribute__((always_inline)) void take_parts(const uz_level_step *s, int parts, int b, int k)
+static inline __attribute__((always_inline)) void take_part(const uz_level_step *s, int what, range of, int b, int k)
 {
-    if (parts & UZ_STEP_SWEEP_DOWN)
-        sweep_down(s->x, s->t, s->level, s->inverse, s->b, b);
-    if (parts & UZ_STEP_RESTRICT)
-        restrict_to(s->coarse, s->level, s->inverse, s->t, b, k);
-    if (parts & UZ_STEP_PROLONG)
-        prolong_from(s->x, s->level, s->inverse, s->coarse, b, k);
-    if (parts & UZ_STEP_SWEEP_UP) {
-        memset(s->t, 0, (size_t)(s->level->A.nodes * uz_width(b)) * sizeof *s->t);
-        sweep_up(s->x, s->t, s->level, s->inverse, s->b, b);
-    }
+    if (what == UZ_STEP_SWEEP_DOWN)
+        sweep_down(s->x, s->t, s->level, s->inverse, s->b, of, b);
+    if (what == UZ_STEP_RESTRICT)
+        restrict_to(s->coarse, s->level, s->inverse, s->t, of, b, k);
+    if (what == UZ_STEP_PROLONG)
+        prolong_from(s->x, s->level, s->inverse, s->coarse, of, b, k);
+    if (what == UZ_STEP_SWEEP_UP)
+        sweep_up(s->x, s->t, s->level, s->inverse, s->b, of, b);
 }
 
 /* For each size of blocks its own loops. */
-static inline __attribute__((always_inline)) void take_step(const uz_level_step *s, int parts)
+static inline __attribute__((always_inline)) void take_any(const uz_level_step *s, int what, range of)
 {
     const int b = s->level->A.b, k = s->k;
     if (b == 3 && k == 6)
-        take_parts(s, parts, 3, 6);
+        take_part(s, what, of, 3, 6);
     else if (b == 6)
-        take_parts(s, parts, 6, 6);
+        take_part(s, what, of, 6, 6);
     else if (b == 2 && k == 3)
-        take_parts(s, parts, 2, 3);
+        take_part(s, what, of, 2, 3);
     else if (b == 3 && k == 3)
-        take_parts(s, parts, 3, 3);
+        take_part(s, what, of, 3, 3);
     else if (b == 2)
-        take_parts(s, parts, 2, 2);
+        take_part(s, what, of, 2, 2);
     else
-        take_parts(s, parts, b, k);
+        take_part(s, what, of, b, k);
 }
 
-UZ_AVX2_FMA static void take_step_fused(const uz_level_step *s, int parts)
+UZ_AVX2_FMA static void take_fused(const uz_level_step *s, int what, range of)
 {
-    take_step(s, parts);
+    take_any(s, what, of);
 }
 
-static void take_step_plain(const uz_level_step *s, int parts)
+static void take_plain(const uz_level_step *s, int what, range of)
 {
-    take_step(s, parts);
+    take_any(s, what, of);
+}
+
+/* A step as the threads that share it see it: parts of the matrix, or as many ranges. */
+typedef struct {
+    const uz_level_step *step;
+    void (*take)(const uz_level_step *s, int what, range of);
+    int what, ranges;
+} sharing;
+
+static void take_matrix_part(void *ctx, int part)
+{
+    const sharing *x = ctx;
+    const int64_t *first = x->step->level->A.part + part;
+    x->take(x->step, x->what, (range){first[0], first[1]});
+}
+
+static void take_range(void *ctx, int part)
+{
+    const sharing *x = ctx;
+    const uz_level *level = x->step->level;
+    const int64_t n = x->what == UZ_STEP_RESTRICT ? level->aggregates : level->A.nodes;
+    x->take(x->step, x->what, (range){n * part / x->ranges, n * (part + 1) / x->ranges});
+}
+
+static void take_step(sharing *x, int what)
+{
+    const uz_blocks *A = &x->step->level->A;
+    const range rest = {A->parts > 0 ? A->part[A->parts] : 0, A->nodes};
+    x->what = what;
+    x->ranges = A->parts > 0 ? uz_aside_threads() : 1;
+    if (what == UZ_STEP_SWEEP_UP)
+        x->take(x->step, what, rest);
+    if (what == UZ_STEP_RESTRICT || what == UZ_STEP_PROLONG)
+        uz_aside_share(take_range, x, x->ranges);
+    else if (A->parts > 0)
+        uz_aside_share(take_matrix_part, x, A->parts);
+    if (what == UZ_STEP_SWEEP_DOWN)
+        x->take(x->step, what, rest);
 }
 
 void uz_level_take_step(const uz_level_step *s, int parts)
 {
-    (uz_cpu_has_avx2_fma() ? take_step_fused : take_step_plain)(s, parts);
+    sharing x = {.step = s, .take = uz_cpu_has_avx2_fma() ? take_fused : take_plain};
+    if (parts & UZ_STEP_SWEEP_DOWN)
+        take_step(&x, UZ_STEP_SWEEP_DOWN);
+    if (parts & UZ_STEP_RESTRICT)
+        take_step(&x, UZ_STEP_RESTRICT);
+    if (parts & UZ_STEP_PROLONG)
+        take_step(&x, UZ_STEP_PROLONG);
+    if (parts & UZ_STEP_SWEEP_UP) {
+        memset(s->t, 0, (size_t)(s->level->A.nodes * uz_width(s->level->A.b)) * sizeof *s->t);
+        take_step(&x, UZ_STEP_SWEEP_UP);
+    }
 }
 
 static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room, float *x, const float *b,
@@ -262,11 +318,40 @@ static uz_status apply_alone(const uz_aggregates *mg, uz_multigrid_room *room, d
     return status;
 }
 
+/* A vector of dofs on its way to the first level, or back. */
+typedef struct {
+    const uz_aggregates *mg;
+    double unit;
+    const double *from;
+    float *level;
+    double *to;
+} passage;
+
+static void read_dofs(void *ctx, int64_t begin, int64_t end)
+{
+    const passage *p = ctx;
+    const int b = p->mg->level[0].A.b, width = uz_width(b);
+    for (int64_t j = begin; j < end; j++) {
+        const int64_t s = p->mg->slot[j];
+        p->level[s / b * width + s % b] = (float)(p->mg->scale[j] * p->from[j] / p->unit);
+    }
+}
+
+static void write_dofs(void *ctx, int64_t begin, int64_t end)
+{
+    const passage *p = ctx;
+    const int b = p->mg->level[0].A.b, width = uz_width(b);
+    for (int64_t j = begin; j < end; j++) {
+        const int64_t s = p->mg->slot[j];
+        p->to[j] = p->mg->scale[j] * (double)p->level[s / b * width + s % b] * p->unit;
+    }
+}
+
 static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
                        uz_error *err)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
-    const int last = base->levels - 1, width = uz_width(mg->level[0].A.b), b = mg->level[0].A.b;
+    const int last = base->levels - 1;
     (void)K;
     if (last == 0)
         return apply_alone(mg, room, z, r, err);
@@ -282,15 +367,11 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
     int exponent;
     (void)frexp(largest, &exponent);
     const double unit = ldexp(1.0, exponent);
-    for (int64_t j = 0; j < base->n; j++) {
-        const int64_t s = mg->slot[j];
-        room->b[0][s / b * width + s % b] = (float)(mg->scale[j] * r[j] / unit);
-    }
+    passage p = {.mg = mg, .unit = unit, .from = r, .level = room->b[0], .to = z};
+    uz_by_pieces(read_dofs, &p, base->n);
     const uz_status status = uz_cycle_below(mg, room, 0, err);
-    for (int64_t j = 0; j < base->n; j++) {
-        const int64_t s = mg->slot[j];
-        z[j] = mg->scale[j] * (double)room->x[0][s / b * width + s % b] * unit;
-    }
+    p.level = room->x[0];
+    uz_by_pieces(write_dofs, &p, base->n);
     return status;
 }
 

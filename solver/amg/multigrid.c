@@ -222,7 +222,7 @@ static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes
     float *of_level = NULL;
     bool done = false;
     uz_status status =
-        node_of_group ? uz_blocks_of_matrix(mg, node_of_group, K, modes, err) : fail_memory(K->cols, err);
+        node_of_group ? uz_blocks_of_matrix(mg, node_of_group, K, modes, team == NULL, err) : fail_memory(K->cols, err);
     free(node_of_group);
     if (status == UZ_OK)
         status = uz_level_round(&mg->level[0], err);

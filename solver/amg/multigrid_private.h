@@ -5,6 +5,8 @@
 #include "factor/factor.h"
 #include "amg/amg.h"
 
+enum { UZ_PARTS_MOST = 4 };
+
 /* A symmetric matrix in blocks of b x b, row by row within each: what nodes exert on nodes. b is 1, 2, 3 or 6. */
 typedef struct {
     int64_t nodes;
@@ -12,6 +14,10 @@ typedef struct {
     int64_t *ptr;       /* nodes + 1 */
     int32_t *idx;       /* ptr[nodes]: the columns left of the diagonal, ascending */
     double *off, *diag; /* ptr[nodes] x b x b, nodes x b x b */
+    /* Nodes from part[p] to part[p + 1] have blocks left of the diagonal among themselves alone; those after all parts
+     * anywhere. What goes through the rows in order can take the parts at once. parts 0: not known. */
+    int parts;
+    int64_t part[UZ_PARTS_MOST + 1];
 } uz_blocks;
 void uz_blocks_clear(uz_blocks *A);
 /* Where in A->idx the column is, which must be there. */
@@ -97,10 +103,11 @@ void uz_level_take_step(const uz_level_step *step, int parts);
 /* A V-cycle from level `from` down, more levels than one: room->x[from] = M^-1 room->b[from]. */
 uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, uz_error *err);
 
-/* Takes K apart into level 0: slot, scale, level[0].A; *node_of_group (modes->n_nodes): where its nodes went, -1:
+/* Takes K apart into level 0: slot, scale, level[0].A, its nodes in the order of K's, or, if it may be parted, in parts
+ * (uz_blocks), each of them in that order; *node_of_group (modes->n_nodes): where its nodes went, -1:
  * nowhere. Errors: NOT_SPD where a diagonal entry or a pair of dofs shows it. */
 uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes,
-                              uz_error *err);
+                              bool parted, uz_error *err);
 
 /* Column by column, lower triangle; dofs without an inverse become those of the unit matrix. */
 uz_status uz_blocks_to_columns(uz_csc *out, const uz_blocks *A, const float *inverse, uz_error *err);

@@ -21,7 +21,7 @@ static struct {
     atomic_int asleep;           /* threads that wait for work */
     atomic_bool shared;          /* somebody has a share; what follows is his, then of who took a part */
     atomic_uint_fast64_t next;   /* number of the share, its parts, and the part to be begun: 32, 16 and 16 bits */
-    atomic_int used;             /* parts of the largest so far */
+    atomic_int used;             /* threads that one had, at most, so far */
     atomic_int left;             /* parts that have not ended */
     atomic_bool owner_asleep;
     void (*run)(void *ctx, int part);
@@ -93,22 +93,23 @@ static void wait_for_all(void)
 
 void uz_aside_share(void (*run)(void *ctx, int part), void *ctx, int parts)
 {
+    const int threads = uz_aside_threads(), most = threads < parts ? threads : parts;
     bool shared = false;
-    if (parts < 2 || uz_aside_threads() < 2 || !atomic_compare_exchange_strong(&aside.shared, &shared, true)) {
+    if (most < 2 || !atomic_compare_exchange_strong(&aside.shared, &shared, true)) {
         for (int part = 0; part < parts; part++)
             run(ctx, part);
         return;
     }
     aside.run = run;
     aside.ctx = ctx;
-    if (atomic_load(&aside.used) < parts)
-        atomic_store(&aside.used, parts);
+    if (atomic_load(&aside.used) < most)
+        atomic_store(&aside.used, most);
     atomic_store(&aside.left, parts);
     const uint64_t share = (atomic_load(&aside.next) >> 32) + 1;
     atomic_store(&aside.next, share << 32 | (uint64_t)parts << 16);
     if (atomic_load(&aside.asleep) > 0) {
         pthread_mutex_lock(&aside.mutex);
-        for (int part = 1; part < parts; part++)
+        for (int thread = 1; thread < most; thread++)
             pthread_cond_signal(&aside.waits);
         pthread_mutex_unlock(&aside.mutex);
     }

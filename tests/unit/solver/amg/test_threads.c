@@ -33,7 +33,7 @@ static void make_and_apply(double *z, double *y, const brick *b, const double *x
 
 TEST(threads_give_the_same_bits)
 {
-    brick b = brick_make((int64_t[3]){25, 24, 23}, (double[3]){1, 1, 1}, 0.3, true);
+    brick b = brick_make((int64_t[3]){25, 25, 26}, (double[3]){1, 1, 1}, 0.3, true);
     const size_t bytes = (size_t)b.d * sizeof(double);
     double *x = malloc(bytes), *z[2] = {malloc(bytes), malloc(bytes)}, *y[2] = {malloc(bytes), malloc(bytes)};
     CHECK(x && z[0] && z[1] && y[0] && y[1]);
