@@ -83,6 +83,9 @@ bool work_probe(worker *me);
 
 bool work_is_stopping(work *w);
 
+/* That each of so many jobs may take: its share of the processors, at most options.threads. */
+int work_threads(const work *w, int jobs);
+
 /* Of the load case i of the job that it runs, once that was read. */
 void work_case_name(const process *p, int64_t i, char name[CASE_NAME]);
 

@@ -52,6 +52,7 @@ bool work_predict(work *w, const work_request *request, uz_prediction *out)
     if (process_make(&p, w->options.program, 0, w->options.solve_bytes, w->log) &&
         segment_reach(&p.inbox, request->len, true) && process_begin(&p)) {
         memcpy(p.inbox.at, request->text, request->len);
+        atomic_store(&p.board->threads, work_threads(w, work_busy(w) + 1)); /* as if the job began now */
         if (message_send(p.socket, &m, -1) && converse(w, &p, request, &m)) {
             known = m.u.predicted.known;
             *out = m.u.predicted.cost;

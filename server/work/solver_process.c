@@ -167,6 +167,7 @@ static void run_prediction(solver *s, const packet *m)
     const solve_with with = {.source = s->source, .hooks = &hooks, .memory_limit = (size_t)m->u.job.memory};
     packet reply = {.kind = MESSAGE_PREDICTED};
     char *text = take_text(s, m);
+    uz_process_threads(atomic_load(&s->board->threads));
     reply.u.predicted.known = text && solve_predict(&reply.u.predicted.cost, &with, text, (size_t)m->u.job.size);
     message_send(s->socket, &reply, -1);
 }

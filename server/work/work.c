@@ -76,9 +76,8 @@ static void call_worker(work *w, bool several)
  * too. Those of the lanes have one. */
 static void share_processors(work *w)
 {
-    const int each = w->processors / (w->busy > 1 ? w->busy : 1), most = w->options.threads;
     for (int i = 0; i < w->options.workers; i++)
-        atomic_store(&w->processes[i].board->threads, most > 0 && most < each ? most : each);
+        atomic_store(&w->processes[i].board->threads, work_threads(w, w->busy));
 }
 
 static void *work_loop(void *arg)
@@ -532,6 +531,12 @@ bool work_solves(work *w)
     w->probe = w->probe == PROBE_RUNS ? PROBE_RUNS : PROBE_NONE;
     pthread_mutex_unlock(&w->lock);
     return good;
+}
+
+int work_threads(const work *w, int jobs)
+{
+    const int each = w->processors / (jobs > 1 ? jobs : 1), most = w->options.threads;
+    return most > 0 && most < each ? most : each;
 }
 
 int work_busy(work *w)

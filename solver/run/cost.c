@@ -193,6 +193,17 @@ static double least_bytes(const uz_cost_plan *plan, bool with_factor, uz_operato
     return least;
 }
 
+/* Of the processor time of a cold solve that contact is certified in, what is in shares: a cube of 64 cells along a
+ * side as a box, one of 48 as hex8. */
+#define BOX_SHARED  0.65
+#define MESH_SHARED 0.41
+
+double uz_cost_shared(double seconds, uz_operator op, bool brick, int threads)
+{
+    const double shared = op != UZ_OPERATOR_MATRIX_FREE ? 0.0 : brick ? BOX_SHARED : MESH_SHARED;
+    return seconds * (1.0 - shared + shared / (threads > 1 ? threads : 1));
+}
+
 uz_status uz_cost_refuse(const uz_cost_plan *plan, uz_operator asked, size_t memory_limit, uz_error *err)
 {
     const bool any = asked == UZ_OPERATOR_AUTO, by_factor = any || uz_dual_form_of(asked)->can.needs_factor;

@@ -1,5 +1,6 @@
 /* predict.c: what a solve will take, from the pattern of its matrices: nothing is factored. */
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/error.h"
 #include "dual/form.h"
 #include "certificate/envelope.h"
@@ -50,7 +51,8 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, c
     out->fits = plan.chosen >= 0;
     out->op = e->op;
     out->bytes = e->bytes;
-    out->seconds = e->setup_s + (double)(cases > 0 ? cases : 1) * e->case_s;
+    out->seconds = uz_cost_shared(e->setup_s + (double)(cases > 0 ? cases : 1) * e->case_s, e->op, brick != NULL,
+                                  uz_aside_threads());
     if (!uz_dual_form_of(out->op)->can.needs_factor)
         out->factor_nnz = 0;
     return UZ_OK;

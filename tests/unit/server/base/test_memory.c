@@ -1,9 +1,10 @@
-/* What a solve may take of the machine. */
+/* What a solve may take of the machine, and what the service has of it. */
 #include "harness.h"
 #include "base/memory.h"
 #include "options/options.h"
 
 #include <stdio.h>
+#include <unistd.h>
 
 TEST(share_of_a_worker)
 {
@@ -13,6 +14,7 @@ TEST(share_of_a_worker)
     CHECK_INT(memory_share(G, 2 * G, 4), (size_t)64 << 20);
     CHECK_INT(memory_share(0, 0, 0), (size_t)64 << 20);
     CHECK(memory_available() > 0);
+    CHECK(processors_available() >= 1 && processors_available() <= sysconf(_SC_NPROCESSORS_ONLN));
 }
 
 TEST(option)

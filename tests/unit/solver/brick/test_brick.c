@@ -1,9 +1,7 @@
 /* Boxes whose K is not assembled: products, diagonal and moved supports against the assembled matrix, residuals in
  * quadruple precision, the multigrid, and whole solves against a factor's. */
 #include "brick/brick.h"
-#include "certificate/brick_product.h"
 #include "certificate/residual.h"
-#include "core/aside.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -306,66 +304,6 @@ static void check_solve(const uz_scene *scene, double relative_error)
     uz_body_model_clear(&model);
     uz_result_free(want);
     uz_result_free(got);
-}
-
-/* What threads compute of a body is what one computes, to the last bit: here the products, a cycle, a start on coarser
- * grids, and what a certificate has of them. */
-TEST(threads_give_the_same_bits)
-{
-    enum { VECTORS = 6, THREADS = 3 };
-    twins t = make_twins(41, 30, 37, 0.3);
-    const int64_t d = t.cells.d;
-    const uz_stop never = {.hooks = NULL, .deadline = INFINITY};
-    uz_error err = {0};
-    uz_csc K = {0};
-    double *x = vector(d), *one[VECTORS], *many[VECTORS], *bottom = vector(d), *top = vector(d);
-    bool *held = calloc((size_t)d, sizeof *held);
-    fill(x, d, 5);
-    for (int64_t j = 0; j < d; j++) {
-        bottom[j] = -INFINITY;
-        top[j] = j % 7 == 0 ? 1e-3 : INFINITY;
-    }
-    CHECK_INT(uz_brick_diagonal(&K, t.cells.brick, &err), UZ_OK);
-    CHECK_INT(uz_aside_begin(THREADS), THREADS);
-    for (int threads = 1; threads <= THREADS; threads++) {
-        double **y = threads == 1 ? one : many;
-        uz_multigrid *mg;
-        uz_cg cg;
-        uz_cg_info info;
-        bool found;
-        for (int k = 0; k < VECTORS && (threads == 1 || threads == 2); k++)
-            y[k] = vector(d);
-        for (int k = 0; k < VECTORS; k++)
-            memset(y[k], 0, (size_t)d * sizeof *y[k]);
-        uz_aside_allow(threads);
-        (void)uz_aside_used();
-        CHECK_INT(uz_brick_multigrid(&mg, t.cells.brick, 0, &err), UZ_OK);
-        CHECK_INT(uz_cg_init(&cg, mg, &err), UZ_OK);
-        mg->kind->multiply(mg, &K, cg.room, y[0], x);
-        CHECK_INT(uz_multigrid_apply(mg, &K, cg.room, y[1], x, &err), UZ_OK);
-        CHECK_INT(mg->kind->start(mg, cg.room, &found, y[2], held, x, bottom, top, &never, &err), UZ_OK);
-        CHECK(found);
-        CHECK_INT(uz_brick_precise_product(y[3], y[4], y[5], t.cells.brick, x, x, &err), UZ_OK);
-        const uz_cg_stop stop = {.relative = 1e-6, .max_iterations = 50, .deadline = INFINITY};
-        CHECK_INT(uz_cg_solve(&info, y[5], &cg, &K, x, &stop, &err), UZ_OK);
-        CHECK(info.met);
-        uz_cg_clear(&cg);
-        uz_multigrid_free(mg);
-        CHECK_INT(uz_aside_used(), threads);
-        for (int k = 0; threads > 1 && k < VECTORS; k++)
-            CHECK_MSG(memcmp(one[k], many[k], (size_t)d * sizeof(double)) == 0, "vector %d by %d threads", k, threads);
-    }
-    uz_aside_allow(1);
-    for (int k = 0; k < VECTORS; k++) {
-        free(one[k]);
-        free(many[k]);
-    }
-    free(x);
-    free(bottom);
-    free(top);
-    free(held);
-    uz_csc_clear(&K);
-    free_twins(&t);
 }
 
 TEST(solves_agree_with_a_factor)

@@ -438,6 +438,17 @@ TEST(a_factor_that_costs_twice_a_multigrid_is_not_made)
     CHECK(made > 0 && spared > 0);
 }
 
+/* Threads leave what they do not share, which on boxes is less; other forms take what one thread does. */
+TEST(threads_divide_what_they_share)
+{
+    for (int threads = 1; threads <= 4; threads++) {
+        const double box = uz_cost_shared(2, UZ_OPERATOR_MATRIX_FREE, true, threads),
+                     mesh = uz_cost_shared(2, UZ_OPERATOR_MATRIX_FREE, false, threads);
+        CHECK(threads == 1 ? box == 2 && mesh == 2 : 2.0 / threads < box && box < mesh && mesh < 2);
+        CHECK(uz_cost_shared(2, UZ_OPERATOR_CONDENSED, false, threads) == 2);
+    }
+}
+
 /* The same membrane in other units: stiffer, or with larger displacements, and begun with reactions. Nothing but
  * exponents may change. */
 TEST(units_do_not_decide)
