@@ -172,7 +172,8 @@ uz_status uz_amg_of_definite(uz_amg **out, uz_multigrid *mg, uz_error *err);
  * rough. NOT_SPD: they show that K is not definite. */
 uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
 /* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD and
- * LIMIT as uz_amg_of. With patience 0 aggregates of another kind are tried where the usual ones do badly. */
+ * LIMIT as uz_amg_of. Aggregates of another kind are tried where the usual ones do badly: with patience where they
+ * would have to be refused, without it where they are slow. */
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, int patience,
                         const uz_hooks *hooks, uz_error *err);
 void uz_amg_free(uz_amg *amg);

@@ -9,8 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Square elements reach all their neighbours at this; where elements are stretched a larger one is needed. */
-#define STRONG 0.08
+/* Square elements reach all their neighbours at this, and cubes and tetrahedra at a smaller one: aggregates of 26 nodes
+ * instead of 10 on tet4, whose next level else has more numbers than K. Where elements are stretched a larger one is
+ * needed (amg.h). */
+#define STRONG       0.08
+#define STRONG_SOLID 0.02
 
 void uz_modes_clear(uz_modes *modes)
 {
@@ -22,7 +25,7 @@ void uz_modes_clear(uz_modes *modes)
 static uz_status allocate(uz_modes *modes, int64_t n, int count, uz_error *err)
 {
     modes->count = count;
-    modes->strong = STRONG;
+    modes->strong = count == UZ_MODES_MOST ? STRONG_SOLID : STRONG;
     modes->node = uz_alloc(n, sizeof *modes->node);
     modes->value = uz_alloc_zero(n * count, sizeof *modes->value);
     if (modes->node && modes->value)

@@ -328,6 +328,55 @@ TEST(solid_bodies)
     close_pair(&p);
 }
 
+/* A cube of tetrahedra, or a body that is as much longer along y. */
+static uz_body_model build_tetrahedra(double length)
+{
+    static uz_material material = {.on = "all", .young = 1, .poisson = 0.3};
+    static uz_support support = {.on = "left"};
+    uz_scene scene = {.model = UZ_SOLID,
+                      .box = {.size = {1, length, 1}, .cells = {12, 12, 12}, .element = "tet4", .dim = 3},
+                      .materials = &material,
+                      .n_materials = 1,
+                      .supports = &support,
+                      .n_supports = 1};
+    return build_body(&scene);
+}
+
+/* Within the patience of who has another way. */
+static uz_amg *amg_of_tetrahedra(const uz_body_model *model)
+{
+    uz_modes modes;
+    uz_amg *amg = NULL;
+    uz_error err = {0};
+    CHECK(uz_modes_of_body(&modes, model->info.xyz, model->dof, model->mesh.n_nodes, 3, model->d, &err) == UZ_OK);
+    CHECK_MSG(uz_amg_create(&amg, &model->K, &modes, 0, 100, NULL, &err) == UZ_OK, "%s", err.message);
+    return amg;
+}
+
+TEST(coarse_levels_of_tetrahedra_are_small)
+{
+    uz_body_model model = build_tetrahedra(1);
+    uz_amg *amg = amg_of_tetrahedra(&model);
+    const uz_level *level = ((const uz_aggregates *)amg->mg)->level;
+    const uz_blocks *fine = &level[0].A, *coarse = &level[1].A;
+    CHECK(amg->info.levels > 1 && coarse->b == 6);
+    CHECK(20 * coarse->nodes < fine->nodes);
+    CHECK(36 * coarse->ptr[coarse->nodes] < 9 * fine->ptr[fine->nodes] / 2);
+    CHECK(amg->info.lambda > 0.05);
+    uz_amg_free(amg);
+    uz_body_model_clear(&model);
+}
+
+/* The usual threshold does not see that they are stretched; the second one does. */
+TEST(stretched_tetrahedra)
+{
+    uz_body_model model = build_tetrahedra(10);
+    uz_amg *amg = amg_of_tetrahedra(&model);
+    CHECK_MSG(amg->info.lambda > 0.05, "%g", amg->info.lambda);
+    uz_amg_free(amg);
+    uz_body_model_clear(&model);
+}
+
 TEST(modes_of_a_free_body_meet_no_resistance)
 {
     brick b = brick_make((int64_t[]){2, 2, 2}, (double[]){1, 2, 3}, 0.3, false);
