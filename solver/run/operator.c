@@ -235,12 +235,14 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
     const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor;
     bool no_factor = free_asked || setup->model.brick || (limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit);
     m.direct = uz_dual_choose(m.N, n_b, free_asked ? UZ_OPERATOR_AUTO : settings->op);
+    const bool surely_free = !no_factor && setup->is_scene &&
+                             uz_cost_is_surely_free(plan, &m.size, &setup->model.mesh, m.direct, m.asked, limit);
     bool done = false;
     for (int k = 0; status == UZ_OK && !done && k < TRIES; k++) {
-        plan->chosen = -1;
         if (no_factor) {
             uz_cost_decide(plan, &m.size, NULL, m.direct, settings->op, limit);
-        } else {
+        } else if (k > 0 || !surely_free) { /* else nobody needs the order of a factor */
+            plan->chosen = -1;
             int64_t n_dofs = uz_dual_form_of(m.direct)->can.contact_last ? n_b : 0;
             int64_t rows = uz_cost_is_one_to_one(m.N, n_dofs) ? 0 : m.N->rows;
             status = uz_shared_factor_get(&setup->shared, cache, key, m.K, dofs, n_dofs, rows, settings->ordering,

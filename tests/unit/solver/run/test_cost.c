@@ -1,0 +1,45 @@
+/* What is decided by counts alone. */
+#include "harness.h"
+#include "run/cost.h"
+#include "scene_fixture.h"
+
+#include <string.h>
+
+/* A solid of hex8 under few rows. */
+static bool is_surely_free(uz_cost_plan *plan, int64_t nx, int64_t ny, int64_t nz, uz_operator asked, size_t limit)
+{
+    const uz_box box = {
+        .size = {(double)nx, (double)ny, (double)nz}, .cells = {nx, ny, nz}, .dim = 3, .element = "hex8"};
+    uz_mesh mesh;
+    uz_error err = {0};
+    CHECK_MSG(uz_mesh_from_box(&mesh, &box, &err) == UZ_OK, "%s", err.message);
+    const int64_t d = 3 * mesh.n_nodes, m = 25;
+    const uz_cost_size size = {
+        .d = d, .m = m, .n_b = m, .k_entries = 41 * d, .n_entries = m, .modes = 6, .active_set = true, .bounds = true};
+    const bool surely = uz_cost_is_surely_free(plan, &size, &mesh, UZ_OPERATOR_CONDENSED, asked, limit);
+    uz_mesh_clear(&mesh);
+    return surely;
+}
+
+TEST(a_large_cube_needs_no_order_of_a_factor)
+{
+    uz_cost_plan plan;
+    CHECK(is_surely_free(&plan, 80, 80, 80, UZ_OPERATOR_AUTO, 0));
+    CHECK_INT(plan.form[plan.chosen].op, UZ_OPERATOR_MATRIX_FREE);
+    CHECK(plan.count > 1 && plan.form[0].op == UZ_OPERATOR_CONDENSED);
+    CHECK(!is_surely_free(&plan, 80, 80, 80, UZ_OPERATOR_CONDENSED, 0));
+}
+
+TEST(a_bar_and_a_small_cube_have_their_factor_counted)
+{
+    uz_cost_plan plan;
+    CHECK(!is_surely_free(&plan, 2000, 4, 4, UZ_OPERATOR_AUTO, 0));
+    CHECK(!is_surely_free(&plan, 8, 8, 8, UZ_OPERATOR_AUTO, 0));
+}
+
+TEST(a_factor_that_cannot_fit_is_not_counted)
+{
+    uz_cost_plan plan;
+    CHECK(is_surely_free(&plan, 40, 40, 40, UZ_OPERATOR_AUTO, (size_t)1 << 30));
+    CHECK(!plan.form[0].fits);
+}
