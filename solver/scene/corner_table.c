@@ -23,8 +23,8 @@ static void sort_nodes(int64_t *node, int count)
     }
 }
 
-/* The corners of a side or of a whole element, ascending, -1 beyond them. */
-static void sorted_corners(int64_t corner[UZ_MOST_CORNERS], const uz_mesh *mesh, uz_face item)
+/* The corners of a side or of a whole element, -1 beyond them; how many there are. */
+static int list_corners(int64_t corner[UZ_MOST_CORNERS], const uz_mesh *mesh, uz_face item)
 {
     const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[item.element]);
     const int64_t *node = mesh->node + mesh->first[item.element];
@@ -32,7 +32,23 @@ static void sorted_corners(int64_t corner[UZ_MOST_CORNERS], const uz_mesh *mesh,
     const int count = item.side < 0 ? type->corners : type->side[item.side].corners;
     for (int i = 0; i < UZ_MOST_CORNERS; i++)
         corner[i] = i >= count ? -1 : local ? node[local[i]] : node[i];
-    sort_nodes(corner, count);
+    return count;
+}
+
+/* The same, ascending. */
+static void sorted_corners(int64_t corner[UZ_MOST_CORNERS], const uz_mesh *mesh, uz_face item)
+{
+    sort_nodes(corner, list_corners(corner, mesh, item));
+}
+
+static int64_t lowest_corner(const uz_mesh *mesh, uz_face item)
+{
+    int64_t corner[UZ_MOST_CORNERS];
+    const int count = list_corners(corner, mesh, item);
+    int64_t lowest = corner[0];
+    for (int i = 1; i < count; i++)
+        lowest = corner[i] < lowest ? corner[i] : lowest;
+    return lowest;
 }
 
 static int compare_corners(const int64_t *a, const int64_t *b)
@@ -57,15 +73,14 @@ static int compare_entries(const void *a, const void *b)
 /* Calls for every item: counts it into start[lowest + 1], or, if `place`, puts it where start[lowest] says. */
 static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, bool place)
 {
-    int64_t corner[UZ_MOST_CORNERS];
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         const int last = sides ? uz_element_type_of((uz_element_kind)mesh->kind[e])->sides - 1 : -1;
         for (int s = sides ? 0 : -1; s <= last; s++) {
-            sorted_corners(corner, mesh, (uz_face){e, s});
+            const int64_t lowest = lowest_corner(mesh, (uz_face){e, s});
             if (place)
-                table->item[table->start[corner[0]]++] = (uz_face){e, s};
+                table->item[table->start[lowest]++] = (uz_face){e, s};
             else
-                table->start[corner[0] + 1]++;
+                table->start[lowest + 1]++;
         }
     }
 }

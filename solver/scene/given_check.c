@@ -56,6 +56,13 @@ static uz_status check_element(const uz_given_mesh *given, int64_t e, uz_error *
     return UZ_OK;
 }
 
+/* As hypot, in a tenth of its time where squares neither overflow nor vanish. */
+static double length_of(const double v[3])
+{
+    const double square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    return square > 1e-200 && square < 1e200 ? sqrt(square) : hypot(hypot(v[0], v[1]), v[2]);
+}
+
 /* The sign of the Jacobian of the map from the reference element at a corner; 0 where the volume there is none but for
  * rounding: small against that of its edges.
  *
@@ -82,7 +89,7 @@ static int corner_sign(const uz_given_mesh *given, int64_t e, int corner)
             chord[c] = to[c] - from[c];
             t[k][c] = mid ? 4 * (mid[c] - from[c]) - chord[c] : chord[c];
         }
-        const double length = hypot(hypot(chord[0], chord[1]), dim == 3 ? chord[2] : 0);
+        const double length = length_of(chord);
         if (!(length > 0) || !isfinite(length))
             return 0;
         for (int c = 0; c < dim; c++)
