@@ -43,3 +43,18 @@ TEST(a_factor_that_cannot_fit_is_not_counted)
     CHECK(is_surely_free(&plan, 40, 40, 40, UZ_OPERATOR_AUTO, (size_t)1 << 30));
     CHECK(!plan.form[0].fits);
 }
+
+/* A cycle on tet4 takes about the time of one on hex8 of as many dofs: most of it is not reading K. */
+TEST(a_multigrid_is_not_paid_by_entries_alone)
+{
+    uz_cost_size size = {
+        .d = 100000, .m = 1000, .n_b = 1000, .n_entries = 1000, .modes = 6, .active_set = true, .bounds = true};
+    double seconds[2];
+    for (int k = 0; k < 2; k++) {
+        uz_cost_plan plan;
+        size.k_entries = (k == 0 ? 23 : 41) * size.d;
+        uz_cost_decide(&plan, &size, NULL, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_MATRIX_FREE, 0);
+        seconds[k] = plan.form[plan.chosen].setup_s + plan.form[plan.chosen].case_s;
+    }
+    CHECK_MSG(seconds[0] < seconds[1] && seconds[1] < 1.5 * seconds[0], "%g and %g s", seconds[0], seconds[1]);
+}
