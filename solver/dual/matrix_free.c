@@ -384,9 +384,14 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
                  root = sqrt(load->dual->amg->info.lambda), most = uz_root(-2.0 * load->psi0);
     double tolerance = fmax(least, x->coarse), *held = x->cg.p, *e = x->cg.r;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
-    for (int64_t j = 0; j < d; j++)
+    bool moved = false;
+    for (int64_t j = 0; j < d; j++) {
         held[j] = box->fixed[j] ? box->u[j] : 0.0;
-    uz_sparse_multiply(load, x->right, held);
+        moved = moved || held[j] != 0.0;
+    }
+    memset(x->right, 0, (size_t)d * sizeof *x->right);
+    if (moved) /* not where all touches from the beginning */
+        uz_sparse_multiply(load, x->right, held);
     for (int64_t j = 0; j < d; j++)
         x->right[j] = x->p[j] - x->right[j]; /* p - K u of the dofs that are held, and no others */
     uz_sparse_multiply(load, box->force, box->u);
