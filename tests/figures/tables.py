@@ -376,6 +376,16 @@ def decks(data):
         *(f"- {reason}: {', '.join(names)}" for reason, names in sorted(why.items(), key=lambda one: -len(one[1])))]
 
 
+def space(data):
+    """Contact of solids over the linear solve of the same K by another program's multigrid."""
+    rows = (data.get("peers_space") or {}).get("rows")
+    told = [[f"`{row['mesh']}`" if row["mesh"] != "box" else "box of `hex8`", f"{row['unknowns']:,}", f"{duration(row['gamg_setup_s'])} + {duration(row['gamg_solve_s'])}",
+             str(row["gamg_iterations"]), duration(row["cold_s"]), duration(row["cached_s"]),
+             f"{row['cold_ratio']:.2f} ({row['cold_spread'][0]:.2f} .. {row['cold_spread'][1]:.2f})", f"{row['cached_ratio']:.2f}", f"`{row['operator']}`", sig(row["certified"], 2)]
+            for row in rows or ()]
+    return rows and table(["mesh", "unknowns", "GAMG", "its iterations", "cold", "another load", "cold over GAMG", "another load", "operator", "certified"], told)
+
+
 REASONS = (("first step is", "the first step is no static one"), ("FRICTION", "friction"), ("EQUATION", "equations between displacements"),
            ("SPRINGA", "springs"), ("in place of a spring", "contact softer than a twentieth of the body"),
            ("PLASTIC", "plasticity"), ("TRANSFORM", "turned axes of nodes"), ("CYCLIC", "cyclic symmetry"))
