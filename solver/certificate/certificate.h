@@ -27,8 +27,9 @@ typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, double *e, double
 /* *doubt: how much the factorization's rounding may falsify that, relative (uz_distrust). */
 typedef uz_status (*uz_measure_doubt)(void *ctx, double *doubt, uz_error *err);
 
-/* From so many dofs on it is worth sparing. */
-enum { UZ_CERTIFY_SPARES = 20000 };
+/* From a factor of so many entries on it is worth sparing: one that no cache of a processor holds, so that reading it
+ * takes longer than all the rest of a certificate. Plane bodies of 16,000 dofs have one, solids of 5,000. */
+enum { UZ_CERTIFY_SPARES = 1500000 };
 
 typedef struct {
     const uz_csc *K, *N;   /* lower triangle; m x d */

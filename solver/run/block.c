@@ -77,7 +77,7 @@ uz_status uz_block_create(uz_block **out, uz_run **runs, uz_setup *setup, const 
                                  .ctx = block,
                                  .terms = setup->terms,
                                  .inverse_bound = uz_factor_describe(setup->factor).inverse_bound,
-                                 .spares = block->d >= UZ_CERTIFY_SPARES};
+                                 .spares = uz_factor_describe(setup->factor).nnz >= UZ_CERTIFY_SPARES};
     if (status == UZ_OK && !in.spares && !(block->permuted = uz_alloc(block->d * UZ_LANES, sizeof(double))))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     if (status == UZ_OK)

@@ -93,7 +93,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .terms = setup->terms,
         .rcond = run->result->summary.rcond,
         .inverse_bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY,
-        .spares = run->d >= UZ_CERTIFY_SPARES,
+        .spares = setup->factor && uz_factor_describe(setup->factor).nnz >= UZ_CERTIFY_SPARES,
         .moved = run->load.moved,
         .whole_norm = whole_norm,
         .sharp = 0.5 * run->work.requested,

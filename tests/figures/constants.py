@@ -136,7 +136,7 @@ PHRASES = {
     "1000 items in each list": None, "4096 groups": constant(4096, r"UZ_MESH_MAX_GROUPS (\d+)"),
     "Each fails with a probability below 1e-12": None, "All claims together fail with a probability below 1e-12": None,  # of the theorems used
     "8e-13 is spent on the first": constant(8e-13, r"#define CHANCE +([\d.e-]+)"), "and 1e-14 on each later one": constant(1e-14, r"#define CHANCE_MORE ([\d.e-]+)"),
-    "spares bodies of 20,000 dofs and more a half": constant(20000, r"UZ_CERTIFY_SPARES = (\d+)"),
+    "1,500,000 entries a half solve": constant(1500000, r"UZ_CERTIFY_SPARES = (\d+)"),
     "d times 2e-16": None,
     "The certificate says 1e-9": None, "From 10 % on": None, "the mesh alone is off by 10 % and": None,
     "`error.mesh` is 0.1 or more": None, "TLS** is 1.3 or 1.2": None, "with TLS 1.3 or 1.2 and forward": None,
