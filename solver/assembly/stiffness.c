@@ -3,6 +3,7 @@
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 #include "linalg/linalg.h"
@@ -324,34 +325,72 @@ UZ_AVX2_FMA static double energy_quad4_wide(const uz_body_model *model, const do
     return energy_quad4(model, ke, nodal, e);
 }
 
-uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried, uz_error *err)
+/* Twice the energy of elements begin to end - 1. */
+static uz_status add_energies(double *twice, const uz_body_model *model, const double *nodal, bool carried,
+                              int64_t begin, int64_t end, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
     double (*const of_quad4)(const uz_body_model *, const double *, const double *, int64_t) =
         uz_cpu_has_avx2_fma() ? energy_quad4_wide : energy_quad4;
     stiffness_source source;
     const double *ke;
-    double twice = 0;
     uz_status status = source_init(&source, model, err);
-    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++) {
+    for (int64_t e = begin; e < end && status == UZ_OK; e++) {
         if (!source.shared) { /* a matrix of its own would be made for it alone */
             uz_element element;
             double d[DOFS], xyz[3 * UZ_ELEMENT_NODES];
             take_nodal(d, model, nodal, e, carried);
             uz_body_element(&element, xyz, model, e);
-            twice += 2 * uz_element_strain_energy(&element, d);
+            *twice += 2 * uz_element_strain_energy(&element, d);
             continue;
         }
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
-            twice += mesh->kind[e] == UZ_QUAD4 && !carried ? of_quad4(model, ke, nodal, e)
-                                                           : energy_any(model, ke, nodal, e, carried);
+            *twice += mesh->kind[e] == UZ_QUAD4 && !carried ? of_quad4(model, ke, nodal, e)
+                                                            : energy_any(model, ke, nodal, e, carried);
     }
+    source_clear(&source);
+    return status;
+}
+
+enum { SHARES = 2, WORTH_SHARING = 20000 }; /* elements */
+
+typedef struct {
+    const uz_body_model *model;
+    const double *nodal;
+    bool carried;
+    double twice[SHARES];
+    uz_status status[SHARES];
+    uz_error err[SHARES];
+} energy_sum;
+
+static void add_share(void *ctx, int share)
+{
+    energy_sum *sum = ctx;
+    const int64_t n = sum->model->mesh.n_elements, middle = n < WORTH_SHARING ? 0 : n / 2;
+    sum->status[share] = add_energies(&sum->twice[share], sum->model, sum->nodal, sum->carried, share == 0 ? 0 : middle,
+                                      share == 0 ? middle : n, &sum->err[share]);
+}
+
+uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried, uz_error *err)
+{
+    const uz_mesh *mesh = &model->mesh;
+    energy_sum sum = {.model = model, .nodal = nodal, .carried = carried};
+    if (mesh->n_elements < WORTH_SHARING)
+        add_share(&sum, 1);
+    else
+        uz_aside_share(add_share, &sum, SHARES);
+    double twice = sum.twice[0] + sum.twice[1];
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && model->spring; i++)
         twice += model->spring[i] * nodal[i] * nodal[i];
-    source_clear(&source);
     *energy = 0.5 * twice;
-    return status;
+    for (int share = 0; share < SHARES; share++)
+        if (sum.status[share] != UZ_OK) {
+            if (err)
+                *err = sum.err[share];
+            return sum.status[share];
+        }
+    return UZ_OK;
 }
 
 /* ------------------------------------------------------------ energy of rounding */

@@ -2,10 +2,12 @@
 #include "group/group.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "group/spread.h"
 #include "group/wire.h"
+#include "linalg/linalg.h"
 
 #include <errno.h>
 #include <math.h>
@@ -125,6 +127,7 @@ struct uz_multigrid_room {
     const bool *held; /* d; NULL: none */
     double square;    /* r'M^-1 r of the last step, as the group says */
     double most;      /* of the system: see uz_multigrid */
+    double *half;     /* d: what the later columns of K make of a vector */
 };
 
 /* Both together, as a call has them. */
@@ -138,18 +141,23 @@ static far_system system_of(const uz_multigrid *mg, uz_multigrid_room *room)
     return (far_system){(const far_multigrid *)mg, room};
 }
 
+static void free_room(uz_multigrid_room *room)
+{
+    if (room)
+        free(room->half);
+    free(room);
+}
+
 static uz_multigrid_room *make_room(const uz_multigrid *mg, size_t *bytes)
 {
     uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
-    *bytes = sizeof *room;
-    if (room)
-        room->most = mg->most;
+    *bytes = sizeof *room + (size_t)mg->n * sizeof *room->half;
+    if (!room || !(room->half = uz_alloc(mg->n, sizeof *room->half))) {
+        free_room(room);
+        return NULL;
+    }
+    room->most = mg->most;
     return room;
-}
-
-static void free_room(uz_multigrid_room *room)
-{
-    free(room);
 }
 
 static void free_multigrid(uz_multigrid *mg)
@@ -164,11 +172,30 @@ static void free_multigrid(uz_multigrid *mg)
     free(body);
 }
 
+/* K x by two shares of its columns, of as many entries: the group waits meanwhile, and its processors are idle. */
+typedef struct {
+    const uz_csc *K;
+    const double *x;
+    double *y[2];
+    int64_t middle; /* the first column of the second share, which reaches no row before it */
+} product;
+
+static void multiply_share(void *ctx, int share)
+{
+    const product *p = ctx;
+    const int64_t begin = share == 0 ? 0 : p->middle, end = share == 0 ? p->middle : p->K->cols;
+    memset(p->y[share] + begin, 0, (size_t)(p->K->cols - begin) * sizeof *p->y[share]);
+    uz_csc_symv_columns(p->y[share], p->K, 1.0, p->x, begin, end);
+}
+
 static void multiply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x)
 {
-    (void)room;
-    memset(y, 0, (size_t)mg->n * sizeof *y);
-    uz_csc_symv(y, K, 1.0, x);
+    product p = {.K = K, .x = x, .y = {y, room->half}};
+    while (p.middle < mg->n && K->ptr[p.middle] < K->ptr[mg->n] / 2)
+        p.middle++;
+    uz_aside_share(multiply_share, &p, 2);
+    for (int64_t j = p.middle; j < mg->n; j++)
+        y[j] += room->half[j];
 }
 
 /* x at dofs that are not held, and zeros. */
@@ -422,6 +449,46 @@ static bool put_rows(uz_process_group *group, int64_t id, const uz_spread *map, 
            put(group, rows->mode, (size_t)(rows->nodes * map->bs * map->modes) * sizeof *rows->mode);
 }
 
+enum { SHARES = 2 };
+
+typedef struct {
+    const uz_spread *map;
+    const uz_csc *K;
+    const uz_modes *modes;
+    int64_t processes;
+    uz_spread_rows rows[SHARES];
+    uz_status status[SHARES];
+    uz_error err[SHARES];
+} filling;
+
+static void fill_share(void *ctx, int share)
+{
+    filling *f = ctx;
+    if (f->rows[share].process < f->processes)
+        f->status[share] = uz_spread_fill(&f->rows[share], f->map, f->K, f->modes, &f->err[share]);
+}
+
+/* Of two processes, each made by a thread, where there are two more. */
+static uz_status send_rows(far_multigrid *body, int64_t first, const uz_csc *K, const uz_modes *modes, uz_error *err)
+{
+    filling f = {.map = &body->map,
+                 .K = K,
+                 .modes = modes,
+                 .processes = body->group->processes,
+                 .rows = {{.process = first}, {.process = first + 1}}};
+    uz_status status = UZ_OK;
+    uz_aside_share(fill_share, &f, SHARES);
+    for (int share = 0; share < SHARES; share++) {
+        if (status == UZ_OK && f.status[share] != UZ_OK)
+            status = uz_fail(err, f.status[share], f.err[share].where, "%s", f.err[share].message);
+        while (status == UZ_OK && uz_spread_next(&f.rows[share], &body->map) &&
+               put_rows(body->group, body->id, &body->map, &f.rows[share]))
+            ;
+        uz_spread_rows_clear(&f.rows[share]);
+    }
+    return status;
+}
+
 /* All of it, until the group has made its multigrid. */
 static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes *modes, uz_error *err)
 {
@@ -441,13 +508,8 @@ static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes 
         !hear(group, &head, UZ_WIRE_PARTS) || !take(group, map->part, (size_t)map->nodes * sizeof *map->part))
         return fail_lost(err);
     uz_status status = uz_spread_number(map, group->processes, err);
-    for (int64_t process = 0; status == UZ_OK && !group->lost && process < group->processes; process++) {
-        uz_spread_rows rows = {.process = process};
-        status = uz_spread_fill(&rows, map, K, modes, err);
-        while (status == UZ_OK && uz_spread_next(&rows, map) && put_rows(group, body->id, map, &rows))
-            ;
-        uz_spread_rows_clear(&rows);
-    }
+    for (int64_t first = 0; status == UZ_OK && !group->lost && first < group->processes; first += SHARES)
+        status = send_rows(body, first, K, modes, err);
     if (status != UZ_OK) {
         group->lost = true; /* it waits for the rest */
         return status;

@@ -176,7 +176,12 @@ void uz_csc_gaxpy_t(double *y, const uz_csc *A, double alpha, const double *x)
 
 void uz_csc_symv(double *y, const uz_csc *A, double alpha, const double *x)
 {
-    for (int64_t j = 0; j < A->cols; j++) {
+    uz_csc_symv_columns(y, A, alpha, x, 0, A->cols);
+}
+
+void uz_csc_symv_columns(double *y, const uz_csc *A, double alpha, const double *x, int64_t begin, int64_t end)
+{
+    for (int64_t j = begin; j < end; j++) {
         double factor = alpha * x[j], sum = 0.0;
         for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
             int64_t i = A->idx[k];

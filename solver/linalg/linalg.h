@@ -16,6 +16,9 @@ int64_t uz_csc_seek(const uz_csc *A, int64_t row, int64_t column);
 /* Where the entry of `row` in `column` is; -1: A has none. */
 int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column);
 
+/* What columns begin to end - 1 of uz_csc_symv's A add to y: nothing above row `begin`. */
+void uz_csc_symv_columns(double *y, const uz_csc *A, double alpha, const double *x, int64_t begin, int64_t end);
+
 /* Room for so many triplets in each of three arrays. False: no memory, and all that is there stays. */
 bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room);
 

@@ -253,3 +253,31 @@ TEST(energies_of_turned_bodies)
         uz_scene_clear(&s);
     }
 }
+
+/* Bodies of so many elements are added up in two parts: equal elements, and each by itself. */
+TEST(energies_of_large_bodies)
+{
+    static const double strain[] = {1e-4, -2e-4, 0.5e-4}, young = 200e3, poisson = 0.3;
+    const double shear = young / 2 / (1 + poisson), lame = 2 * shear * poisson / (1 - 2 * poisson);
+    double trace = 0, squares = 0;
+    for (int c = 0; c < 3; c++) {
+        trace += strain[c];
+        squares += strain[c] * strain[c];
+    }
+    const double want = 3 * 1 * 2 * (0.5 * lame * trace * trace + shear * squares);
+    for (int graded = 0; graded < 2; graded++) {
+        uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){3, 1, 2}, (int64_t[3]){29, 27, 28});
+        s.box.grading[0] = graded ? 1.5 : 1;
+        body_hold(&s, "left", 0, 0, 0);
+        uz_body_model model = body_model(&s);
+        double *u = body_room(model.mesh.n_nodes * 3, sizeof *u), energy = 0;
+        for (int64_t i = 0; i < model.mesh.n_nodes * 3; i++)
+            u[i] = strain[i % 3] * model.mesh.xyz[i];
+        CHECK(model.mesh.uniform == !graded && model.mesh.n_elements > 20000);
+        CHECK(uz_strain_energy(&energy, &model, u, false, NULL) == UZ_OK);
+        CHECK_REL(energy, want, 1e-12);
+        free(u);
+        uz_body_model_clear(&model);
+        uz_scene_clear(&s);
+    }
+}

@@ -1,5 +1,6 @@
 /* Compressed columns against the same operations on dense arrays. */
 #include "harness.h"
+#include "linalg/linalg.h"
 #include "uzawa.h"
 
 enum { MOST = 12 };
@@ -206,6 +207,12 @@ TEST(symmetric_lower_and_its_product)
         }
         uz_csc_symv(y, &K, 2.0, x);
         CHECK(memcmp(y, want, sizeof y) == 0);
+        double first[MOST] = {0}, second[MOST] = {0};
+        const int64_t middle = random_below(n + 1);
+        uz_csc_symv_columns(first, &K, 2.0, x, 0, middle);
+        uz_csc_symv_columns(second, &K, 2.0, x, middle, n);
+        for (int64_t i = 0; i < n; i++)
+            CHECK(first[i] + second[i] == want[i] && (i >= middle || second[i] == 0));
         uz_csc_clear(&K);
     }
 }
