@@ -325,13 +325,43 @@ UZ_AVX2_FMA static double energy_quad4_wide(const uz_body_model *model, const do
     return energy_quad4(model, ke, nodal, e);
 }
 
+/* And for hex8, the element of most solids: by columns, in six registers. */
+static inline __attribute__((always_inline)) double energy_hex8(const uz_body_model *model, const double *ke,
+                                                                const double *nodal, int64_t e)
+{
+    enum { N = 24, WIDE = N / 4 };
+    double d[DOFS];
+    four row[WIDE] = {{0}}, sum = {0};
+    take_nodal(d, model, nodal, e, false);
+    for (int j = 0; j < N; j++) {
+        const four *column = (const four *)(ke + j * N);
+        row[0] += column[0] * d[j];
+        row[1] += column[1] * d[j];
+        row[2] += column[2] * d[j];
+        row[3] += column[3] * d[j];
+        row[4] += column[4] * d[j];
+        row[5] += column[5] * d[j];
+    }
+    for (int i = 0; i < WIDE; i++)
+        sum += row[i] * *(const four *)(d + 4 * i);
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+UZ_AVX2_FMA static double energy_hex8_wide(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
+{
+    return energy_hex8(model, ke, nodal, e);
+}
+
+typedef double (*element_energy)(const uz_body_model *model, const double *ke, const double *nodal, int64_t e);
+
 /* Twice the energy of elements begin to end - 1. */
 static uz_status add_energies(double *twice, const uz_body_model *model, const double *nodal, bool carried,
                               int64_t begin, int64_t end, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
-    double (*const of_quad4)(const uz_body_model *, const double *, const double *, int64_t) =
-        uz_cpu_has_avx2_fma() ? energy_quad4_wide : energy_quad4;
+    const bool wide = uz_cpu_has_avx2_fma();
+    const element_energy of_quad4 = wide ? energy_quad4_wide : energy_quad4,
+                         of_hex8 = wide ? energy_hex8_wide : energy_hex8;
     stiffness_source source;
     const double *ke;
     uz_status status = source_init(&source, model, err);
@@ -346,8 +376,10 @@ static uz_status add_energies(double *twice, const uz_body_model *model, const d
         }
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
-            *twice += mesh->kind[e] == UZ_QUAD4 && !carried ? of_quad4(model, ke, nodal, e)
-                                                            : energy_any(model, ke, nodal, e, carried);
+            *twice += carried                     ? energy_any(model, ke, nodal, e, true)
+                      : mesh->kind[e] == UZ_QUAD4 ? of_quad4(model, ke, nodal, e)
+                      : mesh->kind[e] == UZ_HEX8  ? of_hex8(model, ke, nodal, e)
+                                                  : energy_any(model, ke, nodal, e, false);
     }
     source_clear(&source);
     return status;
