@@ -138,14 +138,26 @@ static void put_materials(text *t, const uz_scene *scene)
 
 static void put_supports(text *t, const uz_scene *scene)
 {
-    static const char *const COMPONENTS[] = {"ux", "uy", "uz"};
+    static const char *const COMPONENTS[] = {"ux", "uy", "uz"}, *const TURNS[] = {"rx", "ry", "rz"};
+    const int dim = uz_scene_dim(scene);
     text_open(t, "supports", '[');
     for (int64_t i = 0; i < scene->n_supports; i++) {
+        const uz_support *support = &scene->supports[i];
+        const bool rigid = support->kind == UZ_SUPPORT_RIGID; /* others have components, in a deck */
         text_open(t, NULL, '{');
-        text_string(t, "on", scene->supports[i].on);
-        for (int c = 0; c < uz_scene_dim(scene); c++)
-            if (!isnan(scene->supports[i].u[c]))
-                text_number(t, COMPONENTS[c], scene->supports[i].u[c]);
+        text_string(t, "on", support->on);
+        if (rigid) {
+            text_open(t, "rigid", '{');
+            text_numbers(t, "point", support->about, dim);
+        }
+        for (int c = 0; c < dim; c++)
+            if (!isnan(support->u[c]))
+                text_number(t, COMPONENTS[c], support->u[c]);
+        for (int c = 0; rigid && c < 3; c++)
+            if (!isnan(support->turn[c]))
+                text_number(t, TURNS[c], support->turn[c] * (180 / 3.14159265358979323846));
+        if (rigid)
+            text_close(t, '}');
         text_close(t, '}');
     }
     text_close(t, ']');
@@ -158,6 +170,7 @@ static void put_loads(text *t, const uz_scene *scene)
                                                      [UZ_LOAD_BODY_FORCE] = "body_force",
                                                      [UZ_LOAD_GRAVITY] = "gravity",
                                                      [UZ_LOAD_TEMPERATURE] = "temperature"}; /* others are in no deck */
+    const int dim = uz_scene_dim(scene);
     text_open(t, "loads", '[');
     for (int64_t i = 0; i < scene->n_loads; i++) {
         const uz_load *load = &scene->loads[i];
@@ -166,35 +179,38 @@ static void put_loads(text *t, const uz_scene *scene)
         if (load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_TEMPERATURE)
             text_number(t, NAMES[load->kind], load->value);
         else
-            text_numbers(t, NAMES[load->kind], load->v, uz_scene_dim(scene));
+            text_numbers(t, NAMES[load->kind], load->v, dim);
+        if (load->has_point) {
+            text_numbers(t, "at", load->point, dim);
+            text_numbers(t, "moment", load->moment + (dim == 2 ? 2 : 0), dim == 2 ? 1 : 3);
+        }
         text_close(t, '}');
     }
     text_close(t, ']');
 }
 
-static void put_contacts(text *t, const uz_scene *scene)
+/* A contact or a tie of two groups. */
+static void put_pair(text *t, const char *on, const char *other_key, const char *other, double tolerance)
 {
+    text_open(t, NULL, '{');
+    text_string(t, "on", on);
+    text_string(t, other_key, other);
+    if (tolerance > 0.0)
+        text_number(t, "tolerance", tolerance);
+    text_close(t, '}');
+}
+
+static void put_pairs(text *t, const uz_scene *scene)
+{
+    if (scene->n_ties > 0) {
+        text_open(t, "ties", '[');
+        for (int64_t i = 0; i < scene->n_ties; i++)
+            put_pair(t, scene->ties[i].on, "to", scene->ties[i].to, scene->ties[i].tolerance);
+        text_close(t, ']');
+    }
     text_open(t, "contacts", '[');
-    for (int64_t i = 0; i < scene->n_contacts; i++) {
-        text_open(t, NULL, '{');
-        text_string(t, "on", scene->contacts[i].on);
-        text_string(t, "with", scene->contacts[i].with);
-        text_close(t, '}');
-    }
-    text_close(t, ']');
-}
-
-static void put_ties(text *t, const uz_scene *scene)
-{
-    text_open(t, "ties", '[');
-    for (int64_t i = 0; i < scene->n_ties; i++) {
-        text_open(t, NULL, '{');
-        text_string(t, "on", scene->ties[i].on);
-        text_string(t, "to", scene->ties[i].to);
-        if (scene->ties[i].tolerance > 0.0)
-            text_number(t, "tolerance", scene->ties[i].tolerance);
-        text_close(t, '}');
-    }
+    for (int64_t i = 0; i < scene->n_contacts; i++)
+        put_pair(t, scene->contacts[i].on, "with", scene->contacts[i].with, 0.0);
     text_close(t, ']');
 }
 
@@ -212,9 +228,7 @@ static void put_scene(text *t, const uz_scene *scene)
     put_materials(t, scene);
     put_supports(t, scene);
     put_loads(t, scene);
-    if (scene->n_ties > 0)
-        put_ties(t, scene);
-    put_contacts(t, scene);
+    put_pairs(t, scene);
     put_mesh(t, &scene->given); /* last: whoever reads it sees the rest first */
     text_close(t, '}');
 }

@@ -36,9 +36,13 @@ typedef struct {
     size_t length;
 } abaqus_keyword;
 uz_status abaqus_read_keyword(abaqus_keyword *out, abaqus_text *text);
+/* What is behind a name that the text begins with, blanks aside, which CalculiX does not read either ("ENDSTEP",
+ * "REFNODE"); NULL: it begins otherwise. */
+const char *abaqus_behind(const char *text, const char *name);
 static inline bool abaqus_keyword_is(const abaqus_keyword *keyword, const char *name)
 {
-    return __builtin_strcmp(keyword->text, name) == 0;
+    const char *behind = abaqus_behind(keyword->text, name);
+    return behind && *behind == '\0';
 }
 /* The value of a parameter ("" if it has none), without quotes; NULL: it is not there. */
 const char *abaqus_parameter(const abaqus_keyword *keyword, const char *name);

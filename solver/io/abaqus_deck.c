@@ -64,10 +64,11 @@ static uz_status check_parameters(abaqus_deck *d, const abaqus_keyword *keyword,
     for (size_t at = strlen(keyword->text) + 1; at < keyword->length && status == UZ_OK;
          at += strlen(keyword->text + at) + 1) {
         const char *field = keyword->text + at;
-        const size_t length = strcspn(field, "=");
-        bool known = length == 0;
-        for (int i = 0; read[i] && !known; i++)
-            known = strlen(read[i]) == length && strncmp(read[i], field, length) == 0;
+        bool known = field[0] == '\0' || field[0] == '=';
+        for (int i = 0; read[i] && !known; i++) {
+            const char *behind = abaqus_behind(field, read[i]);
+            known = behind && (*behind == '=' || *behind == '\0');
+        }
         if (!known)
             status =
                 deck_note(d, keyword->line, keyword->text, UZ_DECK_LEFT_OUT, "its parameter %.40s is left out", field);
@@ -186,6 +187,81 @@ static uz_status begin_acting(double *factor, abaqus_deck *d, const abaqus_keywo
     return status == UZ_OK ? block_factor(factor, d, keyword) : status;
 }
 
+/* ---- rigid bodies */
+
+/* A node that a parameter names by its number or by a set of one; -1: it does not. */
+static uz_status node_parameter(int64_t *node, abaqus_deck *d, const abaqus_keyword *keyword, const char *parameter)
+{
+    const char *field = abaqus_parameter(keyword, parameter);
+    targets at;
+    *node = -1;
+    if (!field)
+        return UZ_OK;
+    const uz_status status = find_targets(&at, d, ABAQUS_NSET, field);
+    if (status == UZ_OK && at.count != 1)
+        return abaqus_fail(&d->text, UZ_ERR_FORMAT, "%s is one node; \"%.60s\" are %lld", parameter, field,
+                           (long long)at.count);
+    *node = status == UZ_OK ? target(&at, 0) : -1;
+    return status;
+}
+
+static uz_status add_rigid(abaqus_deck *d, const abaqus_keyword *keyword)
+{
+    static const char *const READ[] = {"NSET", "ELSET", "REF NODE", "ROT NODE", NULL};
+    const char *nodes = abaqus_parameter(keyword, "NSET"), *elements = abaqus_parameter(keyword, "ELSET");
+    deck_rigid made = {.line = keyword->line};
+    targets at;
+    uz_status status = check_parameters(d, keyword, READ);
+    for (int c = 0; c < 6; c++)
+        made.motion[c] = (double)NAN;
+    if (status == UZ_OK && !nodes == !elements)
+        status =
+            abaqus_fail(&d->text, UZ_ERR_UNSUPPORTED,
+                        "a rigid body is read as an NSET or an ELSET; analytical surfaces are obstacles of a scene");
+    if (status == UZ_OK)
+        status = find_targets(&at, d, nodes ? ABAQUS_NSET : ABAQUS_ELSET, nodes ? nodes : elements);
+    if (status == UZ_OK)
+        status = node_parameter(&made.point, d, keyword, "REF NODE");
+    if (status == UZ_OK)
+        status = node_parameter(&made.turner, d, keyword, "ROT NODE");
+    if (status != UZ_OK)
+        return status;
+    if (!uz_grow(&d->rigids, d->n_rigids, 1, &d->rigids_room, sizeof *d->rigids))
+        return abaqus_no_memory(&d->text);
+    made.of_nodes = nodes != NULL;
+    made.count = at.count;
+    made.index = at.index;
+    made.one = at.one;
+    d->rigids[d->n_rigids++] = made;
+    return UZ_OK;
+}
+
+/* Which of the six motions of a rigid body a direction of a node is, and of which body; NULL: of none. The nodes of
+ * both may be one, of which Abaqus names the rotations 4 to 6. */
+static deck_rigid *rigid_motion(int *motion, const abaqus_deck *d, int64_t node, int64_t direction)
+{
+    for (int64_t i = 0; i < d->n_rigids; i++) {
+        deck_rigid *rigid = &d->rigids[i];
+        const bool turns = node == rigid->turner && direction <= 3;
+        *motion = (int)direction - 1 + (turns ? 3 : 0);
+        if (turns || node == rigid->point)
+            return rigid;
+    }
+    return NULL;
+}
+
+/* Where a displacement (or a force, where `force`) of a node in a direction from 1 on is kept; NULL: it has no such
+ * one. */
+static double *place_at(const abaqus_deck *d, bool force, int64_t node, int64_t direction)
+{
+    const int dim = d->mesh->dim;
+    int motion = 0;
+    deck_rigid *rigid = direction >= 1 && direction <= 6 ? rigid_motion(&motion, d, node, direction) : NULL;
+    if (rigid)
+        return motion < dim || motion >= (dim == 2 ? 5 : 3) ? &(force ? rigid->force : rigid->motion)[motion] : NULL;
+    return direction >= 1 && direction <= dim ? &(force ? d->force : d->fixed)[3 * node + direction - 1] : NULL;
+}
+
 /* ---- materials and sections */
 
 static uz_status add_material(abaqus_deck *d, const abaqus_keyword *keyword)
@@ -200,8 +276,8 @@ static uz_status add_material(abaqus_deck *d, const abaqus_keyword *keyword)
     return status;
 }
 
-/* The names of all materials of the deck: a section may stand before the one that it names. */
-static uz_status list_materials(abaqus_deck *d)
+/* What may be spoken of before it is there: materials, which sections name, and rigid bodies, whose points are held. */
+static uz_status read_ahead(abaqus_deck *d)
 {
     const abaqus_text begin = d->text;
     abaqus_keyword keyword;
@@ -212,6 +288,8 @@ static uz_status list_materials(abaqus_deck *d)
         status = abaqus_read_keyword(&keyword, &d->text);
         if (status == UZ_OK && abaqus_keyword_is(&keyword, "MATERIAL"))
             status = add_material(d, &keyword);
+        else if (status == UZ_OK && abaqus_keyword_is(&keyword, "RIGID BODY"))
+            status = add_rigid(d, &keyword);
     }
     d->text = begin;
     return status;
@@ -348,31 +426,26 @@ static uz_status read_element_types(abaqus_deck *d, const abaqus_keyword *keywor
 
 /* ---- supports */
 
-/* What Abaqus calls some supports: components as bits. */
-static int named_support(const char *field, bool *rotations)
+/* What Abaqus calls some supports: displacements and rotations as bits. */
+static int named_support(const char *field)
 {
     static const struct {
         const char *name;
         int components;
-        bool rotations;
-    } NAMED[] = {
-        {"ENCASTRE", 7, true}, {"PINNED", 7, false}, {"XSYMM", 1, true}, {"YSYMM", 2, true}, {"ZSYMM", 4, true}};
+    } NAMED[] = {{"ENCASTRE", 077}, {"PINNED", 007}, {"XSYMM", 061}, {"YSYMM", 052}, {"ZSYMM", 034}};
     for (size_t i = 0; i < sizeof NAMED / sizeof NAMED[0]; i++)
-        if (strcasecmp(NAMED[i].name, field) == 0) {
-            *rotations = NAMED[i].rotations;
+        if (strcasecmp(NAMED[i].name, field) == 0)
             return NAMED[i].components;
-        }
     return 0;
 }
 
 static uz_status hold(abaqus_deck *d, const abaqus_keyword *keyword, const targets *at, double factor, bool *told)
 {
     char field[ABAQUS_FIELD] = "";
-    bool rotations = false;
     int64_t first = 0, last;
     double value;
     abaqus_field(field, &d->text);
-    const int components = named_support(field, &rotations);
+    const int components = named_support(field);
     if (components == 0) {
         uz_status status = abaqus_int(&first, field, "a direction, 1 to 3", &d->text);
         last = first;
@@ -384,14 +457,20 @@ static uz_status hold(abaqus_deck *d, const abaqus_keyword *keyword, const targe
             return status;
     } else {
         first = 1;
-        last = 3;
+        last = 6;
         value = 0;
     }
-    for (int64_t c = first; c <= last && c <= d->mesh->dim; c++)
-        for (int64_t i = 0; c >= 1 && i < at->count; i++)
-            if (components == 0 || (components >> (c - 1)) % 2 == 1)
-                d->fixed[3 * target(at, i) + c - 1] = factor * value;
-    if (last <= d->mesh->dim || *told || components)
+    bool whole = last <= 6;
+    for (int64_t c = first; c <= last && c <= 6; c++)
+        for (int64_t i = 0; i < at->count; i++) {
+            double *to = place_at(d, false, target(at, i), c);
+            if (components > 0 && (components >> (c - 1)) % 2 == 0)
+                continue;
+            if (to)
+                *to = factor * value;
+            whole = whole && (to || components > 0);
+        }
+    if (whole || *told)
         return UZ_OK;
     *told = true;
     return deck_note(d, d->text.number, keyword->text, UZ_DECK_IRRELEVANT,
@@ -434,15 +513,17 @@ static uz_status read_cload(abaqus_deck *d, const abaqus_keyword *keyword)
         }
         if (status == UZ_OK)
             status = next_number(&value, d, "a force", 0.0);
-        if (status == UZ_OK && (direction < 1 || direction > d->mesh->dim)) {
-            if (value != 0.0)
-                status = deck_note(d, d->text.number, keyword->text, UZ_DECK_LEFT_OUT,
-                                   "the load in direction %lld is left out: forces have %d components",
-                                   (long long)direction, d->mesh->dim);
-            continue;
+        bool whole = true;
+        for (int64_t i = 0; i < at.count && status == UZ_OK; i++) {
+            double *to = place_at(d, true, target(&at, i), direction);
+            if (to)
+                *to += factor * value;
+            whole = whole && to;
         }
-        for (int64_t i = 0; i < at.count && status == UZ_OK; i++)
-            d->force[3 * target(&at, i) + direction - 1] += factor * value;
+        if (status == UZ_OK && !whole && value != 0.0)
+            status = deck_note(d, d->text.number, keyword->text, UZ_DECK_LEFT_OUT,
+                               "the load in direction %lld is left out: forces have %d components",
+                               (long long)direction, d->mesh->dim);
     }
     return status;
 }
@@ -761,7 +842,7 @@ static bool is_procedure(const abaqus_keyword *keyword)
                                              "VISCO",         "SENSITIVITY",   "FEASIBLE DIRECTION",  "CFD",
                                              "CRACK",         "ROBUST DESIGN", "ROBUSTDESIGN",        "MASSLESS"};
     for (size_t i = 0; i < sizeof PROCEDURES / sizeof PROCEDURES[0]; i++)
-        if (strncmp(keyword->text, PROCEDURES[i], strlen(PROCEDURES[i])) == 0)
+        if (abaqus_behind(keyword->text, PROCEDURES[i]))
             return true;
     return false;
 }
@@ -798,9 +879,9 @@ static const struct {
     {"NSET", NULL, true, NULL},
     {"ELSET", NULL, true, NULL},
     {"SURFACE", NULL, true, NULL},
+    {"RIGID BODY", NULL, true, NULL}, /* read ahead */
     {"HEADING", NULL, true, NULL},
     {"END STEP", NULL, true, NULL},
-    {"ENDSTEP", NULL, true, NULL},
     {"PART", NULL, true, NULL},
     {"END PART", NULL, true, NULL},
     {"ASSEMBLY", NULL, true, NULL},
@@ -841,7 +922,6 @@ static const struct {
     {"MPC", NULL, false, "constraints between displacements are left out"},
     {"TRANSFORM", NULL, false, "directions of nodes along other axes are left out: they are those of the file"},
     {"CYCLIC SYMMETRY MODEL", NULL, false, "cyclic symmetry is left out"},
-    {"RIGID BODY", NULL, false, "rigid bodies are left out; a scene has obstacles for that"},
     {"PRE-TENSION SECTION", NULL, false, "the pretension is left out"},
     {"MODEL CHANGE", NULL, false, "contact pairs and elements are not taken away or added"},
 };
@@ -874,7 +954,7 @@ static uz_status read_block(abaqus_deck *d)
 
 uz_status deck_read_lines(abaqus_deck *d)
 {
-    uz_status status = list_materials(d);
+    uz_status status = read_ahead(d);
     abaqus_next_line(&d->text);
     while (status == UZ_OK && !d->ended && d->text.length > 0)
         status = read_block(d);

@@ -42,6 +42,16 @@ typedef struct {
     bool tie;         /* of tied ones, across or along them */
 } deck_spring;
 
+/* *RIGID BODY: nodes, or elements of the file, that move as one. */
+typedef struct {
+    int64_t line;
+    int64_t point, turner; /* nodes whose displacements are the motion of the point, and the rotation; -1: none */
+    bool of_nodes;
+    int64_t count, one;
+    const int64_t *index;       /* count, of a set of the file; NULL: one */
+    double motion[6], force[6]; /* of the point: displacement, rotation (NaN: free); force, moment */
+} deck_rigid;
+
 /* A pressure on a side of an element (of the file), or on a surface. */
 typedef struct {
     int64_t element, line; /* element -1: the surface */
@@ -73,8 +83,9 @@ typedef struct {
     char interaction[ABAQUS_NAME]; /* the one that is being read */
     deck_spring *springs;
     deck_pressure *pressures;
-    int64_t n_materials, n_amplitudes, n_pairs, n_tied, n_springs, n_pressures;
-    int64_t materials_room, amplitudes_room, pairs_room, tied_room, springs_room, pressures_room;
+    deck_rigid *rigids;
+    int64_t n_materials, n_amplitudes, n_pairs, n_tied, n_springs, n_pressures, n_rigids;
+    int64_t materials_room, amplitudes_room, pairs_room, tied_room, springs_room, pressures_room, rigids_room;
 
     int64_t n_met; /* materials that the lines read so far begin: data are of the last of them */
 

@@ -226,22 +226,25 @@ static uz_status drop_nodes(abaqus_deck *d)
 
 /* ---- what the scene says */
 
-static uz_status add_support(abaqus_deck *d, const char *group, const double key[3], int64_t count)
+static uz_status add_support(abaqus_deck *d, uz_support support, const char *group)
 {
     uz_scene *scene = &d->out->scene;
-    (void)count;
     if (scene->n_supports == LIST_MOST)
         return too_many(d, "supports");
     uz_support *to = uz_realloc(scene->supports, scene->n_supports + 1, sizeof *to);
     if (!to)
         return abaqus_no_memory(&d->text);
     scene->supports = to;
-    to += scene->n_supports++;
-    *to = (uz_support){.kind = UZ_SUPPORT_COMPONENTS};
-    memcpy(to->on, group, sizeof to->on);
-    for (int c = 0; c < 3; c++)
-        to->u[c] = c < d->mesh->dim ? key[c] : (double)NAN;
+    snprintf(support.on, sizeof support.on, "%.63s", group);
+    to[scene->n_supports++] = support;
     return UZ_OK;
+}
+
+static uz_status add_held(abaqus_deck *d, const char *group, const double key[3], int64_t count)
+{
+    const double z = d->mesh->dim == 3 ? key[2] : (double)NAN;
+    (void)count;
+    return add_support(d, (uz_support){.kind = UZ_SUPPORT_COMPONENTS, .u = {key[0], key[1], z}}, group);
 }
 
 static uz_status add_load(abaqus_deck *d, uz_load load, const char *group)
@@ -280,6 +283,75 @@ static uz_status add_temperature(abaqus_deck *d, const char *group, const double
 {
     (void)count;
     return add_load(d, (uz_load){.kind = UZ_LOAD_TEMPERATURE, .value = key[0]}, group);
+}
+
+/* The group of nodes that a rigid body is, and their middle. */
+static uz_status group_of_rigid(char name[64], double middle[3], abaqus_deck *d, const deck_rigid *rigid)
+{
+    const uz_given_mesh *mesh = d->mesh;
+    const int64_t n = mesh->n_nodes;
+    bool *marked = uz_alloc_zero(n, sizeof *marked);
+    alike *list = uz_alloc_zero(n, sizeof *list);
+    int64_t count = 0;
+    uz_status status = marked && list ? UZ_OK : abaqus_no_memory(&d->text);
+    for (int64_t i = 0; i < rigid->count && status == UZ_OK; i++) {
+        const int64_t one = rigid->index ? rigid->index[i] : rigid->one;
+        const int64_t e = rigid->of_nodes ? -1 : d->new_element[one];
+        if (rigid->of_nodes)
+            marked[one] = true;
+        for (int64_t q = e < 0 ? 0 : mesh->first[e]; e >= 0 && q < mesh->first[e + 1]; q++)
+            marked[mesh->node[q]] = true;
+    }
+    for (int64_t i = 0; i < n && status == UZ_OK; i++)
+        if (marked[i])
+            list[count++].index = i;
+    for (int64_t i = 0; i < count; i++)
+        for (int c = 0; c < mesh->dim; c++)
+            middle[c] += mesh->xyz[mesh->dim * list[i].index + c] / (double)count;
+    if (status == UZ_OK)
+        status = group_of(name, d, "rigid", true, list, count);
+    free(list);
+    free(marked);
+    return status;
+}
+
+/* While nodes are those of the file. */
+static uz_status make_rigid(abaqus_deck *d, const deck_rigid *rigid)
+{
+    const uz_given_mesh *mesh = d->mesh;
+    const double *motion = rigid->motion, *force = rigid->force;
+    const bool ring = d->out->scene.model == UZ_AXISYMMETRIC;
+    uz_support support = {.kind = UZ_SUPPORT_RIGID};
+    uz_load load = {.kind = UZ_LOAD_FORCE, .has_point = true};
+    bool loaded = false;
+    char name[64];
+    uz_status status = group_of_rigid(name, support.about, d, rigid);
+    for (int c = 0; c < mesh->dim && rigid->point >= 0; c++)
+        support.about[c] = mesh->xyz[mesh->dim * rigid->point + c];
+    for (int c = 0; c < 3; c++) {
+        if (ring && c != 1 && (motion[c] < 0 || motion[c] > 0 || motion[3 + c] < 0 || motion[3 + c] > 0)) {
+            abaqus_text place = d->text;
+            place.number = rigid->line;
+            return abaqus_fail(&place, UZ_ERR_UNSUPPORTED, "a rigid body of revolution moves along its axis only");
+        }
+        support.u[c] = ring && c != 1 ? (double)NAN : motion[c];
+        support.turn[c] = ring ? (double)NAN : motion[3 + c];
+        load.point[c] = support.about[c];
+        load.v[c] = force[c];
+        load.moment[c] = force[3 + c];
+        loaded = loaded || force[c] != 0.0 || force[3 + c] != 0.0;
+    }
+    if (status == UZ_OK)
+        status = add_support(d, support, name);
+    return status == UZ_OK && loaded ? add_load(d, load, name) : status;
+}
+
+static uz_status make_rigids(abaqus_deck *d)
+{
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < d->n_rigids && status == UZ_OK; i++)
+        status = make_rigid(d, &d->rigids[i]);
+    return status;
 }
 
 /* key: the index of the material + 1. */
@@ -666,11 +738,13 @@ uz_status deck_make_scene(abaqus_deck *d)
 {
     uz_status status = choose_model(d);
     if (status == UZ_OK)
+        status = make_rigids(d);
+    if (status == UZ_OK)
         status = drop_nodes(d);
     if (status == UZ_OK)
         status = make_materials(d);
     if (status == UZ_OK)
-        status = for_alike(d, d->fixed, 3, true, "held", add_support);
+        status = for_alike(d, d->fixed, 3, true, "held", add_held);
     if (status == UZ_OK)
         status = for_alike(d, d->force, 3, true, "pulled", add_force);
     if (status == UZ_OK)
@@ -746,6 +820,7 @@ static void clear_deck(abaqus_deck *d)
     free(d->tied);
     free(d->springs);
     free(d->pressures);
+    free(d->rigids);
     free(d->fixed);
     free(d->force);
     free(d->temperature);

@@ -104,13 +104,24 @@ uz_status abaqus_read_keyword(abaqus_keyword *out, abaqus_text *text)
     return UZ_OK;
 }
 
+const char *abaqus_behind(const char *text, const char *name)
+{
+    for (;; text++, name++) {
+        text += *text == ' '; /* one at most: abaqus_read_keyword */
+        name += *name == ' ';
+        if (*name == '\0')
+            return text;
+        if (*text != *name)
+            return NULL;
+    }
+}
+
 const char *abaqus_parameter(const abaqus_keyword *keyword, const char *name)
 {
-    const size_t length = strlen(name);
     for (size_t at = strlen(keyword->text) + 1; at < keyword->length; at += strlen(keyword->text + at) + 1) {
-        const char *field = keyword->text + at;
-        if (strncmp(field, name, length) == 0 && (field[length] == '=' || field[length] == '\0'))
-            return field + length + (field[length] == '=');
+        const char *behind = abaqus_behind(keyword->text + at, name);
+        if (behind && (*behind == '=' || *behind == '\0'))
+            return behind + (*behind == '=');
     }
     return NULL;
 }

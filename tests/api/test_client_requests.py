@@ -4,6 +4,7 @@ usage: test_client_requests.py BUILD_DIR [FILTER]"""
 import gzip
 import hashlib
 import json
+import math
 import os
 import subprocess
 import sys
@@ -220,6 +221,23 @@ def test_a_whole_deck(server):
                                ({"abaqus": "x", "gmsh": "x"}, 422, "unknown_key"), ({}, 422, "missing_key")):
         reply = server.request("POST", "/v1/decks", body)
         check(reply.status == status and reply.json["code"] == code, body, reply)
+
+
+def test_rigid_bodies_of_decks(server):
+    """The lid of the upper square held and turned by a node beside it: the same scene as written by hand."""
+    head, tail = DECK.split("*STEP", 1)
+    lid = ("*NODE\n98, 1, 3\n99, 1, 3\n*NSET, NSET=LID\n13, 14\n*RIGID BODY, NSET=LID, REF NODE=98, ROT NODE=99\n*STEP" + tail.split("*BOUNDARY")[0] +
+           "*BOUNDARY\n1, 1, 2\n2, 1, 2\n98, 1, 1, 0.\n99, 3, 3, 0.001\n*CLOAD\n98, 2, -20.\n*END STEP\n")
+    reply = server.request("POST", "/v1/decks", {"abaqus": head + lid})
+    check(reply.status == 200, reply)
+    problem = reply.json["request"]["problem"]
+    rigid = problem["supports"][0]["rigid"]
+    check(problem["supports"][0]["on"] == "LID" and rigid["point"] == [1, 3] and rigid["ux"] == 0 and abs(rigid["rz"] - math.degrees(1e-3)) < 1e-12, problem)
+    check(problem["loads"] == [{"on": "LID", "force": [0, -20], "at": [1, 3], "moment": [0]}], problem["loads"])
+    summary = server.solve({"problem": problem})["summary"]
+    held = summary["resultants"]["supports"][0]["rigid"]
+    check(summary["outcome"] == "converged" and abs(summary["contact"]["force"][1] / 20 - 1) < 1e-6, summary["contact"])
+    check(abs(held["displacement"][0]) < 1e-15 and abs(held["rotation"][0] - math.degrees(1e-3)) < 1e-9, held)
 
 
 DECK = """*HEADING

@@ -81,6 +81,28 @@ TEST(a_deck_as_a_scene)
     uz_deck_clear(&deck);
 }
 
+/* The upper body turned about a node that no element has; the lower one held at one of its own, whose rotation is 6. */
+TEST(rigid_bodies)
+{
+    uz_deck deck;
+    must_read(&deck, MODEL "*NODE\n98,1,4\n97,0,0\n*NSET,NSET=LID\n13,14\n*RIGIDBODY,NSET=LID,REF NODE=98,ROTNODE=97\n"
+                           "*RIGID BODY,ELSET=LOW,REF NODE=1\n*STEP\n*STATIC\n*BOUNDARY\n98,1,2,.5\n97,3,3,.1\n"
+                           "1,1,2\n*CLOAD\n98,1,7.\n97,3,9.\n1,6,2.\n*ENDSTEP\n");
+    const uz_scene *s = &deck.scene;
+    CHECK(s->n_supports == 2 && s->n_loads == 2);
+    const uz_support *lid = &s->supports[0], *low = &s->supports[1];
+    CHECK(lid->kind == UZ_SUPPORT_RIGID && strcmp(lid->on, "LID") == 0 && lid->about[0] == 1.0 && lid->about[1] == 4.0);
+    CHECK(lid->u[0] == 0.5 && lid->u[1] == 0.5 && lid->turn[2] == 0.1);
+    CHECK(low->kind == UZ_SUPPORT_RIGID && group_named(s, low->on)->n_nodes == 4 && low->u[0] == 0.0);
+    CHECK(isnan(low->turn[2]) && low->about[0] == 0.0);
+    CHECK(s->loads[0].has_point && s->loads[0].point[1] == 4.0 && s->loads[0].v[0] == 7.0 &&
+          s->loads[0].moment[2] == 9.0);
+    CHECK(s->loads[1].moment[2] == 2.0 && s->loads[1].v[0] == 0.0);
+    CHECK_INT(s->given.n_nodes, 8);
+    CHECK_INT(deck.n_notes, 0);
+    uz_deck_clear(&deck);
+}
+
 /* A surface that is given by its nodes is that of the sides between them; one node alone has none. */
 TEST(surfaces_of_nodes)
 {
@@ -205,6 +227,12 @@ static const struct {
     {MODEL "*STEP\n*STATIC\n*CLOAD\n1,1,x\n*END STEP\n", "a force was expected"},
     {MODEL "*STEP\n*STATIC\n*DLOAD\n1,P5,1.\n*END STEP\n", "no side P5"},
     {MODEL "*STEP\n*STATIC\n*DSLOAD\nGONE,P,1.\n*END STEP\n", "no surface of sides"},
+    {MODEL "*RIGID BODY,ANALYTICAL SURFACE=SL,REF NODE=99\n" STEP, "an NSET or an ELSET"},
+    {MODEL "*RIGID BODY,NSET=ALLN,REF NODE=77\n" STEP, "node 77 is not there"},
+    {MODEL "*RIGID BODY,NSET=ALLN,REF NODE=ALLN\n" STEP, "REF NODE is one node"},
+    {NODES "*ELEMENT,TYPE=CAX4,ELSET=LOW\n1,1,2,3,4\n" STEEL "*SOLID SECTION,ELSET=LOW,MATERIAL=EL\n"
+           "*RIGID BODY,ELSET=LOW,REF NODE=99\n*STEP\n*STATIC\n*BOUNDARY\n99,6,6,.1\n*END STEP\n",
+     "along its axis only"},
     {MODEL "*INCLUDE,INPUT=more.inp\n" STEP, "*INCLUDE is not read"},
     {NODES
      "*ELEMENT,TYPE=CPE4,ELSET=LOW\n1,1,2,3,4\n*ELEMENT,TYPE=CAX4,ELSET=HIGH\n2,11,12,13,14\n" STEEL SECTIONS STEP,
