@@ -56,12 +56,6 @@ client_exit client_put_file(client_session *s, json_t *to, const char *key, cons
     return code;
 }
 
-static bool ends_in(const char *path, const char *ending)
-{
-    const size_t all = strlen(path), length = strlen(ending), end = client_is_packed(path) ? all - 3 : all;
-    return end > length && strncasecmp(path + end - length, ending, length) == 0;
-}
-
 /* The key of a mesh, by the name of its file; with another name by how it begins. What can't be told is sent as Gmsh's,
  * and the service says what is wrong with it. */
 static const char *mesh_format(const char *path)
@@ -72,7 +66,7 @@ static const char *mesh_format(const char *path)
                  {".dat", "nastran"}, {".fem", "nastran"}, {".vtu", "vtk"},     {".vtk", "vtk"}};
     char begin[4096];
     for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
-        if (ends_in(path, NAMES[i].ending))
+        if (client_ends_in(path, NAMES[i].ending, true))
             return NAMES[i].key;
     FILE *file = fopen(path, "rb");
     const size_t length = file ? fread(begin, 1, sizeof begin - 1, file) : 0;
@@ -89,7 +83,7 @@ static const char *mesh_format(const char *path)
 /* The key of a surface, by the name of its file. */
 static const char *surface_format(const char *path)
 {
-    return ends_in(path, ".obj") ? "obj" : "stl";
+    return client_ends_in(path, ".obj", true) ? "obj" : "stl";
 }
 
 /* The file for all obstacles that are surfaces without one. */

@@ -51,6 +51,8 @@ client_exit client_upload(client_session *s);
 
 /* By its name: the bytes are gzip's. */
 bool client_is_packed(const char *name);
+/* Does the file's name end so, without regard to case? packed: or so with ".gz" behind. */
+bool client_ends_in(const char *path, const char *ending, bool packed);
 /* The id of a file's bytes on the service, which is sent them unless it has them. `name` tells whether it is packed. */
 client_exit client_upload_once(client_session *s, char id[65], const char *name, const client_buffer *file);
 

@@ -26,12 +26,9 @@
 static const char *ending_of(const char *path)
 {
     static const char *const ENDINGS[] = {".step", ".stp", ".iges", ".igs", ".brep"};
-    const size_t length = path ? strlen(path) : 0;
-    for (size_t i = 0; i < sizeof ENDINGS / sizeof *ENDINGS; i++) {
-        const size_t end = strlen(ENDINGS[i]);
-        if (length > end && strcasecmp(path + length - end, ENDINGS[i]) == 0)
+    for (size_t i = 0; path && i < sizeof ENDINGS / sizeof *ENDINGS; i++)
+        if (client_ends_in(path, ENDINGS[i], false))
             return ENDINGS[i];
-    }
     return NULL;
 }
 

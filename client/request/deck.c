@@ -8,9 +8,7 @@
 
 bool client_is_deck(const char *path)
 {
-    const size_t length = path ? strlen(path) : 0;
-    const size_t end = length > 3 && strcmp(path + length - 3, ".gz") == 0 ? length - 3 : length;
-    return end > 4 && strncasecmp(path + end - 4, ".inp", 4) == 0;
+    return path && client_ends_in(path, ".inp", true);
 }
 
 /* A line for each note; those of what does not matter only where `all`. */

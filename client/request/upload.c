@@ -5,11 +5,18 @@
 #include <gnutls/crypto.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 bool client_is_packed(const char *name)
 {
     const char *end = strrchr(name, '.');
     return end && strcmp(end, ".gz") == 0;
+}
+
+bool client_ends_in(const char *path, const char *ending, bool packed)
+{
+    const size_t all = strlen(path), length = strlen(ending), end = packed && client_is_packed(path) ? all - 3 : all;
+    return end > length && strncasecmp(path + end - length, ending, length) == 0;
 }
 
 /* The id is the digest of the bytes, so that a file that comes twice is stored once: it may be sent again. */
