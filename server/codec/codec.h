@@ -194,6 +194,8 @@ typedef struct {
     const uz_fields *fields; /* scenes: what was computed; its pressure is not written. NULL: nothing */
 } codec_result;
 char *codec_encode_result(const codec_result *result, size_t *len);
+/* What of it is no vector. */
+char *codec_encode_result_head(const codec_result *result);
 /* The same as an archive of NumPy's: an array for each vector, of points with a column for each number, and the rest
  * as result.json. Of Gauss points there are stress_gauss_elements, _points and _stress. NaN stays NaN. NULL: no
  * memory, or more than such a file can hold. */

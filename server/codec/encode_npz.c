@@ -10,9 +10,7 @@ char *codec_encode_result_npz(const codec_result *result, size_t *len)
     const uz_fields *f = r->fields ? r->fields : &NONE;
     const int dim = r->dim > 1 ? r->dim : 0, k = f->components;
     const int64_t each = dim > 0 ? dim : 1;
-    const codec_result bare = {
-        .job_id = r->job_id, .summary = r->summary, .case_name = r->case_name, .part = r->part, .from = r->from};
-    char *head = codec_encode_result(&bare, NULL), *file = NULL;
+    char *head = codec_encode_result_head(r), *file = NULL;
     const uz_npz_array list[] = {
         {.name = "result.json", .text = head},
         {.name = "reactions", .x = r->reactions, .rows = r->m},

@@ -23,6 +23,17 @@ static void put_vector(text *t, const char *key, const double *x, int64_t n, int
     text_close(t, ']');
 }
 
+/* The names of what stresses and strains are made of, where they were computed. */
+static void put_components(text *t, const uz_fields *f)
+{
+    if (!f || !(f->stress || f->strain || f->gauss_stress))
+        return;
+    text_open(t, "components", '[');
+    for (int c = 0; c < f->components; c++)
+        text_string(t, NULL, uz_field_components(f->dim)[c]);
+    text_close(t, ']');
+}
+
 /* What each case has of its own. */
 static void put_fields(text *t, const codec_result *result)
 {
@@ -32,15 +43,9 @@ static void put_fields(text *t, const codec_result *result)
     put_vector(t, "pressure", result->pressure, result->m, 0);
     put_vector(t, "ray", result->ray, result->m, 0);
     put_vector(t, "displacements", result->displacements, result->n_u, result->dim);
+    put_components(t, f);
     if (!f)
         return;
-    /* What was computed; first the names of the components that stresses and strains have. */
-    if (f->stress || f->strain || f->gauss_stress) {
-        text_open(t, "components", '[');
-        for (int c = 0; c < f->components; c++)
-            text_string(t, NULL, uz_field_components(f->dim)[c]);
-        text_close(t, ']');
-    }
     put_vector(t, "contact_status", f->contact_status, f->m, 0);
     put_vector(t, "stress", f->stress, f->n_nodes * f->components, f->components);
     put_vector(t, "principal", f->principal, f->n_nodes * 3, 3);
@@ -63,14 +68,30 @@ void codec_put_places(text *t, const codec_result *result)
     put_vector(t, "contact_nodes", result->contact_nodes, result->m, 0);
 }
 
+static void open_result(text *t, const codec_result *result)
+{
+    text_open(t, NULL, '{');
+    text_string(t, "job", result->job_id);
+    if (result->case_name)
+        text_string(t, "case", result->case_name);
+    text_raw(t, "summary", result->summary);
+}
+
+char *codec_encode_result_head(const codec_result *result)
+{
+    text t = {0};
+    open_result(&t, result);
+    put_components(&t, result->fields);
+    if (result->part)
+        text_integer(&t, "from", result->from);
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
 char *codec_encode_result(const codec_result *result, size_t *len)
 {
     text t = {0};
-    text_open(&t, NULL, '{');
-    text_string(&t, "job", result->job_id);
-    if (result->case_name)
-        text_string(&t, "case", result->case_name);
-    text_raw(&t, "summary", result->summary);
+    open_result(&t, result);
     put_fields(&t, result);
     codec_put_places(&t, result);
     text_close(&t, '}');

@@ -42,6 +42,9 @@ def test_arrays_go_in_and_come_out(s):
     check(job["displacements"].shape == (31 * 11, 2) and job["pressure"].shape == (30,), job["displacements"].shape)
     check(job["displacements"].dtype == float and job.summary["contact"]["active"] == (job["reactions"] < 0).sum())
     check(job["pressure"].max() == job.summary["contact"]["max_pressure"], job["pressure"].max())
+    rows = job.result("stress", "stress_gauss", "nodes")
+    check(rows["components"] == ["xx", "yy", "zz", "xy"] and rows["stress"].shape == (31 * 11, 4) and rows["nodes"].shape == (31 * 11, 2), rows)
+    check(rows["stress_gauss"]["points"].shape == (4 * 300, 2) and rows["stress_gauss"]["elements"].max() == 299, rows["stress_gauss"])
     history = job.history()
     check(len(history) == 12 and history["iteration"][-1] >= job.summary["iterations"] - 1, history["iteration"][-1])
     check((np.diff(history["iteration"]) > 0).all() and history["error_bound"][-1] < history["error_bound"][0], history)
@@ -51,6 +54,15 @@ def test_arrays_go_in_and_come_out(s):
         check("presure" in str(refused), refused)
     else:
         check(False, "a field that no answer has")
+
+
+def test_load_cases_have_arrays_of_their_own(s):
+    loads = [{"on": "top", "traction": [0, -0.1]}]
+    job = client(s).solve({**SCENE, "cases": [{"name": "none", "loads": []}, {"name": "twice", "loads": loads}]})
+    none, twice = job.result("pressure", "displacements")["cases"]
+    check(none["name"] == "none" and (none["pressure"] == 0).all() and twice["pressure"].max() > 0 and twice["case"] == "twice", none, twice)
+    check((job.result("displacements", case="twice")["displacements"] == twice["displacements"]).all())
+    check([one["summary"]["outcome"] for one in job.result()["cases"]] == ["converged"] * 2)
 
 
 def test_matrices_of_numpy_and_of_scipy(s):

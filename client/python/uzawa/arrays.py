@@ -1,6 +1,7 @@
-"""Numbers in: numpy arrays in a request, matrices as Matrix Market text."""
+"""Numbers in: numpy arrays in a request, matrices as Matrix Market text. And out: a result's file of arrays."""
 from __future__ import annotations
 
+import io
 import json
 from typing import Any, Optional
 
@@ -17,6 +18,18 @@ def plain(value: Any) -> Any:
 def to_json(request: Any) -> bytes:
     """A request as JSON. NaN and infinite numbers are refused: JSON has none."""
     return json.dumps(request, default=plain, allow_nan=False).encode()
+
+
+def from_npz(data: bytes) -> dict:
+    """A result.npz: its arrays, those of Gauss points together, beside what it says in JSON."""
+    with np.load(io.BytesIO(data)) as held:
+        found = json.loads(held["result.json"])
+        for name in held.files:
+            if name.startswith("stress_gauss_"):
+                found.setdefault("stress_gauss", {})[name[len("stress_gauss_"):]] = held[name]
+            elif name != "result.json":
+                found[name] = held[name]
+    return found
 
 
 def entries_of(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, int]]:

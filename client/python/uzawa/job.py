@@ -11,18 +11,6 @@ if TYPE_CHECKING:
     from .service import Uzawa
 
 ENDED = ("successful", "failed", "dismissed")
-# Results that are no array of numbers.
-PLAIN = ("summary", "stress_gauss")
-
-
-def as_array(value: Any) -> Any:
-    """Lists of numbers as an array; null, which is a number that is not known, as NaN; all else as it is."""
-    if not isinstance(value, list):
-        return value
-    try:
-        return np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        return value
 
 
 class Job(dict):
@@ -89,9 +77,8 @@ class Job(dict):
         return self
 
     def result(self, *fields: str, case: Optional[str] = None) -> dict:
-        """Fields of the answer: "displacements", "pressure", ... as arrays, "summary" as it is."""
-        found = self.service.result(self.id, *fields, case=case)
-        return {name: value if name in PLAIN else as_array(value) for name, value in found.items()}
+        """Fields of the answer: see Uzawa.result."""
+        return self.service.result(self.id, *fields, case=case)
 
     def history(self, case: Optional[str] = None) -> dict:
         """The convergence history: an array for each column, a number for each iteration."""
