@@ -43,8 +43,9 @@ static uz_status make_values(double **out, uz_scenery *scenery, const uz_field_b
     return status;
 }
 
-/* From back to front: obstacles of a solid, the outline before the deformation, the body. */
-static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
+/* From back to front: obstacles of a solid, the outline before the deformation, the body, obstacles of a plane, arrows.
+ */
+static uz_status put_body(uz_buffer *svg, uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
                           uz_error *err)
 {
     uz_raster raster;
@@ -61,6 +62,11 @@ static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_sk
         status = uz_scenery_paint_contacts(&raster, scenery, err);
     if (status == UZ_OK)
         status = uz_raster_put_image(svg, &raster, err);
+    if (status == UZ_OK) {
+        uz_scenery_put_obstacles(svg, scenery);
+        scenery->longest_arrow = uz_scenery_put_arrows(
+            svg, scenery, scenery->model->mesh.dim == 3 && !scenery->contacts_only ? &raster : NULL);
+    }
     uz_raster_clear(&raster);
     return status;
 }
@@ -109,8 +115,6 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
         status = put_body(svg, scenery, &skin, hooks, err);
     }
     if (status == UZ_OK) {
-        uz_scenery_put_obstacles(svg, scenery);
-        uz_scenery_put_arrows(svg, scenery);
         uz_scenery_put_axes(svg, scenery);
         uz_buffer_print(svg, "</svg>\n");
         uz_scenery_put_legend(svg, scenery, how->title);

@@ -115,6 +115,14 @@ void uz_raster_line(uz_raster *raster, const uz_raster_point *a, const uz_raster
     }
 }
 
+bool uz_raster_hides(const uz_raster *raster, const uz_raster_point *point)
+{
+    if (!(point->x >= 0 && point->y >= 0 && point->x < raster->width && point->y < raster->height))
+        return false;
+    const int64_t at = (int64_t)point->y * raster->width + (int64_t)point->x;
+    return raster->rgba[4 * at + 3] > 0 && raster->depth[at] > point->z + 2;
+}
+
 uz_status uz_raster_put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err)
 {
     png_alloc_size_t len = 0;

@@ -27,6 +27,9 @@ void uz_raster_triangle(uz_raster *raster, const uz_raster_point corner[3], doub
 /* A thin dark line, `lift` nearer than its ends say. */
 void uz_raster_line(uz_raster *raster, const uz_raster_point *a, const uz_raster_point *b, double lift);
 
+/* Is what is drawn at this pixel nearer than the point, by more than two pixels? */
+bool uz_raster_hides(const uz_raster *raster, const uz_raster_point *point);
+
 /* Colour of a value in [0, 1], red, green, blue. */
 void uz_colour(unsigned char rgb[3], double value);
 

@@ -432,16 +432,17 @@ void uz_scenery_put_axes(uz_buffer *svg, const uz_scenery *scenery)
     uz_buffer_print(svg, "</text>\n");
 }
 
-void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
+double uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery, const uz_raster *body)
 {
     const uz_mesh_info *info = &scenery->model->info;
     const int64_t m = scenery->model->m;
     const double largest = scenery->largest_push;
     int64_t pushing = 0, seen = 0;
+    double longest = 0;
     for (int64_t i = 0; i < m; i++)
         pushing += scenery->pressure[i] > 0;
     if (!(largest > 0))
-        return;
+        return 0;
     const int64_t every = (pushing + MOST_ARROWS - 1) / MOST_ARROWS;
     uz_buffer_print(svg, "<path class=\"push\" d=\"");
     for (int64_t i = 0; i < m; i++) {
@@ -451,17 +452,24 @@ void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
         const double length = ARROW * scenery->pressure[i] / largest, head = fmin(6, 0.4 * length);
         const double *n = info->contact_normal + i * info->dim;
         const uz_raster_point tip = uz_scenery_node(scenery, info->contact_node[i], scenery->factor);
-        double dx = 0, dy = 0;
+        double dx = 0, dy = 0, dz = 0;
         for (int c = 0; c < info->dim; c++) {
             dx += scenery->axes[0][c] * n[c];
             dy -= scenery->axes[1][c] * n[c];
+            dz += scenery->axes[2][c] * n[c];
         }
+        const uz_raster_point middle = {
+            .x = tip.x - 0.5 * length * dx, .y = tip.y - 0.5 * length * dy, .z = tip.z - 0.5 * length * dz};
+        if (body && uz_raster_hides(body, &middle))
+            continue;
+        longest = fmax(longest, scenery->pressure[i]);
         uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1fM%.1f %.1fL%.1f %.1fL%.1f %.1f", tip.x - length * dx,
                         tip.y - length * dy, tip.x, tip.y, tip.x - head * (dx + 0.5 * dy),
                         tip.y - head * (dy - 0.5 * dx), tip.x, tip.y, tip.x - head * (dx - 0.5 * dy),
                         tip.y - head * (dy + 0.5 * dx));
     }
     uz_buffer_print(svg, "\"/>\n");
+    return longest;
 }
 
 /* Three digits, and all before the point. */
@@ -526,9 +534,9 @@ void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char
     uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", words + 10);
     uz_buffer_put_escaped(svg, title ? title : "");
     uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g", words + 26, scenery->factor);
-    if (scenery->largest_push > 0) {
+    if (scenery->longest_arrow > 0) {
         uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure ", words + 42);
-        put_short(svg, scenery->largest_push);
+        put_short(svg, scenery->longest_arrow);
         put_unit(svg, " ", units->stress);
     }
     uz_buffer_print(svg, "</text>\n");

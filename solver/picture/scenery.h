@@ -19,6 +19,7 @@ typedef struct {
     bool contacts_only;     /* `value` is there on sides of contacts alone, NaN elsewhere: they alone are coloured */
     const double *pressure; /* m: of each contact row, NaN where it has no area */
     double largest_push;    /* of these; at least 0 */
+    double longest_arrow;   /* the largest pressure that has one */
     double axes[3][3];      /* rows: to the right, upwards, towards the eye */
     double scale;           /* pixels per length */
     double offset[2];       /* pixel = (offset[0] + scale * right, offset[1] - scale * up) */
@@ -56,7 +57,9 @@ bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery);
 uz_status uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, uz_error *err);
 void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery); /* plane models */
 void uz_scenery_put_axes(uz_buffer *svg, const uz_scenery *scenery);
-void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery);
+/* Pressures, but for those whose arrows the body is before: a solid as it was painted; NULL: it is seen through. The
+ * largest of those that are drawn; at least 0. */
+double uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery, const uz_raster *body);
 /* The legend is below the picture, of this height in pixels. */
 int uz_scenery_legend_height(const uz_scenery *scenery);
 void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title);

@@ -234,6 +234,13 @@ TEST(a_solid_stands_on_its_obstacle)
         CHECK_INT(count_of(svg, "base64,"), 2);
         CHECK_INT(count_moves(strstr(svg, "class=\"before\"")), 4 * (3 + 2 + 3));
         free(pixels);
+        /* It is seen from above, and before most of the arrows from below, but where it is seen through. */
+        const int seen = count_moves(strstr(svg, "class=\"push\""));
+        CHECK_INT(count_of(svg, "longest arrow"), seen > 0);
+        free(svg);
+        svg = draw(&s, (uz_picture){.colour = UZ_FIELD_PRESSURE, .factor = 1});
+        const int all = count_moves(strstr(svg, "class=\"push\""));
+        CHECK_MSG(all > 0 && seen < all / 2, "obstacle %d: %d of %d", k, seen, all);
         free(svg);
         drop(&s);
     }
