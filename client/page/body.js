@@ -9,6 +9,7 @@ import { add_stress, displacement_of, forget_surface, load_surface, node_of, pla
 import { announce, h, s, show } from "./dom.js";
 import { number } from "./format.js";
 import { mountPath } from "./path.js";
+import { round_ticks } from "./plot.js";
 import { mountPressure } from "./pressure.js";
 import { colour } from "./theme.js";
 
@@ -158,13 +159,13 @@ class BodyView {
 
   /** The colour bar with its numbers. */
   draw_legend() {
-    const [low, high] = this.range(), id = `body-scale-${this.number}`;
+    const WIDTH = 300, [low, high] = this.range(), id = `body-scale-${this.number}`;
     const stops = Array.from({ length: 9 }, (_, i) => s("stop", { offset: i / 8, "stop-color": `rgb(${viridis(i / 8).join(" ")})` }));
     const name = quantities(this.surface).find((one) => one.id === this.quantity).name;
-    const texts = [[0, "start", low], [0.5, "middle", low + (high - low) / 2], [1, "end", high]];
-    show(this.legend, h("div", { class: "body-quantity" }, name + this.unit(this.quantity)), s("svg", { viewBox: "0 0 320 30", width: 320, height: 30, role: "img", "aria-label": `${name}: colours from ${exact(low)} to ${exact(high)}` },
-      s("defs", null, s("linearGradient", { id }, stops)), s("rect", { width: 320, height: 12, fill: `url(#${id})` }),
-      texts.map(([t, anchor, value]) => s("text", { x: 320 * t, y: 26, "text-anchor": anchor }, exact(value)))),
+    const place = (value) => Math.min(WIDTH, Math.max(0, (WIDTH * (value - low)) / (high - low)));
+    show(this.legend, h("div", { class: "body-quantity" }, name + this.unit(this.quantity)), s("svg", { viewBox: `-20 0 ${WIDTH + 40} 30`, width: WIDTH + 40, height: 30, role: "img", "aria-label": `${name}: colours from ${exact(low)} to ${exact(high)}` },
+      s("defs", null, s("linearGradient", { id }, stops)), s("rect", { width: WIDTH, height: 12, fill: `url(#${id})` }),
+      round_ticks(low, high, WIDTH).map(({ value, text }) => [s("path", { class: "tick", d: `M${place(value)} 12v4` }), s("text", { x: place(value), y: 28, "text-anchor": "middle" }, text)])),
       h("span", { class: "body-range" }, ["low", "high"].map((end, k) => h("input", { type: "number", step: "any", value: Number([low, high][k].toPrecision(5)), class: `body-${end}`,
         "aria-label": `Colours ${k ? "end" : "begin"} at`, onchange: (event) => this.limit(k, event.target.valueAsNumber) })),
         this.limits ? h("button", { type: "button", class: "small", title: "Colours from the least to the largest value", onclick: () => this.limit(0, NaN) }, "all values") : null),

@@ -73,6 +73,14 @@ function fine_ticks(low, high) {
   return found || scaleLinear().domain([low, high]).ticks(4);
 }
 
+/** [{value, text}]: round numbers from low to high along a bar of so many pixels, by the rule of the service's pictures. */
+export function round_ticks(low, high, pixels) {
+  const ROOM = 56, least = ((high - low) * ROOM) / pixels, power = 10 ** Math.floor(Math.log10(least)), found = [];
+  const step = [1, 2, 5].map((digit) => digit * power).find((one) => least <= one * (1 + 1e-9)) ?? 10 * power;
+  for (let k = Math.ceil(low / step - 1e-9); least > 0 && k <= high / step + 1e-9; k++) found.push({ value: k * step, text: number(Number((k * step).toPrecision(12)), 6) });
+  return found;
+}
+
 /** [{value, text}]: powers of ten where there are some, at most so many. format: of a value, where not a plain number. */
 function ticks_of(scale, { log, format, whole }, most) {
   const text_of = format || ((value) => number(value, 4));

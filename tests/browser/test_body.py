@@ -1,6 +1,7 @@
 """The deformed body on a job's page, and the contact along its surface. usage: test_body.py BUILD_DIR [FILTER]"""
 import copy
 import json
+import re
 import time
 
 import browser
@@ -14,6 +15,14 @@ SOLID = {"problem": {"kind": "scene", "model": "solid",
                      "contacts": [{"on": "bottom", "obstacle": {"sphere": {"center": [2, -10, 2], "radius": 10}}}]},
          "solver": {"accuracy": {"relative_error": 1e-6}}}
 VIRIDIS = ["#440154", "#472c7a", "#3b518b", "#2c718e", "#21908d", "#27ad81", "#5cc863", "#aadc32", "#fde725"]
+
+
+LEGEND = "(document.querySelector('.body-legend').innerText + document.querySelector('.body-legend svg')?.getAttribute('aria-label'))"
+
+
+def legend(b):
+    """The numbers below the colour bar, and what it is called, with the least and the largest value."""
+    return b.run(f"return {LEGEND}")
 
 
 def show(s, b, request):
@@ -102,7 +111,12 @@ def test_a_plane_body(s, b):
     check(b.near(".body-frame", "--push", 60) > 200 and b.near(".body-frame", "--obstacle", 30) > 300, "arrows, obstacle")
     label = b.run("return document.querySelector('.body-canvas').getAttribute('aria-label')")
     check("300 elements" in label and "22 of 30 contact nodes touch" in label, label)
-    check("1.5439" in b.text(".body-legend"), b.text(".body-legend"))
+    check("1.5439" in legend(b), legend(b))
+    ticks = [value.replace("×10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) for value in
+             b.run("return [...document.querySelectorAll('.body-legend text')].map((one) => one.textContent)")]
+    picture = s.get(f"/v1/jobs/{job}/deformed.svg?colour=displacements").body.decode()
+    bar = re.findall(r'v4"/><text [^>]*>([^<]*)<', picture)
+    check(len(ticks) > 2 and [float(one) for one in ticks] == [float(one) for one in bar], ticks, bar)
     end = columns(b)[1]
     after(b, lambda: set_value(b, ".body-scale", 0, "input"))
     still = columns(b)[1]
@@ -112,9 +126,9 @@ def test_a_plane_body(s, b):
     check(still + 10 < columns(b)[1] < end - 10, "the right end stands at", columns(b)[1])
     after(b, lambda: set_value(b, ".body-colour", "von_mises", "change"))
     stress = s.get(f"/v1/jobs/{job}/result?fields=von_mises").json["von_mises"]
-    check(f"{max(stress):.4f}" in b.text(".body-legend") and coloured(b) != found, b.text(".body-legend"), max(stress))
+    check(f"{max(stress):.4f}" in legend(b) and coloured(b) != found, legend(b), max(stress))
     after(b, lambda: set_value(b, ".body-colour", "pressure", "change"))
-    check("Contact pressure" in b.text(".body-legend") and b.near(".body-frame", "#8a8f96", 25) > 20000, "grey within")
+    check("Contact pressure" in legend(b) and b.near(".body-frame", "#8a8f96", 25) > 20000, "grey within")
 
 
 def switch(b, part):
@@ -184,10 +198,10 @@ def test_cases_are_chosen_and_a_lost_graphics_card_comes_back(s, b):
     request["cases"] = [{"name": "pressed", "loads": [{"on": "top", "traction": [0, -1]}]},
                         {"name": "pulled", "loads": [{"on": "right", "traction": [1, 0]}]}]
     show_all(s, b, request)
-    before = b.text(".body-legend")
+    before = legend(b)
     b.run("""const field = [...document.querySelectorAll('.body-tools select')].find((one) => [...one.options].some((o) => o.value === 'pulled'));
              field.value = 'pulled'; field.dispatchEvent(new Event('change', {bubbles: true}));""")
-    b.wait("the other case", "return document.querySelector('.body-legend').innerText !== arguments[0]", before)
+    b.wait("the other case", f"return {LEGEND} !== arguments[0]", before)
     check(sum(coloured(b)) > 10000, coloured(b))
     b.run("""const c = document.querySelector('.body-canvas');
              window.card = (c.getContext('webgl2') || c.getContext('webgl')).getExtension('WEBGL_lose_context'); window.card.loseContext();""")
@@ -220,7 +234,7 @@ def test_it_begins_where_it_touches(s, b):
     request["problem"]["supports"] = [{"on": "top", "ux": 0, "uy": -0.01}]
     request["problem"]["loads"] = []
     show(s, b, request)
-    check("Contact pressure" in b.text(".body-legend"), b.text(".body-legend"))
+    check("Contact pressure" in legend(b), legend(b))
     near, home = b.near(".body-frame", "--push", 60), coloured(b)
     press_button(b, "Show all")
     check(near > 10 and not alike(coloured(b), home), "all of it is no other picture")
@@ -239,7 +253,7 @@ def test_colours_between_other_values(s, b):
     before = coloured(b)
     after(b, lambda: set_value(b, ".body-high", 0.00005, "change"))
     now = coloured(b)
-    check(now[-1] > 2 * before[-1] and "5×10⁻⁵" in b.text(".body-legend"), before, now, b.text(".body-legend"))
+    check(now[-1] > 2 * before[-1] and "5×10⁻⁵" in legend(b), before, now, legend(b))
     after(b, lambda: b.click(".body-range button"))
     check(alike(coloured(b), before) and not b.run("return document.querySelector('.body-range button')"), before, coloured(b))
     after(b, lambda: set_value(b, ".body-low", 10, "change"))

@@ -138,12 +138,12 @@ def test_a_path_is_a_curve_and_a_slider(s, b):
     b.one(".body-way input")
     b.wait("the worst case is shown", "return document.querySelector('.body-way output').value === document.querySelector('#case').value")
     for point, name in ((0, "way 1"), (2, "way 3"), (3, "way")):
-        before = b.text(".body-legend")
+        before = b.one(".body-legend svg").get_attribute("aria-label")
         b.run(f"""const range = document.querySelector('.body-way input');
                   range.value = {point}; range.dispatchEvent(new Event('input', {{bubbles: true}}));""")
         b.wait("the point is named", f"return document.querySelector('.body-way output').value === '{name}'")
         b.wait("the body is drawn there", f"return [...document.querySelectorAll('.body-tools select')].some((one) => one.value === '{name}')")
-        check(point == 0 or b.wait("other values", "return document.querySelector('.body-legend').innerText !== arguments[0]", before), point)
+        check(point == 0 or b.wait("other values", "return document.querySelector('.body-legend svg').getAttribute('aria-label') !== arguments[0]", before), point)
 
 
 def test_convergence_is_drawn(s, b):
