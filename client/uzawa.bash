@@ -28,7 +28,7 @@ _uzawa() {
     verify) options='--timeout --key --junit --baseline --tolerance --progress --quiet --json --context --server --retry --help --version ' ;;
     result) options='--format --fields --field --case --output --json --context --server --timeout --retry --help --version ' ;;
     path) options='--format --from --to --count --case --output --json --context --server --timeout --retry --help --version ' ;;
-    picture) options='--colour --factor --width --case --output --json --context --server --timeout --retry --help --version ' ;;
+    picture) options='--colour --factor --view --up --width --case --output --json --context --server --timeout --retry --help --version ' ;;
     history) options='--csv --plot --width --height --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
     plot) options='--deformed --error --trade --x --with --colour --factor --width --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
     report) options='--case --output --json --context --server --timeout --retry --help --version ' ;;
@@ -124,6 +124,8 @@ _uzawa() {
     path--retry) words='' ;;
     picture--colour) words='von_mises displacements pressure' ;;
     picture--factor) words='' ;;
+    picture--view) words='corner below front back left right top bottom' ;;
+    picture--up) words='y z' ;;
     picture--width) words='' ;;
     picture--case|picture-c) words='' ;;
     picture--output|picture-o) files=1 ;;

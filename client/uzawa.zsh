@@ -199,6 +199,8 @@ _uzawa() {
         _arguments \
             '--colour[von_mises (default), displacements or pressure]:C:(von_mises displacements pressure)' \
             '--factor[displacements are drawn X times as large (default\: so that they show)]:X: ' \
+            '--view[of a solid\: corner (default), below, front, back, left, right, top or bottom]:V:(corner below front back left right top bottom)' \
+            '--up[of a solid\: what points upwards, y (default) or z]:AXIS:(y z)' \
             '--width[of the picture, in pixels (default 900)]:N: ' \
             '(-c --case)'{-c,--case}'[of this load case; needed where the job has some]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \

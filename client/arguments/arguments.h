@@ -23,7 +23,7 @@ typedef struct {
     bool leave_out;                             /* of a deck */
     double size;                                /* of elements, of a part from CAD; 0: not given */
     const char *from, *to;                      /* points, as written */
-    const char *name, *key, *format, *output, *status, *colour, *factor, *axis;
+    const char *name, *key, *format, *output, *status, *colour, *factor, *axis, *view, *up;
     const char *case_name, *accuracy;                /* accuracy: a number or a level, as written */
     double time_limit_s;                             /* NAN: not given */
     const char *junit, *baseline;                    /* a file; a job */

@@ -118,6 +118,8 @@ client_exit client_plot(client_session *s)
     const client_query deformed[] = {{"case", o->case_name},
                                      {"colour", o->colour},
                                      {"factor", o->factor},
+                                     {"view", o->view},
+                                     {"up", o->up},
                                      {"width", o->width < 0 ? NULL : width},
                                      {NULL, NULL}};
     const client_query curves[] = {

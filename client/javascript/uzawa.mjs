@@ -111,7 +111,7 @@ export class Uzawa {
     }
   }
 
-  /** SVG: "deformed" (colour, factor, width, case), "convergence" (x, theme, width, case) or "whole-error". */
+  /** SVG: "deformed" (colour, factor, width, view, up, case), "convergence" (x, theme, width, case) or "whole-error". */
   async picture(id, kind = "deformed", query = {}) {
     return (await this.open("GET", `/v1/jobs/${id}/${kind}.svg?${new URLSearchParams(query)}`)).text();
   }

@@ -139,6 +139,7 @@ class BodyView {
     const parts = [part("wire", "Elements"), part("before", "Undeformed")];
     if (surface.contacts.some((one) => one.obstacle)) parts.push(part("obstacles", "Obstacle"));
     if (surface.rows.count) parts.push(part("forces", "Contact forces"));
+    if (surface.dim === 3) parts.push(tick("z upwards", this.view.z_up, (on) => (this.view.stand(on), this.home())).label);
     show(this.tools,
       this.options.cases?.length > 1 ? choice("Case", this.options.cases.map((id) => ({ id, name: id })), this.case_name, (name) => this.change_case(name)).label : null,
       colours.label,

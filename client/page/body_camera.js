@@ -11,7 +11,7 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 /** What one sees: target is the point in the middle, scale the pixels per unit of length. */
 export class Camera {
   constructor(dim) {
-    Object.assign(this, { dim, target: [0, 0, 0], scale: 1, home_scale: 1, width: 1, height: 1 });
+    Object.assign(this, { dim, z_up: false, target: [0, 0, 0], scale: 1, home_scale: 1, width: 1, height: 1 });
     this.turn_home();
   }
 
@@ -26,15 +26,22 @@ export class Camera {
   }
 
   /** Towards where a side looks that has this direction out of the body. */
-  turn_to([x, y, z]) {
+  turn_to(out) {
+    const [x, y, z] = this.z_up ? [out[0], out[2], -out[1]] : out;
     const aslant = Math.abs(y) > 0.5 * Math.hypot(x, y, z);
     this.turn(Math.hypot(x, z) > 0.3 * Math.abs(y) ? Math.atan2(x, z) - TURN.azimuth : TURN.azimuth, aslant ? Math.sign(y) * STEEP : TURN.elevation);
   }
 
-  /** axes: to the right, upwards, towards the eye. */
+  /** y or z points upwards. */
+  stand(z_up) {
+    this.z_up = this.dim === 3 && z_up;
+    this.orient();
+  }
+
+  /** axes: to the right, upwards, towards the eye; with z upwards of a frame that has x, z, -y. */
   orient() {
     const [ca, sa, ce, se] = [Math.cos(this.azimuth), Math.sin(this.azimuth), Math.cos(this.elevation), Math.sin(this.elevation)];
-    this.axes = [[ca, 0, -sa], [-sa * se, ce, -ca * se], [sa * ce, se, ca * ce]];
+    this.axes = [[ca, 0, -sa], [-sa * se, ce, -ca * se], [sa * ce, se, ca * ce]].map(([x, y, z]) => (this.z_up ? [x, -z, y] : [x, y, z]));
   }
 
   /** [x, y, depth]: pixels from the upper left corner; depth grows towards the eye. */

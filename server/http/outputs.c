@@ -72,7 +72,21 @@ static uz_status write_picture(char **file, size_t *len, const output_source *of
     return uz_picture_deformed(file, len, of->scene, of->answer, &how, hooks, err);
 }
 
-/* The colour, the factor of the displacements and the width. */
+/* From where a solid is seen, and what of it is upwards. */
+static bool read_view(uz_picture *to, const http_request *rq, problem_details *problem)
+{
+    static const char TITLE[] = "A query parameter has a value that is not allowed";
+    const char *view = target_value(&rq->target, "view"), *up = target_value(&rq->target, "up");
+    if (view && !uz_view_parse(&to->view, view))
+        return problem_fill(problem, 400, "bad_parameter", TITLE,
+                            "view is corner, below, front, back, left, right, top or bottom, not \"%.60s\"", view);
+    if (up && strcmp(up, "y") != 0 && strcmp(up, "z") != 0)
+        return problem_fill(problem, 400, "bad_parameter", TITLE, "up is y or z, not \"%.60s\"", up);
+    to->z_up = up && *up == 'z';
+    return true;
+}
+
+/* The colour, the factor of the displacements, the width and the view. */
 static bool read_picture(output_options *out, const http_request *rq, problem_details *problem)
 {
     static const char TITLE[] = "A query parameter has a value that is not allowed";
@@ -92,7 +106,7 @@ static bool read_picture(output_options *out, const http_request *rq, problem_de
     if (!request_integer(rq, "width", 200, 4000, &width, problem))
         return false;
     to->width = (int)width;
-    return true;
+    return read_view(to, rq, problem);
 }
 
 static uz_status follow_path(uz_path *path, const output_source *of, const uz_hooks *hooks, uz_error *err)
@@ -188,7 +202,7 @@ static bool read_path(output_options *out, const http_request *rq, problem_detai
 
 static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
 static const char *const FILE_OF[] = {"fields", "case", NULL};
-static const char *const PICTURE[] = {"colour", "factor", "width", "case", NULL};
+static const char *const PICTURE[] = {"colour", "factor", "width", "view", "up", "case", NULL};
 static const char *const SECTION[] = {"point", "normal", "fields", "case", NULL};
 static const char *const PATH[] = {"from", "to", "count", "case", NULL};
 static const char *const HISTORY[] = {"after", "case", NULL};

@@ -87,18 +87,35 @@ void uz_path_clear(uz_path *path);
 
 /* ---------------------------------------------------------------- pictures */
 
+/* Where the eye is: a corner right in front and above, below, or across a side. */
+typedef enum {
+    UZ_VIEW_CORNER,
+    UZ_VIEW_BELOW,
+    UZ_VIEW_FRONT,
+    UZ_VIEW_BACK,
+    UZ_VIEW_LEFT,
+    UZ_VIEW_RIGHT,
+    UZ_VIEW_TOP,
+    UZ_VIEW_BOTTOM,
+    UZ_VIEWS /* how many */
+} uz_view;
+/* "corner", "below", "front", ... False: of no view. */
+bool uz_view_parse(uz_view *view, const char *name);
+
 /* How a deformed body is drawn. */
 typedef struct {
     int width;         /* of the picture in pixels, 200 to 4000; 0: 900 */
     double factor;     /* displacements are drawn this many times as large; 0: chosen so that they show */
     uz_field colour;   /* UZ_FIELD_DISPLACEMENTS (their length), _VON_MISES or _PRESSURE */
     const char *title; /* may be NULL */
+    uz_view view;      /* of a solid */
+    bool z_up;         /* of a solid: z points upwards and y away from the eye of UZ_VIEW_FRONT, not y and towards it */
 } uz_picture;
 
 /* The deformed body in colour over its undeformed outline, the obstacles, an arrow for the contact pressure at each
  * node that touches (at most some 80 of them), a colour bar with round numbers, the axes and a round length: as SVG,
- * with the body's colours as a PNG image in it, so that the size does not grow with the mesh. Solids are seen from the
- * front, the right and above; obstacles stand behind. Of a solid in the colours of the pressure only the sides of the
+ * with the body's colours as a PNG image in it, so that the size does not grow with the mesh. Obstacles of solids stand
+ * behind, wherever the eye is. Of a solid in the colours of the pressure only the sides of the
  * contacts are filled, with the edges of the bodies around them; in the plane a band along those sides is coloured.
  * *svg is NUL-terminated, the caller frees it. Errors: those of uz_fields_compute, _ARGUMENT. */
 uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,

@@ -168,6 +168,8 @@ uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, co
                               .model = &model,
                               .answer = answer,
                               .factor = how->factor,
+                              .view = how->view,
+                              .z_up = how->z_up,
                               .width = how->width ? how->width : WIDTH};
         status = draw(&text, &scenery, &body, how, hooks, err);
     }

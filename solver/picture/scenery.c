@@ -79,15 +79,44 @@ double uz_show_factor(const uz_scene *scene, const uz_body_model *model, const u
     return fmax(power * (rest < 2 ? 1 : rest < 5 ? 2 : 5), 1);
 }
 
-uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
+/* The eye's turn to the right and upwards, in degrees. */
+static const struct {
+    const char *name;
+    double right, up;
+} VIEWS[UZ_VIEWS] = {
+    [UZ_VIEW_CORNER] = {"corner", 30, 25}, [UZ_VIEW_BELOW] = {"below", 30, -25}, [UZ_VIEW_FRONT] = {"front", 0, 0},
+    [UZ_VIEW_BACK] = {"back", 180, 0},     [UZ_VIEW_LEFT] = {"left", -90, 0},    [UZ_VIEW_RIGHT] = {"right", 90, 0},
+    [UZ_VIEW_TOP] = {"top", 0, 90},        [UZ_VIEW_BOTTOM] = {"bottom", 0, -90}};
+
+bool uz_view_parse(uz_view *view, const char *name)
 {
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    /* The plane as it is; a solid from a corner, 30 degrees from the right and 25 from above. */
+    for (int v = 0; v < UZ_VIEWS; v++)
+        if (strcmp(VIEWS[v].name, name) == 0) {
+            *view = (uz_view)v;
+            return true;
+        }
+    return false;
+}
+
+/* The plane as it is. Of a solid the rows are of the frame with y upwards, in which z upwards has x, z, -y. */
+static void set_axes(uz_scenery *scenery)
+{
     static const double PLANE[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    const double a = 30 * 3.14159265358979 / 180, b = 25 * 3.14159265358979 / 180;
+    const double a = VIEWS[scenery->view].right * 3.14159265358979 / 180;
+    const double b = VIEWS[scenery->view].up * 3.14159265358979 / 180;
     const double solid[3][3] = {
         {cos(a), 0, -sin(a)}, {-sin(a) * sin(b), cos(b), -cos(a) * sin(b)}, {sin(a) * cos(b), sin(b), cos(a) * cos(b)}};
     memcpy(scenery->axes, scenery->model->mesh.dim == 2 ? PLANE : solid, sizeof scenery->axes);
+    for (int i = 0; i < 3 && scenery->z_up && scenery->model->mesh.dim == 3; i++) {
+        scenery->axes[i][1] = -solid[i][2];
+        scenery->axes[i][2] = solid[i][1];
+    }
+}
+
+uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
+{
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    set_axes(scenery);
     scenery->extent = scenery->model->mesh.extent;
     if (!(scenery->factor > 0))
         scenery->factor = uz_show_factor(scenery->scene, scenery->model, scenery->answer);

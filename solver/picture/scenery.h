@@ -20,11 +20,13 @@ typedef struct {
     const double *pressure; /* m: of each contact row, NaN where it has no area */
     double largest_push;    /* of these; at least 0 */
     double longest_arrow;   /* the largest pressure that has one */
-    double axes[3][3];      /* rows: to the right, upwards, towards the eye */
-    double scale;           /* pixels per length */
-    double offset[2];       /* pixel = (offset[0] + scale * right, offset[1] - scale * up) */
-    int width, height;      /* of the part that the body is in */
-    double extent;          /* size of the body */
+    uz_view view;
+    bool z_up;
+    double axes[3][3]; /* rows: to the right, upwards, towards the eye */
+    double scale;      /* pixels per length */
+    double offset[2];  /* pixel = (offset[0] + scale * right, offset[1] - scale * up) */
+    int width, height; /* of the part that the body is in */
+    double extent;     /* size of the body */
 } uz_scenery;
 
 /* Are these the displacements and reactions of this model, and finite? Errors: UZ_ERR_SIZE, _NOT_FINITE. */

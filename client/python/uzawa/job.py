@@ -98,7 +98,7 @@ class Job(dict):
         return self.service.events(self.id)
 
     def picture(self, kind: str = "deformed", **query: Any) -> str:
-        """SVG: "deformed" (colour, factor, width, case), "convergence" (x, theme, width, case) or "whole-error"."""
+        """SVG: "deformed" (colour, factor, width, view, up, case), "convergence" (x, theme, width, case) or "whole-error"."""
         with self.service.open("GET", f"/v1/jobs/{self.id}/{kind}.svg?{urllib.parse.urlencode(query)}") as reply:
             return reply.read().decode()
 

@@ -280,6 +280,49 @@ TEST(any_body_fits)
     }
 }
 
+/* A box of 4 x 1 x 2 with its contact below: 4 by 1 from the front, 4 by 2 with z upwards, and its contact in front of
+ * the eye from below. */
+TEST(views_of_a_solid)
+{
+    uz_scene scene = body_scene(UZ_SOLID, "hex8", (double[3]){4, 1, 2}, (int64_t[3]){4, 2, 2});
+    scene.contacts[scene.n_contacts++] = (uz_contact){.on = "bottom", .kind = UZ_OBSTACLE_PLANE, .normal = {0, 1, 0}};
+    body_hold(&scene, "top", 0, -1e-3, 0);
+    solved s = solve_scene(scene);
+    static const struct {
+        const char *name;
+        bool z_up;
+        double wide, tall;
+    } LOOKS[] = {{"front", false, 4, 1}, {"front", true, 4, 2}, {"left", false, 2, 1},
+                 {"right", true, 1, 2},  {"top", false, 4, 2},  {"bottom", true, 4, 1}};
+    for (size_t k = 0; k < sizeof LOOKS / sizeof *LOOKS; k++) {
+        uz_picture how = {.colour = UZ_FIELD_DISPLACEMENTS, .factor = 1, .z_up = LOOKS[k].z_up};
+        int width, height, low[2] = {10000, 10000}, high[2] = {-1, -1};
+        CHECK(uz_view_parse(&how.view, LOOKS[k].name));
+        char *svg = draw(&s, how);
+        char *body = strstr(strstr(svg, "class=\"before\""), "<image"); /* the obstacle comes before */
+        unsigned char *pixels = pixels_of(body, &width, &height);
+        for (int64_t i = 0; i < (int64_t)width * height; i++)
+            for (int c = 0; c < 2 && pixels[4 * i + 3] > 0; c++) {
+                const int at = (int)(c ? i / width : i % width);
+                low[c] = at < low[c] ? at : low[c];
+                high[c] = at > high[c] ? at : high[c];
+            }
+        const double ratio = (double)(high[0] - low[0]) / (high[1] - low[1]);
+        CHECK_MSG(fabs(ratio * LOOKS[k].tall / LOOKS[k].wide - 1) < 0.02, "%s: %g", LOOKS[k].name, ratio);
+        free(pixels);
+        free(svg);
+    }
+    uz_picture how = {.colour = UZ_FIELD_VON_MISES, .factor = 1};
+    char *above = draw(&s, how);
+    CHECK(uz_view_parse(&how.view, "below") && !uz_view_parse(&how.view, "aside"));
+    char *below = draw(&s, how);
+    CHECK_INT(count_moves(strstr(below, "class=\"push\"")), 2 * 15);
+    CHECK(count_moves(strstr(above, "class=\"push\"")) < 15);
+    free(above);
+    free(below);
+    drop(&s);
+}
+
 static bool cancel(void *ctx)
 {
     return ++*(int *)ctx > 0;
