@@ -39,6 +39,8 @@ typedef enum {
     GROUP_OR_CONTACT /* any name: also what several groups are called together, which is no group; checked later */
 } group_use;
 bool decode_group(char name[64], decoding *d, const json_value *value, group_use use);
+/* The selection of all outer sides, for the sake of value. */
+bool decode_everywhere(char name[64], decoding *d, const json_value *value);
 /* What stands beside the problem (decode_beside.c); list or object NULL: none, or the defaults. */
 bool decode_cases(uz_problem *problem, decoding *d, const json_value *list);
 void decode_settings(uz_settings *out, const json_value *object);

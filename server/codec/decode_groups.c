@@ -172,7 +172,7 @@ static void make_name(char name[64], const wording *w, int n)
 /* ---- the list of a scene, and what says `on` */
 
 /* Room for one more, zeroed to the last byte: they are compared whole. NULL: the problem says why. */
-static uz_selection *add_selection(decoding *d, const json_value *where)
+static uz_selection *new_selection(decoding *d, const json_value *where)
 {
     uz_scene *scene = d->scene;
     char place[sizeof d->problem->pointer];
@@ -191,9 +191,25 @@ static uz_selection *add_selection(decoding *d, const json_value *where)
     json_pointer(place, sizeof place, where);
     const char *within = strncmp(place, "/problem/", 9) == 0 ? place + 8 : place; /* of the problem, as the library's */
     snprintf(to->place, sizeof to->place, "%.*s", (int)sizeof to->place - 1, within);
-    if (!read_where(to, d, where, uz_scene_dim(scene)))
-        return NULL;
     return to;
+}
+
+static uz_selection *add_selection(decoding *d, const json_value *where)
+{
+    uz_selection *to = new_selection(d, where);
+    return to && read_where(to, d, where, uz_scene_dim(d->scene)) ? to : NULL;
+}
+
+bool decode_everywhere(char name[64], decoding *d, const json_value *value)
+{
+    uz_selection *to = new_selection(d, value);
+    if (!to)
+        return false;
+    snprintf(to->name, sizeof to->name, "every outer side");
+    memcpy(name, to->name, sizeof to->name);
+    to->kind = UZ_SELECT_SIDES; /* and no condition */
+    d->scene->n_selections++;
+    return true;
 }
 
 bool decode_selections(uz_scene *out, decoding *d, const json_value *list)

@@ -391,6 +391,54 @@ static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
     return out->supports != NULL;
 }
 
+/* The largest of the body's lengths along the axes. */
+static double extent_of(const uz_scene *scene)
+{
+    const int dim = uz_scene_dim(scene);
+    double most = 0;
+    for (int c = 0; c < dim; c++) {
+        double low = HUGE_VAL, high = -HUGE_VAL;
+        for (int64_t a = 0; a < scene->given.n_nodes && scene->source == UZ_MESH_GIVEN; a++) {
+            low = fmin(low, scene->given.xyz[a * dim + c]);
+            high = fmax(high, scene->given.xyz[a * dim + c]);
+        }
+        most = fmax(most, scene->source == UZ_MESH_GIVEN ? high - low : scene->box.size[c]);
+    }
+    return most;
+}
+
+/* Springs on all outer sides, along each axis a millionth as stiff as a bar of the body's material and size. */
+static bool decode_stabilize(uz_scene *out, decoding *d, const json_value *value)
+{
+    const bool solid = out->model == UZ_SOLID, ring = out->model == UZ_AXISYMMETRIC;
+    double young = 0;
+    if (!json_truth(value))
+        return true;
+    if (out->kinematics == UZ_KINEMATICS_FINITE)
+        return decode_refuse(d, "not_allowed", value,
+                             "is of small deformation; with kinematics finite the supports hold the body.");
+    uz_support *grown = room_grow(out->supports, (size_t)out->n_supports + 1, sizeof *grown);
+    if (!grown) {
+        problem_no_memory(d->problem);
+        return false;
+    }
+    out->supports = grown;
+    uz_support *to = memset(&grown[out->n_supports], 0, sizeof *grown);
+    for (int64_t i = 0; i < out->n_materials; i++)
+        for (int c = 0; c < 3; c++) {
+            const uz_material *m = &out->materials[i];
+            young = fmax(young, m->is_orthotropic ? m->orthotropic.young[c] : m->young);
+        }
+    out->stabilizer = 1e-6 * young * (solid || ring ? extent_of(out) : out->thickness);
+    to->kind = UZ_SUPPORT_SPRING;
+    for (int c = ring ? 1 : 0; c < (solid ? 3 : 2); c++)
+        to->spring[c] = out->stabilizer;
+    if (!decode_everywhere(to->on, d, value))
+        return false;
+    out->n_supports++;
+    return true;
+}
+
 /* ---- the whole */
 
 /* That of a stress follows from the others: a word that did not agree with them would be wrong beside every number. */
@@ -444,6 +492,7 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
         return false;
     return decode_materials(out, d, json_get(object, "materials")) &&
            decode_supports(out, d, json_get(object, "supports")) &&
+           decode_stabilize(out, d, json_get(object, "stabilize")) &&
            decode_loads(&out->loads, &out->n_loads, d, json_get(object, "loads"), uz_scene_dim(out)) &&
            decode_ties(out, d, json_get(object, "ties")) && decode_contacts(out, d, json_get(object, "contacts"));
 }

@@ -298,6 +298,7 @@ typedef struct {
     int64_t n_materials;
     uz_support *supports;
     int64_t n_supports;
+    double stabilizer; /* stiffness of the last support, springs that hold what nothing else does; 0: there are none */
     uz_load *loads;
     int64_t n_loads;
     uz_contact *contacts;

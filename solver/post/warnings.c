@@ -36,6 +36,9 @@ static const double LOCKS = 0.45;
 /* Error of the mesh, relative in the energy norm, from which on the answer describes another body. */
 static const double COARSE_MESH = 0.1;
 
+/* Part of the contact forces that springs of a stabilizer may bear before the body is not the one without them. */
+static const double MOST_STABILIZED = 1e-3;
+
 #define DEGREES (180 / 3.14159265358979323846)
 
 typedef struct {
@@ -504,6 +507,26 @@ static void look_at_peak(const doubts *d, const double *pressure)
 
 /* ---- mesh */
 
+/* All forces of the stabilizer's springs are at most its stiffness times the largest displacement, as the shares of
+ * nodes add up to 1. The answer is that of a body without them whose loads have these forces, too. */
+static void look_at_stabilizer(const doubts *d)
+{
+    const int dim = d->model->mesh.dim;
+    double largest = 0, pressed = 0;
+    if (!(d->scene->stabilizer > 0))
+        return;
+    for (int64_t a = 0; a < d->model->mesh.n_nodes; a++) {
+        const double *u = d->u + a * dim;
+        largest = fmax(largest, hypot(hypot(u[0], u[1]), dim == 3 ? u[2] : 0));
+    }
+    for (int64_t i = 0; i < d->model->m; i++)
+        pressed += fabs(d->r[i]);
+    const double part = pressed > 0 ? d->scene->stabilizer * largest / pressed : 1;
+    warn(d->out, "stabilized", part,
+         "springs of %.3g were added: the answer is that to loads that differ by at most %.2g of the contact forces%s",
+         d->scene->stabilizer, part, part > MOST_STABILIZED ? "; hold what is pushed where nothing holds it" : "");
+}
+
 static void look_at_mesh(const doubts *d)
 {
     const uz_mesh *mesh = &d->model->mesh;
@@ -570,6 +593,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
         return status;
     look_at_small_only(&d);
     look_at_turns(&d);
+    look_at_stabilizer(&d);
     look_at_mesh(&d);
     look_at_surfaces(&d);
     status = look_at_contact(&d, err);

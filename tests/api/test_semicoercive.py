@@ -2,6 +2,7 @@
 # not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
+import math
 import subprocess
 
 import service
@@ -70,6 +71,43 @@ def test_the_motion_is_named(s):
     check(error["code"] == "free_body" and error["pointer"] == "/problem/p" and "dof 0" in error["detail"], error)
     error = error_of(s, block(problem={**block()["problem"], "contacts": []}))
     check(error["pointer"] == "/problem/supports" and "translation along y" in error["detail"], error)
+
+
+def test_what_nothing_holds_is_stabilized(s):
+    """The answer of the body that a support holds, within what the springs are said to bear at most."""
+    free = {"problem": {**block()["problem"], "supports": []}}
+    check("or stabilize" in error_of(s, free)["detail"], "the error says how")
+    held = ended(s, block())
+    soft = ended(s, {"problem": {**free["problem"], "stabilize": True}})
+    summary = soft["summary"]
+    warning, = [one for one in summary["warnings"] if one["code"] == "stabilized"]
+    check(0 < warning["value"] < 1e-5 and "hold what" not in warning["message"], warning)
+    a, b = (expect(s.get(f"/v1/jobs/{job['id']}/result?fields=reactions"), 200).json["reactions"] for job in (held, soft))
+    apart = sum(abs(x - y) for x, y in zip(a, b)) / sum(map(abs, a))
+    check(0 < apart < 3 * warning["value"], apart, warning)
+    springs = summary["resultants"]["supports"][-1]
+    check(springs["on"] == "every outer side" and abs(springs["force"][1]) < warning["value"] * summary["contact"]["force"][1], springs)
+    # what is pushed where nothing holds it is told
+    pushed = {**free["problem"], "stabilize": True, "loads": [*free["problem"]["loads"], {"on": "left", "pressure": 0.01}]}
+    told, = [one for one in ended(s, {"problem": pushed})["summary"]["warnings"] if one["code"] == "stabilized"]
+    check(told["value"] > 0.01 and "hold what is pushed" in told["message"], told)
+    expect(s.post({"problem": {**pushed, "kinematics": "finite"}}, query="?validate=true"), 422, "not_allowed")
+
+
+def test_stabilized_bodies_of_each_kind(s):
+    mesh = {"nodes": [[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], "elements": {"hex8": [[0, 1, 3, 2, 4, 5, 7, 6]]},
+            "groups": {"low": {"faces": [[0, 1, 3, 2]]}, "high": {"faces": [[4, 5, 7, 6]]}}}
+    ring, solid = ({"kind": "scene", "model": model, "stabilize": True, "mesh": {"box": {"size": size, "cells": [4] * len(size)}},
+                    "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [], "loads": [{"on": "top", "pressure": 1}],
+                    "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0] * len(size), "normal": [0, 1, 0][:len(size)]}}}]}
+                   for model, size in (("axisymmetric", [3, 1]), ("solid", [2, 1, 2])))
+    given = {**solid, "mesh": mesh, "loads": [{"on": "high", "pressure": 1}],
+             "contacts": [{"on": "low", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 0, 1]}}}],
+             "materials": [{"on": "all", "orthotropic": {"young": [1000, 500, 800], "poisson": [0.2] * 3, "shear": [300] * 3}}]}
+    for problem, force in ((ring, math.pi * 9), (solid, 4), (given, 1)):
+        summary = ended(s, {"problem": problem})["summary"]
+        value, = [one["value"] for one in summary["warnings"] if one["code"] == "stabilized"]
+        check(summary["outcome"] == "converged" and 0 < value < 1e-5 and abs(max(summary["contact"]["force"]) / force - 1) <= value, value, summary["contact"])
 
 
 def test_it_cannot_be_verified(s):
