@@ -56,7 +56,7 @@ class BodyView {
   constructor(element, api, job, options) {
     Object.assign(this, { element, api, job, options, case_name: options.case || options.cases?.[0] || "", ends: new AbortController() });
     Object.assign(this, { quantity: "", limits: null, factor: 0, marked: -1, held: -1, frame: 0, frames: 0, number: ++mounts });
-    this.shown = { wire: true, before: true, obstacles: true, forces: true };
+    this.shown = { wire: true, before: true, obstacles: true, forces: true, through: true };
   }
 
   async start() {
@@ -139,6 +139,7 @@ class BodyView {
     const parts = [part("wire", "Elements"), part("before", "Undeformed")];
     if (surface.contacts.some((one) => one.obstacle)) parts.push(part("obstacles", "Obstacle"));
     if (surface.rows.count) parts.push(part("forces", "Contact forces"));
+    if (surface.dim === 3 && surface.contacts.some((one) => !one.obstacle)) parts.push(part("through", "See through"));
     if (surface.dim === 3) parts.push(tick("z upwards", this.view.z_up, (on) => (this.view.stand(on), this.home())).label);
     show(this.tools,
       this.options.cases?.length > 1 ? choice("Case", this.options.cases.map((id) => ({ id, name: id })), this.case_name, (name) => this.change_case(name)).label : null,
@@ -406,8 +407,10 @@ class BodyView {
     cancelAnimationFrame(this.frame);
     this.frame = 0;
     if (!this.gl || this.ends.signal.aborted) return;
-    this.gl.render(this.view, this.factor);
-    this.overlay.draw(this.view, this.factor, { colours: this.colours, obstacles: this.shown.obstacles, forces: this.shown.forces,
+    const { surface, shown } = this; // where bodies touch each other in space they are before it
+    const through = surface.dim === 3 && shown.through && this.quantity === "pressure" && surface.contacts.some((one) => !one.obstacle);
+    this.gl.render(this.view, this.factor, through);
+    this.overlay.draw(this.view, this.factor, { colours: this.colours, obstacles: shown.obstacles, forces: shown.forces, through,
       plane: this.cut?.plane, marked: this.marked, line: this.line });
     this.canvas.setAttribute("aria-label", this.summary());
     this.canvas.dataset.frames = ++this.frames;

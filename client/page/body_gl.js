@@ -38,6 +38,7 @@ const BODY = {
     uniform vec3 stops[${VIRIDIS.length}];
     uniform vec3 none;
     uniform float lit;
+    uniform float through; // what has no value is not drawn
     varying float v_shade;
     varying vec3 v_place;
     void main() {
@@ -45,6 +46,7 @@ const BODY = {
       float at = clamp(v_shade, 0.0, 1.0) * ${(VIRIDIS.length - 1).toFixed(1)};
       vec3 colour = stops[0];
       for (int i = 1; i < ${VIRIDIS.length}; i++) colour = mix(colour, stops[i], clamp(at - float(i - 1), 0.0, 1.0));
+      if (v_shade < -0.001 && through > 0.5) discard;
       if (v_shade < -0.001) colour = none;
       vec3 normal = cross(dFdx(v_place), dFdy(v_place));
       float facing = abs(normal.z) / max(length(normal), 1e-30);
@@ -157,10 +159,12 @@ export class BodyGL {
     this.renderer.setSize(width, height, false);
   }
 
-  render(view, factor) {
+  /** through: faces without a value are left out. */
+  render(view, factor, through) {
     const { camera } = this, [right, up, eye] = view.axes.map((axis) => new Vector3(...axis));
     const far = 4 + 2 * factor * (this.surface.largest_displacement / this.surface.unit) + view.width / view.scale;
     this.body.material.uniforms.factor.value = factor;
+    this.body.material.uniforms.through.value = through ? 1 : 0;
     for (const one of [this.wire, ...this.cap]) one.material.uniforms.factor.value = factor;
     camera.left = -view.width / 2 / view.scale;
     camera.right = -camera.left;
@@ -207,7 +211,7 @@ function body_material(lit, cut) {
   return new ShaderMaterial({
     ...BODY, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, extensions: { derivatives: true },
     uniforms: {
-      factor: { value: 0 }, lit: { value: lit ? 1 : 0 }, none: { value: new Color(0x8a8f96) }, cut: { value: cut },
+      factor: { value: 0 }, through: { value: 0 }, lit: { value: lit ? 1 : 0 }, none: { value: new Color(0x8a8f96) }, cut: { value: cut },
       stops: { value: VIRIDIS.map((rgb) => new Vector3(...rgb.map((x) => x / 255))) },
     },
   });

@@ -79,9 +79,9 @@ export class Overlay {
     return view.project(p[i] + factor * u[i], p[i + 1] + factor * u[i + 1], p[i + 2] + factor * u[i + 2]);
   }
 
-  /** plane: beyond which the body is cut off, [normal, offset], or none; line: points of a path, each with its
-   * displacement: six numbers. */
-  draw(view, factor, { colours, obstacles, forces, plane, marked, line }) {
+  /** through: a solid is seen through; plane: beyond which the body is cut off, [normal, offset], or none; line: points of a
+   * path, each with its displacement: six numbers. */
+  draw(view, factor, { colours, obstacles, forces, through, plane, marked, line }) {
     const pen = this.canvas.getContext("2d"), { surface, width, height, ratio } = this;
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
@@ -90,13 +90,15 @@ export class Overlay {
       for (const line of obstacle_lines(surface, view.target, (width + height) / view.scale))
         draw_border(pen, line.map(([x, y]) => view.project(x, y, 0)), width, height);
     }
-    if (forces && this.largest > 0) this.draw_forces(pen, view, factor, plane, colours.push);
+    if (forces && this.largest > 0) this.draw_forces(pen, view, factor, plane, through, colours.push);
     if (line?.length) this.draw_line(pen, line.map(([x, y, z, ux, uy, uz]) => view.project(x + factor * ux, y + factor * uy, z + factor * uz)), colours);
     this.draw_triad(pen, view, colours);
     if (marked >= 0) this.draw_mark(pen, this.place(view, factor, marked), colours);
   }
 
-  draw_forces(pen, view, factor, plane, colour) {
+  /** Those that a solid is before are not drawn, unless it is seen through: where it meets another body that is all of them,
+   * but where a plane has cut it open. */
+  draw_forces(pen, view, factor, plane, through, colour) {
     const { rows, position: p } = this.surface, beyond = (i) => plane && plane[0].reduce((sum, n, c) => sum + n * p[i + c], 0) > plane[1];
     pen.strokeStyle = colour;
     pen.lineWidth = 1.5;
@@ -104,7 +106,8 @@ export class Overlay {
     for (const i of this.arrows) {
       if (beyond(3 * rows.vertex[i])) continue;
       const normal = rows.normal.subarray(3 * i, 3 * i + 3), eye = view.axes[2];
-      if (view.dim === 3 && normal[0] * eye[0] + normal[1] * eye[1] + normal[2] * eye[2] > 0) continue; // the body is before it
+      if (view.dim === 3 && !through && !plane && !this.surface.contacts[rows.contact[i]].obstacle) continue;
+      if (view.dim === 3 && !through && normal[0] * eye[0] + normal[1] * eye[1] + normal[2] * eye[2] > 0) continue; // the body is before it
       const way = view.project_way(...normal).map((x) => x / view.scale), size = Math.hypot(...way);
       if (size > 0.02) draw_arrow(pen, this.place(view, factor, rows.vertex[i]), way.map((x) => x / size), (ARROW * size * this.push[i]) / this.largest);
     }

@@ -223,6 +223,25 @@ def test_dark_and_narrow_and_sharp(s, b):
     check(min(coloured(b)) > 500 and b.near(".body-frame", "--paper", 12) > 5000, coloured(b))
 
 
+PAIR = {"kind": "scene", "model": "solid", "mesh": {
+            "nodes": [[x, y, z] for low, wide in ((0, 4), (1, 2)) for z in (low, low + 1) for y in (0, wide) for x in (0, wide)],
+            "elements": {"hex8": [[0, 1, 3, 2, 4, 5, 7, 6], [8, 9, 11, 10, 12, 13, 15, 14]]},
+            "groups": {"low": {"faces": [[4, 5, 7, 6]]}, "high": {"faces": [[8, 9, 11, 10]]}, "base": {"nodes": [0, 1, 2, 3]}, "head": {"nodes": [12, 13, 14, 15]}}},
+        "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+        "supports": [{"on": "base", "ux": 0, "uy": 0, "uz": 0}, {"on": "head", "ux": 0, "uy": 0, "uz": -0.05}], "contacts": [{"on": "high", "with": "low"}]}
+
+
+def test_between_two_solids(s, b):
+    """What presses is seen through the bodies, or not at all: they are before it."""
+    show(s, b, {"problem": PAIR})
+    through = sum(coloured(b)), b.near(".body-frame", "--push", 60)
+    check(through[0] > 3000 and through[1] > 50, "pressure and arrows", through)
+    switch(b, "See through")
+    check(sum(coloured(b)) < through[0] / 2 and b.near(".body-frame", "--push", 60) == 0, coloured(b), through)
+    switch(b, "See through")
+    check(sum(coloured(b)) == through[0], coloured(b), through)
+
+
 def press_button(b, text):
     after(b, lambda: b.run("[...document.querySelectorAll('.body-buttons button')].find((one) => one.innerText === arguments[0]).click()", text))
 
