@@ -31,8 +31,8 @@ static uz_status refuse_free(const uz_parts *parts, const char *who, uz_error *e
     }
     if (parts->count > 1)
         snprintf(which, sizeof which, " of the part with node %lld", (long long)p->node);
-    return uz_fail(err, UZ_ERR_FREE_BODY, "/supports", "%s leave %s%s free; hold it by further supports, or stabilize", who, names,
-                   which);
+    return uz_fail(err, UZ_ERR_FREE_BODY, "/supports", "%s leave %s%s free; hold it by further supports, or stabilize",
+                   who, names, which);
 }
 
 uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)

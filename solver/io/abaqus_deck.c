@@ -464,7 +464,7 @@ static uz_status hold(abaqus_deck *d, const abaqus_keyword *keyword, const targe
     for (int64_t c = first; c <= last && c <= 6; c++)
         for (int64_t i = 0; i < at->count; i++) {
             double *to = place_at(d, false, target(at, i), c);
-            if (components > 0 && (components >> (c - 1)) % 2 == 0)
+            if (c >= 1 && components > 0 && (components >> (c - 1)) % 2 == 0)
                 continue;
             if (to)
                 *to = factor * value;

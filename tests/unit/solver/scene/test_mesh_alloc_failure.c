@@ -127,7 +127,8 @@ static uz_status read_deck(uz_error *err)
         "*NODE,NSET=N\n1,0,0\n2,1,0\n3,0,1\n4,1,1\n9,3,3\n*ELEMENT,TYPE=CPS3,ELSET=E\n7,1,2,3\n8,2,4,3\n"
         "*MATERIAL,NAME=M\n*ELASTIC\n1.,.3\n*EXPANSION\n1.\n*SOLID SECTION,ELSET=E,MATERIAL=M\n"
         "*SURFACE,NAME=S,TYPE=NODE\n1\n2\n*SURFACE,NAME=T\n8,S2\n*CONTACT PAIR,INTERACTION=I\nS,T\n"
-        "*RIGID BODY,ELSET=E,REF NODE=9\n*AMPLITUDE,NAME=A\n0.,0.,1.,2.\n*FRICTION\n.1\n*STEP\n*STATIC\n*BOUNDARY\n1,1,2\n3,1\n9,1\n"
+        "*RIGID BODY,ELSET=E,REF "
+        "NODE=9\n*AMPLITUDE,NAME=A\n0.,0.,1.,2.\n*FRICTION\n.1\n*STEP\n*STATIC\n*BOUNDARY\n1,1,2\n3,1\n9,1\n"
         "*CLOAD,AMPLITUDE=A\n4,1,1.\n9,6,1.\n*DLOAD\n8,P2,1.\nE,GRAV,1.,0.,1.,0.\n*TEMPERATURE\nN,5.\n*END STEP\n";
     uz_deck deck;
     const uz_status status = uz_deck_read(&deck, text, sizeof text - 1, 0, true, err);
