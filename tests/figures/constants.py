@@ -121,6 +121,7 @@ PHRASES = {
     "from Poisson's ratio 0.4 on, except in plane stress": constant(0.4, r"#define NEARLY_INCOMPRESSIBLE ([\d.]+)"),
     "the default there, is 5 %": constant(5e-2, r"UZ_BALANCED_TOTAL_ERROR ([\de.-]+)"), "the paper's body 5 % takes": None, "cells, and 2 % takes": None,  # asked for
     "start near an obstacle (2 % of the body's extent": constant(0.02, r"UZ_CANDIDATES_REACH ([\d.]+)"),
+    "Where the bound is more than 0.001 something": constant(1e-3, r"MOST_STABILIZED = ([\de.-]+)"),
     "(0.1 rad), `large_strain` (0.05),": lambda program: ROTATION(program) and STRAIN(program),
     "from Poisson's ratio 0.45 on.": WARNS_OF_LOCKING, "the summary warns from 0.45 on": WARNS_OF_LOCKING,
     "lock as Poisson's ratio nears 0.5, visibly from 0.4 on": None, "Poisson's ratio near 0.5": None, "Poisson's ratio is below 0.5": None,
