@@ -245,6 +245,7 @@ TEST(decoding)
     exhaust(try_decode, "tests/data/verify.json");
     exhaust(try_decode, "tests/data/assertions.json");
     exhaust(try_scene, "tests/data/mesh_scene.json");
+    exhaust(try_scene, "tests/data/stabilized_scene.json");
     exhaust(try_scene, "tests/data/gmsh_scene.json");
     exhaust(try_refine, "{\"problem\": 1, \"solver\": {\"method\": \"uzawa\"}}");
     exhaust(try_refine, "{\"problem\": 1}");
