@@ -180,15 +180,14 @@ static void transform(double *N, int nodes, int dim)
         N[corners + j] *= 1 - 2 * UZ_MIDDLE_SHARE;
 }
 
-/* The share of one slave side with its points: with A = sqrt(w) N = Q R the dual functions at the points are
- * Q R^-T diag(int N) / sqrt(w). A side of which too little is covered for that is left out. */
-static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_pair *pair, int64_t i, double *A)
+/* With A = sqrt(w) N = Q R the dual functions at the points are Q R^-T diag(int N) / sqrt(w). */
+bool uz_mortar_shares(double *share, double D[UZ_FACE_NODES], const uz_mortar_pair *pair, int64_t i)
 {
     const uz_mortar_points *points = &pair->points;
-    const uz_mortar_side *side = &pair->surface.side[i];
-    const int n = side->nodes, dim = pair->in->model->mesh.dim;
+    const int n = pair->surface.side[i].nodes, dim = pair->in->model->mesh.dim;
     const int64_t count = points->n;
-    double R[UZ_FACE_NODES][UZ_FACE_NODES], D[UZ_FACE_NODES] = {0}, M[UZ_FACE_NODES][UZ_FACE_NODES] = {{0}};
+    double R[UZ_FACE_NODES][UZ_FACE_NODES], *A = share;
+    memset(D, 0, UZ_FACE_NODES * sizeof *D);
     for (int64_t g = 0; g < count; g++) {
         double N[UZ_FACE_NODES];
         memcpy(N, points->point[g].N, sizeof N);
@@ -199,6 +198,30 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_pai
         }
     }
     if (count < n || !orthonormalize(A, R, count, n))
+        return false;
+    for (int64_t g = 0; g < count; g++) {
+        double psi[UZ_FACE_NODES] = {0}; /* R psi' = Q', from the last row up */
+        for (int j = n - 1; j >= 0; j--) {
+            psi[j] = A[j * count + g];
+            for (int k = j + 1; k < n; k++)
+                psi[j] -= R[k][j] * psi[k];
+            psi[j] /= R[j][j];
+        }
+        for (int a = 0; a < n; a++)
+            share[a * count + g] = psi[a] * D[a] * sqrt(points->point[g].weight);
+    }
+    return true;
+}
+
+/* The share of one slave side with its points. A side of which too little is covered for that is left out. */
+static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_pair *pair, int64_t i, double *A)
+{
+    const uz_mortar_points *points = &pair->points;
+    const uz_mortar_side *side = &pair->surface.side[i];
+    const int n = side->nodes, dim = pair->in->model->mesh.dim;
+    const int64_t count = points->n;
+    double D[UZ_FACE_NODES], M[UZ_FACE_NODES][UZ_FACE_NODES] = {{0}};
+    if (!uz_mortar_shares(A, D, pair, i))
         return true;
     double least = INFINITY, shortest = INFINITY;
     const int corners = dim == 2 ? 2 : n % 3 == 0 ? 3 : 4;
@@ -213,15 +236,8 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_pai
     for (int64_t g = 0; g < count; g++) {
         const uz_mortar_point *p = &points->point[g];
         const uz_mortar_side *other = &pair->surface.side[p->master];
-        double psi[UZ_FACE_NODES] = {0}; /* R psi' = Q', from the last row up */
-        for (int j = n - 1; j >= 0; j--) {
-            psi[j] = A[j * count + g];
-            for (int k = j + 1; k < n; k++)
-                psi[j] -= R[k][j] * psi[k];
-            psi[j] /= R[j][j];
-        }
         for (int a = 0; a < n; a++) {
-            const double share = psi[a] * D[a] * sqrt(p->weight);
+            const double share = A[a * count + g];
             to->gap[side->place[a]] += share * p->gap;
             for (int b = 0; b < other->nodes; b++)
                 M[a][b] += share * p->M[b];
@@ -249,6 +265,18 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_pai
     return true;
 }
 
+bool uz_mortar_find_slave_points(uz_mortar_pair *pair, const uz_contact_sites *sites, int64_t i)
+{
+    uz_mortar_points *points = &pair->points;
+    const bool found = uz_mortar_find_points(pair, i);
+    int64_t kept = 0;
+    for (int64_t g = 0; g < points->n && found; g++)
+        if (uz_mortar_is_slave(sites, i, points->point[g].master))
+            points->point[kept++] = points->point[g];
+    points->n = kept;
+    return found;
+}
+
 /* Integrals over all sides that are slaves, as far as they are. False: no memory. */
 static bool integrate(integrals *of, uz_contact_sites *sites, uz_mortar_pair *pair)
 {
@@ -272,13 +300,8 @@ static bool integrate(integrals *of, uz_contact_sites *sites, uz_mortar_pair *pa
         }
         if (sites->n_zones == 2 && sites->n_ranks == 1 && sites->zone[i] == sites->rank[1])
             continue; /* the master of all that it faces */
-        bool good = uz_mortar_find_points(pair, i);
-        uz_mortar_points *points = &pair->points;
-        int64_t kept = 0;
-        for (int64_t g = 0; g < points->n && good; g++)
-            if (uz_mortar_is_slave(sites, i, points->point[g].master))
-                points->point[kept++] = points->point[g];
-        points->n = good ? kept : 0;
+        bool good = uz_mortar_find_slave_points(pair, sites, i);
+        const uz_mortar_points *points = &pair->points;
         if (points->n * UZ_FACE_NODES > room) {
             double *grown = uz_realloc(A, UZ_FACE_NODES * points->room, sizeof *grown);
             good = grown != NULL;

@@ -41,6 +41,7 @@ typedef struct {
     int64_t master; /* side */
     double weight, gap;
     double N[UZ_FACE_NODES], M[UZ_FACE_NODES];
+    double local[2]; /* of a face: where it is on the master side */
 } uz_mortar_point;
 
 typedef struct {
@@ -77,6 +78,11 @@ void uz_mortar_pair_clear(uz_mortar_pair *pair);
 
 /* pair->points: those of side i against whatever it faces. False: no memory. */
 bool uz_mortar_find_points(uz_mortar_pair *pair, int64_t i);
+/* Those of them alone that side i is the slave of. */
+bool uz_mortar_find_slave_points(uz_mortar_pair *pair, const uz_contact_sites *sites, int64_t i);
+/* share (nodes of the side x points->n): what each of pair->points has in the integrals of the dual functions of slave
+ * side i; D: integrals of its shape functions. False: too little of it is covered. */
+bool uz_mortar_shares(double *share, double D[UZ_FACE_NODES], const uz_mortar_pair *pair, int64_t i);
 /* What leads from x on side i to y behind it, on side j. */
 uz_way uz_mortar_way(uz_mortar_pair *pair, int64_t i, int64_t j, const double *x, const double *y);
 

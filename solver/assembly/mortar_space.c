@@ -524,6 +524,7 @@ static bool add_piece(uz_mortar_pair *pair, const polygon *piece, int64_t i_side
                 for (int c = 0; c < 3; c++)
                     normal[c] += p.N[a] * surface->normal[3 * side->place[a] + c];
             uz_unit3(normal);
+            memcpy(p.local, feet[1].local, sizeof p.local);
             p.weight *= sqrt(uz_dot3(area, area)) / uz_dot3(area, on->n);
             p.gap = (height[1] - height[0]) * uz_dot3(normal, on->n);
             for (int k = 0; k < 2; k++) { /* from either face, as it was before anything moved, to its shape */
