@@ -1,4 +1,5 @@
-/* row_turn.c: the derivative of the forces of rows between bodies, by central differences.
+/* row_turn.c: the derivative of the forces of rows between bodies, in the plane by central differences; in space
+ * row_turn_space.c.
  *
  * A row of two surfaces turns with its slave side, and its shares of masters go over from one to the next as the bodies
  * slide. All of that is found by moving nodes a little and finding the rows again, as far as they are near: the row of
@@ -9,6 +10,7 @@
 #include "assembly/row_turn.h"
 
 #include "assembly/parts.h"
+#include "assembly/row_turn_space.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
@@ -297,6 +299,8 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
     moved_rows side[2] = {{.at = NULL}, {.at = NULL}};
     uz_status status = UZ_OK;
     *out = (uz_row_turn){.known = true};
+    if (dim == 3)
+        return uz_row_turn_in_space(out, base, rows, scene, r, least, err);
     bool room = list_pressed(&w);
     if (room && w.n_pressed > 0) {
         w.mark = uz_alloc_zero(base->mesh.n_nodes, sizeof *w.mark);

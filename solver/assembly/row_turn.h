@@ -22,9 +22,9 @@ bool uz_has_pairs(const uz_scene *scene);
  * that are asked for one after the other: *next is 0 at first, and where the search goes on. */
 int64_t uz_next_row(int64_t *next, const uz_body_model *rows, int64_t contact, int64_t place);
 /* Of the rows between bodies whose reaction (r: rows->m) is less than -least. rows: the body that `base` is, moved to a
- * place (uz_body_model_move); scene: with the contacts. In the plane only. stop (NULL: never) is asked at each
- * place; where it is due nothing is known. The caller clears *out in every case.
- * UZ_ERR_MEMORY */
+ * place (uz_body_model_move); scene: with the contacts. stop (NULL: never) is asked at each
+ * place in the plane; where it is due nothing is known. In space how parts of a face change is left out of both. The
+ * caller clears *out in every case. UZ_ERR_MEMORY */
 uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz_body_model *rows,
                            const uz_scene *scene, const double *r, double least, const uz_stop *stop, uz_error *err);
 void uz_row_turn_clear(uz_row_turn *turn);

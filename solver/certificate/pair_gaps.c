@@ -1,4 +1,4 @@
-/* pair_gaps.c: points of either surface against the other one as a line of chords.
+/* pair_gaps.c: points of either surface against the other one as a line of chords; in space pair_gaps_space.c.
  *
  * A side of two nodes is a chord, one of three, a parabola, a line of CHORDS, which are off it by less than a
  * hundredth of its sagitta. The gap of a point is its distance from the nearest chord, negative behind it; where the
@@ -118,6 +118,8 @@ uz_status uz_pair_gaps(double *least, double *part, const uz_body_model *model, 
     curve *curves[2] = {NULL, NULL};
     if (!group[0] || !group[1])
         return UZ_ERR_SCENE;
+    if (model->mesh.dim == 3)
+        return uz_pair_gaps_space(least, part, model, group, u, steps, err);
     for (int j = 0; j < 2; j++)
         curves[j] = make_curves(model, group[j], u);
     for (int j = 0; j < 2 && curves[0] && curves[1]; j++)

@@ -200,6 +200,7 @@ static void end(uz_finite_run *run)
     uz_body_model_clear(&run->base);
     uz_csc_clear(&run->wide);
     uz_csc_clear(&run->skew);
+    uz_row_turn_clear(&run->turn);
     uz_cache_free(run->cache);
     uz_result_free(run->last);
     free(run->scene.supports);

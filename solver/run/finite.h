@@ -101,9 +101,10 @@ typedef struct {
      * supports and loads are; 0 until a part of the load is asked for */
     double *overlap;
     uz_body_model base, tangent;
-    bool pairs;      /* there is contact between bodies */
-    uz_csc wide;     /* the tangent's K with entries of their rows */
-    const uz_csc *K; /* of the last contact problem: that, or the tangent's own */
+    bool pairs;       /* there is contact between bodies */
+    uz_csc wide;      /* the tangent's K with entries of their rows */
+    const uz_csc *K;  /* of the last contact problem: that, or the tangent's own */
+    uz_row_turn turn; /* of these rows at run->at */
     int64_t n, d;
     double *loads;      /* n: forces under t, but those that follow the body */
     bool follows;       /* there are such, */
@@ -137,11 +138,11 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
 /* The contact problem of run->K, p and at.h: run->last. */
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);
 
-/* Of rows between bodies. run->K becomes the tangent with how they turn, and, where `hold`, room for stiffness along
+/* Of rows between bodies. run->K becomes the tangent with run->turn, and, where `hold`, room for stiffness along
  * those that were pressed. */
-uz_status uz_finite_widen(uz_finite_run *run, const uz_row_turn *turn, bool hold, uz_error *err);
+uz_status uz_finite_widen(uz_finite_run *run, bool hold, uz_error *err);
 /* From the contact problem just solved to that on the whole tangent, which is not symmetric. */
-uz_status uz_finite_correct(uz_finite_run *run, const uz_row_turn *turn, uz_error *err);
+uz_status uz_finite_correct(uz_finite_run *run, uz_error *err);
 /* Reactions of the rows `from` stay with their places among those of run->at, where places come and go as bodies slide.
  */
 uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *from, uz_error *err);

@@ -303,17 +303,15 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
 {
     uz_csc *K = &run->tangent.K;
     const uz_stop stop = {&run->hooks, run->deadline};
-    uz_row_turn turn = {.known = true};
     uz_error own = {0};
     uz_status status = UZ_ERR_NOT_SPD;
+    uz_status found = UZ_OK;
+    uz_row_turn_clear(&run->turn);
+    if (run->pairs && run->n_r == run->at.rows.m)
+        found = uz_row_turn_find(&run->turn, &run->base, &run->at.rows, &run->scene, run->r, 0, &stop, err);
     run->K = K;
-    if (run->pairs && run->n_r == run->at.rows.m) {
-        const uz_status found = uz_row_turn_find(&turn, &run->base, &run->at.rows, &run->scene, run->r, 0, &stop, err);
-        if (found != UZ_OK) {
-            uz_row_turn_clear(&turn);
-            return found;
-        }
-    }
+    if (found != UZ_OK)
+        return found;
     const double stiffest = run->stiffest;
     double hold = run->hold, shift = run->shift / LESS_SHIFT < FIRST_SHIFT ? 0 : run->shift / LESS_SHIFT;
     bool pressed = false, more = true;
@@ -334,7 +332,7 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         for (int64_t q = 0; q < K->ptr[K->cols] && shift > 0; q++)
             K->val[q] += shift * run->base.K.val[q];
         if (status == UZ_OK && run->pairs)
-            status = uz_finite_widen(run, &turn, hold > 0, &own);
+            status = uz_finite_widen(run, hold > 0, &own);
         if (status == UZ_OK)
             status = hold_rows(run, hold * stiffest, &own);
         run->spent.assemble += uz_seconds() - start;
@@ -344,15 +342,14 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         load_rows(run, hold * stiffest);
         status = uz_finite_solve_qp(run, &own);
         run->step_qps += status == UZ_OK;
-        if (status == UZ_OK && (turn.force.n > 0 || run->skew.ptr))
-            status = uz_finite_correct(run, &turn, &own);
+        if (status == UZ_OK && (run->turn.force.n > 0 || run->skew.ptr))
+            status = uz_finite_correct(run, &own);
         run->hold = hold;
         run->shift = shift;
         more = step || add_more(&hold, &shift, pressed);
         more = more && !(run->from && shift > 0); /* a path goes from one stable equilibrium to the next one */
         step = NULL;
     }
-    uz_row_turn_clear(&turn);
     if (status == UZ_OK) {
         run->found.held += run->hold > 0 && run->shift == 0;
         run->found.shifted += run->shift > 0;

@@ -32,12 +32,13 @@ enum { MOST_CORRECTIONS = 12, MIXED = 4 };
 /* What rounding may change, in parts of the displacement. */
 #define ROUNDING 1e-12
 
-uz_status uz_finite_widen(uz_finite_run *run, const uz_row_turn *turn, bool hold, uz_error *err)
+uz_status uz_finite_widen(uz_finite_run *run, bool hold, uz_error *err)
 {
     const bool known = run->n_r == run->at.rows.m;
     uz_csc_clear(&run->wide);
     run->K = &run->wide;
-    return uz_widen_by_rows(&run->wide, &run->tangent.K, &run->at.rows.N, hold && known ? run->r : NULL, 0, turn, err);
+    return uz_widen_by_rows(&run->wide, &run->tangent.K, &run->at.rows.N, hold && known ? run->r : NULL, 0, &run->turn,
+                            err);
 }
 
 uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *from, uz_error *err)
@@ -135,7 +136,7 @@ static void add_followers(uz_finite_run *run, const double *v, double *nodal)
 }
 
 /* room: 4 d + m + 2 n. p and h are those of the symmetric part. */
-static uz_status iterate(uz_finite_run *run, const uz_row_turn *turn, double *room, history *past, uz_error *err)
+static uz_status iterate(uz_finite_run *run, double *room, history *past, uz_error *err)
 {
     const int64_t d = run->d, m = run->at.rows.m;
     double *p = room, *from = p + d, *v = from + d, *came = v + d, *h = came + d, *nodal = h + m;
@@ -155,9 +156,9 @@ static uz_status iterate(uz_finite_run *run, const uz_row_turn *turn, double *ro
             run->p[j] = p[j];
         for (int64_t i = 0; i < m; i++)
             run->at.h[i] = h[i];
-        uz_add_entries(run->p, &turn->force, v, true);
+        uz_add_entries(run->p, &run->turn.force, v, true);
         add_followers(run, v, nodal);
-        uz_add_entries(run->at.h, &turn->gap, v, false);
+        uz_add_entries(run->at.h, &run->turn.gap, v, false);
         status = uz_finite_solve_qp(run, err);
         if (status != UZ_OK ||
             (run->last->summary.outcome != UZ_CONVERGED && run->last->summary.outcome != UZ_PRECISION_LIMIT))
@@ -175,7 +176,7 @@ static uz_status iterate(uz_finite_run *run, const uz_row_turn *turn, double *ro
     return status;
 }
 
-uz_status uz_finite_correct(uz_finite_run *run, const uz_row_turn *turn, uz_error *err)
+uz_status uz_finite_correct(uz_finite_run *run, uz_error *err)
 {
     const int64_t d = run->d;
     history past = {.d = d};
@@ -188,7 +189,7 @@ uz_status uz_finite_correct(uz_finite_run *run, const uz_row_turn *turn, uz_erro
         past.change[i] = past.came[i] + d;
     }
     if (status == UZ_OK)
-        status = iterate(run, turn, room, &past, err);
+        status = iterate(run, room, &past, err);
     free(room);
     free(kept);
     return status;

@@ -62,10 +62,6 @@ static uz_status check_pair(const uz_scene *scene, int64_t i, uz_error *err)
 {
     const uz_contact *contact = &scene->contacts[i];
     char where[UZ_CHECK_POINTER];
-    if (scene->model == UZ_SOLID)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
-                       "finite kinematics of solids have contact with rigid obstacles only; give an obstacle, or use "
-                       "the kinematics \"moving\"");
     if (contact->between != UZ_CONTACT_SURFACES)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "discretization"),
                        "finite kinematics have contact between bodies by surfaces; leave discretization out");

@@ -6,6 +6,7 @@ import math
 
 import service
 from service import check, expect
+from two_bodies import brick
 
 SHARED = True  # one service for all tests
 
@@ -271,6 +272,31 @@ def test_a_block_slides_over_another(s):
     check(force[0][1] < -0.05 and abs(force[0][1] - force[1][1]) < 1e-8 and abs(force[0][0] + force[1][0]) < 1e-8, force)
     for of in ("result.vtu", "deformed.svg", "surface", "history", "result?fields=stress_gauss,von_mises,principal"):
         expect(s.get(f"/v1/jobs/{there[0]}/{of}"), 200)
+
+
+def bricks(aside, down, **problem):
+    """A brick on a longer one, pressed into it and moved along it."""
+    lower, upper = brick("hex8", (6, 2, 2), 0, lambda x, y, z: (3 * x, y, 1.2 * z)), brick("hex8", (3, 2, 2), 63, lambda x, y, z: (0.4 + x, 1 + 0.7 * y, 0.1 + z))
+    groups = {f"{name}{side}": {"faces": faces} for name, part in (("a", lower), ("b", upper)) for side, faces in part[2].items()}
+    return block(model="solid", mesh={"nodes": lower[0] + upper[0], "elements": {"hex8": lower[1] + upper[1]}, "groups": groups},
+                 supports=[{"on": "ay0", "ux": 0, "uy": 0, "uz": 0}, {"on": "by1", "ux": aside, "uy": -down, "uz": 0}],
+                 contacts=[{"on": "by0", "with": "ay1"}], **problem)
+
+
+def test_a_brick_slides_over_another(s):
+    """To the mirror image of where it began; auto takes the model that it needs."""
+    here, there = (answer(s, bricks(aside, 0.15)) for aside in (0, 1.2))
+    for _, found in (here, there):
+        summary = found["summary"]
+        check(summary["outcome"] == "converged" and summary["finite"]["steps"] == 1 and summary["finite"]["definite"], summary)
+        check(summary["resultants"]["imbalance"] < 1e-8 and -0.015 < summary["finite"]["least_gap"] < 0, summary["finite"])
+    force = [found["summary"]["resultants"]["supports"][1]["force"] for _, found in (here, there)]
+    check(force[0][1] < -0.1 and abs(force[0][1] - force[1][1]) < 1e-8 and abs(force[0][0] + force[1][0]) < 1e-8 and abs(force[0][2]) < 1e-8, force)
+    for of in ("result.vtu", "deformed.svg", "surface", "result?fields=stress_gauss,von_mises,principal"):
+        expect(s.get(f"/v1/jobs/{there[0]}/{of}"), 200)
+    for down, used in ((0.001, "small"), (0.15, "finite")):
+        summary = answer(s, bricks(0, down, kinematics="auto"), "summary")[1]["summary"]
+        check(summary["outcome"] == "converged" and ("finite" in summary) == (used == "finite"), (down, summary))
 
 
 def test_what_a_comparison_takes_is_predicted(s):

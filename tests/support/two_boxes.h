@@ -1,4 +1,4 @@
-/* two_boxes.h: scenes of two bodies in the plane, each a box, which may be bent. Groups are those of the boxes, with an
+/* two_boxes.h: scenes of two bodies, each a box, which may be bent. Groups are those of the boxes, with an
  * a of the first and a b of the second before their names. */
 #ifndef TESTS_TWO_BOXES_H
 #define TESTS_TWO_BOXES_H
@@ -6,8 +6,8 @@
 #include "body_fixture.h"
 
 typedef struct {
-    double origin[2], size[2];
-    int64_t cells[2];
+    double origin[3], size[3];
+    int64_t cells[3]; /* the last of each: of solids */
     const char *element;
 } box_part;
 
@@ -22,14 +22,14 @@ static inline int64_t *copy_numbers(const int64_t *from, int64_t n, int64_t add)
 /* The second of two meshes in numbers joins the first, its groups behind those. */
 static inline void join(uz_given_mesh *to, const uz_given_mesh *more)
 {
-    const int64_t nodes = to->n_nodes, elements = to->n_elements, entries = to->first[elements];
-    uz_given_mesh out = {.dim = 2, .n_nodes = nodes + more->n_nodes, .n_elements = elements + more->n_elements};
-    out.xyz = body_room(2 * out.n_nodes, sizeof *out.xyz);
+    const int64_t nodes = to->n_nodes, elements = to->n_elements, entries = to->first[elements], dim = to->dim;
+    uz_given_mesh out = {.dim = to->dim, .n_nodes = nodes + more->n_nodes, .n_elements = elements + more->n_elements};
+    out.xyz = body_room(dim * out.n_nodes, sizeof *out.xyz);
     out.kind = body_room(out.n_elements, 1);
     out.first = body_room(out.n_elements + 1, sizeof *out.first);
     out.node = body_room(entries + more->first[more->n_elements], sizeof *out.node);
-    memcpy(out.xyz, to->xyz, (size_t)(2 * nodes) * sizeof *out.xyz);
-    memcpy(out.xyz + 2 * nodes, more->xyz, (size_t)(2 * more->n_nodes) * sizeof *out.xyz);
+    memcpy(out.xyz, to->xyz, (size_t)(dim * nodes) * sizeof *out.xyz);
+    memcpy(out.xyz + dim * nodes, more->xyz, (size_t)(dim * more->n_nodes) * sizeof *out.xyz);
     memcpy(out.kind, to->kind, (size_t)elements);
     memcpy(out.kind + elements, more->kind, (size_t)more->n_elements);
     memcpy(out.node, to->node, (size_t)entries * sizeof *out.node);
@@ -66,10 +66,8 @@ static inline uz_scene two(uz_model model, uz_elasticity law, const box_part *a,
     uz_scene s[2];
     for (int k = 0; k < 2; k++) {
         const box_part *p = k ? b : a;
-        s[k] = body_scene(model, p->element, (double[3]){p->size[0], p->size[1], 0},
-                          (int64_t[3]){p->cells[0], p->cells[1], 0});
-        s[k].box.origin[0] = p->origin[0];
-        s[k].box.origin[1] = p->origin[1];
+        s[k] = body_scene(model, p->element, p->size, p->cells);
+        memcpy(s[k].box.origin, p->origin, sizeof s[k].box.origin);
         body_give_mesh(&s[k], map);
     }
     const uz_given_mesh first = s[0].given;

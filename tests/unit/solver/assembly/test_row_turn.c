@@ -16,7 +16,8 @@ static uz_scene bent(const char *element, uz_model model, bool turned)
     return s;
 }
 
-/* f = N' r and the gaps (m) of the body at a place; reactions by place. */
+/* f = N' r and the gaps (m) of the body at a place; reactions by place. Gaps of middles of edges in space are those of
+ * their rows (contact_rows.c). */
 static void look(double *f, double *g, const uz_body_model *base, uz_scene *s, double *u, const double *r)
 {
     uz_body_model at;
@@ -26,9 +27,57 @@ static void look(double *f, double *g, const uz_body_model *base, uz_scene *s, d
     s->place = NULL;
     memset(f, 0, (size_t)base->d * sizeof *f);
     uz_csc_gaxpy_t(f, &at.N, 1, r);
-    for (int64_t i = 0; i < at.m; i++)
-        g[i] = at.sites[0].gap[at.row_place[i]];
+    const double *gap = at.sites[0].gap;
+    for (int64_t i = 0; i < at.m; i++) {
+        const int64_t *ends = at.sites[0].ends + 2 * at.row_place[i];
+        g[i] = gap[at.row_place[i]];
+        if (ends[0] >= 0)
+            g[i] = (g[i] - UZ_MIDDLE_SHARE * (gap[ends[0]] + gap[ends[1]])) / (1 - 2 * UZ_MIDDLE_SHARE);
+    }
     uz_body_model_clear(&at);
+}
+
+/* At u (nodes), along `way` (nodes), by what is found and by differences of the whole. */
+static void compare(uz_scene *s, const uz_body_model *base, double *u, const double *way, qp_random *rng,
+                    const char *element, double within)
+{
+    const int64_t n = base->mesh.dim * base->mesh.n_nodes, d = base->d;
+    uz_body_model at;
+    double *f[2], *g[2], *v = body_room(d, sizeof *v), *turned = body_room(d, sizeof *turned),
+                         *moved = body_room(base->m + d, sizeof *moved), *r;
+    const double h = 1e-6;
+    uz_row_turn turn;
+    uz_error err = {0};
+    s->place = u;
+    CHECK_MSG(uz_body_model_move(&at, base, s, &err) == UZ_OK, "%s", err.message);
+    s->place = NULL;
+    r = body_room(at.m, sizeof *r);
+    for (int64_t i = 0; i < at.m; i++)
+        r[i] = -random_unit(rng);
+    CHECK_INT(uz_row_turn_find(&turn, base, &at, s, r, 0, NULL, &err), UZ_OK);
+    CHECK(turn.known && turn.force.n > 0 && turn.gap.n > 0 && at.m > 2);
+    uz_restrict_nodal(v, base, way);
+    for (int side = 0; side < 2; side++) {
+        f[side] = body_room(d, sizeof **f);
+        g[side] = body_room(at.m + d, sizeof **g);
+        for (int64_t i = 0; i < n; i++)
+            u[i] += (side ? 2 : -1) * h * way[i];
+        look(f[side], g[side], base, s, u, r);
+    }
+    uz_add_entries(turned, &turn.force, v, false);
+    uz_add_entries(moved, &turn.gap, v, false);
+    uz_csc_gaxpy(moved, &at.N, -1, v);
+    for (int64_t j = 0; j < d; j++)
+        CHECK_MSG(fabs((f[1][j] - f[0][j]) / (2 * h) - turned[j]) < within, "%s: %.9g, not %.9g", element, turned[j],
+                  (f[1][j] - f[0][j]) / (2 * h));
+    for (int64_t i = 0; i < at.m; i++)
+        CHECK_MSG(fabs((g[1][i] - g[0][i]) / (2 * h) - moved[i]) < within, "%s: gap %.9g, not %.9g", element, moved[i],
+                  (g[1][i] - g[0][i]) / (2 * h));
+    uz_row_turn_clear(&turn);
+    uz_body_model_clear(&at);
+    double *const room[] = {v, f[0], f[1], g[0], g[1], turned, moved, r};
+    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
+        free(room[i]);
 }
 
 TEST(forces_and_gaps_change_as_differences_say)
@@ -37,49 +86,56 @@ TEST(forces_and_gaps_change_as_differences_say)
     for (int k = 0; k < 8; k++) {
         qp_random rng = {(uint64_t)k + 1};
         uz_scene s = bent(ELEMENTS[k % 4], k < 6 ? UZ_PLANE_STRAIN : UZ_AXISYMMETRIC, k % 2);
-        uz_body_model base = body_model(&s), at;
-        const int64_t n = 2 * base.mesh.n_nodes, d = base.d;
-        double *u = body_room(n, sizeof *u), *way = body_room(n, sizeof *way), *v = body_room(d, sizeof *v);
-        double *f[2], *g[2], *turned = body_room(d, sizeof *turned), *moved = body_room(base.m + d, sizeof *moved), *r;
-        const double h = 1e-6;
-        uz_row_turn turn;
-        uz_error err = {0};
-        for (int64_t i = 0; i < n; i++)
+        uz_body_model base = body_model(&s);
+        const int64_t n = 2 * base.mesh.n_nodes;
+        double *u = body_room(n, sizeof *u), *way = body_room(n, sizeof *way);
+        for (int64_t i = 0; i < n; i++) {
             u[i] = 0.02 * random_signed(&rng);
-        s.place = u;
-        CHECK_MSG(uz_body_model_move(&at, &base, &s, &err) == UZ_OK, "%s", err.message);
-        s.place = NULL;
-        r = body_room(at.m, sizeof *r);
-        for (int64_t i = 0; i < at.m; i++)
-            r[i] = -random_unit(&rng);
-        CHECK_INT(uz_row_turn_find(&turn, &base, &at, &s, r, 0, NULL, &err), UZ_OK);
-        CHECK(turn.known && turn.force.n > 0 && turn.gap.n > 0 && at.m > 2);
-        for (int64_t j = 0; j < d; j++)
-            v[j] = random_signed(&rng);
-        uz_recover_nodal(way, &base, v, NULL);
-        for (int side = 0; side < 2; side++) {
-            f[side] = body_room(d, sizeof **f);
-            g[side] = body_room(at.m + d, sizeof **g);
-            for (int64_t i = 0; i < n; i++)
-                u[i] += (side ? 2 : -1) * h * way[i];
-            look(f[side], g[side], &base, &s, u, r);
+            way[i] = base.dof[i] < 0 ? 0 : random_signed(&rng);
         }
-        uz_add_entries(turned, &turn.force, v, false);
-        uz_add_entries(moved, &turn.gap, v, false);
-        uz_csc_gaxpy(moved, &at.N, -1, v);
-        for (int64_t j = 0; j < d; j++)
-            CHECK_MSG(fabs((f[1][j] - f[0][j]) / (2 * h) - turned[j]) < 1e-6, "%s: %.9g, not %.9g", ELEMENTS[k % 4],
-                      turned[j], (f[1][j] - f[0][j]) / (2 * h));
-        for (int64_t i = 0; i < at.m; i++)
-            CHECK_MSG(fabs((g[1][i] - g[0][i]) / (2 * h) - moved[i]) < 1e-6, "%s: gap %.9g, not %.9g", ELEMENTS[k % 4],
-                      moved[i], (g[1][i] - g[0][i]) / (2 * h));
-        uz_row_turn_clear(&turn);
-        uz_body_model_clear(&at);
+        compare(&s, &base, u, way, &rng, ELEMENTS[k % 4], 1e-6);
         uz_body_model_clear(&base);
         uz_scene_clear(&s);
-        double *const room[] = {u, way, v, f[0], f[1], g[0], g[1], turned, moved, r};
-        for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-            free(room[i]);
+        free(u);
+        free(way);
+    }
+}
+
+/* A block on a flat top, whose nodes lie anywhere, or of faces with middles where straight edges have them, as
+ * integrals cut along these: exact for any motion of what is below, and rigid ones of the block, whose faces keep their
+ * parts. */
+TEST(solids_turn_and_slide_as_differences_say)
+{
+    static const char *const ELEMENTS[] = {"hex8", "tet4", "hex20", "tet10"};
+    for (int k = 0; k < 8; k++) {
+        qp_random rng = {(uint64_t)k + 1};
+        const box_part a = {{0, 0, 0}, {2, 1, 1}, {3, 1, 2}, ELEMENTS[k / 2]},
+                       b = {{0.7, 1, 0.15}, {0.8, 0.5, 0.6}, {2, 1, 2}, ELEMENTS[(k / 2) ^ (k % 2)]};
+        uz_scene s = two(UZ_SOLID, UZ_ELASTIC_NEO_HOOKE, &a, &b, NULL);
+        body_hold(&s, "abottom", 0, 0, 0);
+        body_hold(&s, "btop", 0, 0, 0);
+        touch(&s, "bbottom", "atop");
+        uz_body_model base = body_model(&s);
+        const int64_t n = 3 * base.mesh.n_nodes;
+        double *u = body_room(n, sizeof *u), *way = body_room(n, sizeof *way), turn[3], aside[3];
+        bool second = false;
+        for (int c = 0; c < 3; c++) {
+            turn[c] = random_signed(&rng);
+            aside[c] = random_signed(&rng);
+        }
+        for (int64_t i = 0; i < n; i++) {
+            const double *x = base.mesh.xyz + i - i % 3;
+            const int c = (int)(i % 3), e = (c + 1) % 3, f = (c + 2) % 3;
+            second = second || (fabs(x[0] - 0.7) + fabs(x[1] - 1) + fabs(x[2] - 0.15) < 1e-9);
+            const double off = k < 4 ? 0.02 * random_signed(&rng) : 0.03 * (turn[0] * x[0] + turn[1] * x[2]);
+            u[i] = !second && (c != 1 || x[1] < 1) ? off : 0;
+            way[i] = second ? aside[c] + turn[e] * x[f] - turn[f] * x[e] : random_signed(&rng);
+        }
+        compare(&s, &base, u, way, &rng, ELEMENTS[k / 2], k < 4 ? 1e-6 : 1e-3); /* cut where edges were straight */
+        uz_body_model_clear(&base);
+        uz_scene_clear(&s);
+        free(u);
+        free(way);
     }
 }
 
