@@ -221,6 +221,14 @@ void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)
              small->load);
 }
 
+void uz_doubt_uncompared(uz_evaluation *out)
+{
+    warn(out, "large_deformation", out->nonlinear,
+         "small deformation leaves out some %.2g %% of the forces, and there was no memory to compare it with large "
+         "deformation: use a coarser mesh to find out",
+         100 * out->nonlinear);
+}
+
 /* ---- contact */
 
 /* The deepest that a node begins in the other body, in lengths of the face that it meets. */

@@ -87,7 +87,11 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
     coarse.relative_error = COMPARED_TO;
     const uz_status status = uz_solve_finite_load(&large, &by_law, &coarse, hooks, deadline, result, NULL, &own);
     free(by_law.scene.materials);
-    if (status == UZ_ERR_MEMORY || status == UZ_ERR_INTERNAL) {
+    if (status == UZ_ERR_MEMORY) { /* what is left is an answer */
+        uz_doubt_uncompared(result->evaluation);
+        return UZ_OK;
+    }
+    if (status == UZ_ERR_INTERNAL) {
         if (err)
             *err = own;
         return status;
