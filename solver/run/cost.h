@@ -36,13 +36,14 @@ double uz_cost_analysis_bytes(const uz_cost_size *size);
 void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
                     uz_operator asked, size_t memory_limit);
 
-/* What is left of seconds of one thread where so many share what they can of it. The plan is that of one: which form is
- * taken does not depend on who else computes. */
-double uz_cost_shared(double seconds, uz_operator op, bool brick, int threads);
 /* Decides so for a solid by counts, without the analysis of a factor: does matrix_free win even over the least that a
  * factor of a body of this breadth (uz_mesh_breadth) takes? false: it has to be analysed, or there is no choice. */
 bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const uz_mesh *mesh, uz_operator direct,
                             uz_operator asked, size_t memory_limit);
+
+/* What is left of seconds of one thread where so many share what they can of it. The plan is that of one: which form is
+ * taken does not depend on who else computes. */
+double uz_cost_shared(double seconds, uz_operator op, bool brick, int threads);
 
 /* The refusal where nothing fits: UZ_ERR_LIMIT with the predicted bytes. */
 uz_status uz_cost_refuse(const uz_cost_plan *plan, uz_operator asked, size_t memory_limit, uz_error *err);
