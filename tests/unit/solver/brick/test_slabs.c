@@ -28,7 +28,7 @@ TEST(threads_give_the_same_bits)
     CHECK_INT(uz_body_model_build(&cells, &scene, UZ_BODY_CELLS, &err), UZ_OK);
     CHECK(cells.brick != NULL);
     const int64_t d = cells.d;
-    double *x = calloc((size_t)d, sizeof(double)), *one[VECTORS], *many[VECTORS],
+    double *x = calloc((size_t)d, sizeof(double)), *one[VECTORS] = {0}, *many[VECTORS] = {0},
            *bottom = calloc((size_t)d, sizeof(double)), *top = calloc((size_t)d, sizeof(double));
     bool *held = calloc((size_t)d, sizeof *held);
     CHECK(x && bottom && top && held);
@@ -36,6 +36,11 @@ TEST(threads_give_the_same_bits)
         x[j] = (double)(j * 7919 % 1000 - 500);
         bottom[j] = -INFINITY;
         top[j] = j % 7 == 0 ? 1e-3 : INFINITY;
+    }
+    for (int k = 0; k < VECTORS; k++) {
+        one[k] = calloc((size_t)d, sizeof(double));
+        many[k] = calloc((size_t)d, sizeof(double));
+        CHECK(one[k] && many[k]);
     }
     CHECK_INT(uz_brick_diagonal(&K, cells.brick, &err), UZ_OK);
     CHECK_INT(uz_aside_begin(THREADS), THREADS);
@@ -45,8 +50,6 @@ TEST(threads_give_the_same_bits)
         uz_cg cg;
         uz_cg_info info;
         bool found;
-        for (int k = 0; k < VECTORS && (threads == 1 || threads == 2); k++)
-            y[k] = calloc((size_t)d, sizeof(double));
         for (int k = 0; k < VECTORS; k++)
             memset(y[k], 0, (size_t)d * sizeof *y[k]);
         uz_aside_allow(threads);
