@@ -73,7 +73,7 @@ export function kinematics_words(summary) {
   const small = summary.small_deformation;
   if (!small) return null;
   if (!Number.isFinite(small.error)) return `Large deformation has no stable equilibrium beyond ${number(small.load)} of the load.`;
-  return `Small deformation ${summary.finite ? "would have erred" : "errs"} by ${percent_up(small.error)}.`;
+  return `Small deformation ${summary.finite ? "would have erred" : "errs"} by ${percent_up(small.error)}${small.in ? ` in ${small.in}` : ""}.`;
 }
 
 /** Is the error of the answer more than that of its equations? Of bodies; matrices have no mesh. */

@@ -384,8 +384,9 @@ static void print_small(FILE *to, const json_t *summary)
         fprintf(to, "large deformation has no stable equilibrium beyond %.6g of the load\n",
                 client_json_number(small, "load"));
     else
-        fprintf(to, "small deformation %s by %.2g %%\n",
-                json_is_object(json_object_get(summary, "finite")) ? "would have erred" : "errs", 100 * error);
+        fprintf(to, "small deformation %s by %.3g %% in %s\n",
+                json_is_object(json_object_get(summary, "finite")) ? "would have erred" : "errs", 100 * error,
+                client_json_text(small, "in"));
 }
 
 /* The bound, whether it is what was asked for, and what it is made of. */

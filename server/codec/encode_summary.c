@@ -439,6 +439,8 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
     if (summary->small.compared) {
         text_open(&t, "small_deformation", '{');
         put_named(&t, NULL, (named[]){{"error", summary->small.error}, {"load", summary->small.load}}, 2);
+        if (isfinite(summary->small.error))
+            text_string(&t, "in", summary->small.in);
         text_close(&t, '}');
     }
     put_certificate(&t, summary, scene);

@@ -197,9 +197,10 @@ typedef struct {
  * their own laws, and by St. Venant and Kirchhoff's in place of the linear one, which it is where strains are small. */
 typedef struct {
     bool compared;
-    double error; /* of small deformation: relative, of the displacements, of the resultants or of the root of the
-                   * strain energy, whichever is most; INFINITY: large deformation has no answer under the whole load */
-    double load;  /* the part of it that it has a stable equilibrium under */
+    double error;   /* of small deformation: relative, of the displacements, of the resultants or of the root of the
+                     * strain energy, whichever is most; INFINITY: large deformation has no answer under the whole load */
+    const char *in; /* which of them: "displacements", "forces" or "energy" */
+    double load;    /* the part of it that it has a stable equilibrium under */
 } uz_small;
 
 /* A quantity of uz_problem: where its value for the body itself, without a mesh, is by estimate. */

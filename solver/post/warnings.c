@@ -211,9 +211,9 @@ void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)
 {
     if (isfinite(small->error))
         warn(out, "large_deformation", small->error,
-             "small deformation errs by %.2g %% as rotations and strains are large: take the law neo_hooke, or "
+             "small deformation errs by %.3g %% in %s as rotations and strains are large: take the law neo_hooke, or "
              "st_venant_kirchhoff where strains stay small",
-             100 * small->error);
+             100 * small->error, small->in);
     else
         warn(out, "large_deformation", small->error,
              "with rotations taken into account (st_venant_kirchhoff) nothing is stable beyond %.3g of the load: take "

@@ -198,12 +198,20 @@ static double compare_displacements(const double *here, const double *small, int
     return all > 0 ? sqrt(off / all) : off > 0 ? (double)INFINITY : 0;
 }
 
+static void take_greater(uz_small *out, double error, const char *in)
+{
+    if (error > out->error) {
+        out->error = error;
+        out->in = in;
+    }
+}
+
 uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, const uz_result *small)
 {
     const uz_evaluation *here = result->evaluation, *there = small->evaluation;
     const double energy = run->at.body.energy;
     double off = 0, most = 0;
-    uz_small out = {.compared = true, .error = INFINITY, .load = run->found.load};
+    uz_small out = {.compared = true, .error = INFINITY, .in = "displacements", .load = run->found.load};
     if (run->found.load < 1)
         return out;
     out.error = compare_displacements(result->u, small->u, run->n, run->base.mesh.dim);
@@ -212,7 +220,7 @@ uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, co
     compare_forces(&off, &most, here->contacts, there->contacts, here->n_contacts);
     compare_forces(&off, &most, here->supports, there->supports, here->n_supports);
     if (most > 0)
-        out.error = fmax(out.error, off / most);
-    out.error = fmax(out.error, fabs(sqrt(there->strain_energy / energy) - 1));
+        take_greater(&out, off / most, "forces");
+    take_greater(&out, fabs(sqrt(there->strain_energy / energy) - 1), "energy");
     return out;
 }

@@ -178,6 +178,7 @@ TEST(a_linear_law_is_not_replaced)
             if (k == 2 && i == 2) {
                 CHECK_MSG(fabs(sum->small.error - 0.077) < 0.001, "%g", sum->small.error);
                 CHECK(told && !warning(chosen, "large_rotation"));
+                CHECK_STR(sum->small.in, "forces");
             }
             uz_result_free(chosen);
             uz_result_free(fixed);
