@@ -33,7 +33,7 @@ _uzawa() {
     plot) options='--deformed --error --trade --x --with --colour --factor --width --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
     report) options='--case --output --json --context --server --timeout --retry --help --version ' ;;
     request) options='--output --json --context --server --timeout --retry --help --version ' ;;
-    list) options='--status --tag --name --limit --quiet --json --context --server --timeout --retry --help --version ' ;;
+    list) options='--format --status --tag --name --limit --quiet --json --context --server --timeout --retry --help --version ' ;;
     cancel) options='--quiet --json --context --server --timeout --retry --help --version ' ;;
     delete) options='--quiet --json --context --server --timeout --retry --help --version ' ;;
     factors) options='--json --context --server --timeout --retry --help --version ' ;;
@@ -163,6 +163,7 @@ _uzawa() {
     request--server|request-s) words='' ;;
     request--timeout|request-t) words='' ;;
     request--retry) words='' ;;
+    list--format|list-f) words='table csv json' ;;
     list--status) words='accepted running successful failed dismissed' ;;
     list--tag) words='' ;;
     list--name) words='' ;;

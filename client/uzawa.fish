@@ -244,6 +244,7 @@ complete -c uzawa -n '__uzawa_is request' -l timeout -s t -r -f -d 'give up afte
 complete -c uzawa -n '__uzawa_is request' -l retry -r -f -d 'keep trying to reach the server for S seconds (default 3; 30 while waiting)'
 complete -c uzawa -n '__uzawa_is request' -l help -s h -d 'explain the command'
 complete -c uzawa -n '__uzawa_is request' -l version -s V -d 'print the version'
+complete -c uzawa -n '__uzawa_is list' -l format -s f -r -f -a 'table csv json' -d 'table (default), csv with whole names, or json with all that is known'
 complete -c uzawa -n '__uzawa_is list' -l status -r -f -a 'accepted running successful failed dismissed' -d 'accepted, running, successful, failed or dismissed'
 complete -c uzawa -n '__uzawa_is list' -l tag -r -f -d 'only jobs with this tag'
 complete -c uzawa -n '__uzawa_is list' -l name -r -f -d 'only jobs that are called so'

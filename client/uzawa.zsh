@@ -275,6 +275,7 @@ _uzawa() {
             '1:ID:_uzawa_ids' ;;
     list)
         _arguments \
+            '(-f --format)'{-f,--format}'[table (default), csv with whole names, or json with all that is known]:F:(table csv json)' \
             '--status[accepted, running, successful, failed or dismissed]:S:(accepted running successful failed dismissed)' \
             '*--tag[only jobs with this tag]:WORD: ' \
             '--name[only jobs that are called so]:NAME: ' \

@@ -172,6 +172,8 @@ static const uz_option OPTIONS[] = {
                     "case, as one series"),
     OPTION("format", 'f', CHOICE, format, IN(PATH), .value = "F", .choices = "table csv json",
            .about = "table (default) with five digits, csv or json with all"),
+    OPTION("format", 'f', CHOICE, format, IN(LIST), .value = "F", .choices = "table csv json",
+           .about = "table (default), csv with whole names, or json with all that is known"),
     OPTION("from", 0, WORD, from, IN(PATH), .value = "P", .about = "the first point, such as 0,20"),
     OPTION("to", 0, WORD, to, IN(PATH), .value = "P", .about = "the last point"),
     OPTION("count", 'n', INTEGER, count, IN(PATH), .least = 2, .most = 10000, .value = "N",

@@ -8,6 +8,49 @@
 
 #define PAGE_JOBS 100L
 
+static const struct {
+    const char *name, *path;
+    int width;
+} COLUMNS[] = {{"id", "id", 32},
+               {"status", "status", 10},
+               {"outcome", "summary.outcome", 15},
+               {"created", "created", 24},
+               {"name", "name", 20}};
+
+static void print_tags(FILE *to, const json_t *job, bool csv)
+{
+    char *text = NULL;
+    size_t len = 0;
+    FILE *tags = csv ? open_memstream(&text, &len) : NULL;
+    client_print_tags(tags ? tags : to, job, ",");
+    if (tags && fclose(tags) == 0)
+        client_print_quoted(to, text);
+    free(text);
+}
+
+/* As a table for a reader, or as CSV for a program: whole cells, a comma between them. */
+static void print_jobs(FILE *to, const json_t *jobs, bool csv)
+{
+    const size_t columns = sizeof COLUMNS / sizeof *COLUMNS;
+    for (size_t k = 0; k < columns; k++)
+        fprintf(to, csv ? "%.*s," : "%-*s  ", COLUMNS[k].width, COLUMNS[k].name);
+    fputs("tags\n", to);
+    for (size_t i = 0; i < json_array_size(jobs); i++) {
+        const json_t *job = json_array_get(jobs, i);
+        for (size_t k = 0; k < columns; k++) {
+            const char *text = client_json_text(job, COLUMNS[k].path);
+            if (csv) {
+                client_print_quoted(to, text);
+                fputc(',', to);
+            } else {
+                client_print_cell(to, text, COLUMNS[k].width);
+            }
+        }
+        print_tags(to, job, csv);
+        fputc('\n', to);
+    }
+}
+
 client_exit client_list(client_session *s)
 {
     const client_options *o = s->options;
@@ -40,7 +83,8 @@ client_exit client_list(client_session *s)
         last = !*cursor || json_array_size(more) == 0;
         json_decref(page);
     }
-    if (code == CLIENT_OK && s->options->json)
+    const char *format = o->json ? "json" : o->format ? o->format : "table";
+    if (code == CLIENT_OK && strcmp(format, "json") == 0)
         code = client_print_json(s, jobs);
     else if (code == CLIENT_OK && o->quiet) {
         for (size_t i = 0; i < json_array_size(jobs); i++) {
@@ -48,18 +92,7 @@ client_exit client_list(client_session *s)
             fputc('\n', s->out);
         }
     } else if (code == CLIENT_OK) {
-        fprintf(s->out, "%-32s  %-10s  %-15s  %-24s  %-20s  %s\n", "id", "status", "outcome", "created", "name",
-                "tags");
-        for (size_t i = 0; i < json_array_size(jobs); i++) {
-            const json_t *job = json_array_get(jobs, i);
-            client_print_cell(s->out, client_json_text(job, "id"), 32);
-            client_print_cell(s->out, client_json_text(job, "status"), 10);
-            client_print_cell(s->out, client_json_text(job, "summary.outcome"), 15);
-            client_print_cell(s->out, client_json_text(job, "created"), 24);
-            client_print_cell(s->out, client_json_text(job, "name"), 20);
-            client_print_tags(s->out, job, ",");
-            fputc('\n', s->out);
-        }
+        print_jobs(s->out, jobs, strcmp(format, "csv") == 0);
         if (!last)
             fprintf(s->err, "the newest %d: --limit shows more\n", o->limit);
     }

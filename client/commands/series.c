@@ -47,15 +47,6 @@ static void put_vector(FILE *to, const json_t *vector, size_t width, const char 
             put_number(to, json_array_get(vector, k));
 }
 
-/* In quotes, those inside doubled. */
-static void put_text(FILE *to, const char *text)
-{
-    fputc('"', to);
-    for (const char *c = text; *c; c++)
-        fprintf(to, *c == '"' ? "\"\"" : "%c", *c);
-    fputc('"', to);
-}
-
 /* like: the summary that says which columns there are; row: the one whose cells they get, NULL: the headings. */
 static void put_columns(FILE *to, const json_t *like, const json_t *row)
 {
@@ -94,7 +85,7 @@ client_exit client_numbers(client_session *s)
         for (size_t i = 0; i < (cases ? json_array_size(cases) : 1); i++) {
             const json_t *summary = summary_of(result, cases, i);
             if (cases) {
-                put_text(to, client_json_text(json_array_get(cases, i), "name"));
+                client_print_quoted(to, client_json_text(json_array_get(cases, i), "name"));
                 fputc(',', to);
             }
             fputs(client_json_text(summary, "outcome"), to);

@@ -148,11 +148,9 @@ static void print_answer(const table *t, const json_t *answer, const char *name)
                                                : t->nodes;
     for (size_t row = 0, rows = json_array_size(list); row < rows; row++) {
         const json_t *at = json_array_get(t->nodes, row);
-        if (t->cases) { /* in quotes, those inside doubled */
-            fputc('"', t->to);
-            for (const char *c = name; *c; c++)
-                fprintf(t->to, *c == '"' ? "\"\"" : "%c", *c);
-            fputs("\",", t->to);
+        if (t->cases) {
+            client_print_quoted(t->to, name);
+            fputc(',', t->to);
         }
         if (t->place == AT_POINTS) {
             const json_t *points = json_object_get(gauss, "points");

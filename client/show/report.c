@@ -171,6 +171,14 @@ void client_print_job(FILE *to, const json_t *job)
     }
 }
 
+void client_print_quoted(FILE *to, const char *text)
+{
+    fputc('"', to);
+    for (const char *c = text; *c; c++)
+        fprintf(to, *c == '"' ? "\"\"" : "%c", *c);
+    fputc('"', to);
+}
+
 void client_print_problem(FILE *to, long http_status, const json_t *problem)
 {
     const char *code = client_json_text(problem, "code"), *pointer = client_json_text(problem, "pointer");

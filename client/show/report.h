@@ -25,6 +25,8 @@ void client_print_tags(FILE *to, const json_t *job, const char *separator);
 /* A cell of a table: at most `width` characters of the text, safe for a terminal, filled up with blanks to that, and
  * two more. */
 void client_print_cell(FILE *to, const char *text, int width);
+/* A cell of CSV: in quotes, those inside doubled (RFC 4180). */
+void client_print_quoted(FILE *to, const char *text);
 /* What came of an ended job, about 15 lines. Parts that the job lacks are left out. */
 void client_print_summary(FILE *to, const json_t *job);
 /* A line for each load case of a result. */

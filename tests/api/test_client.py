@@ -1,5 +1,6 @@
 """Every command of the client against the real daemon. usage: test_client.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
+import csv
 import gzip
 import hashlib
 import json
@@ -77,6 +78,16 @@ def test_status_list_and_tags(server):
     found = json.loads(run(server, "list", "--tag", "one", "--status", "successful", "--json", code=0).stdout)
     check([job["id"] for job in found] == [first], found)
     check(json.loads(run(server, "list", "--status", "failed", "--json", code=0).stdout) == [])
+    check(json.loads(run(server, "list", "--tag", "one", "--format", "json", code=0).stdout) == found)
+
+
+@options()
+def test_list_as_csv(server):
+    """Whole names, whatever is in them."""
+    name = 'a "spring", and another one'
+    run(server, "submit", SPRINGS, "--wait", "--quiet", "--tag", "one", "--tag", "two", "--name", name, code=0)
+    row, = csv.DictReader(run(server, "list", "--format", "csv", code=0).stdout.splitlines())
+    check((row["name"], row["status"], row["outcome"], row["tags"]) == (name, "successful", "converged", "springs,one,two"), row)
 
 
 def test_list_pages(server):
