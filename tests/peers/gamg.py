@@ -136,7 +136,7 @@ class Linear:
 
 def by_daemon(build, asked):
     """Seconds of a body that is new, and of another load on it; what was answered."""
-    s = service.Service(build, "--workers", "1")
+    s = service.Service(build, "--workers", "1", "--threads", "1")
     seconds = []
     try:
         s.start()
