@@ -316,14 +316,23 @@ typedef struct {
     int slabs;
 } passage;
 
+/* Those of planes first to end - 1, which the slab has. */
+static const int64_t *dofs_of_slab(const passage *p, int slab, int64_t *first, int64_t *end)
+{
+    const int64_t *cells = p->mg->level[0].cells;
+    *first = uz_brick_slab(cells[2] + 1, slab, p->slabs);
+    *end = uz_brick_slab(cells[2] + 1, slab + 1, p->slabs);
+    return p->mg->brick->dof + 3 * (cells[0] + 1) * (cells[1] + 1) * *first;
+}
+
 static void read_slab(void *ctx, int slab)
 {
     const passage *p = ctx;
     const double factor = p->factor;
     const uz_brick_level *level = &p->mg->level[0];
-    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1, planes = level->cells[2] + 1;
-    const int64_t first = uz_brick_slab(planes, slab, p->slabs), end = uz_brick_slab(planes, slab + 1, p->slabs);
-    const int64_t *dof = p->mg->brick->dof + 3 * line * lines * first;
+    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1;
+    int64_t first, end;
+    const int64_t *dof = dofs_of_slab(p, slab, &first, &end);
     for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j < lines; j++) {
             float *b = p->v->b + k * level->plane + j * level->stride;
@@ -341,9 +350,9 @@ static void write_slab(void *ctx, int slab)
     const passage *p = ctx;
     const double factor = p->factor;
     const uz_brick_level *level = &p->mg->level[0];
-    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1, planes = level->cells[2] + 1;
-    const int64_t first = uz_brick_slab(planes, slab, p->slabs), end = uz_brick_slab(planes, slab + 1, p->slabs);
-    const int64_t *dof = p->mg->brick->dof + 3 * line * lines * first;
+    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1;
+    int64_t first, end;
+    const int64_t *dof = dofs_of_slab(p, slab, &first, &end);
     for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j < lines; j++) {
             const float *x = p->v->x + k * level->plane + j * level->stride;

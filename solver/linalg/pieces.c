@@ -8,7 +8,7 @@
 /* Numbers of a piece at least, some 5 microseconds; pieces of a sum at most. */
 enum { LEAST = 16384, PIECES_MOST = 512 };
 
-/* A loop, or a sum of which each piece has its own number. */
+/* A loop over 0..n, in so many parts. */
 typedef struct {
     void (*run)(void *ctx, int64_t begin, int64_t end);
     void *ctx;
@@ -22,16 +22,23 @@ static void run_part(void *ctx, int part)
     l->run(l->ctx, l->n * part / l->parts, l->n * (part + 1) / l->parts);
 }
 
-void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n)
+/* By as many threads as there are, but in no more than `most` parts. */
+static void divide(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n, int64_t most)
 {
-    const int threads = n < 2 * LEAST ? 1 : uz_aside_threads();
-    loop l = {run, ctx, n, n / LEAST < threads ? (int)(n / LEAST) : threads};
+    const int threads = most < 2 ? 1 : uz_aside_threads();
+    loop l = {run, ctx, n, most < threads ? (int)most : threads};
     if (threads < 2)
         run(ctx, 0, n);
     else
         uz_aside_share(run_part, &l, l.parts);
 }
 
+void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n)
+{
+    divide(run, ctx, n, n / LEAST);
+}
+
+/* A sum of which each piece has its own number. */
 typedef struct {
     double (*of)(int64_t n, const double *x, const double *y);
     const double *x, *y;
@@ -49,12 +56,6 @@ static void find_pieces(void *ctx, int64_t begin, int64_t end)
     }
 }
 
-static void find_part(void *ctx, int part)
-{
-    const loop *l = ctx;
-    find_pieces(l->ctx, l->n * part / l->parts, l->n * (part + 1) / l->parts);
-}
-
 /* Fills s; returns how many pieces there are. */
 static int64_t find_all(sum *s, double (*of)(int64_t n, const double *x, const double *y), int64_t n, const double *x,
                         const double *y)
@@ -65,12 +66,7 @@ static int64_t find_all(sum *s, double (*of)(int64_t n, const double *x, const d
     s->n = n;
     s->size = s->n / PIECES_MOST < LEAST ? LEAST : s->n / PIECES_MOST + 1;
     const int64_t pieces = (s->n + s->size - 1) / s->size;
-    const int threads = pieces < 2 ? 1 : uz_aside_threads();
-    loop l = {.ctx = s, .n = pieces, .parts = pieces < threads ? (int)pieces : threads};
-    if (threads < 2)
-        find_pieces(s, 0, pieces);
-    else
-        uz_aside_share(find_part, &l, l.parts);
+    divide(find_pieces, s, pieces, pieces);
     return pieces;
 }
 
