@@ -281,10 +281,14 @@ $(BUILD)/%.so: tests/preload/%.c
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
         bench-size bench-deps peers peers-contact peers-decks peers-large peers-space extremes theory roller arch trade figures numbers collect page-size
-test: deps-test ## build and pass every test; ONCE=1: but those that make asan runs as they are
+test: test-build ## build and pass every test; ONCE=1: but those that make asan runs as they are
+	@tests/run.sh $(BUILD) "" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
+
+# What each of the targets that CI runs builds before its tests, so that tests/ci.sh can have it built meanwhile.
+.PHONY: test-build test-postgresql-build asan-build tsan-build fuzz-build
+test-build: deps-test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools $(BUILD)/guard \
 	    $(if $(ONCE),$(patsubst %,$(BUILD)/tests/%,$(notdir $(basename $(filter-out $(SAME_IN_ASAN),$(UNIT_SRC))))),unit-bins)
-	@tests/run.sh $(BUILD) "" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
 
 guard: deps-test ## instructions of small problems against those kept in tests/data/guard.json; KEEP=1: keep the new ones
 	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/guard
@@ -305,9 +309,11 @@ test-api: all test-tools ## the tests that drive the real daemon and client; FIL
 .PHONY: test-postgresql
 # In its short form some of them; test_daemons, test_database and the tests of the store are on it anyway.
 ON_POSTGRESQL ?= test_assert test_between test_client test_refine
-test-postgresql: deps-test ## tests of the daemon whose jobs are in PostgreSQL; ALL=1: all of them; FILTER=name runs some
-	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools
+test-postgresql: test-postgresql-build ## tests of the daemon whose jobs are in PostgreSQL; ALL=1: all of them; FILTER=name runs some
 	@UZAWA_STORE=postgresql tests/run.sh $(BUILD) api "$(FILTER)" "$(if $(ALL)$(FILTER),,$(ON_POSTGRESQL))"
+
+test-postgresql-build: deps-test
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools
 
 .PHONY: test-group
 test-group: deps-test deps-group ## tests of one body on several processes, which skip what needs PETSc where it is not
@@ -349,17 +355,21 @@ open := (
 # As tests/run.sh names them: KIND/NAME.
 programs = $(foreach test,$(1),$(word 2,$(subst /, ,$(test)))/$(notdir $(basename $(test))))
 
-asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
-	$(call sanitized,asan,-fsanitize=address$(comma)undefined -fno-sanitize-recover=all) all unit-bins
+asan: asan-build ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
 	@tests/run.sh $(BUILD)/asan "unit api" "$(FILTER)" "$(call programs,$(UNIT_SRC) $(ASAN_API))"
+
+asan-build: deps-test
+	$(call sanitized,asan,-fsanitize=address$(comma)undefined -fno-sanitize-recover=all) all unit-bins
 
 ubsan: deps-test ## the C tests under UndefinedBehaviorSanitizer alone
 	$(call sanitized,ubsan,-fsanitize=undefined -fno-sanitize-recover=all) all unit-bins
 	@tests/run.sh $(BUILD)/ubsan unit "$(FILTER)"
 
-tsan: deps-test ## the server's tests under ThreadSanitizer
-	$(call sanitized,tsan,-fsanitize=thread) all $(TSAN_UNIT:%=$(BUILD)/tsan/tests/%)
+tsan: tsan-build ## the server's tests under ThreadSanitizer
 	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT:%=unit/%) $(TSAN_API:%=api/%)"
+
+tsan-build: deps-test
+	$(call sanitized,tsan,-fsanitize=thread) all $(TSAN_UNIT:%=$(BUILD)/tsan/tests/%)
 
 soak: deps-test ## a long life in an hour: kills, power losses, slow clients, a million jobs; a table; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load $(BUILD)/library $(PRELOADS)
@@ -370,10 +380,12 @@ valgrind: deps-test ## the C tests under valgrind, VALGRIND_SECONDS (default 60)
 	@$(MAKE) --no-print-directory -s -j$$(nproc) unit-bins
 	@tests/valgrind.sh $(BUILD) $(FILTER)
 
-fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each
+fuzz: fuzz-build ## run every fuzz target for FUZZ_SECONDS (default 30) each
+	@tests/fuzz/run.sh $(BUILD)/fuzzing $${FUZZ_SECONDS:-30}
+
+fuzz-build: deps-test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/libparts.a
 	$(call sanitized,fuzzing,-fsanitize=address$(comma)undefined$(comma)fuzzer-no-link -fno-sanitize-recover=undefined) CC=clang fuzz-bins
-	@tests/fuzz/run.sh $(BUILD)/fuzzing $${FUZZ_SECONDS:-30}
 
 ci: ## what continuous integration runs: test, asan, tsan, fuzz, and one count over all
 	@.ci/run
