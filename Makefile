@@ -186,10 +186,10 @@ $(BUILD)/obj/%.o: %.c
 	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests -Itests/support) $(if $(filter tests/unit/%,$<),-O0) -c -o $@ $<
 
 # Contraction only saves roundings there; the double-double arithmetic of certificates must never have it.
-CONTRACTED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c $(wildcard solver/brick/*.c)
+CONTRACTED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c solver/finite/finite_element.c $(wildcard solver/brick/*.c)
 $(call obj,$(CONTRACTED)): CFLAGS += -ffp-contract=fast
 # Short loops of known length around the registers are unrolled.
-UNROLLED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/post/*.c) solver/io/vtu.c
+UNROLLED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/certificate/finite.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/finite/*.c solver/post/*.c) solver/io/vtu.c
 $(call obj,$(UNROLLED)): CFLAGS += -O3
 
 $(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS) $(BUILD)/gen/openapi.json

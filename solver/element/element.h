@@ -114,6 +114,8 @@ double uz_invert_small(double inverse[3][3], double J[3][3], int dim);
 /* Derivatives by x, y [, z] of the shape functions at a local point: grad[node][direction]. Returns the Jacobian's
  * determinant. */
 double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3]);
+/* Of rings: a radius of at most this part of the element's largest counts as on the axis. */
+#define UZ_AXIS 1e-12
 /* At the same point, of a ring: how displacements along the radius stretch it around, around[node] = N / r, which on
  * the axis is the derivative by r. Returns what an area there stands for: 2 pi r, of other plane models the thickness,
  * of solids (a volume) 1; and `around` is 0 then. */

@@ -8,7 +8,6 @@
 void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEMENT_NODES][3]);
 
 /* The radius at a point with these shape functions; at most UZ_AXIS of the largest it counts as on the axis. */
-#define UZ_AXIS 1e-12
 double uz_ring_radius(double *largest, const uz_element *element, const double *N);
 
 /* One Gauss point: derivatives of the shape functions by x, y, z, and the volume that the point stands for. */

@@ -15,6 +15,7 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
     const uz_mesh *mesh = &model->mesh;
     const int dim = mesh->dim;
     double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], d[UZ_ELEMENT_DOFS];
+    uz_finite_rule rule = {.nodes = 0};
     *out = (uz_finite_measure){.least_det = INFINITY, .at = -1};
     if (force)
         memset(force, 0, (size_t)(dim * mesh->n_nodes) * sizeof *force);
@@ -28,16 +29,21 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         uz_body_element(&element, xyz, model, e);
+        if (rule.nodes == 0 || rule.kind != element.kind)
+            uz_finite_rule_of(&rule, element.kind, element.model);
         for (int i = 0; i < dim * count; i++)
             u[i] = nodal[dim * node[i / dim] + i % dim];
         for (int i = 0; i < dim * count && step; i++)
             d[i] = step[dim * node[i / dim] + i % dim];
-        uz_finite_element(&own, tangent ? ke : NULL, &element, uz_element_material(model, e)->law, u, step ? d : NULL);
-        out->energy += own.energy;
+        uz_finite_element(&own, tangent ? ke : NULL, &rule, &element, uz_element_material(model, e)->law, u,
+                          step ? d : NULL);
         if (!(own.least_det >= out->least_det)) { /* not a number, too */
             out->least_det = own.least_det;
             out->at = e;
         }
+        if (!(own.least_det > 0))
+            continue;
+        out->energy += own.energy;
         for (int i = 0; i < dim * count && force; i++)
             force[dim * node[i / dim] + i % dim] += own.force[i];
         if (tangent)

@@ -1,11 +1,12 @@
 /* finite_element.c: internal forces and tangent of one element.
  *
- * With g_a the gradients of the shape functions before anything moves, F = I + sum_a u_a x g_a; the variation of E by
- * u_a is B_a = (F_i1 g_1, F_i2 g_2, F_i3 g_3, F_i1 g_2 + F_i2 g_1, F_i2 g_3 + F_i3 g_2, F_i3 g_1 + F_i1 g_3); in the
- * plane the third is z N / r, of rings only, along the radius, with the stretch z = 1 + u_r / r around; so that
- *     force_a = integral B_a'S,     K_ab = integral B_a' D B_b + (g_a . S g_b) I,
- * and along the radius S_zz N_a N_b / r^2 more. In plane stress the stretch across the plane is that without stress
- * across it, at each point, and D what is left in the plane.
+ * With g_a the gradients of the shape functions before anything moves, F = I + sum_a u_a x g_a, P = F S the forces per
+ * undeformed area and A = dP/dF, A_iJkL = F_iM D_MJNL F_kN + S_JL (i = k), D = dS/dE of the law:
+ *     force_a = integral P g_a,     K_ab = integral g_a A g_b,
+ * which takes half of the products that B'D B and the part of the stress take each by itself. Around a ring the stretch
+ * is 1 + u_r / r, another F with N / r as its gradient. In plane stress the stretch across the plane is that without
+ * stress across it, at each point, and D what is left in the plane.
+ * What concerns points stands in lanes by four of them, what concerns pairs of nodes by four nodes.
  * A step d by this tangent takes a slender part that turns along its tangent, which lengthens it by a strain that it
  * does not have in the end, and whose stress is all that the next tangent would see. So K's second part has S of the
  * strain that the step was made for, E - h'h / 2 with h = grad d: what stress would be as an unknown of its own. At the
@@ -15,52 +16,133 @@
  * Engrg. 313 (2017) 986-1005. */
 #include "finite/finite_element.h"
 
+#include "core/cpu.h"
 #include "finite/hyperelastic.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { N_STRAINS = UZ_FINITE_STRAINS };
+/* What is inlined into a version for each shape of element and kind of processor, whose sizes are constants there. */
+#define INLINE static inline __attribute__((always_inline))
+
+/* NODES: the most, by fours; AROUND: the derivative of what is around the axis, after those in the plane. */
+enum { N_STRAINS = UZ_FINITE_STRAINS, LANES = UZ_FINITE_LANES, POINTS = UZ_FINITE_POINTS, AROUND = 4 };
+typedef double four __attribute__((vector_size(8 * UZ_FINITE_LANES), aligned(8), may_alias));
+
+/* Four numbers in a row. */
+INLINE const four *four_from(const double *x)
+{
+    return (const four *)x;
+}
+
+INLINE four *four_at(double *x)
+{
+    return (four *)x;
+}
 
 /* Steps to the stretch across the plane, when its square is there to rounding, and the least one that is looked for. */
 enum { MOST_SETTLING = 60 };
 #define SETTLED         1e-13
 #define LEAST_THICKNESS 1e-8
+#define TWO_PI          6.28318530717958647693
 
-/* A point of an element: derivatives of shape functions, and N / r of rings; what an area, of solids a volume, stands
- * for. n: components of strain. */
+/* ---- at all points, four at a time */
+
+/* Before anything moves: derivatives of local coordinates by places [local][x], what a Gauss point stands for, and of
+ * rings 1 / r, which is 0 on the axis. */
 typedef struct {
-    double grad[UZ_ELEMENT_NODES][3], around[UZ_ELEMENT_NODES], depth, det;
-    int nodes, dim, n;
-    bool ring;
-} shape_at;
+    double inverse[3][3][POINTS], volume[POINTS], per_radius[POINTS];
+} shape;
 
-static void shape_of(shape_at *out, const uz_element *element, const double point[3])
+/* H[c][j]: the derivative of u_c by x_j; of rings [2][2] is u_r / r, in the plane else the others with a 2 are 0. */
+typedef double gradients[3][3][POINTS];
+
+/* D[c][i]: derivatives by local coordinates at four points from `first` on, of values (nodes x dim), against those of
+ * the first node: a translation leaves no rounding. */
+INLINE void differentiate(four D[3][3], const uz_finite_rule *rule, const double *value, int first, int dim)
 {
-    const uz_element_type *type = uz_element_type_of(element->kind);
-    out->nodes = type->nodes;
-    out->dim = type->dim;
-    out->n = type->dim == 2 ? UZ_FINITE_PLANE_STRAINS : UZ_FINITE_STRAINS;
-    out->ring = element->model == UZ_AXISYMMETRIC;
-    out->det = uz_element_gradients(out->grad, element, point);
-    out->depth = uz_element_around(out->around, element, out->grad, point);
+    for (int c = 0; c < dim; c++)
+        for (int i = 0; i < dim; i++)
+            D[c][i] = (four){0};
+    for (int a = 1; a < rule->nodes; a++)
+        for (int i = 0; i < dim; i++) {
+            const four slope = *four_from(&rule->at_points[a][i][first]);
+            for (int c = 0; c < dim; c++)
+                D[c][i] += slope * (value[dim * a + c] - value[c]);
+        }
+}
+
+/* Of rings: volumes by the way around, and 1 / r. */
+INLINE void find_radii(shape *out, const uz_finite_rule *rule, const double *xyz)
+{
+    double largest = 0;
+    for (int a = 0; a < rule->nodes; a++)
+        largest = fmax(largest, fabs(xyz[2 * a]));
+    for (int p = 0; p < rule->points; p++) {
+        double radius = 0;
+        for (int a = 0; a < rule->nodes; a++)
+            radius += rule->at_nodes[p][3][a] * xyz[2 * a];
+        out->per_radius[p] = radius > UZ_AXIS * largest ? 1 / radius : 0;
+        out->volume[p] *= TWO_PI * radius;
+    }
+}
+
+INLINE void shape_of(shape *out, const uz_finite_rule *rule, const uz_element *element, int dim, bool ring)
+{
+    for (int p = 0; p < rule->points; p += LANES) {
+        four X[3][3], det;
+        differentiate(X, rule, element->xyz, p, dim);
+        if (dim == 2)
+            det = X[0][0] * X[1][1] - X[0][1] * X[1][0];
+        else
+            det = X[0][0] * (X[1][1] * X[2][2] - X[1][2] * X[2][1]) +
+                  X[0][1] * (X[1][2] * X[2][0] - X[1][0] * X[2][2]) + X[0][2] * (X[1][0] * X[2][1] - X[1][1] * X[2][0]);
+        const four scale = 1 / det;
+        for (int i = 0; i < dim; i++)
+            for (int j = 0; j < dim; j++) {
+                const int b = (i + 1) % 3, c = (i + 2) % 3, d = (j + 1) % 3, e = (j + 2) % 3;
+                four cofactor = X[1 - i % 2][1 - i % 2];
+                if (dim == 3)
+                    cofactor = X[d][b] * X[e][c] - X[d][c] * X[e][b];
+                else if (i != j)
+                    cofactor = -X[i][j];
+                *four_at(&out->inverse[i][j][p]) = cofactor * scale;
+            }
+        const double thick = dim == 2 && !ring ? element->thickness : 1;
+        *four_at(&out->volume[p]) = *four_from(&rule->weight[p]) * det * thick;
+    }
+    if (ring)
+        find_radii(out, rule, element->xyz);
+}
+
+INLINE void find_gradients(gradients H, const uz_finite_rule *rule, const shape *at, const double *u, int dim,
+                           bool ring)
+{
+    for (int p = 0; p < rule->points; p += LANES) {
+        four D[3][3];
+        differentiate(D, rule, u, p, dim);
+        for (int c = 0; c < dim; c++)
+            for (int j = 0; j < dim; j++) {
+                four sum = D[c][0] * *four_from(&at->inverse[0][j][p]);
+                for (int i = 1; i < dim; i++)
+                    sum += D[c][i] * *four_from(&at->inverse[i][j][p]);
+                *four_at(&H[c][j][p]) = sum;
+            }
+    }
+    for (int p = 0; p < rule->points && ring; p++) {
+        double moved = 0;
+        for (int a = 0; a < rule->nodes; a++)
+            moved += rule->at_nodes[p][3][a] * u[2 * a];
+        H[2][2][p] = at->per_radius[p] > 0 ? moved * at->per_radius[p] : H[0][0][p];
+    }
 }
 
 /* In the plane the last of F is the stretch across it, which is 1 but in rings. */
-static void deformation(double F[3][3], const shape_at *at, const double *u)
+INLINE void deformation(double F[3][3], gradients H, int p, int dim, bool ring)
 {
-    const int dim = at->dim;
-    memset(F, 0, 9 * sizeof F[0][0]);
     for (int i = 0; i < 3; i++)
-        F[i][i] = 1;
-    for (int a = 0; a < at->nodes; a++)
-        for (int i = 0; i < dim; i++) {
-            const double way = u[dim * a + i] - u[i]; /* a translation leaves no rounding */
-            for (int j = 0; j < dim; j++)
-                F[i][j] += way * at->grad[a][j];
-        }
-    for (int a = 0; a < at->nodes && at->ring; a++)
-        F[2][2] += u[2 * a] * at->around[a];
+        for (int j = 0; j < 3; j++)
+            F[i][j] = (i == j) + ((i < dim && j < dim) || (ring && i + j == 4) ? H[i][j][p] : 0);
 }
 
 /* det F, and not positive where one of the two of a plane is not: both may be negative of a ring that is turned inside
@@ -109,9 +191,10 @@ static bool settle_thickness(double *W, double S[N_STRAINS], double D[N_STRAINS]
 /* Energy, stress and tangent at C, and what F and C are across the plane where that follows from them: in plane stress
  * the tangent is that in the plane, condensed. */
 static bool law_at(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS], double F[3][3], double C[N_STRAINS],
-                   const uz_element *element, uz_elasticity law, int n)
+                   const uz_element *element, uz_elasticity law)
 {
     const uz_lame lame = uz_lame_in_space(element->model, element->lame);
+    const int n = element->model == UZ_SOLID ? N_STRAINS : UZ_FINITE_PLANE_STRAINS;
     if (element->model != UZ_PLANE_STRESS)
         return uz_hyperelastic(W, S, D, n, law, lame.lambda, lame.mu, C);
     if (!settle_thickness(W, S, D, law, lame, C))
@@ -126,134 +209,270 @@ static bool law_at(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS
     return true;
 }
 
-static double least_det_at_corners(const uz_element *element, const double *u)
-{
-    const uz_element_type *type = uz_element_type_of(element->kind);
-    double least = INFINITY, F[3][3];
-    shape_at at;
-    for (int a = 0; a < type->corners; a++) {
-        shape_of(&at, element, type->local[a]);
-        deformation(F, &at, u);
-        least = fmin(least, orientation(F, at.dim));
-    }
-    return least;
-}
+/* ---- one point */
 
-/* What a displacement of node a along axis i adds to E. */
-static void add_strain_row(double b[N_STRAINS], const shape_at *at, double F[3][3], int a, int i)
-{
-    const double *g = at->grad[a], *f = F[i];
-    b[0] = f[0] * g[0];
-    b[1] = f[1] * g[1];
-    b[3] = f[0] * g[1] + f[1] * g[0];
-    if (at->dim == 2) {
-        b[2] = i == 0 ? F[2][2] * at->around[a] : 0;
-        return;
-    }
-    b[2] = f[2] * g[2];
-    b[4] = f[1] * g[2] + f[2] * g[1];
-    b[5] = f[2] * g[0] + f[0] * g[2];
-}
+/* Which component of a strain is that of two axes. */
+static const int COMPONENT[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
 
-static void add_material(double *ke, double weight, double B[][N_STRAINS], double D[N_STRAINS][N_STRAINS], int n,
-                         int strains)
-{
-    for (int p = 0; p < n; p++) {
-        double DB[N_STRAINS] = {0};
-        for (int i = 0; i < strains; i++)
-            for (int j = 0; j < strains; j++)
-                DB[i] += weight * D[i][j] * B[p][j];
-        if (strains == UZ_FINITE_PLANE_STRAINS)
-            for (int q = 0; q <= p; q++)
-                ke[p * n + q] += DB[0] * B[q][0] + DB[1] * B[q][1] + DB[2] * B[q][2] + DB[3] * B[q][3];
-        else
-            for (int q = 0; q <= p; q++)
-                ke[p * n + q] += DB[0] * B[q][0] + DB[1] * B[q][1] + DB[2] * B[q][2] + DB[3] * B[q][3] +
-                                 DB[4] * B[q][4] + DB[5] * B[q][5];
-    }
-}
+/* Of Gauss points: G[axis][node], derivatives of the shape functions by places, and N / r of rings as [3]; and
+ * A[i dim + J][k dim + L], the derivative of the forces per area P_iJ by F_kL with the point's volume, of rings with
+ * those around as AROUND. */
+enum { COMPONENTS = 9, PADDED = 12 };
+typedef struct {
+    double G[UZ_ELEMENT_GAUSS][4][UZ_ELEMENT_NODES];
+    double A[UZ_ELEMENT_GAUSS][COMPONENTS][PADDED];
+} points;
 
-/* What turns with the body. */
-static void add_stress(double *ke, double weight, const shape_at *at, const double *S)
+INLINE void slopes_of_nodes(points *out, const uz_finite_rule *rule, const shape *at, int p, int dim, int wide,
+                            bool ring)
 {
-    const int nodes = at->nodes, dim = at->dim, n = dim * nodes;
-    for (int a = 0; a < nodes; a++) {
-        const double *g = at->grad[a];
-        double t[3] = {weight * (S[0] * g[0] + S[3] * g[1]), weight * (S[3] * g[0] + S[1] * g[1]), 0};
-        if (dim == 3) {
-            t[0] += weight * S[5] * g[2];
-            t[1] += weight * S[4] * g[2];
-            t[2] = weight * (S[5] * g[0] + S[4] * g[1] + S[2] * g[2]);
+    double(*G)[UZ_ELEMENT_NODES] = out->G[p];
+    for (int w = 0; w < LANES * wide; w += LANES) {
+        for (int j = 0; j < dim; j++) {
+            four sum = *four_from(&rule->at_nodes[p][0][w]) * at->inverse[0][j][p];
+            for (int i = 1; i < dim; i++)
+                sum += *four_from(&rule->at_nodes[p][i][w]) * at->inverse[i][j][p];
+            *four_at(&G[j][w]) = sum;
         }
-        for (int b = 0; b <= a; b++) {
-            double sum = t[0] * at->grad[b][0] + t[1] * at->grad[b][1];
-            sum += dim == 3 ? t[2] * at->grad[b][2] : 0;
-            for (int i = 0; i < dim; i++)
-                ke[(dim * a + i) * n + dim * b + i] += sum;
-        }
-        for (int b = 0; b <= a && at->ring; b++)
-            ke[2 * a * n + 2 * b] += weight * S[2] * at->around[a] * at->around[b];
+        if (ring && at->per_radius[p] > 0)
+            *four_at(&G[3][w]) = *four_from(&rule->at_nodes[p][3][w]) * at->per_radius[p];
+        else if (ring)
+            *four_at(&G[3][w]) = *four_from(&G[0][w]);
     }
+}
+
+/* force[axis][node] += what the stress does, P = F S. */
+INLINE void add_forces(four force[3][UZ_ELEMENT_NODES / LANES], double G[4][UZ_ELEMENT_NODES], double F[3][3],
+                       const double *S, double volume, int dim, int wide, bool ring)
+{
+    for (int i = 0; i < dim; i++)
+        for (int J = 0; J < dim; J++) {
+            double P = 0;
+            for (int M = 0; M < dim; M++)
+                P += F[i][M] * S[COMPONENT[J][M]];
+            for (int w = 0; w < wide; w++)
+                force[i][w] += volume * P * *four_from(&G[J][LANES * w]);
+        }
+    for (int w = 0; w < wide && ring; w++)
+        force[0][w] += volume * F[2][2] * S[2] * *four_from(&G[3][LANES * w]);
+}
+
+/* A_iJkL = F_iM D_JMLN F_kN + T_JL (i = k), T the stress that turns with the body. */
+INLINE void moduli(double A[COMPONENTS][PADDED], double F[3][3], double D[N_STRAINS][N_STRAINS], const double *T,
+                   double volume, int dim, bool ring)
+{
+    double DF[N_STRAINS][PADDED] = {{0}};
+    const int strains = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
+    const int used = dim == 3 ? 12 : ring ? 8 : 4; /* of PADDED */
+    for (int c = 0; c < strains; c++) {
+        for (int k = 0; k < dim; k++)
+            for (int L = 0; L < dim; L++)
+                for (int N = 0; N < dim; N++)
+                    DF[c][k * dim + L] += volume * D[c][COMPONENT[L][N]] * F[k][N];
+        if (ring)
+            DF[c][AROUND] = volume * D[c][2] * F[2][2];
+    }
+    for (int i = 0; i < dim; i++)
+        for (int J = 0; J < dim; J++) {
+            double *row = A[i * dim + J];
+            for (int v = 0; v < used; v += LANES) {
+                four sum = {0};
+                for (int M = 0; M < dim; M++)
+                    sum += F[i][M] * *four_from(&DF[COMPONENT[J][M]][v]);
+                *four_at(&row[v]) = sum;
+            }
+            for (int L = 0; L < dim; L++)
+                row[i * dim + L] += volume * T[COMPONENT[J][L]];
+        }
+    for (int v = 0; v < used && ring; v++)
+        A[AROUND][v] = F[2][2] * DF[2][v] + (v == AROUND ? volume * T[2] : 0);
 }
 
 /* S of the strain without h'h / 2. */
-static void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS], const shape_at *at,
-                          const double *step)
+INLINE void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS], gradients of_step,
+                          int p, int dim, bool ring)
 {
     double h[3][3], q[N_STRAINS];
-    deformation(h, at, step);
+    const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
+    deformation(h, of_step, p, dim, ring);
     for (int i = 0; i < 3; i++)
         h[i][i] -= 1;
-    cauchy_green(q, h, at->dim);
-    for (int i = 0; i < at->n; i++) {
+    cauchy_green(q, h, dim);
+    for (int i = 0; i < n; i++) {
         T[i] = S[i];
-        for (int j = 0; j < at->n; j++)
+        for (int j = 0; j < n; j++)
             T[i] -= (j < 3 ? 0.5 : 1) * D[i][j] * q[j];
     }
 }
 
-bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law, const double *u,
-                       const double *step)
+/* ---- the tangent */
+
+/* Rows of node a along `rows` axes from i on, of nodes from the group `first` of four on: K = integral g_a A g_b. */
+INLINE void add_rows(double *ke, const points *at, const uz_finite_rule *rule, int a, int i, int rows, int first,
+                     int dim, int wide, bool ring)
 {
-    const uz_gauss_rule *rule = uz_element_rule(element->kind, element->model);
-    const uz_element_type *type = uz_element_type_of(element->kind);
-    const int dim = type->dim, n = dim * type->nodes;
-    double F[3][3], B[UZ_ELEMENT_DOFS][N_STRAINS];
-    shape_at at;
-    memset(out, 0, sizeof *out);
-    out->least_det = least_det_at_corners(element, u);
-    if (ke)
-        memset(ke, 0, (size_t)(n * n) * sizeof *ke);
-    for (int g = 0; g < rule->count; g++) {
-        double W, C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS], T[N_STRAINS];
-        shape_of(&at, element, rule->point[g].at);
-        const double weight = rule->point[g].weight * at.det * at.depth;
-        deformation(F, &at, u);
-        out->least_det = fmin(out->least_det, orientation(F, dim));
-        cauchy_green(C, F, dim);
-        if (!(out->least_det > 0) || !law_at(&W, S, D, F, C, element, law, at.n)) {
-            out->least_det = fmin(out->least_det, 0); /* also where no stretch across a plane is without stress */
-            continue;                                 /* the other points may be worse */
-        }
-        out->energy += weight * W;
-        for (int p = 0; p < n; p++) {
-            double work = 0;
-            add_strain_row(B[p], &at, F, p / dim, p % dim);
-            for (int c = 0; c < at.n; c++)
-                work += B[p][c] * S[c];
-            out->force[p] += weight * work;
-        }
-        if (ke && step)
-            stress_before(T, S, D, &at, step);
-        if (ke) {
-            add_material(ke, weight, B, D, n, at.n);
-            add_stress(ke, weight, &at, step ? T : S);
-        }
+    four sum[2][3][UZ_ELEMENT_NODES / LANES];
+    const int n = dim * rule->nodes, used = dim == 3 ? 12 : ring ? 8 : 4;
+    for (int r = 0; r < rows; r++)
+        for (int k = 0; k < dim; k++)
+            for (int w = first; w < wide; w++)
+                sum[r][k][w] = (four){0};
+    for (int g = 0; g < rule->gauss; g++) {
+        double t[2][PADDED];
+        for (int r = 0; r < rows; r++)
+            for (int v = 0; v < used; v += LANES) {
+                four by = at->G[g][0][a] * *four_from(&at->A[g][(i + r) * dim][v]);
+                for (int J = 1; J < dim; J++)
+                    by += at->G[g][J][a] * *four_from(&at->A[g][(i + r) * dim + J][v]);
+                if (ring && i + r == 0)
+                    by += at->G[g][3][a] * *four_from(&at->A[g][AROUND][v]);
+                *four_at(&t[r][v]) = by;
+            }
+        for (int w = first; w < wide; w++)
+            for (int r = 0; r < rows; r++)
+                for (int k = 0; k < dim; k++) {
+                    for (int L = 0; L < dim; L++)
+                        sum[r][k][w] += t[r][k * dim + L] * *four_from(&at->G[g][L][LANES * w]);
+                    if (ring && k == 0)
+                        sum[r][k][w] += t[r][AROUND] * *four_from(&at->G[g][3][LANES * w]);
+                }
     }
-    for (int p = 0; p < n && ke; p++)
-        for (int q = 0; q < p; q++)
-            ke[q * n + p] = ke[p * n + q];
-    return out->least_det > 0;
+    for (int r = 0; r < rows; r++)
+        for (int w = first; w < wide; w++)
+            for (int lane = 0; lane < LANES && LANES * w + lane < rule->nodes; lane++)
+                for (int k = 0; k < dim; k++) {
+                    const int p = dim * a + i + r, q = dim * (LANES * w + lane) + k;
+                    ke[p * n + q] = ke[q * n + p] = sum[r][k][w][lane];
+                }
+}
+
+INLINE void tangent_of(double *ke, const points *at, const uz_finite_rule *rule, int dim, int wide, bool ring)
+{
+    const int rows = dim == 2 ? 2 : 1; /* what registers hold */
+    for (int first = 0; first < wide; first++)
+        for (int a = LANES * first; a < LANES * (first + 1) && a < rule->nodes; a++)
+            for (int i = 0; i < dim; i += rows)
+                add_rows(ke, at, rule, a, i, rows, first, dim, wide, ring);
+}
+
+/* ---- an element */
+
+typedef struct {
+    uz_finite_forces *out;
+    double *ke;
+    const uz_finite_rule *rule;
+    const uz_element *element;
+    uz_elasticity law;
+    const double *u, *step;
+} task;
+
+/* wide: nodes by fours. */
+INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
+{
+    const uz_finite_rule *rule = x->rule;
+    uz_finite_forces *out = x->out;
+    shape rest;
+    gradients H, of_step;
+    points at;
+    four force[3][UZ_ELEMENT_NODES / LANES] = {{{0}}};
+    shape_of(&rest, rule, x->element, dim, ring);
+    find_gradients(H, rule, &rest, x->u, dim, ring);
+    if (x->ke && x->step)
+        find_gradients(of_step, rule, &rest, x->step, dim, ring);
+    for (int p = 0; p < rule->points; p++) {
+        double F[3][3];
+        deformation(F, H, p, dim, ring);
+        out->least_det = fmin(out->least_det, orientation(F, dim));
+    }
+    for (int g = 0; g < rule->gauss; g++) {
+        double F[3][3], W, C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS], T[N_STRAINS];
+        const double volume = rest.volume[g];
+        deformation(F, H, g, dim, ring);
+        cauchy_green(C, F, dim);
+        if (!(out->least_det > 0) || !law_at(&W, S, D, F, C, x->element, x->law)) {
+            out->least_det = fmin(out->least_det, 0); /* also where no stretch across a plane is without stress */
+            return false;
+        }
+        out->energy += volume * W;
+        slopes_of_nodes(&at, rule, &rest, g, dim, wide, ring);
+        add_forces(force, at.G[g], F, S, volume, dim, wide, ring);
+        if (x->ke && x->step)
+            stress_before(T, S, D, of_step, g, dim, ring);
+        if (x->ke)
+            moduli(at.A[g], F, D, x->step ? T : S, volume, dim, ring);
+    }
+    for (int a = 0; a < rule->nodes; a++)
+        for (int i = 0; i < dim; i++)
+            out->force[dim * a + i] = force[i][a / LANES][a % LANES];
+    if (x->ke)
+        tangent_of(x->ke, &at, rule, dim, wide, ring);
+    return true;
+}
+
+/* Of all shapes, for any processor; and of each by itself. */
+static bool any(const task *x)
+{
+    return evaluate(x, x->rule->dim, (x->rule->nodes + LANES - 1) / LANES, x->rule->model == UZ_AXISYMMETRIC);
+}
+
+UZ_AVX2_FMA static bool four_of_plane(const task *x)
+{
+    return evaluate(x, 2, 1, false);
+}
+
+UZ_AVX2_FMA static bool eight_of_plane(const task *x)
+{
+    return evaluate(x, 2, 2, false);
+}
+
+UZ_AVX2_FMA static bool four_of_ring(const task *x)
+{
+    return evaluate(x, 2, 1, true);
+}
+
+UZ_AVX2_FMA static bool eight_of_ring(const task *x)
+{
+    return evaluate(x, 2, 2, true);
+}
+
+UZ_AVX2_FMA static bool four_of_solid(const task *x)
+{
+    return evaluate(x, 3, 1, false);
+}
+
+UZ_AVX2_FMA static bool eight_of_solid(const task *x)
+{
+    return evaluate(x, 3, 2, false);
+}
+
+UZ_AVX2_FMA static bool twelve_of_solid(const task *x)
+{
+    return evaluate(x, 3, 3, false);
+}
+
+UZ_AVX2_FMA static bool sixteen_of_solid(const task *x)
+{
+    return evaluate(x, 3, 4, false);
+}
+
+UZ_AVX2_FMA static bool twenty_of_solid(const task *x)
+{
+    return evaluate(x, 3, 5, false);
+}
+
+bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *rule, const uz_element *element,
+                       uz_elasticity law, const double *u, const double *step)
+{
+    typedef bool (*evaluation)(const task *);
+    static const evaluation PLANE[] = {four_of_plane, eight_of_plane}, RING[] = {four_of_ring, eight_of_ring},
+                            SOLID[] = {four_of_solid, eight_of_solid, twelve_of_solid, sixteen_of_solid,
+                                       twenty_of_solid};
+    const int group = (rule->nodes - 1) / LANES;
+    *out = (uz_finite_forces){.least_det = INFINITY};
+    const task x = {out, ke, rule, element, law, u, step};
+    if (!uz_cpu_has_avx2_fma())
+        return any(&x);
+    return (rule->dim == 3 ? SOLID : rule->model == UZ_AXISYMMETRIC ? RING : PLANE)[group](&x);
 }
 
 void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elasticity law, const double *u,
@@ -261,13 +480,18 @@ void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elas
 {
     static const int AXIS[N_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
     double F[3][3], C[N_STRAINS], W, S[N_STRAINS] = {0}, D[N_STRAINS][N_STRAINS];
-    shape_at at;
-    shape_of(&at, element, point);
-    deformation(F, &at, u);
-    out->det = orientation(F, at.dim);
-    cauchy_green(C, F, at.dim);
-    const bool good = out->det > 0 && law_at(&W, S, D, F, C, element, law, at.n);
-    out->det = orientation(F, at.dim);
+    const bool ring = element->model == UZ_AXISYMMETRIC;
+    uz_finite_rule rule;
+    shape rest;
+    gradients H;
+    uz_finite_rule_at(&rule, element->kind, element->model, point);
+    shape_of(&rest, &rule, element, rule.dim, ring);
+    find_gradients(H, &rule, &rest, u, rule.dim, ring);
+    deformation(F, H, 0, rule.dim, ring);
+    out->det = orientation(F, rule.dim);
+    cauchy_green(C, F, rule.dim);
+    const bool good = out->det > 0 && law_at(&W, S, D, F, C, element, law);
+    out->det = orientation(F, rule.dim);
     for (int c = 0; c < N_STRAINS; c++)
         out->strain[c] = 0.5 * (C[c] - (c < 3));
     const double full[3][3] = {{S[0], S[3], S[5]}, {S[3], S[1], S[4]}, {S[5], S[4], S[2]}};

@@ -3,6 +3,7 @@
 #define UZ_FINITE_ELEMENT_H
 
 #include "element/element.h"
+#include "finite/finite_rule.h"
 
 typedef struct {
     double energy;                 /* W over the element's volume */
@@ -10,14 +11,15 @@ typedef struct {
     double force[UZ_ELEMENT_DOFS]; /* internal forces: the gradient of the energy */
 } uz_finite_forces;
 
-/* Of an element in the plane, of a ring or a solid, whose shape is good, displaced by u (nodes x dim). ke (NULL: not
+/* Of an element in the plane, of a ring or a solid, whose shape is good, displaced by u (nodes x dim).
+ * rule: uz_finite_rule_of its kind and model. ke (NULL: not
  * wanted): the tangent, the energy's second derivatives, full and symmetric, as uz_element_stiffness has it; at u = 0
  * it is that of the standard formulation. False: det F <= 0 somewhere, or
  * in plane stress no stretch across the plane is without stress; least_det alone is then filled. step  nodes x
  * dim, the last change of u: in ke alone, what the stress does to turning parts is that of the strains that this change
  * was linear for. NULL: none */
-bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_element *element, uz_elasticity law, const double *u,
-                       const double *step);
+bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *rule, const uz_element *element,
+                       uz_elasticity law, const double *u, const double *step);
 
 /* At a local point: det F, and Cauchy's stress and the Green-Lagrange strain with the components xx, yy, zz, xy, yz,
  * zx.

@@ -24,7 +24,8 @@ static coefficients neo_hooke(double lambda, double mu, double J, double trace)
 
 static coefficients neo_hooke_isochoric(double lambda, double mu, double J, double trace)
 {
-    const double K = lambda + 2.0 / 3 * mu, a = mu * pow(J, -2.0 / 3), p = K * (J - 1) * J, b = p - a * trace / 3;
+    const double K = lambda + 2.0 / 3 * mu, root = cbrt(J), a = mu / (root * root), p = K * (J - 1) * J,
+                 b = p - a * trace / 3;
     return (coefficients){.W = 0.5 * (a * trace - 3 * mu) + 0.5 * K * (J - 1) * (J - 1),
                           .a = a,
                           .b = b,
@@ -71,10 +72,28 @@ static void kirchhoff(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE
     }
 }
 
+/* Inlined for each n, whose loops the compiler then unrolls. */
+static inline __attribute__((always_inline)) void of_coefficients(double S[UZ_FINITE_STRAINS],
+                                                                  double D[UZ_FINITE_STRAINS][UZ_FINITE_STRAINS],
+                                                                  coefficients k, double B[3][3], int n)
+{
+    static const int AXIS[UZ_FINITE_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}};
+    for (int i = 0; i < n; i++) {
+        const int *p = AXIS[i];
+        const double own = B[p[0]][p[1]];
+        S[i] = k.a * (i < 3) + k.b * own;
+        for (int j = 0; j <= i; j++) {
+            const int *q = AXIS[j];
+            const double other = B[q[0]][q[1]];
+            const double mixed = 0.5 * (B[p[0]][q[0]] * B[p[1]][q[1]] + B[p[0]][q[1]] * B[p[1]][q[0]]);
+            D[i][j] = D[j][i] = k.c * ((i < 3) * other + own * (j < 3)) + k.e * own * other + k.f * mixed;
+        }
+    }
+}
+
 bool uz_hyperelastic(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE_STRAINS][UZ_FINITE_STRAINS], int n,
                      uz_elasticity law, double lambda, double mu, const double C[UZ_FINITE_STRAINS])
 {
-    static const int AXIS[UZ_FINITE_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}};
     double B[3][3], det;
     if (!inverse(B, &det, C))
         return false;
@@ -84,16 +103,9 @@ bool uz_hyperelastic(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE_
     }
     const coefficients k = of_law(law, lambda, mu, sqrt(det), C[0] + C[1] + C[2]);
     *W = k.W;
-    for (int i = 0; i < n; i++) {
-        const int *p = AXIS[i];
-        const double own = B[p[0]][p[1]];
-        S[i] = k.a * (i < 3) + k.b * own;
-        for (int j = 0; j <= i; j++) {
-            const int *q = AXIS[j];
-            const double mixed = 0.5 * (B[p[0]][q[0]] * B[p[1]][q[1]] + B[p[0]][q[1]] * B[p[1]][q[0]]);
-            const double other = B[q[0]][q[1]];
-            D[i][j] = D[j][i] = k.c * ((i < 3) * other + own * (j < 3)) + k.e * own * other + k.f * mixed;
-        }
-    }
+    if (n == UZ_FINITE_PLANE_STRAINS)
+        of_coefficients(S, D, k, B, UZ_FINITE_PLANE_STRAINS);
+    else
+        of_coefficients(S, D, k, B, UZ_FINITE_STRAINS);
     return true;
 }
