@@ -57,34 +57,51 @@ typedef struct {
     bool ring;
 } point_at;
 
-/* Forces in extended precision; of the tangent, whose entries are doubles, the half up to the diagonal. */
-static void add_point(long double *force, double *ke, long double weight, const point_at *x, const uz_piola *at)
+/* Forces in extended precision; of the tangent, whose entries are doubles, the half up to the diagonal, as
+ * rows[p][k][b]: of dof p, axis k and node b. Inlined where dim is a constant. */
+static inline __attribute__((always_inline)) void add_point_of(long double *force, double *rows, long double weight,
+                                                               const point_at *x, const uz_piola *at, int dim,
+                                                               bool ring)
 {
-    const int dim = x->dim, n = dim * x->nodes;
-    double A[9][9];
-    for (int i = 0; i < 9; i++)
-        for (int k = 0; k < 9; k++)
-            A[i][k] = (double)(weight * at->A[i][k]);
-    for (int p = 0; p < n; p++) {
-        const int a = p / dim, i = p % dim;
-        const bool hoop = x->ring && i == 0; /* moves what is around the axis, too */
+    static const int PLANE[] = {0, 1, 3, 4, 8}, SPACE[] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+    const int *entry = dim == 2 ? PLANE : SPACE, count = dim * dim + ring, nodes = x->nodes; /* those of F */
+    double A[9][9], grad[4][UZ_ELEMENT_NODES];
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < count; k++)
+            A[i][k] = (double)(weight * at->A[entry[i]][entry[k]]);
+    for (int a = 0; a < nodes; a++)
+        for (int J = 0; J <= dim; J++)
+            grad[J][a] = J < dim ? x->grad[a][J] : x->around[a];
+    for (int p = 0; p < dim * nodes; p++) {
+        const int a = p / dim, i = p % dim, reach = dim + (ring && i == 0); /* moves what is around the axis, too */
         double by[9] = {0};
-        for (int J = 0; J < dim; J++) {
-            force[p] += weight * at->P[3 * i + J] * x->grad[a][J];
-            for (int k = 0; k < 9; k++)
-                by[k] += A[3 * i + J][k] * x->grad[a][J];
+        for (int J = 0; J < reach; J++) {
+            const int own = J < dim ? dim * i + J : count - 1;
+            force[p] += weight * at->P[entry[own]] * grad[J][a];
+            for (int k = 0; k < count; k++)
+                by[k] += A[own][k] * grad[J][a];
         }
-        force[p] += hoop ? weight * at->P[8] * x->around[a] : 0;
-        for (int k = 0; k < 9 && hoop; k++)
-            by[k] += A[8][k] * x->around[a];
-        for (int b = 0; b <= a; b++)
-            for (int k = 0; k < dim; k++) {
-                double sum = x->ring && k == 0 ? by[8] * x->around[b] : 0;
+        for (int k = 0; k < dim; k++) {
+            double *row = rows + (p * dim + k) * nodes;
+            const double around = ring && k == 0 ? by[count - 1] : 0;
+            for (int b = 0; b <= a; b++) {
+                double sum = ring ? around * grad[dim][b] : 0;
                 for (int L = 0; L < dim; L++)
-                    sum += by[3 * k + L] * x->grad[b][L];
-                ke[p * n + dim * b + k] += sum;
+                    sum += by[dim * k + L] * grad[L][b];
+                row[b] += sum;
             }
+        }
     }
+}
+
+static void add_point(long double *force, double *rows, long double weight, const point_at *x, const uz_piola *at)
+{
+    if (x->dim == 3)
+        add_point_of(force, rows, weight, x, at, 3, false);
+    else if (x->ring)
+        add_point_of(force, rows, weight, x, at, 2, true);
+    else
+        add_point_of(force, rows, weight, x, at, 2, false);
 }
 
 /* Returns what must be positive: det F, which in the plane is not where the stretch across it is not. */
@@ -184,7 +201,8 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
 {
     const uz_body_model *model = w->of->model;
     const int dim = model->mesh.dim;
-    double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], measure;
+    double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], measure;
+    double rows[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS];
     long double force[UZ_ELEMENT_DOFS] = {0};
     uz_element element;
     point_at x;
@@ -197,7 +215,7 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     const uz_lame lame = uz_lame_in_space(element.model, element.lame);
     const uz_elasticity law = uz_element_material(model, e)->law;
     const int n = dim * nodes;
-    memset(ke, 0, (size_t)(n * n) * sizeof *ke);
+    memset(rows, 0, (size_t)(n * n) * sizeof *rows);
     for (int i = 0; i < n; i++)
         u[i] = w->of->u[dim * node[i / dim] + i % dim];
     for (int a = 0; a < type->corners; a++) {
@@ -215,12 +233,12 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
             continue;
         w->energy += weight * at.W;
         add_unit(w, weight, &lame, &x, u);
-        add_point(force, ke, weight, &x, &at);
+        add_point(force, rows, weight, &x, &at);
     }
     for (int i = 0; i < n; i++) {
         w->force[dim * node[i / dim] + i % dim] += force[i];
-        for (int k = 0; k < i; k++)
-            ke[k * n + i] = ke[i * n + k];
+        for (int k = 0; k <= i; k++)
+            ke[k * n + i] = ke[i * n + k] = rows[(i * dim + k % dim) * nodes + k / dim];
     }
     uz_add_stiffness(&w->tangent, ke, node, nodes);
 }

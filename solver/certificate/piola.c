@@ -69,7 +69,7 @@ void uz_piola_at(uz_piola *out, uz_elasticity law, real lambda, real mu, const r
         I1 += F[i] * F[i];
     }
     const bool plain = law == UZ_ELASTIC_NEO_HOOKE;
-    const real a = plain ? mu : mu * powl(J, (real)-2 / 3);
+    const real root = plain ? 1 : cbrtl(J), a = mu / (root * root);
     const real b = plain ? lambda * log_J - mu : K * (J - 1) * J - a * I1 / 3;
     out->W = plain ? mu * (I1 - 3) / 2 - mu * log_J + lambda * log_J * log_J / 2
                    : (a * I1 - 3 * mu) / 2 + K * (J - 1) * (J - 1) / 2;
