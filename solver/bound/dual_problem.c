@@ -927,7 +927,7 @@ static macro *make(macro *kept, const uz_bound_body *body, int64_t element)
     for (int j = 0; j < m->kept; j++)
         for (int r = 0; r < m->outer; r++)
             m->A[m->kept + r + ld * j] = dot(m->all, outer + r * m->all, m->Z + m->all * j);
-    if (!uz_block_factor(m->kept, m->outer, m->A, ld))
+    if (uz_block_factor(m->kept, m->outer, m->A, ld) < m->kept)
         return NULL;
     uz_trsv_lower(m->kept, m->A, ld, m->y, false);
     m->made = true;

@@ -143,7 +143,7 @@ static bool eliminate(uz_envelope *f, int64_t block, const double *own, double l
                                 .subtract = true};
         uz_block_outer(&outer);
     }
-    bool good = uz_block_factor(n, rows - n, L, rows);
+    bool good = uz_block_factor(n, rows - n, L, rows) == n;
     for (int64_t i = 0; i < n && good; i++)
         good = L[i * rows + i] * L[i * rows + i] > least * own[first + i];
     return good;

@@ -70,6 +70,16 @@ void uz_factor_use_threads(int threads)
     blas_threads = threads;
 }
 
+/* column: in the factor's order. */
+static uz_status refuse_pivot(const uz_factor *factor, int64_t column, uz_error *err)
+{
+    const int64_t dof = column < factor->n ? ((SuiteSparse_long *)factor->L.Perm)[column] : -1;
+    return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                   "K is not positive definite: the elimination meets a pivot that is not positive at dof %lld "
+                   "(numbered from 0). Support the body so that it can't move freely, or check the signs of K.",
+                   (long long)dof);
+}
+
 /* cholmod_factorize, told that the matrix is in the factor's order already. A TRUE from it is no proof: status and
  * minor are looked at before anything resets them. */
 static uz_status factorize(uz_factor *factor, cholmod_sparse *S, cholmod_common *common, uz_error *err)
@@ -90,13 +100,8 @@ static uz_status factorize(uz_factor *factor, cholmod_sparse *S, cholmod_common 
     int64_t minor = (int64_t)factor->L.minor;
     if (!S || status == CHOLMOD_OUT_OF_MEMORY || status == CHOLMOD_TOO_LARGE)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %.3g bytes", 8.0 * (double)factor->L.xsize);
-    if (status == CHOLMOD_NOT_POSDEF || minor < factor->n) {
-        int64_t dof = minor < factor->n ? ((SuiteSparse_long *)factor->L.Perm)[minor] : -1;
-        return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                       "K is not positive definite: the elimination meets a pivot that is not positive at dof %lld "
-                       "(numbered from 0). Support the body so that it can't move freely, or check the signs of K.",
-                       (long long)dof);
-    }
+    if (status == CHOLMOD_NOT_POSDEF || minor < factor->n)
+        return refuse_pivot(factor, minor, err);
     if (!ok || status != CHOLMOD_OK)
         return uz_fail(err, UZ_ERR_INTERNAL, "K", "factorization failed (CHOLMOD status %d)", status);
     return UZ_OK;
@@ -138,17 +143,16 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
                          "the factor would take %.0f bytes and the limit is %zu: raise the limit", bytes, memory_limit);
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
-    bool filled = false;
     if (status == UZ_OK && !is_for_many_threads(factor)) {
         uz_refill *numbers;
+        int64_t refused;
         status = uz_refill_new(&numbers, factor, K, true, err);
         if (status == UZ_OK)
-            status = uz_refill_run(&filled, numbers, factor, err);
+            status = uz_refill_run(&refused, numbers, factor, err);
+        if (status == UZ_OK && refused < factor->n)
+            status = refuse_pivot(factor, refused, err);
         uz_refill_free(numbers);
-    }
-    if (status == UZ_OK && !filled) { /* it names a pivot that is not positive */
-        SuiteSparse_free(factor->L.x);
-        factor->L = *analysis->L;
+    } else if (status == UZ_OK) {
         cholmod_sparse *S = uz_permute(K, factor->analysis->position, NULL, &common);
         status = factorize(factor, S, &common, err);
         cholmod_l_free_sparse(&S, &common);

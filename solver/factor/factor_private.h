@@ -36,8 +36,9 @@ uz_status uz_factor_solve_shares(const uz_factor *factor, double *X, double *Y, 
 typedef struct uz_refill uz_refill;
 uz_status uz_refill_new(uz_refill **out, const uz_factor *factor, const uz_csc *K, bool once, uz_error *err);
 void uz_refill_free(uz_refill *x);
-/* *positive false: it met a pivot that is not, with memory to be given back. UZ_ERR_MEMORY. */
-uz_status uz_refill_run(bool *positive, uz_refill *x, uz_factor *factor, uz_error *err);
+/* *refused: the first column, in the factor's order, whose pivot is not positive, with memory to be given back; n:
+ * none. UZ_ERR_MEMORY. */
+uz_status uz_refill_run(int64_t *refused, uz_refill *x, uz_factor *factor, uz_error *err);
 
 struct uz_factor {
     uz_analysis *analysis;

@@ -242,7 +242,7 @@ static uz_status make(bool *positive, uz_paths *x, int64_t s, uz_error *err)
             block[c + b * height] = 0.0;
         block[c + c * height] = 1.0;
     }
-    *positive = uz_block_factor(columns, height - columns, block, height);
+    *positive = uz_block_factor(columns, height - columns, block, height) == columns;
     return UZ_OK;
 }
 

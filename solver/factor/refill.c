@@ -40,10 +40,10 @@ struct uz_refill {
     int64_t *next;     /* nsuper: the one after it in the list that it is in */
     int64_t *from;     /* nsuper: its first row that has not taken its part yet */
     struct {
-        int64_t *local; /* n: a row's place in the current supernode; the rest's is that of share 0, and its room */
-        int64_t *head;  /* nsuper: the first one of this share that it takes from next; -1: none */
-        double *room;   /* for the largest product, or parts of it */
-        bool positive;  /* all pivots so far */
+        int64_t *local;  /* n: a row's place in the current supernode; the rest's is that of share 0, and its room */
+        int64_t *head;   /* nsuper: the first one of this share that it takes from next; -1: none */
+        double *room;    /* for the largest product, or parts of it */
+        int64_t refused; /* the first column whose pivot is not positive; n: none so far */
     } of[UZ_SHARES];
     int64_t room; /* entries of it */
     cholmod_factor *L;
@@ -138,7 +138,7 @@ static void multiply_plain(const uz_outer *p)
 /* The kernels that the processor has. */
 typedef struct {
     void (*multiply)(const uz_outer *p);
-    bool (*factor)(double *block, int64_t columns, int64_t rows);
+    int64_t (*factor)(double *block, int64_t columns, int64_t rows); /* as uz_block_factor */
 } kernels;
 
 static int64_t pitch_of(int64_t rows)
@@ -158,8 +158,9 @@ static inline __attribute__((always_inline)) void add_left(four sum[TILE], const
     }
 }
 
-/* Columns j .. j + width - 1 of a block whose columns before them are done; false: a pivot is not positive. */
-static inline __attribute__((always_inline)) bool factor_strip(double *block, int64_t rows, int64_t j, int width)
+/* Columns j .. j + width - 1 of a block whose columns before them are done. Returns how many of them have pivots that
+ * are positive. */
+static inline __attribute__((always_inline)) int factor_strip(double *block, int64_t rows, int64_t j, int width)
 {
     double L[TILE][TILE] = {{0}}, inverse[TILE] = {0}; /* of their own rows */
     four own[TILE] = {{0}};
@@ -172,7 +173,7 @@ static inline __attribute__((always_inline)) bool factor_strip(double *block, in
                 value -= L[r][k] * L[c][k];
             L[r][c] = r == c ? sqrt(value) : value * inverse[c];
             if (r == c && !(value > 0.0 && value < INFINITY))
-                return false;
+                return c;
             inverse[c] = r == c ? 1.0 / L[c][c] : inverse[c];
             column[r] = L[r][c];
         }
@@ -193,27 +194,29 @@ static inline __attribute__((always_inline)) bool factor_strip(double *block, in
                 column[r] = sum[c][r];
         }
     }
-    return true;
+    return width;
 }
 
 /* The first `columns` columns of a block become those of its Cholesky factor, some at a time. */
-static inline __attribute__((always_inline)) bool factor_columns(double *block, int64_t columns, int64_t rows)
+static inline __attribute__((always_inline)) int64_t factor_columns(double *block, int64_t columns, int64_t rows)
 {
-    bool positive = true;
     int64_t j = 0;
-    for (; positive && j + TILE <= columns; j += TILE)
-        positive = factor_strip(block, rows, j, TILE);
-    for (; positive && j < columns; j++)
-        positive = factor_strip(block, rows, j, 1);
-    return positive;
+    while (j < columns) {
+        const int width = j + TILE <= columns ? TILE : 1;
+        const int good = width == TILE ? factor_strip(block, rows, j, TILE) : factor_strip(block, rows, j, 1);
+        j += good;
+        if (good < width)
+            break;
+    }
+    return j;
 }
 
-UZ_AVX2_FMA static bool factor_fused(double *block, int64_t columns, int64_t rows)
+UZ_AVX2_FMA static int64_t factor_fused(double *block, int64_t columns, int64_t rows)
 {
     return factor_columns(block, columns, rows);
 }
 
-static bool factor_plain(double *block, int64_t columns, int64_t rows)
+static int64_t factor_plain(double *block, int64_t columns, int64_t rows)
 {
     return factor_columns(block, columns, rows);
 }
@@ -393,8 +396,8 @@ static void divide_band(void *ctx, int half)
                     p->block + low + p->begin * p->rows, p->rows);
 }
 
-/* From what a supernode has of K to its columns of the factor; false: a pivot is not positive. */
-static inline __attribute__((always_inline)) bool make_together(pair *p, int64_t columns)
+/* From what a supernode has of K to its columns of the factor, as uz_block_factor. */
+static inline __attribute__((always_inline)) int64_t make_together(pair *p, int64_t columns)
 {
     const double c = (double)columns, r = (double)p->rows, half = (c * r - c * c / 2) / 2;
     p->middle = half > c * c / 2 ? (int64_t)(half / c + c / 2) : (int64_t)sqrt(2 * half); /* of its entries */
@@ -404,12 +407,14 @@ static inline __attribute__((always_inline)) bool make_together(pair *p, int64_t
         p->middle = p->end > (p->begin + p->rows) / 2 ? p->end : (p->begin + p->rows) / 2;
         if (p->begin > 0)
             uz_aside_share(update_band, p, UZ_REST);
-        if (!uz_block_factor(p->end - p->begin, 0, p->block + p->begin * (p->rows + 1), p->rows))
-            return false;
+        const int64_t width = p->end - p->begin,
+                      good = uz_block_factor(width, 0, p->block + p->begin * (p->rows + 1), p->rows);
+        if (good < width)
+            return p->begin + good;
         p->middle = (p->end + p->rows) / 2;
         uz_aside_share(divide_band, p, UZ_REST);
     }
-    return true;
+    return columns;
 }
 
 /* ---- all of them */
@@ -426,6 +431,7 @@ static inline __attribute__((always_inline)) void make(uz_refill *x, int share, 
     double *block = (double *)L->x + ((const SuiteSparse_long *)L->px)[s];
     const band whole = {.x = x, .by = by, .s = s, .high = rows, .local = local, .room = x->of[share].room};
     pair halves = {.x = x, .s = s, .rows = rows, .block = block};
+    int64_t good = columns;
     memset(block, 0, (size_t)(columns * rows) * sizeof *block);
     for (int64_t i = 0; i < rows; i++)
         local[row[pi[s] + i]] = i;
@@ -433,7 +439,7 @@ static inline __attribute__((always_inline)) void make(uz_refill *x, int share, 
         for (int64_t e = ptr[super[s] + c]; e < ptr[super[s] + c + 1]; e++)
             block[local[index[e]] + c * rows] = value[e];
     if (together)
-        x->of[share].positive = make_together(&halves, columns);
+        good = make_together(&halves, columns);
     for (int k = share == UZ_REST ? 0 : share; k <= share; k++) /* the rest takes from all */
         for (int64_t d = x->of[k].head[s], after; d >= 0; d = after) {
             after = x->next[d];
@@ -442,8 +448,10 @@ static inline __attribute__((always_inline)) void make(uz_refill *x, int share, 
             pass_on(x, share, s, d);
         }
     if (!together)
-        x->of[share].positive = columns * columns * rows > MANY ? uz_block_factor(columns, rows - columns, block, rows)
-                                                                : by->factor(block, columns, rows);
+        good = columns * columns * rows > MANY ? uz_block_factor(columns, rows - columns, block, rows)
+                                               : by->factor(block, columns, rows);
+    if (good < columns)
+        x->of[share].refused = super[s] + good;
     x->from[s] = columns;
     if (rows > columns) {
         const int64_t to = x->owner[row[pi[s] + columns]];
@@ -457,10 +465,10 @@ static inline __attribute__((always_inline)) void make_all(uz_refill *x, int sha
 {
     const kernels by = kernels_here();
     const int64_t count = (int64_t)x->L->nsuper;
-    x->of[share].positive = true;
+    x->of[share].refused = (int64_t)x->L->n;
     for (int64_t s = 0; s < count; s++)
         x->of[share].head[s] = -1;
-    for (int64_t s = 0; s < count && x->of[share].positive; s++)
+    for (int64_t s = 0; s < count && x->of[share].refused == (int64_t)x->L->n; s++)
         if (x->share[s] == share)
             make(x, share, s, &by);
 }
@@ -482,18 +490,19 @@ static uz_status make_room(cholmod_factor *L, uz_error *err)
     return UZ_OK;
 }
 
-uz_status uz_refill_run(bool *positive, uz_refill *x, uz_factor *factor, uz_error *err)
+uz_status uz_refill_run(int64_t *refused, uz_refill *x, uz_factor *factor, uz_error *err)
 {
     uz_status status = make_room(&factor->L, err);
-    *positive = false;
+    *refused = 0;
     if (status != UZ_OK)
         return status;
     x->L = &factor->L;
     x->share = factor->analysis->share;
     uz_aside_share(fill_share, x, UZ_REST);
-    if (x->of[0].positive && x->of[1].positive) {
+    *refused = x->of[0].refused < x->of[1].refused ? x->of[0].refused : x->of[1].refused;
+    if (*refused == factor->n) {
         make_all(x, UZ_REST);
-        *positive = x->of[UZ_REST].positive;
+        *refused = x->of[UZ_REST].refused;
     }
     return UZ_OK;
 }
@@ -512,9 +521,9 @@ uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
         for (int64_t k = 0; k < count; k++)
             value[factor->refill->place[k]] = K->val[k];
     }
-    bool positive;
-    uz_status status = uz_refill_run(&positive, factor->refill, factor, err);
-    if (status != UZ_OK || positive)
+    int64_t refused;
+    uz_status status = uz_refill_run(&refused, factor->refill, factor, err);
+    if (status != UZ_OK || refused == factor->n)
         return status;
     return uz_fail(err, UZ_ERR_NOT_SPD, "K", "K is not positive definite to working precision");
 }

@@ -69,12 +69,13 @@ void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *
                     (int)ldx, 1.0, X + n, (int)ldx);
 }
 
-bool uz_block_factor(int64_t n, int64_t rows, double *A, int64_t ld)
+int64_t uz_block_factor(int64_t n, int64_t rows, double *A, int64_t ld)
 {
-    if (LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', (int)n, A, (int)ld) != 0)
-        return false;
+    const int first = LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', (int)n, A, (int)ld); /* from 1 */
+    if (first != 0)
+        return first > 0 ? first - 1 : 0;
     uz_block_divide(n, rows, A, A + n, ld);
-    return true;
+    return n;
 }
 
 void uz_block_divide(int64_t n, int64_t rows, const double *L, double *B, int64_t ld)

@@ -41,9 +41,9 @@ void uz_block_gemv(int64_t rows, int64_t columns, const double *A, int64_t ld, c
                    bool transposed);
 /* [X; Y] (columns, ldx) = [L^-1 X; Y - A L^-1 X] with [L; A] (n + rows by n, ld). */
 void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx);
-/* [L; B] = [chol(A); B L'^-1] in place of [A; B] (n + rows by n, ld), A symmetric, lower; false: a pivot is not
- * positive. */
-bool uz_block_factor(int64_t n, int64_t rows, double *A, int64_t ld);
+/* [L; B] = [chol(A); B L'^-1] in place of [A; B] (n + rows by n, ld), A symmetric, lower. Returns how many pivots are
+ * positive: less than n where one is not, which ends it. */
+int64_t uz_block_factor(int64_t n, int64_t rows, double *A, int64_t ld);
 /* B (rows x n, ld) = B L'^-1. */
 void uz_block_divide(int64_t n, int64_t rows, const double *L, double *B, int64_t ld);
 /* C (rows x n, ldc) = A B', or C - A B': A rows x k (ld), B the n rows that begin `skip` >= 0 rows above A. Of column c
