@@ -299,6 +299,15 @@ static void forget_factors(uz_finite_run *run)
     uz_table_forget(run->cache, UZ_ITEM_FACTOR);
 }
 
+/* At run->at, with nothing added. */
+static uz_status find_tangent(uz_finite_run *run, const double *step, uz_error *err)
+{
+    uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u, step);
+    const uz_status status = add_curvature(run, err);
+    return status == UZ_OK && run->follows ? uz_follower_tangent(&run->tangent, &run->skew, &run->scene, run->at.u, err)
+                                           : status;
+}
+
 static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
 {
     uz_csc *K = &run->tangent.K;
@@ -314,7 +323,8 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         return found;
     const double stiffest = run->stiffest;
     double hold = run->hold, shift = run->shift / LESS_SHIFT < FIRST_SHIFT ? 0 : run->shift / LESS_SHIFT;
-    bool pressed = false, more = true;
+    double held = 0, shifted = 0; /* what the tangent has of them */
+    bool pressed = false, more = true, fresh = true;
     const bool large = !(run->norm > 0) || run->norm > LARGE_STEP;
     double *step = run->step_qps > 0 && shift == 0 && large ? run->step : NULL; /* run->trial is the place before */
     for (int64_t i = 0; i < run->n && step; i++)
@@ -324,17 +334,16 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
     while (more && (status == UZ_ERR_NOT_SPD || status == UZ_ERR_FREE_BODY)) {
         const double start = uz_seconds();
         forget_factors(run);
-        uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u, step);
         uz_error_reset(&own);
-        status = add_curvature(run, &own);
-        if (status == UZ_OK && run->follows)
-            status = uz_follower_tangent(&run->tangent, &run->skew, &run->scene, run->at.u, &own);
-        for (int64_t q = 0; q < K->ptr[K->cols] && shift > 0; q++)
-            K->val[q] += shift * run->base.K.val[q];
+        status = fresh ? find_tangent(run, step, &own) : UZ_OK;
+        if (fresh)
+            held = shifted = 0;
+        for (int64_t q = 0; q < K->ptr[K->cols] && shift > shifted; q++)
+            K->val[q] += (shift - shifted) * run->base.K.val[q];
         if (status == UZ_OK && run->pairs)
             status = uz_finite_widen(run, hold > 0, &own);
         if (status == UZ_OK)
-            status = hold_rows(run, hold * stiffest, &own);
+            status = hold_rows(run, (run->pairs ? hold : hold - held) * stiffest, &own);
         run->spent.assemble += uz_seconds() - start;
         if (status != UZ_OK)
             break;
@@ -344,8 +353,9 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         run->step_qps += status == UZ_OK;
         if (status == UZ_OK && (run->turn.force.n > 0 || run->skew.ptr))
             status = uz_finite_correct(run, &own);
-        run->hold = hold;
-        run->shift = shift;
+        run->hold = held = hold;
+        run->shift = shifted = shift;
+        fresh = step != NULL;
         more = step || add_more(&hold, &shift, pressed);
         more = more && !(run->from && shift > 0); /* a path goes from one stable equilibrium to the next one */
         step = NULL;
@@ -414,6 +424,40 @@ static void take_trial(uz_finite_run *run)
     const uz_finite_place old = run->at;
     run->at = run->trial;
     run->trial = old;
+}
+
+/* About the least that the certificate may find of forces left over at run->at, by the last tangent K: (f'x)^2 / x'K x
+ * <= f'K^-1 f for every x, here that of each dof by itself with those of pressed rows held. 0: not known. */
+static double least_left(uz_finite_run *run)
+{
+    const uz_finite_place *at = &run->at;
+    const uz_csc *N = &at->rows.N;
+    double *rest = run->trial.force, *f = run->p, *x = run->v; /* free until the next step */
+    if (at->body.energy <= 10 * run->grain)
+        return 0;
+    for (int64_t i = 0; i < run->n; i++)
+        rest[i] = at->loads[i] - at->force[i];
+    uz_gather_nodal(f, &run->base, rest);
+    uz_csc_gaxpy_t(f, N, 1, run->r);
+    for (int64_t j = 0; j < run->d; j++) {
+        x[j] = f[j] / run->K->val[run->K->ptr[j]];
+        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+            x[j] = run->r[N->idx[q]] < 0 ? 0 : x[j];
+    }
+    memset(run->Kv, 0, (size_t)run->d * sizeof *run->Kv);
+    uz_csc_symv(run->Kv, run->K, 1, x);
+    const double square = uz_dot(run->d, x, run->Kv), work = uz_dot(run->d, f, x);
+    return square > 0 ? work / sqrt(2 * square * at->body.energy) : 0;
+}
+
+/* Is the certificate worth its time? Not while steps become smaller, and forces are left that it would not pass.
+ * before: the norm of the step before the last one. */
+static bool may_be_settled(uz_finite_run *run, double before)
+{
+    if (!(run->norm < ASKED_FROM))
+        return false;
+    const bool approaches = run->norm == 0 || run->norm < 0.5 * before;
+    return !approaches || run->step_qps == MOST_QPS || least_left(run) <= run->requested;
 }
 
 /* What the certificate says of run->at. *done: it is not to be iterated further. */
@@ -549,7 +593,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         status = keep_reactions(run, err);
         if (status != UZ_OK)
             break;
-        const double norm = run->norm = moved ? (double)INFINITY : step_norm(run);
+        const double last_norm = run->norm, norm = run->norm = moved ? (double)INFINITY : step_norm(run);
         uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);
         if (run->step_qps == 1)
             memcpy(led, to, (size_t)run->n * sizeof *led);
@@ -571,7 +615,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
             status = uz_finite_carry_reactions(run, &run->trial.rows, err);
             comparable = status == UZ_OK;
         }
-        if (comparable && norm < ASKED_FROM)
+        if (status == UZ_OK && comparable && may_be_settled(run, last_norm))
             status = ask_certificate(&done, out, run, err);
     }
     if (status == UZ_OK && *out == UZ_PART_SETTLED && leaps(run, begun, led))
