@@ -30,7 +30,7 @@ _uzawa() {
     path) options='--format --from --to --count --case --output --json --context --server --timeout --retry --help --version ' ;;
     picture) options='--colour --factor --view --up --width --case --output --json --context --server --timeout --retry --help --version ' ;;
     history) options='--csv --plot --width --height --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
-    plot) options='--deformed --error --trade --x --with --colour --factor --width --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
+    plot) options='--deformed --error --trade --path --x --with --colour --factor --width --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
     report) options='--case --output --json --context --server --timeout --retry --help --version ' ;;
     request) options='--output --json --context --server --timeout --retry --help --version ' ;;
     list) options='--format --status --tag --name --limit --quiet --json --context --server --timeout --retry --help --version ' ;;

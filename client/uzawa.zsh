@@ -22,7 +22,7 @@ _uzawa_commands() {
         'path:tabulate displacement and stress along a line'
         'picture:draw the deformed body of a scene as SVG'
         'history:fetch or draw the convergence history'
-        'plot:draw the convergence, the body or the price of accuracy'
+        'plot:draw the convergence, the body, a path or the price of accuracy'
         'report:write all that is known of an answer into one HTML file'
         'request:fetch the request that a job was made of'
         'list:list jobs, newest first'
@@ -234,15 +234,16 @@ _uzawa() {
             '--deformed[draw the deformed body of a scene]' \
             '--error[draw the whole error over time and, where the mesh was chosen, over unknowns]' \
             '--trade[print what each certified digit took, as a table and a drawing]' \
+            '--path[draw, in the terminal, force over displacement along the load cases of large deformation]' \
             '--x[of the convergence\: over iterations (default) or seconds]:AXIS:(iterations seconds)' \
             '*--with[draw another job'\''s convergence beside it; may be repeated]:ID:_uzawa_ids' \
             '--colour[with --deformed\: von_mises (default), displacements or pressure]:C:(von_mises displacements pressure)' \
             '--factor[with --deformed\: displacements are drawn X times as large]:X: ' \
-            '--width[with --deformed and --error\: of the picture, in pixels; with --trade\: of the drawing, in characters]:N: ' \
+            '--width[with --deformed and --error\: of the picture, in pixels; with --path and --trade\: of the drawing, in characters]:N: ' \
             '--ascii[draw in plain ASCII (default where the locale is not UTF-8)]' \
             '(-c --case)'{-c,--case}'[of this load case; needed where the job has some]:NAME: ' \
             '(-o --output)'{-o,--output}'[write to FILE, whole or not at all]:FILE:_files' \
-            '(-j --json)'{-j,--json}'[with --output\: print what was written as JSON; with --trade\: print the numbers]' \
+            '(-j --json)'{-j,--json}'[with --output\: print what was written as JSON; with --path and --trade\: print the numbers]' \
             '--context[the service that ~/.config/uzawa/config has under this name, with its token (default\: $UZAWA_CONTEXT, else what the file says; $UZAWA_SERVER and --server come before that)]:NAME: ' \
             '(-s --server)'{-s,--server}'[the service (default\: $UZAWA_SERVER, else http\://127.0.0.1\:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust]:URL: ' \
             '(-t --timeout)'{-t,--timeout}'[give up after S seconds; for wait and --wait\: stop waiting]:S: ' \

@@ -81,25 +81,28 @@ static bool take_words(parser *p, int argc, char *const *argv, bool apply)
 static bool check_plot(parser *p)
 {
     const client_options *o = p->options;
-    const bool convergence = !o->deformed && !o->trade && !o->whole_error;
-    if (o->deformed + o->trade + o->whole_error > 1)
-        return fail(p, "--deformed, --error and --trade are alternatives: choose one");
+    const bool printed = o->trade || o->along_path, convergence = !o->deformed && !printed && !o->whole_error;
+    const char *name = o->trade ? "--trade" : "--path";
+    if (o->deformed + o->trade + o->along_path + o->whole_error > 1)
+        return fail(p, "--deformed, --error, --path and --trade are alternatives: choose one");
     if (!o->deformed && (o->colour || o->factor))
         return fail(p, "--colour and --factor want --deformed");
     if (convergence && o->width >= 0)
-        return fail(p, "--width wants --deformed, --error or --trade");
+        return fail(p, "--width wants --deformed, --error, --path or --trade");
     if (o->whole_error && o->width >= 0 && o->width < 300)
         return fail(p, "--width wants an integer from 300 to 4000 with --error, not \"%d\"", o->width);
     if (o->deformed && o->width >= 0 && o->width < 200)
         return fail(p, "--width wants an integer from 200 to 4000 with --deformed, not \"%d\"", o->width);
-    if (o->trade && o->width > 400)
-        return fail(p, "--width wants an integer from 40 to 400 with --trade, not \"%d\"", o->width);
+    if (printed && o->width > 400)
+        return fail(p, "--width wants an integer from 40 to 400 with %s, not \"%d\"", name, o->width);
     if (!convergence && (o->axis || o->with.count))
         return fail(p, "--x and --with are of the convergence");
-    if (o->ascii && !o->trade)
-        return fail(p, "--ascii wants --trade");
-    if (o->output && o->trade)
-        return fail(p, "--trade is printed and takes no --output");
+    if (o->ascii && !printed)
+        return fail(p, "--ascii wants --path or --trade");
+    if (o->output && printed)
+        return fail(p, "%s is printed and takes no --output", name);
+    if (o->along_path && o->case_name)
+        return fail(p, "--path is of all load cases: leave --case out");
     return true;
 }
 
@@ -108,7 +111,7 @@ static bool check_all(parser *p)
 {
     const client_options *o = p->options;
     const bool matrices = o->K || o->N || o->h || o->p;
-    const bool drawing = o->command == CLIENT_PICTURE || (o->command == CLIENT_PLOT && !o->trade);
+    const bool drawing = o->command == CLIENT_PICTURE || (o->command == CLIENT_PLOT && !o->trade && !o->along_path);
     const client_page *page = &CLIENT_PAGES[o->command];
     if (o->operand && !page->operand)
         return fail(p, "%s takes no operand, but got \"%s\"", page->name, o->operand);

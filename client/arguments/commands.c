@@ -79,13 +79,13 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
                         CLIENT_OPERAND_NEEDED, "", NULL},
     [CLIENT_HISTORY] = {"history", "history ID [options]", "fetch or draw the convergence history", "ID",
                         CLIENT_OPERAND_NEEDED, "", NULL},
-    [CLIENT_PLOT] =
-        {"plot", "plot ID [options]", "draw the convergence, the body or the price of accuracy", "ID",
-         CLIENT_OPERAND_NEEDED,
-         "Without --deformed, --error or --trade the convergence is drawn: dual objective, residual and certified "
-         "bound. A file that ends in .png gets a PNG, by way of rsvg-convert (Debian: librsvg2-bin); any "
-         "other an SVG.\n",
-         NULL},
+    [CLIENT_PLOT] = {"plot", "plot ID [options]", "draw the convergence, the body, a path or the price of accuracy",
+                     "ID", CLIENT_OPERAND_NEEDED,
+                     "Without --deformed, --error, --path or --trade the convergence is drawn: dual objective, "
+                     "residual and certified "
+                     "bound. A file that ends in .png gets a PNG, by way of rsvg-convert (Debian: librsvg2-bin); any "
+                     "other an SVG.\n",
+                     NULL},
     [CLIENT_REPORT] = {"report", "report ID [options]", "write all that is known of an answer into one HTML file", "ID",
                        CLIENT_OPERAND_NEEDED,
                        "For the archive and for print: the verdict with the whole error, quantities, contacts, "
@@ -201,6 +201,8 @@ static const uz_option OPTIONS[] = {
            .about = "draw the whole error over time and, where the mesh was chosen, over unknowns"),
     OPTION("trade", 0, FLAG, trade, IN(PLOT),
            .about = "print what each certified digit took, as a table and a drawing"),
+    OPTION("path", 0, FLAG, along_path, IN(PLOT),
+           .about = "draw, in the terminal, force over displacement along the load cases of large deformation"),
     OPTION("x", 0, CHOICE, axis, IN(PLOT), .value = "AXIS", .choices = "iterations seconds",
            .about = "of the convergence: over iterations (default) or seconds"),
     OPTION("with", 0, WORDS, with, IN(PLOT), .most = 8, .value = "ID",
@@ -220,8 +222,8 @@ static const uz_option OPTIONS[] = {
     OPTION("factor", 0, WORD, factor, IN(PLOT), .value = "X",
            .about = "with --deformed: displacements are drawn X times as large"),
     OPTION("width", 0, INTEGER, width, IN(PLOT), .least = 40, .most = 4000, .value = "N",
-           .about = "with --deformed and --error: of the picture, in pixels; with --trade: of the drawing, in "
-                    "characters"),
+           .about = "with --deformed and --error: of the picture, in pixels; with --path and --trade: of the "
+                    "drawing, in characters"),
     OPTION("csv", 0, FLAG, csv, IN(HISTORY), .about = "as CSV instead of JSON"),
     OPTION("plot", 0, FLAG, plot, IN(HISTORY), .about = "draw it: log10 of the error bound and of the residual"),
     OPTION("width", 0, INTEGER, width, IN(HISTORY), .least = 24, .most = 400, .value = "N",
@@ -255,7 +257,7 @@ static const uz_option OPTIONS[] = {
     OPTION("json", 'j', FLAG, json, IN(PICTURE) | IN(REPORT) | IN(REQUEST),
            .about = "with --output: print what was written as JSON"),
     OPTION("json", 'j', FLAG, json, IN(PLOT),
-           .about = "with --output: print what was written as JSON; with --trade: print the numbers"),
+           .about = "with --output: print what was written as JSON; with --path and --trade: print the numbers"),
     OPTION("json", 'j', FLAG, json, CLIENT_EVERYWHERE, .about = "print JSON, and what is wrong as JSON too"),
     OPTION("context", 0, WORD, context, ASKING, .value = "NAME",
            .about =

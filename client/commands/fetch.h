@@ -31,5 +31,8 @@ client_exit client_series_of_files(client_session *s, const char *fields);
 client_exit client_draw_history(client_session *s, const char *csv);
 /* What each digit took (work-precision.json), as a table with bars. */
 void client_draw_trade(client_session *s, const json_t *trade);
+/* Of a result with load cases of large deformation the force that changes most over the largest displacement, as a
+ * drawing, or with --json as numbers. */
+client_exit client_draw_path(client_session *s, const json_t *result);
 
 #endif

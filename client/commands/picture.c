@@ -107,6 +107,16 @@ client_exit client_plot(client_session *s)
         json_decref(trade);
         return code;
     }
+    if (s->options->along_path) {
+        json_t *result;
+        const client_query query[] = {{"fields", "summary"}, {NULL, NULL}};
+        client_exit code =
+            client_get_json(s, &result, client_path_with_query(s, s->options->operand, "/result", query));
+        if (code == CLIENT_OK)
+            code = client_draw_path(s, result);
+        json_decref(result);
+        return code;
+    }
     const client_options *o = s->options;
     char width[24];
     client_buffer with = {0};

@@ -84,22 +84,36 @@ enum { SOLID = 1, DOTTED = 2 }; /* bits of a point */
 /* The drawing area: cells of sx x sy points. */
 typedef struct {
     int cols, rows, sx, sy;
-    int across, down;       /* points: cols sx, rows sy */
-    unsigned char *points;  /* down x across */
-    double low, high, last; /* decades at bottom and top; iteration at the right edge */
-    unsigned travelled;     /* points passed by the lines so far */
+    int across, down;      /* points: cols sx, rows sy */
+    unsigned char *points; /* down x across */
+    bool decades;          /* what is drawn are logarithms, over iterations */
+    double low, high;      /* at bottom and top: decades or numbers */
+    double first, last;    /* at the left and the right edge */
+    unsigned travelled;    /* points passed by the lines so far */
     const client_plot_style *style;
 } canvas;
 
-static int across(const canvas *c, double iteration)
+static bool begin(canvas *c)
 {
-    return (int)lround(iteration / c->last * (c->across - 1));
+    c->cols = c->style->width - MARGIN;
+    c->rows = c->style->height - 3;
+    c->sx = c->style->ascii ? 1 : 2;
+    c->sy = c->style->ascii ? 1 : 4;
+    c->across = c->cols * c->sx;
+    c->down = c->rows * c->sy;
+    c->points = c->cols > 0 && c->rows > 0 ? calloc((size_t)c->across, (size_t)c->down) : NULL;
+    return c->points != NULL;
+}
+
+static int across(const canvas *c, double at)
+{
+    return (int)lround((at - c->first) / (c->last - c->first) * (c->across - 1));
 }
 
 /* 0 is the top. */
-static int down(const canvas *c, double decade)
+static int down(const canvas *c, double value)
 {
-    double part = (c->high - decade) / (c->high - c->low);
+    double part = (c->high - value) / (c->high - c->low);
     return (int)lround(fmin(fmax(part, 0), 1) * (c->down - 1));
 }
 
@@ -111,17 +125,17 @@ static void set_point(canvas *c, int x, int y, unsigned char mark)
     c->points[(size_t)y * (size_t)c->across + (size_t)x] |= mark;
 }
 
-static void draw_series(canvas *c, const client_series *s, client_column column, unsigned char mark)
+/* Lines between numbers that are there. */
+static void draw_line(canvas *c, const double *x, const double *y, size_t count, unsigned char mark)
 {
     int previous[2] = {0, 0};
     bool have_previous = false;
-    for (size_t i = 0; i < s->count; i++) {
-        double at = s->column[CLIENT_ITERATION][i], value = s->column[column][i];
-        if (!uz_axis_has(value, true) || !(at >= 0 && at <= c->last)) {
+    for (size_t i = 0; i < count; i++) {
+        if (!uz_axis_has(y[i], c->decades) || !(x[i] >= c->first && x[i] <= c->last)) {
             have_previous = false;
             continue;
         }
-        int here[2] = {across(c, at), down(c, log10(value))};
+        int here[2] = {across(c, x[i]), down(c, c->decades ? log10(y[i]) : y[i])};
         const int *from = have_previous ? previous : here;
         const int dx = here[0] - from[0], dy = here[1] - from[1];
         const int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
@@ -145,12 +159,17 @@ static void print_marked(FILE *to, const client_plot_style *style, unsigned mark
         fputs(text, to);
 }
 
+static int format_place(char text[24], const canvas *c, double at)
+{
+    return snprintf(text, 24, c->decades ? "%.0f" : "%.3g", at);
+}
+
 /* Centred under its tick, as long as it fits between column `used` and column `end`. Returns the columns used. */
-static int print_iteration(FILE *to, const canvas *c, double at, int used, int end)
+static int print_place(FILE *to, const canvas *c, double at, int used, int end)
 {
     char text[24];
-    int len = snprintf(text, sizeof text, "%.0f", at);
-    int start = MARGIN + across(c, at) / c->sx - (at > 0 ? len / 2 : 0);
+    int len = format_place(text, c, at);
+    int start = MARGIN + across(c, at) / c->sx - (at > c->first ? len / 2 : 0);
     bool last = at >= c->last;
     if (last)
         start = end - len;
@@ -159,29 +178,41 @@ static int print_iteration(FILE *to, const canvas *c, double at, int used, int e
     return used + fprintf(to, "%*s%s", start - used, "", text);
 }
 
-/* The lines of the drawing: in the margin the label of the decade that falls into the row, if any; then the cells. */
+static double step_of_decades(double least)
+{
+    static const int STEPS[] = {1, 2, 3, 5, 10, 20};
+    for (size_t i = 0; i < sizeof STEPS / sizeof *STEPS; i++)
+        if (STEPS[i] >= least)
+            return STEPS[i];
+    return MOST_DECADES;
+}
+
+/* What is written beside a row; false: nothing. Steps between labels are the smallest that leave each two rows of its
+ * own. */
+static bool label_row(char label[24], const canvas *c, int row)
+{
+    const double least = 2 * ((c->high - c->low) / c->rows),
+                 step = c->decades ? step_of_decades(least) : uz_round_step(least);
+    for (double k = floor(c->high / step); k * step >= c->low; k--)
+        if (down(c, k * step) / c->sy == row) {
+            snprintf(label, 24, c->decades ? "1e%+03.0f" : "%.3g", k == 0 ? 0 : k * step);
+            return true;
+        }
+    return false;
+}
+
+/* The lines of the drawing: in the margin the label that falls into the row, if any; then the cells. */
 static void print_rows(FILE *to, const canvas *c)
 {
     /* Bit of each point of a Braille cell, by row and column (Unicode 15, section 21.1). */
     static const unsigned BRAILLE[4][2] = {{0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
-    static const int STEPS[] = {1, 2, 3, 5, 10, 20};
     const bool ascii = c->style->ascii;
-    /* Decades between labels: the smallest step that leaves a label two rows of its own. */
-    int step = MOST_DECADES;
-    for (size_t i = sizeof STEPS / sizeof *STEPS; i-- > 0;)
-        if (STEPS[i] >= 2 * ((c->high - c->low) / c->rows))
-            step = STEPS[i];
     for (int row = 0; row < c->rows; row++) {
-        int decade = (int)c->high;
-        while (decade >= (int)c->low && (decade % step != 0 || down(c, decade) / c->sy != row))
-            decade--;
-        if (decade >= (int)c->low) {
-            char label[24];
-            snprintf(label, sizeof label, "1e%+03d", decade);
+        char label[24];
+        if (label_row(label, c, row))
             fprintf(to, "%*s %s", MARGIN - 2, label, ascii ? "+" : "┤");
-        } else {
+        else
             fprintf(to, "%*s%s", MARGIN - 1, "", ascii ? "|" : "│");
-        }
         for (int col = 0; col < c->cols; col++) {
             unsigned bits = 0, marks = 0; /* marks: which lines pass through the cell */
             for (int y = 0; y < c->sy; y++)
@@ -198,19 +229,21 @@ static void print_rows(FILE *to, const canvas *c)
     }
 }
 
-/* The axis with the restarts and the ticks of the iterations, and the labels below it. */
+/* The axis with its ticks and, of a history (NULL: none), the restarts, and the labels below it. */
 static void print_axis(FILE *to, const canvas *c, const client_series *s)
 {
     const bool ascii = c->style->ascii;
-    /* Iterations between labels: 1, 2 or 5 times a power of ten, about one label for 14 cells. */
-    const double step = uz_round_step(fmax(c->last * 14 / c->cols, 1));
+    /* Between labels: 1, 2 or 5 times a power of ten, about one label for 14 cells. */
+    const double wide = (c->last - c->first) * 14 / c->cols, step = uz_round_step(c->decades ? fmax(wide, 1) : wide),
+                 first = ceil(c->first / step) * step;
+    char text[24];
     fprintf(to, "%*s%s", MARGIN - 1, "", ascii ? "+" : "└");
     for (int col = 0; col < c->cols; col++) {
         bool restart = false, label = false;
-        for (size_t i = 0; i < s->count && !restart; i++)
+        for (size_t i = 0; s && i < s->count && !restart; i++)
             restart = s->column[CLIENT_RESTART][i] > 0 && s->column[CLIENT_ITERATION][i] <= c->last &&
                       across(c, s->column[CLIENT_ITERATION][i]) / c->sx == col;
-        for (double at = 0; at <= c->last && !label; at += step)
+        for (double at = first; at <= c->last && !label; at += step)
             label = across(c, at) / c->sx == col;
         if (restart)
             fputs(ascii ? "^" : "▲", to);
@@ -220,21 +253,17 @@ static void print_axis(FILE *to, const canvas *c, const client_series *s)
             fputs(ascii ? "-" : "─", to);
     }
     fputc('\n', to);
-    int end = MARGIN + c->cols, room = snprintf(NULL, 0, "%.0f", c->last) + 2;
-    int used = fprintf(to, "%*s ", MARGIN - 1, "iteration");
-    for (double at = 0; at < c->last; at += step)
-        used = print_iteration(to, c, at, used, end - room);
-    print_iteration(to, c, c->last, used, end);
+    int end = MARGIN + c->cols, room = format_place(text, c, c->last) + 2;
+    int used = fprintf(to, "%*s ", MARGIN - 1, s ? "iteration" : "");
+    for (double at = first; at < c->last; at += step)
+        used = print_place(to, c, at, used, end - room);
+    print_place(to, c, c->last, used, end);
     fputc('\n', to);
 }
 
 bool client_plot_print(FILE *to, const client_series *series, const client_plot_style *style)
 {
-    canvas c = {.cols = style->width - MARGIN, .rows = style->height - 3, .style = style};
-    c.sx = style->ascii ? 1 : 2;
-    c.sy = style->ascii ? 1 : 4;
-    c.across = c.cols * c.sx;
-    c.down = c.rows * c.sy;
+    canvas c = {.style = style, .decades = true};
     /* The iterations and decades that the drawing must hold. */
     uz_range values = UZ_RANGE_NONE;
     for (size_t i = 0; i < series->count; i++) {
@@ -247,17 +276,15 @@ bool client_plot_print(FILE *to, const client_series *series, const client_plot_
             c.last = fmax(c.last, at);
         }
     }
-    if (c.cols < 1 || c.rows < 1 || values.low > values.high)
+    if (values.low > values.high || !begin(&c))
         return false;
     const uz_range decades = uz_range_decades(values);
     c.high = decades.high;
     c.low = fmax(decades.low, c.high - MOST_DECADES);
     c.last = fmax(c.last, 1);
-    c.points = calloc((size_t)c.across, (size_t)c.down);
-    if (!c.points)
-        return false;
-    draw_series(&c, series, CLIENT_RESIDUAL, DOTTED);
-    draw_series(&c, series, CLIENT_ERROR_BOUND, SOLID);
+    const double *at = series->column[CLIENT_ITERATION];
+    draw_line(&c, at, series->column[CLIENT_RESIDUAL], series->count, DOTTED);
+    draw_line(&c, at, series->column[CLIENT_ERROR_BOUND], series->count, SOLID);
     const bool narrow = style->width < LEGEND_WIDTH;
     fprintf(to, "%*s", narrow ? 0 : MARGIN, "");
     print_marked(to, style, SOLID, style->ascii ? "**" : "⠒⠒");
@@ -268,6 +295,34 @@ bool client_plot_print(FILE *to, const client_series *series, const client_plot_
         fprintf(to, "%s restart\n", style->ascii ? "^" : "▲");
     print_rows(to, &c);
     print_axis(to, &c, series);
+    free(c.points);
+    return true;
+}
+
+bool client_plot_curve(FILE *to, const double *x, const double *y, size_t count, const char *names,
+                       const client_plot_style *style)
+{
+    canvas c = {.style = style};
+    uz_range wide = {0, 0}, high = {0, 0};
+    bool any = false;
+    for (size_t i = 0; i < count; i++) {
+        if (!uz_axis_has(x[i], false) || !uz_axis_has(y[i], false))
+            continue;
+        uz_range_take(&wide, x[i], false);
+        uz_range_take(&high, y[i], false);
+        any = true;
+    }
+    if (!any || !begin(&c))
+        return false;
+    c.first = wide.low;
+    c.last = wide.high > wide.low ? wide.high : wide.low + 1;
+    c.low = high.low;
+    c.high = high.high > high.low ? high.high : high.low + 1;
+    draw_line(&c, x, y, count, SOLID);
+    const bool narrow = MARGIN + (int)strlen(names) > style->width;
+    fprintf(to, "%*s%.*s\n", narrow ? 0 : MARGIN, "", style->width, names);
+    print_rows(to, &c);
+    print_axis(to, &c, NULL);
     free(c.points);
     return true;
 }

@@ -1,4 +1,5 @@
-/* plot.h: a convergence history, read from the service's CSV as columns of numbers, drawn with characters. */
+/* plot.h: curves drawn with characters: a convergence history, read from the service's CSV as columns of numbers, and
+ * one number over another. */
 #ifndef CLIENT_PLOT_H
 #define CLIENT_PLOT_H
 
@@ -27,5 +28,10 @@ typedef struct {
 /* Draws log10 of the error bound (solid) and of the residual (dotted) over the iterations, restarts on the axis.
  * False: no memory, or nothing to draw (no row with a positive number); nothing was printed then. */
 bool client_plot_print(FILE *to, const client_series *series, const client_plot_style *style);
+
+/* Draws y over x (count each) as a line from point to point in their order, zero on both axes, under a line that names
+ * them. False: as above, where no point has two numbers. */
+bool client_plot_curve(FILE *to, const double *x, const double *y, size_t count, const char *names,
+                       const client_plot_style *style);
 
 #endif

@@ -69,6 +69,16 @@ static void print_cells(FILE *to, const json_t *cells)
 
 /* ---- the parts, in the order in which they are printed */
 
+/* Of several cases. */
+static void name_worst(FILE *to, const char *before, const json_t *summary)
+{
+    const char *worst = client_json_text(summary, "cases.worst");
+    if (!*worst)
+        return;
+    fputs(before, to);
+    client_print_safe(to, worst);
+}
+
 /* How it ended, and of what: the worst case where there are several. */
 static void print_outcome(FILE *to, const json_t *summary)
 {
@@ -98,6 +108,7 @@ static void print_outcome(FILE *to, const json_t *summary)
         words = strcmp(WORDS[i][0], outcome) == 0 ? WORDS[i][1] : words;
     label(to, "outcome");
     client_print_safe(to, outcome);
+    name_worst(to, ", case ", summary);
     fprintf(to, "%s%s\n", *words ? ": " : "", words);
     if (*message) {
         label(to, "");
@@ -139,8 +150,8 @@ static void print_outcome(FILE *to, const json_t *summary)
     }
     if (json_is_object(json_object_get(summary, "cases"))) {
         label(to, "cases");
-        fprintf(to, "%s; what follows is of the worst: ", number_in_words(count, summary, "cases.count", 9));
-        client_print_safe(to, client_json_text(summary, "cases.worst"));
+        fputs(number_in_words(count, summary, "cases.count", 9), to);
+        name_worst(to, "; what follows is of the worst: ", summary);
         fputc('\n', to);
     }
     if (isfinite(d) && isfinite(m)) {

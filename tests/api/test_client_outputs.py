@@ -344,6 +344,36 @@ def test_price_of_digits(_):
         run(fake.url, "plot", ID, "--trade", code=5)
 
 
+def path_point(k, up=4.0, aside=-30.0):
+    return {"name": f"p {k}", "summary": {"outcome": "converged", "finite": {"displacement": 0.1 * k, "part": k / 5},
+                                          "contact": {"force": [0.0, up * min(k, 3)]},
+                                          "resultants": {"supports": [{"force": [aside * k, 1.0]}]}}}
+
+
+@options(None)
+def test_a_path_is_drawn_in_characters(_):
+    """The force that changes most over the displacement, as a line of points; others where that one stays."""
+    cases = [path_point(k) for k in range(1, 6)]
+    for aside, name, last in ((-30.0, "support 0 along x", -150), (0.0, "contacts along y", 12)):
+        for case in cases:
+            case["summary"]["resultants"]["supports"][0]["force"][0] = aside * round(10 * case["summary"]["finite"]["displacement"])
+        with Fake((200, {"cases": cases})) as fake:
+            lines = run(fake.url, "plot", ID, "--path", "--width", "60", LC_ALL="C").stdout.splitlines()
+            check(fake.requests[0].path == f"/v1/jobs/{ID}/result?fields=summary", fake.requests[0].path)
+            told = json.loads(run(fake.url, "plot", ID, "--path", "--json").stdout)
+        check(f"force of {name}, over the largest displacement" in lines[0] and len(lines) == 20 and all(len(line) <= 60 for line in lines), lines)
+        check([point["displacement"] for point in told["points"]] == [case["summary"]["finite"]["displacement"] for case in cases] and
+              told["points"][-1] == {"case": "p 5", "displacement": 0.5, "force": last}, told)
+        rows = [line.find("*") for line in lines[1:-2]]
+        drawn = [row for row in rows if row >= 0]
+        check(drawn == sorted(drawn, reverse=aside == 0) and max(line.rfind("*") for line in lines[1:-2]) == 59, lines)
+        check(lines[-1].split()[0] == "0" and lines[-1].split()[-1] == "0.5", lines)
+    check(any(line.split()[:2] == ["10", "+"] for line in lines) and any(line.split()[:2] == ["0", "+"] for line in lines), lines)
+    for reply in ({"summary": {}}, {"cases": [{"name": "a", "summary": {}}]}):
+        with Fake((200, reply)) as fake:
+            check("steps" in run(fake.url, "plot", ID, "--path", code=11).stderr)
+
+
 # ------------------------------------------------------- delete and factors
 
 
