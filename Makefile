@@ -280,7 +280,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers peers-contact peers-decks peers-large peers-space extremes theory roller arch trade figures numbers collect page-size
+        bench-size bench-deps peers peers-contact peers-decks peers-large peers-space extremes theory large roller arch trade figures numbers collect page-size
 test: test-build ## build and pass every test; ONCE=1: but those that make asan runs as they are
 	@tests/run.sh $(BUILD) "" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
 
@@ -459,6 +459,9 @@ roller: $(BUILD)/uzawad ## a roller pushed into a block, graded meshes, from eit
 arch: $(BUILD)/uzawad ## a clamped arch that goes through, finer and finer meshes: its limit load; seconds
 	@$(PYTHON) -B tests/theory/arch.py $(BUILD)
 
+large: $(BUILD)/uzawad ## scenes of large deformation against what is known, and over one solve of small deformation: a table and build/large.json; a minute; ONLY=part of a name
+	@$(call measured,large) $(PYTHON) -B tests/theory/large.py $(BUILD) $(BUILD)/large.json $(if $(ONLY),ONLY="$(ONLY)")
+
 trade: $(BUILD)/uzawad ## what a whole error of 10, 5, 2 and 1 % costs, by estimate and guaranteed, and a contact force within 2 %: tables and build/trade.json; minutes; FILTER=words: bodies by their names, "force" of forces alone
 	@$(call measured,trade $(if $(FILTER),--part)) $(PYTHON) -B tests/figures/trade.py $(BUILD) $(BUILD)/trade.json $(FILTER)
 
@@ -475,7 +478,7 @@ collect: ## docs/numbers.md and what other pages cite of it, from what was measu
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
 numbers: ## measure everything that docs/numbers.md shows (hours: soak is one of it), then write them; SPARED="soak" leaves some out
-	@for part in $(filter-out $(SPARED),theory gallery trade extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
+	@for part in $(filter-out $(SPARED),theory large gallery trade extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
 	    $(MAKE) --no-print-directory $$part || exit 1; done
 
 ##@ Style

@@ -386,6 +386,20 @@ def space(data):
     return rows and table(["mesh", "unknowns", "GAMG", "its iterations", "cold", "another load", "cold over GAMG", "another load", "operator", "certified"], told)
 
 
+def large(data):
+    """Large deformation against what is known, and over one solve of small deformation."""
+    found = data.get("large")
+    if not found:
+        return None
+    rows = [[row["scene"], f"{row['unknowns']:,}", "; ".join(f"{one['what']} {sig(one['value'], 6)} ({sig(100 * one['off'])} %)" for one in row["told"]) or NONE,
+             row["qps"], row["steps"] or NONE, row.get("most") or NONE, sig(row.get("over_small"))] for row in found["rows"]]
+    heights = {}
+    for row in found["refined"]:
+        heights.setdefault((row["element"], row["aside"]), []).append(f"{row['high']}: {sig(100 * row['off'])} %")
+    return table(["scene", "unknowns", "found (off by)", "contact problems", "parts", "most in a part", "over small"], rows) + ["", *table(
+        ["elements", "moved aside by", "elements through the height: the force is off by"], [[f"`{element}`", aside, "; ".join(each)] for (element, aside), each in heights.items()])]
+
+
 REASONS = (("first step is", "the first step is no static one"), ("FRICTION", "friction"), ("EQUATION", "equations between displacements"),
            ("SPRINGA", "springs"), ("in place of a spring", "contact softer than a twentieth of the body"),
            ("PLASTIC", "plasticity"), ("ADJUST", "nodes that are moved to the other surface (ADJUST)"), ("TRANSFORM", "turned axes of nodes"), ("CYCLIC", "cyclic symmetry"))
