@@ -343,6 +343,94 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
     return status;
 }
 
+/* ---- along one direction */
+
+/* The body's largest motion, in its extent: what is left of the second derivative, or of the rounding of rows. */
+#define MOVED_ALONG 1e-7
+
+/* Adds `factor` times N'r, and the gaps, of the pressed rows between bodies, as they are in `at`; false: not all of
+ * them are. room: of 2 at->m; N of `rows` is that of the gaps. */
+static bool add_rows_at(double *force, double *gap, double factor, const work *w, const uz_body_model *at, double *room)
+{
+    double *r = room, *g = room + at->m;
+    int64_t next = 0;
+    bool all = true;
+    for (int64_t i = 0; i < at->m; i++) {
+        r[i] = 0;
+        g[i] = at->sites[at->info.contact_of[i]].gap[at->row_place[i]];
+    }
+    uz_blend_rows(g, at);
+    for (int64_t j = 0; j < w->n_pressed && all; j++) {
+        const int64_t row = w->pressed[j];
+        const int64_t there = uz_next_row(&next, at, w->rows->info.contact_of[row], w->rows->row_place[row]);
+        all = there >= 0;
+        if (all) {
+            r[there] = factor * w->r[row];
+            gap[row] += factor * g[there];
+        }
+    }
+    if (all)
+        uz_csc_gaxpy_t(force, &at->N, 1, r);
+    return all;
+}
+
+/* change: d + m, of zeros. */
+static uz_status difference_along(bool *known, double *change, work *w, double part, uz_error *err)
+{
+    const uz_body_model *rows = w->rows;
+    uz_scene scene = *w->scene;
+    uz_body_model moved = {.d = 0};
+    uz_error own = {0};
+    double *room = NULL;
+    scene.place = w->u;
+    uz_status status = uz_body_model_move(&moved, w->base, &scene, &own);
+    if (status == UZ_OK && !(room = uz_alloc(2 * (moved.m + rows->m), sizeof *room)))
+        status = uz_fail(&own, UZ_ERR_MEMORY, "", "no memory for how contact rows turn");
+    if (status == UZ_OK)
+        *known = add_rows_at(change, change + rows->d, 1 / part, w, &moved, room) &&
+                 add_rows_at(change, change + rows->d, -1 / part, w, rows, room);
+    free(room);
+    uz_body_model_clear(&moved);
+    if (status == UZ_ERR_SCENE) /* no contact can be found there */
+        return UZ_OK;
+    if (status != UZ_OK && err)
+        *err = own;
+    return status;
+}
+
+uz_status uz_row_turn_along(bool *known, double *force, double *gap, const uz_body_model *base,
+                            const uz_body_model *rows, const uz_scene *scene, const double *r, double least,
+                            const double *v, uz_error *err)
+{
+    const int64_t n = base->mesh.dim * base->mesh.n_nodes, d = base->d;
+    work w = {.base = base, .rows = rows, .scene = scene, .r = r, .least = least};
+    double most = 0, *change = uz_alloc_zero(d + rows->m, sizeof *change);
+    uz_status status = UZ_OK;
+    *known = false;
+    w.u = uz_alloc(n, sizeof *w.u);
+    if (!w.u || !change || !list_pressed(&w))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how %lld contact rows turn", (long long)rows->m);
+    for (int64_t j = 0; j < d; j++)
+        most = fmax(most, fabs(v[j]));
+    const double part = MOVED_ALONG * base->mesh.extent / most;
+    if (status == UZ_OK && most > 0 && isfinite(part)) {
+        uz_recover_nodal(w.u, base, v, NULL);
+        for (int64_t i = 0; i < n; i++)
+            w.u[i] = rows->place[i] + part * w.u[i];
+        status = difference_along(known, change, &w, part, err);
+    }
+    for (int64_t j = 0; j < d && *known; j++)
+        force[j] += change[j];
+    if (*known)
+        uz_csc_gaxpy(change + d, &rows->N, 1, v);
+    for (int64_t j = 0; j < w.n_pressed && *known; j++)
+        gap[w.pressed[j]] += change[d + w.pressed[j]];
+    free(w.u);
+    free(w.pressed);
+    free(change);
+    return status;
+}
+
 void uz_row_turn_clear(uz_row_turn *turn)
 {
     uz_entries_clear(&turn->force);

@@ -10,8 +10,9 @@
  * K - T, to which the skew part and E are added at the last v: few, as both are small where the surfaces lie on each
  * other, and each a back-substitution, as the matrix stays. Their v are mixed so that what the problem changes about
  * them is least (D. Anderson, "Iterative procedures for nonlinear integral equations", J. ACM 12 (1965) 547-560), as
- * what is skew would turn them about the answer for long. The skew part of pressures that follow the body
- * (finite/follower.h) is added like that of T. */
+ * what is skew would turn them about the answer for long. What is added is told by the rows a little further along v,
+ * so that the whole derivative counts whatever row_turn.h leaves out of its entries. The skew part of pressures that
+ * follow the body (finite/follower.h) is added like that of T. */
 #include "run/finite.h"
 
 #include "core/alloc.h"
@@ -135,6 +136,24 @@ static void add_followers(uz_finite_run *run, const double *v, double *nodal)
         run->p[j] += nodal[j];
 }
 
+/* What the derivatives of rows along v add to what the matrix has of them; where they cannot be told those that the
+ * matrix was made with. */
+static uz_status add_turn(uz_finite_run *run, const double *v, uz_error *err)
+{
+    const uz_row_turn *turn = &run->turn;
+    bool known = false;
+    if (turn->force.n == 0)
+        return UZ_OK;
+    const uz_status status =
+        uz_row_turn_along(&known, run->p, run->at.h, &run->base, &run->at.rows, &run->scene, run->r, 0, v, err);
+    uz_add_entries(run->p, &turn->force, v, true);
+    if (!known)
+        uz_add_entries(run->at.h, &turn->gap, v, false);
+    for (int64_t k = 0; k < turn->force.n && known; k++)
+        run->p[turn->force.row[k]] -= turn->force.val[k] * v[turn->force.col[k]];
+    return status;
+}
+
 /* room: 4 d + m + 2 n. p and h are those of the symmetric part. */
 static uz_status iterate(uz_finite_run *run, double *room, history *past, uz_error *err)
 {
@@ -156,10 +175,10 @@ static uz_status iterate(uz_finite_run *run, double *room, history *past, uz_err
             run->p[j] = p[j];
         for (int64_t i = 0; i < m; i++)
             run->at.h[i] = h[i];
-        uz_add_entries(run->p, &run->turn.force, v, true);
+        status = add_turn(run, v, err);
         add_followers(run, v, nodal);
-        uz_add_entries(run->at.h, &run->turn.gap, v, false);
-        status = uz_finite_solve_qp(run, err);
+        if (status == UZ_OK)
+            status = uz_finite_solve_qp(run, err);
         if (status != UZ_OK ||
             (run->last->summary.outcome != UZ_CONVERGED && run->last->summary.outcome != UZ_PRECISION_LIMIT))
             break;

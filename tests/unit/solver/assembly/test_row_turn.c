@@ -37,15 +37,17 @@ static void look(double *f, double *g, const uz_body_model *base, uz_scene *s, d
     uz_body_model_clear(&at);
 }
 
-/* At u (nodes), along `way` (nodes), by what is found and by differences of the whole. */
+/* At u (nodes), along `way` (nodes): by entries, to `within` (INFINITY: they do not say), by the difference of the rows
+ * at one place more, and by differences of the whole. */
 static void compare(uz_scene *s, const uz_body_model *base, double *u, const double *way, qp_random *rng,
                     const char *element, double within)
 {
+    enum { EACH, WHOLE, WAYS };
     const int64_t n = base->mesh.dim * base->mesh.n_nodes, d = base->d;
     uz_body_model at;
-    double *f[2], *g[2], *v = body_room(d, sizeof *v), *turned = body_room(d, sizeof *turned),
-                         *moved = body_room(base->m + d, sizeof *moved), *r;
+    double *f[2], *g[2], *v = body_room(d, sizeof *v), *turned[WAYS], *moved[WAYS], *r;
     const double h = 1e-6;
+    bool known = false;
     uz_row_turn turn;
     uz_error err = {0};
     s->place = u;
@@ -57,6 +59,12 @@ static void compare(uz_scene *s, const uz_body_model *base, double *u, const dou
     CHECK_INT(uz_row_turn_find(&turn, base, &at, s, r, 0, NULL, &err), UZ_OK);
     CHECK(turn.known && turn.force.n > 0 && turn.gap.n > 0 && at.m > 2);
     uz_restrict_nodal(v, base, way);
+    for (int k = 0; k < WAYS; k++) {
+        turned[k] = body_room(d, sizeof **turned);
+        moved[k] = body_room(at.m + d, sizeof **moved);
+    }
+    CHECK_INT(uz_row_turn_along(&known, turned[WHOLE], moved[WHOLE], base, &at, s, r, 0, v, &err), UZ_OK);
+    CHECK(known);
     for (int side = 0; side < 2; side++) {
         f[side] = body_room(d, sizeof **f);
         g[side] = body_room(at.m + d, sizeof **g);
@@ -64,18 +72,21 @@ static void compare(uz_scene *s, const uz_body_model *base, double *u, const dou
             u[i] += (side ? 2 : -1) * h * way[i];
         look(f[side], g[side], base, s, u, r);
     }
-    uz_add_entries(turned, &turn.force, v, false);
-    uz_add_entries(moved, &turn.gap, v, false);
-    uz_csc_gaxpy(moved, &at.N, -1, v);
-    for (int64_t j = 0; j < d; j++)
-        CHECK_MSG(fabs((f[1][j] - f[0][j]) / (2 * h) - turned[j]) < within, "%s: %.9g, not %.9g", element, turned[j],
-                  (f[1][j] - f[0][j]) / (2 * h));
-    for (int64_t i = 0; i < at.m; i++)
-        CHECK_MSG(fabs((g[1][i] - g[0][i]) / (2 * h) - moved[i]) < within, "%s: gap %.9g, not %.9g", element, moved[i],
-                  (g[1][i] - g[0][i]) / (2 * h));
+    uz_add_entries(turned[EACH], &turn.force, v, false);
+    uz_add_entries(moved[EACH], &turn.gap, v, false);
+    for (int k = within < INFINITY ? EACH : WHOLE; k < WAYS; k++) {
+        const double most = k == WHOLE ? 1e-4 : within; /* of second derivatives */
+        uz_csc_gaxpy(moved[k], &at.N, -1, v);
+        for (int64_t j = 0; j < d; j++)
+            CHECK_MSG(fabs((f[1][j] - f[0][j]) / (2 * h) - turned[k][j]) < most, "%s: %.9g, not %.9g", element,
+                      turned[k][j], (f[1][j] - f[0][j]) / (2 * h));
+        for (int64_t i = 0; i < at.m; i++)
+            CHECK_MSG(fabs((g[1][i] - g[0][i]) / (2 * h) - moved[k][i]) < most, "%s: gap %.9g, not %.9g", element,
+                      moved[k][i], (g[1][i] - g[0][i]) / (2 * h));
+    }
     uz_row_turn_clear(&turn);
     uz_body_model_clear(&at);
-    double *const room[] = {v, f[0], f[1], g[0], g[1], turned, moved, r};
+    double *const room[] = {v, f[0], f[1], g[0], g[1], turned[EACH], turned[WHOLE], moved[EACH], moved[WHOLE], r};
     for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
         free(room[i]);
 }
@@ -94,6 +105,33 @@ TEST(forces_and_gaps_change_as_differences_say)
             way[i] = base.dof[i] < 0 ? 0 : random_signed(&rng);
         }
         compare(&s, &base, u, way, &rng, ELEMENTS[k % 4], 1e-6);
+        uz_body_model_clear(&base);
+        uz_scene_clear(&s);
+        free(u);
+        free(way);
+    }
+}
+
+/* Any motion, by one difference: parts of faces change, too. */
+TEST(solids_deform_as_one_difference_says)
+{
+    static const char *const ELEMENTS[] = {"hex8", "tet4", "hex20", "tet10"};
+    for (int k = 0; k < 4; k++) {
+        qp_random rng = {(uint64_t)k + 1};
+        const box_part a = {{0, 0, 0}, {2, 1, 1}, {3, 1, 2}, ELEMENTS[k]},
+                       b = {{0.7, 1, 0.15}, {0.8, 0.5, 0.6}, {2, 1, 2}, ELEMENTS[3 - k]};
+        uz_scene s = two(UZ_SOLID, UZ_ELASTIC_NEO_HOOKE, &a, &b, NULL);
+        body_hold(&s, "abottom", 0, 0, 0);
+        body_hold(&s, "btop", 0, 0, 0);
+        touch(&s, "bbottom", "atop");
+        uz_body_model base = body_model(&s);
+        const int64_t n = 3 * base.mesh.n_nodes;
+        double *u = body_room(n, sizeof *u), *way = body_room(n, sizeof *way);
+        for (int64_t i = 0; i < n; i++) {
+            u[i] = base.dof[i] < 0 ? 0 : 0.02 * random_signed(&rng);
+            way[i] = base.dof[i] < 0 ? 0 : random_signed(&rng);
+        }
+        compare(&s, &base, u, way, &rng, ELEMENTS[k], INFINITY);
         uz_body_model_clear(&base);
         uz_scene_clear(&s);
         free(u);

@@ -16,7 +16,8 @@ static void fail_each(bool solid)
     body_hold(&s, "btop", 0, 0, solid ? 0 : NAN);
     touch(&s, "bbottom", "atop");
     uz_body_model base = body_model(&s), at;
-    double *u = body_room(base.mesh.dim * base.mesh.n_nodes, sizeof *u), r[8];
+    double *u = body_room(base.mesh.dim * base.mesh.n_nodes, sizeof *u), *v = body_room(2 * base.d, sizeof *v), r[8],
+           gap[8] = {0};
     uz_error first = {0};
     s.place = u;
     CHECK_INT(uz_body_model_move(&at, &base, &s, &first), UZ_OK);
@@ -24,11 +25,13 @@ static void fail_each(bool solid)
     for (int i = 0; i < 8; i++)
         r[i] = -1;
     CHECK(at.m > 0 && at.m <= 8);
+    v[0] = 1;
     uz_status status = UZ_ERR_MEMORY;
     long count = 0;
     for (; status != UZ_OK && count < 20000; count = next_allocation(count)) {
         uz_row_turn turn;
         uz_csc wide = {0};
+        bool known = false;
         uz_error err = {0};
         heap.live = 0;
         heap.failed = false;
@@ -37,6 +40,9 @@ static void fail_each(bool solid)
         status = uz_row_turn_find(&turn, &base, &at, &s, r, 0, NULL, &err);
         if (status == UZ_OK)
             status = uz_widen_by_rows(&wide, &base.K, &at.N, r, 0, &turn, &err);
+        if (status == UZ_OK)
+            status = uz_row_turn_along(&known, v + base.d, gap, &base, &at, &s, r, 0, v, &err);
+        CHECK(known == (status == UZ_OK));
         uz_row_turn_clear(&turn);
         uz_csc_clear(&wide);
         heap.watching = false;
@@ -50,6 +56,7 @@ static void fail_each(bool solid)
     uz_body_model_clear(&base);
     uz_scene_clear(&s);
     free(u);
+    free(v);
 }
 
 TEST(failures_are_told_and_leave_nothing)
