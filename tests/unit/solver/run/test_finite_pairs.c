@@ -347,7 +347,7 @@ TEST(what_converges_is_an_equilibrium)
         uz_scene_clear(&s);
     }
     printf("# %d of %d converged, in at most %lld contact problems\n", converged, SCENES + SOLIDS, (long long)most);
-    CHECK(2 * converged > SCENES + SOLIDS);
+    CHECK(2 * converged > SCENES + SOLIDS && most <= 60); /* with those that go with one factor */
 }
 
 /* `with` becomes a group of the sides of both surfaces. */
