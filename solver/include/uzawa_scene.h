@@ -308,6 +308,9 @@ typedef struct {
     bool all_candidates; /* solve with every contact row, also those far from any obstacle */
     bool peak_stress;    /* the evaluation tells the largest stress, as it does where a material has a yield stress */
     uz_kinematics kinematics;
+    /* Only to be compared with small deformation: sides between bodies may stand for smooth surfaces, as far off these
+     * as they were at first */
+    bool compared;
     /* n_nodes x dim, borrowed: contacts are found where the body has been displaced by this, and linear about it: a
      * uz_result's place. NULL: before anything moves. uz_solve finds places itself (kinematics) and takes none. */
     const double *place;

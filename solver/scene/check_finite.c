@@ -65,7 +65,7 @@ static uz_status check_pair(const uz_scene *scene, int64_t i, uz_error *err)
     if (contact->between != UZ_CONTACT_SURFACES)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "discretization"),
                        "finite kinematics have contact between bodies by surfaces; leave discretization out");
-    if (!contact->faceted)
+    if (!contact->faceted && !scene->compared && uz_may_be_finite(scene))
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "smooth"),
                        "finite kinematics take sides of bodies as they are deformed; leave smooth out, and use quad8 "
                        "or tri6 where surfaces are curved");

@@ -187,6 +187,50 @@ TEST(a_linear_law_is_not_replaced)
         }
 }
 
+/* Two bodies of the linear law, whose sides are taken for smooth surfaces: straight ones are compared to the same
+ * number as facets, and what coarse facets of a press fit lack is no error of small deformation. */
+TEST(smooth_surfaces_are_compared)
+{
+    for (int solid = 0; solid < 2; solid++) {
+        double error[2];
+        const char *element = solid ? "hex8" : "quad8";
+        for (int smooth = 0; smooth < 2; smooth++) {
+            const box_part a = {{0, 0, 0}, {3, 1, 1}, {3, 1, 1}, element},
+                           b = {{1, 1, 0}, {1, 1, 1}, {2, 2, 2}, element};
+            uz_scene s = two(solid ? UZ_SOLID : UZ_PLANE_STRAIN, UZ_ELASTIC_NEO_HOOKE, &a, &b, NULL);
+            touch(&s, "bbottom", "atop");
+            s.contacts[0].faceted = !smooth;
+            body_hold(&s, "abottom", 0, 0, solid ? 0 : NAN);
+            body_hold(&s, "btop", 0, -0.3, solid ? 0 : NAN);
+            uz_result *r = solve_as(&s, UZ_KINEMATICS_AUTO, UZ_ELASTIC_LINEAR);
+            CHECK(r->summary.outcome == UZ_CONVERGED && r->summary.small.compared);
+            CHECK(warning(r, "large_deformation") != NULL);
+            error[smooth] = r->summary.small.error;
+            uz_result_free(r);
+            uz_scene_clear(&s);
+        }
+        CHECK_MSG(error[0] > 0.05 && fabs(error[0] - error[1]) < 1e-6, "%.9g, %.9g", error[0], error[1]);
+    }
+    double fits[2]; /* facets lack a quarter of the pressure of the coarse one */
+    for (int fine = 0; fine < 2; fine++) {
+        const int64_t cells = fine ? 9 : 3;
+        const box_part a = {{1, 0}, {0.4, acos(0)}, {4, cells}, "quad4"};
+        const box_part b = {{1.35, 0}, {0.6, acos(0)}, {4, 2 * cells - 1}, "quad4"};
+        uz_scene s = two(UZ_PLANE_STRAIN, UZ_ELASTIC_NEO_HOOKE, &a, &b, bend);
+        const char *const held[] = {"abottom", "bbottom", "atop", "btop"};
+        for (int i = 0; i < 4; i++)
+            body_hold(&s, held[i], i < 2 ? NAN : 0, i < 2 ? 0 : NAN, NAN);
+        touch(&s, "aright", "bleft");
+        s.contacts[0].faceted = false;
+        uz_result *r = solve_as(&s, UZ_KINEMATICS_AUTO, UZ_ELASTIC_LINEAR);
+        fits[fine] = r->summary.small.error;
+        CHECK(r->summary.outcome == UZ_CONVERGED && r->summary.small.compared);
+        uz_result_free(r);
+        uz_scene_clear(&s);
+    }
+    CHECK_MSG(fabs(fits[0] - fits[1]) < 0.03 * fits[1], "%g, %g", fits[0], fits[1]);
+}
+
 /* A block or a strip on a plane or a circle, pushed or pulled by `size`. */
 static uz_scene random_scene(uint64_t seed, double size)
 {
