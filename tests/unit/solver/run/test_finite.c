@@ -115,6 +115,22 @@ TEST(what_is_not_stable_is_no_answer)
     give_back(result, &s);
 }
 
+/* A top that is free to tilt does so before the limit load of a flat one: where the least eigenvalue of the tangent of
+ * the homogeneous state is 0, by another program (quad8, 3 x 3 points). Finer meshes can do more, and bear less. */
+TEST(a_block_under_a_force_gives_way_where_its_tangent_says)
+{
+    static const double LOAD[] = {0.19538884, 0.18229828, 0.17452686};
+    for (int k = 0; k < 3; k++) {
+        uz_scene s = block("quad8", 1, 1, 1 << k, 1 << k, UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
+        body_hold(&s, "left", 0, NAN, NAN);
+        body_hold(&s, "bottom", NAN, 0, NAN);
+        body_load(&s, UZ_LOAD_TRACTION, "top", 0, -0.25, 0);
+        uz_result *result = solve(&s);
+        check_ended(result, UZ_UNSTABLE, (LOAD[k] - 0.0003) / 0.25, LOAD[k] / 0.25 + 1e-6);
+        give_back(result, &s);
+    }
+}
+
 TEST(what_turns_inside_out_is_no_answer)
 {
     uz_scene s = squeezed("quad4", 2, UZ_ELASTIC_NEO_HOOKE, -0.2);
