@@ -176,7 +176,8 @@ uz_status uz_displaced(uz_body_model *out, const uz_body_model *model, const dou
     return UZ_OK;
 }
 
-/* The area of each row becomes that of the deformed side: as the sides around its node have grown. */
+/* The area of each row becomes that of the deformed side: as the sides around its node have grown. Rows between bodies
+ * have been found on these, with their areas. */
 static uz_status stretch_areas(uz_result *result, const uz_body_model *model, const uz_body_model *displaced,
                                const uz_scene *scene, uz_error *err)
 {
@@ -199,6 +200,8 @@ static uz_status stretch_areas(uz_result *result, const uz_body_model *model, co
     }
     for (int64_t i = 0; i < result->m; i++) {
         const double *own = area + 2 * result->mesh.contact_node[i];
+        if (scene->contacts[result->mesh.contact_of[i]].kind == UZ_OBSTACLE_BODY)
+            continue;
         result->mesh.contact_area[i] *= own[0] > 0 ? own[1] / own[0] : 1;
     }
     free(area);

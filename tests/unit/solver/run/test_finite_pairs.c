@@ -178,6 +178,10 @@ TEST(stacked_bricks_pass_the_patch_test)
             for (int q = 0; q < 3; q++)
                 CHECK(fabs(r->u[3 * i + q] - ((q == 1 ? STRETCH : c) - 1) * r->mesh.xyz[3 * i + q]) < 3e-8);
         CHECK(fabs(r->summary.finite.least_gap) < 3e-9 && r->summary.max_penetration < 3e-9);
+        CHECK_MSG(fabs(r->evaluation->contact_area - c * c) < 1e-7, "%s: %.10g, not %.10g", ELEMENTS[k / 2],
+                  r->evaluation->contact_area, c * c);
+        CHECK_MSG(fabs(r->summary.max_pressure - force / (c * c)) < 1e-6, "%.10g, not %.10g", r->summary.max_pressure,
+                  force / (c * c));
         give_back(r, &s);
     }
 }
