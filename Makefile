@@ -280,7 +280,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers peers-contact peers-decks peers-large peers-space extremes theory large roller arch trade figures numbers collect page-size
+        bench-size bench-deps peers peers-contact peers-decks peers-large peers-large-solids peers-space extremes theory large roller arch trade figures numbers collect page-size
 test: test-build ## build and pass every test; ONCE=1: but those that make asan runs as they are
 	@tests/run.sh $(BUILD) "" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
 
@@ -424,7 +424,7 @@ bench-deps: ## install the Debian packages that only comparisons with other solv
 peers: deps bench-deps ## the same problems by what Debian has, one certificate for all: tables and build/peers.json; SIZES="30 60", TIME=20, ONLY=, PROBLEMS=
 	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
-	@$(if $(SIZES)$(ONLY)$(PROBLEMS),,$(MAKE) --no-print-directory -s peers-contact peers-large peers-space)
+	@$(if $(SIZES)$(ONLY)$(PROBLEMS),,$(MAKE) --no-print-directory -s peers-contact peers-large peers-large-solids peers-space)
 
 peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json
 	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json
@@ -436,6 +436,9 @@ peers-decks: $(BUILD)/uzawad ## CalculiX's own decks with contact or ties by Cal
 
 peers-large: bench-deps $(BUILD)/uzawad ## large deformation by CalculiX, GetFEM and the daemon: a table and build/peers-large.json; ONLY=part of a name
 	@/usr/bin/python3 -B tests/peers/large.py $(BUILD) $(BUILD)/peers-large.json $(if $(ONLY),ONLY="$(ONLY)")
+
+peers-large-solids: bench-deps $(BUILD)/uzawad ## two solids that slide under large deformation by GetFEM and the daemon: a table and build/large-solids.json; ONLY=part of a name
+	@$(call measured,large-solids$(if $(ONLY),-part)) /usr/bin/python3 -B tests/peers/large_solids.py $(BUILD) $(BUILD)/large-solids.json $(if $(ONLY),ONLY="$(ONLY)")
 
 peers-space: bench-deps $(BUILD)/uzawad ## solids in contact by the daemon against the linear solve of the same K by PETSc's GAMG: a table and build/peers-space.json; CELLS=32 along a side
 	@OMP_THREAD_LIMIT=1 OMP_NUM_THREADS=1 $(call measured,peers-space) /usr/bin/python3 -B tests/peers/gamg.py $(BUILD) $(BUILD)/peers-space.json $(if $(CELLS),CELLS=$(CELLS))

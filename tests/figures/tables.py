@@ -400,6 +400,20 @@ def large(data):
         ["elements", "moved aside by", "elements through the height: the force is off by"], [[f"`{element}`", aside, "; ".join(each)] for (element, aside), each in heights.items()])]
 
 
+def large_solids(data):
+    """Two solids that slide under large deformation against a finer mesh and GetFEM: parts of a hundred."""
+    def part(x):
+        return "" if x is None else f"{100 * x:.2f} %"
+
+    rows = []
+    for row in (data.get("large_solids") or {}).get("rows", []):
+        rows += [[row["scene"], f"`{one['element']}`", f"{one['unknowns']:,}", one["qps"], part(one["force_off"]), part(one["area_off"]), part(one["pressure_off"]), part(one["getfem_off"])]
+                 for one in row["rows"]]
+        finer = row["finer"]
+        rows.append([row["scene"], f"`{finer['element']}`, finer", f"{finer['unknowns']:,}", finer["qps"], "", "", "", part(finer["getfem_off"])])
+    return table(["scene", "element", "unknowns", "contact problems", "force", "area", "largest pressure", "force, GetFEM"], rows) if rows else None
+
+
 REASONS = (("first step is", "the first step is no static one"), ("FRICTION", "friction"), ("EQUATION", "equations between displacements"),
            ("SPRINGA", "springs"), ("in place of a spring", "contact softer than a twentieth of the body"),
            ("PLASTIC", "plasticity"), ("ADJUST", "nodes that are moved to the other surface (ADJUST)"), ("TRANSFORM", "turned axes of nodes"), ("CYCLIC", "cyclic symmetry"))

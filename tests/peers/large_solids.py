@@ -1,0 +1,126 @@
+"""Two solids that slide over each other by several elements under large deformation: the daemon's elements against a finer
+mesh of its own, and against GetFEM.
+usage: large_solids.py BUILD_DIR OUTPUT.json [ONLY=part of a name]
+
+A block is pressed on a longer one and moved along it, by four to five elements; another one is pressed on a dome, a part of
+a ball, and moved along that. Compared are the force between them, and on the dome, where no edge makes it infinite, the
+largest pressure. GetFEM (getfem_solids.py) has bricks of 27 nodes, its contact by integrals over rays (K. Poulios and
+Y. Renard), with multipliers that are linear along sides, and the load in the parts that its Newton's method needs. Ours is
+put on at once."""
+import json
+import math
+import pathlib
+import resource
+import subprocess
+import sys
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.append(str(HERE.parent / "api"))
+import service  # noqa: E402  the path is set above
+from two_bodies import body  # noqa: E402
+
+LIMIT, YOUNG, POISSON = 600, 1.0, 0.3
+ELEMENTS = {"hex8": 0, "hex20": 1, "tet10": 1}  # and how much less fine than the finer mesh
+
+
+def box(origin, size):
+    return lambda *t: [o + s * x for o, s, x in zip(origin, size, t)]
+
+
+def dome(*t):
+    """A plate whose top is a part of a ball of radius 2."""
+    x, z = 1.6 * t[0] - 0.8, 1.6 * t[2] - 0.8
+    return [x, t[1] * (1 - 2 + math.sqrt(4 - x * x - z * z)), z]
+
+
+# name: places of the lower and the upper body, their cells, how many times as fine the finer mesh is, the way of what is
+# held, is the pressure finite?
+SCENES = {"block on a block": ((box((0, 0, 0), (3, 1, 1.4)), box((0.4, 1, 0.2), (1, 0.7, 1))), ((8, 3, 4), (4, 2, 3)), 2, (1.2, -0.15, 0), False),
+          "block on a dome": ((dome, box((-1.25, 1, -0.7), (2, 0.5, 1.4))), ((4, 2, 4), (4, 1, 3)), 2, (0.5, -0.06, 0.2), True)}
+
+
+def request(name, element, fine):
+    places, cells, _, way, _ = SCENES[name]
+    return body((element, element), [[fine * n for n in c] for c in cells], places,
+                {"foot": [(0, "y0")], "top": [(0, "y1")], "under": [(1, "y0")], "held": [(1, "y1")]},
+                model="solid", kinematics="finite",
+                materials=[{"on": "all", "young": YOUNG, "poisson": POISSON, "law": "neo_hooke"}],
+                supports=[{"on": "foot", "ux": 0, "uy": 0, "uz": 0}, {"on": "held", **dict(zip(("ux", "uy", "uz"), way))}],
+                contacts=[{"on": "under", "with": "top"}])
+
+
+def by_daemon(s, name, element, fine):
+    job = s.post({**request(name, element, fine), "solver": {"time_limit_s": LIMIT}}).json
+    while job["status"] in ("accepted", "running"):  # for longer than a request may wait
+        time.sleep(0.2)
+        job = s.get(f"/v1/jobs/{job['id']}").json
+    summary = job["summary"]
+    if summary["outcome"] != "converged":
+        sys.exit(f"{name}, {element}: {summary['outcome']}: {summary.get('message')}")
+    contact = summary["contact"]
+    return {"element": element, "unknowns": summary["problem"]["d"], "force": contact["force"], "pressure": contact["max_pressure"], "area": contact["area"],
+            "qps": summary["finite"]["qps"]}
+
+
+def points(place, cells):
+    """Of each brick its 27 nodes, the first axis fastest."""
+    return [[place(*((c + k / 2) / n for c, k, n in zip((x, y, z), (i, j, k), cells))) for k in range(3) for j in range(3) for i in range(3)]
+            for z in range(cells[2]) for y in range(cells[1]) for x in range(cells[0])]
+
+
+def limited():
+    """Of a process that begins: LIMIT seconds of processor."""
+    resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
+
+
+def by_getfem(name, fine):
+    places, cells, _, way, _ = SCENES[name]
+    asked = {"parts": [points(p, [fine * n for n in c]) for p, c in zip(places, cells)], "cells": [[fine * n for n in c] for c in cells],
+             "way": way, "young": YOUNG, "poisson": POISSON}
+    done = subprocess.run(["/usr/bin/python3", "-B", HERE / "getfem_solids.py"], input=json.dumps(asked), capture_output=True, text=True,
+                          check=False, preexec_fn=limited, env={"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PATH": "/usr/bin:/bin"})
+    if done.returncode < 0:  # LIMIT has ended it
+        return {"load": 0, "seconds": LIMIT, "steps": 0}
+    if done.returncode > 0:
+        sys.exit(done.stderr)
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def off(value, true):
+    return math.dist(value, true) / math.hypot(*true)
+
+
+def row_of(s, name):
+    most, smooth = SCENES[name][2], SCENES[name][4]
+    finer = by_daemon(s, name, "hex20", most)
+    row = {"scene": name, "finer": finer, "getfem": by_getfem(name, most - 1), "rows": []}
+    true = row["getfem"]["force"] if row["getfem"]["load"] == 1 else None
+    finer["getfem_off"] = off(finer["force"], true) if true else None
+    text = "".join(f"{x:10.5f}" for x in finer["force"])
+    print(f"{name}, finer: {text}, pressure {finer['pressure']:.5f}; GetFEM {row['getfem']}", flush=True)
+    for element, less in ELEMENTS.items():
+        one = by_daemon(s, name, element, most - less)
+        one.update(force_off=off(one["force"], finer["force"]), pressure_off=abs(one["pressure"] / finer["pressure"] - 1) if smooth else None,
+                   area_off=abs(one["area"] / finer["area"] - 1),
+                   getfem_off=off(one["force"], true) if true else None)
+        row["rows"].append(one)
+        print({key: one[key] for key in one if key != "force"}, flush=True)
+    return row
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    only = "".join(option[5:] for option in sys.argv[3:] if option.startswith("ONLY="))
+    s = service.Service(sys.argv[1])
+    try:
+        s.start()
+        rows = [row_of(s, name) for name in SCENES if only in name]
+    finally:
+        s.stop()
+    pathlib.Path(sys.argv[2]).write_text(json.dumps({"rows": rows}), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
