@@ -198,15 +198,13 @@ void uz_csc_symv_columns(double *y, const uz_csc *A, double alpha, const double 
 
 int64_t uz_csc_seek(const uz_csc *A, int64_t row, int64_t column)
 {
-    int64_t low = A->ptr[column], high = A->ptr[column + 1];
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (A->idx[middle] < row)
-            low = middle + 1;
-        else
-            high = middle;
+    int64_t low = A->ptr[column], left = A->ptr[column + 1] - low;
+    while (left > 1) { /* a choice of numbers, not of ways: which half it is cannot be foretold */
+        const int64_t half = left / 2;
+        low += A->idx[low + half - 1] < row ? half : 0;
+        left -= half;
     }
-    return low;
+    return low + (left == 1 && A->idx[low] < row);
 }
 
 int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column)
