@@ -3,82 +3,168 @@
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/error.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* Elements around each node, and a scratch list of the nodes around one node. */
+/* Elements around each node. */
 typedef struct {
-    const uz_body_model *model;
+    uz_body_model *model;
     uz_mesh tied;          /* the mesh, but for hanging nodes: elements have those in their place that these lie amid */
     int64_t *first, *node; /* its own of these; NULL: there are no hanging nodes */
     int64_t *start;        /* n_nodes + 1, into around */
     int64_t *around;       /* as many as the elements have of these */
-    int64_t *seen;         /* n_nodes: 1 + the last node whose neighbours it was counted among */
-    int64_t *near;         /* neighbours of the node at hand, itself included, ascending; most_near of them */
-    int64_t n_near;
-    int64_t most_nodes; /* of an element, or in the place of its nodes */
+    int64_t most_nodes;    /* of an element, or in the place of its nodes */
+    int64_t *ptr, *ptr_fixed; /* of each column, one place on: how many entries it has; later where they begin */
 } neighbours;
 
-/* Free dofs >= first among the neighbours; written to out unless it is NULL. Returns how many. */
-static int64_t free_rows(int64_t *out, const neighbours *n, int64_t first)
+/* Nodes whose columns somebody makes, and his lists. */
+typedef struct {
+    const neighbours *of;
+    int64_t from, to;
+    int64_t *seen; /* n_nodes: 1 + the last node whose neighbours it was counted among */
+    int64_t *near; /* neighbours of the node at hand, itself included */
+    int64_t n_near;
+    int64_t *rows; /* their free dofs */
+} walk;
+
+static void find_near(walk *w, int64_t a, bool ascending)
 {
-    const int dim = n->model->mesh.dim;
-    int64_t count = 0;
-    for (int64_t i = 0; i < n->n_near; i++)
-        for (int c = 0; c < dim; c++) {
-            const int64_t row = n->model->dof[n->near[i] * dim + c];
-            if (row < first || row < 0)
+    const uz_mesh *mesh = &w->of->tied;
+    w->n_near = 0;
+    for (int64_t i = w->of->start[a]; i < w->of->start[a + 1]; i++)
+        for (int64_t k = mesh->first[w->of->around[i]]; k < mesh->first[w->of->around[i] + 1]; k++) {
+            const int64_t other = mesh->node[k];
+            if (w->seen[other] == a + 1)
                 continue;
-            if (out)
-                out[count] = row;
-            count++;
+            w->seen[other] = a + 1;
+            int64_t at = w->n_near++;
+            for (; ascending && at > 0 && w->near[at - 1] > other; at--) /* it is short, and mostly comes in order */
+                w->near[at] = w->near[at - 1];
+            w->near[at] = other;
         }
-    return count;
 }
 
-/* One column of K (rows from the diagonal on) or of K_fixed (all free rows) per dof: how many entries it has, counted
- * at ptr[column + 1]; where the matrices have room, which (ptr NULL). */
-static void walk_columns(uz_body_model *model, neighbours *n, int64_t *ptr, int64_t *ptr_fixed)
+/* Of K rows from the diagonal on, of K_fixed all free ones. */
+static void count_entries(const walk *w, int64_t a)
 {
-    const uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
-    const int dim = model->mesh.dim;
-    memset(n->seen, 0, (size_t)model->mesh.n_nodes * sizeof *n->seen);
-    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-        const uz_mesh *mesh = &n->tied;
-        n->n_near = 0;
-        for (int64_t i = n->start[a]; i < n->start[a + 1]; i++)
-            for (int64_t k = mesh->first[n->around[i]]; k < mesh->first[n->around[i] + 1]; k++) {
-                const int64_t other = mesh->node[k];
-                if (n->seen[other] == a + 1)
-                    continue;
-                n->seen[other] = a + 1;
-                int64_t at = n->n_near++;
-                for (; at > 0 && n->near[at - 1] > other; at--) /* the list is short, and mostly comes in order */
-                    n->near[at] = n->near[at - 1];
-                n->near[at] = other;
-            }
+    const neighbours *n = w->of;
+    const int dim = n->model->mesh.dim;
+    const int64_t *own = n->model->dof + a * dim;
+    int64_t all = 0, later = 0; /* dofs have the order of their nodes */
+    for (int64_t i = 0; i < w->n_near; i++)
         for (int c = 0; c < dim; c++) {
-            const int64_t column = model->dof[a * dim + c], fixed = -1 - column;
-            if (column == UZ_NO_DOF)
-                continue;
-            if (ptr)
-                *(column >= 0 ? &ptr[column + 1] : &ptr_fixed[fixed + 1]) = free_rows(NULL, n, column);
-            else
-                free_rows(column >= 0 ? K->idx + K->ptr[column] : K_fixed->idx + K_fixed->ptr[fixed], n, column);
+            const int64_t row = n->model->dof[w->near[i] * dim + c];
+            all += row >= 0;
+            later += row >= 0 && w->near[i] >= a;
         }
+    for (int c = 0; c < dim; c++)
+        if (own[c] >= 0)
+            n->ptr[own[c] + 1] = later--;
+        else if (own[c] != UZ_NO_DOF)
+            n->ptr_fixed[-own[c]] = all;
+}
+
+/* The rows of a column: the last of these; and zeros. */
+static void fill_column(uz_csc *A, int64_t column, const int64_t *rows, int64_t count)
+{
+    const int64_t at = A->ptr[column], entries = A->ptr[column + 1] - at;
+    memcpy(A->idx + at, rows + count - entries, (size_t)entries * sizeof *rows);
+    memset(A->val + at, 0, (size_t)entries * sizeof *A->val);
+}
+
+static void fill_columns(const walk *w, int64_t a)
+{
+    uz_body_model *model = w->of->model;
+    const int dim = model->mesh.dim;
+    const int64_t *own = model->dof + a * dim;
+    int64_t count = 0;
+    for (int64_t i = 0; i < w->n_near; i++)
+        for (int c = 0; c < dim; c++) {
+            const int64_t row = model->dof[w->near[i] * dim + c];
+            w->rows[count] = row;
+            count += row >= 0;
+        }
+    for (int c = 0; c < dim; c++)
+        if (own[c] >= 0)
+            fill_column(&model->K, own[c], w->rows, count);
+        else if (own[c] != UZ_NO_DOF)
+            fill_column(&model->K_fixed, -1 - own[c], w->rows, count);
+}
+
+static void count_part(void *ctx, int part)
+{
+    walk *w = (walk *)ctx + part;
+    for (int64_t a = w->from; a < w->to; a++) {
+        find_near(w, a, false);
+        count_entries(w, a);
+    }
+    memset(w->seen, 0, (size_t)w->of->tied.n_nodes * sizeof *w->seen);
+}
+
+static void fill_part(void *ctx, int part)
+{
+    walk *w = (walk *)ctx + part;
+    for (int64_t a = w->from; a < w->to; a++) {
+        find_near(w, a, true);
+        fill_columns(w, a);
     }
 }
 
-/* ptr: of each column one place on, how many entries it has. */
-static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, int64_t *ptr, uz_error *err)
+/* Room for its entries; ptr, as of neighbours, is its own then. */
+static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, int64_t **ptr, uz_error *err)
 {
     for (int64_t j = 0; j < cols; j++)
-        ptr[j + 1] += ptr[j];
-    uz_status status = uz_csc_init(A, rows, cols, ptr[cols], err);
+        (*ptr)[j + 1] += (*ptr)[j];
+    const int64_t entries = (*ptr)[cols];
+    *A = (uz_csc){.rows = rows,
+                  .cols = cols,
+                  .ptr = *ptr,
+                  .idx = uz_alloc(entries, sizeof *A->idx),
+                  .val = uz_alloc(entries, sizeof *A->val)};
+    *ptr = NULL;
+    if (A->idx && A->val)
+        return UZ_OK;
+    uz_csc_clear(A);
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a matrix of %lld columns and %lld entries", (long long)cols,
+                   (long long)entries);
+}
+
+enum { WORTH_SHARING = 20000 }; /* nodes */
+
+/* The columns of parts of the nodes. most: neighbours of a node. */
+static uz_status walk_columns(uz_body_model *model, neighbours *n, int64_t most, uz_error *err)
+{
+    const int64_t nodes = model->mesh.n_nodes;
+    const int parts = nodes < WORTH_SHARING ? 1 : uz_aside_threads();
+    walk walks[UZ_ASIDE_MOST] = {{0}};
+    uz_status status = UZ_OK;
+    for (int p = 0; p < parts; p++) {
+        walk *w = &walks[p];
+        *w = (walk){.of = n,
+                    .from = nodes * p / parts,
+                    .to = nodes * (p + 1) / parts,
+                    .seen = uz_alloc_zero(nodes, sizeof *w->seen),
+                    .near = uz_alloc(most, sizeof *w->near),
+                    .rows = uz_alloc(most * model->mesh.dim + 1, sizeof *w->rows)};
+        if (!w->seen || !w->near || !w->rows)
+            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the neighbours of %lld nodes", (long long)nodes);
+    }
+    if (status == UZ_OK) {
+        uz_aside_share(count_part, walks, parts);
+        status = init_matrix(&model->K, model->d, model->d, &n->ptr, err);
+    }
     if (status == UZ_OK)
-        memcpy(A->ptr, ptr, (size_t)(cols + 1) * sizeof *ptr);
+        status = init_matrix(&model->K_fixed, model->d, model->n_fixed, &n->ptr_fixed, err);
+    if (status == UZ_OK)
+        uz_aside_share(fill_part, walks, parts);
+    for (int p = 0; p < parts; p++) {
+        free(walks[p].seen);
+        free(walks[p].near);
+        free(walks[p].rows);
+    }
     return status;
 }
 
@@ -149,36 +235,25 @@ uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
     const uz_mesh *mesh = &model->mesh;
     neighbours n = {.model = model,
                     .start = uz_alloc(mesh->n_nodes + 1, sizeof *n.start),
-                    .seen = uz_alloc_zero(mesh->n_nodes, sizeof *n.seen)};
+                    .ptr = uz_alloc_zero(model->d + 1, sizeof *n.ptr),
+                    .ptr_fixed = uz_alloc_zero(model->n_fixed + 1, sizeof *n.ptr_fixed)};
     uz_status status = UZ_ERR_MEMORY;
-    int64_t *ptr = uz_alloc_zero(model->d + 1, sizeof *ptr), most = 0;
-    int64_t *ptr_fixed = uz_alloc_zero(model->n_fixed + 1, sizeof *ptr_fixed);
+    int64_t most = 0;
     if (tie(&n))
         n.around = uz_alloc(n.tied.first[mesh->n_elements], sizeof *n.around);
-    if (n.start && n.around && n.seen) {
+    if (n.start && n.around && n.ptr && n.ptr_fixed) {
         uz_mesh_list_around(n.start, n.around, &n.tied);
         for (int64_t a = 0; a < mesh->n_nodes; a++)
             most = n.start[a + 1] - n.start[a] > most ? n.start[a + 1] - n.start[a] : most;
-        n.near = uz_alloc(most * n.most_nodes + 1, sizeof *n.near); /* each counted for every element it shares */
-    }
-    if (!n.near || !ptr || !ptr_fixed) {
+        status = walk_columns(model, &n, most * n.most_nodes, err); /* each counted for every element it shares */
+    } else {
         uz_fail(err, status, "", "no memory for the pattern of %lld unknowns", (long long)model->d);
-        goto done;
     }
-    walk_columns(model, &n, ptr, ptr_fixed);
-    status = init_matrix(&model->K, model->d, model->d, ptr, err);
-    if (status == UZ_OK)
-        status = init_matrix(&model->K_fixed, model->d, model->n_fixed, ptr_fixed, err);
-    if (status == UZ_OK)
-        walk_columns(model, &n, NULL, NULL);
-done:
-    free(ptr);
-    free(ptr_fixed);
+    free(n.ptr);
+    free(n.ptr_fixed);
     free(n.first);
     free(n.node);
     free(n.start);
     free(n.around);
-    free(n.seen);
-    free(n.near);
     return status;
 }
