@@ -6,6 +6,7 @@
 #include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
+#include "element/stiffness_lanes.h"
 #include "linalg/linalg.h"
 
 #include <float.h>
@@ -121,19 +122,77 @@ uz_status uz_check_elements(const uz_body_model *model, uz_error *err)
 
 /* ---------------------------------------------------------------- adding up */
 
-/* A stiffness of displacements at nodes. The rows of a node stand together in every column, at a place that the column
- * of another's first free dof tells: each following one lacks the rows of that node before its diagonal. */
-void uz_add_stiffness(uz_body_model *model, const double *ke, const int64_t *node, int count)
+/* Nodes, whose columns somebody adds to: `from` to before `to`. */
+typedef struct {
+    int64_t from, to;
+} columns;
+
+static bool has_columns(const columns *of, int64_t node)
+{
+    return node >= of->from && node < of->to;
+}
+
+/* The block of two nodes in three free columns of the earlier one each, without questions. column: the first of them;
+ * place: of the later one's first row in it; ke: of that row and the first column, rows n apart. */
+static inline void add_whole_block(uz_csc *K, int64_t column, int64_t place, const double *ke, int n)
+{
+    for (int64_t j = 0; j < 3; j++) {
+        double *val = K->val + K->ptr[column + j] + place - j;
+        for (int i = 0; i < 3; i++)
+            val[i] += ke[i * n + j];
+    }
+}
+
+/* The rows of a node stand together in every column, at a place that the column of another's first free dof tells: each
+ * following one lacks the rows of that node before its diagonal. whole: all three dofs of both are free. */
+static void add_block(uz_csc *K, const int64_t *column, const int64_t *row, const double *ke, int n, int dim,
+                      bool whole)
+{
+    int64_t place = -1, first_column = 0;
+    if (whole) {
+        add_whole_block(K, column[0], uz_csc_find(K, row[0], column[0]) - K->ptr[column[0]], ke, n);
+        return;
+    }
+    for (int j = 0; j < dim; j++) {
+        int64_t at = 0;
+        for (int i = 0; i < dim && column[j] >= 0; i++) {
+            if (row[i] < 0)
+                continue;
+            if (place < 0) {
+                place = uz_csc_find(K, row[i], column[j]) - K->ptr[column[j]];
+                first_column = column[j];
+            }
+            K->val[K->ptr[column[j]] + place - (column[j] - first_column) + at++] += ke[i * n + j];
+        }
+    }
+}
+
+/* What dof j of node a has of a stiffness in its own block and, where it is supported, in K_fixed. */
+static void add_own(uz_body_model *model, const double *ke, const int64_t *const *dof, int n, int a, int j)
+{
+    const int dim = model->mesh.dim;
+    uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
+    const int64_t column = dof[a][j];
+    /* the block of the node itself: its lower triangle, at the head of each column */
+    for (int i = j; i < dim && column >= 0; i++)
+        if (dof[a][i] >= 0)
+            K->val[K->ptr[column] + dof[a][i] - column] += ke[(a * dim + i) * n + a * dim + j];
+    /* the free rows of a supported dof */
+    for (int i = 0; i < n && column < 0; i++) {
+        const int64_t row = dof[i / dim][i % dim];
+        if (row >= 0)
+            K_fixed->val[uz_csc_find(K_fixed, row, -1 - column)] += ke[i * n + a * dim + j];
+    }
+}
+
+/* A stiffness of displacements at nodes, to some columns of K and K_fixed. */
+static void add_to_columns(uz_body_model *model, const columns *of, const double *ke, const int64_t *node, int count)
 {
     double turned[DOFS * DOFS], tied[DOFS * DOFS];
     uz_ties ties;
     const int64_t *dof[UZ_ELEMENT_NODES];
-    uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
+    bool free[UZ_ELEMENT_NODES];
     const int dim = model->mesh.dim;
-    if (uz_have_carriers(model, node, count)) {
-        uz_add_carried(model, ke, node, count);
-        return;
-    }
     if (model->mesh.hangs)
         uz_tie_nodes(&ties, &model->mesh, node, count);
     if (model->mesh.hangs && ties.hangs) {
@@ -148,59 +207,229 @@ void uz_add_stiffness(uz_body_model *model, const double *ke, const int64_t *nod
         uz_turn_stiffness(turned, model, node, count);
         ke = turned;
     }
-    for (int a = 0; a < count; a++)
+    for (int a = 0; a < count; a++) { /* free dofs of a node have numbers in a row */
         dof[a] = model->dof + node[a] * dim;
+        free[a] = dim == 3 && dof[a][0] >= 0 && dof[a][1] >= 0 && dof[a][2] >= 0;
+    }
     for (int a = 0; a < count; a++) {
-        for (int j = 0; j < dim; j++) {
-            const int64_t column = dof[a][j];
-            /* the block of the node itself: its lower triangle, at the head of each column */
-            for (int i = j; i < dim && column >= 0; i++)
-                if (dof[a][i] >= 0)
-                    K->val[K->ptr[column] + dof[a][i] - column] += ke[(a * dim + i) * n + a * dim + j];
-            /* the free rows of a supported dof */
-            for (int i = 0; i < n && column < 0; i++) {
-                const int64_t row = dof[i / dim][i % dim];
-                if (row >= 0)
-                    K_fixed->val[uz_csc_find(K_fixed, row, -1 - column)] += ke[i * n + a * dim + j];
-            }
-        }
-        for (int b = 0; b < count; b++) { /* the block of two nodes, b the later one */
-            int64_t place = -1, first_column = 0;
-            for (int j = 0; j < dim && node[b] > node[a]; j++) {
-                const int64_t column = dof[a][j];
-                int64_t at = 0;
-                for (int i = 0; i < dim && column >= 0; i++) {
-                    if (dof[b][i] < 0)
-                        continue;
-                    if (place < 0) {
-                        place = uz_csc_find(K, dof[b][i], column) - K->ptr[column];
-                        first_column = column;
-                    }
-                    K->val[K->ptr[column] + place - (column - first_column) + at++] +=
-                        ke[(b * dim + i) * n + a * dim + j];
-                }
-            }
-        }
+        if (!has_columns(of, node[a]))
+            continue;
+        for (int j = 0; j < dim; j++)
+            add_own(model, ke, dof, n, a, j);
+        for (int b = 0; b < count; b++)
+            if (node[b] > node[a])
+                add_block(&model->K, dof[a], dof[b], ke + b * dim * n + a * dim, n, dim, free[a] && free[b]);
     }
 }
 
-uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
+void uz_add_stiffness(uz_body_model *model, const double *ke, const int64_t *node, int count)
+{
+    const columns all = {0, model->mesh.n_nodes};
+    if (uz_have_carriers(model, node, count))
+        uz_add_carried(model, ke, node, count);
+    else
+        add_to_columns(model, &all, ke, node, count);
+}
+
+/* ---------------------------------------------------------------- all elements */
+
+enum { LANES = UZ_STRAIN_LANES };
+
+/* One of those that add up a body's elements, each to columns of its own, all in the order of the elements: so that
+ * every entry is the same sum however many there are. An element around whose nodes several have columns is made by
+ * each of these. */
+typedef struct {
+    uz_body_model *model;
+    columns of;
+    stiffness_source source;
+    uz_stiffness_rule *rule; /* UZ_ELEMENT_KINDS, nodes 0: not made yet; NULL: elements share their matrices */
+    /* Elements that follow each other and are of one kind and formulation, to be made at once. */
+    int count;
+    int64_t element[LANES];
+    uz_formulation formulation;
+    bool in_lanes;
+    double *ke; /* LANES x DOFS x DOFS */
+    int64_t refused;
+    uz_status status;
+    uz_error err;
+} adder;
+
+static bool adder_init(adder *s, uz_body_model *model)
+{
+    s->model = model;
+    s->status = source_init(&s->source, model, &s->err);
+    if (s->status != UZ_OK || s->source.shared)
+        return s->status == UZ_OK;
+    s->rule = uz_alloc(UZ_ELEMENT_KINDS, sizeof *s->rule);
+    s->ke = uz_alloc(LANES * DOFS * DOFS, sizeof *s->ke);
+    for (int kind = 0; s->rule && kind < UZ_ELEMENT_KINDS; kind++)
+        s->rule[kind].nodes = 0;
+    if (!s->rule || !s->ke)
+        s->status = uz_fail(&s->err, UZ_ERR_MEMORY, "", "no memory to add up the stiffness of elements");
+    return s->status == UZ_OK;
+}
+
+static void adder_clear(adder *s)
+{
+    source_clear(&s->source);
+    free(s->rule);
+    free(s->ke);
+}
+
+static void add_element(adder *s, const double *ke, int64_t e)
+{
+    int count;
+    const int64_t *node = uz_mesh_element(&s->model->mesh, e, &count);
+    if (s->model->follow.first)
+        uz_add_stiffness(s->model, ke, node, count);
+    else
+        add_to_columns(s->model, &s->of, ke, node, count);
+}
+
+/* The matrices of those that wait; false: not of all. */
+static bool make_in_lanes(adder *s)
+{
+    const uz_body_model *model = s->model;
+    const uz_mesh *mesh = &model->mesh;
+    const uz_element_kind kind = (uz_element_kind)mesh->kind[s->element[0]];
+    uz_stiffness_rule *rule = &s->rule[kind];
+    uz_lanes x[3 * UZ_ELEMENT_NODES];
+    uz_lane_material material;
+    double *ke[LANES];
+    if (rule->nodes == 0)
+        uz_stiffness_rule_of(rule, kind, model->kind);
+    for (int l = 0; l < LANES; l++) { /* the first again where there is none */
+        const int64_t e = s->element[l < s->count ? l : 0], *node = mesh->node + mesh->first[e];
+        const uz_lame *lame = &uz_element_material(model, e)->lame;
+        ke[l] = s->ke + (l < s->count ? l : 0) * DOFS * DOFS;
+        material.lambda[l] = lame->lambda;
+        material.mu[l] = lame->mu;
+        for (int a = 0; a < rule->nodes; a++)
+            for (int c = 0; c < rule->dim; c++)
+                x[a * rule->dim + c][l] = mesh->xyz[node[a] * rule->dim + c];
+    }
+    return uz_lane_stiffness(ke, rule, s->formulation, x, &material, model->thickness);
+}
+
+static void add_waiting(adder *s)
+{
+    const bool made = s->count > 0 && s->in_lanes && make_in_lanes(s);
+    for (int l = 0; l < s->count && s->status == UZ_OK; l++) {
+        const double *ke = s->ke + l * DOFS * DOFS;
+        if (!made)
+            s->status = source_get(&ke, &s->source, s->element[l], &s->err);
+        if (s->status == UZ_OK)
+            add_element(s, ke, s->element[l]);
+        else
+            s->refused = s->element[l];
+    }
+    s->count = 0;
+}
+
+static void await(adder *s, int64_t e)
+{
+    const uz_body_model *model = s->model;
+    const uz_element element = {.model = model->kind,
+                                .formulation = uz_element_formulation(model, e),
+                                .lame = uz_element_material(model, e)->lame};
+    const bool in_lanes = !s->source.shared && uz_is_for_lanes(&element);
+    if (s->count > 0 && (s->in_lanes != in_lanes || s->formulation != element.formulation ||
+                         model->mesh.kind[s->element[0]] != model->mesh.kind[e]))
+        add_waiting(s);
+    s->in_lanes = in_lanes;
+    s->formulation = element.formulation;
+    s->element[s->count++] = e;
+    if (s->count == LANES || !in_lanes)
+        add_waiting(s);
+}
+
+/* Is one of an element's nodes, or of those that its hanging ones lie amid, among these? */
+static bool concerns(const columns *of, const uz_mesh *mesh, int64_t e)
+{
+    int count;
+    const int64_t *node = uz_mesh_element(mesh, e, &count);
+    for (int a = 0; a < count; a++)
+        if (has_columns(of, node[a]) || uz_mesh_hangs(mesh, node[a]))
+            return true;
+    return false;
+}
+
+static void add_elements(void *ctx, int part)
+{
+    adder *s = (adder *)ctx + part;
+    const uz_mesh *mesh = &s->model->mesh;
+    const bool all = s->of.to - s->of.from == mesh->n_nodes;
+    for (int64_t e = 0; e < mesh->n_elements && s->status == UZ_OK; e++)
+        if (all || concerns(&s->of, mesh, e))
+            await(s, e);
+    if (s->status == UZ_OK)
+        add_waiting(s);
+}
+
+enum { WORTH_SHARING = 20000 }; /* elements */
+
+/* More work than this, in parts of all, is not worth to be done by several. */
+#define TWICE_MOST 1.25
+
+/* Nodes in parts with as many elements around them each; returns how many parts. */
+static int divide_nodes(columns of[UZ_ASIDE_MOST], const uz_body_model *model)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const int parts = mesh->n_elements < WORTH_SHARING || model->follow.first ? 1 : uz_aside_threads();
+    const uz_csc *K = &model->K;
+    double made = 0;
+    int64_t a = 0;
+    for (int p = 0; p < parts; p++) {
+        const int64_t entries = K->ptr[K->cols] / parts * (p + 1);
+        of[p].from = a;
+        for (; a < mesh->n_nodes && p < parts - 1; a++) {
+            const int64_t column = model->dof[a * mesh->dim];
+            if (column >= 0 && K->ptr[column] >= entries)
+                break;
+        }
+        of[p].to = p < parts - 1 ? a : mesh->n_nodes;
+    }
+    for (int p = 0; p < parts && parts > 1; p++)
+        for (int64_t e = 0; e < mesh->n_elements; e++)
+            made += concerns(&of[p], mesh, e);
+    if (made > TWICE_MOST * (double)mesh->n_elements) {
+        of[0].to = mesh->n_nodes;
+        return 1;
+    }
+    return parts;
+}
+
+static uz_status add_all_elements(uz_body_model *model, uz_error *err)
+{
+    columns of[UZ_ASIDE_MOST];
+    const int parts = divide_nodes(of, model);
+    adder *adders = uz_alloc_zero(parts, sizeof *adders), *first = NULL;
+    if (!adders)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to add up the stiffness of elements");
+    bool ready = true;
+    for (int p = 0; p < parts; p++) {
+        adders[p].of = of[p];
+        ready = adder_init(&adders[p], model) && ready;
+    }
+    if (ready)
+        uz_aside_share(add_elements, adders, parts);
+    for (int p = 0; p < parts; p++)
+        if (adders[p].status != UZ_OK && (!first || adders[p].refused < first->refused))
+            first = &adders[p];
+    const uz_status status = first ? first->status : UZ_OK;
+    if (first && err)
+        *err = first->err;
+    for (int p = 0; p < parts; p++)
+        adder_clear(&adders[p]);
+    free(adders);
+    return status;
+}
+
+/* The springs of a node as a matrix of its dofs: Q diag(k) Q'. */
+static void add_springs(uz_body_model *model)
 {
     const int dim = model->mesh.dim;
-    stiffness_source source;
-    const double *ke;
-    uz_status status = source_init(&source, model, err);
-    if (status == UZ_OK)
-        status = uz_build_pattern(model, err);
-    for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK; e++) {
-        int count;
-        const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
-        status = source_get(&ke, &source, e, err);
-        if (status == UZ_OK)
-            uz_add_stiffness(model, ke, node, count);
-    }
-    /* the springs of a node as a matrix of its dofs: Q diag(k) Q' */
-    for (int64_t a = 0; a < model->mesh.n_nodes && status == UZ_OK && model->spring; a++) {
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->spring; a++) {
         const double *k = model->spring + a * dim, *Q = uz_node_frame(model, a);
         const int64_t *dof = model->dof + a * dim;
         double own[9] = {0};
@@ -222,7 +451,15 @@ uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
                     model->K_fixed.val[uz_csc_find(&model->K_fixed, dof[i], -1 - dof[j])] += value;
             }
     }
-    source_clear(&source);
+}
+
+uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
+{
+    uz_status status = uz_build_pattern(model, err);
+    if (status == UZ_OK)
+        status = add_all_elements(model, err);
+    if (status == UZ_OK)
+        add_springs(model);
     return status;
 }
 
@@ -385,7 +622,7 @@ static uz_status add_energies(double *twice, const uz_body_model *model, const d
     return status;
 }
 
-enum { SHARES = 2, WORTH_SHARING = 20000 }; /* elements */
+enum { SHARES = 2 };
 
 typedef struct {
     const uz_body_model *model;

@@ -4,6 +4,11 @@
 
 #include "element/element.h"
 
+#include <float.h>
+
+/* The sine of the least angle, in the sense of Hadamard's inequality, that is more than rounding. */
+#define UZ_FLAT (64 * DBL_EPSILON)
+
 /* J[axis][x]: derivatives of position by the reference coordinates, from those of the shape functions. */
 void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEMENT_NODES][3]);
 

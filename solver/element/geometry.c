@@ -2,14 +2,10 @@
  * shape is one that can be integrated. */
 #include "element/element_private.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
-
-/* The sine of the least angle, in the sense of Hadamard's inequality, that is more than rounding. */
-#define FLAT (64 * DBL_EPSILON)
 
 void uz_element_shape(double *N, uz_element_kind kind, const double point[3])
 {
@@ -254,9 +250,9 @@ static uz_shape_fault check_jacobian(const uz_element *element)
         for (int i = 0; i < dim; i++)
             lengths *= sqrt(J[i][0] * J[i][0] + J[i][1] * J[i][1] + (dim == 3 ? J[i][2] * J[i][2] : 0));
         const double det = determinant(J, dim);
-        if (det < -FLAT * lengths)
+        if (det < -UZ_FLAT * lengths)
             fault = UZ_SHAPE_INVERTED;
-        else if (!(det > FLAT * lengths) && fault == UZ_SHAPE_GOOD)
+        else if (!(det > UZ_FLAT * lengths) && fault == UZ_SHAPE_GOOD)
             fault = UZ_SHAPE_DEGENERATE;
     }
     return fault;
