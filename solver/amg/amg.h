@@ -29,6 +29,8 @@ typedef struct {
     float *value;    /* n x count, row by row */
     double strong;   /* couplings weaker than this, relative to the diagonal, form no aggregates; coarser levels, whose
                         matrices are fuller, halve it each (Vanek, Mandel, Brezina 1996, (5.2)) */
+    const double *xyz; /* n_nodes x dim, the caller's: where they are; NULL: unknown */
+    int dim;
 } uz_modes;
 /* From the matrix alone: nodes are groups of dofs with the same neighbours, the modes move all dofs that have the same
  * place in their groups alike (translations, where dofs are displacements). */

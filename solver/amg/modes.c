@@ -79,6 +79,8 @@ uz_status uz_modes_of_body(uz_modes *out, const double *xyz, const int64_t *dof,
     if (status != UZ_OK)
         return status;
     out->n_nodes = n_nodes;
+    out->xyz = xyz;
+    out->dim = dim;
     for (int64_t i = 0; i < n_nodes * dim; i++) {
         low[i % dim] = fmin(low[i % dim], xyz[i]);
         high[i % dim] = fmax(high[i % dim], xyz[i]);

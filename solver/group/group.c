@@ -489,25 +489,58 @@ static uz_status send_rows(far_multigrid *body, int64_t first, const uz_csc *K, 
     return status;
 }
 
+/* By where nodes are, else by their graph, which the group divides: it takes as long as it takes to make a level. */
+static uz_status divide_nodes(far_multigrid *body, const uz_modes *modes, uz_error *err)
+{
+    uz_process_group *group = body->group;
+    uz_spread *map = &body->map;
+    bool divided = group->processes == 1;
+    uz_wire_head head = {.kind = UZ_WIRE_GRAPH, .a = map->nodes};
+    const uz_status status = divided ? UZ_OK : uz_spread_divide(&divided, map, modes, group->processes, err);
+    if (status != UZ_OK || divided)
+        return status;
+    const bool heard = ask(group, head) && put(group, map->offset, (size_t)(map->nodes + 1) * sizeof *map->offset) &&
+                       put(group, map->neighbour, (size_t)map->offset[map->nodes] * sizeof *map->neighbour) &&
+                       hear(group, &head, UZ_WIRE_PARTS) &&
+                       take(group, map->part, (size_t)map->nodes * sizeof *map->part);
+    return heard ? UZ_OK : fail_lost(err);
+}
+
+static uz_status begin_body(far_multigrid *body, double strong, uz_error *err)
+{
+    uz_process_group *group = body->group;
+    const uz_spread *map = &body->map;
+    int64_t *count = uz_alloc_zero(2 * group->processes, sizeof *count);
+    if (!count)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a body");
+    body->id = group->next_id++;
+    const uz_wire_head head = {
+        .kind = UZ_WIRE_BODY, .id = body->id, .a = map->nodes, .b = map->bs, .c = map->modes, .x = strong};
+    for (int64_t i = 0; i < map->nodes; i++) {
+        count[2 * map->part[i]]++;
+        count[2 * map->part[i] + 1] += map->offset[i + 1] - map->offset[i] + 1;
+    }
+    const bool begun = ask(group, head) && put(group, count, (size_t)(2 * group->processes) * sizeof *count);
+    free(count);
+    return begun ? UZ_OK : fail_lost(err);
+}
+
 /* All of it, until the group has made its multigrid. */
 static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes *modes, uz_error *err)
 {
     uz_process_group *group = body->group;
-    uz_spread *map = &body->map;
     uz_wire_head head;
     if (group->processes == 0) {
         if (!hear(group, &head, UZ_WIRE_HELLO) || head.a < 1)
             return fail_lost(err);
         group->processes = head.a;
     }
-    body->id = group->next_id++;
-    head = (uz_wire_head){
-        .kind = UZ_WIRE_BODY, .id = body->id, .a = map->nodes, .b = map->bs, .c = map->modes, .x = modes->strong};
-    if (!ask(group, head) || !put(group, map->offset, (size_t)(map->nodes + 1) * sizeof *map->offset) ||
-        !put(group, map->neighbour, (size_t)map->offset[map->nodes] * sizeof *map->neighbour) ||
-        !hear(group, &head, UZ_WIRE_PARTS) || !take(group, map->part, (size_t)map->nodes * sizeof *map->part))
-        return fail_lost(err);
-    uz_status status = uz_spread_number(map, group->processes, err);
+    uz_status status = divide_nodes(body, modes, err);
+    if (status == UZ_OK)
+        status = uz_spread_number(&body->map, group->processes, err);
+    if (status != UZ_OK)
+        return status;
+    status = begin_body(body, modes->strong, err);
     for (int64_t first = 0; status == UZ_OK && !group->lost && first < group->processes; first += SHARES)
         status = send_rows(body, first, K, modes, err);
     if (status != UZ_OK) {

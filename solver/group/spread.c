@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "group/divide.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -120,12 +121,48 @@ uz_status uz_spread_init(uz_spread *map, const uz_csc *K, const uz_modes *modes,
     if (!map->node || !map->place || !number_dofs(map, modes))
         return fail_memory(err, d);
     map->offset = uz_alloc(map->nodes + 1, sizeof *map->offset);
-    map->part = uz_alloc(map->nodes, sizeof *map->part);
+    map->part = uz_alloc_zero(map->nodes, sizeof *map->part);
     map->order = uz_alloc(map->nodes, sizeof *map->order);
     map->number = uz_alloc(map->nodes, sizeof *map->number);
     if (!map->offset || !map->part || !map->order || !map->number || !make_graph(map, K))
         return fail_memory(err, d);
     return UZ_OK;
+}
+
+/* A plane that cuts more couplings of a body than this share, for each halving, is no good way to divide it: a body
+ * that winds, or a small one. */
+#define CUT_MOST 0.02
+enum { NODES_LEAST = 8 }; /* of a process */
+
+static bool is_good_cut(const int32_t *part, const uz_spread *map, int64_t processes)
+{
+    int64_t cut = 0;
+    double most = 0.0;
+    for (int64_t i = 0; i < map->nodes; i++)
+        for (int32_t k = map->offset[i]; k < map->offset[i + 1]; k++)
+            cut += part[i] != part[map->neighbour[k]];
+    for (int64_t k = 1; k < processes; k *= 2)
+        most += CUT_MOST;
+    return (double)cut <= most * map->offset[map->nodes];
+}
+
+uz_status uz_spread_divide(bool *divided, uz_spread *map, const uz_modes *modes, int64_t processes, uz_error *err)
+{
+    const int dim = modes->dim;
+    *divided = false;
+    if (!modes->xyz || map->nodes < NODES_LEAST * processes)
+        return UZ_OK;
+    double *x = uz_alloc(map->nodes * dim, sizeof *x);
+    int32_t *part = uz_alloc(map->nodes, sizeof *part);
+    for (int64_t j = 0; x && j < map->d; j++)
+        memcpy(x + map->node[j] * (int64_t)dim, modes->xyz + modes->node[j] * (int64_t)dim, (size_t)dim * sizeof *x);
+    const bool made = x && part && uz_divide(part, x, map->nodes, dim, processes);
+    *divided = made && is_good_cut(part, map, processes);
+    if (*divided)
+        memcpy(map->part, part, (size_t)map->nodes * sizeof *part);
+    free(x);
+    free(part);
+    return made ? UZ_OK : fail_memory(err, map->d);
 }
 
 static int ascending(const void *a, const void *b)

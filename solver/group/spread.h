@@ -12,7 +12,7 @@ typedef struct {
     int64_t bs, modes;
     int32_t *node;               /* d: of each dof */
     int32_t *offset, *neighbour; /* nodes + 1, offset[nodes]: the graph, without loops; sorted by uz_spread_number */
-    int32_t *part;               /* nodes: the process of each, filled by the caller before uz_spread_number */
+    int32_t *part;               /* nodes: the process of each, 0 until they are divided */
     int32_t *order, *number;     /* nodes: by process, and of each node its place in that order */
     int64_t *place;              /* d: number of its node x bs + which of its dofs */
 } uz_spread;
@@ -20,6 +20,8 @@ typedef struct {
 /* All but part, order, number; of `place` only which dof of its node it is. Errors: NOT_SPD where a diagonal entry is
  * not positive; UNSUPPORTED: too large for 32 bits. */
 uz_status uz_spread_init(uz_spread *map, const uz_csc *K, const uz_modes *modes, uz_error *err);
+/* part, by where nodes are. *divided false, and nothing done: that is not known, or cuts too many couplings. */
+uz_status uz_spread_divide(bool *divided, uz_spread *map, const uz_modes *modes, int64_t processes, uz_error *err);
 uz_status uz_spread_number(uz_spread *map, int64_t processes, uz_error *err);
 void uz_spread_clear(uz_spread *map);
 

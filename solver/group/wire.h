@@ -1,12 +1,13 @@
 /* wire.h: what a process that solves (group.c) and the first process of a group (worker/main.c) say to each other.
  *
  * A stream in both directions, numbers as this machine writes them. Each message begins with a head; what follows it
- * stands below. The client asks, the group answers each question with one message; ROWS and FREE have no answer.
+ * stands below. The client asks, the group answers each question with one message; BODY, ROWS and FREE have no answer.
  *
  *     <- HELLO                       a: processes
- *     -> BODY    a: nodes n, b: dofs of each, c: modes, x: uz_modes.strong; n + 1 offsets and the neighbours of each
- *                node (int32)
+ *     -> GRAPH   a: nodes n; n + 1 offsets and the neighbours of each node (int32)
  *     <- PARTS   a: processes; of each node the process that is to have it (n int32)
+ *     -> BODY    a: nodes n, b: dofs of each, c: modes, x: uz_modes.strong; of each process its nodes and its blocks
+ *                (int64). No answer
  *     -> ROWS    a: nodes, b: blocks, c: their process; number of blocks of each node (int32), the blocks' columns
  *                (int32), their values (row by row, double), the modes of the nodes' dofs (float). Nodes come by
  *                process, and are numbered so from now on; a message has nodes of one process only
@@ -29,8 +30,9 @@
 
 typedef enum {
     UZ_WIRE_HELLO = 1,
-    UZ_WIRE_BODY,
+    UZ_WIRE_GRAPH,
     UZ_WIRE_PARTS,
+    UZ_WIRE_BODY,
     UZ_WIRE_ROWS,
     UZ_WIRE_MADE,
     UZ_WIRE_HOLD,
@@ -45,7 +47,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 4
+#define UZ_WIRE_VERSION 5
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

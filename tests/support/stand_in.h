@@ -157,19 +157,14 @@ static inline void stand_in_fetch(stand_in *s)
 
 static inline bool stand_in_take_body(stand_in *s, const uz_wire_head *m)
 {
-    int32_t offset[STAND_IN_MOST + 1], neighbour[STAND_IN_MOST * STAND_IN_MOST], part[STAND_IN_MOST] = {0};
+    int64_t count[2];
     s->nodes = m->a;
     s->bs = m->b;
     s->modes = m->c;
     s->n = s->nodes * s->bs;
     s->at = 0;
-    if (s->n > STAND_IN_MOST || !stand_in_take(s, offset, (size_t)(s->nodes + 1) * sizeof *offset) ||
-        !stand_in_take(s, neighbour, (size_t)offset[s->nodes] * sizeof *neighbour))
-        return false;
     memset(s->K, 0, sizeof s->K);
-    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_PARTS, .a = 1});
-    stand_in_put(s, part, (size_t)s->nodes * sizeof *part);
-    return true;
+    return s->n <= STAND_IN_MOST && stand_in_take(s, count, sizeof count) && count[0] == s->nodes;
 }
 
 static inline void stand_in_answer_made(stand_in *s)

@@ -130,51 +130,55 @@ static PetscErrorCode divide(group *g, PetscInt n, const int32_t *offset, const 
     PetscFunctionReturn(0);
 }
 
+static PetscErrorCode answer_parts(group *g, const uz_wire_head *m)
+{
+    const PetscInt n = (PetscInt)m->a;
+    int32_t *offset = NULL, *neighbour = NULL, *part = NULL;
+    PetscFunctionBeginUser;
+    PetscCheck(m->a > 0 && m->a < INT_MAX, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "%lld nodes", (long long)m->a);
+    if (IS_FIRST(g)) {
+        PetscCall(PetscMalloc1(n + 1, &offset));
+        take(g, offset, (size_t)(n + 1) * sizeof *offset);
+        PetscCall(PetscMalloc1(offset[n] + 1, &neighbour));
+        take(g, neighbour, (size_t)offset[n] * sizeof *neighbour);
+        PetscCall(PetscCalloc1(n, &part));
+    }
+    if (g->size > 1 && n >= 8 * g->size)
+        PetscCall(divide(g, n, offset, neighbour, part));
+    answer(g, (uz_wire_head){.kind = UZ_WIRE_PARTS, .id = m->id, .a = g->size});
+    if (IS_FIRST(g))
+        put(g, part, (size_t)n * sizeof *part);
+    PetscCall(PetscFree(offset));
+    PetscCall(PetscFree(neighbour));
+    PetscCall(PetscFree(part));
+    PetscFunctionReturn(0);
+}
+
 static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
 {
     body *b = find(g, 0);
-    int32_t *offset = NULL, *neighbour = NULL, *part = NULL;
-    PetscInt *nodes, *blocks, mine[2];
+    int64_t *of; /* of each process its nodes and blocks */
     PetscFunctionBeginUser;
     PetscCheck(m->a > 0 && m->b > 0 && m->b <= 3 && m->c > 0 && m->c <= 6 && m->a * m->b < INT_MAX, PETSC_COMM_WORLD,
                PETSC_ERR_ARG_OUTOFRANGE, "a body of %lld nodes", (long long)m->a);
     *b = (body){.id = m->id, .nodes = (PetscInt)m->a, .bs = (PetscInt)m->b, .modes = (PetscInt)m->c};
     b->rows = (spread_rows){.b = b->bs, .k = b->modes, .strong = m->x};
-    PetscCall(PetscCalloc2(2 * g->size, &nodes, 2 * g->size, &blocks));
-    if (IS_FIRST(g)) {
-        PetscCall(PetscMalloc1(b->nodes + 1, &offset));
-        take(g, offset, (size_t)(b->nodes + 1) * sizeof *offset);
-        PetscCall(PetscMalloc1(offset[b->nodes] + 1, &neighbour));
-        take(g, neighbour, (size_t)offset[b->nodes] * sizeof *neighbour);
-        PetscCall(PetscCalloc1(b->nodes, &part));
-    }
-    if (g->size > 1 && b->nodes >= 8 * g->size)
-        PetscCall(divide(g, b->nodes, offset, neighbour, part));
-    for (PetscInt i = 0; IS_FIRST(g) && i < b->nodes; i++) {
-        nodes[2 * part[i]]++;
-        nodes[2 * part[i] + 1] += offset[i + 1] - offset[i] + 1;
-    }
-    PetscCallMPI(MPI_Bcast(nodes, 2 * g->size, MPIU_INT, 0, PETSC_COMM_WORLD));
+    PetscCall(PetscMalloc1(2 * g->size, &of));
+    if (IS_FIRST(g))
+        take(g, of, 2 * (size_t)g->size * sizeof *of);
+    PetscCallMPI(MPI_Bcast(of, 2 * g->size, MPI_INT64_T, 0, PETSC_COMM_WORLD));
     PetscCall(PetscMalloc2(g->size, &b->count, g->size, &b->first));
     for (PetscMPIInt k = 0, at = 0; k < g->size; at += b->count[k++]) {
         b->first[k] = at;
-        b->count[k] = nodes[2 * k] * b->bs;
+        b->count[k] = (PetscMPIInt)of[2 * k] * b->bs;
     }
-    mine[0] = nodes[2 * g->rank];
-    mine[1] = nodes[2 * g->rank + 1];
-    PetscCall(PetscFree2(nodes, blocks));
-    b->here = mine[0];
-    b->blocks = mine[1];
+    b->here = (PetscInt)of[2 * g->rank];
+    b->blocks = of[2 * g->rank + 1];
+    PetscCall(PetscFree(of));
     b->rows.ptr = new_zeros(b->here + 1, sizeof *b->rows.ptr);
     b->rows.column = new_zeros(b->blocks, sizeof *b->rows.column);
     b->rows.value = new_zeros(b->blocks * b->bs * b->bs, sizeof *b->rows.value);
     b->rows.mode = new_zeros(b->here * b->bs * b->modes, sizeof *b->rows.mode);
-    answer(g, (uz_wire_head){.kind = UZ_WIRE_PARTS, .id = b->id, .a = g->size});
-    if (IS_FIRST(g))
-        put(g, part, (size_t)b->nodes * sizeof *part);
-    PetscCall(PetscFree(offset));
-    PetscCall(PetscFree(neighbour));
-    PetscCall(PetscFree(part));
     PetscFunctionReturn(0);
 }
 
@@ -338,6 +342,10 @@ static PetscErrorCode make_steps(group *g, spread_system *s, const uz_wire_head 
 static PetscErrorCode obey(group *g, const uz_wire_head *m)
 {
     PetscFunctionBeginUser;
+    if (m->kind == UZ_WIRE_GRAPH) {
+        PetscCall(answer_parts(g, m));
+        PetscFunctionReturn(0);
+    }
     if (m->kind == UZ_WIRE_BODY) {
         PetscCall(begin_body(g, m));
         PetscFunctionReturn(0);

@@ -1,6 +1,9 @@
 /* K by blocks of nodes for several processes: every entry arrives once, at the place that its dofs have. */
 #include "harness.h"
+#include "group/divide.h"
 #include "group/spread.h"
+
+#include <math.h>
 
 enum { D = 40, PROCESSES = 3 };
 
@@ -129,4 +132,77 @@ TEST(a_part_that_does_not_exist_is_refused)
     CHECK(uz_spread_init(&map, &b->K, &b->modes, &err) == UZ_ERR_NOT_SPD && strcmp(err.where, "K") == 0);
     uz_spread_clear(&map);
     free(b);
+}
+
+/* ---- by places */
+
+enum { NX = 12, NY = 5, NZ = 4, POINTS = NX * NY * NZ };
+
+static void lattice(double x[POINTS][3])
+{
+    for (int i = 0; i < POINTS; i++) {
+        const int at[3] = {i % NX, i / NX % NY, i / NX / NY};
+        x[i][0] = 7 + 0.8 * at[0] - 0.6 * at[1]; /* turned */
+        x[i][1] = 3 + 0.6 * at[0] + 0.8 * at[1];
+        x[i][2] = at[2];
+    }
+}
+
+TEST(points_are_divided_across_their_longest_side)
+{
+    double x[POINTS][3];
+    int32_t part[POINTS];
+    lattice(x);
+    CHECK(uz_divide(part, x[0], POINTS, 3, 3));
+    for (int i = 0; i < POINTS; i++)
+        CHECK_INT(part[i], i % NX / 4);
+    CHECK(uz_divide(part, x[0], POINTS, 3, 1));
+    for (int i = 0; i < POINTS; i++)
+        CHECK_INT(part[i], 0);
+    memset(x, 0, sizeof x); /* all in one place */
+    int count[4] = {0};
+    CHECK(uz_divide(part, x[0], POINTS, 3, 4));
+    for (int i = 0; i < POINTS; i++)
+        count[part[i]]++;
+    for (int p = 0; p < 4; p++)
+        CHECK_INT(count[p], POINTS / 4);
+}
+
+/* A chain of nodes that lies straight is cut once, one whose nodes have any place is not cut by where they are. */
+TEST(a_cut_through_too_many_couplings_is_none)
+{
+    enum { N = 100 };
+    double val[2 * N], x[N];
+    int64_t ptr[N + 1] = {0}, idx[2 * N];
+    int32_t node[N];
+    float value[N];
+    bool divided;
+    uz_error err = {0};
+    for (int j = 0; j < N; j++) {
+        ptr[j + 1] = ptr[j];
+        for (int i = j; i < j + 2 && i < N; i++) {
+            val[ptr[j + 1]] = i == j ? 2 : -1;
+            idx[ptr[j + 1]++] = i;
+        }
+        node[j] = j;
+        value[j] = 1;
+        x[j] = j;
+    }
+    const uz_csc K = {.rows = N, .cols = N, .ptr = ptr, .idx = idx, .val = val};
+    uz_modes modes = {.count = 1, .n_nodes = N, .node = node, .value = value, .xyz = x, .dim = 1};
+    uz_spread map;
+    CHECK_INT(uz_spread_init(&map, &K, &modes, &err), UZ_OK);
+    CHECK_INT(uz_spread_divide(&divided, &map, &modes, 2, &err), UZ_OK);
+    CHECK(divided);
+    for (int i = 0; i < N; i++)
+        CHECK_INT(map.part[i], i >= N / 2);
+    memset(map.part, 0, N * sizeof *map.part);
+    for (int j = 0; j < N; j++)
+        x[j] = j * 37 % N;
+    CHECK_INT(uz_spread_divide(&divided, &map, &modes, 2, &err), UZ_OK);
+    CHECK(!divided && map.part[N - 1] == 0);
+    modes.xyz = NULL;
+    CHECK_INT(uz_spread_divide(&divided, &map, &modes, 2, &err), UZ_OK);
+    CHECK(!divided);
+    uz_spread_clear(&map);
 }

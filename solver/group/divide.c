@@ -1,0 +1,90 @@
+/* divide.c: recursive inertial bisection: points are halved by the plane across the line that is nearest to them all,
+ * and the halves likewise (H. Simon, "Partitioning of unstructured problems for parallel processing", Computing Systems
+ * in Engineering 2 (1991) 135-148). It takes a sort for each halving. */
+#include "group/divide.h"
+
+#include "core/alloc.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    double along; /* the line */
+    int32_t point;
+} placed;
+
+static int by_place(const void *a, const void *b)
+{
+    const placed *x = a, *y = b;
+    if (x->along != y->along)
+        return x->along < y->along ? -1 : 1;
+    return (x->point > y->point) - (x->point < y->point);
+}
+
+enum { POWER_STEPS = 30 };
+
+/* The direction in which the points vary most, about; of unit length. M: their covariances. */
+static void find_line(double line[3], double M[3][3], int dim)
+{
+    int widest = 0;
+    for (int c = 1; c < dim; c++)
+        widest = M[c][c] > M[widest][widest] ? c : widest;
+    for (int c = 0; c < dim; c++)
+        line[c] = c == widest;
+    for (int k = 0; k < POWER_STEPS; k++) {
+        double image[3] = {0}, square = 0.0;
+        for (int i = 0; i < dim; i++) {
+            for (int j = 0; j < dim; j++)
+                image[i] += M[i][j] * line[j];
+            square += image[i] * image[i];
+        }
+        for (int i = 0; i < dim && square > 0.0; i++)
+            line[i] = image[i] / sqrt(square);
+    }
+}
+
+/* Sorts n points along their line. */
+static void sort_points(placed *points, int64_t n, const double *x, int dim)
+{
+    double mean[3] = {0}, M[3][3] = {{0}}, line[3];
+    for (int64_t k = 0; k < n; k++)
+        for (int c = 0; c < dim; c++)
+            mean[c] += x[points[k].point * (int64_t)dim + c] / (double)n;
+    for (int64_t k = 0; k < n; k++)
+        for (int i = 0; i < dim; i++)
+            for (int j = 0; j < dim; j++)
+                M[i][j] += (x[points[k].point * (int64_t)dim + i] - mean[i]) *
+                           (x[points[k].point * (int64_t)dim + j] - mean[j]);
+    find_line(line, M, dim);
+    for (int64_t k = 0; k < n; k++) {
+        points[k].along = 0.0;
+        for (int c = 0; c < dim; c++)
+            points[k].along += line[c] * (x[points[k].point * (int64_t)dim + c] - mean[c]);
+    }
+    qsort(points, (size_t)n, sizeof *points, by_place);
+}
+
+static void divide(int32_t *part, placed *points, int64_t n, const double *x, int dim, int64_t first, int64_t processes)
+{
+    if (processes == 1) {
+        for (int64_t k = 0; k < n; k++)
+            part[points[k].point] = (int32_t)first;
+        return;
+    }
+    const int64_t left = processes / 2, of_left = n * left / processes;
+    sort_points(points, n, x, dim);
+    divide(part, points, of_left, x, dim, first, left);
+    divide(part, points + of_left, n - of_left, x, dim, first + left, processes - left);
+}
+
+bool uz_divide(int32_t *part, const double *x, int64_t n, int dim, int64_t processes)
+{
+    placed *points = uz_alloc(n, sizeof *points);
+    for (int64_t k = 0; points && k < n; k++)
+        points[k].point = (int32_t)k;
+    if (points)
+        divide(part, points, n, x, dim, 0, processes);
+    free(points);
+    return points != NULL;
+}
