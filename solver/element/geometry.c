@@ -128,15 +128,27 @@ void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g)
     }
 }
 
+/* What a Gauss point stands for, as uz_gauss_state_at has it, without derivatives by x; N gets the shape functions. */
+static double volume_at(double N[UZ_ELEMENT_NODES], const uz_element *element, int g)
+{
+    double local[UZ_ELEMENT_NODES][3], J[3][3], largest;
+    const uz_element_type *type = uz_element_type_of(element->kind);
+    const uz_gauss_point *at = &uz_element_rule(element->kind, element->model)->point[g];
+    type->shape(type, N, local, at->at);
+    uz_jacobian(J, element, local);
+    const double volume = at->weight * determinant(J, type->dim);
+    if (element->model == UZ_SOLID)
+        return volume;
+    return volume *
+           (element->model == UZ_AXISYMMETRIC ? 2 * PI * uz_ring_radius(&largest, element, N) : element->thickness);
+}
+
 double uz_element_volume(const uz_element *element)
 {
-    double volume = 0;
+    double volume = 0, N[UZ_ELEMENT_NODES];
     const int count = uz_element_rule(element->kind, element->model)->count;
-    for (int g = 0; g < count; g++) {
-        uz_gauss_state state;
-        uz_gauss_state_at(&state, element, g);
-        volume += state.volume;
-    }
+    for (int g = 0; g < count; g++)
+        volume += volume_at(N, element, g);
     return volume;
 }
 
@@ -189,12 +201,11 @@ void uz_element_add_body_force(double *f, const uz_element *element, const doubl
     const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
     const int count = uz_element_rule(element->kind, element->model)->count;
     for (int g = 0; g < count; g++) {
-        uz_gauss_state state;
-        uz_gauss_state_at(&state, element, g);
-        uz_element_shape(state.N, element->kind, state.point);
+        double N[UZ_ELEMENT_NODES];
+        const double volume = volume_at(N, element, g);
         for (int a = 0; a < nodes; a++)
             for (int c = 0; c < dim; c++)
-                f[a * dim + c] += state.volume * state.N[a] * b[c];
+                f[a * dim + c] += volume * N[a] * b[c];
     }
 }
 
