@@ -7,16 +7,18 @@
  * a process, A_e its own blocks and half of those that couple it with others, which the other side has, too. */
 #include "worker.h"
 
+#include "core/alloc.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 void *new_zeros(int64_t count, size_t size)
 {
-    void *made = calloc(count > 0 ? (size_t)count : 1, size);
+    void *made = uz_alloc(count > 0 ? count : 1, size); /* on large pages */
     if (!made)
         end_group("no memory");
-    return made;
+    return memset(made, 0, (count > 0 ? (size_t)count : 1) * size);
 }
 
 static void must(uz_status status, const uz_error *err)
