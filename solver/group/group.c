@@ -443,49 +443,44 @@ static bool put_rows(uz_process_group *group, int64_t id, const uz_spread *map, 
 {
     const size_t squared = (size_t)(map->bs * map->bs);
     const uz_wire_head head = {.kind = UZ_WIRE_ROWS, .id = id, .a = rows->nodes, .b = rows->blocks, .c = rows->process};
-    return ask(group, head) && put(group, rows->count, (size_t)rows->nodes * sizeof *rows->count) &&
-           put(group, rows->column, (size_t)rows->blocks * sizeof *rows->column) &&
-           put(group, rows->value, (size_t)rows->blocks * squared * sizeof *rows->value) &&
-           put(group, rows->mode, (size_t)(rows->nodes * map->bs * map->modes) * sizeof *rows->mode);
+    return ask(group, head) && put(group, rows->counts, (size_t)rows->nodes * sizeof *rows->counts) &&
+           put(group, rows->columns, (size_t)rows->blocks * sizeof *rows->columns) &&
+           put(group, rows->values, (size_t)rows->blocks * squared * sizeof *rows->values) &&
+           put(group, rows->modes, (size_t)(rows->nodes * map->bs * map->modes) * sizeof *rows->modes);
 }
 
 enum { SHARES = 2 };
 
 typedef struct {
     const uz_spread *map;
-    const uz_csc *K;
-    const uz_modes *modes;
-    int64_t processes;
     uz_spread_rows rows[SHARES];
-    uz_status status[SHARES];
-    uz_error err[SHARES];
+    bool more[SHARES];
 } filling;
 
 static void fill_share(void *ctx, int share)
 {
     filling *f = ctx;
-    if (f->rows[share].process < f->processes)
-        f->status[share] = uz_spread_fill(&f->rows[share], f->map, f->K, f->modes, &f->err[share]);
+    f->more[share] = f->more[share] && uz_spread_next(&f->rows[share], f->map);
 }
 
 /* Of two processes, each made by a thread, where there are two more. */
 static uz_status send_rows(far_multigrid *body, int64_t first, const uz_csc *K, const uz_modes *modes, uz_error *err)
 {
-    filling f = {.map = &body->map,
-                 .K = K,
-                 .modes = modes,
-                 .processes = body->group->processes,
-                 .rows = {{.process = first}, {.process = first + 1}}};
+    filling f = {.map = &body->map, .rows = {{.process = first}, {.process = first + 1}}};
     uz_status status = UZ_OK;
-    uz_aside_share(fill_share, &f, SHARES);
-    for (int share = 0; share < SHARES; share++) {
-        if (status == UZ_OK && f.status[share] != UZ_OK)
-            status = uz_fail(err, f.status[share], f.err[share].where, "%s", f.err[share].message);
-        while (status == UZ_OK && uz_spread_next(&f.rows[share], &body->map) &&
-               put_rows(body->group, body->id, &body->map, &f.rows[share]))
-            ;
-        uz_spread_rows_clear(&f.rows[share]);
+    for (int share = 0; share < SHARES && status == UZ_OK; share++) {
+        f.more[share] = f.rows[share].process < body->group->processes;
+        if (f.more[share])
+            status = uz_spread_begin(&f.rows[share], f.map, K, modes, err);
     }
+    while (status == UZ_OK && !body->group->lost && (f.more[0] || f.more[1])) {
+        uz_aside_share(fill_share, &f, SHARES);
+        for (int share = 0; share < SHARES; share++)
+            if (f.more[share])
+                put_rows(body->group, body->id, f.map, &f.rows[share]);
+    }
+    for (int share = 0; share < SHARES; share++)
+        uz_spread_rows_clear(&f.rows[share]);
     return status;
 }
 

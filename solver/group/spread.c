@@ -3,7 +3,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "group/divide.h"
+#include "linalg/linalg.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -49,6 +51,15 @@ static bool number_dofs(uz_spread *map, const uz_modes *modes)
     return true;
 }
 
+/* Has this column the rows of the one before but for its diagonal, of the same node? */
+static bool repeats(const uz_spread *map, const uz_csc *K, int64_t j)
+{
+    if (j == 0 || map->node[j] != map->node[j - 1])
+        return false;
+    const int64_t before = K->ptr[j - 1] + 1, at = K->ptr[j], count = K->ptr[j + 1] - at;
+    return at - before == count && memcmp(K->idx + before, K->idx + at, (size_t)count * sizeof *K->idx) == 0;
+}
+
 /* The graph of nodes: pairs from both sides of each coupling, then without repetition. */
 static bool make_graph(uz_spread *map, const uz_csc *K)
 {
@@ -61,6 +72,8 @@ static bool make_graph(uz_spread *map, const uz_csc *K)
         memset(last, 0xff, (size_t)n * sizeof *last);
         for (int64_t j = 0; j < K->cols; j++) {
             const int32_t b = map->node[j];
+            if (repeats(map, K, j))
+                continue;
             for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
                 const int32_t a = map->node[K->idx[k]];
                 if (a == b || last[a] == b)
@@ -123,8 +136,9 @@ uz_status uz_spread_init(uz_spread *map, const uz_csc *K, const uz_modes *modes,
     map->offset = uz_alloc(map->nodes + 1, sizeof *map->offset);
     map->part = uz_alloc_zero(map->nodes, sizeof *map->part);
     map->order = uz_alloc(map->nodes, sizeof *map->order);
+    map->dof = uz_alloc(map->size, sizeof *map->dof);
     map->number = uz_alloc(map->nodes, sizeof *map->number);
-    if (!map->offset || !map->part || !map->order || !map->number || !make_graph(map, K))
+    if (!map->offset || !map->part || !map->order || !map->number || !map->dof || !make_graph(map, K))
         return fail_memory(err, d);
     return UZ_OK;
 }
@@ -190,8 +204,12 @@ uz_status uz_spread_number(uz_spread *map, int64_t processes, uz_error *err)
         map->order[next[map->part[i]]++] = i;
     }
     free(next);
-    for (int64_t j = 0; j < map->d; j++)
+    for (int64_t i = 0; i < map->size; i++)
+        map->dof[i] = -1;
+    for (int64_t j = 0; j < map->d; j++) {
         map->place[j] += map->number[map->node[j]] * map->bs;
+        map->dof[map->place[j]] = j;
+    }
     for (int64_t i = 0; i < map->nodes; i++) { /* neighbours by their numbers from now on */
         for (int32_t k = map->offset[i]; k < map->offset[i + 1]; k++)
             map->neighbour[k] = map->number[map->neighbour[k]];
@@ -203,7 +221,7 @@ uz_status uz_spread_number(uz_spread *map, int64_t processes, uz_error *err)
 
 void uz_spread_clear(uz_spread *map)
 {
-    void *own[] = {map->node, map->offset, map->neighbour, map->part, map->order, map->number, map->place};
+    void *own[] = {map->node, map->offset, map->neighbour, map->part, map->order, map->number, map->place, map->dof};
     for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
         free(own[k]);
     memset(map, 0, sizeof *map);
@@ -211,131 +229,131 @@ void uz_spread_clear(uz_spread *map)
 
 /* ---- rows */
 
-/* Where the block (row, column) is, rows by their place in the process's. */
-static int64_t find_block(const uz_spread_rows *rows, int64_t row, int32_t column)
-{
-    int64_t low = rows->from[row], high = rows->from[row + 1];
-    while (low + 1 < high) {
-        const int64_t middle = (low + high) / 2;
-        if (rows->columns[middle] <= column)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
-}
-
-/* A dof: the number of its node, counted from the first of the process, and which of its dofs it is. */
+/* The dofs of a node, which as a rule have numbers in a row. */
 typedef struct {
-    int64_t node, place;
-} dof_place;
+    int64_t first;
+    int count;
+    bool in_a_row;
+} dofs;
 
-static inline dof_place place_of(const uz_spread_rows *rows, const uz_spread *map, int64_t dof)
+static dofs dofs_of(const uz_spread *map, int64_t number)
 {
-    const int64_t number = map->number[map->node[dof]];
-    return (dof_place){number - rows->first, map->place[dof] - number * map->bs};
+    const int64_t *dof = map->dof + number * map->bs;
+    dofs of = {.first = dof[0], .in_a_row = true};
+    for (; of.count < map->bs && dof[of.count] >= 0; of.count++)
+        of.in_a_row = of.in_a_row && dof[of.count] == of.first + of.count;
+    return of;
 }
 
-/* Entry (i, j), if row i is one of the process's. *block, pair: of the entry before, which is often a neighbour of this
- * one. */
-static inline void put_entry(uz_spread_rows *rows, const uz_spread *map, dof_place i, dof_place j, double value,
-                             int64_t *block, int64_t pair[2])
+/* Entry by entry. at: [row][column], rows `width` apart. */
+static void copy_entries(double *at, int64_t width, const uz_spread *map, const uz_csc *K, int64_t i, int64_t j)
 {
-    const int64_t bs = map->bs;
-    if (i.node < 0 || i.node >= rows->end - rows->first)
-        return;
-    if (pair[0] != i.node || pair[1] != j.node) {
-        pair[0] = i.node;
-        pair[1] = j.node;
-        *block = find_block(rows, i.node, (int32_t)(j.node + rows->first));
-    }
-    /* the matrix row i.place of the node follows the one before as in a matrix by rows */
-    const int64_t before = rows->from[i.node], width = (rows->from[i.node + 1] - before) * bs;
-    rows->values[before * bs * bs + i.place * width + (*block - before) * bs + j.place] = value;
-}
-
-uz_status uz_spread_fill(uz_spread_rows *rows, const uz_spread *map, const uz_csc *K, const uz_modes *modes,
-                         uz_error *err)
-{
-    const int64_t bs = map->bs;
-    rows->first = 0;
-    while (rows->first < map->nodes && map->part[map->order[rows->first]] < rows->process)
-        rows->first++;
-    for (rows->end = rows->first; rows->end < map->nodes && map->part[map->order[rows->end]] == rows->process;)
-        rows->end++;
-    const int64_t nodes = rows->end - rows->first;
-    int64_t blocks = 0;
-    rows->at = rows->first;
-    for (int64_t i = rows->first; i < rows->end; i++)
-        blocks += map->offset[map->order[i] + 1] - map->offset[map->order[i]] + 1;
-    rows->from = uz_alloc(nodes + 1, sizeof *rows->from);
-    rows->counts = uz_alloc(nodes, sizeof *rows->counts);
-    rows->columns = uz_alloc(blocks, sizeof *rows->columns);
-    rows->values = uz_alloc_zero(blocks * bs * bs, sizeof *rows->values);
-    rows->mode_values = uz_alloc_zero(nodes * bs * map->modes, sizeof *rows->mode_values);
-    if (!rows->from || !rows->counts || !rows->columns || !rows->values || !rows->mode_values)
-        return fail_memory(err, map->d);
-    rows->from[0] = 0;
-    for (int64_t i = 0; i < nodes; i++) {
-        const int32_t node = map->order[rows->first + i], own = (int32_t)(rows->first + i);
-        int64_t at = rows->from[i];
-        int32_t k = map->offset[node];
-        for (; k < map->offset[node + 1] && map->neighbour[k] < own; k++)
-            rows->columns[at++] = map->neighbour[k];
-        rows->columns[at++] = own;
-        for (; k < map->offset[node + 1]; k++)
-            rows->columns[at++] = map->neighbour[k];
-        rows->counts[i] = (int32_t)(at - rows->from[i]);
-        rows->from[i + 1] = at;
-    }
-    int64_t block[2] = {0, 0}, pair[2][2] = {{-1, -1}, {-1, -1}};
-    for (int64_t j = 0; j < map->d; j++) {
-        const dof_place to = place_of(rows, map, j);
-        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
-            const dof_place from = place_of(rows, map, K->idx[k]);
-            put_entry(rows, map, from, to, K->val[k], &block[0], pair[0]);
-            put_entry(rows, map, to, from, K->val[k], &block[1], pair[1]);
+    for (int64_t r = 0; r < map->bs; r++)
+        for (int64_t c = 0; c < map->bs; c++) {
+            const int64_t row = map->dof[i * map->bs + r], column = map->dof[j * map->bs + c];
+            const int64_t k =
+                row < 0 || column < 0 ? -1 : uz_csc_find(K, row > column ? row : column, row > column ? column : row);
+            at[r * width + c] = k < 0 ? 0.0 : K->val[k];
         }
-        for (int64_t c = 0; to.node >= 0 && to.node < nodes && c < map->modes; c++)
-            rows->mode_values[(to.node * bs + to.place) * map->modes + c] = modes->value[j * map->modes + c];
+}
+
+/* Column by column of the earlier node, in each of which the rows of the later one stand together. False: they do
+ * not. */
+static bool copy_columns(double *at, int64_t width, const uz_csc *K, const dofs *row, const dofs *column)
+{
+    const bool below = row->first > column->first;
+    const dofs *later = below ? row : column, *earlier = below ? column : row;
+    const int64_t there = uz_csc_find(K, later->first, earlier->first) - K->ptr[earlier->first];
+    for (int64_t c = 0; c < earlier->count; c++) {
+        const int64_t k = K->ptr[earlier->first + c] + there - c, last = k + later->count - 1;
+        if (there < c || last >= K->ptr[earlier->first + c + 1] || K->idx[k] != later->first ||
+            K->idx[last] != later->first + later->count - 1)
+            return false;
+        for (int64_t r = 0; r < later->count; r++)
+            at[below ? r * width + c : c * width + r] = K->val[k + r];
     }
-    for (int64_t i = 0; i < nodes; i++) { /* dofs that the node does not have */
-        const int64_t before = rows->from[i], width = (rows->from[i + 1] - before) * bs;
-        const int64_t own = find_block(rows, i, (int32_t)(rows->first + i)) - before;
-        double largest = 0.0;
-        for (int pass = 0; pass < 2; pass++)
-            for (int64_t c = 0; c < bs; c++) {
-                double *diagonal = &rows->values[before * bs * bs + c * width + own * bs + c];
-                if (pass == 0)
-                    largest = *diagonal > largest ? *diagonal : largest;
-                else if (*diagonal == 0.0)
-                    *diagonal = largest;
-            }
+    return true;
+}
+
+/* Dofs that the node does not have. */
+static void fill_diagonal(double *own, int64_t width, int64_t bs)
+{
+    double largest = 0.0;
+    for (int64_t c = 0; c < bs; c++)
+        largest = fmax(largest, own[c * width + c]);
+    for (int64_t c = 0; c < bs; c++)
+        if (own[c * width + c] == 0.0)
+            own[c * width + c] = largest;
+}
+
+/* The rows of node i, counted by process; its blocks are the next of the buffers. */
+static void make_rows(uz_spread_rows *rows, const uz_spread *map, int64_t i)
+{
+    const int64_t bs = map->bs;
+    const int32_t node = map->order[i], before = map->offset[node], others = map->offset[node + 1] - before;
+    const int64_t width = (others + 1) * bs;
+    int32_t *columns = rows->columns + rows->blocks;
+    double *values = rows->values + rows->blocks * bs * bs;
+    const dofs own = dofs_of(map, i);
+    int32_t count = 0;
+    for (; count < others && map->neighbour[before + count] < i; count++)
+        columns[count] = map->neighbour[before + count];
+    const int32_t diagonal = count;
+    columns[count++] = (int32_t)i;
+    for (; count <= others; count++)
+        columns[count] = map->neighbour[before + count - 1];
+    memset(values, 0, (size_t)(width * bs) * sizeof *values);
+    for (int32_t k = 0; k < count; k++) {
+        const dofs other = dofs_of(map, columns[k]);
+        if (k == diagonal || !own.in_a_row || !other.in_a_row ||
+            !copy_columns(values + k * bs, width, rows->K, &own, &other))
+            copy_entries(values + k * bs, width, map, rows->K, i, columns[k]);
     }
-    return UZ_OK;
+    fill_diagonal(values + diagonal * bs, width, bs);
+    for (int c = 0; c < own.count; c++)
+        memcpy(rows->modes + (rows->nodes * bs + c) * map->modes, rows->from->value + map->dof[i * bs + c] * map->modes,
+               (size_t)map->modes * sizeof *rows->modes);
+    rows->counts[rows->nodes++] = count;
+    rows->blocks += count;
+}
+
+static int64_t blocks_of(const uz_spread *map, int64_t i)
+{
+    return map->offset[map->order[i] + 1] - map->offset[map->order[i]] + 1;
+}
+
+uz_status uz_spread_begin(uz_spread_rows *rows, const uz_spread *map, const uz_csc *K, const uz_modes *modes,
+                          uz_error *err)
+{
+    const int64_t size = map->bs * map->bs;
+    int64_t room = AT_ONCE / size;
+    rows->K = K;
+    rows->from = modes;
+    rows->at = 0;
+    while (rows->at < map->nodes && map->part[map->order[rows->at]] < rows->process)
+        rows->at++;
+    for (rows->end = rows->at; rows->end < map->nodes && map->part[map->order[rows->end]] == rows->process; rows->end++)
+        room = blocks_of(map, rows->end) > room ? blocks_of(map, rows->end) : room;
+    rows->room = room; /* a node has a block at least */
+    rows->counts = uz_alloc(room, sizeof *rows->counts);
+    rows->columns = uz_alloc(room, sizeof *rows->columns);
+    rows->values = uz_alloc(room * size, sizeof *rows->values);
+    rows->modes = uz_alloc(room * map->bs * map->modes, sizeof *rows->modes);
+    return rows->counts && rows->columns && rows->values && rows->modes ? UZ_OK : fail_memory(err, map->d);
 }
 
 bool uz_spread_next(uz_spread_rows *rows, const uz_spread *map)
 {
-    const int64_t bs = map->bs, begin = rows->at - rows->first, nodes = rows->end - rows->first;
-    int64_t i = begin;
-    while (i < nodes && (i == begin || (rows->from[i + 1] - rows->from[begin]) * bs * bs <= AT_ONCE))
-        i++;
-    rows->nodes = i - begin;
-    if (rows->nodes == 0)
-        return false;
-    rows->blocks = rows->from[i] - rows->from[begin];
-    rows->count = rows->counts + begin;
-    rows->column = rows->columns + rows->from[begin];
-    rows->value = rows->values + rows->from[begin] * bs * bs;
-    rows->mode = rows->mode_values + begin * bs * map->modes;
-    rows->at = rows->first + i;
-    return true;
+    rows->nodes = rows->blocks = 0;
+    memset(rows->modes, 0, (size_t)(rows->room * map->bs * map->modes) * sizeof *rows->modes);
+    while (rows->at < rows->end && rows->blocks + blocks_of(map, rows->at) <= rows->room)
+        make_rows(rows, map, rows->at++);
+    return rows->nodes > 0;
 }
 
 void uz_spread_rows_clear(uz_spread_rows *rows)
 {
-    void *own[] = {rows->from, rows->counts, rows->columns, rows->values, rows->mode_values};
+    void *own[] = {rows->counts, rows->columns, rows->values, rows->modes};
     for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
         free(own[k]);
     memset(rows, 0, sizeof *rows);

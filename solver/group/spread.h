@@ -15,6 +15,7 @@ typedef struct {
     int32_t *part;               /* nodes: the process of each, 0 until they are divided */
     int32_t *order, *number;     /* nodes: by process, and of each node its place in that order */
     int64_t *place;              /* d: number of its node x bs + which of its dofs */
+    int64_t *dof;                /* size: the reverse; -1: the node has fewer */
 } uz_spread;
 
 /* All but part, order, number; of `place` only which dof of its node it is. Errors: NOT_SPD where a diagonal entry is
@@ -27,20 +28,19 @@ void uz_spread_clear(uz_spread *map);
 
 /* The rows of one process, some at a time. */
 typedef struct {
-    int64_t process;
-    int64_t nodes, blocks;  /* of the current ones */
-    const int32_t *count;   /* nodes: blocks of each, */
-    const int32_t *column;  /* blocks: and their columns, ascending */
-    const double *value;    /* blocks x bs x bs: row by row of the matrix */
-    const float *mode;      /* nodes x bs x modes */
-    int64_t first, end, at; /* in map->order: of the process, and of the current nodes the one after the last */
-    int64_t *from;          /* end - first + 1: blocks before each node's */
-    int32_t *counts, *columns;
-    double *values;
-    float *mode_values;
+    int64_t process;       /* by the caller */
+    int64_t nodes, blocks; /* of the current ones */
+    int32_t *counts;       /* nodes: blocks of each, */
+    int32_t *columns;      /* blocks: and their columns, ascending */
+    double *values;        /* blocks x bs x bs: row by row of the matrix */
+    float *modes;          /* nodes x bs x modes */
+    int64_t at, end, room; /* nodes in map->order that come next, and the one after the last; blocks at once */
+    const uz_csc *K;
+    const uz_modes *from;
 } uz_spread_rows;
-uz_status uz_spread_fill(uz_spread_rows *rows, const uz_spread *map, const uz_csc *K, const uz_modes *modes,
-                         uz_error *err);
+/* K and modes are kept until uz_spread_rows_clear, also after a failure. */
+uz_status uz_spread_begin(uz_spread_rows *rows, const uz_spread *map, const uz_csc *K, const uz_modes *modes,
+                          uz_error *err);
 bool uz_spread_next(uz_spread_rows *rows, const uz_spread *map); /* false: there are no more */
 void uz_spread_rows_clear(uz_spread_rows *rows);
 

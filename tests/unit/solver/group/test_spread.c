@@ -51,19 +51,19 @@ static void gather(double *whole, float *modes, const uz_spread *map, const body
     uz_error err = {0};
     for (int64_t process = 0; process < PROCESSES; process++) {
         uz_spread_rows rows = {.process = process};
-        CHECK(uz_spread_fill(&rows, map, &b->K, &b->modes, &err) == UZ_OK);
+        CHECK(uz_spread_begin(&rows, map, &b->K, &b->modes, &err) == UZ_OK);
         while (uz_spread_next(&rows, map)) {
-            const double *value = rows.value;
+            const double *value = rows.values;
             int64_t block = 0;
-            for (int64_t i = 0; i < rows.nodes; block += rows.count[i++], node++) {
+            for (int64_t i = 0; i < rows.nodes; block += rows.counts[i++], node++) {
                 CHECK(map->part[map->order[node]] == process);
                 for (int64_t c = 0; c < bs; c++)
-                    for (int64_t k = 0; k < rows.count[i]; k++)
+                    for (int64_t k = 0; k < rows.counts[i]; k++)
                         for (int64_t e = 0; e < bs; e++)
-                            whole[(node * bs + c) * map->size + rows.column[block + k] * bs + e] = *value++;
-                for (int64_t k = 1; k < rows.count[i]; k++)
-                    CHECK(rows.column[block + k - 1] < rows.column[block + k]);
-                memcpy(modes + node * bs * 2, rows.mode + i * bs * 2, (size_t)(bs * 2) * sizeof *modes);
+                            whole[(node * bs + c) * map->size + rows.columns[block + k] * bs + e] = *value++;
+                for (int64_t k = 1; k < rows.counts[i]; k++)
+                    CHECK(rows.columns[block + k - 1] < rows.columns[block + k]);
+                memcpy(modes + node * bs * 2, rows.modes + i * bs * 2, (size_t)(bs * 2) * sizeof *modes);
             }
         }
         uz_spread_rows_clear(&rows);
