@@ -7,7 +7,7 @@
  *     <- READY                      once, when it has started
  *     -> JOB                        its text is in the inbox
  *     <- ASK     -> ANSWER          an upload, or a part of an earlier job; as often as it likes; or a stream to a
- *                                   group of processes, once, which takes a while
+ *                                   group of processes, once, which takes a while: nothing else is asked meanwhile
  *     <- READ                       the text was read; names of the cases are in the outbox
  *     <- KEPT                       an outcome is in the outbox that holds if the process is ended before it is done
  *     <- DONE                       the outcome is in the outbox; not where one lies that was kept

@@ -51,6 +51,7 @@ typedef struct {
     const codec_request *request;
     double queue_s, parse_s, given_at;
     uz_process_group *group; /* of the job; NULL: it has none */
+    bool group_asked;        /* for, and the answer has not been taken */
     bool fresh;              /* a job has ended since memory was made ready last, or none was solved yet */
 } solver;
 
@@ -83,19 +84,36 @@ static void note_grid(void *ctx, const uz_grid_start *grid)
     live_grid(&((solver *)ctx)->live, grid, clock_seconds(CLOCK_MONOTONIC));
 }
 
+static void ask_for_group(solver *s)
+{
+    const packet question = {.kind = MESSAGE_ASK, .u.ask = {.what = ASK_GROUP}};
+    if (!s->group_asked && !message_send(s->socket, &question, -1))
+        _exit(1); /* the daemon is gone */
+    s->group_asked = true;
+}
+
+/* The group's stream, or -1 and why there is none. */
+static int hear_of_group(solver *s, int32_t *status)
+{
+    packet answer;
+    int stream = -1;
+    if (!message_receive(s->socket, &answer, &stream) || answer.kind != MESSAGE_ANSWER)
+        _exit(1);
+    s->group_asked = false;
+    *status = answer.status;
+    return stream;
+}
+
 /* The group of processes of this job. */
 static uz_process_group *find_group(void *ctx, char *why, size_t size)
 {
     solver *s = ctx;
-    const packet question = {.kind = MESSAGE_ASK, .u.ask = {.what = ASK_GROUP}};
-    packet answer;
-    int stream = -1;
+    int32_t status;
     if (s->group)
         return s->group;
-    if (!message_send(s->socket, &question, -1) || !message_receive(s->socket, &answer, &stream) ||
-        answer.kind != MESSAGE_ANSWER)
-        _exit(1); /* the daemon is gone */
-    if (answer.status == STORE_NOT_FOUND)
+    ask_for_group(s);
+    const int stream = hear_of_group(s, &status);
+    if (status == STORE_NOT_FOUND)
         snprintf(why, size,
                  "this service has no group of processes to solve with. Its option --group-command configures one; or "
                  "ask for the operator matrix_free, or for auto");
@@ -104,6 +122,22 @@ static uz_process_group *find_group(void *ctx, char *why, size_t size)
                  "the group of processes could not be started, and the service's log has the cause. Ask for the "
                  "operator matrix_free, or for auto");
     return s->group = stream >= 0 ? uz_process_group_new(stream) : NULL;
+}
+
+/* It takes a while to start, while the body is assembled. What a start is loaded from is asked for meanwhile, and its
+ * answers would come after the group's. */
+static bool wants_group_soon(const codec_request *request)
+{
+    return request->settings.op == UZ_OPERATOR_DISTRIBUTED && !request->answer.u && !request->start.job[0];
+}
+
+/* Of a job that did not come to it. */
+static void leave_group(solver *s)
+{
+    int32_t status;
+    const int stream = s->group_asked ? hear_of_group(s, &status) : -1;
+    if (stream >= 0)
+        close(stream);
 }
 
 /* The names come before the news, and the news before the solve. */
@@ -122,6 +156,8 @@ static void note_request(void *ctx, const codec_request *request)
     s->parse_s = clock_seconds(CLOCK_MONOTONIC) - s->given_at;
     live_begin(&s->live, &s->board->live, &request->settings, problem);
     message_send(s->socket, &m, -1);
+    if (wants_group_soon(request))
+        ask_for_group(s);
 }
 
 /* What there is of an answer lies in the outbox from now on, and what comes goes behind it: this process may be ended
@@ -197,6 +233,7 @@ static void run_job(solver *s, const packet *m)
     uz_process_threads(atomic_load(&s->board->threads));
     if (body || m->u.job.damaged) {
         solve_job(&solved, &with, m->u.job.id, body, (size_t)m->u.job.size);
+        leave_group(s);
         if (s->group && uz_process_group_is_lost(s->group))
             _exit(SOLVER_GROUP_LOST); /* the job is run again, as where this process had been lost */
         uz_process_group_free(s->group);

@@ -181,6 +181,18 @@ def test_dismissed(s):
     check(time.monotonic() - began < 10, ended)
 
 
+@needs_group
+@options("--workers", "1", "--group-command", PAIR)
+def test_a_group_that_nobody_needs(s):
+    """It is started while the body is assembled: of a scene that is refused then nothing stays, and the next is solved."""
+    free = by("distributed", CUBE)
+    free["problem"]["supports"] = [{"on": "back", "ux": 0}]
+    job = solve(s, free)
+    check(job["status"] == "failed" and job["error"]["code"] == "free_body", job)
+    wait_until(lambda: not processes(s), PATIENT_S)
+    check(solve(s, by("distributed", CUBE))["status"] == "successful")
+
+
 @options("--workers", "1")
 def test_refused_without_a_command(s):
     job = s.solve(by("distributed", SCENE))
