@@ -67,12 +67,20 @@ static void count_entries(const walk *w, int64_t a)
             n->ptr_fixed[-own[c]] = all;
 }
 
-/* The rows of a column: the last of these; and zeros. */
+/* The rows of a column: the last of these. */
 static void fill_column(uz_csc *A, int64_t column, const int64_t *rows, int64_t count)
 {
-    const int64_t at = A->ptr[column], entries = A->ptr[column + 1] - at;
-    memcpy(A->idx + at, rows + count - entries, (size_t)entries * sizeof *rows);
-    memset(A->val + at, 0, (size_t)entries * sizeof *A->val);
+    const int64_t end = A->ptr[column + 1];
+    for (int64_t k = A->ptr[column]; k < end; k++) /* too short for a call of memcpy */
+        A->idx[k] = rows[count - end + k];
+}
+
+/* A part's share of all values. */
+static void clear_values(uz_csc *A, const walk *w)
+{
+    const int64_t entries = A->ptr[A->cols], nodes = w->of->tied.n_nodes;
+    const int64_t begin = entries * w->from / nodes, end = entries * w->to / nodes;
+    memset(A->val + begin, 0, (size_t)(end - begin) * sizeof *A->val);
 }
 
 static void fill_columns(const walk *w, int64_t a)
@@ -107,6 +115,8 @@ static void count_part(void *ctx, int part)
 static void fill_part(void *ctx, int part)
 {
     walk *w = (walk *)ctx + part;
+    clear_values(&w->of->model->K, w);
+    clear_values(&w->of->model->K_fixed, w);
     for (int64_t a = w->from; a < w->to; a++) {
         find_near(w, a, true);
         fill_columns(w, a);

@@ -132,25 +132,29 @@ static bool has_columns(const columns *of, int64_t node)
     return node >= of->from && node < of->to;
 }
 
-/* The block of two nodes in three free columns of the earlier one each, without questions. column: the first of them;
- * place: of the later one's first row in it; ke: of that row and the first column, rows n apart. */
-static inline void add_whole_block(uz_csc *K, int64_t column, int64_t place, const double *ke, int n)
+/* The block of two nodes whose dofs are all free, without questions. column: the first of the earlier one's; place: of
+ * the later one's first row in it; ke: of that row and the first column, rows n apart. */
+static inline void add_whole_block(uz_csc *K, int64_t column, int64_t place, const double *ke, int n, int dim)
 {
-    for (int64_t j = 0; j < 3; j++) {
+    for (int64_t j = 0; j < dim; j++) {
         double *val = K->val + K->ptr[column + j] + place - j;
-        for (int i = 0; i < 3; i++)
+        for (int i = 0; i < dim; i++)
             val[i] += ke[i * n + j];
     }
 }
 
 /* The rows of a node stand together in every column, at a place that the column of another's first free dof tells: each
- * following one lacks the rows of that node before its diagonal. whole: all three dofs of both are free. */
+ * following one lacks the rows of that node before its diagonal. whole: all dofs of both are free. */
 static void add_block(uz_csc *K, const int64_t *column, const int64_t *row, const double *ke, int n, int dim,
                       bool whole)
 {
     int64_t place = -1, first_column = 0;
     if (whole) {
-        add_whole_block(K, column[0], uz_csc_find(K, row[0], column[0]) - K->ptr[column[0]], ke, n);
+        place = uz_csc_find(K, row[0], column[0]) - K->ptr[column[0]];
+        if (dim == 3)
+            add_whole_block(K, column[0], place, ke, n, 3);
+        else
+            add_whole_block(K, column[0], place, ke, n, 2);
         return;
     }
     for (int j = 0; j < dim; j++) {
@@ -209,7 +213,7 @@ static void add_to_columns(uz_body_model *model, const columns *of, const double
     }
     for (int a = 0; a < count; a++) { /* free dofs of a node have numbers in a row */
         dof[a] = model->dof + node[a] * dim;
-        free[a] = dim == 3 && dof[a][0] >= 0 && dof[a][1] >= 0 && dof[a][2] >= 0;
+        free[a] = dof[a][0] >= 0 && dof[a][1] >= 0 && dof[a][dim - 1] >= 0;
     }
     for (int a = 0; a < count; a++) {
         if (!has_columns(of, node[a]))
