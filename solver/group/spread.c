@@ -310,9 +310,11 @@ static void make_rows(uz_spread_rows *rows, const uz_spread *map, int64_t i)
             copy_entries(values + k * bs, width, map, rows->K, i, columns[k]);
     }
     fill_diagonal(values + diagonal * bs, width, bs);
+    float *modes = rows->modes + rows->nodes * bs * map->modes;
+    memset(modes, 0, (size_t)(bs * map->modes) * sizeof *modes);
     for (int c = 0; c < own.count; c++)
-        memcpy(rows->modes + (rows->nodes * bs + c) * map->modes, rows->from->value + map->dof[i * bs + c] * map->modes,
-               (size_t)map->modes * sizeof *rows->modes);
+        memcpy(modes + c * map->modes, rows->from->value + map->dof[i * bs + c] * map->modes,
+               (size_t)map->modes * sizeof *modes);
     rows->counts[rows->nodes++] = count;
     rows->blocks += count;
 }
@@ -345,7 +347,6 @@ uz_status uz_spread_begin(uz_spread_rows *rows, const uz_spread *map, const uz_c
 bool uz_spread_next(uz_spread_rows *rows, const uz_spread *map)
 {
     rows->nodes = rows->blocks = 0;
-    memset(rows->modes, 0, (size_t)(rows->room * map->bs * map->modes) * sizeof *rows->modes);
     while (rows->at < rows->end && rows->blocks + blocks_of(map, rows->at) <= rows->room)
         make_rows(rows, map, rows->at++);
     return rows->nodes > 0;
