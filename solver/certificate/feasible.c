@@ -103,7 +103,11 @@ static double choose_rows(const uz_feasible *c, const double *r, double apart)
         c->move.in[i] = close || uz_row_penetrates(gap - apart * c->size[i]);
         for (int64_t k = c->Nt->ptr[i]; c->move.in[i] && k < c->Nt->ptr[i + 1]; k++)
             moved += fabs(c->Nt->val[k] * c->correction[c->Nt->idx[k]]);
-        c->move.target[i] = c->move.in[i] ? gap - 4.0 * DBL_EPSILON * moved - apart * c->size[i] : 0.0;
+        /* a row that is as open as it should be stays: moves of nothing but rounding, equation by equation, would not
+         * end where other rows, on dofs that hardly move, are far smaller than that */
+        const double open = apart * c->size[i] + 4.0 * DBL_EPSILON * moved, near = 3.0 * DBL_EPSILON * moved;
+        const bool moves = c->move.in[i] && !(fabs(gap - open) <= near);
+        c->move.target[i] = moves ? gap - open : 0.0;
         worst = isnan(gap) ? INFINITY : uz_row_penetrates(gap) ? fmax(worst, -gap / c->size[i]) : worst;
     }
     return worst;

@@ -548,3 +548,34 @@ TEST(rows_between_two_bodies_have_an_active_set)
         uz_problem_clear(&problem);
     }
 }
+
+/* Rows on eight-node faces have several entries. On a plane that the nodes begin on, those that touch are closed to
+ * nothing, or to what is nothing beside the body: no bound was found there. */
+TEST(eight_node_faces_on_a_plane_are_bounded)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(40, 40, 10, 10)};
+    uz_scene *scene = &problem.scene;
+    scene->model = UZ_SOLID;
+    scene->box.dim = 3;
+    scene->box.size[2] = 40;
+    scene->box.cells[2] = 10;
+    snprintf(scene->box.element, sizeof scene->box.element, "hex20");
+    add_support(scene, "left", 0, 0);
+    scene->supports[0].u[2] = 0;
+    add_load(scene, "top", 0, -0.05);
+    add_load(scene, "right", 0.5, 0);
+    add_plane(scene, "bottom", 0, 0, 0, 1);
+    uz_settings exactly = settings_for(UZ_OPERATOR_CONDENSED, UZ_METHOD_AUTO, 1e-9),
+                freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-6);
+    uz_result *exact = solve_problem(&problem, &exactly), *got = solve_problem(&problem, &freely);
+    if (exact && got) {
+        const uz_certificate *c = &got->summary.certificate;
+        CHECK_INT(got->summary.outcome, UZ_CONVERGED);
+        CHECK(c->relative_error <= 1e-6);
+        CHECK(c->energy_dual <= exact->summary.certificate.energy_primal + 1e-12 * fabs(c->energy_primal));
+        CHECK(c->energy_primal >= exact->summary.certificate.energy_dual - 1e-12 * fabs(c->energy_primal));
+    }
+    uz_result_free(exact);
+    uz_result_free(got);
+    uz_problem_clear(&problem);
+}
