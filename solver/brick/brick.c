@@ -198,7 +198,7 @@ static inline __attribute__((always_inline)) void layer(const uz_brick_product *
                 out[m * LINES + q] = of->out[q / 2] + at;
             }
         cells_of_line(of->sums, in, brick->cells[0], room->stride, block);
-        nodes_of_line(out, of->sums, room->stride);
+        nodes_of_line(out, of->sums, room->stride, j == 0);
     }
 }
 
@@ -214,15 +214,14 @@ static void layer_narrow(const uz_brick_product *room, struct uz_brick_product_r
     layer(room, of, brick, block);
 }
 
-/* The next plane becomes the present one; the one after it has no sums yet. */
-static void go_up(const uz_brick_product *room, struct uz_brick_product_room *of)
+/* The next plane becomes the present one. */
+static void go_up(struct uz_brick_product_room *of)
 {
     double *const in = of->in[0], *const out = of->out[0];
     of->in[0] = of->in[1];
     of->in[1] = in;
     of->out[0] = of->out[1];
     of->out[1] = out;
-    memset(out, 0, (size_t)(3 * room->plane) * sizeof *out);
 }
 
 static void multiply_slab(void *ctx, int slab)
@@ -231,6 +230,7 @@ static void multiply_slab(void *ctx, int slab)
     const int64_t cells = p->brick->cells[2], first = uz_brick_slab(cells + 1, slab, p->slabs),
                   end = uz_brick_slab(cells + 1, slab + 1, p->slabs);
     struct uz_brick_product_room *of = &p->room->of[slab];
+    memset(of->out[0], 0, (size_t)(3 * p->room->plane) * sizeof(double));
     for (int64_t k = first > 0 ? first - 1 : 0; k < end; k++) {
         if (k == 0 || k + 1 == first)
             unpack(of->in[0], p, k);
@@ -240,9 +240,8 @@ static void multiply_slab(void *ctx, int slab)
         }
         if (k >= first)
             pack(p, k, of->out[0]);
-        go_up(p->room, of);
+        go_up(of);
     }
-    memset(of->out[0], 0, (size_t)(3 * p->room->plane) * sizeof(double));
 }
 
 void uz_brick_multiply(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x,

@@ -29,7 +29,7 @@ static inline int64_t uz_brick_slab(int64_t planes, int slab, int slabs)
     return planes * slab / slabs;
 }
 
-/* K times a vector in double precision, plane by plane. One room per solve, for `most` threads; out: zeros. */
+/* K times a vector in double precision, plane by plane. One room per solve, for `most` threads. */
 typedef struct {
     int64_t stride, plane; /* numbers in a line and in a plane of nodes, of one component */
     int most;

@@ -49,7 +49,7 @@ typedef struct {
     int64_t apart_near, apart_far;
 } nodes;
 
-/* What the cells of a layer do to the nodes is added to near and far. */
+/* What the cells of a layer do to the nodes is added to near, and is all that far has. */
 static inline __attribute__((always_inline)) void layer(const uz_brick_level *level, float *sums, const nodes *x,
                                                         float *near, float *far)
 {
@@ -63,7 +63,7 @@ static inline __attribute__((always_inline)) void layer(const uz_brick_level *le
                 out[m * LINES + q] = (q < 2 ? near : far) + m * level->plane + line;
             }
         cells_of_line(sums, in, level->cells[0], level->stride, level->block);
-        nodes_of_line(out, sums, level->stride);
+        nodes_of_line(out, sums, level->stride, j == 0);
     }
 }
 
@@ -136,9 +136,10 @@ static void begin_slab(void *ctx, int slab)
     const uz_brick_level *level = s->level;
     const struct uz_brick_room *room = &s->room->of[slab];
     const int64_t first = uz_brick_slab(level->cells[2] + 1, slab, s->slabs);
-    memset(room->plane[0], 0, (size_t)(3 * level->plane) * sizeof(float));
-    if (first == 0)
+    if (first == 0) {
+        memset(room->plane[0], 0, (size_t)(3 * level->plane) * sizeof(float));
         return;
+    }
     add_layer(s, room, first - 1, NULL, room->plane[1], room->plane[0]);
     for (int m = 0; s->what == STEP && m < COMPONENTS; m++)
         memcpy(room->edge + m * level->plane, s->v->x + m * level->size + first * level->plane,
@@ -157,7 +158,6 @@ static void sweep_slab(void *ctx, int slab)
     if (s->what == RESIDUAL)
         begin_slab(ctx, slab);
     for (int64_t k = first; k < end; k++) {
-        memset(planes[1], 0, (size_t)(3 * level->plane) * sizeof(float));
         if (k < level->cells[2])
             add_layer(s, room, k, k + 1 == end ? above : NULL, planes[0], planes[1]);
         for (int m = 0; m < COMPONENTS; m++)
