@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/cpu.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <float.h>
 #include <math.h>
@@ -74,7 +75,7 @@ bool uz_brick_init(uz_brick *brick)
 
 uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
 {
-    uz_status status = uz_csc_init(out, brick->d, brick->d, brick->d, err);
+    uz_status status = uz_csc_init_diagonal(out, brick->d, err);
     if (status != UZ_OK)
         return status;
     int64_t node = 0;
@@ -92,10 +93,6 @@ uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
                             out->val[dof] += brick->ke[(UZ_BRICK_DOFS + 1) * (3 * a + c)];
                     }
                 }
-    for (int64_t j = 0; j <= brick->d; j++)
-        out->ptr[j] = j;
-    for (int64_t j = 0; j < brick->d; j++)
-        out->idx[j] = j;
     return UZ_OK;
 }
 

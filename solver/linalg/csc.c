@@ -10,7 +10,7 @@
 
 size_t uz_csc_bytes(const uz_csc *A)
 {
-    return A->ptr ? 8 * (size_t)(A->cols + 1) + 16 * (size_t)A->ptr[A->cols] : 0;
+    return A->ptr ? 8 * (size_t)(A->cols + 1) + (A->idx == A->ptr ? 8 : 16) * (size_t)A->ptr[A->cols] : 0;
 }
 
 uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_error *err)
@@ -34,12 +34,29 @@ uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_err
     return UZ_OK;
 }
 
+uz_status uz_csc_init_diagonal(uz_csc *A, int64_t n, uz_error *err)
+{
+    uz_csc made = {.rows = n, .cols = n, .ptr = uz_alloc(n + 1, sizeof *made.ptr)};
+    made.idx = made.ptr; /* 0, 1, 2, ... both */
+    made.val = uz_alloc_zero(n, sizeof *made.val);
+    memset(A, 0, sizeof *A);
+    if (!made.ptr || !made.val) {
+        uz_csc_clear(&made);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a diagonal of %lld entries", (long long)n);
+    }
+    for (int64_t j = 0; j <= n; j++)
+        made.ptr[j] = j;
+    *A = made;
+    return UZ_OK;
+}
+
 void uz_csc_clear(uz_csc *A)
 {
     if (!A)
         return;
+    if (A->idx != A->ptr)
+        free(A->idx);
     free(A->ptr);
-    free(A->idx);
     free(A->val);
     memset(A, 0, sizeof *A);
 }
