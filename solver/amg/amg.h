@@ -49,6 +49,13 @@ typedef struct uz_multigrid_room uz_multigrid_room; /* one per thread; each kind
 struct uz_cg_info;
 struct uz_cg_stop;
 
+/* bottom <= u <= top at some dofs. */
+typedef struct {
+    int64_t n;
+    const int64_t *dof;         /* n, ascending; NULL: all */
+    const double *bottom, *top; /* n; infinite: there is none */
+} uz_limits;
+
 /* What a kind of multigrid does. M^-1 is symmetric and positive definite, also with dofs held. */
 typedef struct {
     /* z = M^-1 r (n); z and r do not overlap. */
@@ -64,14 +71,14 @@ typedef struct {
      * since it was made. CANCELLED where it had to stop; the room may then only be freed, or told again. */
     uz_status (*hold)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, const bool *held, size_t *bytes,
                       const uz_stop *stop, uz_error *err);
-    /* Where the contact problem, 1/2 u'Ku - p'u minimal over bottom <= u <= top (n; infinite: no bound), is well begun:
-     * u (n), and which dofs it holds at their bounds, by coarser grids. *found false: there are none, or it had to
-     * stop. No dof may be held; none is afterwards. NULL: nothing is known. */
+    /* Where the contact problem, 1/2 u'Ku - p'u minimal within limits, is well begun: u (n), and which of the limits
+     * hold it (held: as many as they are), by coarser grids. *found false: there are none, or it had to stop. No dof
+     * may be held; none is afterwards. NULL: nothing is known. */
     uz_status (*start)(const uz_multigrid *mg, uz_multigrid_room *room, bool *found, double *u, bool *held,
-                       const double *p, const double *bottom, const double *top, const uz_stop *stop, uz_error *err);
+                       const double *p, const uz_limits *limits, const uz_stop *stop, uz_error *err);
     void (*free)(uz_multigrid *mg);
     /* Whole solves, where they are elsewhere; NULL: by conjugate gradients here. As uz_cg_solve, which leaves info at
-     * 0; r: cg->r, of K as it is here. */
+     * 0, but that x at held dofs counts as 0; r: cg->r, of K as it is here. */
     uz_status (*solve)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, struct uz_cg_info *info,
                        double *x, double *r, const double *b, const struct uz_cg_stop *stop, uz_error *err);
 } uz_multigrid_kind;
@@ -111,8 +118,8 @@ typedef struct {
     const bool *held; /* of uz_cg_hold */
     uz_multigrid_room *room;
     int64_t n;
-    size_t bytes, grown;   /* of all this; what holding dofs adds */
-    double *r, *z, *p, *q; /* n each */
+    size_t bytes, grown; /* of all this; what holding dofs adds */
+    double *r, *z, *p;   /* n each */
 } uz_cg;
 uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, uz_error *err);
 /* Solves from now on are for K_FF: see uz_multigrid_kind. */
@@ -124,6 +131,7 @@ typedef struct uz_cg_stop {
     int64_t max_iterations;
     const uz_hooks *hooks; /* asked in each iteration; may be NULL */
     double deadline;       /* uz_seconds() */
+    bool begun;            /* cg->r is b - K x already, at free dofs; kinds that solve do not read it */
     bool unchecked; /* the caller looks at the residual himself: where the recurrence meets the tolerance, its own
                        is told in `last` and cg->r, and the true one is not computed. Kinds that solve may */
 } uz_cg_stop;
@@ -134,8 +142,8 @@ typedef struct uz_cg_info {
     bool met;           /* the tolerance was reached; false: limit, cancel, deadline, or rounding */
 } uz_cg_info;
 
-/* x (n): in, a start; out, nearer to K^-1 b. At held dofs x is neither read nor written. The residual of the x that is
- * returned stands in cg->r. UZ_ERR_NOT_SPD: some p'K p was not positive. */
+/* x (n): in, a start; out, nearer to K^-1 b. At held dofs it stays as it is, and K x has its part. The residual of the
+ * x that is returned stands in cg->r. UZ_ERR_NOT_SPD: some p'K p was not positive. */
 uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b, const uz_cg_stop *stop,
                       uz_error *err);
 

@@ -16,13 +16,13 @@ enum { RESTARTS_MOST = 4 };
 
 uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, uz_error *err)
 {
-    double **vectors[] = {&cg->r, &cg->z, &cg->p, &cg->q};
+    double **vectors[] = {&cg->r, &cg->z, &cg->p};
     *cg = (uz_cg){.mg = mg, .n = mg->n};
     cg->room = mg->kind->room(mg, &cg->bytes);
     bool ok = cg->room != NULL;
-    for (int k = 0; k < 4; k++)
+    for (int k = 0; k < 3; k++)
         ok = (*vectors[k] = uz_alloc(mg->n, sizeof(double))) && ok;
-    cg->bytes += 32 * (size_t)mg->n;
+    cg->bytes += 24 * (size_t)mg->n;
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to solve for %lld dofs", (long long)mg->n);
 }
 
@@ -39,7 +39,6 @@ void uz_cg_clear(uz_cg *cg)
     free(cg->r);
     free(cg->z);
     free(cg->p);
-    free(cg->q);
     memset(cg, 0, sizeof *cg);
 }
 
@@ -60,7 +59,7 @@ typedef struct {
 static void find_residual(void *ctx, int64_t begin, int64_t end)
 {
     const update *u = ctx;
-    const double *restrict b = u->b, *restrict q = u->cg->q;
+    const double *restrict b = u->b, *restrict q = u->cg->z;
     double *restrict r = u->cg->r;
     for (int64_t j = begin; j < end; j++)
         r[j] = b[j] - q[j];
@@ -70,7 +69,7 @@ static void take_step(void *ctx, int64_t begin, int64_t end)
 {
     const update *u = ctx;
     const bool *held = u->cg->held;
-    const double alpha = u->factor, *restrict p = u->cg->p, *restrict q = u->cg->q;
+    const double alpha = u->factor, *restrict p = u->cg->p, *restrict q = u->cg->z;
     double *restrict x = u->x, *restrict r = u->cg->r;
     for (int64_t j = begin; j < end; j++) {
         x[j] += held && held[j] ? 0.0 : alpha * p[j];
@@ -87,13 +86,30 @@ static void turn_direction(void *ctx, int64_t begin, int64_t end)
         p[j] = z[j] + beta * p[j];
 }
 
+/* There x at held dofs counts as 0: its part goes to the right-hand side. */
+static uz_status solve_elsewhere(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b,
+                                 const uz_cg_stop *stop, uz_error *err)
+{
+    const uz_multigrid_kind *kind = cg->mg->kind;
+    bool moved = false; /* not where all touches from the beginning */
+    for (int64_t j = 0; cg->held && j < cg->n; j++) {
+        cg->p[j] = cg->held[j] ? x[j] : 0.0;
+        moved = moved || cg->p[j] != 0.0;
+    }
+    if (moved)
+        kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
+    for (int64_t j = 0; moved && j < cg->n; j++)
+        cg->p[j] = b[j] - cg->z[j];
+    return kind->solve(cg->mg, K, cg->room, info, x, cg->r, moved ? cg->p : b, stop, err);
+}
+
 static bool should_stop(const uz_cg_info *info, const uz_cg_stop *stop)
 {
     return info->iterations >= stop->max_iterations || uz_cancelled(stop->hooks) || uz_seconds() >= stop->deadline;
 }
 
 /* The recurrence drifts from the true residual by rounding (Greenbaum 1997): it is begun again from the true one until
- * that meets the goal too, or gains nothing more. */
+ * that meets the goal too, or gains nothing more. cg->z holds q = K p until the residual has it, then z = M^-1 r. */
 uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b, const uz_cg_stop *stop,
                       uz_error *err)
 {
@@ -102,13 +118,13 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
     update u = {.cg = cg, .x = x, .b = b};
     memset(info, 0, sizeof *info);
     if (cg->mg->kind->solve)
-        return cg->mg->kind->solve(cg->mg, K, cg->room, info, x, cg->r, b, stop, err);
+        return solve_elsewhere(info, x, cg, K, b, stop, err);
     for (int k = 0;; k++) {
-        /* r = b - K x on the free dofs, z = M^-1 r; x at held dofs counts as 0 */
-        memcpy(cg->p, x, (size_t)n * sizeof *x);
-        clear_held(cg->p, cg);
-        cg->mg->kind->multiply(cg->mg, K, cg->room, cg->q, cg->p);
-        uz_by_pieces(find_residual, &u, n);
+        /* r = b - K x on the free dofs, z = M^-1 r */
+        if (k > 0 || !stop->begun) {
+            cg->mg->kind->multiply(cg->mg, K, cg->room, cg->z, x);
+            uz_by_pieces(find_residual, &u, n);
+        }
         clear_held(cg->r, cg);
         uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
         double square = uz_long_dot(n, cg->r, cg->z);
@@ -124,9 +140,9 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
         before = info->last;
         memcpy(cg->p, cg->z, (size_t)n * sizeof *cg->p);
         while (square > goal * goal && !should_stop(info, stop)) {
-            cg->mg->kind->multiply(cg->mg, K, cg->room, cg->q, cg->p);
-            clear_held(cg->q, cg);
-            const double curvature = uz_long_dot(n, cg->p, cg->q), alpha = square / curvature, last = square;
+            cg->mg->kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
+            clear_held(cg->z, cg);
+            const double curvature = uz_long_dot(n, cg->p, cg->z), alpha = square / curvature, last = square;
             if (fabs(curvature) < DBL_MIN) /* underflow: there is no more to gain */
                 break;
             if (!(curvature > 0.0))

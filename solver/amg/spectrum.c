@@ -96,14 +96,14 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
         if (uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
         /* a step of conjugate gradients without the solution */
-        cg->mg->kind->multiply(cg->mg, K, cg->room, cg->q, cg->p);
-        const double curvature = uz_long_dot(cg->n, cg->p, cg->q), last = square;
+        cg->mg->kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
+        const double curvature = uz_long_dot(cg->n, cg->p, cg->z), last = square;
         if (!(curvature > 0.0))
             return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                            "K is not positive definite: conjugate gradients met a direction that it does not resist. "
                            "Support the body so that it can't move freely, or check the signs of K.");
         const double alpha = square / curvature;
-        uz_axpy(cg->n, -alpha, cg->q, cg->r);
+        uz_axpy(cg->n, -alpha, cg->z, cg->r);
         status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
         square = uz_long_dot(cg->n, cg->r, cg->z);
         const double beta = square / last;

@@ -36,6 +36,6 @@ void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int
 
 /* As uz_multigrid_kind says. */
 uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool *found, double *u, bool *held,
-                         const double *p, const double *bottom, const double *top, const uz_stop *stop, uz_error *err);
+                         const double *p, const uz_limits *limits, const uz_stop *stop, uz_error *err);
 
 #endif

@@ -39,7 +39,7 @@ void uz_brick_axis_clear(uz_brick_axis *axis);
 
 /* What a thread needs of a grid. inverse: 1 / K_jj, 0 at held dofs. */
 typedef struct {
-    float *x, *b, *t, *d; /* t: not of the last */
+    float *x, *b, *t, *d; /* t: not of the last; d may be t */
     const float *inverse;
 } uz_brick_vectors;
 

@@ -398,7 +398,6 @@ static void free_room(uz_multigrid_room *room)
         free(room->v[l].x);
         free(room->v[l].b);
         free(room->v[l].t);
-        free(room->v[l].d);
         free(room->held[l]);
     }
     free(room->held_coarsest);
@@ -421,11 +420,12 @@ static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
     for (int l = 0; l < base->levels; l++) {
         uz_brick_vectors *v = &room->v[l];
         const int64_t n = uz_brick_numbers(&mg->level[l]);
-        float **all[] = {&v->x, &v->b, &v->t, &v->d};
-        for (int k = 0; k < 4; k++)
+        float **all[] = {&v->x, &v->b, &v->t};
+        for (int k = 0; k < 3; k++)
             ok = (*all[k] = uz_alloc_zero(n, sizeof(float))) && ok;
+        v->d = v->t; /* a smoother's direction is of no use to the next one, nor a residual to what follows */
         v->inverse = mg->inverse[l];
-        *bytes += 16 * (size_t)n;
+        *bytes += 12 * (size_t)n;
     }
     ok = uz_brick_planes_init(&room->planes, &mg->level[0], bytes) && ok;
     room->coarse = uz_alloc(mg->n_coarsest, sizeof(double));
@@ -490,12 +490,12 @@ static const uz_multigrid_kind KIND = {.apply = apply,
                                        .start = uz_brick_start,
                                        .free = free_multigrid};
 
-/* A room in single precision, five numbers a dof of all grids; the factor of the last; with dofs held both again. */
+/* A room in single precision, four numbers a dof of all grids; the factor of the last; with dofs held both again. */
 double uz_brick_predict_bytes(const uz_brick *brick)
 {
     const double stride = (double)uz_brick_stride(brick->cells[0]);
     const double padded = 3.0 * stride * (double)((brick->cells[1] + 1) * (brick->cells[2] + 1));
-    return 4.0 * 6.0 * 1.25 * padded + 16.0 * FEW_DOFS * FEW_DOFS + 48.0 * stride * (double)(brick->cells[1] + 1) * 3.0;
+    return 4.0 * 5.0 * 1.25 * padded + 16.0 * FEW_DOFS * FEW_DOFS + 48.0 * stride * (double)(brick->cells[1] + 1) * 3.0;
 }
 
 uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t memory_limit, uz_error *err)

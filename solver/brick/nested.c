@@ -219,38 +219,52 @@ static uz_status solve_grid(nested *x, int l, const uz_stop *stop, uz_error *err
     return status;
 }
 
+static double larger(double most, double size)
+{
+    return size > most && isfinite(size) ? size : most;
+}
+
+/* The place of a dof among the limits, -1: it has none; asked for in ascending order. */
+static int64_t limit_of(const uz_limits *limits, int64_t *next, int64_t dof)
+{
+    if (*next == limits->n || dof != (limits->dof ? limits->dof[*next] : *next))
+        return -1;
+    return (*next)++;
+}
+
 /* Load and bounds of the finest grid, in units in which single precision holds them. */
-static double read_finest(nested *x, const double *p, const double *bottom, const double *top)
+static double read_finest(nested *x, const double *p, const uz_limits *limits)
 {
     const uz_brick_level *level = &x->mg->level[0];
     const int64_t *dof = x->mg->brick->dof;
     const grid_problem *g = &x->grid[0];
     double most = 0.0;
-    for (int64_t j = 0; j < x->mg->base.n; j++) {
-        const double size[3] = {fabs(p[j]) / x->mg->unit, bottom[j], -top[j]}; /* of bounds those that 0 is beyond */
-        for (int k = 0; k < 3; k++)
-            most = size[k] > most && isfinite(size[k]) ? size[k] : most;
-    }
+    int64_t next = 0;
+    for (int64_t j = 0; j < x->mg->base.n; j++)
+        most = larger(most, fabs(p[j]) / x->mg->unit);
+    for (int64_t b = 0; b < limits->n; b++) /* of bounds those that 0 is beyond */
+        most = larger(larger(most, limits->bottom[b]), -limits->top[b]);
     const double down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 1.0;
     for (int64_t k = 0; k <= level->cells[2]; k++)
         for (int64_t j = 0; j <= level->cells[1]; j++)
             for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
                 for (int c = 0; c < 3; c++) {
                     const int64_t at = c * level->size + k * level->plane + j * level->stride + i;
-                    const bool free = dof[c] >= 0;
-                    g->p[at] = free ? (float)(down * (p[dof[c]] / x->mg->unit)) : 0.0F;
-                    g->bottom[at] = free ? (float)(down * bottom[dof[c]]) : -INFINITY;
-                    g->top[at] = free ? (float)(down * top[dof[c]]) : INFINITY;
+                    const int64_t b = limit_of(limits, &next, dof[c]);
+                    g->p[at] = dof[c] >= 0 ? (float)(down * (p[dof[c]] / x->mg->unit)) : 0.0F;
+                    g->bottom[at] = b >= 0 ? (float)(down * limits->bottom[b]) : -INFINITY;
+                    g->top[at] = b >= 0 ? (float)(down * limits->top[b]) : INFINITY;
                 }
     return down;
 }
 
 /* u of the finest grid and what it holds, from the next coarser one. */
-static void write_finest(const nested *x, double *u, bool *held, const double *bottom, const double *top, double down)
+static void write_finest(const nested *x, double *u, bool *held, const uz_limits *limits, double down)
 {
     const uz_brick_level *level = &x->mg->level[0];
     const uz_brick_vectors *v = &x->room->v[0];
     const int64_t *dof = x->mg->brick->dof;
+    int64_t next = 0;
     prolong_problem(x, 0, v->x, v->d);
     for (int64_t k = 0; k <= level->cells[2]; k++)
         for (int64_t j = 0; j <= level->cells[1]; j++)
@@ -259,14 +273,19 @@ static void write_finest(const nested *x, double *u, bool *held, const double *b
                     const int64_t at = c * level->size + k * level->plane + j * level->stride + i, own = dof[c];
                     if (own < 0)
                         continue;
-                    const float touches = decide(&v->x[at], v->d[at], x->grid[0].bottom[at], x->grid[0].top[at]);
-                    held[own] = touches != 0.0F;
-                    u[own] = touches > 0.0F ? top[own] : touches < 0.0F ? bottom[own] : (double)v->x[at] / down;
+                    const int64_t b = limit_of(limits, &next, own);
+                    const float touches =
+                        b >= 0 ? decide(&v->x[at], v->d[at], x->grid[0].bottom[at], x->grid[0].top[at]) : 0.0F;
+                    if (b >= 0)
+                        held[b] = touches != 0.0F;
+                    u[own] = touches > 0.0F   ? limits->top[b]
+                             : touches < 0.0F ? limits->bottom[b]
+                                              : (double)v->x[at] / down;
                 }
 }
 
 uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool *found, double *u, bool *held,
-                         const double *p, const double *bottom, const double *top, const uz_stop *stop, uz_error *err)
+                         const double *p, const uz_limits *limits, const uz_stop *stop, uz_error *err)
 {
     nested x = {.mg = (const uz_brick_grids *)base, .room = room};
     const int last = base->levels - 1 < GRIDS ? base->levels - 1 : GRIDS;
@@ -277,7 +296,7 @@ uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool
     if (!allocate(&x, last))
         status =
             uz_fail(err, UZ_ERR_MEMORY, "", "no memory to begin on coarser grids of %lld dofs", (long long)base->n);
-    const double down = status == UZ_OK ? read_finest(&x, p, bottom, top) : 1.0;
+    const double down = status == UZ_OK ? read_finest(&x, p, limits) : 1.0;
     for (int l = 1; status == UZ_OK && l <= last; l++)
         restrict_problem(&x, l);
     for (int l = last; status == UZ_OK && l >= 1; l--) {
@@ -290,7 +309,7 @@ uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool
         status = solve_grid(&x, l, stop, err);
     }
     if (status == UZ_OK && !uz_stop_is_due(stop)) {
-        write_finest(&x, u, held, bottom, top, down);
+        write_finest(&x, u, held, limits, down);
         *found = true;
     }
     clear(&x);

@@ -11,48 +11,86 @@
 #include <stdlib.h>
 #include <string.h>
 
-uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const double *p, uz_error *err)
+/* The rows that bound a dof, ascending: of column j of N those whose entry is not 0. */
+static bool is_bound(const uz_bounds *bounds, const uz_csc *N, int64_t k, int64_t j)
 {
-    int64_t d = x->load.dual->d, m = x->load.dual->m;
+    return N->val[k] != 0.0 && bounds->dof[N->idx[k]] == j;
+}
+
+/* box->n, and box->dof where they are not all. */
+static bool list_dofs(uz_bounded *box, const uz_dual *dual)
+{
+    const uz_csc *N = &dual->N;
+    box->n = dual->d;
+    if (uz_sparse_has_entries(dual))
+        return true;
+    box->dof = uz_alloc(dual->m < dual->d ? dual->m : dual->d, sizeof *box->dof);
+    box->n = 0;
+    for (int64_t j = 0; box->dof && j < dual->d; j++) {
+        bool bound = false;
+        for (int64_t k = N->ptr[j]; !bound && k < N->ptr[j + 1]; k++)
+            bound = is_bound(box->bounds, N, k, j);
+        if (bound)
+            box->dof[box->n++] = j;
+    }
+    return box->dof != NULL;
+}
+
+/* The tightest row of each dof on either side. A bound that overflows holds nothing, or nothing can meet it. */
+static void find_tightest(uz_bounded *box, const uz_dual_load *load)
+{
+    const uz_bounds *bounds = box->bounds;
+    const uz_csc *N = &load->dual->N;
+    for (int64_t b = 0; b < box->n; b++) {
+        const int64_t j = uz_bounded_dof(box, b);
+        box->upper[b] = box->lower[b] = -1;
+        box->top[b] = INFINITY;
+        box->bottom[b] = -INFINITY;
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++) {
+            const int64_t i = N->idx[k];
+            if (!is_bound(bounds, N, k, j))
+                continue;
+            const double value = load->h[i] / bounds->scale[i];
+            if (bounds->scale[i] > 0.0 && value < box->top[b]) {
+                box->top[b] = value;
+                box->upper[b] = i;
+            } else if (bounds->scale[i] < 0.0 && value > box->bottom[b]) {
+                box->bottom[b] = value;
+                box->lower[b] = i;
+            }
+        }
+        box->contradictory =
+            box->contradictory || box->bottom[b] > box->top[b] || isinf(box->top[b]) < 0 || isinf(box->bottom[b]) > 0;
+    }
+}
+
+uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, uz_error *err)
+{
+    const uz_dual *dual = x->load.dual;
+    const bool sweeps = uz_sparse_has_entries(dual);
+    const int64_t d = dual->d, m = dual->m;
     uz_bounded *box = x->box = uz_alloc_zero(1, sizeof *box);
     if (!box)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
-    double **room[] = {&box->p, &box->top, &box->bottom, &box->u, &box->force, &box->size, &box->point};
-    bool ok = true;
+    box->bounds = bounds;
+    bool ok = list_dofs(box, dual);
+    double **room[] = {&box->top, &box->bottom, &box->u, &box->size, &box->point};
+    const int64_t count[] = {box->n, box->n, d, sweeps ? d : 0, sweeps ? d : 0};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        ok = (*room[k] = uz_alloc(d, sizeof(double))) && ok;
+        ok = (count[k] == 0 || (*room[k] = uz_alloc(count[k], sizeof(double)))) && ok;
     int64_t **rows[] = {&box->upper, &box->lower, &box->holder};
     for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++)
-        ok = (*rows[k] = uz_alloc(d, sizeof(int64_t))) && ok;
+        ok = (*rows[k] = uz_alloc(box->n, sizeof(int64_t))) && ok;
     box->r = uz_alloc(m, sizeof(double));
-    box->fixed = uz_alloc(d, sizeof(bool));
+    box->fixed = uz_alloc_zero(d, sizeof(bool));
     if (!ok || !box->r || !box->fixed)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for bounds on %lld dofs", (long long)d);
-    memcpy(box->p, p, (size_t)d * sizeof *p);
+    box->p = x->p;
+    box->force = x->work2;
     box->point_energy = INFINITY;
-    box->bounds = bounds;
-    /* The tightest row of each dof on either side. A bound that overflows holds nothing, or nothing can meet it. */
-    for (int64_t j = 0; j < d; j++) {
-        box->upper[j] = box->lower[j] = -1;
-        box->top[j] = INFINITY;
-        box->bottom[j] = -INFINITY;
-    }
-    for (int64_t i = 0; i < m; i++) {
-        const int64_t j = bounds->dof[i];
-        const double value = x->load.h[i] / bounds->scale[i];
-        if (bounds->scale[i] > 0.0 && value < box->top[j]) {
-            box->top[j] = value;
-            box->upper[j] = i;
-        } else if (bounds->scale[i] < 0.0 && value > box->bottom[j]) {
-            box->bottom[j] = value;
-            box->lower[j] = i;
-        }
-    }
-    for (int64_t j = 0; j < d; j++)
-        box->contradictory =
-            box->contradictory || box->bottom[j] > box->top[j] || isinf(box->top[j]) < 0 || isinf(box->bottom[j]) > 0;
+    find_tightest(box, &x->load);
     memcpy(box->u, x->base, (size_t)d * sizeof *box->u);
-    x->load.bytes += 8 * (10 * (size_t)d + (size_t)m);
+    x->load.bytes += 8 * (size_t)((sweeps ? 3 : 1) * d + (box->dof ? 6 : 5) * box->n + m) + (size_t)d;
     return UZ_OK;
 }
 
@@ -61,25 +99,28 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
 {
     uz_bounded *box = x->box;
     const uz_bounds *bounds = box->bounds;
-    const int64_t d = x->load.dual->d, m = x->load.dual->m;
+    const uz_csc *N = &x->load.dual->N;
     if (box->contradictory)
         return false;
     x->known_u = x->known_r = NULL;
-    for (int64_t j = 0; j < d; j++)
-        box->holder[j] = -1;
-    for (int64_t i = 0; i < m; i++) {
-        int64_t j = bounds->dof[i];
-        if (!active[i])
-            continue;
-        if (bounds->scale[i] > 0.0)
-            box->holder[j] = box->upper[j];
-        else if (box->holder[j] < 0)
-            box->holder[j] = box->lower[j];
-    }
-    for (int64_t j = 0; j < d; j++) {
-        box->fixed[j] = box->holder[j] >= 0;
-        double free = keep ? box->u[j] : 0.0;
-        box->u[j] = !box->fixed[j] ? free : bounds->scale[box->holder[j]] > 0.0 ? box->top[j] : box->bottom[j];
+    if (!keep)
+        memset(box->u, 0, (size_t)x->load.dual->d * sizeof *box->u);
+    for (int64_t b = 0; b < box->n; b++) {
+        const int64_t j = uz_bounded_dof(box, b);
+        int64_t holder = -1;
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++) {
+            const int64_t i = N->idx[k];
+            if (!active[i] || !is_bound(bounds, N, k, j))
+                continue;
+            if (bounds->scale[i] > 0.0)
+                holder = box->upper[b];
+            else if (holder < 0)
+                holder = box->lower[b];
+        }
+        box->holder[b] = holder;
+        box->fixed[j] = holder >= 0;
+        if (holder >= 0)
+            box->u[j] = bounds->scale[holder] > 0.0 ? box->top[b] : box->bottom[b];
     }
     return true;
 }
@@ -93,15 +134,17 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
 static void balance_by_product(const uz_sparse_load *x)
 {
     uz_bounded *box = x->box;
-    const uz_csc *K = x->load.K;
-    double largest = 0.0;
     uz_sparse_multiply(&x->load, box->force, box->u);
-    for (int64_t j = 0; j < K->cols; j++)
-        largest = fabs(box->u[j]) > largest ? fabs(box->u[j]) : largest;
-    for (int64_t j = 0; j < K->cols; j++) {
+    box->largest = 0.0;
+    for (int64_t j = 0; j < x->load.K->cols; j++) {
+        box->largest = fabs(box->u[j]) > box->largest ? fabs(box->u[j]) : box->largest;
         box->force[j] -= box->p[j];
-        box->size[j] = fabs(box->p[j]) + ROW_SUM * K->val[K->ptr[j]] * largest;
     }
+}
+
+static double size_of(const uz_bounded *box, const uz_csc *K, int64_t j)
+{
+    return box->largest < 0.0 ? box->size[j] : fabs(box->p[j]) + ROW_SUM * K->val[K->ptr[j]] * box->largest;
 }
 
 /* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to; roughly: by an estimate of it. */
@@ -113,6 +156,7 @@ void uz_bounded_balance(const uz_sparse_load *x, bool roughly)
         balance_by_product(x);
         return;
     }
+    box->largest = -1.0;
     for (int64_t j = 0; j < K->cols; j++) {
         box->force[j] = -box->p[j];
         box->size[j] = fabs(box->p[j]);
@@ -144,18 +188,19 @@ void uz_bounded_react(const uz_sparse_load *x, double *g, bool *active)
     uz_bounded *box = x->box;
     const uz_bounds *bounds = box->bounds;
     const double *h = x->load.h;
-    const int64_t d = x->load.dual->d, m = x->load.dual->m;
+    const int64_t m = x->load.dual->m;
     memset(box->r, 0, (size_t)m * sizeof *box->r);
     memset(active, 0, (size_t)m * sizeof *active);
-    for (int64_t j = 0; j < d; j++) {
-        int64_t row = box->holder[j];
+    for (int64_t b = 0; b < box->n; b++) {
+        const int64_t j = uz_bounded_dof(box, b);
+        int64_t row = box->holder[b];
         if (row < 0)
             continue;
-        if (box->top[j] <= box->bottom[j])
-            row = box->force[j] > 0.0 ? box->lower[j] : box->upper[j];
+        if (box->top[b] <= box->bottom[b])
+            row = box->force[j] > 0.0 ? box->lower[b] : box->upper[b];
         active[row] = true;
         box->r[row] = box->force[j] / bounds->scale[row];
-        if (uz_reaction_pulls(box->r[row]) && fabs(box->force[j]) <= NOISE * box->size[j])
+        if (uz_reaction_pulls(box->r[row]) && fabs(box->force[j]) <= NOISE * size_of(box, x->load.K, j))
             box->r[row] = 0.0;
     }
     for (int64_t i = 0; i < m; i++) {
@@ -171,13 +216,13 @@ bool uz_bounded_crossed(const uz_sparse_load *x, double *y)
 {
     const uz_bounded *box = x->box;
     const uz_bounds *bounds = box->bounds;
-    for (int64_t j = 0; j < x->load.dual->d; j++) {
-        int64_t a = box->upper[j], b = box->lower[j];
-        if (a < 0 || b < 0 || !(box->bottom[j] > box->top[j]))
+    for (int64_t b = 0; b < box->n; b++) {
+        const int64_t upper = box->upper[b], lower = box->lower[b];
+        if (upper < 0 || lower < 0 || !(box->bottom[b] > box->top[b]))
             continue;
         memset(y, 0, (size_t)x->load.dual->m * sizeof *y);
-        y[a] = bounds->scale[b];
-        y[b] = -bounds->scale[a];
+        y[upper] = bounds->scale[lower];
+        y[lower] = -bounds->scale[upper];
         return true;
     }
     return false;

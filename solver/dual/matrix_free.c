@@ -45,7 +45,6 @@ enum { STEPS_MOST = 5000 };
 typedef struct {
     uz_sparse_load sparse;
     uz_cg cg;   /* of the whole body */
-    double *p;  /* d */
     double aim; /* relative */
     uz_stop stop;
     double base_slack; /* of base = K^-1 p, */
@@ -58,7 +57,7 @@ typedef struct {
     double probed;     /* and while probing */
     bool probing;      /* r is a vector of any size: the answer's says nothing about how accurate D r must be */
     double coarse;     /* accuracy at which the next guess of the active rows is judged */
-    double *right;     /* d: a right-hand side */
+    double *right;     /* d: a right-hand side, or what solves one to bound a norm */
     double *u, *r;     /* d, m: the last answer of rows of many entries; NULL: none was asked for */
     int guesses;       /* of these rows so far, most of which were wrong */
     char bounded[65];  /* digest of the e whose e'K^-1 e was bounded last, "" before, */
@@ -93,16 +92,16 @@ static uz_status solve_base(free_load *x, double aim, uz_error *err)
     double *base = x->sparse.base;
     int64_t d = load->dual->d;
     uz_cg_info info;
-    double root = sqrt(load->dual->amg->info.lambda), norm = uz_root(uz_dot(d, x->p, base));
+    double root = sqrt(load->dual->amg->info.lambda), norm = uz_root(uz_dot(d, x->sparse.p, base));
     /* From 0 the first residual has the size of the solution. */
     uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : aim * root, aim * norm * root);
-    uz_status status = uz_cg_solve(&info, base, &x->cg, load->K, x->p, &stop, err);
+    uz_status status = uz_cg_solve(&info, base, &x->cg, load->K, x->sparse.p, &stop, err);
     if (status != UZ_OK)
         return status;
     x->base_aim = aim;
     x->base_slack = info.last / root;
     x->sparse.slack = x->base_slack;
-    load->psi0 = -0.5 * uz_dot(d, x->p, base);
+    load->psi0 = -0.5 * uz_dot(d, x->sparse.p, base);
     memcpy(load->g0, load->h, (size_t)load->dual->m * sizeof *load->g0);
     uz_csc_gaxpy(load->g0, &load->dual->N, -1.0, base);
     return UZ_OK;
@@ -119,15 +118,16 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     x->stop.deadline = INFINITY;
     x->tight = CHANGE_KEPT;
     x->base_aim = INFINITY;
-    x->p = uz_alloc(d, sizeof *x->p);
+    x->sparse.p = uz_alloc(d, sizeof *x->sparse.p);
     x->right = uz_alloc(d, sizeof *x->right);
-    status = x->p && x->right ? uz_cg_init(&x->cg, load->dual->amg->mg, err)
-                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
+    status = x->sparse.p && x->right
+                 ? uz_cg_init(&x->cg, load->dual->amg->mg, err)
+                 : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
     if (status != UZ_OK)
         return status;
     load->bytes += 16 * (size_t)d + x->cg.bytes;
     x->sparse.room = x->cg.room;
-    memcpy(x->p, p, (size_t)d * sizeof *p);
+    memcpy(x->sparse.p, p, (size_t)d * sizeof *p);
     x->base_slack = INFINITY;
     /* Where coarser grids tell which rows touch nothing needs a base until D is applied. */
     if (!x->cg.mg->kind->start || load->dual->m == 0 || !((const uz_sparse *)load->dual)->bounds.dof)
@@ -139,7 +139,6 @@ static void unload(uz_dual_load *load)
 {
     free_load *x = (free_load *)load;
     uz_cg_clear(&x->cg);
-    free(x->p);
     free(x->right);
     free(x->u);
     free(x->r);
@@ -287,26 +286,27 @@ static uz_status sharpen(free_load *x, double *value, double *w, const double *e
     return status;
 }
 
-/* With w from conjugate gradients, s = e - K w: e'K^-1 e = w'(e + s) + s'K^-1 s. enough: of the value. */
+/* With w from conjugate gradients that begin at 0, s = e - K w: e'K^-1 e = w'(e + s) + s'K^-1 s. enough: of the value.
+ */
 static uz_status bound_inverse_norm(free_load *x, double *value, double *e, double enough, uz_error *err)
 {
     const double lambda = x->sparse.load.dual->amg->info.lambda;
     const int64_t n = x->cg.n;
-    double *w = uz_alloc_zero(n, sizeof *w), sum = 0.0, largest = 0.0;
+    double *w = x->right, sum = 0.0, largest = 0.0;
     uz_cg_stop stop = {.relative = SHARP * sqrt(lambda),
                        .max_iterations = NORM_STEPS_MOST,
                        .hooks = x->stop.hooks,
-                       .deadline = x->stop.deadline};
+                       .deadline = x->stop.deadline,
+                       .begun = true};
     uz_cg_info info;
     *value = INFINITY;
-    if (!w)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)n);
+    memset(w, 0, (size_t)n * sizeof *w);
     for (int64_t j = 0; j < n; j++)
         largest = fmax(largest, fabs(e[j]));
     /* By the power of two below the largest: squares of forces stay in range; what is left is exact. */
     const double unit = largest > 0.0 && !isinf(largest) ? ldexp(1.0, ilogb(largest)) : 1.0;
     for (int64_t j = 0; j < n; j++)
-        e[j] /= unit;
+        x->cg.r[j] = e[j] /= unit;
     uz_status status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
     for (int64_t j = 0; j < n; j++)
         sum += w[j] * (e[j] + x->cg.r[j]);
@@ -315,7 +315,6 @@ static uz_status bound_inverse_norm(free_load *x, double *value, double *e, doub
         status = sharpen(x, &scaled, w, e, info.last, enough / unit / unit, err);
     if (status == UZ_OK)
         *value = scaled * unit * unit;
-    free(w);
     return status;
 }
 
@@ -366,8 +365,8 @@ static uz_status measure_slack(free_load *x, const double *e, const double *r, u
     x->sparse.slack = x->held_slack = INFINITY;
     if (pulls)
         return UZ_OK;
-    const uz_status status = uz_multigrid_apply(x->cg.mg, x->sparse.load.K, x->cg.room, x->cg.z, e, err);
-    x->sparse.slack = x->held_slack = uz_root(uz_dot(dual->d, e, x->cg.z) / dual->amg->info.lambda);
+    const uz_status status = uz_multigrid_apply(x->cg.mg, x->sparse.load.K, x->cg.room, x->cg.p, e, err);
+    x->sparse.slack = x->held_slack = uz_root(uz_dot(dual->d, e, x->cg.p) / dual->amg->info.lambda);
     return status;
 }
 
@@ -382,27 +381,22 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     const uz_bounds *bounds = box->bounds;
     const double least = (load->dual->amg->info.least > 0.0 ? GUESSED_FLOOR : ACTIVE_FLOOR) * x->aim,
                  root = sqrt(load->dual->amg->info.lambda), most = uz_root(-2.0 * load->psi0);
-    double tolerance = fmax(least, x->coarse), *held = x->cg.p, *e = x->cg.r;
+    double tolerance = fmax(least, x->coarse), *e = x->cg.r;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
-    bool moved = false;
-    for (int64_t j = 0; j < d; j++) {
-        held[j] = box->fixed[j] ? box->u[j] : 0.0;
-        moved = moved || held[j] != 0.0;
-    }
-    memset(x->right, 0, (size_t)d * sizeof *x->right);
-    if (moved) /* not where all touches from the beginning */
-        uz_sparse_multiply(load, x->right, held);
-    for (int64_t j = 0; j < d; j++)
-        x->right[j] = x->p[j] - x->right[j]; /* p - K u of the dofs that are held, and no others */
     uz_sparse_multiply(load, box->force, box->u);
     double square = uz_dot(d, box->u, box->force); /* u'K u */
+    for (int64_t j = 0; j < d; j++)
+        box->force[j] -= x->sparse.p[j];
     for (bool go_on = true; status == UZ_OK && go_on; tolerance = least) {
         const double norm = fmin(uz_root(square), most > 0.0 ? most : INFINITY);
         /* from 0 the first residual has the size of the solution */
         uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : tolerance * root, tolerance * norm * root);
         uz_cg_info info;
         stop.unchecked = tolerance >= NO_DRIFT;
-        status = uz_cg_solve(&info, box->u, cg, load->K, x->right, &stop, err);
+        stop.begun = true;
+        for (int64_t j = 0; j < d; j++)
+            cg->r[j] = -box->force[j];
+        status = uz_cg_solve(&info, box->u, cg, load->K, x->sparse.p, &stop, err);
         if (status != UZ_OK)
             break;
         uz_bounded_balance(&x->sparse, tolerance > least);
@@ -427,14 +421,14 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     status = measure_slack(x, e, box->r, err);
     /* psi(r) by u where no base tells it: -u'K u / 2 + r'h, u'K u = u'p + r'(h - g) */
     if (isinf(x->base_aim))
-        load->psi0 = 0.5 * (uz_dot(m, box->r, load->h) - uz_dot(m, box->r, load->g0) - uz_dot(d, box->u, x->p));
+        load->psi0 = 0.5 * (uz_dot(m, box->r, load->h) - uz_dot(m, box->r, load->g0) - uz_dot(d, box->u, x->sparse.p));
     return status;
 }
 
 /* Reactions that pull by less than this of the largest, times the tolerance, are what the solve has left. */
 #define WEAK 0.1
 
-/* From x->u, which obeys the rows, to K u = p + N'r on them: u, r, g, and e = K u - p - N'r in cg->q. *right: no row is
+/* From x->u, which obeys the rows, to K u = p + N'r on them: u, r, g, and e = K u - p - N'r in cg->z. *right: no row is
  * seen to be wrong. */
 static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, double *g, const bool *active,
                                  double tolerance, double norm, uz_error *err)
@@ -445,10 +439,10 @@ static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, 
     uz_cg cg = x->cg;
     uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : tolerance * root, tolerance * norm * root);
     uz_cg_info info;
-    double largest = 0.0, *e = x->cg.q;
+    double largest = 0.0, *e = x->cg.z;
     cg.mg = uz_projected_multigrid(part);
     stop.unchecked = tolerance >= NO_DRIFT;
-    memcpy(x->right, x->p, (size_t)dual->d * sizeof *x->p);
+    memcpy(x->right, x->sparse.p, (size_t)dual->d * sizeof *x->sparse.p);
     uz_csc_gaxpy_t(x->right, &dual->N, 1.0, x->r); /* what the rows are known to bear is no residual */
     uz_status status = uz_cg_solve(&info, x->u, &cg, load->K, x->right, &stop, err);
     if (status == UZ_OK)
@@ -456,7 +450,7 @@ static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, 
     if (status != UZ_OK)
         return status;
     uz_sparse_multiply(load, e, x->u);
-    uz_axpy(dual->d, -1.0, x->p, e);
+    uz_axpy(dual->d, -1.0, x->sparse.p, e);
     status = uz_projected_react(part, x->r, e, err);
     for (int64_t i = 0; i < dual->m; i++)
         largest = fmax(largest, fabs(x->r[i]));
@@ -489,20 +483,20 @@ static uz_status solve_rows(free_load *x, bool *solved, double *g, const bool *a
             return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows as equations", (long long)dual->m);
         memcpy(x->u, x->sparse.base, (size_t)dual->d * sizeof *x->u);
     }
-    uz_status status = uz_projected_create(&part, x->cg.mg, dual, x->sparse.weight, active, x->stop.hooks, err);
+    uz_status status = uz_projected_create(&part, x->cg.mg, dual, load->K, active, x->stop.hooks, err);
     if (!part)
         return status;
     for (int64_t i = 0; i < dual->m; i++)
         x->r[i] = active[i] ? x->r[i] : 0.0;
     status = uz_projected_close(part, x->u, load->h, err);
     for (bool right = true; status == UZ_OK && right; tolerance = least) {
-        uz_sparse_multiply(load, x->cg.q, x->u);
-        const double norm = fmin(uz_root(uz_dot(dual->d, x->u, x->cg.q)), most > 0.0 ? most : INFINITY);
+        uz_sparse_multiply(load, x->cg.z, x->u);
+        const double norm = fmin(uz_root(uz_dot(dual->d, x->u, x->cg.z)), most > 0.0 ? most : INFINITY);
         status = solve_projected(x, part, &right, g, active, tolerance, norm, err);
         right = right && tolerance > least;
     }
     if (status == UZ_OK)
-        status = measure_slack(x, x->cg.q, x->r, err);
+        status = measure_slack(x, x->cg.z, x->r, err);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
     const size_t bytes = uz_projected_bytes(part) + 8 * (size_t)(dual->d + dual->m);
     load->most = bytes > load->most ? bytes : load->most;
@@ -566,23 +560,25 @@ static bool start_on_grids(free_load *x, bool *active)
     uz_dual_load *load = &x->sparse.load;
     uz_bounded *box = x->sparse.box;
     const uz_multigrid *mg = load->dual->amg->mg;
-    bool found = false;
+    bool found = false, *held = NULL;
     uz_error ignored = {0};
     if (!box || x->started)
         return false;
     x->started = true;
-    if (!box->contradictory)
-        (void)mg->kind->start(mg, x->cg.room, &found, box->u, box->fixed, x->p, box->bottom, box->top, &x->stop,
-                              &ignored);
+    const uz_limits limits = {box->n, box->dof, box->bottom, box->top};
+    if (!box->contradictory && (held = uz_alloc(box->n, sizeof *held)))
+        (void)mg->kind->start(mg, x->cg.room, &found, box->u, held, x->sparse.p, &limits, &x->stop, &ignored);
     if (!found) { /* gaps of the body without reactions are what is left to guess by */
         (void)solve_base(x, BASE_ROUGH, &ignored);
         memcpy(box->u, x->sparse.base, (size_t)load->dual->d * sizeof *box->u);
+        free(held);
         return false;
     }
     memset(active, 0, (size_t)load->dual->m * sizeof *active);
-    for (int64_t j = 0; j < load->dual->d; j++)
-        if (box->fixed[j])
-            active[box->u[j] >= box->top[j] ? box->upper[j] : box->lower[j]] = true;
+    for (int64_t b = 0; b < box->n; b++)
+        if (held[b])
+            active[box->u[uz_bounded_dof(box, b)] >= box->top[b] ? box->upper[b] : box->lower[b]] = true;
+    free(held);
     x->coarse = STARTED_TOLERANCE;
     return true;
 }
@@ -621,7 +617,7 @@ static const cycle_costs PLANE = {6.5, 0.0, 50.0, 11.0, 22.0}, SOLID = {1.8, 66.
 #define CELLS_PASSES  30.0
 #define CELLS_CREATE  45.0
 #define CELLS_LOAD    50.0
-#define CELLS_VECTORS 37.0
+#define CELLS_VECTORS 28.0
 
 static void add_cost_by_cells(uz_cost_estimate *cost, const uz_cost_size *size, const uz_cost_rates *rates)
 {

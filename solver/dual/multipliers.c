@@ -136,7 +136,7 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
         for (int64_t i = 0; i < m; i++) {
             double compliance = 0.0;
             for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
-                compliance += Nt->val[k] * Nt->val[k] * x->weight[Nt->idx[k]];
+                compliance += Nt->val[k] * Nt->val[k] * uz_sparse_weight(x->load.K, Nt->idx[k]);
             a.sigma[i] = compliance > 0.0 ? sigma / compliance : 0.0;
         }
         status = iterate(&a, &slow, r, &S, ws, err);

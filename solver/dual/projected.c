@@ -1,4 +1,5 @@
 #include "dual/projected.h"
+#include "dual/sparse.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
@@ -11,7 +12,7 @@ struct uz_projected {
     uz_multigrid base;
     const uz_multigrid *mg;
     const uz_dual *dual;
-    const double *weight;
+    const uz_csc *K;
     int64_t n, *row; /* the active rows, ascending */
     uz_factor *factor;
     uz_factor_workspace *ws;
@@ -44,7 +45,7 @@ static int64_t add_column(double *sum, int64_t *met, int64_t *seen, const uz_pro
                 sum[l] = 0.0;
                 met[count++] = l;
             }
-            sum[l] += Nt->val[q] * x->weight[j] * N->val[s];
+            sum[l] += Nt->val[q] * uz_sparse_weight(x->K, j) * N->val[s];
         }
     }
     qsort(met, (size_t)count, sizeof *met, compare);
@@ -132,7 +133,7 @@ static void add_rows(const uz_projected *x, double *u, double factor, bool weigh
     const uz_csc *Nt = &x->dual->Nt;
     for (int64_t k = 0; k < x->n; k++)
         for (int64_t q = Nt->ptr[x->row[k]]; q < Nt->ptr[x->row[k] + 1]; q++)
-            u[Nt->idx[q]] += factor * Nt->val[q] * x->y[k] * (weighted ? x->weight[Nt->idx[q]] : 1.0);
+            u[Nt->idx[q]] += factor * Nt->val[q] * x->y[k] * (weighted ? uz_sparse_weight(x->K, Nt->idx[q]) : 1.0);
 }
 
 uz_status uz_projected_close(uz_projected *x, double *u, const double *h, uz_error *err)
@@ -152,7 +153,7 @@ static uz_status find_reactions(uz_projected *x, const double *force, uz_error *
     for (int64_t k = 0; k < x->n; k++) {
         x->b[k] = 0.0;
         for (int64_t q = Nt->ptr[x->row[k]]; q < Nt->ptr[x->row[k] + 1]; q++)
-            x->b[k] += Nt->val[q] * x->weight[Nt->idx[q]] * force[Nt->idx[q]];
+            x->b[k] += Nt->val[q] * uz_sparse_weight(x->K, Nt->idx[q]) * force[Nt->idx[q]];
     }
     return solve(x, err);
 }
@@ -187,7 +188,7 @@ static void multiply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room 
 
 static const uz_multigrid_kind PROJECTED = {.apply = apply, .multiply = multiply};
 
-uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const uz_dual *dual, const double *weight,
+uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const uz_dual *dual, const uz_csc *K,
                               const bool *active, const uz_hooks *hooks, uz_error *err)
 {
     uz_projected *x = uz_alloc_zero(1, sizeof *x);
@@ -198,7 +199,7 @@ uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const 
     x->base = (uz_multigrid){.kind = &PROJECTED, .n = mg->n, .levels = mg->levels, .knows_K = mg->knows_K};
     x->mg = mg;
     x->dual = dual;
-    x->weight = weight;
+    x->K = K;
     for (int64_t i = 0; i < dual->m; i++)
         x->n += active[i];
     x->row = uz_alloc(x->n, sizeof *x->row);

@@ -14,9 +14,9 @@
 
 typedef struct uz_projected uz_projected;
 
-/* mg: the multigrid for K; dual, weight (d, W), active (m): borrowed. *out NULL, UZ_OK: the rows depend on each other
+/* mg: the multigrid for K; dual, K, active (m): borrowed. *out NULL, UZ_OK: the rows depend on each other
  * to working precision. UZ_ERR_MEMORY. */
-uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const uz_dual *dual, const double *weight,
+uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const uz_dual *dual, const uz_csc *K,
                               const bool *active, const uz_hooks *hooks, uz_error *err);
 void uz_projected_free(uz_projected *x);
 size_t uz_projected_bytes(const uz_projected *x);

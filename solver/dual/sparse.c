@@ -56,15 +56,12 @@ uz_status uz_sparse_load_begin(uz_sparse_load *x, uz_error *err)
     x->response = uz_alloc_zero(d, sizeof(double)); /* and there */
     x->work = uz_alloc_zero(room, sizeof(double));
     x->work2 = uz_alloc_zero(room, sizeof(double));
-    x->weight = uz_alloc(d, sizeof(double));
     load->correction = uz_alloc_zero(d, sizeof(double));
     load->kept = uz_alloc_zero(d, sizeof(double));
-    load->bytes = 8 * (7 * (size_t)d + 2 * (size_t)load->dual->m);
-    if (!x->base || !x->response || !x->work || !x->work2 || !x->weight || !load->correction || !load->kept)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
-    for (int64_t j = 0; j < d; j++) /* sorted lower triangle: the diagonal comes first */
-        x->weight[j] = 1.0 / load->K->val[load->K->ptr[j]];
-    return UZ_OK;
+    load->bytes = 8 * (6 * (size_t)d + 2 * (size_t)load->dual->m);
+    if (x->base && x->response && x->work && x->work2 && load->correction && load->kept)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
 }
 
 uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err)
@@ -77,19 +74,27 @@ uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err)
         load->psi0 -= 0.5 * p[j] * x->base[j];
     memcpy(load->g0, load->h, (size_t)dual->m * sizeof *load->g0);
     uz_csc_gaxpy(load->g0, &dual->N, -1.0, x->base);
-    return bounds->dof ? uz_bounded_create(x, bounds, p, err) : UZ_OK;
+    if (!bounds->dof)
+        return UZ_OK;
+    if (!x->p) {
+        if (!(x->p = uz_alloc(dual->d, sizeof *x->p)))
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->d);
+        memcpy(x->p, p, (size_t)dual->d * sizeof *p);
+        load->bytes += 8 * (size_t)dual->d;
+    }
+    return uz_bounded_create(x, bounds, err);
 }
 
 void uz_sparse_unload(uz_sparse_load *x)
 {
     uz_bounded *box = x->box;
-    void *room[] = {x->base, x->response, x->work, x->work2, x->weight};
+    void *room[] = {x->p, x->base, x->response, x->work, x->work2};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     if (!box)
         return;
-    void *of_box[] = {box->p,     box->top, box->bottom, box->u,     box->force,  box->size,
-                      box->point, box->r,   box->upper,  box->lower, box->holder, box->fixed};
+    void *of_box[] = {box->dof, box->top,   box->bottom, box->u,      box->size, box->point,
+                      box->r,   box->upper, box->lower,  box->holder, box->fixed};
     for (size_t k = 0; k < sizeof of_box / sizeof of_box[0]; k++)
         free(of_box[k]);
     free(box);
@@ -140,11 +145,11 @@ uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r,
             double miss = g[i] - column_dot(Nt, i, c);
             double weighted = 0.0; /* n_i'W n_i */
             for (int64_t q = Nt->ptr[i]; q < Nt->ptr[i + 1]; q++)
-                weighted += Nt->val[q] * Nt->val[q] * x->weight[Nt->idx[q]];
+                weighted += Nt->val[q] * Nt->val[q] * uz_sparse_weight(load->K, Nt->idx[q]);
             if (weighted <= 0.0 || (!closing && uz_gap_is_open(miss)))
                 continue;
             for (int64_t q = Nt->ptr[i]; q < Nt->ptr[i + 1]; q++)
-                c[Nt->idx[q]] += miss / weighted * x->weight[Nt->idx[q]] * Nt->val[q];
+                c[Nt->idx[q]] += miss / weighted * uz_sparse_weight(load->K, Nt->idx[q]) * Nt->val[q];
             moved = fmax(moved, fabs(miss));
         }
     }

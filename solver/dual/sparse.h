@@ -11,21 +11,31 @@ typedef struct {
     double *scale; /* m */
 } uz_bounds;
 
-/* The same problem as minimize 1/2 u'Ku - p'u, bottom <= u <= top, of one load. */
+/* The same problem as minimize 1/2 u'Ku - p'u, bottom <= u <= top, of one load. Bounds are listed: of all dofs where K
+ * has its entries, as sweeps go by those, else of the dofs alone that rows are on. */
 typedef struct {
     const uz_bounds *bounds;
-    double *p;              /* d */
-    double *top, *bottom;   /* d: +-INFINITY where there is none */
-    int64_t *upper, *lower; /* d: the row that says so, the tightest; -1: none */
+    const double *p;        /* d: that of the load */
+    int64_t n, *dof;        /* n: the dof of each, ascending; NULL: all d */
+    double *top, *bottom;   /* n: +-INFINITY where there is none */
+    int64_t *upper, *lower; /* n: the row that says so, the tightest; -1: none */
     bool contradictory;     /* some bottom lies above its top */
-    int64_t *holder;        /* d: the row that holds the dof in the current guess, -1: free */
+    int64_t *holder;        /* n: the row that holds the dof in the current guess, -1: free */
     bool *fixed;            /* d: holder >= 0 */
     double *u, *r;          /* d, m */
-    double *force, *size;   /* d: a residual of equilibrium and what its rounding is in proportion to */
-    double *point;          /* d: where the sweeps ended; energy INFINITY before the first */
+    double *force;          /* d, work2 of the load: a residual of equilibrium */
+    double *size;           /* d: what its rounding is in proportion to; NULL: K has no entries */
+    double largest;         /* of |u|, >= 0: size was told by it, roughly; -1: by the terms of the sums */
+    double *point;          /* d: where the sweeps ended, NULL: there are none; energy INFINITY before the first */
     double point_energy;
     size_t swept_bytes; /* what the dofs that were swept last took, until the sweeps ended */
 } uz_bounded;
+
+/* The dof of bound b. */
+static inline int64_t uz_bounded_dof(const uz_bounded *box, int64_t b)
+{
+    return box->dof ? box->dof[b] : b;
+}
 
 typedef struct {
     uz_dual dual;
@@ -35,10 +45,10 @@ typedef struct {
 /* Corrections are c (d). */
 typedef struct {
     uz_dual_load load;
+    double *p;            /* d: of rows that bound dofs, or where the form wants it; else NULL */
     double *base;         /* d: u0 = K^-1 p */
     double *response;     /* d: K^-1 N'r of the last apply */
     double *work, *work2; /* max(d, m) each */
-    double *weight;       /* d: 1 / K_ii: the metric in which penetrating rows are lifted */
     double slack;         /* how far u(r) is from what the last apply or solve_active left, in the energy norm */
     uz_bounded *box;      /* with bounds, else NULL */
     const double *known_u, *known_r; /* d, m: the displacement and reactions of the last guess of the active rows; NULL:
@@ -50,19 +60,24 @@ typedef struct {
 uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err);
 void uz_sparse_clear(uz_dual *dual);
 uz_status uz_sparse_load_begin(uz_sparse_load *x, uz_error *err);
-uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err);
+uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err); /* keeps p in x->p */
 void uz_sparse_unload(uz_sparse_load *x);
 uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
 uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err);
 bool uz_sparse_guess_active(uz_dual_load *load, bool *active);
 
-/* x->box, once base, h and g0 are there. */
-uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const double *p, uz_error *err);
+/* x->box, once p, base, h and g0 are there. */
+uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, uz_error *err);
 
 /* Does load->K have its entries, or its diagonal only? */
 static inline bool uz_sparse_has_entries(const uz_dual *dual)
 {
     return !dual->amg || !dual->amg->mg->knows_K;
+}
+/* 1 / K_jj: the metric in which penetrating rows are lifted. In a sorted lower triangle the diagonal comes first. */
+static inline double uz_sparse_weight(const uz_csc *K, int64_t j)
+{
+    return 1.0 / K->val[K->ptr[j]];
 }
 /* y (d) = K x, by whatever the operator has of K. */
 void uz_sparse_multiply(const uz_dual_load *load, double *y, const double *x);

@@ -42,6 +42,7 @@ TEST(threads_give_the_same_bits)
         many[k] = calloc((size_t)d, sizeof(double));
         CHECK(one[k] && many[k]);
     }
+    const uz_limits limits = {.n = d, .bottom = bottom, .top = top};
     CHECK_INT(uz_brick_diagonal(&K, cells.brick, &err), UZ_OK);
     CHECK_INT(uz_aside_begin(THREADS), THREADS);
     for (int threads = 1; threads <= THREADS; threads++) {
@@ -58,7 +59,7 @@ TEST(threads_give_the_same_bits)
         CHECK_INT(uz_cg_init(&cg, mg, &err), UZ_OK);
         mg->kind->multiply(mg, &K, cg.room, y[0], x);
         CHECK_INT(uz_multigrid_apply(mg, &K, cg.room, y[1], x, &err), UZ_OK);
-        CHECK_INT(mg->kind->start(mg, cg.room, &found, y[2], held, x, bottom, top, &never, &err), UZ_OK);
+        CHECK_INT(mg->kind->start(mg, cg.room, &found, y[2], held, x, &limits, &never, &err), UZ_OK);
         CHECK(found);
         CHECK_INT(uz_brick_precise_product(y[3], y[4], y[5], cells.brick, x, x, &err), UZ_OK);
         const uz_cg_stop stop = {.relative = 1e-6, .max_iterations = 50, .deadline = INFINITY};
