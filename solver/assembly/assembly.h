@@ -152,6 +152,7 @@ void uz_body_side(uz_side *side, double xyz[3 * UZ_FACE_NODES], int64_t node[UZ_
 typedef enum {
     UZ_BODY_SUPPORTED, /* by supports and springs alone */
     UZ_BODY_CELLS,     /* likewise; K is not assembled where it can be told by `brick` */
+    UZ_BODY_COUNTED,   /* likewise, and a brick's K is not there at all: for who counts what a solve takes */
     /* by obstacles, too: K is then singular and has `modes` for null space. Refuses with UZ_ERR_FREE_BODY only what no
      * obstacle stands in the way of; whether the load presses the body on is the load's matter */
     UZ_BODY_HELD,
@@ -174,6 +175,9 @@ uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, con
  * `model` (same uz_scene_body_key). On failure the outputs are undefined. */
 uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_body_model *model,
                              const uz_scene *scene, uz_error *err);
+
+/* h (m) alone, without what _load checks of the loads. */
+uz_status uz_body_model_gaps(double *h, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
 /* Does the load p (d) press a body that obstacles may hold on its obstacles, in every mode that nothing else holds?
  * UZ_ERR_FREE_BODY at "/loads" names the motion by which the body leaves them, or could at no cost. */

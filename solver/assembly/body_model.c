@@ -132,7 +132,8 @@ static uz_status displace(uz_body_model *model, const uz_body_model *rest, const
 
 uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_body_extent extent, uz_error *err)
 {
-    const bool held = extent != UZ_BODY_SUPPORTED && extent != UZ_BODY_CELLS;
+    const bool cells = extent == UZ_BODY_CELLS || extent == UZ_BODY_COUNTED,
+               held = extent != UZ_BODY_SUPPORTED && !cells;
     bool by_cells = false;
     memset(model, 0, sizeof *model);
     uz_status status = uz_mesh_from_scene(&model->mesh, scene, err);
@@ -172,8 +173,8 @@ uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_bo
         status = uz_build_contact_rows(model, scene, err);
     if (status == UZ_OK && held)
         status = uz_rigid_modes(&model->modes, &model->n_modes, model, err);
-    if (status == UZ_OK && extent == UZ_BODY_CELLS)
-        status = uz_build_cells(&by_cells, model, scene, err);
+    if (status == UZ_OK && cells)
+        status = uz_build_cells(&by_cells, model, scene, extent == UZ_BODY_CELLS, err);
     if (status == UZ_OK && extent != UZ_BODY_OUTLINE && !by_cells)
         status = uz_build_stiffness(model, err);
     if (status != UZ_OK)
@@ -214,6 +215,26 @@ static uz_status check_finite(const double *x, int64_t n, const char *where, uz_
     return UZ_OK;
 }
 
+/* h (m) and the prescribed values (n_fixed). */
+static uz_status find_gaps(double *h, double *prescribed, const uz_body_model *model, const uz_scene *scene,
+                           uz_error *err)
+{
+    uz_status status = uz_prescribed_values(prescribed, model, scene, err);
+    if (status == UZ_OK)
+        status = uz_initial_gaps(h, prescribed, model, scene, err);
+    return status == UZ_OK ? check_finite(h, model->m, "/contacts", err) : status;
+}
+
+uz_status uz_body_model_gaps(double *h, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    double *prescribed = uz_alloc(model->n_fixed, sizeof *prescribed);
+    const uz_status status =
+        prescribed ? find_gaps(h, prescribed, model, scene, err)
+                   : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld supported dofs", (long long)model->n_fixed);
+    free(prescribed);
+    return status;
+}
+
 uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_body_model *model,
                              const uz_scene *scene, uz_error *err)
 {
@@ -223,11 +244,7 @@ uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_
         return status;
     if (!prescribed && !(prescribed = own = uz_alloc(model->n_fixed, sizeof *own)))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld supported dofs", (long long)model->n_fixed);
-    status = uz_prescribed_values(prescribed, model, scene, err);
-    if (status == UZ_OK)
-        status = uz_initial_gaps(h, prescribed, model, scene, err);
-    if (status == UZ_OK)
-        status = check_finite(h, model->m, "/contacts", err);
+    status = find_gaps(h, prescribed, model, scene, err);
     if (status == UZ_OK && !(f = uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *f)))
         status =
             uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)model->mesh.n_nodes);

@@ -31,7 +31,7 @@ static bool has_equal_cells(const uz_body_model *model, const uz_scene *scene)
            model->info.n_rotated == 0 && !model->place && model->n_rigid == 0;
 }
 
-uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, uz_error *err)
+uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, bool diagonal, uz_error *err)
 {
     *made = false;
     if (!has_equal_cells(model, scene) || !has_bounds_only(model))
@@ -51,7 +51,7 @@ uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene
         free(brick);
         return UZ_OK;
     }
-    const uz_status status = uz_brick_diagonal(&model->K, brick, err);
+    const uz_status status = diagonal ? uz_brick_diagonal(&model->K, brick, err) : UZ_OK;
     if (status != UZ_OK) {
         free(brick);
         return status;

@@ -116,8 +116,9 @@ uz_status uz_build_pattern(uz_body_model *model, uz_error *err);
 uz_status uz_build_stiffness(uz_body_model *model, uz_error *err);
 /* Adds a stiffness ke (full, square) of displacements along the axes at `count` nodes to K and K_fixed. */
 void uz_add_stiffness(uz_body_model *model, const double *ke, const int64_t *node, int count);
-/* K's diagonal and `brick`, where the body is one whose rows bound a dof each (*made); else nothing. */
-uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* `brick` and, if it is wanted, K's diagonal, where the body is one whose rows bound a dof each (*made); else nothing.
+ */
+uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, bool diagonal, uz_error *err);
 /* Refuses what uz_build_stiffness would refuse. */
 uz_status uz_check_elements(const uz_body_model *model, uz_error *err);
 

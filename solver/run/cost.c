@@ -118,10 +118,10 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_brick *b
 {
     const bool by_auto = settings->method == UZ_METHOD_AUTO && settings->stopping == UZ_STOP_CERTIFIED;
     const bool by_active_set = by_auto || settings->method == UZ_METHOD_ACTIVE_SET;
-    return (uz_cost_size){.d = K->cols,
+    return (uz_cost_size){.d = N->cols,
                           .m = N->rows,
                           .n_b = n_b,
-                          .k_entries = K->ptr[K->cols],
+                          .k_entries = brick ? brick->d : K->ptr[K->cols],
                           .n_entries = N->ptr[N->cols],
                           .modes = dim == 3 ? 6 : 3,
                           .active_set = by_active_set,

@@ -17,7 +17,7 @@ typedef struct {
     int count, chosen;
 } uz_cost_plan;
 
-/* Of K (of a brick its diagonal; brick NULL: K has its entries) and of N, whose rows touch n_b dofs, for so many load
+/* Of K (of a brick it is not read; brick NULL: K has its entries) and of N, whose rows touch n_b dofs, for so many load
  * cases. dim: of a scene's mesh, else 0. An active set solves with the free dofs only where each row has one entry,
  * unless gradient steps were asked for, which take hundreds of solves. */
 uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_brick *brick, int64_t n_b, int dim,

@@ -78,16 +78,15 @@ static void predict_finite(uz_prediction *out, const uz_body_model *model, const
 static uz_status find_rows(uz_csc *N, int64_t *all, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     uz_candidates rows = {0};
-    double *p = uz_alloc(model->d, sizeof *p), *h = uz_alloc(model->m, sizeof *h);
-    uz_status status = p && h ? uz_body_model_load(p, h, NULL, model, scene, err)
-                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld loads", (long long)model->d);
+    double *h = uz_alloc(model->m, sizeof *h);
+    uz_status status = h ? uz_body_model_gaps(h, model, scene, err)
+                         : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)model->m);
     *all = model->m;
     if (status == UZ_OK)
         status = uz_choose_rows(&rows, h, model->m, &model->info, scene, NULL, err);
     if (status == UZ_OK)
         status = rows.in ? uz_candidates_reduce(N, &model->N, &rows, err) : uz_csc_copy(N, &model->N, err);
     uz_candidates_clear(&rows);
-    free(p);
     free(h);
     return status;
 }
@@ -126,7 +125,8 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
         uz_csc N = {0};
         int64_t m = 0;
         uz_error_reset(err);
-        status = uz_body_model_build(&model, &problem->scene, uz_setup_extent(problem, settings), err);
+        const uz_body_extent extent = uz_setup_extent(problem, settings);
+        status = uz_body_model_build(&model, &problem->scene, extent == UZ_BODY_CELLS ? UZ_BODY_COUNTED : extent, err);
         if (status == UZ_OK)
             status = find_rows(&N, &m, &model, &problem->scene, err);
         if (status == UZ_OK) {

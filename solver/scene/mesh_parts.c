@@ -33,9 +33,12 @@ void uz_join(int64_t *of, int64_t a, int64_t b)
 
 int64_t uz_mesh_number_parts(int64_t *part, const uz_mesh *mesh)
 {
-    int64_t count = 0;
-    int64_t *parent = uz_alloc(mesh->n_nodes, sizeof *parent);
-    if (!parent)
+    int64_t count = 0, *parent = NULL;
+    if (mesh->uniform) { /* a box */
+        memset(part, 0, (size_t)mesh->n_nodes * sizeof *part);
+        return mesh->n_nodes > 0;
+    }
+    if (!(parent = uz_alloc(mesh->n_nodes, sizeof *parent)))
         return -1;
     for (int64_t a = 0; a < mesh->n_nodes; a++)
         parent[a] = a;
