@@ -280,7 +280,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers peers-contact peers-decks peers-large peers-large-solids peers-space extremes theory large roller arch trade figures numbers collect page-size
+        bench-size bench-solids bench-deps peers peers-contact peers-decks peers-large peers-large-solids peers-space extremes theory large roller arch trade figures numbers collect page-size
 test: test-build ## build and pass every test; ONCE=1: but those that make asan runs as they are
 	@tests/run.sh $(BUILD) "" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
 
@@ -418,6 +418,10 @@ bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/benc
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
 	@$(call measured,bench-size $(if $(CELLS),--part)) $(BUILD)/bench $(BUILD)/bench-size.json size $(CELLS)
 
+bench-solids: deps-test ## solids in contact without a factor, by shapes, materials, elements and load cases: tables and build/bench-solids.json; CELLS=32 along a side; minutes
+	@$(MAKE) --no-print-directory -s $(BUILD)/bench $(BUILD)/uzawad
+	@$(call measured,bench-solids) /usr/bin/python3 -B tests/bench/solids.py $(BUILD) $(BUILD)/bench-solids.json $(if $(CELLS),CELLS=$(CELLS))
+
 bench-deps: ## install the Debian packages that only comparisons with other solvers use
 	@tests/deps.sh $(PEER_PACKAGES)
 
@@ -482,7 +486,7 @@ collect: ## docs/numbers.md and what other pages cite of it, from what was measu
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
 numbers: ## measure everything that docs/numbers.md shows (hours: soak is one of it), then write them; SPARED="soak" leaves some out
-	@for part in $(filter-out $(SPARED),theory large gallery trade extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
+	@for part in $(filter-out $(SPARED),theory large gallery trade extremes bench bench-size bench-solids $(if $(wildcard tests/peers/*),peers) soak figures); do \
 	    $(MAKE) --no-print-directory $$part || exit 1; done
 
 ##@ Style

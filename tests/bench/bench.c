@@ -507,6 +507,12 @@ int main(int argc, char **argv)
         fprintf(out.json, "}\n");
         return fclose(out.json) != 0;
     }
+    if (out.filter && strcmp(out.filter, "cycles") == 0) {
+        fprintf(out.json, "{");
+        const bool solved = bench_cycles(out.json);
+        fprintf(out.json, "}\n");
+        return fclose(out.json) != 0 || !solved;
+    }
     fprintf(out.json, "{\"ratios\": [\n");
     if (wanted(&out, "matrix_market"))
         bench_reader(&out);

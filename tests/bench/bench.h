@@ -77,6 +77,9 @@ typedef struct {
     bench_value linear, aggregates, cached;
 } bench_cells_row;
 bool bench_cells(bench_cells_row *row, int64_t n);
+/* Conjugate gradients to 1e-8 on boxes of equal cells, from 16 to 96 along a side and of cells 10 times as long and as
+ * short along one axis: their numbers, printed and as a member of a JSON object. false: one is not solved. */
+bool bench_cycles(FILE *json);
 /* 100 load cases of the paper's body with nx x nx/3 cells, certified 1e-8: their time over that of one CHOLMOD solve
  * of one right-hand side, both with the factor at hand. false: no answer. */
 bool bench_load_cases(bench_value *ratio, int64_t nx);

@@ -24,12 +24,12 @@ import tables  # noqa: E402
 
 ROOT = pathlib.Path(os.environ.get("NUMBERS_ROOT") or pathlib.Path(__file__).resolve().parent.parent.parent)
 WIDTH = 119
-COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "extremes": "make extremes", "solids": "make extremes FILTER=solids", "bounds": "make extremes FILTER=bounds", "quantities": "make extremes FILTER=quantities", "trade": "make trade",
+COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "bench_solids": "make bench-solids", "extremes": "make extremes", "solids": "make extremes FILTER=solids", "bounds": "make extremes FILTER=bounds", "quantities": "make extremes FILTER=quantities", "trade": "make trade",
             "theory": "make theory", "large": "make large", "soak": "make soak", "peers": "make peers", "decks": "make peers-decks", "peers_space": "make peers-space", "large_solids": "make peers-large-solids", "gallery": "make gallery", "page": "make figures (the page)"}
 ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems", "trade": "rows"}  # what is measured by parts
 
 
-TIMED = ("figures", "bench", "bench_size", "soak", "peers", "decks", "peers_space", "large", "trade")  # what other programs on the machine can change
+TIMED = ("figures", "bench", "bench_size", "bench_solids", "soak", "peers", "decks", "peers_space", "large", "trade")  # what other programs on the machine can change
 
 
 def timed(lines, data, name, key=None, shown=("",)):
@@ -189,6 +189,13 @@ without the rigid motions, whichever takes less. Nodes within `hex8` and `tet4` 
 LARGE_SOLIDS = """Two solids under large deformation (`make peers-large-solids`): a block is pressed on a longer one and moved along it by more than its own length, another one is pressed
 on a dome and moved along that, the whole way at once. How far the force between them, as a vector, the area in contact and, where no edge makes it infinite, the largest pressure are off those of a
 finer mesh; and how far the force is off that of GetFEM, with bricks of 27 nodes on the mesh of the row of `hex20`, contact by integrals along rays, the way in parts."""
+CYCLES = """Iterations of conjugate gradients to 1e-8 on boxes of equal `hex8`, clamped on one side, with the multigrid that they have without a matrix (`make bench-solids`), by cells
+along each side; aspect: how many times as long as its other sides a cell is along one axis. Grown: the most over the fewest of a row."""
+
+SHAPES = """The same cube as above, one thread, seconds of processor of the daemon from request to answer, certified to 1e-6 (`make bench-solids`): ratios to the plain cube of the same
+mesh, of a body that is not known and of another load on one that is; medians of three of runs one after the other. The stiff ball has a twelfth of the cube's volume and no plane of its
+mesh at its surface. Of load cases: all of them in one run, of a body that is not known."""
+
 BOUNDS = """Scenes of [theory](#against-theory), of the gallery and of the pages on a coarse mesh (`make extremes FILTER=bounds`): the guaranteed bound on the whole error and the
 true error, in the energy norm itself, by potential energies, in which what its pressures do on the gaps of the answer counts, too: that of the body is known from a mesh refined to a tenth of the error. Where an answer stands in a round obstacle
 between its nodes its energy tells less: there is no ratio where the square of the true error is left open by more than a tenth to either side."""
@@ -246,6 +253,7 @@ def page(data, files):
     add("Decks of CalculiX", timed(tables.decks(data), data, "decks"), DECKS)
     add("Solids over one multigrid solve", timed(tables.space(data), data, "peers_space"), SPACE)
     add("Solids that slide under large deformation", tables.large_solids(data), LARGE_SOLIDS)
+    add("Solids without a factor", timed([*tables.cycles(data), "", *tables.shapes(data)] if "bench_solids" in data else None, data, "bench_solids"), CYCLES, SHAPES)
     add("What the whole error costs", timed(tables.trade(data), data, "trade", "rows"), TRADE)
     add("A contact force within 2 %", tables.forces(data), FORCES)
     add("Claims at the extremes", tables.extremes(data), EXTREMES)

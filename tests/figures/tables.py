@@ -414,6 +414,26 @@ def large_solids(data):
     return table(["scene", "element", "unknowns", "contact problems", "force", "area", "largest pressure", "force, GetFEM"], rows) if rows else None
 
 
+def cycles(data):
+    """Iterations on boxes by their cells, and how much they grow."""
+    found = data["bench_solids"]["boxes"]
+    sides = sorted({row["cells"] for row in found})
+    rows = []
+    for aspect in sorted({row["aspect"] for row in found}, reverse=True):
+        own = {row["cells"]: row["iterations"] for row in found if row["aspect"] == aspect}
+        rows.append([sig(aspect), *(str(own.get(side, NONE)) for side in sides), f"{max(own.values()) / min(own.values()):.2f} (1.3)"])
+    return table(["aspect", *(str(side) for side in sides), "grown (target)"], rows)
+
+
+def shapes(data):
+    """What makes a solid dearer than the plain cube, and many load cases."""
+    rows = []
+    for row in data["bench_solids"]["rows"]:
+        told = [duration(value) if row["unit"] else f"{value:.2f}" for value in (row["cold"], row["cached"]) if value is not None]
+        rows.append([row["what"], "box of `hex8`" if row["mesh"] == "box" else f"`{row['mesh']}`", f"{row['unknowns']:,}", f"`{row['operator']}`", *told, *[NONE] * (2 - len(told)), f"{row['target']}{' ' + row['unit'] if row['unit'] else ''}"])
+    return table(["what", "mesh", "unknowns", "operator", "cold", "another load", "target"], rows)
+
+
 REASONS = (("first step is", "the first step is no static one"), ("FRICTION", "friction"), ("EQUATION", "equations between displacements"),
            ("SPRINGA", "springs"), ("in place of a spring", "contact softer than a twentieth of the body"),
            ("PLASTIC", "plasticity"), ("ADJUST", "nodes that are moved to the other surface (ADJUST)"), ("TRANSFORM", "turned axes of nodes"), ("CYCLIC", "cyclic symmetry"))

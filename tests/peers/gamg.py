@@ -14,55 +14,13 @@ import time
 
 import numpy
 import petsc4py
+from cubes import CORNERS, POISSON, SIDE, YOUNG, by_daemon, mesh, request
 
 petsc4py.init([])
 from petsc4py import PETSc  # noqa: E402  it reads the options when it is imported
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "api"))
-import service  # noqa: E402  the path is set above
-
-RUNS, SIDE, YOUNG, POISSON = 3, 40.0, 1000.0, 0.3
+RUNS = 3
 NEIGHBOURS = 27  # of a node, itself among them
-CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]  # of hex8
-TETS = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
-SIDES = {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)}  # axis, end
-
-
-def mesh(kind, n):
-    """Nodes, elements, and faces of the four sides."""
-    line = numpy.arange(n + 1) * SIDE / n
-    z, y, x = numpy.meshgrid(line, line, line, indexing="ij")
-    nodes = numpy.stack([x, y, z], axis=-1).reshape(-1, 3)
-    if kind != "box":
-        moved = 0.15 * SIDE / n * numpy.random.default_rng(1).uniform(-1, 1, nodes.shape)
-        nodes = nodes + numpy.where((nodes > 0) & (nodes < SIDE * (1 - 1e-9)), moved, 0)
-    k, j, i = (t.ravel() for t in numpy.meshgrid(*3 * [numpy.arange(n)], indexing="ij"))
-    cells = numpy.stack([((k + c[2]) * (n + 1) + j + c[1]) * (n + 1) + i + c[0] for c in CORNERS], axis=1)
-    faces = {}
-    for side, (axis, end) in SIDES.items():
-        at = [c for c in range(8) if CORNERS[c][axis] == end]
-        at = [at[0], at[1], at[3], at[2]] if sum(a != b for a, b in zip(CORNERS[at[1]], CORNERS[at[2]])) == 2 else at
-        quads = cells[((i, j, k)[axis] == end * (n - 1))][:, at]
-        faces[side] = quads if kind != "tet4" else halves(quads, at)
-    return nodes, (cells[:, TETS].reshape(-1, 4) if kind == "tet4" else cells), faces
-
-
-def halves(quads, corners):
-    """Triangles along the diagonal that the tetrahedra have: it goes from the face's least corner to its greatest."""
-    order = sorted(range(4), key=lambda q: sum(CORNERS[corners[q]]))
-    first, last = order[0], order[3]
-    return numpy.concatenate([quads[:, [first, q, last]] for q in order[1:3]])
-
-
-def request(kind, n, nodes, elements, faces):
-    box = {"box": {"size": 3 * [SIDE], "cells": 3 * [n], "element": "hex8"}}
-    given = {"nodes": nodes.tolist(), "elements": {kind: elements.tolist()}, "groups": {side: {"faces": f.tolist()} for side, f in faces.items()}}
-    return {"problem": {"kind": "scene", "model": "solid", "mesh": box if kind == "box" else given,
-                        "materials": [{"on": "all", "young": YOUNG, "poisson": POISSON}],
-                        "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}],
-                        "loads": [{"on": "top", "traction": [0, -0.05, 0]}, {"on": "right", "traction": [0.5, 0, 0]}],
-                        "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}}]},
-            "solver": {"accuracy": {"relative_error": 1e-6}}}
 
 
 def stiffness(nodes, elements):
@@ -132,24 +90,6 @@ class Linear:
         if ksp.getConvergedReason() <= 0:
             raise RuntimeError(f"PETSc ended with reason {ksp.getConvergedReason()}")
         return made - start, end - made, ksp.getIterationNumber()
-
-
-def by_daemon(build, asked):
-    """Seconds of a body that is new, and of another load on it; what was answered."""
-    s = service.Service(build, "--workers", "1", "--threads", "1")
-    seconds = []
-    try:
-        s.start()
-        for factor in (1.0, 1.03):
-            loads = [{**load, "traction": [factor * t for t in load["traction"]]} for load in asked["problem"]["loads"]]
-            before = s.settle()
-            job = s.solve({**asked, "problem": {**asked["problem"], "loads": loads}})
-            seconds.append(s.settle() - before)
-            if job["status"] != "successful" or job["summary"]["outcome"] != "converged":
-                raise RuntimeError(job.get("error") or job["summary"]["outcome"])
-        return seconds, job["summary"]
-    finally:
-        s.stop()
 
 
 def row_of(build, kind, n):

@@ -1,0 +1,129 @@
+"""What a solid in contact costs without a factor, by shapes, materials, elements and load cases.
+usage: solids.py BUILD_DIR OUTPUT.json [CELLS=32]
+
+The cube of tests/peers/gamg.py with CELLS cells along a side: as a box of equal hex8, whose K is no matrix, and as hex8
+whose inner nodes were moved; seconds of processor of a daemon at its defaults, in one thread, from request to answer,
+certified to 1e-6. Ratios are of runs one after the other, medians of RUNS; many cases are run once. Iterations of conjugate gradients on boxes are
+counted by BUILD_DIR/bench."""
+import copy
+import json
+import math
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+
+import numpy
+
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent.parent / folder) for folder in ("api", "peers")]
+import cubes  # noqa: E402  the paths are set above
+import service  # noqa: E402
+
+RUNS, CASES, LONGEST_S = 3, 50, 1800
+JUMP, NEARLY = 1e4, 0.49
+
+
+def with_ball(asked, nodes, elements):
+    """Stiff elements in a ball that no plane of the mesh touches."""
+    middle = numpy.array(nodes)[elements].mean(axis=1)
+    inside = numpy.linalg.norm(middle - numpy.array([0.47, 0.53, 0.49]) * cubes.SIDE, axis=1) < 0.27 * cubes.SIDE
+    problem = asked["problem"]
+    for name, part, young in (("ball", inside, JUMP * cubes.YOUNG), ("rest", ~inside, cubes.YOUNG)):
+        problem["mesh"]["groups"][name] = {"elements": numpy.flatnonzero(part).tolist()}
+        problem["materials"].append({"on": name, "young": young, "poisson": cubes.POISSON})
+    del problem["materials"][0]
+    return asked
+
+
+def nearly_incompressible(asked):
+    asked["problem"]["materials"][0]["poisson"] = NEARLY
+    return asked
+
+
+def of_element(asked, element, n):
+    asked["problem"]["mesh"]["box"].update(element=element, cells=3 * [n])
+    return asked
+
+
+def without_contact(asked):
+    del asked["problem"]["contacts"]
+    return asked
+
+
+def with_cases(asked):
+    """Pull and pressure grow and shrink, so that the contact does."""
+    cases = []
+    for k in range(CASES):
+        loads = copy.deepcopy(asked["problem"]["loads"])
+        loads[0]["traction"][1] *= 1 + 0.5 * math.sin(0.37 * k)
+        loads[1]["traction"][0] *= 1 + 0.5 * math.cos(0.11 * k)
+        cases.append({"name": str(k), "loads": loads})
+    asked["cases"] = cases
+    return asked
+
+
+def ratio(build, one, other, per=lambda first, second: 1.0):
+    """Of cold solves of the second over the first, and of those with the body in the cache; the second's summary."""
+    cold, cached = [], []
+    for _ in range(RUNS):
+        (a, b), first = cubes.by_daemon(build, one)
+        (c, d), second = cubes.by_daemon(build, other)
+        cold.append(c / a * per(first, second))
+        cached.append(d / b * per(first, second))
+    return statistics.median(cold), statistics.median(cached), second
+
+
+def many_cases(build, asked):
+    """Seconds of a body that is new with all its cases, and what was answered."""
+    s = service.Service(build, "--workers", "1", "--threads", "1")
+    try:
+        s.start()
+        before = s.settle()
+        job = s.wait_status(s.post(asked).json["id"], "successful", "failed", seconds=LONGEST_S)
+        seconds = s.settle() - before
+        if job["status"] != "successful":
+            raise RuntimeError(job["error"])
+        return seconds, job["summary"]
+    finally:
+        s.stop()
+
+
+def ratios(build, n):
+    nodes, elements, faces = cubes.mesh("hex8", n)
+    plain = {kind: lambda kind=kind: cubes.request(kind, n, nodes, elements, faces) for kind in ("box", "hex8")}
+    per_unknown = lambda first, second: first["problem"]["d"] / second["problem"]["d"]  # noqa: E731
+    rows = [("stiff ball, E times 10,000", "hex8", 4, plain["hex8"](), with_ball(plain["hex8"](), nodes, elements), None)]
+    for kind in plain:
+        rows.append((f"Poisson's ratio {NEARLY}", kind, 4, plain[kind](), nearly_incompressible(plain[kind]()), None))
+    rows.append(("`tet10` over `tet4`, per unknown", "tet10", 2, of_element(plain["box"](), "tet4", n), of_element(plain["box"](), "tet10", n // 2), per_unknown))
+    for kind in plain:
+        rows.append(("with contact over without", kind, 1.5, without_contact(plain[kind]()), plain[kind](), None))
+    for what, kind, target, one, other, per in rows:
+        cold, cached, summary = ratio(build, one, other, *([per] if per else []))
+        yield {"what": what, "mesh": kind, "unknowns": summary["problem"]["d"], "target": target, "unit": "", "cold": cold, "cached": cached, "operator": summary["operator"]}
+    for kind, target in (("box", 3), ("hex8", 10)):
+        seconds, summary = many_cases(build, with_cases(plain[kind]()))
+        yield {"what": f"{CASES} load cases", "mesh": kind, "unknowns": summary["problem"]["d"], "target": target, "unit": "s", "cold": seconds, "cached": None, "operator": summary["operator"]}
+
+
+def count_cycles(build):
+    with tempfile.TemporaryDirectory() as folder:
+        out = pathlib.Path(folder) / "cycles.json"
+        subprocess.run([f"{build}/bench", str(out), "cycles"], check=True)
+        return json.loads(out.read_text(encoding="utf-8"))["boxes"]
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    n = int(sys.argv[3].split("=")[-1]) if len(sys.argv) > 3 else 32
+    found = {"boxes": count_cycles(sys.argv[1]), "rows": []}
+    for row in ratios(sys.argv[1], n):
+        print(f"{row['what']:34s} {row['mesh']:6s} {row['unknowns']:8d} {row['cold']:8.2f} {row['cached'] or math.nan:8.2f}  (target {row['target']}) {row['operator']}", flush=True)
+        found["rows"].append(row)
+    pathlib.Path(sys.argv[2]).write_text(json.dumps(found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
