@@ -254,14 +254,15 @@ static inline __attribute__((always_inline)) void take_pair(const product_of *q,
 static inline __attribute__((always_inline)) void finish_row(const uz_residuals *out, int64_t j, const double *lo,
                                                              const uz_csc *N, const double *p, const double *r)
 {
-    double_double sum = {out->Ku[j], lo[j]};
+    const double low = lo[j]; /* e_u may stand there */
+    double_double sum = {out->Ku[j], low};
     dd_add(&sum, -p[j]);
     for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
         dd_add_product(&sum.hi, &sum.lo, -N->val[k], r[N->idx[k]], 0);
     out->e_u[j] = sum.hi + sum.lo;
     dd_add(&sum, out->Kc[j]);
     out->e[j] = sum.hi + sum.lo;
-    out->Ku[j] += lo[j];
+    out->Ku[j] += low;
 }
 
 /* The same in rows j to j + 3, which N does not touch. */
@@ -328,9 +329,8 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
                                   const double *c, const double *r, uz_error *err)
 {
     int64_t d = K->rows;
-    double *lo = uz_alloc_zero(d, sizeof *lo);
-    if (!lo)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a residual of %lld dofs", (long long)d);
+    double *lo = out->e_u; /* until a row is finished */
+    memset(lo, 0, (size_t)d * sizeof *lo);
     memset(out->Ku, 0, (size_t)d * sizeof *lo);
     memset(out->Kc, 0, (size_t)d * sizeof *lo);
     product_of product = {
@@ -348,7 +348,6 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
         (uz_cpu_has_avx2_fma() ? multiply_fused : multiply_split)(&product);
     }
     (uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow)(out, lo, N, p, r);
-    free(lo);
     return status;
 }
 
