@@ -418,9 +418,9 @@ bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/benc
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
 	@$(call measured,bench-size $(if $(CELLS),--part)) $(BUILD)/bench $(BUILD)/bench-size.json size $(CELLS)
 
-bench-solids: deps-test ## solids in contact without a factor, by shapes, materials, elements and load cases: tables and build/bench-solids.json; CELLS=32 along a side; minutes
+bench-solids: deps-test ## solids in contact without a factor, by shapes, materials, elements and load cases: tables and build/bench-solids.json; CELLS=32 along a side, RUNS=3; minutes
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench $(BUILD)/uzawad
-	@$(call measured,bench-solids) /usr/bin/python3 -B tests/bench/solids.py $(BUILD) $(BUILD)/bench-solids.json $(if $(CELLS),CELLS=$(CELLS))
+	@$(call measured,bench-solids) /usr/bin/python3 -B tests/bench/solids.py $(BUILD) $(BUILD)/bench-solids.json $(foreach v,CELLS RUNS,$(if $($(v)),$(v)=$($(v))))
 
 bench-deps: ## install the Debian packages that only comparisons with other solvers use
 	@tests/deps.sh $(PEER_PACKAGES)

@@ -1,5 +1,5 @@
 """What a solid in contact costs without a factor, by shapes, materials, elements and load cases.
-usage: solids.py BUILD_DIR OUTPUT.json [CELLS=32]
+usage: solids.py BUILD_DIR OUTPUT.json [CELLS=32] [RUNS=3]
 
 The cube of tests/peers/gamg.py with CELLS cells along a side: as a box of equal hex8, whose K is no matrix, and as hex8
 whose inner nodes were moved; seconds of processor of a daemon at its defaults, in one thread, from request to answer,
@@ -20,7 +20,7 @@ sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent.parent / folder) for
 import cubes  # noqa: E402  the paths are set above
 import service  # noqa: E402
 
-RUNS, CASES, LONGEST_S = 3, 50, 1800
+CASES = 50
 JUMP, NEARLY = 1e4, 0.49
 
 
@@ -63,10 +63,10 @@ def with_cases(asked):
     return asked
 
 
-def ratio(build, one, other, per=lambda first, second: 1.0):
+def ratio(build, runs, one, other, per=lambda first, second: 1.0):
     """Of cold solves of the second over the first, and of those with the body in the cache; the second's summary."""
     cold, cached = [], []
-    for _ in range(RUNS):
+    for _ in range(runs):
         (a, b), first = cubes.by_daemon(build, one)
         (c, d), second = cubes.by_daemon(build, other)
         cold.append(c / a * per(first, second))
@@ -80,16 +80,13 @@ def many_cases(build, asked):
     try:
         s.start()
         before = s.settle()
-        job = s.wait_status(s.post(asked).json["id"], "successful", "failed", seconds=LONGEST_S)
-        seconds = s.settle() - before
-        if job["status"] != "successful":
-            raise RuntimeError(job["error"])
-        return seconds, job["summary"]
+        job = cubes.answer(s, asked)
+        return s.settle() - before, job["summary"]
     finally:
         s.stop()
 
 
-def ratios(build, n):
+def ratios(build, n, runs):
     nodes, elements, faces = cubes.mesh("hex8", n)
     plain = {kind: lambda kind=kind: cubes.request(kind, n, nodes, elements, faces) for kind in ("box", "hex8")}
     per_unknown = lambda first, second: first["problem"]["d"] / second["problem"]["d"]  # noqa: E731
@@ -100,7 +97,7 @@ def ratios(build, n):
     for kind in plain:
         rows.append(("with contact over without", kind, 1.5, without_contact(plain[kind]()), plain[kind](), None))
     for what, kind, target, one, other, per in rows:
-        cold, cached, summary = ratio(build, one, other, *([per] if per else []))
+        cold, cached, summary = ratio(build, runs, one, other, *([per] if per else []))
         yield {"what": what, "mesh": kind, "unknowns": summary["problem"]["d"], "target": target, "unit": "", "cold": cold, "cached": cached, "operator": summary["operator"]}
     for kind, target in (("box", 3), ("hex8", 10)):
         seconds, summary = many_cases(build, with_cases(plain[kind]()))
@@ -117,9 +114,9 @@ def count_cycles(build):
 def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
-    n = int(sys.argv[3].split("=")[-1]) if len(sys.argv) > 3 else 32
-    found = {"boxes": count_cycles(sys.argv[1]), "rows": []}
-    for row in ratios(sys.argv[1], n):
+    given = {"CELLS": 32, "RUNS": 3, **{key: int(value) for key, value in (word.split("=") for word in sys.argv[3:])}}
+    found = {"runs": given["RUNS"], "boxes": count_cycles(sys.argv[1]), "rows": []}
+    for row in ratios(sys.argv[1], given["CELLS"], given["RUNS"]):
         print(f"{row['what']:34s} {row['mesh']:6s} {row['unknowns']:8d} {row['cold']:8.2f} {row['cached'] or math.nan:8.2f}  (target {row['target']}) {row['operator']}", flush=True)
         found["rows"].append(row)
     pathlib.Path(sys.argv[2]).write_text(json.dumps(found), encoding="utf-8")

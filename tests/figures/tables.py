@@ -434,6 +434,11 @@ def shapes(data):
     return table(["what", "mesh", "unknowns", "operator", "cold", "another load", "target"], rows)
 
 
+def runs_of_shapes(data):
+    runs = data["bench_solids"]["runs"]
+    return [f"Ratios are medians of {runs} runs." if runs > 1 else "Ratios are of single runs."]
+
+
 REASONS = (("first step is", "the first step is no static one"), ("FRICTION", "friction"), ("EQUATION", "equations between displacements"),
            ("SPRINGA", "springs"), ("in place of a spring", "contact softer than a twentieth of the body"),
            ("PLASTIC", "plasticity"), ("ADJUST", "nodes that are moved to the other surface (ADJUST)"), ("TRANSFORM", "turned axes of nodes"), ("CYCLIC", "cyclic symmetry"))
