@@ -200,16 +200,32 @@ static uz_selection *add_selection(decoding *d, const json_value *where)
     return to && read_where(to, d, where, uz_scene_dim(d->scene)) ? to : NULL;
 }
 
-bool decode_everywhere(char name[64], decoding *d, const json_value *value)
+static bool is_selected(const uz_scene *scene, const char *name)
 {
+    for (int64_t i = 0; i < scene->n_selections; i++)
+        if (strcmp(scene->selections[i].name, name) == 0)
+            return true;
+    return false;
+}
+
+/* The group `name` of all outer sides; nothing, where one is called so. */
+static bool select_outer_sides(decoding *d, const char *name, const json_value *value)
+{
+    if (is_selected(d->scene, name))
+        return true;
     uz_selection *to = new_selection(d, value);
     if (!to)
         return false;
-    snprintf(to->name, sizeof to->name, "every outer side");
-    memcpy(name, to->name, sizeof to->name);
+    snprintf(to->name, sizeof to->name, "%s", name);
     to->kind = UZ_SELECT_SIDES; /* and no condition */
     d->scene->n_selections++;
     return true;
+}
+
+bool decode_everywhere(char name[64], decoding *d, const json_value *value)
+{
+    memcpy(name, "every outer side", sizeof "every outer side");
+    return select_outer_sides(d, name, value);
 }
 
 bool decode_selections(uz_scene *out, decoding *d, const json_value *list)
@@ -249,23 +265,19 @@ static bool check_name(decoding *d, const json_value *value, const char *name, g
     const uz_scene *scene = d->scene;
     const bool box = scene->source == UZ_MESH_BOX, all = strcmp(name, "all") == 0;
     known_names known = {.asked = name};
-    bool selected = false;
     for (int i = 0; box && i < 2 * uz_scene_dim(scene); i++)
         offer(&known, SIDES[i].name);
     for (int64_t i = 0; !box && i < scene->given.n_groups; i++)
         offer(&known, scene->given.groups[i].name);
-    for (int64_t i = 0; i < scene->n_selections; i++) {
+    for (int64_t i = 0; i < scene->n_selections; i++)
         offer(&known, scene->selections[i].name);
-        selected = selected || strcmp(scene->selections[i].name, name) == 0;
-    }
     offer(&known, "all");
-    if (!box)
-        offer(&known, "boundary");
+    offer(&known, "boundary");
     if (known.found && box && use == GROUP_OF_SIDES && all)
         return decode_refuse(d, "not_allowed", value, "is \"all\", every element of the box; name sides of it.");
-    if (known.found && box && use == GROUP_OF_ELEMENTS && !all && !selected)
+    if (known.found && box && use == GROUP_OF_ELEMENTS && !all && !is_selected(scene, name))
         return decode_refuse(d, "not_allowed", value,
-                             "is a side of the box, and must be \"all\" or elements by where they are.");
+                             "is of the box's surface, and must be \"all\" or elements by where they are.");
     if (known.found)
         return true;
     const size_t shown = known.count < MOST_SHOWN ? known.count : MOST_SHOWN;
@@ -315,5 +327,7 @@ bool decode_group(char name[64], decoding *d, const json_value *value, group_use
             text = SIDES[i].name;
     if (whole && strlen(text) < 64)
         memcpy(name, text, strlen(text) + 1);
-    return use == GROUP_OR_CONTACT || check_name(d, value, name, use);
+    if (use != GROUP_OR_CONTACT && !check_name(d, value, name, use))
+        return false;
+    return !box || strcmp(name, "boundary") != 0 || select_outer_sides(d, name, value); /* other meshes have it */
 }

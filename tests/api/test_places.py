@@ -46,6 +46,32 @@ def test_places_are_the_sides_that_they_name(s):
     check(u == v and summary["resultants"]["supports"][0]["on"] == "left", summary["resultants"])
 
 
+def test_boundary_of_a_box_is_all_its_sides(s):
+    """Whatever touches is found, and it is what the sides by name find; a group of one's own may be called so."""
+    request = copy.deepcopy(SCENE)
+    wall = {"plane": {"point": [60.00005, 0], "normal": [-1, 0]}}
+    request["problem"]["contacts"] = [{"on": name, "obstacle": obstacle} for name, obstacle in (("bottom", {"plane": {"point": [0, 0], "normal": [0, 1]}}), ("right", wall))]
+    named, u = solved(s, request)
+    bottom = named["contact"]["candidates"] - 11  # the other side has so many more
+    for contact in request["problem"]["contacts"]:
+        contact["on"] = "boundary"
+    whole, v = solved(s, request)
+    check(named["contact"]["candidates"] < whole["contact"]["candidates"] and named["contact"]["active"] == whole["contact"]["active"] > 20, named["contact"], whole["contact"])
+    check(whole["resultants"]["contacts"][1]["force"][0] < -1, whole["resultants"])
+    check(max(abs(a - b) for p, q in zip(u, v) for a, b in zip(p, q)) < 1e-6 * max(map(abs, sum(u, []))))
+    solid = {"problem": {"kind": "scene", "model": "solid", "mesh": {"box": {"size": [2, 2, 1], "cells": [4, 4, 2]}}, "materials": [{"on": "all", "young": 1e3, "poisson": 0.3}],
+                         "supports": [{"on": "front", "ux": 0, "uy": 0, "uz": -0.01}], "contacts": [{"on": "back", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 0, 1]}}}]}}
+    of_back = solved(s, solid)[0]["contact"]
+    solid["problem"]["contacts"][0]["on"] = "boundary"
+    of_all = solved(s, solid)[0]["contact"]
+    check(abs(of_back["reaction_sum"] / of_all["reaction_sum"] - 1) < 1e-7, of_back, of_all)
+    request["problem"]["groups"] = [{"name": "boundary", "where": {"y": 0}}]
+    check(solved(s, request)[0]["contact"]["candidates"] == 2 * bottom)
+    request["problem"].pop("groups")
+    request["problem"]["materials"][0]["on"] = "boundary"
+    refused(s, request, "not_allowed", "/problem/materials/0/on", "of the box's surface")
+
+
 def test_the_same_name_elsewhere_is_another_body(s):
     """A factor that is kept for a body must not answer for one whose group of that name is another."""
     def held(where):
