@@ -64,11 +64,22 @@ typedef struct {
     const char *unit, *power; /* "length", "force" or "stress", by which problem.units calls it, NULL: none; "\u00b2" */
 } column;
 
-static void put_table(const report *r, const char *caption, const char *list_at, const column *columns, size_t count)
+/* How many of the list have what a table is about; key NULL: all. */
+static size_t count_having(const json_t *list, const char *key)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < json_array_size(list); i++)
+        count += !key || json_object_get(json_array_get(list, i), key);
+    return count;
+}
+
+/* having: only of those that have this key; NULL: of all. */
+static void put_table(const report *r, const char *caption, const char *list_at, const char *having,
+                      const column *columns, size_t count)
 {
     const json_t *list = client_json_at(r->summary, list_at), *one;
     size_t i;
-    if (json_array_size(list) == 0)
+    if (count_having(list, having) == 0)
         return;
     uz_buffer_print(r->to, "<h2>%s</h2><table><tr>", caption);
     for (size_t k = 0; k < count; k++) {
@@ -81,6 +92,8 @@ static void put_table(const report *r, const char *caption, const char *list_at,
     put(r->to, "</tr>\n");
     json_array_foreach(list, i, one)
     {
+        if (having && !json_object_get(one, having))
+            continue;
         put(r->to, "<tr>");
         for (size_t k = 0; k < count; k++) {
             const column *c = &columns[k];
@@ -149,13 +162,20 @@ static void put_tables(const report *r)
                                       {"Largest", "max_pressure", NULL, CELL_NUMBER, "stress", NULL},
                                       {"Area", "area", NULL, CELL_NUMBER, "length", "\u00b2"},
                                       {"Center of pressure", "center", NULL, CELL_VECTOR, "length", NULL}},
+                        RIGID[] = {{"On", "on", NULL, CELL_TEXT, NULL, NULL},
+                                   {"Point", "rigid.point", NULL, CELL_VECTOR, "length", NULL},
+                                   {"Displacement", "rigid.displacement", NULL, CELL_VECTOR, "length", NULL},
+                                   {"Rotation, degrees", "rigid.rotation", NULL, CELL_VECTOR, NULL, NULL},
+                                   {"Force", "force", NULL, CELL_VECTOR, "force", NULL},
+                                   {"Moment at the point", "rigid.moment", NULL, CELL_VECTOR, NULL, NULL}},
                         ASSERTIONS[] = {{"Result", "result", NULL, CELL_TEXT, NULL, NULL},
                                         {"Quantity", "name", "quantity", CELL_TEXT, NULL, NULL},
                                         {"Value", "value", NULL, CELL_NUMBER, NULL, NULL},
                                         {"Why", "reason", NULL, CELL_TEXT, NULL, NULL}};
-    put_table(r, "Quantities", "quantities", QUANTITIES, sizeof QUANTITIES / sizeof QUANTITIES[0]);
-    put_table(r, "Contacts, on this mesh", "resultants.contacts", CONTACTS, sizeof CONTACTS / sizeof CONTACTS[0]);
-    put_table(r, "Assertions", "assertions", ASSERTIONS, sizeof ASSERTIONS / sizeof ASSERTIONS[0]);
+    put_table(r, "Quantities", "quantities", NULL, QUANTITIES, sizeof QUANTITIES / sizeof QUANTITIES[0]);
+    put_table(r, "Contacts, on this mesh", "resultants.contacts", NULL, CONTACTS, sizeof CONTACTS / sizeof CONTACTS[0]);
+    put_table(r, "Rigid groups", "resultants.supports", "rigid", RIGID, sizeof RIGID / sizeof RIGID[0]);
+    put_table(r, "Assertions", "assertions", NULL, ASSERTIONS, sizeof ASSERTIONS / sizeof ASSERTIONS[0]);
 }
 
 static void put_warnings(const report *r)

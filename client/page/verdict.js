@@ -91,6 +91,17 @@ function contacts_of(summary) {
       ...[one.mean_pressure, one.max_pressure, one.area].map((value) => h("td", null, number(value, 4))), h("td", null, vector(one.center))))));
 }
 
+/** How rigid groups moved, and what holds them at their points. */
+function rigid_of(summary) {
+  const rigid = (summary.resultants?.supports || []).filter((one) => one.rigid);
+  if (!rigid.length) return null;
+  return h("table", { class: "assertions", id: "rigid" }, h("caption", null, "Rigid groups"),
+    h("thead", null, h("tr", null, [["On"], ["Point", "length"], ["Displacement", "length"], ["Rotation, degrees"], ["Force", "force"], ["Moment at the point", "moment"]].map(([name, of]) =>
+      h("th", { scope: "col" }, name, unit_of(summary, of) && `,${unit_of(summary, of)}`)))),
+    h("tbody", null, rigid.map((one) => h("tr", null, h("td", null, one.on),
+      ...[one.rigid.point, one.rigid.displacement, one.rigid.rotation, one.force, one.rigid.moment].map((value) => h("td", null, vector(value)))))));
+}
+
 /** The card of a summary. */
 export function verdict_card(summary) {
   const outcome = outcome_words(summary), whole = whole_words(summary), kinematics = kinematics_words(summary);
@@ -105,7 +116,7 @@ export function verdict_card(summary) {
 
 /** What else is known of it: less than the body itself tells. */
 export function numbers_card(summary) {
-  return [h("h2", null, "Numbers"), contacts_of(summary),
+  return [h("h2", null, "Numbers"), contacts_of(summary), rigid_of(summary),
     h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value))))];
 }
 

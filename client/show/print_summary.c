@@ -332,7 +332,28 @@ static void print_stress(FILE *to, const json_t *summary)
     print_trends(to, json_object_get(stress, "estimates"));
 }
 
-/* What acts on the body, without moments: "contact bottom (0, 10.5)". */
+/* " N mm": of a moment. */
+static void print_moment_unit(FILE *to, const json_t *summary)
+{
+    print_unit(to, summary, "force", "");
+    print_unit(to, summary, "length", "");
+}
+
+/* How a rigid group was moved, and the moment that the support takes at its point. */
+static void print_rigid(FILE *to, const json_t *summary, const json_t *rigid)
+{
+    const bool plane = json_array_size(json_object_get(rigid, "displacement")) == 2;
+    fprintf(to, "\n%14srigid: its point", "");
+    print_vector(to, " ", json_object_get(rigid, "point"));
+    print_vector(to, " moves by ", json_object_get(rigid, "displacement"));
+    print_unit(to, summary, "length", "");
+    print_vector(to, plane ? " and turns by " : " and turns about the axes by ", json_object_get(rigid, "rotation"));
+    fputs(" degrees", to);
+    print_vector(to, "; moment ", json_object_get(rigid, "moment"));
+    print_moment_unit(to, summary);
+}
+
+/* What acts on the body, moments but of rigid groups left out: "contact bottom (0, 10.5)". */
 static void print_resultants(FILE *to, const json_t *summary)
 {
     static const char *const LISTS[][2] = {{"contacts", "contact "}, {"supports", "support "}, {"loads", "loads"}};
@@ -360,6 +381,8 @@ static void print_resultants(FILE *to, const json_t *summary)
                 fputs(" around", to);
                 print_vector(to, " ", client_json_at(one, "center"));
             }
+            if (json_is_object(json_object_get(one, "rigid")))
+                print_rigid(to, summary, json_object_get(one, "rigid"));
             fputc('\n', to);
             first = false;
         }

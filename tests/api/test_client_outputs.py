@@ -127,6 +127,23 @@ def test_a_report_is_one_file_with_everything(server):
     check("no job" in run(server, "report", ID, code=4).stderr)
 
 
+def test_motions_of_rigid_groups_are_told(server):
+    """A strip of stiffness E I / L under a moment: its end turns by M L / (E I), and its support takes what is left."""
+    problem = {"kind": "scene", "model": "plane_stress", "units": {"length": "mm", "force": "N"}, "mesh": {"box": {"size": [10, 1], "cells": [20, 2], "element": "quad8"}},
+               "materials": [{"on": "all", "young": 1000, "poisson": 0}], "loads": [{"on": "right", "force": [0, 0], "at": [10, 0.5], "moment": [0.2]}],
+               "supports": [{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "rigid": {"point": [10, 0.5]}}]}
+    job = solved(server, "-", stdin=json.dumps({"problem": problem}))
+    said = run(server, "status", job).stdout
+    check("rigid: its point (10, 0.5) moves by (" in said and ", 0.12) mm and turns by (1.3751) degrees; moment (" in said and said.count("rigid: ") == 1, said)
+    page = Page(run(server, "report", job).stdout)
+    words = " ".join(page.words)
+    check("Rigid groups" in words and "Rotation, degrees" in words and "(1.3751)" in words, words)
+    check(page.words[page.words.index("Rigid groups"):].count("left") == 0, "only supports that are rigid are in the table")
+    problem["supports"][1] = {"on": "right", "uy": 0}
+    other = solved(server, "-", stdin=json.dumps({"problem": problem}))
+    check("rigid" not in run(server, "status", other).stdout and "Rigid groups" not in run(server, "report", other).stdout)
+
+
 # ----------------------------------------------------------------- tables
 
 

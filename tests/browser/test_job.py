@@ -231,6 +231,25 @@ def test_says_in_words_how_good_the_answer_is(s, b):
     check("iterations" in b.text(".timing-keys") and "factorization" in b.text(".timing-keys"), b.text(".timing-keys"))
 
 
+def test_motions_of_rigid_groups_are_told(s, b):
+    request = copy.deepcopy(SCENE)
+    request["problem"] |= {"units": {"length": "mm", "force": "N"}, "loads": [{"on": "right", "force": [0, 0], "at": [60, 10], "moment": [5]}]}
+    request["problem"]["supports"].append({"on": "right", "rigid": {"point": [60, 10], "ux": 0.001}})
+    job = s.post(request, {"Prefer": "wait=30"}).json
+    moved = job["summary"]["resultants"]["supports"][1]["rigid"]
+    b.open(s, f"jobs/{job['id']}")
+    b.says("#rigid caption", "Rigid groups")
+    head, cells = (b.run(f"return [...document.querySelectorAll('#rigid {name}')].map((one) => one.innerText)") for name in ("th", "td"))
+    check(head == ["On", "Point, mm", "Displacement, mm", "Rotation, degrees", "Force, N", "Moment at the point, N·mm"], head)
+    check(cells[:2] == ["right", "(60, 10)"] and len(cells) == 6, cells)
+    told = [plain(one) for one in cells[2].strip("()").split(", ")] + [plain(cells[3].strip("()"))]
+    check(all(abs(a - c) <= 5e-3 * abs(c) for a, c in zip(told, moved["displacement"] + moved["rotation"])), cells, moved)
+    request["problem"]["supports"].pop()
+    b.open(s, f"jobs/{s.post(request, {'Prefer': 'wait=30'}).json['id']}")
+    b.says("main", "Imbalance")
+    check(b.run("return document.querySelector('#rigid') === null"))
+
+
 def test_an_obstacle_on_the_other_side_is_hinted_at(s, b):
     plane = {"plane": {"point": [0, 0], "normal": [0, -1]}}
     job = s.solve({"problem": {**SCENE["problem"], "contacts": [{"on": "bottom", "obstacle": plane}]}})
