@@ -13,23 +13,36 @@
 
 /* ---- types of elements */
 
-/* Sides of solids and plane bodies, as meshing programs write them beside the elements; shells alone are no body. */
+/* What is no body by itself; meshing programs write it beside the elements, too, for the sides of a body. */
+static const abaqus_family TRUSS = {"a truss", "give it its section in solid elements, or hold what it holds by a "
+                                               "support of the scene with \"spring\""},
+                           BEAM = {"a beam", "give it its section in solid elements (C3D20, C3D10), or its height in "
+                                             "CPS or CPE"},
+                           SHELL = {"a shell", "give it its thickness in solid elements (C3D20, C3D10), or take a "
+                                               "section of it with CPE, CPS or CAX"},
+                           MEMBRANE = {"a membrane", "give it its thickness in solid elements (C3D20, C3D10)"},
+                           RIGID = {"a rigid element", "a rigid surface is an obstacle of the scene"},
+                           SURFACE = {"a surface element", "take the body below it"};
+
 static const struct {
     const char *name;
     int dim, nodes;
+    const abaqus_family *family;
 } SIDE_TYPES[] = {
-    {"T2D2", 1, 2},   {"T2D3", 1, 3},   {"T3D2", 1, 2},   {"T3D3", 1, 3},   {"B21", 1, 2},   {"B22", 1, 3},
-    {"B31", 1, 2},    {"B32", 1, 3},    {"R2D2", 1, 2},   {"RAX2", 1, 2},   {"SAX1", 1, 2},  {"SAX2", 1, 3},
-    {"S3", 2, 3},     {"S4", 2, 4},     {"S6", 2, 6},     {"S8", 2, 8},     {"STRI3", 2, 3}, {"STRI65", 2, 6},
-    {"M3D3", 2, 3},   {"M3D4", 2, 4},   {"M3D6", 2, 6},   {"M3D8", 2, 8},   {"R3D3", 2, 3},  {"R3D4", 2, 4},
-    {"SFM3D3", 2, 3}, {"SFM3D4", 2, 4}, {"SFM3D6", 2, 6}, {"SFM3D8", 2, 8},
+    {"T2D2", 1, 2, &TRUSS},     {"T2D3", 1, 3, &TRUSS},     {"T3D2", 1, 2, &TRUSS},     {"T3D3", 1, 3, &TRUSS},
+    {"B21", 1, 2, &BEAM},       {"B22", 1, 3, &BEAM},       {"B31", 1, 2, &BEAM},       {"B32", 1, 3, &BEAM},
+    {"R2D2", 1, 2, &RIGID},     {"RAX2", 1, 2, &RIGID},     {"SAX1", 1, 2, &SHELL},     {"SAX2", 1, 3, &SHELL},
+    {"S3", 2, 3, &SHELL},       {"S4", 2, 4, &SHELL},       {"S6", 2, 6, &SHELL},       {"S8", 2, 8, &SHELL},
+    {"STRI3", 2, 3, &SHELL},    {"STRI65", 2, 6, &SHELL},   {"M3D3", 2, 3, &MEMBRANE},  {"M3D4", 2, 4, &MEMBRANE},
+    {"M3D6", 2, 6, &MEMBRANE},  {"M3D8", 2, 8, &MEMBRANE},  {"R3D3", 2, 3, &RIGID},     {"R3D4", 2, 4, &RIGID},
+    {"SFM3D3", 2, 3, &SURFACE}, {"SFM3D4", 2, 4, &SURFACE}, {"SFM3D6", 2, 6, &SURFACE}, {"SFM3D8", 2, 8, &SURFACE},
 };
 enum { N_SIDE_TYPES = sizeof SIDE_TYPES / sizeof SIDE_TYPES[0] };
 
 /* The name without what tells of integration, incompatible modes and mixed forms, which the scene decides. */
 static bool is_type(const char *name, const char *base)
 {
-    static const char *const SUFFIX[] = {"", "R", "I", "H", "RH", "IH", "M", "MH", "5"};
+    static const char *const SUFFIX[] = {"", "R", "I", "H", "RH", "IH", "M", "MH", "R5"};
     const size_t length = base ? strlen(base) : 0;
     if (!base || strncmp(name, base, length) != 0)
         return false;
@@ -54,9 +67,21 @@ int abaqus_type_number(const char *name)
 abaqus_type abaqus_type_of(int number)
 {
     if (number >= ABAQUS_SIDES)
-        return (abaqus_type){SIDE_TYPES[number - ABAQUS_SIDES].dim, SIDE_TYPES[number - ABAQUS_SIDES].nodes, -1, true};
+        return (abaqus_type){SIDE_TYPES[number - ABAQUS_SIDES].dim, SIDE_TYPES[number - ABAQUS_SIDES].nodes, -1,
+                             SIDE_TYPES[number - ABAQUS_SIDES].family};
     const uz_element_type *type = uz_element_type_of((uz_element_kind)number);
-    return (abaqus_type){type->dim, type->nodes, number, false};
+    return (abaqus_type){type->dim, type->nodes, number, NULL};
+}
+
+uz_status abaqus_fail_no_body(const abaqus_file *file, int64_t element)
+{
+    const int number = file->type[element];
+    const abaqus_family *family = abaqus_type_of(number).family;
+    abaqus_text place = file->text;
+    place.number = file->line[element];
+    return abaqus_fail(&place, UZ_ERR_UNSUPPORTED, "element %lld, of type %s, is %s, which is not modelled; %s",
+                       (long long)file->elements.tag[element], SIDE_TYPES[number - ABAQUS_SIDES].name, family->what,
+                       family->remedy);
 }
 
 /* ---- lists that grow, and numbers that are looked up */
@@ -222,6 +247,25 @@ static uz_status read_element(abaqus_file *file, int type, int64_t set)
     return status == UZ_OK ? check_size(file) : status;
 }
 
+/* What to write in place of elements of a type that is not read. */
+static const char *remedy_for(const char *name)
+{
+    static const struct {
+        const char *begin, *remedy;
+    } REMEDIES[] = {
+        {"SPRING", "a support of the scene with \"spring\" holds a group by springs to the ground"},
+        {"DASHPOT", "they do nothing in a static step: leave them out"},
+        {"GAP", "a contact pair stands for them"},
+        {"MASS", "a point mass is a \"force\" of the scene \"at\" its centre"},
+        {"DCOUP", "a rigid group of the scene stands for them"},
+        {"U", "what they are is in a program beside the deck"},
+    };
+    for (size_t i = 0; i < sizeof REMEDIES / sizeof REMEDIES[0]; i++)
+        if (strncmp(name, REMEDIES[i].begin, strlen(REMEDIES[i].begin)) == 0)
+            return REMEDIES[i].remedy;
+    return "mesh with CPS, CPE, CAX (3, 4, 6, 8 nodes) or C3D (4, 6, 8, 10, 15, 20)";
+}
+
 static uz_status read_elements(abaqus_file *file, const abaqus_keyword *keyword)
 {
     char name[ABAQUS_NAME];
@@ -231,10 +275,8 @@ static uz_status read_elements(abaqus_file *file, const abaqus_keyword *keyword)
     for (char *c = name; *c; c++)
         *c = (char)(*c >= 'a' && *c <= 'z' ? *c - 'a' + 'A' : *c);
     if (status == UZ_OK && (type = abaqus_type_number(name)) < 0)
-        status = abaqus_fail(&file->text, UZ_ERR_UNSUPPORTED,
-                             "elements of type %s are not read; mesh with CPS, CPE, CAX (3, 4, 6, 8 nodes) or C3D (4, "
-                             "6, 8, 10, 15, 20)",
-                             name);
+        status = abaqus_fail(&file->text, UZ_ERR_UNSUPPORTED, "elements of type %s are not read; %s", name,
+                             remedy_for(name));
     if (status == UZ_OK)
         status = set_of_block(&set, file, keyword, ABAQUS_ELSET);
     while (status == UZ_OK && abaqus_next_line(&file->text) && !abaqus_is_keyword(&file->text))
@@ -309,23 +351,21 @@ static uz_status read_block(abaqus_file *file)
 /* The dimension of the elements that are no sides; a plane body is one with z constant. */
 static uz_status choose_dim(int *dim, const abaqus_file *file)
 {
-    abaqus_text place = file->text;
     double low = INFINITY, high = -INFINITY, size = 0.0;
     *dim = 0;
     for (int64_t e = 0; e < file->elements.count; e++) {
         const abaqus_type type = abaqus_type_of(file->type[e]);
-        *dim = !type.shell && type.dim > *dim ? type.dim : *dim;
+        *dim = !type.family && type.dim > *dim ? type.dim : *dim;
     }
+    if (*dim == 0 && file->elements.count > 0)
+        return abaqus_fail_no_body(file, 0);
     if (*dim == 0)
         return abaqus_fail(&file->text, UZ_ERR_UNSUPPORTED,
-                           "there is no element of a body: shells, beams and membranes are not modelled; mesh a plane "
-                           "body with CPS, CPE or CAX elements, a solid with C3D");
+                           "there is no element of a body; mesh a plane one with CPS, CPE or CAX elements, a solid "
+                           "with C3D");
     for (int64_t e = 0; *dim == 2 && e < file->elements.count; e++)
-        if (abaqus_type_of(file->type[e]).shell && abaqus_type_of(file->type[e]).dim == 2) {
-            place.number = file->line[e];
-            return abaqus_fail(&place, UZ_ERR_UNSUPPORTED,
-                               "shells and membranes beside plane elements are not modelled");
-        }
+        if (abaqus_type_of(file->type[e]).family && abaqus_type_of(file->type[e]).dim == 2)
+            return abaqus_fail_no_body(file, e);
     for (int64_t q = 0; *dim == 2 && q < file->first[file->elements.count]; q++) {
         const double *x = file->xyz + 3 * abaqus_tags_find(&file->nodes, file->node[q]);
         low = fmin(low, x[2]);
@@ -356,7 +396,7 @@ static uz_status add_body(uz_given_mesh *out, const abaqus_file *file, int64_t *
     int64_t places = 0;
     for (int64_t e = 0; e < file->elements.count; e++) {
         const abaqus_type type = abaqus_type_of(file->type[e]);
-        const bool body = !type.shell && type.dim == out->dim;
+        const bool body = !type.family && type.dim == out->dim;
         new_element[e] = body ? out->n_elements++ : -1;
         places += body ? type.nodes : 0;
     }

@@ -122,16 +122,23 @@ typedef struct {
 
 uz_status abaqus_no_memory(const abaqus_text *text);
 
-/* A type of element: one of the body, or of its sides. */
+/* What is no part of a body, as "a shell", and what to do with it. */
+typedef struct {
+    const char *what, *remedy;
+} abaqus_family;
+
+/* A type of element: one of the body, or what is not, but may say which its sides are. */
 typedef struct {
     int dim, nodes;
-    int kind; /* uz_element_kind; -1: a side or a line */
-    bool shell;
+    int kind;                    /* uz_element_kind; -1: a side or a line */
+    const abaqus_family *family; /* of a side or a line; NULL: of the body */
 } abaqus_type;
 enum { ABAQUS_SIDES = UZ_ELEMENT_KINDS }; /* types from here on are no elements of a body */
 /* The number of a type by its name in capitals; -1: there is none. */
 int abaqus_type_number(const char *name);
 abaqus_type abaqus_type_of(int number);
+/* Refuses an element of a family: its line, what it is, and the remedy. */
+uz_status abaqus_fail_no_body(const abaqus_file *file, int64_t element);
 
 /* ---- sets (abaqus_sets.c) */
 

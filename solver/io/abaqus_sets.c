@@ -171,7 +171,12 @@ uz_status abaqus_read_surface(abaqus_file *file, const abaqus_keyword *keyword)
         const bool sided = abaqus_field(side, &file->text);
         if (status == UZ_OK && !nodes) {
             item.face = sided ? side_of(side) : 0;
-            if (item.face == 0)
+            if (sided && (strcasecmp(side, "SPOS") == 0 || strcasecmp(side, "SNEG") == 0))
+                status = abaqus_fail(&file->text, UZ_ERR_UNSUPPORTED,
+                                     "%s is a side of a shell or a membrane, which are not modelled; give it its "
+                                     "thickness in solid elements (C3D20, C3D10)",
+                                     side);
+            else if (item.face == 0)
                 status = abaqus_fail(&file->text, UZ_ERR_UNSUPPORTED,
                                      "a side of elements, S1 to S6, was expected behind \"%.40s\"%s", member,
                                      sided ? "" : "; give the sides of the surface one by one");
@@ -316,7 +321,13 @@ static uz_status add_surface(uz_given_group *to, const set_work *w, int64_t set)
         return abaqus_no_memory(&file->text);
     for (int64_t i = 0, used = 0; i < list->count; i++) {
         const int64_t e = list->index[i];
-        const char *corner = w->new_element[e] >= 0 ? abaqus_side((uz_element_kind)file->type[e], list->face[i]) : NULL;
+        if (w->new_element[e] < 0)
+            return abaqus_type_of(file->type[e]).family
+                       ? abaqus_fail_no_body(file, e)
+                       : fail_at(w, file->line[e], UZ_ERR_UNSUPPORTED,
+                                 "the surface \"%s\" has element %lld, of a plane body beside a solid one",
+                                 file->sets[set].name, file->elements.tag[e]);
+        const char *corner = abaqus_side((uz_element_kind)file->type[e], list->face[i]);
         if (!corner)
             return fail_at(w, file->line[e], UZ_ERR_UNSUPPORTED,
                            "the surface \"%s\" has a side, S%lld, that this element has not", file->sets[set].name,
