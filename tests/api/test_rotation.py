@@ -102,6 +102,41 @@ def test_a_lever_is_pressed_on_a_plane(s):
     check(abs(one["contact"]["force"][1] - other["contact"]["force"][1]) < 1e-9 * one["contact"]["force"][1], other["contact"])
 
 
+def hexagon(sectors, of=6, radial=4, around=12):
+    """`sectors` of the sixths of a ring of radii 1 and 2 in a hexagonal hole, pressed from inside."""
+    whole = sectors == of
+    columns = sectors * around + (0 if whole else 1)
+    at = lambda i, j: (i % columns) * (radial + 1) + j
+    nodes = [[(1 + j / radial) * math.cos(i * 2 * math.pi / of / around), (1 + j / radial) * math.sin(i * 2 * math.pi / of / around)] for i in range(columns) for j in range(radial + 1)]
+    quads = [[at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)] for i in range(sectors * around) for j in range(radial)]
+    groups = {"inner": {"edges": [[at(i, 0), at(i + 1, 0)] for i in range(sectors * around)]}}
+    contacts, supports = [], []
+    for k in range(sectors):
+        groups[f"outer{k}"] = {"edges": [[at(i, radial), at(i + 1, radial)] for i in range(k * around, (k + 1) * around)]}
+        middle = (k + 0.5) * 2 * math.pi / of
+        contacts.append({"on": f"outer{k}", "obstacle": {"plane": {"point": [2.001 * math.cos(middle), 2.001 * math.sin(middle)], "normal": [-math.cos(middle), -math.sin(middle)]}}})
+    if whole:
+        groups["a"] = {"nodes": [at(0, 0), at(3 * around, 0)]}
+        supports = [{"on": "a", "uy": 0}]
+    else:
+        groups["first"] = {"edges": [[at(0, j), at(0, j + 1)] for j in range(radial)]}
+        groups["last"] = {"edges": [[at(around, j), at(around, j + 1)] for j in range(radial)]}
+        turn = 2 * math.pi / of
+        supports = [{"on": "first", "uy": 0}, {"on": "last", "normal": [-math.sin(turn), math.cos(turn)], "u": 0}]
+    return {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"nodes": nodes, "elements": {"quad4": quads}, "groups": groups},
+            "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": supports, "loads": [{"on": "inner", "pressure": 10}], "contacts": contacts}}
+
+
+def test_a_sector_between_planes_of_symmetry_is_a_sixth_of_the_ring(s):
+    """Held along the normals of its cuts: the same pressure at the same place, a sixth of the energy."""
+    part, whole = (expect(s.post(hexagon(sectors), {"Prefer": "wait=60"}), 200).json["summary"] for sectors in (1, 6))
+    check(part["outcome"] == whole["outcome"] == "converged", part["outcome"], whole["outcome"])
+    check(abs(6 * part["energy"]["potential"] / whole["energy"]["potential"] - 1) < 1e-9, part["energy"], whole["energy"])
+    for one in whole["resultants"]["contacts"]:
+        check(abs(one["normal_force"] / part["resultants"]["contacts"][0]["normal_force"] - 1) < 1e-9, one, part["resultants"])
+    check(abs(part["contact"]["max_pressure"] / whole["contact"]["max_pressure"] - 1) < 1e-9, part["contact"], whole["contact"])
+
+
 def test_what_is_too_much_or_has_no_meaning(s):
     turn = lambda degrees, **more: [{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "rotation": dict(about=[2, 0.5], angle=degrees, **more)}]  # noqa: E731
     make = lambda supports, model="plane_stress", **more: scene(model, [2, 1], [4, 2], "quad4", supports, **more)  # noqa: E731
