@@ -19,7 +19,7 @@ _uzawa() {
     done
     case $command in
     '') options='--server --timeout --retry --help --version'; words=$commands ;;
-    submit) options='--K --N --h --p --mesh --size --surface --leave-out --set --vary --wait --timeout --tag --name --key --junit --baseline --tolerance --progress --quiet --json --context --server --retry --help --version ' ;;
+    submit) options='--K --N --h --p --mesh --size --surface --leave-out --set --vary --validate --wait --timeout --tag --name --key --junit --baseline --tolerance --progress --quiet --json --context --server --retry --help --version ' ;;
     import) options='--leave-out --output --quiet --json --context --server --timeout --retry --help --version ' ;;
     upload) options='--json --context --server --timeout --retry --help --version ' ;;
     status) options='--json --context --server --timeout --retry --help --version ' ;;

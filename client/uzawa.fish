@@ -61,6 +61,7 @@ complete -c uzawa -n '__uzawa_is submit' -l surface -r -F -d 'an STL or OBJ file
 complete -c uzawa -n '__uzawa_is submit' -l leave-out -d 'of a deck, leave out what a scene has no words for, although the answer is another one with it'
 complete -c uzawa -n '__uzawa_is submit' -l set -r -f -d 'put VALUE, as JSON or else as a string, at PATH of the request; may be repeated'
 complete -c uzawa -n '__uzawa_is submit' -l vary -r -f -d 'solve for each of VALUES at PATH: FIRST:LAST:COUNT in equal steps, or a list A,B,C; may be repeated'
+complete -c uzawa -n '__uzawa_is submit' -l validate -d 'only check the request: tell all mistakes, or what it will take; nothing is solved'
 complete -c uzawa -n '__uzawa_is submit' -l wait -s w -d 'wait until the job has ended and print the summary'
 complete -c uzawa -n '__uzawa_is submit' -l timeout -s t -r -f -d 'with --wait: stop waiting after S seconds'
 complete -c uzawa -n '__uzawa_is submit' -l tag -r -f -d 'label the job; may be repeated'

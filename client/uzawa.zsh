@@ -63,6 +63,7 @@ _uzawa() {
             '--leave-out[of a deck, leave out what a scene has no words for, although the answer is another one with it]' \
             '*--set[put VALUE, as JSON or else as a string, at PATH of the request; may be repeated]:PATH=VALUE: ' \
             '*--vary[solve for each of VALUES at PATH\: FIRST\:LAST\:COUNT in equal steps, or a list A,B,C; may be repeated]:PATH=VALUES: ' \
+            '--validate[only check the request\: tell all mistakes, or what it will take; nothing is solved]' \
             '(-w --wait)'{-w,--wait}'[wait until the job has ended and print the summary]' \
             '(-t --timeout)'{-t,--timeout}'[with --wait\: stop waiting after S seconds]:S: ' \
             '*--tag[label the job; may be repeated]:WORD: ' \

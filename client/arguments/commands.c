@@ -156,6 +156,8 @@ static const uz_option OPTIONS[] = {
            .about = "counted from the start of the first run"),
     OPTION("time-limit", 0, NUMBER, time_limit_s, IN(REFINE), .value = "S", .unit = "seconds",
            .about = "of the new run, in seconds"),
+    OPTION("validate", 0, FLAG, validate, IN(SUBMIT),
+           .about = "only check the request: tell all mistakes, or what it will take; nothing is solved"),
     OPTION("wait", 'w', FLAG, wait, MAKING, .about = "wait until the job has ended and print the summary"),
     OPTION("timeout", 't', NUMBER, timeout_s, MAKING, .value = "S", .unit = "seconds",
            .about = "with --wait: stop waiting after S seconds"),

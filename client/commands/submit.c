@@ -159,6 +159,27 @@ static client_exit post_several(client_session *s, const client_bodies *bodies)
     return code;
 }
 
+/* ------------------------------------------------------------- only checked */
+
+static client_exit check_bodies(client_session *s, const client_bodies *bodies)
+{
+    client_exit first = CLIENT_OK;
+    for (size_t i = 0; i < bodies->count; i++) {
+        client_request request = client_request_new(s, "POST", "/v1/jobs?validate=true");
+        json_t *valid;
+        request.body = bodies->item[i].body.data ? bodies->item[i].body.data : "";
+        request.body_len = bodies->item[i].body.len;
+        client_exit code = client_ask_json(s, &valid, &request);
+        if (code == CLIENT_OK && s->options->json)
+            code = client_print_json(s, valid);
+        else if (code == CLIENT_OK && !s->options->quiet)
+            client_print_valid(s->out, bodies->item[i].label, valid);
+        json_decref(valid);
+        first = first == CLIENT_OK ? code : first;
+    }
+    return first;
+}
+
 /* ------------------------------------------------------------ the commands */
 
 client_exit client_submit(client_session *s)
@@ -167,7 +188,9 @@ client_exit client_submit(client_session *s)
     if (!have_key(s))
         return client_complain(s, CLIENT_LOCAL, "no random numbers for an idempotency key");
     client_exit code = client_build(s, &bodies);
-    if (code == CLIENT_OK && bodies.count == 1)
+    if (code == CLIENT_OK && s->options->validate)
+        code = check_bodies(s, &bodies);
+    else if (code == CLIENT_OK && bodies.count == 1)
         code = post_and_stay(s, "/v1/jobs", &bodies.item[0].body);
     else if (code == CLIENT_OK)
         code = post_several(s, &bodies);

@@ -240,7 +240,7 @@ static client_exit build_edited(client_session *s, client_bodies *out, const cli
         /* A name for jobs that belong together and have none: of the key, so that a repeat is the same request. */
         if (code == CLIENT_OK && count > 1 && !o->tags.count) {
             snprintf(common, sizeof common, "vary-%.16s", o->key ? o->key : s->key);
-            if (!o->json)
+            if (!o->json && !o->validate)
                 fprintf(s->err, "uzawa: %zu jobs with the tag %s\n", count, common);
         }
         for (size_t i = 0; code == CLIENT_OK && i < count; i++) {

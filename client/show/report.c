@@ -179,25 +179,39 @@ void client_print_quoted(FILE *to, const char *text)
     fputc('"', to);
 }
 
+/* Where in a request something is; nothing where it is in none. */
+static void print_place(FILE *to, const json_t *problem)
+{
+    const char *pointer = client_json_text(problem, "pointer");
+    const double line = client_json_number(problem, "line");
+    if (!*pointer && !(line > 0))
+        return;
+    fputs("  at ", to);
+    client_print_safe(to, pointer);
+    if (line > 0)
+        fprintf(to, "%sline %.0f", *pointer ? ", " : "", line);
+    fputc('\n', to);
+}
+
 void client_print_problem(FILE *to, long http_status, const json_t *problem)
 {
-    const char *code = client_json_text(problem, "code"), *pointer = client_json_text(problem, "pointer");
+    const char *code = client_json_text(problem, "code");
     const char *detail = client_json_text(problem, "detail"), *title = client_json_text(problem, "title");
     const char *otherwise = http_status >= 500   ? "the server failed"
                             : http_status >= 400 ? "the server refused the request"
                                                  : "this is no reply of a contact solver service";
-    double line = client_json_number(problem, "line");
+    const json_t *mistakes = json_object_get(problem, "mistakes");
     fputs("uzawa: ", to);
     client_print_safe(to, *detail ? detail : *title ? title : otherwise);
     fputc('\n', to);
     if (strcmp(code, "case_needed") == 0)
         fputs("  here: --case NAME\n", to);
-    if (*pointer || line > 0) {
-        fputs("  at ", to);
-        client_print_safe(to, pointer);
-        if (line > 0)
-            fprintf(to, "%sline %.0f", *pointer ? ", " : "", line);
+    print_place(to, problem);
+    for (size_t i = 1; i < json_array_size(mistakes); i++) { /* the first is what the problem itself says */
+        fputs("uzawa: ", to);
+        client_print_safe(to, client_json_text(json_array_get(mistakes, i), "detail"));
         fputc('\n', to);
+        print_place(to, json_array_get(mistakes, i));
     }
     if (http_status > 0)
         fprintf(to, "  HTTP status %ld%s", http_status, *code ? ", code " : "");
@@ -206,4 +220,29 @@ void client_print_problem(FILE *to, long http_status, const json_t *problem)
     client_print_safe(to, code);
     if (http_status > 0 || *code)
         fputc('\n', to);
+}
+
+void client_print_valid(FILE *to, const char *label, const json_t *valid)
+{
+    const json_t *predicted = json_object_get(valid, "predicted");
+    const double bytes = client_json_number(predicted, "bytes"), seconds = client_json_number(predicted, "seconds");
+    char text[32];
+    if (*label) {
+        client_print_safe(to, label);
+        fputs(": ", to);
+    }
+    if (!json_is_object(predicted)) {
+        fputs("valid; what it will take is not known\n", to);
+        return;
+    }
+    fprintf(to, "valid: %.0f unknowns, %.0f contact conditions", client_json_number(predicted, "d"),
+            client_json_number(predicted, "m"));
+    if (isfinite(seconds) && isfinite(bytes))
+        fprintf(to, "; about %s and %.3g MB by the %s operator, after the assembly",
+                client_format_seconds(text, sizeof text, seconds), bytes / 1e6,
+                client_json_text(predicted, "operator"));
+    fprintf(to, "%s\n",
+            json_is_false(json_object_get(predicted, "fits")) ? "; that is more memory than it may take: it would be "
+                                                                "refused"
+                                                              : "");
 }

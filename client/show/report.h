@@ -31,8 +31,12 @@ void client_print_quoted(FILE *to, const char *text);
 void client_print_summary(FILE *to, const json_t *job);
 /* A line for each load case of a result. */
 void client_print_cases(FILE *to, const json_t *result);
-/* Problem details (RFC 9457), or a plain line about the status where the reply has none. */
+/* Problem details (RFC 9457) with all mistakes that they list, or a plain line about the status where the reply has
+ * none. */
 void client_print_problem(FILE *to, long http_status, const json_t *problem);
+
+/* A request that was only checked: "valid: 660 unknowns, ...", with the label before it where there is one. */
+void client_print_valid(FILE *to, const char *label, const json_t *valid);
 
 /* "12.3 ms"; buffer of at least 16. */
 const char *client_format_seconds(char *buffer, size_t size, double seconds);

@@ -54,6 +54,33 @@ def scene(**more):
     return {**json.load(open(PAPER)), **more}
 
 
+def test_requests_are_only_checked(server):
+    """What they will take, or every mistake with its place; no job is made, for each of several requests."""
+    before = len(server.get("/v1/jobs").json["jobs"])
+    said = run(server.url, "submit", PAPER, "--validate").stdout
+    check(said.startswith("valid: 660 unknowns, 30 contact conditions; about ") and " MB by the condensed operator" in said, said)
+    done = run(server.url, "submit", PAPER, "--validate", "--vary", "materials.0.young=1e3,2e3")
+    check([line.split(": ")[:2] for line in done.stdout.splitlines()] == [["1000", "valid"], ["2000", "valid"]] and not done.stderr, done)
+    told = json.loads(run(server.url, "submit", PAPER, "--validate", "--json").stdout)
+    check(told["valid"] is True and told["predicted"]["d"] == 660, told)
+    check(run(server.url, "submit", PAPER, "--validate", "--quiet").stdout == "")
+    wrong = scene()
+    wrong["problem"]["model"], wrong["problem"]["foo"], wrong["problem"]["mesh"]["box"]["cells"] = "plane", 1, [0, 1]
+    said = run(server.url, "submit", "-", "--validate", stdin=json.dumps(wrong), code=4).stderr
+    check([line.split("at ")[1] for line in said.splitlines() if line.startswith("  at ")] == ["/problem/foo", "/problem/model", "/problem/mesh/box/cells/0"] and said.count("uzawa: ") == 3, said)
+    told = json.loads(run(server.url, "submit", "-", "--validate", "--json", stdin=json.dumps(wrong), code=4).stderr)
+    check(len(told["mistakes"]) == 3 and told["exit"] == 4, told)
+    inside = scene()
+    inside["problem"]["contacts"][0]["obstacle"]["plane"]["point"] = [0, 1]
+    inside["problem"]["supports"].append({"on": "bottom", "uy": 0})
+    check("obstacle" in run(server.url, "submit", "-", "--validate", stdin=json.dumps(inside), code=4).stderr)
+    with Fake((200, {"valid": True, "predicted": None}), (200, {"valid": True, "predicted": {"d": 9, "m": 3, "operator": "factored", "bytes": 2e9, "seconds": 3.0, "fits": False}})) as fake:
+        check("is not known" in run(fake.url, "submit", PAPER, "--validate").stdout)
+        said = run(fake.url, "submit", PAPER, "--validate").stdout
+        check("2e+03 MB" in said and "would be refused" in said, said)
+    check(len(server.get("/v1/jobs").json["jobs"]) == before)
+
+
 # ------------------------------------------------------------------ files
 
 
