@@ -103,7 +103,7 @@ _uzawa() {
     verify--context) words='' ;;
     verify--server|verify-s) words='' ;;
     verify--retry) words='' ;;
-    result--format|result-f) words='json csv npz vtu pvd' ;;
+    result--format|result-f) words='json table csv npz vtu pvd' ;;
     result--fields) words='summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss' ;;
     result--field) words='summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss' ;;
     result--case|result-c) words='' ;;

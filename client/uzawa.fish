@@ -151,7 +151,7 @@ complete -c uzawa -n '__uzawa_is verify' -l retry -r -f -d 'keep trying to reach
 complete -c uzawa -n '__uzawa_is verify' -l help -s h -d 'explain the command'
 complete -c uzawa -n '__uzawa_is verify' -l version -s V -d 'print the version'
 complete -c uzawa -n '__uzawa_is result' -f -a '(__uzawa_ids)'
-complete -c uzawa -n '__uzawa_is result' -l format -s f -r -f -a 'json csv npz vtu pvd' -d 'json (default), csv: a table, npz: arrays for NumPy; scenes only: vtu, or pvd: a vtu of each load case, as one series'
+complete -c uzawa -n '__uzawa_is result' -l format -s f -r -f -a 'json table csv npz vtu pvd' -d 'json (default), table: with five digits, csv: with all, npz: arrays for NumPy; scenes only: vtu, or pvd: a vtu of each load case, as one series'
 complete -c uzawa -n '__uzawa_is result' -l fields -r -f -a 'summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss' -d 'such as displacements, reactions, gaps, pressure, stress, von_mises (default: reactions,gaps; of vtu: everything useful)'
 complete -c uzawa -n '__uzawa_is result' -l field -r -f -a 'summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss' -d 'one of them; may be repeated'
 complete -c uzawa -n '__uzawa_is result' -l case -s c -r -f -d 'of this load case alone'

@@ -167,7 +167,7 @@ _uzawa() {
             '1:FILE:_files' ;;
     result)
         _arguments \
-            '(-f --format)'{-f,--format}'[json (default), csv\: a table, npz\: arrays for NumPy; scenes only\: vtu, or pvd\: a vtu of each load case, as one series]:F:(json csv npz vtu pvd)' \
+            '(-f --format)'{-f,--format}'[json (default), table\: with five digits, csv\: with all, npz\: arrays for NumPy; scenes only\: vtu, or pvd\: a vtu of each load case, as one series]:F:(json table csv npz vtu pvd)' \
             '*--fields[such as displacements, reactions, gaps, pressure, stress, von_mises (default\: reactions,gaps; of vtu\: everything useful)]:A,B:(summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss)' \
             '*--field[one of them; may be repeated]:NAME:(summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss)' \
             '(-c --case)'{-c,--case}'[of this load case alone]:NAME: ' \

@@ -169,8 +169,8 @@ static const uz_option OPTIONS[] = {
     OPTION("key", 'k', WORD, key, IN(SUBMIT), .value = "KEY",
            .about = "idempotency key (default: random); the same key and request give the same job"),
     OPTION("key", 'k', WORD, key, STAYING & ~IN(WAIT), .value = "KEY", .about = "idempotency key (default: random)"),
-    OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json csv npz vtu pvd",
-           .about = "json (default), csv: a table, npz: arrays for NumPy; scenes only: vtu, or pvd: a vtu of each load "
+    OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json table csv npz vtu pvd",
+           .about = "json (default), table: with five digits, csv: with all, npz: arrays for NumPy; scenes only: vtu, or pvd: a vtu of each load "
                     "case, as one series"),
     OPTION("format", 'f', CHOICE, format, IN(PATH), .value = "F", .choices = "table csv json",
            .about = "table (default) with five digits, csv or json with all"),

@@ -168,6 +168,7 @@ client_exit client_result(client_session *s)
         return client_complain(s, CLIENT_LOCAL, "no memory");
     }
     const char *fields = text.data;
+    const bool columns = strcmp(format, "table") == 0, rows = columns || strcmp(format, "csv") == 0;
     const client_query query[] = {{"fields", *fields ? fields : NULL}, {"case", o->case_name}, {NULL, NULL}};
     const char *const at = strcmp(format, "vtu") == 0   ? "/result.vtu"
                            : strcmp(format, "npz") == 0 ? "/result.npz"
@@ -175,10 +176,10 @@ client_exit client_result(client_session *s)
     client_exit code;
     if (strcmp(format, "pvd") == 0)
         code = client_series_of_files(s, *fields ? fields : NULL);
-    else if (strcmp(format, "csv") == 0 && strcmp(fields, "summary") == 0)
-        code = client_numbers(s);
-    else if (strcmp(format, "csv") == 0)
-        code = client_table(s, *fields ? fields : "reactions,gaps");
+    else if (rows && strcmp(fields, "summary") == 0)
+        code = client_numbers(s, columns);
+    else if (rows)
+        code = client_table(s, *fields ? fields : "reactions,gaps", columns);
     else
         code = fetch_and_deliver(s, client_path_with_query(s, o->operand, at, query));
     free(text.data);

@@ -18,13 +18,16 @@ char *client_path_with_query(client_session *s, const char *id, const char *suff
 /* To --output or standard output, whole or not at all; with --json it says what was written. */
 client_exit client_deliver(client_session *s, const char *text, size_t len);
 
+/* CSV (length bytes and a NUL) as it is, or in columns for a person: numbers with five digits, "-" for none. */
+client_exit client_deliver_rows(client_session *s, const char *csv, size_t length, bool columns);
+
 /* A picture as PNG, by way of rsvg-convert, appended to *png; what is in the way is told on s->err. */
 client_exit client_picture_to_png(client_session *s, const client_buffer *svg, client_buffer *png);
 
-/* The fields ("a,b") of the job's answer as CSV. */
-client_exit client_table(client_session *s, const char *fields);
-/* The numbers of the answer, or of each of its cases, as CSV. */
-client_exit client_numbers(client_session *s);
+/* The fields ("a,b") of the job's answer as CSV, or in columns. */
+client_exit client_table(client_session *s, const char *fields, bool columns);
+/* The numbers of the answer, or of each of its cases, likewise. */
+client_exit client_numbers(client_session *s, bool columns);
 /* FILE.pvd, which --output names, and FILE-1.vtu, ... of the cases, with these fields (NULL: those by default). */
 client_exit client_series_of_files(client_session *s, const char *fields);
 /* A history in CSV as a drawing; it goes where the data would. */

@@ -69,7 +69,7 @@ static void put_columns(FILE *to, const json_t *like, const json_t *row)
     }
 }
 
-client_exit client_numbers(client_session *s)
+client_exit client_numbers(client_session *s, bool columns)
 {
     char *text = NULL;
     size_t len = 0;
@@ -93,7 +93,8 @@ client_exit client_numbers(client_session *s)
             fputc('\n', to);
         }
         const bool whole = !ferror(to);
-        code = fclose(to) == 0 && whole ? client_deliver(s, text, len) : client_complain(s, CLIENT_LOCAL, "no memory");
+        code = fclose(to) == 0 && whole ? client_deliver_rows(s, text, len, columns)
+                                        : client_complain(s, CLIENT_LOCAL, "no memory");
     } else if (code == CLIENT_OK) {
         code = client_complain(s, CLIENT_LOCAL, "no memory");
     }

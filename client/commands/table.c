@@ -1,4 +1,5 @@
-/* table.c: fields of an answer as CSV (RFC 4180, with '\n'): a row for each node, contact, unknown or point. */
+/* table.c: fields of an answer as CSV (RFC 4180, with '\n'): a row for each node, contact, unknown or point; and CSV as
+ * columns for a person. */
 #include "commands/fetch.h"
 #include "show/report.h"
 
@@ -177,9 +178,86 @@ static void print_answer(const table *t, const json_t *answer, const char *name)
     }
 }
 
+/* ----------------------------------------------------------------- columns */
+
+enum { CELL = 11 }; /* "-1.2345e-06", or a longer heading and its space */
+
+/* The cell that begins at *at, which moves behind it, and its text: of a number the five digits that a person compares.
+ */
+static void take_cell(char text[64], const char **at)
+{
+    const bool quoted = **at == '"';
+    const char *c = *at + quoted;
+    char *end;
+    size_t used = 0;
+    for (; *c && *c != '\n'; c++) {
+        c += quoted && c[0] == '"' && c[1] == '"';
+        if (*c == (quoted ? '"' : ',') && !(quoted && c[-1] == '"'))
+            break;
+        if (used < 63)
+            text[used++] = *c;
+    }
+    text[used] = '\0';
+    *at = c + (quoted && *c == '"');
+    const double value = strtod(text, &end);
+    if (!used || strcmp(text, "nan") == 0)
+        snprintf(text, 64, "-");
+    else if (*end == '\0')
+        snprintf(text, 64, "%.5g", value);
+}
+
+/* Characters of UTF-8. */
+static int length_of(const char *text)
+{
+    int count = 0;
+    for (; *text; text++)
+        count += ((unsigned char)*text & 0xc0) != 0x80;
+    return count;
+}
+
+static void print_columns(FILE *to, const char *csv)
+{
+    int width[64];
+    const size_t most = sizeof width / sizeof *width;
+    for (bool heading = true; *csv; heading = false) {
+        const char *end = csv + strcspn(csv, "\n");
+        size_t column = 0;
+        for (; csv <= end && column < most; column++, csv++) {
+            char text[64];
+            take_cell(text, &csv);
+            if (heading)
+                width[column] = length_of(text) > CELL ? length_of(text) : CELL;
+            fprintf(to, "%*s%*s", column ? 2 : 0, "",
+                    width[column] - length_of(text) > 0 ? width[column] - length_of(text) : 0, "");
+            client_print_safe(to, text);
+        }
+        fputc('\n', to);
+        csv = end + (*end == '\n');
+    }
+}
+
+client_exit client_deliver_rows(client_session *s, const char *csv, size_t length, bool columns)
+{
+    char *text = NULL;
+    size_t len = 0;
+    FILE *to = columns ? open_memstream(&text, &len) : NULL;
+    if (!columns)
+        return client_deliver(s, csv, length);
+    if (to)
+        print_columns(to, csv);
+    const bool whole = to && !ferror(to);
+    client_exit code;
+    if (to && fclose(to) == 0 && whole)
+        code = client_deliver(s, text, len);
+    else
+        code = client_complain(s, CLIENT_LOCAL, "no memory");
+    free(text);
+    return code;
+}
+
 /* ------------------------------------------------------------- the command */
 
-client_exit client_table(client_session *s, const char *fields)
+client_exit client_table(client_session *s, const char *fields, bool columns)
 {
     char *text = NULL;
     size_t len = 0;
@@ -208,7 +286,7 @@ client_exit client_table(client_session *s, const char *fields)
             print_answer(&t, result, "");
         bool whole = !ferror(t.to);
         if (fclose(t.to) == 0 && whole)
-            code = client_deliver(s, text, len);
+            code = client_deliver_rows(s, text, len, columns);
         else
             code = client_complain(s, CLIENT_LOCAL, "no memory");
     } else if (code == CLIENT_OK) {

@@ -160,6 +160,23 @@ def test_table_of_nodes(server):
               "every digit:", row)
 
 
+def test_tables_for_the_eye(server):
+    """The columns of the CSV below each other, with five digits; names as they are, whatever is in them."""
+    job = solved(server)
+    for fields in ("displacements,von_mises", "reactions,gaps", "summary"):
+        rows = list(csv.reader(io.StringIO(run(server, "result", job, "--format", "csv", "--fields", fields).stdout)))
+        lines = run(server, "result", job, "--format", "table", "--fields", fields).stdout.splitlines()
+        check(len({len(line) for line in lines}) == 1 and len(lines) == len(rows), lines[:3])
+        check(lines[0].split() == rows[0], lines[0], rows[0])
+        for line, row in zip(lines[1:], rows[1:]):
+            check(line.split() == [f"{float(one):.5g}" if one and one[0] in "-0123456789" else one or "-" for one in row], line, row)
+    with open("tests/data/cases.json", encoding="utf-8") as file:
+        request = json.load(file)
+    request["cases"][0]["name"] = 'a, "b" n\u00e4her'
+    lines = run(server, "result", solved(server, "-", stdin=json.dumps(request)), "--format", "table").stdout.splitlines()
+    check(lines[1].startswith('a, "b" n\u00e4her  ') and all(line.rstrip() == line for line in lines) and len({len(line) for line in lines[2:]}) == 1, lines)
+
+
 def test_table_of_contacts(server):
     job = solved(server)
     rows = table(server, job)
