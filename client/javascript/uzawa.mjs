@@ -15,7 +15,9 @@ const of = (name, query) => new URLSearchParams({ ...query, ...(name ? { case: n
 /** The service's reason (RFC 9457): problem has status, code, detail and a JSON pointer into the request. */
 export class Refused extends Error {
   constructor(problem) {
-    super(`${problem.pointer ?? ""} ${problem.detail ?? JSON.stringify(problem)}`.trim());
+    const { pointer = "", detail = JSON.stringify(problem) } = problem;
+    super(detail.startsWith(pointer) ? detail : `${pointer} ${detail}`); // details begin with the place where they can
+    this.name = "Refused";
     this.problem = problem;
   }
 }

@@ -58,7 +58,8 @@ test("refusals say where", async () => {
   await assert.rejects(service.submit({ problem: { kind: "nothing" } }), (error) => {
     assert.ok(error instanceof Refused);
     assert.equal(error.problem.pointer, "/problem/kind");
-    return error.message.startsWith("/problem/kind ");
+    assert.equal(error.name, "Refused");
+    return error.message.startsWith("/problem/kind ") && error.message.split("/problem/kind ").length === 2;
   });
   const singular = { problem: { kind: "matrices", K: "%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 -1\n", p: [1] } };
   await assert.rejects(service.solve(singular), (error) => error.problem.code === "not_positive_definite");

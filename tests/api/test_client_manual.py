@@ -141,12 +141,12 @@ def test_completion_of_commands_and_options(_):
 
 @options(None)
 def test_completion_of_values(_):
-    check(complete("uzawa result x --format ") == ["json", "csv", "npz", "vtu", "pvd"])
+    check(complete("uzawa result x --format ") == ["json", "table", "csv", "npz", "vtu", "pvd"])
     check(complete("uzawa result x -f v") == ["vtu"])
     check(complete("uzawa list --status r") == ["running"])
     check(complete("uzawa refine x --accuracy e") == ["exact"])
     # As bash takes the words apart: at "=" and ":" as well.
-    check(complete("uzawa result x --format = v") == ["vtu"] and complete("uzawa result x --format =") == ["json", "csv", "npz", "vtu", "pvd"])
+    check(complete("uzawa result x --format = v") == ["vtu"] and complete("uzawa result x --format =") == ["json", "table", "csv", "npz", "vtu", "pvd"])
     check(complete("uzawa --server http : //h : 1 li") == ["list"])
     check(complete("uzawa --server = http : //h : 1 list --status = r") == ["running"])
     check(complete("uzawa submit --vary ") == [] and complete("uzawa list --limit ") == [])
@@ -195,7 +195,7 @@ def test_completion_of_fish(server):
     for command in commands():
         offered = of_fish(f"uzawa {command['name']} --")
         check(sorted(offered) == sorted({option["name"] for option in command["options"]}), command["name"], offered)
-    check(sorted(of_fish("uzawa result x --format ")) == ["csv", "json", "npz", "pvd", "vtu"], of_fish("uzawa result x --format "))
+    check(sorted(of_fish("uzawa result x --format ")) == ["csv", "json", "npz", "pvd", "table", "vtu"], of_fish("uzawa result x --format "))
     check(of_fish("uzawa list --limit ") == [] and of_fish("uzawa help ref") == ["refine"])
     job = server.post(service.MATRICES).json["id"]
     check(any(of_fish("uzawa status ", server) == [job] for _ in range(10)), "the service has a second to answer")
@@ -209,7 +209,7 @@ def test_completion_of_zsh(server):
                                    "zstyle ':completion:*' verbose no; LISTMAX=0; unsetopt beep; unset zle_bracketed_paste\n")
     environment = {"ZDOTDIR": str(folder), "PATH": f"{BUILD}:{os.environ['PATH']}", "UZAWA_SERVER": "http://127.0.0.1:1",
                    "TERM": "dumb"}
-    lines = {"uzawa re\t\t": rb"refine +report +request +result", "uzawa result x -f \t\t": rb"csv +json +npz +pvd +vtu",
+    lines = {"uzawa re\t\t": rb"refine +report +request +result", "uzawa result x -f \t\t": rb"csv +json +npz +pvd +table +vtu",
              "uzawa help ref\t": b"uzawa help refine", "uzawa submit --bas\t": b"uzawa submit --baseline"}
     with Terminal([shutil.which("zsh"), "-d", "-i"], columns=200, environment=environment) as terminal:
         wanted = b"READY "

@@ -21,7 +21,8 @@ class Refused(Exception):
     """The service's reason (RFC 9457): .problem has status, code, detail and a JSON pointer into the request."""
 
     def __init__(self, problem: dict) -> None:
-        super().__init__(f"{problem.get('pointer', '')} {problem.get('detail', problem)}".strip())
+        pointer, detail = problem.get("pointer", ""), str(problem.get("detail", problem))
+        super().__init__(detail if detail.startswith(pointer) else f"{pointer} {detail}")  # details begin with the place where they can
         self.problem = problem
 
 
