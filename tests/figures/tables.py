@@ -441,7 +441,8 @@ def runs_of_shapes(data):
 
 REASONS = (("first step is", "the first step is no static one"), ("FRICTION", "friction"), ("EQUATION", "equations between displacements"),
            ("SPRINGA", "springs"), ("in place of a spring", "contact softer than a twentieth of the body"),
-           ("PLASTIC", "plasticity"), ("ADJUST", "nodes that are moved to the other surface (ADJUST)"), ("TRANSFORM", "turned axes of nodes"), ("CYCLIC", "cyclic symmetry"))
+           ("PLASTIC", "plasticity"), ("ADJUST", "nodes that are moved to the other surface (ADJUST)"), ("TRANSFORM", "turned axes of nodes"), ("CYCLIC", "cyclic symmetry"),
+           ("a shell", "shells"), ("a beam", "beams"))
 
 
 def bounds(data):
