@@ -135,8 +135,8 @@ static bool check_limits(const codec_request *request, problem_details *problem)
 }
 
 /* What the solver would refuse a scene for, as far as that takes milliseconds: mesh, materials, supports, loads and
- * contacts, but nothing of K. Whether something holds the body depends on the settings and is left to the run, and so
- * are large meshes and the loads of cases but the first. */
+ * contacts, and motions that neither supports nor obstacles stop, but nothing of K. Whether loads press the body on what
+ * would hold it is left to the run, and so are large meshes and the loads of cases but the first. */
 static bool check_scene(const codec_request *request, problem_details *problem)
 {
     enum { MOST_NODES = 100000 };
@@ -151,7 +151,8 @@ static bool check_scene(const codec_request *request, problem_details *problem)
     uz_error err = {.status = UZ_OK};
     const uz_scene first = uz_scene_of_case(p, 0);
     const uz_status status = uz_scene_check(&first, &err);
-    if (status != UZ_ERR_SCENE && status != UZ_ERR_NOT_FINITE)
+    const bool free_to_move = status == UZ_ERR_FREE_BODY && strcmp(err.where, "/supports") == 0;
+    if (status != UZ_ERR_SCENE && status != UZ_ERR_NOT_FINITE && !free_to_move)
         return true;
     if (p->n_cases > 0 && strncmp(err.where, "/loads", 6) == 0)
         uz_error_name_case(&err, p, 0);

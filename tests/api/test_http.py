@@ -224,6 +224,9 @@ def test_validate(s):
     check(predicted["bytes"] > 1e5 and 0 < predicted["seconds"] < 10, predicted)
     free = json.loads(json.dumps(SCENE))
     free["problem"]["supports"] = []
+    problem = expect(s.post(free, query="?validate=true"), 422, "free_body").json
+    check(problem["pointer"] == "/problem/supports" and "translation along x" in problem["detail"], problem)
+    free["problem"]["supports"] = [{"on": "left", "ux": 0}]  # the obstacle holds the rest
     check(expect(s.post(free, query="?validate=true"), 200).json == {"valid": True, "predicted": None})
     check(expect(s.post(MATRICES, query="?validate=true"), 200).json["predicted"]["d"] == 2)
     expect(s.post({"problem": {}}, query="?validate=true"), 422)

@@ -66,7 +66,7 @@ def fill(s):
             "hooked": post({**MATRICES, "webhook": {"url": "http://127.0.0.1:9/told"}})}
     check([ended(job, "root") for job in jobs.values()] == ["successful"] * 5, "they did not all end well")
     failing = json.loads(json.dumps(SCENE))
-    failing["problem"]["supports"] = []
+    failing["problem"].update(supports=[{"on": "left", "ux": 0}], loads=[{"on": "top", "traction": [0, 0.05]}])  # off the obstacle
     jobs["failed"] = post(failing)
     check(ended(jobs["failed"]) == "failed")
     jobs["refined"] = expect(s.request("POST", f"/v1/jobs/{jobs['keyed']}/refine", {"accuracy": {"relative_error": 1e-12}},
