@@ -30,7 +30,7 @@ _uzawa() {
     path) options='--format --from --to --count --case --output --json --context --server --timeout --retry --help --version ' ;;
     picture) options='--colour --factor --view --up --width --case --output --json --context --server --timeout --retry --help --version ' ;;
     history) options='--csv --plot --width --height --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
-    plot) options='--deformed --error --trade --path --x --with --colour --factor --width --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
+    plot) options='--deformed --error --trade --path --x --with --view --up --colour --factor --width --ascii --case --output --json --context --server --timeout --retry --help --version ' ;;
     report) options='--case --output --json --context --server --timeout --retry --help --version ' ;;
     request) options='--output --json --context --server --timeout --retry --help --version ' ;;
     list) options='--format --status --tag --name --limit --quiet --json --context --server --timeout --retry --help --version ' ;;
@@ -143,6 +143,8 @@ _uzawa() {
     history--retry) words='' ;;
     plot--x) words='iterations seconds' ;;
     plot--with) words=$(_uzawa_ids) ;;
+    plot--view) words='corner below front back left right top bottom' ;;
+    plot--up) words='y z' ;;
     plot--colour) words='von_mises displacements pressure' ;;
     plot--factor) words='' ;;
     plot--width) words='' ;;

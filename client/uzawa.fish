@@ -214,6 +214,8 @@ complete -c uzawa -n '__uzawa_is plot' -l trade -d 'print what each certified di
 complete -c uzawa -n '__uzawa_is plot' -l path -d 'draw, in the terminal, force over displacement along the load cases of large deformation'
 complete -c uzawa -n '__uzawa_is plot' -l x -r -f -a 'iterations seconds' -d 'of the convergence: over iterations (default) or seconds'
 complete -c uzawa -n '__uzawa_is plot' -l with -r -f -a '(__uzawa_ids)' -d 'draw another job'\''s convergence beside it; may be repeated'
+complete -c uzawa -n '__uzawa_is plot' -l view -r -f -a 'corner below front back left right top bottom' -d 'of a solid: corner (default), below, front, back, left, right, top or bottom'
+complete -c uzawa -n '__uzawa_is plot' -l up -r -f -a 'y z' -d 'of a solid: what points upwards, y (default) or z'
 complete -c uzawa -n '__uzawa_is plot' -l colour -r -f -a 'von_mises displacements pressure' -d 'with --deformed: von_mises (default), displacements or pressure'
 complete -c uzawa -n '__uzawa_is plot' -l factor -r -f -d 'with --deformed: displacements are drawn X times as large'
 complete -c uzawa -n '__uzawa_is plot' -l width -r -f -d 'with --deformed and --error: of the picture, in pixels; with --path and --trade: of the drawing, in characters'

@@ -238,6 +238,8 @@ _uzawa() {
             '--path[draw, in the terminal, force over displacement along the load cases of large deformation]' \
             '--x[of the convergence\: over iterations (default) or seconds]:AXIS:(iterations seconds)' \
             '*--with[draw another job'\''s convergence beside it; may be repeated]:ID:_uzawa_ids' \
+            '--view[of a solid\: corner (default), below, front, back, left, right, top or bottom]:V:(corner below front back left right top bottom)' \
+            '--up[of a solid\: what points upwards, y (default) or z]:AXIS:(y z)' \
             '--colour[with --deformed\: von_mises (default), displacements or pressure]:C:(von_mises displacements pressure)' \
             '--factor[with --deformed\: displacements are drawn X times as large]:X: ' \
             '--width[with --deformed and --error\: of the picture, in pixels; with --path and --trade\: of the drawing, in characters]:N: ' \

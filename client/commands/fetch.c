@@ -193,6 +193,8 @@ client_exit client_picture(client_session *s)
     snprintf(width, sizeof width, "%d", o->width);
     const client_query query[] = {{"colour", o->colour},
                                   {"factor", o->factor},
+                                  {"view", o->view},
+                                  {"up", o->up},
                                   {"width", o->width < 0 ? NULL : width},
                                   {"case", o->case_name},
                                   {NULL, NULL}};

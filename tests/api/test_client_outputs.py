@@ -318,6 +318,20 @@ def test_contexts_name_services(_):
 # ---------------------------------------------------------------- pictures
 
 
+def test_pictures_are_seen_from_where_one_wants(server):
+    """Each option reaches the service: what is drawn is what it draws for these."""
+    block = {"problem": {"kind": "scene", "model": "solid", "mesh": {"box": {"size": [3, 2, 1], "cells": [3, 2, 1]}}, "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                         "supports": [{"on": "back", "ux": 0, "uy": 0, "uz": 0.01}], "contacts": [{"on": "front", "obstacle": {"plane": {"point": [0, 0, 1], "normal": [0, 0, -1]}}}]}}
+    job = solved(server, "-", stdin=json.dumps(block))
+    seen = {"": run(server, "picture", job).stdout}
+    for query, words in (("view=front", ["--view", "front"]), ("up=z", ["--up", "z"]), ("view=left&up=z", ["--view", "left", "--up", "z"]), ("width=300&colour=pressure&factor=5", ["--width", "300", "--colour", "pressure", "--factor", "5"])):
+        drawn = server.get(f"/v1/jobs/{job}/deformed.svg?{query}").body.decode()
+        for command in (["picture"], ["plot", "--deformed"]):
+            check(run(server, *command, job, *words).stdout == drawn, command, words)
+        seen[query] = drawn
+    check(len(set(seen.values())) == len(seen), "they are the same")
+
+
 def test_pictures_go_to_files(server):
     job = solved(server)
     target = os.path.join(server.folder, "body.svg")
