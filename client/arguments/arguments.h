@@ -29,7 +29,8 @@ typedef struct {
     const char *junit, *baseline;                    /* a file; a job */
     double tolerance;                                /* of the baseline; -1: not given */
     int limit, width, height, count, max_iterations; /* -1: not given */
-    bool wait, quiet, json, progress, csv, plot, ascii, deformed, whole_error, trade, validate, along_path, help, version;
+    bool wait, quiet, json, progress, csv, plot, ascii, deformed, whole_error, trade, validate, along_path, help,
+        version;
 } client_options;
 
 extern const char CLIENT_DEFAULT_SERVER[];

@@ -76,7 +76,8 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
                      "displacement, stress, von Mises stress; nothing where a point is not in the body.\n",
                      NULL},
     [CLIENT_PICTURE] = {"picture", "picture ID [options]", "draw the deformed body of a scene as SVG", "ID",
-                        CLIENT_OPERAND_NEEDED, "", NULL},
+                        CLIENT_OPERAND_NEEDED,
+                        "A file that ends in .png gets a PNG, by way of rsvg-convert (Debian: librsvg2-bin).\n", NULL},
     [CLIENT_HISTORY] = {"history", "history ID [options]", "fetch or draw the convergence history", "ID",
                         CLIENT_OPERAND_NEEDED, "", NULL},
     [CLIENT_PLOT] = {"plot", "plot ID [options]", "draw the convergence, the body, a path or the price of accuracy",
@@ -170,7 +171,8 @@ static const uz_option OPTIONS[] = {
            .about = "idempotency key (default: random); the same key and request give the same job"),
     OPTION("key", 'k', WORD, key, STAYING & ~IN(WAIT), .value = "KEY", .about = "idempotency key (default: random)"),
     OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json table csv npz vtu pvd",
-           .about = "json (default), table: with five digits, csv: with all, npz: arrays for NumPy; scenes only: vtu, or pvd: a vtu of each load "
+           .about = "json (default), table: with five digits, csv: with all, npz: arrays for NumPy; scenes only: vtu, "
+                    "or pvd: a vtu of each load "
                     "case, as one series"),
     OPTION("format", 'f', CHOICE, format, IN(PATH), .value = "F", .choices = "table csv json",
            .about = "table (default) with five digits, csv or json with all"),
@@ -213,7 +215,8 @@ static const uz_option OPTIONS[] = {
            .about = "von_mises (default), displacements or pressure"),
     OPTION("factor", 0, WORD, factor, IN(PICTURE), .value = "X",
            .about = "displacements are drawn X times as large (default: so that they show)"),
-    OPTION("view", 0, WORD, view, IN(PICTURE) | IN(PLOT), .value = "V", .choices = "corner below front back left right top bottom",
+    OPTION("view", 0, WORD, view, IN(PICTURE) | IN(PLOT), .value = "V",
+           .choices = "corner below front back left right top bottom",
            .about = "of a solid: corner (default), below, front, back, left, right, top or bottom"),
     OPTION("up", 0, WORD, up, IN(PICTURE) | IN(PLOT), .value = "AXIS", .choices = "y z",
            .about = "of a solid: what points upwards, y (default) or z"),

@@ -186,21 +186,6 @@ client_exit client_result(client_session *s)
     return code;
 }
 
-client_exit client_picture(client_session *s)
-{
-    char width[24];
-    const client_options *o = s->options;
-    snprintf(width, sizeof width, "%d", o->width);
-    const client_query query[] = {{"colour", o->colour},
-                                  {"factor", o->factor},
-                                  {"view", o->view},
-                                  {"up", o->up},
-                                  {"width", o->width < 0 ? NULL : width},
-                                  {"case", o->case_name},
-                                  {NULL, NULL}};
-    return fetch_and_deliver(s, client_path_with_query(s, s->options->operand, "/deformed.svg", query));
-}
-
 client_exit client_import(client_session *s)
 {
     json_t *request;

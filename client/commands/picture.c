@@ -86,64 +86,19 @@ client_exit client_picture_to_png(client_session *s, const client_buffer *svg, c
     return client_complain(s, CLIENT_LOCAL, "rsvg-convert could not make a PNG of the picture");
 }
 
-/* ------------------------------------------------------------ the command */
+/* ------------------------------------------------------------ the commands */
 
-client_exit client_plot(client_session *s)
+/* The picture at `path`, which it frees, as SVG, or as PNG where the file that it goes to is called so. */
+static client_exit fetch_picture(client_session *s, char *path)
 {
+    const char *output = s->options->output;
+    const bool as_png = output && strlen(output) > 4 && strcmp(output + strlen(output) - 4, ".png") == 0;
     client_reply reply;
     client_buffer png = {0};
-    const char *output = s->options->output;
-    if (s->options->trade) {
-        json_t *trade;
-        const client_query query[] = {{"case", s->options->case_name}, {NULL, NULL}};
-        client_exit code =
-            client_get_json(s, &trade, client_path_with_query(s, s->options->operand, "/work-precision", query));
-        if (code == CLIENT_OK && !json_is_array(json_object_get(trade, "decades")))
-            code = client_complain(s, CLIENT_SERVER_ERROR, "the reply has no decades; is this the right server?");
-        else if (code == CLIENT_OK && s->options->json)
-            code = client_print_json(s, trade);
-        else if (code == CLIENT_OK)
-            client_draw_trade(s, trade);
-        json_decref(trade);
-        return code;
-    }
-    if (s->options->along_path) {
-        json_t *result;
-        const client_query query[] = {{"fields", "summary"}, {NULL, NULL}};
-        client_exit code =
-            client_get_json(s, &result, client_path_with_query(s, s->options->operand, "/result", query));
-        if (code == CLIENT_OK)
-            code = client_draw_path(s, result);
-        json_decref(result);
-        return code;
-    }
-    const client_options *o = s->options;
-    char width[24];
-    client_buffer with = {0};
-    snprintf(width, sizeof width, "%d", o->width);
-    if (!client_append_words(&with, &o->with)) {
-        free(with.data);
-        return client_complain(s, CLIENT_LOCAL, "no memory");
-    }
-    const client_query deformed[] = {{"case", o->case_name},
-                                     {"colour", o->colour},
-                                     {"factor", o->factor},
-                                     {"view", o->view},
-                                     {"up", o->up},
-                                     {"width", o->width < 0 ? NULL : width},
-                                     {NULL, NULL}};
-    const client_query curves[] = {
-        {"case", o->case_name}, {"x", o->axis}, {"with", with.len ? with.data : NULL}, {NULL, NULL}};
-    const client_query errors[] = {{"case", o->case_name}, {"width", o->width < 0 ? NULL : width}, {NULL, NULL}};
-    char *path = o->deformed      ? client_path_with_query(s, s->options->operand, "/deformed.svg", deformed)
-                 : o->whole_error ? client_path_with_query(s, s->options->operand, "/whole-error.svg", errors)
-                                  : client_path_with_query(s, s->options->operand, "/convergence.svg", curves);
-    free(with.data);
     if (!path)
         return CLIENT_LOCAL;
     client_request request = client_request_new(s, "GET", path);
     client_exit code = client_ask(s, &reply, &request);
-    const bool as_png = output && strlen(output) > 4 && strcmp(output + strlen(output) - 4, ".png") == 0;
     if (code == CLIENT_OK && as_png)
         code = client_picture_to_png(s, &reply.body, &png);
     const client_buffer *picture = as_png ? &png : &reply.body;
@@ -153,4 +108,71 @@ client_exit client_plot(client_session *s)
     client_reply_clear(&reply);
     free(path);
     return code;
+}
+
+client_exit client_picture(client_session *s)
+{
+    const client_options *o = s->options;
+    char width[24];
+    snprintf(width, sizeof width, "%d", o->width);
+    const client_query query[] = {{"case", o->case_name},
+                                  {"colour", o->colour},
+                                  {"factor", o->factor},
+                                  {"view", o->view},
+                                  {"up", o->up},
+                                  {"width", o->width < 0 ? NULL : width},
+                                  {NULL, NULL}};
+    return fetch_picture(s, client_path_with_query(s, o->operand, "/deformed.svg", query));
+}
+
+static client_exit plot_trade(client_session *s)
+{
+    json_t *trade;
+    const client_query query[] = {{"case", s->options->case_name}, {NULL, NULL}};
+    client_exit code =
+        client_get_json(s, &trade, client_path_with_query(s, s->options->operand, "/work-precision", query));
+    if (code == CLIENT_OK && !json_is_array(json_object_get(trade, "decades")))
+        code = client_complain(s, CLIENT_SERVER_ERROR, "the reply has no decades; is this the right server?");
+    else if (code == CLIENT_OK && s->options->json)
+        code = client_print_json(s, trade);
+    else if (code == CLIENT_OK)
+        client_draw_trade(s, trade);
+    json_decref(trade);
+    return code;
+}
+
+static client_exit plot_path(client_session *s)
+{
+    json_t *result;
+    const client_query query[] = {{"fields", "summary"}, {NULL, NULL}};
+    client_exit code = client_get_json(s, &result, client_path_with_query(s, s->options->operand, "/result", query));
+    if (code == CLIENT_OK)
+        code = client_draw_path(s, result);
+    json_decref(result);
+    return code;
+}
+
+client_exit client_plot(client_session *s)
+{
+    const client_options *o = s->options;
+    char width[24];
+    client_buffer with = {0};
+    if (o->trade)
+        return plot_trade(s);
+    if (o->along_path)
+        return plot_path(s);
+    if (o->deformed)
+        return client_picture(s);
+    snprintf(width, sizeof width, "%d", o->width);
+    if (!client_append_words(&with, &o->with)) {
+        free(with.data);
+        return client_complain(s, CLIENT_LOCAL, "no memory");
+    }
+    const client_query curves[] = {
+        {"case", o->case_name}, {"x", o->axis}, {"with", with.len ? with.data : NULL}, {NULL, NULL}};
+    const client_query errors[] = {{"case", o->case_name}, {"width", o->width < 0 ? NULL : width}, {NULL, NULL}};
+    char *path = o->whole_error ? client_path_with_query(s, s->options->operand, "/whole-error.svg", errors)
+                                : client_path_with_query(s, s->options->operand, "/convergence.svg", curves);
+    free(with.data);
+    return fetch_picture(s, path);
 }

@@ -346,8 +346,10 @@ def test_png_by_the_converter(server):
     if not shutil.which("rsvg-convert"):
         raise Skip("rsvg-convert is not installed")
     target = os.path.join(server.folder, "body.png")
-    run(server, "plot", solved(server), "--deformed", "-o", target)
-    check(open(target, "rb").read(8) == b"\x89PNG\r\n\x1a\n")
+    for command in (["plot", "--deformed"], ["picture"]):
+        run(server, *command, solved(server), "-o", target)
+        check(open(target, "rb").read(8) == b"\x89PNG\r\n\x1a\n")
+        os.remove(target)
     with Fake((200, "<svg" + " " * 300_000)) as fake:  # more than the pipes hold, and no picture
         done = run(fake.url, "plot", ID, "-o", os.path.join(server.folder, "none.png"), code=11)
         check("rsvg-convert could not" in done.stderr and not os.path.exists(os.path.join(server.folder, "none.png")), done)
