@@ -10,7 +10,8 @@ enum { WIDTH = 900 };
 
 static const char STYLE[] =
     "<style>text{font:12px system-ui,sans-serif;fill:#333}.title{font-weight:600}path{fill:none}"
-    ".before{stroke:#9aa0a8;stroke-dasharray:4 3}.obstacle{stroke:#555;stroke-width:2}.ticks{stroke:#888}"
+    ".edge{stroke:#28282f;stroke-width:.6}.before{stroke:#9aa0a8;stroke-dasharray:4 "
+    "3}.obstacle{stroke:#555;stroke-width:2}.ticks{stroke:#888}"
     ".push{stroke:#c2255c;stroke-width:1.5}.axis{stroke:#333}"
     ".mark{paint-order:stroke;stroke:#fff;stroke-width:3}</style>\n";
 
@@ -49,25 +50,31 @@ static uz_status put_body(uz_buffer *svg, uz_scenery *scenery, const uz_skin *sk
                           uz_error *err)
 {
     uz_raster raster;
-    uz_status status = uz_raster_init(&raster, scenery->width, scenery->height, err);
+    uz_skin_edges edges;
+    uz_status status = uz_skin_edges_build(&edges, skin, &scenery->model->mesh, err);
+    if (status != UZ_OK)
+        return status;
+    status = uz_raster_init(&raster, scenery->width, scenery->height, err);
     if (status == UZ_OK && uz_scenery_paint_obstacles(&raster, scenery)) {
         status = uz_raster_put_image(svg, &raster, err);
         uz_raster_wipe(&raster);
     }
-    if (status == UZ_OK)
-        status = uz_scenery_put_outline(svg, scenery, skin, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK) {
+        uz_scenery_put_outline(svg, scenery, &edges);
         status = uz_scenery_paint(&raster, scenery, skin, hooks, err);
+    }
     if (status == UZ_OK && scenery->contacts_only)
         status = uz_scenery_paint_contacts(&raster, scenery, err);
     if (status == UZ_OK)
         status = uz_raster_put_image(svg, &raster, err);
     if (status == UZ_OK) {
+        uz_scenery_put_edges(svg, scenery, &edges, &raster);
         uz_scenery_put_obstacles(svg, scenery);
         scenery->longest_arrow = uz_scenery_put_arrows(
             svg, scenery, scenery->model->mesh.dim == 3 && !scenery->contacts_only ? &raster : NULL);
     }
     uz_raster_clear(&raster);
+    uz_skin_edges_clear(&edges);
     return status;
 }
 

@@ -101,26 +101,30 @@ void uz_raster_triangle(uz_raster *raster, const uz_raster_point p[3], double li
         }
 }
 
-void uz_raster_line(uz_raster *raster, const uz_raster_point *a, const uz_raster_point *b, double lift)
+/* The pixel of a point, -1: it is outside, or nothing is drawn there. */
+static int64_t drawn_at(const uz_raster *raster, double x, double y)
 {
-    static const unsigned char INK[3] = {40, 40, 48};
-    const double length = fmax(fabs(b->x - a->x), fabs(b->y - a->y));
-    if (!(length < 1e5))
-        return;
-    const int steps = (int)ceil(length) + 1;
-    for (int i = 0; i <= steps; i++) {
-        const double t = (double)i / steps, x = a->x + t * (b->x - a->x), y = a->y + t * (b->y - a->y);
-        if (x >= 0 && y >= 0 && x < raster->width && y < raster->height)
-            set_pixel(raster, (int64_t)y * raster->width + (int64_t)x, a->z + t * (b->z - a->z) + lift, INK, 1);
-    }
+    if (!(x >= 0 && y >= 0 && x < raster->width && y < raster->height))
+        return -1;
+    const int64_t at = (int64_t)y * raster->width + (int64_t)x;
+    return raster->rgba[4 * at + 3] > 0 ? at : -1;
 }
 
-bool uz_raster_hides(const uz_raster *raster, const uz_raster_point *point)
+bool uz_raster_hides(const uz_raster *raster, const uz_raster_point *point, double lift)
 {
-    if (!(point->x >= 0 && point->y >= 0 && point->x < raster->width && point->y < raster->height))
-        return false;
-    const int64_t at = (int64_t)point->y * raster->width + (int64_t)point->x;
-    return raster->rgba[4 * at + 3] > 0 && raster->depth[at] > point->z + 2;
+    const int64_t at = drawn_at(raster, point->x, point->y);
+    return at >= 0 && raster->depth[at] > point->z + lift;
+}
+
+bool uz_raster_hides_line(const uz_raster *raster, const uz_raster_point *point, double lift)
+{
+    static const int BESIDE[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+    bool hidden = uz_raster_hides(raster, point, lift);
+    for (int k = 0; k < 4 && hidden; k++) {
+        const int64_t at = drawn_at(raster, point->x + BESIDE[k][0], point->y + BESIDE[k][1]);
+        hidden = at < 0 || raster->depth[at] > point->z + lift;
+    }
+    return hidden;
 }
 
 uz_status uz_raster_put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err)

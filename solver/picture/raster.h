@@ -1,4 +1,4 @@
-/* raster.h: triangles and lines with a depth, as pixels. */
+/* raster.h: triangles with a depth, as pixels. */
 #ifndef UZ_PICTURE_RASTER_H
 #define UZ_PICTURE_RASTER_H
 
@@ -24,11 +24,11 @@ void uz_raster_wipe(uz_raster *raster);
 
 /* Colour and depth are linear over the triangle. light: 1 as it is, 0 black. What is not finite is left out. */
 void uz_raster_triangle(uz_raster *raster, const uz_raster_point corner[3], double light);
-/* A thin dark line, `lift` nearer than its ends say. */
-void uz_raster_line(uz_raster *raster, const uz_raster_point *a, const uz_raster_point *b, double lift);
-
-/* Is what is drawn at this pixel nearer than the point, by more than two pixels? */
-bool uz_raster_hides(const uz_raster *raster, const uz_raster_point *point);
+/* Is what is drawn at this pixel nearer than the point, by more than `lift` pixels? */
+bool uz_raster_hides(const uz_raster *raster, const uz_raster_point *point, double lift);
+/* The same for a point of a line on what is drawn: of a face that is seen from its side a pixel beside it may be as far
+ * as the line. */
+bool uz_raster_hides_line(const uz_raster *raster, const uz_raster_point *point, double lift);
 
 /* Colour of a value in [0, 1], red, green, blue. */
 void uz_colour(unsigned char rgb[3], double value);

@@ -144,11 +144,8 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
 
 /* ---- the body as coloured triangles: the elements of a plane, the outer faces of a solid */
 
-/* Grids of more elements than this would hide their colours behind the lines. */
-enum { MOST_LINED = 4000 };
-
 /* A convex polygon of corners with the middles of its edges, as a fan about its mean. */
-static void paint_polygon(uz_raster *raster, const uz_raster_point *p, int n, double light, bool lined)
+static void paint_polygon(uz_raster *raster, const uz_raster_point *p, int n, double light)
 {
     uz_raster_point mean = {0, 0, 0, 0};
     for (int k = 0; k < n; k++) {
@@ -161,26 +158,14 @@ static void paint_polygon(uz_raster *raster, const uz_raster_point *p, int n, do
         const uz_raster_point triangle[3] = {p[k], p[(k + 1) % n], mean};
         uz_raster_triangle(raster, triangle, light);
     }
-    for (int k = 0; lined && k < n; k++)
-        uz_raster_line(raster, &p[k], &p[(k + 1) % n], 0.5);
 }
 
 uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
                            uz_error *err)
 {
     const uz_mesh *mesh = &scenery->model->mesh;
-    const bool lined = mesh->n_elements <= (mesh->dim == 2 ? 1 : 4) * MOST_LINED;
-    if (mesh->dim == 3 && scenery->contacts_only) {
-        uz_skin_edges edges;
-        const uz_status status = uz_skin_edges_build(&edges, skin, mesh, err);
-        for (int64_t i = 0; status == UZ_OK && i < edges.n_outline; i++) {
-            const uz_raster_point a = uz_scenery_node(scenery, edges.outline[2 * i], scenery->factor),
-                                  b = uz_scenery_node(scenery, edges.outline[2 * i + 1], scenery->factor);
-            uz_raster_line(raster, &a, &b, 0.5);
-        }
-        uz_skin_edges_clear(&edges);
-        return status;
-    }
+    if (mesh->dim == 3 && scenery->contacts_only)
+        return UZ_OK;
     for (int64_t i = 0; i < skin->n_cells; i++) {
         if (i % 4096 == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the picture was drawn");
@@ -203,7 +188,7 @@ uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const u
                 continue;
             light = 0.55 + 0.45 * fmin(1, -area / (2 * size * size));
         }
-        paint_polygon(raster, p, n, light, lined);
+        paint_polygon(raster, p, n, light);
     }
     return UZ_OK;
 }
@@ -238,7 +223,7 @@ uz_status uz_scenery_paint_contacts(uz_raster *raster, const uz_scenery *scenery
                 if (isnan(p[j].value))
                     p[j].value = sum / known;
             if (known > 0 && side.dim == 3)
-                paint_polygon(raster, p, n, 1, true);
+                paint_polygon(raster, p, n, 1);
             for (int j = 0; known > 0 && side.dim == 2 && j + 1 < n; j++) {
                 /* The body is on the left of its side; the pixels' y points down. */
                 const double dx = p[j + 1].x - p[j].x, dy = p[j + 1].y - p[j].y, length = hypot(dx, dy);
@@ -248,7 +233,7 @@ uz_status uz_scenery_paint_contacts(uz_raster *raster, const uz_scenery *scenery
                     band[i].y -= i < 2 ? 0 : BAND * dx / length;
                     band[i].z += 1;
                 }
-                paint_polygon(raster, band, 4, 1, false);
+                paint_polygon(raster, band, 4, 1);
             }
         }
     }
@@ -339,23 +324,74 @@ bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery)
 
 /* ---- around the body: its outline before, obstacles of a plane, contact forces, the legend */
 
-enum { MOST_OUTLINE = 20000, MOST_ARROWS = 80, ARROW = 55, TICK = 9 };
+/* Grids of more elements than MOST_LINED, of solids four times as many, would hide their colours behind the lines. */
+enum { MOST_LINED = 4000, MOST_OUTLINE = 20000, MOST_ARROWS = 80, ARROW = 55, TICK = 9 };
 
-uz_status uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, uz_error *err)
+void uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin_edges *edges)
 {
-    uz_skin_edges edges;
-    uz_status status = uz_skin_edges_build(&edges, skin, &scenery->model->mesh, err);
-    if (status != UZ_OK)
-        return status;
     uz_buffer_print(svg, "<path class=\"before\" d=\"");
-    for (int64_t i = 0; i < edges.n_outline && i < MOST_OUTLINE; i++) {
-        const uz_raster_point a = uz_scenery_node(scenery, edges.outline[2 * i], 0),
-                              b = uz_scenery_node(scenery, edges.outline[2 * i + 1], 0);
+    for (int64_t i = 0; i < edges->n_outline && i < MOST_OUTLINE; i++) {
+        const uz_raster_point a = uz_scenery_node(scenery, edges->outline[2 * i], 0),
+                              b = uz_scenery_node(scenery, edges->outline[2 * i + 1], 0);
         uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1f", a.x, a.y, b.x, b.y);
     }
     uz_buffer_print(svg, "\"/>\n");
-    uz_skin_edges_clear(&edges);
-    return UZ_OK;
+}
+
+/* Tenths of a pixel, in as few bytes as they need: there are thousands of them. */
+static double tenths(double x)
+{
+    return round(10 * x) / 10 + 0.0;
+}
+
+static void put_line(uz_buffer *svg, const uz_raster_point *a, const uz_raster_point *b)
+{
+    const double x = tenths(a->x), y = tenths(a->y), along = tenths(b->x - x), down = tenths(b->y - y);
+    if (fabs(along) + fabs(down) > 0.05) /* not the end alone of a line that is hidden */
+        uz_buffer_print(svg, "M%.7g%s%.7gl%.7g%s%.7g", x, y < 0 ? "" : " ", y, along, down < 0 ? "" : " ", down);
+}
+
+/* What is seen of a line, tried every two pixels. */
+static void put_seen(uz_buffer *svg, const uz_raster *body, const uz_raster_point *a, const uz_raster_point *b,
+                     double lift)
+{
+    const double length = fmax(fabs(b->x - a->x), fabs(b->y - a->y));
+    const int steps = length < 1e5 ? (int)ceil(length / 2) + 1 : 0;
+    uz_raster_point from = *a, to = *a;
+    bool seen = false;
+    for (int i = 0; i <= steps && steps > 0; i++) {
+        const double t = (double)i / steps;
+        const uz_raster_point p = {a->x + t * (b->x - a->x), a->y + t * (b->y - a->y), a->z + t * (b->z - a->z), 0};
+        const bool now = !uz_raster_hides_line(body, &p, lift);
+        if (now && !seen)
+            from = p;
+        if (now)
+            to = p;
+        if (seen && (!now || i == steps))
+            put_line(svg, &from, &to);
+        seen = now;
+    }
+}
+
+void uz_scenery_put_edges(uz_buffer *svg, const uz_scenery *scenery, const uz_skin_edges *edges, const uz_raster *body)
+{
+    const uz_mesh *mesh = &scenery->model->mesh;
+    const bool solid = mesh->dim == 3, some = solid && scenery->contacts_only;
+    const double lift = solid ? 2 : 0.5; /* bands of contacts are 1 before a plane */
+    uz_buffer_print(svg, "<path class=\"edge\" d=\"");
+    for (int64_t i = 0; i < edges->n_lines && (some || mesh->n_elements <= (solid ? 4 : 1) * MOST_LINED); i++) {
+        const int64_t *end = edges->line + 2 * i;
+        const uz_raster_point a = uz_scenery_node(scenery, end[0], scenery->factor),
+                              b = uz_scenery_node(scenery, end[1], scenery->factor);
+        if (!some || !(isnan(a.value) || isnan(b.value)))
+            put_seen(svg, body, &a, &b, lift);
+    }
+    for (int64_t i = 0; i < edges->n_outline && i < MOST_OUTLINE && some; i++) {
+        const uz_raster_point a = uz_scenery_node(scenery, edges->outline[2 * i], scenery->factor),
+                              b = uz_scenery_node(scenery, edges->outline[2 * i + 1], scenery->factor);
+        put_seen(svg, body, &a, &b, lift);
+    }
+    uz_buffer_print(svg, "\"/>\n");
 }
 
 /* One stroke of an obstacle's border with the obstacle on its right, and ticks into it. */
@@ -489,7 +525,7 @@ double uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery, const uz
         }
         const uz_raster_point middle = {
             .x = tip.x - 0.5 * length * dx, .y = tip.y - 0.5 * length * dy, .z = tip.z - 0.5 * length * dz};
-        if (body && uz_raster_hides(body, &middle))
+        if (body && uz_raster_hides(body, &middle, 2))
             continue;
         longest = fmax(longest, scenery->pressure[i]);
         uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1fM%.1f %.1fL%.1f %.1fL%.1f %.1f", tip.x - length * dx,

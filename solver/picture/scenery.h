@@ -44,7 +44,7 @@ uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x);
 /* Where a node is; its place is that before the deformation plus `factor` times the displacement. */
 uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double factor);
 
-/* The surface of the body in colour; of a solid with contacts_only its sharp edges. UZ_ERR_CANCELLED, _MEMORY. */
+/* The surface of the body in colour; of a solid with contacts_only nothing. UZ_ERR_CANCELLED. */
 uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
                            uz_error *err);
 
@@ -55,8 +55,11 @@ uz_status uz_scenery_paint_contacts(uz_raster *raster, const uz_scenery *scenery
 bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery);
 
 /* SVG elements, each appended to the buffer. The outline before the deformation is the border of a plane or the sharp
- * edges of a solid: UZ_ERR_MEMORY. */
-uz_status uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, uz_error *err);
+ * edges of a solid. */
+void uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin_edges *edges);
+/* Edges of elements, as far as the body, as it was painted, is not before them, where they are not so many that they
+ * would hide its colours; of a solid with contacts_only its sharp edges, and those of the sides of contacts. */
+void uz_scenery_put_edges(uz_buffer *svg, const uz_scenery *scenery, const uz_skin_edges *edges, const uz_raster *body);
 void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery); /* plane models */
 void uz_scenery_put_axes(uz_buffer *svg, const uz_scenery *scenery);
 /* Pressures, but for those whose arrows the body is before: a solid as it was painted; NULL: it is seen through. The

@@ -246,6 +246,30 @@ TEST(a_solid_stands_on_its_obstacle)
     }
 }
 
+/* Of a box every edge of its mesh is a line of its own in what is seen of it: three of its six sides from a corner. The
+ * length of all of them is that of the grids there, and where pressure is the colour, of the bottom's and the box's. */
+TEST(edges_are_lines)
+{
+    uz_scene scene = body_scene(UZ_SOLID, "hex8", (double[3]){2, 1, 2}, (int64_t[3]){4, 2, 4});
+    scene.contacts[scene.n_contacts++] = (uz_contact){.on = "bottom", .kind = UZ_OBSTACLE_PLANE, .normal = {0, 1, 0}};
+    body_hold(&scene, "top", 0, -1e-3, 0);
+    solved s = solve_scene(scene);
+    uz_picture how = {.colour = UZ_FIELD_VON_MISES, .factor = 1};
+    char *svg = draw(&s, how);
+    const int shown = (4 * 5 + 4 * 5) + 2 * (4 * 3 + 2 * 5) - (4 + 4 + 2); /* three edges are of two sides each */
+    CHECK_INT(count_moves(strstr(svg, "class=\"edge\"")), shown);
+    free(svg);
+    CHECK(uz_view_parse(&how.view, "below"));
+    svg = draw(&s, how);
+    CHECK_INT(count_moves(strstr(svg, "class=\"edge\"")), shown);
+    free(svg);
+    how = (uz_picture){.colour = UZ_FIELD_PRESSURE, .factor = 1};
+    svg = draw(&s, how);
+    CHECK_INT(count_moves(strstr(svg, "class=\"edge\"")), 2 * 4 * 5 + (4 * 4 + 4 * 4 + 4 * 2)); /* and the sharp ones */
+    free(svg);
+    drop(&s);
+}
+
 TEST(any_body_fits)
 {
     const double size[4][2] = {{1e-6, 1e3}, {1e3, 1e-6}, {1e-9, 1e-9}, {60, 20}};
