@@ -1,6 +1,8 @@
 // api.js: the service as the page uses it. Every request goes to the origin that the page came from. The token is sent
 // in the Authorization header field and nowhere else: never in an address, so in no log and no history.
 
+const UNSEEN_MS = 3000; // between two looks of a page that nobody sees
+
 /** What the service refused; problem is its problem document (RFC 9457), or one made up where it sent none. */
 export class ApiError extends Error {
   constructor(status, problem) {
@@ -58,8 +60,29 @@ export function make_api({ token, ask }) {
     }
   }
 
-  /** Calls on_event({event, data, id}) for each Server-Sent Event until the stream ends, and returns then. */
+  /**
+   * Calls on_event({event, data, id}) for each Server-Sent Event until the stream ends or nobody sees the page any more,
+   * and returns then: a browser has six connections to a service, and people have more tabs than that.
+   */
   async function stream(path, { signal, last, on_event, on_open }) {
+    if (document.hidden) await seen_again(signal);
+    if (document.hidden || signal.aborted) return;
+    const unseen = new AbortController(), leave = () => unseen.abort(), look = () => document.hidden && leave();
+    signal.addEventListener("abort", leave);
+    addEventListener("pagehide", leave);
+    document.addEventListener("visibilitychange", look);
+    try {
+      await read_events(path, { signal: unseen.signal, last, on_event, on_open });
+    } catch (error) {
+      if (signal.aborted || !unseen.signal.aborted) throw error;
+    } finally {
+      signal.removeEventListener("abort", leave);
+      removeEventListener("pagehide", leave);
+      document.removeEventListener("visibilitychange", look);
+    }
+  }
+
+  async function read_events(path, { signal, last, on_event, on_open }) {
     const headers = { Accept: "text/event-stream", ...(last ? { "Last-Event-ID": last } : {}) };
     const response = await send(path, { headers, signal, cache: "no-store" });
     if (response.status === 204 || !response.body) return;
@@ -105,6 +128,21 @@ export function make_api({ token, ask }) {
       return response.status === 204 ? null : response.json();
     },
   };
+}
+
+/** Until the page is seen again, or some seconds have passed, or it is not wanted any more. */
+function seen_again(signal) {
+  return new Promise((resolve) => {
+    const timer = setTimeout(done, UNSEEN_MS);
+    function done() {
+      clearTimeout(timer);
+      document.removeEventListener("visibilitychange", done);
+      signal.removeEventListener("abort", done);
+      resolve();
+    }
+    document.addEventListener("visibilitychange", done);
+    signal.addEventListener("abort", done);
+  });
 }
 
 /** One block of an event stream (HTML, section 9.2.6); null: a comment. */

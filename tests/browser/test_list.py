@@ -65,6 +65,48 @@ def test_cancels_and_deletes(s, b):
     check(s.get(f"/v1/jobs/{job['id']}").status == 404, "it is still there")
 
 
+def test_every_cell_is_in_sight_at_any_width(s, b):
+    """From a phone to a desk: nothing is cut off at the right, the menu of a job least of all."""
+    s.post({**MATRICES, "name": "a name that is rather long", "tags": ["one tag", "another"]}, {"Prefer": "wait=20"})
+    for width in (390, 701, 760, 820, 960, 961, 1100, 1280):
+        b.size(width, 900, width < 700)
+        b.open(s)
+        b.wait(f"a row at {width}", "return document.querySelectorAll('.sizer .row').length === 1")
+        right, menu = b.run("""const row = document.querySelector('.sizer .row'), box = document.querySelector('.jobs').getBoundingClientRect();
+            return [Math.max(...[...row.children].filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect().right)) - box.right,
+                    row.querySelector('.menu-button').getBoundingClientRect().right - box.right]""")
+        check(right <= 0.5 and menu <= 0.5, width, right, menu)
+    b.size(1200, 900)
+
+
+def test_many_tabs_leave_connections_to_each_other(s, b):
+    """A browser has six to a service. Pages that are left, and tabs that are not seen, hold none; a job that is not
+    seen says in its title how it ends."""
+    job = s.post(ENDLESS).json
+    first = b.driver.current_window_handle
+    b.open(s, f"jobs/{job['id']}")
+    b.says(".title", "running")
+    for _ in range(8):
+        b.open(s)
+        has_rows(b, 1)
+    b.open(s, f"jobs/{job['id']}")
+    b.says(".title", "running")
+    tabs = []
+    for _ in range(8):
+        b.driver.switch_to.new_window("tab")
+        tabs.append(b.driver.current_window_handle)
+        b.open(s)
+        has_rows(b, 1)
+        b.says("#list-state", "live")
+    expect(s.request("DELETE", f"/v1/jobs/{job['id']}"), 200)
+    b.says(".sizer .row .status", "dismissed")
+    for tab in tabs:
+        b.driver.switch_to.window(tab)
+        b.driver.close()
+    b.driver.switch_to.window(first)
+    b.says(".title", "dismissed")
+
+
 def test_filters(s, b):
     s.solve({**SCENE, "tags": ["a", "b"]})
     s.solve({**SCENE, "tags": ["a"]})
