@@ -135,8 +135,8 @@ static bool check_limits(const codec_request *request, problem_details *problem)
 }
 
 /* What the solver would refuse a scene for, as far as that takes milliseconds: mesh, materials, supports, loads and
- * contacts, and motions that neither supports nor obstacles stop, but nothing of K. Whether loads press the body on what
- * would hold it is left to the run, and so are large meshes and the loads of cases but the first. */
+ * contacts, and motions that neither supports nor obstacles stop, but nothing of K. Whether loads press the body on
+ * what would hold it is left to the run, and so are large meshes and the loads of cases but the first. */
 static bool check_scene(const codec_request *request, problem_details *problem)
 {
     enum { MOST_NODES = 100000 };

@@ -922,7 +922,8 @@ static const struct {
     {"EQUATION", NULL, false, "equations between displacements are left out"},
     {"MPC", NULL, false, "constraints between displacements are left out"},
     {"TRANSFORM", NULL, false, "directions of nodes along other axes are left out: they are those of the file"},
-    {"CYCLIC SYMMETRY MODEL", NULL, false, "cyclic symmetry is left out; give the whole ring, or hold planes of symmetry"},
+    {"CYCLIC SYMMETRY MODEL", NULL, false,
+     "cyclic symmetry is left out; give the whole ring, or hold planes of symmetry"},
     {"PRE-TENSION SECTION", NULL, false, "the pretension is left out"},
     {"MODEL CHANGE", NULL, false, "contact pairs and elements are not taken away or added"},
 };
