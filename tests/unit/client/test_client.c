@@ -127,7 +127,7 @@ static const char *const REFUSED[][2] = {
     {"picture x --fields a", "does not take --fields"},
     {"upload", "FILE"},
     {"upload x --tag a", "does not take --tag"},
-    {"result x --format xml", "json, csv, npz, vtu or pvd"},
+    {"result x --format xml", "json, table, csv, npz, vtu or pvd"},
     {"submit a --progress", "--progress wants --wait"},
     {"submit a --wait --quiet --json", "contradict"},
     {"wait a --quiet --progress", "contradict"},
