@@ -70,6 +70,7 @@ const PATCH = {
       vec4 place = modelViewMatrix * vec4(position, 1.0);
       v_place = place.xyz;
       gl_Position = projectionMatrix * place;
+      gl_Position.z += 1e-3; // some thousandths of the body: facets of what is round dip into what touches it
     }`,
   fragmentShader: `
     uniform vec3 ink;
