@@ -226,13 +226,15 @@ static uz_status judge(bool *done, uz_run *run, uz_error *err)
     const uz_certificate *c = &run->answer.certificate;
     uz_work *work = &run->work;
     const bool next = work->end == UZ_END_NEXT;
+    uz_status status = UZ_OK;
     if (run->asked->settings->balanced && run->asked->setup->is_scene && !work->again && !next) {
         const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
-        uz_balance_request(&work->requested, &run->asked->setup->model, &scene, run->answer.u, run->load.prescribed,
-                           run->load.exponent);
+        status = uz_balance_request(&work->requested, &run->asked->setup->model, &scene, run->answer.u,
+                                    run->load.prescribed, run->load.exponent, err);
         work->target = work->requested;
     }
-    uz_status status = improve(run, err);
+    if (status == UZ_OK)
+        status = improve(run, err);
     *done = run->result->ray || c->relative_error <= work->requested || (work->end != UZ_END_TARGET && !next);
     work->again = !next;
     if (*done || next || !(work->it.best_relative <= work->target))

@@ -350,8 +350,10 @@ static uz_status run_rounds(uz_semi *s, uz_error *err)
         if (!settled && s->rounds % IMPATIENCE != 0)
             continue;
         if (s->settings->balanced && s->is_scene)
-            uz_balance_request(&s->requested, &s->model, &s->problem->scene, s->last->u, s->prescribed, 0);
-        status = try_exact(s, &done, err);
+            status =
+                uz_balance_request(&s->requested, &s->model, &s->problem->scene, s->last->u, s->prescribed, 0, err);
+        if (status == UZ_OK)
+            status = try_exact(s, &done, err);
         for (int64_t i = 0; status == UZ_OK && !done && i < s->m; i++)
             s->target[i] = s->of.h[i] - s->last->g[i];
     }

@@ -122,13 +122,13 @@ double uz_requested_error(const uz_settings *settings)
     return settings->relative_error > 0.0 ? settings->relative_error : UZ_EXACT_RELATIVE_ERROR;
 }
 
-void uz_balance_request(double *requested, const uz_body_model *model, const uz_scene *scene, const double *u,
-                        const double *prescribed, int exponent)
+uz_status uz_balance_request(double *requested, const uz_body_model *model, const uz_scene *scene, const double *u,
+                             const double *prescribed, int exponent, uz_error *err)
 {
     const int64_t count = model->mesh.n_nodes * model->mesh.dim;
     double *nodal = uz_alloc(count, sizeof *nodal);
     if (!nodal)
-        return;
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to look at what the mesh loses");
     uz_recover_nodal(nodal, model, u, prescribed);
     for (int64_t i = 0; exponent != 0 && i < count; i++)
         nodal[i] = ldexp(nodal[i], -exponent);
@@ -137,4 +137,5 @@ void uz_balance_request(double *requested, const uz_body_model *model, const uz_
     free(nodal);
     if (mesh > 0.0 && isfinite(mesh))
         *requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * mesh * share));
+    return UZ_OK;
 }

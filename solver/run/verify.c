@@ -106,8 +106,8 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
         status = uz_dual_load_create(&run->work.dual, setup->dual, uz_setup_K(setup, asked->problem), run->load.p,
                                      run->load.h, err);
     if (status == UZ_OK && asked->settings->balanced && setup->is_scene)
-        uz_balance_request(&run->work.requested, &setup->model, &asked->problem->scene, answer->u, run->load.prescribed,
-                           run->load.exponent);
+        status = uz_balance_request(&run->work.requested, &setup->model, &asked->problem->scene, answer->u,
+                                    run->load.prescribed, run->load.exponent, err);
     if (status == UZ_OK)
         status = uz_run_certify_input(&input, run, answer, err);
     if (status == UZ_OK)
