@@ -33,6 +33,8 @@
 /* Where rows are bounds an answer of the active set does not come from the base, which begins it: until D is applied it
  * stays as rough as that. So it is before anybody has said what it is for. */
 #define BASE_ROUGH 1e-3
+/* The same where few of the dofs have bounds: the first guess of the rows is no better than this anyway. */
+#define BASE_ROUGHER 1e-2
 #define FIRST_AIM  1e-10
 /* Share of a change of the response that an application of D may leave unsolved. */
 #define CHANGE_KEPT 0.01
@@ -72,6 +74,15 @@ enum { GUESSES_MOST = 40 };
 static bool may_hold(const free_load *x)
 {
     return x->sparse.box || (!x->cg.mg->kind->solve && !x->cg.mg->knows_K && x->guesses < GUESSES_MOST);
+}
+
+/* Where few of the dofs have bounds a step of the active set costs no more than sweeps over them all. */
+#define FEW_BOUNDS 0.125
+enum { REFUSED_MOST = 8 };
+
+static bool are_few(int64_t m, int64_t d)
+{
+    return (double)m < FEW_BOUNDS * (double)d;
 }
 
 static uz_cg_stop stop_at(const free_load *x, double relative, double absolute)
@@ -131,7 +142,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     x->base_slack = INFINITY;
     /* Where coarser grids tell which rows touch nothing needs a base until D is applied. */
     if (!x->cg.mg->kind->start || load->dual->m == 0 || !((const uz_sparse *)load->dual)->bounds.dof)
-        status = solve_base(x, BASE_ROUGH, err);
+        status = solve_base(x, load->dual->m > 0 && are_few(load->dual->m, d) ? BASE_ROUGHER : BASE_ROUGH, err);
     return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, err) : status;
 }
 
@@ -348,6 +359,9 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
 /* A guess by coarser grids is wrong in few rows. */
 #define STARTED_TOLERANCE 1e-3
 #define NEXT_TOLERANCE    0.1
+/* Nor better, where few dofs have bounds, than to this share of what the guess changes: the next one would change more
+ * than that. Plane bodies take more guesses above this share, solids none of 0.2. */
+#define GUESS_KEPT 0.05
 /* Of the aim: below this a solve is as good as exact; where lambda is a guess, which is rather too large, */
 #define ACTIVE_FLOOR  0.5
 #define GUESSED_FLOOR 0.1
@@ -393,6 +407,8 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
         uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : tolerance * root, tolerance * norm * root);
         uz_cg_info info;
         stop.unchecked = tolerance >= NO_DRIFT;
+        if (tolerance > least && are_few(m, d))
+            stop.relative = fmax(stop.relative, GUESS_KEPT);
         stop.begun = true;
         for (int64_t j = 0; j < d; j++)
             cg->r[j] = -box->force[j];
@@ -431,7 +447,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
 /* From x->u, which obeys the rows, to K u = p + N'r on them: u, r, g, and e = K u - p - N'r in cg->z. *right: no row is
  * seen to be wrong. */
 static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, double *g, const bool *active,
-                                 double tolerance, double norm, uz_error *err)
+                                 double tolerance, bool guessed, double norm, uz_error *err)
 {
     uz_dual_load *load = &x->sparse.load;
     const uz_dual *dual = load->dual;
@@ -442,6 +458,8 @@ static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, 
     double largest = 0.0, *e = x->cg.z;
     cg.mg = uz_projected_multigrid(part);
     stop.unchecked = tolerance >= NO_DRIFT;
+    if (guessed)
+        stop.relative = fmax(stop.relative, GUESS_KEPT);
     memcpy(x->right, x->sparse.p, (size_t)dual->d * sizeof *x->sparse.p);
     uz_csc_gaxpy_t(x->right, &dual->N, 1.0, x->r); /* what the rows are known to bear is no residual */
     uz_status status = uz_cg_solve(&info, x->u, &cg, load->K, x->right, &stop, err);
@@ -492,7 +510,7 @@ static uz_status solve_rows(free_load *x, bool *solved, double *g, const bool *a
     for (bool right = true; status == UZ_OK && right; tolerance = least) {
         uz_sparse_multiply(load, x->cg.z, x->u);
         const double norm = fmin(uz_root(uz_dot(dual->d, x->u, x->cg.z)), most > 0.0 ? most : INFINITY);
-        status = solve_projected(x, part, &right, g, active, tolerance, norm, err);
+        status = solve_projected(x, part, &right, g, active, tolerance, tolerance > least, norm, err);
         right = right && tolerance > least;
     }
     if (status == UZ_OK)
@@ -543,15 +561,6 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     x->sparse.known_r = status == UZ_OK ? box->r : NULL;
     *end = status == UZ_OK ? UZ_ACTIVE_SOLVED : UZ_ACTIVE_UNSOLVED;
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
-}
-
-/* Where few of the dofs have bounds a step of the active set costs no more than sweeps over them all. */
-#define FEW_BOUNDS 0.125
-enum { REFUSED_MOST = 8 };
-
-static bool are_few(int64_t m, int64_t d)
-{
-    return (double)m < FEW_BOUNDS * (double)d;
 }
 
 /* The first guess is that of coarser grids, with the displacement that it begins at; there is no other. */
