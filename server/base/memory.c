@@ -87,6 +87,12 @@ void memory_keep_heap(void)
     mallopt(M_TRIM_THRESHOLD, INT_MAX);
 }
 
+size_t memory_for_cache(size_t available)
+{
+    const size_t least = (size_t)1 << 30, share = available / 6;
+    return share > least ? share : least;
+}
+
 size_t memory_share(size_t available, size_t cache, int workers)
 {
     size_t least = (size_t)64 << 20, most = available / 5 * 4, share = 0;

@@ -15,6 +15,9 @@ int processors_available(void);
  */
 void memory_keep_heap(void);
 
+/* What is kept of bodies: a sixth of all, so that the first of two processes, which has half of it, keeps a solid of a
+ * twentieth of all; at least 1 GB. */
+size_t memory_for_cache(size_t available);
 /* What one of `workers` solves may take: 80 % of all, less the cache, divided; at least 64 MB. */
 size_t memory_share(size_t available, size_t cache, int workers);
 

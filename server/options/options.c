@@ -194,6 +194,8 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
                               strncmp(out->listen, "localhost:", 10) == 0;
         out->max_client_connections = loopback ? 0 : 1 + out->max_connections / 4;
     }
+    if (out->cache == 0)
+        out->cache = memory_for_cache(memory_available());
     if (out->memory == 0)
         out->memory = memory_share(memory_available(), out->cache, out->workers);
     if (backup)

@@ -79,8 +79,9 @@ static const uz_option ROWS[] = {
         "threads", INTEGER, threads, .value = "N", .most = 1024, .normal = "0", .unit = "threads", .zero_is_off = true,
         .about = "of one solve, at most, where processors are idle, which jobs that run share out evenly; 0: all of "
                  "them"),
-    SETTING("cache", BYTES, cache, .value = "BYTES", .least = 1, .normal = "1G", .unit = "bytes",
-            .about = "memory for factors that are kept; a quarter of it lies ready for the next one"),
+    SETTING("cache", BYTES, cache, .value = "BYTES", .least = 1,
+            .otherwise = "a sixth of what the machine or its control group has, at least 1G", .unit = "bytes",
+            .about = "memory for bodies that are kept; a quarter of it, at most 256M, lies ready for the next one"),
     SETTING("memory", BYTES, memory, .value = "BYTES", .least = 1,
             .otherwise = "80 % of what the machine or its control group has, less the cache, divided by the workers",
             .unit = "bytes", .about = "memory that one problem may take"),

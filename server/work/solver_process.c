@@ -271,6 +271,12 @@ static void run_job(solver *s, const packet *m)
 
 /* ---- between jobs */
 
+static size_t reserve_share(size_t cache_bytes)
+{
+    const size_t share = cache_bytes / RESERVE_SHARE;
+    return share < RESERVE_MOST ? share : RESERVE_MOST;
+}
+
 /* Memory for the next body is touched while nobody waits for it, and given back when no job has run for long. What is
  * freed stays in the heap (memory_keep_heap): where much lies free there, all of it goes back to the system; where
  * little and a body may come, so much is touched now, in huge pages. Returns the milliseconds until it is to be done
@@ -286,7 +292,7 @@ static int make_ready(solver *s)
     while (poll(&socket, 1, 0) == 0 && uz_reserve_fill(s->reserve))
         ;
     const bool large = uz_reserve_bytes(s->reserve) > 0; /* bodies are solved here */
-    const size_t share = s->cache_bytes / 8, least = large ? share : 0;
+    const size_t share = reserve_share(s->cache_bytes) / 2, least = large ? share : 0;
     const struct mallinfo2 heap = mallinfo2();
     const bool known = heap.uordblks > 0; /* else it is another allocator, which tells nothing */
     void *block = NULL;
@@ -374,7 +380,7 @@ int solver_process(int argc, char **argv)
         return 2;
     }
     s.cache_bytes = (size_t)strtoull(argv[3], NULL, 10);
-    const size_t solve_bytes = (size_t)strtoull(argv[4], NULL, 10), reserved = s.cache_bytes / RESERVE_SHARE;
+    const size_t solve_bytes = (size_t)strtoull(argv[4], NULL, 10), reserved = reserve_share(s.cache_bytes);
     memory_keep_heap();
     uz_process_init(1);
     uz_thread_init();

@@ -10,8 +10,9 @@ enum { SOLVER_ARGUMENTS = 5 };
 /* What it is started with. */
 enum { SOLVER_SOCKET = 3, SOLVER_BOARD, SOLVER_INBOX, SOLVER_OUTBOX };
 
-/* Of the cache's bytes one part in so many is the reserve's: memory that lies ready for the next factor. */
-enum { RESERVE_SHARE = 4 };
+/* Of the cache's bytes one part in so many, up to a limit, is the reserve's: memory that lies ready for the next
+ * factor. */
+enum { RESERVE_SHARE = 4, RESERVE_MOST = 256 << 20 };
 
 /* Its exit status where the group of processes that it solved with was lost: with it goes all that was made. */
 enum { SOLVER_GROUP_LOST = 3 };
