@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { ROWS_MOST = 6 };
+
 /* Columns of A P for each node, ascending. */
 typedef struct {
     int64_t *ptr;    /* nodes + 1 */
@@ -136,20 +138,60 @@ typedef struct {
     int32_t first, end; /* aggregates */
 } product;
 
+typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
+
+/* Rows of A P have room for so many numbers each, read and written four at a time: what follows the k is anything. */
+static inline int width_of(int k)
+{
+    return k > 4 ? 8 : 4;
+}
+
 /* to += block P_j, a column of blocks after the other; or with the block transposed. */
 static inline __attribute__((always_inline)) void add_product(const product *x, const double *A, bool transposed,
                                                               int64_t j, int b, int k)
 {
     const uz_level *level = x->level;
+    const int width = width_of(k);
     for (int64_t e = level->ptr[j]; e < level->ptr[j + 1]; e++) {
-        double *to = x->row + (int64_t)x->place[level->block[e]] * b * k;
-        const float *P = level->value + e * b * k;
-        for (int s = 0; s < b; s++)
+        double *to = x->row + (int64_t)x->place[level->block[e]] * b * width;
+        for (int q = 0; q < width; q += 4) {
+            const float *P = level->value + e * b * k + q;
+            four row[ROWS_MOST];
+            for (int s = 0; s < b; s++)
+                row[s] = __builtin_convertvector(*(const four_floats *)(P + s * k), four);
             for (int r = 0; r < b; r++) {
-                const double factor = transposed ? A[s * b + r] : A[r * b + s];
-                for (int c = 0; c < k; c++)
-                    to[r * k + c] += factor * (double)P[s * k + c];
+                four sum = *(const four *)(to + r * width + q);
+                for (int s = 0; s < b; s++)
+                    sum += (transposed ? A[s * b + r] : A[r * b + s]) * row[s];
+                *(four *)(to + r * width + q) = sum;
             }
+        }
+    }
+}
+
+/* to (k x k) += (rows of P)' rows of A P. */
+static inline __attribute__((always_inline)) void add_block(double *to, const float *P, const double *row, int b, int k)
+{
+    const int width = width_of(k);
+    for (int p = 0; p < k; p++) {
+        int c = 0;
+        for (; c + 4 <= k; c += 4) {
+            four sum = *(const four *)(to + p * k + c);
+            for (int r = 0; r < b; r++)
+                sum += (double)P[r * k + p] * *(const four *)(row + r * width + c);
+            *(four *)(to + p * k + c) = sum;
+        }
+        for (; c + 2 <= k; c += 2) {
+            two sum = *(const two *)(to + p * k + c);
+            for (int r = 0; r < b; r++)
+                sum += (double)P[r * k + p] * *(const two *)(row + r * width + c);
+            *(two *)(to + p * k + c) = sum;
+        }
+        for (; c < k; c++)
+            for (int r = 0; r < b; r++)
+                to[p * k + c] += (double)P[r * k + p] * row[r * width + c];
     }
 }
 
@@ -168,7 +210,7 @@ static inline __attribute__((always_inline)) void add_node(const product *x, int
         return;
     for (int64_t s = 0; s < count; s++)
         x->place[column[s]] = (int32_t)s;
-    memset(x->row, 0, (size_t)(count * b * k) * sizeof *x->row);
+    memset(x->row, 0, (size_t)(count * b * width_of(k)) * sizeof *x->row);
     add_product(x, A->diag + i * square, false, i, b, k);
     for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
         add_product(x, A->off + e * square, false, A->idx[e], b, k);
@@ -180,11 +222,7 @@ static inline __attribute__((always_inline)) void add_node(const product *x, int
         for (int64_t s = 0; s < count && column[s] <= a; s++) {
             double *to = column[s] == a ? x->coarse->diag + (int64_t)a * k * k
                                         : x->coarse->off + uz_blocks_find(x->coarse, a, column[s]) * k * k;
-            const double *row = x->row + s * b * k;
-            for (int p = 0; p < k; p++)
-                for (int r = 0; r < b; r++)
-                    for (int c = 0; c < k; c++)
-                        to[p * k + c] += (double)P[r * k + p] * row[r * k + c];
+            add_block(to, P, x->row + s * b * width_of(k), b, k);
         }
     }
 }
@@ -291,7 +329,7 @@ uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *
         int32_t *idx = uz_realloc(coarse->idx, coarse->ptr[aggregates], sizeof *idx);
         coarse->idx = idx ? idx : coarse->idx;
         for (int part = 0; part < n.parts; part++)
-            ok = (n.of[part].row = uz_alloc(longest * level->A.b * k, sizeof(double))) && ok;
+            ok = (n.of[part].row = uz_alloc(longest * level->A.b * width_of(k), sizeof(double))) && ok;
         coarse->off = uz_alloc_zero(coarse->ptr[aggregates] * k * k + 4, sizeof *coarse->off);
         coarse->diag = uz_alloc_zero(aggregates * k * k + 4, sizeof *coarse->diag);
         ok = ok && coarse->off && coarse->diag;
