@@ -26,7 +26,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STEPS_MOST = 3000, CHECK_EVERY = 4, POWERS = 4 };
+enum { STEPS_MOST = 3000, CHECK_EVERY = 4, POWERS = 3 };
 
 /* 0.8 times this is 1e-12. */
 #define LEAST_SHARE 1.25e-12
@@ -81,9 +81,22 @@ static void random_residual(uz_cg *cg, const uz_csc *K)
 /* M is K but for rounding where there is one level only, and steps are cheap. */
 #define NEAR_ONE 0.9
 
-/* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. patience: uz_amg_of. */
-static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, const uz_csc *K, int patience,
-                             const uz_hooks *hooks, uz_error *err)
+/* power = D z / ||D^1/2 z||, D = diag(K). Returns that norm. */
+static double begin_power(double *power, const double *z, const uz_csc *K)
+{
+    double square = 0.0;
+    for (int64_t j = 0; j < K->cols; j++)
+        square += K->val[K->ptr[j]] * z[j] * z[j];
+    const double norm = sqrt(square);
+    for (int64_t j = 0; j < K->cols; j++)
+        power[j] = K->val[K->ptr[j]] * z[j] / norm;
+    return norm;
+}
+
+/* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. patience: uz_amg_of. power (n): the first one of
+ * find_rcond, which begins with the same residual. */
+static uz_status bound_below(uz_amg_info *info, coefficients *c, double *power, uz_cg *cg, const uz_csc *K,
+                             int patience, const uz_hooks *hooks, uz_error *err)
 {
     const int most = patience > 0 && patience < STEPS_MOST ? patience : STEPS_MOST;
     double share = LEAST_SHARE / sqrt(cg->mg->most), before = 0.0;
@@ -91,6 +104,7 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
     random_residual(cg, K);
     uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
     double square = uz_long_dot(cg->n, cg->r, cg->z);
+    (void)begin_power(power, cg->z, K);
     memcpy(cg->p, cg->z, (size_t)cg->n * sizeof *cg->p);
     for (c->count = 0; status == UZ_OK && c->count < most && square > 0.0;) {
         if (uz_cancelled(hooks))
@@ -131,22 +145,15 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
 /* Below this rounding of the entries of K alone makes or unmakes a digit of lambda_min(D^-1 K). */
 #define RCOND_LEAST DBL_EPSILON
 
-/* info->rcond: lambda over lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), by powers: some per cent too small. */
-static uz_status find_rcond(uz_amg_info *info, uz_cg *cg, const uz_csc *K, uz_error *err)
+/* info->rcond: lambda over lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), which powers, the first of them given, find up to
+ * a tenth too small. */
+static uz_status find_rcond(uz_amg_info *info, double *power, uz_cg *cg, const uz_csc *K, uz_error *err)
 {
     double most = INFINITY;
     uz_status status = UZ_OK;
-    random_residual(cg, K);
-    for (int power = 0; status == UZ_OK && power < POWERS; power++) {
-        status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
-        double square = 0.0;
-        for (int64_t j = 0; j < cg->n; j++) {
-            double scaled = sqrt(K->val[K->ptr[j]]) * cg->z[j];
-            square += scaled * scaled;
-        }
-        most = sqrt(square);
-        for (int64_t j = 0; j < cg->n; j++)
-            cg->r[j] = K->val[K->ptr[j]] * cg->z[j] / most;
+    for (int k = 1; status == UZ_OK && k < POWERS; k++) {
+        status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, power, err);
+        most = begin_power(power, cg->z, K);
     }
     if (status != UZ_OK)
         return status;
@@ -165,19 +172,21 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patienc
     const double start = uz_seconds();
     uz_amg *amg = uz_alloc_zero(1, sizeof *amg);
     coefficients *c = uz_alloc_zero(1, sizeof *c);
+    double *power = uz_alloc(mg->n, sizeof *power);
     uz_cg cg = {0};
     *out = NULL;
     uz_status status =
-        amg && c ? uz_cg_init(&cg, mg, err) : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
+        amg && c && power ? uz_cg_init(&cg, mg, err) : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
     if (status == UZ_OK) {
         amg->info.levels = mg->levels;
         amg->info.bytes = mg->bytes;
-        status = bound_below(&amg->info, c, &cg, K, patience, hooks, err);
+        status = bound_below(&amg->info, c, power, &cg, K, patience, hooks, err);
     }
     if (status == UZ_OK)
-        status = find_rcond(&amg->info, &cg, K, err);
+        status = find_rcond(&amg->info, power, &cg, K, err);
     uz_cg_clear(&cg);
     free(c);
+    free(power);
     if (status == UZ_OK) {
         amg->mg = mg;
         amg->info.spectrum_s = uz_seconds() - start;
