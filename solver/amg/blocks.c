@@ -130,8 +130,9 @@ static bool number_slots(uz_aggregates *mg, int32_t *node_of_group, const uz_csc
         A->b = places[group] > A->b ? places[group] : A->b;
     }
     const bool ok = !parted || number_by_parts(A, node_of_group, K, modes);
+    mg->shift = uz_width(A->b) == 8 ? 3 : 2;
     for (int64_t j = 0; ok && j < mg->base.n; j++)
-        mg->slot[j] += (int64_t)node_of_group[modes->node[j]] * A->b;
+        mg->slot[j] += (int64_t)node_of_group[modes->node[j]] << mg->shift;
     free(places);
     return ok;
 }
@@ -154,9 +155,9 @@ static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
         for (int64_t i = 0; i < A->nodes; i++)
             seen[i] = -1;
         for (int64_t j = 0; j < K->cols; j++) {
-            const int32_t J = (int32_t)(mg->slot[j] / A->b);
+            const int32_t J = (int32_t)uz_slot_node(mg, mg->slot[j]);
             for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
-                const int32_t I = (int32_t)(mg->slot[K->idx[q]] / A->b);
+                const int32_t I = (int32_t)uz_slot_node(mg, mg->slot[K->idx[q]]);
                 if (I == J || seen[I] == J)
                     continue;
                 seen[I] = J;
@@ -214,10 +215,10 @@ static uz_status fill(uz_aggregates *mg, const uz_csc *K, uz_error *err)
     uz_blocks *A = &mg->level[0].A;
     const int b = A->b;
     for (int64_t j = 0; j < K->cols; j++) {
-        const int64_t J = mg->slot[j] / b, c = mg->slot[j] % b;
+        const int64_t J = uz_slot_node(mg, mg->slot[j]), c = uz_slot_place(mg, mg->slot[j]);
         int64_t known = -1, at = 0; /* the place of the block of the last row */
         for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
-            const int64_t i = K->idx[q], I = mg->slot[i] / b, r = mg->slot[i] % b;
+            const int64_t i = K->idx[q], I = uz_slot_node(mg, mg->slot[i]), r = uz_slot_place(mg, mg->slot[i]);
             const double value = mg->scale[i] * K->val[q] * mg->scale[j];
             if (!(fabs(value) <= ENTRY_MOST))
                 return uz_fail(err, UZ_ERR_NOT_SPD, "K",

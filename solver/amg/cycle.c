@@ -330,21 +330,22 @@ typedef struct {
 static void read_dofs(void *ctx, int64_t begin, int64_t end)
 {
     const passage *p = ctx;
-    const int b = p->mg->level[0].A.b, width = uz_width(b);
-    for (int64_t j = begin; j < end; j++) {
-        const int64_t s = p->mg->slot[j];
-        p->level[s / b * width + s % b] = (float)(p->mg->scale[j] * p->from[j] / p->unit);
-    }
+    const double *restrict scale = p->mg->scale, *restrict from = p->from, unit = p->unit;
+    const int64_t *restrict slot = p->mg->slot;
+    float *restrict level = p->level;
+    for (int64_t j = begin; j < end; j++)
+        level[slot[j]] = (float)(scale[j] * from[j] / unit);
 }
 
 static void write_dofs(void *ctx, int64_t begin, int64_t end)
 {
     const passage *p = ctx;
-    const int b = p->mg->level[0].A.b, width = uz_width(b);
-    for (int64_t j = begin; j < end; j++) {
-        const int64_t s = p->mg->slot[j];
-        p->to[j] = p->mg->scale[j] * (double)p->level[s / b * width + s % b] * p->unit;
-    }
+    const double *restrict scale = p->mg->scale, unit = p->unit;
+    const int64_t *restrict slot = p->mg->slot;
+    const float *restrict level = p->level;
+    double *restrict to = p->to;
+    for (int64_t j = begin; j < end; j++)
+        to[j] = scale[j] * (double)level[slot[j]] * unit;
 }
 
 static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
@@ -357,8 +358,10 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
         return apply_alone(mg, room, z, r, err);
     /* by the power of two above the largest, single precision holds them all */
     double largest = 0.0;
-    for (int64_t j = 0; j < base->n; j++)
-        largest = fmax(largest, fabs(mg->scale[j] * r[j]));
+    for (int64_t j = 0; j < base->n; j++) {
+        const double size = fabs(mg->scale[j] * r[j]);
+        largest = size > largest ? size : largest;
+    }
     if (!(largest > 0.0) || isinf(largest)) {
         for (int64_t j = 0; j < base->n; j++)
             z[j] = largest > 0.0 ? NAN : 0.0;
@@ -385,17 +388,16 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
 static void multiply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
-    const int b = mg->level[0].A.b;
     if (base->levels == 1) {
         memset(y, 0, (size_t)base->n * sizeof *y);
         uz_csc_symv(y, K, 1.0, x);
         return;
     }
     for (int64_t j = 0; j < base->n; j++)
-        room->from[mg->slot[j] / b * 4 + mg->slot[j] % b] = x[j] / mg->scale[j];
+        room->from[mg->slot[j]] = x[j] / mg->scale[j];
     uz_blocks_multiply(room->to, &mg->level[0].A, room->from);
     for (int64_t j = 0; j < base->n; j++)
-        y[j] = room->to[mg->slot[j] / b * 4 + mg->slot[j] % b] / mg->scale[j];
+        y[j] = room->to[mg->slot[j]] / mg->scale[j];
 }
 
 static void free_room(uz_multigrid_room *room)

@@ -247,9 +247,10 @@ uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blo
     const int b = level->A.b;
     size_t bytes = 0;
     for (int64_t j = 0; j < base->n; j++) /* slots are numbered as dofs are: see there */
-        for (int64_t e = level->A.ptr[mg->slot[j] / b] - 1; e < level->A.ptr[mg->slot[j] / b + 1]; e++) {
-            const int64_t i = mg->slot[j] / b, c = e < level->A.ptr[i] ? i : level->A.idx[e];
-            double *row = (c == i ? loss->diag + i * b * b : loss->off + e * b * b) + mg->slot[j] % b * b;
+        for (int64_t i = uz_slot_node(mg, mg->slot[j]), e = level->A.ptr[i] - 1; e < level->A.ptr[i + 1]; e++) {
+            const int64_t c = e < level->A.ptr[i] ? i : level->A.idx[e];
+            double *row =
+                (c == i ? loss->diag + i * b * b : loss->off + e * b * b) + uz_slot_place(mg, mg->slot[j]) * b;
             for (int q = 0; q < b; q++)
                 row[q] *= mg->scale[j] * mg->scale[c * b + q];
         }
@@ -269,7 +270,7 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
         inverse[j] = finest->inverse[j];
     for (int64_t j = 0; inverse && j < mg->base.n; j++)
         if (held[j])
-            inverse[mg->slot[j]] = 0.0F;
+            inverse[uz_slot_node(mg, mg->slot[j]) * finest->A.b + uz_slot_place(mg, mg->slot[j])] = 0.0F;
     *bytes += 4 * (size_t)slots;
     if (status == UZ_OK && !init_loss(&loss, &mg->level[1])) {
         free(loss.off);

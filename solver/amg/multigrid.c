@@ -58,31 +58,44 @@ uz_status uz_level_round(uz_level *level, uz_error *err)
     return UZ_OK;
 }
 
+/* y = A x, vectors with `width` numbers for each node, the surplus ones 0: four where uz_blocks_multiply takes them. */
+static void multiply(double *y, const uz_blocks *A, const double *x, int width)
+{
+    const int b = A->b;
+    const int64_t size = (int64_t)b * b;
+    if (width == 4) {
+        uz_blocks_multiply(y, A, x);
+        return;
+    }
+    memset(y, 0, (size_t)(A->nodes * width) * sizeof *y);
+    for (int64_t i = 0; i < A->nodes; i++)
+        for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
+            const bool own = e < A->ptr[i];
+            const double *block = own ? A->diag + i * size : A->off + e * size;
+            const int64_t j = own ? i : A->idx[e];
+            for (int r = 0; r < b; r++)
+                for (int c = 0; c < b; c++) {
+                    y[i * width + r] += block[r * b + c] * x[j * width + c];
+                    y[j * width + c] += own ? 0.0 : block[r * b + c] * x[i * width + r];
+                }
+        }
+}
+
 uz_status uz_level_range(double *range, const uz_level *level, uz_error *err)
 {
     const uz_blocks *A = &level->A;
-    const int b = A->b;
-    const int64_t n = A->nodes * b, size = (int64_t)b * b;
-    double *x = uz_alloc(n, sizeof *x), *y = uz_alloc(n, sizeof *y);
+    const int b = A->b, width = b <= 3 ? 4 : b;
+    const int64_t n = A->nodes * width;
+    double *x = uz_alloc_zero(n, sizeof *x), *y = uz_alloc(n, sizeof *y);
     uint64_t state = 1;
     *range = 1.0;
-    for (int64_t i = 0; x && i < n; i++)
-        x[i] = level->inverse[i] > 0.0F ? uz_uniform(&state) - 0.5 : 0.0;
+    for (int64_t i = 0; x && i < A->nodes * b; i++)
+        x[i / b * width + i % b] = level->inverse[i] > 0.0F ? uz_uniform(&state) - 0.5 : 0.0;
     for (int step = 0; x && y && step < POWER_STEPS; step++) {
-        memset(y, 0, (size_t)n * sizeof *y);
+        multiply(y, A, x, width);
         for (int64_t i = 0; i < A->nodes; i++)
-            for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
-                const bool own = e < A->ptr[i];
-                const double *block = own ? A->diag + i * size : A->off + e * size;
-                const int64_t j = own ? i : A->idx[e];
-                for (int r = 0; r < b; r++)
-                    for (int c = 0; c < b; c++) {
-                        y[i * b + r] += block[r * b + c] * x[j * b + c];
-                        y[j * b + c] += own ? 0.0 : block[r * b + c] * x[i * b + r];
-                    }
-            }
-        for (int64_t i = 0; i < n; i++)
-            y[i] *= (double)level->inverse[i];
+            for (int r = 0; r < width; r++)
+                y[i * width + r] *= r < b ? (double)level->inverse[i * b + r] : 0.0;
         const double before = uz_norm(n, x), after = uz_norm(n, y);
         *range = before > 0.0 && after > 0.0 ? 1.1 * (after / before) : 1.0;
         if (!(before > 0.0) || !(after > 0.0))
@@ -152,21 +165,26 @@ static size_t count_bytes(const uz_aggregates *mg)
  * root of its largest row sum times its largest column sum. In any order of the dofs: all of K's entries count. */
 static uz_status bound_by_diagonal(double *bound, const uz_csc *K, uz_error *err)
 {
-    double most = 0.0, *row = uz_alloc_zero(K->cols, sizeof *row);
-    if (!row)
-        return fail_memory(K->cols, err);
-    for (int64_t j = 0; j < K->cols; j++)
+    double most = 0.0, *row = uz_alloc_zero(K->cols, sizeof *row), *root = uz_alloc(K->cols, sizeof *root);
+    const bool ok = row && root;
+    for (int64_t j = 0; ok && j < K->cols; j++)
+        root[j] = sqrt(K->val[K->ptr[j]]);
+    for (int64_t j = 0; ok && j < K->cols; j++) {
+        double own = 0.0;
         for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
             const int64_t i = K->idx[k];
-            const double scaled = fabs(K->val[k]) / sqrt(K->val[K->ptr[j]]) / sqrt(K->val[K->ptr[i]]);
-            row[j] += scaled;
+            const double scaled = fabs(K->val[k]) / root[j] / root[i];
+            own += scaled;
             row[i] += scaled;
         }
-    for (int64_t j = 0; j < K->cols; j++)
+        row[j] += own;
+    }
+    for (int64_t j = 0; ok && j < K->cols; j++)
         most = fmax(most, row[j]);
     *bound = (1.0 + most) * (1.0 + most);
     free(row);
-    return UZ_OK;
+    free(root);
+    return ok ? UZ_OK : fail_memory(K->cols, err);
 }
 
 uz_status uz_factor_coarsest(uz_factor **out, const uz_csc *A, size_t memory_limit, const uz_hooks *hooks,
@@ -205,13 +223,16 @@ static uz_status factor_last(uz_aggregates *mg, const uz_csc *K, size_t memory_l
 static float *scale_modes(const uz_aggregates *mg, const uz_modes *modes)
 {
     const int k = mg->k;
-    float *scaled = uz_alloc_zero(mg->level[0].A.nodes * mg->level[0].A.b * k, sizeof *scaled);
+    const int b = mg->level[0].A.b;
+    float *scaled = uz_alloc_zero(mg->level[0].A.nodes * b * k, sizeof *scaled);
     double least = INFINITY;
     for (int64_t j = 0; j < mg->base.n; j++)
         least = fmin(least, mg->scale[j]);
-    for (int64_t j = 0; scaled && j < mg->base.n; j++)
+    for (int64_t j = 0; scaled && j < mg->base.n; j++) {
+        float *to = scaled + (uz_slot_node(mg, mg->slot[j]) * b + uz_slot_place(mg, mg->slot[j])) * k;
         for (int c = 0; c < k; c++)
-            scaled[mg->slot[j] * k + c] = (float)(least / mg->scale[j] * (double)modes->value[j * k + c]);
+            to[c] = (float)(least / mg->scale[j] * (double)modes->value[j * k + c]);
+    }
     return scaled;
 }
 

@@ -55,11 +55,21 @@ enum { UZ_LEVELS_MOST = 24 };
 typedef struct {
     uz_multigrid base;
     int k;
-    int64_t *slot;                  /* n: where each dof stands: node x b + place */
+    int shift;
+    int64_t *slot;                  /* n: where each dof stands in vectors of level 0: node x 2^shift + place */
     double *scale;                  /* n: S */
     uz_level level[UZ_LEVELS_MOST]; /* the last one has no prolongation; one level only: K itself, none is filled */
     uz_factor *coarsest;
 } uz_aggregates;
+/* Of a slot; without a division, as each entry of K asks. */
+static inline int64_t uz_slot_node(const uz_aggregates *mg, int64_t slot)
+{
+    return slot >> mg->shift;
+}
+static inline int64_t uz_slot_place(const uz_aggregates *mg, int64_t slot)
+{
+    return slot & (((int64_t)1 << mg->shift) - 1);
+}
 extern const uz_multigrid_kind uz_aggregates_kind;
 
 /* One thread's. Levels of its own where dofs are held: off, diag and inverse of each, or NULL for those that are the

@@ -496,13 +496,14 @@ static void half_of(uz_blocks *half, const pair *p)
     half->diag = calloc((size_t)(A->nodes * b * b + 4), sizeof *half->diag);
     for (int64_t j = 0; j < p->K.cols; j++)
         for (int64_t k = p->K.ptr[j]; k < p->K.ptr[j + 1]; k++) {
-            const int64_t s = mg->slot[j], t = mg->slot[p->K.idx[k]], I = s / b, J = t / b;
+            const int64_t s = mg->slot[j], t = mg->slot[p->K.idx[k]], I = uz_slot_node(mg, s), J = uz_slot_node(mg, t);
+            const int64_t r = uz_slot_place(mg, s), c = uz_slot_place(mg, t);
             const double value = 0.5 * p->K.val[k];
             if (I == J) {
-                half->diag[I * b * b + s % b * b + t % b] = half->diag[I * b * b + t % b * b + s % b] = value;
+                half->diag[I * b * b + r * b + c] = half->diag[I * b * b + c * b + r] = value;
             } else {
                 const int64_t at = I > J ? uz_blocks_find(A, I, (int32_t)J) : uz_blocks_find(A, J, (int32_t)I);
-                half->off[at * b * b + (I > J ? s % b * b + t % b : t % b * b + s % b)] = value;
+                half->off[at * b * b + (I > J ? r * b + c : c * b + r)] = value;
             }
         }
 }
