@@ -611,9 +611,9 @@ static bool guess_active(uz_dual_load *load, bool *active)
 typedef struct {
     double passes, numbers, create, step, guess;
 } cycle_costs;
-static const cycle_costs PLANE = {6.5, 0.0, 50.0, 11.0, 22.0}, SOLID = {1.8, 66.0, 40.0, 8.0, 26.0};
-#define SPECTRUM_CYCLES 38.0
-#define SOLVE_CYCLES    10.0
+static const cycle_costs PLANE = {6.5, 0.0, 50.0, 11.0, 22.0}, SOLID = {1.8, 66.0, 31.0, 5.5, 26.0};
+#define SPECTRUM_CYCLES 36.0
+#define SOLVE_CYCLES    9.0
 #define STEPS           6.0
 #define SWEPT_CYCLES    30.0
 #define CHANGE_CYCLES   6.0
