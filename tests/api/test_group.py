@@ -186,7 +186,8 @@ def test_dismissed(s):
 def test_a_group_that_nobody_needs(s):
     """It is started while the body is assembled: of a scene that is refused then nothing stays, and the next is solved."""
     free = by("distributed", CUBE)
-    free["problem"]["supports"] = [{"on": "back", "ux": 0}]
+    free["problem"]["supports"] = [{"on": "left", "ux": 0}, {"on": "top", "uy": 0}]
+    free["problem"]["loads"] = [{"on": "back", "traction": [0, 0, -1]}]  # away from the sphere: the solver finds it
     job = solve(s, free)
     check(job["status"] == "failed" and job["error"]["code"] == "free_body", job)
     wait_until(lambda: not processes(s), PATIENT_S)
