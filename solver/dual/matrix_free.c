@@ -35,7 +35,7 @@
 #define BASE_ROUGH 1e-3
 /* The same where few of the dofs have bounds: the first guess of the rows is no better than this anyway. */
 #define BASE_ROUGHER 1e-2
-#define FIRST_AIM  1e-10
+#define FIRST_AIM    1e-10
 /* Share of a change of the response that an application of D may leave unsolved. */
 #define CHANGE_KEPT 0.01
 /* The same where the iterations are to be those of the exact operator, and an aim for the floor. */

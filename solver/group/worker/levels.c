@@ -15,10 +15,13 @@
 
 void *new_zeros(int64_t count, size_t size)
 {
-    void *made = uz_alloc(count > 0 ? count : 1, size); /* on large pages */
-    if (!made)
+    count = count > 0 ? count : 1;
+    void *made = uz_alloc(count, size); /* on large pages */
+    if (made)
+        memset(made, 0, (size_t)count * size);
+    else
         end_group("no memory");
-    return memset(made, 0, (count > 0 ? (size_t)count : 1) * size);
+    return made;
 }
 
 static void must(uz_status status, const uz_error *err)
