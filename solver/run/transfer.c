@@ -107,6 +107,19 @@ uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_bo
     return UZ_OK;
 }
 
+/* What a state that is stored has besides its reactions: they are the best there are, and of D r nothing is known. */
+static bool complete(uz_state *state, int64_t m)
+{
+    double **others[] = {&state->rho, &state->best_r, &state->anchor, &state->Dr, &state->Drho};
+    for (int k = 0; k < 5; k++) {
+        if (!(*others[k] = uz_alloc_zero(m, sizeof(double))))
+            return false;
+        if (k < 3)
+            memcpy(*others[k], state->r, (size_t)m * sizeof *state->r);
+    }
+    return true;
+}
+
 uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, bool whole,
                          uz_error *err)
 {
@@ -141,13 +154,7 @@ uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_
     }
     free(row_at);
     free(next);
-    double **others[] = {&state->rho, &state->best_r, &state->anchor, &state->Dr, &state->Drho};
-    for (int k = 0; k < 5 && room && whole; k++) { /* of D r nothing is known */
-        room = (*others[k] = uz_alloc_zero(m, sizeof(double))) != NULL;
-        if (room && k < 3)
-            memcpy(*others[k], state->r, (size_t)m * sizeof *state->r);
-    }
-    if (!room) {
+    if (!room || (whole && !complete(state, m))) {
         uz_state_free(state);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from an answer with %lld contacts",
                        (long long)result->m);
