@@ -218,8 +218,8 @@ def test_client_tells_other_ends_first(s):
     report, done = report_of(s, stopped, code=7)
     check("uncertain" in done.stdout, done.stdout)
     check(len(names_of(report, "failure")) == 2, names_of(report, "failure"))
-    broken = {"problem": {**SCENE["problem"], "contacts": []}}
-    broken["problem"]["supports"] = [{"on": "left", "ux": 0}]
+    away = {"supports": [{"on": "left", "ux": 0}], "loads": [{"on": "top", "traction": [0, 1]}]}
+    broken = {"problem": {**SCENE["problem"], **away}}  # the solver finds out
     report, _ = report_of(s, broken, code=6)
     check(names_of(report, "error") == ["converged"], names_of(report))
 
