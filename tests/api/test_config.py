@@ -133,7 +133,7 @@ def test_the_sample_is_the_table(s):
     text = "".join(line[1:] if line.startswith("#") and not line.startswith("# ") else line
                    for line in sample.splitlines(True))
     default = effective(s)
-    computed = ("workers", "memory", "max-streams", "max-client-connections")
+    computed = ("workers", "cache", "memory", "max-streams", "max-client-connections")
     for name in computed:
         text = text.replace(f"\n{name} =\n", "\n\n")
     for name, (value, source) in effective(s, "--config", write(s, text)).items():

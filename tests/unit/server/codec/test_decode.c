@@ -37,6 +37,7 @@ static problem_details refuse(const char *body, int status, const char *code, co
 #define SCENE_HEAD                                                                                                     \
     "{\"problem\":{\"kind\":\"scene\",\"model\":\"plane_strain\",\"mesh\":{\"box\":{\"origin\":[-1,2.5],"              \
     "\"size\":[60,20],\"cells\":[30,10]}},\"materials\":[{\"on\":\"all\",\"young\":2e5,\"poisson\":0.3}]"
+#define HELD SCENE_HEAD ",\"supports\":[{\"on\":\"left\",\"ux\":0,\"uy\":0}]"
 
 TEST(scene)
 {
@@ -65,8 +66,8 @@ TEST(scene)
     CHECK(s->contacts[0].point[1] == 2 && s->contacts[0].normal[1] == 3);
     CHECK_STR(r.tags, "[\"a\",\"\xc3\xa9\"]");
     codec_request_clear(&r);
-    r = take(SCENE_HEAD "}}");
-    CHECK(r.problem.scene.thickness == 1 && r.problem.scene.n_supports == 0 && r.problem.scene.n_contacts == 0);
+    r = take(HELD "}}");
+    CHECK(r.problem.scene.thickness == 1 && r.problem.scene.n_loads == 0 && r.problem.scene.n_contacts == 0);
     CHECK_STR(r.tags, "[]");
     codec_request_clear(&r);
 }
@@ -90,7 +91,7 @@ TEST(beyond_the_schema)
 static uz_settings settings_of(const char *solver)
 {
     char body[1024];
-    snprintf(body, sizeof body, "%s},\"solver\":%s}", SCENE_HEAD, solver);
+    snprintf(body, sizeof body, "%s},\"solver\":%s}", HELD, solver);
     codec_request r = take(body);
     uz_settings s = r.settings;
     codec_request_clear(&r);
