@@ -18,7 +18,6 @@ import bounds  # noqa: after its place is known
 
 SHARED = True  # one service for all tests
 
-WAIT = {"Prefer": "wait=60"}
 LOWEST, HIGHEST = -3.96275665e-3, -3.96275643e-3  # the continuum's minimum for the paper's body lies between
 
 
@@ -30,7 +29,7 @@ def asked(accuracy, **changes):
 
 
 def summary_of(s, request):
-    job = expect(s.post(request, WAIT), 200).json
+    job = s.solve(request)
     check(job["status"] == "successful", job)
     return job["summary"]
 
