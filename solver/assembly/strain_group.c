@@ -8,11 +8,9 @@
 
 #include <stdlib.h>
 
-#define INLINE static inline __attribute__((always_inline))
-
 enum { LANES = UZ_STRAIN_LANES };
 
-INLINE void take_material(uz_strain_group *g, const uz_strain_source *from)
+UZ_INLINE void take_material(uz_strain_group *g, const uz_strain_source *from)
 {
     const uz_lame **lame = g->lame;
     g->general = false;
@@ -32,7 +30,7 @@ INLINE void take_material(uz_strain_group *g, const uz_strain_source *from)
 }
 
 /* Values (n_nodes x dim) at the nodes of the elements. */
-INLINE void gather(uz_lanes *out, const uz_strain_group *g, const double *value, int dim)
+UZ_INLINE void gather(uz_lanes *out, const uz_strain_group *g, const double *value, int dim)
 {
     for (int a = 0; a < g->rule.nodes; a++) {
         const double *const at[LANES] = {value + g->node[0][a] * dim, value + g->node[1][a] * dim,
@@ -61,7 +59,7 @@ static void strains_of_each(uz_strain_group *g, const uz_body_model *model)
     }
 }
 
-INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
+UZ_INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
 {
     const uz_mesh *mesh = &from->model->mesh;
     for (int l = 0; l < LANES; l++) {
@@ -90,7 +88,7 @@ INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
         strains_of_each(g, from->model);
 }
 
-INLINE void load_in_space(uz_strain_group *g, const uz_strain_source *from)
+UZ_INLINE void load_in_space(uz_strain_group *g, const uz_strain_source *from)
 {
     if (g->rule.dim == 2)
         load(g, from, 2);

@@ -4,15 +4,13 @@
 
 #include <string.h>
 
-#define INLINE static inline __attribute__((always_inline))
-
 enum { LANES = UZ_STRAIN_LANES, NODES = UZ_ELEMENT_NODES, MOST_ROW = 8, LINEAR = 4 };
 
 typedef int64_t lane_bits __attribute__((vector_size(8 * UZ_STRAIN_LANES), aligned(8)));
 
 /* ---- sums at nodes */
 
-INLINE void transpose(uz_lanes out[LANES], const uz_lanes in[LANES])
+UZ_INLINE void transpose(uz_lanes out[LANES], const uz_lanes in[LANES])
 {
     const uz_lanes low = __builtin_shufflevector(in[0], in[1], 0, 4, 2, 6),
                    high = __builtin_shufflevector(in[0], in[1], 1, 5, 3, 7),
@@ -25,8 +23,8 @@ INLINE void transpose(uz_lanes out[LANES], const uz_lanes in[LANES])
 }
 
 /* Adds one row for each lane at node a, or at all nodes where a < 0. */
-INLINE void add_rows(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
-                     const uz_lanes value[MOST_ROW], int a, int size)
+UZ_INLINE void add_rows(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                        const uz_lanes value[MOST_ROW], int a, int size)
 {
     const int from = a < 0 ? 0 : a, to = a < 0 ? g->rule.nodes : a + 1;
     for (int part = 0; part < size; part += LANES) {
@@ -39,8 +37,8 @@ INLINE void add_rows(double *rows, const uz_strain_group *g, const int64_t *cons
 }
 
 /* What the samples give to each node, with the element's volume as weight. */
-INLINE void add_shares(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
-                       const double share[][UZ_ELEMENT_SAMPLES], uz_lanes value[MOST_ROW], int n, int size)
+UZ_INLINE void add_shares(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                          const double share[][UZ_ELEMENT_SAMPLES], uz_lanes value[MOST_ROW], int n, int size)
 {
     const int samples = g->rule.asked, different = samples == 1 ? 1 : g->rule.nodes;
     for (int a = 0; a < different; a++) {
@@ -55,7 +53,7 @@ INLINE void add_shares(double *rows, const uz_strain_group *g, const int64_t *co
 }
 
 /* A X = B by elimination with pivots on the diagonal: A is a Gram matrix. A: m x m, B: m x n. */
-INLINE void solve_small(uz_lanes A[LINEAR][LINEAR], uz_lanes B[LINEAR][UZ_ELEMENT_STRESSES], int m, int n)
+UZ_INLINE void solve_small(uz_lanes A[LINEAR][LINEAR], uz_lanes B[LINEAR][UZ_ELEMENT_STRESSES], int m, int n)
 {
     for (int k = 0; k < m; k++) {
         const uz_lanes pivot = 1 / A[k][k];
@@ -76,8 +74,8 @@ INLINE void solve_small(uz_lanes A[LINEAR][LINEAR], uz_lanes B[LINEAR][UZ_ELEMEN
 }
 
 /* At each node, the linear function of the place that fits the samples best, with the element's volume as weight. */
-INLINE void add_linear_fit(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
-                           uz_lanes value[MOST_ROW], int n, int dim, int size)
+UZ_INLINE void add_linear_fit(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                              uz_lanes value[MOST_ROW], int n, int dim, int size)
 {
     const int m = dim + 1, nodes = g->rule.nodes;
     const lane_bits no_sign = (lane_bits){0} + INT64_MAX;
@@ -116,8 +114,8 @@ INLINE void add_linear_fit(double *rows, const uz_strain_group *g, const int64_t
     }
 }
 
-INLINE void add(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
-                const double share[][UZ_ELEMENT_SAMPLES], int n, int dim, int size)
+UZ_INLINE void add(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                   const double share[][UZ_ELEMENT_SAMPLES], int n, int dim, int size)
 {
     uz_lanes value[MOST_ROW] = {{0}};
     for (int k = 0; k < g->rule.asked; k++)
@@ -133,7 +131,7 @@ INLINE void add(double *rows, const uz_strain_group *g, const int64_t *const pla
 /* ---- comparison */
 
 /* Stress of the strains less the thermal strain. n: components, `direct` of them no shear. */
-INLINE void stress_of(uz_lanes *stress, const uz_strain_group *g, const uz_lanes *strain, int n, int direct)
+UZ_INLINE void stress_of(uz_lanes *stress, const uz_strain_group *g, const uz_lanes *strain, int n, int direct)
 {
     uz_lanes trace = {0};
     for (int c = 0; c < direct; c++)
@@ -144,8 +142,8 @@ INLINE void stress_of(uz_lanes *stress, const uz_strain_group *g, const uz_lanes
 }
 
 /* nodal[a][c]: the averages at the nodes. */
-INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, const uz_strain_group *g,
-                        const int64_t *const place[LANES], int size)
+UZ_INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, const uz_strain_group *g,
+                           const int64_t *const place[LANES], int size)
 {
     for (int a = 0; a < g->rule.nodes; a++)
         for (int part = 0; part < size; part += LANES) {
@@ -158,8 +156,8 @@ INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, con
 
 /* Deviator and trace apart, so that a large lambda cancels nothing: with n direct components and t = trace(s),
  * s' C^-1 s = t^2 / (n (n lambda + 2 mu)) + (s_dev . s_dev) / (2 mu). */
-INLINE void compare(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
-                    const int64_t *const place[LANES], int n, int direct, int size)
+UZ_INLINE void compare(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
+                       const int64_t *const place[LANES], int n, int direct, int size)
 {
     uz_lanes nodal[NODES][MOST_ROW], eta = {0}, energy[2] = {{0}};
     const uz_lanes twice_mu = 2 * g->material.mu, per_twice_mu = 1 / twice_mu,
@@ -207,8 +205,8 @@ INLINE void compare(uz_stress_sums *sums, const double *rows, const uz_strain_gr
 
 /* ---- for each model and kind of processor */
 
-INLINE void add_of_model(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
-                         const double share[][UZ_ELEMENT_SAMPLES], int size)
+UZ_INLINE void add_of_model(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                            const double share[][UZ_ELEMENT_SAMPLES], int size)
 {
     if (size == LANES)
         add(rows, g, place, share, 3, 2, LANES);
@@ -256,8 +254,8 @@ static void compare_each(uz_stress_sums *sums, const double *rows, const uz_stra
     }
 }
 
-INLINE void compare_of_model(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
-                             const int64_t *const place[LANES], int size)
+UZ_INLINE void compare_of_model(uz_stress_sums *sums, const double *rows, const uz_strain_group *g,
+                                const int64_t *const place[LANES], int size)
 {
     if (size == LANES)
         compare(sums, rows, g, place, 3, 2, LANES);

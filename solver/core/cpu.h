@@ -3,7 +3,7 @@
  * A kernel is written once, as a function that is always inlined. Beside it stands a copy that is compiled for wider
  * registers, and the caller takes the one that the processor has:
  *
- *     static inline __attribute__((always_inline)) void add(double *y, ...) { ... }
+ *     UZ_INLINE void add(double *y, ...) { ... }
  *     UZ_AVX2_FMA static void add_fused(double *y, ...) { add(y, ...); }
  *     ...
  *     (uz_cpu_has_avx2_fma() ? add_fused : add)(y, ...);
@@ -13,6 +13,9 @@
 #define UZ_CORE_CPU_H
 
 #include <stdbool.h>
+
+/* What is inlined into a version for each kind of processor; sizes that are constants there let short loops unroll. */
+#define UZ_INLINE static inline __attribute__((always_inline))
 
 #ifdef __x86_64__
 #define UZ_AVX2             __attribute__((target("avx2")))

@@ -4,12 +4,10 @@
 
 #include "core/cpu.h"
 #include "element/element_private.h"
+#include "element/lane_shape.h"
 
 #include <float.h>
 #include <string.h>
-
-/* dim is a constant where this is inlined, so that short loops unroll. */
-#define INLINE static inline __attribute__((always_inline))
 
 enum { LANES = UZ_STRAIN_LANES };
 
@@ -43,50 +41,17 @@ bool uz_is_for_lanes(const uz_element *element)
 /* ---- shape */
 
 /* J[axis][x], as uz_jacobian. */
-INLINE void jacobian(uz_lanes J[3][3], const double slope[][3], const uz_lanes *x, int nodes, int dim)
+UZ_INLINE void jacobian(uz_lanes J[3][3], const double slope[][3], const uz_lanes *x, int nodes, int dim)
 {
-    uz_lanes sum[3][3] = {{{0}}};
-    for (int a = 1; a < nodes; a++)
-        for (int j = 0; j < dim; j++) {
-            const uz_lanes from_first = x[a * dim + j] - x[j];
-            for (int i = 0; i < dim; i++)
-                sum[i][j] += slope[a][i] * from_first;
-        }
+    uz_lanes X[3][3];
+    uz_lane_differentiate(X, slope, x, nodes, dim);
     for (int i = 0; i < dim; i++)
         for (int j = 0; j < dim; j++)
-            J[i][j] = sum[i][j];
-}
-
-INLINE void determinant(uz_lanes *det, uz_lanes J[3][3], int dim)
-{
-    if (dim == 2)
-        *det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
-    else
-        *det = J[0][0] * (J[1][1] * J[2][2] - J[1][2] * J[2][1]) + J[0][1] * (J[1][2] * J[2][0] - J[1][0] * J[2][2]) +
-               J[0][2] * (J[1][0] * J[2][1] - J[1][1] * J[2][0]);
-}
-
-/* As uz_invert_small: inverse[x][axis]. */
-INLINE void invert(uz_lanes inverse[3][3], uz_lanes *det, uz_lanes J[3][3], int dim)
-{
-    determinant(det, J, dim);
-    const uz_lanes scale = 1 / *det;
-    if (dim == 2) {
-        inverse[0][0] = J[1][1] * scale;
-        inverse[0][1] = -J[0][1] * scale;
-        inverse[1][0] = -J[1][0] * scale;
-        inverse[1][1] = J[0][0] * scale;
-        return;
-    }
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int p = (i + 1) % 3, q = (i + 2) % 3, s = (j + 1) % 3, t = (j + 2) % 3;
-            inverse[j][i] = (J[p][s] * J[q][t] - J[p][t] * J[q][s]) * scale;
-        }
+            J[i][j] = X[j][i];
 }
 
 /* The question of uz_element_check, squared: what overflows or vanishes by that is not said to be good. */
-INLINE void look_at(lane_bits *good, uz_lanes J[3][3], int dim)
+UZ_INLINE void look_at(lane_bits *good, uz_lanes J[3][3], int dim)
 {
     uz_lanes det, squares = UZ_FLAT * UZ_FLAT - (uz_lanes){0};
     for (int i = 0; i < dim; i++) {
@@ -95,11 +60,11 @@ INLINE void look_at(lane_bits *good, uz_lanes J[3][3], int dim)
             square += J[i][2] * J[i][2];
         squares *= square;
     }
-    determinant(&det, J, dim);
+    uz_lane_determinant(&det, J, dim);
     *good &= (lane_bits)(det > 0) & (lane_bits)(det * det > squares);
 }
 
-INLINE void look_at_corners(lane_bits *good, const uz_stiffness_rule *rule, const uz_lanes *x, int dim)
+UZ_INLINE void look_at_corners(lane_bits *good, const uz_stiffness_rule *rule, const uz_lanes *x, int dim)
 {
     for (int a = 0; a < rule->corners; a++) {
         uz_lanes J[3][3];
@@ -117,15 +82,15 @@ typedef struct {
     uz_lanes mean[UZ_ELEMENT_DOFS], mean_stiffness;
 } integrand;
 
-INLINE void differentiate(integrand *of, lane_bits *good, const uz_stiffness_rule *rule, const uz_lanes *x,
-                          double thickness, int dim)
+UZ_INLINE void differentiate(integrand *of, lane_bits *good, const uz_stiffness_rule *rule, const uz_lanes *x,
+                             double thickness, int dim)
 {
     for (int g = 0; g < rule->points; g++) {
         uz_lanes J[3][3], inverse[3][3], det;
         jacobian(J, rule->slope[g], x, rule->nodes, dim);
         if (rule->checks_rule)
             look_at(good, J, dim);
-        invert(inverse, &det, J, dim);
+        uz_lane_invert(inverse, &det, J, dim);
         of->volume[g] = rule->weight[g] * det;
         if (rule->model != UZ_SOLID)
             of->volume[g] *= thickness;
@@ -133,14 +98,14 @@ INLINE void differentiate(integrand *of, lane_bits *good, const uz_stiffness_rul
             for (int j = 0; j < dim; j++) {
                 uz_lanes sum = {0};
                 for (int i = 0; i < dim; i++)
-                    sum += inverse[j][i] * rule->slope[g][a][i];
+                    sum += inverse[i][j] * rule->slope[g][a][i];
                 of->grad[g][a * dim + j] = sum;
             }
     }
 }
 
 /* uz_mean_gradients, what the mean dilatation resists with, and what is in the place of lambda. */
-INLINE void average(integrand *of, const uz_stiffness_rule *rule, int dofs)
+UZ_INLINE void average(integrand *of, const uz_stiffness_rule *rule, int dofs)
 {
     const uz_lanes share = 2 * of->mu / (rule->model == UZ_PLANE_STRAIN ? 2.0 : 3.0);
     uz_lanes volume = {0};
@@ -158,7 +123,8 @@ INLINE void average(integrand *of, const uz_stiffness_rule *rule, int dofs)
 }
 
 /* The block of nodes a and b, b <= a, from own[point][direction], the derivatives of a times the volumes. */
-INLINE void find_block(uz_lanes block[3][3], const integrand *of, uz_lanes own[][3], int points, int a, int b, int dim)
+UZ_INLINE void find_block(uz_lanes block[3][3], const integrand *of, uz_lanes own[][3], int points, int a, int b,
+                          int dim)
 {
     uz_lanes sum[3][3] = {{{0}}}, trace = {0};
     for (int g = 0; g < points; g++)
@@ -183,7 +149,7 @@ INLINE void find_block(uz_lanes block[3][3], const integrand *of, uz_lanes own[]
             block[i][j] = block[j][i];
 }
 
-INLINE void look_at_block(lane_bits *good, uz_lanes block[3][3], bool diagonal, int dim)
+UZ_INLINE void look_at_block(lane_bits *good, uz_lanes block[3][3], bool diagonal, int dim)
 {
     for (int i = 0; i < dim; i++) {
         for (int j = 0; j < dim; j++)
@@ -193,8 +159,8 @@ INLINE void look_at_block(lane_bits *good, uz_lanes block[3][3], bool diagonal, 
     }
 }
 
-INLINE bool stiffness_of(double *const ke[LANES], const uz_stiffness_rule *rule, uz_formulation formulation,
-                         const uz_lanes *x, const uz_lane_material *material, double thickness, int dim)
+UZ_INLINE bool stiffness_of(double *const ke[LANES], const uz_stiffness_rule *rule, uz_formulation formulation,
+                            const uz_lanes *x, const uz_lane_material *material, double thickness, int dim)
 {
     integrand of;
     uz_lanes own[UZ_ELEMENT_GAUSS][3], block[3][3];
@@ -227,8 +193,8 @@ INLINE bool stiffness_of(double *const ke[LANES], const uz_stiffness_rule *rule,
 
 /* ---- for each kind of processor */
 
-INLINE bool stiffness_in_space(double *const ke[LANES], const uz_stiffness_rule *rule, uz_formulation formulation,
-                               const uz_lanes *x, const uz_lane_material *material, double thickness)
+UZ_INLINE bool stiffness_in_space(double *const ke[LANES], const uz_stiffness_rule *rule, uz_formulation formulation,
+                                  const uz_lanes *x, const uz_lane_material *material, double thickness)
 {
     if (rule->dim == 2)
         return stiffness_of(ke, rule, formulation, x, material, thickness, 2);

@@ -2,13 +2,11 @@
 
 #include "core/cpu.h"
 #include "element/element_private.h"
+#include "element/lane_shape.h"
 
 #include <string.h>
 
 #define TWO_PI 6.28318530717958647693
-
-/* What is inlined into a version for each kind of processor; dim is a constant there, so that short loops unroll. */
-#define INLINE static inline __attribute__((always_inline))
 
 enum { MODES = UZ_ELEMENT_INTERNAL };
 
@@ -53,53 +51,12 @@ void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model mode
 
 /* ---- shape */
 
-/* D[c][i]: derivative of component c by local axis i, of values (nodes x dim) against those of the first node: slopes
- * of all nodes sum to 0. */
-INLINE void differentiate(uz_lanes D[3][3], const double slope[][3], const uz_lanes *value, int nodes, int dim)
+UZ_INLINE void shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness, int dim)
 {
-    uz_lanes sum[3][3];
-    for (int c = 0; c < dim; c++)
-        for (int i = 0; i < dim; i++)
-            sum[c][i] = slope[1][i] * (value[dim + c] - value[c]);
-    for (int a = 2; a < nodes; a++)
-        for (int c = 0; c < dim; c++) {
-            const uz_lanes from_first = value[a * dim + c] - value[c];
-            for (int i = 0; i < dim; i++)
-                sum[c][i] += slope[a][i] * from_first;
-        }
-    for (int c = 0; c < dim; c++)
-        for (int i = 0; i < dim; i++)
-            D[c][i] = sum[c][i];
-}
-
-/* X[x][axis]: derivatives of position; inverse[x][axis]. */
-INLINE void invert(uz_lanes inverse[3][3], uz_lanes *det, uz_lanes X[3][3], int dim)
-{
-    if (dim == 2) {
-        *det = X[0][0] * X[1][1] - X[0][1] * X[1][0];
-        const uz_lanes scale = 1 / *det;
-        inverse[0][0] = X[1][1] * scale;
-        inverse[0][1] = -X[1][0] * scale;
-        inverse[1][0] = -X[0][1] * scale;
-        inverse[1][1] = X[0][0] * scale;
-        return;
-    }
-    *det = X[0][0] * (X[1][1] * X[2][2] - X[1][2] * X[2][1]) + X[0][1] * (X[1][2] * X[2][0] - X[1][0] * X[2][2]) +
-           X[0][2] * (X[1][0] * X[2][1] - X[1][1] * X[2][0]);
-    const uz_lanes scale = 1 / *det;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int p = (i + 1) % 3, q = (i + 2) % 3, s = (j + 1) % 3, t = (j + 2) % 3;
-            inverse[i][j] = (X[p][s] * X[q][t] - X[p][t] * X[q][s]) * scale;
-        }
-}
-
-INLINE void shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness, int dim)
-{
-    uz_lanes X[3][3];
+    uz_lanes X[3][3]; /* derivatives of position: [x][axis], and so are inverses */
     for (int g = 0; g < rule->points; g++) {
-        differentiate(X, rule->slope[g], x, rule->nodes, dim);
-        invert(shape->inverse[g], &shape->det[g], X, dim);
+        uz_lane_differentiate(X, rule->slope[g], x, rule->nodes, dim);
+        uz_lane_invert(shape->inverse[g], &shape->det[g], X, dim);
         shape->volume[g] = rule->weight[g] * shape->det[g];
         if (rule->model == UZ_AXISYMMETRIC) { /* a radius of at most UZ_AXIS of the largest counts as on the axis */
             uz_lanes radius = {0}, largest = {0};
@@ -117,15 +74,15 @@ INLINE void shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_
         }
     }
     if (rule->formulation == UZ_FORMULATION_INCOMPATIBLE) {
-        differentiate(X, rule->centre, x, rule->nodes, dim);
-        invert(shape->centre_inverse, &shape->centre_det, X, dim);
+        uz_lane_differentiate(X, rule->centre, x, rule->nodes, dim);
+        uz_lane_invert(shape->centre_inverse, &shape->centre_det, X, dim);
     }
 }
 
 /* ---- strain */
 
 /* Derivatives of the incompatible mode m by x_j at a Gauss point: slope[m][j], see uz_mode_gradients. */
-INLINE void mode_slopes(uz_lanes slope[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, int g, int dim)
+UZ_INLINE void mode_slopes(uz_lanes slope[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, int g, int dim)
 {
     const uz_lanes ratio = -2 * shape->centre_det / shape->det[g];
     for (int m = 0; m < dim; m++)
@@ -135,8 +92,8 @@ INLINE void mode_slopes(uz_lanes slope[3][3], const uz_strain_rule *rule, const 
 
 /* A point's part of the modes' equations A internal = b: of A its lower triangle, (m, c) being row m dim + c; b is what
  * the stress of the displacements does along the modes. */
-INLINE void add_mode_equations(uz_lanes A[MODES][MODES], uz_lanes b[MODES], uz_lanes H[3][3], uz_lanes slope[3][3],
-                               const uz_lane_material *material, const uz_lanes *volume, int dim)
+UZ_INLINE void add_mode_equations(uz_lanes A[MODES][MODES], uz_lanes b[MODES], uz_lanes H[3][3], uz_lanes slope[3][3],
+                                  const uz_lane_material *material, const uz_lanes *volume, int dim)
 {
     uz_lanes trace = H[0][0] + H[1][1];
     if (dim == 3)
@@ -162,8 +119,8 @@ INLINE void add_mode_equations(uz_lanes A[MODES][MODES], uz_lanes b[MODES], uz_l
 }
 
 /* The modes take the shape of least energy, and their derivatives join in. */
-INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
-                      const uz_lane_material *material, int dim)
+UZ_INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                         const uz_lane_material *material, int dim)
 {
     uz_lanes A[MODES][MODES] = {{{0}}}, internal[MODES] = {{0}}, slope[3][3];
     for (int g = rule->averaged; g < rule->points; g++) {
@@ -196,8 +153,8 @@ INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_l
 }
 
 /* The dilatation becomes its mean over the volume: an n-th of the difference goes to each of n direct strains. */
-INLINE void take_mean_dilatation(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                 const uz_lane_shape *shape)
+UZ_INLINE void take_mean_dilatation(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                                    const uz_lane_shape *shape)
 {
     uz_lanes sum = {0}, volume = {0}, own[UZ_ELEMENT_GAUSS];
     const int n = rule->direct;
@@ -217,8 +174,8 @@ INLINE void take_mean_dilatation(uz_lanes strain[][UZ_ELEMENT_STRESSES], const u
 }
 
 /* Of a ring u_r / r; on the axis the radial strain. */
-INLINE void strain_around(uz_lanes *around, const uz_lanes *radial, const uz_strain_rule *rule,
-                          const uz_lane_shape *shape, const uz_lanes *u, int g)
+UZ_INLINE void strain_around(uz_lanes *around, const uz_lanes *radial, const uz_strain_rule *rule,
+                             const uz_lane_shape *shape, const uz_lanes *u, int g)
 {
     const lane_bits on_axis = (lane_bits)(shape->per_radius[g] == 0);
     uz_lanes displacement = {0};
@@ -228,8 +185,8 @@ INLINE void strain_around(uz_lanes *around, const uz_lanes *radial, const uz_str
     *around = (uz_lanes)((on_axis & (lane_bits)*radial) | (~on_axis & (lane_bits)displacement));
 }
 
-INLINE void strain_of_gradient(uz_lanes *strain, uz_lanes H[3][3], const uz_strain_rule *rule,
-                               const uz_lane_shape *shape, const uz_lanes *u, int g, int dim)
+UZ_INLINE void strain_of_gradient(uz_lanes *strain, uz_lanes H[3][3], const uz_strain_rule *rule,
+                                  const uz_lane_shape *shape, const uz_lanes *u, int g, int dim)
 {
     strain[0] = H[0][0];
     strain[1] = H[1][1];
@@ -247,11 +204,11 @@ INLINE void strain_of_gradient(uz_lanes *strain, uz_lanes H[3][3], const uz_stra
 }
 
 /* H[c][j]: derivative of u_c by x_j. */
-INLINE void gradient_at(uz_lanes H[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u,
-                        int g, int dim)
+UZ_INLINE void gradient_at(uz_lanes H[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u,
+                           int g, int dim)
 {
     uz_lanes D[3][3];
-    differentiate(D, rule->slope[g], u, rule->nodes, dim);
+    uz_lane_differentiate(D, rule->slope[g], u, rule->nodes, dim);
     for (int c = 0; c < dim; c++)
         for (int j = 0; j < dim; j++) {
             H[c][j] = D[c][0] * shape->inverse[g][j][0];
@@ -260,8 +217,8 @@ INLINE void gradient_at(uz_lanes H[3][3], const uz_strain_rule *rule, const uz_l
         }
 }
 
-INLINE void strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lane_shape *shape,
-                       const uz_lane_material *material, const uz_lanes *u, int dim)
+UZ_INLINE void strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                          const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u, int dim)
 {
     if (rule->formulation == UZ_FORMULATION_INCOMPATIBLE) {
         uz_lanes H[UZ_ELEMENT_GAUSS][3][3];
@@ -281,8 +238,8 @@ INLINE void strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_r
         take_mean_dilatation(strain, rule, shape);
 }
 
-INLINE void gradients_of(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u,
-                         int dim)
+UZ_INLINE void gradients_of(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                            const uz_lanes *u, int dim)
 {
     for (int g = 0; g < rule->points; g++) {
         for (int c = 0; c < 3 && dim == 2; c++)
@@ -295,7 +252,7 @@ INLINE void gradients_of(uz_lanes H[][3][3], const uz_strain_rule *rule, const u
 
 /* ---- for each kind of processor */
 
-INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
+UZ_INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
 {
     if (rule->dim == 2)
         shape_of(shape, rule, x, thickness, 2);
@@ -303,8 +260,8 @@ INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, con
         shape_of(shape, rule, x, thickness, 3);
 }
 
-INLINE void strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                             const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
+UZ_INLINE void strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                                const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
 {
     if (rule->dim == 2)
         strains_of(strain, rule, shape, material, u, 2);
@@ -312,8 +269,8 @@ INLINE void strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_st
         strains_of(strain, rule, shape, material, u, 3);
 }
 
-INLINE void gradients_in_space(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
-                               const uz_lanes *u)
+UZ_INLINE void gradients_in_space(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                                  const uz_lanes *u)
 {
     if (rule->dim == 2)
         gradients_of(H, rule, shape, u, 2);

@@ -17,25 +17,23 @@
 #include "finite/finite_element.h"
 
 #include "core/cpu.h"
+#include "element/lane_shape.h"
 #include "finite/hyperelastic.h"
 
 #include <math.h>
 #include <string.h>
-
-/* What is inlined into a version for each shape of element and kind of processor, whose sizes are constants there. */
-#define INLINE static inline __attribute__((always_inline))
 
 /* NODES: the most, by fours; AROUND: the derivative of what is around the axis, after those in the plane. */
 enum { N_STRAINS = UZ_FINITE_STRAINS, LANES = UZ_FINITE_LANES, POINTS = UZ_FINITE_POINTS, AROUND = 4 };
 typedef double four __attribute__((vector_size(8 * UZ_FINITE_LANES), aligned(8), may_alias));
 
 /* Four numbers in a row. */
-INLINE const four *four_from(const double *x)
+UZ_INLINE const four *four_from(const double *x)
 {
     return (const four *)x;
 }
 
-INLINE four *four_at(double *x)
+UZ_INLINE four *four_at(double *x)
 {
     return (four *)x;
 }
@@ -59,7 +57,7 @@ typedef double gradients[3][3][POINTS];
 
 /* D[c][i]: derivatives by local coordinates at four points from `first` on, of values (nodes x dim), against those of
  * the first node: a translation leaves no rounding. */
-INLINE void differentiate(four D[3][3], const uz_finite_rule *rule, const double *value, int first, int dim)
+UZ_INLINE void differentiate(four D[3][3], const uz_finite_rule *rule, const double *value, int first, int dim)
 {
     for (int c = 0; c < dim; c++)
         for (int i = 0; i < dim; i++)
@@ -73,7 +71,7 @@ INLINE void differentiate(four D[3][3], const uz_finite_rule *rule, const double
 }
 
 /* Of rings: volumes by the way around, and 1 / r. */
-INLINE void find_radii(shape *out, const uz_finite_rule *rule, const double *xyz)
+UZ_INLINE void find_radii(shape *out, const uz_finite_rule *rule, const double *xyz)
 {
     double largest = 0;
     for (int a = 0; a < rule->nodes; a++)
@@ -87,27 +85,15 @@ INLINE void find_radii(shape *out, const uz_finite_rule *rule, const double *xyz
     }
 }
 
-INLINE void shape_of(shape *out, const uz_finite_rule *rule, const uz_element *element, int dim, bool ring)
+UZ_INLINE void shape_of(shape *out, const uz_finite_rule *rule, const uz_element *element, int dim, bool ring)
 {
     for (int p = 0; p < rule->points; p += LANES) {
-        four X[3][3], det;
+        four X[3][3], inverse[3][3], det;
         differentiate(X, rule, element->xyz, p, dim);
-        if (dim == 2)
-            det = X[0][0] * X[1][1] - X[0][1] * X[1][0];
-        else
-            det = X[0][0] * (X[1][1] * X[2][2] - X[1][2] * X[2][1]) +
-                  X[0][1] * (X[1][2] * X[2][0] - X[1][0] * X[2][2]) + X[0][2] * (X[1][0] * X[2][1] - X[1][1] * X[2][0]);
-        const four scale = 1 / det;
+        uz_lane_invert(inverse, &det, X, dim);
         for (int i = 0; i < dim; i++)
-            for (int j = 0; j < dim; j++) {
-                const int b = (i + 1) % 3, c = (i + 2) % 3, d = (j + 1) % 3, e = (j + 2) % 3;
-                four cofactor = X[1 - i % 2][1 - i % 2];
-                if (dim == 3)
-                    cofactor = X[d][b] * X[e][c] - X[d][c] * X[e][b];
-                else if (i != j)
-                    cofactor = -X[i][j];
-                *four_at(&out->inverse[i][j][p]) = cofactor * scale;
-            }
+            for (int j = 0; j < dim; j++)
+                *four_at(&out->inverse[i][j][p]) = inverse[j][i];
         const double thick = dim == 2 && !ring ? element->thickness : 1;
         *four_at(&out->volume[p]) = *four_from(&rule->weight[p]) * det * thick;
     }
@@ -115,8 +101,8 @@ INLINE void shape_of(shape *out, const uz_finite_rule *rule, const uz_element *e
         find_radii(out, rule, element->xyz);
 }
 
-INLINE void find_gradients(gradients H, const uz_finite_rule *rule, const shape *at, const double *u, int dim,
-                           bool ring)
+UZ_INLINE void find_gradients(gradients H, const uz_finite_rule *rule, const shape *at, const double *u, int dim,
+                              bool ring)
 {
     for (int p = 0; p < rule->points; p += LANES) {
         four D[3][3];
@@ -138,7 +124,7 @@ INLINE void find_gradients(gradients H, const uz_finite_rule *rule, const shape 
 }
 
 /* In the plane the last of F is the stretch across it, which is 1 but in rings. */
-INLINE void deformation(double F[3][3], gradients H, int p, int dim, bool ring)
+UZ_INLINE void deformation(double F[3][3], gradients H, int p, int dim, bool ring)
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
@@ -223,8 +209,8 @@ typedef struct {
     double A[UZ_ELEMENT_GAUSS][COMPONENTS][PADDED];
 } points;
 
-INLINE void slopes_of_nodes(points *out, const uz_finite_rule *rule, const shape *at, int p, int dim, int wide,
-                            bool ring)
+UZ_INLINE void slopes_of_nodes(points *out, const uz_finite_rule *rule, const shape *at, int p, int dim, int wide,
+                               bool ring)
 {
     double(*G)[UZ_ELEMENT_NODES] = out->G[p];
     for (int w = 0; w < LANES * wide; w += LANES) {
@@ -242,8 +228,8 @@ INLINE void slopes_of_nodes(points *out, const uz_finite_rule *rule, const shape
 }
 
 /* force[axis][node] += what the stress does, P = F S. */
-INLINE void add_forces(four force[3][UZ_ELEMENT_NODES / LANES], double G[4][UZ_ELEMENT_NODES], double F[3][3],
-                       const double *S, double volume, int dim, int wide, bool ring)
+UZ_INLINE void add_forces(four force[3][UZ_ELEMENT_NODES / LANES], double G[4][UZ_ELEMENT_NODES], double F[3][3],
+                          const double *S, double volume, int dim, int wide, bool ring)
 {
     for (int i = 0; i < dim; i++)
         for (int J = 0; J < dim; J++) {
@@ -258,8 +244,8 @@ INLINE void add_forces(four force[3][UZ_ELEMENT_NODES / LANES], double G[4][UZ_E
 }
 
 /* A_iJkL = F_iM D_JMLN F_kN + T_JL (i = k), T the stress that turns with the body. */
-INLINE void moduli(double A[COMPONENTS][PADDED], double F[3][3], double D[N_STRAINS][N_STRAINS], const double *T,
-                   double volume, int dim, bool ring)
+UZ_INLINE void moduli(double A[COMPONENTS][PADDED], double F[3][3], double D[N_STRAINS][N_STRAINS], const double *T,
+                      double volume, int dim, bool ring)
 {
     double DF[N_STRAINS][PADDED] = {{0}};
     const int strains = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
@@ -289,8 +275,8 @@ INLINE void moduli(double A[COMPONENTS][PADDED], double F[3][3], double D[N_STRA
 }
 
 /* S of the strain without h'h / 2. */
-INLINE void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS], gradients of_step,
-                          int p, int dim, bool ring)
+UZ_INLINE void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS], gradients of_step,
+                             int p, int dim, bool ring)
 {
     double h[3][3], q[N_STRAINS];
     const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
@@ -308,8 +294,8 @@ INLINE void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAI
 /* ---- the tangent */
 
 /* Rows of node a along `rows` axes from i on, of nodes from the group `first` of four on: K = integral g_a A g_b. */
-INLINE void add_rows(double *ke, const points *at, const uz_finite_rule *rule, int a, int i, int rows, int first,
-                     int dim, int wide, bool ring)
+UZ_INLINE void add_rows(double *ke, const points *at, const uz_finite_rule *rule, int a, int i, int rows, int first,
+                        int dim, int wide, bool ring)
 {
     four sum[2][3][UZ_ELEMENT_NODES / LANES];
     const int n = dim * rule->nodes, used = dim == 3 ? 12 : ring ? 8 : 4;
@@ -346,7 +332,7 @@ INLINE void add_rows(double *ke, const points *at, const uz_finite_rule *rule, i
                 }
 }
 
-INLINE void tangent_of(double *ke, const points *at, const uz_finite_rule *rule, int dim, int wide, bool ring)
+UZ_INLINE void tangent_of(double *ke, const points *at, const uz_finite_rule *rule, int dim, int wide, bool ring)
 {
     const int rows = dim == 2 ? 2 : 1; /* what registers hold */
     for (int first = 0; first < wide; first++)
@@ -367,7 +353,7 @@ typedef struct {
 } task;
 
 /* wide: nodes by fours. */
-INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
+UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
 {
     const uz_finite_rule *rule = x->rule;
     uz_finite_forces *out = x->out;

@@ -22,8 +22,7 @@
 
 #include <math.h>
 
-#define PI     3.14159265358979323846
-#define INLINE static inline __attribute__((always_inline))
+#define PI 3.14159265358979323846
 
 enum { N = UZ_ELEMENT_STRESSES };
 /* Axes of the components of a symmetric matrix, xx yy zz xy yz zx, and which of these strains of a model are. */
@@ -60,7 +59,7 @@ static double strip_modulus(uz_model model, const uz_lame *lame)
 }
 
 /* stress = C strain in each lane. */
-INLINE void stress_of(uz_lanes *stress, const uz_strain_group *group, const uz_lanes *strain)
+UZ_INLINE void stress_of(uz_lanes *stress, const uz_strain_group *group, const uz_lanes *strain)
 {
     const uz_strain_rule *rule = &group->rule;
     if (group->general) {
@@ -83,7 +82,7 @@ INLINE void stress_of(uz_lanes *stress, const uz_strain_group *group, const uz_l
 }
 
 /* Of plane stress, where nothing holds the body across the plane. */
-INLINE void strain_across(uz_lanes *across, const uz_strain_group *group, const uz_lanes *stress)
+UZ_INLINE void strain_across(uz_lanes *across, const uz_strain_group *group, const uz_lanes *stress)
 {
     *across = (uz_lanes){0};
     for (int l = 0; l < UZ_STRAIN_LANES && group->rule.model == UZ_PLANE_STRESS; l++)
@@ -91,7 +90,7 @@ INLINE void strain_across(uz_lanes *across, const uz_strain_group *group, const 
             uz_strain_zz(UZ_PLANE_STRESS, *group->lame[l], (double[]){stress[0][l], stress[1][l], stress[2][l]}, 0);
 }
 
-INLINE void add_point(sums *to, const uz_strain_group *group, const uz_lanes *volume, uz_lanes H[3][3])
+UZ_INLINE void add_point(sums *to, const uz_strain_group *group, const uz_lanes *volume, uz_lanes H[3][3])
 {
     const uz_lanes weight = *volume;
     uz_lanes across, Q[N], e[N], of_Q[N], of_e[N], size = {0};
@@ -124,7 +123,7 @@ INLINE void add_point(sums *to, const uz_strain_group *group, const uz_lanes *vo
     to->law += weight * size * work[2];
 }
 
-INLINE void add_group(sums *to, const uz_strain_group *group, const uz_lanes *modulus)
+UZ_INLINE void add_group(sums *to, const uz_strain_group *group, const uz_lanes *modulus)
 {
     uz_lanes H[UZ_ELEMENT_GAUSS][3][3];
     uz_lane_gradients(H, &group->rule, &group->shape, group->u);
