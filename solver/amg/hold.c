@@ -270,7 +270,7 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
         inverse[j] = finest->inverse[j];
     for (int64_t j = 0; inverse && j < mg->base.n; j++)
         if (held[j])
-            inverse[uz_slot_node(mg, mg->slot[j]) * finest->A.b + uz_slot_place(mg, mg->slot[j])] = 0.0F;
+            inverse[uz_slot_number(mg, mg->slot[j])] = 0.0F;
     *bytes += 4 * (size_t)slots;
     if (status == UZ_OK && !init_loss(&loss, &mg->level[1])) {
         free(loss.off);

@@ -223,16 +223,14 @@ static uz_status factor_last(uz_aggregates *mg, const uz_csc *K, size_t memory_l
 static float *scale_modes(const uz_aggregates *mg, const uz_modes *modes)
 {
     const int k = mg->k;
-    const int b = mg->level[0].A.b;
-    float *scaled = uz_alloc_zero(mg->level[0].A.nodes * b * k, sizeof *scaled);
+    float *scaled = uz_alloc_zero(mg->level[0].A.nodes * mg->level[0].A.b * k, sizeof *scaled);
     double least = INFINITY;
     for (int64_t j = 0; j < mg->base.n; j++)
         least = fmin(least, mg->scale[j]);
-    for (int64_t j = 0; scaled && j < mg->base.n; j++) {
-        float *to = scaled + (uz_slot_node(mg, mg->slot[j]) * b + uz_slot_place(mg, mg->slot[j])) * k;
+    for (int64_t j = 0; scaled && j < mg->base.n; j++)
         for (int c = 0; c < k; c++)
-            to[c] = (float)(least / mg->scale[j] * (double)modes->value[j * k + c]);
-    }
+            scaled[uz_slot_number(mg, mg->slot[j]) * k + c] =
+                (float)(least / mg->scale[j] * (double)modes->value[j * k + c]);
     return scaled;
 }
 

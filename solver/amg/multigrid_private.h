@@ -70,6 +70,11 @@ static inline int64_t uz_slot_place(const uz_aggregates *mg, int64_t slot)
 {
     return slot & (((int64_t)1 << mg->shift) - 1);
 }
+/* Where level 0 keeps one number for each dof of its nodes, b each, without the surplus of vectors. */
+static inline int64_t uz_slot_number(const uz_aggregates *mg, int64_t slot)
+{
+    return uz_slot_node(mg, slot) * mg->level[0].A.b + uz_slot_place(mg, slot);
+}
 extern const uz_multigrid_kind uz_aggregates_kind;
 
 /* One thread's. Levels of its own where dofs are held: off, diag and inverse of each, or NULL for those that are the
