@@ -513,7 +513,7 @@ static uz_status begin_body(far_multigrid *body, double strong, uz_error *err)
         .kind = UZ_WIRE_BODY, .id = body->id, .a = map->nodes, .b = map->bs, .c = map->modes, .x = strong};
     for (int64_t i = 0; i < map->nodes; i++) {
         count[2 * map->part[i]]++;
-        count[2 * map->part[i] + 1] += map->offset[i + 1] - map->offset[i] + 1;
+        count[2 * map->part[i] + 1] += uz_spread_blocks(map, i);
     }
     const bool begun = ask(group, head) && put(group, count, (size_t)(2 * group->processes) * sizeof *count);
     free(count);

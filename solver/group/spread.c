@@ -319,11 +319,6 @@ static void make_rows(uz_spread_rows *rows, const uz_spread *map, int64_t i)
     rows->blocks += count;
 }
 
-static int64_t blocks_of(const uz_spread *map, int64_t i)
-{
-    return map->offset[map->order[i] + 1] - map->offset[map->order[i]] + 1;
-}
-
 uz_status uz_spread_begin(uz_spread_rows *rows, const uz_spread *map, const uz_csc *K, const uz_modes *modes,
                           uz_error *err)
 {
@@ -335,7 +330,8 @@ uz_status uz_spread_begin(uz_spread_rows *rows, const uz_spread *map, const uz_c
     while (rows->at < map->nodes && map->part[map->order[rows->at]] < rows->process)
         rows->at++;
     for (rows->end = rows->at; rows->end < map->nodes && map->part[map->order[rows->end]] == rows->process; rows->end++)
-        room = blocks_of(map, rows->end) > room ? blocks_of(map, rows->end) : room;
+        room =
+            uz_spread_blocks(map, map->order[rows->end]) > room ? uz_spread_blocks(map, map->order[rows->end]) : room;
     rows->room = room; /* a node has a block at least */
     rows->counts = uz_alloc(room, sizeof *rows->counts);
     rows->columns = uz_alloc(room, sizeof *rows->columns);
@@ -347,7 +343,7 @@ uz_status uz_spread_begin(uz_spread_rows *rows, const uz_spread *map, const uz_c
 bool uz_spread_next(uz_spread_rows *rows, const uz_spread *map)
 {
     rows->nodes = rows->blocks = 0;
-    while (rows->at < rows->end && rows->blocks + blocks_of(map, rows->at) <= rows->room)
+    while (rows->at < rows->end && rows->blocks + uz_spread_blocks(map, map->order[rows->at]) <= rows->room)
         make_rows(rows, map, rows->at++);
     return rows->nodes > 0;
 }

@@ -25,6 +25,11 @@ uz_status uz_spread_init(uz_spread *map, const uz_csc *K, const uz_modes *modes,
 uz_status uz_spread_divide(bool *divided, uz_spread *map, const uz_modes *modes, int64_t processes, uz_error *err);
 uz_status uz_spread_number(uz_spread *map, int64_t processes, uz_error *err);
 void uz_spread_clear(uz_spread *map);
+/* Blocks in the rows of a node. */
+static inline int64_t uz_spread_blocks(const uz_spread *map, int64_t node)
+{
+    return map->offset[node + 1] - map->offset[node] + 1;
+}
 
 /* The rows of one process, some at a time. */
 typedef struct {
