@@ -399,11 +399,11 @@ static uz_status difference_along(bool *known, double *change, work *w, double p
 }
 
 uz_status uz_row_turn_along(bool *known, double *force, double *gap, const uz_body_model *base,
-                            const uz_body_model *rows, const uz_scene *scene, const double *r, double least,
-                            const double *v, uz_error *err)
+                            const uz_body_model *rows, const uz_scene *scene, const double *r, const double *v,
+                            uz_error *err)
 {
     const int64_t n = base->mesh.dim * base->mesh.n_nodes, d = base->d;
-    work w = {.base = base, .rows = rows, .scene = scene, .r = r, .least = least};
+    work w = {.base = base, .rows = rows, .scene = scene, .r = r};
     double most = 0, *change = uz_alloc_zero(d + rows->m, sizeof *change);
     uz_status status = UZ_OK;
     *known = false;

@@ -29,11 +29,11 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
                            const uz_scene *scene, const double *r, double least, const uz_stop *stop, uz_error *err);
 void uz_row_turn_clear(uz_row_turn *turn);
 /* The whole of both along v (d), by a difference of the rows at one place more: force (d) and gap (m) are added to.
- * least as above. false in *known, with nothing added: a pressed row is not there, or no contact can be found.
- * UZ_ERR_MEMORY */
+ * Pressed are all rows with r < 0. false in *known, with nothing added: a pressed row is not there, or no contact can
+ * be found. UZ_ERR_MEMORY */
 uz_status uz_row_turn_along(bool *known, double *force, double *gap, const uz_body_model *base,
-                            const uz_body_model *rows, const uz_scene *scene, const double *r, double least,
-                            const double *v, uz_error *err);
+                            const uz_body_model *rows, const uz_scene *scene, const double *r, const double *v,
+                            uz_error *err);
 /* y += A x; skew: that of the skew part of A alone. */
 void uz_add_entries(double *y, const uz_entries *of, const double *x, bool skew);
 

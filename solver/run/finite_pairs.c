@@ -145,7 +145,7 @@ static uz_status add_turn(uz_finite_run *run, const double *v, uz_error *err)
     if (turn->force.n == 0)
         return UZ_OK;
     const uz_status status =
-        uz_row_turn_along(&known, run->p, run->at.h, &run->base, &run->at.rows, &run->scene, run->r, 0, v, err);
+        uz_row_turn_along(&known, run->p, run->at.h, &run->base, &run->at.rows, &run->scene, run->r, v, err);
     uz_add_entries(run->p, &turn->force, v, true);
     if (!known)
         uz_add_entries(run->at.h, &turn->gap, v, false);

@@ -63,7 +63,7 @@ static void compare(uz_scene *s, const uz_body_model *base, double *u, const dou
         turned[k] = body_room(d, sizeof **turned);
         moved[k] = body_room(at.m + d, sizeof **moved);
     }
-    CHECK_INT(uz_row_turn_along(&known, turned[WHOLE], moved[WHOLE], base, &at, s, r, 0, v, &err), UZ_OK);
+    CHECK_INT(uz_row_turn_along(&known, turned[WHOLE], moved[WHOLE], base, &at, s, r, v, &err), UZ_OK);
     CHECK(known);
     for (int side = 0; side < 2; side++) {
         f[side] = body_room(d, sizeof **f);

@@ -41,7 +41,7 @@ static void fail_each(bool solid)
         if (status == UZ_OK)
             status = uz_widen_by_rows(&wide, &base.K, &at.N, r, 0, &turn, &err);
         if (status == UZ_OK)
-            status = uz_row_turn_along(&known, v + base.d, gap, &base, &at, &s, r, 0, v, &err);
+            status = uz_row_turn_along(&known, v + base.d, gap, &base, &at, &s, r, v, &err);
         CHECK(known == (status == UZ_OK));
         uz_row_turn_clear(&turn);
         uz_csc_clear(&wide);
