@@ -9,11 +9,12 @@ import time
 
 import getfem
 import numpy
+from getfem_steps import put_on
 
 LAWS = {"neo_hooke_isochoric": "mu/2*((Norm_sqr(F)+1)*pow(Det(F),-2/3)-3)+(la/2+mu/3)*sqr(Det(F)-1)",
         "st_venant_kirchhoff": "la/8*sqr(Norm_sqr(F)-2)+mu/4*Norm_sqr(F'*F-Id(2))"}
 ORDER = [0, 4, 1, 7, 5, 3, 6, 2]  # nodes of a quad8 as GetFEM has them
-MOST, LEAST_PART, ERROR = 50, 1 / 64, 1e-9
+MOST = 50
 
 
 def mesh_of(scene):
@@ -73,29 +74,14 @@ def model_of(scene):
 
 def solve(scene):
     model, field, inside, region = model_of(scene)
-    reached, part, steps_of_all = 0.0, 1.0, 0
-    kept = model.from_variables()
-    while reached < 1 and part >= LEAST_PART:
-        model.set_variable("t", [min(1.0, reached + part)])
-        try:
-            steps, good = model.solve("max_res", ERROR, "max_iter", MOST, "lsolver", "mumps", "lsearch", scene["search"])
-            good = bool(good) and numpy.all(numpy.isfinite(model.variable("u")))
-        except RuntimeError:
-            steps, good = MOST, False
-        steps_of_all += steps
-        if good:
-            reached = min(1.0, reached + part)
-            kept = model.from_variables()
-        else:
-            part /= 2
-            model.to_variables(kept)
+    reached, steps = put_on(model, "t", ["u"], MOST, scene["search"])
     u, places = model.variable("u").reshape(-1, 2), field.basic_dof_nodes()[:, ::2].T
     probe = u[numpy.argmin(numpy.linalg.norm(places - numpy.array(scene["probe"]), axis=1))]
     force = [0.0, 0.0]
     if scene.get("obstacle"):
         normal = gap_of(scene["obstacle"])[1]
         force = [-float(getfem.asm_generic(inside, 0, f"p*({normal}({c}))", region, model)) for c in (1, 2)]
-    return {"load": reached, "steps": steps_of_all, "force": force, "probe": probe.tolist()}
+    return {"load": reached, "steps": steps, "force": force, "probe": probe.tolist()}
 
 
 def main():

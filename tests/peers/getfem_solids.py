@@ -9,10 +9,11 @@ import time
 
 import getfem
 import numpy
+from getfem_steps import put_on
 
 LAW = "mu/2*(Norm_sqr(F)-3)-mu*log(Det(F))+la/2*sqr(log(Det(F)))"
-MOST, ERROR, LEAST_PART = 30, 1e-9, 1 / 64
 BELOW, ABOVE = 1, 2
+HOW = {"unknowns": ["u0", "u1"], "most": 30, "search": "simplest", "part": 0.5}
 
 
 def mesh_of(points, cells):
@@ -56,34 +57,13 @@ def model_of(asked):
     return model, inside[1], alive + inside
 
 
-def put_on(model, name):
-    """(the part that has an answer, steps)"""
-    reached, part, steps_of_all = 0.0, 0.5, 0
-    kept = model.from_variables()
-    while reached < 1 and part >= LEAST_PART:
-        model.set_variable(name, [min(1.0, reached + part)])
-        try:
-            steps, good = model.solve("max_res", ERROR, "max_iter", MOST, "lsolver", "mumps", "lsearch", "simplest")
-            good = bool(good) and all(numpy.all(numpy.isfinite(model.variable(u))) for u in ("u0", "u1"))
-        except RuntimeError:
-            steps, good = MOST, False
-        steps_of_all += steps
-        if good:
-            reached = min(1.0, reached + part)
-            kept = model.from_variables()
-        else:
-            part /= 2
-            model.to_variables(kept)
-    return reached, steps_of_all
-
-
 def main():
     asked = json.load(sys.stdin)
     getfem.util_trace_level(0)
     begun = time.process_time()
     model, inside, _alive = model_of(asked)
-    down, first = put_on(model, "t")
-    aside, second = put_on(model, "s") if down == 1 else (0, 0)
+    down, first = put_on(model, "t", **HOW)
+    aside, second = put_on(model, "s", **HOW) if down == 1 else (0, 0)
     force = [float(getfem.asm_generic(inside, 0, f"m1({c})", ABOVE, model)) for c in (1, 2, 3)]
     print(json.dumps({"load": aside, "steps": first + second, "force": force, "seconds": time.process_time() - begun}))
 
