@@ -83,9 +83,8 @@ const client_page CLIENT_PAGES[CLIENT_COMMANDS] = {
     [CLIENT_PLOT] = {"plot", "plot ID [options]", "draw the convergence, the body, a path or the price of accuracy",
                      "ID", CLIENT_OPERAND_NEEDED,
                      "Without --deformed, --error, --path or --trade the convergence is drawn: dual objective, "
-                     "residual and certified "
-                     "bound. A file that ends in .png gets a PNG, by way of rsvg-convert (Debian: librsvg2-bin); any "
-                     "other an SVG.\n",
+                     "residual and certified bound. A file that ends in .png gets a PNG, by way of rsvg-convert "
+                     "(Debian: librsvg2-bin); any other an SVG.\n",
                      NULL},
     [CLIENT_REPORT] = {"report", "report ID [options]", "write all that is known of an answer into one HTML file", "ID",
                        CLIENT_OPERAND_NEEDED,

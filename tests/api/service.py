@@ -57,6 +57,8 @@ SCENE = {"problem": {"kind": "scene", "model": "plane_stress", "thickness": 5,
                      "loads": [{"on": "top", "traction": [0, -0.05]}, {"on": "right", "traction": [0.5, 0]}],
                      "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]},
          "solver": {"method": "accelerated_restart", "accuracy": {"relative_error": 1e-6}}}
+# What makes SCENE one that is refused by the solver, and not before: loads push the body off its obstacle.
+PUSHED_OFF = {"supports": [{"on": "left", "ux": 0}], "loads": [{"on": "top", "traction": [0, 0.05]}]}
 # Steps so short that it runs until it is told to stop.
 ENDLESS = {**SCENE, "solver": {"method": "uzawa", "alpha": 1e-9, "max_iterations": 1000000000}}
 

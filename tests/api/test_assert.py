@@ -10,7 +10,7 @@ import tempfile
 import xml.etree.ElementTree
 
 import service
-from service import MATRICES, SCENE, check, expect
+from service import MATRICES, PUSHED_OFF, SCENE, check, expect
 
 SHARED = True  # one service for all tests
 
@@ -218,9 +218,7 @@ def test_client_tells_other_ends_first(s):
     report, done = report_of(s, stopped, code=7)
     check("uncertain" in done.stdout, done.stdout)
     check(len(names_of(report, "failure")) == 2, names_of(report, "failure"))
-    away = {"supports": [{"on": "left", "ux": 0}], "loads": [{"on": "top", "traction": [0, 1]}]}
-    broken = {"problem": {**SCENE["problem"], **away}}  # the solver finds out
-    report, _ = report_of(s, broken, code=6)
+    report, _ = report_of(s, {"problem": {**SCENE["problem"], **PUSHED_OFF}}, code=6)
     check(names_of(report, "error") == ["converged"], names_of(report))
 
 

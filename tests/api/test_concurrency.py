@@ -8,7 +8,7 @@ import threading
 import time
 
 import service
-from service import ENDLESS, MATRICES, SCENE, check, expect, options, wait_until
+from service import ENDLESS, MATRICES, PUSHED_OFF, SCENE, check, expect, options, wait_until
 
 ENERGY, REACTION_SUM = -3.9608186040e-3, -10.51371700  # of the scene
 CLIENTS = 8
@@ -187,7 +187,7 @@ def test_small_cache_under_load(s):
 def test_unlike_jobs_at_once(s):
     """Every method and operator side by side, a body that fails among them: each gets what it gets alone."""
     broken = scaled_scene(1)
-    broken["problem"].update(supports=[{"on": "left", "ux": 0}], loads=[{"on": "top", "traction": [0, 0.05]}])  # off the obstacle
+    broken["problem"].update(PUSHED_OFF)
     few_steps = ("auto", "active_set", "dual_active_set")
     kinds = [(method, "condensed") for method in ("uzawa", "accelerated", "auto")]
     kinds += [(method, "factored") for method in (few_steps if service.INSTRUMENTED else ("uzawa", "accelerated", "auto"))]

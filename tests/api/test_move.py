@@ -11,7 +11,7 @@ import time
 
 import databases
 import service
-from service import ENDLESS, MATRICES, SCENE, Service, check, expect
+from service import ENDLESS, MATRICES, PUSHED_OFF, SCENE, Service, check, expect
 
 SERVER = None
 TOKENS = "ann submit ann-secret-is-long\nbob submit bob-secret-is-long\nroot admin root-secret-is-long\n"
@@ -66,7 +66,7 @@ def fill(s):
             "hooked": post({**MATRICES, "webhook": {"url": "http://127.0.0.1:9/told"}})}
     check([ended(job, "root") for job in jobs.values()] == ["successful"] * 5, "they did not all end well")
     failing = json.loads(json.dumps(SCENE))
-    failing["problem"].update(supports=[{"on": "left", "ux": 0}], loads=[{"on": "top", "traction": [0, 0.05]}])  # off the obstacle
+    failing["problem"].update(PUSHED_OFF)
     jobs["failed"] = post(failing)
     check(ended(jobs["failed"]) == "failed")
     jobs["refined"] = expect(s.request("POST", f"/v1/jobs/{jobs['keyed']}/refine", {"accuracy": {"relative_error": 1e-12}},
