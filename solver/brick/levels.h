@@ -37,6 +37,9 @@ static inline int64_t uz_brick_numbers(const uz_brick_level *level)
 bool uz_brick_axis_init(uz_brick_axis *axis, int64_t fine, int64_t coarse);
 void uz_brick_axis_clear(uz_brick_axis *axis);
 
+/* A bound on the largest eigenvalue of diag(K)^-1 K of so many cells, each with ke / unit, whatever dofs are held. */
+double uz_brick_most(const int64_t cells[3], const double *ke, double unit);
+
 /* What a thread needs of a grid. inverse: 1 / K_jj, 0 at held dofs. */
 typedef struct {
     float *x, *b, *t, *d; /* t: not of the last; d may be t */

@@ -15,50 +15,9 @@
 /* Cells that are this much longer than the shortest are not made longer. */
 #define SHORT 1.6
 /* A grid of so few dofs is the last. */
-enum { FEW_DOFS = 200, ROOT_POWERS = 7 };
+enum { FEW_DOFS = 200 };
 
 /* -------------------------------------------------------------- the grids */
-
-/* lambda_max of a symmetric 3 x 3 matrix, at most 1 % too large: the root of the norm of a high power. */
-static double largest(const double given[9])
-{
-    double A[9], log_scale = 0.0;
-    memcpy(A, given, sizeof A);
-    for (int power = 0; power <= ROOT_POWERS; power++) {
-        double norm = 0.0, square[9];
-        for (int i = 0; i < 3; i++)
-            norm = fmax(norm, fabs(A[3 * i]) + fabs(A[3 * i + 1]) + fabs(A[3 * i + 2]));
-        if (norm == 0.0)
-            return 0.0;
-        log_scale = 2.0 * log_scale + log(norm); /* A stands for exp(log_scale) A */
-        for (int i = 0; i < 9; i++)
-            A[i] /= norm;
-        if (power == ROOT_POWERS)
-            return exp(log_scale / (double)(1 << ROOT_POWERS));
-        for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++)
-                square[3 * i + j] = A[3 * i] * A[j] + A[3 * i + 1] * A[3 + j] + A[3 * i + 2] * A[6 + j];
-        memcpy(A, square, sizeof A);
-    }
-    return 0.0;
-}
-
-/* The largest eigenvalue of diag(K)^-1 K is at most that of a cell (Fried, J. Sound Vib. 22 (1972)), which is one of
- * those of its blocks. */
-static double most_of_cell(const double *block, const double *ke, double unit)
-{
-    double most = 0.0;
-    for (int p = 0; p < UZ_BRICK_PARITIES; p++) {
-        double scaled[9];
-        for (int m = 0; m < 3; m++)
-            for (int l = 0; l < 3; l++)
-                scaled[3 * m + l] =
-                    UZ_BRICK_NODES * block[9 * p + 3 * m + l] /
-                    (sqrt(ke[(UZ_BRICK_DOFS + 1) * m] / unit) * sqrt(ke[(UZ_BRICK_DOFS + 1) * l] / unit));
-        most = fmax(most, largest(scaled));
-    }
-    return most;
-}
 
 static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit)
 {
@@ -75,7 +34,7 @@ static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit
         level->block[i] = (float)block[i];
     for (int c = 0; c < 3; c++)
         level->diagonal[c] = (float)(ke[(UZ_BRICK_DOFS + 1) * c] / unit);
-    level->most = most_of_cell(block, ke, unit);
+    level->most = uz_brick_most(level->cells, ke, unit);
     return true;
 }
 

@@ -1,6 +1,7 @@
 /* Boxes whose K is not assembled: products, diagonal and moved supports against the assembled matrix, residuals in
  * quadruple precision, the multigrid, and whole solves against a factor's. */
 #include "brick/brick.h"
+#include "brick/levels.h"
 #include "certificate/residual.h"
 #include "harness.h"
 #include "qp_fixture.h"
@@ -222,6 +223,49 @@ TEST(the_cycle_is_symmetric_with_dofs_held_too)
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     free_twins(&t);
+}
+
+/* Powers reach the largest eigenvalue of diag(K)^-1 K from below. */
+static double largest_found(const uz_csc *K)
+{
+    double *x = vector(K->cols), *y = vector(K->cols), most = 0.0;
+    fill(x, K->cols, 5);
+    for (int step = 0; step < 200; step++) {
+        double up = 0.0, down = 0.0;
+        memset(y, 0, (size_t)K->cols * sizeof *y);
+        uz_csc_symv(y, K, 1.0, x);
+        for (int64_t j = 0; j < K->cols; j++) {
+            up += x[j] * y[j];
+            down += x[j] * x[j] * K->val[K->ptr[j]];
+        }
+        most = up / down;
+        for (int64_t j = 0; j < K->cols; j++)
+            x[j] = y[j] / K->val[K->ptr[j]] / most;
+    }
+    free(x);
+    free(y);
+    return most;
+}
+
+/* Were it less than that, the cycle could be indefinite, and what it certifies wrong; where it is more, it smooths
+ * less.
+ */
+TEST(smoothers_are_made_for_the_largest_eigenvalue)
+{
+    static const int64_t cells[][3] = {{6, 6, 6}, {7, 5, 6}, {3, 4, 3}, {9, 2, 3}, {8, 1, 1}, {5, 1, 2}};
+    static const double poisson[] = {0, 0.3, 0.45, 0.499}, length[] = {60, 6};
+    for (size_t k = 0; k < sizeof cells / sizeof cells[0]; k++)
+        for (int of = 0; of < 8; of++) {
+            uz_scene scene = block_scene(cells[k][0], cells[k][1], cells[k][2], poisson[of / 2]);
+            scene.box.size[0] = length[of % 2];
+            uz_body_model whole = build_body(&scene), by_cells;
+            CHECK(uz_body_model_build(&by_cells, &scene, UZ_BODY_CELLS, NULL) == UZ_OK);
+            const double found = largest_found(&whole.K), most = uz_brick_most(cells[k], by_cells.brick->ke, 1.0);
+            CHECK_MSG(found <= most && most <= 1.25 * found, "%zu, %d: %g for %g", k, of, most, found);
+            uz_body_model_clear(&whole);
+            uz_body_model_clear(&by_cells);
+            uz_scene_clear(&scene);
+        }
 }
 
 /* Iterations to 1e-8 of the first residual. */

@@ -1,0 +1,104 @@
+/* smoother.c: how large the eigenvalues are that the smoother of a grid is made for.
+ *
+ * The largest eigenvalue of diag(K)^-1 K is at most that of any of the parts that a body is put together of, as K and
+ * its diagonal are sums over these, and no larger where dofs are held (Fried, J. Sound Vib. 22 (1972)). One cell is a
+ * rough part: alone it can do what its neighbours would hinder. For Poisson's ratios from 0.3 to 0.49 its eigenvalue
+ * is 1.6 to 2.1 times the largest of a cube of many cells, that of eight cells 1.08 times. */
+#include "brick/levels.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { DOFS = UZ_BRICK_DOFS, ROOT_POWERS = 7 };
+
+/* lambda_max of a symmetric matrix without negative eigenvalues, at most 1.3 % too large: the root of the norm of a
+ * high power. */
+static double largest(const double given[DOFS * DOFS])
+{
+    double A[DOFS * DOFS], square[DOFS * DOFS], log_scale = 0.0;
+    memcpy(A, given, sizeof A);
+    for (int power = 0;; power++) {
+        double norm = 0.0;
+        for (int i = 0; i < DOFS; i++) {
+            double sum = 0.0;
+            for (int j = 0; j < DOFS; j++)
+                sum += fabs(A[DOFS * i + j]);
+            norm = fmax(norm, sum);
+        }
+        if (norm == 0.0)
+            return 0.0;
+        log_scale = 2.0 * log_scale + log(norm); /* A stands for exp(log_scale) A */
+        if (power == ROOT_POWERS)
+            return exp(log_scale / (double)(1 << ROOT_POWERS));
+        for (int i = 0; i < DOFS * DOFS; i++)
+            A[i] /= norm;
+        memset(square, 0, sizeof square);
+        for (int i = 0; i < DOFS; i++)
+            for (int k = 0; k < DOFS; k++)
+                for (int j = 0; j < DOFS; j++)
+                    square[DOFS * i + j] += A[DOFS * i + k] * A[DOFS * k + j];
+        memcpy(A, square, sizeof A);
+    }
+}
+
+/* A part of cells is symmetric to its reflections, as each cell is: K is eight blocks, for displacements that are even
+ * or odd along each axis, which those of an eighth of the nodes tell. Returns with which sign a dof follows from which
+ * of these, 0: it is 0. */
+static int follow(int *from, const int node[3], int component, const int cells[3], int parity)
+{
+    int sign = 1;
+    *from = component;
+    for (int c = 0; c < 3; c++) {
+        const bool odd = (parity >> c & 1) != (c == component), beyond = 2 * node[c] > cells[c];
+        if (odd)
+            sign *= beyond ? -1 : 2 * node[c] == cells[c] ? 0 : 1;
+        *from += 3 * (beyond ? cells[c] - node[c] : node[c]) << c;
+    }
+    return sign;
+}
+
+/* The largest eigenvalue of diag(K)^-1 K of a part of at most three cells along each axis. */
+static double most_of_part(const int cells[3], const double *ke, double unit)
+{
+    double most = 0.0;
+    for (int parity = 0; parity < UZ_BRICK_PARITIES; parity++) {
+        double K[DOFS * DOFS] = {0.0}, D[DOFS] = {0.0};
+        for (int cell = 0; cell < cells[0] * cells[1] * cells[2]; cell++) {
+            const int at[3] = {cell % cells[0], cell / cells[0] % cells[1], cell / cells[0] / cells[1]};
+            int from[DOFS], sign[DOFS];
+            for (int i = 0; i < DOFS; i++) {
+                const int *corner = uz_brick_corner[i / 3];
+                const int node[3] = {at[0] + corner[0], at[1] + corner[1], at[2] + corner[2]};
+                sign[i] = follow(&from[i], node, i % 3, cells, parity);
+            }
+            for (int i = 0; i < DOFS; i++) {
+                D[from[i]] += sign[i] * sign[i] * (ke[(DOFS + 1) * i] / unit);
+                for (int j = 0; j < DOFS; j++)
+                    K[DOFS * from[i] + from[j]] += sign[i] * sign[j] * (ke[DOFS * i + j] / unit);
+            }
+        }
+        for (int i = 0; i < DOFS; i++)
+            for (int j = 0; j < DOFS; j++)
+                K[DOFS * i + j] = D[i] > 0.0 && D[j] > 0.0 ? K[DOFS * i + j] / (sqrt(D[i]) * sqrt(D[j])) : 0.0;
+        most = fmax(most, largest(K));
+    }
+    return most;
+}
+
+/* Parts of two cells along each axis, and one of three where their number is odd. */
+double uz_brick_most(const int64_t cells[3], const double *ke, double unit)
+{
+    double most = 0.0;
+    int part[3];
+    for (part[0] = 1; part[0] <= 3; part[0]++)
+        for (part[1] = 1; part[1] <= 3; part[1]++)
+            for (part[2] = 1; part[2] <= 3; part[2]++) {
+                bool there = true;
+                for (int c = 0; c < 3; c++)
+                    there =
+                        there && (cells[c] <= 3 ? part[c] == cells[c] : part[c] == 2 || part[c] == 2 + cells[c] % 2);
+                if (there)
+                    most = fmax(most, most_of_part(part, ke, unit));
+            }
+    return most;
+}
