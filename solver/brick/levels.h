@@ -20,6 +20,7 @@ typedef struct {
 typedef struct {
     int64_t cells[3];
     double cell[3];
+    int halvings[3];             /* along each axis, from the first grid */
     int64_t stride, plane, size; /* numbers in a line, a plane with a register more, and in all of one component */
     float block[9 * UZ_BRICK_PARITIES];
     float diagonal[3];   /* what one cell gives to a node */

@@ -19,6 +19,47 @@ enum { FEW_DOFS = 200 };
 
 /* -------------------------------------------------------------- the grids */
 
+/* ke of two cells beside each other along an axis as one, between whose corners displacements are linear. */
+static void join_cells(double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS], int axis)
+{
+    double joined[UZ_BRICK_DOFS * UZ_BRICK_DOFS] = {0.0};
+    for (int half = 0; half < 2; half++) {
+        double share[UZ_BRICK_NODES][UZ_BRICK_NODES]; /* of the whole's corners in those of the half */
+        for (int a = 0; a < UZ_BRICK_NODES; a++)
+            for (int of = 0; of < UZ_BRICK_NODES; of++) {
+                const int *at = uz_brick_corner[a], *corner = uz_brick_corner[of];
+                const double along = 0.5 * (half + at[axis]);
+                share[a][of] = corner[axis] ? along : 1.0 - along;
+                for (int c = 0; c < 3; c++)
+                    if (c != axis && at[c] != corner[c])
+                        share[a][of] = 0.0;
+            }
+        for (int a = 0; a < UZ_BRICK_DOFS; a++)
+            for (int b = 0; b < UZ_BRICK_DOFS; b++)
+                for (int p = 0; p < UZ_BRICK_NODES; p++)
+                    for (int q = 0; q < UZ_BRICK_NODES; q++)
+                        joined[(3 * p + a % 3) * UZ_BRICK_DOFS + 3 * q + b % 3] +=
+                            share[a / 3][p] * share[b / 3][q] * ke[a * UZ_BRICK_DOFS + b];
+    }
+    memcpy(ke, joined, sizeof joined);
+}
+
+/* Galerkin's: a cell of a coarser grid is as stiff as the cells of the finest in it are where displacements are linear
+ * between its corners. Of mean dilatation one large cell would resist far less: what the finest one has to take back
+ * then. Where halves do not come out even it is made of as many of a size that does. */
+static bool stiffness_of(double *ke, const uz_brick *brick, const uz_brick_level *level)
+{
+    double size[3];
+    for (int c = 0; c < 3; c++)
+        size[c] = ldexp(level->cell[c], -level->halvings[c]);
+    if (!uz_brick_stiffness(ke, brick, size))
+        return false;
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < level->halvings[c]; k++)
+            join_cells(ke, c);
+    return true;
+}
+
 static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit)
 {
     double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS], block[9 * UZ_BRICK_PARITIES];
@@ -27,7 +68,7 @@ static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit
      * have */
     level->plane = level->stride * (level->cells[1] + 1) + UZ_BRICK_PAD;
     level->size = level->plane * (level->cells[2] + 1);
-    if (!uz_brick_stiffness(ke, brick, level->cell))
+    if (!stiffness_of(ke, brick, level))
         return false;
     (void)uz_brick_blocks(block, ke, unit);
     for (int i = 0; i < 9 * UZ_BRICK_PARITIES; i++)
@@ -71,6 +112,7 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
             return true;
         for (int c = 0; c < 3; c++) {
             mg->level[l + 1].cells[c] = next[c];
+            mg->level[l + 1].halvings[c] = level->halvings[c] + (next[c] < level->cells[c] ? 1 : 0);
             mg->level[l + 1].cell[c] = level->cell[c] * ((double)level->cells[c] / (double)next[c]);
             if (!uz_brick_axis_init(&level->to[c], level->cells[c], next[c]))
                 return false;
@@ -137,7 +179,7 @@ uz_status uz_brick_factor_coarsest(double **out, const uz_brick_grids *mg, const
     double *A = uz_alloc_zero(n * n, sizeof *A);
     uz_status status = UZ_OK;
     *out = NULL;
-    if (!place || !A || !uz_brick_stiffness(ke, mg->brick, level->cell)) {
+    if (!place || !A || !stiffness_of(ke, mg->brick, level)) {
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
         goto done;
     }
