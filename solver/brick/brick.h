@@ -26,9 +26,9 @@ uz_status uz_brick_subtract_moved(double *p, const uz_brick *brick, const double
 
 /* Geometric multigrid on a brick, which has to outlive it: a V-cycle in single precision, with cells twice as long on
  * each next grid, along the axes along which cells are short (Trottenberg, Oosterlee and Schueller, "Multigrid", 5.1),
- * and Chebyshev polynomials of degree 2 on the diagonal before and after (Adams, Brezina, Hu and Tuminaro, J. Comput.
- * Phys. 188 (2003)); the last grid by its factor. As a uz_multigrid its K is that of the brick: the K that it is handed
- * is not read. UZ_ERR_MEMORY, LIMIT, NOT_SPD. */
+ * and Chebyshev polynomials of degree 2 to 4 on the diagonal before and after (Adams, Brezina, Hu and Tuminaro, J.
+ * Comput. Phys. 188 (2003)); the last grid by its factor. As a uz_multigrid its K is that of the brick: the K that it
+ * is handed is not read. UZ_ERR_MEMORY, LIMIT, NOT_SPD. */
 uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t memory_limit, uz_error *err);
 /* What it takes, and its room. */
 double uz_brick_predict_bytes(const uz_brick *brick);

@@ -17,14 +17,29 @@ typedef struct {
     float *share;         /* (coarse + 1) x UZ_BRICK_SHARES: ... and those of that and the next ones */
 } uz_brick_axis;
 
+enum { UZ_BRICK_DEGREE_MOST = 4 };
+
+/* A polynomial of diag(K)^-1 K, in steps d = p d + q diag(K)^-1 r, x += d. */
+typedef struct {
+    double most; /* a bound on the largest eigenvalue of diag(K)^-1 K */
+    int degree;
+    float p[UZ_BRICK_DEGREE_MOST], q[UZ_BRICK_DEGREE_MOST];
+} uz_brick_smoother;
+/* Of a grid of so many cells, each with ke / unit, whatever dofs are held; coarser: along which axes the next one is.
+ */
+void uz_brick_smoother_init(uz_brick_smoother *out, const int64_t cells[3], const double *ke, double unit,
+                            const bool coarser[3]);
+/* A bound on lambda_max(diag(K)^-1 M) of a cycle that smooths so on the first grid. */
+double uz_brick_bound_on_cycle(const uz_brick_smoother *s);
+
 typedef struct {
     int64_t cells[3];
     double cell[3];
     int halvings[3];             /* along each axis, from the first grid */
     int64_t stride, plane, size; /* numbers in a line, a plane with a register more, and in all of one component */
     float block[9 * UZ_BRICK_PARITIES];
-    float diagonal[3];   /* what one cell gives to a node */
-    double most;         /* a bound on the largest eigenvalue of diag(K)^-1 K */
+    float diagonal[3]; /* what one cell gives to a node */
+    uz_brick_smoother smoother;
     uz_brick_axis to[3]; /* the next grid; not of the last one */
 } uz_brick_level;
 
@@ -37,9 +52,6 @@ static inline int64_t uz_brick_numbers(const uz_brick_level *level)
 /* false: no memory; clear it all the same. */
 bool uz_brick_axis_init(uz_brick_axis *axis, int64_t fine, int64_t coarse);
 void uz_brick_axis_clear(uz_brick_axis *axis);
-
-/* A bound on the largest eigenvalue of diag(K)^-1 K of so many cells, each with ke / unit, whatever dofs are held. */
-double uz_brick_most(const int64_t cells[3], const double *ke, double unit);
 
 /* What a thread needs of a grid. inverse: 1 / K_jj, 0 at held dofs. */
 typedef struct {

@@ -10,8 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The smoother is made for the eigenvalues of diag(K)^-1 K from the largest down to this part of it. */
-#define SMOOTHED 6.0
 /* Cells that are this much longer than the shortest are not made longer. */
 #define SHORT 1.6
 /* A grid of so few dofs is the last. */
@@ -60,7 +58,7 @@ static bool stiffness_of(double *ke, const uz_brick *brick, const uz_brick_level
     return true;
 }
 
-static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit)
+static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit, const bool coarser[3])
 {
     double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS], block[9 * UZ_BRICK_PARITIES];
     level->stride = uz_brick_stride(level->cells[0]);
@@ -75,7 +73,7 @@ static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit
         level->block[i] = (float)block[i];
     for (int c = 0; c < 3; c++)
         level->diagonal[c] = (float)(ke[(UZ_BRICK_DOFS + 1) * c] / unit);
-    level->most = uz_brick_most(level->cells, ke, unit);
+    uz_brick_smoother_init(&level->smoother, level->cells, ke, unit, coarser);
     return true;
 }
 
@@ -106,9 +104,11 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
     for (;; l++) {
         uz_brick_level *level = &mg->level[l];
         int64_t next[3];
-        *sound = *sound && init_level(level, brick, mg->unit);
+        const bool last = !coarsen(next, level) || l + 1 == UZ_BRICK_LEVELS_MOST;
+        const bool coarser[3] = {next[0] < level->cells[0], next[1] < level->cells[1], next[2] < level->cells[2]};
+        *sound = *sound && init_level(level, brick, mg->unit, coarser);
         mg->base.levels = l + 1;
-        if (!*sound || l + 1 == UZ_BRICK_LEVELS_MOST || !coarsen(next, level))
+        if (!*sound || last)
             return true;
         for (int c = 0; c < 3; c++) {
             mg->level[l + 1].cells[c] = next[c];
@@ -215,33 +215,6 @@ done:
 
 /* -------------------------------------------------------------- the cycle */
 
-/* Chebyshev's recurrence for two steps on [most / SMOOTHED, most]: d = q0 inverse r, then d = p1 d + q1 inverse r. */
-typedef struct {
-    float q0, p1, q1;
-} polynomial;
-
-static polynomial polynomial_of(double most)
-{
-    const double least = most / SMOOTHED, middle = 0.5 * (most + least), half = 0.5 * (most - least);
-    const double sigma = middle / half, rho = 1.0 / sigma, next = 1.0 / (2.0 * sigma - rho);
-    return (polynomial){(float)(1.0 / middle), (float)(next * rho), (float)(2.0 * next / half)};
-}
-
-/* A bound on lambda_max(diag(K)^-1 M): M^-1 is at least what the smoothers do without the coarser grids,
- * (1 - phi(t)^2) / t for an eigenvalue t of diag(K)^-1 K, phi what two steps leave. */
-static double bound_on_cycle(double most)
-{
-    enum { SAMPLES = 4000 };
-    const polynomial s = polynomial_of(most);
-    double worst = 0.0;
-    for (int k = 1; k <= SAMPLES; k++) {
-        const double t = most * k / SAMPLES, first = 1.0 - (double)s.q0 * t;
-        const double phi = first - t * ((double)s.p1 * (double)s.q0 + (double)s.q1 * first);
-        worst = fmax(worst, t / (1.0 - phi * phi));
-    }
-    return 1.01 * worst;
-}
-
 static void solve_coarsest(const uz_brick_grids *mg, const uz_multigrid_room *room)
 {
     const int last = mg->base.levels - 1;
@@ -289,10 +262,11 @@ void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int
     for (int l = first; l < last; l++) {
         const uz_brick_level *level = &mg->level[l];
         const uz_brick_vectors *v = &room->v[l];
-        const polynomial s = polynomial_of(level->most);
-        first_step begin = {v, s.q0};
+        const uz_brick_smoother *s = &level->smoother;
+        first_step begin = {v, s->q[0]};
         uz_by_pieces(take_first_step, &begin, 3 * level->size);
-        uz_brick_step(level, v, &room->planes, s.p1, s.q1);
+        for (int k = 1; k < s->degree; k++)
+            uz_brick_step(level, v, &room->planes, s->p[k], s->q[k]);
         uz_brick_residual(level, v, &room->planes);
         uz_brick_restrict(level, level + 1, v, v + 1, &room->planes);
     }
@@ -300,10 +274,10 @@ void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int
     for (int l = last - 1; l >= first; l--) {
         const uz_brick_level *level = &mg->level[l];
         const uz_brick_vectors *v = &room->v[l];
-        const polynomial s = polynomial_of(level->most);
+        const uz_brick_smoother *s = &level->smoother;
         uz_brick_prolong(level, level + 1, v, v + 1, &room->planes);
-        uz_brick_step(level, v, &room->planes, 0.0F, s.q0);
-        uz_brick_step(level, v, &room->planes, s.p1, s.q1);
+        for (int k = 0; k < s->degree; k++)
+            uz_brick_step(level, v, &room->planes, s->p[k], s->q[k]);
     }
 }
 
@@ -535,7 +509,7 @@ uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t m
             uz_fail(err, UZ_ERR_NOT_FINITE, "/materials", "the stiffness of larger cells overflows; use other units");
     if (status == UZ_OK) {
         mg->n_coarsest = list_coarsest(NULL, &mg->level[mg->base.levels - 1]);
-        mg->base.most = bound_on_cycle(mg->level[0].most);
+        mg->base.most = uz_brick_bound_on_cycle(&mg->level[0].smoother);
         mg->base.bytes += sizeof *mg + 8 * (size_t)(mg->n_coarsest * mg->n_coarsest);
         status = uz_brick_factor_coarsest(&mg->coarsest, mg, mg->inverse[mg->base.levels - 1], NULL, err);
     }
