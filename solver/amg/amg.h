@@ -170,8 +170,8 @@ typedef struct {
 } uz_amg;
 
 /* Of any multigrid for K, which is taken, also on failure. patience: LIMIT where so many steps do not bound the
- * spectrum, as conjugate gradients would then be slow too; 0: as many as it takes. NOT_SPD where K is singular to
- * working precision. */
+ * spectrum, or are seen not to, as conjugate gradients would then be slow too; 0: as many as it takes. NOT_SPD where K
+ * is singular to working precision. */
 uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patience, const uz_hooks *hooks,
                     uz_error *err);
 /* The same where K is known to be definite, as that of a body is by its assembly: without bounds, which uz_amg_probe
@@ -183,7 +183,7 @@ uz_status uz_amg_of_definite(uz_amg **out, uz_multigrid *mg, uz_error *err);
 uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
 /* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD and
  * LIMIT as uz_amg_of. Aggregates of another kind are tried where the usual ones do badly: with patience where they
- * would have to be refused, without it where they are slow. */
+ * would have to be refused, or nearly, without it where they are slow. */
 uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, int patience,
                         const uz_hooks *hooks, uz_error *err);
 void uz_amg_free(uz_amg *amg);

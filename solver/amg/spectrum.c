@@ -78,6 +78,8 @@ static void random_residual(uz_cg *cg, const uz_csc *K)
  * root: further steps would not spare each solve a tenth of one. */
 #define NEAR_RITZ 0.4
 #define ENOUGH    1.5
+/* Where as many steps as this times those that are allowed would not do, at the rate so far. */
+#define HOPELESS 1.5
 /* M is K but for rounding where there is one level only, and steps are cheap. */
 #define NEAR_ONE 0.9
 
@@ -93,6 +95,13 @@ static double begin_power(double *power, const double *z, const uz_csc *K)
     return norm;
 }
 
+/* Will so many steps not do? A residual that has fallen by `fallen` has to fall by `needed`, logarithms both. In the
+ * first third it falls no faster than later, but for what rounds off. */
+static bool are_hopeless(int count, int most, double fallen, double needed)
+{
+    return 3 * count >= most && fallen * HOPELESS * (double)most < needed * (double)count;
+}
+
 /* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. patience: uz_amg_of. power (n): the first one of
  * find_rcond, which begins with the same residual. */
 static uz_status bound_below(uz_amg_info *info, coefficients *c, double *power, uz_cg *cg, const uz_csc *K,
@@ -104,6 +113,7 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, double *power, 
     random_residual(cg, K);
     uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
     double square = uz_long_dot(cg->n, cg->r, cg->z);
+    const double first = square;
     (void)begin_power(power, cg->z, K);
     memcpy(cg->p, cg->z, (size_t)cg->n * sizeof *cg->p);
     for (c->count = 0; status == UZ_OK && c->count < most && square > 0.0;) {
@@ -126,6 +136,9 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, double *power, 
         c->alpha[c->count] = alpha;
         c->beta[c->count++] = beta;
         info->iterations = c->count;
+        if (status == UZ_OK && most < STEPS_MOST &&
+            are_hopeless(c->count, most, log(first / square), log(first) - 2.0 * log(share)))
+            break;
         if (status != UZ_OK || sqrt(square) >= share)
             continue;
         info->lambda = excluded(c, sqrt(square) / share);
@@ -134,9 +147,9 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, double *power, 
             return status;
         before = c->count % CHECK_EVERY == 0 ? info->lambda : before;
     }
-    if (status == UZ_OK && most < STEPS_MOST && c->count == most)
-        return uz_fail(err, UZ_ERR_LIMIT, "K", "conjugate gradients would take too many iterations: %d did not do",
-                       most);
+    if (status == UZ_OK && most < STEPS_MOST && square > 0.0)
+        return uz_fail(err, UZ_ERR_LIMIT, "K", "conjugate gradients would take too many iterations, as %d have shown",
+                       c->count);
     if (status == UZ_OK && info->lambda == 0.0) /* the residual may have vanished, too */
         info->lambda = excluded(c, sqrt(square) / share);
     return status;
@@ -218,7 +231,9 @@ uz_status uz_amg_of_definite(uz_amg **out, uz_multigrid *mg, uz_error *err)
 #define SECOND_STRONG 4.0
 #define SEES_MORE     1.1
 #define BAD_LAMBDA    0.02
-#define WORTH_LAMBDA  3.0
+/* The same for who has another way, and takes it where the bound is not much better than this. */
+#define WORST_LAMBDA 0.002
+#define WORTH_LAMBDA 3.0
 
 /* A multigrid at one threshold, or why there is none. */
 typedef struct {
@@ -257,7 +272,7 @@ static bool does_badly(const attempt *a, int patience)
 {
     if (a->levels < 2)
         return false;
-    return a->end == UZ_OK ? patience == 0 && a->amg->info.lambda < BAD_LAMBDA
+    return a->end == UZ_OK ? a->amg->info.lambda < (patience == 0 ? BAD_LAMBDA : WORST_LAMBDA)
                            : a->end == (patience == 0 ? UZ_ERR_NOT_SPD : UZ_ERR_LIMIT);
 }
 

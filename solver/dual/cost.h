@@ -20,8 +20,11 @@ typedef struct {
 typedef struct {
     uz_operator op;
     double setup_s, case_s; /* once for the body, and for each load */
-    double bytes;           /* K and N included */
-    double flops;           /* of the setup and one load */
+    /* Of these, what conjugate gradients on multigrid take where the bound on the spectrum takes so many steps; both
+     * grow with them. */
+    double steps, setup_steps_s, case_steps_s;
+    double bytes; /* K and N included */
+    double flops; /* of the setup and one load */
     bool fits;
 } uz_cost_estimate;
 

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "scene/breadth.h"
 
+#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -194,6 +195,18 @@ bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const 
                                   .bytes = (size_t)(sizeof(double) * entries)};
     uz_cost_decide(plan, size, &least, direct, asked, memory_limit);
     return plan->chosen >= 0 && !uz_dual_form_of(plan->form[plan->chosen].op)->can.needs_factor;
+}
+
+int uz_cost_patience(const uz_cost_plan *plan, const uz_cost_size *size)
+{
+    const uz_cost_estimate *chosen = &plan->form[plan->chosen];
+    const double cases = (double)(size->cases > 0 ? size->cases : 1);
+    double least = INFINITY;
+    for (int k = 0; k < plan->count; k++)
+        if (plan->form[k].fits && uz_dual_form_of(plan->form[k].op)->can.needs_factor)
+            least = fmin(least, total(&plan->form[k], size));
+    const double more = (least - total(chosen, size)) / (chosen->setup_steps_s + cases * chosen->case_steps_s);
+    return isfinite(least) ? (int)fmin(chosen->steps * (1.0 + fmax(0.0, more)), INT_MAX) : 0;
 }
 
 /* The fewest bytes of the forms with a factor, or without, and which that is. */

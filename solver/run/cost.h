@@ -41,6 +41,10 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
 bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const uz_mesh *mesh, uz_operator direct,
                             uz_operator asked, size_t memory_limit);
 
+/* Steps that a bound on the spectrum may take before the chosen form, which has no factor, is dearer than one that has
+ * and fits, as conjugate gradients then take longer in proportion; 0: there is none that fits. */
+int uz_cost_patience(const uz_cost_plan *plan, const uz_cost_size *size);
+
 /* What is left of seconds of one thread where so many share what they can of it. The plan is that of one: which form is
  * taken does not depend on who else computes. */
 double uz_cost_shared(double seconds, uz_operator op, bool brick, int threads);

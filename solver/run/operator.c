@@ -117,11 +117,6 @@ static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_er
 
 /* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
 #define LAMBDA_LEAST 1e-3
-/* Steps that a bound on the spectrum may take where a factor fits, too. It takes 36 on solids of well-shaped hex8 of
- * any size, also with Young's moduli from 1 to 10,000; 64 at a Poisson number of 0.45; 130 to 150 at 0.49 and at an
- * aspect of 10, where the solve takes four times what the factor does. */
-enum { PATIENCE = 100 };
-
 /* A multigrid that a group of processes holds. */
 static uz_status spread(making *m, uz_modes *modes, uz_error *err)
 {
@@ -168,7 +163,8 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
         if (status == UZ_OK && plan->form[plan->chosen].op == UZ_OPERATOR_DISTRIBUTED)
             status = spread(m, &modes, err);
         else if (status == UZ_OK)
-            status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, choice ? PATIENCE : 0, m->hooks, err);
+            status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget,
+                                   choice ? uz_cost_patience(plan, &m->size) : 0, m->hooks, err);
     }
     if (status == UZ_OK)
         status = make_dual(m, plan->form[plan->chosen].op, err);

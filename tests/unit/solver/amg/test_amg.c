@@ -628,7 +628,7 @@ TEST(memory_is_bounded)
 }
 
 /* A flat body's cells have ten times the length along two axes: the bound on the spectrum takes more steps than who has
- * another way wants to wait for; one of cubes takes fewer. */
+ * another way wants to wait for, which is seen before that; one of cubes takes fewer. */
 TEST(patience_ends)
 {
     enum { PATIENCE = 60 };
@@ -640,7 +640,12 @@ TEST(patience_ends)
         uz_error err = {0};
         CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
         CHECK_INT(uz_amg_create(&amg, &b.K, &modes, 0, PATIENCE, NULL, &err), flat ? UZ_ERR_LIMIT : UZ_OK);
-        CHECK(flat ? amg == NULL && strstr(err.message, "60 ") != NULL : amg->info.iterations < PATIENCE);
+        if (flat) {
+            const char *after = strstr(err.message, "as ");
+            CHECK(amg == NULL && after && atoi(after + 3) > PATIENCE / 4 && atoi(after + 3) < PATIENCE / 2);
+        } else {
+            CHECK(amg->info.iterations < PATIENCE);
+        }
         uz_amg_free(amg);
         brick_free(&b);
     }

@@ -58,3 +58,25 @@ TEST(a_multigrid_is_not_paid_by_entries_alone)
     }
     CHECK_MSG(seconds[0] < seconds[1] && seconds[1] < 1.5 * seconds[0], "%g and %g s", seconds[0], seconds[1]);
 }
+
+/* As many steps as make it as dear as the form with a factor; the more, the dearer that is. */
+TEST(patience_is_as_long_as_a_factor_is_dear)
+{
+    const uz_cost_size size = {.d = 100000, .cases = 2};
+    uz_cost_plan plan = {.form = {{.op = UZ_OPERATOR_CONDENSED, .setup_s = 9, .case_s = 0.5, .fits = true},
+                                  {.op = UZ_OPERATOR_FACTORED, .setup_s = 1, .case_s = 1, .fits = false},
+                                  {.op = UZ_OPERATOR_MATRIX_FREE,
+                                   .setup_s = 2,
+                                   .case_s = 1,
+                                   .steps = 40,
+                                   .setup_steps_s = 1.25,
+                                   .case_steps_s = 0.875,
+                                   .fits = true}},
+                         .count = 3,
+                         .chosen = 2};
+    CHECK_INT(uz_cost_patience(&plan, &size), 120); /* (10 - 4) / (1.25 + 2 * 0.875) times as many more */
+    plan.form[1].fits = true;
+    CHECK_INT(uz_cost_patience(&plan, &size), 40);
+    plan.form[0].fits = plan.form[1].fits = false;
+    CHECK_INT(uz_cost_patience(&plan, &size), 0);
+}
