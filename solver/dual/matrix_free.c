@@ -297,14 +297,23 @@ static uz_status sharpen(free_load *x, double *value, double *w, const double *e
     return status;
 }
 
-/* With w from conjugate gradients that begin at 0, s = e - K w: e'K^-1 e = w'(e + s) + s'K^-1 s. enough: of the value.
- */
+/* w'(e + s) + s'M^-1 s / lambda, where w has left `last`. */
+static double bound_by_cycle(const free_load *x, const double *e, const double *w, double last)
+{
+    double sum = 0.0;
+    for (int64_t j = 0; j < x->cg.n; j++)
+        sum += w[j] * (e[j] + x->cg.r[j]);
+    return (isnan(sum) ? INFINITY : fmax(0.0, sum)) + last * last / x->sparse.load.dual->amg->info.lambda;
+}
+
+/* With w from conjugate gradients that begin at 0, s = e - K w: e'K^-1 e = w'(e + s) + s'K^-1 s. enough: of the value:
+ * where half of it may be left to M, a cycle alone often tells. What is not small enough so is to be sharp. */
 static uz_status bound_inverse_norm(free_load *x, double *value, double *e, double enough, uz_error *err)
 {
-    const double lambda = x->sparse.load.dual->amg->info.lambda;
+    const uz_amg_info *known = &x->sparse.load.dual->amg->info;
     const int64_t n = x->cg.n;
-    double *w = x->right, sum = 0.0, largest = 0.0;
-    uz_cg_stop stop = {.relative = SHARP * sqrt(lambda),
+    double *w = x->right, largest = 0.0;
+    uz_cg_stop stop = {.relative = SHARP * sqrt(known->lambda),
                        .max_iterations = NORM_STEPS_MOST,
                        .hooks = x->stop.hooks,
                        .deadline = x->stop.deadline,
@@ -318,12 +327,19 @@ static uz_status bound_inverse_norm(free_load *x, double *value, double *e, doub
     const double unit = largest > 0.0 && !isinf(largest) ? ldexp(1.0, ilogb(largest)) : 1.0;
     for (int64_t j = 0; j < n; j++)
         x->cg.r[j] = e[j] /= unit;
+    enough = enough / unit / unit;
+    if (!(known->least > 0.0)) /* else lambda is a guess */
+        stop.absolute = sqrt(0.5 * known->lambda * enough);
     uz_status status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
-    for (int64_t j = 0; j < n; j++)
-        sum += w[j] * (e[j] + x->cg.r[j]);
-    double scaled = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / lambda;
-    if (status == UZ_OK && x->sparse.load.dual->amg->info.least > 0.0)
-        status = sharpen(x, &scaled, w, e, info.last, enough / unit / unit, err);
+    double scaled = bound_by_cycle(x, e, w, info.last);
+    if (status == UZ_OK && scaled > enough && info.last > stop.relative * info.first && stop.absolute > 0.0) {
+        stop.absolute = stop.relative * info.first;
+        stop.relative = 0.0;
+        status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
+        scaled = fmin(scaled, bound_by_cycle(x, e, w, info.last));
+    }
+    if (status == UZ_OK && known->least > 0.0)
+        status = sharpen(x, &scaled, w, e, info.last, enough, err);
     if (status == UZ_OK)
         *value = scaled * unit * unit;
     return status;

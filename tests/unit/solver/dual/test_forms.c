@@ -293,6 +293,39 @@ static void check_forms(const uz_qp *qp, bool bounds)
     free(r);
 }
 
+/* What is small enough is told by a cycle, and not made sharp; what is not is sharp, to be judged by. */
+TEST(a_bound_is_as_sharp_as_it_has_to_be)
+{
+    const double enough[] = {100.0, 0.0, 1.01, 0.5}, sharp = 1.02; /* times the exact value */
+    uz_qp qp;
+    uz_error err = {0};
+    subject s;
+    qp_random rng = {11};
+    uz_thread_init();
+    CHECK_INT(hex8_qp(&qp, 12, &err), UZ_OK);
+    for (int k = 0; k < UZ_DUAL_FORMS; k++) {
+        if (uz_dual_forms[k]->can.needs_factor || uz_dual_forms[k]->can.asked_for)
+            continue;
+        open_subject(&s, &qp, k);
+        const int64_t d = qp.K.cols;
+        for (int q = 0; q < 4; q++) {
+            double *w = vector(d), *e = vector(d), value = NAN;
+            for (int64_t j = 0; j < d; j++)
+                w[j] = random_signed(&rng);
+            uz_csc_symv(e, &qp.K, 1.0, w);
+            const double exact = dot(w, e, d);
+            CHECK_INT(s.load->dual->form->inverse_norm(s.load, &value, e, enough[q] * exact, &err), UZ_OK);
+            CHECK_MSG(value >= exact * (1 - 1e-12), "%.17g for %.17g", value, exact);
+            CHECK_MSG(q == 0 ? value > sharp * exact && value <= enough[q] * exact : value <= sharp * exact,
+                      "%g for %g where %g is enough", value, exact, enough[q] * exact);
+            free(w);
+            free(e);
+        }
+        close_subject(&s);
+    }
+    uz_qp_clear(&qp);
+}
+
 TEST(rows_that_bound_a_dof_each)
 {
     uz_qp qp;
