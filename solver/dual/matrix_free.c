@@ -33,14 +33,16 @@
 /* Where rows are bounds an answer of the active set does not come from the base, which begins it: until D is applied it
  * stays as rough as that. So it is before anybody has said what it is for. */
 #define BASE_ROUGH 1e-3
-/* The same where few of the dofs have bounds: the first guess of the rows is no better than this anyway. */
-#define BASE_ROUGHER 1e-2
+/* The same where few of the dofs have bounds: the first guess of the rows is worse than this anyway. */
+#define BASE_ROUGHER 3e-2
 #define FIRST_AIM    1e-10
 /* Share of a change of the response that an application of D may leave unsolved. */
 #define CHANGE_KEPT 0.01
 /* The same where the iterations are to be those of the exact operator, and an aim for the floor. */
 #define EXACT_CHANGE 1e-6
 #define EXACT_AIM    1e-11
+/* As far the residual of conjugate gradients is that of their answer, which is looked at afterwards anyway. */
+#define NO_DRIFT 1e-8
 enum { STEPS_MOST = 5000 };
 
 /* How well the equations of a load are solved. Slacks are bounds in the energy norm. */
@@ -106,6 +108,7 @@ static uz_status solve_base(free_load *x, double aim, uz_error *err)
     double root = sqrt(load->dual->amg->info.lambda), norm = uz_root(uz_dot(d, x->sparse.p, base));
     /* From 0 the first residual has the size of the solution. */
     uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : aim * root, aim * norm * root);
+    stop.unchecked = aim >= NO_DRIFT;
     uz_status status = uz_cg_solve(&info, base, &x->cg, load->K, x->sparse.p, &stop, err);
     if (status != UZ_OK)
         return status;
@@ -381,9 +384,6 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
 /* Of the aim: below this a solve is as good as exact; where lambda is a guess, which is rather too large, */
 #define ACTIVE_FLOOR  0.5
 #define GUESSED_FLOOR 0.1
-/* As far the residual of conjugate gradients is that of their answer, which is looked at afterwards anyway. */
-#define NO_DRIFT 1e-8
-
 /* What u misses of K u = p + N'r, in the norm of K^-1; e (d): force - N'r. Nobody bounds an answer by rows that pull.
  */
 static uz_status measure_slack(free_load *x, const double *e, const double *r, uz_error *err)
