@@ -38,10 +38,14 @@ void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx,
     divide(run, ctx, n, n / LEAST);
 }
 
+/* What a piece of two vectors has. */
+typedef double (*of_piece)(int64_t n, const void *x, const void *y);
+
 /* A sum of which each piece has its own number. */
 typedef struct {
-    double (*of)(int64_t n, const double *x, const double *y);
-    const double *x, *y;
+    of_piece of;
+    const char *x, *y;
+    size_t width;    /* of a number */
     int64_t n, size; /* of a piece */
     double piece[PIECES_MOST];
 } sum;
@@ -52,17 +56,18 @@ static void find_pieces(void *ctx, int64_t begin, int64_t end)
     sum *s = ctx;
     for (int64_t k = begin; k < end; k++) {
         const int64_t from = k * s->size, n = from + s->size < s->n ? s->size : s->n - from;
-        s->piece[k] = s->of(n, s->x + from, s->y + from);
+        const size_t at = (size_t)from * s->width;
+        s->piece[k] = s->of(n, s->x + at, s->y + at);
     }
 }
 
 /* Fills s; returns how many pieces there are. */
-static int64_t find_all(sum *s, double (*of)(int64_t n, const double *x, const double *y), int64_t n, const double *x,
-                        const double *y)
+static int64_t find_all(sum *s, of_piece of, size_t width, int64_t n, const void *x, const void *y)
 {
     s->of = of;
     s->x = x;
     s->y = y;
+    s->width = width;
     s->n = n;
     s->size = s->n / PIECES_MOST < LEAST ? LEAST : s->n / PIECES_MOST + 1;
     const int64_t pieces = (s->n + s->size - 1) / s->size;
@@ -70,31 +75,83 @@ static int64_t find_all(sum *s, double (*of)(int64_t n, const double *x, const d
     return pieces;
 }
 
-double uz_long_dot(int64_t n, const double *x, const double *y)
+static double find_sum(of_piece of, size_t width, int64_t n, const void *x, const void *y)
 {
     sum s;
-    const int64_t pieces = find_all(&s, uz_dot, n, x, y);
+    const int64_t pieces = find_all(&s, of, width, n, x, y);
     double all = 0.0;
     for (int64_t k = 0; k < pieces; k++)
         all += s.piece[k];
     return all;
 }
 
-static double find_largest(int64_t n, const double *x, const double *y)
+static double find_dot(int64_t n, const void *x, const void *y)
 {
+    return uz_dot(n, x, y);
+}
+
+double uz_long_dot(int64_t n, const double *x, const double *y)
+{
+    return find_sum(find_dot, sizeof *x, n, x, y);
+}
+
+typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
+typedef double four __attribute__((vector_size(32)));
+
+static double find_dot_single(int64_t n, const void *x, const void *y)
+{
+    const float *a = x, *b = y;
+    four lanes = {0.0};
+    int64_t j = 0;
+    for (; j + 4 <= n; j += 4)
+        lanes += __builtin_convertvector(*(const four_floats *)(a + j), four) *
+                 __builtin_convertvector(*(const four_floats *)(b + j), four);
+    double all = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+    for (; j < n; j++)
+        all += (double)a[j] * (double)b[j];
+    return all;
+}
+
+double uz_long_dot_single(int64_t n, const float *x, const float *y)
+{
+    return find_sum(find_dot_single, sizeof *x, n, x, y);
+}
+
+static double find_largest(int64_t n, const void *x, const void *y)
+{
+    const double *of = x;
     double most = 0.0;
     (void)y;
     for (int64_t j = 0; j < n; j++)
-        most = fabs(x[j]) > most ? fabs(x[j]) : most;
+        most = fabs(of[j]) > most ? fabs(of[j]) : most;
+    return most;
+}
+
+static double find_largest_product(int64_t n, const void *x, const void *y)
+{
+    const double *a = x, *b = y;
+    double most = 0.0;
+    for (int64_t j = 0; j < n; j++)
+        most = fabs(a[j] * b[j]) > most ? fabs(a[j] * b[j]) : most;
+    return most;
+}
+
+static double find_most(of_piece of, int64_t n, const double *x, const double *y)
+{
+    sum s;
+    const int64_t pieces = find_all(&s, of, sizeof *x, n, x, y);
+    double most = 0.0;
+    for (int64_t k = 0; k < pieces; k++)
+        most = fmax(most, s.piece[k]);
     return most;
 }
 
 double uz_long_max(int64_t n, const double *x)
 {
-    sum s;
-    const int64_t pieces = find_all(&s, find_largest, n, x, x);
-    double most = 0.0;
-    for (int64_t k = 0; k < pieces; k++)
-        most = fmax(most, s.piece[k]);
-    return most;
+    return find_most(find_largest, n, x, x);
+}
+
+double uz_long_max_product(int64_t n, const double *x, const double *y)
+{
+    return find_most(find_largest_product, n, x, y);
 }

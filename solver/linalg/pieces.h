@@ -10,7 +10,11 @@
 void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n);
 /* x'y. */
 double uz_long_dot(int64_t n, const double *x, const double *y);
+/* The same of single numbers, their products and sums in double precision. */
+double uz_long_dot_single(int64_t n, const float *x, const float *y);
 /* The largest |x_j|, but for those that are no numbers; 0 where there is none. */
 double uz_long_max(int64_t n, const double *x);
+/* The largest |x_j y_j|, likewise. */
+double uz_long_max_product(int64_t n, const double *x, const double *y);
 
 #endif
