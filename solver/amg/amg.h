@@ -63,6 +63,11 @@ typedef struct {
                        uz_error *err);
     /* y = K x in double precision; y and x do not overlap. */
     void (*multiply)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x);
+    /* x += K_FF^-1 r as conjugate gradients in single precision know it, r (n) what they have left: for residuals that
+     * are looked at afterwards. *info: `met` false where single precision may not reach the tolerance, x is then as far
+     * as it came (iterations 0: as it was, and r too). NULL: there is none. */
+    uz_status (*solve_roughly)(const uz_multigrid *mg, uz_multigrid_room *room, struct uz_cg_info *info, double *x,
+                               double *r, const struct uz_cg_stop *stop, uz_error *err);
     /* What a thread needs to apply it, *bytes of it; NULL: no memory. */
     uz_multigrid_room *(*room)(const uz_multigrid *mg, size_t *bytes);
     void (*free_room)(uz_multigrid_room *room); /* NULL and half-built ones too */
@@ -90,6 +95,7 @@ struct uz_multigrid {
     int levels;
     size_t bytes;
     double most;  /* a bound on lambda_max(diag(K)^-1 M) */
+    double drift; /* what single precision hides of a change, relative, in the energy norm; 0: not known */
     bool knows_K; /* without being handed it: of that only the diagonal is read, and need be there */
 };
 
@@ -141,6 +147,9 @@ typedef struct uz_cg_info {
     double first, last; /* sqrt(r'M^-1 r) at the start, and of the true residual at the end */
     bool met;           /* the tolerance was reached; false: limit, cancel, deadline, or rounding */
 } uz_cg_info;
+
+/* Limit, cancel, or deadline. */
+bool uz_cg_should_stop(const uz_cg_info *info, const uz_cg_stop *stop);
 
 /* x (n): in, a start; out, nearer to K^-1 b. At held dofs it stays as it is, and K x has its part. The residual of the
  * x that is returned stands in cg->r. UZ_ERR_NOT_SPD: some p'K p was not positive. */

@@ -363,3 +363,79 @@ void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x)
         uz_aside_share(multiply_part, &p, A->parts);
     p.multiply(y, A, x, A->parts > 0 ? A->part[A->parts] : 0, A->nodes);
 }
+
+/* ------------------------------------------------- the same in single precision */
+
+typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
+
+static inline __attribute__((always_inline)) void multiply_single(float *y, const uz_level *level, const float *x,
+                                                                  int64_t first, int64_t end, int b)
+{
+    const uz_blocks *A = &level->A;
+    for (int64_t i = first; i < end; i++) {
+        const float *own = level->diag + i * b * b;
+        const four_floats xi = *(const four_floats *)(x + 4 * i);
+        four_floats sum[3], back = {0};
+        for (int r = 0; r < b; r++)
+            sum[r] = *(const four_floats *)(own + r * b) * xi;
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+            const float *block = level->off + e * b * b;
+            const four_floats xj = *(const four_floats *)(x + 4 * (int64_t)A->idx[e]);
+            four_floats *to = (four_floats *)(y + 4 * (int64_t)A->idx[e]), value = *to;
+            for (int r = 0; r < b; r++) {
+                const four_floats row = *(const four_floats *)(block + r * b);
+                sum[r] += row * xj;
+                value += row * xi[r];
+            }
+            *to = value;
+        }
+        for (int r = 0; r < b; r++)
+            back[r] = (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
+        *(four_floats *)(y + 4 * i) = back;
+    }
+}
+
+static inline __attribute__((always_inline)) void multiply_any_single(float *y, const uz_level *level, const float *x,
+                                                                      int64_t first, int64_t end)
+{
+    if (level->A.b == 3)
+        multiply_single(y, level, x, first, end, 3);
+    else if (level->A.b == 2)
+        multiply_single(y, level, x, first, end, 2);
+    else
+        multiply_single(y, level, x, first, end, 1);
+}
+
+UZ_AVX2_FMA static void multiply_single_fused(float *y, const uz_level *level, const float *x, int64_t first,
+                                              int64_t end)
+{
+    multiply_any_single(y, level, x, first, end);
+}
+
+static void multiply_single_plain(float *y, const uz_level *level, const float *x, int64_t first, int64_t end)
+{
+    multiply_any_single(y, level, x, first, end);
+}
+
+typedef struct {
+    float *y;
+    const uz_level *level;
+    const float *x;
+    void (*multiply)(float *y, const uz_level *level, const float *x, int64_t first, int64_t end);
+} single_product;
+
+static void multiply_single_part(void *ctx, int part)
+{
+    const single_product *p = ctx;
+    const int64_t *first = p->level->A.part + part;
+    p->multiply(p->y, p->level, p->x, first[0], first[1]);
+}
+
+void uz_level_multiply(float *y, const uz_level *level, const float *x)
+{
+    const uz_blocks *A = &level->A;
+    single_product p = {y, level, x, uz_cpu_has_avx2_fma() ? multiply_single_fused : multiply_single_plain};
+    if (A->parts > 0)
+        uz_aside_share(multiply_single_part, &p, A->parts);
+    p.multiply(y, level, x, A->parts > 0 ? A->part[A->parts] : 0, A->nodes);
+}

@@ -103,9 +103,29 @@ static uz_status solve_elsewhere(uz_cg_info *info, double *x, uz_cg *cg, const u
     return kind->solve(cg->mg, K, cg->room, info, x, cg->r, moved ? cg->p : b, stop, err);
 }
 
-static bool should_stop(const uz_cg_info *info, const uz_cg_stop *stop)
+bool uz_cg_should_stop(const uz_cg_info *info, const uz_cg_stop *stop)
 {
     return info->iterations >= stop->max_iterations || uz_cancelled(stop->hooks) || uz_seconds() >= stop->deadline;
+}
+
+/* As far as single precision carries. Where that is not far enough *stop is told what is left to do. */
+static uz_status solve_roughly(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b,
+                               uz_cg_stop *stop, uz_error *err)
+{
+    const uz_multigrid_kind *kind = cg->mg->kind;
+    update u = {.cg = cg, .x = x, .b = b};
+    if (!stop->begun) {
+        kind->multiply(cg->mg, K, cg->room, cg->z, x);
+        uz_by_pieces(find_residual, &u, cg->n);
+    }
+    clear_held(cg->r, cg);
+    const uz_status status = kind->solve_roughly(cg->mg, cg->room, info, x, cg->r, stop, err);
+    stop->begun = info->iterations == 0;
+    if (!stop->begun) {
+        stop->absolute = fmax(stop->absolute, stop->relative * info->first);
+        stop->relative = 0.0;
+    }
+    return status;
 }
 
 /* The recurrence drifts from the true residual by rounding (Greenbaum 1997): it is begun again from the true one until
@@ -119,6 +139,13 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
     memset(info, 0, sizeof *info);
     if (cg->mg->kind->solve)
         return solve_elsewhere(info, x, cg, K, b, stop, err);
+    uz_cg_stop left = *stop;
+    if (stop->unchecked && cg->mg->kind->solve_roughly) {
+        const uz_status status = solve_roughly(info, x, cg, K, b, &left, err);
+        if (status != UZ_OK || info->met)
+            return status;
+        stop = &left;
+    }
     for (int k = 0;; k++) {
         /* r = b - K x on the free dofs, z = M^-1 r */
         if (k > 0 || !stop->begun) {
@@ -134,12 +161,12 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
             goal = fmax(stop->absolute, stop->relative * info->first);
         }
         info->met = info->last <= goal;
-        if (status != UZ_OK || (k > 0 && should_stop(info, stop)) || k == RESTARTS_MOST || !(info->last > goal) ||
+        if (status != UZ_OK || (k > 0 && uz_cg_should_stop(info, stop)) || k == RESTARTS_MOST || !(info->last > goal) ||
             !(info->last < 0.5 * before))
             return status;
         before = info->last;
         memcpy(cg->p, cg->z, (size_t)n * sizeof *cg->p);
-        while (square > goal * goal && !should_stop(info, stop)) {
+        while (square > goal * goal && !uz_cg_should_stop(info, stop)) {
             cg->mg->kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
             clear_held(cg->z, cg);
             const double curvature = uz_long_dot(n, cg->p, cg->z), alpha = square / curvature, last = square;

@@ -348,6 +348,18 @@ static void write_dofs(void *ctx, int64_t begin, int64_t end)
         to[j] = scale[j] * (double)level[slot[j]] * unit;
 }
 
+double uz_read_dofs(float *level, const uz_aggregates *mg, const double *r)
+{
+    const double largest = uz_long_max_product(mg->base.n, mg->scale, r);
+    if (!(largest > 0.0) || isinf(largest))
+        return largest;
+    int exponent;
+    (void)frexp(largest, &exponent);
+    passage p = {.mg = mg, .unit = ldexp(1.0, exponent), .from = r, .level = level};
+    uz_by_pieces(read_dofs, &p, mg->base.n);
+    return p.unit;
+}
+
 static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
                        uz_error *err)
 {
@@ -356,22 +368,12 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
     (void)K;
     if (last == 0)
         return apply_alone(mg, room, z, r, err);
-    /* by the power of two above the largest, single precision holds them all */
-    double largest = 0.0;
-    for (int64_t j = 0; j < base->n; j++) {
-        const double size = fabs(mg->scale[j] * r[j]);
-        largest = size > largest ? size : largest;
-    }
-    if (!(largest > 0.0) || isinf(largest)) {
+    passage p = {.mg = mg, .unit = uz_read_dofs(room->b[0], mg, r), .to = z};
+    if (!(p.unit > 0.0) || isinf(p.unit)) {
         for (int64_t j = 0; j < base->n; j++)
-            z[j] = largest > 0.0 ? NAN : 0.0;
+            z[j] = p.unit > 0.0 ? NAN : 0.0;
         return UZ_OK;
     }
-    int exponent;
-    (void)frexp(largest, &exponent);
-    const double unit = ldexp(1.0, exponent);
-    passage p = {.mg = mg, .unit = unit, .from = r, .level = room->b[0], .to = z};
-    uz_by_pieces(read_dofs, &p, base->n);
     const uz_status status = uz_cycle_below(mg, room, 0, err);
     p.level = room->x[0];
     uz_by_pieces(write_dofs, &p, base->n);
@@ -384,6 +386,34 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
     return mg->kind->apply(mg, K, room, z, r, err);
 }
 
+/* A product with level 0. */
+typedef struct {
+    const uz_aggregates *mg;
+    uz_multigrid_room *room;
+    double *y;
+    const double *x;
+} product;
+
+static void enter_product(void *ctx, int64_t begin, int64_t end)
+{
+    const product *p = ctx;
+    const double *restrict scale = p->mg->scale, *restrict x = p->x;
+    const int64_t *restrict slot = p->mg->slot;
+    double *restrict from = p->room->from;
+    for (int64_t j = begin; j < end; j++)
+        from[slot[j]] = x[j] / scale[j];
+}
+
+static void leave_product(void *ctx, int64_t begin, int64_t end)
+{
+    const product *p = ctx;
+    const double *restrict scale = p->mg->scale, *restrict to = p->room->to;
+    const int64_t *restrict slot = p->mg->slot;
+    double *restrict y = p->y;
+    for (int64_t j = begin; j < end; j++)
+        y[j] = to[slot[j]] / scale[j];
+}
+
 /* K x = S^-1 (S K S) S^-1 x: powers of two. */
 static void multiply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x)
 {
@@ -393,11 +423,10 @@ static void multiply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_roo
         uz_csc_symv(y, K, 1.0, x);
         return;
     }
-    for (int64_t j = 0; j < base->n; j++)
-        room->from[mg->slot[j]] = x[j] / mg->scale[j];
+    product p = {mg, room, y, x};
+    uz_by_pieces(enter_product, &p, base->n);
     uz_blocks_multiply(room->to, &mg->level[0].A, room->from);
-    for (int64_t j = 0; j < base->n; j++)
-        y[j] = room->to[mg->slot[j]] / mg->scale[j];
+    uz_by_pieces(leave_product, &p, base->n);
 }
 
 static void free_room(uz_multigrid_room *room)
@@ -493,6 +522,7 @@ static void free_aggregates(uz_multigrid *base)
 
 const uz_multigrid_kind uz_aggregates_kind = {.apply = apply,
                                               .multiply = multiply,
+                                              .solve_roughly = uz_solve_roughly,
                                               .room = make_room,
                                               .free_room = free_room,
                                               .hold = hold,

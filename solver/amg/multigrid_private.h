@@ -115,6 +115,16 @@ typedef struct {
 enum { UZ_STEP_SWEEP_DOWN = 1, UZ_STEP_RESTRICT = 2, UZ_STEP_PROLONG = 4, UZ_STEP_SWEEP_UP = 8 };
 void uz_level_take_step(const uz_level_step *step, int parts);
 
+/* y = A x of level 0, of its numbers in single precision, as uz_blocks_multiply. */
+void uz_level_multiply(float *y, const uz_level *level, const float *x);
+
+/* level (room->b[0]): S r by a power of two above the largest, which is returned; 0 or infinite: there is none. */
+double uz_read_dofs(float *level, const uz_aggregates *mg, const double *r);
+
+/* kind->solve_roughly. */
+uz_status uz_solve_roughly(const uz_multigrid *mg, uz_multigrid_room *room, uz_cg_info *info, double *x, double *r,
+                           const uz_cg_stop *stop, uz_error *err);
+
 /* A V-cycle from level `from` down, more levels than one: room->x[from] = M^-1 room->b[from]. */
 uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, uz_error *err);
 

@@ -201,6 +201,7 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patienc
     free(c);
     free(power);
     if (status == UZ_OK) {
+        mg->drift = FLT_EPSILON / sqrt(amg->info.rcond);
         amg->mg = mg;
         amg->info.spectrum_s = uz_seconds() - start;
         *out = amg;

@@ -9,9 +9,11 @@
 
 enum { THREADS = 3 };
 
-/* M^-1 x and K x by so many threads. */
-static void make_and_apply(double *z, double *y, const brick *b, const double *x, int threads)
+/* M^-1 x and K x by so many threads, and s, K^-1 x roughly. */
+static void make_and_apply(double *z, double *y, double *s, const brick *b, const double *x, int threads)
 {
+    const uz_cg_stop stop = {.relative = 1e-2, .max_iterations = 100, .deadline = INFINITY, .unchecked = true};
+    uz_cg_info info;
     uz_multigrid *mg;
     uz_modes modes;
     uz_cg cg;
@@ -25,6 +27,10 @@ static void make_and_apply(double *z, double *y, const brick *b, const double *x
     CHECK_INT(uz_cg_init(&cg, mg, &err), UZ_OK);
     CHECK_INT(uz_multigrid_apply(mg, &b->K, cg.room, z, x, &err), UZ_OK);
     mg->kind->multiply(mg, &b->K, cg.room, y, x);
+    mg->drift = 1e-6;
+    memset(s, 0, (size_t)b->d * sizeof *s);
+    CHECK_INT(uz_cg_solve(&info, s, &cg, &b->K, x, &stop, &err), UZ_OK);
+    CHECK(info.met && info.iterations > 1);
     uz_cg_clear(&cg);
     uz_multigrid_free(mg);
     uz_modes_clear(&modes);
@@ -35,19 +41,21 @@ TEST(threads_give_the_same_bits)
 {
     brick b = brick_make((int64_t[3]){25, 25, 26}, (double[3]){1, 1, 1}, 0.3, true);
     const size_t bytes = (size_t)b.d * sizeof(double);
-    double *x = malloc(bytes), *z[2] = {malloc(bytes), malloc(bytes)}, *y[2] = {malloc(bytes), malloc(bytes)};
-    CHECK(x && z[0] && z[1] && y[0] && y[1]);
+    double *x = malloc(bytes), *z[2] = {malloc(bytes), malloc(bytes)}, *y[2] = {malloc(bytes), malloc(bytes)},
+           *s[2] = {malloc(bytes), malloc(bytes)};
+    CHECK(x && z[0] && z[1] && y[0] && y[1] && s[0] && s[1]);
     CHECK_INT(uz_aside_begin(THREADS), THREADS);
     for (int64_t j = 0; j < b.d; j++)
         x[j] = (double)(j * 7919 % 1000 - 500);
-    make_and_apply(z[0], y[0], &b, x, 1);
+    make_and_apply(z[0], y[0], s[0], &b, x, 1);
     for (int threads = 2; threads <= THREADS; threads++) {
-        make_and_apply(z[1], y[1], &b, x, threads);
-        CHECK(memcmp(z[0], z[1], bytes) == 0 && memcmp(y[0], y[1], bytes) == 0);
+        make_and_apply(z[1], y[1], s[1], &b, x, threads);
+        CHECK(memcmp(z[0], z[1], bytes) == 0 && memcmp(y[0], y[1], bytes) == 0 && memcmp(s[0], s[1], bytes) == 0);
     }
     for (int k = 0; k < 2; k++) {
         free(z[k]);
         free(y[k]);
+        free(s[k]);
     }
     free(x);
     brick_free(&b);
