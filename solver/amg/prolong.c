@@ -2,9 +2,13 @@
 #include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
+#include "core/cpu.h"
 #include "core/error.h"
 
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -74,135 +78,206 @@ uz_status uz_fail_stopped(uz_error *err)
     return uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the multigrid was made");
 }
 
-/* The node's rows while they are added up: a block for each aggregate met. */
+/* The node's rows while they are added up. */
 typedef struct {
-    int32_t *slot; /* aggregates: where its block stands, -1: not met */
+    int32_t
+        *slot; /* aggregates: where its block stands, -1: not met; while blocks are counted the last node that met it */
     int32_t *met;  /* the aggregates met, in order, */
     double *block; /* and b x k each */
-    int64_t count, room, size;
+    int64_t count, longest;
 } rows_of_node;
 
-/* The block of an aggregate, 0 when it is new; NULL: no memory. */
-static double *block_of(rows_of_node *row, int32_t aggregate)
+/* All nodes, as the threads that share them see that. */
+typedef struct {
+    uz_level *level;
+    const uz_below *below;
+    const float *basis;
+    const int32_t *aggregate;
+    double omega;
+    int k, parts;
+    rows_of_node row[UZ_ASIDE_MOST];
+    pthread_t owner; /* who asks whether it has to stop: hooks are called from the solving thread */
+    const uz_stop *stop;
+    atomic_bool over; /* it had to */
+} smoothing;
+
+static bool goes_on(smoothing *x, int64_t i)
+{
+    if (i % UZ_ROWS_AT_ONCE != 0)
+        return true;
+    if (pthread_equal(pthread_self(), x->owner) && uz_stop_is_due(x->stop))
+        atomic_store(&x->over, true);
+    return !atomic_load(&x->over);
+}
+
+static int64_t first_of_part(const smoothing *x, int part)
+{
+    return x->level->A.nodes * part / x->parts;
+}
+
+static int64_t meet(rows_of_node *row, int32_t aggregate, int64_t i)
+{
+    if (aggregate < 0 || row->slot[aggregate] == (int32_t)i)
+        return 0;
+    row->slot[aggregate] = (int32_t)i;
+    return 1;
+}
+
+/* level->ptr[i + 1]: the blocks of node i. */
+static void count_part(void *ctx, int part)
+{
+    smoothing *x = ctx;
+    const uz_blocks *A = &x->level->A;
+    rows_of_node *row = &x->row[part];
+    for (int64_t a = 0; a < x->level->aggregates; a++)
+        row->slot[a] = -1;
+    for (int64_t i = first_of_part(x, part); i < first_of_part(x, part + 1) && goes_on(x, i); i++) {
+        int64_t count = meet(row, x->aggregate[i], i);
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+            count += meet(row, x->aggregate[A->idx[e]], i);
+        for (int64_t e = x->below->ptr[i]; e < x->below->ptr[i + 1]; e++)
+            count += meet(row, x->aggregate[x->below->node[e]], i);
+        x->level->ptr[i + 1] = count;
+        row->longest = count > row->longest ? count : row->longest;
+    }
+}
+
+/* The block of an aggregate, 0 when it is new. */
+static inline double *block_of(rows_of_node *row, int32_t aggregate, int64_t size)
 {
     int32_t slot = row->slot[aggregate];
     if (slot < 0) {
-        if (row->count == row->room) {
-            const int64_t room = row->room ? 2 * row->room : 64;
-            int32_t *met = uz_realloc(row->met, room, sizeof *met);
-            row->met = met ? met : row->met;
-            double *block = met ? uz_realloc(row->block, room * row->size, sizeof *block) : NULL;
-            if (!block)
-                return NULL;
-            row->block = block;
-            row->room = room;
-        }
         slot = row->slot[aggregate] = (int32_t)row->count;
         row->met[row->count++] = aggregate;
-        memset(row->block + slot * row->size, 0, (size_t)row->size * sizeof *row->block);
+        memset(row->block + slot * size, 0, (size_t)size * sizeof *row->block);
     }
-    return row->block + slot * row->size;
+    return row->block + slot * size;
 }
 
-/* to -= A basis for one block of A, or its transpose. false: no memory. */
-static bool subtract(rows_of_node *row, int32_t aggregate, const double *A, bool transposed, const float *basis, int b,
-                     int k)
+/* to -= A basis for one block of A, or its transpose. */
+UZ_INLINE void subtract(rows_of_node *row, int32_t aggregate, const double *A, bool transposed, const float *basis,
+                        int b, int k)
 {
-    double *to = aggregate < 0 ? NULL : block_of(row, aggregate);
-    if (!to)
-        return aggregate < 0;
+    if (aggregate < 0)
+        return;
+    double *to = block_of(row, aggregate, (int64_t)b * k);
     for (int r = 0; r < b; r++)
         for (int s = 0; s < b; s++) {
             const double factor = transposed ? A[s * b + r] : A[r * b + s];
             for (int c = 0; c < k; c++)
                 to[r * k + c] -= factor * (double)basis[s * k + c];
         }
-    return true;
-}
-
-typedef struct {
-    uz_level *level;
-    int64_t count, room; /* blocks of the prolongation so far, and room for */
-} prolongation;
-
-static bool reserve_blocks(prolongation *p, int64_t more, int64_t size)
-{
-    if (p->count + more <= p->room)
-        return true;
-    int64_t room = p->room + p->room / 2 + more;
-    int32_t *block = uz_realloc(p->level->block, room, sizeof *block);
-    if (block)
-        p->level->block = block;
-    float *value = block ? uz_realloc(p->level->value, room * size + 8, sizeof *value) : NULL;
-    if (!value)
-        return false;
-    p->level->value = value;
-    p->room = room;
-    return true;
 }
 
 /* The node's rows of (I - omega D^-1 A) basis, aggregates ascending. */
-static bool smooth_node(prolongation *p, rows_of_node *row, const uz_below *below, const float *basis,
-                        const int32_t *aggregate, double omega, int k, int64_t i)
+UZ_INLINE void smooth_node(const smoothing *x, rows_of_node *row, int64_t i, int b, int k)
 {
-    uz_level *level = p->level;
+    uz_level *level = x->level;
     const uz_blocks *A = &level->A;
-    const int b = A->b;
+    const uz_below *below = x->below;
+    const int32_t *aggregate = x->aggregate;
     const int64_t size = (int64_t)b * k, square = (int64_t)b * b;
     row->count = 0;
-    bool ok = subtract(row, aggregate[i], A->diag + i * square, false, basis + i * size, b, k);
-    for (int64_t e = A->ptr[i]; ok && e < A->ptr[i + 1]; e++)
-        ok = subtract(row, aggregate[A->idx[e]], A->off + e * square, false, basis + A->idx[e] * size, b, k);
-    for (int64_t e = below->ptr[i]; ok && e < below->ptr[i + 1]; e++)
-        ok = subtract(row, aggregate[below->node[e]], A->off + below->at[e] * square, true,
-                      basis + below->node[e] * size, b, k);
-    if (!ok || !reserve_blocks(p, row->count, size))
-        return false;
+    subtract(row, aggregate[i], A->diag + i * square, false, x->basis + i * size, b, k);
+    for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+        subtract(row, aggregate[A->idx[e]], A->off + e * square, false, x->basis + A->idx[e] * size, b, k);
+    for (int64_t e = below->ptr[i]; e < below->ptr[i + 1]; e++)
+        subtract(row, aggregate[below->node[e]], A->off + below->at[e] * square, true, x->basis + below->node[e] * size,
+                 b, k);
     for (int64_t s = 1; s < row->count; s++) /* few, and nearly in order */
         for (int64_t t = s; t > 0 && row->met[t] < row->met[t - 1]; t--) {
             const int32_t swap = row->met[t];
             row->met[t] = row->met[t - 1];
             row->met[t - 1] = swap;
         }
-    for (int64_t s = 0; s < row->count; s++, p->count++) {
+    for (int64_t s = 0; s < row->count; s++) {
+        const int64_t at = level->ptr[i] + s;
         const double *from = row->block + row->slot[row->met[s]] * size;
-        float *to = level->value + p->count * size;
-        level->block[p->count] = row->met[s];
+        float *to = level->value + at * size;
+        level->block[at] = row->met[s];
         for (int64_t c = 0; c < size; c++) {
-            const double own = row->met[s] == aggregate[i] ? (double)basis[i * size + c] : 0.0;
-            to[c] = (float)(own + omega * (double)level->inverse[i * b + c / k] * from[c]);
+            const double own = row->met[s] == aggregate[i] ? (double)x->basis[i * size + c] : 0.0;
+            to[c] = (float)(own + x->omega * (double)level->inverse[i * b + c / k] * from[c]);
         }
     }
     for (int64_t s = 0; s < row->count; s++)
         row->slot[row->met[s]] = -1;
-    level->ptr[i + 1] = p->count;
-    return true;
 }
+
+static void smooth_part(void *ctx, int part)
+{
+    smoothing *x = ctx;
+    const int b = x->level->A.b, k = x->k;
+    rows_of_node *row = &x->row[part];
+    for (int64_t a = 0; a < x->level->aggregates; a++)
+        row->slot[a] = -1;
+    for (int64_t i = first_of_part(x, part); i < first_of_part(x, part + 1) && goes_on(x, i); i++) {
+        if (b == 3 && k == 6)
+            smooth_node(x, row, i, 3, 6);
+        else if (b == 6 && k == 6)
+            smooth_node(x, row, i, 6, 6);
+        else if (b == 2 && k == 3)
+            smooth_node(x, row, i, 2, 3);
+        else
+            smooth_node(x, row, i, b, k);
+    }
+}
+
+/* level->ptr, and room for all blocks. false: no memory, or it had to stop. */
+static bool find_places(smoothing *x)
+{
+    uz_level *level = x->level;
+    const int64_t nodes = level->A.nodes, size = (int64_t)level->A.b * x->k;
+    bool ok = (level->ptr = uz_alloc_zero(nodes + 1, sizeof *level->ptr)) != NULL;
+    for (int part = 0; part < x->parts; part++)
+        ok = (x->row[part].slot = uz_alloc(level->aggregates, sizeof(int32_t))) && ok;
+    if (!ok)
+        return false;
+    uz_aside_share(count_part, x, x->parts);
+    if (atomic_load(&x->over))
+        return false;
+    for (int64_t i = 0; i < nodes; i++)
+        level->ptr[i + 1] += level->ptr[i];
+    for (int part = 0; part < x->parts; part++) {
+        rows_of_node *row = &x->row[part];
+        ok = (row->met = uz_alloc(row->longest, sizeof *row->met)) && ok;
+        ok = (row->block = uz_alloc(row->longest * size, sizeof *row->block)) && ok;
+    }
+    level->block = uz_alloc(level->ptr[nodes], sizeof *level->block);
+    level->value = uz_alloc(level->ptr[nodes] * size + 8, sizeof *level->value);
+    return ok && level->block && level->value;
+}
+
+/* Nodes of a part, at least. */
+enum { PART_LEAST = 4096 };
 
 uz_status uz_prolong_smoothed(uz_level *level, const uz_below *below, const float *basis, const int32_t *aggregate,
                               double omega, int k, const uz_stop *stop, uz_error *err)
 {
-    const int64_t nodes = level->A.nodes, size = (int64_t)level->A.b * k;
-    rows_of_node row = {.slot = uz_alloc(level->aggregates, sizeof *row.slot), .size = size};
-    prolongation p = {level, 0, 0};
-    bool over = false;
-    for (int64_t a = 0; row.slot && a < level->aggregates; a++)
-        row.slot[a] = -1;
-    level->ptr = uz_alloc_zero(nodes + 1, sizeof *level->ptr);
-    bool ok = row.slot && level->ptr && reserve_blocks(&p, 2 * nodes, size);
-    for (int64_t i = 0; ok && !(over = i % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop)) && i < nodes; i++)
-        ok = smooth_node(&p, &row, below, basis, aggregate, omega, k, i);
+    const int64_t nodes = level->A.nodes, most = nodes / PART_LEAST;
+    const int threads = most < 2 ? 1 : uz_aside_threads();
+    smoothing x = {.level = level,
+                   .below = below,
+                   .basis = basis,
+                   .aggregate = aggregate,
+                   .omega = omega,
+                   .k = k,
+                   .parts = threads < most ? threads
+                            : most > 1     ? (int)most
+                                           : 1,
+                   .owner = pthread_self(),
+                   .stop = stop};
+    const bool ok = find_places(&x);
     if (ok) {
-        int32_t *block = uz_realloc(p.level->block, p.count, sizeof *block);
-        float *value = uz_realloc(p.level->value, p.count * size + 8, sizeof *value);
-        p.level->block = block ? block : p.level->block;
-        p.level->value = value ? value : p.level->value;
-        memset(p.level->value + p.count * size, 0, 8 * sizeof *value);
+        uz_aside_share(smooth_part, &x, x.parts);
+        memset(level->value + level->ptr[nodes] * level->A.b * k, 0, 8 * sizeof *level->value);
     }
-    free(row.slot);
-    free(row.met);
-    free(row.block);
-    if (over)
+    for (int part = 0; part < x.parts; part++) {
+        free(x.row[part].slot);
+        free(x.row[part].met);
+        free(x.row[part].block);
+    }
+    if (atomic_load(&x.over))
         return uz_fail_stopped(err);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld nodes", (long long)nodes);
 }
