@@ -210,21 +210,34 @@ static uz_status find_scale(uz_aggregates *mg, const uz_csc *K, uz_error *err)
 /* Entries of a positive definite matrix are smaller than the diagonal's: 4, scaled. */
 #define ENTRY_MOST 4.0
 
-static uz_status fill(uz_aggregates *mg, const uz_csc *K, uz_error *err)
+/* Columns of K as the threads that share them see that: each entry has a place of its own. */
+typedef struct {
+    uz_aggregates *mg;
+    const uz_csc *K;
+    int parts;
+    int64_t bad[UZ_ASIDE_MOST][2]; /* of each part: an entry that is too large, -1: there is none */
+} filling;
+
+static void fill_part(void *ctx, int part)
 {
-    uz_blocks *A = &mg->level[0].A;
+    filling *x = ctx;
+    const uz_aggregates *mg = x->mg;
+    const uz_csc *K = x->K;
+    const uz_blocks *A = &mg->level[0].A;
     const int b = A->b;
-    for (int64_t j = 0; j < K->cols; j++) {
+    const int64_t end = K->cols * (part + 1) / x->parts;
+    x->bad[part][0] = -1;
+    for (int64_t j = K->cols * part / x->parts; j < end; j++) {
         const int64_t J = uz_slot_node(mg, mg->slot[j]), c = uz_slot_place(mg, mg->slot[j]);
         int64_t known = -1, at = 0; /* the place of the block of the last row */
         for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
             const int64_t i = K->idx[q], I = uz_slot_node(mg, mg->slot[i]), r = uz_slot_place(mg, mg->slot[i]);
             const double value = mg->scale[i] * K->val[q] * mg->scale[j];
-            if (!(fabs(value) <= ENTRY_MOST))
-                return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                               "K is not positive definite: its entry of the dofs %lld and %lld (numbered from 0) is "
-                               "larger than their diagonal entries allow. Check the signs and units of K.",
-                               (long long)i, (long long)j);
+            if (!(fabs(value) <= ENTRY_MOST)) {
+                x->bad[part][0] = i;
+                x->bad[part][1] = j;
+                return;
+            }
             if (I == J) {
                 A->diag[(I * b + r) * b + c] = A->diag[(I * b + c) * b + r] = value;
                 continue;
@@ -235,6 +248,18 @@ static uz_status fill(uz_aggregates *mg, const uz_csc *K, uz_error *err)
             A->off[at * b * b + (I > J ? r * b + c : c * b + r)] = value;
         }
     }
+}
+
+static uz_status fill(uz_aggregates *mg, const uz_csc *K, uz_error *err)
+{
+    filling x = {.mg = mg, .K = K, .parts = K->cols < 2 * PART_LEAST ? 1 : uz_aside_threads()};
+    uz_aside_share(fill_part, &x, x.parts);
+    for (int part = 0; part < x.parts; part++)
+        if (x.bad[part][0] >= 0)
+            return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                           "K is not positive definite: its entry of the dofs %lld and %lld (numbered from 0) is "
+                           "larger than their diagonal entries allow. Check the signs and units of K.",
+                           (long long)x.bad[part][0], (long long)x.bad[part][1]);
     return UZ_OK;
 }
 

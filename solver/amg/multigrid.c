@@ -6,6 +6,7 @@
 
 #include "core/alloc.h"
 #include "linalg/blas.h"
+#include "linalg/pieces.h"
 #include "core/error.h"
 #include "core/hooks.h"
 #include "core/random.h"
@@ -33,6 +34,18 @@ static uz_status fail_soft(uz_error *err)
                    "Support the body so that it can't move freely, or check the signs of K.");
 }
 
+typedef struct {
+    float *to;
+    const double *from;
+} rounding;
+
+static void round_numbers(void *ctx, int64_t begin, int64_t end)
+{
+    const rounding *x = ctx;
+    for (int64_t e = begin; e < end; e++)
+        x->to[e] = (float)x->from[e];
+}
+
 uz_status uz_level_round(uz_level *level, uz_error *err)
 {
     const uz_blocks *A = &level->A;
@@ -43,10 +56,8 @@ uz_status uz_level_round(uz_level *level, uz_error *err)
     level->inverse = uz_alloc(A->nodes * b, sizeof *level->inverse);
     if (!level->off || !level->diag || !level->inverse)
         return fail_memory(A->nodes * b, err);
-    for (int64_t e = 0; e < count; e++)
-        level->off[e] = (float)A->off[e];
-    for (int64_t e = 0; e < A->nodes * size; e++)
-        level->diag[e] = (float)A->diag[e];
+    uz_by_pieces(round_numbers, &(rounding){level->off, A->off}, count);
+    uz_by_pieces(round_numbers, &(rounding){level->diag, A->diag}, A->nodes * size);
     memset(level->off + count, 0, 8 * sizeof *level->off);
     memset(level->diag + A->nodes * size, 0, 8 * sizeof *level->diag);
     for (int64_t i = 0; i < A->nodes * b; i++) {
