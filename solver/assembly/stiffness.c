@@ -607,7 +607,7 @@ static uz_status add_energies(double *twice, const uz_body_model *model, const d
     const double *ke;
     uz_status status = source_init(&source, model, err);
     for (int64_t e = begin; e < end && status == UZ_OK; e++) {
-        if (!source.shared) { /* a matrix of its own would be made for it alone */
+        if (!source.shared) { /* a matrix of its own would be made for it alone; it is rotated back */
             uz_element element;
             double d[DOFS], xyz[3 * UZ_ELEMENT_NODES];
             take_nodal(d, model, nodal, e, carried);
@@ -649,7 +649,10 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
 {
     const uz_mesh *mesh = &model->mesh;
     energy_sum sum = {.model = model, .nodal = nodal, .carried = carried};
-    if (mesh->n_elements < WORTH_SHARING)
+    const bool alike = mesh->uniform && model->kind != UZ_AXISYMMETRIC;
+    if (!alike && !carried)
+        sum.status[0] = uz_strain_energy_of_groups(&sum.twice[0], model, nodal, &sum.err[0]);
+    else if (mesh->n_elements < WORTH_SHARING)
         add_share(&sum, 1);
     else
         uz_aside_share(add_share, &sum, SHARES);

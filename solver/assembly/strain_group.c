@@ -69,6 +69,11 @@ UZ_INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
     }
     take_material(g, from);
     gather(g->u, g, from->nodal, dim);
+    for (int c = from->model->kind == UZ_AXISYMMETRIC; c < dim && from->apart; c++) {
+        const uz_lanes first = g->u[c];
+        for (int a = 0; a < g->rule.nodes; a++)
+            g->u[a * dim + c] -= first;
+    }
     if (!g->shaped) {
         const bool equal = mesh->uniform && from->model->kind != UZ_AXISYMMETRIC;
         uz_element element;

@@ -28,6 +28,8 @@ typedef struct {
     const uz_body_model *model;
     const double *nodal;       /* n_nodes x dim */
     const double *free_strain; /* n_elements; NULL: no temperature */
+    bool apart;                /* displacements against those of each element's first node: a translation strains
+                                * nothing, and what it would leave by rounding grows with it. Not along the radius */
 } uz_strain_source;
 
 /* From element[0..count) and the rule to the strains. */

@@ -122,6 +122,26 @@ static double plain_measure(const uz_body_model *model, const double *u, double 
                 (sqrt(all.squares) + sqrt(all.law)) / sqrt(2 * energy) + fabs(all.along) / (2 * energy));
 }
 
+/* Twice the energy, by each element alone, and by springs. */
+static double energy_one_by_one(const uz_body_model *model, const double *u)
+{
+    const int dim = model->mesh.dim;
+    double twice = 0;
+    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
+        int count;
+        const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
+        uz_element element;
+        double xyz[3 * UZ_ELEMENT_NODES], d[UZ_ELEMENT_DOFS];
+        uz_body_element(&element, xyz, model, e);
+        for (int i = 0; i < count * dim; i++)
+            d[i] = u[node[i / dim] * dim + i % dim];
+        twice += 2 * uz_element_strain_energy(&element, d);
+    }
+    for (int64_t i = 0; i < model->mesh.n_nodes * dim && model->spring; i++)
+        twice += model->spring[i] * u[i] * u[i];
+    return twice;
+}
+
 static void compare(const uz_body_model *model, qp_random *rng, const char *what)
 {
     const int64_t n = model->mesh.n_nodes * model->mesh.dim;
@@ -130,6 +150,7 @@ static void compare(const uz_body_model *model, qp_random *rng, const char *what
     for (int64_t i = 0; i < n; i++)
         u[i] = size * (model->mesh.xyz[i] + 0.3 * random_signed(rng));
     CHECK_INT(uz_strain_energy(&energy, model, u, false, NULL), UZ_OK);
+    CHECK_MSG(fabs(2 * energy / energy_one_by_one(model, u) - 1) <= 1e-12, "%s: energy %.17g", what, energy);
     const double want = plain_measure(model, u, energy);
     CHECK_INT(uz_measure_nonlinear(&got, model, u, energy, uz_least_buckling_strain(model), NULL), UZ_OK);
     CHECK_MSG(isnan(want) ? isnan(got) : fabs(got - want) <= 1e-11 * want, "%s: %.17g, not %.17g", what, got, want);
