@@ -15,6 +15,7 @@ typedef struct {
     bool cheap_steps;  /* solve_active works on the contact only: a step costs little beside a linear solve */
     bool asked_for;    /* only by name, never by AUTO */
     bool lanes;        /* several loads with one pass over the factor: block.h */
+    bool begin_near;   /* a displacement near the answer saves it a part of the solve */
 } uz_dual_abilities;
 
 typedef struct uz_dual_form uz_dual_form; /* form.h */

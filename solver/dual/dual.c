@@ -119,6 +119,12 @@ double uz_dual_lambda_max_as_given(const uz_dual *dual)
 uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p,
                               const double *h, uz_error *err)
 {
+    return uz_dual_load_near(out, dual, K, p, h, NULL, NULL, err);
+}
+
+uz_status uz_dual_load_near(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
+                            const double *u, const double *r, uz_error *err)
+{
     *out = NULL;
     uz_status status = UZ_OK;
     uz_dual_load *load = uz_alloc_zero(1, dual->form->load_size);
@@ -127,6 +133,8 @@ uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_
     load->dual = dual;
     load->K = K;
     load->stop.deadline = INFINITY;
+    load->near_u = u;
+    load->near_r = r;
     load->h = uz_alloc_zero(dual->m, sizeof(double));
     load->g0 = uz_alloc_zero(dual->m, sizeof(double));
     if (!load->h || !load->g0)
@@ -135,6 +143,7 @@ uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_
         load->h[i] = dual->row_scale[i] * h[i];
     if (status == UZ_OK && p)
         status = dual->form->load(load, p, err);
+    load->near_u = load->near_r = NULL;
     if (status == UZ_OK)
         *out = load;
     else

@@ -58,7 +58,8 @@ typedef struct {
                      * theirs near these, which all press */
     double *correction, *kept; /* feasible corrections, as the form writes them: the last, and the kept one */
     bool has_kept;
-    bool asked_lambda_max; /* by uz_dual_load_lambda_max: others on the same body may have, too */
+    bool asked_lambda_max;         /* by uz_dual_load_lambda_max: others on the same body may have, too */
+    const double *near_u, *near_r; /* of uz_dual_load_near, while it is made; NULL: nothing is known */
 } uz_dual_load;
 
 /* What an operator is made from. */
@@ -80,6 +81,10 @@ double uz_dual_lambda_max_as_given(const uz_dual *dual);
  * it. */
 uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p,
                               const double *h, uz_error *err);
+/* The same where its answer is expected near u (d), with reactions r (m, scaled rows); both are only read. Where the
+ * form can.begin_near, the first guess of the active rows and its displacement are these. */
+uz_status uz_dual_load_near(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
+                            const double *u, const double *r, uz_error *err);
 void uz_dual_load_free(uz_dual_load *load);
 
 /* What the answers will be needed for, and how long that may take. Called before the methods run, and again when the

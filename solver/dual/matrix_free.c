@@ -56,6 +56,7 @@ typedef struct {
     double held_slack; /* of known_u, while it is there */
     int refused;       /* guesses that were left to steps of the active set */
     bool asked;        /* for D r, before */
+    bool near;         /* box->u and box->r are near the answer, and nobody has begun there yet */
     bool started;      /* on coarser grids */
     double tight;      /* relative accuracy of a change of the response, */
     double probed;     /* and while probing */
@@ -143,10 +144,19 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     x->sparse.room = x->cg.room;
     memcpy(x->sparse.p, p, (size_t)d * sizeof *p);
     x->base_slack = INFINITY;
-    /* Where coarser grids tell which rows touch nothing needs a base until D is applied. */
-    if (!x->cg.mg->kind->start || load->dual->m == 0 || !((const uz_sparse *)load->dual)->bounds.dof)
+    /* Where coarser grids or an answer nearby tell which rows touch nothing needs a base until D is applied. */
+    const bool told =
+        (x->cg.mg->kind->start || load->near_u) && load->dual->m > 0 && ((const uz_sparse *)load->dual)->bounds.dof;
+    if (!told)
         status = solve_base(x, load->dual->m > 0 && are_few(load->dual->m, d) ? BASE_ROUGHER : BASE_ROUGH, err);
-    return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, err) : status;
+    if (status == UZ_OK)
+        status = uz_sparse_load_end(&x->sparse, p, err);
+    x->near = status == UZ_OK && told && load->near_u;
+    if (x->near) {
+        memcpy(x->sparse.box->u, load->near_u, (size_t)d * sizeof *x->sparse.box->u);
+        memcpy(x->sparse.box->r, load->near_r, (size_t)load->dual->m * sizeof *x->sparse.box->r);
+    }
+    return status;
 }
 
 static void unload(uz_dual_load *load)
@@ -608,9 +618,34 @@ static bool start_on_grids(free_load *x, bool *active)
     return true;
 }
 
+/* Rows that press, or that a step of the size of the dof's own compliance would leave beyond their bounds. */
+static void start_near(free_load *x, bool *active)
+{
+    const uz_dual_load *load = &x->sparse.load;
+    const uz_bounded *box = x->sparse.box;
+    x->near = false;
+    x->started = true;
+    x->coarse = STARTED_TOLERANCE;
+    memset(active, 0, (size_t)load->dual->m * sizeof *active);
+    for (int64_t b = 0; b < box->n; b++) {
+        const int64_t j = uz_bounded_dof(box, b), upper = box->upper[b], lower = box->lower[b];
+        const double weight = uz_sparse_weight(load->K, j),
+                     above = upper >= 0 ? -weight * box->bounds->scale[upper] * box->r[upper] : 0.0,
+                     below = lower >= 0 ? -weight * box->bounds->scale[lower] * box->r[lower] : 0.0;
+        if (upper >= 0 && box->u[j] + above > box->top[b])
+            active[upper] = true;
+        else if (lower >= 0 && box->u[j] + below < box->bottom[b])
+            active[lower] = true;
+    }
+}
+
 static bool guess_active(uz_dual_load *load, bool *active)
 {
     free_load *x = (free_load *)load;
+    if (x->near && !x->sparse.box->contradictory) {
+        start_near(x, active);
+        return true;
+    }
     if (x->cg.mg->kind->start)
         return start_on_grids(x, active);
     if (x->sparse.box && are_few(load->dual->m, load->dual->d) && x->refused++ < REFUSED_MOST)
@@ -709,7 +744,9 @@ static void add_cost_distributed(uz_cost_estimate *cost, const uz_cost_size *siz
     .correct = uz_sparse_correct, .recover = uz_sparse_recover, .solve_active = solve_active,                          \
     .guess_active = guess_active, .inverse_norm = inverse_norm
 
-const uz_dual_form uz_dual_matrix_free = {.can = {.op = UZ_OPERATOR_MATRIX_FREE}, .add_cost = add_cost, BY_MULTIGRID};
+const uz_dual_form uz_dual_matrix_free = {
+    .can = {.op = UZ_OPERATOR_MATRIX_FREE, .begin_near = true}, .add_cost = add_cost, BY_MULTIGRID};
 
-const uz_dual_form uz_dual_distributed = {
-    .can = {.op = UZ_OPERATOR_DISTRIBUTED, .asked_for = true}, .add_cost = add_cost_distributed, BY_MULTIGRID};
+const uz_dual_form uz_dual_distributed = {.can = {.op = UZ_OPERATOR_DISTRIBUTED, .asked_for = true, .begin_near = true},
+                                          .add_cost = add_cost_distributed,
+                                          BY_MULTIGRID};

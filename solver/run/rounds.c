@@ -10,7 +10,9 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "linalg/blas.h"
 #include "run/block.h"
+#include "run/nearby.h"
 #include "run/problem.h"
 #include "run/results.h"
 #include "run/rows.h"
@@ -42,12 +44,14 @@ typedef struct {
     int64_t kept;         /* rows of the first round */
     uz_candidates wanted; /* rows of the next round, or in NULL */
     uz_state *carried;    /* the start of the one case; NULL: those of `starts` */
+    uz_nearby *nearby;    /* which cases have loads near to each other; NULL: it does not matter */
 } batch;
 
 static uz_status reacquire_for_starts(batch *b, uz_error *err);
 static uz_status check_memory(const batch *b, uz_error *err);
 static uz_status solve_in_blocks(batch *b, uz_error *err);
 static uz_request request_of(const batch *b, int64_t place, bool in_block);
+static void begin_near(uz_run *run, const batch *b);
 static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *err);
 static void prepare_round(batch *b);
 
@@ -85,12 +89,16 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
         const bool block = status == UZ_OK && b.n_todo > 1 && b.setup->dual->can->lanes;
         if (block)
             status = solve_in_blocks(&b, &own);
+        else if (status == UZ_OK && n > 1 && !b.nearby && b.setup->dual->can->begin_near)
+            b.nearby = uz_nearby_new(n, b.setup->dual->d, uz_setup_all_rows(b.setup, problem)->rows);
         for (int64_t place = 0; status == UZ_OK && !block && place < b.n_todo; place++) {
             const uz_request asked = request_of(&b, place, false);
             uz_run run;
             status = uz_run_begin(&run, &asked, &own);
             if (status == UZ_OK)
                 status = uz_run_load(&run, &own);
+            if (status == UZ_OK)
+                begin_near(&run, &b);
             if (status == UZ_OK)
                 status = uz_run_start(&run, &own);
             if (status == UZ_OK)
@@ -123,6 +131,7 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
     free(b.todo);
     free(b.again);
     uz_candidates_clear(&b.wanted);
+    uz_nearby_free(b.nearby);
     uz_state_free(b.carried);
     return status;
 }
@@ -209,6 +218,46 @@ static uz_status solve_in_blocks(batch *b, uz_error *err)
     return status;
 }
 
+/* What a start may be off by, of the load. Elsewhere there is nothing but the body without its rows; a box has coarser
+ * grids, whose answer is off by a tenth in the body and by a node in what touches: of 50 loads on a cube a limit of 0.1
+ * takes 8 % more cycles than no such start, and 0.01 6 % less with what it spares on these grids. */
+#define NEAR          0.1
+#define NEAR_ON_GRIDS 0.01
+
+/* run->near, from answers to cases whose loads are near; without memory, or where there are none, it is left NULL. */
+static void begin_near(uz_run *run, const batch *b)
+{
+    const uz_setup *setup = run->asked->setup;
+    const uz_candidates *rows = &setup->rows;
+    uz_nearby_sum sum;
+    if (!b->nearby || run->load.exponent != 0)
+        return;
+    uz_nearby_place(b->nearby, run->asked->index, run->load.p, run->load.h_all);
+    const double near = setup->model.brick ? NEAR_ON_GRIDS : NEAR;
+    if (run->asked->start || !uz_nearby_find(&sum, b->nearby, run->asked->index, near))
+        return;
+    double *u = uz_alloc_zero(run->d + run->m, sizeof *u), *one = uz_alloc(run->d + run->m, sizeof *one);
+    for (int k = 0; u && one && k < sum.count; k++) {
+        const uz_result *result = b->results[sum.of[k]];
+        if (setup->is_scene)
+            uz_restrict_nodal(one, &setup->model, result->u);
+        else
+            memcpy(one, result->u, (size_t)run->d * sizeof *one);
+        if (rows->in)
+            uz_candidates_gather(one + run->d, result->r, rows);
+        else if (run->m > 0)
+            memcpy(one + run->d, result->r, (size_t)run->m * sizeof *one);
+        uz_axpy(run->d + run->m, sum.share[k], one, u);
+    }
+    for (int64_t i = 0; u && i < run->m; i++)
+        u[run->d + i] /= setup->dual->row_scale[i];
+    if (one)
+        run->near = u;
+    else
+        free(u);
+    free(one);
+}
+
 /* The result goes to its place and the case's rows to those of the next round, or the error is named. */
 static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *err)
 {
@@ -228,6 +277,8 @@ static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *e
         uz_result_free(before);
         b->results[i] = result;
         run->result = NULL;
+        if (b->nearby && run->load.exponent == 0 && result->summary.outcome == UZ_CONVERGED)
+            uz_nearby_answered(b->nearby, i);
     } else if (b->problem->n_cases > 0) {
         uz_error_name_case(err, b->problem, i);
     }

@@ -100,8 +100,10 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     double start = uz_seconds();
     uz_status status = UZ_OK;
     if (!work->dual)
-        status = uz_dual_load_create(&work->dual, asked->setup->dual, uz_setup_K(asked->setup, asked->problem),
-                                     run->load.p, run->load.h, err);
+        status = uz_dual_load_near(&work->dual, asked->setup->dual, uz_setup_K(asked->setup, asked->problem),
+                                   run->load.p, run->load.h, run->near, run->near ? run->near + run->d : NULL, err);
+    free(run->near);
+    run->near = NULL;
     if (status == UZ_OK)
         status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
@@ -330,6 +332,7 @@ void uz_run_end(uz_run *run)
     free(run->work.scratch);
     free(run->work.far);
     free(run->load.owned);
+    free(run->near);
     uz_answer_clear(&run->answer);
     uz_candidates_clear(&run->wants);
     uz_result_free(run->result);

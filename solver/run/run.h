@@ -68,6 +68,7 @@ typedef struct {
     const uz_request *asked;
     int64_t d, m, all; /* dofs, rows of the setup, rows of the problem */
     uz_load_vectors load;
+    double *near; /* d + m: a displacement near the answer, and reactions (scaled rows), until it has begun; or NULL */
     uz_work work;
     uz_answer answer;
     uz_candidates wants; /* rows that the load has to be solved with, as others were left out wrongly; in NULL: none */
