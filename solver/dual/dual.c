@@ -47,6 +47,23 @@ static uz_status scale_rows(uz_dual *dual, uz_error *err)
     return UZ_OK;
 }
 
+/* Of a large body with few rows the pattern is all that N takes: a number for each dof. */
+static uz_status take_rows(uz_dual *dual, const uz_dual_source *source, uz_error *err)
+{
+    const uz_csc *N = source->N;
+    if (!source->lasts || !N->ptr)
+        return uz_csc_copy(&dual->N, N, err);
+    const int64_t entries = N->ptr[N->cols];
+    double *val = uz_alloc(entries, sizeof *val);
+    if (!val)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)N->rows);
+    if (entries > 0)
+        memcpy(val, N->val, (size_t)entries * sizeof *val);
+    dual->shares_pattern = true;
+    dual->N = (uz_csc){.rows = N->rows, .cols = N->cols, .ptr = N->ptr, .idx = N->idx, .val = val};
+    return UZ_OK;
+}
+
 uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_hooks *hooks, uz_error *err)
 {
     const uz_dual_form *form = uz_dual_form_of(source->op);
@@ -74,7 +91,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_h
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
     }
     if (status == UZ_OK)
-        status = uz_csc_copy(&dual->N, N, err);
+        status = take_rows(dual, source, err);
     if (status == UZ_OK)
         status = scale_rows(dual, err);
     if (status == UZ_OK)
@@ -95,7 +112,10 @@ void uz_dual_free(uz_dual *dual)
     if (!dual)
         return;
     dual->form->clear(dual);
-    uz_csc_clear(&dual->N);
+    if (dual->shares_pattern)
+        free(dual->N.val);
+    else
+        uz_csc_clear(&dual->N);
     uz_csc_clear(&dual->Nt);
     free(dual->row_scale);
     free(dual->row_weight);

@@ -32,6 +32,7 @@ typedef struct {
     bool rows_may_depend;  /* solve_active may fail because rows depend on each other; false where it can't, or where
                             * rows that join one by one would cost an inexact solve each */
     uz_csc N, Nt;          /* m x d, its rows scaled, and d x m */
+    bool shares_pattern;   /* ptr and idx of N are the caller's */
     const uz_csc *touched; /* N, or N without columns of zeros, its columns in another order: for ||N'x|| */
     double *row_scale;     /* m: the powers of two by which rows of N and h were multiplied: a gap here is scale x the
                             * caller's, a caller's reaction is scale x the one here */
@@ -64,8 +65,9 @@ typedef struct {
 
 /* What an operator is made from. */
 typedef struct {
-    uz_operator op;          /* not AUTO */
-    const uz_csc *N;         /* m x d; copied */
+    uz_operator op;  /* not AUTO */
+    const uz_csc *N; /* m x d; copied, but for its pattern where it outlives the operator: */
+    bool lasts;
     const uz_factor *factor; /* of K, where the form needs one: must outlive the operator. Where `can.contact_last`,
                               * any: best with the dofs of uz_dual_contact_dofs last */
     const uz_amg *amg;       /* of K, for the other forms; likewise */

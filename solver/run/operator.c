@@ -93,7 +93,8 @@ typedef struct {
 static uz_status make_dual(making *m, uz_operator op, uz_error *err)
 {
     uz_setup *setup = m->setup;
-    const uz_dual_source source = {op, m->N, setup->factor, setup->amg};
+    const uz_dual_source source = {
+        .op = op, .N = m->N, .lasts = setup->is_scene, .factor = setup->factor, .amg = setup->amg};
     double start = uz_seconds();
     uz_status status = uz_dual_create(&setup->dual, &source, m->hooks, err);
     setup->condense_s = uz_seconds() - start;

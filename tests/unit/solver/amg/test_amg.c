@@ -161,7 +161,7 @@ static void check_norm(pair *p)
     uz_dual *dual = NULL;
     uz_dual_load *load = NULL;
     CHECK(uz_csc_init(&no_rows, 0, n, 0, &err) == UZ_OK);
-    const uz_dual_source source = {UZ_OPERATOR_MATRIX_FREE, &no_rows, NULL, p->amg};
+    const uz_dual_source source = {.op = UZ_OPERATOR_MATRIX_FREE, .N = &no_rows, .amg = p->amg};
     CHECK(uz_dual_create(&dual, &source, NULL, &err) == UZ_OK);
     CHECK(uz_dual_load_create(&load, dual, &p->K, no_load, &none, &err) == UZ_OK);
     memcpy(w, e, (size_t)n * sizeof *w);

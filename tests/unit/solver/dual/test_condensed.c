@@ -52,7 +52,7 @@ static form form_of(const uz_qp *qp, bool contact_last)
     CHECK(uz_dual_contact_dofs(&dofs, &count, &qp->N, &err) == UZ_OK);
     CHECK(factor_by(&f.factor, &qp->K, dofs, contact_last ? count : 0, UZ_ORDERING_AUTO, 0, &err) == UZ_OK);
     CHECK_INT(uz_factor_describe(f.factor).contact_last, contact_last);
-    uz_dual_source source = {UZ_OPERATOR_CONDENSED, &qp->N, f.factor, NULL};
+    uz_dual_source source = {.op = UZ_OPERATOR_CONDENSED, .N = &qp->N, .factor = f.factor};
     CHECK(uz_dual_create(&f.dual, &source, NULL, &err) == UZ_OK);
     CHECK(uz_dual_load_create(&f.load, f.dual, &qp->K, qp->p, qp->h, &err) == UZ_OK);
     free(dofs);

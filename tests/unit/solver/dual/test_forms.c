@@ -33,7 +33,7 @@ static void open_subject(subject *s, const uz_qp *qp, int k)
         CHECK_INT(uz_modes_of_matrix(&modes, &qp->K, &err), UZ_OK);
         CHECK_INT(uz_amg_create(&s->amg, &qp->K, &modes, 0, 0, NULL, &err), UZ_OK);
     }
-    uz_dual_source source = {s->can->op, &qp->N, s->factor, s->amg};
+    uz_dual_source source = {.op = s->can->op, .N = &qp->N, .factor = s->factor, .amg = s->amg};
     CHECK_INT(uz_dual_create(&s->dual, &source, NULL, &err), UZ_OK);
     CHECK_INT(uz_dual_load_create(&s->load, s->dual, &qp->K, qp->p, qp->h, &err), UZ_OK);
     CHECK_INT(uz_dual_load_aim(s->load, 1e-10, NULL, &err), UZ_OK);

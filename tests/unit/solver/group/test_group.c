@@ -190,7 +190,7 @@ static void far_begin(far_body *b, double weak)
     uz_modes_clear(&modes);
     CHECK(uz_amg_of_definite(&b->amg, mg, &err) == UZ_OK);
     CHECK_MSG(uz_amg_probe(b->amg, &b->qp.K, NULL, &err) == UZ_OK, "%s", err.message);
-    const uz_dual_source source = {UZ_OPERATOR_DISTRIBUTED, &b->no_rows, NULL, b->amg};
+    const uz_dual_source source = {.op = UZ_OPERATOR_DISTRIBUTED, .N = &b->no_rows, .amg = b->amg};
     CHECK(uz_dual_create(&b->dual, &source, NULL, &err) == UZ_OK);
     CHECK(uz_dual_load_create(&b->load, b->dual, &b->qp.K, b->qp.p, &b->none, &err) == UZ_OK);
 }
