@@ -675,9 +675,9 @@ static const cycle_costs PLANE = {6.5, 0.0, 50.0, 11.0, 22.0}, SOLID = {1.8, 66.
 /* On equal cells a cycle and a product, in passes of numbers; making the multigrid and bounding the spectrum, and a
  * load that begins on coarser grids, in cycles. Solid bodies of 45,000 to 2,700,000 dofs. */
 #define CELLS_PASSES  30.0
-#define CELLS_CREATE  45.0
-#define CELLS_LOAD    50.0
-#define CELLS_VECTORS 28.0
+#define CELLS_CREATE  29.0
+#define CELLS_LOAD    23.0
+#define CELLS_VECTORS 27.0
 
 static void add_cost_by_cells(uz_cost_estimate *cost, const uz_cost_size *size, const uz_cost_rates *rates)
 {
