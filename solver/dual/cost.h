@@ -19,10 +19,11 @@ typedef struct {
 
 typedef struct {
     uz_operator op;
-    double setup_s, case_s; /* once for the body, and for each load */
-    /* Of these, what conjugate gradients on multigrid take where the bound on the spectrum takes so many steps; both
+    double setup_s, case_s; /* once for the body, and for a load */
+    double next_s;          /* for each further load of a call; 0: as for the first */
+    /* Of these, what conjugate gradients on multigrid take where the bound on the spectrum takes so many steps; they
      * grow with them. */
-    double steps, setup_steps_s, case_steps_s;
+    double steps, setup_steps_s, case_steps_s, next_steps_s;
     double bytes; /* K and N included */
     double flops; /* of the setup and one load */
     bool fits;

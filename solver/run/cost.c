@@ -105,6 +105,7 @@ static uz_cost_estimate estimate(const uz_dual_abilities *can, const uz_cost_siz
                       UZ_COST_FACTOR_PASSES * (double)L.nnz * rates->entry_s;
     }
     uz_dual_form_of(out.op)->add_cost(&out, size, predicted ? &L : NULL, rates);
+    out.next_s = out.next_s > 0.0 ? out.next_s : out.case_s;
     return out;
 }
 
@@ -143,9 +144,9 @@ bool uz_cost_is_one_to_one(const uz_csc *N, int64_t n_b)
 #define MUCH_CHEAPER 2.0
 #define WORTH_S      2.0
 
-static double total(const uz_cost_estimate *e, const uz_cost_size *size)
+double uz_cost_seconds(const uz_cost_estimate *form, int64_t cases)
 {
-    return e->setup_s + (double)(size->cases > 0 ? size->cases : 1) * e->case_s;
+    return form->setup_s + form->case_s + (double)(cases > 1 ? cases - 1 : 0) * form->next_s;
 }
 
 _Static_assert(sizeof((uz_cost){0}.considered) == UZ_DUAL_FORMS * sizeof(uz_cost_option), "a result names each form");
@@ -172,9 +173,9 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
         bool allowed = asked == UZ_OPERATOR_AUTO || form->op == asked;
         if (!allowed || !form->fits)
             continue;
-        const double before = plan->chosen >= 0 ? total(&plan->form[plan->chosen], size) : INFINITY;
+        const double before = plan->chosen >= 0 ? uz_cost_seconds(&plan->form[plan->chosen], size->cases) : INFINITY;
         if (plan->chosen < 0 || (!uz_dual_form_of(form->op)->can.needs_factor && before > WORTH_S &&
-                                 MUCH_CHEAPER * total(form, size) < before))
+                                 MUCH_CHEAPER * uz_cost_seconds(form, size->cases) < before))
             plan->chosen = k;
     }
 }
@@ -200,12 +201,13 @@ bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const 
 int uz_cost_patience(const uz_cost_plan *plan, const uz_cost_size *size)
 {
     const uz_cost_estimate *chosen = &plan->form[plan->chosen];
-    const double cases = (double)(size->cases > 0 ? size->cases : 1);
+    const double further = (double)(size->cases > 1 ? size->cases - 1 : 0);
+    const double grows = chosen->setup_steps_s + chosen->case_steps_s + further * chosen->next_steps_s;
     double least = INFINITY;
     for (int k = 0; k < plan->count; k++)
         if (plan->form[k].fits && uz_dual_form_of(plan->form[k].op)->can.needs_factor)
-            least = fmin(least, total(&plan->form[k], size));
-    const double more = (least - total(chosen, size)) / (chosen->setup_steps_s + cases * chosen->case_steps_s);
+            least = fmin(least, uz_cost_seconds(&plan->form[k], size->cases));
+    const double more = (least - uz_cost_seconds(chosen, size->cases)) / grows;
     return isfinite(least) ? (int)fmin(chosen->steps * (1.0 + fmax(0.0, more)), INT_MAX) : 0;
 }
 

@@ -45,6 +45,9 @@ bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const 
  * and fits, as conjugate gradients then take longer in proportion; 0: there is none that fits. */
 int uz_cost_patience(const uz_cost_plan *plan, const uz_cost_size *size);
 
+/* Seconds of the body and so many loads on it (0: one). */
+double uz_cost_seconds(const uz_cost_estimate *form, int64_t cases);
+
 /* What is left of seconds of one thread where so many share what they can of it. The plan is that of one: which form is
  * taken does not depend on who else computes. */
 double uz_cost_shared(double seconds, uz_operator op, bool brick, int threads);

@@ -63,20 +63,49 @@ TEST(a_multigrid_is_not_paid_by_entries_alone)
 TEST(patience_is_as_long_as_a_factor_is_dear)
 {
     const uz_cost_size size = {.d = 100000, .cases = 2};
-    uz_cost_plan plan = {.form = {{.op = UZ_OPERATOR_CONDENSED, .setup_s = 9, .case_s = 0.5, .fits = true},
-                                  {.op = UZ_OPERATOR_FACTORED, .setup_s = 1, .case_s = 1, .fits = false},
-                                  {.op = UZ_OPERATOR_MATRIX_FREE,
-                                   .setup_s = 2,
-                                   .case_s = 1,
-                                   .steps = 40,
-                                   .setup_steps_s = 1.25,
-                                   .case_steps_s = 0.875,
-                                   .fits = true}},
-                         .count = 3,
-                         .chosen = 2};
-    CHECK_INT(uz_cost_patience(&plan, &size), 120); /* (10 - 4) / (1.25 + 2 * 0.875) times as many more */
+    uz_cost_plan plan = {
+        .form = {{.op = UZ_OPERATOR_CONDENSED, .setup_s = 9, .case_s = 0.6, .next_s = 0.4, .fits = true},
+                 {.op = UZ_OPERATOR_FACTORED, .setup_s = 1, .case_s = 1, .next_s = 1, .fits = false},
+                 {.op = UZ_OPERATOR_MATRIX_FREE,
+                  .setup_s = 2,
+                  .case_s = 1.5,
+                  .next_s = 0.5,
+                  .steps = 40,
+                  .setup_steps_s = 1.25,
+                  .case_steps_s = 1.25,
+                  .next_steps_s = 0.5,
+                  .fits = true}},
+        .count = 3,
+        .chosen = 2};
+    CHECK_INT(uz_cost_patience(&plan, &size), 120); /* (10 - 4) / (1.25 + 1.25 + 0.5) times as many more */
     plan.form[1].fits = true;
     CHECK_INT(uz_cost_patience(&plan, &size), 40);
     plan.form[0].fits = plan.form[1].fits = false;
     CHECK_INT(uz_cost_patience(&plan, &size), 0);
+}
+
+/* The first of many loads costs what one does; the others less where they begin at answers, the same on a factor. */
+TEST(further_loads_cost_less_without_a_factor)
+{
+    const uz_factor_info factor = {.nnz = 40000000, .flops = 1e11, .bytes = 320000000};
+    const uz_cost_size size = {.d = 100000,
+                               .m = 1000,
+                               .n_b = 1000,
+                               .k_entries = 4100000,
+                               .n_entries = 1000,
+                               .modes = 6,
+                               .active_set = true,
+                               .bounds = true,
+                               .cases = 50};
+    uz_cost_plan plan;
+    uz_cost_decide(&plan, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+    CHECK(plan.count > 1);
+    for (int k = 0; k < plan.count; k++) {
+        const uz_cost_estimate *form = &plan.form[k];
+        const double one = uz_cost_seconds(form, 0), many = uz_cost_seconds(form, 50);
+        CHECK_REL(one, form->setup_s + form->case_s, 1e-12);
+        CHECK(uz_cost_seconds(form, 1) <= one && uz_cost_seconds(form, 1) >= one);
+        CHECK_REL(many, one + 49 * form->next_s, 1e-12);
+        CHECK(form->op == UZ_OPERATOR_MATRIX_FREE ? form->next_s < 0.7 * form->case_s : form->next_s >= form->case_s);
+    }
 }
