@@ -70,6 +70,8 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
         analysis->position[((const SuiteSparse_long *)analysis->L->Perm)[k]] = k;
     if (status == UZ_OK && !(analysis->share = uz_share_tree(analysis->L)))
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld dofs", (long long)K->cols);
+    for (size_t s = 0; status == UZ_OK && s < analysis->L->nsuper; s++)
+        analysis->is_shared = analysis->is_shared || analysis->share[s] != UZ_REST;
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     cholmod_l_finish(&common);

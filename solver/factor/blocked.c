@@ -7,7 +7,6 @@
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
-#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 
@@ -217,15 +216,15 @@ uz_status uz_factor_solve_shares(const uz_factor *factor, double *X, double *Y, 
     if (!room)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution with %d columns", UZ_LANES);
     substitution x = {factor, forward, 1, {X, forward ? Y : X, X}, {room, room + most, room}};
-    if (forward)
+    if (!forward)
+        substitute(&x, UZ_REST, false);
+    else if (factor->analysis->is_shared)
         trade_columns(factor, X, Y, true);
-    else
-        substitute(&x, UZ_REST, false);
-    uz_aside_share(substitute_share, &x, UZ_REST);
-    if (forward) {
+    uz_run_shares(factor->analysis, substitute_share, &x);
+    if (forward && factor->analysis->is_shared)
         trade_columns(factor, X, Y, false);
+    if (forward)
         substitute(&x, UZ_REST, false);
-    }
     free(room);
     return UZ_OK;
 }

@@ -15,6 +15,7 @@ struct uz_analysis {
     int64_t *last;        /* n_last dofs, ascending */
     int64_t *position;    /* n: inverse of L->Perm */
     unsigned char *share; /* nsuper: see uz_share_tree */
+    bool is_shared;       /* not all are of the rest */
     uz_order_choice chosen, considered[UZ_CHOICES];
     int n_considered;
     double seconds;
@@ -25,6 +26,8 @@ struct uz_analysis {
 enum { UZ_REST = 2, UZ_SHARES };
 /* nsuper: the share of each; all are of the rest where two threads would gain little. NULL: no memory. */
 unsigned char *uz_share_tree(const cholmod_factor *L);
+/* run(ctx, share) of both shares, by two threads where they have supernodes. */
+void uz_run_shares(const uz_analysis *analysis, void (*run)(void *ctx, int share), void *ctx);
 /* Worth two threads' time for itself. */
 bool uz_is_large(int64_t columns, int64_t rows);
 

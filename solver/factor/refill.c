@@ -498,7 +498,7 @@ uz_status uz_refill_run(int64_t *refused, uz_refill *x, uz_factor *factor, uz_er
         return status;
     x->L = &factor->L;
     x->share = factor->analysis->share;
-    uz_aside_share(fill_share, x, UZ_REST);
+    uz_run_shares(factor->analysis, fill_share, x);
     *refused = x->of[0].refused < x->of[1].refused ? x->of[0].refused : x->of[1].refused;
     if (*refused == factor->n) {
         make_all(x, UZ_REST);

@@ -6,6 +6,7 @@
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -126,4 +127,12 @@ unsigned char *uz_share_tree(const cholmod_factor *L)
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return ok ? share : NULL;
+}
+
+void uz_run_shares(const uz_analysis *analysis, void (*run)(void *ctx, int share), void *ctx)
+{
+    if (analysis->is_shared)
+        uz_aside_share(run, ctx, UZ_REST);
+    for (int share = 0; share < UZ_REST && !analysis->is_shared; share++)
+        run(ctx, share);
 }

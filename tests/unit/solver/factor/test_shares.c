@@ -59,20 +59,6 @@ TEST(shares_do_not_need_each_other)
     free(owner);
 }
 
-/* A small body is not shared out. */
-TEST(little_is_not_shared)
-{
-    uz_thread_init();
-    uz_qp qp = paper_qp(6, 1.0);
-    uz_analysis *analysis;
-    uz_error err;
-    CHECK_INT(uz_analysis_create(&analysis, &qp.K, NULL, 0, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
-    for (size_t s = 0; s < analysis->L->nsuper; s++)
-        CHECK_INT(analysis->share[s], UZ_REST);
-    uz_analysis_free(analysis);
-    uz_qp_clear(&qp);
-}
-
 /* allowed: by two threads. again: by uz_factor_again. */
 static uz_factor *factor_with(const uz_csc *K, const uz_analysis *analysis, bool allowed, bool again, uz_status wanted)
 {
@@ -90,6 +76,24 @@ static uz_factor *factor_with(const uz_csc *K, const uz_analysis *analysis, bool
     return factor;
 }
 
+/* A small body is not shared out, and no thread is woken for it. */
+TEST(little_is_not_shared)
+{
+    uz_thread_init();
+    uz_qp qp = paper_qp(6, 1.0);
+    uz_analysis *analysis;
+    uz_error err;
+    CHECK_INT(uz_analysis_create(&analysis, &qp.K, NULL, 0, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
+    for (size_t s = 0; s < analysis->L->nsuper; s++)
+        CHECK_INT(analysis->share[s], UZ_REST);
+    uz_aside_used();
+    for (int again = 0; again < 2; again++)
+        uz_factor_free(factor_with(&qp.K, analysis, true, again, UZ_OK));
+    CHECK_INT(uz_aside_used(), 1);
+    uz_analysis_free(analysis);
+    uz_qp_clear(&qp);
+}
+
 /* turns: how often, made anew and made again; bad: of K that is not positive, too. */
 static void check_same_bits(uz_csc *K, int turns, bool bad)
 {
@@ -98,8 +102,10 @@ static void check_same_bits(uz_csc *K, int turns, bool bad)
     CHECK_INT(uz_analysis_create(&analysis, K, NULL, 0, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
     for (int again = 0; again < 2; again++)
         for (int turn = 0; turn < turns; turn++) {
-            uz_factor *one = factor_with(K, analysis, false, again, UZ_OK),
-                      *two = factor_with(K, analysis, true, again, UZ_OK);
+            uz_factor *one = factor_with(K, analysis, false, again, UZ_OK);
+            uz_aside_used();
+            uz_factor *two = factor_with(K, analysis, true, again, UZ_OK);
+            CHECK_INT(uz_aside_used(), 2);
             CHECK(memcmp(one->L.x, two->L.x, one->L.xsize * sizeof(double)) == 0);
             CHECK(one->info.rcond == two->info.rcond && one->info.inverse_bound == two->info.inverse_bound);
             uz_factor_free(one);
