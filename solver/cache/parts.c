@@ -25,24 +25,32 @@ typedef struct {
     bool last; /* the contact, and not much else, has to come last: what is dense is as large as all that does */
 } wanted;
 
-uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *A, uz_error *err)
+uz_status uz_pattern_digest(char digest[65], const uz_csc *A, uz_error *err)
 {
-    int64_t shape[2] = {A->rows, A->cols};
-    size_t nnz = (size_t)A->ptr[A->cols];
-    uz_digest *pattern = uz_digest_new(), *values = uz_digest_new();
-    bool ok = pattern && values;
+    const int64_t shape[2] = {A->rows, A->cols};
+    uz_digest *pattern = uz_digest_new();
     if (pattern) {
         uz_digest_add(pattern, shape, sizeof shape);
         uz_digest_add(pattern, A->ptr, (size_t)(A->cols + 1) * sizeof *A->ptr);
-        uz_digest_add(pattern, A->idx, nnz * sizeof *A->idx);
-        ok = uz_digest_end(pattern, key->pattern) && ok;
+        uz_digest_add(pattern, A->idx, (size_t)A->ptr[A->cols] * sizeof *A->idx);
     }
+    return pattern && uz_digest_end(pattern, digest) ? UZ_OK
+                                                     : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
+}
+
+uz_status uz_matrix_digest(uz_matrix_key *key, uz_cache *cache, const uz_csc *A, uz_error *err)
+{
+    if (uz_table_find_name(key, cache, A))
+        return UZ_OK;
+    const uz_status status = uz_pattern_digest(key->pattern, A, err);
+    uz_digest *values = status == UZ_OK ? uz_digest_new() : NULL;
     if (values) {
-        uz_digest_add(values, key->pattern, pattern ? sizeof key->pattern : 0);
-        uz_digest_add(values, A->val, nnz * sizeof *A->val);
-        ok = uz_digest_end(values, key->values) && ok;
+        uz_digest_add(values, key->pattern, sizeof key->pattern);
+        uz_digest_add(values, A->val, (size_t)A->ptr[A->cols] * sizeof *A->val);
     }
-    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest of a matrix");
+    if (status != UZ_OK || (values && uz_digest_end(values, key->values)))
+        return status;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest of a matrix");
 }
 
 /* The key of an object that `first` (a digest), the ordering and the contact determine. */

@@ -6,11 +6,10 @@
 #include "cache/table.h"
 #include "factor/factor.h"
 
-/* SHA-256 of a matrix, hex: of its pattern, and of pattern and values. */
-typedef struct {
-    char pattern[65], values[65];
-} uz_matrix_key;
-uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *A, uz_error *err);
+/* What the table calls A (uz_table_name), or its digests. cache NULL is legal. UZ_ERR_MEMORY. */
+uz_status uz_matrix_digest(uz_matrix_key *key, uz_cache *cache, const uz_csc *A, uz_error *err);
+/* Of the pattern alone. */
+uz_status uz_pattern_digest(char digest[65], const uz_csc *A, uz_error *err);
 
 /* A factor and where it belongs. All zero: none. */
 typedef struct {

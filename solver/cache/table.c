@@ -27,6 +27,8 @@ struct uz_cache {
     pthread_cond_t changed;
     uz_item *newest, *oldest;
     size_t bytes, max_bytes;
+    uz_csc named; /* borrowed, never read; val NULL: none */
+    uz_matrix_key name;
 };
 
 uz_cache *uz_cache_new(size_t max_bytes)
@@ -234,6 +236,26 @@ uz_item *uz_table_search(uz_cache *cache, uz_item_kind kind, bool (*fits)(const 
         use(cache, item);
     pthread_mutex_unlock(&cache->mutex);
     return item;
+}
+
+void uz_table_name(uz_cache *cache, const uz_csc *A, const uz_matrix_key *key)
+{
+    pthread_mutex_lock(&cache->mutex);
+    cache->named = *A;
+    cache->name = *key;
+    pthread_mutex_unlock(&cache->mutex);
+}
+
+bool uz_table_find_name(uz_matrix_key *key, uz_cache *cache, const uz_csc *A)
+{
+    if (!cache)
+        return false;
+    pthread_mutex_lock(&cache->mutex);
+    const bool found = A->val && A->val == cache->named.val && A->ptr == cache->named.ptr && A->idx == cache->named.idx;
+    if (found)
+        *key = cache->name;
+    pthread_mutex_unlock(&cache->mutex);
+    return found;
 }
 
 void *uz_item_object(const uz_item *item)

@@ -31,6 +31,16 @@ void uz_table_release(uz_cache *cache, uz_item *item);
 /* A use of the most recently used object of this kind that `fits`, or NULL. fits is called under the mutex. */
 uz_item *uz_table_search(uz_cache *cache, uz_item_kind kind, bool (*fits)(const void *object, void *ctx), void *ctx);
 
+/* SHA-256 of a matrix, hex: of its pattern, and of pattern and values; or what its owner calls them. */
+typedef struct {
+    char pattern[65], values[65];
+} uz_matrix_key;
+/* Of a table that one owner has for matrices that come once: while A's arrays stand where they are and have what they
+ * have, `key` is what uz_matrix_digest says of it, which reads them all. Another name takes the place of the last. */
+void uz_table_name(uz_cache *cache, const uz_csc *A, const uz_matrix_key *key);
+/* false: nobody has told. cache NULL is legal. */
+bool uz_table_find_name(uz_matrix_key *key, uz_cache *cache, const uz_csc *A);
+
 void *uz_item_object(const uz_item *item); /* NULL until it is published */
 
 /* Calls visit for each published object of the kind, most recently used first, under the mutex. */

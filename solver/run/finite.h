@@ -9,6 +9,7 @@
 #define UZ_RUN_FINITE_H
 
 #include "assembly/row_turn.h"
+#include "cache/table.h"
 #include "certificate/finite.h"
 #include "core/hooks.h"
 #include "finite/finite_body.h"
@@ -91,9 +92,11 @@ typedef struct {
     double requested;          /* error of the answer */
     uz_hooks hooks;
     double deadline;
-    uz_cache *cache; /* of tangents: their ordering is found once */
-    uz_scene scene;  /* with supports and loads under `load`, of its own */
-    double load;     /* t */
+    uz_cache *cache;    /* of tangents: their ordering is found once */
+    uz_matrix_key name; /* of the last one there: its pattern's digest, and its number */
+    int64_t tangents;
+    uz_scene scene; /* with supports and loads under `load`, of its own */
+    double load;    /* t */
     const uz_finite_point
         *from; /* the way from there, or from rest (NULL) to `part` of the whole is put on in parts t */
     double part;

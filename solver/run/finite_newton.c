@@ -23,11 +23,12 @@
 #include "linalg/blas.h"
 #include "linalg/linalg.h"
 #include "assembly/parts.h"
-#include "cache/table.h"
+#include "cache/parts.h"
 #include "obstacle/obstacle.h"
 #include "run/solve.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -234,12 +235,25 @@ static void load_step(bool *moved, uz_finite_run *run)
     uz_csc_symv(run->p, run->K, 1, run->v);
 }
 
+/* A tangent comes once: by its number it need not be read to be known. Between bodies its pattern changes. */
+static uz_status name_tangent(uz_finite_run *run, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    if (run->pairs || !run->name.pattern[0])
+        status = uz_pattern_digest(run->name.pattern, run->K, err);
+    snprintf(run->name.values, sizeof run->name.values, "%lld", (long long)run->tangents);
+    uz_table_name(run->cache, run->K, &run->name);
+    return status;
+}
+
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err)
 {
     const uz_problem qp = {.kind = UZ_PROBLEM_MATRICES, .qp = {*run->K, run->at.rows.N, run->p, run->at.h}};
     uz_result *next = NULL;
     run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
-    const uz_status status = uz_solve_rounds(&next, &qp, &run->settings, NULL, NULL, run->cache, &run->hooks, err);
+    uz_status status = name_tangent(run, err);
+    if (status == UZ_OK)
+        status = uz_solve_rounds(&next, &qp, &run->settings, NULL, NULL, run->cache, &run->hooks, err);
     if (status != UZ_OK)
         return status;
     run->found.qps++;
@@ -298,6 +312,7 @@ static bool add_more(double *hold, double *shift, bool rows)
 /* Another tangent has another factor; its ordering stays. */
 static void forget_factors(uz_finite_run *run)
 {
+    run->tangents++;
     uz_table_forget(run->cache, UZ_ITEM_SETUP); /* which use factors */
     uz_table_forget(run->cache, UZ_ITEM_FACTOR);
 }

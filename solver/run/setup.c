@@ -57,7 +57,7 @@ uz_body_extent uz_setup_extent(const uz_problem *problem, const uz_settings *set
 }
 
 uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz_candidates *wanted,
-                          const uz_settings *settings, uz_error *err)
+                          const uz_settings *settings, uz_cache *cache, uz_error *err)
 {
     memset(key, 0, sizeof *key);
     uz_digest *state = uz_digest_new();
@@ -91,9 +91,9 @@ uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz
             uz_digest_add(state, wanted->in, (size_t)wanted->m);
     } else {
         uz_matrix_key N = {.values = ""}; /* without rows it may be a zeroed struct */
-        status = uz_matrix_digest(&key->K, &problem->qp.K, err);
+        status = uz_matrix_digest(&key->K, cache, &problem->qp.K, err);
         if (status == UZ_OK && problem->qp.N.ptr)
-            status = uz_matrix_digest(&N, &problem->qp.N, err);
+            status = uz_matrix_digest(&N, cache, &problem->qp.N, err);
         uz_digest_add(state, key->K.values, sizeof key->K.values);
         uz_digest_add(state, N.values, sizeof N.values);
     }

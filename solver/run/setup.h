@@ -37,13 +37,14 @@ typedef struct uz_setup {
 } uz_setup;
 
 /* SHA-256, hex: of everything a setup is made from, the asked operator, ordering and memory limit included, and of
- * what the choice of its rows follows from; of K, for matrices (a scene's K has to be assembled first). */
+ * what the choice of its rows follows from; of K, for matrices (a scene's K has to be assembled first). cache (or
+ * NULL): may have a name for it. */
 typedef struct {
     char digest[65];
     uz_matrix_key K;
 } uz_setup_key;
 uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz_candidates *wanted,
-                          const uz_settings *settings, uz_error *err);
+                          const uz_settings *settings, uz_cache *cache, uz_error *err);
 
 /* Assembles (scenes) and chooses rows (`wanted` among them; NULL: none in particular): all but the operator. */
 uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_candidates *wanted,

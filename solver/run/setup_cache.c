@@ -41,7 +41,7 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
     if (settings->op == UZ_OPERATOR_DISTRIBUTED) /* its group ends with the call */
         cache = NULL;
     if (cache)
-        status = uz_setup_digest(&key, problem, wanted, settings, err);
+        status = uz_setup_digest(&key, problem, wanted, settings, cache, err);
     if (cache && status == UZ_OK)
         status = uz_table_acquire(&item, &create, cache, UZ_ITEM_SETUP, key.digest, hooks, err);
     if (status != UZ_OK)
@@ -54,7 +54,7 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
     uz_setup *made;
     status = uz_setup_create(&made, problem, wanted, settings, err);
     if (status == UZ_OK && cache && made->is_scene && !made->model.brick) /* which has no factor */
-        status = uz_matrix_digest(&key.K, uz_setup_K(made, problem), err);
+        status = uz_matrix_digest(&key.K, cache, uz_setup_K(made, problem), err);
     if (status == UZ_OK)
         status = uz_setup_make_operator(made, problem, &key.K, settings, cache, hooks, err);
     if (status != UZ_OK) {

@@ -1,6 +1,6 @@
 /* The cache of bodies: one creator per key, a bound in bytes, and keys that tell bodies apart. */
 #include "run/setup_cache.h"
-#include "cache/table.h"
+#include "cache/parts.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -81,6 +81,34 @@ TEST(hits_are_counted_and_listed)
     }
     CHECK(strcmp(entries[0].digest, entries[1].digest) != 0);
     free(entries);
+    uz_cache_free(cache);
+    uz_problem_clear(&a);
+    uz_problem_clear(&b);
+}
+
+/* A table that has a name for a matrix does not read it: two with one name are taken for one, and after another name,
+ * or without one, each has its own digest. */
+TEST(a_named_matrix_is_not_read)
+{
+    uz_cache *cache = uz_cache_new(1 << 30);
+    uz_problem a = spring_body(10, 1), b = spring_body(20, 1);
+    const uz_matrix_key one = {"pattern", "1"}, two = {"pattern", "2"};
+    uz_matrix_key key, read;
+    uz_error err;
+    CHECK_INT(uz_matrix_digest(&read, cache, &a.qp.K, &err), UZ_OK);
+    CHECK_INT(strlen(read.values), 64);
+    uz_table_name(cache, &a.qp.K, &one);
+    CHECK_INT(uz_matrix_digest(&key, cache, &a.qp.K, &err), UZ_OK);
+    CHECK(strcmp(key.pattern, "pattern") == 0 && strcmp(key.values, "1") == 0);
+    CHECK_INT(uz_matrix_digest(&key, NULL, &a.qp.K, &err), UZ_OK);
+    CHECK(strcmp(key.pattern, read.pattern) == 0 && strcmp(key.values, read.values) == 0);
+    CHECK_INT(uz_matrix_digest(&key, cache, &b.qp.K, &err), UZ_OK);
+    CHECK_INT(strlen(key.values), 64);
+    CHECK(!touch(cache, &a));
+    a.qp.K.val[0] += 1; /* against the contract */
+    CHECK(touch(cache, &a));
+    uz_table_name(cache, &a.qp.K, &two);
+    CHECK(!touch(cache, &a));
     uz_cache_free(cache);
     uz_problem_clear(&a);
     uz_problem_clear(&b);
@@ -339,7 +367,7 @@ static void digest_of(char digest[65], const uz_problem *problem, const uz_setti
 {
     uz_setup_key key;
     uz_error err = {0};
-    CHECK(uz_setup_digest(&key, problem, NULL, settings, &err) == UZ_OK);
+    CHECK(uz_setup_digest(&key, problem, NULL, settings, NULL, &err) == UZ_OK);
     memcpy(digest, key.digest, 65);
     CHECK_INT(strlen(digest), 64);
 }
