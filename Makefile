@@ -60,6 +60,7 @@ UNIT_SRC   := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c te
 FUZZ_SRC   := $(sort $(wildcard tests/fuzz/fuzz_*.c))
 BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
 EXTREMES_SRC := $(sort $(wildcard tests/extremes/*.c))
+LARGE_SRC  := $(sort $(wildcard tests/extremes/large/*.c))
 THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
 FIGURES_SRC := $(sort $(wildcard tests/figures/*.c))
 SOAK_SRC   := $(sort $(wildcard tests/soak/*.c))
@@ -67,7 +68,7 @@ GUARD_SRC  := $(sort $(wildcard tests/guard/*.c))
 PEERS_SRC  := $(sort $(wildcard tests/peers/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(if $(HAS_PETSC),$(GROUP_SRC)) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
+C_FILES    := $(SOLVER_SRC) $(if $(HAS_PETSC),$(GROUP_SRC)) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(LARGE_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
               $(wildcard tests/support/*.c)
 H_FILES    := $(if $(HAS_PETSC),$(wildcard solver/group/worker/*.h)) $(wildcard solver/*/*.h server/*.h server/*/*.h server/*/*/*.h client/*.h client/*/*.h tests/*/*.h)
 
@@ -242,6 +243,10 @@ $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC) tests/support/harness_measure.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath -lgmp
 
+# What claims of large deformation are held against: nothing of the solver.
+$(BUILD)/large-checker: $(call obj,$(LARGE_SRC))
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ -lm
+
 $(BUILD)/theory: $(call obj,$(THEORY_SRC) tests/support/harness_measure.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
 
@@ -296,7 +301,7 @@ guard: deps-test ## instructions of small problems against those kept in tests/d
 
 # What tests run besides both programs.
 .PHONY: test-tools
-test-tools: $(PRELOADS) $(BUILD)/library $(BUILD)/load $(PEER_LAB)
+test-tools: $(PRELOADS) $(BUILD)/library $(BUILD)/load $(BUILD)/large-checker $(PEER_LAB)
 
 unit-bins: $(UNIT_BIN) test-tools
 
@@ -448,7 +453,7 @@ peers-space: bench-deps $(BUILD)/uzawad ## solids in contact by the daemon again
 	@OMP_THREAD_LIMIT=1 OMP_NUM_THREADS=1 $(call measured,peers-space) /usr/bin/python3 -B tests/peers/gamg.py $(BUILD) $(BUILD)/peers-space.json $(if $(CELLS),CELLS=$(CELLS))
 
 extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles, 500 of large deformation, 100 with quantities, 40 solids, bounds of known scenes: tables, build/extremes.json, build/contacts.json, build/obstacles.json, build/generated_large.json, build/quantities.json, build/solids.json, build/bounds.json; FILTER=name: some, FILTER=contacts, obstacles, large, quantities, solids or bounds: these scenes alone, SCENES=100: the first of them
-	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/uzawad
+	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/large-checker $(BUILD)/uzawad
 	@$(if $(filter contacts obstacles large quantities solids bounds,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
 	@$(if $(filter-out contacts,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_contacts.py $(BUILD) $(BUILD)/contacts.json $(SCENES))
 	@$(if $(filter-out obstacles,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_obstacles.py $(BUILD) $(BUILD)/obstacles.json $(SCENES))
