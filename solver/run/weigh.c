@@ -110,13 +110,27 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
     return UZ_OK;
 }
 
+/* A body that only obstacles hold has an answer of small deformation alone, which may not be enough. */
+static uz_status refuse_free(const uz_result *small, const uz_error *own, uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_FREE_BODY, own->where,
+                   "small deformation leaves out some %.2g %% of the forces, and large deformation has no answer: "
+                   "%.320s; or take the law linear, which is not compared then",
+                   100 * small->evaluation->nonlinear, own->message);
+}
+
 static uz_status choose(uz_result **result, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
                         double deadline, uz_error *err)
 {
     uz_problem finite = *one;
     uz_result *large = NULL, *left;
+    uz_error own = {0};
     finite.scene.kinematics = UZ_KINEMATICS_FINITE;
-    const uz_status status = uz_solve_finite_load(&large, &finite, settings, hooks, deadline, *result, NULL, err);
+    const uz_status status = uz_solve_finite_load(&large, &finite, settings, hooks, deadline, *result, NULL, &own);
+    if (status == UZ_ERR_FREE_BODY)
+        return refuse_free(*result, &own, err);
+    if (status != UZ_OK && err)
+        *err = own;
     if (status != UZ_OK)
         return status;
     const bool enough = large->summary.small.error <= TOLERABLE;

@@ -525,6 +525,29 @@ static double resident(const char *key)
 }
 
 /* What is told is what the process grows by: bodies, tangent and certificate, with one factor at a time. */
+/* Only the plane holds it: with a law of finite strain it is answered while small deformation is surely enough, and
+ * then refused, with both reasons. */
+TEST(a_free_body_is_answered_while_it_surely_is_small)
+{
+    for (int much = 0; much < 2; much++) {
+        uz_scene s = block("quad8", 1, 1, 2, 2);
+        body_plane(&s, "bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+        body_hold(&s, "left", 0, NAN, NAN);
+        body_load(&s, UZ_LOAD_TRACTION, "top", 0, much ? -0.1 : -1e-4, 0);
+        s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+        const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+        const uz_settings settings = uz_settings_default();
+        uz_result *result = NULL;
+        uz_error err = {0};
+        const uz_status status = uz_solve(&result, &problem, &settings, NULL, NULL, &err);
+        CHECK_MSG(status == (much ? UZ_ERR_FREE_BODY : UZ_OK), "%s", err.message);
+        CHECK(!much || (strstr(err.message, "small deformation leaves out") && strstr(err.message, "along y") &&
+                        strcmp(err.where, "/supports") == 0));
+        uz_result_free(result);
+        uz_scene_clear(&s);
+    }
+}
+
 TEST(what_a_comparison_takes_is_counted)
 {
     uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){1, 1, 1}, (int64_t[3]){12, 12, 12});
