@@ -102,6 +102,16 @@ def quantities(raw):
     return {"scenes": raw["scenes"], "told": raw["told"], "held": raw["held"]}
 
 
+def thresholds(raw):
+    """By kind of body: the load up to which small deformation is chosen over that up to which it suffices."""
+    rows = []
+    for body in dict.fromkeys(row["body"] for row in raw["rows"]):
+        of = [row for row in raw["rows"] if row["body"] == body]
+        ratios = [row["ratio"] for row in of if "ratio" in row]
+        rows.append({"body": body.replace("_", " "), "bodies": len(of), "compared": len(ratios), "least": min(ratios, default=None), "largest": max(ratios, default=None)})
+    return {"rows": rows}
+
+
 def decks(raw):
     """What was compared; of the others that their reasons are."""
     keys = ("problem", "ties", "unknowns", "apart", "apart_stiff", "calculix_s", "ours_s")
@@ -113,7 +123,7 @@ def alone(make):
 
 
 KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": bench_size, "bench-solids": alone(dict), "extremes": alone(extremes),
-         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "quantities": alone(quantities), "bounds": alone(dict), "decks": alone(decks), "peers-space": alone(dict), "large": alone(dict), "large-solids": alone(dict), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
+         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "quantities": alone(quantities), "thresholds": alone(thresholds), "bounds": alone(dict), "decks": alone(decks), "peers-space": alone(dict), "large": alone(dict), "large-solids": alone(dict), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
 
 
 def dump(value):

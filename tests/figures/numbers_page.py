@@ -24,7 +24,7 @@ import tables  # noqa: E402
 
 ROOT = pathlib.Path(os.environ.get("NUMBERS_ROOT") or pathlib.Path(__file__).resolve().parent.parent.parent)
 WIDTH = 119
-COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "bench_solids": "make bench-solids", "extremes": "make extremes", "solids": "make extremes FILTER=solids", "bounds": "make extremes FILTER=bounds", "quantities": "make extremes FILTER=quantities", "trade": "make trade",
+COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "bench_solids": "make bench-solids", "extremes": "make extremes", "solids": "make extremes FILTER=solids", "bounds": "make extremes FILTER=bounds", "quantities": "make extremes FILTER=quantities", "thresholds": "make extremes FILTER=thresholds", "trade": "make trade",
             "theory": "make theory", "large": "make large", "soak": "make soak", "peers": "make peers", "decks": "make peers-decks", "peers_space": "make peers-space", "large_solids": "make peers-large-solids", "gallery": "make gallery", "page": "make figures (the page)"}
 ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems", "trade": "rows"}  # what is measured by parts
 
@@ -204,6 +204,9 @@ LARGE = """Scenes of [large deformation](theory.md#large-deformation) at the dae
 (B), and what finer meshes converge to: contact problems, of them the most in one part of the load, and the time of the processor over that of one solve of small deformation on the same mesh, with nothing in the cache, the least of
 seven each. Below, the block over the roller by elements through its height: by how much its force is off."""
 
+THRESHOLDS = """Of bodies whose load grows (`make extremes FILTER=thresholds`), of every law: the load up to which `auto` has the answer of small deformation, under the
+linear law without a warning, over that up to which this is off by less than 5 % of the answer of large deformation, in displacements, forces and energy."""
+
 SOLIDS = """Of generated solids (`make extremes FILTER=solids`: boxes, wedges, inner nodes moved at random, a re-entrant edge; half of them on planes and balls), two or three
 elements deep, the estimated error of the mesh over the true one, by the potential energy of a mesh of `hex20` that is many times finer."""
 
@@ -261,6 +264,7 @@ def page(data, files):
     add("Estimates in space", tables.solids(data), SOLIDS)
     add("Against theory", tables.theory(data), THEORY)
     add("Large deformation", timed(tables.large(data), data, "large"), LARGE)
+    add("Where small deformation suffices", tables.thresholds(data), THRESHOLDS)
     add("Elements", tables.elements(data), ELEMENTS)
     add("The service", service_tables.soak(data), SERVICE)
     return wrapped("\n".join(lines).rstrip()) + "\n"

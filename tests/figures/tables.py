@@ -400,6 +400,12 @@ def large(data):
         ["elements", "moved aside by", "elements through the height: the force is off by"], [[f"`{element}`", aside, "; ".join(each)] for (element, aside), each in heights.items()])]
 
 
+def thresholds(data):
+    """Up to which load auto stays at small deformation, over that up to which it suffices."""
+    rows = [[row["body"], row["bodies"], *["" if row[key] is None else f"{row[key]:.3f}" for key in ("least", "largest")]] for row in (data.get("thresholds") or {}).get("rows", [])]
+    return table(["body", "of them", "chosen over enough: least", "most"], rows) if rows else None
+
+
 def large_solids(data):
     """Two solids that slide under large deformation against a finer mesh and GetFEM: parts of a hundred."""
     def part(x):
