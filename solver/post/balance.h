@@ -33,10 +33,15 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
 /* *part: about how much of the forces of the answer u small deformation leaves out: squares of its gradient in the
  * strains, by the energy norm; stress that turns with the body, along u; strains and rotations in the law itself,
  * weighted by the energy (U, > 0). Relative to its energy norm; and what the mean stress does to a strip that bends,
- * see nonlinear.c (buckling: uz_least_buckling_strain). NaN: elements are not of the standard formulation, the only one
- * that large deformation has. UZ_ERR_MEMORY. */
+ * see nonlinear.c (buckling: uz_least_buckling_strain), or to forces (leverage: uz_force_leverage). NaN: elements are
+ * not of the standard formulation, the only one that large deformation has. UZ_ERR_MEMORY. */
 uz_status uz_measure_nonlinear(double *part, const uz_body_model *model, const double *u, double energy,
-                               double buckling, uz_error *err);
+                               double buckling, double leverage, uz_error *err);
+/* *out: sqrt(2 U S) / F over the root of the body's stiffness integral E dV, see leverage.c: the error of a force, in
+ * parts of the largest, over the part of the energy norm that is left out. 0: nothing holds the body against itself.
+ * e: forces and strain energy of the answer with reactions r. UZ_ERR_MEMORY. */
+uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_scene *scene, const uz_evaluation *e,
+                            const double *r, double buckling, uz_error *err);
 /* The strain from which on a strip as flat as the body may buckle, by Euler. */
 double uz_least_buckling_strain(const uz_body_model *model);
 /* Warns that small deformation is off by `error` (uz_small) under a linear law. */
@@ -53,6 +58,8 @@ void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_sc
 enum { UZ_MOST_COMPARED = 20000 };
 /* Less than this of uz_measure_nonlinear is no large deformation. */
 #define UZ_SURELY_SMALL 0.02
+/* Of what forces may be off by, at most, less is surely small. */
+#define UZ_SURELY_HELD  0.04
 #define UZ_WARN_SLIDING "sliding"
 #define UZ_WARN_COARSE  "coarse_contact"
 #define UZ_WARN_OVERLAP "overlap"

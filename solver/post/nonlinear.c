@@ -12,7 +12,7 @@
  * body is taken for such a strip, of its own area along its diagonal, a solid for the brick that has its moments of
  * inertia, P is its mean stress, which of a body that only bends is next to none, and what bends aside the part of the
  * gradient that turns. From half of P_0 on it counts in any case. Area in thin parts along the diagonal, as of a frame,
- * is taken for a thicker strip. */
+ * is taken for a thicker strip. Forces may be off by more than the energy: leverage.c says by how much. */
 #include "post/balance.h"
 
 #include "assembly/parts.h"
@@ -257,7 +257,7 @@ static double mean_strain(const sums *of)
 }
 
 uz_status uz_measure_nonlinear(double *out, const uz_body_model *model, const double *u, double energy, double buckling,
-                               uz_error *err)
+                               double leverage, uz_error *err)
 {
     sums all = {.model = model, .part = uz_stress_count(model->kind) == 3 ? PLANE : SPACE};
     const uz_strain_source from = {.model = model, .nodal = u};
@@ -268,8 +268,9 @@ uz_status uz_measure_nonlinear(double *out, const uz_body_model *model, const do
         return status;
     const double part = mean_strain(&all) / buckling, gradient = total(&all.gradient);
     const double aside = gradient > 0 ? sqrt(total(&all.turns) / gradient) : 0;
-    *out = fmax(part * fmax(2 * UZ_SURELY_SMALL, aside),
-                (sqrt(total(&all.squares)) + sqrt(total(&all.law))) / sqrt(2 * energy) +
-                    fabs(total(&all.along)) / (2 * energy));
+    const double left = (sqrt(total(&all.squares)) + sqrt(total(&all.law))) / sqrt(2 * energy);
+    const double forces = left * leverage * sqrt(total(&all.modulus));
+    *out = fmax(fmax(part * fmax(2 * UZ_SURELY_SMALL, aside), forces * (UZ_SURELY_SMALL / UZ_SURELY_HELD)),
+                left + fabs(total(&all.along)) / (2 * energy));
     return UZ_OK;
 }

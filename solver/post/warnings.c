@@ -159,7 +159,7 @@ static void look_at_elements(const doubts *d)
 
 /* Could uz_measure_nonlinear come to anything? Gradients are at most about four times the slope that is_steep finds,
  * and the body's energy norm is known. */
-static bool may_be_nonlinear(const doubts *d, double buckling)
+static bool may_be_nonlinear(const doubts *d, double buckling, double leverage)
 {
     const uz_mesh *mesh = &d->model->mesh;
     const bool ring = d->model->kind == UZ_AXISYMMETRIC;
@@ -172,7 +172,8 @@ static bool may_be_nonlinear(const doubts *d, double buckling)
         depth = fmax(depth, 2 * acos(-1) * r);
         around = fmax(around, r > 0 ? fabs(d->u[2 * i]) / r : 0); /* on the axis it is a slope */
     }
-    const double most = sqrt(stiffest * extent * extent * depth), least = 0.25 * UZ_SURELY_SMALL;
+    const double most = sqrt(stiffest * extent * extent * depth);
+    const double least = 0.25 * fmin(UZ_SURELY_SMALL, leverage > 0 ? UZ_SURELY_HELD / (leverage * most) : INFINITY);
     const double steep = 0.25 * fmin(UZ_SURELY_SMALL * buckling, fmin(least, sqrt(2 * least * sqrt(2 * U) / most)));
     return U > 0 && (around > steep || is_steep(d, steep));
 }
@@ -593,9 +594,12 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     if (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_model(scene) &&
         (uz_has_finite_law(scene) || model->d <= UZ_MOST_COMPARED)) {
         const double buckling = uz_least_buckling_strain(model);
+        double leverage = 0;
         d.out->nonlinear = 0;
-        if (may_be_nonlinear(&d, buckling))
-            status = uz_measure_nonlinear(&d.out->nonlinear, model, result->u, d.out->strain_energy, buckling, err);
+        status = uz_force_leverage(&leverage, model, scene, d.out, result->r, buckling, err);
+        if (status == UZ_OK && may_be_nonlinear(&d, buckling, leverage))
+            status = uz_measure_nonlinear(&d.out->nonlinear, model, result->u, d.out->strain_energy, buckling, leverage,
+                                          err);
     }
     if (status != UZ_OK)
         return status;

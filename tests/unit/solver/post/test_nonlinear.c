@@ -152,7 +152,7 @@ static void compare(const uz_body_model *model, qp_random *rng, const char *what
     CHECK_INT(uz_strain_energy(&energy, model, u, false, NULL), UZ_OK);
     CHECK_MSG(fabs(2 * energy / energy_one_by_one(model, u) - 1) <= 1e-12, "%s: energy %.17g", what, energy);
     const double want = plain_measure(model, u, energy);
-    CHECK_INT(uz_measure_nonlinear(&got, model, u, energy, uz_least_buckling_strain(model), NULL), UZ_OK);
+    CHECK_INT(uz_measure_nonlinear(&got, model, u, energy, uz_least_buckling_strain(model), 0, NULL), UZ_OK);
     CHECK_MSG(isnan(want) ? isnan(got) : fabs(got - want) <= 1e-11 * want, "%s: %.17g, not %.17g", what, got, want);
     free(u);
 }
@@ -211,6 +211,34 @@ TEST(a_bar_may_buckle_by_its_thickness)
         CHECK_REL(uz_least_buckling_strain(&model), 0.2 / 400, 1e-12);
         model.mesh.uniform = false;
         CHECK_REL(uz_least_buckling_strain(&model), 0.2 / 400, 1e-12);
+        uz_body_model_clear(&model);
+        uz_scene_clear(&s);
+    }
+}
+
+/* A strip of L = 8, h = 0.5, held at both ends along x and y, along y, at one end; and with its upper side held along
+ * x, next to the end that is. */
+TEST(what_is_left_out_pulls_between_holders)
+{
+    static const double L = 8, H = 0.5;
+    for (int k = 0; k < 4; k++) {
+        uz_scene s = body_scene(UZ_PLANE_STRAIN, "quad8", (double[3]){L, H, 0}, (int64_t[3]){8, 1, 0});
+        uz_body_model model;
+        uz_error err = {0};
+        uz_resultant force[2] = {{.force = {3, 4, 0}}, {.force = {-1, 0, 0}}};
+        const uz_evaluation e = {.supports = force, .n_supports = 2, .strain_energy = 2};
+        double got = NAN;
+        body_hold(&s, "left", 0, 0, NAN);
+        if (k == 0 || k == 1)
+            body_hold(&s, "right", k == 0 ? 0 : NAN, 0, NAN);
+        if (k == 3)
+            body_hold(&s, "top", 0, NAN, NAN);
+        CHECK_INT(uz_body_model_build(&model, &s, UZ_BODY_OUTLINE, &err), UZ_OK);
+        const double buckling = uz_least_buckling_strain(&model), h = L * H / model.mesh.extent;
+        const double next = sqrt(L * H / 3); /* the least distance that counts */
+        const double want[] = {sqrt(1 + pow(h / L, 2)) / L, h / L / L, 0, sqrt(1 + pow(h / next, 2)) / next};
+        CHECK_INT(uz_force_leverage(&got, &model, &s, &e, NULL, buckling, &err), UZ_OK);
+        CHECK_MSG(fabs(got - want[k] * 2 / 5) <= 1e-12, "%d: %.17g, not %.17g", k, got, want[k] * 2 / 5);
         uz_body_model_clear(&model);
         uz_scene_clear(&s);
     }

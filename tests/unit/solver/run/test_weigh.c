@@ -415,6 +415,29 @@ TEST(small_deformation_is_the_answer_up_to_where_it_suffices)
     CHECK(found > 0 && unknown <= found / 20);
 }
 
+/* A strip that bends between its ends pulls at them by what its turns stretch it: a force that is large beside the load
+ * long before displacements, or the energy, are off. It is told from two per cent on. */
+TEST(forces_that_small_deformation_leaves_out)
+{
+    static const double LOAD[] = {1e-8, 1e-6, 1.5e-6};
+    for (int k = 0; k < 3; k++) {
+        uz_scene s = block("quad8", 25, 1, 20, 1);
+        body_hold(&s, "left", 0, 0, NAN);
+        body_hold(&s, "right", 0, 0, NAN);
+        body_load(&s, UZ_LOAD_TRACTION, "top", 0, -LOAD[k], 0);
+        uz_result *chosen = solve_as(&s, UZ_KINEMATICS_AUTO, UZ_ELASTIC_LINEAR);
+        uz_result *finite = solve_as(&s, UZ_KINEMATICS_FINITE, UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
+        const uz_small *small = &chosen->summary.small;
+        const double error = error_of(chosen, finite);
+        CHECK_MSG(k == 0 ? error < 0.001 : k == 1 ? error > 0.02 && error < TOLERABLE : error > TOLERABLE, "%g", error);
+        CHECK(small->compared == (k > 0) && (k == 0 || strcmp(small->in, "forces") == 0));
+        CHECK((k == 2) == (warning(chosen, "large_deformation") != NULL));
+        uz_result_free(chosen);
+        uz_result_free(finite);
+        uz_scene_clear(&s);
+    }
+}
+
 /* More than a block of St. Venant and Kirchhoff's law bears: one element, which can do nothing else. */
 TEST(a_load_that_cannot_be_borne)
 {
