@@ -411,13 +411,17 @@ def large_solids(data):
     def part(x):
         return "" if x is None else f"{100 * x:.2f} %"
 
+    def stiff(row):
+        """CalculiX's, by the stiffness of its contact."""
+        return "; ".join(f"{one['stiffness']}: {part(one['off']) or NONE}" for one in (row.get("calculix") or {}).get("rows", []))
+
     rows = []
     for row in (data.get("large_solids") or {}).get("rows", []):
-        rows += [[row["scene"], f"`{one['element']}`", f"{one['unknowns']:,}", one["qps"], part(one["force_off"]), part(one["area_off"]), part(one["pressure_off"]), part(one["getfem_off"])]
-                 for one in row["rows"]]
+        rows += [[row["scene"], f"`{one['element']}`", f"{one['unknowns']:,}", one["qps"], part(one["force_off"]), part(one["area_off"]), part(one["pressure_off"]), part(one["getfem_off"]),
+                  stiff(row) if one["element"] == "hex20" else ""] for one in row["rows"]]
         finer = row["finer"]
-        rows.append([row["scene"], f"`{finer['element']}`, finer", f"{finer['unknowns']:,}", finer["qps"], "", "", "", part(finer["getfem_off"])])
-    return table(["scene", "element", "unknowns", "contact problems", "force", "area", "largest pressure", "force, GetFEM"], rows) if rows else None
+        rows.append([row["scene"], f"`{finer['element']}`, finer", f"{finer['unknowns']:,}", finer["qps"], "", "", "", part(finer["getfem_off"]), ""])
+    return table(["scene", "element", "unknowns", "contact problems", "force", "area", "largest pressure", "force, GetFEM", "force, CalculiX"], rows) if rows else None
 
 
 def cycles(data):

@@ -73,8 +73,9 @@ def pushed(n):
     return request
 
 
-def deck(scene, discretization):
-    """The scene as CalculiX reads it: one kind of brick, supports along axes, one contact, forces at nodes."""
+def deck(scene, discretization, contact_stiffness=100):
+    """The scene as CalculiX reads it: one kind of brick, supports along axes, one contact, of so many E for the length of a side,
+    forces at nodes."""
     mesh, contact = scene["mesh"], scene["contacts"][0]
     kind, cells = next(iter(mesh["elements"].items()))
     stiff, side = max(m["young"] for m in scene["materials"]), min(math.dist(mesh["nodes"][e[0]], mesh["nodes"][e[1]]) for e in cells)
@@ -91,7 +92,7 @@ def deck(scene, discretization):
         members = mesh["groups"].get(material["on"], {"elements": range(len(cells))})["elements"]
         lines += [f"*ELSET, ELSET=M{k}"] + [str(e + 1) for e in members] + [
             f"*MATERIAL, NAME=M{k}", "*ELASTIC", f"{material['young']}, {material['poisson']}", f"*SOLID SECTION, ELSET=M{k}, MATERIAL=M{k}"]
-    lines += ["*SURFACE INTERACTION, NAME=I", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{100 * stiff / side:.6g}, {1e-8 * stiff:.6g}",
+    lines += ["*SURFACE INTERACTION, NAME=I", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{contact_stiffness * stiff / side:.6g}, {1e-8 * stiff:.6g}",
               f"*CONTACT PAIR, INTERACTION=I, TYPE={KINDS[discretization]}", f"{contact['on'].upper()}, {contact['with'].upper()}",
               "*STEP", "*STATIC", "1., 1.", "*BOUNDARY"]
     # a face is told by its corners; what is held on it are all nodes of its elements there

@@ -1,12 +1,14 @@
 """Two solids that slide over each other by several elements under large deformation: the daemon's elements against a finer
-mesh of its own, and against GetFEM.
+mesh of its own, and against GetFEM and CalculiX.
 usage: large_solids.py BUILD_DIR OUTPUT.json [ONLY=part of a name]
 
 A block is pressed on a longer one and moved along it, by four to five elements; another one is pressed on a dome, a part of
 a ball, and moved along that. Compared are the force between them, and on the dome, where no edge makes it infinite, the
 largest pressure. GetFEM (getfem_solids.py) has bricks of 27 nodes, its contact by integrals over rays (K. Poulios and
-Y. Renard), with multipliers that are linear along sides, and the load in the parts that its Newton's method needs. Ours is
-put on at once."""
+Y. Renard), with multipliers that are linear along sides, and the load in the parts that its Newton's method needs. CalculiX
+has the mesh of the row of hex20, of 20 nodes too, the law neo_hooke_isochoric, which it has as *HYPERELASTIC, NEO HOOKE with
+C10 = mu / 2 and D1 = 2 / K, and a penalty between surfaces, of some stiffnesses in E for the length of a side; it is held against ours of that
+mesh and law. It goes down first, then aside, in increments that it takes by itself. Ours is put on at once."""
 import json
 import math
 import pathlib
@@ -17,10 +19,12 @@ import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.append(str(HERE.parent / "api"))
-import service  # noqa: E402  the path is set above
+import calculix  # noqa: E402  the path is set above
+import service  # noqa: E402
 from two_bodies import body  # noqa: E402
 
 LIMIT, YOUNG, POISSON = 600, 1.0, 0.3
+STIFFNESS = (10, 100, 1000)  # of CalculiX's contact, in E for the length of a side
 ELEMENTS = {"hex8": 0, "hex20": 1, "tet10": 1}  # and how much less fine than the finer mesh
 
 
@@ -40,18 +44,18 @@ SCENES = {"block on a block": ((box((0, 0, 0), (3, 1, 1.4)), box((0.4, 1, 0.2), 
           "block on a dome": ((dome, box((-1.25, 1, -0.7), (2, 0.5, 1.4))), ((4, 2, 4), (4, 1, 3)), 2, (0.5, -0.06, 0.2), True)}
 
 
-def request(name, element, fine):
+def request(name, element, fine, law="neo_hooke"):
     places, cells, _, way, _ = SCENES[name]
     return body((element, element), [[fine * n for n in c] for c in cells], places,
                 {"foot": [(0, "y0")], "top": [(0, "y1")], "under": [(1, "y0")], "held": [(1, "y1")]},
                 model="solid", kinematics="finite",
-                materials=[{"on": "all", "young": YOUNG, "poisson": POISSON, "law": "neo_hooke"}],
+                materials=[{"on": "all", "young": YOUNG, "poisson": POISSON, "law": law}],
                 supports=[{"on": "foot", "ux": 0, "uy": 0, "uz": 0}, {"on": "held", **dict(zip(("ux", "uy", "uz"), way))}],
                 contacts=[{"on": "under", "with": "top"}])
 
 
-def by_daemon(s, name, element, fine):
-    job = s.post({**request(name, element, fine), "solver": {"time_limit_s": LIMIT}}).json
+def by_daemon(s, name, element, fine, law="neo_hooke"):
+    job = s.post({**request(name, element, fine, law), "solver": {"time_limit_s": LIMIT}}).json
     while job["status"] in ("accepted", "running"):  # for longer than a request may wait
         time.sleep(0.2)
         job = s.get(f"/v1/jobs/{job['id']}").json
@@ -87,6 +91,29 @@ def by_getfem(name, fine):
     return json.loads(done.stdout.strip().splitlines()[-1])
 
 
+def steps(name, fine, stiffness):
+    """What calculix.deck makes of the scene, with its law, and the way in two steps."""
+    scene = request(name, "hex20", fine)["problem"]
+    way = SCENES[name][3]
+    down, whole = ([{**one, **dict(zip(("ux", "uy", "uz"), w))} if one["on"] == "held" else one for one in scene["supports"]] for w in ((0, way[1], 0), way))
+    texts = [calculix.deck({**scene, "supports": supports}, "surfaces", stiffness) for supports in (down, whole)]
+    shear, bulk = YOUNG / 2 / (1 + POISSON), YOUNG / 3 / (1 - 2 * POISSON)
+    head = texts[0].split("*STEP", 1)[0].replace(f"*ELASTIC\n{YOUNG}, {POISSON}", f"*HYPERELASTIC, NEO HOOKE\n{shear / 2:.15g}, {2 / bulk:.15g}")
+    held = [text.split("*BOUNDARY\n", 1)[1].split("*NODE PRINT", 1)[0] for text in texts]
+    return head + "".join(f"*STEP, NLGEOM, INC=1000\n*STATIC\n0.1, 1.\n*BOUNDARY\n{each}*NODE PRINT, NSET=ALL, FREQUENCY=100000\nU, RF\n*END STEP\n" for each in held)
+
+
+def by_calculix(s, name, fine):
+    """The force on the upper body by CalculiX, and how far it is off ours of its law, by the stiffness of its contact."""
+    scene, rows = request(name, "hex20", fine)["problem"], []
+    ours = by_daemon(s, name, "hex20", fine, "neo_hooke_isochoric")["force"]
+    for stiffness in STIFFNESS:
+        printed, seconds = calculix.by_calculix(steps(name, fine, stiffness))
+        force = calculix.force_on_slave(scene, printed) if printed else None
+        rows.append({"stiffness": stiffness, "seconds": seconds, "force": force, "off": off(force, ours) if force else None})
+    return {"ours": ours, "rows": rows}
+
+
 def off(value, true):
     return math.dist(value, true) / math.hypot(*true)
 
@@ -94,11 +121,11 @@ def off(value, true):
 def row_of(s, name):
     most, smooth = SCENES[name][2], SCENES[name][4]
     finer = by_daemon(s, name, "hex20", most)
-    row = {"scene": name, "finer": finer, "getfem": by_getfem(name, most - 1), "rows": []}
+    row = {"scene": name, "finer": finer, "getfem": by_getfem(name, most - 1), "calculix": by_calculix(s, name, most - 1), "rows": []}
     true = row["getfem"]["force"] if row["getfem"]["load"] == 1 else None
     finer["getfem_off"] = off(finer["force"], true) if true else None
     text = "".join(f"{x:10.5f}" for x in finer["force"])
-    print(f"{name}, finer: {text}, pressure {finer['pressure']:.5f}; GetFEM {row['getfem']}", flush=True)
+    print(f"{name}, finer: {text}, pressure {finer['pressure']:.5f}; GetFEM {row['getfem']}; CalculiX {row['calculix']}", flush=True)
     for element, less in ELEMENTS.items():
         one = by_daemon(s, name, element, most - less)
         one.update(force_off=off(one["force"], finer["force"]), pressure_off=abs(one["pressure"] / finer["pressure"] - 1) if smooth else None,
