@@ -446,7 +446,7 @@ peers-decks: $(BUILD)/uzawad ## CalculiX's own decks with contact or ties by Cal
 peers-large: bench-deps $(BUILD)/uzawad ## large deformation by CalculiX, GetFEM and the daemon: a table and build/peers-large.json; ONLY=part of a name
 	@/usr/bin/python3 -B tests/peers/large.py $(BUILD) $(BUILD)/peers-large.json $(if $(ONLY),ONLY="$(ONLY)")
 
-peers-large-solids: bench-deps $(BUILD)/uzawad ## two solids that slide under large deformation by GetFEM and the daemon: a table and build/large-solids.json; ONLY=part of a name
+peers-large-solids: bench-deps $(BUILD)/uzawad ## two solids that slide under large deformation by CalculiX, GetFEM and the daemon: a table and build/large-solids.json; ONLY=part of a name
 	@$(call measured,large-solids$(if $(ONLY),-part)) /usr/bin/python3 -B tests/peers/large_solids.py $(BUILD) $(BUILD)/large-solids.json $(if $(ONLY),ONLY="$(ONLY)")
 
 peers-space: bench-deps $(BUILD)/uzawad ## solids in contact by the daemon against the linear solve of the same K by PETSc's GAMG: a table and build/peers-space.json; CELLS=32 along a side
