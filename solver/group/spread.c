@@ -185,6 +185,23 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Of two nodes of one process the later one has the block; neighbours by their numbers from now on. */
+static void keep_half(uz_spread *map)
+{
+    int32_t kept = 0, at = 0;
+    for (int64_t i = 0; i < map->nodes; i++) {
+        const int32_t first = kept;
+        for (; at < map->offset[i + 1]; at++) {
+            const int32_t other = map->neighbour[at];
+            if (map->part[other] != map->part[i] || map->number[other] < map->number[i])
+                map->neighbour[kept++] = map->number[other];
+        }
+        map->offset[i] = first;
+        qsort(map->neighbour + first, (size_t)(kept - first), sizeof *map->neighbour, ascending);
+    }
+    map->offset[map->nodes] = kept;
+}
+
 uz_status uz_spread_number(uz_spread *map, int64_t processes, uz_error *err)
 {
     int64_t *next = uz_alloc_zero(processes + 1, sizeof *next);
@@ -210,12 +227,7 @@ uz_status uz_spread_number(uz_spread *map, int64_t processes, uz_error *err)
         map->place[j] += map->number[map->node[j]] * map->bs;
         map->dof[map->place[j]] = j;
     }
-    for (int64_t i = 0; i < map->nodes; i++) { /* neighbours by their numbers from now on */
-        for (int32_t k = map->offset[i]; k < map->offset[i + 1]; k++)
-            map->neighbour[k] = map->number[map->neighbour[k]];
-        qsort(map->neighbour + map->offset[i], (size_t)(map->offset[i + 1] - map->offset[i]), sizeof *map->neighbour,
-              ascending);
-    }
+    keep_half(map);
     return UZ_OK;
 }
 

@@ -11,7 +11,8 @@ typedef struct {
     int64_t d, nodes, size; /* size = nodes x bs */
     int64_t bs, modes;
     int32_t *node;               /* d: of each dof */
-    int32_t *offset, *neighbour; /* nodes + 1, offset[nodes]: the graph, without loops; sorted by uz_spread_number */
+    int32_t *offset, *neighbour; /* nodes + 1, offset[nodes]: the graph, without loops; by uz_spread_number sorted, and
+                                    of neighbours of the same process those before a node alone */
     int32_t *part;               /* nodes: the process of each, 0 until they are divided */
     int32_t *order, *number;     /* nodes: by process, and of each node its place in that order */
     int64_t *place;              /* d: number of its node x bs + which of its dofs */
@@ -23,15 +24,16 @@ typedef struct {
 uz_status uz_spread_init(uz_spread *map, const uz_csc *K, const uz_modes *modes, uz_error *err);
 /* part, by where nodes are. *divided false, and nothing done: that is not known, or cuts too many couplings. */
 uz_status uz_spread_divide(bool *divided, uz_spread *map, const uz_modes *modes, int64_t processes, uz_error *err);
+/* order, number, place, dof; the graph becomes the blocks of each node's rows, less the one on the diagonal. */
 uz_status uz_spread_number(uz_spread *map, int64_t processes, uz_error *err);
 void uz_spread_clear(uz_spread *map);
-/* Blocks in the rows of a node. */
+/* Blocks in the rows of a node, once they are numbered. */
 static inline int64_t uz_spread_blocks(const uz_spread *map, int64_t node)
 {
     return map->offset[node + 1] - map->offset[node] + 1;
 }
 
-/* The rows of one process, some at a time. */
+/* The rows of one process, some at a time: among its own nodes the lower triangle. */
 typedef struct {
     int64_t process;       /* by the caller */
     int64_t nodes, blocks; /* of the current ones */

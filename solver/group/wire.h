@@ -10,7 +10,8 @@
  *                (int64). No answer
  *     -> ROWS    a: nodes, b: blocks, c: their process; number of blocks of each node (int32), the blocks' columns
  *                (int32), their values (row by row, double), the modes of the nodes' dofs (float). Nodes come by
- *                process, and are numbered so from now on; a message has nodes of one process only
+ *                process, and are numbered so from now on; a message has nodes of one process only, and of the blocks
+ *                among these the lower triangle
  *     <- MADE    after the last of them. a: levels, b: bytes, x: `most`, y: seconds
  *     -> HOLD    a byte for each dof: held or not           <- MADE
  *     -> BEGIN   a: system, b: 1: from 0; else the start (double); right-hand side (double)
@@ -47,7 +48,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 5
+#define UZ_WIRE_VERSION 6
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

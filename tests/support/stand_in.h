@@ -187,8 +187,10 @@ static inline bool stand_in_take_rows(stand_in *s, const uz_wire_head *m)
     for (int64_t i = 0; i < m->a; block += count[i++], s->at++)
         for (int64_t c = 0; c < bs; c++)
             for (int64_t k = 0; k < count[i]; k++)
-                for (int64_t e = 0; e < bs; e++)
-                    s->K[UZ_WIRE_WHOLE][s->at * bs + c][column[block + k] * bs + e] = value[from++];
+                for (int64_t e = 0; e < bs; e++) {
+                    const int64_t row = s->at * bs + c, other = column[block + k] * bs + e;
+                    s->K[UZ_WIRE_WHOLE][row][other] = s->K[UZ_WIRE_WHOLE][other][row] = value[from++];
+                }
     if (s->at == s->nodes)
         stand_in_answer_made(s);
     return true;

@@ -56,9 +56,9 @@ static void find_places(spread_system *s, const spread_rows *rows)
     for (int64_t i = 0; i < here; i++)
         for (int64_t e = rows->ptr[i]; e < rows->ptr[i + 1]; e++) {
             const int64_t j = rows->column[e] - (int64_t)begin;
-            if (j >= 0 && j < i)
-                A->ptr[i + 1]++;
-            else if (j < 0 || j >= here)
+            if (j >= 0 && j < here)
+                A->ptr[i + 1] += j < i;
+            else
                 A->ptr[here + place_of_ghost(near, rows->column[e]) + 1]++;
         }
     for (int64_t i = 0; i < A->nodes; i++)
@@ -85,8 +85,6 @@ static void fill_level(spread_system *s, const spread_rows *rows, const double *
             const int64_t ghost = own ? 0 : place_of_ghost(near, rows->column[e]);
             const double *of_column = own ? s->scale + j * b : scale_of_ghosts + ghost * b;
             double *to = A->diag + i * size;
-            if (own && j > i)
-                continue;
             if (j != i) {
                 const int64_t at = next[own ? i : here + ghost]++;
                 A->idx[at] = (int32_t)(own ? j : i);

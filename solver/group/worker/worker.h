@@ -79,8 +79,8 @@ typedef struct {
     double unit;                   /* of the residual that a solve began with */
 } spread_system;
 
-/* Rows of the own nodes: a node's blocks are those of its neighbours and its own, columns ascending, row by row of the
- * matrix. modes (here x b x k). */
+/* Rows of the own nodes: a node's blocks are those of others' nodes, of own ones before it, and its own, columns
+ * ascending, row by row of the matrix. modes (here x b x k). */
 typedef struct {
     const int32_t *first; /* size + 1 */
     int64_t *ptr;

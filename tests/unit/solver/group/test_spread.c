@@ -59,8 +59,15 @@ static void gather(double *whole, float *modes, const uz_spread *map, const body
                 CHECK(map->part[map->order[node]] == process);
                 for (int64_t c = 0; c < bs; c++)
                     for (int64_t k = 0; k < rows.counts[i]; k++)
-                        for (int64_t e = 0; e < bs; e++)
-                            whole[(node * bs + c) * map->size + rows.columns[block + k] * bs + e] = *value++;
+                        for (int64_t e = 0; e < bs; e++) {
+                            const int64_t row = node * bs + c, other = rows.columns[block + k], column = other * bs + e;
+                            const bool own = map->part[map->order[other]] == process;
+                            CHECK(!own || other <= node);
+                            whole[row * map->size + column] = *value;
+                            if (own)
+                                whole[column * map->size + row] = *value;
+                            value++;
+                        }
                 for (int64_t k = 1; k < rows.counts[i]; k++)
                     CHECK(rows.columns[block + k - 1] < rows.columns[block + k]);
                 memcpy(modes + node * bs * 2, rows.modes + i * bs * 2, (size_t)(bs * 2) * sizeof *modes);
