@@ -443,9 +443,9 @@ static bool put_rows(uz_process_group *group, int64_t id, const uz_spread *map, 
 {
     const size_t squared = (size_t)(map->bs * map->bs);
     const uz_wire_head head = {.kind = UZ_WIRE_ROWS, .id = id, .a = rows->nodes, .b = rows->blocks, .c = rows->process};
-    return ask(group, head) && put(group, rows->counts, (size_t)rows->nodes * sizeof *rows->counts) &&
+    return ask(group, head) && put(group, rows->values, (size_t)rows->blocks * squared * sizeof *rows->values) &&
+           put(group, rows->counts, (size_t)rows->nodes * sizeof *rows->counts) &&
            put(group, rows->columns, (size_t)rows->blocks * sizeof *rows->columns) &&
-           put(group, rows->values, (size_t)rows->blocks * squared * sizeof *rows->values) &&
            put(group, rows->modes, (size_t)(rows->nodes * map->bs * map->modes) * sizeof *rows->modes);
 }
 

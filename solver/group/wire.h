@@ -8,8 +8,8 @@
  *     <- PARTS   a: processes; of each node the process that is to have it (n int32)
  *     -> BODY    a: nodes n, b: dofs of each, c: modes, x: uz_modes.strong; of each process its nodes and its blocks
  *                (int64). No answer
- *     -> ROWS    a: nodes, b: blocks, c: their process; number of blocks of each node (int32), the blocks' columns
- *                (int32), their values (row by row, double), the modes of the nodes' dofs (float). Nodes come by
+ *     -> ROWS    a: nodes, b: blocks, c: their process; the blocks' values (row by row, double), number of blocks of
+ *                each node (int32), the blocks' columns (int32), the modes of the nodes' dofs (float). Nodes come by
  *                process, and are numbered so from now on; a message has nodes of one process only, and of the blocks
  *                among these the lower triangle
  *     <- MADE    after the last of them. a: levels, b: bytes, x: `most`, y: seconds
@@ -48,7 +48,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 6
+#define UZ_WIRE_VERSION 7
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

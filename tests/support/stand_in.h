@@ -178,9 +178,9 @@ static inline bool stand_in_take_rows(stand_in *s, const uz_wire_head *m)
     int32_t count[STAND_IN_MOST], column[STAND_IN_MOST * STAND_IN_MOST];
     double value[STAND_IN_MOST * STAND_IN_MOST];
     float mode[STAND_IN_MOST * 6];
-    if (!stand_in_take(s, count, (size_t)m->a * sizeof *count) ||
+    if (!stand_in_take(s, value, (size_t)(m->b * bs * bs) * sizeof *value) ||
+        !stand_in_take(s, count, (size_t)m->a * sizeof *count) ||
         !stand_in_take(s, column, (size_t)m->b * sizeof *column) ||
-        !stand_in_take(s, value, (size_t)(m->b * bs * bs) * sizeof *value) ||
         !stand_in_take(s, mode, (size_t)(m->a * bs * s->modes) * sizeof *mode))
         return false;
     int64_t block = 0, from = 0;

@@ -33,7 +33,7 @@ typedef struct {
     int stream; /* of the first process */
     PetscMPIInt rank, size;
     body body[UZ_WIRE_BODIES];
-    double *whole; /* the first process: a vector, room of `room` numbers */
+    void *whole; /* what follows a head, or an answer; of other processes rows on their way; room of `room` bytes */
     size_t room;
 } group;
 
@@ -71,6 +71,39 @@ static body *find(group *g, int64_t id)
             return &g->body[k];
     end_group("no such body, or too many");
     return NULL;
+}
+
+static void *need_room(group *g, size_t bytes)
+{
+    if (g->room < bytes) {
+        free(g->whole);
+        g->whole = new_zeros((int64_t)bytes, 1);
+        g->room = bytes;
+    }
+    return g->whole;
+}
+
+static size_t bytes_of_rows(const body *b, const uz_wire_head *m)
+{
+    const size_t nodes = (size_t)m->a, blocks = (size_t)m->b, bs = (size_t)b->bs;
+    if (m->a <= 0 || m->a > b->nodes || m->b < m->a || m->b > INT_MAX / (8 * 6 * 6 * 2))
+        end_group("rows of no size that can be");
+    return blocks * (8 * bs * bs + 4) + nodes * 4 * (1 + bs * (size_t)b->modes);
+}
+
+/* What follows a head the first process has read before the others hear of it: till then they sleep, and leave their
+ * processors to who makes it. */
+static size_t bytes_behind(group *g, const uz_wire_head *m)
+{
+    if (m->version != UZ_WIRE_VERSION)
+        return 0;
+    if (m->kind == UZ_WIRE_ROWS)
+        return bytes_of_rows(find(g, m->id), m);
+    if (m->kind != UZ_WIRE_HOLD && m->kind != UZ_WIRE_BEGIN && m->kind != UZ_WIRE_APPLY)
+        return 0;
+    const body *b = find(g, m->id);
+    const size_t n = (size_t)(b->nodes * b->bs);
+    return m->kind == UZ_WIRE_HOLD ? n : n * sizeof(double) * (m->kind == UZ_WIRE_BEGIN && m->b != 1 ? 2 : 1);
 }
 
 /* ---- a body comes in */
@@ -223,43 +256,26 @@ static PetscErrorCode take_rows(group *g, const uz_wire_head *m)
     body *b = find(g, m->id);
     const PetscInt nodes = (PetscInt)m->a, blocks = (PetscInt)m->b, bs = b->bs, of = nodes * bs * b->modes;
     const PetscMPIInt owner = (PetscMPIInt)m->c;
+    const size_t bytes = bytes_of_rows(b, m);
     PetscFunctionBeginUser;
-    PetscCheck(owner >= 0 && owner < g->size && nodes > 0 && blocks >= nodes, PETSC_COMM_WORLD,
-               PETSC_ERR_ARG_OUTOFRANGE, "rows for process %d", owner);
+    PetscCheck(owner >= 0 && owner < g->size, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "rows for process %d", owner);
     b->arrived += nodes;
-    if (g->rank == owner || IS_FIRST(g)) {
-        int32_t *count, *column;
-        double *value;
-        float *mode;
-        PetscCall(PetscMalloc4(nodes, &count, blocks, &column, blocks * bs * bs, &value, of, &mode));
-        if (IS_FIRST(g)) {
-            take(g, count, (size_t)nodes * sizeof *count);
-            take(g, column, (size_t)blocks * sizeof *column);
-            take(g, value, (size_t)(blocks * bs * bs) * sizeof *value);
-            take(g, mode, (size_t)of * sizeof *mode);
-        }
-        if (owner != 0 && IS_FIRST(g)) {
-            PetscCallMPI(MPI_Send(count, nodes, MPI_INT32_T, owner, 3, PETSC_COMM_WORLD));
-            PetscCallMPI(MPI_Send(column, blocks, MPI_INT32_T, owner, 4, PETSC_COMM_WORLD));
-            PetscCallMPI(MPI_Send(value, blocks * bs * bs, MPI_DOUBLE, owner, 5, PETSC_COMM_WORLD));
-            PetscCallMPI(MPI_Send(mode, of, MPI_FLOAT, owner, 6, PETSC_COMM_WORLD));
-        } else if (owner != 0) {
-            PetscCallMPI(MPI_Recv(count, nodes, MPI_INT32_T, 0, 3, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
-            PetscCallMPI(MPI_Recv(column, blocks, MPI_INT32_T, 0, 4, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
-            PetscCallMPI(MPI_Recv(value, blocks * bs * bs, MPI_DOUBLE, 0, 5, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
-            PetscCallMPI(MPI_Recv(mode, of, MPI_FLOAT, 0, 6, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
-        }
-        if (g->rank == owner) {
-            const int64_t at = b->rows.ptr[b->filled], size = (int64_t)bs * bs;
-            PetscCheck(b->filled + nodes <= b->here && at + blocks <= b->blocks, PETSC_COMM_SELF,
-                       PETSC_ERR_ARG_OUTOFRANGE, "more rows than were told of");
-            memcpy(b->rows.column + at, column, (size_t)blocks * sizeof *column);
-            memcpy(b->rows.value + at * size, value, (size_t)(blocks * size) * sizeof *value);
-            memcpy(b->rows.mode + b->filled * bs * b->modes, mode, (size_t)of * sizeof *mode);
-            for (PetscInt i = 0; i < nodes; i++, b->filled++)
-                b->rows.ptr[b->filled + 1] = b->rows.ptr[b->filled] + count[i];
-        }
-        PetscCall(PetscFree4(count, column, value, mode));
+    if (owner != 0 && IS_FIRST(g))
+        PetscCallMPI(MPI_Send(g->whole, (int)bytes, MPI_BYTE, owner, 3, PETSC_COMM_WORLD));
+    else if (owner != 0 && g->rank == owner)
+        PetscCallMPI(MPI_Recv(need_room(g, bytes), (int)bytes, MPI_BYTE, 0, 3, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+    if (g->rank == owner) {
+        const int64_t at = b->rows.ptr[b->filled], size = (int64_t)bs * bs;
+        const double *value = g->whole;
+        const int32_t *count = (const int32_t *)(value + blocks * size), *column = count + nodes;
+        const float *mode = (const float *)(column + blocks);
+        PetscCheck(b->filled + nodes <= b->here && at + blocks <= b->blocks, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+                   "more rows than were told of");
+        memcpy(b->rows.column + at, column, (size_t)blocks * sizeof *column);
+        memcpy(b->rows.value + at * size, value, (size_t)(blocks * size) * sizeof *value);
+        memcpy(b->rows.mode + b->filled * bs * b->modes, mode, (size_t)of * sizeof *mode);
+        for (PetscInt i = 0; i < nodes; i++, b->filled++)
+            b->rows.ptr[b->filled + 1] = b->rows.ptr[b->filled] + count[i];
     }
     if (b->arrived == b->nodes)
         make_system(g, b);
@@ -281,13 +297,8 @@ static void hold(group *g, body *b)
 {
     const double start = MPI_Wtime();
     const int n = b->here * b->bs;
-    char *whole = NULL, *held = new_zeros(n, 1);
-    if (IS_FIRST(g)) {
-        whole = new_zeros((int64_t)b->nodes * b->bs, 1);
-        take(g, whole, (size_t)(b->nodes * b->bs));
-    }
-    MPI_Scatterv(whole, b->count, b->first, MPI_CHAR, held, n, MPI_CHAR, 0, PETSC_COMM_WORLD);
-    free(whole);
+    char *held = new_zeros(n, 1);
+    MPI_Scatterv(g->whole, b->count, b->first, MPI_CHAR, held, n, MPI_CHAR, 0, PETSC_COMM_WORLD);
     system_hold(&b->system, held);
     b->made[VARIANT_HELD] = true;
     free(held);
@@ -296,20 +307,14 @@ static void hold(group *g, body *b)
 
 /* ---- vectors and steps */
 
-/* In the solver's order a node has bs numbers, in ours four; ours are of S^-1 u and S f. */
-static void take_vector(group *g, const body *b, double *v, bool displacement)
+/* The vector with this number of those that came. In the solver's order a node has bs numbers, in ours four; ours are
+ * of S^-1 u and S f. */
+static void take_vector(group *g, const body *b, double *v, int which, bool displacement)
 {
-    const size_t n = (size_t)(b->nodes * b->bs);
     const int mine = b->count[g->rank];
+    const double *all = IS_FIRST(g) ? (const double *)g->whole + (int64_t)which * b->nodes * b->bs : NULL;
     double *own = b->system.q;
-    if (IS_FIRST(g) && g->room < n) {
-        free(g->whole);
-        g->whole = new_zeros((int64_t)n, sizeof *g->whole);
-        g->room = n;
-    }
-    if (IS_FIRST(g))
-        take(g, g->whole, n * sizeof *g->whole);
-    MPI_Scatterv(g->whole, b->count, b->first, MPI_DOUBLE, own, mine, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
+    MPI_Scatterv(all, b->count, b->first, MPI_DOUBLE, own, mine, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
     for (int64_t i = 0; i < mine; i++) {
         const double scale = b->system.scale[i];
         v[i / b->bs * 4 + i % b->bs] = displacement ? own[i] / scale : own[i] * scale;
@@ -319,13 +324,14 @@ static void take_vector(group *g, const body *b, double *v, bool displacement)
 static void put_displacement(group *g, const body *b, const double *v)
 {
     const int mine = b->count[g->rank];
-    double *own = b->system.q;
+    const size_t bytes = (size_t)(b->nodes * b->bs) * sizeof(double);
+    double *own = b->system.q, *all = IS_FIRST(g) ? need_room(g, bytes) : NULL;
     for (int64_t i = 0; i < mine; i++)
         own[i] = v[i / b->bs * 4 + i % b->bs] * b->system.scale[i];
-    MPI_Gatherv(own, mine, MPI_DOUBLE, g->whole, b->count, b->first, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
+    MPI_Gatherv(own, mine, MPI_DOUBLE, all, b->count, b->first, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
     answer(g, (uz_wire_head){.kind = UZ_WIRE_VECTOR, .id = b->id});
     if (IS_FIRST(g))
-        put(g, g->whole, (size_t)(b->nodes * b->bs) * sizeof *g->whole);
+        put(g, all, bytes);
 }
 
 static PetscErrorCode make_steps(group *g, spread_system *s, const uz_wire_head *m)
@@ -372,8 +378,8 @@ static PetscErrorCode obey(group *g, const uz_wire_head *m)
         if (from_zero)
             memset(s->u, 0, 4 * (size_t)s->near.here * sizeof *s->u);
         else
-            take_vector(g, b, s->u, true);
-        take_vector(g, b, s->f, false);
+            take_vector(g, b, s->u, 0, true);
+        take_vector(g, b, s->f, from_zero ? 0 : 1, false);
     }
     if (m->kind == UZ_WIRE_BEGIN || m->kind == UZ_WIRE_AGAIN) {
         const double square = system_begin(s, which, from_zero);
@@ -383,7 +389,7 @@ static PetscErrorCode obey(group *g, const uz_wire_head *m)
     } else if (m->kind == UZ_WIRE_FETCH) {
         put_displacement(g, b, s->u);
     } else if (m->kind == UZ_WIRE_APPLY) {
-        take_vector(g, b, s->r, false);
+        take_vector(g, b, s->r, 0, false);
         system_precondition(s, which, s->z, s->r);
         put_displacement(g, b, s->z);
     } else {
@@ -407,6 +413,9 @@ static PetscErrorCode hear(group *g, uz_wire_head *m)
     PetscFunctionBeginUser;
     if (IS_FIRST(g) && !stream_read(g->stream, m, sizeof *m))
         m->kind = 0;
+    const size_t behind = IS_FIRST(g) && m->kind != 0 ? bytes_behind(g, m) : 0;
+    if (behind > 0)
+        take(g, need_room(g, behind), behind);
     PetscCallMPI(MPI_Ibcast(m, (int)sizeof *m, MPI_BYTE, 0, PETSC_COMM_WORLD, &request));
     since = MPI_Wtime();
     for (;;) {
