@@ -83,9 +83,10 @@ typedef struct {
                        const double *p, const uz_limits *limits, const uz_stop *stop, uz_error *err);
     void (*free)(uz_multigrid *mg);
     /* Whole solves, where they are elsewhere; NULL: by conjugate gradients here. As uz_cg_solve, which leaves info at
-     * 0, but that x at held dofs counts as 0; r: cg->r, of K as it is here. */
+     * 0, but that x at held dofs counts as 0; r: cg->r, of K as it is here. count: of systems that are solved at once,
+     * 1 or 2, x, r and b being n for each; info: of the worse one. */
     uz_status (*solve)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, struct uz_cg_info *info,
-                       double *x, double *r, const double *b, const struct uz_cg_stop *stop, uz_error *err);
+                       double *x, double *r, const double *b, int count, const struct uz_cg_stop *stop, uz_error *err);
 } uz_multigrid_kind;
 
 /* What every kind begins with. */
@@ -187,8 +188,8 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patienc
  * finds then. */
 uz_status uz_amg_of_definite(uz_amg **out, uz_multigrid *mg, uz_error *err);
 /* Finds info.least by solves with K that are checked here, so that what is certified by it needs no word of the program
- * that holds M; and a guess at info.lambda, where there is none yet. UNSUPPORTED: the solves are not those of K, or too
- * rough. NOT_SPD: they show that K is not definite. */
+ * that holds M, whose kind has `solve`; and a guess at info.lambda, where there is none yet. UNSUPPORTED: the solves
+ * are not those of K, or too rough. NOT_SPD: they show that K is not definite. */
 uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
 /* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD and
  * LIMIT as uz_amg_of. Aggregates of another kind are tried where the usual ones do badly: with patience where they

@@ -318,75 +318,88 @@ uz_status uz_blocks_to_columns(uz_csc *out, const uz_blocks *A, const float *inv
 
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
-/* Each block is read once, for both triangles. Rows of a block are read as four numbers: what follows them counts for
- * nothing, as the fourth number of a node is 0. */
+/* Each block is read once, for both triangles and all lanes. Rows of a block are read as four numbers: what follows
+ * them counts for nothing, as the fourth number of a node is 0. */
 static inline __attribute__((always_inline)) void multiply(double *y, const uz_blocks *A, const double *x,
-                                                           int64_t first, int64_t end, int b)
+                                                           int64_t first, int64_t end, int b, int lanes)
 {
     for (int64_t i = first; i < end; i++) {
         const double *own = A->diag + i * b * b;
-        const four xi = *(const four *)(x + 4 * i);
-        four sum[3], back = {0};
-        for (int r = 0; r < b; r++)
-            sum[r] = *(const four *)(own + r * b) * xi;
-        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
-            const double *block = A->off + e * b * b;
-            const four xj = *(const four *)(x + 4 * (int64_t)A->idx[e]);
-            four *to = (four *)(y + 4 * (int64_t)A->idx[e]), value = *to;
-            for (int r = 0; r < b; r++) {
-                const four row = *(const four *)(block + r * b);
-                sum[r] += row * xj;
-                value += row * xi[r];
-            }
-            *to = value;
+        four mine[UZ_LANES_MOST], sum[UZ_LANES_MOST][3];
+        for (int l = 0; l < lanes; l++) {
+            mine[l] = *(const four *)(x + 4 * (i * lanes + l));
+            for (int r = 0; r < b; r++)
+                sum[l][r] = *(const four *)(own + r * b) * mine[l];
         }
-        for (int r = 0; r < b; r++)
-            back[r] = (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
-        *(four *)(y + 4 * i) = back;
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+            const double *block = A->off + e * b * b, *from = x + 4 * lanes * (int64_t)A->idx[e];
+            double *to = y + 4 * lanes * (int64_t)A->idx[e];
+            for (int l = 0; l < lanes; l++) {
+                const four other = *(const four *)(from + 4 * l);
+                four value = *(const four *)(to + 4 * l);
+                for (int r = 0; r < b; r++) {
+                    const four row = *(const four *)(block + r * b);
+                    sum[l][r] += row * other;
+                    value += row * mine[l][r];
+                }
+                *(four *)(to + 4 * l) = value;
+            }
+        }
+        for (int l = 0; l < lanes; l++) {
+            four back = {0};
+            for (int r = 0; r < b; r++)
+                back[r] = (sum[l][r][0] + sum[l][r][1]) + (sum[l][r][2] + sum[l][r][3]);
+            *(four *)(y + 4 * (i * lanes + l)) = back;
+        }
     }
 }
 
 /* What the nodes from `first` to `end` know of A x, after those that they have blocks with. */
 static inline __attribute__((always_inline)) void multiply_any(double *y, const uz_blocks *A, const double *x,
-                                                               int64_t first, int64_t end)
+                                                               int64_t first, int64_t end, int lanes)
 {
     if (A->b == 3)
-        multiply(y, A, x, first, end, 3);
+        multiply(y, A, x, first, end, 3, lanes);
     else if (A->b == 2)
-        multiply(y, A, x, first, end, 2);
+        multiply(y, A, x, first, end, 2, lanes);
     else
-        multiply(y, A, x, first, end, 1);
-}
-
-UZ_AVX2_FMA static void multiply_fused(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end)
-{
-    multiply_any(y, A, x, first, end);
-}
-
-static void multiply_plain(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end)
-{
-    multiply_any(y, A, x, first, end);
+        multiply(y, A, x, first, end, 1, lanes);
 }
 
 typedef struct {
     double *y;
     const uz_blocks *A;
     const double *x;
-    void (*multiply)(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end);
+    int lanes;
+    void (*multiply)(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end, int lanes);
 } product;
+
+UZ_AVX2_FMA static void multiply_fused(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end,
+                                       int lanes)
+{
+    if (lanes == 1)
+        multiply_any(y, A, x, first, end, 1);
+    else
+        multiply_any(y, A, x, first, end, UZ_LANES_MOST);
+}
+
+static void multiply_plain(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end, int lanes)
+{
+    multiply_any(y, A, x, first, end, lanes);
+}
 
 static void multiply_part(void *ctx, int part)
 {
     const product *p = ctx;
-    p->multiply(p->y, p->A, p->x, p->A->part[part], p->A->part[part + 1]);
+    p->multiply(p->y, p->A, p->x, p->A->part[part], p->A->part[part + 1], p->lanes);
 }
 
-void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x)
+void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x, int lanes)
 {
-    product p = {y, A, x, uz_cpu_has_avx2_fma() ? multiply_fused : multiply_plain};
+    product p = {y, A, x, lanes, uz_cpu_has_avx2_fma() ? multiply_fused : multiply_plain};
     if (A->parts > 0)
         uz_aside_share(multiply_part, &p, A->parts);
-    p.multiply(y, A, x, A->parts > 0 ? A->part[A->parts] : 0, A->nodes);
+    p.multiply(y, A, x, A->parts > 0 ? A->part[A->parts] : 0, A->nodes, lanes);
 }
 
 /* ------------------------------------------------- the same in single precision */

@@ -100,7 +100,7 @@ static uz_status solve_elsewhere(uz_cg_info *info, double *x, uz_cg *cg, const u
         kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
     for (int64_t j = 0; moved && j < cg->n; j++)
         cg->p[j] = b[j] - cg->z[j];
-    return kind->solve(cg->mg, K, cg->room, info, x, cg->r, moved ? cg->p : b, stop, err);
+    return kind->solve(cg->mg, K, cg->room, info, x, cg->r, moved ? cg->p : b, 1, stop, err);
 }
 
 bool uz_cg_should_stop(const uz_cg_info *info, const uz_cg_stop *stop)

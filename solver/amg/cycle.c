@@ -25,38 +25,46 @@ typedef float four __attribute__((vector_size(16), aligned(4), may_alias));
 enum { ROWS_MOST = 6, PARTS_MOST = 2 };
 
 /* s = b - t - (blocks left of the diagonal) x. */
-static inline __attribute__((always_inline)) void gather(float *s, const uz_level *level, const float *x, int64_t i,
-                                                         int b)
+static inline __attribute__((always_inline)) void gather(float s[UZ_LANES_MOST][ROWS_MOST], const uz_level *level,
+                                                         const float *x, int64_t i, int b, int lanes)
 {
     const int parts = b > 4 ? 2 : 1;
     const uz_blocks *A = &level->A;
-    four sum[ROWS_MOST] = {{0}};
+    four sum[UZ_LANES_MOST][ROWS_MOST] = {{{0}}};
     for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
-        const float *block = level->off + e * b * b, *of = x + (int64_t)A->idx[e] * 4 * parts;
-        for (int q = 0; q < parts; q++) {
-            const four value = *(const four *)(of + 4 * q);
-            for (int r = 0; r < b; r++)
-                sum[r] += *(const four *)(block + r * b + 4 * q) * value;
-        }
+        const float *block = level->off + e * b * b, *of = x + (int64_t)A->idx[e] * 4 * parts * lanes;
+        for (int q = 0; q < parts; q++)
+            for (int l = 0; l < lanes; l++) {
+                const four value = *(const four *)(of + 4 * (l * parts + q));
+                for (int r = 0; r < b; r++)
+                    sum[l][r] += *(const four *)(block + r * b + 4 * q) * value;
+            }
     }
-    for (int r = 0; r < b; r++)
-        s[r] -= (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
+    for (int l = 0; l < lanes; l++)
+        for (int r = 0; r < b; r++)
+            s[l][r] -= (sum[l][r][0] + sum[l][r][1]) + (sum[l][r][2] + sum[l][r][3]);
 }
 
 /* t += (the same blocks)' value. */
-static inline __attribute__((always_inline)) void scatter(float *t, const uz_level *level, const float *value,
-                                                          int64_t i, int b)
+static inline __attribute__((always_inline)) void
+scatter(float *t, const uz_level *level, float value[UZ_LANES_MOST][ROWS_MOST], int64_t i, int b, int lanes)
 {
     const int parts = b > 4 ? 2 : 1;
     const uz_blocks *A = &level->A;
     for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
         const float *block = level->off + e * b * b;
-        float *to = t + (int64_t)A->idx[e] * 4 * parts;
+        float *to = t + (int64_t)A->idx[e] * 4 * parts * lanes;
         for (int q = 0; q < parts; q++) {
-            four sum = *(four *)(to + 4 * q);
-            for (int r = 0; r < b; r++)
-                sum += *(const four *)(block + r * b + 4 * q) * value[r];
-            *(four *)(to + 4 * q) = sum;
+            four sum[UZ_LANES_MOST];
+            for (int l = 0; l < lanes; l++)
+                sum[l] = *(four *)(to + 4 * (l * parts + q));
+            for (int r = 0; r < b; r++) {
+                const four row = *(const four *)(block + r * b + 4 * q);
+                for (int l = 0; l < lanes; l++)
+                    sum[l] += row * value[l][r];
+            }
+            for (int l = 0; l < lanes; l++)
+                *(four *)(to + 4 * (l * parts + q)) = sum[l];
         }
     }
 }
@@ -68,140 +76,166 @@ typedef struct {
 
 /* x = (D + L)^-1 b, t = b - A x, of which L'x alone is not 0; of nodes whose blocks are among themselves, or with those
  * that are done. */
-static inline __attribute__((always_inline)) void sweep_down(float *x, float *t, const uz_level *level,
-                                                             const float *inverse, const float *rhs, range of, int b)
+static inline __attribute__((always_inline)) void sweep_down(const uz_level_step *step, range of, int b, int lanes)
 {
+    const uz_level *level = step->level;
     const int width = uz_width(b);
     for (int64_t i = of.first; i < of.end; i++) {
-        const float *own = level->diag + i * b * b;
-        float s[ROWS_MOST] = {0}, value[ROWS_MOST] = {0}, left[ROWS_MOST] = {0};
-        for (int r = 0; r < b; r++)
-            s[r] = rhs[i * width + r];
-        gather(s, level, x, i, b);
-        for (int r = 0; r < b; r++) {
-            for (int c = 0; c < r; c++)
-                s[r] -= own[r * b + c] * value[c];
-            value[r] = inverse[i * b + r] * s[r];
+        const float *own = level->diag + i * b * b, *inverse = step->inverse + i * b;
+        float s[UZ_LANES_MOST][ROWS_MOST] = {{0}}, value[UZ_LANES_MOST][ROWS_MOST] = {{0}};
+        for (int l = 0; l < lanes; l++)
+            for (int r = 0; r < b; r++)
+                s[l][r] = step->b[(i * lanes + l) * width + r];
+        gather(s, level, step->x, i, b, lanes);
+        for (int l = 0; l < lanes; l++) {
+            float *x = step->x + (i * lanes + l) * width, *t = step->t + (i * lanes + l) * width;
+            float left[ROWS_MOST] = {0};
+            for (int r = 0; r < b; r++) {
+                for (int c = 0; c < r; c++)
+                    s[l][r] -= own[r * b + c] * value[l][c];
+                value[l][r] = inverse[r] * s[l][r];
+            }
+            for (int r = 0; r < b; r++) {
+                left[r] = 0.0F;
+                for (int c = r + 1; c < b; c++)
+                    left[r] -= own[r * b + c] * value[l][c];
+            }
+            for (int r = 0; r < width; r++) {
+                x[r] = r < b ? value[l][r] : 0.0F;
+                t[r] = r < b ? left[r] : 0.0F;
+            }
+            for (int r = 0; r < b; r++)
+                value[l][r] = -value[l][r];
         }
-        for (int r = 0; r < b; r++) {
-            left[r] = 0.0F;
-            for (int c = r + 1; c < b; c++)
-                left[r] -= own[r * b + c] * value[c];
-        }
-        for (int r = 0; r < width; r++) {
-            x[i * width + r] = r < b ? value[r] : 0.0F;
-            t[i * width + r] = r < b ? left[r] : 0.0F;
-        }
-        for (int r = 0; r < b; r++)
-            value[r] = -value[r];
-        scatter(t, level, value, i, b);
+        scatter(step->t, level, value, i, b, lanes);
     }
 }
 
 /* x = (D + L')^-1 (b - L x), likewise, those after them being done. t: zeros before the first of all. */
-static inline __attribute__((always_inline)) void sweep_up(float *x, float *t, const uz_level *level,
-                                                           const float *inverse, const float *rhs, range of, int b)
+static inline __attribute__((always_inline)) void sweep_up(const uz_level_step *step, range of, int b, int lanes)
 {
+    const uz_level *level = step->level;
     const int width = uz_width(b);
     for (int64_t i = of.end - 1; i >= of.first; i--) {
-        const float *own = level->diag + i * b * b;
-        float s[ROWS_MOST] = {0}, value[ROWS_MOST] = {0};
-        for (int r = 0; r < b; r++) {
-            s[r] = rhs[i * width + r] - t[i * width + r];
-            value[r] = x[i * width + r];
+        const float *own = level->diag + i * b * b, *inverse = step->inverse + i * b;
+        float s[UZ_LANES_MOST][ROWS_MOST] = {{0}}, value[UZ_LANES_MOST][ROWS_MOST] = {{0}};
+        for (int l = 0; l < lanes; l++)
+            for (int r = 0; r < b; r++) {
+                const int64_t at = (i * lanes + l) * width + r;
+                s[l][r] = step->b[at] - step->t[at];
+                value[l][r] = step->x[at];
+            }
+        gather(s, level, step->x, i, b, lanes);
+        for (int l = 0; l < lanes; l++) {
+            float *x = step->x + (i * lanes + l) * width;
+            for (int r = b - 1; r >= 0; r--) {
+                for (int c = 0; c < b; c++)
+                    s[l][r] -= c == r ? 0.0F : own[r * b + c] * value[l][c];
+                value[l][r] = inverse[r] * s[l][r];
+            }
+            for (int r = 0; r < b; r++)
+                x[r] = value[l][r];
         }
-        gather(s, level, x, i, b);
-        for (int r = b - 1; r >= 0; r--) {
-            for (int c = 0; c < b; c++)
-                s[r] -= c == r ? 0.0F : own[r * b + c] * value[c];
-            value[r] = inverse[i * b + r] * s[r];
-        }
-        for (int r = 0; r < b; r++)
-            x[i * width + r] = value[r];
-        scatter(t, level, value, i, b);
+        scatter(step->t, level, value, i, b, lanes);
     }
 }
 
 /* coarse = P't, but for rows of held dofs; of these aggregates, whose nodes are looked for among all. */
-static inline __attribute__((always_inline)) void
-restrict_to(float *coarse, const uz_level *level, const float *inverse, const float *t, range of, int b, int k)
+static inline __attribute__((always_inline)) void restrict_to(const uz_level_step *step, range of, int b, int k,
+                                                              int lanes)
 {
-    const int width = uz_width(b), parts = k > 4 ? 2 : 1;
-    memset(coarse + of.first * uz_width(k), 0, (size_t)((of.end - of.first) * uz_width(k)) * sizeof *coarse);
+    const uz_level *level = step->level;
+    const int width = uz_width(b), parts = k > 4 ? 2 : 1, wide = 4 * parts * lanes;
+    memset(step->coarse + of.first * wide, 0, (size_t)((of.end - of.first) * wide) * sizeof *step->coarse);
     for (int64_t i = 0; i < level->A.nodes; i++)
         for (int64_t e = level->ptr[i]; e < level->ptr[i + 1] && level->block[e] < of.end; e++) {
             if (level->block[e] < of.first)
                 continue;
             const float *P = level->value + e * b * k;
-            float *to = coarse + (int64_t)level->block[e] * 4 * parts;
-            for (int q = 0; q < parts; q++) {
-                four sum = *(four *)(to + 4 * q);
-                for (int r = 0; r < b; r++)
-                    sum += *(const four *)(P + r * k + 4 * q) * (inverse[i * b + r] > 0.0F ? t[i * width + r] : 0.0F);
-                *(four *)(to + 4 * q) = sum;
+            for (int l = 0; l < lanes; l++) {
+                const float *t = step->t + (i * lanes + l) * width;
+                float *to = step->coarse + ((int64_t)level->block[e] * lanes + l) * 4 * parts;
+                for (int q = 0; q < parts; q++) {
+                    four sum = *(four *)(to + 4 * q);
+                    for (int r = 0; r < b; r++)
+                        sum += *(const four *)(P + r * k + 4 * q) * (step->inverse[i * b + r] > 0.0F ? t[r] : 0.0F);
+                    *(four *)(to + 4 * q) = sum;
+                }
             }
         }
 }
 
 /* x += P coarse, but at held dofs. */
-static inline __attribute__((always_inline)) void prolong_from(float *x, const uz_level *level, const float *inverse,
-                                                               const float *coarse, range of, int b, int k)
+static inline __attribute__((always_inline)) void prolong_from(const uz_level_step *step, range of, int b, int k,
+                                                               int lanes)
 {
+    const uz_level *level = step->level;
     const int width = uz_width(b), parts = k > 4 ? 2 : 1;
     for (int64_t i = of.first; i < of.end; i++) {
-        four sum[ROWS_MOST] = {{0}};
+        four sum[UZ_LANES_MOST][ROWS_MOST] = {{{0}}};
         for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
-            const float *P = level->value + e * b * k, *from = coarse + (int64_t)level->block[e] * 4 * parts;
-            for (int q = 0; q < parts; q++) {
-                const four value = *(const four *)(from + 4 * q);
-                for (int r = 0; r < b; r++)
-                    sum[r] += *(const four *)(P + r * k + 4 * q) * value;
+            const float *P = level->value + e * b * k;
+            for (int l = 0; l < lanes; l++) {
+                const float *from = step->coarse + ((int64_t)level->block[e] * lanes + l) * 4 * parts;
+                for (int q = 0; q < parts; q++) {
+                    const four value = *(const four *)(from + 4 * q);
+                    for (int r = 0; r < b; r++)
+                        sum[l][r] += *(const four *)(P + r * k + 4 * q) * value;
+                }
             }
         }
-        for (int r = 0; r < b; r++)
-            if (inverse[i * b + r] > 0.0F)
-                x[i * width + r] += (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
+        for (int l = 0; l < lanes; l++)
+            for (int r = 0; r < b; r++)
+                if (step->inverse[i * b + r] > 0.0F)
+                    step->x[(i * lanes + l) * width + r] +=
+                        (sum[l][r][0] + sum[l][r][1]) + (sum[l][r][2] + sum[l][r][3]);
     }
 }
 
-static inline __attribute__((always_inline)) void take_part(const uz_level_step *s, int what, range of, int b, int k)
+static inline __attribute__((always_inline)) void take_part(const uz_level_step *s, int what, range of, int b, int k,
+                                                            int lanes)
 {
     if (what == UZ_STEP_SWEEP_DOWN)
-        sweep_down(s->x, s->t, s->level, s->inverse, s->b, of, b);
+        sweep_down(s, of, b, lanes);
     if (what == UZ_STEP_RESTRICT)
-        restrict_to(s->coarse, s->level, s->inverse, s->t, of, b, k);
+        restrict_to(s, of, b, k, lanes);
     if (what == UZ_STEP_PROLONG)
-        prolong_from(s->x, s->level, s->inverse, s->coarse, of, b, k);
+        prolong_from(s, of, b, k, lanes);
     if (what == UZ_STEP_SWEEP_UP)
-        sweep_up(s->x, s->t, s->level, s->inverse, s->b, of, b);
+        sweep_up(s, of, b, lanes);
 }
 
 /* For each size of blocks its own loops. */
-static inline __attribute__((always_inline)) void take_any(const uz_level_step *s, int what, range of)
+static inline __attribute__((always_inline)) void take_any(const uz_level_step *s, int what, range of, int lanes)
 {
     const int b = s->level->A.b, k = s->k;
     if (b == 3 && k == 6)
-        take_part(s, what, of, 3, 6);
+        take_part(s, what, of, 3, 6, lanes);
     else if (b == 6)
-        take_part(s, what, of, 6, 6);
+        take_part(s, what, of, 6, 6, lanes);
     else if (b == 2 && k == 3)
-        take_part(s, what, of, 2, 3);
+        take_part(s, what, of, 2, 3, lanes);
     else if (b == 3 && k == 3)
-        take_part(s, what, of, 3, 3);
+        take_part(s, what, of, 3, 3, lanes);
     else if (b == 2)
-        take_part(s, what, of, 2, 2);
+        take_part(s, what, of, 2, 2, lanes);
     else
-        take_part(s, what, of, b, k);
+        take_part(s, what, of, b, k, lanes);
 }
 
 UZ_AVX2_FMA static void take_fused(const uz_level_step *s, int what, range of)
 {
-    take_any(s, what, of);
+    take_any(s, what, of, 1);
+}
+
+UZ_AVX2_FMA static void take_both_fused(const uz_level_step *s, int what, range of)
+{
+    take_any(s, what, of, UZ_LANES_MOST);
 }
 
 static void take_plain(const uz_level_step *s, int what, range of)
 {
-    take_any(s, what, of);
+    take_any(s, what, of, s->lanes);
 }
 
 /* A step as the threads that share it see it: parts of the matrix, or as many ranges. */
@@ -244,7 +278,7 @@ static void take_step(sharing *x, int what)
 
 void uz_level_take_step(const uz_level_step *s, int parts)
 {
-    sharing x = {.step = s, .take = uz_cpu_has_avx2_fma() ? take_fused : take_plain};
+    sharing x = {.step = s, .take = !uz_cpu_has_avx2_fma() ? take_plain : s->lanes == 1 ? take_fused : take_both_fused};
     if (parts & UZ_STEP_SWEEP_DOWN)
         take_step(&x, UZ_STEP_SWEEP_DOWN);
     if (parts & UZ_STEP_RESTRICT)
@@ -252,22 +286,23 @@ void uz_level_take_step(const uz_level_step *s, int parts)
     if (parts & UZ_STEP_PROLONG)
         take_step(&x, UZ_STEP_PROLONG);
     if (parts & UZ_STEP_SWEEP_UP) {
-        memset(s->t, 0, (size_t)(s->level->A.nodes * uz_width(s->level->A.b)) * sizeof *s->t);
+        memset(s->t, 0, (size_t)(s->level->A.nodes * s->lanes * uz_width(s->level->A.b)) * sizeof *s->t);
         take_step(&x, UZ_STEP_SWEEP_UP);
     }
 }
 
-static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room, float *x, const float *b,
+/* x, b: of one lane of so many. */
+static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room, float *x, const float *b, int lanes,
                                 uz_error *err)
 {
     const int last = mg->base.levels - 1;
     const uz_level *level = &mg->level[last];
     const uz_factor *factor = room->coarsest ? room->coarsest : mg->coarsest;
     const float *inverse = room->coarsest ? room->own[last].inverse : level->inverse;
-    const int of_node = level->A.b, width = uz_width(of_node);
+    const int of_node = level->A.b, width = uz_width(of_node), apart = width * lanes;
     for (int64_t i = 0; i < level->A.nodes; i++)
         for (int r = 0; r < of_node; r++)
-            room->coarse[i * of_node + r] = inverse[i * of_node + r] > 0.0F ? (double)b[i * width + r] : 0.0;
+            room->coarse[i * of_node + r] = inverse[i * of_node + r] > 0.0F ? (double)b[i * apart + r] : 0.0;
     uz_factor_permute(factor, room->permuted, room->coarse);
     uz_status status = uz_factor_solve_one(factor, room->ws, room->permuted, true, err);
     if (status == UZ_OK)
@@ -275,15 +310,16 @@ static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room
     uz_factor_unpermute(factor, room->coarse, room->permuted);
     for (int64_t i = 0; i < level->A.nodes; i++)
         for (int r = 0; r < width; r++)
-            x[i * width + r] = r < of_node ? (float)room->coarse[i * of_node + r] : 0.0F;
+            x[i * apart + r] = r < of_node ? (float)room->coarse[i * of_node + r] : 0.0F;
     return status;
 }
 
-uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, uz_error *err)
+uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, int lanes, uz_error *err)
 {
-    const int last = mg->base.levels - 1;
+    const int last = mg->base.levels - 1, apart = uz_width(mg->level[last].A.b);
     uz_level_step at[UZ_LEVELS_MOST];
     uz_level now[UZ_LEVELS_MOST];
+    uz_status status = UZ_OK;
     for (int l = from; l < last; l++) {
         uz_level *level = &now[l];
         *level = mg->level[l];
@@ -293,10 +329,12 @@ uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int f
             level->off = room->own[l].off;
             level->diag = room->own[l].diag;
         }
-        at[l] = (uz_level_step){level, level->inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k};
+        at[l] =
+            (uz_level_step){level, level->inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k, lanes};
         uz_level_take_step(&at[l], UZ_STEP_SWEEP_DOWN | UZ_STEP_RESTRICT);
     }
-    const uz_status status = solve_coarsest(mg, room, room->x[last], room->b[last], err);
+    for (int lane = 0; status == UZ_OK && lane < lanes; lane++)
+        status = solve_coarsest(mg, room, room->x[last] + lane * apart, room->b[last] + lane * apart, lanes, err);
     for (int l = last - 1; l >= from; l--) {
         at[l].coarse = room->x[l + 1];
         uz_level_take_step(&at[l], UZ_STEP_PROLONG | UZ_STEP_SWEEP_UP);
@@ -374,7 +412,7 @@ static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_r
             z[j] = p.unit > 0.0 ? NAN : 0.0;
         return UZ_OK;
     }
-    const uz_status status = uz_cycle_below(mg, room, 0, err);
+    const uz_status status = uz_cycle_below(mg, room, 0, 1, err);
     p.level = room->x[0];
     uz_by_pieces(write_dofs, &p, base->n);
     return status;
@@ -425,7 +463,7 @@ static void multiply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_roo
     }
     product p = {mg, room, y, x};
     uz_by_pieces(enter_product, &p, base->n);
-    uz_blocks_multiply(room->to, &mg->level[0].A, room->from);
+    uz_blocks_multiply(room->to, &mg->level[0].A, room->from, 1);
     uz_by_pieces(leave_product, &p, base->n);
 }
 
@@ -446,6 +484,25 @@ static void free_room(uz_multigrid_room *room)
     free(room);
 }
 
+static bool make_vectors(uz_multigrid_room *room, const uz_aggregates *mg, int lanes)
+{
+    bool ok = true;
+    for (int l = 0; ok && mg->base.levels > 1 && l < mg->base.levels; l++) {
+        float **vector[] = {&room->t[l], &room->x[l], &room->b[l]};
+        for (size_t v = 0; ok && v < sizeof vector / sizeof vector[0]; v++) {
+            free(*vector[v]);
+            *vector[v] = uz_alloc_zero(mg->level[l].A.nodes * lanes * uz_width(mg->level[l].A.b), sizeof(float));
+            ok = *vector[v] != NULL;
+        }
+    }
+    return ok;
+}
+
+bool uz_room_for_lanes(uz_multigrid_room *room, const uz_multigrid *base)
+{
+    return make_vectors(room, (const uz_aggregates *)base, UZ_LANES_MOST);
+}
+
 static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
@@ -459,15 +516,9 @@ static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
     if (room)
         room->levels = base->levels;
     *bytes = sizeof *room + 16 * (size_t)(coarsest + finest);
-    for (int l = 0; ok && base->levels > 1 && l < base->levels; l++) {
-        const int64_t size = mg->level[l].A.nodes * uz_width(mg->level[l].A.b);
-        room->t[l] = uz_alloc_zero(size, sizeof(float));
-        room->x[l] = uz_alloc_zero(size, sizeof(float));
-        room->b[l] = uz_alloc_zero(size, sizeof(float));
-        ok = room->t[l] && room->x[l] && room->b[l];
-        *bytes += 12 * (size_t)size;
-    }
-    if (ok)
+    for (int l = 0; ok && base->levels > 1 && l < base->levels; l++)
+        *bytes += 12 * (size_t)(mg->level[l].A.nodes * uz_width(mg->level[l].A.b));
+    if (ok && make_vectors(room, mg, 1))
         return room;
     free_room(room);
     return NULL;

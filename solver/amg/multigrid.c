@@ -75,7 +75,7 @@ static void multiply(double *y, const uz_blocks *A, const double *x, int width)
     const int b = A->b;
     const int64_t size = (int64_t)b * b;
     if (width == 4) {
-        uz_blocks_multiply(y, A, x);
+        uz_blocks_multiply(y, A, x, 1);
         return;
     }
     memset(y, 0, (size_t)(A->nodes * width) * sizeof *y);

@@ -6,6 +6,7 @@
 #include "amg/amg.h"
 
 enum { UZ_PARTS_MOST = 4 };
+enum { UZ_LANES_MOST = 2 }; /* systems that are solved at once */
 
 /* A symmetric matrix in blocks of b x b, row by row within each: what nodes exert on nodes. b is 1, 2, 3 or 6. */
 typedef struct {
@@ -22,8 +23,8 @@ typedef struct {
 void uz_blocks_clear(uz_blocks *A);
 /* Where in A->idx the column is, which must be there. */
 int64_t uz_blocks_find(const uz_blocks *A, int64_t row, int32_t column);
-/* y = A x, vectors with four numbers for each node, the surplus ones 0 in x and anything in y. b <= 3. */
-void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x);
+/* y = A x, vectors with four numbers for each node and lane, the surplus ones 0 in x and anything in y. b <= 3. */
+void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x, int lanes);
 
 /* Which blocks stand below the diagonal in each column. */
 typedef struct {
@@ -98,7 +99,8 @@ void uz_release_levels(uz_multigrid_room *room);
 uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *mg, uz_blocks *loss, const uz_team *team,
                        uz_error *err);
 
-/* Vectors of a level have `width` numbers for each node. */
+/* Vectors of a level have `width` numbers for each node; where two systems are solved at once, in two lanes, those of
+ * the first lane, then those of the second. */
 static inline int uz_width(int b)
 {
     return b > 4 ? 8 : 4;
@@ -110,7 +112,7 @@ typedef struct {
     const uz_level *level;
     const float *inverse, *b;
     float *x, *t, *coarse; /* coarse: the next level's right-hand side on the way down, its answer on the way up */
-    int k;
+    int k, lanes;
 } uz_level_step;
 enum { UZ_STEP_SWEEP_DOWN = 1, UZ_STEP_RESTRICT = 2, UZ_STEP_PROLONG = 4, UZ_STEP_SWEEP_UP = 8 };
 void uz_level_take_step(const uz_level_step *step, int parts);
@@ -126,7 +128,9 @@ uz_status uz_solve_roughly(const uz_multigrid *mg, uz_multigrid_room *room, uz_c
                            const uz_cg_stop *stop, uz_error *err);
 
 /* A V-cycle from level `from` down, more levels than one: room->x[from] = M^-1 room->b[from]. */
-uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, uz_error *err);
+uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, int lanes, uz_error *err);
+/* The room is for cycles of two lanes, too, from now on. More levels than one. False: no memory. */
+bool uz_room_for_lanes(uz_multigrid_room *room, const uz_multigrid *mg);
 
 /* Takes K apart into level 0: slot, scale, level[0].A, its nodes in the order of K's, or, if it may be parted, in parts
  * (uz_blocks), each of them in that order; *node_of_group (modes->n_nodes): where its nodes went, -1:

@@ -26,7 +26,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PROBES_LEAST = 2, PROBES_MOST = 12, STEPS_MOST = 1000 };
+/* In pairs, which are solved at once. */
+enum { PAIR = 2, PROBES_MOST = 12, STEPS_MOST = 1000 };
 
 /* Of what is claimed after the fewest trials, and after each more of them: 1e-12 in all. */
 #define CHANCE      8e-13
@@ -38,7 +39,7 @@ enum { PROBES_LEAST = 2, PROBES_MOST = 12, STEPS_MOST = 1000 };
 
 static double threshold(int trials)
 {
-    return pow(trials > PROBES_LEAST ? CHANCE_MORE : CHANCE, 1.0 / trials) / 0.8;
+    return pow(trials > PAIR ? CHANCE_MORE : CHANCE, 1.0 / trials) / 0.8;
 }
 
 /* The norm of D^-1/2 |K| D^-1/2, at most: its largest sum of a row; times what summing the longest row rounds. */
@@ -99,31 +100,50 @@ static void measure(double *reach, double *missed, double *work, const uz_amg_in
 
 enum { TIGHTENED_MOST = 3 };
 
-/* One trial, of which the residual is to be below `most`. */
-static uz_status try_once(uz_amg_info *amg, double *reach, double *missed, double *y, double *b, uz_cg *cg,
-                          const uz_csc *K, uint64_t *state, double most, const uz_hooks *hooks, uz_error *err)
+/* What a pair of trials needs, n numbers for each of them. */
+typedef struct {
+    double *y, *b, *q;
+    const uz_multigrid *mg;
+    uz_multigrid_room *room;
+    const uz_csc *K;
+    uint64_t state;
+} trials;
+
+/* Two, of which the residuals are to be below `most`. */
+static uz_status try_both(uz_amg_info *amg, double *reach, double *missed, trials *x, double most,
+                          const uz_hooks *hooks, uz_error *err)
 {
+    const int64_t n = x->mg->n;
     uz_cg_stop stop = {
         .absolute = ASKED / LEFT * most, .max_iterations = STEPS_MOST, .hooks = hooks, .deadline = INFINITY};
-    uz_cg_info info;
-    double work = 0.0, before = INFINITY;
-    for (int64_t j = 0; j < cg->n; j++) {
-        b[j] = sqrt(K->val[K->ptr[j]]) * uz_normal(state);
-        y[j] = 0.0;
+    double before = INFINITY;
+    bool negative = false;
+    for (int64_t j = 0; j < PAIR * n; j++) {
+        x->b[j] = sqrt(x->K->val[x->K->ptr[j % n]]) * uz_normal(&x->state);
+        x->y[j] = 0.0;
     }
     for (int k = 0; k < TIGHTENED_MOST; k++) {
-        const uz_status status = uz_cg_solve(&info, y, cg, K, b, &stop, err);
+        uz_cg_info info = {0};
+        const uz_status status = x->mg->kind->solve(x->mg, x->K, x->room, &info, x->y, x->q, x->b, PAIR, &stop, err);
         if (status != UZ_OK)
             return status;
         if (!(amg->lambda > 0.0))
             amg->lambda = guess_lambda(&info);
-        measure(reach, missed, &work, amg, y, b, cg->r, K);
+        *reach = *missed = 0.0;
+        negative = false;
+        for (int64_t at = 0; at < PAIR * n; at += n) {
+            double wide, left, work;
+            measure(&wide, &left, &work, amg, x->y + at, x->b + at, x->q + at, x->K);
+            *reach = fmax(*reach, wide);
+            *missed = fmax(*missed, left);
+            negative = negative || (left < 1.0 && !(work > 0.0));
+        }
         if (*missed <= most || !(*missed < 0.5 * before) || !info.met)
             break;
         before = *missed;
         stop.absolute *= 0.5 * most / *missed;
     }
-    if (*missed < 1.0 && !(work > 0.0))
+    if (negative)
         return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                        "K is not positive definite: a force does negative work on the displacement that it causes. "
                        "Check the signs of K.");
@@ -143,35 +163,41 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_e
 {
     const double start = uz_seconds();
     const int64_t n = K->cols;
-    double *y = uz_alloc(n, sizeof *y), *b = uz_alloc(n, sizeof *b), reach = 0.0, missed = 0.0;
-    uint64_t state = 0xD1B54A32D192ED03u;
-    uz_cg cg = {0};
-    uz_status status = uz_cg_init(&cg, amg->mg, err);
-    if (status == UZ_OK && (!y || !b))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)n);
-    if (status == UZ_OK)
-        status = find_rounding(&amg->info.rounding, K, err);
+    double reach = 0.0, missed = 0.0;
+    size_t bytes;
+    trials x = {.y = uz_alloc(PAIR * n, sizeof *x.y),
+                .b = uz_alloc(PAIR * n, sizeof *x.b),
+                .q = uz_alloc(PAIR * n, sizeof *x.q),
+                .mg = amg->mg,
+                .room = amg->mg->kind->room(amg->mg, &bytes),
+                .K = K,
+                .state = 0xD1B54A32D192ED03u};
+    uz_status status = x.y && x.b && x.q && x.room
+                           ? find_rounding(&amg->info.rounding, K, err)
+                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)n);
     amg->info.least = 0.0;
-    for (int k = 1; status == UZ_OK && k <= PROBES_MOST && !(amg->info.least > 0.0); k++) {
-        const double t = threshold(k), aim = threshold(k < PROBES_LEAST ? PROBES_LEAST : k);
+    for (int k = PAIR; status == UZ_OK && k <= PROBES_MOST && !(amg->info.least > 0.0); k += PAIR) {
+        const double t = threshold(k);
         double wide = INFINITY, left = INFINITY;
         if (uz_cancelled(hooks)) {
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
             break;
         }
-        status = try_once(&amg->info, &wide, &left, y, b, &cg, K, &state, LEFT * aim, hooks, err);
+        status = try_both(&amg->info, &wide, &left, &x, LEFT * t, hooks, err);
         reach = fmax(reach, wide);
         missed = fmax(missed, left);
-        if (status == UZ_OK && k >= PROBES_LEAST && missed <= LEFT * t)
+        if (status == UZ_OK && missed <= LEFT * t)
             amg->info.least = (t - missed) / reach;
     }
     if (status == UZ_OK && !(amg->info.least > 0.0))
         status = fail_probes(missed, err);
     if (status == UZ_OK)
         amg->info.rcond = fmin(amg->info.rcond, 1.0 / reach);
-    uz_cg_clear(&cg);
-    free(y);
-    free(b);
+    if (x.room)
+        amg->mg->kind->free_room(x.room);
+    free(x.y);
+    free(x.b);
+    free(x.q);
     amg->info.spectrum_s += uz_seconds() - start;
     return status;
 }

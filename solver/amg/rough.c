@@ -70,7 +70,7 @@ static uz_status iterate(rough *s, uz_multigrid_room *room, uz_cg_info *info, do
             break;
         s->factor = (float)(last / curvature);
         uz_by_pieces(take_step, s, n);
-        status = uz_cycle_below(s->mg, room, 0, err);
+        status = uz_cycle_below(s->mg, room, 0, 1, err);
         *square = uz_long_dot_single(n, s->r, s->z);
         s->factor = (float)(*square / last);
         uz_by_pieces(turn_direction, s, n);
@@ -100,7 +100,7 @@ uz_status uz_solve_roughly(const uz_multigrid *base, uz_multigrid_room *room, uz
                .held = room->held};
     if (!(s.unit > 0.0) || isinf(s.unit))
         return UZ_OK;
-    uz_status status = uz_cycle_below(mg, room, 0, err);
+    uz_status status = uz_cycle_below(mg, room, 0, 1, err);
     double square = uz_long_dot_single(n, s.r, s.z);
     info->first = info->last = s.unit * uz_root(square);
     const double goal = fmax(stop->absolute, stop->relative * info->first);

@@ -213,9 +213,7 @@ static bool put_vector(const far_system *s, const double *x)
 static bool take_vector(const far_system *s, double *x, bool zeros)
 {
     const far_multigrid *body = s->body;
-    uz_wire_head head;
-    if (!hear(body->group, &head, UZ_WIRE_VECTOR) ||
-        !take(body->group, body->wide, (size_t)body->map.size * sizeof *body->wide))
+    if (!take(body->group, body->wide, (size_t)body->map.size * sizeof *body->wide))
         return false;
     for (int64_t j = 0; j < body->map.d; j++)
         if (!s->room->held || !s->room->held[j])
@@ -232,6 +230,12 @@ static bool ask_of(const far_system *s, uz_wire_head head)
     return ask(s->body->group, head);
 }
 
+static bool hear_vector(const far_system *s)
+{
+    uz_wire_head head;
+    return hear(s->body->group, &head, UZ_WIRE_VECTOR);
+}
+
 static bool hear_square(const far_system *s)
 {
     uz_wire_head head = {.kind = 0};
@@ -246,18 +250,32 @@ static uz_status apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_roo
     const far_system of = system_of(mg, room), *s = &of;
     (void)K;
     pthread_mutex_lock(&s->body->group->mutex);
-    const bool done = ask_of(s, (uz_wire_head){.kind = UZ_WIRE_APPLY}) && put_vector(s, r) && take_vector(s, z, true);
+    const bool done = ask_of(s, (uz_wire_head){.kind = UZ_WIRE_APPLY}) && put_vector(s, r) && hear_vector(s) &&
+                      take_vector(s, z, true);
     pthread_mutex_unlock(&s->body->group->mutex);
     return done ? UZ_OK : fail_lost(err);
 }
 
-static bool begin(const far_system *s, const double *x, const double *b)
+static bool begin(const far_system *s, const double *x, const double *b, int count)
 {
+    const int64_t d = s->body->map.d;
     bool zero = true;
-    for (int64_t j = 0; zero && j < s->body->map.d; j++)
-        zero = x[j] == 0.0 || (s->room->held && s->room->held[j]);
-    return ask_of(s, (uz_wire_head){.kind = UZ_WIRE_BEGIN, .b = zero}) && (zero || put_vector(s, x)) &&
-           put_vector(s, b) && hear_square(s);
+    for (int64_t j = 0; zero && j < count * d; j++)
+        zero = x[j] == 0.0 || (s->room->held && s->room->held[j % d]);
+    bool done = ask_of(s, (uz_wire_head){.kind = UZ_WIRE_BEGIN, .b = zero, .c = count});
+    for (int k = 0; done && !zero && k < count; k++)
+        done = put_vector(s, x + k * d);
+    for (int k = 0; done && k < count; k++)
+        done = put_vector(s, b + k * d);
+    return done && hear_square(s);
+}
+
+static bool fetch(const far_system *s, double *x, int count)
+{
+    bool done = ask_of(s, (uz_wire_head){.kind = UZ_WIRE_FETCH}) && hear_vector(s);
+    for (int k = 0; done && k < count; k++)
+        done = take_vector(s, x + k * s->body->map.d, false);
+    return done;
 }
 
 /* Up to `most` steps while the square is above goal2. */
@@ -265,7 +283,7 @@ static bool make_steps(const far_system *s, int *made, bool *flat, int most, dou
 {
     uz_wire_head head;
     *made = 0;
-    const uz_wire_head question = {.kind = UZ_WIRE_STEPS, .b = most, .x = goal2, .y = s->room->square};
+    const uz_wire_head question = {.kind = UZ_WIRE_STEPS, .b = most, .x = goal2};
     if (!ask_of(s, question) || !hear(s->body->group, &head, UZ_WIRE_STATE))
         return false;
     if (head.a < 0 || head.a > most)
@@ -340,11 +358,11 @@ static void find_residual(const far_system *s, const uz_csc *K, double *r, const
 }
 
 /* The group's part of it: false: it was lost. */
-static bool solve_there(const far_system *s, uz_cg_info *info, bool *flat, double *x, const double *b,
+static bool solve_there(const far_system *s, uz_cg_info *info, bool *flat, double *x, const double *b, int count,
                         const uz_cg_stop *stop)
 {
     double goal = 0.0, before = INFINITY;
-    bool done = begin(s, x, b);
+    bool done = begin(s, x, b, count);
     for (int k = 0; done; k++) {
         done = k == 0 || (ask_of(s, (uz_wire_head){.kind = UZ_WIRE_AGAIN}) && hear_square(s));
         info->last = uz_root(s->room->square);
@@ -363,18 +381,18 @@ static bool solve_there(const far_system *s, uz_cg_info *info, bool *flat, doubl
         if (*flat || (info->met && info->last > DRIFTS * info->first))
             break;
     }
-    return done && ask_of(s, (uz_wire_head){.kind = UZ_WIRE_FETCH}) && take_vector(s, x, false);
+    return done && fetch(s, x, count);
 }
 
 static uz_status solve(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, uz_cg_info *info, double *x,
-                       double *r, const double *b, const uz_cg_stop *stop, uz_error *err)
+                       double *r, const double *b, int count, const uz_cg_stop *stop, uz_error *err)
 {
     const far_system of = system_of(mg, room), *s = &of;
-    bool flat = false;
+    bool flat = false, possible = true;
     pthread_mutex_lock(&s->body->group->mutex);
-    const bool done = solve_there(s, info, &flat, x, b, stop);
-    if (done)
-        find_residual(s, K, r, x, b);
+    const bool done = solve_there(s, info, &flat, x, b, count, stop);
+    for (int64_t at = 0; done && at < count * mg->n; at += mg->n)
+        find_residual(s, K, r + at, x + at, b + at);
     pthread_mutex_unlock(&s->body->group->mutex);
     if (!done)
         return fail_lost(err);
@@ -382,7 +400,9 @@ static uz_status solve(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_roo
         return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                        "K is not positive definite: conjugate gradients met a direction that it does not resist. "
                        "Support the body so that it can't move freely, or check the signs of K.");
-    return is_possible(s, K, r, x, b) ? UZ_OK : fail_wrong(err);
+    for (int64_t at = 0; possible && at < count * mg->n; at += mg->n)
+        possible = is_possible(s, K, r + at, x + at, b + at);
+    return possible ? UZ_OK : fail_wrong(err);
 }
 
 /* ---- making them */

@@ -14,12 +14,13 @@
  *                among these the lower triangle
  *     <- MADE    after the last of them. a: levels, b: bytes, x: `most`, y: seconds
  *     -> HOLD    a byte for each dof: held or not           <- MADE
- *     -> BEGIN   a: system, b: 1: from 0; else the start (double); right-hand side (double)
- *                                                        <- STATE   x: r'M^-1 r
- *     -> STEPS   a: system, b: at most so many, x: until r'M^-1 r is not above it, y: what it is now
+ *     -> BEGIN   a: system, b: 1: from 0, c: 1, or 2 for two right-hand sides at once; unless from 0 the start of
+ *                each (double); right-hand side of each (double)
+ *                                                        <- STATE   x: r'M^-1 r, here and below of the worse one
+ *     -> STEPS   a: system, b: at most so many, x: until r'M^-1 r is not above it
  *     <- STATE   a: made, fewer where there is no more to gain, b: 1 where p'K p was not positive, x: r'M^-1 r
  *     -> AGAIN   a: system; from the true residual          <- STATE   x: r'M^-1 r
- *     -> FETCH   a: system                                  <- VECTOR  x
+ *     -> FETCH   a: system                                  <- VECTOR  x of each
  *     -> APPLY   a: system; r                               <- VECTOR  M^-1 r
  *     -> FREE    the body `id`
  *
@@ -48,7 +49,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 7
+#define UZ_WIRE_VERSION 8
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

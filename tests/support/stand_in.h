@@ -35,7 +35,10 @@ typedef struct {
     double weak;                                           /* M is so many times the diagonal; 0: once */
     int64_t nodes, bs, modes, n, at, solves, steps, again; /* again: residuals that were found anew */
     double K[2][STAND_IN_MOST][STAND_IN_MOST];
-    double x[STAND_IN_MOST], b[STAND_IN_MOST], r[STAND_IN_MOST], z[STAND_IN_MOST], p[STAND_IN_MOST];
+    int lanes; /* systems that are solved at once */
+    struct {
+        double x[STAND_IN_MOST], b[STAND_IN_MOST], r[STAND_IN_MOST], z[STAND_IN_MOST], p[STAND_IN_MOST], square;
+    } lane[2];
 } stand_in;
 
 static inline bool stand_in_take(stand_in *s, void *to, size_t size)
@@ -99,60 +102,75 @@ static inline void stand_in_multiply(const stand_in *s, int which, double *y, co
         y[0] -= 0.01 * s->K[which][0][0] * x[0];
 }
 
+static inline double stand_in_square(const stand_in *s)
+{
+    return s->lanes == 1 ? s->lane[0].square : fmax(s->lane[0].square, s->lane[1].square);
+}
+
 static inline void stand_in_begin(stand_in *s, int which)
 {
-    stand_in_multiply(s, which, s->r, s->x);
-    for (int64_t i = 0; i < s->n; i++)
-        s->r[i] = s->b[i] - s->r[i];
-    const double square = stand_in_cycle(s, which, s->z, s->r);
-    memcpy(s->p, s->z, sizeof s->p);
-    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_STATE, .x = square});
+    for (int l = 0; l < s->lanes; l++) {
+        stand_in_multiply(s, which, s->lane[l].r, s->lane[l].x);
+        for (int64_t i = 0; i < s->n; i++)
+            s->lane[l].r[i] = s->lane[l].b[i] - s->lane[l].r[i];
+        s->lane[l].square = stand_in_cycle(s, which, s->lane[l].z, s->lane[l].r);
+        memcpy(s->lane[l].p, s->lane[l].z, sizeof s->lane[l].p);
+    }
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_STATE, .x = stand_in_square(s)});
+}
+
+/* Until its square is not above the goal; *flat: the next step would be along a direction without resistance. */
+static inline int64_t stand_in_step_lane(stand_in *s, int l, bool *flat, const uz_wire_head *m)
+{
+    const int which = (int)m->a;
+    double q[STAND_IN_MOST], *x = s->lane[l].x, *r = s->lane[l].r, *z = s->lane[l].z, *p = s->lane[l].p;
+    int64_t made = 0;
+    while (made < m->b && s->lane[l].square > m->x) {
+        double curvature = 0.0;
+        const double last = s->lane[l].square;
+        stand_in_multiply(s, which, q, p);
+        for (int64_t i = 0; i < s->n; i++)
+            curvature += p[i] * q[i];
+        *flat = !(curvature > 0.0);
+        if (*flat)
+            break;
+        const double alpha = last / curvature;
+        for (int64_t i = 0; i < s->n; i++) {
+            x[i] += alpha * p[i];
+            r[i] -= alpha * q[i];
+        }
+        s->lane[l].square = stand_in_cycle(s, which, z, r);
+        const double beta = s->lane[l].square / last;
+        for (int64_t i = 0; i < s->n; i++)
+            p[i] = z[i] + beta * p[i];
+        made++;
+    }
+    return made;
 }
 
 static inline void stand_in_steps(stand_in *s, const uz_wire_head *m)
 {
-    const int which = (int)m->a;
-    double q[STAND_IN_MOST], square = m->y;
-    int64_t made = 0;
+    int64_t most = 0;
     bool flat = false;
-    while (made < m->b && square > m->x) {
-        double curvature = 0.0;
-        const double last = square;
-        stand_in_multiply(s, which, q, s->p);
-        for (int64_t i = 0; i < s->n; i++)
-            curvature += s->p[i] * q[i];
-        flat = !(curvature > 0.0);
-        if (flat)
-            break;
-        const double alpha = last / curvature;
-        for (int64_t i = 0; i < s->n; i++) {
-            s->x[i] += alpha * s->p[i];
-            s->r[i] -= alpha * q[i];
-        }
-        square = stand_in_cycle(s, which, s->z, s->r);
-        const double beta = square / last;
-        for (int64_t i = 0; i < s->n; i++)
-            s->p[i] = s->z[i] + beta * s->p[i];
-        made++;
+    for (int l = 0; l < s->lanes && !flat; l++) {
+        const int64_t made = stand_in_step_lane(s, l, &flat, m);
+        most = made > most ? made : most;
     }
-    s->steps += made;
-    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_STATE, .a = made, .b = flat, .x = square});
-}
-
-static inline void stand_in_answer_vector(stand_in *s, const double *v)
-{
-    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_VECTOR});
-    stand_in_put(s, v, (size_t)s->n * sizeof *v);
+    s->steps += most;
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_STATE, .a = most, .b = flat, .x = stand_in_square(s)});
 }
 
 static inline void stand_in_fetch(stand_in *s)
 {
-    double most = 0.0;
-    for (int64_t i = 0; i < s->n; i++)
-        most = fmax(most, fabs(s->x[i]));
-    for (int64_t i = 0; i < s->n && stand_in_is_wrong(s, STAND_IN_SHIFTS); i++)
-        s->x[i] += 1e-3 * most;
-    stand_in_answer_vector(s, s->x);
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_VECTOR});
+    for (int l = 0; l < s->lanes; l++) {
+        double most = 0.0, *x = s->lane[l].x;
+        for (int64_t i = 0; i < s->n; i++)
+            most = fmax(most, fabs(x[i]));
+        for (int64_t i = 0; i < s->n && stand_in_is_wrong(s, STAND_IN_SHIFTS); i++)
+            x[i] += 1e-3 * most;
+        stand_in_put(s, x, (size_t)s->n * sizeof *x);
+    }
 }
 
 static inline bool stand_in_take_body(stand_in *s, const uz_wire_head *m)
@@ -220,10 +238,16 @@ static inline bool stand_in_obey(stand_in *s, const uz_wire_head *m)
     case UZ_WIRE_HOLD:
         return stand_in_hold(s);
     case UZ_WIRE_BEGIN:
-        s->solves++;
-        memset(s->x, 0, sizeof s->x);
-        if ((m->b == 0 && !stand_in_take(s, s->x, size)) || !stand_in_take(s, s->b, size))
-            return false;
+        s->lanes = (int)m->c;
+        s->solves += m->c;
+        for (int l = 0; l < s->lanes; l++)
+            memset(s->lane[l].x, 0, sizeof s->lane[l].x);
+        for (int l = 0; l < s->lanes && m->b == 0; l++)
+            if (!stand_in_take(s, s->lane[l].x, size))
+                return false;
+        for (int l = 0; l < s->lanes; l++)
+            if (!stand_in_take(s, s->lane[l].b, size))
+                return false;
         stand_in_begin(s, which);
         return true;
     case UZ_WIRE_AGAIN:
@@ -237,10 +261,11 @@ static inline bool stand_in_obey(stand_in *s, const uz_wire_head *m)
         stand_in_fetch(s);
         return true;
     case UZ_WIRE_APPLY:
-        if (!stand_in_take(s, s->b, size))
+        if (!stand_in_take(s, s->lane[0].b, size))
             return false;
-        stand_in_cycle(s, which, s->z, s->b);
-        stand_in_answer_vector(s, s->z);
+        stand_in_cycle(s, which, s->lane[0].z, s->lane[0].b);
+        stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_VECTOR});
+        stand_in_put(s, s->lane[0].z, size);
         return true;
     default:
         return m->kind == UZ_WIRE_FREE;

@@ -459,7 +459,7 @@ static void set_coarse(variant *v, uz_multigrid *made, const neighbours *near)
     size_t bytes;
     v->base = made;
     v->room = made ? made->kind->room(made, &bytes) : NULL;
-    if (made && !v->room)
+    if (made && !(v->room && uz_room_for_lanes(v->room, made)))
         end_group("no memory");
     if (made)
         shared_init(&v->shared, made, v->room, near);
@@ -517,14 +517,15 @@ static void coarsen(spread_system *s, const spread_rows *rows)
 
 static void make_room(spread_system *s)
 {
-    const int64_t size = 4 * s->level.A.nodes, coarse = s->next.nodes;
+    const int64_t size = 4 * LANES * s->level.A.nodes, coarse = s->next.nodes;
     double **vectors[] = {&s->u, &s->f, &s->r, &s->z, &s->p, &s->q};
     for (size_t v = 0; v < sizeof vectors / sizeof vectors[0]; v++)
         *vectors[v] = new_zeros(size, sizeof(double));
     s->rhs = new_zeros(size, sizeof *s->rhs);
     s->x = new_zeros(size, sizeof *s->x);
     s->t = new_zeros(size, sizeof *s->t);
-    s->coarse = new_zeros(coarse * uz_width(s->k), sizeof *s->coarse);
+    s->lanes = 1;
+    s->coarse = new_zeros(coarse * LANES * uz_width(s->k), sizeof *s->coarse);
     s->coarse_r = new_zeros(coarse * s->k, sizeof *s->coarse_r);
     s->coarse_z = new_zeros(coarse * s->k, sizeof *s->coarse_z);
 }
@@ -622,7 +623,7 @@ int64_t system_bytes(const spread_system *s, int which)
         return coarse;
     const int64_t prolongation = s->level.ptr ? s->level.ptr[nodes] * (4 + 4 * s->b * s->k) : 0;
     return coarse + blocks_bytes(&s->level.A) + blocks_bytes(&s->next) + prolongation +
-           4 * size * (s->level.A.ptr[nodes] + nodes) + nodes * (8 + 60 * 4);
+           4 * size * (s->level.A.ptr[nodes] + nodes) + nodes * (8 + 60 * LANES * 4);
 }
 
 int system_levels(const spread_system *s, int which)

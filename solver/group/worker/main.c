@@ -91,6 +91,13 @@ static size_t bytes_of_rows(const body *b, const uz_wire_head *m)
     return blocks * (8 * bs * bs + 4) + nodes * 4 * (1 + bs * (size_t)b->modes);
 }
 
+static int lanes_of(const uz_wire_head *m)
+{
+    if (m->c < 1 || m->c > LANES)
+        end_group("so many systems at once are not solved");
+    return (int)m->c;
+}
+
 /* What follows a head the first process has read before the others hear of it: till then they sleep, and leave their
  * processors to who makes it. */
 static size_t bytes_behind(group *g, const uz_wire_head *m)
@@ -103,7 +110,9 @@ static size_t bytes_behind(group *g, const uz_wire_head *m)
         return 0;
     const body *b = find(g, m->id);
     const size_t n = (size_t)(b->nodes * b->bs);
-    return m->kind == UZ_WIRE_HOLD ? n : n * sizeof(double) * (m->kind == UZ_WIRE_BEGIN && m->b != 1 ? 2 : 1);
+    if (m->kind == UZ_WIRE_HOLD)
+        return n;
+    return n * sizeof(double) * (m->kind == UZ_WIRE_APPLY ? 1 : (size_t)lanes_of(m) * (m->b != 1 ? 2 : 1));
 }
 
 /* ---- a body comes in */
@@ -307,42 +316,58 @@ static void hold(group *g, body *b)
 
 /* ---- vectors and steps */
 
-/* The vector with this number of those that came. In the solver's order a node has bs numbers, in ours four; ours are
- * of S^-1 u and S f. */
-static void take_vector(group *g, const body *b, double *v, int which, bool displacement)
+/* Of the vectors that came those from `first` on, one for each lane. In the solver's order a node has bs numbers, in
+ * ours four; ours are of S^-1 u and S f. */
+static void take_vectors(group *g, const body *b, double *v, int first, bool displacement)
 {
-    const int mine = b->count[g->rank];
-    const double *all = IS_FIRST(g) ? (const double *)g->whole + (int64_t)which * b->nodes * b->bs : NULL;
+    const int mine = b->count[g->rank], lanes = b->system.lanes;
+    const int64_t n = (int64_t)b->nodes * b->bs;
     double *own = b->system.q;
-    MPI_Scatterv(all, b->count, b->first, MPI_DOUBLE, own, mine, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
-    for (int64_t i = 0; i < mine; i++) {
-        const double scale = b->system.scale[i];
-        v[i / b->bs * 4 + i % b->bs] = displacement ? own[i] / scale : own[i] * scale;
+    for (int l = 0; l < lanes; l++) {
+        const double *from = IS_FIRST(g) ? (const double *)g->whole + (first + l) * n : NULL;
+        MPI_Scatterv(from, b->count, b->first, MPI_DOUBLE, own, mine, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
+        for (int64_t i = 0; i < mine; i++) {
+            const double scale = b->system.scale[i];
+            v[(i / b->bs * lanes + l) * 4 + i % b->bs] = displacement ? own[i] / scale : own[i] * scale;
+        }
     }
 }
 
-static void put_displacement(group *g, const body *b, const double *v)
+static void put_displacements(group *g, const body *b, const double *v)
 {
-    const int mine = b->count[g->rank];
-    const size_t bytes = (size_t)(b->nodes * b->bs) * sizeof(double);
-    double *own = b->system.q, *all = IS_FIRST(g) ? need_room(g, bytes) : NULL;
-    for (int64_t i = 0; i < mine; i++)
-        own[i] = v[i / b->bs * 4 + i % b->bs] * b->system.scale[i];
-    MPI_Gatherv(own, mine, MPI_DOUBLE, all, b->count, b->first, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
+    const int mine = b->count[g->rank], lanes = b->system.lanes;
+    const int64_t n = (int64_t)b->nodes * b->bs;
+    double *own = b->system.q, *all = IS_FIRST(g) ? need_room(g, (size_t)(lanes * n) * sizeof *all) : NULL;
+    for (int l = 0; l < lanes; l++) {
+        for (int64_t i = 0; i < mine; i++)
+            own[i] = v[(i / b->bs * lanes + l) * 4 + i % b->bs] * b->system.scale[i];
+        MPI_Gatherv(own, mine, MPI_DOUBLE, all ? all + l * n : NULL, b->count, b->first, MPI_DOUBLE, 0,
+                    PETSC_COMM_WORLD);
+    }
     answer(g, (uz_wire_head){.kind = UZ_WIRE_VECTOR, .id = b->id});
     if (IS_FIRST(g))
-        put(g, all, bytes);
+        put(g, all, (size_t)(lanes * n) * sizeof *all);
 }
 
 static PetscErrorCode make_steps(group *g, spread_system *s, const uz_wire_head *m)
 {
-    double square = m->y;
     bool flat;
     PetscFunctionBeginUser;
     PetscCheck(m->b > 0 && m->b <= UZ_WIRE_STEPS_MOST, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "too many steps");
-    const int made = system_steps(s, (int)m->a, &square, &flat, (int)m->b, m->x);
-    answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .a = made, .b = flat, .x = square});
+    const int made = system_steps(s, (int)m->a, &flat, (int)m->b, m->x);
+    answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .a = made, .b = flat, .x = system_square(s)});
     PetscFunctionReturn(0);
+}
+
+static void begin_solve(group *g, const body *b, spread_system *s, const uz_wire_head *m)
+{
+    const bool from_zero = m->b == 1;
+    s->lanes = lanes_of(m);
+    memset(s->f, 0, 4 * (size_t)(s->lanes * s->near.here) * sizeof *s->f); /* surplus numbers stood elsewhere */
+    memset(s->u, 0, 4 * (size_t)(s->lanes * s->near.here) * sizeof *s->u);
+    if (!from_zero)
+        take_vectors(g, b, s->u, 0, true);
+    take_vectors(g, b, s->f, from_zero ? 0 : s->lanes, false);
 }
 
 static PetscErrorCode obey(group *g, const uz_wire_head *m)
@@ -373,25 +398,21 @@ static PetscErrorCode obey(group *g, const uz_wire_head *m)
     PetscCheck((m->a == 0 || m->a == 1) && b->made[m->a], PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONGSTATE, "no such system");
     spread_system *s = &b->system;
     const int which = (int)m->a;
-    const bool from_zero = m->kind == UZ_WIRE_BEGIN && m->b == 1;
-    if (m->kind == UZ_WIRE_BEGIN) {
-        if (from_zero)
-            memset(s->u, 0, 4 * (size_t)s->near.here * sizeof *s->u);
-        else
-            take_vector(g, b, s->u, 0, true);
-        take_vector(g, b, s->f, from_zero ? 0 : 1, false);
-    }
+    if (m->kind == UZ_WIRE_BEGIN)
+        begin_solve(g, b, s, m);
     if (m->kind == UZ_WIRE_BEGIN || m->kind == UZ_WIRE_AGAIN) {
-        const double square = system_begin(s, which, from_zero);
-        answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .x = square});
+        system_begin(s, which, m->kind == UZ_WIRE_BEGIN && m->b == 1);
+        answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .x = system_square(s)});
     } else if (m->kind == UZ_WIRE_STEPS) {
         PetscCall(make_steps(g, s, m));
     } else if (m->kind == UZ_WIRE_FETCH) {
-        put_displacement(g, b, s->u);
+        put_displacements(g, b, s->u);
     } else if (m->kind == UZ_WIRE_APPLY) {
-        take_vector(g, b, s->r, 0, false);
+        s->lanes = 1;
+        memset(s->r, 0, 4 * (size_t)s->near.here * sizeof *s->r);
+        take_vectors(g, b, s->r, 0, false);
         system_precondition(s, which, s->z, s->r);
-        put_displacement(g, b, s->z);
+        put_displacements(g, b, s->z);
     } else {
         SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "message of kind %d", m->kind);
     }

@@ -93,14 +93,16 @@ void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid
         level.inverse = room->own[0].inverse;
     }
     const int b = level.A.b, width = uz_width(b);
-    own->count = new_zeros(near->size, sizeof *own->count);
-    own->first = new_zeros(near->size, sizeof *own->first);
-    for (int p = 0; p < near->size; p++) {
-        own->first[p] = (int)(level.A.nodes * p / near->size) * width;
-        own->count[p] = (int)(level.A.nodes * (p + 1) / near->size) * width - own->first[p];
+    for (int l = 0; l < LANES; l++) {
+        own->count[l] = new_zeros(near->size, sizeof *own->count[l]);
+        own->first[l] = new_zeros(near->size, sizeof *own->first[l]);
+        for (int p = 0; p < near->size; p++) {
+            own->first[l][p] = (int)(level.A.nodes * p / near->size) * width * (l + 1);
+            own->count[l][p] = (int)(level.A.nodes * (p + 1) / near->size) * width * (l + 1) - own->first[l][p];
+        }
     }
-    own->begin = own->first[near->rank] / width;
-    own->end = own->begin + own->count[near->rank] / width;
+    own->begin = own->first[0][near->rank] / width;
+    own->end = own->begin + own->count[0][near->rank] / width;
     own->outside_ptr = new_zeros(own->end - own->begin + 1, sizeof *own->outside_ptr);
     list_outside(own, &level, false);
     for (int64_t i = 0; i < own->end - own->begin; i++)
@@ -120,58 +122,62 @@ void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid
 
 void shared_clear(shared_level *own)
 {
-    void *made[] = {own->count,       own->first,       own->outside_ptr, own->outside_idx, own->outside,      own->sum,
-                    own->level.A.ptr, own->level.A.idx, own->level.off,   own->level.diag,  own->level.inverse};
+    void *made[] = {own->count[0],    own->count[1],   own->first[0],     own->first[1],    own->outside_ptr,
+                    own->outside_idx, own->outside,    own->sum,          own->level.A.ptr, own->level.A.idx,
+                    own->level.off,   own->level.diag, own->level.inverse};
     for (size_t k = 0; k < sizeof made / sizeof made[0]; k++)
         free(made[k]);
     *own = (shared_level){0};
 }
 
 /* All processes' numbers of x, and to (of the own nodes) += (D' - D) x - O x: see steps.c. */
-static void meet(const shared_level *own, float *x, float *to)
+static void meet(const shared_level *own, float *x, float *to, int lanes)
 {
     const int b = own->level.A.b, width = uz_width(b);
-    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, x, own->count, own->first, MPI_FLOAT, MPI_COMM_WORLD);
-    for (int64_t i = 0; to && i < own->end - own->begin; i++) {
-        const float *here = x + (own->begin + i) * width;
-        if (own->outside_ptr[i] == own->outside_ptr[i + 1])
-            continue;
-        for (int r = 0; r < b; r++)
-            to[i * width + r] += own->sum[i * b + r] * here[r];
-        for (int64_t e = own->outside_ptr[i]; e < own->outside_ptr[i + 1]; e++) {
-            const float *block = own->outside + e * b * b, *there = x + (int64_t)own->outside_idx[e] * width;
+    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, x, own->count[lanes - 1], own->first[lanes - 1], MPI_FLOAT,
+                   MPI_COMM_WORLD);
+    for (int64_t i = 0; to && i < own->end - own->begin; i++)
+        for (int l = 0; l < lanes && own->outside_ptr[i] < own->outside_ptr[i + 1]; l++) {
+            const float *here = x + ((own->begin + i) * lanes + l) * width;
+            float *sum = to + (i * lanes + l) * width;
             for (int r = 0; r < b; r++)
-                for (int c = 0; c < b; c++)
-                    to[i * width + r] -= block[r * b + c] * there[c];
+                sum[r] += own->sum[i * b + r] * here[r];
+            for (int64_t e = own->outside_ptr[i]; e < own->outside_ptr[i + 1]; e++) {
+                const float *block = own->outside + e * b * b,
+                            *there = x + ((int64_t)own->outside_idx[e] * lanes + l) * width;
+                for (int r = 0; r < b; r++)
+                    for (int c = 0; c < b; c++)
+                        sum[r] -= block[r * b + c] * there[c];
+            }
         }
-    }
 }
 
-void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigrid_room *room, float *z)
+void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigrid_room *room, float *z, int lanes)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
     const uz_level *level = &mg->level[0];
     const int b = level->A.b, width = uz_width(b);
-    const int64_t from = own->begin * width;
+    const int64_t from = own->begin * lanes * width, fours = level->A.nodes * lanes;
     uz_error err = {0};
-    for (int64_t i = 0; i < level->A.nodes; i++) /* dofs are numbered as they stand there */
+    for (int64_t i = 0; i < fours; i++) /* dofs are numbered as they stand there */
         for (int r = 0; r < b; r++)
-            room->b[0][i * width + r] = (float)mg->scale[i * b + r] * z[i * width + r];
+            room->b[0][i * width + r] = (float)mg->scale[i / lanes * b + r] * z[i * width + r];
     uz_level_step step = {
-        &own->level, own->level.inverse, room->b[0] + from, room->x[0] + from, room->t[0] + from, room->b[1], mg->k};
+        &own->level, own->level.inverse, room->b[0] + from, room->x[0] + from, room->t[0] + from, room->b[1], mg->k,
+        lanes};
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
-    meet(own, room->x[0], room->t[0] + from);
+    meet(own, room->x[0], room->t[0] + from, lanes);
     uz_level_take_step(&step, UZ_STEP_RESTRICT);
-    MPI_Allreduce(MPI_IN_PLACE, room->b[1], (int)(level->aggregates * uz_width(mg->k)), MPI_FLOAT, MPI_SUM,
+    MPI_Allreduce(MPI_IN_PLACE, room->b[1], (int)(level->aggregates * lanes * uz_width(mg->k)), MPI_FLOAT, MPI_SUM,
                   MPI_COMM_WORLD);
-    if (uz_cycle_below(mg, room, 1, &err) != UZ_OK)
+    if (uz_cycle_below(mg, room, 1, lanes, &err) != UZ_OK)
         end_group(err.message);
     step.coarse = room->x[1];
     uz_level_take_step(&step, UZ_STEP_PROLONG);
-    meet(own, room->x[0], room->b[0] + from);
+    meet(own, room->x[0], room->b[0] + from, lanes);
     uz_level_take_step(&step, UZ_STEP_SWEEP_UP);
-    meet(own, room->x[0], NULL);
-    for (int64_t i = 0; i < level->A.nodes; i++)
+    meet(own, room->x[0], NULL, lanes);
+    for (int64_t i = 0; i < fours; i++)
         for (int r = 0; r < width; r++)
-            z[i * width + r] = r < b ? (float)mg->scale[i * b + r] * room->x[0][i * width + r] : 0.0F;
+            z[i * width + r] = r < b ? (float)mg->scale[i / lanes * b + r] * room->x[0][i * width + r] : 0.0F;
 }

@@ -22,73 +22,96 @@ static void add_outside(spread_system *s, float *to)
 {
     neighbours *near = &s->near;
     const uz_blocks *A = &s->level.A;
-    const int b = s->b;
-    float *of_ghosts = s->x + 4 * near->here;
+    const int b = s->b, width = 4 * s->lanes;
+    float *of_ghosts = s->x + width * near->here;
     if (near->size == 1)
         return;
-    neighbours_fetch(near, of_ghosts, s->x, 4 * sizeof *s->x);
+    neighbours_fetch(near, of_ghosts, s->x, (size_t)width * sizeof *s->x);
     for (int64_t f = 0; f < s->faces; f++)
-        for (int c = 0; c < b; c++)
-            to[4 * s->face[f] + c] += s->outside[s->face[f] * b + c] * s->x[4 * s->face[f] + c];
+        for (int q = 0; q < width; q += 4)
+            for (int c = 0; c < b; c++) {
+                const int64_t at = width * (int64_t)s->face[f] + q + c;
+                to[at] += s->outside[s->face[f] * b + c] * s->x[at];
+            }
     for (int64_t g = 0; g < near->ghosts; g++)
         for (int64_t e = A->ptr[near->here + g]; e < A->ptr[near->here + g + 1]; e++)
-            for (int r = 0; r < b; r++)
-                for (int c = 0; c < b; c++)
-                    to[4 * A->idx[e] + c] -= s->level.off[(e * b + r) * b + c] * of_ghosts[4 * g + r];
+            for (int q = 0; q < width; q += 4)
+                for (int r = 0; r < b; r++)
+                    for (int c = 0; c < b; c++)
+                        to[width * (int64_t)A->idx[e] + q + c] -=
+                            s->level.off[(e * b + r) * b + c] * of_ghosts[width * g + q + r];
+}
+
+/* Where each process does it alone; lane by lane. */
+static void correct_alone(spread_system *s, const variant *v)
+{
+    const int k = s->k, width = uz_width(k);
+    uz_error err = {0};
+    for (int l = 0; l < s->lanes; l++) {
+        for (int64_t a = 0; a < s->next.nodes; a++)
+            for (int c = 0; c < k; c++)
+                s->coarse_r[a * k + c] = (double)s->coarse[(a * s->lanes + l) * width + c];
+        if (uz_multigrid_apply(v->base, NULL, v->room, s->coarse_z, s->coarse_r, &err) != UZ_OK)
+            end_group(err.message);
+        for (int64_t a = 0; a < s->next.nodes; a++)
+            for (int c = 0; c < width; c++)
+                s->coarse[(a * s->lanes + l) * width + c] = c < k ? (float)s->coarse_z[a * k + c] : 0.0F;
+    }
 }
 
 static void correct(spread_system *s, const variant *v, const uz_level_step *step)
 {
-    const int k = s->k, width = uz_width(k);
-    const int64_t nodes = s->next.nodes;
-    uz_error err = {0};
     uz_level_take_step(step, UZ_STEP_RESTRICT);
-    MPI_Allreduce(MPI_IN_PLACE, s->coarse, (int)(nodes * width), MPI_FLOAT, MPI_SUM, MPI_COMM_WORLD);
-    if (v->shared.divided) {
-        shared_apply(&v->shared, v->base, v->room, s->coarse);
-        uz_level_take_step(step, UZ_STEP_PROLONG);
-        return;
-    }
-    for (int64_t a = 0; a < nodes; a++)
-        for (int c = 0; c < k; c++)
-            s->coarse_r[a * k + c] = (double)s->coarse[a * width + c];
-    if (uz_multigrid_apply(v->base, NULL, v->room, s->coarse_z, s->coarse_r, &err) != UZ_OK)
-        end_group(err.message);
-    for (int64_t a = 0; a < nodes; a++)
-        for (int c = 0; c < width; c++)
-            s->coarse[a * width + c] = c < k ? (float)s->coarse_z[a * k + c] : 0.0F;
+    MPI_Allreduce(MPI_IN_PLACE, s->coarse, (int)(s->next.nodes * s->lanes * uz_width(s->k)), MPI_FLOAT, MPI_SUM,
+                  MPI_COMM_WORLD);
+    if (v->shared.divided)
+        shared_apply(&v->shared, v->base, v->room, s->coarse, s->lanes);
+    else
+        correct_alone(s, v);
     uz_level_take_step(step, UZ_STEP_PROLONG);
 }
 
-/* The power of two above the largest: times that, single precision holds a residual, and those that are some 30 orders
- * smaller, as they become before a solve is begun again. 0: there is nothing to solve for. */
-static double unit_of(const spread_system *s, const double *r)
+/* Vectors are fours of numbers, one for each node and lane; how many there are here, and the lane of one. */
+static int64_t fours(const spread_system *s)
 {
-    double largest = 0.0;
-    int exponent;
-    for (int64_t i = 0; i < 4 * s->near.here; i++)
-        largest = fmax(largest, fabs(r[i]));
-    MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
-    if (!(largest > 0.0) || isinf(largest))
-        return largest;
-    (void)frexp(largest, &exponent);
-    return ldexp(1.0, exponent);
+    return s->lanes * s->near.here;
 }
 
-static void cycle(spread_system *s, int which, double *z, const double *r, double unit)
+static int lane_of(const spread_system *s, int64_t of)
+{
+    return (int)(of & (s->lanes - 1));
+}
+
+/* The power of two above the largest of each lane: times that, single precision holds a residual, and those that are
+ * some 30 orders smaller, as they become before a solve is begun again. 0: there is nothing to solve for. */
+static void find_units(const spread_system *s, double unit[LANES], const double *r)
+{
+    memset(unit, 0, LANES * sizeof *unit);
+    for (int64_t i = 0; i < fours(s); i++) {
+        double *largest = &unit[lane_of(s, i)];
+        for (int64_t q = 4 * i; q < 4 * i + 4; q++)
+            *largest = fmax(*largest, fabs(r[q]));
+    }
+    MPI_Allreduce(MPI_IN_PLACE, unit, LANES, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
+    for (int l = 0; l < LANES; l++)
+        if (unit[l] > 0.0 && !isinf(unit[l])) {
+            int exponent;
+            (void)frexp(unit[l], &exponent);
+            unit[l] = ldexp(1.0, exponent);
+        }
+}
+
+static void cycle(spread_system *s, int which, double *z, const double *r, const double unit[LANES])
 {
     const variant *v = &s->variant[which];
-    const int64_t n = 4 * s->near.here;
     uz_level own = s->level;
     own.A.nodes = s->near.here;
-    if (!(unit > 0.0) || isinf(unit)) {
-        for (int64_t i = 0; i < n; i++)
-            z[i] = unit > 0.0 ? NAN : 0.0;
-        return;
+    for (int64_t i = 0; i < fours(s); i++) {
+        const double by = unit[lane_of(s, i)], inverse = by > 0.0 && !isinf(by) ? 1.0 / by : 0.0; /* powers of two */
+        for (int64_t q = 4 * i; q < 4 * i + 4; q++)
+            s->rhs[q] = inverse > 0.0 ? (float)(r[q] * inverse) : 0.0F;
     }
-    for (int64_t i = 0; i < n; i++)
-        s->rhs[i] = (float)(r[i] / unit);
-    const uz_level_step step = {&own, v->inverse, s->rhs, s->x, s->t, s->coarse, s->k};
+    const uz_level_step step = {&own, v->inverse, s->rhs, s->x, s->t, s->coarse, s->k, s->lanes};
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
     if (v->base) {
         add_outside(s, s->t);
@@ -96,71 +119,105 @@ static void cycle(spread_system *s, int which, double *z, const double *r, doubl
     }
     add_outside(s, s->rhs);
     uz_level_take_step(&step, UZ_STEP_SWEEP_UP);
-    for (int64_t i = 0; i < n; i++)
-        z[i] = (double)s->x[i] * unit;
+    for (int64_t i = 0; i < fours(s); i++) {
+        const double by = isinf(unit[lane_of(s, i)]) ? NAN : unit[lane_of(s, i)];
+        for (int64_t q = 4 * i; q < 4 * i + 4; q++)
+            z[q] = (double)s->x[q] * by;
+    }
 }
 
 void system_precondition(spread_system *s, int which, double *z, const double *r)
 {
-    cycle(s, which, z, r, unit_of(s, r));
+    double unit[LANES];
+    s->lanes = 1;
+    find_units(s, unit, r);
+    cycle(s, which, z, r, unit);
 }
 
-static double dot(const spread_system *s, const double *x, const double *y)
+static void dot(const spread_system *s, double sum[LANES], const double *x, const double *y)
 {
-    double sum = 0.0;
-    for (int64_t i = 0; i < 4 * s->near.here; i++)
-        sum += x[i] * y[i];
-    MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
-    return sum;
+    memset(sum, 0, LANES * sizeof *sum);
+    for (int64_t i = 0; i < fours(s); i++) {
+        const double *a = x + 4 * i, *b = y + 4 * i;
+        sum[lane_of(s, i)] += (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]);
+    }
+    MPI_Allreduce(MPI_IN_PLACE, sum, LANES, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
 }
 
 /* y = K x, or K_FF x. */
 static void multiply(spread_system *s, int which, double *y, double *x)
 {
     const int64_t here = s->near.here;
+    const int width = 4 * s->lanes;
     const float *inverse = s->variant[which].inverse;
-    neighbours_fetch(&s->near, x + 4 * here, x, 4 * sizeof *x);
-    uz_blocks_multiply(y, &s->level.A, x);
+    neighbours_fetch(&s->near, x + width * here, x, (size_t)width * sizeof *x);
+    uz_blocks_multiply(y, &s->level.A, x, s->lanes);
     for (int64_t i = 0; i < here; i++)
-        for (int c = 0; c < 4; c++)
-            if (c >= s->b || !(inverse[i * s->b + c] > 0.0F))
-                y[4 * i + c] = 0.0;
+        for (int q = 0; q < width; q++)
+            if (q % 4 >= s->b || !(inverse[i * s->b + q % 4] > 0.0F))
+                y[width * i + q] = 0.0;
 }
 
-double system_begin(spread_system *s, int which, bool u_is_zero)
+void system_begin(spread_system *s, int which, bool u_is_zero)
 {
-    const int64_t n = 4 * s->near.here;
     if (!u_is_zero)
         multiply(s, which, s->q, s->u);
-    for (int64_t i = 0; i < n; i++)
+    for (int64_t i = 0; i < 4 * fours(s); i++)
         s->r[i] = s->f[i] - (u_is_zero ? 0.0 : s->q[i]);
-    s->unit = unit_of(s, s->r);
+    find_units(s, s->unit, s->r);
     cycle(s, which, s->z, s->r, s->unit);
-    memcpy(s->p, s->z, (size_t)n * sizeof *s->p);
-    return dot(s, s->r, s->z);
+    memcpy(s->p, s->z, 4 * (size_t)fours(s) * sizeof *s->p);
+    dot(s, s->square, s->r, s->z);
 }
 
-int system_steps(spread_system *s, int which, double *square, bool *flat, int most, double goal2)
+double system_square(const spread_system *s)
 {
-    const int64_t n = 4 * s->near.here;
+    return s->lanes == 1 || s->square[0] > s->square[1] || isnan(s->square[0]) ? s->square[0] : s->square[1];
+}
+
+/* *moves: the next step is one; not where rounding has nothing more to gain. */
+static void find_lengths(const spread_system *s, double alpha[LANES], bool *moves, bool *flat)
+{
+    double curvature[LANES];
+    dot(s, curvature, s->p, s->q);
+    *moves = *flat = false;
+    for (int l = 0; l < s->lanes; l++) {
+        const bool gains = !(fabs(curvature[l]) < DBL_MIN); /* underflow */
+        *flat = *flat || (gains && !(curvature[l] > 0.0));
+        *moves = *moves || gains;
+        alpha[l] = gains ? s->square[l] / curvature[l] : 0.0;
+    }
+}
+
+int system_steps(spread_system *s, int which, bool *flat, int most, double goal2)
+{
     int made = 0;
     *flat = false;
-    while (made<most && * square> goal2) {
+    while (made < most && system_square(s) > goal2) {
+        double alpha[LANES], beta[LANES] = {0};
+        bool moves;
         multiply(s, which, s->q, s->p);
-        const double curvature = dot(s, s->p, s->q), last = *square, alpha = last / curvature;
-        if (fabs(curvature) < DBL_MIN) /* underflow: there is no more to gain */
+        find_lengths(s, alpha, &moves, flat);
+        if (*flat || !moves)
             break;
-        *flat = !(curvature > 0.0);
-        if (*flat)
-            break;
-        for (int64_t i = 0; i < n; i++) {
-            s->u[i] += alpha * s->p[i];
-            s->r[i] -= alpha * s->q[i];
+        for (int64_t i = 0; i < fours(s); i++) {
+            const double length = alpha[lane_of(s, i)];
+            for (int64_t q = 4 * i; q < 4 * i + 4; q++) {
+                s->u[q] += length * s->p[q];
+                s->r[q] -= length * s->q[q];
+            }
         }
+        for (int l = 0; l < s->lanes; l++)
+            beta[l] = s->square[l];
         cycle(s, which, s->z, s->r, s->unit);
-        *square = dot(s, s->r, s->z);
-        for (int64_t i = 0; i < n; i++)
-            s->p[i] = s->z[i] + *square / last * s->p[i];
+        dot(s, s->square, s->r, s->z);
+        for (int l = 0; l < s->lanes; l++)
+            beta[l] = beta[l] > 0.0 ? s->square[l] / beta[l] : 0.0;
+        for (int64_t i = 0; i < fours(s); i++) {
+            const double kept = beta[lane_of(s, i)];
+            for (int64_t q = 4 * i; q < 4 * i + 4; q++)
+                s->p[q] = s->z[q] + kept * s->p[q];
+        }
         made++;
     }
     return made;

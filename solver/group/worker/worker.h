@@ -2,7 +2,8 @@
  * conjugate gradients with it. All functions are collective, but for those that say so; what goes wrong ends the group.
  *
  * Vectors have four numbers for each node, the surplus ones 0, first those of this process's nodes and then those of
- * its ghosts: nodes of others that its own ones are coupled with. */
+ * its ghosts: nodes of others that its own ones are coupled with. Where two systems are solved at once, in two lanes,
+ * a node has eight, those of the first lane first. */
 #ifndef UZ_GROUP_WORKER_H
 #define UZ_GROUP_WORKER_H
 
@@ -37,17 +38,17 @@ void neighbours_free(neighbours *n);
 typedef struct {
     bool divided; /* false: there is nothing to divide, and the rest is empty */
     int size;
-    int64_t begin, end;   /* its nodes */
-    int *count, *first;   /* size: numbers of each process in a vector of the level */
-    uz_level level;       /* own nodes among each other; the prolongation is that of the whole level */
-    int64_t *outside_ptr; /* end - begin + 1: blocks that couple them with others' nodes, */
-    int32_t *outside_idx; /* which, */
-    float *outside, *sum; /* the blocks, and their absolute sums, b for each node */
+    int64_t begin, end;       /* its nodes */
+    int *count[2], *first[2]; /* size each: numbers of each process in a vector of the level, of one lane and of two */
+    uz_level level;           /* own nodes among each other; the prolongation is that of the whole level */
+    int64_t *outside_ptr;     /* end - begin + 1: blocks that couple them with others' nodes, */
+    int32_t *outside_idx;     /* which, */
+    float *outside, *sum;     /* the blocks, and their absolute sums, b for each node */
 } shared_level;
 void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid_room *room, const neighbours *near);
 void shared_clear(shared_level *own);
 /* z = M^-1 z, vectors of the level as uz_level_step has them. */
-void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigrid_room *room, float *z);
+void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigrid_room *room, float *z, int lanes);
 
 /* What is coarser than the finest level, each process has whole. */
 typedef struct {
@@ -58,6 +59,7 @@ typedef struct {
 } variant;
 
 enum { VARIANT_WHOLE, VARIANT_HELD, VARIANTS };
+enum { LANES = UZ_LANES_MOST };
 
 typedef struct {
     neighbours near;
@@ -72,11 +74,14 @@ typedef struct {
     uz_blocks next; /* the next matrix */
     float *modes;   /* next.nodes x k x k: of that */
     variant variant[VARIANTS];
+    int lanes; /* of the solve at hand: 1 or LANES */
     float *rhs, *x, *t, *coarse;
+    float *alone;                  /* here x 8: x and t of one lane of two */
     double *coarse_r, *coarse_z;   /* next.nodes x k */
     double *u, *f, *r, *z, *p, *q; /* vectors */
     double most;                   /* a bound on lambda_max(diag(K)^-1 M) */
-    double unit;                   /* of the residual that a solve began with */
+    double unit[LANES];            /* of the residual that a solve began with */
+    double square[LANES];          /* r'z */
 } spread_system;
 
 /* Rows of the own nodes: a node's blocks are those of others' nodes, of own ones before it, and its own, columns
@@ -97,12 +102,14 @@ void system_free(spread_system *s);
 int64_t system_bytes(const spread_system *s, int which); /* of this process */
 int system_levels(const spread_system *s, int which);
 
-/* z = M^-1 r: one V-cycle. */
+/* z = M^-1 r: one V-cycle. One lane. */
 void system_precondition(spread_system *s, int which, double *z, const double *r);
-/* From u and f: r = f - K u, z = M^-1 r, p = z; the square r'z. u_is_zero: as is K u then. */
-double system_begin(spread_system *s, int which, bool u_is_zero);
-/* Steps of conjugate gradients until *square <= goal2; how many. *flat: the last one was not made, as p'K p was not
+/* From u and f, of so many lanes: r = f - K u, z = M^-1 r, p = z. u_is_zero: as is K u then. */
+void system_begin(spread_system *s, int which, bool u_is_zero);
+/* r'z, of the worse lane. */
+double system_square(const spread_system *s);
+/* Steps of conjugate gradients until that is <= goal2; how many. *flat: the last one was not made, as p'K p was not
  * positive. */
-int system_steps(spread_system *s, int which, double *square, bool *flat, int most, double goal2);
+int system_steps(spread_system *s, int which, bool *flat, int most, double goal2);
 
 #endif
