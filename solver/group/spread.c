@@ -269,13 +269,28 @@ static void copy_entries(double *at, int64_t width, const uz_spread *map, const 
         }
 }
 
-/* Column by column of the earlier node, in each of which the rows of the later one stand together. False: they do
- * not. */
-static bool copy_columns(double *at, int64_t width, const uz_csc *K, const dofs *row, const dofs *column)
+/* Where in the column of a node's first dof the rows of another begin. As a rule they are the next that are read there,
+ * since nodes come in the order of their dofs. */
+static int64_t find_rows(uz_spread_rows *rows, const dofs *later, const dofs *earlier, int64_t number)
 {
+    const uz_csc *K = rows->K;
+    int64_t k = K->ptr[earlier->first] + rows->read[number];
+    if (k >= K->ptr[earlier->first + 1] || K->idx[k] != later->first)
+        k = uz_csc_find(K, later->first, earlier->first);
+    if (k >= 0)
+        rows->read[number] = (int32_t)(k + later->count - K->ptr[earlier->first]);
+    return k - K->ptr[earlier->first];
+}
+
+/* Column by column of the earlier node, in each of which the rows of the later one stand together. False: they do
+ * not. i, j: numbers of both. */
+static bool copy_columns(double *at, int64_t width, uz_spread_rows *rows, const dofs *row, const dofs *column,
+                         int64_t i, int64_t j)
+{
+    const uz_csc *K = rows->K;
     const bool below = row->first > column->first;
     const dofs *later = below ? row : column, *earlier = below ? column : row;
-    const int64_t there = uz_csc_find(K, later->first, earlier->first) - K->ptr[earlier->first];
+    const int64_t there = find_rows(rows, later, earlier, below ? j : i);
     for (int64_t c = 0; c < earlier->count; c++) {
         const int64_t k = K->ptr[earlier->first + c] + there - c, last = k + later->count - 1;
         if (there < c || last >= K->ptr[earlier->first + c + 1] || K->idx[k] != later->first ||
@@ -318,7 +333,7 @@ static void make_rows(uz_spread_rows *rows, const uz_spread *map, int64_t i)
     for (int32_t k = 0; k < count; k++) {
         const dofs other = dofs_of(map, columns[k]);
         if (k == diagonal || !own.in_a_row || !other.in_a_row ||
-            !copy_columns(values + k * bs, width, rows->K, &own, &other))
+            !copy_columns(values + k * bs, width, rows, &own, &other, i, columns[k]))
             copy_entries(values + k * bs, width, map, rows->K, i, columns[k]);
     }
     fill_diagonal(values + diagonal * bs, width, bs);
@@ -349,7 +364,9 @@ uz_status uz_spread_begin(uz_spread_rows *rows, const uz_spread *map, const uz_c
     rows->columns = uz_alloc(room, sizeof *rows->columns);
     rows->values = uz_alloc(room * size, sizeof *rows->values);
     rows->modes = uz_alloc(room * map->bs * map->modes, sizeof *rows->modes);
-    return rows->counts && rows->columns && rows->values && rows->modes ? UZ_OK : fail_memory(err, map->d);
+    rows->read = uz_alloc_zero(map->nodes, sizeof *rows->read);
+    return rows->read && rows->counts && rows->columns && rows->values && rows->modes ? UZ_OK
+                                                                                      : fail_memory(err, map->d);
 }
 
 bool uz_spread_next(uz_spread_rows *rows, const uz_spread *map)
@@ -362,7 +379,7 @@ bool uz_spread_next(uz_spread_rows *rows, const uz_spread *map)
 
 void uz_spread_rows_clear(uz_spread_rows *rows)
 {
-    void *own[] = {rows->counts, rows->columns, rows->values, rows->modes};
+    void *own[] = {rows->counts, rows->columns, rows->values, rows->modes, rows->read};
     for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
         free(own[k]);
     memset(rows, 0, sizeof *rows);

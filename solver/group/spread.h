@@ -41,6 +41,7 @@ typedef struct {
     int32_t *columns;      /* blocks: and their columns, ascending */
     double *values;        /* blocks x bs x bs: row by row of the matrix */
     float *modes;          /* nodes x bs x modes */
+    int32_t *read;         /* of all nodes: entries of the column of its first dof up to the last one that was read */
     int64_t at, end, room; /* nodes in map->order that come next, and the one after the last; blocks at once */
     const uz_csc *K;
     const uz_modes *from;
