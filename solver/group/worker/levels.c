@@ -148,15 +148,17 @@ static void bound_by_diagonal(spread_system *s)
     const int b = s->b;
     const int64_t here = s->near.here, size = (int64_t)b * b;
     double *row = new_zeros(here * b, sizeof *row), *column = new_zeros(here * b, sizeof *column);
+    double *inverse = new_zeros(here * b, sizeof *inverse);
     double most[3] = {0.0, 0.0, 1.0}; /* of a row, of a column, of D'/D */
+    for (int64_t i = 0; i < here * b; i++)
+        inverse[i] = sqrt(1.0 / A->diag[i / b * size + i % b * b + i % b]); /* which is about 1 */
     for (int64_t i = 0; i < here; i++)
         for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
             const int64_t j = e < A->ptr[i] ? i : A->idx[e];
             const double *block = e < A->ptr[i] ? A->diag + i * size : A->off + e * size;
             for (int r = 0; r < b; r++)
                 for (int c = 0; c < (j == i ? r : b); c++) {
-                    const double scaled = fabs(block[r * b + c]) / sqrt(A->diag[i * size + r * b + r]) /
-                                          sqrt(A->diag[j * size + c * b + c]);
+                    const double scaled = fabs(block[r * b + c]) * inverse[i * b + r] * inverse[j * b + c];
                     row[i * b + r] += scaled;
                     column[j * b + c] += scaled;
                 }
@@ -169,6 +171,7 @@ static void bound_by_diagonal(spread_system *s)
     }
     free(row);
     free(column);
+    free(inverse);
     MPI_Allreduce(MPI_IN_PLACE, most, 3, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
     const double root = sqrt(most[2]) + sqrt(most[0] * most[1]);
     s->most = root * root;
