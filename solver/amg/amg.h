@@ -140,7 +140,8 @@ typedef struct uz_cg_stop {
     double deadline;       /* uz_seconds() */
     bool begun;            /* cg->r is b - K x already, at free dofs; kinds that solve do not read it */
     bool unchecked; /* the caller looks at the residual himself: where the recurrence meets the tolerance, its own
-                       is told in `last` and cg->r, and the true one is not computed. Kinds that solve may */
+                       is told in `last` and cg->r, and the true one is not computed. Kinds that solve then leave cg->r
+                       as it is */
 } uz_cg_stop;
 
 typedef struct uz_cg_info {
