@@ -347,6 +347,74 @@ TEST(changes_are_solved_for_in_single_precision)
     close_pair(&p);
 }
 
+static void check_near(const float *x, const float *wanted, int64_t n, double tolerance)
+{
+    double off = 0.0, size = 0.0;
+    for (int64_t i = 0; i < n; i++) {
+        off = fmax(off, fabs((double)x[i] - (double)wanted[i]));
+        size = fmax(size, fabs((double)wanted[i]));
+    }
+    CHECK_MSG(off <= tolerance * size && size > 0.0, "off by %g of %g", off, size);
+}
+
+/* A cycle and a product of two vectors at once are those of each. */
+static void check_lanes(pair *p)
+{
+    const uz_aggregates *mg = (const uz_aggregates *)p->amg->mg;
+    const uz_blocks *A = &mg->level[0].A;
+    uz_multigrid_room *room = p->cg.room;
+    const int64_t nodes = A->nodes, n = 4 * nodes;
+    float *alone[2];
+    double *x = vector(2 * n), *y = vector(2 * n), *one = vector(n), *image = vector(n);
+    uz_error err = {0};
+    CHECK(p->amg->mg->levels > 1 && uz_room_for_lanes(room, p->amg->mg));
+    for (int l = 0; l < 2; l++) {
+        double *b = random_vector(nodes * A->b, (uint64_t)(7 + l));
+        alone[l] = malloc((size_t)n * sizeof *alone[l]);
+        memset(one, 0, (size_t)n * sizeof *one);
+        for (int64_t i = 0; i < nodes * A->b; i++) {
+            one[i / A->b * 4 + i % A->b] = b[i];
+            x[(i / A->b * 2 + l) * 4 + i % A->b] = b[i];
+        }
+        for (int64_t i = 0; i < n; i++)
+            room->b[0][i] = (float)one[i];
+        CHECK(uz_cycle_below(mg, room, 0, 1, &err) == UZ_OK);
+        memcpy(alone[l], room->x[0], (size_t)n * sizeof *alone[l]);
+        uz_blocks_multiply(image, A, one, 1);
+        for (int64_t i = 0; i < nodes * A->b; i++)
+            one[i] = image[i / A->b * 4 + i % A->b];
+        uz_blocks_multiply(y, A, x, 2); /* the second lane is 0 the first time */
+        for (int64_t i = 0; i < nodes * A->b; i++)
+            CHECK(fabs(y[(i / A->b * 2 + l) * 4 + i % A->b] - one[i]) <= 1e-12 * (1.0 + fabs(one[i])));
+        free(b);
+    }
+    for (int64_t i = 0; i < 2 * n; i++)
+        room->b[0][i] = (float)x[i];
+    CHECK(uz_cycle_below(mg, room, 0, 2, &err) == UZ_OK);
+    for (int l = 0; l < 2; l++) {
+        float *lane = malloc((size_t)n * sizeof *lane);
+        for (int64_t i = 0; i < n; i++)
+            lane[i] = room->x[0][(i / 4 * 2 + l) * 4 + i % 4];
+        check_near(lane, alone[l], n, 1e-5);
+        free(lane);
+        free(alone[l]);
+    }
+    free(x);
+    free(y);
+    free(one);
+    free(image);
+}
+
+TEST(two_lanes_are_two_cycles)
+{
+    pair plane = open_plane(paper_scene(120, 40), true),
+         solid = open_brick((const int64_t[]){12, 12, 12}, (const double[]){1, 1, 1}, 0.3);
+    check_lanes(&plane);
+    check_lanes(&solid);
+    close_pair(&plane);
+    close_pair(&solid);
+}
+
 TEST(bounds_end_near_the_least_ritz_value)
 {
     pair p = open_brick((const int64_t[]){10, 10, 10}, (const double[]){1, 1, 1}, 0.3);
