@@ -191,7 +191,9 @@ uz_status uz_amg_of_definite(uz_amg **out, uz_multigrid *mg, uz_error *err);
 /* Finds info.least by solves with K that are checked here, so that what is certified by it needs no word of the program
  * that holds M, whose kind has `solve`; and a guess at info.lambda, where there is none yet. UNSUPPORTED: the solves
  * are not those of K, or too rough. NOT_SPD: they show that K is not definite. */
-uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err);
+uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_hooks *hooks, uz_error *err);
+/* info.rounding, which uz_amg_probe is given: of K alone. */
+uz_status uz_amg_rounding(double *rounding, const uz_csc *K, uz_error *err);
 /* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD and
  * LIMIT as uz_amg_of. Aggregates of another kind are tried where the usual ones do badly: with patience where they
  * would have to be refused, or nearly, without it where they are slow. */

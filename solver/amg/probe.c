@@ -43,7 +43,7 @@ static double threshold(int trials)
 }
 
 /* The norm of D^-1/2 |K| D^-1/2, at most: its largest sum of a row; times what summing the longest row rounds. */
-static uz_status find_rounding(double *rounding, const uz_csc *K, uz_error *err)
+uz_status uz_amg_rounding(double *rounding, const uz_csc *K, uz_error *err)
 {
     double *sum = uz_alloc_zero(K->cols, sizeof *sum), *root = uz_alloc(K->cols, sizeof *root), most = 0.0;
     int64_t *count = uz_alloc_zero(K->cols, sizeof *count), longest = 0;
@@ -159,7 +159,7 @@ static uz_status fail_probes(double missed, uz_error *err)
                    missed);
 }
 
-uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_error *err)
+uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_hooks *hooks, uz_error *err)
 {
     const double start = uz_seconds();
     const int64_t n = K->cols;
@@ -173,9 +173,10 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, const uz_hooks *hooks, uz_e
                 .K = K,
                 .state = 0xD1B54A32D192ED03u};
     uz_status status = x.y && x.b && x.q && x.room
-                           ? find_rounding(&amg->info.rounding, K, err)
+                           ? UZ_OK
                            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)n);
     amg->info.least = 0.0;
+    amg->info.rounding = rounding;
     for (int k = PAIR; status == UZ_OK && k <= PROBES_MOST && !(amg->info.least > 0.0); k += PAIR) {
         const double t = threshold(k);
         double wide = INFINITY, left = INFINITY;

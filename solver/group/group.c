@@ -541,7 +541,6 @@ static uz_status begin_body(far_multigrid *body, double strong, uz_error *err)
     return begun ? UZ_OK : fail_lost(err);
 }
 
-/* All of it, until the group has made its multigrid. */
 static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes *modes, uz_error *err)
 {
     uz_process_group *group = body->group;
@@ -563,7 +562,7 @@ static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes 
         group->lost = true; /* it waits for the rest */
         return status;
     }
-    return !group->lost && hear_made(group, &body->base) ? UZ_OK : fail_lost(err);
+    return group->lost ? fail_lost(err) : UZ_OK;
 }
 
 uz_status uz_group_multigrid(uz_multigrid **out, uz_process_group *group, const uz_csc *K, const uz_modes *modes,
@@ -589,4 +588,13 @@ uz_status uz_group_multigrid(uz_multigrid **out, uz_process_group *group, const 
     else
         free_multigrid(&body->base);
     return status;
+}
+
+uz_status uz_group_await(uz_multigrid *mg, uz_error *err)
+{
+    far_multigrid *body = (far_multigrid *)mg;
+    pthread_mutex_lock(&body->group->mutex);
+    const bool made = hear_made(body->group, mg);
+    pthread_mutex_unlock(&body->group->mutex);
+    return made ? UZ_OK : fail_lost(err);
 }

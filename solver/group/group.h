@@ -8,9 +8,13 @@
 #include "amg/amg.h"
 #include "uzawa.h"
 
-/* Dofs that are held are those of the last one who held some: of one room at a time. Errors: NOT_SPD where the diagonal
- * shows it; UNSUPPORTED: too large; MEMORY; INTERNAL: the group was lost (uz_process_group_is_lost). */
+/* Returns when all of K was sent, while the group makes its levels; *out is to be awaited before anything else is done
+ * with it or the group. Dofs that are held are those of the last one who held some: of one room at a time. Errors:
+ * NOT_SPD where the diagonal shows it; UNSUPPORTED: too large; MEMORY; INTERNAL: the group was lost
+ * (uz_process_group_is_lost). */
 uz_status uz_group_multigrid(uz_multigrid **out, uz_process_group *group, const uz_csc *K, const uz_modes *modes,
                              uz_error *err);
+/* INTERNAL: the group was lost; mg may only be freed then. */
+uz_status uz_group_await(uz_multigrid *mg, uz_error *err);
 
 #endif

@@ -125,17 +125,25 @@ static uz_status spread(making *m, uz_modes *modes, uz_error *err)
     char why[256] = "this program has no group of processes to solve with";
     const bool may = m->hooks && m->hooks->group;
     uz_process_group *group = may ? m->hooks->group(m->hooks->ctx, why, sizeof why) : NULL;
-    uz_multigrid *mg;
+    uz_multigrid *mg = NULL;
+    double rounding = 0.0;
     uz_status status = group ? uz_group_multigrid(&mg, group, m->K, modes, err)
                              : uz_fail(err, UZ_ERR_UNSUPPORTED, "operator", "operator distributed: %s", why);
     uz_modes_clear(modes);
+    if (status == UZ_OK) {
+        status = uz_amg_rounding(&rounding, m->K, err); /* while the group is at work */
+        const uz_status awaited = uz_group_await(mg, status == UZ_OK ? err : NULL);
+        status = status == UZ_OK ? awaited : status;
+        if (status != UZ_OK)
+            uz_multigrid_free(mg);
+    }
     const double made = uz_seconds();
     if (status == UZ_OK)
         status = m->setup->is_scene ? uz_amg_of_definite(&m->setup->amg, mg, err)
                                     : uz_amg_of(&m->setup->amg, mg, m->K, 0, m->hooks, err);
     if (status == UZ_OK) {
         m->setup->amg->info.create_s = made - start;
-        status = uz_amg_probe(m->setup->amg, m->K, m->hooks, err);
+        status = uz_amg_probe(m->setup->amg, m->K, rounding, m->hooks, err);
     }
     return status;
 }

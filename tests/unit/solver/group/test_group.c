@@ -178,6 +178,7 @@ static void far_begin(far_body *b, double weak)
     uz_error err = {0};
     uz_modes modes;
     uz_multigrid *mg;
+    double rounding;
     qp_random rng = {5};
     memset(b, 0, sizeof *b);
     b->s = malloc(sizeof *b->s);
@@ -188,8 +189,10 @@ static void far_begin(far_body *b, double weak)
     CHECK(uz_modes_of_matrix(&modes, &b->qp.K, &err) == UZ_OK);
     CHECK(uz_group_multigrid(&mg, b->group, &b->qp.K, &modes, &err) == UZ_OK);
     uz_modes_clear(&modes);
+    CHECK(uz_amg_rounding(&rounding, &b->qp.K, &err) == UZ_OK && rounding > 0.0);
+    CHECK(uz_group_await(mg, &err) == UZ_OK);
     CHECK(uz_amg_of_definite(&b->amg, mg, &err) == UZ_OK);
-    CHECK_MSG(uz_amg_probe(b->amg, &b->qp.K, NULL, &err) == UZ_OK, "%s", err.message);
+    CHECK_MSG(uz_amg_probe(b->amg, &b->qp.K, rounding, NULL, &err) == UZ_OK, "%s", err.message);
     const uz_dual_source source = {.op = UZ_OPERATOR_DISTRIBUTED, .N = &b->no_rows, .amg = b->amg};
     CHECK(uz_dual_create(&b->dual, &source, NULL, &err) == UZ_OK);
     CHECK(uz_dual_load_create(&b->load, b->dual, &b->qp.K, b->qp.p, &b->none, &err) == UZ_OK);
