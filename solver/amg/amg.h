@@ -29,7 +29,9 @@ typedef struct {
     float *value;    /* n x count, row by row */
     double strong;   /* couplings weaker than this, relative to the diagonal, form no aggregates; coarser levels, whose
                         matrices are fuller, halve it each (Vanek, Mandel, Brezina 1996, (5.2)) */
-    const double *xyz; /* n_nodes x dim, the caller's: where they are; NULL: unknown */
+    const double *xyz;   /* n_nodes x dim, the caller's: where they are; NULL: unknown */
+    const int32_t *ends; /* n_nodes x 2, the caller's: the ends of the edge that a node is the middle of, or -1; NULL:
+                            there are no middles */
     int dim;
 } uz_modes;
 /* From the matrix alone: nodes are groups of dofs with the same neighbours, the modes move all dofs that have the same

@@ -329,8 +329,8 @@ uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int f
             level->off = room->own[l].off;
             level->diag = room->own[l].diag;
         }
-        at[l] =
-            (uz_level_step){level, level->inverse, room->b[l], room->x[l], room->t[l], room->b[l + 1], mg->k, lanes};
+        at[l] = (uz_level_step){level,      level->inverse, room->b[l],           room->x[l],
+                                room->t[l], room->b[l + 1], mg->level[l + 1].A.b, lanes};
         uz_level_take_step(&at[l], UZ_STEP_SWEEP_DOWN | UZ_STEP_RESTRICT);
     }
     for (int lane = 0; status == UZ_OK && lane < lanes; lane++)

@@ -120,6 +120,30 @@ uz_status uz_level_range(double *range, const uz_level *level, uz_error *err)
     return ok ? UZ_OK : fail_memory(n, err);
 }
 
+/* From a level whose prolongation is there. */
+static uz_status make_next(uz_level *level, const uz_below *below, int k, const uz_team *team, const uz_stop *stop,
+                           uz_error *err)
+{
+    uz_status status = uz_galerkin(&level[1].A, level, below, k, team, stop, err);
+    return status == UZ_OK ? uz_level_round(level + 1, err) : status;
+}
+
+/* To the corners of elements with middles: the next level is what elements without them would be, with a quarter to an
+ * eighth of the nodes and fewer blocks for each. Aggregates of all nodes take more steps there and more time to make.
+ */
+static uz_status coarsen_to_corners(uz_level *level, float **modes, const int32_t *ends, int dim, int k,
+                                    const uz_team *team, const uz_stop *stop, uz_error *err)
+{
+    uz_below below;
+    uz_status status = uz_below_init(&below, &level->A) ? UZ_OK : fail_memory(level->A.nodes * level->A.b, err);
+    if (status == UZ_OK)
+        status = uz_prolong_linear(level, modes, ends, dim, k, err);
+    if (status == UZ_OK)
+        status = make_next(level, &below, level->A.b, team, stop, err);
+    uz_below_clear(&below);
+    return status;
+}
+
 /* The prolongation of the level, the next matrix, and *modes, which become its own. *done: it can't be coarsened. */
 static uz_status coarsen(uz_level *level, bool *done, float **modes, double threshold, int k, const uz_team *team,
                          const uz_stop *stop, uz_error *err)
@@ -144,9 +168,7 @@ static uz_status coarsen(uz_level *level, bool *done, float **modes, double thre
         if (status == UZ_OK)
             status = uz_prolong_smoothed(level, &below, basis, aggregate, 4.0 / 3.0 / range, k, stop, err);
         if (status == UZ_OK)
-            status = uz_galerkin(&level[1].A, level, &below, k, team, stop, err);
-        if (status == UZ_OK)
-            status = uz_level_round(level + 1, err);
+            status = make_next(level, &below, k, team, stop, err);
         free(*modes);
         *modes = coarse;
     }
@@ -167,7 +189,7 @@ static size_t count_bytes(const uz_aggregates *mg)
         if (level->A.off)
             bytes += 8 * b * b * (nodes + blocks);
         if (level->ptr)
-            bytes += 8 * nodes + (size_t)level->ptr[nodes] * (4 + 4 * b * (size_t)mg->k);
+            bytes += 8 * nodes + (size_t)level->ptr[nodes] * (4 + 4 * b * (size_t)level[1].A.b);
     }
     return bytes + (mg->coarsest ? uz_factor_describe(mg->coarsest).bytes : 0);
 }
@@ -233,7 +255,7 @@ static uz_status factor_last(uz_aggregates *mg, const uz_csc *K, size_t memory_l
 /* The modes of level 0: those of S K S are S^-1 times K's, here times the least of S, so that none overflows. */
 static float *scale_modes(const uz_aggregates *mg, const uz_modes *modes)
 {
-    const int k = mg->k;
+    const int k = modes->count;
     float *scaled = uz_alloc_zero(mg->level[0].A.nodes * mg->level[0].A.b * k, sizeof *scaled);
     double least = INFINITY;
     for (int64_t j = 0; j < mg->base.n; j++)
@@ -245,6 +267,31 @@ static float *scale_modes(const uz_aggregates *mg, const uz_modes *modes)
     return scaled;
 }
 
+/* Ends by nodes of level 0, where that has much fewer corners than nodes; NULL: it has not, or *failed for memory. */
+static int32_t *find_ends(const uz_blocks *A, const int32_t *node_of_group, const uz_modes *modes, bool *failed)
+{
+    if (!modes->ends)
+        return NULL;
+    int32_t *ends = uz_alloc(2 * A->nodes, sizeof *ends);
+    int64_t middles = 0;
+    *failed = !ends;
+    for (int64_t i = 0; ends && i < 2 * A->nodes; i++)
+        ends[i] = -1;
+    for (int64_t g = 0; ends && g < modes->n_nodes; g++) {
+        const int32_t *of = modes->ends + 2 * g, node = node_of_group[g];
+        if (node < 0 || of[0] < 0)
+            continue;
+        /* an end without dofs does not move; a middle without such ends is a corner */
+        for (int side = 0; side < 2; side++)
+            ends[2 * node + side] = node_of_group[of[side]];
+        middles += ends[2 * node] >= 0 || ends[2 * node + 1] >= 0;
+    }
+    if (ends && (double)(A->nodes - middles) <= LEAST_GAIN * (double)A->nodes)
+        return ends;
+    free(ends);
+    return NULL;
+}
+
 static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes, const uz_team *team,
                        size_t memory_limit, const uz_stop *stop, uz_error *err)
 {
@@ -253,7 +300,12 @@ static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes
     bool done = false;
     uz_status status =
         node_of_group ? uz_blocks_of_matrix(mg, node_of_group, K, modes, team == NULL, err) : fail_memory(K->cols, err);
+    bool no_memory = false;
+    int32_t *ends = status == UZ_OK ? find_ends(&mg->level[0].A, node_of_group, modes, &no_memory) : NULL;
+    const int first = ends ? 1 : 0; /* level with aggregates */
     free(node_of_group);
+    if (no_memory)
+        status = fail_memory(K->cols, err);
     if (status == UZ_OK)
         status = uz_level_round(&mg->level[0], err);
     if (status == UZ_OK && !(of_level = scale_modes(mg, modes)))
@@ -264,14 +316,19 @@ static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes
         done = l + 1 == UZ_LEVELS_MOST || (l > 0 && level->A.nodes * level->A.b <= COARSEST);
         if (done)
             break;
-        status = uz_stop_is_due(stop)
-                     ? uz_fail_stopped(err)
-                     : coarsen(level, &done, &of_level, modes->strong * ldexp(1.0, -l), mg->k, team, stop, err);
+        if (uz_stop_is_due(stop))
+            status = uz_fail_stopped(err);
+        else if (l < first)
+            status = coarsen_to_corners(level, &of_level, ends, modes->dim, modes->count, team, stop, err);
+        else
+            status =
+                coarsen(level, &done, &of_level, modes->strong * ldexp(1.0, first - l), modes->count, team, stop, err);
         mg->base.levels += level[1].A.ptr != NULL && level[1].inverse != NULL;
         if (status == UZ_OK && memory_limit > 0 && count_bytes(mg) > memory_limit)
             status = uz_fail(err, UZ_ERR_LIMIT, "K", "the levels of the multigrid take more than the %zu bytes allowed",
                              memory_limit);
     }
+    free(ends);
     free(of_level);
     return status;
 }
@@ -287,7 +344,6 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
     uz_aggregates *mg = uz_alloc_zero(1, sizeof *mg);
     if (!mg)
         return fail_memory(n, err);
-    mg->k = modes->count;
     mg->base = (uz_multigrid){.kind = &uz_aggregates_kind, .n = n, .levels = 1};
     uz_status status = n > ALONE ? build(mg, K, modes, team, memory_limit, stop, err) : UZ_OK;
     if (status == UZ_OK)

@@ -36,9 +36,10 @@ bool uz_below_init(uz_below *below, const uz_blocks *A); /* false: no memory; cl
 void uz_below_clear(uz_below *below);
 
 /* One level and the way to the next, coarser one. A coarse level has a node for each aggregate of the finer one, with a
- * dof for each mode; where an aggregate has fewer independent modes, those left over are 0 everywhere. Dofs that are
- * not there have rows of zeros. Sweeps are made in single precision: the cycle is positive definite whatever their
- * rounding is, as it is that of the rounded matrices. */
+ * dof for each mode, or for each corner of elements with middles, with its own dofs; where an aggregate has fewer
+ * independent modes, those left over are 0 everywhere. Dofs that are not there have rows of zeros. Sweeps are made in
+ * single precision: the cycle is positive definite whatever their rounding is, as it is that of the rounded matrices.
+ */
 typedef struct {
     uz_blocks A; /* level 0: kept for products, the last one for what holding dofs takes from it; else without numbers,
                   * once the next level is made */
@@ -55,7 +56,6 @@ enum { UZ_LEVELS_MOST = 24 };
 /* Multigrid on smoothed aggregates. Level 0 is S K S with powers of two that make its diagonal about 1. */
 typedef struct {
     uz_multigrid base;
-    int k;
     int shift;
     int64_t *slot;                  /* n: where each dof stands in vectors of level 0: node x 2^shift + place */
     double *scale;                  /* n: S */
@@ -156,6 +156,9 @@ uz_status uz_tentative(float *basis, float *coarse, const float *modes, const in
 /* Fills the prolongation (I - omega D^-1 A) basis of the level. */
 uz_status uz_prolong_smoothed(uz_level *level, const uz_below *below, const float *basis, const int32_t *aggregate,
                               double omega, int k, const uz_stop *stop, uz_error *err);
+/* Fills a prolongation to the nodes that are no middles, linear along edges, and *modes (nodes x b x k), which become
+ * theirs. ends (nodes x 2): uz_modes; the ends of a middle are no middles. */
+uz_status uz_prolong_linear(uz_level *level, float **modes, const int32_t *ends, int dim, int k, uz_error *err);
 /* off, diag and inverse of the level, from A in double precision. NOT_SPD where a diagonal entry is negative. */
 uz_status uz_level_round(uz_level *level, uz_error *err);
 /* *range: lambda_max(D^-1 A), a little too large: powers reach it within some per cent from below. */

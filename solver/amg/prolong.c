@@ -281,3 +281,67 @@ uz_status uz_prolong_smoothed(uz_level *level, const uz_below *below, const floa
         return uz_fail_stopped(err);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld nodes", (long long)nodes);
 }
+
+/* ---------------------------------------------------------- to corners, linear */
+
+/* to (b x b) = share of the displacement of node j in that of node i. Their dofs are along directions that the first
+ * dim modes tell, translations, and in units of their own: a unit of dof c moves the node by 1 / |modes of c|. */
+static void add_share(float *to, const float *modes, int64_t i, int64_t j, double share, int b, int dim, int k)
+{
+    for (int r = 0; r < b; r++)
+        for (int c = 0; c < b; c++) {
+            const float *row = modes + (i * b + r) * k, *column = modes + (j * b + c) * k;
+            double across = 0.0, own = 0.0;
+            for (int m = 0; m < dim; m++) {
+                across += (double)row[m] * (double)column[m];
+                own += (double)column[m] * (double)column[m];
+            }
+            to[r * b + c] = own > 0.0 ? (float)(share * (across / own)) : 0.0F;
+        }
+}
+
+uz_status uz_prolong_linear(uz_level *level, float **modes, const int32_t *ends, int dim, int k, uz_error *err)
+{
+    const int b = level->A.b;
+    const int64_t nodes = level->A.nodes, size = (int64_t)b * b;
+    int32_t *corner = uz_alloc(nodes, sizeof *corner);
+    int64_t count = 0;
+    level->ptr = uz_alloc_zero(nodes + 1, sizeof *level->ptr);
+    for (int64_t i = 0; corner && level->ptr && i < nodes; i++) {
+        const int32_t *of = ends + 2 * i;
+        const bool middle = of[0] >= 0 || of[1] >= 0;
+        corner[i] = middle ? -1 : (int32_t)level->aggregates++;
+        count += middle ? (of[0] >= 0) + (of[1] >= 0) : 1;
+        level->ptr[i + 1] = count;
+    }
+    level->block = uz_alloc(count, sizeof *level->block);
+    level->value = uz_alloc_zero(count * size + 8, sizeof *level->value);
+    float *coarse = uz_alloc(level->aggregates * b * k, sizeof *coarse);
+    const bool ok = corner && level->ptr && level->block && level->value && coarse;
+    for (int64_t i = 0; ok && i < nodes; i++) {
+        int64_t at = level->ptr[i];
+        if (corner[i] >= 0) {
+            level->block[at] = corner[i];
+            for (int r = 0; r < b; r++)
+                level->value[at * size + r * b + r] = level->inverse[i * b + r] > 0.0F ? 1.0F : 0.0F;
+            memcpy(coarse + (int64_t)corner[i] * b * k, *modes + i * b * k, (size_t)(b * k) * sizeof *coarse);
+            continue;
+        }
+        const int32_t *of = ends + 2 * i, turned = of[0] > of[1] ? 1 : 0; /* corners are numbered as nodes are */
+        for (int side = 0; side < 2; side++) {
+            const int32_t j = of[side ^ turned];
+            if (j < 0)
+                continue;
+            level->block[at] = corner[j];
+            add_share(level->value + at++ * size, *modes, i, j, 0.5, b, dim, k);
+        }
+    }
+    free(corner);
+    if (ok) {
+        free(*modes);
+        *modes = coarse;
+    } else {
+        free(coarse);
+    }
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld nodes", (long long)nodes);
+}

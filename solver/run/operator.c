@@ -2,6 +2,7 @@
 #include "run/setup.h"
 #include "brick/brick.h"
 #include "dual/form.h"
+#include "element/element_type.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -79,6 +80,28 @@ static uz_status find_modes(uz_modes *modes, const uz_setup *setup, const uz_csc
     return status;
 }
 
+/* The ends of the edges that nodes are the middles of, as uz_modes has them; *out NULL where no element has middles. */
+static uz_status find_ends(int32_t **out, const uz_mesh *mesh, uz_error *err)
+{
+    int32_t *ends = NULL;
+    *out = NULL;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        const int64_t *node = mesh->node + mesh->first[e];
+        if (type->nodes == type->corners)
+            continue;
+        if (!ends && !(ends = uz_alloc(2 * mesh->n_nodes, sizeof *ends)))
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the edges of %lld nodes", (long long)mesh->n_nodes);
+        for (int64_t i = 0; !*out && i < 2 * mesh->n_nodes; i++)
+            ends[i] = -1;
+        *out = ends;
+        for (int m = type->corners; m < type->nodes; m++)
+            for (int side = 0; side < 2; side++)
+                ends[2 * node[m] + side] = (int32_t)node[type->edge[m - type->corners][side]];
+    }
+    return UZ_OK;
+}
+
 /* What the operator is made of. */
 typedef struct {
     uz_setup *setup;
@@ -148,6 +171,20 @@ static uz_status spread(making *m, uz_modes *modes, uz_error *err)
     return status;
 }
 
+/* A multigrid that is here. */
+static uz_status aggregate(making *m, uz_modes *modes, size_t budget, int patience, uz_error *err)
+{
+    int32_t *ends = NULL;
+    const uz_status status = m->setup->is_scene ? find_ends(&ends, &m->setup->model.mesh, err) : UZ_OK;
+    modes->ends = ends;
+    if (status != UZ_OK)
+        uz_modes_clear(modes);
+    const uz_status made =
+        status == UZ_OK ? uz_amg_create(&m->setup->amg, m->K, modes, budget, patience, m->hooks, err) : status;
+    free(ends);
+    return made;
+}
+
 /* A multigrid in the factor's place, and what it may take so that the whole stays within the limit. *regretted: nothing
  * was made, as the plan took matrix_free for its price only, and the matrix is one of those that it is not cheap for,
  * or that tell more to a factorization. */
@@ -172,8 +209,7 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
         if (status == UZ_OK && plan->form[plan->chosen].op == UZ_OPERATOR_DISTRIBUTED)
             status = spread(m, &modes, err);
         else if (status == UZ_OK)
-            status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget,
-                                   choice ? uz_cost_patience(plan, &m->size) : 0, m->hooks, err);
+            status = aggregate(m, &modes, (size_t)budget, choice ? uz_cost_patience(plan, &m->size) : 0, err);
     }
     if (status == UZ_OK)
         status = make_dual(m, plan->form[plan->chosen].op, err);

@@ -156,19 +156,18 @@ void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigri
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
     const uz_level *level = &mg->level[0];
-    const int b = level->A.b, width = uz_width(b);
+    const int b = level->A.b, width = uz_width(b), k = mg->level[1].A.b;
     const int64_t from = own->begin * lanes * width, fours = level->A.nodes * lanes;
     uz_error err = {0};
     for (int64_t i = 0; i < fours; i++) /* dofs are numbered as they stand there */
         for (int r = 0; r < b; r++)
             room->b[0][i * width + r] = (float)mg->scale[i / lanes * b + r] * z[i * width + r];
     uz_level_step step = {
-        &own->level, own->level.inverse, room->b[0] + from, room->x[0] + from, room->t[0] + from, room->b[1], mg->k,
-        lanes};
+        &own->level, own->level.inverse, room->b[0] + from, room->x[0] + from, room->t[0] + from, room->b[1], k, lanes};
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
     meet(own, room->x[0], room->t[0] + from, lanes);
     uz_level_take_step(&step, UZ_STEP_RESTRICT);
-    MPI_Allreduce(MPI_IN_PLACE, room->b[1], (int)(level->aggregates * lanes * uz_width(mg->k)), MPI_FLOAT, MPI_SUM,
+    MPI_Allreduce(MPI_IN_PLACE, room->b[1], (int)(level->aggregates * lanes * uz_width(k)), MPI_FLOAT, MPI_SUM,
                   MPI_COMM_WORLD);
     if (uz_cycle_below(mg, room, 1, lanes, &err) != UZ_OK)
         end_group(err.message);

@@ -4,6 +4,7 @@
 #include "factor_fixture.h"
 #include "harness.h"
 #include "amg/multigrid_private.h"
+#include "element/element_type.h"
 #include "dual/form.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -493,18 +494,24 @@ TEST(solid_bodies)
     close_pair(&p);
 }
 
-/* A cube of tetrahedra, or a body that is as much longer along y. */
-static uz_body_model build_tetrahedra(double length)
+static uz_body_model build_solid(const char *element, int64_t cells, double length)
 {
     static uz_material material = {.on = "all", .young = 1, .poisson = 0.3};
     static uz_support support = {.on = "left"};
     uz_scene scene = {.model = UZ_SOLID,
-                      .box = {.size = {1, length, 1}, .cells = {12, 12, 12}, .element = "tet4", .dim = 3},
+                      .box = {.size = {1, length, 1}, .cells = {cells, cells, cells}, .dim = 3},
                       .materials = &material,
                       .n_materials = 1,
                       .supports = &support,
                       .n_supports = 1};
+    snprintf(scene.box.element, sizeof scene.box.element, "%s", element);
     return build_body(&scene);
+}
+
+/* A cube of tetrahedra, or a body that is as much longer along y. */
+static uz_body_model build_tetrahedra(double length)
+{
+    return build_solid("tet4", 12, length);
 }
 
 /* Within the patience of who has another way. */
@@ -540,6 +547,77 @@ TEST(stretched_tetrahedra)
     CHECK_MSG(amg->info.lambda > 0.05, "%g", amg->info.lambda);
     uz_amg_free(amg);
     uz_body_model_clear(&model);
+}
+
+/* The ends of edges with middles. */
+static int32_t *ends_of(const uz_mesh *mesh)
+{
+    int32_t *ends = malloc(2 * (size_t)mesh->n_nodes * sizeof *ends);
+    for (int64_t i = 0; i < 2 * mesh->n_nodes; i++)
+        ends[i] = -1;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        const int64_t *node = mesh->node + mesh->first[e];
+        for (int m = type->corners; m < type->nodes; m++)
+            for (int side = 0; side < 2; side++)
+                ends[2 * node[m] + side] = (int32_t)node[type->edge[m - type->corners][side]];
+    }
+    return ends;
+}
+
+/* The sum of the squares of all entries off the diagonal, relative to that, does not depend on units. */
+static double strength_of(const uz_csc *K)
+{
+    double sum = 0.0;
+    for (int64_t j = 0; j < K->cols; j++)
+        for (int64_t q = K->ptr[j] + 1; q < K->ptr[j + 1]; q++)
+            sum += K->val[q] * K->val[q] / K->val[K->ptr[j]] / K->val[K->ptr[K->idx[q]]];
+    return sum;
+}
+
+static void check_corners(const uz_level *level, const uz_csc *K)
+{
+    uz_csc columns = {0};
+    uz_error err = {0};
+    uz_blocks A = level->A;
+    const int64_t off = 9 * A.ptr[A.nodes], diag = 9 * A.nodes;
+    CHECK_INT(A.b, 3);
+    CHECK_INT(3 * A.nodes, K->cols);
+    A.off = vector(off);
+    A.diag = vector(diag);
+    for (int64_t e = 0; e < off; e++)
+        A.off[e] = (double)level->off[e];
+    for (int64_t e = 0; e < diag; e++)
+        A.diag[e] = (double)level->diag[e];
+    CHECK(uz_blocks_to_columns(&columns, &A, level->inverse, &err) == UZ_OK);
+    CHECK_REL(strength_of(&columns), strength_of(K), 1e-5);
+    uz_csc_clear(&columns);
+    free(A.off);
+    free(A.diag);
+}
+
+/* Of tet10 K on the corners is that of tet4, to rounding. Then fewer steps do than with aggregates of all nodes. */
+TEST(quadratic_elements_go_to_their_corners)
+{
+    uz_body_model model = build_solid("tet10", 8, 1), linear = build_solid("tet4", 8, 1);
+    int32_t *ends = ends_of(&model.mesh);
+    int64_t steps[2];
+    for (int known = 0; known < 2; known++) {
+        uz_modes modes;
+        uz_amg *amg = NULL;
+        uz_error err = {0};
+        CHECK(uz_modes_of_body(&modes, model.info.xyz, model.dof, model.mesh.n_nodes, 3, model.d, &err) == UZ_OK);
+        modes.ends = known ? ends : NULL;
+        CHECK_MSG(uz_amg_create(&amg, &model.K, &modes, 0, 0, NULL, &err) == UZ_OK, "%s", err.message);
+        steps[known] = amg->info.iterations;
+        if (known)
+            check_corners(&((const uz_aggregates *)amg->mg)->level[1], &linear.K);
+        uz_amg_free(amg);
+    }
+    CHECK_MSG(5 * steps[1] < 4 * steps[0], "%lld steps, %lld without", (long long)steps[1], (long long)steps[0]);
+    free(ends);
+    uz_body_model_clear(&model);
+    uz_body_model_clear(&linear);
 }
 
 TEST(modes_of_a_free_body_meet_no_resistance)
