@@ -294,8 +294,8 @@ static quad add_forces(body *b)
                 }
         }
         for (int k = 0; k < grid; k++) {
-            const quad place[3] = {(quad)(k % GRID) / 2 - 1, (quad)(k / GRID % GRID) / 2 - 1,
-                                   (quad)(k / GRID / GRID) / 2 - 1};
+            const int along[3] = {k % GRID, k / GRID % GRID, k / (GRID * GRID)};
+            const quad place[3] = {(quad)along[0] / 2 - 1, (quad)along[1] / 2 - 1, (quad)along[2] / 2 - 1};
             deform(&x, b, e, place);
             const quad J = piola(P, b, x.F);
             least = J < least ? J : least;
