@@ -9,6 +9,7 @@
  * "Numerical Optimization", ch. 18). A K that is not positive definite gets stiffness along the pressed rows added,
  * which changes nothing where they stay closed, and where that is not enough that of the undeformed body, which costs
  * steps; along a path from another case the part is given up there, as the equilibrium beyond may be another one.
+ * Where all supports move alike, the body is carried along before the first one.
  * After a large step K first has the stress that the step was made for (finite_element.c), which takes half of
  * the steps where slender parts turn; where it is not positive definite with that the body's own comes next. Steps are
  * shortened until no element turns inside out and the potential energy, with a penalty on negative gaps that exceeds
@@ -54,6 +55,8 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4, MOST_
 #define NEAR 1e-2
 /* Steps that are more than this in the energy's norm may turn slender parts. */
 #define LARGE_STEP 0.3
+/* Ways of supports that differ by less than this part of the body's extent are the same. */
+#define CARRIED 1e-12
 /* Along a path: how far its end may be from where the first tangent leads to, in ways there. */
 #define MOST_LEAP 1.0
 
@@ -568,6 +571,61 @@ static bool leaps(const uz_finite_run *run, const double *begun, const double *l
     return off > MOST_LEAP * MOST_LEAP * way + run->base.mesh.extent * run->base.mesh.extent * 1e-16;
 }
 
+/* The axis that a node's dof is along, or against it (*sign); -1: none. */
+static int axis_of(double *sign, const uz_body_model *model, int64_t node, int c)
+{
+    const int dim = model->mesh.dim;
+    const double *frame = uz_node_frame(model, node);
+    int axis = frame ? -1 : c;
+    *sign = 1;
+    for (int k = 0; frame && k < dim; k++)
+        if (fabs(frame[dim * c + k]) > 1 - CARRIED) {
+            axis = k;
+            *sign = copysign(1, frame[dim * c + k]);
+        }
+    return axis;
+}
+
+/* Where all supports still have to go the same way, the body is carried along before anything else: contact is where it
+ * comes to, and the first problem would otherwise be that of where it was. Not after a part that failed, which may have
+ * been led through an obstacle so, nor of rings, which have no way but along their axis. way: of each axis, 0 where
+ * nothing is held. */
+static bool find_way(double way[3], const uz_finite_run *run)
+{
+    const uz_body_model *model = &run->base;
+    const int dim = model->mesh.dim;
+    bool alike = !run->pairs && run->found.failed == 0 && model->kind != UZ_AXISYMMETRIC, known[3] = {false};
+    for (int64_t i = 0; i < run->n && alike; i++) {
+        const int64_t dof = model->dof[i], node = i / dim;
+        const int c = (int)(i % dim);
+        double sign;
+        const int axis = dof < 0 && dof != UZ_NO_DOF ? axis_of(&sign, model, node, c) : -1;
+        if (dof >= 0)
+            continue;
+        alike = axis >= 0;
+        if (!alike)
+            break;
+        const double own = sign * (run->prescribed[-1 - dof] - uz_along_dof(model, node, c, run->at.u + dim * node));
+        way[axis] = known[axis] ? way[axis] : own;
+        known[axis] = true;
+        alike = fabs(own - way[axis]) <= CARRIED * model->mesh.extent;
+    }
+    return alike;
+}
+
+static void carry(uz_finite_run *run)
+{
+    const uz_body_model *model = &run->base;
+    const int dim = model->mesh.dim;
+    double way[3] = {0};
+    const bool carried = find_way(way, run);
+    for (int64_t i = 0; i < run->n && carried; i++) {
+        const int64_t dof = model->dof[i];
+        const bool exact = dof < 0 && !uz_node_frame(model, i / dim);
+        run->at.u[i] = exact ? run->prescribed[-1 - dof] : run->at.u[i] + way[i % dim];
+    }
+}
+
 uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
 {
     double before[REMEMBERED] = {0};
@@ -587,8 +645,10 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     run->at.work = 0;
     if (status == UZ_OK)
         memcpy(begun, run->at.u, (size_t)run->n * sizeof *begun);
-    if (status == UZ_OK)
+    if (status == UZ_OK) {
+        carry(run);
         status = uz_finite_place_find(&fits, &run->at, run, err); /* supports have moved */
+    }
     while (status == UZ_OK && fits && !done && run->step_qps < MOST_QPS) {
         bool moved = false, found = false, inverted = false;
         if (uz_stop_is_due(&stop)) {

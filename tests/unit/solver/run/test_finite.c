@@ -180,9 +180,7 @@ TEST(a_block_over_a_roller_is_mirrored)
         for (int i = 0; i < 3; i++) {
             s[i] = over_roller(ELEMENTS[k], k == 1 ? 4 : 8, -i);
             r[i] = solve(&s[i]);
-            if (k < 2 || i < 2) /* of the finer mesh the first half alone is passed at once */
-                check_converged(r[i], 1, i == 0 ? 4 : 9);
-            CHECK(r[i]->summary.outcome == UZ_CONVERGED && r[i]->summary.finite.qps <= 25);
+            check_converged(r[i], 1, 5); /* carried to where it is pressed */
         }
         CHECK_MSG(fabs(r[0]->summary.force[1] - 0.34405) < FACE[k] * 0.34405, "%.7g", r[0]->summary.force[1]);
         CHECK_MSG(fabs(r[1]->summary.force[1] - 0.36159) < FACE[k] * 0.36159, "%.7g", r[1]->summary.force[1]);
