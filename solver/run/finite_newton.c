@@ -42,8 +42,10 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4, MOST_
 #define ASKED_FROM 1e-3
 /* A determinant of F that is next to none. */
 #define NEARLY_FLAT 0.2
-/* Stiffness along pressed rows, in those of the stiffest dof. */
-#define LEAST_HOLD 1.0
+/* Stiffness along pressed rows, in those of the stiffest dof: from little on, as rows that have to open are held by it,
+ * and with much of it open one after the other, a few from step to step. */
+#define LEAST_HOLD 1e-4
+#define MORE_HOLD  100.0
 #define MOST_HOLD  1e3
 /* Stiffness of the undeformed body that is added first, by how much more each time, and less in the next step. */
 #define FIRST_SHIFT 0.01
@@ -305,7 +307,7 @@ static bool add_more(double *hold, double *shift, bool rows)
     if (rows && *hold == 0) {
         *hold = LEAST_HOLD;
     } else if (rows && *hold < MOST_HOLD && *shift == 0) {
-        *hold = MOST_HOLD;
+        *hold = fmin(MOST_HOLD, MORE_HOLD * *hold);
     } else {
         *shift = fmax(FIRST_SHIFT, MORE_SHIFT * *shift);
     }
