@@ -122,6 +122,14 @@ double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *
 double uz_element_around(double around[UZ_ELEMENT_NODES], const uz_element *element, double grad[UZ_ELEMENT_NODES][3],
                          const double point[3]);
 
+/* One Gauss point of the stiffness' rule: derivatives of the shape functions by x, y, z, and the volume that the point
+ * stands for. */
+typedef struct {
+    double point[3], grad[UZ_ELEMENT_NODES][3], det, volume;
+    double N[UZ_ELEMENT_NODES], radius; /* axisymmetric only: shape functions, distance from the axis */
+} uz_gauss_state;
+void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g);
+
 /* Volume by the Gauss rule of the stiffness. */
 double uz_element_volume(const uz_element *element);
 

@@ -15,13 +15,6 @@ void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEM
 /* The radius at a point with these shape functions; at most UZ_AXIS of the largest it counts as on the axis. */
 double uz_ring_radius(double *largest, const uz_element *element, const double *N);
 
-/* One Gauss point: derivatives of the shape functions by x, y, z, and the volume that the point stands for. */
-typedef struct {
-    double point[3], grad[UZ_ELEMENT_NODES][3], det, volume;
-    double N[UZ_ELEMENT_NODES], radius; /* axisymmetric only: shape functions, distance from the axis */
-} uz_gauss_state;
-void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g);
-
 /* mean[node][direction]: the derivatives' mean over the volume, so that the mean dilatation is their sum with u; of a
  * ring with N / r in the radial one. Returns the volume. */
 double uz_mean_gradients(double mean[UZ_ELEMENT_NODES][3], const uz_element *element);

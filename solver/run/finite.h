@@ -2,6 +2,7 @@
  *
  *     uz_solve_finite    finite.c          load cases; the load put on in parts
  *     uz_finite_settle   finite_newton.c   the equilibrium under one part: contact problems on tangents
+ *     uz_finite_turn     finite_turn.c     large steps of parts that turn
  *     uz_finite_correct  finite_pairs.c    what rows between bodies need in it
  *     uz_finite_report   finite_report.c   the answer as a result
  *     uz_solve_weighed   weigh.c           whether small deformation is enough (kinematics AUTO) */
@@ -121,6 +122,7 @@ typedef struct {
     double penalty, hold, shift; /* of merits; what the last tangent had added, see finite_newton.c */
     double stiffest, grain;      /* of the undeformed body: its stiffest dof; what rounding may leave of an energy */
     int64_t step_qps;
+    bool turned;     /* `at`, or the last trial, is not straight on from the place before (finite_turn.c) */
     uz_result *last; /* of the last contact problem: methods and factor */
     uz_timings spent;
     uz_outcome stopped;
@@ -140,6 +142,15 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
 
 /* The contact problem of run->K, p and at.h: run->last. */
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);
+
+/* Another tangent has another factor; its ordering stays. */
+void uz_finite_forget_factors(uz_finite_run *run);
+/* p less what run->tangent makes of the ways that supports still have to go from run->at. *moved: are there any? */
+void uz_finite_move_supports(bool *moved, uz_finite_run *run);
+
+/* run->trial.u becomes the place that the step from run->at leads to if its parts turn, where that makes more of a
+ * difference than the strain that the step is for (*turned); run->tangent is of no use then. */
+uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err);
 
 /* Of rows between bodies. run->K becomes the tangent with run->turn, and, where `hold`, room for stiffness along
  * those that were pressed. */

@@ -10,6 +10,7 @@
  * which changes nothing where they stay closed, and where that is not enough that of the undeformed body, which costs
  * steps; along a path from another case the part is given up there, as the equilibrium beyond may be another one.
  * Where all supports move alike, the body is carried along before the first one.
+ * Steps that turn slender parts lead to where these have their length (finite_turn.c).
  * After a large step K first has the stress that the step was made for (finite_element.c), which takes half of
  * the steps where slender parts turn; where it is not positive definite with that the body's own comes next. Steps are
  * shortened until no element turns inside out and the potential energy, with a penalty on negative gaps that exceeds
@@ -55,7 +56,9 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4, MOST_
 /* Between bodies, whose rows are no derivatives of one energy, steps that are less
  * than this are not measured by it. */
 #define NEAR 1e-2
-/* Steps that are more than this in the energy's norm may turn slender parts. */
+/* Steps that are more than this in the energy's norm may turn slender parts: it is looked at what they do, */
+#define TURNING_STEP 0.1
+/* and from here on the tangent after them has the stress that they were made for. */
 #define LARGE_STEP 0.3
 /* Ways of supports that differ by less than this part of the body's extent are the same. */
 #define CARRIED 1e-12
@@ -213,17 +216,12 @@ static uz_status add_curvature(uz_finite_run *run, uz_error *err)
     return status;
 }
 
-/* p: what free dofs are loaded with in the contact problem of all of u. *moved: do supports still have to move? */
-static void load_step(bool *moved, uz_finite_run *run)
+void uz_finite_move_supports(bool *moved, uz_finite_run *run)
 {
     const uz_finite_place *at = &run->at;
     const uz_body_model *model = &run->base;
     const int dim = model->mesh.dim;
     *moved = false;
-    double *rest = run->trial.force; /* it is free until the next place is looked at */
-    for (int64_t i = 0; i < run->n; i++)
-        rest[i] = at->loads[i] - at->force[i];
-    uz_gather_nodal(run->p, model, rest);
     for (int64_t i = 0; i < run->n; i++) {
         const int64_t dof = model->dof[i];
         if (dof >= 0)
@@ -236,6 +234,18 @@ static void load_step(bool *moved, uz_finite_run *run)
         for (int64_t q = fixed->ptr[-1 - dof]; q < fixed->ptr[-dof]; q++)
             run->p[fixed->idx[q]] -= fixed->val[q] * way;
     }
+}
+
+/* p: what free dofs are loaded with in the contact problem of all of u. *moved: do supports still have to move? */
+static void load_step(bool *moved, uz_finite_run *run)
+{
+    const uz_finite_place *at = &run->at;
+    const uz_body_model *model = &run->base;
+    double *rest = run->trial.force; /* it is free until the next place is looked at */
+    for (int64_t i = 0; i < run->n; i++)
+        rest[i] = at->loads[i] - at->force[i];
+    uz_gather_nodal(run->p, model, rest);
+    uz_finite_move_supports(moved, run);
     uz_restrict_nodal(run->v, model, at->u);
     uz_csc_symv(run->p, run->K, 1, run->v);
 }
@@ -314,8 +324,7 @@ static bool add_more(double *hold, double *shift, bool rows)
     return *shift <= MOST_SHIFT;
 }
 
-/* Another tangent has another factor; its ordering stays. */
-static void forget_factors(uz_finite_run *run)
+void uz_finite_forget_factors(uz_finite_run *run)
 {
     run->tangents++;
     uz_table_forget(run->cache, UZ_ITEM_SETUP); /* which use factors */
@@ -329,6 +338,12 @@ static uz_status find_tangent(uz_finite_run *run, const double *step, uz_error *
     const uz_status status = add_curvature(run, err);
     return status == UZ_OK && run->follows ? uz_follower_tangent(&run->tangent, &run->skew, &run->scene, run->at.u, err)
                                            : status;
+}
+
+/* Or not known. */
+static bool is_more(double norm, double than)
+{
+    return !(norm > 0) || norm > than;
 }
 
 static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
@@ -348,15 +363,16 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
     double hold = run->hold, shift = run->shift / LESS_SHIFT < FIRST_SHIFT ? 0 : run->shift / LESS_SHIFT;
     double held = 0, shifted = 0; /* what the tangent has of them */
     bool pressed = false, more = true, fresh = true;
-    const bool large = !(run->norm > 0) || run->norm > LARGE_STEP;
-    double *step = run->step_qps > 0 && shift == 0 && large ? run->step : NULL; /* run->trial is the place before */
+    double *step = run->step_qps > 0 && shift == 0 && is_more(run->norm, LARGE_STEP) && !run->turned
+                       ? run->step
+                       : NULL; /* run->trial is the place before */
     for (int64_t i = 0; i < run->n && step; i++)
         step[i] = run->at.u[i] - run->trial.u[i];
     for (int64_t i = 0; i < run->n_r && run->n_r == run->at.rows.m; i++)
         pressed = pressed || run->r[i] < 0;
     while (more && (status == UZ_ERR_NOT_SPD || status == UZ_ERR_FREE_BODY)) {
         const double start = uz_seconds();
-        forget_factors(run);
+        uz_finite_forget_factors(run);
         uz_error_reset(&own);
         status = fresh ? find_tangent(run, step, &own) : UZ_OK;
         if (fresh)
@@ -412,6 +428,27 @@ static void find_work(uz_finite_run *run)
         to->work += 0.5 * (from->loads[i] + to->loads[i]) * (to->u[i] - from->u[i]);
 }
 
+/* trial becomes `part` of the step from `at` to `to`, turned where it has to be. */
+static uz_status find_part(bool *fits, uz_finite_run *run, const double *to, double part, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    run->turned = !run->pairs && is_more(run->norm, TURNING_STEP);
+    *fits = false;
+    while (status == UZ_OK && !*fits) {
+        const bool turn = run->turned;
+        for (int64_t i = 0; i < run->n; i++)
+            run->trial.u[i] = part == 1 ? to[i] : run->at.u[i] + part * (to[i] - run->at.u[i]);
+        if (turn)
+            status = uz_finite_turn(&run->turned, run, err);
+        if (status == UZ_OK)
+            status = uz_finite_place_find(fits, &run->trial, run, err);
+        if (!run->turned)
+            break;
+        run->turned = *fits;
+    }
+    return status;
+}
+
 /* trial becomes a part of the way from `at` to `to`, the largest that is let. before: merits of the last places, of
  * which one must be above; NULL: any will do. */
 static uz_status step_towards(bool *found, bool *inverted, uz_finite_run *run, const double *to, const double *before,
@@ -423,9 +460,7 @@ static uz_status step_towards(bool *found, bool *inverted, uz_finite_run *run, c
     for (int k = 0; k < remembered && before; k++)
         most = fmax(most, before[k]);
     for (int k = 0; k <= (before ? MOST_HALVINGS : 0) && status == UZ_OK && !*found; k++, part *= 0.5) {
-        for (int64_t i = 0; i < run->n; i++)
-            run->trial.u[i] = part == 1 ? to[i] : run->at.u[i] + part * (to[i] - run->at.u[i]);
-        status = uz_finite_place_find(found, &run->trial, run, err);
+        status = find_part(found, run, to, part, err);
         *inverted = status == UZ_OK && !*found;
         find_work(run);
         if (status == UZ_OK && *found && before)
@@ -477,7 +512,7 @@ static double least_left(uz_finite_run *run)
  * before: the norm of the step before the last one. */
 static bool may_be_settled(uz_finite_run *run, double before)
 {
-    if (!(run->norm < ASKED_FROM))
+    if (!(run->norm < ASKED_FROM) || run->turned)
         return false;
     const bool approaches = run->norm == 0 || run->norm < 0.5 * before;
     return !approaches || run->step_qps == MOST_QPS || least_left(run) <= run->requested;
@@ -491,7 +526,7 @@ static uz_status ask_certificate(bool *done, uz_part *out, uz_finite_run *run, u
     uz_finite_certificate *c = &run->certificate;
     const double start = uz_seconds();
     const uz_stop stop = {&run->hooks, run->deadline};
-    forget_factors(run); /* its own takes more */
+    uz_finite_forget_factors(run); /* its own takes more */
     const uz_status status = uz_certify_finite(c, &answer, &stop, err);
     run->spent.certify += uz_seconds() - start;
     const double length = 1e-9 * run->base.mesh.extent;
@@ -644,6 +679,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     run->penalty = run->hold = run->shift = 0;
     run->norm = INFINITY;
     run->step_qps = 0;
+    run->turned = false;
     run->at.work = 0;
     if (status == UZ_OK)
         memcpy(begun, run->at.u, (size_t)run->n * sizeof *begun);

@@ -150,7 +150,7 @@ TEST(a_cantilever_bends_as_the_elastica)
     body_hold(&s, "left", 0, 0, NAN);
     body_load(&s, UZ_LOAD_FORCE, "right", 0, 80, 0);
     uz_result *result = solve(&s);
-    check_converged(result, 1, 9);
+    check_converged(result, 1, 6);
     const double *u = moved_by(result, 10, 0.1);
     CHECK_MSG(fabs(u[1] / 10 - 0.811192) < 0.002 * 0.811192, "%.6f", u[1] / 10);
     CHECK_MSG(fabs(u[0] / 10 + 0.555479) < 0.002 * 0.555479, "%.6f", u[0] / 10);
@@ -211,7 +211,7 @@ TEST(a_ring_between_plates)
         body_hold(&s, "top", 0, NAN, NAN);
         body_plane(&s, "right", (double[3]){0, 10.5, 0}, (double[3]){0, -1, 0});
         uz_result *result = solve(&s);
-        check_converged(result, 1, k < 2 ? 5 : 14);
+        check_converged(result, 1, 5);
         CHECK_MSG(fabs(-2 * result->summary.force[1] - FORCE[k]) < (k < 3 ? 0.004 : 0.002) * FORCE[k], "%.7g",
                   -2 * result->summary.force[1]);
         if (k >= 2) { /* its middle has lifted off the plate */
@@ -219,6 +219,25 @@ TEST(a_ring_between_plates)
             CHECK_MSG(fabs(moved_by(result, 10.5, 0)[0] - 3.23773) < 0.002, "%.6g", moved_by(result, 10.5, 0)[0]);
             CHECK_MSG(crown[1] < -1e-5, "%.6g", crown[1]);
         }
+        give_back(result, &s);
+    }
+}
+
+/* Thin ones, and of rubber, which are nowhere near where the first tangent leads to: in one part all the same. */
+TEST(a_ring_that_turns_far)
+{
+    static const double WIDE[] = {0.3, 1, 1}, UP[] = {5.25, 2.1, 3.15}, POISSON[] = {0.3, 0.499, 0.499};
+    for (int k = 0; k < 3; k++) {
+        const uz_elasticity law = k == 0 ? UZ_ELASTIC_NEO_HOOKE : UZ_ELASTIC_NEO_HOOKE_ISOCHORIC;
+        uz_scene s = block("quad8", WIDE[k], acos(0), 2, k == 0 ? 24 : 48, law);
+        s.box.origin[0] = 9.5;
+        s.materials[0].poisson = POISSON[k];
+        body_give_mesh(&s, bend);
+        body_hold(&s, "bottom", NAN, UP[k], NAN);
+        body_hold(&s, "top", 0, NAN, NAN);
+        body_plane(&s, "right", (double[3]){0, 9.5 + WIDE[k], 0}, (double[3]){0, -1, 0});
+        uz_result *result = solve(&s);
+        check_converged(result, 1, 15); /* 24 in two parts, 45 in four and 55 in eight where steps are straight */
         give_back(result, &s);
     }
 }
@@ -358,7 +377,7 @@ TEST(a_plate_bends_as_the_elastica)
     body_hold(&s, "left", 0, 0, NAN);
     body_load(&s, UZ_LOAD_FORCE, "right", 0, 80, 0);
     uz_result *result = solve(&s);
-    check_converged(result, 1, 9);
+    check_converged(result, 1, 6);
     const double *u = moved_by(result, 10, 0.1);
     CHECK_MSG(fabs(u[1] / 10 - 0.811192) < 0.002 * 0.811192, "%.6f", u[1] / 10);
     CHECK_MSG(fabs(u[0] / 10 + 0.555479) < 0.002 * 0.555479, "%.6f", u[0] / 10);

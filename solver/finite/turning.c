@@ -1,0 +1,140 @@
+#include "finite/turning.h"
+
+#include "assembly/parts.h"
+#include "element/element.h"
+
+#include <math.h>
+#include <string.h>
+
+/* H[c][i] (dim x dim): the derivative of u_c by x_i. */
+static void gradient(double H[3][3], const uz_gauss_state *at, const double *u, int nodes, int dim)
+{
+    for (int c = 0; c < dim; c++)
+        for (int i = 0; i < dim; i++) {
+            H[c][i] = 0;
+            for (int a = 1; a < nodes; a++)
+                H[c][i] += (u[dim * a + c] - u[c]) * at->grad[a][i];
+        }
+}
+
+static void multiply(double out[3][3], double A[3][3], double B[3][3], int dim)
+{
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++) {
+            out[i][j] = 0;
+            for (int k = 0; k < dim; k++)
+                out[i][j] += A[i][k] * B[k][j];
+        }
+}
+
+/* R of a skew w (both dim x dim): (I + w) V^-1 with V^2 = I - w^2. Returns |w|^2. */
+static double rotation(double R[3][3], double w[3][3], int dim)
+{
+    double square = 0, ww[3][3];
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < i; j++)
+            square += w[i][j] * w[i][j];
+    const double root = sqrt(1 + square);
+    multiply(ww, w, w, dim);
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            R[i][j] = (i == j) + w[i][j] / root + ww[i][j] / (root * (root + 1));
+    return square;
+}
+
+/* H, of where a step begins, becomes what a turned step changes it by; h is the step's. out: the integrands. */
+static void turn(uz_turning *out, double H[3][3], double h[3][3], int dim)
+{
+    double F[3][3], inverse[3][3], g[3][3], w[3][3], stretch[3][3], R[3][3], to[3][3];
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            F[i][j] = (i == j) + H[i][j];
+    uz_invert_small(inverse, F, dim);
+    multiply(g, h, inverse, dim);
+    out->strain = 0;
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++) {
+            const double strain = 0.5 * (g[i][j] + g[j][i]);
+            out->strain += strain * strain;
+            stretch[i][j] = (i == j) + strain;
+            w[i][j] = 0.5 * (g[i][j] - g[j][i]);
+        }
+    const double square = rotation(R, w, dim);
+    out->turning = 0.5 * square * square; /* w'w is |w|^2 along both directions that turn */
+    multiply(to, stretch, F, dim);
+    multiply(H, R, to, dim);
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            H[i][j] -= F[i][j];
+}
+
+void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, const double *from, const double *to)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const int dim = mesh->dim;
+    *out = (uz_turning){.turning = 0};
+    memset(force, 0, (size_t)(dim * mesh->n_nodes) * sizeof *force);
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        uz_element element;
+        double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], step[UZ_ELEMENT_DOFS];
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        uz_body_element(&element, xyz, model, e);
+        for (int i = 0; i < dim * count; i++) {
+            u[i] = from[dim * node[i / dim] + i % dim];
+            step[i] = to[dim * node[i / dim] + i % dim] - u[i];
+        }
+        for (int g = 0; g < uz_element_rule(element.kind, element.model)->count; g++) {
+            uz_gauss_state at;
+            uz_turning own;
+            double H[3][3], h[3][3], around = 0;
+            uz_gauss_state_at(&at, &element, g);
+            const bool ring = element.model == UZ_AXISYMMETRIC;
+            const double weight = element.lame.mu * at.volume;
+            gradient(H, &at, u, count, dim);
+            gradient(h, &at, step, count, dim);
+            turn(&own, H, h, dim);
+            out->turning += weight * own.turning;
+            out->strain += weight * own.strain;
+            for (int a = 0; a < count && ring; a++)
+                around += at.N[a] / at.radius * step[dim * a];
+            for (int a = 0; a < count; a++) {
+                for (int i = 0; i < dim * dim; i++)
+                    force[dim * node[a] + i / dim] += weight * H[i / dim][i % dim] * at.grad[a][i % dim];
+                force[dim * node[a]] += ring ? weight * around * at.N[a] / at.radius : 0;
+            }
+        }
+    }
+}
+
+void uz_turning_metric(uz_body_model *metric, const uz_body_model *model)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const int dim = mesh->dim;
+    memset(metric->K.val, 0, (size_t)metric->K.ptr[metric->K.cols] * sizeof *metric->K.val);
+    memset(metric->K_fixed.val, 0, (size_t)metric->K_fixed.ptr[metric->K_fixed.cols] * sizeof *metric->K_fixed.val);
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        uz_element element;
+        double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS] = {0}, xyz[3 * UZ_ELEMENT_NODES];
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        uz_body_element(&element, xyz, model, e);
+        for (int g = 0; g < uz_element_rule(element.kind, element.model)->count; g++) {
+            uz_gauss_state at;
+            uz_gauss_state_at(&at, &element, g);
+            const double weight = element.lame.mu * at.volume;
+            const double around = element.model == UZ_AXISYMMETRIC ? 1 / at.radius : 0;
+            for (int a = 0; a < count; a++)
+                for (int b = 0; b < count; b++) {
+                    double *of = ke + dim * (dim * count * a + b);
+                    double sum = 0;
+                    for (int i = 0; i < dim; i++)
+                        sum += at.grad[a][i] * at.grad[b][i];
+                    for (int c = 0; c < dim; c++)
+                        of[(dim * count + 1) * c] += weight * sum;
+                    of[0] += around > 0 ? weight * around * around * at.N[a] * at.N[b] : 0;
+                }
+        }
+        uz_add_stiffness(metric, ke, node, count);
+    }
+}
