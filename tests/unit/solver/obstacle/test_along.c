@@ -2,6 +2,7 @@
 #include "core/random.h"
 #include "harness.h"
 #include "obstacle/along.h"
+#include "sanitized.h"
 
 enum { MOST_POINTS = 400 };
 
@@ -99,7 +100,7 @@ TEST(one_piece_before_straight_and_round_obstacles)
 TEST(pieces_are_those_of_every_point)
 {
     uint64_t seed = 11;
-    for (int trial = 0; trial < 600; trial++) {
+    for (int trial = 0; trial < some_of(600); trial++) {
         double x[MOST_POINTS], y[MOST_POINTS], low[2], high[2];
         const int kind = trial % 4, n = 2 + (int)between(&seed, 0, trial % 3 == 0 ? 300 : 9);
         const double unit = pow(10, between(&seed, -6, 6)), bend = between(&seed, 0.01, 2);

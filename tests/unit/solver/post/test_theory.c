@@ -1,4 +1,6 @@
-/* Stress and contact pressure against theory, on meshes that take a moment; `make theory` goes further. */
+/* Stress and contact pressure against theory, on meshes that take a moment; `make theory` goes further. Under a
+ * sanitizer one mesh of each scene: its answers are those of the plain build. */
+#include "sanitized.h"
 #include "theory.h"
 
 static void check_all(const theory_table *t, double tolerance)
@@ -11,17 +13,20 @@ static void check_all(const theory_table *t, double tolerance)
 TEST(hertz_line)
 {
     theory_table t = {.count = 0};
-    theory_hertz(&t, UZ_PLANE_STRAIN, "quad4", 32, 1.2);
-    theory_hertz(&t, UZ_PLANE_STRAIN, "quad8", 20, 1.25);
     theory_hertz(&t, UZ_PLANE_STRAIN, "tri6", 20, 1.25);
+    if (!SANITIZED) {
+        theory_hertz(&t, UZ_PLANE_STRAIN, "quad4", 32, 1.2);
+        theory_hertz(&t, UZ_PLANE_STRAIN, "quad8", 20, 1.25);
+    }
     check_all(&t, 0.03);
 }
 
 TEST(hertz_point)
 {
     theory_table t = {.count = 0};
-    theory_hertz(&t, UZ_AXISYMMETRIC, "quad4", 32, 1.2);
     theory_hertz(&t, UZ_AXISYMMETRIC, "quad8", 20, 1.25);
+    if (!SANITIZED)
+        theory_hertz(&t, UZ_AXISYMMETRIC, "quad4", 32, 1.2);
     check_all(&t, 0.03);
 }
 
@@ -29,8 +34,10 @@ TEST(hertz_point_in_space)
 {
     theory_table t = {.count = 0};
     theory_hertz(&t, UZ_SOLID, "hex8", 4, 1.7);
-    theory_hertz(&t, UZ_SOLID, "hex20", 3, 1.8);
-    theory_hertz(&t, UZ_SOLID, "wedge15", 3, 1.8);
+    if (!SANITIZED) {
+        theory_hertz(&t, UZ_SOLID, "hex20", 3, 1.8);
+        theory_hertz(&t, UZ_SOLID, "wedge15", 3, 1.8);
+    }
     check_all(&t, 0.15);
 }
 
@@ -58,10 +65,12 @@ TEST(thick_tube)
 {
     theory_table t = {.count = 0};
     theory_tube(&t, UZ_PLANE_STRAIN, "quad8", 6);
-    theory_tube(&t, UZ_PLANE_STRAIN, "tri6", 8);
-    theory_tube(&t, UZ_AXISYMMETRIC, "quad8", 8);
     theory_tube(&t, UZ_AXISYMMETRIC, "quad4", 12);
-    theory_tube(&t, UZ_PLANE_STRAIN, "quad4", 12);
+    if (!SANITIZED) {
+        theory_tube(&t, UZ_PLANE_STRAIN, "tri6", 8);
+        theory_tube(&t, UZ_AXISYMMETRIC, "quad8", 8);
+        theory_tube(&t, UZ_PLANE_STRAIN, "quad4", 12);
+    }
     check_all(&t, 0.03);
 }
 

@@ -1,5 +1,5 @@
 /* The store on a disk that fails: power loss, full disk and errors at every write, damaged files. SOAK=N in the
- * environment runs N times as many, a build with a sanitizer a third. */
+ * environment runs N times as many, a build with a sanitizer a fifth. */
 #include "faulty_vfs.h"
 #include "sanitized.h"
 #include "sqlite_file.h"
@@ -12,7 +12,7 @@
 static long scaled(long runs)
 {
     const char *soak = getenv("SOAK");
-    return (soak ? runs * atol(soak) : runs) / (SANITIZED ? 3 : 1);
+    return (soak ? runs * atol(soak) : runs) / (SANITIZED ? 5 : 1);
 }
 
 /* ---- what somebody was told */
@@ -341,8 +341,8 @@ TEST(a_fault_at_any_write_loses_nothing_that_was_acknowledged)
     faulty_install();
     for (size_t i = 0; i < sizeof CODES / sizeof CODES[0]; i++)
         for (int for_ever = 0; for_ever < 2; for_ever++) {
-            /* the four together meet every n, with a sanitizer every third */
-            long step = getenv("SOAK") ? 1 : SANITIZED ? 12 : 4, n = 1 + 2 * (long)i + for_ever;
+            /* the four together meet every n, with a sanitizer every fifth */
+            long step = getenv("SOAK") ? 1 : SANITIZED ? 20 : 4, n = 1 + 2 * (long)i + for_ever;
             n = step == 1 ? 1 : n;
             while (fail_once(n, CODES[i], for_ever != 0))
                 n += step;
