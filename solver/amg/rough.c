@@ -87,7 +87,8 @@ uz_status uz_solve_roughly(const uz_multigrid *base, uz_multigrid_room *room, uz
     if (base->levels == 1 || !(base->drift > 0.0) || (!(stop->absolute > 0.0) && stop->relative * HIDDEN < base->drift))
         return UZ_OK;
     const int64_t n = 4 * mg->level[0].A.nodes;
-    float *first = (float *)room->to, *second = (float *)room->from; /* 2 n numbers each */
+    void *const to = room->to, *const from = room->from; /* room for 2 n numbers each */
+    float *first = to, *second = from;
     rough s = {.mg = mg,
                .p = first,
                .q = first + n,
