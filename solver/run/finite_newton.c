@@ -22,6 +22,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "linalg/blas.h"
 #include "linalg/linalg.h"
 #include "assembly/parts.h"
@@ -62,6 +63,8 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4, MOST_
 #define LARGE_STEP 0.3
 /* Ways of supports that differ by less than this part of the body's extent are the same. */
 #define CARRIED 1e-12
+/* A way to where they are is looked at from this many points of it at least. */
+#define WAY_POINTS 64
 /* Along a path: how far its end may be from where the first tangent leads to, in ways there. */
 #define MOST_LEAP 1.0
 
@@ -650,17 +653,64 @@ static bool find_way(double way[3], const uz_finite_run *run)
     return alike;
 }
 
-static void carry(uz_finite_run *run)
+/* May a point go straight from x along `way`? Where it is within the obstacle it has to be so on the side where it went
+ * in: what comes out behind, or nears it, has been led through the obstacle, and what would have stopped it is not seen
+ * any more. */
+static bool may_go(const uz_obstacle *obstacle, const double *x, const double *way)
+{
+    const double length = sqrt(uz_dot3(way, way));
+    double entry[3] = {0}, done = 0;
+    bool outside = true; /* all the way since the last point */
+    while (true) {
+        uz_gap gap;
+        double at[3];
+        for (int c = 0; c < 3; c++)
+            at[c] = x[c] + way[c] * (done / length);
+        if (uz_obstacle_gap(&gap, obstacle, at, NULL) != UZ_OK || (!outside && !(uz_dot3(entry, gap.normal) > 0)))
+            return false;
+        if (outside)
+            memcpy(entry, gap.normal, sizeof entry);
+        if (done >= length)
+            return true;
+        const double step = fmax(gap.gap, length / WAY_POINTS);
+        outside = step <= gap.gap;
+        done = fmin(length, done + step);
+    }
+}
+
+/* May all places of rows at run->at? */
+static uz_status may_be_carried(bool *may, uz_finite_run *run, const double way[3], uz_error *err)
+{
+    const uz_body_model *rows = &run->at.rows;
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK && *may; k++) {
+        uz_obstacle *obstacle = NULL;
+        status = uz_obstacle_new(&obstacle, &run->scene.contacts[k], k, run->scene.model, err);
+        for (int64_t i = 0; status == UZ_OK && i < rows->m && *may; i++) {
+            const row_place place = place_of_row(&run->at, i);
+            *may = rows->info.contact_of[i] != k || may_go(obstacle, place.at, way);
+        }
+        uz_obstacle_free(obstacle);
+    }
+    return status;
+}
+
+/* From run->at, whose rows are known. *fits: as of uz_finite_place_find. */
+static uz_status carry(bool *fits, uz_finite_run *run, uz_error *err)
 {
     const uz_body_model *model = &run->base;
     const int dim = model->mesh.dim;
     double way[3] = {0};
-    const bool carried = find_way(way, run);
-    for (int64_t i = 0; i < run->n && carried; i++) {
+    bool carried = find_way(way, run) && uz_dot3(way, way) > 0;
+    const uz_status status = carried ? may_be_carried(&carried, run, way, err) : UZ_OK;
+    if (status != UZ_OK || !carried)
+        return status;
+    for (int64_t i = 0; i < run->n; i++) {
         const int64_t dof = model->dof[i];
         const bool exact = dof < 0 && !uz_node_frame(model, i / dim);
         run->at.u[i] = exact ? run->prescribed[-1 - dof] : run->at.u[i] + way[i % dim];
     }
+    return uz_finite_place_find(fits, &run->at, run, err);
 }
 
 uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
@@ -684,8 +734,9 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     if (status == UZ_OK)
         memcpy(begun, run->at.u, (size_t)run->n * sizeof *begun);
     if (status == UZ_OK) {
-        carry(run);
         status = uz_finite_place_find(&fits, &run->at, run, err); /* supports have moved */
+        if (status == UZ_OK && fits)
+            status = carry(&fits, run, err);
     }
     while (status == UZ_OK && fits && !done && run->step_qps < MOST_QPS) {
         bool moved = false, found = false, inverted = false;

@@ -695,6 +695,33 @@ TEST(a_body_that_is_carried_along)
     give_back(result, &s);
 }
 
+/* What stands in the way of supports stops a body as they move, also where it would fit beyond: down on a roller by
+ * less and more than that is thick, and aside past one. */
+TEST(nothing_is_carried_through_an_obstacle)
+{
+    static const struct {
+        const char *held;
+        double way[2], at[2], radius;
+    } CASES[] = {{"top", {0, -0.5}, {0.5, -0.5}, 0.5},
+                 {"top", {0, -0.8}, {0.5, -0.5}, 0.5},
+                 {"top", {0, -2}, {0.5, -0.5}, 0.5},
+                 {"top", {3, -0.1}, {1.5, -0.05}, 0.3}};
+    for (size_t k = 0; k < sizeof CASES / sizeof *CASES; k++) {
+        uz_scene s = block("quad4", 1, 1, 4, 4, UZ_ELASTIC_NEO_HOOKE);
+        body_hold(&s, CASES[k].held, CASES[k].way[0], CASES[k].way[1], NAN);
+        uz_contact *roller =
+            body_plane(&s, "bottom", (double[3]){CASES[k].at[0], CASES[k].at[1], 0}, (double[3]){0, 1, 0});
+        roller->kind = UZ_OBSTACLE_ROUND;
+        roller->radius = CASES[k].radius;
+        uz_result *result = solve(&s);
+        const double *force = result->summary.force;
+        CHECK_MSG(result->summary.outcome != UZ_CONVERGED, "%zu: %s, load %g", k,
+                  uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), result->summary.finite.load);
+        CHECK_MSG(k == 3 || force[1] > 0, "%zu: %g", k, force[1]);
+        give_back(result, &s);
+    }
+}
+
 /* Pulled so little that rounding shows. */
 TEST(what_rounding_leaves_is_told)
 {
