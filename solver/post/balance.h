@@ -58,6 +58,8 @@ void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_sc
 enum { UZ_MOST_COMPARED = 20000 };
 /* Less than this of uz_measure_nonlinear is no large deformation. */
 #define UZ_SURELY_SMALL 0.02
+/* The least force that others are parts of, in the sum of the loads' sizes. */
+#define UZ_LEAST_FORCE 0.01
 /* Of what forces may be off by, at most, less is surely small. */
 #define UZ_SURELY_HELD  0.04
 #define UZ_WARN_SLIDING "sliding"

@@ -18,6 +18,7 @@
 #include "scene/scene.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -113,10 +114,14 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
 /* A body that only obstacles hold has an answer of small deformation alone, which may not be enough. */
 static uz_status refuse_free(const uz_result *small, const uz_error *own, uz_error *err)
 {
-    return uz_fail(err, UZ_ERR_FREE_BODY, own->where,
-                   "small deformation leaves out some %.2g %% of the forces, and large deformation has no answer: "
-                   "%.320s; or take the law linear, which is not compared then",
-                   100 * small->evaluation->nonlinear, own->message);
+    const double part = small->evaluation->nonlinear;
+    char why[96] = "gaps and normals are not those of the body at rest where it has slid to";
+    if (part > UZ_SURELY_SMALL)
+        snprintf(why, sizeof why, "small deformation leaves out some %.2g %% of the forces", 100 * part);
+    return uz_fail(
+        err, UZ_ERR_FREE_BODY, own->where,
+        "%s, and large deformation has no answer: %.320s; or take the law linear, which is not compared then", why,
+        own->message);
 }
 
 static uz_status choose(uz_result **result, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,

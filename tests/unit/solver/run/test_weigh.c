@@ -438,6 +438,34 @@ TEST(forces_that_small_deformation_leaves_out)
     }
 }
 
+/* Loads that hold each other leave rounding to supports, of which no part is a reason for anything. */
+TEST(forces_that_are_rounding_are_not_compared)
+{
+    static const double PULL[] = {1e-6, 1e-4, 3e-3};
+    static const uz_elasticity LAWS[] = {UZ_ELASTIC_LINEAR, UZ_ELASTIC_NEO_HOOKE, UZ_ELASTIC_ST_VENANT_KIRCHHOFF};
+    for (int k = 0; k < 9; k++) {
+        uz_scene s = block("quad4", 1, 1, 4, 4);
+        body_give_mesh(&s, NULL);
+        for (int64_t end = 0; end < 2; end++) {
+            uz_given_group *corner = &s.given.groups[s.given.n_groups++];
+            *corner = (uz_given_group){.n_nodes = 1, .node = body_room(1, sizeof *corner->node)};
+            snprintf(corner->name, sizeof corner->name, "corner%d", (int)end);
+            corner->node[0] = 4 * end;
+            body_hold(&s, corner->name, end == 0 ? 0 : NAN, 0, NAN);
+        }
+        body_load(&s, UZ_LOAD_TRACTION, "left", -PULL[k / 3], 0, 0);
+        body_load(&s, UZ_LOAD_TRACTION, "right", PULL[k / 3], 0, 0);
+        uz_result *chosen = solve_as(&s, UZ_KINEMATICS_AUTO, LAWS[k % 3]);
+        const uz_small *small = &chosen->summary.small;
+        CHECK_INT(chosen->summary.outcome, UZ_CONVERGED);
+        CHECK_MSG(small->compared ? k / 3 == 2 && small->error < 0.02 : k / 3 < 2, "%d: %d, %g in %s", k,
+                  small->compared, small->error, small->in);
+        CHECK(!warning(chosen, "large_deformation"));
+        uz_result_free(chosen);
+        uz_scene_clear(&s);
+    }
+}
+
 /* More than a block of St. Venant and Kirchhoff's law bears: one element, which can do nothing else. */
 TEST(a_load_that_cannot_be_borne)
 {
@@ -569,6 +597,32 @@ TEST(a_free_body_is_answered_while_it_surely_is_small)
         uz_result_free(result);
         uz_scene_clear(&s);
     }
+}
+
+/* What slides far is asked about, too, whatever deforms: the reason is not the part of the forces. */
+TEST(a_free_body_that_slides_is_refused_for_that)
+{
+    uz_scene s = block("quad4", 4, 1, 8, 2);
+    body_give_mesh(&s, NULL);
+    uz_given_group *middle = &s.given.groups[s.given.n_groups++];
+    *middle = (uz_given_group){.name = "middle", .n_nodes = 1, .node = body_room(1, sizeof *middle->node)};
+    middle->node[0] = 4;
+    body_hold(&s, "middle", 0.05, NAN, NAN);
+    for (int side = 0; side < 2; side++) {
+        uz_contact *roller = body_plane(&s, "bottom", (double[3]){1 + 2 * side, -20, 0}, (double[3]){0, 1, 0});
+        roller->kind = UZ_OBSTACLE_ROUND;
+        roller->radius = 20;
+    }
+    body_load(&s, UZ_LOAD_TRACTION, "top", 0, -1e-6, 0);
+    s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+    const uz_settings settings = uz_settings_default();
+    uz_result *result = NULL;
+    uz_error err = {0};
+    CHECK_INT(uz_solve(&result, &problem, &settings, NULL, NULL, &err), UZ_ERR_FREE_BODY);
+    CHECK_MSG(strstr(err.message, "gaps and normals") && !strstr(err.message, "0 %"), "%s", err.message);
+    uz_result_free(result);
+    uz_scene_clear(&s);
 }
 
 TEST(what_a_comparison_takes_is_counted)
