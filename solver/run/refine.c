@@ -248,7 +248,9 @@ uz_status uz_run_decide(uz_run *run, uz_error *err)
     uz_status status = UZ_OK;
     /* What contradicts itself in few bits need not in more, where entries of a row are far apart. Units of the load may
      * be too far from those of an answer that rows hold; in many bits the caller's do as well. */
-    for (int bits = UZ_PRECISE_BITS; gave_up && bits <= UZ_PRECISE_MORE_BITS;) {
+    /* Of a body by its cells there is only the diagonal of K. */
+    const bool has_K = !run->asked->setup->model.brick;
+    for (int bits = UZ_PRECISE_BITS; gave_up && has_K && bits <= UZ_PRECISE_MORE_BITS;) {
         if (status == UZ_OK && !run->result->ray && c->relative_error > enough &&
             uz_precise_is_small(run->d, run->m, bits, seconds) && !uz_stop_is_due(&stop)) {
             status = solve_precisely(run, &solved, run->load.p, bits, err);

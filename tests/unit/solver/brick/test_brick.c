@@ -433,6 +433,34 @@ TEST(bodies_far_from_the_plane_and_pressed_flat_on_it)
     uz_scene_clear(&scene);
 }
 
+/* A body that only moves, of cells that hardly bend: what ends short of the request has no exact solve, as there is no
+ * matrix to make it with. */
+TEST(what_has_no_matrix_has_no_exact_solve)
+{
+    static const double asked[] = {1e-4, 1e-5, 1e-6};
+    uz_scene scene = block_scene(3, 3, 3, 0);
+    const double size[3] = {1000, 1, 10};
+    memcpy(scene.box.size, size, sizeof size);
+    scene.supports[0].u[0] = 1;
+    scene.n_loads = 0;
+    scene.contacts[0].point[1] = -1e-4;
+    uz_settings settings = uz_settings_default();
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene};
+    settings.op = UZ_OPERATOR_MATRIX_FREE;
+    for (int k = 0; k < 3; k++) {
+        settings.relative_error = asked[k];
+        uz_result *result = solve_problem(&problem, &settings);
+        double off = 0; /* of the true answer */
+        for (int64_t i = 0; i < result->n_nodes; i++)
+            off = fmax(off, fabs(result->u[3 * i] - 1));
+        CHECK_INT(result->summary.op, UZ_OPERATOR_MATRIX_FREE);
+        CHECK_MSG(off < 0.01 || result->summary.outcome != UZ_CONVERGED, "%g is off by %g", asked[k], off);
+        uz_result_free(result);
+    }
+    scene.n_loads = 2; /* to be cleared */
+    uz_scene_clear(&scene);
+}
+
 /* Where a factor takes longer, by far; what it is said to take before anything is assembled, and takes. */
 TEST(auto_takes_boxes_of_many_cells_and_tells_their_memory)
 {
