@@ -99,6 +99,12 @@ static uz_status find_ends(int32_t **out, const uz_mesh *mesh, uz_error *err)
             for (int side = 0; side < 2; side++)
                 ends[2 * node[m] + side] = (int32_t)node[type->edge[m - type->corners][side]];
     }
+    /* what is a corner of any element is no middle: beside a divided element the middle of an edge is one, too */
+    for (int64_t e = 0; *out && e < mesh->n_elements; e++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        for (int k = 0; k < type->corners; k++)
+            ends[2 * mesh->node[mesh->first[e] + k]] = ends[2 * mesh->node[mesh->first[e] + k] + 1] = -1;
+    }
     return UZ_OK;
 }
 

@@ -138,6 +138,14 @@ def test_operators_agree(s):
     check(max(energy) - min(energy) < 2e-3 * abs(energy[0]), energy)
 
 
+def test_corners_beside_hanging_nodes(s):
+    """The middle of a quadratic edge is a corner of the elements beside it that are divided."""
+    for element, traction, error in some((("quad8", [0, -1], 0.002), ("hex20", [0, -1, 0], 0.03))):
+        energy = [solved(s, l_shape(element, traction), error, operator=operator)["summary"]["energy"]["primal"]
+                  for operator in ("factored", "matrix_free")]
+        check(abs(energy[0] - energy[1]) < 2 * error ** 2 * abs(energy[0]), energy)
+
+
 def test_fields_find_the_mesh(s):
     for element in ("quad4", "quad8", "hex8", "hex20"):
         job = solved(s, l_shape(element, [0, -1, 0][:2 if element[0] == "q" else 3]), 0.1)
