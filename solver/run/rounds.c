@@ -234,11 +234,15 @@ static void begin_near(uz_run *run, const batch *b)
         return;
     uz_nearby_place(b->nearby, run->asked->index, run->load.p, run->load.h_all);
     const double near = setup->model.brick ? NEAR_ON_GRIDS : NEAR;
-    if (run->asked->start || !uz_nearby_find(&sum, b->nearby, run->asked->index, near))
+    /* without forces the answer may be 0, which no sum comes near enough to be told from */
+    if (run->asked->start || uz_norm(run->d, run->load.p) == 0.0 ||
+        !uz_nearby_find(&sum, b->nearby, run->asked->index, near))
         return;
     double *u = uz_alloc_zero(run->d + run->m, sizeof *u), *one = uz_alloc(run->d + run->m, sizeof *one);
     for (int k = 0; u && one && k < sum.count; k++) {
         const uz_result *result = b->results[sum.of[k]];
+        if (!result->u) /* a later round has found a ray */
+            continue;
         if (setup->is_scene)
             uz_restrict_nodal(one, &setup->model, result->u);
         else

@@ -146,3 +146,22 @@ TEST(a_case_begins_where_others_ended)
     check_cases("tet4", 0);
     check_cases("tet4", 1e-4);
 }
+
+/* Cases without a load, whose answer is 0, are not begun at what is left of others by rounding. */
+TEST(without_a_load_the_answer_is_none)
+{
+    enum { CASES = 4 };
+    uz_problem problem = cube("tet4", 6, 0.002, CASES);
+    for (int i = 1; i < CASES; i++)
+        for (int k = 0; k < 2; k++)
+            for (int c = 0; c < 3; c++)
+                problem.cases[i].loads[k].v[c] = 0;
+    uz_result **got = solve_all(&problem, UZ_OPERATOR_MATRIX_FREE, 1e-6);
+    for (int i = 0; got && i < CASES; i++) {
+        CHECK_INT(got[i]->summary.outcome, UZ_CONVERGED);
+        CHECK_MSG(i == 0 || fabs(got[i]->summary.certificate.energy_primal) < 1e-300, "%g, %lld steps",
+                  got[i]->summary.certificate.energy_primal, (long long)got[i]->summary.iterations);
+    }
+    uz_results_free(got, CASES);
+    uz_problem_clear(&problem);
+}
