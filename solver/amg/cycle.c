@@ -217,7 +217,7 @@ static inline __attribute__((always_inline)) void take_any(const uz_level_step *
         take_part(s, what, of, 2, 3, lanes);
     else if (b == 3 && k == 3)
         take_part(s, what, of, 3, 3, lanes);
-    else if (b == 2)
+    else if (b == 2 && k == 2)
         take_part(s, what, of, 2, 2, lanes);
     else
         take_part(s, what, of, b, k, lanes);

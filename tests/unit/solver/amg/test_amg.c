@@ -427,6 +427,31 @@ TEST(two_lanes_are_two_cycles)
     close_pair(&solid);
 }
 
+/* Two dofs at each node, and the six motions of a body in space. */
+TEST(solids_that_are_held_across)
+{
+    pair p;
+    uz_error err = {0};
+    uz_modes modes;
+    uz_scene scene = box_scene(10, 10, 11, 11);
+    scene.model = UZ_SOLID;
+    scene.box.dim = 3;
+    scene.box.size[2] = 10;
+    scene.box.cells[2] = 11;
+    snprintf(scene.box.element, sizeof scene.box.element, "tet4");
+    add_support(&scene, "left", 0, 0);
+    add_support(&scene, "all", NAN, NAN);
+    scene.supports[0].u[2] = scene.supports[1].u[2] = 0;
+    uz_body_model model = build_body(&scene);
+    CHECK(uz_modes_of_body(&modes, model.info.xyz, model.dof, model.mesh.n_nodes, 3, model.d, &err) == UZ_OK);
+    CHECK_MSG(open_pair(&p, &model.K, &modes, &err), "%s", err.message);
+    CHECK_MSG(p.info.lambda > 0.1 && p.info.iterations < 40, "%g by %lld steps", p.info.lambda,
+              (long long)p.info.iterations);
+    close_pair(&p);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&scene);
+}
+
 TEST(a_bound_that_is_enough_takes_one_cycle)
 {
     pair p = open_plane(paper_scene(60, 20), true);
