@@ -111,7 +111,8 @@ uz_status uz_solve_roughly(const uz_multigrid *base, uz_multigrid_room *room, uz
     memset(s.x, 0, (size_t)n * sizeof *s.x);
     memcpy(s.p, s.z, (size_t)n * sizeof *s.p);
     status = iterate(&s, room, info, &square, goal / s.unit, stop, err);
-    uz_by_pieces(leave, &s, base->n);
+    if (info->iterations > 0) /* else r is as it was, in double precision */
+        uz_by_pieces(leave, &s, base->n);
     memset(second, 0, (size_t)n * sizeof *second); /* a product counts on surplus numbers there */
     info->last = s.unit * uz_root(square);
     info->met = info->last <= goal;
