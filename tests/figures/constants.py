@@ -103,6 +103,7 @@ PHRASES = {
     "Computing 56, 1996": None, "SIAM J. Numerical Analysis 33, 1996": None, "Computing 22, 2000": None, "Contact Mechanics, 1985": None, "Acta Numerica 10, 2001": None, "SIAM J. Numerical Analysis 38, 2000": None,
     "Int. J. Numerical Methods in Engineering 83, 2010": None, "Applied Mechanics and Engineering 193, 2004": None,
     "Applied Mechanics and Engineering 200, 2011": None,
+    "(Huang and others, 2011)": None, "Computer Graphics 17, 2011": None,
     "(Farkas 1902)": None, "Goldfarb and Idnani (Math. Programming 27 (1983))": None, "a K below 1e-289 is": None, "(below 1e-289)": None, "Mathematical Programming 27, 1983": None, "SIAM J. Optimization 2, 1992": None,
     "Mathematical Programming Computation 4, 2012": None,
     "a block squeezed by 30 %": None,  # tests/peers/large.py
