@@ -9,7 +9,7 @@ import struct
 import zlib
 
 import service
-from service import check, expect
+from service import check, expect, some
 from two_bodies import body
 
 SHARED = True  # one service for all tests
@@ -82,20 +82,20 @@ def near(answer, known, *context):
 
 
 def test_all_methods_on_all_forms(s):
-    for name, request in SCENES.items():
-        _, known = answer_of(s, request)
-        part = known["summary"]["contact"]["active"] < known["summary"]["contact"]["candidates"]
+    known = {name: answer_of(s, request)[1] for name, request in SCENES.items()}
+    for name, answer in known.items():
+        part = answer["summary"]["contact"]["active"] < answer["summary"]["contact"]["candidates"]
         check(part or name == "press fit" or "loose" in name, name)
-        for method, operator in itertools.product(METHODS, OPERATORS):
-            solver = {"method": method, "operator": operator,
-                      "accuracy": {"relative_error": 1e-6 if method in EXACT else 1e-3}}
-            job = expect(s.post({**request, "solver": solver}, WAIT), 200).json
-            if job["summary"]["outcome"] == "precision_limit" and (method, operator) == ("active_set", "matrix_free"):
-                # It refuses wide rows, and says so, where the body is too large to be solved in rational numbers.
-                check("few rows" in job["summary"]["message"], job["summary"])
-                continue
-            _, answer = answer_of(s, {**request, "solver": solver})
-            near(answer, known, name, method, operator)
+    for name, method, operator in some(itertools.product(SCENES, METHODS, OPERATORS), 5):
+        solver = {"method": method, "operator": operator,
+                  "accuracy": {"relative_error": 1e-6 if method in EXACT else 1e-3}}
+        job = expect(s.post({**SCENES[name], "solver": solver}, WAIT), 200).json
+        if job["summary"]["outcome"] == "precision_limit" and (method, operator) == ("active_set", "matrix_free"):
+            # It refuses wide rows, and says so, where the body is too large to be solved in rational numbers.
+            check("few rows" in job["summary"]["message"], job["summary"])
+            continue
+        _, answer = answer_of(s, {**SCENES[name], "solver": solver})
+        near(answer, known[name], name, method, operator)
 
 
 def test_loose_bodies_have_energies(s):
