@@ -253,29 +253,37 @@ static void load_step(bool *moved, uz_finite_run *run)
     uz_csc_symv(run->p, run->K, 1, run->v);
 }
 
-/* A tangent comes once: by its number it need not be read to be known. Between bodies its pattern changes. */
-static uz_status name_tangent(uz_finite_run *run, uz_error *err)
+/* A matrix comes once: by its number it need not be read to be known. Between bodies its pattern changes. */
+static uz_status name_matrix(uz_finite_run *run, const uz_csc *K, uz_error *err)
 {
     uz_status status = UZ_OK;
     if (run->pairs || !run->name.pattern[0])
-        status = uz_pattern_digest(run->name.pattern, run->K, err);
+        status = uz_pattern_digest(run->name.pattern, K, err);
     snprintf(run->name.values, sizeof run->name.values, "%lld", (long long)run->tangents);
-    uz_table_name(run->cache, run->K, &run->name);
+    uz_table_name(run->cache, K, &run->name);
+    return status;
+}
+
+uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, uz_error *err)
+{
+    const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = *qp};
+    run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
+    uz_status status = name_matrix(run, &qp->K, err);
+    if (status == UZ_OK)
+        status = uz_solve_rounds(out, &problem, &run->settings, NULL, NULL, run->cache, &run->hooks, err);
+    if (status == UZ_OK)
+        uz_timings_add(&run->spent, &(*out)->summary.timings);
     return status;
 }
 
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err)
 {
-    const uz_problem qp = {.kind = UZ_PROBLEM_MATRICES, .qp = {*run->K, run->at.rows.N, run->p, run->at.h}};
+    const uz_qp qp = {*run->K, run->at.rows.N, run->p, run->at.h};
     uz_result *next = NULL;
-    run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
-    uz_status status = name_tangent(run, err);
-    if (status == UZ_OK)
-        status = uz_solve_rounds(&next, &qp, &run->settings, NULL, NULL, run->cache, &run->hooks, err);
+    const uz_status status = uz_finite_solve(&next, run, &qp, err);
     if (status != UZ_OK)
         return status;
     run->found.qps++;
-    uz_timings_add(&run->spent, &next->summary.timings);
     uz_result_free(run->last);
     run->last = next;
     return UZ_OK;
@@ -436,18 +444,17 @@ static uz_status find_part(bool *fits, uz_finite_run *run, const double *to, dou
 {
     uz_status status = UZ_OK;
     run->turned = !run->pairs && is_more(run->norm, TURNING_STEP);
+    bool again = true;
     *fits = false;
-    while (status == UZ_OK && !*fits) {
-        const bool turn = run->turned;
+    while (status == UZ_OK && again) {
         for (int64_t i = 0; i < run->n; i++)
             run->trial.u[i] = part == 1 ? to[i] : run->at.u[i] + part * (to[i] - run->at.u[i]);
-        if (turn)
+        if (run->turned)
             status = uz_finite_turn(&run->turned, run, err);
         if (status == UZ_OK)
             status = uz_finite_place_find(fits, &run->trial, run, err);
-        if (!run->turned)
-            break;
-        run->turned = *fits;
+        again = run->turned && !*fits; /* straight on, then */
+        run->turned = run->turned && *fits;
     }
     return status;
 }

@@ -7,36 +7,22 @@
  * next step begins there, and the certificate asks nothing of how it was reached. */
 #include "run/finite.h"
 
-#include "core/alloc.h"
-#include "core/clock.h"
-#include "core/error.h"
 #include "finite/turning.h"
-#include "run/solve.h"
 
-#include <math.h>
-#include <stdlib.h>
+#include <string.h>
 
 /* u = K^-1 p on the metric, which takes the tangent's place: no contact has a say in it. *solved: to the accuracy of
  * steps. */
 static uz_status solve_metric(bool *solved, uz_finite_run *run, uz_error *err)
 {
-    int64_t *none = uz_alloc_zero(run->d + 1, sizeof *none);
+    const uz_qp linear = {.K = run->tangent.K, .p = run->p};
     uz_result *result = NULL;
-    if (!none)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld dofs", (long long)run->d);
-    const uz_csc N = {.rows = 0, .cols = run->d, .ptr = none};
-    const uz_problem linear = {.kind = UZ_PROBLEM_MATRICES, .qp = {run->tangent.K, N, run->p, NULL}};
-    run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
-    const uz_status status =
-        uz_solve_rounds(&result, &linear, &run->settings, NULL, NULL, run->cache, &run->hooks, err);
-    free(none);
     *solved = false;
+    const uz_status status = uz_finite_solve(&result, run, &linear, err);
     if (status != UZ_OK)
         return status;
     *solved = result->summary.outcome == UZ_CONVERGED || result->summary.outcome == UZ_PRECISION_LIMIT;
-    uz_timings_add(&run->spent, &result->summary.timings);
-    for (int64_t j = 0; j < run->d; j++)
-        run->v[j] = result->u[j];
+    memcpy(run->v, result->u, (size_t)run->d * sizeof *run->v);
     uz_result_free(result);
     return UZ_OK;
 }
