@@ -154,6 +154,8 @@ typedef struct uz_cg_info {
 
 /* Limit, cancel, or deadline. */
 bool uz_cg_should_stop(const uz_cg_info *info, const uz_cg_stop *stop);
+/* The next direction: cg->p = cg->z + beta cg->p, by the threads there are. */
+void uz_cg_turn(uz_cg *cg, double beta);
 
 /* x (n): in, a start; out, nearer to K^-1 b. At held dofs it stays as it is, and K x has its part. The residual of the
  * x that is returned stands in cg->r. UZ_ERR_NOT_SPD: some p'K p was not positive. */

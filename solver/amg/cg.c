@@ -86,6 +86,12 @@ static void turn_direction(void *ctx, int64_t begin, int64_t end)
         p[j] = z[j] + beta * p[j];
 }
 
+void uz_cg_turn(uz_cg *cg, double beta)
+{
+    update u = {.cg = cg, .factor = beta};
+    uz_by_pieces(turn_direction, &u, cg->n);
+}
+
 /* There x at held dofs counts as 0: its part goes to the right-hand side. */
 static uz_status solve_elsewhere(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b,
                                  const uz_cg_stop *stop, uz_error *err)

@@ -102,28 +102,19 @@ static bool are_hopeless(int count, int most, double fallen, double needed)
     return 3 * count >= most && fallen * HOPELESS * (double)most < needed * (double)count;
 }
 
-/* What a step does to vectors, in pieces that threads share. */
+/* A step of so much along the direction, in pieces that threads share. */
 typedef struct {
     uz_cg *cg;
-    double factor;
+    double alpha;
 } step;
 
 static void reduce_residual(void *ctx, int64_t begin, int64_t end)
 {
     const step *s = ctx;
-    const double alpha = s->factor, *restrict q = s->cg->z;
+    const double alpha = s->alpha, *restrict q = s->cg->z;
     double *restrict r = s->cg->r;
     for (int64_t j = begin; j < end; j++)
         r[j] -= alpha * q[j];
-}
-
-static void turn_direction(void *ctx, int64_t begin, int64_t end)
-{
-    const step *s = ctx;
-    const double beta = s->factor, *restrict z = s->cg->z;
-    double *restrict p = s->cg->p;
-    for (int64_t j = begin; j < end; j++)
-        p[j] = z[j] + beta * p[j];
 }
 
 /* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. patience: uz_amg_of. power (n): the first one of
@@ -151,12 +142,11 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, double *power, 
                            "K is not positive definite: conjugate gradients met a direction that it does not resist. "
                            "Support the body so that it can't move freely, or check the signs of K.");
         const double alpha = square / curvature;
-        step u = {.cg = cg, .factor = alpha};
-        uz_by_pieces(reduce_residual, &u, cg->n);
+        uz_by_pieces(reduce_residual, &(step){cg, alpha}, cg->n);
         status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
         square = uz_long_dot(cg->n, cg->r, cg->z);
-        const double beta = u.factor = square / last;
-        uz_by_pieces(turn_direction, &u, cg->n);
+        const double beta = square / last;
+        uz_cg_turn(cg, beta);
         c->alpha[c->count] = alpha;
         c->beta[c->count++] = beta;
         info->iterations = c->count;
