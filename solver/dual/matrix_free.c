@@ -709,12 +709,12 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
                                                            : UZ_COST_ITERATIONS * CHANGE_CYCLES);
     double levels = uz_amg_predict_bytes(size->d, size->k_entries, size->modes);
     cost->setup_s += setup * cycle;
-    cost->next_s = cost->case_s + (size->bounds ? NEXT_CASE : 1.0) * load * cycle;
-    cost->case_s += load * cycle;
     cost->steps = SPECTRUM_CYCLES;
     cost->setup_steps_s = SPECTRUM_CYCLES * cycle;
     cost->case_steps_s = load * cycle;
     cost->next_steps_s = (size->bounds ? NEXT_CASE : 1.0) * load * cycle;
+    cost->next_s = cost->case_s + cost->next_steps_s;
+    cost->case_s += cost->case_steps_s;
     cost->flops += (setup + load) * 4.0 * passed;
     /* beside it the dofs that are swept, with both triangles of K */
     const double swept = 32.0 * (double)size->k_entries + 52.0 * (double)size->d;
