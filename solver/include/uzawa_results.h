@@ -252,6 +252,7 @@ typedef struct {
     uz_resultant *contacts,
         *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
     uz_resultant loads; /* all of them; on is "" */
+    double loads_size;  /* the sum of the lengths of the forces on nodes that they are: they may hold each other */
     int64_t n_surfaces; /* of contacts between two surfaces, `on` and `with` of each */
     uz_contact_surface *surfaces;
     /* What the forces and moments (about the first node, by the body's extent) leave over, relative to the sum of the

@@ -382,8 +382,12 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         status = uz_nodal_loads(b.load, model, scene, err);
     for (int64_t a = 0; a < n && status == UZ_OK; a++) {
         const double *f = b.load + a * dim;
-        for (int64_t c = 0; c < dim; c++)
+        double square = 0;
+        for (int64_t c = 0; c < dim; c++) {
             work += f[c] * u[a * dim + c];
+            square += f[c] * f[c];
+        }
+        out->loads_size += sqrt(square);
         if (f[0] != 0 || f[1] != 0 || (dim == 3 && f[2] != 0))
             add_force(&b, &out->loads, a, f);
     }

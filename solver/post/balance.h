@@ -12,8 +12,8 @@ typedef struct {
     double energy;
 } uz_balance_known;
 
-/* Fills out->contacts, supports, loads, imbalance and both energies; the names and zeros are there. u: n_nodes x dim;
- * r: m; scene: with the loads of the case; known: NULL: all follows from the stiffness. */
+/* Fills out->contacts, supports, loads, loads_size, imbalance and both energies; the names and zeros are there.
+ * u: n_nodes x dim; r: m; scene: with the loads of the case; known: NULL: all follows from the stiffness. */
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                             const double *r, const uz_balance_known *known, uz_error *err);
 
@@ -58,7 +58,7 @@ void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_sc
 enum { UZ_MOST_COMPARED = 20000 };
 /* Less than this of uz_measure_nonlinear is no large deformation. */
 #define UZ_SURELY_SMALL 0.02
-/* The least force that others are parts of, in the sum of the loads' sizes. */
+/* The least force that others are parts of, in uz_evaluation.loads_size. */
 #define UZ_LEAST_FORCE 0.01
 /* Of what forces may be off by, at most, less is surely small. */
 #define UZ_SURELY_HELD  0.04

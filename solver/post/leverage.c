@@ -13,7 +13,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
-#include "linalg/blas.h"
 #include "post/parts.h"
 #include "scene/scene.h"
 
@@ -81,23 +80,14 @@ static double of_pair(const holder *a, const holder *b, const uz_body_model *mod
 }
 
 /* Loads may hold each other, and what is left for supports is rounding. */
-static uz_status largest_force(double *out, const uz_body_model *model, const uz_scene *scene, const uz_evaluation *e,
-                               uz_error *err)
+static double largest_force(const uz_evaluation *e)
 {
-    const int dim = model->mesh.dim;
-    double most = 0, all = 0, *f = uz_alloc(dim * model->mesh.n_nodes, sizeof *f);
-    const uz_status status =
-        f ? uz_nodal_loads(f, model, scene, err)
-          : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)model->mesh.n_nodes);
-    for (int64_t i = 0; i < model->mesh.n_nodes && status == UZ_OK; i++)
-        all += uz_norm(dim, f + dim * i);
-    free(f);
+    double most = UZ_LEAST_FORCE * e->loads_size;
     for (int64_t k = 0; k < e->n_supports; k++)
         most = fmax(most, sqrt(uz_dot3(e->supports[k].force, e->supports[k].force)));
     for (int64_t k = 0; k < e->n_contacts; k++)
         most = fmax(most, sqrt(uz_dot3(e->contacts[k].force, e->contacts[k].force)));
-    *out = fmax(most, UZ_LEAST_FORCE * all);
-    return status;
+    return most;
 }
 
 uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_scene *scene, const uz_evaluation *e,
@@ -107,11 +97,8 @@ uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_sc
     /* h / L, and the least distance that counts: next to each other, supports are as stiff as a sector between them */
     const double slender = sqrt(5 * buckling), thick = slender * model->mesh.extent,
                  least = sqrt(slender / 3) * model->mesh.extent;
-    double most = 0, force;
-    *out = 0;
-    const uz_status status = largest_force(&force, model, scene, e, err);
-    if (status != UZ_OK)
-        return status;
+    const double force = largest_force(e);
+    double most = 0;
     holder *of = uz_alloc_zero(n, sizeof *of);
     if (!of)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for what holds the body");
@@ -123,7 +110,6 @@ uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_sc
             if (of[j].any)
                 most = fmax(most, of_pair(&of[i], &of[j], model, thick, least));
     free(of);
-    if (force > 0)
-        *out = most * sqrt(2 * e->strain_energy) / force;
+    *out = force > 0 ? most * sqrt(2 * e->strain_energy) / force : 0;
     return UZ_OK;
 }

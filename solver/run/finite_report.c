@@ -2,7 +2,6 @@
  * of the mesh, bounds, and doubts about small deformation. */
 #include "run/finite.h"
 
-#include "linalg/blas.h"
 #include "post/balance.h"
 
 #include "core/alloc.h"
@@ -213,7 +212,7 @@ uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, co
 {
     const uz_evaluation *here = result->evaluation, *there = small->evaluation;
     const double energy = run->at.body.energy;
-    double off = 0, most = 0, all = 0;
+    double off = 0, most = 0;
     uz_small out = {.compared = true, .error = INFINITY, .in = "displacements", .load = run->found.load};
     if (run->found.load < 1)
         return out;
@@ -222,9 +221,7 @@ uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, co
         return out;
     compare_forces(&off, &most, here->contacts, there->contacts, here->n_contacts);
     compare_forces(&off, &most, here->supports, there->supports, here->n_supports);
-    for (int64_t i = 0; i < run->n; i += run->base.mesh.dim)
-        all += uz_norm(run->base.mesh.dim, run->at.loads + i);
-    most = fmax(most, UZ_LEAST_FORCE * all); /* of loads that hold each other supports have rounding */
+    most = fmax(most, UZ_LEAST_FORCE * here->loads_size); /* of loads that hold each other supports have rounding */
     if (most > 0)
         take_greater(&out, off / most, "forces");
     take_greater(&out, fabs(sqrt(there->strain_energy / energy) - 1), "energy");
