@@ -27,16 +27,20 @@ typedef struct {
     bool whole; /* with what is hidden */
 } estimate;
 
-static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
+void uz_energy_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
 {
-    const estimate *x = ctx;
     const uz_gauss_rule *energy = &uz_element_type_of(kind)->energy;
     double point[UZ_ELEMENT_GAUSS][3], weight[UZ_ELEMENT_GAUSS];
     for (int g = 0; g < energy->count; g++) {
         memcpy(point[g], energy->point[g].at, sizeof point[g]);
         weight[g] = energy->point[g].weight;
     }
-    uz_strain_rule_at(rule, kind, x->model->kind, formulation, (const double(*)[3])point, weight, energy->count);
+    uz_strain_rule_at(rule, kind, model, formulation, (const double(*)[3])point, weight, energy->count);
+}
+
+static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
+{
+    uz_energy_rule(rule, kind, ((const estimate *)ctx)->model->kind, formulation);
 }
 
 /* The mean over the elements at a node has a part of what it is compared with: of N that err alike and by chance, the
@@ -56,17 +60,25 @@ static void take_own_part(uz_lanes *times, const uz_strain_group *group, const i
     }
 }
 
+void uz_whole_difference(uz_lanes *times, const uz_strain_group *group, const int64_t *const place[UZ_STRAIN_LANES],
+                         const uz_nodal_strains *nodal)
+{
+    const uz_element_kind kind = group->rule.kind;
+    *times = (uz_lanes){0} + 1;
+    if (kind == UZ_TET4 || kind == UZ_TET10)
+        take_own_part(times, group, place, nodal);
+    if (kind == UZ_TRI6 || kind == UZ_TET10)
+        *times *= HIDDEN;
+}
+
 static void compare(void *ctx, const uz_strain_group *group)
 {
     estimate *x = ctx;
     const int64_t *place[UZ_STRAIN_LANES];
-    const uz_element_kind kind = (uz_element_kind)x->model->mesh.kind[group->element[0]];
     uz_nodal_places(place, &x->nodal, group, &x->model->mesh);
     x->sums.times = (uz_lanes){0} + 1;
-    if (x->whole && (kind == UZ_TET4 || kind == UZ_TET10))
-        take_own_part(&x->sums.times, group, place, &x->nodal);
-    if (x->whole && (kind == UZ_TRI6 || kind == UZ_TET10))
-        x->sums.times *= HIDDEN;
+    if (x->whole)
+        uz_whole_difference(&x->sums.times, group, place, &x->nodal);
     uz_stress_rows_compare(&x->sums, x->nodal.rows, x->nodal.size, group, place);
 }
 

@@ -87,7 +87,9 @@ UZ_INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
         uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
         g->shaped = equal;
     }
-    if (!g->general || g->rule.formulation != UZ_FORMULATION_INCOMPATIBLE)
+    if (from->large)
+        uz_lane_green_strains(g->strain, &g->rule, &g->shape, g->u);
+    else if (!g->general || g->rule.formulation != UZ_FORMULATION_INCOMPATIBLE)
         uz_lane_strains(g->strain, &g->rule, &g->shape, &g->material, g->u);
     else
         strains_of_each(g, from->model);

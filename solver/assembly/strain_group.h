@@ -30,6 +30,7 @@ typedef struct {
     const double *free_strain; /* n_elements; NULL: no temperature */
     bool apart;                /* displacements against those of each element's first node: a translation strains
                                 * nothing, and what it would leave by rounding grows with it. Not along the radius */
+    bool large;                /* strains are those of Green and Lagrange, of elements of the standard formulation */
 } uz_strain_source;
 
 /* From element[0..count) and the rule to the strains. */

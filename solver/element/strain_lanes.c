@@ -252,6 +252,27 @@ UZ_INLINE void gradients_of(uz_lanes H[][3][3], const uz_strain_rule *rule, cons
 
 /* ---- for each kind of processor */
 
+/* (H'H)_ij of the components' axes i and j, half of it where these are one: of rings H[2][2] is that around. */
+UZ_INLINE void green_strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                                const uz_lane_shape *shape, const uz_lanes *u, int dim)
+{
+    static const int PLANE[][2] = {{0, 0}, {1, 1}, {0, 1}}, RING[][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}},
+                     SPACE[][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
+    const int(*axes)[2] = dim == 3 ? SPACE : rule->stresses == 4 ? RING : PLANE;
+    uz_lanes H[UZ_ELEMENT_GAUSS][3][3];
+    gradients_of(H, rule, shape, u, dim);
+    for (int g = 0; g < rule->points; g++) {
+        strain_of_gradient(strain[g], H[g], rule, shape, u, g, dim);
+        for (int c = 0; c < rule->stresses; c++) {
+            const int i = axes[c][0], j = axes[c][1];
+            uz_lanes square = H[g][0][i] * H[g][0][j] + H[g][1][i] * H[g][1][j];
+            if (dim == 3 || rule->stresses == 4)
+                square += H[g][2][i] * H[g][2][j];
+            strain[g][c] += (i == j ? 0.5 : 1.0) * square;
+        }
+    }
+}
+
 UZ_INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
 {
     if (rule->dim == 2)
@@ -278,6 +299,15 @@ UZ_INLINE void gradients_in_space(uz_lanes H[][3][3], const uz_strain_rule *rule
         gradients_of(H, rule, shape, u, 3);
 }
 
+UZ_INLINE void green_strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                                      const uz_lane_shape *shape, const uz_lanes *u)
+{
+    if (rule->dim == 2)
+        green_strains_of(strain, rule, shape, u, 2);
+    else
+        green_strains_of(strain, rule, shape, u, 3);
+}
+
 UZ_AVX2_FMA static void shape_fused(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x,
                                     double thickness)
 {
@@ -296,6 +326,12 @@ UZ_AVX2_FMA static void gradients_fused(uz_lanes H[][3][3], const uz_strain_rule
     gradients_in_space(H, rule, shape, u);
 }
 
+UZ_AVX2_FMA static void green_strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                                            const uz_lane_shape *shape, const uz_lanes *u)
+{
+    green_strains_in_space(strain, rule, shape, u);
+}
+
 void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
 {
     (uz_cpu_has_avx2_fma() ? shape_fused : shape_in_space)(shape, rule, x, thickness);
@@ -305,6 +341,12 @@ void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], con
                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
 {
     (uz_cpu_has_avx2_fma() ? strains_fused : strains_in_space)(strain, rule, shape, material, u);
+}
+
+void uz_lane_green_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                           const uz_lane_shape *shape, const uz_lanes *u)
+{
+    (uz_cpu_has_avx2_fma() ? green_strains_fused : green_strains_in_space)(strain, rule, shape, u);
 }
 
 void uz_lane_gradients(uz_lanes H[UZ_ELEMENT_GAUSS][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,

@@ -50,6 +50,11 @@ typedef struct {
 void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u);
 
+/* Those of Green and Lagrange, (H + H' + H'H) / 2 with shears 2 E_xy, for large deformation: of the standard formulation
+ * alone. */
+void uz_lane_green_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                           const uz_lane_shape *shape, const uz_lanes *u);
+
 /* H[point][c][j]: derivative of u_c by x_j of the displacements u alone, without modes and means; of rings [2][2] is
  * the strain around, in the plane [2] and [.][2] are 0. */
 void uz_lane_gradients(uz_lanes H[UZ_ELEMENT_GAUSS][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
