@@ -461,6 +461,13 @@ bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *
     return (rule->dim == 3 ? SOLID : rule->model == UZ_AXISYMMETRIC ? RING : PLANE)[group](&x);
 }
 
+bool uz_finite_law(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS], double C[N_STRAINS],
+                   const uz_element *element, uz_elasticity law)
+{
+    double F[3][3];
+    return law_at(W, S, D, F, C, element, law);
+}
+
 void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elasticity law, const double *u,
                         const double point[3])
 {

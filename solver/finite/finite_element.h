@@ -21,6 +21,10 @@ typedef struct {
 bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *rule, const uz_element *element,
                        uz_elasticity law, const double *u, const double *step);
 
+/* Energy, second Piola-Kirchhoff stress and tangent at C, with the components of hyperelastic.h: in plane stress C_zz
+ * becomes that without stress across the plane, and the tangent is condensed. False: no such C_zz, or det C <= 0. */
+bool uz_finite_law(double *W, double S[6], double D[6][6], double C[6], const uz_element *element, uz_elasticity law);
+
 /* At a local point: det F, and Cauchy's stress and the Green-Lagrange strain with the components xx, yy, zz, xy, yz,
  * zx.
  */

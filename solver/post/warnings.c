@@ -47,6 +47,7 @@ typedef struct {
     const double *u, *r;
     double sliding, mesh_error;
     uz_evaluation *out;
+    bool large; /* deformation, which has no other formulations */
 } doubts;
 
 __attribute__((format(printf, 4, 5))) static void warn(uz_evaluation *out, const char *code, double value,
@@ -561,12 +562,24 @@ static void look_at_mesh(const doubts *d)
         warn(d->out, "locking", poisson,
              "element %lld (%s) has Poisson's ratio %.5g: plain linear elements are too stiff there; use %s",
              (long long)stiff, uz_element_name((uz_element_kind)mesh->kind[stiff]), poisson,
-             mesh->dim == 2 ? "quad4 with bbar, tri6 or quad8" : "hex8 with bbar, or tet10");
+             mesh->dim == 2 ? d->large ? "tri6 or quad8" : "quad4 with bbar, tri6 or quad8"
+             : d->large     ? "hex20 or tet10"
+                            : "hex8 with bbar, or tet10");
     if (mesh->n_unused > 0)
         warn(
             d->out, "unused_nodes", (double)mesh->n_unused,
             "%lld nodes of the file belong to no element and are left out; the others are numbered anew in their order",
             (long long)mesh->n_unused);
+}
+
+void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene *scene)
+{
+    const doubts d = {.model = model,
+                      .scene = scene,
+                      .mesh_error = result->summary.discretization_error,
+                      .out = result->evaluation,
+                      .large = true};
+    look_at_mesh(&d);
 }
 
 void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene)
@@ -586,7 +599,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
 {
     const uz_summary *s = &result->summary;
     const doubts d = {
-        model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
+        model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation, false};
     if (is_steep(&d, 0.25 * fmin(MOST_STRAIN, MOST_ROTATION)))
         look_at_elements(&d);
     uz_status status = UZ_OK;

@@ -52,8 +52,8 @@ uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings 
                        "finite, and compare meshes");
     if (settings->guaranteed || settings->total_error > 0 || settings->balanced)
         return uz_fail(err, UZ_ERR_SCENE, "/solver/accuracy",
-                       "the error of the mesh is not estimated where kinematics are finite: ask for a relative_error "
-                       "of the equations, and compare meshes");
+                       "where kinematics are finite no mesh is chosen by its error, which is told but not bounded: ask "
+                       "for a relative_error of the equations, and compare meshes");
     if (settings->stopping == UZ_STOP_PAPER)
         return uz_fail(err, UZ_ERR_SCENE, "/solver/stopping",
                        "finite kinematics end by their certificate; leave stopping out");

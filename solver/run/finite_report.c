@@ -1,5 +1,5 @@
-/* finite_report.c: the answer of finite kinematics as a result. What follows from fixed moduli is left out: the error
- * of the mesh, bounds, and doubts about small deformation. */
+/* finite_report.c: the answer of finite kinematics as a result. What follows from fixed moduli is left out: bounds, and
+ * doubts about small deformation. */
 #include "run/finite.h"
 
 #include "post/balance.h"
@@ -7,6 +7,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "finite/mesh_error.h"
 #include "linalg/linalg.h"
 #include "post/evaluate.h"
 #include "run/results.h"
@@ -107,7 +108,7 @@ static void summarize(uz_summary *s, const uz_finite_run *run, uz_part why, doub
     s->added = 0;
     s->infeasible_radius = 0;
     s->discretization_error = NAN;
-    s->stress_share = 1; /* of a mesh whose error is not known */
+    s->stress_share = 1; /* all strain makes stress */
     s->message[0] = '\0';
     memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
     if (s->outcome != UZ_CONVERGED)
@@ -156,6 +157,15 @@ double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, boo
            (pairs ? (double)uz_csc_bytes(&base->K) : 0) + 8 * (NODAL * n + FREE * (double)base->d);
 }
 
+/* Of a body that is carried along nothing is lost; of one at rest, as no part of the load was borne, nothing is told.
+ */
+static double mesh_error(const uz_finite_run *run)
+{
+    if (run->found.steps == 0 && !run->from)
+        return NAN;
+    return run->at.body.energy > 10 * run->grain ? uz_finite_mesh_error(&run->base, run->at.u) : 0;
+}
+
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err)
 {
     uz_result *result = uz_alloc_zero(1, sizeof *result);
@@ -171,10 +181,13 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
     uz_status status = take_rows(result, run, err);
     if (status == UZ_OK)
         status = uz_evaluate_finite(result, &run->at.rows, &run->scene, run->at.force, run->at.body.energy, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK) {
+        result->summary.discretization_error = mesh_error(run);
+        uz_doubt_mesh(result, &run->at.rows, &run->scene);
         *out = result;
-    else
+    } else {
         uz_result_free(result);
+    }
     return status;
 }
 

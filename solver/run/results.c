@@ -53,7 +53,10 @@ uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const
 double uz_total_error(double *equations, const uz_summary *s)
 {
     const bool scene = s->stress_share > 0.0;
-    const double certified = s->certificate.relative_error / (scene ? s->stress_share : 1.0);
+    const bool large = s->geometry.kind == UZ_KINEMATICS_FINITE;
+    const double certified = large   ? s->finite.residual
+                             : scene ? s->certificate.relative_error / s->stress_share
+                                     : s->certificate.relative_error;
     const double left = isnan(s->geometry.left) ? 0.0 : s->geometry.left;
     const double total = s->guarantee.proved ? s->guarantee.relative
                                              : hypot(hypot(certified, left), scene ? s->discretization_error : 0.0);

@@ -1,0 +1,92 @@
+/* mesh_error.c: Zienkiewicz and Zhu's comparison (assembly/error_estimate.c) in strains that know no rotation.
+ *
+ * The strain E of Green and Lagrange jumps from element to element; averaged at the nodes it is closer to the true one.
+ * With the moduli D = dS/dE of the law where the body is,
+ *     eta^2 = integral of (E* - E_h)' D (E* - E_h) over the volume at rest
+ * estimates the square of the error in the energy norm of the tangent, but for what the stress does to turning parts,
+ * and 2 W stands for the square of the norm of u, which it is of small strain. */
+#include "finite/mesh_error.h"
+
+#include "assembly/nodal_strains.h"
+#include "assembly/parts.h"
+#include "finite/finite_element.h"
+#include "finite/hyperelastic.h"
+
+#include <math.h>
+
+enum { N_STRAINS = UZ_FINITE_STRAINS };
+/* Of smaller strains W is half of S : E, to this part of it, and its own terms cancel. */
+#define SMALL 1e-4
+
+typedef struct {
+    const uz_body_model *model;
+    uz_nodal_strains nodal;
+    double energy, eta2;
+    bool failed; /* a point has no energy */
+} comparison;
+
+static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
+{
+    uz_energy_rule(rule, kind, ((const comparison *)ctx)->model->kind, formulation);
+}
+
+/* At point p of the element in a lane: W, and the difference's energy in the moduli there. Where these are not positive
+ * a difference may have none. */
+static bool compare_at(double *W, double *eta2, const comparison *x, const uz_strain_group *group, const int64_t *place,
+                       const uz_element *element, int p, int lane)
+{
+    static const int PLANE[] = {0, 1, 3}, SPACE[] = {0, 1, 2, 3, 4, 5}; /* components of the rows' */
+    const int n = group->rule.stresses, *at = n == 3 ? PLANE : SPACE;
+    double C[N_STRAINS] = {1, 1, 1}, S[N_STRAINS], D[N_STRAINS][N_STRAINS], off[N_STRAINS], sum = 0, work = 0, most = 0;
+    for (int c = 0; c < n; c++) {
+        const double E = group->strain[p][c][lane];
+        C[at[c]] += (at[c] < 3 ? 2 : 1) * E; /* shears are 2 E_xy, and C_xy is */
+        off[c] = -E;
+        for (int a = 0; a < group->rule.nodes; a++)
+            off[c] += group->rule.N[p][a] * x->nodal.rows[place[a] * x->nodal.size + c];
+    }
+    if (!uz_finite_law(W, S, D, C, element, uz_element_material(x->model, group->element[lane])->law))
+        return false;
+    for (int i = 0; i < n; i++) {
+        work += S[at[i]] * group->strain[p][i][lane];
+        most = fmax(most, fabs(group->strain[p][i][lane]));
+        for (int j = 0; j < n; j++)
+            sum += off[i] * D[at[i]][at[j]] * off[j];
+    }
+    *W = most < SMALL ? 0.5 * work : *W;
+    *eta2 = fmax(0, sum);
+    return true;
+}
+
+static void compare(void *ctx, const uz_strain_group *group)
+{
+    comparison *x = ctx;
+    const int64_t *place[UZ_STRAIN_LANES];
+    uz_nodal_places(place, &x->nodal, group, &x->model->mesh);
+    uz_lanes times;
+    uz_whole_difference(&times, group, place, &x->nodal);
+    for (int l = 0; l < group->count; l++) {
+        double xyz[3 * UZ_ELEMENT_NODES], W, eta2;
+        uz_element element;
+        uz_body_element(&element, xyz, x->model, group->element[l]);
+        for (int p = 0; p < group->rule.asked; p++) {
+            if (!compare_at(&W, &eta2, x, group, place[l], &element, p, l)) {
+                x->failed = true;
+                return;
+            }
+            x->energy += group->shape.volume[p][l] * W;
+            x->eta2 += times[l] * group->shape.volume[p][l] * eta2;
+        }
+    }
+}
+
+double uz_finite_mesh_error(const uz_body_model *model, const double *u)
+{
+    comparison x = {.model = model};
+    const uz_strain_source from = {.model = model, .nodal = u, .apart = true, .large = true};
+    uz_status status = uz_nodal_strains_recover(&x.nodal, &from, UZ_CONTINUE_LINEAR, NULL, NULL);
+    if (status == UZ_OK)
+        status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, NULL);
+    uz_nodal_strains_clear(&x.nodal);
+    return status != UZ_OK || x.failed ? (double)NAN : sqrt(x.eta2 / (2 * x.energy + x.eta2));
+}

@@ -1,0 +1,12 @@
+/* mesh_error.h: what the mesh of a body under large deformation has lost, by estimate. */
+#ifndef UZ_FINITE_MESH_ERROR_H
+#define UZ_FINITE_MESH_ERROR_H
+
+#include "assembly/assembly.h"
+
+/* About ||u - u_h|| / ||u|| in the energy norm of the tangent at u_h, for the displacements u (n_nodes x dim) of an
+ * equilibrium in the standard formulation: what uz_estimate_mesh_error is of small deformation, which it becomes. NaN
+ * when there is no memory, or the law has no energy somewhere. */
+double uz_finite_mesh_error(const uz_body_model *model, const double *u);
+
+#endif

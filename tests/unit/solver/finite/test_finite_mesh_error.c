@@ -1,0 +1,88 @@
+/* The estimate of what the mesh loses under large deformation: what that of small deformation is where strains are
+ * small, and the same however the body is turned. */
+#include "assembly/assembly.h"
+#include "body_fixture.h"
+#include "finite/mesh_error.h"
+#include "qp_fixture.h"
+
+static double signed_of(qp_random *rng)
+{
+    return 2 * random_unit(rng) - 1;
+}
+
+static const uz_model PLANE[] = {UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETRIC};
+
+static uz_scene scene_of(uz_element_kind kind, int way)
+{
+    const bool solid = uz_element_type_of(kind)->dim == 3;
+    uz_scene s = body_scene(solid ? UZ_SOLID : PLANE[way % 3], uz_element_name(kind), (double[3]){5, 3, 2},
+                            (int64_t[3]){4, 3, 2});
+    s.formulation = UZ_FORMULATION_STANDARD;
+    s.kinematics = UZ_KINEMATICS_FINITE;
+    s.box.grading[0] = way % 2 ? 1.7 : 1;
+    s.box.origin[0] = 1;
+    s.materials[0].law = (uz_elasticity)(UZ_ELASTIC_ST_VENANT_KIRCHHOFF + way % 3);
+    body_hold(&s, "top", 0, 0, 0);
+    return s;
+}
+
+TEST(of_small_strain_it_is_that_of_small_deformation)
+{
+    qp_random rng = {21};
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
+        for (int way = 0; way < 9; way++) {
+            uz_scene s = scene_of((uz_element_kind)k, way);
+            uz_body_model model = body_model(&s);
+            const int64_t n = model.mesh.n_nodes * model.mesh.dim;
+            double *u = body_room(n, sizeof *u);
+            for (int64_t i = 0; i < n; i++)
+                u[i] = 1e-7 * (model.mesh.xyz[i] + 0.3 * signed_of(&rng));
+            const double small = uz_estimate_mesh_error(NULL, NULL, &model, NULL, u);
+            const double large = uz_finite_mesh_error(&model, u);
+            CHECK_MSG(small > 0.01 && fabs(large - small) < 1e-5 * small, "%s, way %d: %.12g, not %.12g",
+                      uz_element_name((uz_element_kind)k), way, large, small);
+            free(u);
+            uz_body_model_clear(&model);
+            uz_scene_clear(&s);
+        }
+}
+
+/* By 2 about an axis that is none of the body's, and carried along. */
+TEST(a_turn_changes_nothing)
+{
+    const double angle = 2, along[3] = {2. / 3, -1. / 3, 2. / 3};
+    qp_random rng = {22};
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
+        for (int way = 0; way < 6; way++) {
+            uz_scene s = scene_of((uz_element_kind)k, way);
+            uz_body_model model = body_model(&s);
+            const int dim = model.mesh.dim;
+            const int64_t n = model.mesh.n_nodes * dim;
+            double *u = body_room(n, sizeof *u), *turned = body_room(n, sizeof *turned);
+            for (int64_t i = 0; i < n; i++) {
+                u[i] = 0.04 * signed_of(&rng);
+                turned[i] = u[i];
+            }
+            for (int64_t a = 0; a < n && model.kind != UZ_AXISYMMETRIC; a += dim) {
+                double x[3] = {0}, w[3] = {0, 0, 1}, across[3], inner = 0;
+                for (int c = 0; c < dim; c++) {
+                    x[c] = model.mesh.xyz[a + c] + u[a + c];
+                    w[c] = dim == 3 ? along[c] : w[c];
+                }
+                for (int c = 0; c < 3; c++) {
+                    across[c] = w[(c + 1) % 3] * x[(c + 2) % 3] - w[(c + 2) % 3] * x[(c + 1) % 3];
+                    inner += w[c] * x[c];
+                }
+                for (int c = 0; c < dim; c++)
+                    turned[a + c] = cos(angle) * x[c] + sin(angle) * across[c] + (1 - cos(angle)) * inner * w[c] -
+                                    model.mesh.xyz[a + c] + 7;
+            }
+            const double at_rest = uz_finite_mesh_error(&model, u), there = uz_finite_mesh_error(&model, turned);
+            CHECK_MSG(at_rest > 0.01 && fabs(there - at_rest) < 1e-9, "%s, way %d: %.12g, not %.12g",
+                      uz_element_name((uz_element_kind)k), way, there, at_rest);
+            free(turned);
+            free(u);
+            uz_body_model_clear(&model);
+            uz_scene_clear(&s);
+        }
+}
