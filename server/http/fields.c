@@ -93,8 +93,8 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
     uz_field_source answer = {.u = NULL};
     uz_error err = {0};
     uz_status status = UZ_ERR_ARGUMENT;
-    double *u = NULL, *r = NULL, *g = NULL, *cells = NULL, *place = NULL, *bisected = NULL;
-    int64_t n_gaps = 0, n_cells = 0, n_place = 0, *list = NULL;
+    double *u = NULL, *r = NULL, *g = NULL, *cells = NULL, *place = NULL, *bisected = NULL, *warm = NULL;
+    int64_t n_gaps = 0, n_cells = 0, n_place = 0, n_warm = 0, *list = NULL;
     store_status found = store_get_vector(s, id, number, "displacements", &u, &answer.n_u);
     if (found == STORE_OK)
         found = store_get_vector(s, id, number, "reactions", &r, &answer.m);
@@ -118,6 +118,11 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
         found = found == STORE_NOT_FOUND ? STORE_OK : found;
         scene.place = n_place == answer.n_u ? place : NULL;
     }
+    if (found == STORE_OK) {
+        found = store_get_vector(s, id, number, "free_strain", &warm, &n_warm);
+        found = found == STORE_NOT_FOUND ? STORE_OK : found;
+        scene.free_strain = warm;
+    }
     answer.u = u;
     answer.r = r;
     answer.g = n_gaps == answer.m ? g : NULL;
@@ -128,6 +133,7 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
     free(g);
     free(cells);
     free(place);
+    free(warm);
     free(bisected);
     free(list);
     if (found != STORE_OK)

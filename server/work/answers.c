@@ -98,6 +98,7 @@ static bool build_one(answers *a, int64_t i, uz_result *const *results, const co
     add_vector(parts, "ray", result->ray, result->m);
     add_vector(parts, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
     add_vector(parts, "place", result->place, result->mesh.n_nodes * result->mesh.dim);
+    add_vector(parts, "free_strain", result->free_strain, result->n_free_strain);
     add_vector(parts, "pressure", result->pressure, result->m);
     if (result->state) { /* without memory for it the run can't be continued, and that is all */
         int64_t count = 0;

@@ -10,6 +10,7 @@
  *   "gaps"           m  g
  *   "displacements"  d for matrices; nodes x dim, node by node, for a scene
  *   "place"          nodes x dim, the displacement at which the contacts were found; only where kinematics moved them
+ *   "free_strain"    elements, what temperature does under finite kinematics; only where it does
  *   "nodes"          nodes x dim, coordinates; scenes only
  *   "contact_nodes"  m, the node of each reaction; scenes only
  *   "pressure"       m, reaction over tributary area; scenes only

@@ -228,7 +228,7 @@ const uz_inner_place *uz_row_inner(const uz_body_model *model, int64_t row);
 size_t uz_body_model_bytes(const uz_body_model *model);
 
 /* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included.
- */
+ * Of large deformation without that, and without pressures, which follow the body. */
 uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
 /* 1/2 u'K u over all dofs, springs included. carried: rigid motion may be most of u; elements are then rotated back one

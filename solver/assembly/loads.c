@@ -15,7 +15,7 @@ typedef struct {
     const uz_body_model *model;
     const uz_load *load;
     double *f;   /* n_nodes x dim */
-    bool follow; /* pressures follow the body, and are for finite/follower.h */
+    bool finite; /* pressures follow the body, and are for finite/follower.h; temperature is in the strains */
 } loading;
 
 static void add_to_nodes(const loading *x, const double *f, const int64_t *node, int count)
@@ -94,7 +94,7 @@ static uz_status add_load(const loading *x, const char *where, uz_error *err)
     const uz_group *group = uz_mesh_group(mesh, x->load->on, where, err);
     if (!group)
         return UZ_ERR_SCENE;
-    if (x->follow && x->load->kind == UZ_LOAD_PRESSURE)
+    if (x->finite && (x->load->kind == UZ_LOAD_PRESSURE || x->load->kind == UZ_LOAD_TEMPERATURE))
         return UZ_OK;
     switch (x->load->kind) {
     case UZ_LOAD_TRACTION:

@@ -116,7 +116,7 @@ static long double deform(point_at *x, double *measure, const uz_element *elemen
     *measure = uz_element_gradients(x->grad, element, local);
     *measure *= uz_element_around(x->around, element, x->grad, local);
     for (int i = 0; i < 9; i++) {
-        F[i] = i % 4 == 0;
+        F[i] = (i % 4 == 0) + (i == 8 ? element->across : 0);
         for (int a = 0; a < x->nodes && i / 3 < dim && i % 3 < dim; a++)
             F[i] += ((long double)u[dim * a + i / 3] - u[i / 3]) * x->grad[a][i % 3];
     }
@@ -197,6 +197,21 @@ static void add_unit(work *w, long double weight, const uz_lame *lame, const poi
     w->small += weight * (lame->lambda * trace * trace / 2 + lame->mu * squares);
 }
 
+/* The law's F is what is left of F beside the free expansion, which is that of the body at rest that has expanded
+ * freely: where its nodes would be, and as much less of u. Radii grow from the axis on. */
+static void expand(uz_element *element, double *xyz, double *u, int n, int dim, double free_strain)
+{
+    for (int i = n; i-- > 0;) {
+        const bool radius = element->model == UZ_AXISYMMETRIC && i % dim == 0;
+        const double by = free_strain * (radius ? xyz[i] : xyz[i] - xyz[i % dim]);
+        u[i] -= by;
+        xyz[i] += by;
+    }
+    element->thickness += free_strain * element->thickness;
+    if (element->model == UZ_PLANE_STRAIN)
+        element->across = 1 / (1 + free_strain) - 1;
+}
+
 static void add_element(uz_finite_certificate *out, work *w, int64_t e)
 {
     const uz_body_model *model = w->of->model;
@@ -218,6 +233,8 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     memset(rows, 0, (size_t)(n * n) * sizeof *rows);
     for (int i = 0; i < n; i++)
         u[i] = w->of->u[dim * node[i / dim] + i % dim];
+    if (w->of->free_strain)
+        expand(&element, xyz, u, n, dim, w->of->free_strain[e]);
     for (int a = 0; a < type->corners; a++) {
         long double det = deform(&x, &measure, &element, u, type->local[a]);
         if (det > 0 && element.model == UZ_PLANE_STRESS)

@@ -15,6 +15,8 @@ typedef struct {
     const double *u;            /* n_nodes x dim */
     const double *r, *g;        /* m: reactions, and gaps at the place */
     const double *prescribed;   /* n_fixed */
+    const double *free_strain;  /* n_elements: what each would be larger by in all directions without stress, as the
+                                 * loads have it; NULL: no temperature */
 } uz_finite_answer;
 
 typedef struct {

@@ -85,6 +85,7 @@ typedef struct {
     uz_formulation formulation; /* as uz_resolve_formulation gave it: never UZ_FORMULATION_AUTO */
     uz_lame lame;
     double thickness;  /* plane models; not read by the others */
+    double across;     /* large deformation in plane strain: the stretch across the plane that makes stress, less 1 */
     const double *xyz; /* nodes x dim, the true coordinates: differences to the first node are taken here */
 } uz_element;
 

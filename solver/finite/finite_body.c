@@ -10,7 +10,7 @@
 #include <string.h>
 
 void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangent, const uz_body_model *model,
-                    const double *nodal, const double *step)
+                    const double *free_strain, const double *nodal, const double *step)
 {
     const uz_mesh *mesh = &model->mesh;
     const int dim = mesh->dim;
@@ -35,6 +35,7 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
             u[i] = nodal[dim * node[i / dim] + i % dim];
         for (int i = 0; i < dim * count && step; i++)
             d[i] = step[dim * node[i / dim] + i % dim];
+        uz_finite_warm(&element, xyz, u, free_strain ? free_strain[e] : 0);
         uz_finite_element(&own, tangent ? ke : NULL, &rule, &element, uz_element_material(model, e)->law, u,
                           step ? d : NULL);
         if (!(own.least_det >= out->least_det)) { /* not a number, too */

@@ -123,7 +123,7 @@ UZ_INLINE void find_gradients(gradients H, const uz_finite_rule *rule, const sha
     }
 }
 
-/* In the plane the last of F is the stretch across it, which is 1 but in rings. */
+/* In the plane the last of F is the stretch across it, which is 1 but in rings, and where the element is warm. */
 UZ_INLINE void deformation(double F[3][3], gradients H, int p, int dim, bool ring)
 {
     for (int i = 0; i < 3; i++)
@@ -368,12 +368,14 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
     for (int p = 0; p < rule->points; p++) {
         double F[3][3];
         deformation(F, H, p, dim, ring);
+        F[2][2] += dim == 2 && !ring ? x->element->across : 0;
         out->least_det = fmin(out->least_det, orientation(F, dim));
     }
     for (int g = 0; g < rule->gauss; g++) {
         double F[3][3], W, C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS], T[N_STRAINS];
         const double volume = rest.volume[g];
         deformation(F, H, g, dim, ring);
+        F[2][2] += dim == 2 && !ring ? x->element->across : 0;
         cauchy_green(C, F, dim);
         if (!(out->least_det > 0) || !law_at(&W, S, D, F, C, x->element, x->law)) {
             out->least_det = fmin(out->least_det, 0); /* also where no stretch across a plane is without stress */
@@ -461,6 +463,24 @@ bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *
     return (rule->dim == 3 ? SOLID : rule->model == UZ_AXISYMMETRIC ? RING : PLANE)[group](&x);
 }
 
+void uz_finite_warm(uz_element *element, double *xyz, double *u, double free_strain)
+{
+    const int dim = uz_element_type_of(element->kind)->dim, n = dim * uz_element_node_count(element->kind);
+    const bool ring = element->model == UZ_AXISYMMETRIC;
+    double first[3] = {0}; /* node: places are from it on, but radii from the axis */
+    if (free_strain == 0)
+        return;
+    for (int c = ring; c < dim; c++)
+        first[c] = xyz[c];
+    for (int i = 0; i < n; i++) {
+        const double more = free_strain * (xyz[i] - first[i % dim]);
+        xyz[i] += more;
+        u[i] -= more;
+    }
+    element->thickness *= 1 + free_strain;
+    element->across = element->model == UZ_PLANE_STRAIN ? -free_strain / (1 + free_strain) : 0;
+}
+
 bool uz_finite_law(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS], double C[N_STRAINS],
                    const uz_element *element, uz_elasticity law)
 {
@@ -481,6 +501,7 @@ void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elas
     shape_of(&rest, &rule, element, rule.dim, ring);
     find_gradients(H, &rule, &rest, u, rule.dim, ring);
     deformation(F, H, 0, rule.dim, ring);
+    F[2][2] += element->across;
     out->det = orientation(F, rule.dim);
     cauchy_green(C, F, rule.dim);
     const bool good = out->det > 0 && law_at(&W, S, D, F, C, element, law);

@@ -21,6 +21,11 @@ typedef struct {
 bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *rule, const uz_element *element,
                        uz_elasticity law, const double *u, const double *step);
 
+/* What expands freely by a part `free_strain` of its size in all directions is, without stress, so much larger: F of
+ * the law is what is left of it, F / (1 + free_strain). The element and its u become those of that larger body at rest:
+ * energy, forces and tangent are then of the law's F. xyz: the places that element->xyz is, which change. */
+void uz_finite_warm(uz_element *element, double *xyz, double *u, double free_strain);
+
 /* Energy, second Piola-Kirchhoff stress and tangent at C, with the components of hyperelastic.h: in plane stress C_zz
  * becomes that without stress across the plane, and the tangent is condensed. False: no such C_zz, or det C <= 0. */
 bool uz_finite_law(double *W, double S[6], double D[6][6], double C[6], const uz_element *element, uz_elasticity law);

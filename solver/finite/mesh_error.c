@@ -30,31 +30,44 @@ static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_
     uz_energy_rule(rule, kind, ((const comparison *)ctx)->model->kind, formulation);
 }
 
+/* Of what expands freely by w the strain that makes stress is that of the larger body: (E - thermal) / (1 + w)^2. */
+static double thermal(double w)
+{
+    return w * (1 + 0.5 * w);
+}
+
 /* At point p of the element in a lane: W, and the difference's energy in the moduli there. Where these are not positive
- * a difference may have none. */
+ * a difference may have none. Per volume of the body at rest. */
 static bool compare_at(double *W, double *eta2, const comparison *x, const uz_strain_group *group, const int64_t *place,
                        const uz_element *element, int p, int lane)
 {
     static const int PLANE[] = {0, 1, 3}, SPACE[] = {0, 1, 2, 3, 4, 5}; /* components of the rows' */
     const int n = group->rule.stresses, *at = n == 3 ? PLANE : SPACE;
-    double C[N_STRAINS] = {1, 1, 1}, S[N_STRAINS], D[N_STRAINS][N_STRAINS], off[N_STRAINS], sum = 0, work = 0, most = 0;
+    const double warm = group->free_strain[lane], size = 1 + warm, per_square = 1 / (size * size);
+    double mean = 0; /* expansion, at the nodes */
+    for (int a = 0; a < group->rule.nodes && x->nodal.size > n + 1; a++)
+        mean += group->rule.N[p][a] * x->nodal.rows[place[a] * x->nodal.size + n + 1];
+    double C[N_STRAINS] = {1, 1, n == 3 ? per_square : 1}, strain[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS],
+           off[N_STRAINS], sum = 0, work = 0, most = 0;
     for (int c = 0; c < n; c++) {
-        const double E = group->strain[p][c][lane];
-        C[at[c]] += (at[c] < 3 ? 2 : 1) * E; /* shears are 2 E_xy, and C_xy is */
-        off[c] = -E;
+        const double E = group->strain[p][c][lane] - (at[c] < 3 ? thermal(warm) : 0);
+        off[c] = -E - (at[c] < 3 ? thermal(mean) : 0);
         for (int a = 0; a < group->rule.nodes; a++)
             off[c] += group->rule.N[p][a] * x->nodal.rows[place[a] * x->nodal.size + c];
+        off[c] *= per_square;
+        strain[c] = per_square * E;
+        C[at[c]] += (at[c] < 3 ? 2 : 1) * strain[c]; /* shears are 2 E_xy, and C_xy is */
     }
     if (!uz_finite_law(W, S, D, C, element, uz_element_material(x->model, group->element[lane])->law))
         return false;
     for (int i = 0; i < n; i++) {
-        work += S[at[i]] * group->strain[p][i][lane];
-        most = fmax(most, fabs(group->strain[p][i][lane]));
+        work += S[at[i]] * strain[i];
+        most = fmax(most, fabs(strain[i]));
         for (int j = 0; j < n; j++)
             sum += off[i] * D[at[i]][at[j]] * off[j];
     }
-    *W = most < SMALL ? 0.5 * work : *W;
-    *eta2 = fmax(0, sum);
+    *W = (most < SMALL && warm == 0 ? 0.5 * work : *W) * size * size * size;
+    *eta2 = fmax(0, sum) * size * size * size;
     return true;
 }
 
@@ -80,10 +93,11 @@ static void compare(void *ctx, const uz_strain_group *group)
     }
 }
 
-double uz_finite_mesh_error(const uz_body_model *model, const double *u)
+double uz_finite_mesh_error(const uz_body_model *model, const double *free_strain, const double *u)
 {
     comparison x = {.model = model};
-    const uz_strain_source from = {.model = model, .nodal = u, .apart = true, .large = true};
+    const uz_strain_source from = {
+        .model = model, .nodal = u, .free_strain = free_strain, .apart = true, .large = true};
     uz_status status = uz_nodal_strains_recover(&x.nodal, &from, UZ_CONTINUE_LINEAR, NULL, NULL);
     if (status == UZ_OK)
         status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, NULL);

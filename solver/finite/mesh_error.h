@@ -5,8 +5,9 @@
 #include "assembly/assembly.h"
 
 /* About ||u - u_h|| / ||u|| in the energy norm of the tangent at u_h, for the displacements u (n_nodes x dim) of an
- * equilibrium in the standard formulation: what uz_estimate_mesh_error is of small deformation, which it becomes. NaN
- * when there is no memory, or the law has no energy somewhere. */
-double uz_finite_mesh_error(const uz_body_model *model, const double *u);
+ * equilibrium in the standard formulation; free_strain: n_elements, of the temperature, NULL: none. What
+ * uz_estimate_mesh_error is of small deformation, which it becomes. NaN when there is no memory, or the law has no
+ * energy somewhere. */
+double uz_finite_mesh_error(const uz_body_model *model, const double *free_strain, const double *u);
 
 #endif

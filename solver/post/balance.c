@@ -416,7 +416,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     }
     if (status == UZ_OK)
         status = add_springs(&b, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK && !known)
         status = thermal_energy(&expanding, &expanded, &b, err);
     if (known)
         energy = known->energy;

@@ -12,7 +12,13 @@
 uz_status uz_field_body_init(uz_field_body *out, const uz_scene *scene, const uz_body_model *model, uz_error *err)
 {
     *out = (uz_field_body){.scene = scene, .model = model, .components = model->mesh.dim == 2 ? 4 : 6};
-    return uz_free_strains(&out->free_strain, model, scene, err);
+    if (!scene->free_strain)
+        return uz_free_strains(&out->free_strain, model, scene, err);
+    out->free_strain = uz_alloc(model->mesh.n_elements, sizeof *out->free_strain);
+    if (!out->free_strain)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for temperatures");
+    memcpy(out->free_strain, scene->free_strain, (size_t)model->mesh.n_elements * sizeof *out->free_strain);
+    return UZ_OK;
 }
 
 void uz_field_body_clear(uz_field_body *body)
@@ -30,7 +36,8 @@ void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const
     out->group.count = 0;
 }
 
-/* Cauchy's stress and the Green-Lagrange strain. */
+/* Cauchy's stress, and the Green-Lagrange strain of the body at rest: of its warm one, which is larger by a part w, it
+ * has E = (C - I) / 2 of C / (1 + w)^2. */
 static void finite_states(uz_field_state *state, const uz_field_points *points, int64_t e)
 {
     const uz_body_model *model = points->body->model;
@@ -42,11 +49,14 @@ static void finite_states(uz_field_state *state, const uz_field_points *points, 
     uz_body_element(&element, xyz, model, e);
     for (int i = 0; i < dim * count; i++)
         u[i] = points->u[dim * node[i / dim] + i % dim];
+    const double warm = points->body->free_strain ? points->body->free_strain[e] : 0;
+    uz_finite_warm(&element, xyz, u, warm);
     for (int k = 0; k < points->count; k++) {
         uz_finite_state at;
         uz_finite_state_at(&at, &element, uz_element_material(model, e)->law, u, points->point[k]);
         memcpy(state[k].stress, at.stress, (size_t)points->body->components * sizeof at.stress[0]);
-        memcpy(state[k].strain, at.strain, (size_t)points->body->components * sizeof at.strain[0]);
+        for (int c = 0; c < points->body->components; c++)
+            state[k].strain[c] = at.strain[c] + warm * (2 + warm) * (at.strain[c] + (c < 3 ? 0.5 : 0));
     }
 }
 

@@ -69,6 +69,22 @@ static void scale_load(uz_load *out, const uz_load *from, double factor)
     out->value = factor * from->value;
 }
 
+/* The temperatures of run->scene's loads. */
+static uz_status warm(uz_finite_run *run, uz_error *err)
+{
+    free(run->free_strain);
+    run->scene.free_strain = NULL;
+    const uz_status status = uz_free_strains(&run->free_strain, &run->base, &run->scene, err);
+    for (int64_t e = 0; e < run->base.mesh.n_elements && run->free_strain; e++)
+        if (!(run->free_strain[e] > -1))
+            return uz_fail(err, UZ_ERR_SCENE, "/loads",
+                           "temperature shrinks element %lld to nothing: expansion times temperature is %.3g, and must "
+                           "be above -1",
+                           (long long)e, run->free_strain[e]);
+    run->scene.free_strain = run->free_strain;
+    return status;
+}
+
 /* Supports and loads become those of a part t of the way from run->from to run->part of the whole. */
 static uz_status put_on(uz_finite_run *run, double t, uz_error *err)
 {
@@ -87,7 +103,9 @@ static uz_status put_on(uz_finite_run *run, double t, uz_error *err)
             scale_load(&run->scene.loads[i], &whole->loads[i], t * run->part);
         else
             scale_load(&run->scene.loads[i], &run->from->loads[i - whole->n_loads], 1 - t);
-    const uz_status status = uz_nodal_loads(run->loads, &run->base, &run->scene, err);
+    uz_status status = uz_nodal_loads(run->loads, &run->base, &run->scene, err);
+    if (status == UZ_OK)
+        status = warm(run, err);
     return status == UZ_OK ? uz_prescribed_values(run->prescribed, &run->base, &run->scene, err) : status;
 }
 
@@ -205,6 +223,7 @@ static void end(uz_finite_run *run)
     uz_result_free(run->last);
     free(run->scene.supports);
     free(run->scene.loads);
+    free(run->free_strain);
     free(run->loads);
     free(run->prescribed);
     free(run->overlap);

@@ -110,10 +110,11 @@ typedef struct {
     const uz_csc *K;  /* of the last contact problem: that, or the tangent's own */
     uz_row_turn turn; /* of these rows at run->at */
     int64_t n, d;
-    double *loads;      /* n: forces under t, but those that follow the body */
-    bool follows;       /* there are such, */
-    uz_csc skew;        /* and of the last tangent the skew part of their derivative (finite/follower.h) */
-    double *prescribed; /* n_fixed: under t */
+    double *free_strain; /* n_elements: of the temperature under t; NULL: there is none */
+    double *loads;       /* n: forces under t, but those that follow the body */
+    bool follows;        /* there are such, */
+    uz_csc skew;         /* and of the last tangent the skew part of their derivative (finite/follower.h) */
+    double *prescribed;  /* n_fixed: under t */
     uz_finite_place at, trial;
     double *r; /* reactions of the rows that the last contact problem had, n_r of them */
     int64_t n_r;

@@ -124,7 +124,7 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
 {
     uz_error own = {0};
     forget_rows(place);
-    uz_finite_body(&place->body, place->force, NULL, &run->base, place->u, NULL);
+    uz_finite_body(&place->body, place->force, NULL, &run->base, run->free_strain, place->u, NULL);
     *fits = place->body.least_det > 0 && isfinite(place->body.energy);
     if (!*fits)
         return UZ_OK;
@@ -345,7 +345,7 @@ void uz_finite_forget_factors(uz_finite_run *run)
 /* At run->at, with nothing added. */
 static uz_status find_tangent(uz_finite_run *run, const double *step, uz_error *err)
 {
-    uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->at.u, step);
+    uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->free_strain, run->at.u, step);
     const uz_status status = add_curvature(run, err);
     return status == UZ_OK && run->follows ? uz_follower_tangent(&run->tangent, &run->skew, &run->scene, run->at.u, err)
                                            : status;
@@ -531,8 +531,8 @@ static bool may_be_settled(uz_finite_run *run, double before)
 /* What the certificate says of run->at. *done: it is not to be iterated further. */
 static uz_status ask_certificate(bool *done, uz_part *out, uz_finite_run *run, uz_error *err)
 {
-    const uz_finite_answer answer = {&run->at.rows, &run->base,  &run->scene,    run->at.u,
-                                     run->r,        run->at.gap, run->prescribed};
+    const uz_finite_answer answer = {&run->at.rows, &run->base,  &run->scene,     run->at.u,
+                                     run->r,        run->at.gap, run->prescribed, run->free_strain};
     uz_finite_certificate *c = &run->certificate;
     const double start = uz_seconds();
     const uz_stop stop = {&run->hooks, run->deadline};

@@ -130,6 +130,13 @@ static uz_status take_rows(uz_result *result, const uz_finite_run *run, uz_error
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer at %lld nodes",
                        (long long)run->base.mesh.n_nodes);
     memcpy(result->u, run->at.u, (size_t)run->n * sizeof *result->u);
+    if (run->free_strain) {
+        result->n_free_strain = run->base.mesh.n_elements;
+        result->free_strain = uz_alloc(result->n_free_strain, sizeof *result->free_strain);
+        if (!result->free_strain)
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for temperatures");
+        memcpy(result->free_strain, run->free_strain, (size_t)result->n_free_strain * sizeof *result->free_strain);
+    }
     memcpy(result->place, run->at.u, (size_t)run->n * sizeof *result->place);
     if (m > 0)
         memcpy(result->g, run->at.gap, (size_t)m * sizeof *result->g);
@@ -163,7 +170,7 @@ static double mesh_error(const uz_finite_run *run)
 {
     if (run->found.steps == 0 && !run->from)
         return NAN;
-    return run->at.body.energy > 10 * run->grain ? uz_finite_mesh_error(&run->base, run->at.u) : 0;
+    return run->at.body.energy > 10 * run->grain ? uz_finite_mesh_error(&run->base, run->free_strain, run->at.u) : 0;
 }
 
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err)

@@ -198,6 +198,7 @@ void uz_result_free(uz_result *result)
     free(result->g);
     free(result->pressure);
     free(result->place);
+    free(result->free_strain);
     uz_evaluation_free(result->evaluation);
     free(result->history.rows);
     uz_state_free(result->state);

@@ -125,9 +125,9 @@ static uz_status check_loads(const uz_scene *scene, uz_error *err)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "at"),
                            "what turns is not where it was, and finite kinematics have forces that stay: leave at and "
                            "moment out, or use the kinematics \"moving\"");
-        if (scene->loads[i].kind == UZ_LOAD_TEMPERATURE)
+        if (scene->loads[i].kind == UZ_LOAD_TEMPERATURE && !uz_may_be_finite(scene))
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
-                           "finite kinematics have no temperature: leave it out, or use the kinematics \"moving\"");
+                           "small deformation of the linear law is not compared with large where there is temperature");
     }
     return UZ_OK;
 }

@@ -95,6 +95,60 @@ def test_the_mesh_has_its_part_of_the_error(s):
     check("use tri6 or quad8" in warned[1]["message"], warned)
 
 
+def warm_block(model, law, size=1, top=0, temperature=0.0, held=(), **more):
+    """Squeezed between bottom and top; what is warmer by 1000 would be twice as large."""
+    solid = model == "solid"
+    thickness = {"thickness": size} if model == "plane_stress" else {}
+    back = [{"on": "back", "uz": 0}] if solid else []
+    return block(law, model=model, contacts=[], **thickness, **more,
+                 mesh={"box": {"size": [size] * (3 if solid else 2), "cells": [2] * (3 if solid else 2), "element": "hex8" if solid else "quad8"}},
+                 materials=[{"on": "all", "young": 1, "poisson": 0.3, "law": law, "expansion": 1e-3}],
+                 loads=[{"on": "all", "temperature": temperature}] if temperature else [],
+                 supports=[{"on": "left", "ux": 0}, {"on": "bottom", "uy": 0}, {"on": "top", "uy": top}, *back, *held])
+
+
+def test_a_warm_body_is_a_larger_one(s):
+    """What expands freely by a quarter and is squeezed to its size is a body that is larger by a quarter, squeezed as much."""
+    fields = "summary,displacements,stress,strain"
+    for model in ("plane_stress", "axisymmetric", "solid"):
+        for law in ("neo_hooke", "st_venant_kirchhoff"):
+            _, warm = answer(s, warm_block(model, law, temperature=250), fields)
+            _, large = answer(s, warm_block(model, law, 1.25, -0.25), fields)
+            check(warm["summary"]["outcome"] == large["summary"]["outcome"] == "converged", warm["summary"])
+            forces = [found["summary"]["resultants"]["supports"][2]["force"][1] for found in (warm, large)]
+            check(abs(forces[0] - forces[1]) < 1e-8 and abs(forces[0]) > 0.1, (model, law, forces))
+            check(all(abs(a - b) < 1e-8 for one, other in zip(warm["stress"], large["stress"]) for a, b in zip(one, other)), (model, law))
+            # places are the same, and strains those of the body as it was
+            check(all(abs(u[1]) < 1e-8 for u in warm["displacements"]) and all(abs(e[1]) < 1e-8 for e in warm["strain"]), warm["strain"][0])
+            energies = [found["summary"]["energy"]["strain"] for found in (warm, large)]
+            check(abs(energies[0] - energies[1]) < 1e-8 and warm["summary"]["error"]["mesh"] < 1e-6, energies)
+    # across the plane nothing gives way: it is a cube that is held on both sides
+    _, flat = answer(s, warm_block("plane_strain", "neo_hooke", temperature=250), "summary,stress")
+    _, cube = answer(s, warm_block("solid", "neo_hooke", temperature=250, held=[{"on": "front", "uz": 0}]), "summary,stress")
+    check(all(abs(a - b) < 1e-8 for a, b in zip(flat["stress"][0], cube["stress"][0])), (flat["stress"][0], cube["stress"][0]))
+    # and auto sees that it is no small deformation
+    _, auto = answer(s, warm_block("plane_strain", "neo_hooke", temperature=250, kinematics="auto"), "summary,stress")
+    check(auto["summary"]["small_deformation"]["error"] > 0.05 and abs(auto["stress"][0][1] - flat["stress"][0][1]) < 1e-8, auto["summary"])
+    # each point of a path has its part of the temperature
+    path = {**warm_block("plane_stress", "neo_hooke"), "cases": [{"name": "warm", "steps": [0.5, 1], "loads": [{"on": "all", "temperature": 250}]}]}
+    name, _ = answer(s, path, "summary")
+    _, half = answer(s, warm_block("plane_stress", "neo_hooke", temperature=125), "summary,stress")
+    got = expect(s.get(f"/v1/jobs/{name}/result?fields=stress&case=warm%201"), 200).json
+    check(abs(half["stress"][0][1]) > 0.1 and abs(got["stress"][0][1] - half["stress"][0][1]) < 1e-8, (got["stress"][0], half["stress"][0]))
+
+
+def test_warmth_that_is_little_is_that_of_small_deformation(s):
+    def stress(kinematics, law):
+        _, found = answer(s, block(law, model="plane_stress", kinematics=kinematics, contacts=[], mesh={"box": {"size": [2, 1], "cells": [8, 4], "element": "quad8"}},
+                                   materials=[{"on": "all", "young": 1, "poisson": 0.3, "law": law, "expansion": 1e-5}],
+                                   loads=[{"on": "all", "temperature": 1}], supports=[{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "ux": 0}]), "summary,stress")
+        return [value for one in found["stress"] for value in one], found["summary"]["error"]["mesh"]
+    (small, coarse), (large, as_coarse) = stress("fixed", "linear"), stress("finite", "neo_hooke")
+    most = max(abs(value) for value in small)
+    check(all(abs(a - b) < 1e-3 * most for a, b in zip(small, large)), max(abs(a - b) / most for a, b in zip(small, large)))
+    check(abs(coarse - as_coarse) < 0.02 * coarse, (coarse, as_coarse))
+
+
 def test_a_limit_load_is_no_answer(s):
     """Of St. Venant and Kirchhoff's law: 0.21148 at the stretch of 1 / sqrt 3, by one element, which can do nothing else."""
     body = block("st_venant_kirchhoff", supports=[{"on": "left", "ux": 0}, {"on": "bottom", "uy": 0}], contacts=[],
@@ -367,7 +421,6 @@ def test_what_is_not_modelled_is_refused(s):
                     contacts=[{"on": "bottom", "obstacle": {"height": {"x": [0, 1], "y": [0, 1], "z": [[0, 0], [0, 0]]}}}]),
               "/problem/contacts/0/obstacle/height", "cylinders"),
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
-             (block(loads=[{"on": "all", "temperature": 1}]), "/problem/loads/0/temperature", "moving"),
              (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
              (block(supports=[{"on": "left", "ux": 0}, {"on": "top", "spring": [1, 1]}]), "/problem/supports/1/spring", "prescribe"),
              (block(mesh={"box": {"size": [1, 1], "cells": "auto"}}), "/problem/mesh/box/cells", "give their numbers"),

@@ -105,7 +105,7 @@ static inline void bend(void *ctx, const uz_side *side, const int *node)
  * Finite Element Analysis", section on membrane elements). */
 static inline double cook(uz_element_kind kind, uz_formulation way, uz_model model, double poisson, int cells)
 {
-    const uz_element element = {kind, model, way, uz_lame_of(model, 1, poisson), 1, NULL};
+    const uz_element element = {kind, model, way, uz_lame_of(model, 1, poisson), .thickness = 1, .xyz = NULL};
     small_body b = body_of(element, cells, cells, 1);
     hold(&b, 0, 0, 0);
     hold(&b, 0, 0, 1);
@@ -129,7 +129,7 @@ static inline double cook(uz_element_kind kind, uz_formulation way, uz_model mod
  * Design 1 (1985), the thick-walled cylinder). A quarter in plane strain or in space, or a ring. */
 static inline double tube(uz_element_kind kind, uz_model model, uz_formulation way, double poisson)
 {
-    const uz_element element = {kind, model, way, uz_lame_of(model, 1000, poisson), 1, NULL};
+    const uz_element element = {kind, model, way, uz_lame_of(model, 1000, poisson), .thickness = 1, .xyz = NULL};
     const bool ring = model == UZ_AXISYMMETRIC;
     small_body b = body_of(element, 10, ring ? 2 : 8, 1);
     hold(&b, 1, 0, 1);

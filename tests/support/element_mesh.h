@@ -357,7 +357,7 @@ static inline bool each_element(uz_element *element, int i, double poisson)
                 if ((uz_element_type_of(k)->dim == 3) != (m == UZ_SOLID) || uz_resolve_formulation(f, k, m, 0) != f ||
                     count++ != i)
                     continue;
-                *element = (uz_element){k, m, f, uz_lame_of(m, 70, poisson), 0.75, NULL};
+                *element = (uz_element){k, m, f, uz_lame_of(m, 70, poisson), .thickness = 0.75};
                 return true;
             }
     return false;

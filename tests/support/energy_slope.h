@@ -32,7 +32,7 @@ static inline double energy_slope(const uz_result *r, const uz_scene *scene, con
     for (int s = 0; s < 4; s++) {
         for (int64_t i = 0; i < n; i++)
             u[i] = r->u[i] + WAY[s] * h * v[i];
-        uz_finite_body(&at[s], NULL, NULL, &model, u, NULL);
+        uz_finite_body(&at[s], NULL, NULL, &model, NULL, u, NULL);
     }
     for (int64_t i = 0; i < n; i++) {
         work += f[i] * v[i];

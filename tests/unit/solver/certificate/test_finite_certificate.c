@@ -56,7 +56,7 @@ static void give_back(answered *a)
 static uz_finite_certificate judge(const answered *a)
 {
     const uz_result *r = a->result;
-    const uz_finite_answer of = {&a->there, &a->base, &a->scene, r->u, r->r, r->g, a->prescribed};
+    const uz_finite_answer of = {&a->there, &a->base, &a->scene, r->u, r->r, r->g, a->prescribed, NULL};
     uz_finite_certificate c;
     uz_error err = {0};
     CHECK_MSG(uz_certify_finite(&c, &of, NULL, &err) == UZ_OK, "%s", err.message);
@@ -129,7 +129,7 @@ TEST(a_certificate_that_is_stopped_says_so)
     answered a;
     answer(&a, &s);
     const uz_result *r = a.result;
-    const uz_finite_answer of = {&a.there, &a.base, &a.scene, r->u, r->r, r->g, a.prescribed};
+    const uz_finite_answer of = {&a.there, &a.base, &a.scene, r->u, r->r, r->g, a.prescribed, NULL};
     int asked = 0, stopped = 0;
     for (bool ended = false; !ended && asked < 100; asked++) {
         int left = asked;
@@ -201,7 +201,7 @@ TEST(the_residual_is_the_distance)
     uz_finite_measure measure;
     uz_error err = {0};
     CHECK_INT(uz_finite_tangent_of(&tangent, &a.base, &err), UZ_OK);
-    uz_finite_body(&measure, NULL, &tangent, &a.base, a.result->u, NULL);
+    uz_finite_body(&measure, NULL, &tangent, &a.base, NULL, a.result->u, NULL);
     qp_random rng = {5};
     double *v = body_room(a.base.d, sizeof *v), *Kv = body_room(a.base.d, sizeof *Kv), square = 0;
     for (int64_t i = 0; i < 2 * a.base.mesh.n_nodes; i++)

@@ -159,7 +159,7 @@ static void check_stiffness(uz_element_kind kind, uz_model model, uz_formulation
         u[i] = cos(3 * i);
     }
     const uz_formulation resolved = uz_resolve_formulation(way, kind, model, 0.3);
-    uz_element element = {kind, model, resolved, uz_lame_of(model, 70, 0.3), 0.75, xyz};
+    uz_element element = {kind, model, resolved, uz_lame_of(model, 70, 0.3), .thickness = 0.75, .xyz = xyz};
     CHECK(uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD);
     const double energy = uz_element_strain_energy(&element, u);
     element.lame = uz_lame_general(&general);
@@ -205,8 +205,8 @@ TEST(energy_is_that_of_the_stiffness)
                                         (uz_model)model,
                                         uz_resolve_formulation((uz_formulation)way, kind, (uz_model)model, 0.3),
                                         uz_lame_general(&general),
-                                        0.75,
-                                        xyz};
+                                        .thickness = 0.75,
+                                        .xyz = xyz};
             CHECK(uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD);
             for (int i = 0; i < dofs * dofs; i++)
                 sum += 0.5 * ke[i] * u[i / dofs] * u[i % dofs];

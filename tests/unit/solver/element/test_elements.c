@@ -302,7 +302,7 @@ TEST(quadratic_elements_have_quadratic_fields)
 TEST(a_ring_may_reach_the_axis)
 {
     const double xe[8] = {0, 0, 2, 0, 2, 1, -1e-18, 1};
-    uz_element element = {UZ_QUAD4, UZ_AXISYMMETRIC, UZ_FORMULATION_STANDARD, {1, 1, NULL}, 0, xe};
+    uz_element element = {UZ_QUAD4, UZ_AXISYMMETRIC, UZ_FORMULATION_STANDARD, {1, 1, NULL}, .thickness = 0, .xyz = xe};
     double u[8], want[6], got[6], ke[64];
     uz_element_motion motion;
     linear_field(u, want, &element, (double[3][3]){{0.25, 0}, {0.5, 2}});
@@ -375,7 +375,8 @@ TEST(cube_has_the_stiffness_of_the_matrices_of_strains)
 {
     double ke[24 * 24], want[24][24], xe[24];
     const double h = 0.25;
-    uz_element element = {UZ_HEX8, UZ_SOLID, UZ_FORMULATION_STANDARD, uz_lame_of(UZ_SOLID, 1, HEX8_POISSON), 0, xe};
+    uz_element element = {UZ_HEX8,        UZ_SOLID, UZ_FORMULATION_STANDARD, uz_lame_of(UZ_SOLID, 1, HEX8_POISSON),
+                          .thickness = 0, .xyz = xe};
     int bits[8];
     for (int a = 0; a < 8; a++) {
         bits[a] = 0;
@@ -395,7 +396,7 @@ TEST(cube_has_the_stiffness_of_the_matrices_of_strains)
 static uz_shape_fault fault_of(uz_element_kind kind, uz_model model, const double *xe)
 {
     double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS];
-    const uz_element element = {kind, model, UZ_FORMULATION_STANDARD, {1, 1, NULL}, 1, xe};
+    const uz_element element = {kind, model, UZ_FORMULATION_STANDARD, {1, 1, NULL}, .thickness = 1, .xyz = xe};
     const uz_shape_fault fault = uz_element_stiffness(ke, &element);
     CHECK(uz_element_check(&element) == fault);
     CHECK(strlen(uz_shape_fault_text(fault)) > 5);
@@ -431,7 +432,7 @@ TEST(bad_solid_elements_are_refused)
 {
     const uz_model s = UZ_SOLID;
     double cube[24], tet[30], ke[900];
-    const uz_element small = {UZ_HEX8, s, UZ_FORMULATION_STANDARD, {1, 1, NULL}, 1, cube};
+    const uz_element small = {UZ_HEX8, s, UZ_FORMULATION_STANDARD, {1, 1, NULL}, .thickness = 1, .xyz = cube};
     memcpy(tet, (const double[]){0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, 12 * sizeof *tet);
     CHECK(fault_of(UZ_TET4, s, tet) == UZ_SHAPE_GOOD);
     tet[11] = -1;
@@ -461,7 +462,8 @@ TEST(elements_inverted_inside_are_refused)
     const double *xyz[2] = {quad, hex};
     for (int k = 0; k < 2; k++) {
         const uz_element_kind kind = k ? UZ_HEX8 : UZ_QUAD8;
-        const uz_element element = {kind, UZ_PLANE_STRESS, UZ_FORMULATION_STANDARD, {1, 1, NULL}, 1, xyz[k]};
+        const uz_element element = {kind,         UZ_PLANE_STRESS, UZ_FORMULATION_STANDARD,
+                                    {1, 1, NULL}, .thickness = 1,  .xyz = xyz[k]};
         double grad[UZ_ELEMENT_NODES][3];
         for (int a = 0; a < uz_element_node_count(kind); a++)
             CHECK(uz_element_gradients(grad, &element, uz_element_type_of(kind)->local[a]) > 1e-3);
@@ -481,7 +483,8 @@ TEST(a_curved_side_must_not_cross_the_axis)
 TEST(rounding_is_no_area)
 {
     const double line[6] = {-0.45, -0.54, -0.45 + 0.1, -0.54 + 0.3, -0.45 + 0.2, -0.54 + 0.6};
-    const uz_element element = {UZ_TRI3, UZ_PLANE_STRESS, UZ_FORMULATION_STANDARD, {1, 1, NULL}, 1, line};
+    const uz_element element = {UZ_TRI3,      UZ_PLANE_STRESS, UZ_FORMULATION_STANDARD,
+                                {1, 1, NULL}, .thickness = 1,  .xyz = line};
     double grad[UZ_ELEMENT_NODES][3];
     CHECK(uz_element_gradients(grad, &element, (const double[3]){0.3, 0.3}) > 0);
     CHECK(fault_of(UZ_TRI3, UZ_PLANE_STRESS, line) == UZ_SHAPE_DEGENERATE);

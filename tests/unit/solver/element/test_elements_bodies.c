@@ -48,7 +48,7 @@ enum { LENGTH = 12 };
 static double beam(uz_element_kind kind, uz_formulation way, bool by_moment)
 {
     const uz_model model = uz_element_type_of(kind)->dim == 3 ? UZ_SOLID : UZ_PLANE_STRESS;
-    const uz_element element = {kind, model, way, uz_lame_of(model, 1e4, 0.3), 1, NULL};
+    const uz_element element = {kind, model, way, uz_lame_of(model, 1e4, 0.3), .thickness = 1, .xyz = NULL};
     small_body b = body_of(element, LENGTH, 1, 1);
     const int dim = b.mesh.dim;
     hold(&b, 0, 0, 0);

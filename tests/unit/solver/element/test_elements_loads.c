@@ -90,11 +90,12 @@ TEST(third_stress_of_plane_strain)
 TEST(volumes_of_simple_bodies)
 {
     const double quad[8] = {1, 0, 4, 0, 4, 2, 1, 2}, tet[12] = {0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5};
-    uz_element element = {UZ_QUAD4, UZ_PLANE_STRAIN, UZ_FORMULATION_STANDARD, {1, 1, NULL}, 0.5, quad};
+    uz_element element = {UZ_QUAD4,     UZ_PLANE_STRAIN,  UZ_FORMULATION_STANDARD,
+                          {1, 1, NULL}, .thickness = 0.5, .xyz = quad};
     CHECK_REL(uz_element_volume(&element), 3.0, 1e-15);
     element.model = UZ_AXISYMMETRIC;
     CHECK_REL(uz_element_volume(&element), TAU / 2 * (16 - 1) * 2, 1e-15);
-    const uz_element solid = {UZ_TET4, UZ_SOLID, UZ_FORMULATION_STANDARD, {1, 1, NULL}, 0.5, tet};
+    const uz_element solid = {UZ_TET4, UZ_SOLID, UZ_FORMULATION_STANDARD, {1, 1, NULL}, .thickness = 0.5, .xyz = tet};
     CHECK_REL(uz_element_volume(&solid), 5.0, 1e-15);
 }
 

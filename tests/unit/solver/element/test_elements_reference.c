@@ -46,7 +46,8 @@ static double entry_of(const uz_csc *K, int64_t i, int64_t j)
 /* E = 1000, nu = 0.3, the nodes of the top (z = 1) held, the others in the order of the mesh. */
 static void compare_with_calculix(const char *mesh_text, const uz_csc *K)
 {
-    const uz_element tet = {UZ_TET4, UZ_SOLID, UZ_FORMULATION_STANDARD, uz_lame_of(UZ_SOLID, 1000, 0.3), 1, NULL};
+    const uz_element tet = {UZ_TET4,        UZ_SOLID,   UZ_FORMULATION_STANDARD, uz_lame_of(UZ_SOLID, 1000, 0.3),
+                            .thickness = 1, .xyz = NULL};
     small_mesh mesh = read_tets(mesh_text, tet);
     skyline ours = assemble(&mesh);
     int *dof = zeros((size_t)ours.n, sizeof *dof), n = 0;

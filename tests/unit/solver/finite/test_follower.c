@@ -301,7 +301,7 @@ TEST(the_certificate_sees_where_pressures_act)
         uz_result *r = solve(&s);
         uz_body_model base = body_model(&s);
         double *prescribed = body_room(base.n_fixed, sizeof *prescribed), none = 0;
-        const uz_finite_answer of = {&base, &base, &s, r->u, &none, &none, prescribed};
+        const uz_finite_answer of = {&base, &base, &s, r->u, &none, &none, prescribed, NULL};
         CHECK(uz_certify_finite(&c, &of, NULL, &err) == UZ_OK);
         CHECK_MSG(c.definite && c.residual < 1e-8, "%.3g", c.residual);
         s.loads[0].value *= 1.001;
