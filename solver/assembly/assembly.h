@@ -239,6 +239,8 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
 /* Do supports move the body: is a prescribed value (n_fixed; NULL: none) not zero? Then ||u||_K over the free dofs
  * alone is not the norm of the deformation. */
 bool uz_is_moved(const uz_body_model *model, const double *prescribed);
+/* Is a load of the scene not zero, so that a body which is carried is deformed as well? */
+bool uz_is_loaded(const uz_scene *scene);
 /* ||u||_K over all dofs, springs included, from the free dofs u (d) and the prescribed values. */
 uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *u, const double *prescribed,
                         uz_error *err);

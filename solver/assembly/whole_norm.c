@@ -15,6 +15,18 @@ bool uz_is_moved(const uz_body_model *model, const double *prescribed)
     return moved;
 }
 
+bool uz_is_loaded(const uz_scene *scene)
+{
+    bool loaded = false;
+    for (int64_t i = 0; i < scene->n_loads && !loaded; i++) {
+        const uz_load *load = &scene->loads[i];
+        loaded = load->value != 0;
+        for (int c = 0; c < 3; c++)
+            loaded = loaded || load->v[c] != 0 || load->moment[c] != 0;
+    }
+    return loaded;
+}
+
 /* By elements: u'Ku from the blocks of free and supported dofs would cancel. */
 uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *u, const double *prescribed,
                         uz_error *err)

@@ -104,9 +104,10 @@ bool uz_bound_blames_distance(const uz_certificate *out, double square, double r
 #define RIGID    1e-10
 #define ROUNDING 1e-12
 
-double uz_bound_reference(double whole_norm, double free_norm, double error)
+double uz_bound_reference(double whole_norm, double free_norm, double error, bool loaded)
 {
-    return whole_norm <= RIGID * free_norm && error <= ROUNDING * free_norm ? free_norm : whole_norm;
+    const bool rigid = !loaded && whole_norm <= RIGID * free_norm && error <= ROUNDING * free_norm;
+    return rigid ? free_norm : whole_norm;
 }
 
 /* Below this energy the squares of its rounding errors leave the range of double, and a bound would be zero for
@@ -169,7 +170,7 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
     if (t->anything)
         out->absolute_error = (1.0 + SUMS) * out->absolute_error + sqrt(DBL_MIN);
     if (t->moved)
-        out->energy_norm = uz_bound_reference(t->whole_norm, out->energy_norm, out->absolute_error);
+        out->energy_norm = uz_bound_reference(t->whole_norm, out->energy_norm, out->absolute_error, t->loaded);
     /* over ||u*||_K, which is at least ||v||_K minus the error */
     const double least = out->energy_norm - out->absolute_error;
     out->relative_error = out->absolute_error == 0.0               ? 0.0

@@ -15,7 +15,7 @@ typedef struct {
     double complementarity;   /* -r'g(v + delta) */
     double settled, pressed;  /* ||delta||_K, -r'|g(v)|: it is v + delta that is feasible; 0 where delta is 0 */
     double positive_part;     /* of the reactions that were given */
-    bool moved;               /* supports move the body: */
+    bool moved, loaded;       /* supports move the body, and loads deform it: */
     double whole_norm;        /* ||u||_K with the supported dofs */
     bool anything;            /* some entry of u, c or K u - p - N'r is not zero */
 } uz_bound_terms;
@@ -62,8 +62,9 @@ double uz_bound_rounding(const uz_energy_sums *s, int64_t d);
 
 /* What an error is relative to where supports move the body. u'Ku over the free dofs counts that motion as if it tore
  * the body off its supports: an error relative to free_norm says nothing of strain and reactions. So it is whole_norm,
- * of which rigid motions are no part; but for a body that is surely not deformed beyond the rounding of its motion. */
-double uz_bound_reference(double whole_norm, double free_norm, double error);
+ * of which rigid motions are no part; but for a body that nothing but its supports moves, and that is surely not
+ * deformed beyond the rounding of its motion. One that is loaded is deformed, whether or not that is seen. */
+double uz_bound_reference(double whole_norm, double free_norm, double error, bool loaded);
 
 /* 2-norm without overflow. */
 double uz_bound_norm(const double *x, int64_t n);

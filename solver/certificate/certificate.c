@@ -202,8 +202,11 @@ static void add_up(certifier *c, uz_bound_terms *t)
 static uz_status conclude(certifier *c, uz_certificate *out, const double *r, const double *g, double positive_part,
                           bool feasible, uz_error *err)
 {
-    uz_bound_terms terms = {
-        .square = INFINITY, .positive_part = positive_part, .moved = c->in->moved, .whole_norm = c->in->whole_norm};
+    uz_bound_terms terms = {.square = INFINITY,
+                            .positive_part = positive_part,
+                            .moved = c->in->moved,
+                            .loaded = c->in->loaded,
+                            .whole_norm = c->in->whole_norm};
     uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, c->u, c->c, r, err);
     if (status != UZ_OK)
         return status;

@@ -208,7 +208,8 @@ static void conclude(exact *c, uz_certificate *better, const mpf_t square)
     mpf_sub(term, energy, gap);
     better->energy_dual = outward(term, -1.0);
     if (c->in->moved) {
-        mpf_set_d(term, uz_bound_reference(c->in->whole_norm, better->energy_norm, better->absolute_error));
+        mpf_set_d(term,
+                  uz_bound_reference(c->in->whole_norm, better->energy_norm, better->absolute_error, c->in->loaded));
     } else {
         mpf_set_q(term, c->norm);
         mpf_sqrt(term, term);

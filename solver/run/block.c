@@ -167,7 +167,8 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
                                       .g = runs[k].answer.g,
                                       .h = runs[k].load.h,
                                       .sharp = 0.5 * runs[k].work.requested,
-                                      .moved = runs[k].load.moved,
+                                      .moved = load->moved,
+                                      .loaded = load->loaded,
                                       .whole_norm = whole_norm};
     }
     if (status != UZ_OK)

@@ -95,6 +95,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .inverse_bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY,
         .spares = setup->factor && uz_factor_describe(setup->factor).nnz >= UZ_CERTIFY_SPARES,
         .moved = run->load.moved,
+        .loaded = run->load.loaded,
         .whole_norm = whole_norm,
         .sharp = 0.5 * run->work.requested,
     };

@@ -32,7 +32,7 @@ typedef struct {
     const double *p, *h; /* d; rows of the setup */
     const double *h_all; /* all rows */
     double *prescribed;  /* scenes: n_fixed */
-    bool moved;          /* some of them are not zero */
+    bool moved, loaded;  /* some of them are not zero; a load is not (scenes) */
     int exponent;        /* all of these, and the answer, are times 2^exponent (scale.c) */
     double *owned;       /* n_owned: room of all of these; matrices: NULL where they are the caller's */
     int64_t n_owned;
