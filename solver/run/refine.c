@@ -175,6 +175,30 @@ uz_status uz_run_refine(uz_run *run, uz_error *err)
     return status;
 }
 
+/* Of a body that rows keep from moving at all an error has nothing to be relative to, so that it is right or not: the
+ * reactions in doubles, which balance the load or don't, tell it where longer ones are cut somewhere, too. */
+static uz_status certify_rest(uz_run *run, uz_answer *answer, int bits, uz_error *err)
+{
+    uz_certify_input input;
+    bool rests = true; /* with reactions that are numbers */
+    for (int64_t j = 0; j < run->d && rests; j++)
+        rests = answer->u[j] == 0.0;
+    for (int64_t i = 0; i < run->m && rests; i++)
+        rests = isfinite(answer->r[i]);
+    if (!rests)
+        return UZ_OK;
+    mpf_t *u = uz_precise_numbers(run->d, bits), *r = uz_precise_numbers(run->m, bits);
+    uz_status status = u && r ? uz_run_certify_input(&input, run, answer, err)
+                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)run->d);
+    for (int64_t i = 0; status == UZ_OK && i < run->m; i++)
+        mpf_set_d(r[i], answer->r[i]);
+    if (status == UZ_OK)
+        status = uz_certify_exact(&answer->certificate, answer->u, (const mpf_t *)u, (const mpf_t *)r, &input, err);
+    uz_precise_free(u, run->d);
+    uz_precise_free(r, run->m);
+    return status;
+}
+
 /* The answer in numbers of so many bits, if there is one, and its certificate; or a proof that there is none. *solved:
  * there is one. p: the load, or 0: that rows contradict each other has nothing to do with it. */
 static uz_status solve_precisely(uz_run *run, bool *solved, const double *p, int bits, uz_error *err)
@@ -200,6 +224,8 @@ static uz_status solve_precisely(uz_run *run, bool *solved, const double *p, int
         answer.u[j] = uz_precise_round(u[j]);
     if (status == UZ_OK && *solved && p == run->load.p)
         status = uz_run_certify_answer(run, &answer, err);
+    if (status == UZ_OK && *solved && p == run->load.p && isinf(answer.certificate.relative_error))
+        status = certify_rest(run, &answer, bits, err);
     /* Then the answer that was there: its u may be nearer than v as doubles hold it, entry by entry. */
     for (int k = 0; status == UZ_OK && *solved && p == run->load.p && k < 2; k++) {
         const uz_certificate *now = &answer.certificate, *before = &run->answer.certificate;

@@ -117,6 +117,15 @@ def test_loads_from_the_ends_of_double(s):
         check(summary["certificate"]["absolute_error"] > 0, power, summary)
 
 
+def test_a_body_that_rows_keep_from_moving(s):
+    """u = 0 exactly: an error has nothing to be relative to, and is 0 where reactions in doubles balance the load."""
+    matrix = "%%MatrixMarket matrix coordinate real {}\n{}\n"
+    for K, N, h, p in (("1 1 1\n1 1 3", "1 1 1\n1 1 -1", [0], [-3]), ("1 1 1\n1 1 6e24", "3 1 2\n2 1 1\n3 1 -1", [4, 0, 2], [7.5e33]),
+                       ("2 2 3\n1 1 2\n2 1 -1\n2 2 2", "2 2 2\n1 1 1\n2 2 2", [0, 0], [1, 2])):
+        job = s.solve({"problem": {"kind": "matrices", "K": matrix.format("symmetric", K), "N": matrix.format("general", N), "h": h, "p": p}})
+        check(job["summary"]["outcome"] == "converged" and job["summary"]["certificate"]["relative_error"] == 0, job["summary"])
+
+
 def test_a_stiffness_without_digits_is_refused(s):
     for value in ("5e-324", "3e-310", "1e-300"):
         request = {"problem": {"kind": "matrices", "p": [1], "h": [1],
