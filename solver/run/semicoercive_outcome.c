@@ -145,20 +145,52 @@ static uz_status certify(uz_semi *s, uz_error *err)
 /* A sum of loads that is no more than their rounding. */
 #define NO_LOAD 1e-12
 
-/* Does the load leave all motions without stiffness alone? Then nothing says where in their room they end. */
-static bool is_loose(const uz_semi *s)
+/* What rounding of loads is relative to. Of a scene that is all that acts on it: of what acts on rigid groups the free
+ * motions may have rounding alone. */
+static uz_status sum_loads(double *size, const uz_semi *s, uz_error *err)
 {
-    bool loose = s->Z != NULL;
-    for (int64_t c = 0; loose && c < s->k; c++) {
-        double work = 0.0, size = 0.0, largest = 0.0;
+    const int64_t n = s->is_scene ? s->model.mesh.n_nodes * s->model.mesh.dim : 0;
+    double of_dofs = 0.0, of_nodes = 0.0, *f = n > 0 ? uz_alloc(n, sizeof *f) : NULL;
+    *size = 0.0;
+    if (n > 0 && !f)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld dofs", (long long)n);
+    const uz_status status = f ? uz_nodal_loads(f, &s->model, &s->problem->scene, err) : UZ_OK;
+    for (int64_t j = 0; j < s->d; j++)
+        of_dofs += fabs(s->of.p[j]);
+    for (int64_t i = 0; status == UZ_OK && i < n; i++)
+        of_nodes += fabs(f[i]);
+    free(f);
+    *size = fmax(of_dofs, of_nodes);
+    return status;
+}
+
+/* Do loads leave all motions without stiffness alone, and reactions, where they are proved to hold the body? Then
+ * nothing says where in their room the motions end: what is more than rounding there comes from overlaps alone. */
+static uz_status look_for_room(bool *loose, const uz_semi *s, uz_error *err)
+{
+    const uz_csc *Nt = &s->Nt;
+    double size;
+    *loose = false;
+    const uz_status status = sum_loads(&size, s, err);
+    if (status != UZ_OK)
+        return status;
+    *loose = s->Z != NULL;
+    for (int64_t c = 0; *loose && c < s->k; c++) {
+        const double *z = s->Z + c * s->d;
+        double work = 0.0, pressed = 0.0, largest = 0.0;
         for (int64_t j = 0; j < s->d; j++) {
-            work += s->Z[c * s->d + j] * s->of.p[j];
-            size += fabs(s->of.p[j]);
-            largest = fmax(largest, fabs(s->Z[c * s->d + j]));
+            work += z[j] * s->of.p[j];
+            largest = fmax(largest, fabs(z[j]));
         }
-        loose = fabs(work) <= NO_LOAD * size * largest;
+        for (int64_t i = 0; s->proved && i < s->m; i++) {
+            double along = 0.0;
+            for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+                along += Nt->val[k] * z[Nt->idx[k]];
+            pressed += fabs(s->last->r[i] * along);
+        }
+        *loose = fmax(fabs(work), pressed) <= NO_LOAD * size * largest;
     }
-    return loose;
+    return UZ_OK;
 }
 
 /* On the factor of the last augmented problem, whose springs stand on rows that are in contact. */
@@ -195,14 +227,18 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
 {
     uz_result *result = s->last;
     uz_summary *summary = &result->summary;
-    uz_status status = result->ray ? UZ_OK : certify(s, err);
+    bool loose = false;
+    uz_status status = result->ray ? UZ_OK : look_for_room(&loose, s, err);
+    s->proved = s->proved && !loose;
+    if (status == UZ_OK && !result->ray)
+        status = certify(s, err);
     if (status != UZ_OK)
         return status;
     if (!result->ray && s->proved && summary->certificate.relative_error <= s->requested)
         summary->outcome = UZ_CONVERGED;
     else if (!result->ray && summary->outcome == UZ_CONVERGED)
         summary->outcome = UZ_PRECISION_LIMIT;
-    if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT && is_loose(s))
+    if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT && loose)
         summary->outcome = UZ_LOOSE;
     summary->requested_error = s->requested;
     uz_semicoercive *held = &summary->semicoercive;

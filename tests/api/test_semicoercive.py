@@ -61,6 +61,25 @@ def test_an_ordinary_body_says_nothing_of_it(s):
     check("semicoercive" not in ended(s, SCENE)["summary"], "semicoercive")
 
 
+def test_rounding_holds_nothing(s):
+    """Loads that sum to rounding along a free motion press on nothing, also where that rounding finds an obstacle."""
+    pressed = json.loads((service.ROOT / "tests/data/scenes/held_by_rounding.json").read_text())
+    plate = {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"origin": [6.2, 4.64], "size": [1.8, 1], "cells": [3, 2]}},
+             "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "loads": [{"on": "top", "pressure": 1}],
+             "supports": [{"on": "top", "rigid": {"point": [6.2 + 1.8 / 2, 5.64], "ux": 0, "uy": 0}}],
+             "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [6.2 + 1.8 / 2, 4.64 - 5.01], "radius": 5}}}]}
+    for body in pressed, {"problem": plate}:
+        summary = ended(s, body)["summary"]
+        check(summary["outcome"] == "loose" and summary["certificate"]["relative_error"] is None, summary)
+        check("may lie anywhere" in summary["message"] and summary["semicoercive"]["held"] == 0, summary)
+    # what is wedged without a load is held
+    wedged = {**plate, "loads": [], "supports": [{"on": "top", "normal": [0, 1], "u": 0}], "contacts": [
+        {"on": side, "obstacle": {"plane": {"point": [6.2 + (0.01 if way > 0 else 1.79), 0], "normal": [way, 0]}}}
+        for side, way in (("left", 1), ("right", -1))]}
+    summary = ended(s, {"problem": wedged})["summary"]
+    check(summary["outcome"] == "converged" and summary["contact"]["reaction_sum"] < -10, summary)
+
+
 # ---------------------------------------------------------------- refused
 
 def test_the_motion_is_named(s):
