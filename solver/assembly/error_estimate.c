@@ -119,6 +119,9 @@ uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model
 /* Strain that makes stress, in parts of the whole, that is not told from rounding and what the equations left. */
 #define FREE 1e-7
 
+/* What solves leave of a translation, in parts of it. */
+#define CARRIED 1e-12
+
 double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
                               const double *nodal)
 {
@@ -131,9 +134,13 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
         return NAN;
     /* A translation strains nothing, unless along the radius of rings: what its strains come to is rounding. */
     const int dim = model->mesh.dim;
-    bool is_translation = !free_strain && (model->kind != UZ_AXISYMMETRIC || fabs(nodal[0]) <= 0);
+    double way = 0;
+    for (int c = 0; c < dim; c++)
+        way = fmax(way, fabs(nodal[c]));
+    const double rounding = CARRIED * way;
+    bool is_translation = !free_strain && (model->kind != UZ_AXISYMMETRIC || fabs(nodal[0]) <= rounding);
     for (int64_t i = dim; i < model->mesh.n_nodes * dim && is_translation; i++)
-        is_translation = nodal[i] >= nodal[i % dim] && nodal[i] <= nodal[i % dim];
+        is_translation = fabs(nodal[i] - nodal[i % dim]) <= rounding;
     if (is_translation)
         return 0;
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};

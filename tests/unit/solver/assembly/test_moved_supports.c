@@ -121,6 +121,21 @@ TEST(a_body_that_is_only_carried_converges)
     }
 }
 
+/* Nor has the mesh an error: the strains are what rounding leaves of the ride. */
+TEST(a_body_that_is_only_carried_has_no_mesh_error)
+{
+    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){5.345, 0.681, 1.301}, (int64_t[3]){4, 1, 1});
+    s.materials[0].poisson = 0.499;
+    body_hold(&s, "top", NAN, 0.000308, NAN);
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "back", NAN, NAN, 0);
+    uz_result *x = body_solve(&s, 1e-8);
+    CHECK(x->summary.discretization_error <= 0);
+    CHECK_INT(x->evaluation ? x->evaluation->n_warnings : -1, 0);
+    uz_result_free(x);
+    uz_scene_clear(&s);
+}
+
 /* The strains are there, though they are small beside the ride: what rounding leaves of them is not what was asked for.
  */
 TEST(a_loaded_body_that_is_carried_out_of_sight)
