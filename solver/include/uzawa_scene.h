@@ -199,7 +199,7 @@ typedef struct {
 typedef enum {
     UZ_LOAD_TRACTION,    /* v: force per area on edges or faces */
     UZ_LOAD_PRESSURE,    /* value: force per area against the outward normal */
-    UZ_LOAD_FORCE,       /* v: the sum, spread over edges or faces by area, elements by volume, nodes equally */
+    UZ_LOAD_FORCE,       /* v: the sum, spread over edges or faces by area, nodes equally */
     UZ_LOAD_BODY_FORCE,  /* v: force per volume of elements */
     UZ_LOAD_GRAVITY,     /* v: acceleration; times the density of each material */
     UZ_LOAD_NODE_FORCE,  /* v: at `node`; refused where nodes of a file are left out, as the others are numbered anew */
