@@ -142,7 +142,7 @@ void uz_finite_place_clear(uz_finite_place *place);
 uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
 
 /* Of a matrix in run->tangent or run->wide that no factor is known of (uz_finite_forget_factors), until the deadline;
- * its time counts. */
+ * its time counts. Where run->r are of as many rows it begins with them. */
 uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, uz_error *err);
 /* The contact problem of run->K, p and at.h: run->last. */
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);

@@ -267,10 +267,12 @@ static uz_status name_matrix(uz_finite_run *run, const uz_csc *K, uz_error *err)
 uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, uz_error *err)
 {
     const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = *qp};
+    const uz_result near = {.m = run->n_r, .r = run->r};
     run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
     uz_status status = name_matrix(run, &qp->K, err);
     if (status == UZ_OK)
-        status = uz_solve_rounds(out, &problem, &run->settings, NULL, NULL, run->cache, &run->hooks, err);
+        status = uz_solve_rounds(out, &problem, &run->settings, NULL, run->n_r > 0 ? &near : NULL, run->cache,
+                                 &run->hooks, err);
     if (status == UZ_OK)
         uz_timings_add(&run->spent, &(*out)->summary.timings);
     return status;

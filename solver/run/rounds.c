@@ -81,7 +81,8 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
         if (status == UZ_OK && b.round == 1 && b.setup->rows.in)
             status = reacquire_for_starts(&b, &own);
         if (status == UZ_OK && b.round == 1 && near)
-            status = uz_carry_start(&b.carried, near, &b.setup->model.info, b.setup->model.m, false, &own);
+            status = uz_carry_start(&b.carried, near, &b.setup->model.info,
+                                    b.setup->rows.in ? b.setup->rows.m : b.setup->dual->m, false, &own);
         if (status == UZ_OK)
             status = check_memory(&b, &own);
         if (status == UZ_OK && b.round == 1)

@@ -38,7 +38,8 @@ void uz_judge_whole_error(uz_result *result, const uz_problem *problem, const uz
 /* Solves all load cases on setups from the cache. K that is not positive definite is refused.
  *   results  n = max(1, n_cases), NULL at entry; those that are there stay on failure, and the caller frees them
  *   starts   n or NULL, as in uz_solve_cases
- *   near     one case, no starts: an answer to the same scene at another place, whose reactions it starts from, or NULL
+ *   near     one case, no starts: an answer to the same scene at another place, whose reactions it starts from; of
+ *            matrices one with the same rows; or NULL
  * Errors are those of uz_solve_cases, but for what only the obstacle holds: UZ_ERR_FREE_BODY, UZ_ERR_NOT_SPD. */
 uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                           const uz_state *const *starts, const uz_result *near, uz_cache *cache, const uz_hooks *hooks,

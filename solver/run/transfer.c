@@ -124,7 +124,8 @@ uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_
                          uz_error *err)
 {
     const uz_mesh_info *here = &result->mesh;
-    bool known = here->contact_of != NULL;
+    const bool places = here->contact_of != NULL;
+    bool known = places || result->m == m;
     *out = NULL;
     for (int64_t i = 0; known && i < result->m; i++)
         known = isfinite(result->r[i]);
@@ -134,7 +135,9 @@ uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_
     int64_t *row_at = uz_alloc_zero(here->n_nodes, sizeof *row_at); /* 1 + the first row at a node that is not taken */
     int64_t *next = uz_alloc(result->m, sizeof *next);
     bool room = state && row_at && next && (state->r = uz_alloc(m, sizeof *state->r));
-    for (int64_t i = 0, first = 0, end; i < m && room; first = end) { /* rows come contact by contact */
+    if (room && !places)
+        memcpy(state->r, result->r, (size_t)m * sizeof *state->r);
+    for (int64_t i = 0, first = 0, end; i < m && room && places; first = end) { /* rows come contact by contact */
         const int64_t contact = there->contact_of[i];
         while (first < result->m && here->contact_of[first] < contact)
             first++;

@@ -12,8 +12,9 @@ uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_bo
                             uz_error *err);
 
 /* Reactions for the contact rows of a body at another place: those of the result at the same nodes, in the order in
- * which a contact has rows there. whole: a state that can be stored, which says nothing but these reactions. *out NULL
- * and UZ_OK: the result has none. The caller frees with uz_state_free. */
+ * which a contact has rows there; of a result without a mesh those of the same rows, if there are as many. whole: a
+ * state that can be stored, which says nothing but these reactions. *out NULL and UZ_OK: the result has none. The
+ * caller frees with uz_state_free. */
 uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, bool whole,
                          uz_error *err);
 
