@@ -22,10 +22,12 @@ static const char *number_in_words(char text[32], const json_t *object, const ch
     return text;
 }
 
-/* Places behind the point that leave two digits, up to six. */
-static int places(double value)
+/* With two digits: up to six places behind the point, then with a power of ten. */
+static const char *two_digits(char buffer[32], double value)
 {
-    return value > 0 ? (int)fmin(6, fmax(0, 1 - floor(log10(value)))) : 0;
+    const int places = value > 0 ? (int)fmax(0, 1 - floor(log10(value))) : 0;
+    snprintf(buffer, 32, places > 6 ? "%.*g" : "%.*f", places > 6 ? 2 : places, value);
+    return buffer;
 }
 
 /* " MPa": what the scene calls the unit of this ("length", "force" or "stress"), or nothing. power: "^2" of an area. */
@@ -103,7 +105,7 @@ static void print_outcome(FILE *to, const json_t *summary)
     const char *outcome = client_json_text(summary, "outcome"), *words = "";
     const char *message = client_json_text(summary, "message");
     const double d = client_json_number(summary, "problem.d"), m = client_json_number(summary, "problem.m");
-    char count[32], percent[32];
+    char count[32], percent[32], of_mesh[32];
     for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
         words = strcmp(WORDS[i][0], outcome) == 0 ? WORDS[i][1] : words;
     label(to, "outcome");
@@ -127,8 +129,8 @@ static void print_outcome(FILE *to, const json_t *summary)
             fprintf(to, "at most %s in the energy norm, which may be all of it: guaranteed\n",
                     client_format_bound(percent, client_json_number(error, "bound")));
         else if (isfinite(total))
-            fprintf(to, "about %.*f %% in the energy norm: %.*f %% of it the mesh's, by estimate\n",
-                    places(100 * total), 100 * total, places(100 * mesh), 100 * mesh);
+            fprintf(to, "about %s %% in the energy norm: %s %% of it the mesh's, by estimate\n",
+                    two_digits(percent, 100 * total), two_digits(of_mesh, 100 * mesh));
         else
             fprintf(to, "not known: what the %s could not be told\n",
                     isfinite(mesh) ? "equations leave" : "mesh loses");

@@ -184,6 +184,26 @@ static char *summary_of(const json_t *job)
     return out;
 }
 
+/* Of answers that the mesh holds exactly, too. */
+TEST(errors_have_two_digits)
+{
+    static const struct {
+        double total, mesh;
+        const char *text;
+    } CASES[] = {{0.123, 0.1, "about 12 % in the energy norm: 10 % of it"},
+                 {2.3e-7, 2.2e-7, "about 0.000023 % in the energy norm: 0.000022 % of it"},
+                 {1.24e-12, 0, "about 1.2e-10 % in the energy norm: 0 % of it"}};
+    for (size_t i = 0; i < sizeof CASES / sizeof *CASES; i++) {
+        json_t *job = json_loads(JOB, 0, NULL), *error = json_object_get(json_object_get(job, "summary"), "error");
+        json_object_set_new(error, "total", json_real(CASES[i].total));
+        json_object_set_new(error, "mesh", json_real(CASES[i].mesh));
+        char *text = summary_of(job);
+        CHECK_MSG(strstr(text, CASES[i].text), "%s in %s", CASES[i].text, text);
+        free(text);
+        json_decref(job);
+    }
+}
+
 TEST(summary_says_everything_that_counts)
 {
     static const char *const PARTS[] = {
