@@ -631,7 +631,7 @@ enum { SHARES = 2 };
 typedef struct {
     const uz_body_model *model;
     const double *nodal;
-    bool carried;
+    bool carried, by_strains;
     double twice[SHARES];
     uz_status status[SHARES];
     uz_error err[SHARES];
@@ -641,18 +641,19 @@ static void add_share(void *ctx, int share)
 {
     energy_sum *sum = ctx;
     const int64_t n = sum->model->mesh.n_elements, middle = n < WORTH_SHARING ? 0 : n / 2;
-    sum->status[share] = add_energies(&sum->twice[share], sum->model, sum->nodal, sum->carried, share == 0 ? 0 : middle,
-                                      share == 0 ? middle : n, &sum->err[share]);
+    const int64_t begin = share == 0 ? 0 : middle, end = share == 0 ? middle : n;
+    double *twice = &sum->twice[share];
+    sum->status[share] = sum->by_strains
+                             ? uz_strain_energy_of_groups(twice, sum->model, sum->nodal, begin, end, &sum->err[share])
+                             : add_energies(twice, sum->model, sum->nodal, sum->carried, begin, end, &sum->err[share]);
 }
 
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
     energy_sum sum = {.model = model, .nodal = nodal, .carried = carried};
-    const bool alike = mesh->uniform && model->kind != UZ_AXISYMMETRIC;
-    if (!alike && !carried)
-        sum.status[0] = uz_strain_energy_of_groups(&sum.twice[0], model, nodal, &sum.err[0]);
-    else if (mesh->n_elements < WORTH_SHARING)
+    sum.by_strains = !carried && (!mesh->uniform || model->kind == UZ_AXISYMMETRIC);
+    if (mesh->n_elements < WORTH_SHARING)
         add_share(&sum, 1);
     else
         uz_aside_share(add_share, &sum, SHARES);

@@ -72,11 +72,12 @@ static void add_group(void *ctx, const uz_strain_group *group)
         (uz_cpu_has_avx2_fma() ? add_fused : add_of_model)(ctx, group);
 }
 
-uz_status uz_strain_energy_of_groups(double *twice, const uz_body_model *model, const double *nodal, uz_error *err)
+uz_status uz_strain_energy_of_groups(double *twice, const uz_body_model *model, const double *nodal, int64_t begin,
+                                     int64_t end, uz_error *err)
 {
     energy_sum sum = {.model = model};
     const uz_strain_work work = {make_rule, add_group, &sum};
-    const uz_strain_source from = {.model = model, .nodal = nodal, .apart = true};
+    const uz_strain_source from = {.model = model, .nodal = nodal, .apart = true, .begin = begin, .end = end};
     const uz_status status = uz_strain_groups(&work, &from, NULL, err);
     *twice = sum.twice;
     return status;

@@ -132,7 +132,8 @@ uz_status uz_strain_groups(const uz_strain_work *work, const uz_strain_source *f
     if (!groups)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the strains of %lld elements",
                        (long long)mesh->n_elements);
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
+    const int64_t end = from->end > 0 ? from->end : mesh->n_elements;
+    for (int64_t e = from->begin; e < end; e++) {
         const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
         uz_strain_group *g = &groups[kind];
         if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks)) {

@@ -31,6 +31,7 @@ typedef struct {
     bool apart;                /* displacements against those of each element's first node: a translation strains
                                 * nothing, and what it would leave by rounding grows with it. Not along the radius */
     bool large;                /* strains are those of Green and Lagrange, of elements of the standard formulation */
+    int64_t begin, end;        /* of uz_strain_groups: the elements from begin to end - 1; end 0: all */
 } uz_strain_source;
 
 /* From element[0..count) and the rule to the strains. */
@@ -43,7 +44,7 @@ typedef struct {
     void (*take)(void *ctx, const uz_strain_group *group);
     void *ctx;
 } uz_strain_work;
-/* Calls take with every element in some group; those of one kind come together, in whatever order that gives.
+/* Calls take with each of these elements in some group; those of one kind come together, in whatever order that gives.
  * UZ_ERR_CANCELLED, _MEMORY. */
 uz_status uz_strain_groups(const uz_strain_work *work, const uz_strain_source *from, const uz_hooks *hooks,
                            uz_error *err);
