@@ -186,7 +186,10 @@ class Service:
         """Seconds of processor of the daemon and of the processes that it solves in."""
         folder = pathlib.Path(f"/proc/{process or self.process.pid}")
         own = sum(map(int, (folder / "stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[11:15])) / 100
-        return own + sum(map(self.spent, " ".join(one.read_text(encoding="utf-8") for one in folder.glob("task/*/children")).split()))
+        for one in folder.glob("task/*/children"):
+            with contextlib.suppress(OSError):  # the thread has ended
+                own += sum(map(self.spent, one.read_text(encoding="utf-8").split()))
+        return own
 
     def settle(self):
         """Waits until it does nothing more: its process makes memory ready when it begins. Seconds of processor by then."""
