@@ -187,8 +187,8 @@ SPACE = """A cube of cells in contact with a plane below, clamped on one side, p
 answer, certified to 1e-6, of a body that it has not seen and of another load on it, over those of PETSc's multigrid GAMG at its defaults, setup and solve to 1e-8 of the same K, with or
 without the rigid motions, whichever takes less. Nodes within `hex8` and `tet4` are moved at random. Medians of three ratios of runs one after the other."""
 LARGE_SOLIDS = """Two solids under large deformation (`make peers-large-solids`): a block is pressed on a longer one and moved along it by more than its own length, another one is pressed
-on a dome and moved along that, the whole way at once. How far the force between them, as a vector, the area in contact and, where no edge makes it infinite, the largest pressure are off those of a
-finer mesh; and how far the force is off that of GetFEM, with bricks of 27 nodes on the mesh of the row of `hex20`, contact by integrals along rays, the way in parts; of `hex20` also how far that of CalculiX is off ours
+on a dome and moved along that, the whole way at once. How far the force between them, as a vector, the area in contact and, where no edge makes it infinite, the largest pressure are off those of the
+finest mesh of `hex20`; and how far the force is off that of GetFEM, with bricks of 27 nodes on its coarsest, contact by integrals along rays, the way in parts; of that one also how far that of CalculiX is off ours
 of the same mesh and of the law that both have (`neo_hooke_isochoric`), by the stiffness of its contact, in E for the length of a side."""
 CYCLES = """Iterations of conjugate gradients to 1e-8 on boxes of equal `hex8`, clamped on one side, with the multigrid that they have without a matrix (`make bench-solids`), by cells
 along each side; aspect: how many times as long as its other sides a cell is along one axis. Grown: the most over the fewest of a row."""
