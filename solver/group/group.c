@@ -470,39 +470,55 @@ static bool put_rows(uz_process_group *group, int64_t id, const uz_spread *map, 
            put(group, rows->modes, (size_t)(rows->nodes * map->bs * map->modes) * sizeof *rows->modes);
 }
 
-enum { SHARES = 2 };
-
 typedef struct {
-    const uz_spread *map;
-    uz_spread_rows rows[SHARES];
-    bool more[SHARES];
-} filling;
+    far_multigrid *body;
+    const uz_csc *K;
+    const uz_modes *modes;
+    pthread_mutex_t stream; /* of a whole message, and of the two below */
+    uz_status status;
+    uz_error *err;
+} sending;
 
-static void fill_share(void *ctx, int share)
+/* All rows of a process. */
+static uz_status send_process(sending *s, int64_t process, uz_error *err)
 {
-    filling *f = ctx;
-    f->more[share] = f->more[share] && uz_spread_next(&f->rows[share], f->map);
+    const uz_spread *map = &s->body->map;
+    uz_spread_rows rows = {.process = process};
+    const uz_status status = uz_spread_begin(&rows, map, s->K, s->modes, err);
+    bool goes_on = status == UZ_OK;
+    while (goes_on && uz_spread_next(&rows, map)) {
+        pthread_mutex_lock(&s->stream);
+        goes_on = s->status == UZ_OK && put_rows(s->body->group, s->body->id, map, &rows);
+        pthread_mutex_unlock(&s->stream);
+    }
+    uz_spread_rows_clear(&rows);
+    return status;
 }
 
-/* Of two processes, each made by a thread, where there are two more. */
-static uz_status send_rows(far_multigrid *body, int64_t first, const uz_csc *K, const uz_modes *modes, uz_error *err)
+static void send_share(void *ctx, int share)
 {
-    filling f = {.map = &body->map, .rows = {{.process = first}, {.process = first + 1}}};
+    sending *s = ctx;
+    uz_error err = {0};
     uz_status status = UZ_OK;
-    for (int share = 0; share < SHARES && status == UZ_OK; share++) {
-        f.more[share] = f.rows[share].process < body->group->processes;
-        if (f.more[share])
-            status = uz_spread_begin(&f.rows[share], f.map, K, modes, err);
-    }
-    while (status == UZ_OK && !body->group->lost && (f.more[0] || f.more[1])) {
-        uz_aside_share(fill_share, &f, SHARES);
-        for (int share = 0; share < SHARES; share++)
-            if (f.more[share])
-                put_rows(body->group, body->id, f.map, &f.rows[share]);
-    }
-    for (int share = 0; share < SHARES; share++)
-        uz_spread_rows_clear(&f.rows[share]);
-    return status;
+    for (int64_t p = share; status == UZ_OK && p < s->body->group->processes; p += UZ_ASIDE_MOST)
+        status = send_process(s, p, &err);
+    if (status == UZ_OK)
+        return;
+    pthread_mutex_lock(&s->stream);
+    s->status = status;
+    *s->err = err;
+    pthread_mutex_unlock(&s->stream);
+}
+
+/* While rows of one process are on their way, another thread makes those of the next. */
+static uz_status send_rows(far_multigrid *body, const uz_csc *K, const uz_modes *modes, uz_error *err)
+{
+    sending s = {.body = body, .K = K, .modes = modes, .err = err};
+    const int64_t processes = body->group->processes;
+    pthread_mutex_init(&s.stream, NULL);
+    uz_aside_share(send_share, &s, processes < UZ_ASIDE_MOST ? (int)processes : UZ_ASIDE_MOST);
+    pthread_mutex_destroy(&s.stream);
+    return s.status;
 }
 
 /* By where nodes are, else by their graph, which the group divides: it takes as long as it takes to make a level. */
@@ -556,8 +572,8 @@ static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes 
     if (status != UZ_OK)
         return status;
     status = begin_body(body, modes->strong, err);
-    for (int64_t first = 0; status == UZ_OK && !group->lost && first < group->processes; first += SHARES)
-        status = send_rows(body, first, K, modes, err);
+    if (status == UZ_OK)
+        status = send_rows(body, K, modes, err);
     if (status != UZ_OK) {
         group->lost = true; /* it waits for the rest */
         return status;

@@ -33,6 +33,8 @@ typedef struct {
     pthread_t thread;
     double most;                                           /* what it says that diag(K)^-1 M is bounded by */
     double weak;                                           /* M is so many times the diagonal; 0: once */
+    int64_t processes;                                     /* that it says it is of */
+    int64_t next[STAND_IN_MOST];                           /* of each the node whose rows are to come next */
     int64_t nodes, bs, modes, n, at, solves, steps, again; /* again: residuals that were found anew */
     double K[2][STAND_IN_MOST][STAND_IN_MOST];
     int lanes; /* systems that are solved at once */
@@ -175,14 +177,32 @@ static inline void stand_in_fetch(stand_in *s)
 
 static inline bool stand_in_take_body(stand_in *s, const uz_wire_head *m)
 {
-    int64_t count[2];
+    int64_t count[2 * STAND_IN_MOST], first = 0;
     s->nodes = m->a;
     s->bs = m->b;
     s->modes = m->c;
     s->n = s->nodes * s->bs;
     s->at = 0;
     memset(s->K, 0, sizeof s->K);
-    return s->n <= STAND_IN_MOST && stand_in_take(s, count, sizeof count) && count[0] == s->nodes;
+    if (s->n > STAND_IN_MOST || !stand_in_take(s, count, 2 * (size_t)s->processes * sizeof *count))
+        return false;
+    for (int64_t p = 0; p < s->processes; first += count[2 * p++])
+        s->next[p] = first;
+    return first == s->nodes;
+}
+
+/* Node after node goes to the next process. */
+static inline bool stand_in_divide(stand_in *s, const uz_wire_head *m)
+{
+    int32_t offset[STAND_IN_MOST + 1], neighbour[STAND_IN_MOST * STAND_IN_MOST], part[STAND_IN_MOST];
+    if (m->a > STAND_IN_MOST || !stand_in_take(s, offset, (size_t)(m->a + 1) * sizeof *offset) ||
+        !stand_in_take(s, neighbour, (size_t)offset[m->a] * sizeof *neighbour))
+        return false;
+    for (int64_t i = 0; i < m->a; i++)
+        part[i] = (int32_t)(i % s->processes);
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_PARTS, .a = s->processes});
+    stand_in_put(s, part, (size_t)m->a * sizeof *part);
+    return true;
 }
 
 static inline void stand_in_answer_made(stand_in *s)
@@ -201,14 +221,16 @@ static inline bool stand_in_take_rows(stand_in *s, const uz_wire_head *m)
         !stand_in_take(s, column, (size_t)m->b * sizeof *column) ||
         !stand_in_take(s, mode, (size_t)(m->a * bs * s->modes) * sizeof *mode))
         return false;
-    int64_t block = 0, from = 0;
-    for (int64_t i = 0; i < m->a; block += count[i++], s->at++)
+    int64_t block = 0, from = 0, at = s->next[m->c];
+    for (int64_t i = 0; i < m->a; block += count[i++], at++)
         for (int64_t c = 0; c < bs; c++)
             for (int64_t k = 0; k < count[i]; k++)
                 for (int64_t e = 0; e < bs; e++) {
-                    const int64_t row = s->at * bs + c, other = column[block + k] * bs + e;
+                    const int64_t row = at * bs + c, other = column[block + k] * bs + e;
                     s->K[UZ_WIRE_WHOLE][row][other] = s->K[UZ_WIRE_WHOLE][other][row] = value[from++];
                 }
+    s->next[m->c] = at;
+    s->at += m->a;
     if (s->at == s->nodes)
         stand_in_answer_made(s);
     return true;
@@ -231,6 +253,8 @@ static inline bool stand_in_obey(stand_in *s, const uz_wire_head *m)
     const size_t size = (size_t)s->n * sizeof(double);
     const int which = (int)m->a;
     switch (m->kind) {
+    case UZ_WIRE_GRAPH:
+        return stand_in_divide(s, m);
     case UZ_WIRE_BODY:
         return stand_in_take_body(s, m);
     case UZ_WIRE_ROWS:
@@ -276,7 +300,7 @@ static inline void *stand_in_run(void *arg)
 {
     stand_in *s = arg;
     uz_wire_head m;
-    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_HELLO, .a = 1});
+    stand_in_answer(s, (uz_wire_head){.kind = UZ_WIRE_HELLO, .a = s->processes});
     while (stand_in_take(s, &m, sizeof m) && stand_in_obey(s, &m))
         ;
     close(s->stream);
@@ -284,10 +308,12 @@ static inline void *stand_in_run(void *arg)
 }
 
 /* The end of the stream that is to be asked. */
-static inline int stand_in_start(stand_in *s, stand_in_fault fault, int honest_solves, double most)
+static inline int stand_in_start_many(stand_in *s, int64_t processes, stand_in_fault fault, int honest_solves,
+                                      double most)
 {
     int pair[2];
     memset(s, 0, sizeof *s);
+    s->processes = processes;
     s->fault = fault;
     s->honest_solves = honest_solves;
     s->most = most;
@@ -297,6 +323,11 @@ static inline int stand_in_start(stand_in *s, stand_in_fault fault, int honest_s
     if (pthread_create(&s->thread, NULL, stand_in_run, s) != 0)
         abort();
     return pair[0];
+}
+
+static inline int stand_in_start(stand_in *s, stand_in_fault fault, int honest_solves, double most)
+{
+    return stand_in_start_many(s, 1, fault, honest_solves, most);
 }
 
 #endif

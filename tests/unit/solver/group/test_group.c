@@ -1,5 +1,6 @@
 /* Solves by other processes: what is certified holds whatever they answer. Small systems that were once certified
  * wrongly (K = diag(2, 1), whose multigrid had one level that left a dof alone), by a stand-in and by uzawa-group. */
+#include "core/aside.h"
 #include "dual/form.h"
 #include "group/group.h"
 #include "harness.h"
@@ -133,6 +134,20 @@ TEST(an_honest_group_gives_certified_answers)
 {
     stand_in *s = malloc(sizeof *s);
     uz_process_group *group = uz_process_group_new(stand_in_start(s, STAND_IN_HONEST, 0, 1.0));
+    check_small_systems(group, MUST_CONVERGE);
+    uz_process_group_free(group);
+    pthread_join(s->thread, NULL);
+    free(s);
+}
+
+/* More of them than threads, some without a node: rows come as threads have made them, of each process in order. */
+TEST(rows_of_many_processes_are_made_by_threads)
+{
+    CHECK(uz_aside_begin(3) >= 1);
+    uz_aside_allow(3);
+    stand_in *s = malloc(sizeof *s);
+    const int stream = stand_in_start_many(s, UZ_ASIDE_MOST + 3, STAND_IN_HONEST, 0, 1.0);
+    uz_process_group *group = uz_process_group_new(stream);
     check_small_systems(group, MUST_CONVERGE);
     uz_process_group_free(group);
     pthread_join(s->thread, NULL);
