@@ -181,6 +181,32 @@ def test_dismissed(s):
     check(time.monotonic() - began < 10, ended)
 
 
+def used_s(pid):
+    """Seconds of processors."""
+    times = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]
+    return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
+
+
+@needs_group
+@options("--workers", "1", "--group-command", PAIR)
+def test_who_waits_for_another_sleeps(s):
+    """Whichever process is held up, the other leaves its processor to who can use it, and goes on afterwards."""
+    job = waiting_in_group(s, LONG)
+    pair = sorted(processes(s))
+    for stopped, waits in (pair, pair[::-1]):
+        os.kill(stopped, signal.SIGSTOP)
+        time.sleep(0.2)
+        before = used_s(waits)
+        time.sleep(2)
+        used = used_s(waits) - before
+        last = s.get(f"/v1/jobs/{job}/history").json["rows"][-1]
+        os.kill(stopped, signal.SIGCONT)
+        check(used < 0.07, used)  # 2 where it asks all the time, less where others have the processors
+        wait_until(lambda: s.get(f"/v1/jobs/{job}/history").json["rows"][-1] != last, PATIENT_S)
+    s.request("DELETE", f"/v1/jobs/{job}")
+    s.wait_status(job, "dismissed", seconds=PATIENT_S)
+
+
 @needs_group
 @options("--workers", "1", "--group-command", PAIR)
 def test_a_group_that_nobody_needs(s):

@@ -11,11 +11,9 @@
 #include <limits.h>
 #include <malloc.h>
 #include <petscmat.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 /* A body, its rows by process. */
 typedef struct {
@@ -227,7 +225,7 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
 static void tell_made(group *g, const body *b, int which, double start)
 {
     int64_t bytes = system_bytes(&b->system, which);
-    MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_INT64_T, MPI_SUM, PETSC_COMM_WORLD);
+    combine(&bytes, 1, MPI_INT64_T, MPI_SUM);
     answer(g, (uz_wire_head){.kind = UZ_WIRE_MADE,
                              .id = b->id,
                              .a = system_levels(&b->system, which),
@@ -421,16 +419,10 @@ static PetscErrorCode obey(group *g, const uz_wire_head *m)
 
 /* ---- beginning and end */
 
-#define SPIN_S  2e-3  /* a process that waits asks all the time for so long: the next question may come at once, */
-#define FIRST_S 50e-6 /* then it sleeps between, */
-#define LAST_S  2e-3  /* longer each time: MPI's own wait would take a processor */
-
 /* What is asked next, from the first process to all. */
 static PetscErrorCode hear(group *g, uz_wire_head *m)
 {
     MPI_Request request;
-    int there = 0;
-    double since, nap = FIRST_S;
     PetscFunctionBeginUser;
     if (IS_FIRST(g) && !stream_read(g->stream, m, sizeof *m))
         m->kind = 0;
@@ -438,18 +430,7 @@ static PetscErrorCode hear(group *g, uz_wire_head *m)
     if (behind > 0)
         take(g, need_room(g, behind), behind);
     PetscCallMPI(MPI_Ibcast(m, (int)sizeof *m, MPI_BYTE, 0, PETSC_COMM_WORLD, &request));
-    since = MPI_Wtime();
-    for (;;) {
-        PetscCallMPI(MPI_Test(&request, &there, MPI_STATUS_IGNORE));
-        if (there)
-            break;
-        if (MPI_Wtime() - since < SPIN_S) {
-            sched_yield();
-            continue;
-        }
-        nanosleep(&(struct timespec){.tv_nsec = (long)(1e9 * nap)}, NULL);
-        nap = nap < LAST_S ? 1.5 * nap : LAST_S;
-    }
+    wait_for(1, &request);
     PetscFunctionReturn(0);
 }
 

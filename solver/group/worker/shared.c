@@ -134,8 +134,10 @@ void shared_clear(shared_level *own)
 static void meet(const shared_level *own, float *x, float *to, int lanes)
 {
     const int b = own->level.A.b, width = uz_width(b);
-    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, x, own->count[lanes - 1], own->first[lanes - 1], MPI_FLOAT,
-                   MPI_COMM_WORLD);
+    MPI_Request request;
+    MPI_Iallgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, x, own->count[lanes - 1], own->first[lanes - 1], MPI_FLOAT,
+                    MPI_COMM_WORLD, &request);
+    wait_for(1, &request);
     for (int64_t i = 0; to && i < own->end - own->begin; i++)
         for (int l = 0; l < lanes && own->outside_ptr[i] < own->outside_ptr[i + 1]; l++) {
             const float *here = x + ((own->begin + i) * lanes + l) * width;
@@ -167,8 +169,7 @@ void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigri
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
     meet(own, room->x[0], room->t[0] + from, lanes);
     uz_level_take_step(&step, UZ_STEP_RESTRICT);
-    MPI_Allreduce(MPI_IN_PLACE, room->b[1], (int)(level->aggregates * lanes * uz_width(k)), MPI_FLOAT, MPI_SUM,
-                  MPI_COMM_WORLD);
+    combine(room->b[1], (int)(level->aggregates * lanes * uz_width(k)), MPI_FLOAT, MPI_SUM);
     if (uz_cycle_below(mg, room, 1, lanes, &err) != UZ_OK)
         end_group(err.message);
     step.coarse = room->x[1];

@@ -16,6 +16,11 @@
 /* For any process alone. */
 void end_group(const char *why);
 void *new_zeros(int64_t count, size_t size); /* zeros */
+/* MPI_Waitall, asleep where it takes long. */
+void wait_for(int count, MPI_Request *requests);
+
+/* MPI_Allreduce in place, waiting so. */
+void combine(void *x, int count, MPI_Datatype type, MPI_Op op);
 
 /* Who has which nodes, and what passes between neighbours. */
 typedef struct {
