@@ -15,6 +15,7 @@
  * one of another matrix leaves its difference. */
 #include "amg/amg.h"
 
+#include "core/aside.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/alloc.h"
@@ -81,47 +82,63 @@ static double guess_lambda(const uz_cg_info *info)
     return root * root;
 }
 
-/* ||D^1/2 y|| -> *reach, *missed >= ||D^-1/2 q||, b = D^1/2 s; *work = b'K^-1 b, but for q'K^-1 q. */
-static void measure(double *reach, double *missed, double *work, const uz_amg_info *amg, const double *y,
-                    const double *b, const double *q, const uz_csc *K)
-{
-    double wide = 0.0, left = 0.0, size = 0.0;
-    *work = 0.0;
-    for (int64_t j = 0; j < K->cols; j++) {
-        const double own = K->val[K->ptr[j]];
-        wide += own * y[j] * y[j];
-        left += q[j] * q[j] / own;
-        size += b[j] * b[j] / own;
-        *work += y[j] * (b[j] + q[j]);
-    }
-    *reach = isnan(wide) ? INFINITY : sqrt(wide);
-    *missed = (isnan(left) ? INFINITY : sqrt(left)) + amg->rounding * *reach + DBL_EPSILON * sqrt(size);
-}
-
 enum { TIGHTENED_MOST = 3 };
 
-/* What a pair of trials needs, n numbers for each of them. */
+/* What a pair of trials needs, n numbers for each of them, and what came of each. A trial's own numbers are found by a
+ * thread: who solves waits meanwhile. */
 typedef struct {
     double *y, *b, *q;
     const uz_multigrid *mg;
     uz_multigrid_room *room;
     const uz_csc *K;
-    uint64_t state;
+    double rounding; /* of uz_amg_info */
+    uint64_t state[PAIR];
+    double reach[PAIR];  /* ||D^1/2 y|| */
+    double missed[PAIR]; /* >= ||D^-1/2 q|| */
+    double work[PAIR];   /* b'K^-1 b, but for q'K^-1 q */
 } trials;
+
+/* b = D^1/2 s, y = 0. */
+static void draw(void *ctx, int trial)
+{
+    trials *x = ctx;
+    const uz_csc *K = x->K;
+    double *b = x->b + trial * K->cols;
+    uint64_t state = x->state[trial]; /* the other thread's stands beside it */
+    for (int64_t j = 0; j < K->cols; j++)
+        b[j] = sqrt(K->val[K->ptr[j]]) * uz_normal(&state);
+    x->state[trial] = state;
+    memset(x->y + trial * K->cols, 0, (size_t)K->cols * sizeof *x->y);
+}
+
+static void measure(void *ctx, int trial)
+{
+    trials *x = ctx;
+    const uz_csc *K = x->K;
+    const double *y = x->y + trial * K->cols, *b = x->b + trial * K->cols, *q = x->q + trial * K->cols;
+    double wide = 0.0, left = 0.0, size = 0.0, work = 0.0;
+    for (int64_t j = 0; j < K->cols; j++) {
+        const double own = K->val[K->ptr[j]];
+        wide += own * y[j] * y[j];
+        left += q[j] * q[j] / own;
+        size += b[j] * b[j] / own;
+        work += y[j] * (b[j] + q[j]);
+    }
+    const double reach = isnan(wide) ? INFINITY : sqrt(wide);
+    x->reach[trial] = reach;
+    x->missed[trial] = (isnan(left) ? INFINITY : sqrt(left)) + x->rounding * reach + DBL_EPSILON * sqrt(size);
+    x->work[trial] = work;
+}
 
 /* Two, of which the residuals are to be below `most`. */
 static uz_status try_both(uz_amg_info *amg, double *reach, double *missed, trials *x, double most,
                           const uz_hooks *hooks, uz_error *err)
 {
-    const int64_t n = x->mg->n;
     uz_cg_stop stop = {
         .absolute = ASKED / LEFT * most, .max_iterations = STEPS_MOST, .hooks = hooks, .deadline = INFINITY};
     double before = INFINITY;
     bool negative = false;
-    for (int64_t j = 0; j < PAIR * n; j++) {
-        x->b[j] = sqrt(x->K->val[x->K->ptr[j % n]]) * uz_normal(&x->state);
-        x->y[j] = 0.0;
-    }
+    uz_aside_share(draw, x, PAIR);
     for (int k = 0; k < TIGHTENED_MOST; k++) {
         uz_cg_info info = {0};
         const uz_status status = x->mg->kind->solve(x->mg, x->K, x->room, &info, x->y, x->q, x->b, PAIR, &stop, err);
@@ -131,12 +148,11 @@ static uz_status try_both(uz_amg_info *amg, double *reach, double *missed, trial
             amg->lambda = guess_lambda(&info);
         *reach = *missed = 0.0;
         negative = false;
-        for (int64_t at = 0; at < PAIR * n; at += n) {
-            double wide, left, work;
-            measure(&wide, &left, &work, amg, x->y + at, x->b + at, x->q + at, x->K);
-            *reach = fmax(*reach, wide);
-            *missed = fmax(*missed, left);
-            negative = negative || (left < 1.0 && !(work > 0.0));
+        uz_aside_share(measure, x, PAIR);
+        for (int trial = 0; trial < PAIR; trial++) {
+            *reach = fmax(*reach, x->reach[trial]);
+            *missed = fmax(*missed, x->missed[trial]);
+            negative = negative || (x->missed[trial] < 1.0 && !(x->work[trial] > 0.0));
         }
         if (*missed <= most || !(*missed < 0.5 * before) || !info.met)
             break;
@@ -171,7 +187,8 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_h
                 .mg = amg->mg,
                 .room = amg->mg->kind->room(amg->mg, &bytes),
                 .K = K,
-                .state = 0xD1B54A32D192ED03u};
+                .rounding = rounding,
+                .state = {0xD1B54A32D192ED03u, 0x8CB92BA72F3D8DD6u}};
     uz_status status = x.y && x.b && x.q && x.room
                            ? UZ_OK
                            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)n);
