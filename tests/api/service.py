@@ -33,6 +33,9 @@ SCHEMAS = ROOT / "schemas"
 # A daemon with a sanitizer takes five to twenty times as long: tests give it smaller bodies then.
 INSTRUMENTED = len(sys.argv) > 1 and pathlib.Path(sys.argv[1]).name in ("asan", "tsan")
 
+# Whatever is waited for is there at once, or beside much else in a while: only what never comes takes so long.
+PATIENT_S = 180
+
 
 def some(cases, every=3):
     """All of many like cases; with a sanitizer, which looks at the code and not at the answers, each third of them."""
@@ -222,7 +225,7 @@ class Service:
                                             env={**os.environ, "TSAN_OPTIONS": suppressions, **self.environment})
         line = self.process.stdout.readline().decode()
         if not line.startswith("listening on http://"):
-            self.process.wait(timeout=30)
+            self.process.wait(timeout=PATIENT_S)
             raise AssertionError(f"no listening line but {line!r}; the log says:\n{self.log()}")
         self.url = line.split()[-1]
         self.host, port = self.url[len("http://"):].rsplit(":", 1)
@@ -245,7 +248,7 @@ class Service:
         lines = [json.loads(line) for line in self.log().splitlines() if line.startswith("{")]
         return [line for line in lines if event is None or line["event"] == event]
 
-    def terminate(self, timeout=60, number=signal.SIGTERM):
+    def terminate(self, timeout=PATIENT_S, number=signal.SIGTERM):
         """Sends a signal and returns the exit status."""
         self.process.send_signal(number)
         return self.process.wait(timeout=timeout)
@@ -259,9 +262,9 @@ class Service:
                 return self.process.wait(timeout=2)
             except subprocess.TimeoutExpired:
                 pass
-        return self.process.wait(timeout=60)
+        return self.process.wait(timeout=PATIENT_S)
 
-    def restart(self, number=signal.SIGKILL, timeout=60):
+    def restart(self, number=signal.SIGKILL, timeout=PATIENT_S):
         """Ends it by a signal and starts it again on the same database; returns the exit status."""
         status = self.terminate(timeout, number)
         self.start()
@@ -307,7 +310,7 @@ class Service:
 
     # ---- requests
 
-    def request(self, method, path, body=None, headers=None, timeout=60):
+    def request(self, method, path, body=None, headers=None, timeout=PATIENT_S):
         """One request on a connection of its own. A dict or list becomes JSON."""
         headers = dict(headers or {})
         if isinstance(body, (dict, list)):
@@ -336,7 +339,7 @@ class Service:
             job = self.get(f"/v1/jobs/{job['id']}", Prefer="wait=60").json
         return job
 
-    def wait_status(self, job_id, *statuses, seconds=30):
+    def wait_status(self, job_id, *statuses, seconds=PATIENT_S):
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             job = self.get(f"/v1/jobs/{job_id}").json
@@ -379,7 +382,7 @@ def check(condition, *what):
         raise AssertionError(" ".join(str(one) for one in what))
 
 
-def wait_until(holds, seconds=60):
+def wait_until(holds, seconds=PATIENT_S):
     end = time.monotonic() + seconds
     while not holds():
         check(time.monotonic() < end, "not true after", seconds, "s")

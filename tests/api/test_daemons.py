@@ -58,7 +58,7 @@ def force_of(daemon, job):
 def check_all(daemon, name, posted):
     """Each job that was acknowledged is there, ended well, with the answer of its own problem, once."""
     for job, i in posted.items():
-        check(daemon.wait_status(job, "successful", "failed", seconds=60)["status"] == "successful", job)
+        check(daemon.wait_status(job, "successful", "failed")["status"] == "successful", job)
         check(abs(abs(force_of(daemon, job)) - (1 + i / 1000)) < 1e-6, job, i, force_of(daemon, job))
     counts = dict(SERVER.sql(name, "SELECT status, jobs FROM uzawa.counted"))
     check(counts["0"] == counts["1"] == "0" and int(counts["2"]) >= len(posted), counts)
@@ -125,7 +125,7 @@ def test_a_wait_at_another_daemon_ends_with_the_job(s):
             # told to end at the one that does not run it
             check(other.request("DELETE", f"/v1/jobs/{long}").status in (200, 202))
             job = waits.result().json
-        check(job["status"] == "dismissed" and time.monotonic() - begun < 10, job, time.monotonic() - begun)
+        check(job["status"] == "dismissed" and time.monotonic() - begun < 40, job, time.monotonic() - begun)
         check(here.get(f"/v1/jobs/{long}").json["status"] == "dismissed")
 
 
@@ -245,7 +245,7 @@ def test_one_that_begins_anew_takes_up_its_jobs(s):
         a.process.kill()
         a.process.wait()
         a.start()  # the lease is good for most of a minute
-        wait_until(lambda: a.get(f"/v1/jobs/{job}").json["attempts"] == 2, seconds=20)
+        wait_until(lambda: a.get(f"/v1/jobs/{job}").json["attempts"] == 2, seconds=40)
         check([event["requeued"] for event in a.events("recovered")] == [1], a.events("recovered"))
         check(len(a.get("/v1/nodes").json["nodes"]) == 1, "its former self is a node")
         a.request("DELETE", f"/v1/jobs/{job}")
@@ -260,11 +260,11 @@ def test_one_is_stopped_past_its_lease(s):
         stopped, other = (a, b) if a.events("job_started") else (b, a)
         stopped.process.send_signal(signal.SIGSTOP)
         end_leases(name, stopped)
-        found = other.wait_status(job, "successful", "failed", seconds=90)
+        found = other.wait_status(job, "successful", "failed")
         check(found["status"] == "successful" and found["attempts"] == 2, found)
         before = other.get(f"/v1/jobs/{job}/result").body
         stopped.process.send_signal(signal.SIGCONT)
-        wait_until(lambda: stopped.events("result_not_wanted") or stopped.events("job_taken_over"), seconds=90)
+        wait_until(lambda: stopped.events("result_not_wanted") or stopped.events("job_taken_over"))
         check(other.get(f"/v1/jobs/{job}/result").body == before, "an owner whose lease was over wrote")
         check(not stopped.events("job_ended"), stopped.events("job_ended"))
         check(SERVER.sql(name, f"SELECT count(DISTINCT token) FROM uzawa.pieces WHERE job = '{job}'") == [["1"]])
@@ -283,10 +283,10 @@ def test_the_database_is_away_for_a_while(s):
         check(int(refused.headers["retry-after"]) > 0)
         expect(a.post(numbered(9), {"Idempotency-Key": "later"}), 503, "store_unavailable")
         expect(a.get("/readyz"), 503, "store_unavailable")
-        wait_until(lambda: a.events("store_failed"), seconds=90)  # it has its answer, and nowhere to put it
+        wait_until(lambda: a.events("store_failed"))  # it has its answer, and nowhere to put it
         SERVER.start()
         wait_until(lambda: a.get(f"/v1/jobs/{job}").status == 200)
-        found = a.wait_status(job, "successful", "failed", seconds=90)
+        found = a.wait_status(job, "successful", "failed")
         check(found["status"] == "successful" and found["attempts"] == 1, found)
         last = a.post(numbered(9), {"Idempotency-Key": "later"}).json["id"]
         check_all(a, name, {**posted, last: 9})

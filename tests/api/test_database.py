@@ -117,7 +117,7 @@ def pooler(of):
     with open(os.path.join(folder, "log"), "wb") as log:
         process = subprocess.Popen([*as_other, program, os.path.join(folder, "ini")], stdout=log, stderr=log)
     try:
-        wait_until(lambda: os.path.exists(os.path.join(folder, ".s.PGSQL.6432")), seconds=30)
+        wait_until(lambda: os.path.exists(os.path.join(folder, ".s.PGSQL.6432")))
         yield folder
     finally:
         process.kill()
@@ -136,14 +136,14 @@ def test_a_pooler_in_transaction_mode(s):
             jobs = [one.post(MATRICES, {"Idempotency-Key": f"k{i}"}).json["id"] for i in range(10) for one in (a, b)]
             check(len(set(jobs)) == 10, jobs)
             for job in set(jobs):
-                check(b.wait_status(job, "successful", "failed", seconds=60)["status"] == "successful")
+                check(b.wait_status(job, "successful", "failed")["status"] == "successful")
             long = a.post(ENDLESS).json["id"]
             a.wait_status(long, "running")
             here, other = (a, b) if any(one["job"] == long for one in a.events("job_started")) else (b, a)
             begun = time.monotonic()
             check(other.request("DELETE", f"/v1/jobs/{long}").status in (200, 202))
             check(other.get(f"/v1/jobs/{long}", Prefer="wait=60").json["status"] == "dismissed")
-            check(time.monotonic() - begun < 15, time.monotonic() - begun)
+            check(time.monotonic() - begun < 40, time.monotonic() - begun)
             check(here.get(f"/v1/jobs/{long}").json["status"] == "dismissed")
             check(a.request("POST", "/v1/admin/check").json["whole"])
 

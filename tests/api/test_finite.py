@@ -36,7 +36,7 @@ def roller(aside):
 def answer(s, body, fields="summary,displacements,reactions,gaps,pressure,stress,strain,contact_status"):
     job = s.post(body)
     expect(job, 202)
-    ended = s.wait_status(job.json["id"], "successful", "failed", seconds=60)
+    ended = s.wait_status(job.json["id"], "successful", "failed")
     check(ended["status"] == "successful", ended)
     return job.json["id"], s.get(f"/v1/jobs/{job.json['id']}/result?fields={fields}").json
 
@@ -156,7 +156,7 @@ def test_a_limit_load_is_no_answer(s):
     body["cases"] = [{"name": "too much", "loads": [{"on": "top", "traction": [0, -0.25]}]},
                      {"name": "borne", "loads": [{"on": "top", "traction": [0, -0.2]}]}]
     job = s.post(body)
-    check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job)
+    check(s.wait_status(job.json["id"], "successful", "failed")["status"] == "successful", job)
     result = s.get(f"/v1/jobs/{job.json['id']}/result").json
     first, second = (case["summary"] for case in result["cases"])
     check(first["outcome"] == "unstable" and "under 0.84" in first["message"], first["message"])
@@ -173,7 +173,7 @@ def test_a_path_begins_where_the_case_before_has_come_to(s):
     body["cases"] = [{"name": "a", "part": 0.1}, {"name": "b", "part": 0.2, "after": "a"},
                      {"name": "c", "part": 0.25, "after": "b"}, {"name": "d", "part": 0.3, "after": "c"}]
     job = s.post(body)
-    check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job.json)
+    check(s.wait_status(job.json["id"], "successful", "failed")["status"] == "successful", job.json)
     cases = [case["summary"] for case in s.get(f"/v1/jobs/{job.json['id']}/result").json["cases"]]
     check([case["outcome"] for case in cases] == ["converged", "converged", "unstable", "unstable"], [case["outcome"] for case in cases])
     check([case["finite"]["part"] for case in cases[:2]] == [0.1, 0.2], cases[0]["finite"])
@@ -183,7 +183,7 @@ def test_a_path_begins_where_the_case_before_has_come_to(s):
     check("the case before" in cases[2]["message"] and "where it ended" in cases[3]["message"], cases[3]["message"])
     body["cases"][1]["after"] = "c"
     reply = s.post(body)
-    found = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", seconds=60)["error"]
+    found = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed")["error"]
     check(found["pointer"] == "/cases/1/after" and "earlier in the list" in found["detail"], found)
 
 
@@ -199,7 +199,7 @@ def test_every_point_of_a_path_is_answered(s):
     found = []
     for one in (body, long):
         job = s.post(one)
-        check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job.json)
+        check(s.wait_status(job.json["id"], "successful", "failed")["status"] == "successful", job.json)
         found.append(s.get(f"/v1/jobs/{job.json['id']}/result?fields=displacements").json["cases"])
     check([case["name"] for case in found[0]] == [case["name"] for case in long["cases"]], [case["name"] for case in found[0]])
     check([case["displacements"] for case in found[0]] == [case["displacements"] for case in found[1]], "the same cases")
@@ -217,7 +217,7 @@ def test_every_point_of_a_path_is_answered(s):
         wrong = copy.deepcopy(body)
         wrong["cases"][1].update(change)
         reply = s.post(wrong)
-        told = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", seconds=60)["error"]
+        told = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed")["error"]
         check(told["pointer"] == pointer and remedy in told["detail"], pointer, told)
     for wrong, pointer in (({**body, "cases": [{"name": "p", "steps": [0.1] * 1000}] * 11}, "/cases"),
                            ({**block(kinematics="auto"), "cases": body["cases"]}, "/cases/0/steps")):
@@ -254,7 +254,7 @@ def test_auto_takes_the_model_that_the_deformation_needs(s):
     whole["problem"]["supports"] = [{"on": "left", "ux": 0, "uy": 0}]
     whole["cases"] = [{"name": "little", "loads": [{"on": "top", "traction": [0, -0.01]}]}, {"name": "much", "loads": [{"on": "top", "traction": [0, -0.4]}]}]
     job = s.post(whole)
-    check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job.json)
+    check(s.wait_status(job.json["id"], "successful", "failed")["status"] == "successful", job.json)
     kinds = [case["summary"]["contact"]["geometry"]["kinematics"] for case in s.get(f"/v1/jobs/{job.json['id']}/result").json["cases"]]
     check(kinds == ["fixed", "finite"], kinds)
     refused = s.request("POST", "/v1/verify", {**squeezed(0.03, "neo_hooke"), "answer": {"displacements": small["displacements"], "reactions": small["reactions"]}})
@@ -435,7 +435,7 @@ def test_what_is_not_modelled_is_refused(s):
     for body, pointer, remedy in asked:
         reply = s.post(body)
         if reply.status == 202:
-            ended = s.wait_status(reply.json["id"], "successful", "failed", seconds=60)
+            ended = s.wait_status(reply.json["id"], "successful", "failed")
             check(ended["status"] == "failed", ended)
             found = ended["error"]
         else:

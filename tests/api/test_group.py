@@ -11,12 +11,11 @@ import subprocess
 import time
 
 import service
-from service import MATRICES, SCENE, Skip, check, options, wait_until
+from service import MATRICES, PATIENT_S, SCENE, Skip, check, options, wait_until
 
 # As root, on fewer processors than processes, and in a container without process_vm_readv.
 os.environ.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
                   OMPI_MCA_btl_vader_single_copy_mechanism="none")
-PATIENT_S = 150  # processes of MPI that wait for each other are slow where others use the processors, too
 PAIR = "mpirun --oversubscribe -n 2 {program}"
 
 CUBE = {"problem": {"kind": "scene", "model": "solid",
@@ -89,7 +88,7 @@ def needs_group(test):
             raise Skip("uzawa-group needs PETSc and MPI (make deps-group)")
         s.start()
         test(s)
-        wait_until(lambda: not processes(s), PATIENT_S)  # nothing of it stays
+        wait_until(lambda: not processes(s))  # nothing of it stays
     run.options = (None, *test.options)
     return run
 
@@ -109,7 +108,7 @@ def test_answers_are_those_of_one_process(s):
         check(abs(one["energy"]["primal"] - two["energy"]["primal"]) <= 1e-11 * abs(one["energy"]["primal"]), one, two)
         near = 1e-4 * abs(one["contact"]["reaction_sum"])
         check(abs(one["contact"]["reaction_sum"] - two["contact"]["reaction_sum"]) <= near, one["contact"], two["contact"])
-    wait_until(lambda: not processes(s), PATIENT_S)  # the group ends with its job
+    wait_until(lambda: not processes(s))  # the group ends with its job
     done = subprocess.run([str(s.build / "uzawa"), "--server", f"http://{s.host}:{s.port}", "submit", "-", "--wait"],
                           input=json.dumps({**MATRICES, "solver": {"operator": "distributed"}}), capture_output=True, text=True,
                           timeout=PATIENT_S)
@@ -131,7 +130,7 @@ def test_levels_of_a_larger_body(s):
 def waiting_in_group(s, request):
     """A job that iterates on a group."""
     job = s.post(request).json["id"]
-    wait_until(lambda: len(s.get(f"/v1/jobs/{job}/history").json.get("rows", ())) > 2, PATIENT_S)
+    wait_until(lambda: len(s.get(f"/v1/jobs/{job}/history").json.get("rows", ())) > 2)
     check(len(processes(s)) == 2, processes(s))
     return job
 
@@ -146,13 +145,12 @@ def test_a_lost_process_is_a_lost_attempt(s):
     """Killed: a process of the group, in both attempts; then the job has failed, and the service solves the next one."""
     job = waiting_in_group(s, LONG)
     os.kill(max(processes(s)), signal.SIGKILL)
-    wait_until(lambda: s.get(f"/v1/jobs/{job}").json["attempts"] == 2, PATIENT_S)
+    wait_until(lambda: s.get(f"/v1/jobs/{job}").json["attempts"] == 2)
     gone_before = s.events("process_died")
     check([event["cause"] for event in gone_before] == ["the loss of its group of processes"], gone_before)
-    wait_until(lambda: len(s.get(f"/v1/jobs/{job}/history").json.get("rows", ())) > 2 and len(processes(s)) == 2,
-               PATIENT_S)
+    wait_until(lambda: len(s.get(f"/v1/jobs/{job}/history").json.get("rows", ())) > 2 and len(processes(s)) == 2)
     os.kill(min(processes(s)), signal.SIGKILL)
-    ended = s.wait_status(job, "failed", seconds=PATIENT_S)
+    ended = s.wait_status(job, "failed")
     check(ended["error"]["code"] == "process_died" and "group" in ended["error"]["detail"], ended)
     check(s.solve(MATRICES)["status"] == "successful")
 
@@ -165,7 +163,7 @@ def test_mpirun_is_lost(s):
     parents = {int(pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[1]) for pid in group}
     check(len(parents) == 1, parents)
     os.kill(parents.pop(), signal.SIGKILL)
-    ended = s.wait_status(job, "failed", seconds=PATIENT_S)
+    ended = s.wait_status(job, "failed")
     check(ended["error"]["code"] == "process_died", ended)
     check(s.solve(MATRICES)["status"] == "successful")
 
@@ -177,8 +175,8 @@ def test_dismissed(s):
     job = waiting_in_group(s, LONG)
     began = time.monotonic()
     s.request("DELETE", f"/v1/jobs/{job}")
-    ended = s.wait_status(job, "dismissed", seconds=PATIENT_S)
-    check(time.monotonic() - began < 10, ended)
+    ended = s.wait_status(job, "dismissed")
+    check(time.monotonic() - began < 40, ended)
 
 
 def used_s(pid):
@@ -216,7 +214,7 @@ def test_a_group_that_nobody_needs(s):
     free["problem"]["loads"] = [{"on": "back", "traction": [0, 0, -1]}]  # away from the sphere: the solver finds it
     job = solve(s, free)
     check(job["status"] == "failed" and job["error"]["code"] == "free_body", job)
-    wait_until(lambda: not processes(s), PATIENT_S)
+    wait_until(lambda: not processes(s))
     check(solve(s, by("distributed", CUBE))["status"] == "successful")
 
 

@@ -228,7 +228,7 @@ def test_kill_while_it_runs(s):
     job = expect(s.post(request), 202).json["id"]
     s.wait_status(job, "running")
     s.restart()
-    ended = s.wait_status(job, "successful", "failed", seconds=60)
+    ended = s.wait_status(job, "successful", "failed")
     check(ended["status"] == "successful" and ended["attempts"] == 2, ended)
     check([case["name"] for case in result(s, job)["cases"]] == list(LOADS), "other cases")
     check(len(s.events("job_ended")) == 1, s.events("job_ended"))

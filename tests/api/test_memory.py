@@ -136,6 +136,7 @@ def test_the_next_body_lands_on_memory_that_is_there(s):
         check(job["status"] == "successful" and not job["summary"]["factor"]["cached"], job)
         faults.append(page_faults(s) - before)
         time.sleep(1.2)  # for the housekeeper
+        s.settle()
     check(faults[0] > 2000, faults)
     check(sorted(faults[-4:])[1] < faults[0] / 4, faults)
     # So does the next answer; what is shared goes once none follows.

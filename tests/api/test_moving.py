@@ -25,7 +25,7 @@ def bump(kinematics, **solver):
 def answer(s, body):
     job = s.post(body)
     expect(job, 202)
-    check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job)
+    check(s.wait_status(job.json["id"], "successful", "failed")["status"] == "successful", job)
     return job.json["id"], s.get(f"/v1/jobs/{job.json['id']}/result").json
 
 

@@ -54,7 +54,7 @@ def solve(daemon, body=LARGE):
 def until_back(ask):
     """After a failure nobody asks the object store for a moment."""
     replies = []
-    wait_until(lambda: replies.append(ask()) or replies[-1].status != 503, seconds=20)
+    wait_until(lambda: replies.append(ask()) or replies[-1].status != 503)
     return replies[-1]
 
 
@@ -123,7 +123,7 @@ def test_requests_of_two_daemons(s):
         place.objects.update(objects)
         with place.failing("500", "PUT"):  # it is acknowledged all the same
             other = a.post(padded(3)).json["id"]
-        check(b.wait_status(other, "successful", "failed", seconds=60)["status"] == "successful")
+        check(b.wait_status(other, "successful", "failed")["status"] == "successful")
         check(SERVER.sql(name, "SELECT job FROM uzawa.request") == [[other]])
         for one in job, again:
             expect(b.request("DELETE", f"/v1/jobs/{one}"), 204)
@@ -141,7 +141,7 @@ def test_what_is_deleted_is_collected(s):
         check(len(place.objects) >= 3, "it went before its time")
         with place.failing("500", "DELETE"):
             SERVER.sql(name, "UPDATE uzawa.object SET due = 0 WHERE due < 'Infinity'")
-            wait_until(lambda: SERVER.sql(name, "SELECT 1 FROM uzawa.object WHERE doomed"), seconds=40)
+            wait_until(lambda: SERVER.sql(name, "SELECT 1 FROM uzawa.object WHERE doomed"))
         collect(name, place, lambda: not SERVER.sql(name, "SELECT 1 FROM uzawa.object WHERE job IS NULL"))
         check(result_of(a, keep) == before)
 
@@ -167,7 +167,7 @@ def test_a_daemon_is_killed_between_object_and_row(s):
             other.start()
         check(other.get(f"/v1/jobs/{job}").json["status"] in ("accepted", "running"))
         SERVER.sql(name, "UPDATE uzawa.job SET lease = uzawa.moment() - 1 WHERE status = 1")
-        check(other.wait_status(job, "successful", "failed", seconds=90)["status"] == "successful")
+        check(other.wait_status(job, "successful", "failed")["status"] == "successful")
         result_of(other, job)
         kept = {row[0] for row in SERVER.sql(name, "SELECT DISTINCT object FROM uzawa.placed")}
         collect(name, place, lambda: set(place.objects) == kept)
@@ -217,7 +217,7 @@ def test_the_object_store_is_away_for_a_while(s):
         matrix = MATRICES["problem"]["K"].replace("symmetric\n", "symmetric\n" + ("%" + " " * 900 + "\n") * 5).encode()
         expect(a.request("POST", "/v1/uploads", matrix), 503, "store_unavailable")
         place.start()
-        found = a.wait_status(job, "successful", "failed", seconds=60)
+        found = a.wait_status(job, "successful", "failed")
         check(found["status"] == "successful" and found["attempts"] == 1, found)
         result_of(a, job)
         check(a.wait_status(small, "successful")["attempts"] == 1)
@@ -240,7 +240,7 @@ def test_the_object_store_is_away_for_a_while(s):
             a.wait_status(second, "running")
             time.sleep(1)
             check(a.get(f"/v1/jobs/{second}").json["status"] == "running")
-        found = a.wait_status(second, "successful", "failed", seconds=60)
+        found = a.wait_status(second, "successful", "failed")
         check(found["status"] == "successful" and found["attempts"] == 1, found)
 
 

@@ -20,7 +20,7 @@ def scene(model, size, cells, element, supports, contacts=None, law="linear", **
 def answer(s, body):
     job = s.post(body)
     expect(job, 202)
-    ended = s.wait_status(job.json["id"], "successful", "failed", seconds=60)
+    ended = s.wait_status(job.json["id"], "successful", "failed")
     check(ended["status"] == "successful", ended)
     return s.get(f"/v1/jobs/{job.json['id']}/result?fields=summary,displacements,nodes,strain").json
 

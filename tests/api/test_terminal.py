@@ -110,7 +110,7 @@ def test_interrupt_leaves_the_job(server):
         asked = time.monotonic()
         seen.type("\x03")
         check(seen.end() == 130, seen.screen.text)
-        check(time.monotonic() - asked < 10, "it must not wait for the server")
+        check(time.monotonic() - asked < 40, "it must not wait for the server")
     said = next(line for line in seen.screen.lines if "interrupted" in line)
     job = said.split("uzawa wait ")[1].split(";")[0]
     check(len(job) == 32 and f"uzawa cancel {job}" in said and " %" not in said, said)

@@ -16,7 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "tests" / "api"))
 
 import service  # noqa: E402
-from service import Skip, check, options  # noqa: E402,F401
+from service import PATIENT_S, Skip, check, options  # noqa: E402,F401
 
 try:
     from selenium import webdriver
@@ -72,25 +72,31 @@ class Browser:
         self.driver.get(f"{s.url}/#/{place}")
         self.wait("the view", "return document.querySelector('main').childElementCount > 0")
 
+    def to_front(self, window):
+        """Goes to a tab and shows it: one that is not shown draws no frame, and Chromium need not show it by itself when
+        another is closed."""
+        self.driver.switch_to.window(window)
+        self.command("Page.bringToFront")
+
     def run(self, script, *arguments):
         """The value of a script that says `return`."""
         return self.driver.execute_script(script, *arguments)
 
-    def wait(self, what, script, *arguments, seconds=30):
+    def wait(self, what, script, *arguments, seconds=PATIENT_S):
         """Waits until the script returns something true, and returns that."""
         end = time.monotonic() + seconds
         while True:
             value = self.run(script, *arguments)
             if value:
                 return value
-            check(time.monotonic() < end, "not there after", seconds, "s:", what, "\nthe page says:", self.text("body")[:1500],
-                  "\nthe console:", self.console())
+            check(time.monotonic() < end, "not there after", seconds, "s:", what, "\nthe page, which is",
+                  self.run("return document.visibilityState"), "says:", self.text("body")[:1500], "\nthe console:", self.console())
             time.sleep(0.03)
 
     def all(self, selector):
         return self.driver.find_elements(By.CSS_SELECTOR, selector)
 
-    def one(self, selector, seconds=30):
+    def one(self, selector, seconds=PATIENT_S):
         """The element that a CSS selector finds, waited for until it is seen."""
         self.wait(selector, "const e = document.querySelector(arguments[0]); return e && e.checkVisibility()", selector,
                   seconds=seconds)
@@ -115,7 +121,7 @@ class Browser:
         """What an element shows; "" if there is none."""
         return self.run(SHOWN + "return text", selector)
 
-    def says(self, selector, text, seconds=30):
+    def says(self, selector, text, seconds=PATIENT_S):
         """Waits until an element shows a text."""
         return self.wait(f"{selector} saying {text!r}", SHOWN + "return text.includes(arguments[1])", selector, text,
                          seconds=seconds)

