@@ -20,12 +20,14 @@ check() { # NAME COMMAND...
         status=1
     fi
 }
-unbuilt() { # what the compiler has not yet seen: the build, whose warnings are errors, has read the rest
-    if [ "$(make -s print-CC)" = gcc ]; then
-        make -n $(printf "$(make -s print-BUILD)/obj/%s.o " ${c_files//.c/}) | sed -n 's/.* -c -o [^ ]* //p'
-    else
-        printf '%s\n' $c_files
-    fi
+unbuilt() { # what no build has read, whose warnings are errors: nor the one with AddressSanitizer, where there is one
+    local build left=$c_files
+    [ "$(make -s print-CC)" = gcc ] || { printf '%s\n' $left && return; }
+    for build in "$(make -s print-BUILD)"{,/asan}; do
+        [ ! -d "$build" ] || [ -z "$left" ] ||
+            left=$(make -n BUILD="$build" PLAIN="${build%/asan}" $(printf "$build/obj/%s.o " ${left//.c/}) | sed -n 's/.* -c -o [^ ]* //p')
+    done
+    printf '%s\n' $left
 }
 gcc_warnings() { # those that need no optimization
     unbuilt | xargs -r -P "$cores" -n 8 gcc -fsyntax-only $strict $includes $cflags -Itests -Itests/support
@@ -66,16 +68,26 @@ shell_syntax() {
 only_in() { # HEADER PATTERN: the header is included nowhere but in files that match
     ! grep -ln "include [<\"]$1" $(printf '%s\n' $sources | grep -v '^tests/') | grep -Ev "$2"
 }
-headers_alone() { # a header says all that it needs
-    printf '%s\n' $sources | grep '\.h$' | xargs -P "$cores" -n 4 sh -c 'options=$1; shift; status=0
+headers_alone() { # a header says all that it needs: one that a source includes first has shown it
+    local file
+    for file in $c_files; do
+        echo "${file%/*}/ $(grep -m1 '^#include' "$file")"
+    done | awk -F '[ "]+' -v headers="$(printf '%s\n' $sources | grep '\.h$')" '
+        BEGIN {split(headers, all, "\n"); for (i in all) left[all[i]] = 1}
+        {n = split($1 " solver/include/ solver/ server/ client/ tests/ tests/support/", at, " ")
+         for (i = 1; i <= n && !(at[i] $3 in left); i++);
+         left[at[i] $3] = 0}
+        END {for (one in left) if (left[one]) print one}' | xargs -r -P "$cores" -n 4 sh -c 'options=$1; shift; status=0
         for header; do printf "#include \"%s\"\n" "$header" | gcc -fsyntax-only -x c $options -I. - || status=255; done
         exit $status' headers "$strict $includes $cflags $group_flags -Itests -Itests/support"
 }
 check format clang-format --dry-run -Werror $sources
 check gcc gcc_warnings
 check clang tidy
+# C tests, all of which run under sanitizers, have shown there what it looks for.
 check cppcheck cppcheck -j "$cores" --quiet --std=c11 --error-exitcode=1 --inline-suppr --enable=warning,portability \
-    --suppress=missingIncludeSystem --suppress=normalCheckLevelMaxBranches $includes $c_files $group_files
+    --suppress=missingIncludeSystem --suppress=normalCheckLevelMaxBranches $includes \
+    $(printf '%s\n' $c_files | grep -v '^tests/unit/') $group_files
 check headers_alone headers_alone
 check rooms python3 -B tests/rooms.py
 check file_length long_files
