@@ -75,12 +75,18 @@ H_FILES    := $(if $(HAS_PETSC),$(wildcard solver/group/worker/*.h)) $(wildcard 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
-SOLVER_OBJ := $(call obj,$(SOLVER_SRC))
+# Builds with sanitizers, which have a BUILD of their own, take from the ordinary one what they need not look at. Under
+# ThreadSanitizer that is the client, and rooms that know of no thread: they touch what their caller has given them.
+PLAIN      ?= $(BUILD)
+THREADS    := pthread|stdatomic|core/(aside|lock|reserve)\.h|linalg/pieces\.h
+THREADLESS := $(if $(findstring thread,$(SAN)),client/ $(filter-out $(dir $(shell grep -lE '$(THREADS)' solver/*/*.[ch])),$(sort $(dir $(SOLVER_SRC)))))
+looked_at   = $(foreach source,$(1),$(if $(filter $(addsuffix %,$(THREADLESS)),$(source)),$(PLAIN),$(BUILD))/obj/$(source:.c=.o))
+SOLVER_OBJ := $(call looked_at,$(SOLVER_SRC))
 SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(BUILD)/obj/gen/embedded.o $(BUILD)/obj/gen/page.o
-CLIENT_OBJ := $(call obj,$(CLIENT_SRC))
+CLIENT_OBJ := $(call looked_at,$(CLIENT_SRC))
 GROUP_OBJ  := $(call obj,$(GROUP_SRC))
 # What unit tests may link: everything but the two mains.
-PARTS_OBJ  := $(filter-out $(BUILD)/obj/server/main.o,$(SERVER_OBJ)) $(filter-out $(BUILD)/obj/client/main.o,$(CLIENT_OBJ))
+PARTS_OBJ  := $(filter-out $(BUILD)/obj/server/main.o,$(SERVER_OBJ)) $(filter-out %/obj/client/main.o,$(CLIENT_OBJ))
 UNIT_BIN   := $(addprefix $(BUILD)/tests/,$(notdir $(basename $(UNIT_SRC))))
 PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
@@ -173,8 +179,7 @@ $(BUILD)/uzawa: $(CLIENT_OBJ) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(CLIENT_LIBS)
 
 # PETSc's macros for memory convert signed sizes in whoever uses them. It has a heap and handlers of its own, and runs
-# under mpirun: no sanitizer, and what it has of the solver is that of the ordinary build in PLAIN.
-PLAIN ?= $(BUILD)
+# under mpirun: no sanitizer, and what it has of the solver is that of the ordinary build.
 GROUP_FLAGS = $(patsubst -I%,-isystem %,$(filter -I%,$(call pkg,--cflags petsc ompi-c))) -Wno-sign-conversion
 $(GROUP_OBJ): CFLAGS += $(GROUP_FLAGS) -O3
 $(GROUP_OBJ): override SAN =
@@ -346,7 +351,7 @@ test-hygiene: ## formatting, static analysis, both compilers
 # Each sanitizer has a build of its own inside BUILD. Its reports need lines and no variables: with -g1 it compiles in
 # three quarters of the time. Programs at a fixed address need not relocate the half a million pointers of what is
 # checked whenever one starts, and tests start them some thousand times.
-sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/libuzawa.a && \
+sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/libuzawa.a $(BUILD)/uzawa && \
             $(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) PLAIN=$(BUILD) OPT="-O1 -g1 -fno-pie" LDFLAGS=-no-pie SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that say
 # "not under ThreadSanitizer", or "not under sanitizers" at all.
