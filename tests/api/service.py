@@ -87,6 +87,9 @@ class Reply:
         return f"{self.status} {self.headers} {self.body[:600]!r}"
 
 
+# Who asks for these waits for the end of a job; the service replies that it is under way after a minute.
+AS_LONG_AS_IT_TAKES = "wait=60", "wait=120"
+
 # What tells which schema a reply must meet: a member that only this kind of object has.
 KINDS = [("valid", "valid.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("limits", "limits.json"),
          ("whole", "check.json"), ("notes", "translation.json"), ("rows", "history.json"), ("decades", "work-precision.json"), ("code", "problem-details.json"),
@@ -322,9 +325,15 @@ class Service:
         try:
             connection.request(method, path, body=body, headers=headers)
             reply = connection.getresponse()
-            return Reply(reply.status, reply.getheaders(), reply.read())
+            reply = Reply(reply.status, reply.getheaders(), reply.read())
         finally:
             connection.close()
+        if reply.status != 202 or headers.get("Prefer") not in AS_LONG_AS_IT_TAKES:
+            return reply
+        asked = {name: headers[name] for name in ("Authorization", "Prefer") if name in headers}
+        while (told := self.request("GET", f"/v1/jobs/{reply.json['id']}", headers=asked)).json["status"] in ("accepted", "running"):
+            pass
+        return told
 
     def get(self, path, **headers):
         return self.request("GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
@@ -334,10 +343,7 @@ class Service:
 
     def solve(self, body):
         """Posts a job, waits until it ended, and returns it."""
-        job = self.post(body, {"Prefer": "wait=60"}).json
-        while job["status"] in ("accepted", "running"):
-            job = self.get(f"/v1/jobs/{job['id']}", Prefer="wait=60").json
-        return job
+        return self.post(body, {"Prefer": "wait=60"}).json
 
     def wait_status(self, job_id, *statuses, seconds=PATIENT_S):
         end = time.monotonic() + seconds

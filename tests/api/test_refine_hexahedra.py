@@ -98,7 +98,7 @@ def test_reactions_are_those_of_other_elements(s):
 
 def test_supports_and_loads_sum_up(s):
     """To rounding, with hanging nodes on sides that are held, loaded, in contact, and on springs."""
-    for element in ("quad4", "quad8", "hex8", "hex20"):
+    for element in some(("quad8", "quad4", "hex20", "hex8")):
         dim = 2 if element[0] == "q" else 3
         for spring in (False, True):
             problem = l_shape(element, [0.3, -1, 0.2][:dim])
@@ -147,7 +147,7 @@ def test_corners_beside_hanging_nodes(s):
 
 
 def test_fields_find_the_mesh(s):
-    for element in ("quad4", "quad8", "hex8", "hex20"):
+    for element in some(("quad4", "quad8", "hex8", "hex20")):
         job = solved(s, l_shape(element, [0, -1, 0][:2 if element[0] == "q" else 3]), 0.1)
         answer = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=von_mises,pressure,nodes,stress,displacements"),
                         200).json
