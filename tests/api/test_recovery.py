@@ -1,6 +1,7 @@
 """Nothing that was acknowledged is lost, whenever the daemon dies, and nothing is done twice.
 usage: test_recovery.py BUILD_DIR [FILTER]
 """
+# once in CI: fewer jobs and kills than alone (more are in make soak)
 import collections
 import copy
 import http.client
@@ -276,7 +277,7 @@ def test_drain_leaves_the_rest_for_the_next_start(s):
     acknowledged = submit(s, JOBS // 2)
     started = time.monotonic()
     check(s.restart(signal.SIGTERM) == 0, s.log()[-2000:])
-    check(time.monotonic() - started < 10, "the drain took", time.monotonic() - started)
+    check(time.monotonic() - started < 40, "the drain took", time.monotonic() - started)
     check(len(s.events("stopped")) == 1, s.log()[-2000:])
     for job_id in endless:
         check(s.wait_status(job_id, "running")["attempts"] == 1, "a release is no attempt")

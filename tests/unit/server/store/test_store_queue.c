@@ -1,4 +1,5 @@
-/* The queue of the store and those who work on it: order, recovery, expiry, retention, webhooks, many threads. */
+/* The queue of the store and those who work on it: order, recovery, expiry, retention, webhooks, many threads.
+ * once in CI: shorter queues than alone. */
 #include "store/engine_base.h"
 #include "sanitized.h"
 #include "sqlite_file.h"
