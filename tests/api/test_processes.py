@@ -60,20 +60,19 @@ def test_threads_can_be_bounded(s):
 @options("--workers", "1")
 def test_dismissed_while_it_factors(s):
     job = busy(s, LONG)
-    began = time.monotonic()
+    before = s.spent()
     reply = expect(s.request("DELETE", f"/v1/jobs/{job}"), 200)
     s.wait_status(job, "dismissed")
-    took = time.monotonic() - began
-    check(took < 5, took, reply)  # 0.2 s and what a machine that is busy adds, of ten
+    check(s.spent() - before < 4, s.spent() - before, reply)  # seconds of processor; all of it takes ten
     check(s.solve(MATRICES)["status"] == "successful")
 
 
 @options("--workers", "1")
 def test_time_is_over_while_it_factors(s):
+    before = s.spent()
     job = s.solve(copy.deepcopy({**LONG, "solver": {**LONG["solver"], "time_limit_s": 1}}))
     check(job["status"] == "failed" and job["error"]["code"] == "time_limit" and "factored" in job["error"]["detail"], job)
-    total = next(event["total_s"] for event in s.events("job_ended") if event["job"] == job["id"])
-    check(total < 8, total)  # the limit, 0.8 s, reading the request, starting the process
+    check(s.spent() - before < 6, s.spent() - before)  # seconds of processor; all of it takes ten
     check(s.solve(MATRICES)["status"] == "successful")
 
 
