@@ -7,9 +7,10 @@
  * K the second derivatives of the energy and of r times the gaps, h and N the gaps and normals where the body is:
  * Newton's method on the conditions of equilibrium with contact, sequential quadratic programming (Nocedal and Wright,
  * "Numerical Optimization", ch. 18). A K that is not positive definite gets stiffness along the pressed rows added,
- * which changes nothing where they stay closed, and where that is not enough that of the undeformed body, which costs
- * steps; along a path from another case the part is given up there, as the equilibrium beyond may be another one.
- * Where all supports move alike, the body is carried along before the first one.
+ * which changes nothing where they stay closed. Where that is not enough, or the step before was so large that its
+ * reactions say little, what r times second derivatives of gaps adds is left out, then stiffness of the undeformed
+ * body is added: both cost steps; along a path from another case the part is given up there, as the equilibrium
+ * beyond may be another one. Where all supports move alike, the body is carried along before the first one.
  * Steps that turn slender parts lead to where these have their length (finite_turn.c).
  * After a large step K first has the stress that the step was made for (finite_element.c), which takes half of
  * the steps where slender parts turn; where it is not positive definite with that the body's own comes next. Steps are
@@ -37,9 +38,8 @@
 
 /* Contact problems of one part, and how often a step is halved. A part is given up after MOST_SHIFTED in a row that
  * stiffness of the undeformed body had to be added to: their steps get smaller slowly (a ring of rubber took all 20 for
- * the whole, the half and the quarter of its load). Between bodies, where what touches changes from one to the next as
- * well, after MOST_SHIFTED_PAIRS: six of seven parts of generated pairs that took more never settled. */
-enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4, MOST_SHIFTED_PAIRS = 3 };
+ * the whole, the half and the quarter of its load). */
+enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4 };
 /* The certificate is asked once steps are less than this part of the energy's norm. */
 #define ASKED_FROM 1e-3
 /* A determinant of F that is next to none. */
@@ -323,18 +323,23 @@ static void load_rows(uz_finite_run *run, double factor)
                 run->p[j] += factor * N->val[q] * run->at.gap[N->idx[q]];
 }
 
-/* What is added to a tangent that is not positive definite, from nothing on: first along the pressed rows, as contact
- * may be all that keeps the body stable, then of the undeformed body. */
-static bool add_more(double *hold, double *shift, bool rows)
+typedef struct {
+    double hold, shift;
+    bool straight;
+} addition;
+
+/* What a tangent that is not positive definite gets, from nothing on: first stiffness along the pressed rows, as
+ * contact may be all that keeps the body stable; then what reactions times the curvature of gaps add is left out of it,
+ * which takes most where reactions are too large; then stiffness of the undeformed body. pressed: are there such rows?
+ * roughly: their reactions are hardly known, and are not worth being held for. */
+static void add_more(addition *add, bool pressed, bool roughly)
 {
-    if (rows && *hold == 0) {
-        *hold = LEAST_HOLD;
-    } else if (rows && *hold < MOST_HOLD && *shift == 0) {
-        *hold = fmin(MOST_HOLD, MORE_HOLD * *hold);
-    } else {
-        *shift = fmax(FIRST_SHIFT, MORE_SHIFT * *shift);
-    }
-    return *shift <= MOST_SHIFT;
+    if (pressed && !add->straight && !roughly && (add->hold == 0 || (add->hold < MOST_HOLD && add->shift == 0)))
+        add->hold = add->hold == 0 ? LEAST_HOLD : fmin(MOST_HOLD, MORE_HOLD * add->hold);
+    else if (pressed && !add->straight)
+        *add = (addition){.straight = true};
+    else
+        add->shift = fmax(FIRST_SHIFT, MORE_SHIFT * add->shift);
 }
 
 void uz_finite_forget_factors(uz_finite_run *run)
@@ -344,11 +349,11 @@ void uz_finite_forget_factors(uz_finite_run *run)
     uz_table_forget(run->cache, UZ_ITEM_FACTOR);
 }
 
-/* At run->at, with nothing added. */
-static uz_status find_tangent(uz_finite_run *run, const double *step, uz_error *err)
+/* At run->at, with nothing added; straight: what gaps bend left out. */
+static uz_status find_tangent(uz_finite_run *run, const double *step, bool straight, uz_error *err)
 {
     uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->free_strain, run->at.u, step);
-    const uz_status status = add_curvature(run, err);
+    const uz_status status = straight ? UZ_OK : add_curvature(run, err);
     return status == UZ_OK && run->follows ? uz_follower_tangent(&run->tangent, &run->skew, &run->scene, run->at.u, err)
                                            : status;
 }
@@ -357,6 +362,13 @@ static uz_status find_tangent(uz_finite_run *run, const double *step, uz_error *
 static bool is_more(double norm, double than)
 {
     return !(norm > 0) || norm > than;
+}
+
+/* Was the step to run->at large? While supports move, by what it has changed the root of the energy by. */
+static bool was_large(const uz_finite_run *run)
+{
+    const double here = sqrt(run->at.body.energy), before = sqrt(run->trial.body.energy);
+    return run->step_qps > 0 && (isinf(run->norm) ? fabs(here - before) > LARGE_STEP * here : run->norm > LARGE_STEP);
 }
 
 static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
@@ -373,10 +385,12 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
     if (found != UZ_OK)
         return found;
     const double stiffest = run->stiffest;
-    double hold = run->hold, shift = run->shift / LESS_SHIFT < FIRST_SHIFT ? 0 : run->shift / LESS_SHIFT;
+    const bool roughly = was_large(run);
+    addition add = {.hold = roughly ? 0 : run->hold, .shift = run->shift / LESS_SHIFT};
+    add.shift = add.shift < FIRST_SHIFT ? 0 : add.shift;
     double held = 0, shifted = 0; /* what the tangent has of them */
     bool pressed = false, more = true, fresh = true;
-    double *step = run->step_qps > 0 && shift == 0 && is_more(run->norm, LARGE_STEP) && !run->turned
+    double *step = run->step_qps > 0 && add.shift == 0 && is_more(run->norm, LARGE_STEP) && !run->turned
                        ? run->step
                        : NULL; /* run->trial is the place before */
     for (int64_t i = 0; i < run->n && step; i++)
@@ -387,29 +401,34 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         const double start = uz_seconds();
         uz_finite_forget_factors(run);
         uz_error_reset(&own);
-        status = fresh ? find_tangent(run, step, &own) : UZ_OK;
+        status = fresh ? find_tangent(run, step, add.straight, &own) : UZ_OK;
         if (fresh)
             held = shifted = 0;
-        for (int64_t q = 0; q < K->ptr[K->cols] && shift > shifted; q++)
-            K->val[q] += (shift - shifted) * run->base.K.val[q];
+        for (int64_t q = 0; q < K->ptr[K->cols] && add.shift > shifted; q++)
+            K->val[q] += (add.shift - shifted) * run->base.K.val[q];
         if (status == UZ_OK && run->pairs)
-            status = uz_finite_widen(run, hold > 0, &own);
+            status = uz_finite_widen(run, add.hold > 0, &own);
         if (status == UZ_OK)
-            status = hold_rows(run, (run->pairs ? hold : hold - held) * stiffest, &own);
+            status = hold_rows(run, (run->pairs ? add.hold : add.hold - held) * stiffest, &own);
         run->spent.assemble += uz_seconds() - start;
         if (status != UZ_OK)
             break;
         load_step(moved, run);
-        load_rows(run, hold * stiffest);
+        load_rows(run, add.hold * stiffest);
         status = uz_finite_solve_qp(run, &own);
         run->step_qps += status == UZ_OK;
         if (status == UZ_OK && (run->turn.force.n > 0 || run->skew.ptr))
             status = uz_finite_correct(run, &own);
-        run->hold = held = hold;
-        run->shift = shifted = shift;
-        fresh = step != NULL;
-        more = step || add_more(&hold, &shift, pressed);
-        more = more && !(run->from && shift > 0); /* a path goes from one stable equilibrium to the next one */
+        run->hold = held = add.hold;
+        run->shift = shifted = add.shift;
+        const bool was_straight = add.straight;
+        if (!step)
+            add_more(&add, pressed, roughly);
+        fresh = step || add.straight != was_straight;
+        if (add.straight)
+            uz_row_turn_clear(&run->turn);
+        /* a path goes from one stable equilibrium to the next one */
+        more = add.shift <= (run->from ? 0 : MOST_SHIFT) && !(run->from && add.straight);
         step = NULL;
     }
     if (status == UZ_OK) {
@@ -768,7 +787,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         }
         status = keep_reactions(run, err);
         in_a_row = run->shift > 0 ? in_a_row + 1 : 0;
-        if (status != UZ_OK || in_a_row == (run->pairs ? MOST_SHIFTED_PAIRS : MOST_SHIFTED))
+        if (status != UZ_OK || in_a_row == MOST_SHIFTED)
             break;
         const double last_norm = run->norm, norm = run->norm = moved ? (double)INFINITY : step_norm(run);
         uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);

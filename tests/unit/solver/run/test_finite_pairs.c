@@ -355,6 +355,22 @@ TEST(what_converges_is_an_equilibrium)
     CHECK(2 * converged > tried && most <= 60); /* with those that go with one factor */
 }
 
+/* Reactions of a first step that is much too long, times the curvature of gaps, made tangents that no stiffness along
+ * rows mends: these took 66 to 144 contact problems, in three to seven parts. */
+TEST(reactions_of_a_large_step_do_not_cut_the_load_in_parts)
+{
+    static const int SEED[] = {68, 71, 161, 207, 208, 225, 239};
+    for (size_t i = 0; i < sizeof SEED / sizeof *SEED; i++) {
+        qp_random rng = {(uint64_t)SEED[i]};
+        uz_scene s = random_pair(&rng, (SEED[i] - 1) % 4 == 3);
+        uz_result *r = solve_to(&s, 1e-8);
+        check_converged(r, 1, 45);
+        CHECK_MSG(r->summary.finite.failed == 0, "seed %d: %lld parts failed", SEED[i],
+                  (long long)r->summary.finite.failed);
+        give_back(r, &s);
+    }
+}
+
 /* `with` becomes a group of the sides of both surfaces. */
 static void name_both(uz_given_mesh *mesh, uz_contact *c)
 {
