@@ -147,6 +147,10 @@ uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, 
 /* The contact problem of run->K, p and at.h: run->last. */
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);
 
+/* Of the step that run->last leads to: sqrt(v'K v) over the root of twice the energy; 0 where that energy is rounding.
+ */
+double uz_finite_step_norm(uz_finite_run *run);
+
 /* Another tangent has another factor; its ordering stays. */
 void uz_finite_forget_factors(uz_finite_run *run);
 /* p less what run->tangent makes of the ways that supports still have to go from run->at. *moved: are there any? */

@@ -609,8 +609,7 @@ static uz_status keep_reactions(uz_finite_run *run, uz_error *err)
     return UZ_OK;
 }
 
-/* sqrt(v'K v) over the root of twice the energy, v the step; 0 where that energy is rounding. */
-static double step_norm(uz_finite_run *run)
+double uz_finite_step_norm(uz_finite_run *run)
 {
     uz_restrict_nodal(run->v, &run->base, run->at.u);
     for (int64_t j = 0; j < run->d; j++)
@@ -789,7 +788,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         in_a_row = run->shift > 0 ? in_a_row + 1 : 0;
         if (status != UZ_OK || in_a_row == MOST_SHIFTED)
             break;
-        const double last_norm = run->norm, norm = run->norm = moved ? (double)INFINITY : step_norm(run);
+        const double last_norm = run->norm, norm = run->norm = moved ? (double)INFINITY : uz_finite_step_norm(run);
         uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);
         if (run->step_qps == 1)
             memcpy(led, to, (size_t)run->n * sizeof *led);

@@ -159,8 +159,9 @@ static uz_status iterate(uz_finite_run *run, double *room, history *past, uz_err
 {
     const int64_t d = run->d, m = run->at.rows.m;
     double *p = room, *from = p + d, *v = from + d, *came = v + d, *h = came + d, *nodal = h + m;
-    /* of the first step the norm is infinite */
-    const double left = fmin(ROUGHLY, fmax(CORRECTED, PART_LEFT * run->norm));
+    /* of the first step the norm is infinite; nor more than the answer is asked for, as far as this step goes */
+    const double now = uz_finite_step_norm(run), enough = now > 0 ? PART_LEFT * run->requested / now : ROUGHLY;
+    const double left = fmin(ROUGHLY, fmax(fmax(CORRECTED, enough), PART_LEFT * run->norm));
     uz_status status = UZ_OK;
     uz_restrict_nodal(from, &run->base, run->at.u);
     for (int64_t j = 0; j < d; j++) {
