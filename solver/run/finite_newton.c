@@ -17,7 +17,8 @@
  * shortened until no element turns inside out and the potential energy, with a penalty on negative gaps that exceeds
  * the reactions (ibid., ch. 18.3), is less than it was at one of the last places; but that which moves the supports,
  * whose place has no energy to compare, and those under pressures that follow the body without one: their tangent has
- * a skew part, and steps as in finite_pairs.c. The end is the certificate's to say. */
+ * a skew part, and steps as in finite_pairs.c. The end is the certificate's to say, and must not be behind an obstacle
+ * that the part began in front of. */
 #include "run/finite.h"
 
 #include "core/alloc.h"
@@ -740,6 +741,76 @@ static uz_status carry(bool *fits, uz_finite_run *run, uz_error *err)
     return uz_finite_place_find(fits, &run->at, run, err);
 }
 
+/* May all of a side go straight from one displacement to another (n each), past a round obstacle? Between points by
+ * which it is looked at there is a quarter of the radius, or, of very small ones, a sixty-fourth of the side. What goes
+ * less than the radius stays in front of it, or grazes it. */
+static bool side_may_go(const uz_mesh *mesh, uz_face face, const uz_obstacle *obstacle, double radius,
+                        const double *from, const double *to)
+{
+    int64_t node[UZ_FACE_NODES];
+    const int dim = mesh->dim, count = uz_mesh_face(node, mesh, face);
+    const int corners = dim == 2 ? 2 : count % 3 == 0 ? 3 : 4;
+    double x[4][3] = {{0}}, way[4][3] = {{0}}, longest = 0, length = 0;
+    for (int a = 0; a < corners; a++) {
+        for (int c = 0; c < dim; c++) {
+            x[a][c] = mesh->xyz[dim * node[a] + c] + from[dim * node[a] + c];
+            way[a][c] = to[dim * node[a] + c] - from[dim * node[a] + c];
+        }
+        longest = fmax(longest, sqrt(uz_dot3(way[a], way[a])));
+        length = fmax(length, sqrt(uz_distance2(x[a], x[0], 3)));
+    }
+    if (longest < radius)
+        return true;
+    const int n = (int)fmin(WAY_POINTS, ceil(4 * length / radius));
+    for (int i = 0; i <= n; i++)
+        for (int j = 0; j <= (dim == 2 ? 0 : corners == 3 ? n - i : n); j++) {
+            const double s = (double)i / n, t = (double)j / n;
+            const double share[4] = {corners == 4 ? (1 - s) * (1 - t) : 1 - s - t, corners == 4 ? s * (1 - t) : s,
+                                     corners == 4 ? s * t : t, (1 - s) * t};
+            double at[3] = {0}, along[3] = {0};
+            for (int a = 0; a < corners; a++)
+                for (int c = 0; c < dim; c++) {
+                    at[c] += share[a] * x[a][c];
+                    along[c] += share[a] * way[a][c];
+                }
+            if (uz_dot3(along, along) > 0 && !may_go(obstacle, at, along))
+                return false;
+        }
+    return true;
+}
+
+/* May the sides of contacts go straight from where the part began to run->at? What has gone through a round obstacle,
+ * which may be smaller than a side, has no rows there that would bring it back. Where sides slide around one it takes
+ * smaller parts, whose ways are near those that they go. */
+static uz_status may_be_led(bool *may, const uz_finite_run *run, const double *begun, uz_error *err)
+{
+    const uz_mesh *mesh = &run->base.mesh;
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK && *may; k++) {
+        const uz_contact *contact = &run->scene.contacts[k];
+        uz_obstacle *obstacle = NULL;
+        if (contact->kind != UZ_OBSTACLE_ROUND || contact->inside)
+            continue;
+        const uz_group *on = uz_mesh_group(mesh, contact->on, "", err);
+        status = on ? uz_obstacle_new(&obstacle, contact, k, run->scene.model, err) : UZ_ERR_SCENE;
+        for (int64_t i = 0; status == UZ_OK && i < on->n_faces && *may; i++)
+            *may = side_may_go(mesh, on->face[i], obstacle, contact->radius, begun, run->at.u);
+        uz_obstacle_free(obstacle);
+    }
+    return status;
+}
+
+/* Of a part that has settled: it is unsettled where it may not have gone there. */
+static uz_status look_back(uz_part *out, const uz_finite_run *run, const double *begun, const double *led,
+                           uz_error *err)
+{
+    bool may = true;
+    const uz_status status = may_be_led(&may, run, begun, err);
+    if (!may || leaps(run, begun, led))
+        *out = UZ_PART_UNSETTLED;
+    return status;
+}
+
 uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
 {
     double before[REMEMBERED] = {0};
@@ -813,8 +884,8 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         if (status == UZ_OK && comparable && may_be_settled(run, last_norm))
             status = ask_certificate(&done, out, run, err);
     }
-    if (status == UZ_OK && *out == UZ_PART_SETTLED && leaps(run, begun, led))
-        *out = UZ_PART_UNSETTLED;
+    if (status == UZ_OK && *out == UZ_PART_SETTLED)
+        status = look_back(out, run, begun, led, err);
     free(to);
     free(begun);
     free(led);

@@ -726,6 +726,22 @@ TEST(nothing_is_carried_through_an_obstacle)
 }
 
 /* Pulled so little that rounding shows. */
+/* A circle smaller than the sides, which stands in the way of one: it was put behind it, within the body, and called
+ * converged without a force. */
+TEST(no_side_goes_through_an_obstacle_that_is_smaller)
+{
+    uz_scene s = block("quad4", 3, 1, 3, 1, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "top", 0, -1.5, NAN);
+    uz_contact *c = body_plane(&s, "bottom", (double[3]){1.3, -0.5, 0}, (double[3]){0, 1, 0});
+    c->kind = UZ_OBSTACLE_ROUND;
+    c->radius = 0.2;
+    uz_result *r = solve(&s);
+    CHECK_INT(r->summary.outcome, UZ_UNSTABLE);
+    CHECK_MSG(r->summary.finite.load > 0.3 && r->summary.finite.load < 0.6, "%.6g", r->summary.finite.load);
+    CHECK(r->summary.active > 0 && r->evaluation->contacts[0].force[1] > 0);
+    give_back(r, &s);
+}
+
 TEST(what_rounding_leaves_is_told)
 {
     uz_scene s = block("quad4", 1, 1, 1, 1, UZ_ELASTIC_NEO_HOOKE);
