@@ -10,6 +10,7 @@
 /* Vectors of the basis. What is beyond them counts as a coordinate of its own. */
 enum { BASIS = 8 };
 
+/* size: of the load; z, beyond: of the load of that direction whose size is 1. */
 typedef struct {
     bool placed, answered;
     double z[BASIS], beyond, size;
@@ -24,9 +25,9 @@ struct uz_nearby {
     double unit[2];       /* of p and h: the sizes of the first of each that is not 0; 0: none was */
 };
 
-/* Loads that differ by less are the same. */
+/* Directions that differ by less are the same. */
 #define SAME 1e-9
-/* Distances are told apart down to this part of the load. */
+/* Distances are told apart down to this. */
 #define CLOSEST 1e-3
 
 uz_nearby *uz_nearby_new(int64_t n, int64_t d, int64_t m)
@@ -84,14 +85,18 @@ void uz_nearby_place(uz_nearby *x, int64_t i, const double *p, const double *h)
             uz_axpy(n, -along, x->basis[k], v);
         }
     at->beyond = uz_norm(n, v);
-    at->placed = isfinite(at->size) && isfinite(at->beyond);
-    if (!at->placed || at->beyond <= SAME * at->size || x->count == BASIS ||
-        !(x->basis[x->count] = uz_alloc(n, sizeof *v)))
+    at->placed = isfinite(at->size) && isfinite(at->beyond) && at->size > 0.0;
+    if (!at->placed)
         return;
-    for (int64_t j = 0; j < n; j++)
-        x->basis[x->count][j] = v[j] / at->beyond;
-    at->z[x->count++] = at->beyond;
-    at->beyond = 0.0;
+    if (at->beyond > SAME * at->size && x->count < BASIS && (x->basis[x->count] = uz_alloc(n, sizeof *v))) {
+        for (int64_t j = 0; j < n; j++)
+            x->basis[x->count][j] = v[j] / at->beyond;
+        at->z[x->count++] = at->beyond;
+        at->beyond = 0.0;
+    }
+    for (int k = 0; k < BASIS; k++)
+        at->z[k] /= at->size;
+    at->beyond /= at->size;
 }
 
 void uz_nearby_answered(uz_nearby *x, int64_t i)
@@ -127,7 +132,7 @@ static void list_nearest(uz_nearby_sum *out, double far[UZ_NEARBY_MOST], const u
     }
 }
 
-/* Shares s of which the sum of (s_k far_k)^2 is least among those with the load's coordinates. */
+/* Shares s, of loads of size 1, of which the sum of (s_k far_k)^2 is least among those with the load's coordinates. */
 bool uz_nearby_find(uz_nearby_sum *out, const uz_nearby *x, int64_t i, double near)
 {
     const place *at = &x->of[i];
@@ -135,11 +140,11 @@ bool uz_nearby_find(uz_nearby_sum *out, const uz_nearby *x, int64_t i, double ne
     double far[UZ_NEARBY_MOST], A[BASIS * BASIS] = {0}, y[BASIS], off = 0.0, missed = at->beyond * at->beyond,
                                           trace = 0.0;
     out->count = 0;
-    if (!at->placed || !(at->size > 0.0))
+    if (!at->placed)
         return false;
     list_nearest(out, far, x, i);
     for (int k = 0; k < out->count; k++) {
-        const double *z = x->of[out->of[k]].z, weight = 1.0 / fmax(far[k], CLOSEST * at->size);
+        const double *z = x->of[out->of[k]].z, weight = 1.0 / fmax(far[k], CLOSEST);
         for (int a = 0; a < n; a++)
             for (int b = 0; b <= a; b++)
                 A[b * n + a] += weight * weight * z[a] * z[b];
@@ -153,7 +158,7 @@ bool uz_nearby_find(uz_nearby_sum *out, const uz_nearby *x, int64_t i, double ne
         return false;
     uz_potrs_lower(n, A, n, y);
     for (int k = 0; k < out->count; k++) {
-        const double *z = x->of[out->of[k]].z, weight = 1.0 / fmax(far[k], CLOSEST * at->size);
+        const double *z = x->of[out->of[k]].z, weight = 1.0 / fmax(far[k], CLOSEST);
         out->share[k] = 0.0;
         for (int a = 0; a < n; a++)
             out->share[k] += weight * weight * z[a] * y[a];
@@ -165,5 +170,7 @@ bool uz_nearby_find(uz_nearby_sum *out, const uz_nearby *x, int64_t i, double ne
             rest -= out->share[k] * x->of[out->of[k]].z[a];
         missed += rest * rest;
     }
-    return sqrt(missed) + off / at->size <= near * at->size;
+    for (int k = 0; k < out->count; k++)
+        out->share[k] *= at->size / x->of[out->of[k]].size;
+    return sqrt(missed) + off <= near;
 }

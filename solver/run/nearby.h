@@ -1,9 +1,10 @@
 /* nearby.h: where a load case begins: at answers to former cases of the same call, as far as their loads are near.
  *
  * As long as the same rows press, an answer is linear in its load (p, h): the sum of answers whose loads sum up to this
- * one. Where rows change it is off by the square of how far the loads are apart. Loads are told by their coordinates in
- * an orthonormal basis of all so far, which has as many vectors as they are independent: two for any number of cases
- * that differ by two factors. Nothing that is proved of an answer follows from where it began. */
+ * one. Where rows change it is off by the square of how far the loads are apart, in direction alone, as t (p, h) has t
+ * times the answer for any t > 0. Loads are told by their coordinates in an orthonormal basis of all so far, which has
+ * as many vectors as they are independent: two for any number of cases that differ by two factors. Nothing that is
+ * proved of an answer follows from where it began. */
 #ifndef UZ_NEARBY_H
 #define UZ_NEARBY_H
 

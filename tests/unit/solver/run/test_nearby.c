@@ -69,6 +69,27 @@ TEST(what_is_far_is_no_start)
     uz_nearby_free(nearby);
 }
 
+/* Five times a load has five times its answer, whichever rows press. */
+TEST(directions_tell_what_is_near)
+{
+    uz_nearby *nearby = uz_nearby_new(3, D, M);
+    double p[D], h[M];
+    uz_nearby_sum sum;
+    for (int k = 0; k < 3; k++) {
+        make_load(p, h, k < 2 ? 5 : 1, k < 2 ? 10 * (1 - k) : 2);
+        for (int i = 0; i < M && k == 2; i++)
+            h[i] /= 5;
+        uz_nearby_place(nearby, k, p, h);
+        if (k == 2) {
+            CHECK(uz_nearby_find(&sum, nearby, k, 1e-4));
+            for (int q = 0; q < sum.count; q++)
+                CHECK(fabs(sum.share[q] - (sum.of[q] == 0 ? 0.2 : 0.0)) < 1e-5);
+        }
+        uz_nearby_answered(nearby, k);
+    }
+    uz_nearby_free(nearby);
+}
+
 /* A cube on a plane, pulled aside and pressed, of which K is not assembled, or is. */
 static uz_problem cube(const char *element, int64_t cells, double depth, int cases)
 {
