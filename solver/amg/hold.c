@@ -28,9 +28,9 @@ static uz_status fail_memory(int64_t n, uz_error *err)
 }
 
 /* to += G + G', G one block at (a, c), k x k. */
-static void add_symmetric(uz_blocks *to, int32_t a, int32_t c, const double *G)
+static inline __attribute__((always_inline)) void add_symmetric(uz_blocks *to, int32_t a, int32_t c, const double *G,
+                                                                int k)
 {
-    const int k = to->b;
     double *block =
         a == c ? to->diag + (int64_t)a * k * k : to->off + uz_blocks_find(to, a > c ? a : c, a > c ? c : a) * k * k;
     for (int p = 0; p < k; p++)
@@ -50,29 +50,46 @@ typedef struct {
     const double *left, *right; /* b: weights of its rows and columns */
 } coupling;
 
-/* to += G + G', G = P_i' left A right P_j. */
-static void add_coupling(uz_blocks *to, const uz_level *fine, const coupling *x)
+/* to += G + G', G = P_i' left A right P_j, row by row of those that count: of held dofs one in three does. */
+static inline __attribute__((always_inline)) void add_blocks(uz_blocks *to, const uz_level *fine, const coupling *x,
+                                                             int b, int k)
 {
-    const int b = fine->A.b, k = to->b;
+    int rows = 0, row[SIZE_MOST];
+    for (int r = 0; r < b; r++)
+        if (x->left[r] > 0.0)
+            row[rows++] = r;
     for (int64_t e = fine->ptr[x->j]; e < fine->ptr[x->j + 1]; e++) {
         const float *P = fine->value + e * b * k;
         double AP[SIZE_MOST * SIZE_MOST] = {0};
-        for (int r = 0; r < b; r++)
-            for (int s = 0; s < b && x->left[r] > 0.0; s++) {
+        for (int q = 0; q < rows; q++)
+            for (int s = 0; s < b; s++) {
+                const int r = row[q];
                 const double factor = x->left[r] * x->right[s] * (x->transposed ? x->A[s * b + r] : x->A[r * b + s]);
                 for (int c = 0; c < k; c++)
-                    AP[r * k + c] += factor * (double)P[s * k + c];
+                    AP[q * k + c] += factor * (double)P[s * k + c];
             }
         for (int64_t f = fine->ptr[x->i]; f < fine->ptr[x->i + 1]; f++) {
             const float *of_row = fine->value + f * b * k;
             double G[SIZE_MOST * SIZE_MOST] = {0};
-            for (int r = 0; r < b; r++)
-                for (int p = 0; p < k && x->left[r] > 0.0; p++)
+            for (int q = 0; q < rows; q++)
+                for (int p = 0; p < k; p++)
                     for (int c = 0; c < k; c++)
-                        G[p * k + c] += (double)of_row[r * k + p] * AP[r * k + c];
-            add_symmetric(to, fine->block[f], fine->block[e], G);
+                        G[p * k + c] += (double)of_row[row[q] * k + p] * AP[q * k + c];
+            add_symmetric(to, fine->block[f], fine->block[e], G, k);
         }
     }
+}
+
+/* For each size of blocks of solids its own loops. */
+static void add_coupling(uz_blocks *to, const uz_level *fine, const coupling *x)
+{
+    const int b = fine->A.b, k = to->b;
+    if (b == 3 && k == 6)
+        add_blocks(to, fine, x, 3, 6);
+    else if (b == 6 && k == 6)
+        add_blocks(to, fine, x, 6, 6);
+    else
+        add_blocks(to, fine, x, b, k);
 }
 
 static bool is_any_held(const float *inverse, const float *free, int b)
