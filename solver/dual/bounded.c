@@ -147,15 +147,28 @@ static double size_of(const uz_bounded *box, const uz_csc *K, int64_t j)
     return box->largest < 0.0 ? box->size[j] : fabs(box->p[j]) + ROW_SUM * K->val[K->ptr[j]] * box->largest;
 }
 
-/* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to; roughly: by an estimate of it. */
+/* Is there a reaction that may be rounding, so that it matters how large that is? */
+static bool has_doubts(const uz_bounded *box)
+{
+    bool doubts = false;
+    for (int64_t b = 0; b < box->n && !doubts; b++) {
+        const int64_t row = box->holder[b];
+        doubts = row >= 0 && uz_reaction_pulls(box->force[uz_bounded_dof(box, b)] / box->bounds->scale[row]);
+    }
+    return doubts;
+}
+
+/* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to; roughly: by an estimate of it,
+ * which also has to do where a product alone is faster and shows no row that pulls. */
 void uz_bounded_balance(const uz_sparse_load *x, bool roughly)
 {
     uz_bounded *box = x->box;
     const uz_csc *K = x->load.K;
-    if (roughly || !uz_sparse_has_entries(x->load.dual)) {
+    const bool entries = uz_sparse_has_entries(x->load.dual);
+    if (roughly || x->room || !entries)
         balance_by_product(x);
+    if (roughly || !entries || (x->room && !has_doubts(box)))
         return;
-    }
     box->largest = -1.0;
     for (int64_t j = 0; j < K->cols; j++) {
         box->force[j] = -box->p[j];

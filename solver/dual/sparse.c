@@ -112,6 +112,25 @@ void uz_sparse_multiply(const uz_dual_load *load, double *y, const double *x)
     uz_csc_symv(y, load->K, 1.0, x);
 }
 
+/* c'K c, where few entries of c (d) are not 0; room (d). */
+static double correction_energy(const uz_dual_load *load, const double *c, double *room)
+{
+    const uz_csc *K = load->K;
+    double square = 0.0;
+    bool any = false;
+    for (int64_t j = 0; j < K->cols && !any; j++)
+        any = c[j] != 0.0;
+    if (any && !uz_sparse_has_entries(load->dual)) {
+        uz_sparse_multiply(load, room, c);
+        for (int64_t j = 0; j < K->cols; j++)
+            square += c[j] * room[j];
+    }
+    for (int64_t j = 0; j < K->cols && any && uz_sparse_has_entries(load->dual); j++)
+        for (int64_t k = K->ptr[j]; c[j] != 0.0 && k < K->ptr[j + 1]; k++)
+            square += (K->idx[k] == j ? 1.0 : 2.0) * K->val[k] * c[K->idx[k]] * c[j];
+    return square;
+}
+
 enum { MAX_SWEEPS = 60 };
 
 static double column_dot(const uz_csc *Nt, int64_t i, const double *x)
@@ -130,7 +149,7 @@ uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r,
     uz_sparse_load *x = (uz_sparse_load *)load;
     const uz_dual *dual = x->load.dual;
     const uz_csc *Nt = &dual->Nt;
-    double *c = x->load.correction, *Nc = x->work, *Kc = x->work2, square = 0.0, complementarity = 0.0, scale = 0.0;
+    double *c = x->load.correction, *Nc = x->work, complementarity = 0.0, scale = 0.0;
     memset(c, 0, (size_t)dual->d * sizeof *c);
     for (int64_t i = 0; i < dual->m; i++)
         if (close[i] || uz_gap_penetrates(g[i]))
@@ -160,10 +179,7 @@ uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r,
     }
     for (int64_t i = 0; i < dual->m; i++)
         complementarity -= r[i] * fmax(0.0, g[i] - Nc[i]);
-    uz_sparse_multiply(load, Kc, c);
-    for (int64_t j = 0; j < dual->d; j++)
-        square += c[j] * Kc[j];
-    double distance = sqrt(fmax(0.0, square)) + x->slack;
+    double distance = sqrt(fmax(0.0, correction_energy(load, c, x->work2))) + x->slack;
     *bound2 = distance * distance + 2.0 * complementarity;
     return UZ_OK;
 }
