@@ -144,12 +144,20 @@ typedef struct uz_cg_stop {
     bool unchecked; /* the caller looks at the residual himself: where the recurrence meets the tolerance, its own
                        is told in `last` and cg->r, and the true one is not computed. Kinds that solve then leave cg->r
                        as it is */
+    /* Asked once, where the norm has come down to the larger of these, with x and cg->r = b - K x as they are there, at
+     * held dofs too: the goal from there on, INFINITY: none, the solve ends. Then all is in double precision. NULL:
+     * nobody is asked, as by kinds that solve. */
+    double (*look)(void *ctx);
+    void *ctx;
+    double look_absolute, look_relative;
 } uz_cg_stop;
 
 typedef struct uz_cg_info {
     int64_t iterations;
     double first, last; /* sqrt(r'M^-1 r) at the start, and of the true residual at the end */
     bool met;           /* the tolerance was reached; false: limit, cancel, deadline, or rounding */
+    bool looked;        /* stop->look was asked, */
+    bool ended;         /* and ended the solve */
 } uz_cg_info;
 
 /* Limit, cancel, or deadline. */

@@ -114,6 +114,18 @@ bool uz_cg_should_stop(const uz_cg_info *info, const uz_cg_stop *stop)
     return info->iterations >= stop->max_iterations || uz_cancelled(stop->hooks) || uz_seconds() >= stop->deadline;
 }
 
+/* Asks stop->look where it is due, once; `goal` is what it says. */
+static void look(double *goal, uz_cg_info *info, uz_cg_stop *stop, double norm)
+{
+    if (!stop->look || norm > fmax(*goal, fmax(stop->look_absolute, stop->look_relative * info->first)))
+        return;
+    *goal = stop->absolute = stop->look(stop->ctx);
+    stop->relative = 0.0;
+    stop->look = NULL;
+    info->looked = true;
+    info->ended = isinf(*goal);
+}
+
 /* As far as single precision carries. Where that is not far enough *stop is told what is left to do. */
 static uz_status solve_roughly(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b,
                                uz_cg_stop *stop, uz_error *err)
@@ -136,7 +148,7 @@ static uz_status solve_roughly(uz_cg_info *info, double *x, uz_cg *cg, const uz_
 
 /* The recurrence drifts from the true residual by rounding (Greenbaum 1997): it is begun again from the true one until
  * that meets the goal too, or gains nothing more. cg->z holds q = K p until the residual has it, then z = M^-1 r. */
-uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b, const uz_cg_stop *stop,
+uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b, const uz_cg_stop *asked,
                       uz_error *err)
 {
     const int64_t n = cg->n;
@@ -144,13 +156,13 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
     update u = {.cg = cg, .x = x, .b = b};
     memset(info, 0, sizeof *info);
     if (cg->mg->kind->solve)
-        return solve_elsewhere(info, x, cg, K, b, stop, err);
-    uz_cg_stop left = *stop;
-    if (stop->unchecked && cg->mg->kind->solve_roughly) {
-        const uz_status status = solve_roughly(info, x, cg, K, b, &left, err);
+        return solve_elsewhere(info, x, cg, K, b, asked, err);
+    const bool told = asked->look != NULL; /* what the residual is at held dofs, where z and p are 0 */
+    uz_cg_stop left = *asked, *stop = &left;
+    if (stop->unchecked && !told && cg->mg->kind->solve_roughly) {
+        const uz_status status = solve_roughly(info, x, cg, K, b, stop, err);
         if (status != UZ_OK || info->met)
             return status;
-        stop = &left;
     }
     for (int k = 0;; k++) {
         /* r = b - K x on the free dofs, z = M^-1 r */
@@ -158,7 +170,8 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
             cg->mg->kind->multiply(cg->mg, K, cg->room, cg->z, x);
             uz_by_pieces(find_residual, &u, n);
         }
-        clear_held(cg->r, cg);
+        if (!told)
+            clear_held(cg->r, cg);
         uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
         double square = uz_long_dot(n, cg->r, cg->z);
         info->last = uz_root(square);
@@ -173,8 +186,12 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
         before = info->last;
         memcpy(cg->p, cg->z, (size_t)n * sizeof *cg->p);
         while (square > goal * goal && !uz_cg_should_stop(info, stop)) {
+            look(&goal, info, stop, uz_root(square));
+            if (info->ended || square <= goal * goal)
+                break;
             cg->mg->kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
-            clear_held(cg->z, cg);
+            if (!told)
+                clear_held(cg->z, cg);
             const double curvature = uz_long_dot(n, cg->p, cg->z), alpha = square / curvature, last = square;
             if (fabs(curvature) < DBL_MIN) /* underflow: there is no more to gain */
                 break;
@@ -192,9 +209,9 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
             uz_by_pieces(turn_direction, &u, n);
             info->iterations++;
         }
-        if (stop->unchecked && square <= goal * goal) {
+        if (info->ended || (stop->unchecked && square <= goal * goal)) {
             info->last = uz_root(square);
-            info->met = true;
+            info->met = !info->ended;
             return UZ_OK;
         }
     }

@@ -410,6 +410,49 @@ static uz_status measure_slack(free_load *x, const double *e, const double *r, u
     return status;
 }
 
+/* A guess of the rows on its way to its answer. */
+typedef struct {
+    free_load *x;
+    double *g;
+    bool *active;
+    double least; /* a relative tolerance that is as good as exact */
+} stepwise;
+
+/* Is no row seen to be wrong? */
+static bool looks_right(const stepwise *s)
+{
+    const uz_bounded *box = s->x->sparse.box;
+    bool right = true;
+    uz_bounded_react(&s->x->sparse, s->g, s->active);
+    for (int64_t i = 0; right && i < s->x->sparse.load.dual->m; i++)
+        right = !(s->active[i] ? uz_reaction_pulls(box->r[i]) : uz_gap_penetrates(s->g[i]));
+    return right;
+}
+
+/* What sqrt(r'M^-1 r) may be; square: u'K u. */
+static double goal_of(const free_load *x, double tolerance, double square)
+{
+    const double most = uz_root(-2.0 * x->sparse.load.psi0);
+    return tolerance * fmin(uz_root(square), most > 0.0 ? most : INFINITY) *
+           sqrt(x->sparse.load.dual->amg->info.lambda);
+}
+
+/* As uz_cg_stop has it, with p - K u in cg->r: a guess that looks right is solved for, another one is not. */
+static double look(void *ctx)
+{
+    const stepwise *s = ctx;
+    free_load *x = s->x;
+    uz_bounded *box = x->sparse.box;
+    box->largest = 0.0;
+    for (int64_t j = 0; j < x->cg.n; j++) {
+        box->largest = fmax(box->largest, fabs(box->u[j]));
+        box->force[j] = -x->cg.r[j];
+    }
+    if (!looks_right(s))
+        return INFINITY;
+    return goal_of(x, s->least, uz_dot(x->cg.n, box->u, box->force) + uz_dot(x->cg.n, box->u, box->p));
+}
+
 /* u, r, g and active: at the coarse tolerance of the energy norm, and, while the guess still looks right, at the one
  * that is as good as exact. */
 static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active, uz_error *err)
@@ -420,33 +463,42 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     uz_bounded *box = x->sparse.box;
     const uz_bounds *bounds = box->bounds;
     const double least = (load->dual->amg->info.least > 0.0 ? GUESSED_FLOOR : ACTIVE_FLOOR) * x->aim,
-                 root = sqrt(load->dual->amg->info.lambda), most = uz_root(-2.0 * load->psi0);
+                 root = sqrt(load->dual->amg->info.lambda);
+    stepwise on_way = {x, g, active, least};
     double tolerance = fmax(least, x->coarse), *e = x->cg.r;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
     uz_sparse_multiply(load, box->force, box->u);
     double square = uz_dot(d, box->u, box->force); /* u'K u */
     for (int64_t j = 0; j < d; j++)
         box->force[j] -= x->sparse.p[j];
-    for (bool go_on = true; status == UZ_OK && go_on; tolerance = least) {
-        const double norm = fmin(uz_root(square), most > 0.0 ? most : INFINITY);
+    for (bool go_on = true; status == UZ_OK && go_on;) {
+        const double goal = goal_of(x, tolerance, square);
         /* from 0 the first residual has the size of the solution */
-        uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : tolerance * root, tolerance * norm * root);
+        uz_cg_stop stop = stop_at(x, goal > 0.0 ? 0.0 : tolerance * root, goal);
         uz_cg_info info;
         stop.unchecked = tolerance >= NO_DRIFT;
         if (tolerance > least && are_few(m, d))
             stop.relative = fmax(stop.relative, GUESS_KEPT);
+        if (tolerance > least && !cg->mg->kind->solve && !cg->mg->kind->solve_roughly) {
+            stop.look = look;
+            stop.ctx = &on_way;
+            stop.look_absolute = stop.absolute;
+            stop.look_relative = stop.relative;
+            stop.absolute = goal_of(x, least, square);
+            stop.relative = goal > 0.0 ? 0.0 : least * root;
+            stop.unchecked = least >= NO_DRIFT;
+        }
         stop.begun = true;
         for (int64_t j = 0; j < d; j++)
             cg->r[j] = -box->force[j];
         status = uz_cg_solve(&info, box->u, cg, load->K, x->sparse.p, &stop, err);
         if (status != UZ_OK)
             break;
-        uz_bounded_balance(&x->sparse, tolerance > least);
+        const bool roughly = tolerance > least && (!stop.look || info.ended);
+        uz_bounded_balance(&x->sparse, roughly);
         square = uz_dot(d, box->u, box->force) + uz_dot(d, box->u, box->p);
-        uz_bounded_react(&x->sparse, g, active);
-        go_on = info.met && tolerance > least;
-        for (int64_t i = 0; go_on && i < m; i++)
-            go_on = !(active[i] ? uz_reaction_pulls(box->r[i]) : uz_gap_penetrates(g[i]));
+        go_on = looks_right(&on_way) && roughly && (info.met || info.ended);
+        tolerance = least;
     }
     memcpy(r, box->r, (size_t)m * sizeof *r);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);

@@ -359,6 +359,79 @@ TEST(changes_are_solved_for_in_single_precision)
     close_pair(&p);
 }
 
+/* Somebody who looks at a solve on its way. */
+typedef struct {
+    const pair *p;
+    const double *x, *b;
+    double near, goal; /* asked for; said */
+    int asked;
+} onlooker;
+
+static double look_on(void *ctx)
+{
+    onlooker *o = ctx;
+    const int64_t n = o->p->K.cols;
+    double *r = vector(n), off = 0.0, size = 0.0;
+    memcpy(r, o->b, (size_t)n * sizeof *r);
+    uz_csc_symv(r, &o->p->K, -1.0, o->x);
+    for (int64_t j = 0; j < n; j++) { /* at held dofs too */
+        off = fmax(off, fabs(r[j] - o->p->cg.r[j]));
+        size = fmax(size, fabs(r[j]));
+    }
+    CHECK_MSG(off <= 1e-5 * size, "a residual of %g is off by %g", size, off);
+    o->asked++;
+    free(r);
+    return o->goal;
+}
+
+/* Asked once, where the residual is as small as was said; then it is solved to the goal, or no further. */
+static void check_look(pair *p, bool unchecked, double goal)
+{
+    const int64_t n = p->K.cols;
+    double *b = random_vector(n, 3), *x = vector(n);
+    bool *held = calloc((size_t)n, sizeof *held);
+    uz_error err = {0};
+    uz_cg_info info;
+    for (int64_t j = 0; j < n; j++) {
+        held[j] = j % 11 == 0;
+        x[j] = (double)(j % 5);
+    }
+    CHECK(uz_cg_hold(&p->cg, &p->K, held, NULL, &err) == UZ_OK);
+    const double before = residual_norm(p, x, b, held);
+    onlooker o = {p, x, b, 1e-2 * before, goal * before, 0};
+    const uz_cg_stop stop = {.absolute = 1e-9 * before,
+                             .max_iterations = 500,
+                             .deadline = INFINITY,
+                             .unchecked = unchecked,
+                             .look = look_on,
+                             .ctx = &o,
+                             .look_absolute = o.near};
+    CHECK(uz_cg_solve(&info, x, &p->cg, &p->K, b, &stop, &err) == UZ_OK && info.looked);
+    const double after = residual_norm(p, x, b, held);
+    CHECK_INT(o.asked, 1);
+    CHECK_INT(info.ended, isinf(goal));
+    CHECK_INT(info.met, !isinf(goal));
+    CHECK_MSG(after <= 1.1 * (isinf(goal) ? o.near : o.goal), "%g of %g", after, before);
+    CHECK_MSG(!isinf(goal) || after > 1e-2 * o.near, "solved for %g in vain", after);
+    for (int64_t j = 0; j < n; j++)
+        CHECK(!held[j] || x[j] == (double)(j % 5));
+    CHECK(uz_cg_hold(&p->cg, &p->K, NULL, NULL, &err) == UZ_OK);
+    free(b);
+    free(x);
+    free(held);
+}
+
+TEST(a_solve_is_looked_at_on_its_way)
+{
+    pair p = open_brick((int64_t[]){9, 9, 9}, (double[]){1, 1, 1}, 0.3);
+    for (int unchecked = 0; unchecked < 2; unchecked++) {
+        check_look(&p, unchecked, INFINITY);
+        check_look(&p, unchecked, 1e-3);
+        check_look(&p, unchecked, 1e-7);
+    }
+    close_pair(&p);
+}
+
 static void check_near(const float *x, const float *wanted, int64_t n, double tolerance)
 {
     double off = 0.0, size = 0.0;

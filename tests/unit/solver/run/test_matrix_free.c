@@ -70,8 +70,9 @@ static void check_against_factor(const uz_problem *problem, uz_method method, do
     CHECK(c->relative_error <= relative_error);
     CHECK_MSG(error <= c->absolute_error + slack, "%g: error %g, certified %g", relative_error, error,
               c->absolute_error);
-    /* Within its own share of rounding the bound is not far off either. */
-    CHECK_MSG(c->absolute_error <= 30.0 * (error + slack) + 1e-11 * c->energy_norm, "certified %g for an error of %g",
+    /* Within its own share of rounding the bound is not far off either. It is in the norm of the body that nothing
+     * touches, which yields more to what is left than one that rows hold. */
+    CHECK_MSG(c->absolute_error <= 60.0 * (error + slack) + 1e-11 * c->energy_norm, "certified %g for an error of %g",
               c->absolute_error, error);
     CHECK(c->energy_dual <= exact->summary.certificate.energy_primal + 1e-12 * fabs(c->energy_primal));
     CHECK(c->energy_primal >= exact->summary.certificate.energy_dual - 1e-12 * fabs(c->energy_primal));
