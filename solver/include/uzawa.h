@@ -81,8 +81,9 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
  * uz_results_free. settings->time_limit_s is of all cases together. When time is up or the solve is cancelled, cases
  * that had no turn are answered with what r = 0 gives, certified as any other. settings->memory_limit counts the
  * results too. The first case's timings have those of the body; for the others it is cached. Of several cases none
- * depends on its neighbours or its place, bit for bit, unless contact rows are left out (summary.kept): cases that need
- * more of them share those of a further round. One alone differs from one of several by rounding. starts: n, or
+ * depends on its neighbours or its place, bit for bit, unless there is no factor, so that a case begins at answers to
+ * those before it, or contact rows are left out (summary.kept): cases that need more of them share those of a further
+ * round. One alone differs from one of several by rounding. starts: n, or
  * NULL; starts[i] NULL: from r = 0. A start with rho continues the run it was taken from, bit for bit where method,
  * operator and problem are the same ones (and the number of cases is 1 for both or for neither): its history begins
  * with the row after that run's last, and may have no rows; alpha is the state's. Where D r or the bound in it are not
