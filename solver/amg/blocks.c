@@ -6,6 +6,7 @@
 #include "core/cpu.h"
 #include "core/error.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -317,30 +318,64 @@ uz_status uz_blocks_to_columns(uz_csc *out, const uz_blocks *A, const float *inv
 /* ------------------------------------------------------------------- product */
 
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
+typedef int32_t four_rests __attribute__((vector_size(16), aligned(4), may_alias));
+
+/* Numbers of A, whole or in two parts. */
+typedef struct {
+    const double *whole;
+    const float *single;
+    uz_rests rest;
+} numbers;
+
+static inline __attribute__((always_inline)) void read_row(four *row, const numbers *of, int64_t at, bool parted)
+{
+    if (parted)
+        *row = __builtin_convertvector(*(const four_floats *)(of->single + at), four) +
+               of->rest.unit * __builtin_convertvector(*(const four_rests *)(of->rest.value + at), four);
+    else
+        *row = *(const four *)(of->whole + at);
+}
+
+/* y = A x: places of A, its numbers in `off` and `diag`. */
+typedef struct product {
+    double *y;
+    const uz_blocks *A;
+    numbers off, diag;
+    const double *x;
+    int lanes;
+    void (*multiply)(const struct product *p, int64_t first, int64_t end);
+} product;
 
 /* Each block is read once, for both triangles and all lanes. Rows of a block are read as four numbers: what follows
  * them counts for nothing, as the fourth number of a node is 0. */
-static inline __attribute__((always_inline)) void multiply(double *y, const uz_blocks *A, const double *x,
-                                                           int64_t first, int64_t end, int b, int lanes)
+static inline __attribute__((always_inline)) void multiply(const product *p, int64_t first, int64_t end, int b,
+                                                           int lanes, bool parted)
 {
+    const uz_blocks *A = p->A;
+    const double *x = p->x;
+    double *y = p->y;
     for (int64_t i = first; i < end; i++) {
-        const double *own = A->diag + i * b * b;
         four mine[UZ_LANES_MOST], sum[UZ_LANES_MOST][3];
         for (int l = 0; l < lanes; l++) {
             mine[l] = *(const four *)(x + 4 * (i * lanes + l));
-            for (int r = 0; r < b; r++)
-                sum[l][r] = *(const four *)(own + r * b) * mine[l];
+            for (int r = 0; r < b; r++) {
+                read_row(&sum[l][r], &p->diag, (i * b + r) * b, parted);
+                sum[l][r] *= mine[l];
+            }
         }
         for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
-            const double *block = A->off + e * b * b, *from = x + 4 * lanes * (int64_t)A->idx[e];
+            const double *from = x + 4 * lanes * (int64_t)A->idx[e];
             double *to = y + 4 * lanes * (int64_t)A->idx[e];
+            four row[3];
+            for (int r = 0; r < b; r++)
+                read_row(&row[r], &p->off, (e * b + r) * b, parted);
             for (int l = 0; l < lanes; l++) {
                 const four other = *(const four *)(from + 4 * l);
                 four value = *(const four *)(to + 4 * l);
                 for (int r = 0; r < b; r++) {
-                    const four row = *(const four *)(block + r * b);
-                    sum[l][r] += row * other;
-                    value += row * mine[l][r];
+                    sum[l][r] += row[r] * other;
+                    value += row[r] * mine[l][r];
                 }
                 *(four *)(to + 4 * l) = value;
             }
@@ -355,56 +390,108 @@ static inline __attribute__((always_inline)) void multiply(double *y, const uz_b
 }
 
 /* What the nodes from `first` to `end` know of A x, after those that they have blocks with. */
-static inline __attribute__((always_inline)) void multiply_any(double *y, const uz_blocks *A, const double *x,
-                                                               int64_t first, int64_t end, int lanes)
+static inline __attribute__((always_inline)) void multiply_any(const product *p, int64_t first, int64_t end, int lanes,
+                                                               bool parted)
 {
-    if (A->b == 3)
-        multiply(y, A, x, first, end, 3, lanes);
-    else if (A->b == 2)
-        multiply(y, A, x, first, end, 2, lanes);
+    if (p->A->b == 3)
+        multiply(p, first, end, 3, lanes, parted);
+    else if (p->A->b == 2)
+        multiply(p, first, end, 2, lanes, parted);
     else
-        multiply(y, A, x, first, end, 1, lanes);
+        multiply(p, first, end, 1, lanes, parted);
 }
 
-typedef struct {
-    double *y;
-    const uz_blocks *A;
-    const double *x;
-    int lanes;
-    void (*multiply)(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end, int lanes);
-} product;
-
-UZ_AVX2_FMA static void multiply_fused(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end,
-                                       int lanes)
+UZ_AVX2_FMA static void multiply_fused(const product *p, int64_t first, int64_t end)
 {
-    if (lanes == 1)
-        multiply_any(y, A, x, first, end, 1);
+    if (p->off.rest.value && p->lanes == 1)
+        multiply_any(p, first, end, 1, true);
+    else if (p->off.rest.value)
+        multiply_any(p, first, end, UZ_LANES_MOST, true);
+    else if (p->lanes == 1)
+        multiply_any(p, first, end, 1, false);
     else
-        multiply_any(y, A, x, first, end, UZ_LANES_MOST);
+        multiply_any(p, first, end, UZ_LANES_MOST, false);
 }
 
-static void multiply_plain(double *y, const uz_blocks *A, const double *x, int64_t first, int64_t end, int lanes)
+static void multiply_plain(const product *p, int64_t first, int64_t end)
 {
-    multiply_any(y, A, x, first, end, lanes);
+    multiply_any(p, first, end, p->lanes, p->off.rest.value != NULL);
 }
 
 static void multiply_part(void *ctx, int part)
 {
     const product *p = ctx;
-    p->multiply(p->y, p->A, p->x, p->A->part[part], p->A->part[part + 1], p->lanes);
+    p->multiply(p, p->A->part[part], p->A->part[part + 1]);
+}
+
+static void multiply_all(product *p)
+{
+    const uz_blocks *A = p->A;
+    p->multiply = uz_cpu_has_avx2_fma() ? multiply_fused : multiply_plain;
+    if (A->parts > 0)
+        uz_aside_share(multiply_part, p, A->parts);
+    p->multiply(p, A->parts > 0 ? A->part[A->parts] : 0, A->nodes);
 }
 
 void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x, int lanes)
 {
-    product p = {y, A, x, lanes, uz_cpu_has_avx2_fma() ? multiply_fused : multiply_plain};
-    if (A->parts > 0)
-        uz_aside_share(multiply_part, &p, A->parts);
-    p.multiply(y, A, x, A->parts > 0 ? A->part[A->parts] : 0, A->nodes, lanes);
+    product p = {.y = y, .A = A, .off.whole = A->off, .diag.whole = A->diag, .x = x, .lanes = lanes};
+    multiply_all(&p);
+}
+
+void uz_level_multiply_parts(double *y, const uz_level *level, const double *x, int lanes)
+{
+    product p = {.y = y,
+                 .A = &level->A,
+                 .off = {.single = level->off, .rest = level->off_rest},
+                 .diag = {.single = level->diag, .rest = level->diag_rest},
+                 .x = x,
+                 .lanes = lanes};
+    multiply_all(&p);
+}
+
+/* In their own place, from the front: a rest is half as long. Rows are read as four of them. */
+static uz_rests leave_rests(double **whole, const float *single, int64_t count)
+{
+    double most = 0.0;
+    for (int64_t e = 0; e < count; e++)
+        most = fmax(most, fabs((*whole)[e]));
+    const double unit = ldexp(1.0, (most > 0.0 ? ilogb(most) : 0) - FLT_MANT_DIG - 31);
+    char *to = (char *)*whole;
+    for (int64_t e = 0; e < count; e++) {
+        const double value = ((*whole)[e] - (double)single[e]) / unit;
+        const int32_t rest = (int32_t)lrint(fmin(fmax(value, -INT32_MAX), INT32_MAX));
+        memcpy(to + e * (int64_t)sizeof rest, &rest, sizeof rest);
+    }
+    memset(to + count * (int64_t)sizeof(int32_t), 0, 4 * sizeof(int32_t));
+    int32_t *rests = uz_realloc(*whole, count + 4, sizeof *rests);
+    rests = rests ? rests : (int32_t *)(void *)*whole;
+    *whole = NULL;
+    return (uz_rests){rests, unit};
+}
+
+void uz_level_part(uz_level *level)
+{
+    uz_blocks *A = &level->A;
+    const int64_t size = (int64_t)A->b * A->b;
+    level->off_rest = leave_rests(&A->off, level->off, A->ptr[A->nodes] * size);
+    level->diag_rest = leave_rests(&A->diag, level->diag, A->nodes * size);
+}
+
+const double *uz_level_block(double *room, const uz_level *level, bool own, int64_t e)
+{
+    const int64_t size = (int64_t)level->A.b * level->A.b;
+    const double *whole = own ? level->A.diag : level->A.off;
+    const float *single = (own ? level->diag : level->off) + e * size;
+    if (whole)
+        return whole + e * size;
+    const uz_rests *rest = own ? &level->diag_rest : &level->off_rest;
+    for (int64_t k = 0; k < size; k++)
+        room[k] = (double)single[k] + rest->unit * (double)rest->value[e * size + k];
+    return room;
 }
 
 /* ------------------------------------------------- the same in single precision */
-
-typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
 
 static inline __attribute__((always_inline)) void multiply_single(float *y, const uz_level *level, const float *x,
                                                                   int64_t first, int64_t end, int b)

@@ -463,7 +463,7 @@ static void multiply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_roo
     }
     product p = {mg, room, y, x};
     uz_by_pieces(enter_product, &p, base->n);
-    uz_blocks_multiply(room->to, &mg->level[0].A, room->from, 1);
+    uz_level_multiply_parts(room->to, &mg->level[0], room->from, 1);
     uz_by_pieces(leave_product, &p, base->n);
 }
 
@@ -560,7 +560,8 @@ static void free_aggregates(uz_multigrid *base)
     uz_aggregates *mg = (uz_aggregates *)base;
     for (int l = 0; l < UZ_LEVELS_MOST; l++) {
         uz_level *level = &mg->level[l];
-        void *own[] = {level->off, level->diag, level->inverse, level->ptr, level->block, level->value};
+        void *own[] = {level->off,     level->diag, level->off_rest.value, level->diag_rest.value,
+                       level->inverse, level->ptr,  level->block,          level->value};
         uz_blocks_clear(&level->A);
         for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
             free(own[k]);

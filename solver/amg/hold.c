@@ -113,23 +113,23 @@ void uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
 {
     const uz_blocks *A = &fine->A;
     const int b = A->b;
-    const int64_t size = (int64_t)b * b;
-    double held_i[SIZE_MOST], rest_i[SIZE_MOST], held_j[SIZE_MOST], rest_j[SIZE_MOST];
+    double room[SIZE_MOST * SIZE_MOST], held_i[SIZE_MOST], rest_i[SIZE_MOST], held_j[SIZE_MOST], rest_j[SIZE_MOST];
     for (int64_t i = 0; i < A->nodes; i++) {
         const bool own = is_any_held(inverse + i * b, fine->inverse + i * b, b);
         weigh(held_i, rest_i, inverse + i * b, b);
         if (own)
-            add_coupling(loss, fine, &(coupling){A->diag + i * size, false, i, i, held_i, rest_i});
+            add_coupling(loss, fine, &(coupling){uz_level_block(room, fine, true, i), false, i, i, held_i, rest_i});
         for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
             const int64_t j = A->idx[e];
             const bool other = is_any_held(inverse + j * b, fine->inverse + j * b, b);
             if (!own && !other)
                 continue;
+            const double *block = uz_level_block(room, fine, false, e);
             weigh(held_j, rest_j, inverse + j * b, b);
             if (own)
-                add_coupling(loss, fine, &(coupling){A->off + e * size, false, i, j, held_i, rest_j});
+                add_coupling(loss, fine, &(coupling){block, false, i, j, held_i, rest_j});
             if (other)
-                add_coupling(loss, fine, &(coupling){A->off + e * size, true, j, i, held_j, rest_i});
+                add_coupling(loss, fine, &(coupling){block, true, j, i, held_j, rest_i});
         }
     }
 }

@@ -186,8 +186,8 @@ static size_t count_bytes(const uz_aggregates *mg)
         const uz_level *level = &mg->level[l];
         const size_t nodes = (size_t)level->A.nodes, b = (size_t)level->A.b, blocks = (size_t)level->A.ptr[nodes];
         bytes += nodes * (8 + 4 * b + 4 * b * b) + blocks * (4 + 4 * b * b);
-        if (level->A.off)
-            bytes += 8 * b * b * (nodes + blocks);
+        if (level->A.off || level->off_rest.value)
+            bytes += (level->A.off ? 8 : 4) * b * b * (nodes + blocks);
         if (level->ptr)
             bytes += 8 * nodes + (size_t)level->ptr[nodes] * (4 + 4 * b * (size_t)level[1].A.b);
     }
@@ -348,7 +348,9 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
     uz_status status = n > ALONE ? build(mg, K, modes, team, memory_limit, stop, err) : UZ_OK;
     if (status == UZ_OK)
         status = factor_last(mg, K, memory_limit, stop, err);
-    for (int l = 1; l + 1 < mg->base.levels; l++) { /* only products with K and the last level need them again */
+    if (mg->base.levels > 1) /* what is left for products with K */
+        uz_level_part(&mg->level[0]);
+    for (int l = 1; l + 1 < mg->base.levels; l++) { /* only the last level needs them again */
         free(mg->level[l].A.off);
         free(mg->level[l].A.diag);
         mg->level[l].A.off = mg->level[l].A.diag = NULL;

@@ -26,6 +26,14 @@ int64_t uz_blocks_find(const uz_blocks *A, int64_t row, int32_t column);
 /* y = A x, vectors with four numbers for each node and lane, the surplus ones 0 in x and anything in y. b <= 3. */
 void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x, int lanes);
 
+/* What single precision has left off numbers, as whole numbers of a power of two: half a unit of the largest in single
+ * precision is 2^31 of these. Of numbers from a quarter of the largest on nothing is lost, of the others no more than a
+ * product loses anyway, as long as the largest is of the size of the diagonal. */
+typedef struct {
+    int32_t *value; /* NULL: not parted */
+    double unit;
+} uz_rests;
+
 /* Which blocks stand below the diagonal in each column. */
 typedef struct {
     int64_t *ptr;  /* nodes + 1 */
@@ -41,13 +49,14 @@ void uz_below_clear(uz_below *below);
  * single precision: the cycle is positive definite whatever their rounding is, as it is that of the rounded matrices.
  */
 typedef struct {
-    uz_blocks A; /* level 0: kept for products, the last one for what holding dofs takes from it; else without numbers,
-                  * once the next level is made */
-    float *off, *diag; /* the same in single precision */
-    float *inverse;    /* nodes x b: 1 / a_jj, 0 where a dof is not there, which makes it vanish from every sweep */
-    int64_t *ptr;      /* nodes + 1: the blocks of each node's rows of the prolongation */
-    int32_t *block;    /* ptr[nodes]: the aggregate of each, ascending */
-    float *value;      /* ptr[nodes] x b x k */
+    uz_blocks A; /* the last level: kept for what holding dofs takes from it; else without numbers, once the next level
+                  * is made */
+    float *off, *diag;            /* the same in single precision */
+    uz_rests off_rest, diag_rest; /* level 0: what that has left off, with which both are A */
+    float *inverse; /* nodes x b: 1 / a_jj, 0 where a dof is not there, which makes it vanish from every sweep */
+    int64_t *ptr;   /* nodes + 1: the blocks of each node's rows of the prolongation */
+    int32_t *block; /* ptr[nodes]: the aggregate of each, ascending */
+    float *value;   /* ptr[nodes] x b x k */
     int64_t aggregates;
 } uz_level;
 
@@ -119,6 +128,13 @@ void uz_level_take_step(const uz_level_step *step, int parts);
 
 /* y = A x of level 0, of its numbers in single precision, as uz_blocks_multiply. */
 void uz_level_multiply(float *y, const uz_level *level, const float *x);
+/* The same in double precision, A being in two parts. */
+void uz_level_multiply_parts(double *y, const uz_level *level, const double *x, int lanes);
+/* The numbers of A, at most 4, become those that single precision has left off: level 0, whose sweeps have the others.
+ */
+void uz_level_part(uz_level *level);
+/* Block e of A->off, or that of node e of A->diag, from A or from its parts; room: b x b, where it may be put. */
+const double *uz_level_block(double *room, const uz_level *level, bool own, int64_t e);
 
 /* level (room->b[0]): S r by a power of two above the largest, which is returned; 0 or infinite: there is none. */
 double uz_read_dofs(float *level, const uz_aggregates *mg, const double *r);

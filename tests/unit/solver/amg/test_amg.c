@@ -465,10 +465,10 @@ static void check_lanes(pair *p)
             room->b[0][i] = (float)one[i];
         CHECK(uz_cycle_below(mg, room, 0, 1, &err) == UZ_OK);
         memcpy(alone[l], room->x[0], (size_t)n * sizeof *alone[l]);
-        uz_blocks_multiply(image, A, one, 1);
+        uz_level_multiply_parts(image, &mg->level[0], one, 1);
         for (int64_t i = 0; i < nodes * A->b; i++)
             one[i] = image[i / A->b * 4 + i % A->b];
-        uz_blocks_multiply(y, A, x, 2); /* the second lane is 0 the first time */
+        uz_level_multiply_parts(y, &mg->level[0], x, 2); /* the second lane is 0 the first time */
         for (int64_t i = 0; i < nodes * A->b; i++)
             CHECK(fabs(y[(i / A->b * 2 + l) * 4 + i % A->b] - one[i]) <= 1e-12 * (1.0 + fabs(one[i])));
         free(b);
@@ -498,6 +498,64 @@ TEST(two_lanes_are_two_cycles)
     check_lanes(&solid);
     close_pair(&plane);
     close_pair(&solid);
+}
+
+/* Of K x as somebody finds it: the error in the norm of D^-1, over the size of x in that of D; D: the diagonal. */
+static double error_of_product(const uz_csc *K, const double *y, const double *x, const long double *exact)
+{
+    double off = 0.0, size = 0.0;
+    for (int64_t j = 0; j < K->cols; j++) {
+        const double own = K->val[K->ptr[j]];
+        off += pow((double)((long double)y[j] - exact[j]) / sqrt(own), 2);
+        size += x[j] * x[j] * own;
+    }
+    return sqrt(off / size);
+}
+
+/* K is there in single precision and in what that leaves off: together they are as good as K in double precision. */
+static void check_parts(pair *p)
+{
+    const uz_aggregates *mg = (const uz_aggregates *)p->amg->mg;
+    const int64_t n = p->K.cols;
+    double *x = random_vector(n, 11), *y = vector(n), *z = vector(n);
+    long double *exact = calloc((size_t)n, sizeof *exact);
+    double rounding = 0.0;
+    uz_error err = {0};
+    CHECK(mg->base.levels > 1 && !mg->level[0].A.off && !mg->level[0].A.diag);
+    CHECK(uz_amg_rounding(&rounding, &p->K, &err) == UZ_OK);
+    for (int smooth = 0; smooth < 2; smooth++) {
+        for (int64_t j = 0; smooth && j < n; j++)
+            x[j] = 1.0 + (double)j / (double)n;
+        memset(exact, 0, (size_t)n * sizeof *exact);
+        for (int64_t j = 0; j < n; j++)
+            for (int64_t k = p->K.ptr[j]; k < p->K.ptr[j + 1]; k++) {
+                const int64_t i = p->K.idx[k];
+                exact[i] += (long double)p->K.val[k] * (long double)x[j];
+                exact[j] += i != j ? (long double)p->K.val[k] * (long double)x[i] : 0.0L;
+            }
+        memset(y, 0, (size_t)n * sizeof *y);
+        uz_csc_symv(y, &p->K, 1.0, x);
+        p->amg->mg->kind->multiply(p->amg->mg, &p->K, p->cg.room, z, x);
+        const double whole = error_of_product(&p->K, y, x, exact), parted = error_of_product(&p->K, z, x, exact);
+        CHECK_MSG(parted < 1.5 * whole && parted < rounding, "%g, whole %g of %g", parted, whole, rounding);
+    }
+    free(x);
+    free(y);
+    free(z);
+    free(exact);
+}
+
+TEST(nothing_is_lost_in_parts)
+{
+    pair p = open_plane(paper_scene(60, 20), true);
+    check_parts(&p);
+    close_pair(&p);
+    p = open_plane(stretched(600, 20, 300, 10, 0.3), true);
+    check_parts(&p);
+    close_pair(&p);
+    p = open_brick((int64_t[]){9, 9, 9}, (double[]){1, 1, 1}, 0.499);
+    check_parts(&p);
+    close_pair(&p);
 }
 
 /* Two dofs at each node, and the six motions of a body in space. */
