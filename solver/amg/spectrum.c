@@ -326,10 +326,10 @@ void uz_amg_free(uz_amg *amg)
     free(amg);
 }
 
-/* K in blocks takes 12 bytes an entry, in both precisions; the rest is the prolongation, some five blocks a node, of a
+/* K in blocks takes 8 bytes an entry, in two parts; the rest is the prolongation, some five blocks a node, of a
  * solid four, and the coarse levels. Measured on plane and solid bodies: 1 to 1.2 times what it is. */
 double uz_amg_predict_bytes(int64_t n, int64_t nnz, int modes)
 {
-    const double of_mode = modes == UZ_MODES_MOST ? 50.0 : 65.0;
-    return 11.5 * (double)nnz + (double)n * (40.0 + of_mode * modes);
+    const double of_mode = modes == UZ_MODES_MOST ? 50.0 : 105.0;
+    return 7.8 * (double)nnz + (double)n * (40.0 + of_mode * modes);
 }

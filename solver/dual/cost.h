@@ -14,6 +14,8 @@ typedef struct {
     bool active_set;   /* the active set is to solve */
     bool bounds;       /* and with the free dofs only */
     double by_cells;   /* bytes of a multigrid on equal cells, where K has its diagonal only; else 0 */
+    double stretch;    /* longest over shortest distance of an element's corners, of a solid */
+    double firmness;   /* what its material resists of a change of volume, over that of a Poisson's ratio of 0.3 */
     int64_t cases;     /* loads on the body */
 } uz_cost_size;
 

@@ -16,7 +16,9 @@
 
 /* ----------------------------------------------------------------- the machine */
 
-enum { DENSE = 192, SPARSE = 60000, BAND = 10, REPEATS = 4 };
+/* The sparse matrix, of less than a megabyte, is about as much as a core has for itself: larger ones take up to twice
+ * the time for an entry while other cores compute, which solves, going through theirs block by block, do not. */
+enum { DENSE = 192, SPARSE = 5000, BAND = 10, REACH = 70, REPEATS = 4 };
 
 #define ENOUGH_S 0.02 /* of one measurement; four times take an eighth of it on a machine of today */
 
@@ -25,7 +27,7 @@ static const uz_cost_rates ASSUMED = {3e-11, 1e-9};
 
 static uz_cost_rates measured; /* written once, under the guard */
 
-/* In pages that go back to the system: ten megabytes that lie free in the heap would hide what the first body takes. */
+/* In pages that go back to the system: what lies free in the heap would hide what the first body takes. */
 static void measure(void)
 {
     enum { ROOM = 2 * (DENSE * DENSE + SPARSE), ENTRIES = SPARSE * BAND };
@@ -50,8 +52,8 @@ static void measure(void)
     int64_t at = 0;
     for (int64_t j = 0; j < SPARSE; j++) {
         A.ptr[j] = at;
-        for (int64_t k = 0; k < BAND && j + k / 4 * 200 + k < SPARSE; k++) {
-            A.idx[at] = j + k / 4 * 200 + k;
+        for (int64_t k = 0; k < BAND && j + k / 4 * REACH + k < SPARSE; k++) {
+            A.idx[at] = j + k / 4 * REACH + k;
             A.val[at++] = 1.0;
         }
     }
@@ -66,6 +68,13 @@ static void measure(void)
     munmap(room, bytes);
 }
 
+const uz_cost_rates *uz_cost_machine(void)
+{
+    static pthread_once_t guard = PTHREAD_ONCE_INIT; /* a property of the machine, not of any call */
+    pthread_once(&guard, measure);
+    return &measured;
+}
+
 /* -------------------------------------------------------------------- the model */
 
 /* Putting the contact last costs a tenth more entries of L and half as many flops again (plane bodies, AMD). */
@@ -75,8 +84,8 @@ static void measure(void)
 /* While it is made: supernodes are updated through room of their own, a fifth of the factor of a solid body. */
 #define FACTOR_PEAK 1.25
 /* Vectors of dofs: passes of K that a certificate and a load take, and of single numbers. */
-#define CASE_PASSES  14.0
-#define CASE_NUMBERS 120.0
+#define CASE_PASSES  8.5
+#define CASE_NUMBERS 73.0
 
 static double matrix_bytes(const uz_cost_size *s)
 {
@@ -101,8 +110,8 @@ static uz_cost_estimate estimate(const uz_dual_abilities *can, const uz_cost_siz
         L.bytes = (size_t)((double)L.bytes * entries);
         out.flops = L.flops;
         out.bytes += FACTOR_PEAK * (double)L.bytes;
-        out.setup_s = L.order_s + UZ_COST_FACTOR_FLOPS * L.flops * rates->flop_s +
-                      UZ_COST_FACTOR_PASSES * (double)L.nnz * rates->entry_s;
+        out.setup_s =
+            UZ_COST_FACTOR_FLOPS * L.flops * rates->flop_s + UZ_COST_FACTOR_PASSES * (double)L.nnz * rates->entry_s;
     }
     uz_dual_form_of(out.op)->add_cost(&out, size, predicted ? &L : NULL, rates);
     out.next_s = out.next_s > 0.0 ? out.next_s : out.case_s;
@@ -115,20 +124,65 @@ double uz_cost_analysis_bytes(const uz_cost_size *size)
     return matrix_bytes(size) + 20.0 * (double)size->k_entries + 130.0 * (double)size->d;
 }
 
-uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_brick *brick, int64_t n_b, int dim,
-                             int64_t cases, const uz_settings *settings)
+/* Longest over shortest distance of an element's corners: sqrt(3) of a cube, and of the tetrahedra that it is divided
+ * into. Of a thousand elements, their geometric mean. */
+static double find_stretch(const uz_mesh *mesh, const uz_brick *brick)
+{
+    const double *cell = brick ? brick->cell : NULL;
+    double sum = 0.0;
+    int64_t n = 0;
+    if (cell)
+        return hypot(hypot(cell[0], cell[1]), cell[2]) / fmin(fmin(cell[0], cell[1]), cell[2]);
+    for (int64_t e = 0; e < mesh->n_elements; e += 1 + mesh->n_elements / 1000, n++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        const int64_t *node = mesh->node + mesh->first[e];
+        double longest = 0.0, shortest = INFINITY;
+        for (int i = 0; i < type->corners; i++)
+            for (int k = 0; k < i; k++) {
+                double distance = 0.0;
+                for (int c = 0; c < mesh->dim; c++)
+                    distance = hypot(distance, mesh->xyz[node[i] * mesh->dim + c] - mesh->xyz[node[k] * mesh->dim + c]);
+                longest = fmax(longest, distance);
+                shortest = fmin(shortest, distance);
+            }
+        sum += log(longest / shortest);
+    }
+    return n > 0 ? exp(sum / (double)n) : 1.0;
+}
+
+/* How much more a solid resists a change of volume than one of shape, over what it does at a Poisson's ratio of 0.3: of
+ * the material where that is most. Tetrahedra, whose shapes are hardly free to keep their volume, show the root of it.
+ */
+static double find_firmness(const uz_scene *scene, const uz_mesh *mesh, const uz_brick *brick)
+{
+    const bool tetrahedra =
+        !brick && mesh->n_elements > 0 && uz_element_type_of((uz_element_kind)mesh->kind[0])->corners == 4;
+    double most = 1.0;
+    for (int64_t k = 0; k < scene->n_materials; k++) {
+        const double nu = scene->materials[k].poisson;
+        most = fmax(most, (1.0 - nu) / (1.0 - 2.0 * nu) / (0.7 / 0.4));
+    }
+    return tetrahedra ? sqrt(most) : most;
+}
+
+uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_model *model, const uz_scene *scene,
+                             int64_t n_b, int64_t cases, const uz_settings *settings)
 {
     const bool by_auto = settings->method == UZ_METHOD_AUTO && settings->stopping == UZ_STOP_CERTIFIED;
     const bool by_active_set = by_auto || settings->method == UZ_METHOD_ACTIVE_SET;
+    const uz_brick *brick = model ? model->brick : NULL;
+    const bool solid = model && model->mesh.dim == 3;
     return (uz_cost_size){.d = N->cols,
                           .m = N->rows,
                           .n_b = n_b,
                           .k_entries = brick ? brick->d : K->ptr[K->cols],
                           .n_entries = N->ptr[N->cols],
-                          .modes = dim == 3 ? 6 : 3,
+                          .modes = solid ? 6 : 3,
                           .active_set = by_active_set,
                           .bounds = by_active_set && uz_dual_bounds_dofs(N),
                           .by_cells = brick ? uz_brick_predict_bytes(brick) : 0.0,
+                          .stretch = solid ? find_stretch(&model->mesh, brick) : 1.0,
+                          .firmness = solid ? find_firmness(scene, &model->mesh, brick) : 1.0,
                           .cases = cases};
 }
 
@@ -154,21 +208,21 @@ _Static_assert(sizeof((uz_cost){0}.considered) == UZ_DUAL_FORMS * sizeof(uz_cost
 void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
                     uz_operator asked, size_t memory_limit)
 {
-    static pthread_once_t guard = PTHREAD_ONCE_INIT; /* a property of the machine, not of any call */
-    pthread_once(&guard, measure);
+    const uz_cost_rates *rates = uz_cost_machine();
     plan->count = 0;
     if (factor)
-        plan->form[plan->count++] = estimate(&uz_dual_form_of(direct)->can, size, factor, direct, &measured);
+        plan->form[plan->count++] = estimate(&uz_dual_form_of(direct)->can, size, factor, direct, rates);
     for (int k = 0; k < UZ_DUAL_FORMS; k++) {
         const uz_dual_abilities *can = &uz_dual_forms[k]->can;
         if (can->asked_for && can->op != asked)
             continue;
         if (!can->needs_factor || (factor && can->op != direct))
-            plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, &measured);
+            plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, rates);
     }
     plan->chosen = -1;
     for (int k = 0; k < plan->count; k++) {
         uz_cost_estimate *form = &plan->form[k];
+        form->setup_s += factor ? factor->order_s : 0.0; /* it has been taken, whatever is chosen */
         form->fits = memory_limit == 0 || form->bytes <= (double)memory_limit;
         bool allowed = asked == UZ_OPERATOR_AUTO || form->op == asked;
         if (!allowed || !form->fits)

@@ -6,6 +6,7 @@
 #ifndef UZ_COST_H
 #define UZ_COST_H
 
+#include "assembly/assembly.h"
 #include "brick/brick.h"
 #include "dual/choice.h"
 #include "dual/cost.h"
@@ -17,11 +18,14 @@ typedef struct {
     int count, chosen;
 } uz_cost_plan;
 
-/* Of K (of a brick it is not read; brick NULL: K has its entries) and of N, whose rows touch n_b dofs, for so many load
- * cases. dim: of a scene's mesh, else 0. An active set solves with the free dofs only where each row has one entry,
- * unless gradient steps were asked for, which take hundreds of solves. */
-uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_brick *brick, int64_t n_b, int dim,
-                             int64_t cases, const uz_settings *settings);
+/* The rates of this machine; measured when they are asked for first. */
+const uz_cost_rates *uz_cost_machine(void);
+
+/* Of K (of a brick it is not read) and of N, whose rows touch n_b dofs, for so many load cases. model, scene: NULL of
+ * matrices. An active set solves with the free dofs only where each row has one entry, unless gradient steps were asked
+ * for, which take hundreds of solves. */
+uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_model *model, const uz_scene *scene,
+                             int64_t n_b, int64_t cases, const uz_settings *settings);
 
 /* Whether each of n_b contact dofs has a row of its own: the trailing block of a factor with these dofs last is then
  * all of the operator. Otherwise the contact may stand anywhere in it, whichever is cheaper. */

@@ -249,7 +249,7 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
         return status;
     if (!base->factor)
         return make_dual(&m, base->dual->can->op, err);
-    m.size = uz_cost_size_of(m.K, m.N, NULL, n_b, setup->model.mesh.dim, 0, settings);
+    m.size = uz_cost_size_of(m.K, m.N, setup->is_scene ? &setup->model : NULL, &problem->scene, n_b, 0, settings);
     const uz_factor_info there = uz_factor_describe(base->factor);
     const uz_operator direct = uz_dual_choose(m.N, n_b, settings->op);
     uz_cost_decide(&setup->plan, &m.size, &there, direct, settings->op, settings->memory_limit);
@@ -277,8 +277,8 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, m.N, err);
     if (status != UZ_OK)
         return status;
-    m.size = uz_cost_size_of(m.K, m.N, setup->model.brick, n_b, setup->is_scene ? setup->model.mesh.dim : 0,
-                             problem->n_cases, settings);
+    m.size = uz_cost_size_of(m.K, m.N, setup->is_scene ? &setup->model : NULL, &problem->scene, n_b, problem->n_cases,
+                             settings);
     const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor;
     bool no_factor = free_asked || setup->model.brick || (limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit);
     m.direct = uz_dual_choose(m.N, n_b, free_asked ? UZ_OPERATOR_AUTO : settings->op);
@@ -309,7 +309,7 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
             done = !regretted;
             m.asked = regretted ? m.direct : m.asked;
             if (regretted && m.size.by_cells > 0.0) { /* K is there now, and nobody has its digest */
-                m.size = uz_cost_size_of(m.K, m.N, NULL, n_b, 3, problem->n_cases, settings);
+                m.size = uz_cost_size_of(m.K, m.N, &setup->model, &problem->scene, n_b, problem->n_cases, settings);
                 no_factor = limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit;
                 cache = NULL;
             }

@@ -19,7 +19,8 @@
 /* The form and what it takes, of K and N (model NULL: of matrices); the analysis of a factor where there is to be one.
  */
 static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, const uz_body_model *model,
-                         int64_t cases, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
+                         const uz_scene *scene, int64_t cases, const uz_settings *settings, const uz_hooks *hooks,
+                         uz_error *err)
 {
     const uz_brick *brick = model ? model->brick : NULL;
     const size_t limit = settings->memory_limit;
@@ -30,7 +31,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, c
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, N, err);
     if (status != UZ_OK)
         return status;
-    const uz_cost_size size = uz_cost_size_of(K, N, brick, n_b, model ? model->mesh.dim : 0, cases, settings);
+    const uz_cost_size size = uz_cost_size_of(K, N, model, scene, n_b, cases, settings);
     const bool no_factor = free_asked || brick || (limit > 0 && uz_cost_analysis_bytes(&size) > (double)limit);
     const uz_operator form = uz_dual_choose(N, n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
     if (no_factor) {
@@ -131,7 +132,7 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
         if (status == UZ_OK) {
             out->d = model.d;
             out->m = m;
-            status = predict(out, &model.K, &N, &model, problem->n_cases, settings, hooks, err);
+            status = predict(out, &model.K, &N, &model, &problem->scene, problem->n_cases, settings, hooks, err);
         }
         if (status == UZ_OK)
             predict_finite(out, &model, &problem->scene);
@@ -140,7 +141,7 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
     } else if (status == UZ_OK) {
         out->d = problem->qp.K.cols;
         out->m = problem->qp.N.rows;
-        status = predict(out, &problem->qp.K, &problem->qp.N, NULL, problem->n_cases, settings, hooks, err);
+        status = predict(out, &problem->qp.K, &problem->qp.N, NULL, NULL, problem->n_cases, settings, hooks, err);
     }
     return status;
 }

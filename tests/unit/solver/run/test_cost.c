@@ -1,4 +1,5 @@
 /* What is decided by counts alone. */
+#include "body_fixture.h"
 #include "harness.h"
 #include "run/cost.h"
 #include "scene_fixture.h"
@@ -108,4 +109,92 @@ TEST(further_loads_cost_less_without_a_factor)
         CHECK_REL(many, one + 49 * form->next_s, 1e-12);
         CHECK(form->op == UZ_OPERATOR_MATRIX_FREE ? form->next_s < 0.7 * form->case_s : form->next_s >= form->case_s);
     }
+}
+
+static double seconds_without_factor(uz_cost_size size)
+{
+    uz_cost_plan plan;
+    uz_cost_decide(&plan, &size, NULL, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_MATRIX_FREE, 0);
+    return uz_cost_seconds(&plan.form[plan.chosen], size.cases);
+}
+
+/* More dofs, a material that keeps its volume more, longer elements and more loads, each by itself, with a matrix and
+ * by cells; below what cubes at a Poisson's ratio of 0.3 are nothing is spared. */
+TEST(what_is_harder_costs_more)
+{
+    for (int cells = 0; cells < 2; cells++) {
+        const uz_cost_size plain = {.d = 100000,
+                                    .m = 1000,
+                                    .n_b = 1000,
+                                    .k_entries = 4100000,
+                                    .n_entries = 1000,
+                                    .modes = 6,
+                                    .active_set = true,
+                                    .bounds = true,
+                                    .by_cells = cells ? 2e7 : 0.0,
+                                    .stretch = 1.8,
+                                    .firmness = 1.0,
+                                    .cases = 1};
+        uz_cost_size larger = plain, firmer = plain, longer = plain, more = plain, easier = plain;
+        larger.d *= 2;
+        larger.k_entries *= 2;
+        firmer.firmness = 14.6; /* 0.49 */
+        longer.stretch = 10.0;
+        more.cases = 10;
+        easier.firmness = 0.6;
+        const double base = seconds_without_factor(plain);
+        CHECK_REL(seconds_without_factor(larger), 2.0 * base, 1e-9);
+        CHECK(seconds_without_factor(firmer) > 1.5 * base && seconds_without_factor(firmer) < 5.0 * base);
+        CHECK(seconds_without_factor(longer) > 1.5 * base && seconds_without_factor(longer) < 10.0 * base);
+        CHECK(seconds_without_factor(more) > 2.0 * base && seconds_without_factor(more) < 10.0 * base);
+        CHECK_REL(seconds_without_factor(easier), base, 1e-12);
+    }
+}
+
+/* Poisson's ratio and the elements of a scene find their way to the price. */
+TEST(a_scene_tells_how_hard_it_is)
+{
+    double seconds[4];
+    for (int k = 0; k < 4; k++) {
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE,
+                              .scene = body_scene(UZ_SOLID, k == 2 ? "tet4" : "wedge6",
+                                                  (double[3]){k == 3 ? 20.0 : 1.0, 1.0, 1.0}, (int64_t[3]){8, 8, 8})};
+        uz_settings settings = uz_settings_default();
+        uz_prediction asked;
+        uz_error err = {0};
+        settings.op = UZ_OPERATOR_MATRIX_FREE;
+        if (k == 1)
+            problem.scene.materials[0].poisson = 0.49;
+        body_hold(&problem.scene, "left", 0, 0, 0);
+        body_plane(&problem.scene, "bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+        CHECK_MSG(uz_predict(&asked, &problem, &settings, NULL, &err) == UZ_OK, "%s", err.message);
+        CHECK_INT(asked.op, UZ_OPERATOR_MATRIX_FREE);
+        seconds[k] = asked.seconds;
+        uz_scene_clear(&problem.scene);
+    }
+    CHECK_MSG(seconds[1] > 1.5 * seconds[0] && seconds[3] > 1.5 * seconds[0], "%g, %g, %g s", seconds[0], seconds[1],
+              seconds[3]);
+    CHECK(seconds[2] < seconds[0]); /* fewer entries */
+}
+
+/* An order that was made to know the price has been paid for, whatever is chosen. */
+TEST(an_order_that_is_there_makes_no_form_dearer)
+{
+    const uz_cost_size size = {.d = 100000,
+                               .m = 100,
+                               .n_b = 100,
+                               .k_entries = 4100000,
+                               .n_entries = 100,
+                               .modes = 6,
+                               .active_set = true,
+                               .bounds = true,
+                               .cases = 1};
+    uz_factor_info factor = {.nnz = 4000000, .flops = 1e9, .bytes = 32000000};
+    uz_cost_plan quick, slow;
+    uz_cost_decide(&quick, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+    factor.order_s = 1000.0;
+    uz_cost_decide(&slow, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+    CHECK_INT(slow.form[slow.chosen].op, quick.form[quick.chosen].op);
+    for (int k = 0; k < slow.count; k++)
+        CHECK_REL(slow.form[k].setup_s, quick.form[k].setup_s + 1000.0, 1e-12);
 }
