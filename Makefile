@@ -292,7 +292,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-solids bench-deps peers peers-contact peers-decks peers-large peers-large-solids peers-space extremes theory large roller arch trade figures numbers collect page-size
+        bench-size bench-solids bench-predictions bench-deps peers peers-contact peers-decks peers-large peers-large-solids peers-space extremes theory large roller arch trade figures numbers collect page-size
 test: test-build ## build and pass every test; ONCE=1: but lint, and those that make asan runs as they are
 	@tests/run.sh $(BUILD) "$(if $(ONCE),unit api browser guard)" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
 
@@ -439,6 +439,10 @@ bench-solids: deps-test ## solids in contact without a factor, by shapes, materi
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench $(BUILD)/uzawad
 	@$(call measured,bench-solids) /usr/bin/python3 -B tests/bench/solids.py $(BUILD) $(BUILD)/bench-solids.json $(foreach v,CELLS RUNS,$(if $($(v)),$(v)=$($(v))))
 
+bench-predictions: deps ## what solves are expected to take against what they take, by bodies and forms of the operator: a table and build/bench-predictions.json; FILTER=element; minutes, and 3 GB
+	@$(MAKE) --no-print-directory -s $(BUILD)/bench
+	@$(call measured,bench-predictions) $(BUILD)/bench $(BUILD)/bench-predictions.json predictions $(FILTER)
+
 bench-deps: ## install the Debian packages that only comparisons with other solvers use
 	@tests/deps.sh $(PEER_PACKAGES)
 
@@ -504,7 +508,7 @@ collect: ## docs/numbers.md and what other pages cite of it, from what was measu
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
 numbers: ## measure everything that docs/numbers.md shows (hours: soak is one of it), then write them; SPARED="soak" leaves some out
-	@for part in $(filter-out $(SPARED),theory large gallery trade extremes bench bench-size bench-solids $(if $(wildcard tests/peers/*),peers) soak figures); do \
+	@for part in $(filter-out $(SPARED),theory large gallery trade extremes bench bench-size bench-solids bench-predictions $(if $(wildcard tests/peers/*),peers) soak figures); do \
 	    $(MAKE) --no-print-directory $$part || exit 1; done
 
 ##@ Style

@@ -494,6 +494,11 @@ int main(int argc, char **argv)
         uz_thread_init();
         return bench_memory_child(argv[2], argv[3]);
     }
+    if (argc == 3 && strcmp(argv[1], BENCH_PREDICTIONS_FLAG) == 0) {
+        uz_process_init(1);
+        uz_thread_init();
+        return bench_predictions_child(argv[2]);
+    }
     if (argc < 2 || !(out.json = fopen(argv[1], "w"))) {
         fprintf(stderr, "usage: bench OUTPUT.json [name part]\n");
         return 2;
@@ -510,6 +515,12 @@ int main(int argc, char **argv)
     if (out.filter && strcmp(out.filter, "cycles") == 0) {
         fprintf(out.json, "{");
         const bool solved = bench_cycles(out.json);
+        fprintf(out.json, "}\n");
+        return fclose(out.json) != 0 || !solved;
+    }
+    if (out.filter && strcmp(out.filter, "predictions") == 0) {
+        fprintf(out.json, "{");
+        const bool solved = bench_predictions(out.json, argc > 3 ? argv[3] : NULL);
         fprintf(out.json, "}\n");
         return fclose(out.json) != 0 || !solved;
     }

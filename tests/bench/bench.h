@@ -80,6 +80,12 @@ bool bench_cells(bench_cells_row *row, int64_t n);
 /* Conjugate gradients to 1e-8 on boxes of equal cells, from 16 to 96 along a side and of cells 10 times as long and as
  * short along one axis: their numbers, printed and as a member of a JSON object. false: one is not solved. */
 bool bench_cycles(FILE *json);
+/* Bodies of every kind: seconds and bytes that were predicted, and what their solves took, printed and as a member of a
+ * JSON object. filter: part of an element's name, NULL: all. false: one is not solved. Minutes, and 3 GB. */
+bool bench_predictions(FILE *json, const char *filter);
+/* What main does when it is started as `bench BENCH_PREDICTIONS_FLAG row`; its exit status. */
+#define BENCH_PREDICTIONS_FLAG "--prediction"
+int bench_predictions_child(const char *which);
 /* 100 load cases of the paper's body with nx x nx/3 cells, certified 1e-8: their time over that of one CHOLMOD solve
  * of one right-hand side, both with the factor at hand. false: no answer. */
 bool bench_load_cases(bench_value *ratio, int64_t nx);

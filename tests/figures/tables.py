@@ -443,6 +443,25 @@ def shapes(data):
     return table(["what", "mesh", "unknowns", "operator", "cold", "another load", "target"], rows)
 
 
+def predictions(data):
+    """Ratios of what was predicted to what it took, and of forms that were asked for to what was chosen."""
+    found = (data.get("bench_predictions") or {}).get("rows", [])
+    body = lambda row: (row["element"], tuple(row["cells"]), row["poisson"], row["stretch"], row["jump"], row["moved"])  # noqa: E731
+    chosen = {body(row): row for row in found if row["asked"] == "auto"}
+    keys = (("predicted_s", "cold_s", 1.5), ("predicted_cached_s", "cached_s", 1.5), ("predicted_bytes", "peak_bytes", 1.2))
+    ratios = {name: [row[name] / row[actual] for row in found] for name, actual, _ in keys}
+    rows = []
+    for row in found:
+        special = [text for text, said in ((f"nu {sig(row['poisson'])}", row["poisson"] != 0.3), (f"{sig(row['stretch'])} times as long", row["stretch"] != 1),
+                                           ("stiff ball", row["jump"] != 1), ("nodes moved", row["moved"])) if said]
+        own = chosen.get(body(row))
+        over = NONE if row["asked"] == "auto" or not own or own["operator"] == row["operator"] else f"{row['cold_s'] / own['cold_s']:.2f}, {row['cached_s'] / own['cached_s']:.2f}"
+        rows.append([f"`{row['element']}` {' x '.join(str(c) for c in row['cells'] if c)}", ", ".join(special) or NONE, f"{row['unknowns']:,}", f"`{row['operator']}`",
+                     *(f"{row[name] / row[actual]:.2f}" for name, actual, _ in keys), over])
+    within = [f"{sum(1 / most <= ratio <= most for ratio in ratios[name])} of {len(found)}" for name, _, most in keys]
+    return found and table(["body", "special", "unknowns", "operator", *(f"{what} ({count})" for what, count in zip(("cold", "another load", "bytes"), within)), "over the one chosen"], rows)
+
+
 def runs_of_shapes(data):
     runs = data["bench_solids"]["runs"]
     return [f"Ratios are medians of {runs} runs." if runs > 1 else "Ratios are of single runs."]
