@@ -24,14 +24,16 @@ typedef float four __attribute__((vector_size(16), aligned(4), may_alias));
  * of a node are 0 in x, and are not read in b and t. */
 enum { ROWS_MOST = 6, PARTS_MOST = 2 };
 
-/* s = b - t - (blocks left of the diagonal) x. */
+/* s = b - t - (blocks left of the diagonal) x. The blocks are gone through as the nodes are: against that order memory
+ * is not read ahead, which made a sweep up take 1.3 to 1.8 times as long as one down. */
 static inline __attribute__((always_inline)) void gather(float s[UZ_LANES_MOST][ROWS_MOST], const uz_level *level,
-                                                         const float *x, int64_t i, int b, int lanes)
+                                                         const float *x, int64_t i, bool upwards, int b, int lanes)
 {
     const int parts = b > 4 ? 2 : 1;
     const uz_blocks *A = &level->A;
     four sum[UZ_LANES_MOST][ROWS_MOST] = {{{0}}};
-    for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+    for (int64_t k = A->ptr[i]; k < A->ptr[i + 1]; k++) {
+        const int64_t e = upwards ? A->ptr[i] + A->ptr[i + 1] - 1 - k : k;
         const float *block = level->off + e * b * b, *of = x + (int64_t)A->idx[e] * 4 * parts * lanes;
         for (int q = 0; q < parts; q++)
             for (int l = 0; l < lanes; l++) {
@@ -86,7 +88,7 @@ static inline __attribute__((always_inline)) void sweep_down(const uz_level_step
         for (int l = 0; l < lanes; l++)
             for (int r = 0; r < b; r++)
                 s[l][r] = step->b[(i * lanes + l) * width + r];
-        gather(s, level, step->x, i, b, lanes);
+        gather(s, level, step->x, i, false, b, lanes);
         for (int l = 0; l < lanes; l++) {
             float *x = step->x + (i * lanes + l) * width, *t = step->t + (i * lanes + l) * width;
             float left[ROWS_MOST] = {0};
@@ -125,7 +127,7 @@ static inline __attribute__((always_inline)) void sweep_up(const uz_level_step *
                 s[l][r] = step->b[at] - step->t[at];
                 value[l][r] = step->x[at];
             }
-        gather(s, level, step->x, i, b, lanes);
+        gather(s, level, step->x, i, true, b, lanes);
         for (int l = 0; l < lanes; l++) {
             float *x = step->x + (i * lanes + l) * width;
             for (int r = b - 1; r >= 0; r--) {
