@@ -58,6 +58,10 @@ typedef struct {
     const double *bottom, *top; /* n; infinite: there is none */
 } uz_limits;
 
+/* A step of conjugate gradients, by so much along the direction, from r'M^-1 r = before to after. Returns whether they
+ * are to go on. */
+typedef bool (*uz_cg_visit)(void *ctx, double along, double before, double after);
+
 /* What a kind of multigrid does. M^-1 is symmetric and positive definite, also with dofs held. */
 typedef struct {
     /* z = M^-1 r (n); z and r do not overlap. */
@@ -70,6 +74,11 @@ typedef struct {
      * as it came (iterations 0: as it was, and r too). NULL: there is none. */
     uz_status (*solve_roughly)(const uz_multigrid *mg, uz_multigrid_room *room, struct uz_cg_info *info, double *x,
                                double *r, const struct uz_cg_stop *stop, uz_error *err);
+    /* The same steps from a residual r (n), until the visitor ends them, or rounding does: of the matrix in single
+     * precision that the cycle is made of, whose entries are those of K but for half of FLT_EPSILON. NULL: there is
+     * none. */
+    uz_status (*step_roughly)(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+                              void *ctx, uz_error *err);
     /* What a thread needs to apply it, *bytes of it; NULL: no memory. */
     uz_multigrid_room *(*room)(const uz_multigrid *mg, size_t *bytes);
     void (*free_room)(uz_multigrid_room *room); /* NULL and half-built ones too */

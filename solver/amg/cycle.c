@@ -77,8 +77,9 @@ typedef struct {
 } range;
 
 /* x = (D + L)^-1 b, t = b - A x, of which L'x alone is not 0; of nodes whose blocks are among themselves, or with those
- * that are done. */
-static inline __attribute__((always_inline)) void sweep_down(const uz_level_step *step, range of, int b, int lanes)
+ * that are done. reduces: afterwards swept -= share (along + x), t = -L'swept. */
+static inline __attribute__((always_inline)) void sweep_down(const uz_level_step *step, range of, bool reduces, int b,
+                                                             int lanes)
 {
     const uz_level *level = step->level;
     const int width = uz_width(b);
@@ -97,15 +98,19 @@ static inline __attribute__((always_inline)) void sweep_down(const uz_level_step
                     s[l][r] -= own[r * b + c] * value[l][c];
                 value[l][r] = inverse[r] * s[l][r];
             }
+            for (int r = 0; r < width; r++)
+                x[r] = r < b ? value[l][r] : 0.0F;
+            for (int r = 0; reduces && r < b; r++) {
+                const int64_t at = (i * lanes + l) * width + r;
+                value[l][r] = step->swept[at] -= step->share * (step->along[at] + value[l][r]);
+            }
             for (int r = 0; r < b; r++) {
                 left[r] = 0.0F;
                 for (int c = r + 1; c < b; c++)
                     left[r] -= own[r * b + c] * value[l][c];
             }
-            for (int r = 0; r < width; r++) {
-                x[r] = r < b ? value[l][r] : 0.0F;
+            for (int r = 0; r < width; r++)
                 t[r] = r < b ? left[r] : 0.0F;
-            }
             for (int r = 0; r < b; r++)
                 value[l][r] = -value[l][r];
         }
@@ -135,10 +140,35 @@ static inline __attribute__((always_inline)) void sweep_up(const uz_level_step *
                     s[l][r] -= c == r ? 0.0F : own[r * b + c] * value[l][c];
                 value[l][r] = inverse[r] * s[l][r];
             }
-            for (int r = 0; r < b; r++)
+            for (int r = 0; r < b; r++) {
+                float above = 0.0F;
+                for (int c = r + 1; c < b; c++)
+                    above += own[r * b + c] * value[l][c];
+                step->t[(i * lanes + l) * width + r] += above;
                 x[r] = value[l][r];
+            }
         }
         scatter(step->t, level, value, i, b, lanes);
+    }
+}
+
+/* x = (D + L) swept. */
+static inline __attribute__((always_inline)) void raise_swept(const uz_level_step *step, range of, int b, int lanes)
+{
+    const uz_level *level = step->level;
+    const int width = uz_width(b);
+    for (int64_t i = of.first; i < of.end; i++) {
+        const float *own = level->diag + i * b * b;
+        float s[UZ_LANES_MOST][ROWS_MOST] = {{0}};
+        gather(s, level, step->swept, i, false, b, lanes);
+        for (int l = 0; l < lanes; l++)
+            for (int r = 0; r < b; r++) {
+                const float *swept = step->swept + (i * lanes + l) * width;
+                float sum = -s[l][r];
+                for (int c = 0; c <= r; c++)
+                    sum += own[r * b + c] * swept[c];
+                step->x[(i * lanes + l) * width + r] = sum;
+            }
     }
 }
 
@@ -198,7 +228,11 @@ static inline __attribute__((always_inline)) void take_part(const uz_level_step 
                                                             int lanes)
 {
     if (what == UZ_STEP_SWEEP_DOWN)
-        sweep_down(s, of, b, lanes);
+        sweep_down(s, of, false, b, lanes);
+    if (what == UZ_STEP_REDUCE)
+        sweep_down(s, of, true, b, lanes);
+    if (what == UZ_STEP_RAISE)
+        raise_swept(s, of, b, lanes);
     if (what == UZ_STEP_RESTRICT)
         restrict_to(s, of, b, k, lanes);
     if (what == UZ_STEP_PROLONG)
@@ -274,15 +308,16 @@ static void take_step(sharing *x, int what)
         uz_aside_share(take_range, x, x->ranges);
     else if (A->parts > 0)
         uz_aside_share(take_matrix_part, x, A->parts);
-    if (what == UZ_STEP_SWEEP_DOWN)
+    if (what == UZ_STEP_SWEEP_DOWN || what == UZ_STEP_REDUCE || what == UZ_STEP_RAISE)
         x->take(x->step, what, rest);
 }
 
 void uz_level_take_step(const uz_level_step *s, int parts)
 {
     sharing x = {.step = s, .take = !uz_cpu_has_avx2_fma() ? take_plain : s->lanes == 1 ? take_fused : take_both_fused};
-    if (parts & UZ_STEP_SWEEP_DOWN)
-        take_step(&x, UZ_STEP_SWEEP_DOWN);
+    for (int what = UZ_STEP_SWEEP_DOWN; what <= UZ_STEP_RAISE; what <<= 1)
+        if (parts & what)
+            take_step(&x, what);
     if (parts & UZ_STEP_RESTRICT)
         take_step(&x, UZ_STEP_RESTRICT);
     if (parts & UZ_STEP_PROLONG)
@@ -316,6 +351,25 @@ static uz_status solve_coarsest(const uz_aggregates *mg, uz_multigrid_room *room
     return status;
 }
 
+uz_level_step uz_step_of(uz_level *now, const uz_aggregates *mg, const uz_multigrid_room *room, int l)
+{
+    *now = mg->level[l];
+    if (room->own[l].inverse)
+        now->inverse = room->own[l].inverse;
+    if (room->own[l].off) {
+        now->off = room->own[l].off;
+        now->diag = room->own[l].diag;
+    }
+    return (uz_level_step){.level = now,
+                           .inverse = now->inverse,
+                           .b = room->b[l],
+                           .x = room->x[l],
+                           .t = room->t[l],
+                           .coarse = room->b[l + 1],
+                           .k = mg->level[l + 1].A.b,
+                           .lanes = 1};
+}
+
 uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, int lanes, uz_error *err)
 {
     const int last = mg->base.levels - 1, apart = uz_width(mg->level[last].A.b);
@@ -323,16 +377,8 @@ uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int f
     uz_level now[UZ_LEVELS_MOST];
     uz_status status = UZ_OK;
     for (int l = from; l < last; l++) {
-        uz_level *level = &now[l];
-        *level = mg->level[l];
-        if (room->own[l].inverse)
-            level->inverse = room->own[l].inverse;
-        if (room->own[l].off) {
-            level->off = room->own[l].off;
-            level->diag = room->own[l].diag;
-        }
-        at[l] = (uz_level_step){level,      level->inverse, room->b[l],           room->x[l],
-                                room->t[l], room->b[l + 1], mg->level[l + 1].A.b, lanes};
+        at[l] = uz_step_of(&now[l], mg, room, l);
+        at[l].lanes = lanes;
         uz_level_take_step(&at[l], UZ_STEP_SWEEP_DOWN | UZ_STEP_RESTRICT);
     }
     for (int lane = 0; status == UZ_OK && lane < lanes; lane++)
@@ -479,7 +525,7 @@ static void free_room(uz_multigrid_room *room)
         free(room->x[l]);
         free(room->b[l]);
     }
-    void *rest[] = {room->coarse, room->permuted, room->to, room->from};
+    void *rest[] = {room->coarse, room->permuted, room->to, room->from, room->d};
     for (size_t k = 0; k < sizeof rest / sizeof rest[0]; k++)
         free(rest[k]);
     uz_release_levels(room);
@@ -514,10 +560,10 @@ static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
     bool ok = room && (room->ws = uz_factor_workspace_new()) && (room->coarse = uz_alloc(coarsest, sizeof(double))) &&
               (room->permuted = uz_alloc(coarsest, sizeof(double))) &&
               (room->to = uz_alloc_zero(finest, sizeof(double))) &&
-              (room->from = uz_alloc_zero(finest, sizeof(double)));
+              (room->from = uz_alloc_zero(finest, sizeof(double))) && (room->d = uz_alloc_zero(finest, sizeof(float)));
     if (room)
         room->levels = base->levels;
-    *bytes = sizeof *room + 16 * (size_t)(coarsest + finest);
+    *bytes = sizeof *room + 16 * (size_t)coarsest + 20 * (size_t)finest;
     for (int l = 0; ok && base->levels > 1 && l < base->levels; l++)
         *bytes += 12 * (size_t)(mg->level[l].A.nodes * uz_width(mg->level[l].A.b));
     if (ok && make_vectors(room, mg, 1))
@@ -577,6 +623,7 @@ static void free_aggregates(uz_multigrid *base)
 const uz_multigrid_kind uz_aggregates_kind = {.apply = apply,
                                               .multiply = multiply,
                                               .solve_roughly = uz_solve_roughly,
+                                              .step_roughly = uz_step_roughly,
                                               .room = make_room,
                                               .free_room = free_room,
                                               .hold = hold,

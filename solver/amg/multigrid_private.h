@@ -95,6 +95,7 @@ struct uz_multigrid_room {
     float *x[UZ_LEVELS_MOST], *b[UZ_LEVELS_MOST], *t[UZ_LEVELS_MOST]; /* nodes x width each */
     double *coarse, *permuted;                                        /* of the coarsest level */
     double *to, *from;                                                /* vectors of a product with level 0: nodes x 4 */
+    float *d;                                                         /* of level 0, for rough.c: nodes x 4 */
     const bool *held;
     uz_level own[UZ_LEVELS_MOST];
     uz_factor *coarsest; /* likewise; of K_FF where there is one level only */
@@ -116,19 +117,30 @@ static inline int uz_width(int b)
 }
 
 /* One level of a cycle, or parts of that: on the way down x = (D + L)^-1 b, t = b - A x and coarse = P't; on the way up
- * x += P coarse and x = (D + L')^-1 (b - L x), t being room. Dofs without an inverse take no part. */
+ * x += P coarse and x = (D + L')^-1 (b - L x), t being room, and afterwards L'x.
+ * Dofs without an inverse take no part.
+ *
+ * Instead of the sweep down, of conjugate gradients whose residual is kept swept (rough.c): REDUCE: x = (D + L)^-1 b,
+ * swept -= share (along + x) and t = -L'swept; RAISE: x = (D + L) swept. */
 typedef struct {
     const uz_level *level;
     const float *inverse, *b;
     float *x, *t, *coarse; /* coarse: the next level's right-hand side on the way down, its answer on the way up */
     int k, lanes;
+    float *swept, share; /* of the last two parts alone */
+    const float *along;
 } uz_level_step;
-enum { UZ_STEP_SWEEP_DOWN = 1, UZ_STEP_RESTRICT = 2, UZ_STEP_PROLONG = 4, UZ_STEP_SWEEP_UP = 8 };
+enum {
+    UZ_STEP_SWEEP_DOWN = 1,
+    UZ_STEP_REDUCE = 2,
+    UZ_STEP_RAISE = 4,
+    UZ_STEP_RESTRICT = 8,
+    UZ_STEP_PROLONG = 16,
+    UZ_STEP_SWEEP_UP = 32
+};
 void uz_level_take_step(const uz_level_step *step, int parts);
 
-/* y = A x of level 0, of its numbers in single precision, as uz_blocks_multiply. */
-void uz_level_multiply(float *y, const uz_level *level, const float *x);
-/* The same in double precision, A being in two parts. */
+/* uz_blocks_multiply where A is in two parts. */
 void uz_level_multiply_parts(double *y, const uz_level *level, const double *x, int lanes);
 /* The numbers of A, at most 4, become those that single precision has left off: level 0, whose sweeps have the others.
  */
@@ -139,9 +151,14 @@ const double *uz_level_block(double *room, const uz_level *level, bool own, int6
 /* level (room->b[0]): S r by a power of two above the largest, which is returned; 0 or infinite: there is none. */
 double uz_read_dofs(float *level, const uz_aggregates *mg, const double *r);
 
-/* kind->solve_roughly. */
+/* The step of level l, not the last, of this room's cycle; now: the level as it is there. */
+uz_level_step uz_step_of(uz_level *now, const uz_aggregates *mg, const uz_multigrid_room *room, int l);
+
+/* kind->solve_roughly and step_roughly. */
 uz_status uz_solve_roughly(const uz_multigrid *mg, uz_multigrid_room *room, uz_cg_info *info, double *x, double *r,
                            const uz_cg_stop *stop, uz_error *err);
+uz_status uz_step_roughly(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+                          void *ctx, uz_error *err);
 
 /* A V-cycle from level `from` down, more levels than one: room->x[from] = M^-1 room->b[from]. */
 uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, int lanes, uz_error *err);

@@ -1,7 +1,18 @@
 /* rough.c: conjugate gradients in single precision, in vectors of the first level, for changes of a displacement whose
- * residual is computed in double precision afterwards. They read half as many bytes of K, and no vector of dofs.
+ * residual is computed in double precision afterwards, and for what they tell of the spectrum. They read half as many
+ * bytes of K, and no vector of dofs.
  *
- * What each product with K hides of a change delta is rounding of its entries, of FLT_EPSILON ||delta|| in the norm of
+ * They read K no more often than the cycle does, after Eisenstat, SIAM J. Sci. Stat. Comput. 2 (1981): with
+ * A = D + L + L' the cycle begins with a sweep down, so that of the residual r only what that makes of it is kept,
+ * s = (D + L)^-1 r. With w = L'p, a step along p takes from s
+ *
+ *     (D + L)^-1 A p = p + (D + L)^-1 w,   and   p'A p = p'D p + 2 p'w,
+ *
+ * which is another right-hand side for the sweep that would have been made anyway. From the coarse correction c the
+ * sweep up makes z = (D + L')^-1 (r - L (s + c)) = (D + L')^-1 (D s - L c), with L'z on the way, and
+ * r'z = s'(D z + L'z).
+ *
+ * What each step hides of a change delta is rounding of the entries of K, of FLT_EPSILON ||delta|| in the norm of
  * diag(K), which in that of K^-1 comes to FLT_EPSILON ||delta||_K / sqrt(lambda_min(diag(K)^-1 K)) at most: `drift`
  * times the first residual. */
 #include "amg/multigrid_private.h"
@@ -14,67 +25,179 @@
 /* Of a tolerance the most that rounding may hide. */
 #define HIDDEN 0.1
 
-/* Vectors of level 0, in the room that a product in double precision has, and what a step does to pieces of them. */
+/* Vectors of level 0, in the room that a product in double precision has and in that of its step, and what is done to
+ * pieces of them. At held dofs s, p, z and D are 0, and so is all at the surplus numbers of a node. */
 typedef struct {
     const uz_aggregates *mg;
-    float *x, *p, *q, *r;
-    const float *z;
+    uz_multigrid_room *room;
+    uz_level level; /* 0, as it is in this room */
+    uz_level_step step;
+    float *x, *p, *w, *s;
+    float *z, *t, *b, *d; /* of the room: z, L'z, either D z + L'z or D p + 2 w, and D */
+    int64_t n;            /* numbers of each */
+    double square;        /* r'z */
     float factor;
     double unit;               /* of them all */
     double *whole_x, *whole_r; /* of dofs */
     const bool *held;
 } rough;
 
-static void take_step(void *ctx, int64_t begin, int64_t end)
+/* ------------------------------------------------------------- steps */
+
+/* D, where dofs take part. */
+static void find_diagonal(void *ctx, int64_t begin, int64_t end)
 {
-    const rough *s = ctx;
-    const float alpha = s->factor, *restrict p = s->p, *restrict q = s->q;
-    float *restrict x = s->x, *restrict r = s->r;
-    for (int64_t j = begin; j < end; j++) {
-        x[j] += alpha * p[j];
-        r[j] -= alpha * q[j];
-    }
+    const rough *v = ctx;
+    const int b = v->level.A.b;
+    for (int64_t i = begin; i < end; i++)
+        for (int r = 0; r < b; r++)
+            v->d[4 * i + r] = v->step.inverse[i * b + r] > 0.0F ? v->level.diag[i * b * b + r * b + r] : 0.0F;
+}
+
+static void enter_sweep_up(void *ctx, int64_t begin, int64_t end)
+{
+    const rough *v = ctx;
+    const float *restrict d = v->d, *restrict s = v->s;
+    float *restrict b = v->b;
+    for (int64_t j = begin; j < end; j++)
+        b[j] = d[j] * s[j];
+}
+
+static void leave_sweep_up(void *ctx, int64_t begin, int64_t end)
+{
+    const rough *v = ctx;
+    const float *restrict d = v->d, *restrict z = v->z, *restrict t = v->t;
+    float *restrict b = v->b;
+    for (int64_t j = begin; j < end; j++)
+        b[j] = d[j] * z[j] + t[j];
+}
+
+/* From s and t = -L's: z, L'z and r'z. */
+static uz_status precondition(rough *v, uz_error *err)
+{
+    uz_level_take_step(&v->step, UZ_STEP_RESTRICT);
+    const uz_status status = uz_cycle_below(v->mg, v->room, 1, 1, err);
+    uz_by_pieces(enter_sweep_up, v, v->n);
+    memset(v->z, 0, (size_t)v->n * sizeof *v->z);
+    uz_level_step up = v->step;
+    up.coarse = v->room->x[1];
+    uz_level_take_step(&up, UZ_STEP_PROLONG | UZ_STEP_SWEEP_UP);
+    uz_by_pieces(leave_sweep_up, v, v->n);
+    v->square = uz_long_dot_single(v->n, v->s, v->b);
+    return status;
 }
 
 static void turn_direction(void *ctx, int64_t begin, int64_t end)
 {
-    const rough *s = ctx;
-    const float beta = s->factor, *restrict z = s->z;
-    float *restrict p = s->p;
-    for (int64_t j = begin; j < end; j++)
+    const rough *v = ctx;
+    const float beta = v->factor, *restrict d = v->d, *restrict z = v->z, *restrict t = v->t;
+    float *restrict p = v->p, *restrict w = v->w, *restrict b = v->b;
+    for (int64_t j = begin; j < end; j++) {
         p[j] = z[j] + beta * p[j];
+        w[j] = t[j] + beta * w[j];
+        b[j] = d[j] * p[j] + 2.0F * w[j];
+    }
+}
+
+/* Another step along p, and a new p. *along 0: rounding lets none be made, or K: double precision tells. */
+static uz_status take_step(rough *v, double *along, uz_error *err)
+{
+    const double curvature = uz_long_dot_single(v->n, v->p, v->b), last = v->square;
+    *along = curvature > 0.0 ? last / curvature : 0.0;
+    if (!(*along > 0.0) || isinf(*along))
+        return UZ_OK;
+    uz_level_step down = v->step;
+    down.b = v->w;
+    down.along = v->p;
+    down.share = (float)*along;
+    uz_level_take_step(&down, UZ_STEP_REDUCE);
+    const uz_status status = precondition(v, err);
+    v->factor = (float)(v->square / last);
+    return status;
+}
+
+/* The first residual r (n) and its direction. False: it is 0, or no number. */
+static uz_status begin(rough *v, bool *begun, const uz_aggregates *mg, uz_multigrid_room *room, const double *r,
+                       uz_error *err)
+{
+    const int64_t n = 4 * mg->level[0].A.nodes;
+    void *const to = room->to, *const from = room->from; /* room for 2 n numbers each */
+    float *first = to, *second = from;
+    *v = (rough){.mg = mg,
+                 .room = room,
+                 .p = first,
+                 .w = first + n,
+                 .x = second,
+                 .s = second + n,
+                 .z = room->x[0],
+                 .t = room->t[0],
+                 .b = room->b[0],
+                 .d = room->d,
+                 .n = n,
+                 .unit = uz_read_dofs(room->b[0], mg, r),
+                 .held = room->held};
+    *begun = v->unit > 0.0 && !isinf(v->unit);
+    if (!*begun)
+        return UZ_OK;
+    v->step = uz_step_of(&v->level, mg, room, 0);
+    v->step.swept = v->s;
+    uz_by_pieces(find_diagonal, v, mg->level[0].A.nodes);
+    uz_level_take_step(&v->step, UZ_STEP_SWEEP_DOWN);
+    memcpy(v->s, v->z, (size_t)n * sizeof *v->s);
+    const uz_status status = precondition(v, err);
+    memset(first, 0, 2 * (size_t)n * sizeof *first);
+    memset(v->x, 0, (size_t)n * sizeof *v->x);
+    v->factor = 0.0F;
+    uz_by_pieces(turn_direction, v, n);
+    return status;
+}
+
+/* A product counts on surplus numbers there. */
+static void end(const rough *v)
+{
+    const size_t bytes = 2 * (size_t)v->n * sizeof(float);
+    memset(v->room->to, 0, bytes);
+    memset(v->room->from, 0, bytes);
+}
+
+/* ------------------------------------------------------------- solves */
+
+static void move_on(void *ctx, int64_t begin, int64_t end)
+{
+    const rough *v = ctx;
+    const float alpha = v->factor, *restrict p = v->p;
+    float *restrict x = v->x;
+    for (int64_t j = begin; j < end; j++)
+        x[j] += alpha * p[j];
 }
 
 static void leave(void *ctx, int64_t begin, int64_t end)
 {
-    const rough *s = ctx;
-    const double *restrict scale = s->mg->scale, unit = s->unit;
-    const int64_t *restrict slot = s->mg->slot;
+    const rough *v = ctx;
+    const double *restrict scale = v->mg->scale, unit = v->unit;
+    const int64_t *restrict slot = v->mg->slot;
     for (int64_t j = begin; j < end; j++) {
-        s->whole_x[j] += scale[j] * (double)s->x[slot[j]] * unit;
-        s->whole_r[j] = s->held && s->held[j] ? 0.0 : (double)s->r[slot[j]] * unit / scale[j];
+        v->whole_x[j] += scale[j] * (double)v->x[slot[j]] * unit;
+        v->whole_r[j] = v->held && v->held[j] ? 0.0 : (double)v->z[slot[j]] * unit / scale[j];
     }
 }
 
-/* Until the square is not above the goal's. Of held dofs, and of the surplus numbers of a node, z and p are 0, so that
- * nothing reads what r and q have there. */
-static uz_status iterate(rough *s, uz_multigrid_room *room, uz_cg_info *info, double *square, double goal,
-                         const uz_cg_stop *stop, uz_error *err)
+/* Until the square is not above the goal's. */
+static uz_status iterate(rough *v, uz_cg_info *info, double goal, const uz_cg_stop *stop, uz_error *err)
 {
-    const int64_t n = 4 * s->mg->level[0].A.nodes;
     uz_status status = UZ_OK;
-    while (status == UZ_OK && *square > goal * goal && !uz_cg_should_stop(info, stop)) {
-        uz_level_multiply(s->q, &s->mg->level[0], s->p);
-        const double curvature = uz_long_dot_single(n, s->p, s->q), last = *square;
-        if (!(curvature > 0.0)) /* rounding, or K: double precision tells */
+    while (status == UZ_OK && v->square > goal * goal && !uz_cg_should_stop(info, stop)) {
+        double along;
+        status = take_step(v, &along, err);
+        if (!(along > 0.0))
             break;
-        s->factor = (float)(last / curvature);
-        uz_by_pieces(take_step, s, n);
-        status = uz_cycle_below(s->mg, room, 0, 1, err);
-        *square = uz_long_dot_single(n, s->r, s->z);
-        s->factor = (float)(*square / last);
-        uz_by_pieces(turn_direction, s, n);
+        const float beta = v->factor;
+        v->factor = (float)along;
+        uz_by_pieces(move_on, v, v->n);
+        v->factor = beta;
         info->iterations++;
+        if (v->square > goal * goal)
+            uz_by_pieces(turn_direction, v, v->n);
     }
     return status;
 }
@@ -82,39 +205,50 @@ static uz_status iterate(rough *s, uz_multigrid_room *room, uz_cg_info *info, do
 uz_status uz_solve_roughly(const uz_multigrid *base, uz_multigrid_room *room, uz_cg_info *info, double *x, double *r,
                            const uz_cg_stop *stop, uz_error *err)
 {
-    const uz_aggregates *mg = (const uz_aggregates *)base;
+    rough v;
+    bool begun = false;
     memset(info, 0, sizeof *info);
     if (base->levels == 1 || !(base->drift > 0.0) || (!(stop->absolute > 0.0) && stop->relative * HIDDEN < base->drift))
         return UZ_OK;
-    const int64_t n = 4 * mg->level[0].A.nodes;
-    void *const to = room->to, *const from = room->from; /* room for 2 n numbers each */
-    float *first = to, *second = from;
-    rough s = {.mg = mg,
-               .p = first,
-               .q = first + n,
-               .x = second,
-               .r = room->b[0],
-               .z = room->x[0],
-               .unit = uz_read_dofs(room->b[0], mg, r),
-               .whole_x = x,
-               .whole_r = r,
-               .held = room->held};
-    if (!(s.unit > 0.0) || isinf(s.unit))
-        return UZ_OK;
-    uz_status status = uz_cycle_below(mg, room, 0, 1, err);
-    double square = uz_long_dot_single(n, s.r, s.z);
-    info->first = info->last = s.unit * uz_root(square);
+    uz_status status = begin(&v, &begun, (const uz_aggregates *)base, room, r, err);
+    if (status != UZ_OK || !begun)
+        return status;
+    info->first = info->last = v.unit * uz_root(v.square);
     const double goal = fmax(stop->absolute, stop->relative * info->first);
     info->met = info->first <= goal;
-    if (status != UZ_OK || info->met || goal * HIDDEN < base->drift * info->first)
+    if (!info->met && goal * HIDDEN >= base->drift * info->first) {
+        v.whole_x = x;
+        v.whole_r = r;
+        status = iterate(&v, info, goal / v.unit, stop, err);
+        info->last = v.unit * uz_root(v.square);
+        info->met = info->last <= goal;
+        if (info->iterations > 0) { /* else r is as it was, in double precision */
+            uz_level_take_step(&v.step, UZ_STEP_RAISE);
+            uz_by_pieces(leave, &v, base->n);
+        }
+    }
+    end(&v);
+    return status;
+}
+
+uz_status uz_step_roughly(const uz_multigrid *base, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+                          void *ctx, uz_error *err)
+{
+    rough v;
+    bool go_on = false;
+    if (base->levels == 1)
+        return UZ_OK;
+    uz_status status = begin(&v, &go_on, (const uz_aggregates *)base, room, r, err);
+    if (status != UZ_OK || !go_on)
         return status;
-    memset(s.x, 0, (size_t)n * sizeof *s.x);
-    memcpy(s.p, s.z, (size_t)n * sizeof *s.p);
-    status = iterate(&s, room, info, &square, goal / s.unit, stop, err);
-    if (info->iterations > 0) /* else r is as it was, in double precision */
-        uz_by_pieces(leave, &s, base->n);
-    memset(second, 0, (size_t)n * sizeof *second); /* a product counts on surplus numbers there */
-    info->last = s.unit * uz_root(square);
-    info->met = info->last <= goal;
+    for (bool moves = true; status == UZ_OK && go_on && moves && v.square > 0.0;) {
+        const double before = v.square, unit = v.unit * v.unit;
+        double along;
+        status = take_step(&v, &along, err);
+        moves = along > 0.0;
+        go_on = moves && status == UZ_OK && visit(ctx, along, unit * before, unit * v.square);
+        uz_by_pieces(turn_direction, &v, v.n);
+    }
+    end(&v);
     return status;
 }

@@ -164,8 +164,14 @@ void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigri
     for (int64_t i = 0; i < fours; i++) /* dofs are numbered as they stand there */
         for (int r = 0; r < b; r++)
             room->b[0][i * width + r] = (float)mg->scale[i / lanes * b + r] * z[i * width + r];
-    uz_level_step step = {
-        &own->level, own->level.inverse, room->b[0] + from, room->x[0] + from, room->t[0] + from, room->b[1], k, lanes};
+    uz_level_step step = {.level = &own->level,
+                          .inverse = own->level.inverse,
+                          .b = room->b[0] + from,
+                          .x = room->x[0] + from,
+                          .t = room->t[0] + from,
+                          .coarse = room->b[1],
+                          .k = k,
+                          .lanes = lanes};
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
     meet(own, room->x[0], room->t[0] + from, lanes);
     uz_level_take_step(&step, UZ_STEP_RESTRICT);

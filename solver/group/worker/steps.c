@@ -110,7 +110,14 @@ static void cycle(spread_system *s, int which, double *z, const double *r, const
         for (int64_t q = 4 * i; q < 4 * i + 4; q++)
             s->rhs[q] = inverse > 0.0 ? (float)(r[q] * inverse) : 0.0F;
     }
-    const uz_level_step step = {&own, v->inverse, s->rhs, s->x, s->t, s->coarse, s->k, s->lanes};
+    const uz_level_step step = {.level = &own,
+                                .inverse = v->inverse,
+                                .b = s->rhs,
+                                .x = s->x,
+                                .t = s->t,
+                                .coarse = s->coarse,
+                                .k = s->k,
+                                .lanes = s->lanes};
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
     if (v->base) {
         add_outside(s, s->t);
