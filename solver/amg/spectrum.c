@@ -102,6 +102,38 @@ static bool are_hopeless(int count, int most, double fallen, double needed)
     return 3 * count >= most && fallen * HOPELESS * (double)most < needed * (double)count;
 }
 
+/* What the steps tell, and what they are asked for. */
+typedef struct {
+    coefficients *c;
+    int most;             /* steps; patience: uz_amg_of */
+    double share;         /* sqrt(r_k'M^-1 r_k) over this is a level of excluded() */
+    double first, before; /* r_0'M^-1 r_0; the bound at the last check */
+    double square;        /* r_k'M^-1 r_k */
+    double lambda;        /* the bound so far, 0: there is none */
+    bool enough, hopeless;
+    const uz_hooks *hooks;
+} bounding;
+
+/* Are further steps worth making? */
+static bool take_in(void *ctx, double along, double last, double square)
+{
+    bounding *x = ctx;
+    coefficients *c = x->c;
+    x->first = c->count == 0 ? last : x->first;
+    x->square = square;
+    c->alpha[c->count] = along;
+    c->beta[c->count++] = square / last;
+    x->hopeless = x->most < STEPS_MOST &&
+                  are_hopeless(c->count, x->most, log(x->first / square), log(x->first) - 2.0 * log(x->share));
+    if (!x->hopeless && sqrt(square) < x->share) {
+        x->lambda = excluded(c, sqrt(square) / x->share);
+        const bool checked = c->count % CHECK_EVERY == 0 && x->lambda > 0.0 && x->lambda < ENOUGH * x->before;
+        x->enough = x->lambda > NEAR_ONE || x->lambda >= NEAR_RITZ * excluded(c, 0.0) || checked;
+        x->before = c->count % CHECK_EVERY == 0 ? x->lambda : x->before;
+    }
+    return !x->enough && !x->hopeless && c->count < x->most && square > 0.0 && !uz_cancelled(x->hooks);
+}
+
 /* A step of so much along the direction, in pieces that threads share. */
 typedef struct {
     uz_cg *cg;
@@ -117,24 +149,13 @@ static void reduce_residual(void *ctx, int64_t begin, int64_t end)
         r[j] -= alpha * q[j];
 }
 
-/* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. patience: uz_amg_of. power (n): the first one of
- * find_rcond, which begins with the same residual. */
-static uz_status bound_below(uz_amg_info *info, coefficients *c, double *power, uz_cg *cg, const uz_csc *K,
-                             int patience, const uz_hooks *hooks, uz_error *err)
+/* Steps of conjugate gradients without the solution, from the residual r. */
+static uz_status take_steps(bounding *x, uz_cg *cg, const uz_csc *K, uz_error *err)
 {
-    const int most = patience > 0 && patience < STEPS_MOST ? patience : STEPS_MOST;
-    double share = LEAST_SHARE / sqrt(cg->mg->most), before = 0.0;
-    info->lambda = 0.0;
-    random_residual(cg, K);
     uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
-    double square = uz_long_dot(cg->n, cg->r, cg->z);
-    const double first = square;
-    (void)begin_power(power, cg->z, K);
+    double square = x->square = uz_long_dot(cg->n, cg->r, cg->z);
     memcpy(cg->p, cg->z, (size_t)cg->n * sizeof *cg->p);
-    for (c->count = 0; status == UZ_OK && c->count < most && square > 0.0;) {
-        if (uz_cancelled(hooks))
-            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
-        /* a step of conjugate gradients without the solution */
+    for (bool go_on = square > 0.0 && !uz_cancelled(x->hooks); status == UZ_OK && go_on;) {
         cg->mg->kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
         const double curvature = uz_long_dot(cg->n, cg->p, cg->z), last = square;
         if (!(curvature > 0.0))
@@ -145,46 +166,70 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, double *power, 
         uz_by_pieces(reduce_residual, &(step){cg, alpha}, cg->n);
         status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
         square = uz_long_dot(cg->n, cg->r, cg->z);
-        const double beta = square / last;
-        uz_cg_turn(cg, beta);
-        c->alpha[c->count] = alpha;
-        c->beta[c->count++] = beta;
-        info->iterations = c->count;
-        if (status == UZ_OK && most < STEPS_MOST &&
-            are_hopeless(c->count, most, log(first / square), log(first) - 2.0 * log(share)))
-            break;
-        if (status != UZ_OK || sqrt(square) >= share)
-            continue;
-        info->lambda = excluded(c, sqrt(square) / share);
-        const bool checked = c->count % CHECK_EVERY == 0 && info->lambda > 0.0 && info->lambda < ENOUGH * before;
-        if (info->lambda > NEAR_ONE || info->lambda >= NEAR_RITZ * excluded(c, 0.0) || checked)
-            return status;
-        before = c->count % CHECK_EVERY == 0 ? info->lambda : before;
+        uz_cg_turn(cg, square / last);
+        go_on = status == UZ_OK && take_in(x, alpha, last, square);
     }
-    if (status == UZ_OK && most < STEPS_MOST && square > 0.0)
+    return status;
+}
+
+/* Rounding of K's entries to single precision makes K smaller by half of FLT_EPSILON times its absolute values at most,
+ * of which the norm of D^-1/2 |K| D^-1/2 is no larger than the largest row sum, 1 + that of bound_by_diagonal; twice
+ * that, for what is rounded on the way: K >= A - slack M for A as steps in single precision have it. Where that is more
+ * than this, or takes more than half of the bound, steps are in double precision. */
+#define ROUGH_MOST 0.02
+
+/* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. most: lambda_max(M^-1 D). */
+static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, const uz_csc *K, double most, int patience,
+                             const uz_hooks *hooks, uz_error *err)
+{
+    const double slack = FLT_EPSILON * sqrt(cg->mg->most) * most;
+    const bounding begun = {.c = c,
+                            .most = patience > 0 && patience < STEPS_MOST ? patience : STEPS_MOST,
+                            .share = LEAST_SHARE / sqrt(cg->mg->most),
+                            .hooks = hooks};
+    bounding x = begun;
+    uz_status status = UZ_OK;
+    if (cg->mg->kind->step_roughly && slack <= ROUGH_MOST)
+        status = cg->mg->kind->step_roughly(cg->mg, cg->room, cg->r, take_in, &x, err);
+    if (status == UZ_OK && x.enough && x.lambda > 2.0 * slack) {
+        info->iterations = c->count;
+        info->lambda = x.lambda - slack;
+        return UZ_OK;
+    }
+    if (status == UZ_OK && !x.hopeless) {
+        c->count = 0;
+        x = begun;
+        status = take_steps(&x, cg, K, err);
+    }
+    info->iterations = c->count;
+    if (status == UZ_OK && uz_cancelled(hooks))
+        return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
+    if (status == UZ_OK && !x.enough && x.most < STEPS_MOST && x.square > 0.0)
         return uz_fail(err, UZ_ERR_LIMIT, "K", "conjugate gradients would take too many iterations, as %d have shown",
                        c->count);
-    if (status == UZ_OK && info->lambda == 0.0) /* the residual may have vanished, too */
-        info->lambda = excluded(c, sqrt(square) / share);
+    /* the residual may have vanished, too */
+    info->lambda = x.lambda > 0.0 ? x.lambda : excluded(c, sqrt(x.square) / x.share);
     return status;
 }
 
 /* Below this rounding of the entries of K alone makes or unmakes a digit of lambda_min(D^-1 K). */
 #define RCOND_LEAST DBL_EPSILON
 
-/* info->rcond: lambda over lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), which powers, the first of them given, find up to
- * a tenth too small. */
-static uz_status find_rcond(uz_amg_info *info, double *power, uz_cg *cg, const uz_csc *K, uz_error *err)
+/* *most: lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), which powers find up to a tenth too small. power: room, n. */
+static uz_status find_most(double *most, double *power, uz_cg *cg, const uz_csc *K, uz_error *err)
 {
-    double most = INFINITY;
     uz_status status = UZ_OK;
-    for (int k = 1; status == UZ_OK && k < POWERS; k++) {
+    *most = INFINITY;
+    memcpy(power, cg->r, (size_t)cg->n * sizeof *power);
+    for (int k = 0; status == UZ_OK && k < POWERS; k++) {
         status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, power, err);
-        most = begin_power(power, cg->z, K);
+        *most = begin_power(power, cg->z, K);
     }
-    if (status != UZ_OK)
-        return status;
-    info->rcond = info->lambda / most;
+    return status;
+}
+
+static uz_status check_rcond(const uz_amg_info *info, uz_error *err)
+{
     if (info->rcond >= RCOND_LEAST)
         return UZ_OK;
     return uz_fail(err, UZ_ERR_NOT_SPD, "K",
@@ -199,7 +244,7 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patienc
     const double start = uz_seconds();
     uz_amg *amg = uz_alloc_zero(1, sizeof *amg);
     coefficients *c = uz_alloc_zero(1, sizeof *c);
-    double *power = uz_alloc(mg->n, sizeof *power);
+    double *power = uz_alloc(mg->n, sizeof *power), most = INFINITY;
     uz_cg cg = {0};
     *out = NULL;
     uz_status status =
@@ -207,10 +252,15 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patienc
     if (status == UZ_OK) {
         amg->info.levels = mg->levels;
         amg->info.bytes = mg->bytes;
-        status = bound_below(&amg->info, c, power, &cg, K, patience, hooks, err);
+        random_residual(&cg, K);
+        status = find_most(&most, power, &cg, K, err);
     }
     if (status == UZ_OK)
-        status = find_rcond(&amg->info, power, &cg, K, err);
+        status = bound_below(&amg->info, c, &cg, K, most, patience, hooks, err);
+    if (status == UZ_OK) {
+        amg->info.rcond = amg->info.lambda / most;
+        status = check_rcond(&amg->info, err);
+    }
     uz_cg_clear(&cg);
     free(c);
     free(power);

@@ -524,6 +524,43 @@ TEST(the_residual_in_single_precision_is_told)
     close_pair(&p);
 }
 
+/* The bound on the spectrum of a brick: cycles in double precision that it took, and lambda; rough: by a kind that has
+ * steps in single precision. */
+static int64_t cycles_of_bound(double *lambda, const int64_t cells[3], const double size[3], bool rough)
+{
+    brick b = brick_make(cells, size, 0.3, true);
+    uz_multigrid_kind counting = uz_aggregates_kind;
+    uz_multigrid *mg;
+    uz_modes modes;
+    uz_amg *amg;
+    uz_error err = {0};
+    counting.apply = count_cycles;
+    counting.step_roughly = rough ? counting.step_roughly : NULL;
+    CHECK_INT(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err), UZ_OK);
+    CHECK_INT(uz_multigrid_create(&mg, &b.K, &modes, NULL, 0, NULL, &err), UZ_OK);
+    mg->kind = &counting;
+    cycles = 0;
+    CHECK_INT(uz_amg_of(&amg, mg, &b.K, 0, NULL, &err), UZ_OK);
+    *lambda = amg->info.lambda;
+    uz_amg_free(amg);
+    uz_modes_clear(&modes);
+    brick_free(&b);
+    return cycles;
+}
+
+TEST(the_spectrum_is_bounded_in_single_precision_where_that_hides_little)
+{
+    double rough, exact;
+    const int64_t cube[] = {9, 9, 9}, bar[] = {120, 4, 4};
+    CHECK(cycles_of_bound(&rough, cube, (double[]){1, 1, 1}, true) < 5);
+    CHECK(cycles_of_bound(&exact, cube, (double[]){1, 1, 1}, false) > 15);
+    CHECK_MSG(rough < exact && rough > 0.95 * exact, "%g for %g", rough, exact);
+    /* bends too easily */
+    CHECK(cycles_of_bound(&rough, bar, (double[]){120, 1, 1}, true) > 15);
+    CHECK(cycles_of_bound(&exact, bar, (double[]){120, 1, 1}, false) > 15);
+    CHECK_REL(rough, exact, 1e-12);
+}
+
 static void check_near(const float *x, const float *wanted, int64_t n, double tolerance)
 {
     double off = 0.0, size = 0.0;
