@@ -109,6 +109,12 @@ const char *uz_shape_fault_text(uz_shape_fault fault);
  * so that neither units nor flat elements matter. Everything below needs a good shape. */
 uz_shape_fault uz_element_check(const uz_element *element);
 
+/* The local point of an element at a place x, by Newton's iteration from its centre; xyz: of its nodes, extent: of the
+ * mesh. False: it is far outside. */
+bool uz_element_find(double point[3], const uz_element_type *type, const double *xyz, double extent, const double x[3]);
+/* How deep a local point is within the element, in local coordinates: its least distance from a side, negative outside.
+ */
+double uz_element_depth(const uz_element_type *type, const double point[3]);
 /* The inverse of a matrix of dim rows, 2 or 3, by its cofactors; returns its determinant. Singular: not finite. */
 double uz_invert_small(double inverse[3][3], double J[3][3], int dim);
 

@@ -16,67 +16,13 @@
 /* How far outside of an element, in its local coordinates, a point still counts as its own: rounding, and the sagitta
  * between a body's true border and its mesh has no place here. */
 #define OUTSIDE 1e-8
-enum { MOST_STEPS = 30 };
-
-/* Is a local point in the element? The sides are plane in local coordinates, and the centre lies within all. */
-static bool is_within(const uz_element_type *type, const double point[3])
-{
-    for (int s = 0; s < type->sides; s++) {
-        const int *node = type->side[s].node;
-        const double *o = type->local[node[0]], *a = type->local[node[1]];
-        double n[3] = {0}, to_point = 0, to_centre = 0, size = 0;
-        if (type->dim == 2) {
-            n[0] = a[1] - o[1];
-            n[1] = o[0] - a[0];
-        } else {
-            const double *b = type->local[node[2]];
-            for (int c = 0; c < 3; c++)
-                n[c] = (a[(c + 1) % 3] - o[(c + 1) % 3]) * (b[(c + 2) % 3] - o[(c + 2) % 3]) -
-                       (a[(c + 2) % 3] - o[(c + 2) % 3]) * (b[(c + 1) % 3] - o[(c + 1) % 3]);
-        }
-        for (int c = 0; c < type->dim; c++) {
-            to_point += n[c] * (point[c] - o[c]);
-            to_centre += n[c] * (type->centre[c] - o[c]);
-            size = hypot(size, n[c]);
-        }
-        if ((to_centre > 0 ? to_point : -to_point) < -OUTSIDE * size)
-            return false;
-    }
-    return true;
-}
 
 /* The shape functions of an element at a place x; xyz: of its nodes. False: it is not in there. */
 static bool find_within(double N[UZ_ELEMENT_NODES], const uz_element_type *type, const double *xyz, double extent,
                         const double x[3])
 {
-    double slope[UZ_ELEMENT_NODES][3], point[3];
-    memcpy(point, type->centre, sizeof point);
-    for (int k = 0; k < MOST_STEPS; k++) {
-        double J[3][3] = {{0}}, inverse[3][3], rest[3] = {0}, off = 0, moved = 0;
-        type->shape(type, N, slope, point);
-        for (int c = 0; c < type->dim; c++) {
-            rest[c] = x[c];
-            for (int a = 0; a < type->nodes; a++) {
-                rest[c] -= N[a] * xyz[a * type->dim + c];
-                for (int axis = 0; axis < type->dim; axis++)
-                    J[c][axis] += slope[a][axis] * xyz[a * type->dim + c];
-            }
-            off = fmax(off, fabs(rest[c]));
-        }
-        uz_invert_small(inverse, J, type->dim);
-        for (int c = 0; c < type->dim; c++) {
-            double step = 0;
-            for (int i = 0; i < type->dim; i++)
-                step += inverse[c][i] * rest[i];
-            if (!(fabs(step) <= 1e3)) /* far outside, where the map may fold; or the element has no size there */
-                return false;
-            point[c] += step;
-            moved = fmax(moved, fabs(step));
-        }
-        if (moved < 1e-12 || off < 1e-15 * extent)
-            break;
-    }
-    if (!is_within(type, point))
+    double point[3];
+    if (!uz_element_find(point, type, xyz, extent, x) || uz_element_depth(type, point) < -OUTSIDE)
         return false;
     type->shape(type, N, NULL, point);
     return true;
