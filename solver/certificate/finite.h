@@ -38,6 +38,7 @@ typedef struct {
     double least_gap;      /* of the obstacles from points on the deformed sides, a length: SAMPLES a side, and nodes */
     double least_part;     /* the same over the length of the side there, of those between nodes */
     double least_at_rows;  /* of g */
+    bool swallows;         /* an obstacle is inside of the body (swallowed.h) */
 } uz_finite_certificate;
 
 /* stop (NULL: never) is asked between elements, blocks of the factor and places beside this one. Errors: UZ_ERR_MEMORY,

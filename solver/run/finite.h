@@ -70,6 +70,7 @@ typedef enum {
     UZ_PART_INDEFINITE,    /* one that is no minimum */
     UZ_PART_INVERTED,      /* the way to it turns elements inside out */
     UZ_PART_CONTRADICTORY, /* contact conditions that no displacement meets */
+    UZ_PART_SWALLOWED,     /* an obstacle is inside of the body */
     UZ_PART_STOPPED        /* by time, or by the caller, or by a limit on iterations: run->stopped */
 } uz_part;
 

@@ -570,6 +570,8 @@ static uz_status ask_certificate(bool *done, uz_part *out, uz_finite_run *run, u
         *out = UZ_PART_STOPPED;
     } else if (!(c->least_det > 0))
         *out = UZ_PART_INVERTED;
+    else if (c->swallows)
+        *out = UZ_PART_SWALLOWED;
     else if (!c->definite)
         *out = UZ_PART_INDEFINITE;
     else if (!(c->residual <= fmax(run->requested, c->rounding)) || c->worst_support > length ||

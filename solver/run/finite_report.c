@@ -27,7 +27,7 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
     char *text = s->message;
     const size_t size = sizeof s->message;
     const char *of = run->from ? "the way from the load of the case before it" : "the load";
-    if (s->outcome == UZ_MESH_LIMIT) {
+    if (s->outcome == UZ_MESH_LIMIT && why != UZ_PART_SWALLOWED) {
         snprintf(text, size,
                  "the obstacle, or another body, stands %.3g of a side's length deep in it, between rows: use a finer "
                  "mesh along the contact",
@@ -59,6 +59,12 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
                  "it, the last part with a stable equilibrium",
                  tried, of, load);
         break;
+    case UZ_PART_SWALLOWED:
+        snprintf(text, size,
+                 "under %.6g of %s an obstacle is inside of the body, whose sides have gone past it: this is the answer "
+                 "under %.6g of it. Use a finer mesh along the contact",
+                 tried, of, load);
+        break;
     case UZ_PART_STOPPED:
         snprintf(text, size, "%s: this is the answer under %.6g of %s",
                  run->stopped == UZ_DISMISSED    ? "stopped by request"
@@ -81,7 +87,10 @@ static uz_outcome outcome_of(const uz_finite_run *run, uz_part why)
         return c->least_part < -CUTS_IN           ? UZ_MESH_LIMIT
                : !(c->residual <= run->requested) ? UZ_PRECISION_LIMIT
                                                   : UZ_CONVERGED;
-    return why == UZ_PART_INVERTED ? UZ_INVERTED : why == UZ_PART_STOPPED ? run->stopped : UZ_UNSTABLE;
+    return why == UZ_PART_INVERTED    ? UZ_INVERTED
+           : why == UZ_PART_SWALLOWED ? UZ_MESH_LIMIT
+           : why == UZ_PART_STOPPED   ? run->stopped
+                                      : UZ_UNSTABLE;
 }
 
 /* Of what was found, in place of what the last contact problem has of its own. */

@@ -742,6 +742,38 @@ TEST(no_side_goes_through_an_obstacle_that_is_smaller)
     give_back(r, &s);
 }
 
+/* Whatever the steps were: blocks that are pushed over an obstacle of a fiftieth to a third of their sides, by many
+ * times its size. What has gone past it has it inside, which no gap of a side tells. */
+TEST(no_obstacle_is_inside_of_a_converged_body)
+{
+    static const char *const ELEMENTS[] = {"quad4", "quad8", "tri6", "hex8", "tet10"};
+    int refused = 0;
+    for (int k = 0; k < 20; k++) {
+        qp_random rng = {(uint64_t)k + 900};
+        const bool solid = k % 5 > 2;
+        const int cells = 1 + (int)(3 * random_unit(&rng));
+        const double radius = (0.02 + 0.3 * random_unit(&rng)) / cells, gap = 0.05 + 0.3 * random_unit(&rng),
+                     at = 0.2 + 0.6 * random_unit(&rng), by = (1.5 + random_unit(&rng)) * (2 * radius + gap);
+        uz_scene s = body_scene(solid ? UZ_SOLID : UZ_PLANE_STRAIN, ELEMENTS[k % 5], (double[3]){1, 1, 1},
+                                (int64_t[3]){cells, 1 + k % 2, 1});
+        s.kinematics = UZ_KINEMATICS_FINITE;
+        s.materials[0].young = 1;
+        s.materials[0].poisson = 0.3;
+        s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+        body_hold(&s, "top", 0, -by, solid ? 0 : NAN);
+        uz_contact *c = body_plane(&s, "bottom", (double[3]){at, -gap - radius, 0.5}, (double[3]){0, 0, 1});
+        c->kind = k % 2 && solid ? UZ_OBSTACLE_CYLINDER : UZ_OBSTACLE_ROUND;
+        c->radius = radius;
+        uz_result *r = solve(&s);
+        refused += r->summary.outcome != UZ_CONVERGED;
+        /* what is pushed over it so far feels it */
+        CHECK_MSG(r->summary.outcome != UZ_CONVERGED || r->evaluation->contacts[0].force[1] > 1e-6, "scene %d", k);
+        CHECK(r->summary.outcome != UZ_MESH_LIMIT || strstr(r->summary.message, "finer mesh"));
+        give_back(r, &s);
+    }
+    CHECK(refused > 5);
+}
+
 TEST(what_rounding_leaves_is_told)
 {
     uz_scene s = block("quad4", 1, 1, 1, 1, UZ_ELASTIC_NEO_HOOKE);
