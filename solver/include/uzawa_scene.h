@@ -314,8 +314,8 @@ typedef struct {
     /* n_nodes x dim, borrowed: contacts are found where the body has been displaced by this, and linear about it: a
      * uz_result's place. NULL: before anything moves. uz_solve finds places itself (kinematics) and takes none. */
     const double *place;
-    /* Of an answer of large deformation: expansion times rise of temperature of each element, as uz_result has it; NULL:
-     * the loads tell. Borrowed */
+    /* Of an answer of large deformation: expansion times rise of temperature of each element, as uz_result has it;
+     * NULL: the loads tell. Borrowed */
     const double *free_strain;
 } uz_scene;
 void uz_scene_clear(uz_scene *scene);

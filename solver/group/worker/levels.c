@@ -172,7 +172,7 @@ static void bound_by_diagonal(spread_system *s)
     free(row);
     free(column);
     free(inverse);
-    combine(most, 3, MPI_DOUBLE, MPI_MAX);
+    combine_all(most, 3, MPI_DOUBLE, MPI_MAX);
     const double root = sqrt(most[2]) + sqrt(most[0] * most[1]);
     s->most = root * root;
 }
@@ -200,7 +200,7 @@ static float *scale_modes(const spread_system *s, const spread_rows *rows)
     double least = INFINITY;
     for (int64_t i = 0; i < s->near.here * s->b; i++)
         least = fmin(least, s->scale[i]);
-    combine(&least, 1, MPI_DOUBLE, MPI_MIN);
+    combine_all(&least, 1, MPI_DOUBLE, MPI_MIN);
     for (int64_t i = 0; i < s->near.here * s->b; i++)
         for (int c = 0; c < s->k; c++)
             scaled[i * s->k + c] = (float)(least / s->scale[i] * (double)rows->mode[i * s->k + c]);
@@ -271,7 +271,7 @@ static void fetch_prolongation(spread_system *s)
         count[i] = level->ptr[i + 1] - level->ptr[i];
         most = count[i] > most ? count[i] : most;
     }
-    combine(&most, 1, MPI_INT64_T, MPI_MAX);
+    combine_all(&most, 1, MPI_INT64_T, MPI_MAX);
     neighbours_fetch(near, count + here, count, sizeof *count);
     /* as many as the longest, so that all are alike */
     const size_t each = (size_t)most * (sizeof(int32_t) + (size_t)size * sizeof(float));
@@ -501,7 +501,7 @@ static void coarsen(spread_system *s, const spread_rows *rows)
     level->A.nodes = here;
     must(uz_level_range(&range, level, &err), &err);
     level->A.nodes = nodes;
-    combine(&range, 1, MPI_DOUBLE, MPI_MAX);
+    combine_all(&range, 1, MPI_DOUBLE, MPI_MAX);
     must(uz_prolong_smoothed(level, &below, basis, aggregate, 4.0 / 3.0 / range, s->k, NULL, &err), &err);
     free(aggregate);
     free(basis);

@@ -225,7 +225,7 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
 static void tell_made(group *g, const body *b, int which, double start)
 {
     int64_t bytes = system_bytes(&b->system, which);
-    combine(&bytes, 1, MPI_INT64_T, MPI_SUM);
+    combine_all(&bytes, 1, MPI_INT64_T, MPI_SUM);
     answer(g, (uz_wire_head){.kind = UZ_WIRE_MADE,
                              .id = b->id,
                              .a = system_levels(&b->system, which),

@@ -31,7 +31,7 @@ void wait_for(int count, MPI_Request *requests)
     }
 }
 
-void combine(void *x, int count, MPI_Datatype type, MPI_Op op)
+void combine_all(void *x, int count, MPI_Datatype type, MPI_Op op)
 {
     MPI_Request request;
     MPI_Iallreduce(MPI_IN_PLACE, x, count, type, op, MPI_COMM_WORLD, &request);

@@ -175,7 +175,7 @@ void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigri
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
     meet(own, room->x[0], room->t[0] + from, lanes);
     uz_level_take_step(&step, UZ_STEP_RESTRICT);
-    combine(room->b[1], (int)(level->aggregates * lanes * uz_width(k)), MPI_FLOAT, MPI_SUM);
+    combine_all(room->b[1], (int)(level->aggregates * lanes * uz_width(k)), MPI_FLOAT, MPI_SUM);
     if (uz_cycle_below(mg, room, 1, lanes, &err) != UZ_OK)
         end_group(err.message);
     step.coarse = room->x[1];

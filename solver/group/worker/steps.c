@@ -62,7 +62,7 @@ static void correct_alone(spread_system *s, const variant *v)
 static void correct(spread_system *s, const variant *v, const uz_level_step *step)
 {
     uz_level_take_step(step, UZ_STEP_RESTRICT);
-    combine(s->coarse, (int)(s->next.nodes * s->lanes * uz_width(s->k)), MPI_FLOAT, MPI_SUM);
+    combine_all(s->coarse, (int)(s->next.nodes * s->lanes * uz_width(s->k)), MPI_FLOAT, MPI_SUM);
     if (v->shared.divided)
         shared_apply(&v->shared, v->base, v->room, s->coarse, s->lanes);
     else
@@ -91,7 +91,7 @@ static void find_units(const spread_system *s, double unit[LANES], const double 
         for (int64_t q = 4 * i; q < 4 * i + 4; q++)
             *largest = fmax(*largest, fabs(r[q]));
     }
-    combine(unit, LANES, MPI_DOUBLE, MPI_MAX);
+    combine_all(unit, LANES, MPI_DOUBLE, MPI_MAX);
     for (int l = 0; l < LANES; l++)
         if (unit[l] > 0.0 && !isinf(unit[l])) {
             int exponent;
@@ -147,7 +147,7 @@ static void dot(const spread_system *s, double sum[LANES], const double *x, cons
         const double *a = x + 4 * i, *b = y + 4 * i;
         sum[lane_of(s, i)] += (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]);
     }
-    combine(sum, LANES, MPI_DOUBLE, MPI_SUM);
+    combine_all(sum, LANES, MPI_DOUBLE, MPI_SUM);
 }
 
 /* y = K x, or K_FF x. */

@@ -20,7 +20,7 @@ void *new_zeros(int64_t count, size_t size); /* zeros */
 void wait_for(int count, MPI_Request *requests);
 
 /* MPI_Allreduce in place, waiting so. */
-void combine(void *x, int count, MPI_Datatype type, MPI_Op op);
+void combine_all(void *x, int count, MPI_Datatype type, MPI_Op op);
 
 /* Who has which nodes, and what passes between neighbours. */
 typedef struct {
