@@ -241,6 +241,9 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
 bool uz_is_moved(const uz_body_model *model, const double *prescribed);
 /* Is a load of the scene not zero, so that a body which is carried is deformed as well? */
 bool uz_is_loaded(const uz_scene *scene);
+/* May rows h - N u press on a body that is carried to u (d)? One closes, or nears it more than what rounding of so long
+ * a way hides. Also where there is no memory to tell. */
+bool uz_may_press(const uz_csc *N, const double *h, const double *u);
 /* ||u||_K over all dofs, springs included, from the free dofs u (d) and the prescribed values. */
 uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *u, const double *prescribed,
                         uz_error *err);

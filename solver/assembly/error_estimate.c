@@ -137,7 +137,7 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
     double way = 0;
     for (int c = 0; c < dim; c++)
         way = fmax(way, fabs(nodal[c]));
-    const double rounding = CARRIED * way;
+    const double rounding = scene && !uz_is_loaded(scene) ? CARRIED * way : 0; /* what loads deform may be less */
     bool is_translation = !free_strain && (model->kind != UZ_AXISYMMETRIC || fabs(nodal[0]) <= rounding);
     for (int64_t i = dim; i < model->mesh.n_nodes * dim && is_translation; i++)
         is_translation = fabs(nodal[i] - nodal[i % dim]) <= rounding;

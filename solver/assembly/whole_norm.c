@@ -27,6 +27,21 @@ bool uz_is_loaded(const uz_scene *scene)
     return loaded;
 }
 
+#define HIDDEN 1e-8 /* of the way of a row, by rounding and by what solves leave */
+
+bool uz_may_press(const uz_csc *N, const double *h, const double *u)
+{
+    bool may = false;
+    double *way = uz_alloc_zero(N->rows, sizeof *way);
+    if (!way)
+        return true;
+    uz_csc_gaxpy(way, N, 1, u);
+    for (int64_t i = 0; i < N->rows && !may; i++)
+        may = h[i] - way[i] < HIDDEN * fabs(way[i]);
+    free(way);
+    return may;
+}
+
 /* By elements: u'Ku from the blocks of free and supported dofs would cancel. */
 uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *u, const double *prescribed,
                         uz_error *err)

@@ -22,7 +22,7 @@ _Static_assert((int)UZ_LANES == (int)UZ_CERTIFY_LANES, "what comes out of the fa
 
 struct uz_block {
     uz_setup *setup;
-    const uz_csc *K;
+    const uz_csc *K, *N;
     int64_t d, width;
     uz_dual_block *loads;
     uz_lane_certifier *certifier;
@@ -60,6 +60,7 @@ uz_status uz_block_create(uz_block **out, uz_run **runs, uz_setup *setup, const 
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     block->setup = setup;
     block->K = uz_setup_K(setup, problem);
+    block->N = uz_setup_N(setup, problem);
     block->d = block->K->cols;
     block->width = blocks * UZ_LANES;
     block->runs = *runs = uz_alloc_zero(block->width, sizeof *block->runs);
@@ -72,7 +73,7 @@ uz_status uz_block_create(uz_block **out, uz_run **runs, uz_setup *setup, const 
     if (status == UZ_OK)
         status = uz_dual_block_create(&block->loads, setup->dual, blocks, err);
     const uz_certify_input in = {.K = block->K,
-                                 .N = uz_setup_N(setup, problem),
+                                 .N = block->N,
                                  .measure_doubt = measure_doubt,
                                  .ctx = block,
                                  .terms = setup->terms,
@@ -168,7 +169,8 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
                                       .h = runs[k].load.h,
                                       .sharp = 0.5 * runs[k].work.requested,
                                       .moved = load->moved,
-                                      .loaded = load->loaded,
+                                      .loaded = load->loaded ||
+                                                (load->moved && uz_may_press(block->N, load->h, runs[k].answer.u)),
                                       .whole_norm = whole_norm};
     }
     if (status != UZ_OK)

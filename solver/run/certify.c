@@ -81,12 +81,14 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         run->load.moved ? uz_whole_norm(&whole_norm, &setup->model, answer->u, run->load.prescribed, err) : UZ_OK;
     if (status != UZ_OK)
         return status;
+    const uz_csc *N = all_rows ? uz_setup_all_rows(setup, asked->problem) : uz_setup_N(setup, asked->problem);
+    const double *h = all_rows ? run->load.h_all : run->load.h;
     *input = (uz_certify_input){
         .K = K,
         .brick = setup->model.brick,
-        .N = all_rows ? uz_setup_all_rows(setup, asked->problem) : uz_setup_N(setup, asked->problem),
+        .N = N,
         .p = run->load.p,
-        .h = all_rows ? run->load.h_all : run->load.h,
+        .h = h,
         .inverse_norm = setup->factor ? inverse_norm : setup->dual->form->inverse_norm,
         .measure_doubt = setup->factor ? measure_doubt : NULL,
         .ctx = setup->factor ? (void *)run : (void *)work->dual,
@@ -95,7 +97,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .inverse_bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY,
         .spares = setup->factor && uz_factor_describe(setup->factor).nnz >= UZ_CERTIFY_SPARES,
         .moved = run->load.moved,
-        .loaded = run->load.loaded,
+        .loaded = run->load.loaded || (run->load.moved && uz_may_press(N, h, answer->u)),
         .whole_norm = whole_norm,
         .sharp = 0.5 * run->work.requested,
     };
