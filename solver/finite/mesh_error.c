@@ -17,12 +17,16 @@
 enum { N_STRAINS = UZ_FINITE_STRAINS };
 /* Of smaller strains W is half of S : E, to this part of it, and its own terms cancel. */
 #define SMALL 1e-4
+/* F is about 1, and known to its last digits. */
+#define ROUNDING 1e-13
+/* Steps to the strain that is free of stress in the plane. */
+enum { MOST_STEPS = 20 };
 
 typedef struct {
     const uz_body_model *model;
     uz_nodal_strains nodal;
-    double energy, eta2;
-    bool failed; /* a point has no energy */
+    double energy, eta2, unit; /* unit: integral of the moduli, twice the energy of a strain of 1 */
+    bool failed;               /* a point has no energy */
 } comparison;
 
 static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
@@ -34,6 +38,23 @@ static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_
 static double thermal(double w)
 {
     return w * (1 + 0.5 * w);
+}
+
+/* What warmth does across a plane that cannot grow there has an energy that no displacement changes: W at the strain
+ * that is free of stress in the plane, by Newton's method. */
+static double energy_across(const uz_element *element, uz_elasticity law, double across)
+{
+    double W = 0, S[N_STRAINS], D[N_STRAINS][N_STRAINS], c = 1;
+    for (int k = 0; k < MOST_STEPS; k++) {
+        double C[N_STRAINS] = {c, c, across};
+        if (!uz_finite_law(&W, S, D, C, element, law))
+            return 0;
+        const double next = c - 2 * S[0] / (D[0][0] + D[0][1]);
+        if (!(next > 0) || fabs(next - c) <= 1e-15 * c)
+            break;
+        c = next;
+    }
+    return W;
 }
 
 /* At point p of the element in a lane: W, and the difference's energy in the moduli there. Where these are not positive
@@ -58,7 +79,8 @@ static bool compare_at(double *W, double *eta2, const comparison *x, const uz_st
         strain[c] = per_square * E;
         C[at[c]] += (at[c] < 3 ? 2 : 1) * strain[c]; /* shears are 2 E_xy, and C_xy is */
     }
-    if (!uz_finite_law(W, S, D, C, element, uz_element_material(x->model, group->element[lane])->law))
+    const uz_elasticity law = uz_element_material(x->model, group->element[lane])->law;
+    if (!uz_finite_law(W, S, D, C, element, law))
         return false;
     for (int i = 0; i < n; i++) {
         work += S[at[i]] * strain[i];
@@ -66,7 +88,11 @@ static bool compare_at(double *W, double *eta2, const comparison *x, const uz_st
         for (int j = 0; j < n; j++)
             sum += off[i] * D[at[i]][at[j]] * off[j];
     }
-    *W = (most < SMALL && warm == 0 ? 0.5 * work : *W) * size * size * size;
+    if (most < SMALL && warm == 0)
+        *W = 0.5 * work;
+    else if (element->model == UZ_PLANE_STRAIN && warm != 0)
+        *W -= energy_across(element, law, per_square);
+    *W *= size * size * size;
     *eta2 = fmax(0, sum) * size * size * size;
     return true;
 }
@@ -88,6 +114,7 @@ static void compare(void *ctx, const uz_strain_group *group)
                 return;
             }
             x->energy += group->shape.volume[p][l] * W;
+            x->unit += group->shape.volume[p][l] * (element.lame.lambda + 2 * element.lame.mu);
             x->eta2 += times[l] * group->shape.volume[p][l] * eta2;
         }
     }
@@ -102,5 +129,9 @@ double uz_finite_mesh_error(const uz_body_model *model, const double *free_strai
     if (status == UZ_OK)
         status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, NULL);
     uz_nodal_strains_clear(&x.nodal);
-    return status != UZ_OK || x.failed ? (double)NAN : sqrt(x.eta2 / (2 * x.energy + x.eta2));
+    if (status == UZ_OK && !x.failed && x.energy == 0 && x.eta2 == 0)
+        return 0;
+    const double square = 2 * x.energy + x.eta2;
+    const bool known = status == UZ_OK && !x.failed && square > ROUNDING * ROUNDING * x.unit;
+    return known ? sqrt(x.eta2 / square) : (double)NAN;
 }

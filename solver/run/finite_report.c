@@ -27,7 +27,7 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
     char *text = s->message;
     const size_t size = sizeof s->message;
     const char *of = run->from ? "the way from the load of the case before it" : "the load";
-    if (s->outcome == UZ_MESH_LIMIT && why != UZ_PART_SWALLOWED) {
+    if (s->outcome == UZ_MESH_LIMIT && load >= 1) {
         snprintf(text, size,
                  "the obstacle, or another body, stands %.3g of a side's length deep in it, between rows: use a finer "
                  "mesh along the contact",
@@ -60,10 +60,11 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
                  tried, of, load);
         break;
     case UZ_PART_SWALLOWED:
-        snprintf(text, size,
-                 "under %.6g of %s an obstacle is inside of the body, whose sides have gone past it: this is the answer "
-                 "under %.6g of it. Use a finer mesh along the contact",
-                 tried, of, load);
+        snprintf(
+            text, size,
+            "under %.6g of %s an obstacle is inside of the body, whose sides have gone past it: this is the answer "
+            "under %.6g of it. Use a finer mesh along the contact",
+            tried, of, load);
         break;
     case UZ_PART_STOPPED:
         snprintf(text, size, "%s: this is the answer under %.6g of %s",
@@ -173,13 +174,11 @@ double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, boo
            (pairs ? (double)uz_csc_bytes(&base->K) : 0) + 8 * (NODAL * n + FREE * (double)base->d);
 }
 
-/* Of a body that is carried along nothing is lost; of one at rest, as no part of the load was borne, nothing is told.
- */
+/* Of a body at rest, as no part of the load was borne, nothing is told. */
 static double mesh_error(const uz_finite_run *run)
 {
-    if (run->found.steps == 0 && !run->from)
-        return NAN;
-    return run->at.body.energy > 10 * run->grain ? uz_finite_mesh_error(&run->base, run->free_strain, run->at.u) : 0;
+    const bool known = run->found.steps > 0 || run->from;
+    return known ? uz_finite_mesh_error(&run->base, run->free_strain, run->at.u) : (double)NAN;
 }
 
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err)

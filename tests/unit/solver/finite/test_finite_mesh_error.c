@@ -47,6 +47,37 @@ TEST(of_small_strain_it_is_that_of_small_deformation)
         }
 }
 
+/* What warmth does across a plane that cannot grow is no part of what the mesh has to tell. */
+TEST(warmth_across_the_plane_hides_nothing)
+{
+    qp_random rng = {23};
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
+        if (uz_element_type_of((uz_element_kind)k)->dim == 3)
+            continue;
+        uz_scene s = scene_of((uz_element_kind)k, 4);
+        s.materials[0].expansion = 1e-3;
+        uz_body_model model = body_model(&s);
+        CHECK_INT(model.kind, UZ_PLANE_STRAIN);
+        const int64_t n = model.mesh.n_nodes * 2;
+        double *u = body_room(n, sizeof *u), *warm = body_room(model.mesh.n_elements, sizeof *warm);
+        const double nu = s.materials[0].poisson, growth = 1e-3;
+        for (int64_t e = 0; e < model.mesh.n_elements; e++)
+            warm[e] = growth;
+        for (int64_t i = 0; i < n; i++)
+            u[i] = 1e-4 * signed_of(&rng);
+        const double cold = uz_finite_mesh_error(&model, NULL, u);
+        for (int64_t i = 0; i < n; i++) /* as it grows freely in the plane */
+            u[i] += (1 + nu) * growth * model.mesh.xyz[i];
+        const double there = uz_finite_mesh_error(&model, warm, u);
+        CHECK_MSG(cold > 0.1 && fabs(there - cold) < 0.02 * cold, "%s: %g, not %g", uz_element_name((uz_element_kind)k),
+                  there, cold);
+        free(u);
+        free(warm);
+        uz_body_model_clear(&model);
+        uz_scene_clear(&s);
+    }
+}
+
 /* By 2 about an axis that is none of the body's, and carried along. */
 TEST(a_turn_changes_nothing)
 {
