@@ -420,7 +420,10 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double mo
             group ? uz_obstacle_new(&obstacle[k], &of->scene->contacts[k], k, of->scene->model, err) : UZ_ERR_SCENE;
         for (int64_t i = 0; status == UZ_OK && i < group->n_faces; i++)
             status = look_at_side(out, of, group->face[i], obstacle[k], err);
-        out->swallows = out->swallows || (status == UZ_OK && uz_swallows(of->model, of->scene, k, of->u));
+        bool inside = false;
+        if (status == UZ_OK)
+            status = uz_swallows(&inside, of->model, of->scene, k, of->u, err);
+        out->swallows = out->swallows || inside;
     }
     if (status == UZ_OK)
         status = add_curvature(w, obstacle, most, err);
