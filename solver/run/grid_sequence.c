@@ -5,6 +5,10 @@
  *          -> the next grid: of a box whose cells are chosen another number of cells, from the rate at which the error
  *             was seen to fall; of a mesh that is refined its elements where the error is, bisected
  *
+ * A few elements have an estimate that may be worth nothing: the averages that it compares the stress with are hardly
+ * other than the stress. On so few the sequence does not end before all of them were divided, and the energy that this
+ * released left the estimate standing.
+ *
  * The algebraic part is asked for a tenth of the total, so that it takes half a percent of it and the estimate, which
  * needs an answer to look at, is one of the mesh alone. */
 #include "run/solve.h"
@@ -38,6 +42,15 @@
 /* Beyond these unknowns a solve takes minutes, and estimates of where it ends are worth little. */
 #define MOST_DOFS 4e6
 
+/* An estimate of fewer elements is looked at on a finer grid before the mesh is called fine enough. Quadratic ones have
+ * a slope of their own to compare, and as many nodes as four times as many linear ones in the plane. */
+enum { FEW_LINEAR = 64, FEW_QUADRATIC = 16 };
+
+/* What is released when all elements are divided is less than the square of the error. At singular stress estimates
+ * are two thirds of the error and it halves: so many squares of the estimate are released by one that is worth having.
+ */
+#define MOST_RELEASED 2.0
+
 /* Why no further grid was tried. */
 typedef enum {
     STOP_NOT,
@@ -61,6 +74,7 @@ typedef struct {
     uz_result **results; /* n_cases; NULL: none */
     grid on;
     double error; /* the largest total error of all cases that have an answer */
+    bool doubted; /* refined: that is an estimate of few elements, and no finer grid has confirmed it */
 } answers;
 
 /* What one grid has of numbers that nothing bounds, of one case. */
@@ -68,6 +82,8 @@ typedef struct {
     double max_pressure, contact_area;
     double peak_size, mean_size; /* of sides at the peak, and of all that touch; 0: nothing does */
     uz_trend_point von_mises, used;
+    double potential, most_released; /* energy of the answer; what it may lose if the estimate is worth having */
+    double low, high;                /* of the quantity that is asked for, if one is */
 } seen;
 
 /* The search for the grid. */
@@ -254,15 +270,53 @@ static bool choose_between(grid *next, const search *g)
     return n > 0 && !uz_cancelled(g->hooks) && has_time(g, next->dofs);
 }
 
-static seen seen_of(const uz_summary *s)
+/* What the equations of a grid may leave. */
+static double equations_asked(const search *g)
+{
+    return g->settings->quantity_error > 0.0 ? uz_settings_default().relative_error : ALGEBRAIC_SHARE * g->requested;
+}
+
+static seen seen_of(const search *g, const uz_summary *s)
 {
     const uz_evaluation *e = s->evaluation;
+    const double mesh = fmin(1.0, s->discretization_error * s->discretization_error), left = equations_asked(g);
+    const bool asked = e->asked > 0.0 && e->n_quantities > 0;
     return (seen){.max_pressure = s->max_pressure,
                   .contact_area = e->contact_area,
                   .peak_size = e->peak_size,
                   .mean_size = s->active > 0 ? pow(e->contact_area / (double)s->active, 1.0 / (s->dim - 1)) : 0.0,
                   .von_mises = {e->von_mises.size, e->von_mises.value},
-                  .used = {e->used.size, e->used.value}};
+                  .used = {e->used.size, e->used.value},
+                  .potential = e->potential_energy,
+                  .most_released = e->strain_energy * (MOST_RELEASED * mesh / (1.0 - mesh) + left * left),
+                  .low = asked ? e->quantities[0].low : -INFINITY,
+                  .high = asked ? e->quantities[0].high : (double)INFINITY};
+}
+
+/* ---- what the estimate of a few elements is worth */
+
+/* Does the next grid, of all elements divided, say that the estimate of this one was too small? */
+static bool refuted(const seen *of, const seen *finer)
+{
+    return of->potential - finer->potential > of->most_released || finer->low > of->high || finer->high < of->low;
+}
+
+/* Whether an error that is small enough is still to be looked at: it is an estimate, and either there are few elements
+ * and it is the first of them that is small enough, or the last one was, and was wrong. */
+static bool is_doubted(const search *g, const answers *x, int64_t n_elements, int64_t few)
+{
+    const int count = g->sequence.count;
+    const bool again = count > 0 && g->best.doubted;
+    bool estimated = false, wrong = false;
+    for (int64_t i = 0; i < g->n_cases; i++) {
+        const uz_summary *s = &x->results[i]->summary;
+        const seen *now = &g->seen[i * UZ_GRID_LEVELS + count];
+        if (uz_has_no_answer(s))
+            continue;
+        estimated = estimated || !s->guarantee.proved;
+        wrong = wrong || (again && refuted(now - 1, now));
+    }
+    return g->refines && x->error <= g->requested && estimated && (again ? wrong : n_elements < few);
 }
 
 /* ---- one grid */
@@ -274,8 +328,7 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const 
     uz_settings settings = *g->settings;
     uz_status status = UZ_OK;
     settings.balanced = false;
-    settings.relative_error =
-        settings.quantity_error > 0.0 ? uz_settings_default().relative_error : ALGEBRAIC_SHARE * g->requested;
+    settings.relative_error = equations_asked(g);
     uz_state **starts = uz_alloc_zero(g->n_cases, sizeof *starts);
     if (!starts)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
@@ -298,11 +351,18 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const 
         seen *known = &g->seen[i * UZ_GRID_LEVELS + g->sequence.count];
         level->iterations += s->iterations;
         level->d = s->d;
-        *known = (seen){.max_pressure = NAN, .contact_area = NAN, .von_mises.value = NAN, .used.value = NAN};
+        *known = (seen){.max_pressure = NAN,
+                        .contact_area = NAN,
+                        .von_mises.value = NAN,
+                        .used.value = NAN,
+                        .potential = NAN,
+                        .most_released = NAN,
+                        .low = -INFINITY,
+                        .high = INFINITY};
         if (uz_has_no_answer(s))
             continue;
         if (s->evaluation)
-            *known = seen_of(s);
+            *known = seen_of(g, s);
         const double error = uz_asked_error(s);
         x->error = fmax(x->error, settings.quantity_error > 0.0 ? fmin(error, NO_INTERVAL) : error);
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
@@ -331,6 +391,7 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
     const uz_element_type *type = uz_element_type_of((uz_element_kind)outline.mesh.kind[0]);
     g->order = (type->nodes > type->corners ? 2 : 1) * (g->settings->quantity_error > 0.0 ? 2 : 1);
     level->n_elements = outline.mesh.n_elements;
+    const int64_t few = type->nodes > type->corners ? FEW_QUADRATIC : FEW_LINEAR;
     x->on.dofs = (double)(outline.mesh.n_nodes * outline.mesh.dim);
     if (x->on.dofs > MOST_DOFS && g->sequence.count > 0)
         status =
@@ -360,7 +421,8 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
             offer(g);
         status = solve_cases(x, level, g, &problem, &outline, err);
     }
-    if (status == UZ_OK && x->results && g->refines && x->error > g->requested)
+    x->doubted = status == UZ_OK && x->results && is_doubted(g, x, level->n_elements, few);
+    if (status == UZ_OK && x->results && g->refines && (x->error > g->requested || x->doubted))
         status = uz_mark_elements(&g->bisected, &g->n_bisected, &outline, &problem, x->results, g->requested / x->error,
                                   uz_mesh_can_subdivide(&outline.mesh) && !g->settings->guaranteed, err);
     uz_body_model_clear(&outline);
@@ -372,12 +434,13 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
     return status;
 }
 
-/* The coarsest grid that meets the request; until there is one, that of the smallest error. */
+/* The coarsest grid that meets the request and is not doubted; until there is one, that of the smallest error. An
+ * error that is doubted is less worth than that of any finer grid. */
 static void keep_better(search *g, answers *x)
 {
     const bool meets = x->error <= g->requested, met = g->best.results && g->best.error <= g->requested;
-    const bool better =
-        !g->best.results || (met ? meets && x->on.dofs < g->best.on.dofs : meets || x->error < g->best.error);
+    const bool better = !g->best.results || g->best.doubted ||
+                        (met ? meets && x->on.dofs < g->best.on.dofs : meets || x->error < g->best.error);
     answers *worse = better ? &g->best : x;
     for (int64_t i = 0; worse->results && i < g->n_cases; i++)
         uz_timings_add(&g->spent[i], &worse->results[i]->summary.timings);
@@ -403,7 +466,7 @@ static uz_status try_grid(search *g, grid on, uz_error *err)
         g->sequence.level[g->sequence.count].error = x.error;
         g->tried[g->sequence.count++] = (uz_tried){number_of(g, &x.on), x.error};
         g->tried_dofs = x.on.dofs;
-        g->stop = x.error <= g->requested ? STOP_MET : STOP_NOT;
+        g->stop = x.error <= g->requested && !x.doubted ? STOP_MET : STOP_NOT;
         /* what the ends of the cases' solves say about going on */
         for (int64_t i = 0; g->stop != STOP_MET && g->stop != STOP_CANCELLED && i < g->n_cases; i++) {
             const uz_summary *s = &x.results[i]->summary;
@@ -439,7 +502,7 @@ static void conclude(const search *g, uz_summary *s)
     const double total = uz_asked_error(s);
     if (total <= g->requested && s->outcome == UZ_MESH_LIMIT && uz_is_unproved(s))
         return; /* a bound was asked for, and an estimate is none */
-    if (total <= g->requested) {
+    if (total <= g->requested && !g->best.doubted) {
         s->outcome = UZ_CONVERGED;
         s->message[0] = '\0';
         return;
@@ -454,7 +517,11 @@ static void conclude(const search *g, uz_summary *s)
                       : s->outcome == UZ_TIME_LIMIT ? "the time allowed was used up: raise time_limit_s"
                       : s->outcome == UZ_DISMISSED  ? "stopped by request"
                                                     : "the equations of this grid could not be solved better";
-    if (s->evaluation && s->evaluation->asked > 0.0 && s->evaluation->n_quantities > 0)
+    if (total <= g->requested)
+        snprintf(s->message, sizeof s->message,
+                 "%s. The error of %lld elements is estimated as %.3g, and no finer grid has confirmed that.", why,
+                 (long long)g->sequence.n_elements, total);
+    else if (s->evaluation && s->evaluation->asked > 0.0 && s->evaluation->n_quantities > 0)
         snprintf(s->message, sizeof s->message, "%.120s. %.40s is known within %.3g of itself, asked for %.3g.", why,
                  s->evaluation->quantities[0].name, total, g->requested);
     else

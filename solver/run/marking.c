@@ -120,12 +120,13 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
         sum += all[e].share;
     if (done)
         qsort(all, (size_t)n_elements, sizeof *all, by_share);
-    const bool once = body->mesh.dim == 2 && !subdivided && (squared ? sqrt(left) : left) > NEAR;
+    const bool every = left >= 1;
+    const bool once = !every && body->mesh.dim == 2 && !subdivided && (squared ? sqrt(left) : left) > NEAR;
     /* what is bisected once along each direction keeps 4^-order of the square of its error, of triangles that are
      * halved 2^-order; what else is in intervals by estimate, of the ends of contacts, falls faster */
     const double kept = squared ? (proved ? AIM : 1) * left : AIM * AIM * left * left,
                  needed = (1 - kept) / (1 - pow(once ? 2 : 4, -order)), bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
-    while (done && count < n_elements && part < bulk && all[count].share > 0)
+    while (done && count < n_elements && (every || (part < bulk && all[count].share > 0)))
         part += all[count++].share;
     int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 3 + count, sizeof *grown) : NULL;
     if (grown) {

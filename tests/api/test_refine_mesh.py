@@ -2,7 +2,9 @@
 # not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
+import math
 import os
+import random
 import subprocess
 import tempfile
 
@@ -179,6 +181,54 @@ def test_a_formulation_of_elements_that_are_all_bisected(s):
     request["problem"]["formulation"] = "incompatible_modes"
     summary = solved(s, request)["summary"]
     check(summary["outcome"] == "converged" and summary["mesh"]["elements"] > 16, summary["message"], summary["mesh"])
+
+
+def block(rng):
+    """A block pressed onto a plane, with loads of all kinds; a mesh of a few elements, a fine one, and what to ask for."""
+    size, young = [rng.uniform(1, 2.5), rng.uniform(1, 2)], 10**rng.uniform(1, 4)
+    supports, loads = [{"on": "top", "ux": 0, "uy": -0.01 * rng.random()}], []
+    if rng.random() < 0.3:
+        supports.append({"on": "right", "spring": [0.1 * young] * 2})
+    if rng.random() < 0.7:
+        loads.append({"on": "right", "traction": [0.003 * young * rng.uniform(-1, 1) for _ in range(2)]})
+    if rng.random() < 0.3:
+        loads.append({"on": "all", "temperature": rng.uniform(-20, 20)})
+    if rng.random() < 0.4:
+        loads.append({"on": "all", "body_force": [0, -0.003 * young]})
+    problem = {"kind": "scene", "model": rng.choice(("plane_strain", "plane_stress", "axisymmetric")), "supports": supports,
+               "materials": [{"on": "all", "young": young, "poisson": rng.choice((0, 0.3, 0.4)), "expansion": 1e-4}],
+               "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, rng.uniform(-0.005, 0.003)], "normal": [0, 1]}}}],
+               "loads": loads, "kinematics": "fixed"}
+    few = {"box": {"size": size, "cells": [rng.randint(1, 4), rng.randint(1, 3)],
+                   "element": rng.choice(("tri3", "quad4", "tri6", "quad8"))}, "refine": "auto"}
+    fine = {"box": {"size": size, "cells": [int(40 * x / max(size)) for x in size], "element": "quad8"}}
+    return problem, few, fine, rng.choice((0.1, 0.2))
+
+
+def check_told(s, problem, few, fine, asked):
+    """The error told at the end is at least half of the true one, by the energy of a much finer mesh."""
+    mine = solved(s, {"problem": {**problem, "mesh": few}, "solver": {"accuracy": {"relative_error": asked}}})["summary"]
+    best = solved(s, {"problem": {**problem, "mesh": fine}, "solver": {"accuracy": {"relative_error": 1e-6}}})["summary"]
+    check(mine["outcome"] == "converged" and mine["error"]["total"] <= asked, mine["message"])
+    lost = mine["energy"]["potential"] - best["energy"]["potential"]
+    true = math.sqrt(max(0, lost) / best["energy"]["strain"])
+    check(mine["error"]["total"] >= 0.5 * true - 1e-4, mine["error"], true, mine["mesh"], problem, few)
+
+
+def test_a_few_elements_are_not_taken_at_their_word(s):
+    """Six triangles that told 0.18 and were 0.76 off."""
+    problem = {"kind": "scene", "model": "plane_strain", "materials": [{"on": "all", "young": 339.65, "poisson": 0.3}],
+               "supports": [{"on": "top", "ux": 0, "uy": -1.865e-4}, {"on": "right", "spring": [33.97, 33.97]}],
+               "loads": [{"on": "all", "body_force": [0, -1.01896]}], "kinematics": "fixed",
+               "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, -0.0023656], "normal": [0, 1]}}}]}
+    size = [1.6917, 1.8449]
+    check_told(s, problem, {"box": {"size": size, "cells": [3, 1], "element": "tri3"}, "refine": "auto"},
+               {"box": {"size": size, "cells": [36, 40], "element": "quad8"}}, 0.2)
+
+
+def test_errors_told_of_blocks_that_begin_with_a_few_elements(s):
+    for seed in range(40):
+        check_told(s, *block(random.Random(seed)))
 
 
 def test_client_prints_the_grids(s):
