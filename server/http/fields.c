@@ -122,6 +122,7 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
         found = store_get_vector(s, id, number, "free_strain", &warm, &n_warm);
         found = found == STORE_NOT_FOUND ? STORE_OK : found;
         scene.free_strain = warm;
+        scene.n_free_strain = n_warm;
     }
     answer.u = u;
     answer.r = r;

@@ -317,6 +317,7 @@ typedef struct {
     /* Of an answer of large deformation: expansion times rise of temperature of each element, as uz_result has it;
      * NULL: the loads tell. Borrowed */
     const double *free_strain;
+    int64_t n_free_strain;
 } uz_scene;
 void uz_scene_clear(uz_scene *scene);
 /* Dimensions of the bodies that its model is for: 2 or 3. */

@@ -14,6 +14,9 @@ uz_status uz_field_body_init(uz_field_body *out, const uz_scene *scene, const uz
     *out = (uz_field_body){.scene = scene, .model = model, .components = model->mesh.dim == 2 ? 4 : 6};
     if (!scene->free_strain)
         return uz_free_strains(&out->free_strain, model, scene, err);
+    if (scene->n_free_strain != model->mesh.n_elements)
+        return uz_fail(err, UZ_ERR_SIZE, "free_strain", "%lld elements have temperatures, and the mesh has %lld",
+                       (long long)scene->n_free_strain, (long long)model->mesh.n_elements);
     out->free_strain = uz_alloc(model->mesh.n_elements, sizeof *out->free_strain);
     if (!out->free_strain)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for temperatures");

@@ -82,6 +82,7 @@ static uz_status warm(uz_finite_run *run, uz_error *err)
                            "be above -1",
                            (long long)e, run->free_strain[e]);
     run->scene.free_strain = run->free_strain;
+    run->scene.n_free_strain = run->base.mesh.n_elements;
     return status;
 }
 
