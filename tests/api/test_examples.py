@@ -4,6 +4,7 @@ usage: test_examples.py BUILD_DIR [FILTER]"""
 import json
 import os
 import pathlib
+import random
 import re
 import shutil
 import subprocess
@@ -238,9 +239,15 @@ class Repository:
 
 
 def free_port():
-    with service.socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    """Not one that connections of other tests get by themselves meanwhile."""
+    for port in random.sample(range(20000, 32000), 100):
+        with service.socket.socket() as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+                return port
+            except OSError:
+                pass
+    raise RuntimeError("no port is free")
 
 
 def github_steps():

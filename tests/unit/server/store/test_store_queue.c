@@ -421,11 +421,11 @@ STORE_TEST(a_job_that_ran_once_has_no_queue_limit)
     int64_t count;
     if (!place_begin(&p))
         return;
-    submit_with(p.s, (store_request){.queue_limit_s = 0.2}, id);
+    submit_with(p.s, (store_request){.queue_limit_s = 3}, id); /* till then it is claimed, on any machine */
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
     CHECK_INT(release_as(p.s, claimed, "me"), STORE_OK);
     submit_with(p.s, (store_request){.queue_limit_s = 0.2}, other);
-    sleep_s(0.25);
+    sleep_s(3.1);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
     CHECK_STR(claimed, id);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_NOT_FOUND); /* too late, though nobody has said so yet */
@@ -510,10 +510,10 @@ STORE_TEST(a_job_stays_until_somebody_was_told)
     CHECK_INT(store_webhook_next(p.s, NULL, 0, &due), STORE_OK);
     CHECK_STR(due.url, "http://x/");
     CHECK_INT(due.attempts, 0);
-    CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_AGAIN, 0.5, 0), STORE_OK);
+    CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_AGAIN, 3, 0), STORE_OK);
     free(due.url);
     CHECK_INT(store_webhook_next(p.s, NULL, 0, &due), STORE_NOT_FOUND); /* not yet */
-    sleep_s(0.6);
+    sleep_s(3.1);
     CHECK_INT(store_webhook_next(p.s, NULL, 0, &due), STORE_OK);
     CHECK_INT(due.attempts, 1);
     /* nobody answers there: what else is due at that address waits too, and nothing at another one does */
