@@ -82,7 +82,7 @@ static bool looks_into(const uz_body_model *model, const uz_contact *contact, in
 {
     const uz_mesh *mesh = &model->mesh;
     const int dim = mesh->dim;
-    double xyz[3 * UZ_ELEMENT_NODES], centre[3] = {0}, at[3];
+    double xyz[3 * UZ_ELEMENT_NODES] = {0}, centre[3] = {0}, at[3];
     int count;
     const int64_t *node = uz_mesh_element(mesh, e, &count);
     const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);

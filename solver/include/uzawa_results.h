@@ -396,8 +396,8 @@ typedef struct {
     double *free_strain; /* of large deformation with temperature: n_free_strain, expansion times rise of each element,
                             for uz_scene.free_strain; else NULL */
     int64_t n_free_strain;
-    double *ray;   /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof, rounded; out of reach: what bounds
-                      infeasible_radius, h'y / ||N'y||_1. u, r, g are then NaN. Else NULL */
+    double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof, rounded; out of reach: what bounds
+                          infeasible_radius, h'y / ||N'y||_1. u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
     uz_evaluation *evaluation;
     uz_grid_sequence *grids; /* cells chosen or elements bisected here; owns its list */
