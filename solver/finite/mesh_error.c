@@ -41,11 +41,12 @@ static double thermal(double w)
 }
 
 /* What warmth does across a plane that cannot grow there has an energy that no displacement changes: W at the strain
- * that is free of stress in the plane, by Newton's method. */
-static double energy_across(const uz_element *element, uz_elasticity law, double across)
+ * that is free of stress in the plane, by Newton's method. 0 of other elements. */
+static double energy_across(const uz_element *element, uz_elasticity law, double warm)
 {
     double W = 0, S[N_STRAINS], D[N_STRAINS][N_STRAINS], c = 1;
-    for (int k = 0; k < MOST_STEPS; k++) {
+    const double across = 1 / ((1 + warm) * (1 + warm));
+    for (int k = 0; k < MOST_STEPS && element->model == UZ_PLANE_STRAIN && warm != 0; k++) {
         double C[N_STRAINS] = {c, c, across};
         if (!uz_finite_law(&W, S, D, C, element, law))
             return 0;
@@ -60,7 +61,7 @@ static double energy_across(const uz_element *element, uz_elasticity law, double
 /* At point p of the element in a lane: W, and the difference's energy in the moduli there. Where these are not positive
  * a difference may have none. Per volume of the body at rest. */
 static bool compare_at(double *W, double *eta2, const comparison *x, const uz_strain_group *group, const int64_t *place,
-                       const uz_element *element, int p, int lane)
+                       const uz_element *element, double across, int p, int lane)
 {
     static const int PLANE[] = {0, 1, 3}, SPACE[] = {0, 1, 2, 3, 4, 5}; /* components of the rows' */
     const int n = group->rule.stresses, *at = n == 3 ? PLANE : SPACE;
@@ -90,8 +91,8 @@ static bool compare_at(double *W, double *eta2, const comparison *x, const uz_st
     }
     if (most < SMALL && warm == 0)
         *W = 0.5 * work;
-    else if (element->model == UZ_PLANE_STRAIN && warm != 0)
-        *W -= energy_across(element, law, per_square);
+    else
+        *W -= across;
     *W *= size * size * size;
     *eta2 = fmax(0, sum) * size * size * size;
     return true;
@@ -108,8 +109,10 @@ static void compare(void *ctx, const uz_strain_group *group)
         double xyz[3 * UZ_ELEMENT_NODES], W, eta2;
         uz_element element;
         uz_body_element(&element, xyz, x->model, group->element[l]);
+        const double across =
+            energy_across(&element, uz_element_material(x->model, group->element[l])->law, group->free_strain[l]);
         for (int p = 0; p < group->rule.asked; p++) {
-            if (!compare_at(&W, &eta2, x, group, place[l], &element, p, l)) {
+            if (!compare_at(&W, &eta2, x, group, place[l], &element, across, p, l)) {
                 x->failed = true;
                 return;
             }
