@@ -118,7 +118,7 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
         found = found == STORE_NOT_FOUND ? STORE_OK : found;
         scene.place = n_place == answer.n_u ? place : NULL;
     }
-    if (found == STORE_OK) {
+    if (found == STORE_OK && scene.place) { /* which answers of large deformation have */
         found = store_get_vector(s, id, number, "free_strain", &warm, &n_warm);
         found = found == STORE_NOT_FOUND ? STORE_OK : found;
         scene.free_strain = warm;
