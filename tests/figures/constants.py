@@ -62,7 +62,7 @@ def reference(row):
 
 
 PHRASES = {
-    "0.7 to\n1.7 times the error of a ring": None, "2 to 3.4 times of a tube": None, "(1.9 of one that it hardly widens)": None, "relative to the root of 2 W": None,
+    "0.7 to 1.7 times the error of a ring": None, "2 to 3.4 times of a tube": None, "(1.9 of one that it hardly widens)": None, "relative to the root of 2 W": None,
     "the force within 2 %": None, "proved within 2 %": None, "so 108 unknowns where displacements have 3: 36 times": None, "18 unknowns for 3": None,
     "216 times the displacements'": None, "16,200 rows and takes 1.4e12 operations against 6.6e9": None, "it takes 130 GB against 3.6 GB": None,
     "27 unknowns for 3, and a cut of 9 for 3: 9 times the unknowns": None, "27 times the operations": None,
