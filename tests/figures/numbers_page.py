@@ -25,7 +25,7 @@ import tables  # noqa: E402
 ROOT = pathlib.Path(os.environ.get("NUMBERS_ROOT") or pathlib.Path(__file__).resolve().parent.parent.parent)
 WIDTH = 119
 COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "bench_solids": "make bench-solids", "bench_predictions": "make bench-predictions", "extremes": "make extremes", "solids": "make extremes FILTER=solids", "bounds": "make extremes FILTER=bounds", "quantities": "make extremes FILTER=quantities", "thresholds": "make extremes FILTER=thresholds", "trade": "make trade",
-            "theory": "make theory", "large": "make large", "soak": "make soak", "peers": "make peers", "decks": "make peers-decks", "peers_space": "make peers-space", "large_solids": "make peers-large-solids", "gallery": "make gallery", "page": "make figures (the page)"}
+            "theory": "make theory", "large": "make large", "soak": "make soak", "peers": "make peers", "decks": "make peers-decks", "peers_space": "make peers-space", "peers_large": "make peers-large", "large_solids": "make peers-large-solids", "gallery": "make gallery", "page": "make figures (the page)"}
 ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems", "trade": "rows"}  # what is measured by parts
 
 
@@ -186,6 +186,9 @@ CalculiX from deck to answer, of the daemon from request to answer."""
 SPACE = """A cube of cells in contact with a plane below, clamped on one side, pulled on the opposite one (`make peers-space`): seconds of processor of the daemon from request to
 answer, certified to 1e-6, of a body that it has not seen and of another load on it, over those of PETSc's multigrid GAMG at its defaults, setup and solve to 1e-8 of the same K, with or
 without the rigid motions, whichever takes less. Nodes within `hex8` and `tet4` are moved at random. Medians of three ratios of runs one after the other."""
+PEERS_LARGE = """Scenes of large deformation by CalculiX, by GetFEM and by the daemon, on the same meshes of `quad8` (`make peers-large`): the force through the contact (of the cantilever, how far
+its end has gone), how many steps it takes (of the daemon, contact problems), and seconds of processor: of the daemon from request to answer, of the others of the solve alone or from deck to answer.
+Off: no answer in half a minute, or one more than a fiftieth off. The ratio is that of the quickest of the others that has an answer."""
 LARGE_SOLIDS = """Two solids under large deformation (`make peers-large-solids`): a block is pressed on a longer one and moved along it by more than its own length, another one is pressed
 on a dome and moved along that, the whole way at once. How far the force between them, as a vector, the area in contact and, where no edge makes it infinite, the largest pressure are off those of the
 finest mesh of `hex20`; and how far the force is off that of GetFEM, with bricks of 27 nodes on its coarsest, contact by integrals along rays, the way in parts; of that one also how far that of CalculiX is off ours
@@ -260,6 +263,7 @@ def page(data, files):
             f"The paper's body is certified to 1e-6. Means are shifted geometric ones over all problems, where a failure costs the limit. {packages}.")
     add("Decks of CalculiX", timed(tables.decks(data), data, "decks"), DECKS)
     add("Solids over one multigrid solve", timed(tables.space(data), data, "peers_space"), SPACE)
+    add("Large deformation against other programs", tables.peers_large(data), PEERS_LARGE)
     add("Solids that slide under large deformation", tables.large_solids(data), LARGE_SOLIDS)
     add("Solids without a factor", timed([*tables.cycles(data), "", *tables.shapes(data), "", *tables.runs_of_shapes(data)] if "bench_solids" in data else None, data, "bench_solids"), CYCLES, SHAPES)
     add("Predicted and actual", timed(tables.predictions(data), data, "bench_predictions"), PREDICTIONS)

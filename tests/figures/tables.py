@@ -406,6 +406,20 @@ def thresholds(data):
     return table(["body", "of them", "chosen over enough: least", "most"], rows) if rows else None
 
 
+def peers_large(data):
+    """Scenes of large deformation by other programs and the daemon."""
+    def of(row, name, fits):
+        value, seconds, steps = row[name], row[f"{name}_s"], row[f"{name}_steps"]
+        return "off" if value is None or not fits(value) else f"{sig(value, 5)}, {steps}, {duration(seconds)}"
+
+    rows = []
+    for row in (data.get("peers_large") or {}).get("rows", []):
+        fits = lambda value, ours=row["ours"]: abs(value / ours - 1) <= 0.02  # noqa: E731
+        rows.append([row["scene"], f"{row['unknowns']:,}", f"{sig(row['ours'], 5)}, {row['qps']}, {duration(row['ours_s'])}", *(of(row, name, fits) for name in ("calculix", "getfem")),
+                     NONE if row["ratio"] is None else f"{row['ratio']:.1f}"])
+    return table(["scene", "unknowns", "ours", "CalculiX", "GetFEM", "ratio"], rows) if rows else None
+
+
 def large_solids(data):
     """Two solids that slide under large deformation against a finer mesh and GetFEM: parts of a hundred."""
     def part(x):
