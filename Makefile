@@ -460,7 +460,7 @@ peers-decks: $(BUILD)/uzawad ## CalculiX's own decks with contact or ties by Cal
 	@$(call measured,decks) $(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/decks.json $(DECKS)
 
 peers-large: bench-deps $(BUILD)/uzawad ## large deformation by CalculiX, GetFEM and the daemon: a table and build/peers-large.json; ONLY=part of a name
-	@/usr/bin/python3 -B tests/peers/large.py $(BUILD) $(BUILD)/peers-large.json $(if $(ONLY),ONLY="$(ONLY)")
+	@$(call measured,peers-large $(if $(ONLY),--part)) /usr/bin/python3 -B tests/peers/large.py $(BUILD) $(BUILD)/peers-large.json $(if $(ONLY),ONLY="$(ONLY)")
 
 peers-large-solids: bench-deps $(BUILD)/uzawad ## two solids that slide under large deformation by CalculiX, GetFEM and the daemon: a table and build/large-solids.json; ONLY=part of a name
 	@$(call measured,large-solids$(if $(ONLY),-part)) /usr/bin/python3 -B tests/peers/large_solids.py $(BUILD) $(BUILD)/large-solids.json $(if $(ONLY),ONLY="$(ONLY)")

@@ -13,7 +13,7 @@ import sys
 import stamp
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-ROWS = {"bench": ("ratios", "name"), "bench-size": ("sizes", "d"), "trade": ("rows", "name")}  # programs whose rows are renewed one by one, and what names a row
+ROWS = {"bench": ("ratios", "name"), "bench-size": ("sizes", "d"), "trade": ("rows", "name"), "peers-large": ("rows", "scene")}  # programs whose rows are renewed one by one, and what names a row
 
 
 def merged(name, new, old):
