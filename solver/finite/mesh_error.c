@@ -13,6 +13,7 @@
 #include "finite/hyperelastic.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { N_STRAINS = UZ_FINITE_STRAINS };
 /* Of smaller strains W is half of S : E, to this part of it, and its own terms cancel. */
@@ -26,6 +27,7 @@ typedef struct {
     const uz_body_model *model;
     uz_nodal_strains nodal;
     double energy, eta2, unit; /* unit: integral of the moduli, twice the energy of a strain of 1 */
+    double *eta2_of;           /* n_elements; NULL: not wanted */
     bool failed;               /* a point has no energy */
 } comparison;
 
@@ -118,23 +120,28 @@ static void compare(void *ctx, const uz_strain_group *group)
             }
             x->energy += group->shape.volume[p][l] * W;
             x->unit += group->shape.volume[p][l] * (element.lame.lambda + 2 * element.lame.mu);
-            x->eta2 += times[l] * group->shape.volume[p][l] * eta2;
+            eta2 *= times[l] * group->shape.volume[p][l];
+            x->eta2 += eta2;
+            if (x->eta2_of)
+                x->eta2_of[group->element[l]] += eta2;
         }
     }
 }
 
-double uz_finite_mesh_error(const uz_body_model *model, const double *free_strain, const double *u)
+uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const double *free_strain,
+                               const double *u, uz_error *err)
 {
-    comparison x = {.model = model};
+    comparison x = {.model = model, .eta2_of = eta2};
     const uz_strain_source from = {
         .model = model, .nodal = u, .free_strain = free_strain, .apart = true, .large = true};
-    uz_status status = uz_nodal_strains_recover(&x.nodal, &from, UZ_CONTINUE_LINEAR, NULL, NULL);
+    if (eta2)
+        memset(eta2, 0, (size_t)model->mesh.n_elements * sizeof *eta2);
+    uz_status status = uz_nodal_strains_recover(&x.nodal, &from, UZ_CONTINUE_LINEAR, NULL, err);
     if (status == UZ_OK)
-        status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, NULL);
+        status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, err);
     uz_nodal_strains_clear(&x.nodal);
-    if (status == UZ_OK && !x.failed && x.energy == 0 && x.eta2 == 0)
-        return 0;
     const double square = 2 * x.energy + x.eta2;
-    const bool known = status == UZ_OK && !x.failed && square > ROUNDING * ROUNDING * x.unit;
-    return known ? sqrt(x.eta2 / square) : (double)NAN;
+    const bool told = status == UZ_OK && !x.failed, rests = x.energy == 0 && x.eta2 == 0;
+    *error = told && rests ? 0 : told && square > ROUNDING * ROUNDING * x.unit ? sqrt(x.eta2 / square) : (double)NAN;
+    return status;
 }

@@ -4,10 +4,12 @@
 
 #include "assembly/assembly.h"
 
-/* About ||u - u_h|| / ||u|| in the energy norm of the tangent at u_h, for the displacements u (n_nodes x dim) of an
- * equilibrium in the standard formulation; free_strain: n_elements, of the temperature, NULL: none. What
- * uz_estimate_mesh_error is of small deformation, which it becomes. 0 of a body that nothing strains; NaN when
- * there is no memory, the law has no energy somewhere, or strains are rounding. */
-double uz_finite_mesh_error(const uz_body_model *model, const double *free_strain, const double *u);
+/* *error: about ||u - u_h|| / ||u|| in the energy norm of the tangent at u_h, for the displacements u (n_nodes x dim)
+ * of an equilibrium in the standard formulation; free_strain: n_elements, of the temperature, NULL: none. What
+ * uz_estimate_mesh_error is of small deformation, which it becomes. eta2: n_elements, what each has of the square of
+ * the error, an energy; NULL: not wanted. 0 of a body that nothing strains; NaN where the law has no energy somewhere,
+ * or strains are rounding. UZ_ERR_MEMORY: *error is NaN, too. */
+uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const double *free_strain,
+                               const double *u, uz_error *err);
 
 #endif

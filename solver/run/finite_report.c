@@ -174,11 +174,15 @@ double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, boo
            (pairs ? (double)uz_csc_bytes(&base->K) : 0) + 8 * (NODAL * n + FREE * (double)base->d);
 }
 
-/* Of a body at rest, as no part of the load was borne, nothing is told. */
-static double mesh_error(const uz_finite_run *run)
+/* Of a body at rest, as no part of the load was borne, nothing is told; nor where there is no memory, but that a mesh
+ * is refined by it. */
+static uz_status mesh_error(double *error, const uz_finite_run *run, uz_error *err)
 {
-    const bool known = run->found.steps > 0 || run->from;
-    return known ? uz_finite_mesh_error(&run->base, run->free_strain, run->at.u) : (double)NAN;
+    const bool known = run->found.steps > 0 || run->from, asked = run->scene.refine;
+    *error = NAN;
+    const uz_status status =
+        known ? uz_finite_mesh_error(error, NULL, &run->base, run->free_strain, run->at.u, asked ? err : NULL) : UZ_OK;
+    return asked ? status : UZ_OK;
 }
 
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err)
@@ -196,8 +200,9 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
     uz_status status = take_rows(result, run, err);
     if (status == UZ_OK)
         status = uz_evaluate_finite(result, &run->at.rows, &run->scene, run->at.force, run->at.body.energy, err);
+    if (status == UZ_OK)
+        status = mesh_error(&result->summary.discretization_error, run, err);
     if (status == UZ_OK) {
-        result->summary.discretization_error = mesh_error(run);
         uz_doubt_mesh(result, &run->at.rows, &run->scene);
         *out = result;
     } else {

@@ -12,6 +12,13 @@ static double signed_of(qp_random *rng)
 
 static const uz_model PLANE[] = {UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETRIC};
 
+static double error_of(const uz_body_model *model, const double *free_strain, const double *u)
+{
+    double error;
+    CHECK_INT(uz_finite_mesh_error(&error, NULL, model, free_strain, u, NULL), UZ_OK);
+    return error;
+}
+
 static uz_scene scene_of(uz_element_kind kind, int way)
 {
     const bool solid = uz_element_type_of(kind)->dim == 3;
@@ -38,7 +45,7 @@ TEST(of_small_strain_it_is_that_of_small_deformation)
             for (int64_t i = 0; i < n; i++)
                 u[i] = 1e-7 * (model.mesh.xyz[i] + 0.3 * signed_of(&rng));
             const double small = uz_estimate_mesh_error(NULL, NULL, &model, NULL, u);
-            const double large = uz_finite_mesh_error(&model, NULL, u);
+            const double large = error_of(&model, NULL, u);
             CHECK_MSG(small > 0.01 && fabs(large - small) < 1e-5 * small, "%s, way %d: %.12g, not %.12g",
                       uz_element_name((uz_element_kind)k), way, large, small);
             free(u);
@@ -65,10 +72,10 @@ TEST(warmth_across_the_plane_hides_nothing)
             warm[e] = growth;
         for (int64_t i = 0; i < n; i++)
             u[i] = 1e-4 * signed_of(&rng);
-        const double cold = uz_finite_mesh_error(&model, NULL, u);
+        const double cold = error_of(&model, NULL, u);
         for (int64_t i = 0; i < n; i++) /* as it grows freely in the plane */
             u[i] += (1 + nu) * growth * model.mesh.xyz[i];
-        const double there = uz_finite_mesh_error(&model, warm, u);
+        const double there = error_of(&model, warm, u);
         CHECK_MSG(cold > 0.1 && fabs(there - cold) < 0.02 * cold, "%s: %g, not %g", uz_element_name((uz_element_kind)k),
                   there, cold);
         free(u);
@@ -108,8 +115,7 @@ TEST(a_turn_changes_nothing)
                     turned[a + c] = cos(angle) * x[c] + sin(angle) * across[c] + (1 - cos(angle)) * inner * w[c] -
                                     model.mesh.xyz[a + c] + 7;
             }
-            const double at_rest = uz_finite_mesh_error(&model, NULL, u),
-                         there = uz_finite_mesh_error(&model, NULL, turned);
+            const double at_rest = error_of(&model, NULL, u), there = error_of(&model, NULL, turned);
             CHECK_MSG(at_rest > 0.01 && fabs(there - at_rest) < 1e-9, "%s, way %d: %.12g, not %.12g",
                       uz_element_name((uz_element_kind)k), way, there, at_rest);
             free(turned);
@@ -117,4 +123,38 @@ TEST(a_turn_changes_nothing)
             uz_body_model_clear(&model);
             uz_scene_clear(&s);
         }
+}
+
+/* Squares of elements are those of the body, and belong to where the strain jumps. */
+TEST(elements_have_their_parts)
+{
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
+        uz_scene s = scene_of((uz_element_kind)k, 3);
+        uz_body_model model = body_model(&s);
+        const int dim = model.mesh.dim;
+        const int64_t n = model.mesh.n_nodes * dim;
+        double *u = body_room(n, sizeof *u), *eta2 = body_room(model.mesh.n_elements, sizeof *eta2), sum = 0, here = 0,
+               error;
+        for (int64_t i = 0; i < n; i += dim) {
+            const double x = model.mesh.xyz[i] - 1;
+            u[i] = 0.1 * x + (x > 4 ? 0.3 * (x - 4) * (x - 4) : 0);
+        }
+        CHECK_INT(uz_finite_mesh_error(&error, eta2, &model, NULL, u, NULL), UZ_OK);
+        for (int64_t e = 0; e < model.mesh.n_elements; e++) {
+            int count;
+            const int64_t *node = uz_mesh_element(&model.mesh, e, &count);
+            double right = 0;
+            for (int a = 0; a < count; a++)
+                right = fmax(right, model.mesh.xyz[node[a] * dim] - 1);
+            CHECK(eta2[e] >= 0);
+            sum += eta2[e];
+            here += right > 3 ? eta2[e] : 0;
+        }
+        CHECK_MSG(error > 0.01 && sum > 0 && here > 0.9 * sum, "%s: %g, %g of %g", uz_element_name((uz_element_kind)k),
+                  error, here, sum);
+        free(u);
+        free(eta2);
+        uz_body_model_clear(&model);
+        uz_scene_clear(&s);
+    }
 }
