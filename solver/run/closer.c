@@ -8,6 +8,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "run/transfer.h"
 #include "scene/mesh.h"
 #include "scene/subdivide.h"
 
@@ -26,17 +27,6 @@ enum { ROUNDS = 2, MOST_ROUNDS = 8, FEW = 6 };
 #define AMID 1e-13
 /* The same of nodes that are the answer's own, some of which were straightened. */
 #define NEAR 1e-5
-
-double *uz_closer_carry(const uz_mesh *mesh, const double *value, int64_t n_nodes, int stride)
-{
-    double *out = uz_alloc(mesh->n_nodes * stride, sizeof *out);
-    if (out)
-        memcpy(out, value, (size_t)(n_nodes * stride) * sizeof *out);
-    for (int64_t i = n_nodes; out && i < mesh->n_nodes; i++)
-        for (int c = 0; c < stride; c++)
-            out[i * stride + c] = uz_mesh_value_amid(mesh, i, out + c, stride);
-    return out;
-}
 
 /* Of edges that face others: how much of each is covered -> covered, n_edges; 1 of all others. */
 static void look_at_pairs(double *covered, const uz_bound_body *body)
@@ -143,7 +133,7 @@ static uz_status take_mesh(uz_closer *out, int64_t n, const uz_result *result, c
     const uz_status status = uz_body_model_build(&out->model, &out->problem.scene, UZ_BODY_OUTLINE, err);
     if (status != UZ_OK)
         return status;
-    out->u = uz_closer_carry(&out->model.mesh, result->u, own->n_nodes, 2);
+    out->u = uz_carry_nodal(&out->model.mesh, result->u, own->n_nodes, 2);
     *within = *within && is_within(&out->model.mesh, own);
     straighten(&out->model.mesh, own->n_nodes);
     return out->u ? UZ_OK

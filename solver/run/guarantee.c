@@ -7,6 +7,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "run/transfer.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -367,7 +368,7 @@ static void take_better(uz_guarantee *out, const uz_guaranteed *g, double bound)
 static uz_status hold_closer(uz_guaranteed *closer, const uz_closer *mesh, const uz_result *result, uz_error *err)
 {
     double *own = press_at_nodes(result),
-           *finer = own ? uz_closer_carry(&mesh->model.mesh, own, result->n_nodes, 1) : NULL;
+           *finer = own ? uz_carry_nodal(&mesh->model.mesh, own, result->n_nodes, 1) : NULL;
     const uz_status status = hold(closer, finer, err);
     free(own);
     free(finer);
@@ -390,7 +391,7 @@ static uz_status prove_closer(uz_guarantee *out, bool *narrow, const uz_result *
         status = uz_bound_body_make(&closer.body, &mesh.model, &mesh.problem.scene, err);
     const double *own[] = {g->lift, g->cheap};
     for (int k = 0; k < 2 && status == UZ_OK && any; k++)
-        closer.carried[k] = own[k] ? uz_closer_carry(&mesh.model.mesh, own[k], g->body.model->mesh.n_nodes, 2) : NULL;
+        closer.carried[k] = own[k] ? uz_carry_nodal(&mesh.model.mesh, own[k], g->body.model->mesh.n_nodes, 2) : NULL;
     if (status == UZ_OK && any && !*closer.body.why && closer.body.n_loose > 0)
         status = hold_closer(&closer, &mesh, result, err);
     if (status == UZ_OK && any && !*closer.body.why)

@@ -61,8 +61,7 @@ typedef struct {
  * own mesh. Errors as those of meshes, and UZ_ERR_MEMORY, _CANCELLED. The caller clears *out. */
 uz_status uz_closer_make(uz_closer *out, bool *any, const uz_guaranteed *g, const uz_result *result, uz_error *err);
 void uz_closer_clear(uz_closer *closer);
-/* What is by nodes, n_nodes x stride, at those of a mesh that is refined from theirs. NULL: no memory. */
-double *uz_closer_carry(const uz_mesh *finer, const double *value, int64_t n_nodes, int stride);
+
 /* ... guaranteed intervals for the quantities, once the whole error is proved; what has none keeps its
  * estimate, and says why. UZ_ERR_MEMORY, _CANCELLED and what problems in matrices fail with. */
 uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_error *err);

@@ -170,3 +170,14 @@ uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_
     *out = state;
     return UZ_OK;
 }
+
+double *uz_carry_nodal(const uz_mesh *finer, const double *value, int64_t n_nodes, int stride)
+{
+    double *out = uz_alloc(finer->n_nodes * stride, sizeof *out);
+    if (out)
+        memcpy(out, value, (size_t)(n_nodes * stride) * sizeof *out);
+    for (int64_t i = n_nodes; out && i < finer->n_nodes; i++)
+        for (int c = 0; c < stride; c++)
+            out[i * stride + c] = uz_mesh_value_amid(finer, i, out + c, stride);
+    return out;
+}

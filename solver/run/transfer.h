@@ -18,4 +18,7 @@ uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_bo
 uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_info *there, int64_t m, bool whole,
                          uz_error *err);
 
+/* What is by nodes, n_nodes x stride, at those of a mesh that is refined from theirs. NULL: no memory. */
+double *uz_carry_nodal(const uz_mesh *finer, const double *value, int64_t n_nodes, int stride);
+
 #endif
