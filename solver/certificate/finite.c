@@ -565,9 +565,13 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
         most = fmax(most, fabs(answer->r[i]));
     for (int64_t i = 0; i < dim * model->mesh.n_nodes && status == UZ_OK; i++) {
         const double *u = answer->u + dim * (i / dim);
-        if (model->dof[i] < 0)
-            out->worst_support = fmax(out->worst_support, fabs(uz_along_dof(model, i / dim, (int)(i % dim), u) -
-                                                               answer->prescribed[-1 - model->dof[i]]));
+        const int64_t dof = model->dof[i];
+        double off = 0;
+        if (uz_mesh_hangs(&model->mesh, i / dim)) /* where those that it lies amid have it */
+            off = answer->u[i] - uz_mesh_value_amid(&model->mesh, i / dim, answer->u + i % dim, dim);
+        else if (dof < 0)
+            off = uz_along_dof(model, i / dim, (int)(i % dim), u) - answer->prescribed[-1 - dof];
+        out->worst_support = fmax(out->worst_support, fabs(off));
     }
     for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK && !out->stopped; e++) {
         out->stopped = e % ELEMENTS_BETWEEN == 0 && uz_stop_is_due(stop);

@@ -43,17 +43,19 @@ uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings 
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
                        "cells are chosen by the error of small deformation; give their numbers where kinematics are "
                        "finite");
-    if (problem->scene.refine) /* before what it asks of the accuracy */
+    const bool refines = problem->scene.refine;
+    if (refines && !uz_is_finite(problem)) /* before what it asks of the accuracy */
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
-                       "meshes are refined by the error of small deformation; give a mesh where kinematics are finite");
+                       "a mesh is refined by the error of one model, and auto may take either: ask for the kinematics "
+                       "\"finite\", or give a mesh");
     if (problem->n_quantities > 0)
         return uz_fail(err, UZ_ERR_SCENE, problem->quantities[0].asked ? "/solver/accuracy" : "/quantities",
                        "quantities are bounded by duality of small deformation; leave them out where kinematics are "
                        "finite, and compare meshes");
-    if (settings->guaranteed || settings->total_error > 0 || settings->balanced)
+    if (settings->guaranteed || (!refines && (settings->total_error > 0 || settings->balanced)))
         return uz_fail(err, UZ_ERR_SCENE, "/solver/accuracy",
-                       "where kinematics are finite no mesh is chosen by its error, which is told but not bounded: ask "
-                       "for a relative_error of the equations, and compare meshes");
+                       "where kinematics are finite the error of the mesh is told by estimate, but not bounded: leave "
+                       "guaranteed out, and ask for a relative_error of the equations, or refine the mesh");
     if (settings->stopping == UZ_STOP_PAPER)
         return uz_fail(err, UZ_ERR_SCENE, "/solver/stopping",
                        "finite kinematics end by their certificate; leave stopping out");
@@ -184,6 +186,7 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
 {
     *run = (uz_finite_run){.problem = one, .settings = *settings, .scene = one->scene, .deadline = deadline};
     run->from = path ? path->from : NULL;
+    run->near = path && !path->from ? path->near : NULL;
     run->part = path ? path->part : 1;
     const double start = uz_seconds();
     run->hooks = hooks ? *hooks : (uz_hooks){.ctx = NULL};
@@ -305,6 +308,17 @@ static bool start_at(settled *to, const uz_finite_point *from)
     return true;
 }
 
+/* run->at becomes the place that is near the answer, with supports where the whole load has them. */
+static uz_status begin_near(uz_finite_run *run, uz_error *err)
+{
+    const uz_status status = put_on(run, 1, err);
+    if (status != UZ_OK)
+        return status;
+    uz_restrict_nodal(run->v, &run->base, run->near);
+    uz_recover_nodal(run->at.u, &run->base, run->v, run->prescribed);
+    return UZ_OK;
+}
+
 /* Until the whole load is on, or no further part of it holds. Of a way that begins where another one has ended before
  * its whole load nothing is put on. */
 static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_error *err)
@@ -328,7 +342,7 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
            found->steps + found->failed < MOST_PARTS) {
         uz_part part = UZ_PART_UNSETTLED;
         const double t = fmin(1.0, found->load + step);
-        status = put_on(run, t, err);
+        status = run->near ? begin_near(run, err) : put_on(run, t, err);
         if (status == UZ_OK)
             status = uz_finite_settle(&part, run, err);
         if (status != UZ_OK)
@@ -345,8 +359,10 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
         }
         *why = part;
         *tried = t;
-        found->failed++;
-        step *= 0.5;
+        const bool near = run->near; /* then from rest, as if it were not known */
+        run->near = NULL;
+        found->failed += !near;
+        step *= near ? 1 : 0.5;
         status = go_back(run, &last, found->load, err);
         if (status == UZ_OK && found->failed == 1 && found->load == 0 && !from)
             measure_overlap(run);
@@ -432,15 +448,18 @@ static int64_t last_after(const uz_problem *problem, int64_t i)
 
 /* points: n_cases, those that later cases need. */
 static uz_status solve_case(uz_result **out, uz_finite_point **points, const uz_problem *problem, int64_t i,
-                            const uz_settings *settings, const uz_hooks *hooks, double deadline, uz_error *err)
+                            const double *near, const uz_settings *settings, const uz_hooks *hooks, double deadline,
+                            uz_error *err)
 {
     const uz_problem one = uz_problem_of_case(problem, i);
+    uz_finite_path path = {.part = 1, .near = near};
     if (problem->n_cases == 0)
-        return uz_solve_finite_load(out, &one, settings, hooks, deadline, NULL, NULL, err);
+        return uz_solve_finite_load(out, &one, settings, hooks, deadline, NULL, &path, err);
     const uz_load_case *own = &problem->cases[i];
     const int64_t before = own->after[0] ? uz_case_before(problem, i) : -1;
-    const uz_finite_path path = {own->has_part ? own->part : 1, before >= 0 ? points[before] : NULL,
-                                 last_after(problem, i) > 0 ? &points[i] : NULL};
+    path.part = own->has_part ? own->part : 1;
+    path.from = before >= 0 ? points[before] : NULL;
+    path.to = last_after(problem, i) > 0 ? &points[i] : NULL;
     const uz_status status = uz_solve_finite_load(out, &one, settings, hooks, deadline, NULL, &path, err);
     if (status != UZ_OK)
         uz_error_name_case(err, problem, i);
@@ -458,10 +477,16 @@ static uz_status solve_case(uz_result **out, uz_finite_point **points, const uz_
 uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
-    const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
-    const double deadline = uz_seconds() + settings->time_limit_s;
     (void)starts; /* where small deformation has got to says nothing of it */
     (void)cache;  /* tangents are those of one answer */
+    return uz_solve_finite_near(results, problem, settings, NULL, hooks, err);
+}
+
+uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                               double *const *near, const uz_hooks *hooks, uz_error *err)
+{
+    const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
+    const double deadline = uz_seconds() + settings->time_limit_s;
     uz_status status = uz_check_settings(settings, err);
     if (status == UZ_OK)
         status = uz_check_problem(problem, err);
@@ -477,7 +502,7 @@ uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const 
         }
         if (hooks && hooks->begins)
             hooks->begins(hooks->ctx, i);
-        status = solve_case(&results[i], points, problem, i, settings, hooks, deadline, err);
+        status = solve_case(&results[i], points, problem, i, near ? near[i] : NULL, settings, hooks, deadline, err);
     }
     for (int64_t i = 0; i < n && points; i++)
         uz_finite_point_free(points[i]);

@@ -137,7 +137,7 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
     if (status == UZ_OK)
         status = find_gaps(place, run, &own);
     run->scene.place = NULL;
-    if (status == UZ_ERR_SCENE && run->found.qps > 0) { /* the scene is good: it is the place that is not */
+    if (status == UZ_ERR_SCENE && (run->found.qps > 0 || run->near)) { /* the scene is good: the place is not */
         *fits = false;
         return UZ_OK;
     }
@@ -228,7 +228,7 @@ void uz_finite_move_supports(bool *moved, uz_finite_run *run)
     *moved = false;
     for (int64_t i = 0; i < run->n; i++) {
         const int64_t dof = model->dof[i];
-        if (dof >= 0)
+        if (dof >= 0 || dof == UZ_NO_DOF)
             continue;
         const double *u = at->u + dim * (i / dim);
         const double way = run->prescribed[-1 - dof] - uz_along_dof(model, i / dim, (int)(i % dim), u);
@@ -669,9 +669,9 @@ static bool find_way(double way[3], const uz_finite_run *run)
         const int64_t dof = model->dof[i], node = i / dim;
         const int c = (int)(i % dim);
         double sign;
-        const int axis = dof < 0 && dof != UZ_NO_DOF ? axis_of(&sign, model, node, c) : -1;
-        if (dof >= 0)
+        if (dof >= 0 || dof == UZ_NO_DOF)
             continue;
+        const int axis = axis_of(&sign, model, node, c);
         alike = axis >= 0;
         if (!alike)
             break;
@@ -737,7 +737,7 @@ static uz_status carry(bool *fits, uz_finite_run *run, uz_error *err)
         return status;
     for (int64_t i = 0; i < run->n; i++) {
         const int64_t dof = model->dof[i];
-        const bool exact = dof < 0 && !uz_node_frame(model, i / dim);
+        const bool exact = dof < 0 && dof != UZ_NO_DOF && !uz_node_frame(model, i / dim);
         run->at.u[i] = exact ? run->prescribed[-1 - dof] : run->at.u[i] + way[i % dim];
     }
     return uz_finite_place_find(fits, &run->at, run, err);

@@ -5,6 +5,10 @@
  *          -> the next grid: of a box whose cells are chosen another number of cells, from the rate at which the error
  *             was seen to fall; of a mesh that is refined its elements where the error is, bisected
  *
+ * Of finite kinematics the next grid starts from the displacement of the best one so far. Where a load is not borne on
+ * a grid that is its answer, as a finer one bears no more; where elements turn inside out, or an obstacle stands
+ * between nodes, the next grid is to tell.
+ *
  * A few elements have an estimate that may be worth nothing: the averages that it compares the stress with are hardly
  * other than the stress. On so few the sequence does not end before all of them were divided, and the energy that this
  * released left the estimate standing.
@@ -20,6 +24,7 @@
 #include "core/hooks.h"
 #include "methods/milestones.h"
 #include "post/trend.h"
+#include "run/finite.h"
 #include "run/marking.h"
 #include "run/problem.h"
 #include "run/results.h"
@@ -35,9 +40,11 @@
 
 #define ALGEBRAIC_SHARE 0.1
 
-/* A quantity without an interval, as on grids that do not see a contact, is this far off, relative: the next one is
- * finer. */
-#define NO_INTERVAL 2.0
+/* A quantity without an interval, as on grids that do not see a contact, is this far off, relative, and what is under a
+ * part of the load alone further still: the next grid is finer. */
+#define UNKNOWN 2.0
+/* Where a finer grid does not bear so much more of the load, others are not looked at. */
+#define MORE_LOAD 0.01
 
 /* Beyond these unknowns a solve takes minutes, and estimates of where it ends are worth little. */
 #define MOST_DOFS 4e6
@@ -168,6 +175,8 @@ static uz_status check(const search *g, const uz_state *const *starts, uz_error 
     uz_status status = uz_check_settings(g->settings, err);
     if (status == UZ_OK)
         status = uz_check_problem(g->problem, err);
+    if (status == UZ_OK && uz_is_finite(g->problem))
+        status = uz_check_finite_settings(g->problem, g->settings, err);
     if (status == UZ_OK && g->settings->stopping == UZ_STOP_PAPER)
         status = uz_fail(err, UZ_ERR_ARGUMENT, "", "the paper's rule bounds no error that a mesh could be chosen by");
     for (int64_t i = 0; status == UZ_OK && starts && i < g->n_cases; i++)
@@ -293,7 +302,38 @@ static seen seen_of(const search *g, const uz_summary *s)
                   .high = asked ? e->quantities[0].high : (double)INFINITY};
 }
 
-/* ---- what the estimate of a few elements is worth */
+/* ---- what answers are worth */
+
+static bool is_large(const uz_summary *s)
+{
+    return s->geometry.kind == UZ_KINEMATICS_FINITE;
+}
+
+/* Is there an answer, and one of the scene as it is asked for? */
+static bool is_answered(const uz_summary *s)
+{
+    return !uz_has_no_answer(s) && s->outcome != UZ_UNSTABLE;
+}
+
+/* Of large deformation: is the answer under a part of the load, or an obstacle in it that a finer grid may keep out? */
+static bool wants_finer(const uz_summary *s)
+{
+    return is_large(s) && (s->finite.load < 1 || s->outcome == UZ_MESH_LIMIT);
+}
+
+static double error_of(const search *g, const uz_summary *s)
+{
+    const double error = uz_asked_error(s);
+    if (is_large(s) && s->finite.load < 1)
+        return UNKNOWN + 1 - s->finite.load;
+    return g->settings->quantity_error > 0.0 ? fmin(error, UNKNOWN) : error;
+}
+
+/* What the equations are off by. */
+static double left_of(const uz_summary *s)
+{
+    return is_large(s) ? s->finite.residual : s->certificate.relative_error;
+}
 
 /* Does the next grid, of all elements divided, say that the estimate of this one was too small? */
 static bool refuted(const seen *of, const seen *finer)
@@ -302,50 +342,79 @@ static bool refuted(const seen *of, const seen *finer)
 }
 
 /* Whether an error that is small enough is still to be looked at: it is an estimate, and either there are few elements
- * and it is the first of them that is small enough, or the last one was, and was wrong. */
+ * and it is the first of them that is small enough, or the last one was, and was wrong. Without an energy, as under
+ * pressures that follow the body, it is looked at while there are few. */
 static bool is_doubted(const search *g, const answers *x, int64_t n_elements, int64_t few)
 {
     const int count = g->sequence.count;
     const bool again = count > 0 && g->best.doubted;
-    bool estimated = false, wrong = false;
+    bool estimated = false, wrong = false, finer = false;
     for (int64_t i = 0; i < g->n_cases; i++) {
         const uz_summary *s = &x->results[i]->summary;
         const seen *now = &g->seen[i * UZ_GRID_LEVELS + count];
-        if (uz_has_no_answer(s))
+        if (!is_answered(s))
             continue;
         estimated = estimated || !s->guarantee.proved;
-        wrong = wrong || (again && refuted(now - 1, now));
+        wrong = wrong || (again && (isnan(now->potential) ? n_elements < few : refuted(now - 1, now)));
+        finer = finer || wants_finer(s);
     }
-    return g->refines && x->error <= g->requested && estimated && (again ? wrong : n_elements < few);
+    return g->refines && x->error <= g->requested && (finer || (estimated && (again ? wrong : n_elements < few)));
 }
 
 /* ---- one grid */
 
-/* Solves the cases of a problem on a grid, from the best answers so far. */
-static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const uz_problem *problem,
-                             const uz_body_model *outline, uz_error *err)
+/* Of small deformation, from the pressure of the best answers so far. started: uz_seconds(). */
+static uz_status solve_small(uz_result **results, const search *g, const uz_problem *problem,
+                             const uz_settings *settings, const uz_body_model *outline, double started, uz_error *err)
 {
-    uz_settings settings = *g->settings;
-    uz_status status = UZ_OK;
-    settings.balanced = false;
-    settings.relative_error = equations_asked(g);
     uz_state **starts = uz_alloc_zero(g->n_cases, sizeof *starts);
-    if (!starts)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
+    uz_status status = starts ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
     for (int64_t i = 0; status == UZ_OK && g->best.results && i < g->n_cases; i++)
         status = uz_transfer_start(&starts[i], g->best.results[i], g->refines ? NULL : &g->best.on.box, outline, err);
     const uz_state *const *from = (const uz_state *const *)starts;
-    const double started = uz_seconds();
-    settings.time_limit_s = fmax(0.0, g->deadline - started);
-    if (status == UZ_OK && !(x->results = uz_alloc_zero(g->n_cases, sizeof(uz_result *))))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the results of %lld cases", (long long)g->n_cases);
     if (status == UZ_OK) {
-        status = uz_solve_rounds(x->results, problem, &settings, from, NULL, g->cache, g->hooks, err);
-        status = uz_settle_cases(x->results, status, problem, &settings, from, g->cache, g->hooks, started, err);
+        status = uz_solve_rounds(results, problem, settings, from, NULL, g->cache, g->hooks, err);
+        status = uz_settle_cases(results, status, problem, settings, from, g->cache, g->hooks, started, err);
     }
     for (int64_t i = 0; starts && i < g->n_cases; i++)
         uz_state_free(starts[i]);
     free(starts);
+    return status;
+}
+
+/* Of large deformation, from the displacements of the best answers so far. */
+static uz_status solve_large(uz_result **results, const search *g, const uz_problem *problem,
+                             const uz_settings *settings, const uz_mesh *mesh, uz_error *err)
+{
+    double **near = uz_alloc_zero(g->n_cases, sizeof *near);
+    bool room = near;
+    for (int64_t i = 0; room && g->best.results && i < g->n_cases; i++) {
+        const uz_result *best = g->best.results[i];
+        if (best->summary.finite.load >= 1)
+            room = (near[i] = uz_carry_nodal(mesh, best->u, best->n_nodes, mesh->dim));
+    }
+    const uz_status status = room ? uz_solve_finite_near(results, problem, settings, near, g->hooks, err)
+                                  : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
+    for (int64_t i = 0; near && i < g->n_cases; i++)
+        free(near[i]);
+    free(near);
+    return status;
+}
+
+/* Solves the cases of a problem on a grid. */
+static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const uz_problem *problem,
+                             const uz_body_model *outline, uz_error *err)
+{
+    uz_settings settings = *g->settings;
+    settings.balanced = false;
+    settings.relative_error = equations_asked(g);
+    const double started = uz_seconds();
+    settings.time_limit_s = fmax(0.0, g->deadline - started);
+    if (!(x->results = uz_alloc_zero(g->n_cases, sizeof(uz_result *))))
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the results of %lld cases", (long long)g->n_cases);
+    const uz_status status = uz_is_finite(problem)
+                                 ? solve_large(x->results, g, problem, &settings, &outline->mesh, err)
+                                 : solve_small(x->results, g, problem, &settings, outline, started, err);
     for (int64_t i = 0; status == UZ_OK && i < g->n_cases; i++) {
         const uz_summary *s = &x->results[i]->summary;
         seen *known = &g->seen[i * UZ_GRID_LEVELS + g->sequence.count];
@@ -359,14 +428,13 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const 
                         .most_released = NAN,
                         .low = -INFINITY,
                         .high = INFINITY};
-        if (uz_has_no_answer(s))
+        if (!is_answered(s))
             continue;
         if (s->evaluation)
             *known = seen_of(g, s);
-        const double error = uz_asked_error(s);
-        x->error = fmax(x->error, settings.quantity_error > 0.0 ? fmin(error, NO_INTERVAL) : error);
+        x->error = fmax(x->error, error_of(g, s));
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
-        level->certified_error = fmax(level->certified_error, s->certificate.relative_error);
+        level->certified_error = fmax(level->certified_error, left_of(s));
     }
     return status;
 }
@@ -474,8 +542,14 @@ static uz_status try_grid(search *g, grid on, uz_error *err)
                 g->stop = STOP_CANCELLED;
             else if (s->outcome == UZ_TIME_LIMIT)
                 g->stop = STOP_TIME;
-            else if (!uz_has_no_answer(s) && !(s->certificate.relative_error < g->requested) && g->stop == STOP_NOT)
+            else if (is_answered(s) && !(left_of(s) < g->requested) && g->stop == STOP_NOT)
                 g->stop = STOP_ALGEBRA;
+            if (g->stop == STOP_NOT && is_large(s) && s->finite.load < 1 && g->best.results &&
+                s->finite.load < g->best.results[i]->summary.finite.load + MORE_LOAD) {
+                g->stop = STOP_GRID;
+                snprintf(g->reason, sizeof g->reason, "the next grid bears %.3g of the load alone: %.20s",
+                         s->finite.load, uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome));
+            }
         }
         keep_better(g, &x);
         return UZ_OK;
@@ -497,8 +571,8 @@ static uz_status try_grid(search *g, grid on, uz_error *err)
 static void conclude(const search *g, uz_summary *s)
 {
     s->requested_error = g->requested;
-    if (uz_has_no_answer(s) || s->outcome == UZ_LOOSE || s->outcome == UZ_MOVING_GEOMETRY)
-        return;
+    if (!is_answered(s) || s->outcome == UZ_LOOSE || s->outcome == UZ_MOVING_GEOMETRY || wants_finer(s))
+        return; /* it has told */
     const double total = uz_asked_error(s);
     if (total <= g->requested && s->outcome == UZ_MESH_LIMIT && uz_is_unproved(s))
         return; /* a bound was asked for, and an estimate is none */
@@ -527,7 +601,7 @@ static void conclude(const search *g, uz_summary *s)
     else
         snprintf(s->message, sizeof s->message,
                  "%s. Total error about %.3g (mesh %.3g, certified %.3g), asked for %.3g.", why, total,
-                 s->discretization_error, s->certificate.relative_error, g->requested);
+                 s->discretization_error, left_of(s), g->requested);
 }
 
 /* What the grids tell of the largest pressure, of the area of a case's contact and of the largest stress. The area ends
@@ -565,7 +639,7 @@ static uz_status complete(const search *g, uz_result *result, int64_t i, uz_erro
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grids that were tried");
     *result->grids = g->sequence;
     result->summary.grids = result->grids;
-    if (result->evaluation)
+    if (result->evaluation && is_answered(&result->summary))
         tell_trends(g, result, g->seen + i * UZ_GRID_LEVELS);
     if (g->refines) { /* may be shorter than the search's list: of a grid that was tried later */
         const int64_t n = result->grids->n_bisected = g->best.on.n_bisected;

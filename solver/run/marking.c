@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "finite/mesh_error.h"
 #include "run/problem.h"
 #include "run/results.h"
 #include "scene/bisect.h"
@@ -106,8 +107,12 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
             all[e].share = fmax(all[e].share, known[e] * weight_of(results[i]));
         if (known)
             continue;
-        const double error = uz_estimate_mesh_error(eta2, NULL, body, &scene, results[i]->u);
-        done = !isnan(error);
+        const bool large = results[i]->summary.geometry.kind == UZ_KINEMATICS_FINITE;
+        double error = large ? (double)NAN : uz_estimate_mesh_error(eta2, NULL, body, &scene, results[i]->u);
+        if (large)
+            done = uz_finite_mesh_error(&error, eta2, body, results[i]->free_strain, results[i]->u, NULL) == UZ_OK;
+        else
+            done = !isnan(error);
         for (int64_t e = 0; e < n_elements; e++)
             seen += eta2[e];
         add_contact(eta2, room, body, &scene, results[i]);

@@ -1,9 +1,10 @@
 /* solve.c: where a call enters. What follows stands in the order in which control goes down (solve.h):
  *
- *     finite kinematics -> parts of a load -> contact problems on tangents, each by rounds
  *     auto, laws of finite strain -> what is given, compared with finite kinematics
  *     chosen cells -> grids -> rounds of contact rows -> blocks or one by one -> one load
- *                           -> what the answers of the rounds ask for */
+ *                           -> what the answers of the rounds ask for
+ *                           -> of finite kinematics:
+ *     finite kinematics -> parts of a load -> contact problems on tangents, each by rounds */
 #include "run/solve.h"
 
 #include "core/alloc.h"
@@ -54,9 +55,9 @@ uz_status uz_solve_given(uz_result **results, const uz_problem *problem, const u
     return status;
 }
 
-static const run_kind KINDS[] = {{uz_is_finite, uz_solve_finite},
-                                 {uz_is_weighed, uz_solve_weighed},
+static const run_kind KINDS[] = {{uz_is_weighed, uz_solve_weighed},
                                  {is_mesh_chosen, uz_solve_grid_sequence},
+                                 {uz_is_finite, uz_solve_finite},
                                  {any, uz_solve_given}};
 
 static uz_status run(uz_result **results, const uz_problem *problem, const uz_settings *settings,

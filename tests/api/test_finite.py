@@ -410,6 +410,24 @@ def test_auto_is_there_for_all_models(s):
         check(small.get("small_deformation", {"error": 0})["error"] < 0.05 and "finite" not in small, small.get("small_deformation"))
 
 
+def test_a_mesh_is_refined(s):
+    """What is asked for in any way, and all that is drawn of the mesh that was made."""
+    mesh = {"box": {"size": [4, 1], "cells": [8, 2], "element": "quad4"}, "refine": "auto"}
+    for solver, asked in (({}, 0.05), ({"accuracy": "balanced"}, 0.05), ({"accuracy": {"total": 0.08}}, 0.08), ({"accuracy": {"relative_error": 0.1}}, 0.1)):
+        name, found = answer(s, {**{"problem": {**roller(-0.5)["problem"], "mesh": mesh}}, "solver": solver}, "summary,displacements,pressure,stress,strain")
+        summary = found["summary"]
+        check(summary["outcome"] == "converged" and summary["error"]["total"] <= asked and summary["error"]["kind"] == "estimated", summary["error"])
+        ladder = summary["mesh"]["ladder"]
+        check(summary["mesh"]["refined"] and len(ladder) > 1 and ladder[-1]["elements"] == summary["mesh"]["elements"] > 16, ladder)
+        check(all(level["certified_error"] <= 0.1 * asked for level in ladder) and abs(ladder[-1]["error"] - summary["error"]["total"]) < 1e-12, ladder)
+        check(len(found["displacements"]) == len(found["stress"]) and summary["finite"]["qps"] <= 3, summary["finite"])
+        for of in ("result.vtu", "deformed.svg", "surface", "result?fields=stress_gauss,von_mises,principal"):
+            expect(s.get(f"/v1/jobs/{name}/{of}"), 200)
+    finer, coarser = (answer(s, {"problem": {**roller(-0.5)["problem"], "mesh": mesh}, "solver": {"accuracy": {"total": t}}}, "summary")[1]["summary"] for t in (0.03, 0.1))
+    true = math.sqrt(max(0, coarser["energy"]["potential"] - finer["energy"]["potential"]) / finer["energy"]["strain"])
+    check(true < 0.1, true, coarser["error"])
+
+
 def test_what_is_not_modelled_is_refused(s):
     asked = [(stacked(0, smooth=True), "/problem/contacts/0/smooth", "quad8"),
              (stacked(0, discretization="nodes"), "/problem/contacts/0/discretization", "leave discretization out"),
@@ -424,8 +442,10 @@ def test_what_is_not_modelled_is_refused(s):
              (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
              (block(supports=[{"on": "left", "ux": 0}, {"on": "top", "spring": [1, 1]}]), "/problem/supports/1/spring", "prescribe"),
              (block(mesh={"box": {"size": [1, 1], "cells": "auto"}}), "/problem/mesh/box/cells", "give their numbers"),
-             (block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "/problem/mesh/refine", "give a mesh"),
-             ({**block(), "solver": {"accuracy": {"total": 0.1}}}, "/solver/accuracy", "compare meshes"),
+             (block(kinematics="auto", mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "/problem/mesh/refine", "finite"),
+             ({**block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "solver": {"accuracy": {"total": 0.1, "guaranteed": True}}},
+              "/solver/accuracy", "leave guaranteed out"),
+             ({**block(), "solver": {"accuracy": {"total": 0.1}}}, "/solver/accuracy", "refine the mesh"),
              ({**block(), "quantities": [{"quantity": "contact.force"}]}, "/quantities", "compare meshes")]
     large = {"model": "solid", "mesh": {"box": {"size": [1, 1, 1], "cells": [20, 20, 20]}}, "supports": [{"on": "top", "ux": 0, "uy": -0.1, "uz": 0}],
              "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}}]}
