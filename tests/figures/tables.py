@@ -421,7 +421,7 @@ def peers_large(data):
 
 
 def large_solids(data):
-    """Two solids that slide under large deformation against a finer mesh and GetFEM: parts of a hundred."""
+    """Two bodies that slide under large deformation against a finer mesh and GetFEM: parts of a hundred."""
     def part(x):
         return "" if x is None else f"{100 * x:.2f} %"
 
@@ -431,7 +431,7 @@ def large_solids(data):
 
     rows = []
     for row in (data.get("large_solids") or {}).get("rows", []):
-        compared = next(one for one in row["rows"] if one["element"] == "hex20")  # the mesh of the others
+        compared = next(one for one in row["rows"] if one["element"] == row["finer"]["element"])  # the mesh of the others
         rows += [[row["scene"], f"`{one['element']}`{'' if 'force_off' in one else ', finest'}", f"{one['unknowns']:,}", one["qps"], *(part(one.get(key)) for key in ("force_off", "area_off", "pressure_off", "getfem_off")),
                   stiff(row) if one is compared else ""] for one in row["rows"]]
     return table(["scene", "element", "unknowns", "contact problems", "force", "area", "largest pressure", "force, GetFEM", "force, CalculiX"], rows) if rows else None

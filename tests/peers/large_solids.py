@@ -1,14 +1,16 @@
-"""Two solids that slide over each other by several elements under large deformation: the daemon's elements against a finer
+"""Two bodies that slide over each other by several elements under large deformation: the daemon's elements against a finer
 mesh of its own, and against GetFEM and CalculiX.
 usage: large_solids.py BUILD_DIR OUTPUT.json [ONLY=part of a name]
 
-A block is pressed on a longer one and moved along it, by four to five elements; another one is pressed on a dome, a part of
-a ball, and moved along that. Compared are the force between them, and on the dome, where no edge makes it infinite, the
-largest pressure. GetFEM (getfem_solids.py) has bricks of 27 nodes, its contact by integrals over rays (K. Poulios and
-Y. Renard), with multipliers that are linear along sides, and the load in the parts that its Newton's method needs. CalculiX
+A block is pressed on a longer one and moved along it, by four to five elements, in the plane and in space; another one is
+pressed on a dome, a part of a ball, and moved along that; and a ring is pressed on a larger one, of both a quarter.
+Compared are the force between them, and where no edge makes it infinite the largest pressure. GetFEM (getfem_solids.py) has
+cells of 9 and 27 nodes, its contact by integrals over rays (K. Poulios and Y. Renard), with multipliers that are linear
+along sides, and the load in the parts that its Newton's method needs. CalculiX, in space,
 has the coarsest mesh of hex20, of 20 nodes too, the law neo_hooke_isochoric, which it has as *HYPERELASTIC, NEO HOOKE with
 C10 = mu / 2 and D1 = 2 / K, and a penalty between surfaces, of some stiffnesses in E for the length of a side; it is held against ours of that
 mesh and law. It goes down first, then aside, in increments that it takes by itself. Ours is put on at once."""
+import itertools
 import json
 import math
 import pathlib
@@ -38,21 +40,48 @@ def dome(*t):
     return [x, t[1] * (1 - 2 + math.sqrt(4 - x * x - z * z)), z]
 
 
-# name: places of the lower and the upper body, their cells, the way of what is held, is the pressure finite, how many times
-# as fine the meshes of each element are; the last of hex20 is what the others are held against, the first that of others
-SCENES = {"block on a block": ((box((0, 0, 0), (3, 1, 1.4)), box((0.4, 1, 0.2), (1, 0.7, 1))), ((8, 3, 4), (4, 2, 3)), (1.2, -0.15, 0), False,
-                                {"hex8": (1, 2), "hex20": (1, 2), "tet10": (1,)}),
-          "block on a dome": ((dome, box((-1.25, 1, -0.7), (2, 0.5, 1.4))), ((4, 2, 4), (4, 1, 3)), (0.5, -0.06, 0.2), True,
-                             {"hex8": (1, 2, 4), "hex20": (1, 2, 3), "tet10": (1, 2)})}
+def quarter(inner, outer, middle, begin):
+    """Of a ring, from the angle `begin` in right angles on; its outer side is x1."""
+    return lambda x, y: [(inner + (outer - inner) * x) * math.cos(math.pi / 2 * (begin + y)),
+                         middle + (inner + (outer - inner) * x) * math.sin(math.pi / 2 * (begin + y))]
+
+
+def pushed(*way):
+    """The lower body is held by its side y0, the upper one's y1 is moved so, and y0 touches y1: (part, side, u)."""
+    return [(0, "y0", dict(enumerate([0] * len(way)))), (1, "y1", dict(enumerate(way)))]
+
+
+# Places of the lower and the upper body, their cells, which sides are held and how they are moved, which side of the upper
+# one touches which of the lower one, is the pressure finite, how many times as fine the meshes of each element are. The last
+# one of ELEMENT[dimensions] is what the others are held against, the first is that of other programs.
+SCENES = {"block on a block": {"places": (box((0, 0, 0), (3, 1, 1.4)), box((0.4, 1, 0.2), (1, 0.7, 1))), "cells": ((8, 3, 4), (4, 2, 3)), "held": pushed(1.2, -0.15, 0),
+                               "touch": ("y0", "y1"), "smooth": False, "meshes": {"hex8": (1, 2), "hex20": (1, 2), "tet10": (1,)}},
+          "block on a dome": {"places": (dome, box((-1.25, 1, -0.7), (2, 0.5, 1.4))), "cells": ((4, 2, 4), (4, 1, 3)), "held": pushed(0.5, -0.06, 0.2),
+                              "touch": ("y0", "y1"), "smooth": True, "meshes": {"hex8": (1, 2, 4), "hex20": (1, 2, 3), "tet10": (1, 2)}},
+          "block on a block, plane": {"places": (box((0, 0), (3, 1)), box((0.4, 1), (1, 0.7))), "cells": ((12, 4), (5, 3)), "held": pushed(0.9, -0.15),
+                                      "touch": ("y0", "y1"), "smooth": False, "meshes": {"quad4": (1, 2, 4), "quad8": (1, 2, 4)}},
+          "ring on a ring": {"places": (quarter(1.6, 2, 0, 0), quarter(0.7, 1, 3, -1)), "cells": ((2, 16), (2, 12)),
+                             "held": [(0, "y0", {1: 0}), (0, "y1", {0: 0}), (1, "y0", {0: 0}), (1, "y1", {1: -0.8})],
+                             "touch": ("x1", "x1"), "smooth": True, "meshes": {"quad4": (1, 2, 4), "quad8": (1, 2, 4)}}}
+ELEMENT = {2: "quad8", 3: "hex20"}
+PLANE_SIDES = {"x0": "left", "x1": "right", "y0": "bottom", "y1": "top"}
+
+
+def dimensions(name):
+    return len(SCENES[name]["cells"][0])
 
 
 def request(name, element, fine, law="neo_hooke"):
-    places, cells, way, *_ = SCENES[name]
-    return body((element, element), [[fine * n for n in c] for c in cells], places,
-                {"foot": [(0, "y0")], "top": [(0, "y1")], "under": [(1, "y0")], "held": [(1, "y1")]},
-                model="solid", kinematics="finite",
+    scene, dim = SCENES[name], dimensions(name)
+
+    def side(of):
+        return of if dim == 3 else PLANE_SIDES[of]
+    groups = {"under": [(1, side(scene["touch"][0]))], "top": [(0, side(scene["touch"][1]))],
+              **{f"held {k}": [(part, side(of))] for k, (part, of, _) in enumerate(scene["held"])}}
+    return body((element, element), [[fine * n for n in c] for c in scene["cells"]], scene["places"], groups,
+                model="solid" if dim == 3 else "plane_strain", kinematics="finite",
                 materials=[{"on": "all", "young": YOUNG, "poisson": POISSON, "law": law}],
-                supports=[{"on": "foot", "ux": 0, "uy": 0, "uz": 0}, {"on": "held", **dict(zip(("ux", "uy", "uz"), way))}],
+                supports=[{"on": f"held {k}", **{f"u{'xyz'[c]}": value for c, value in u.items()}} for k, (_, _, u) in enumerate(scene["held"])],
                 contacts=[{"on": "under", "with": "top"}])
 
 
@@ -65,14 +94,15 @@ def by_daemon(s, name, element, fine, law="neo_hooke"):
     if summary["outcome"] != "converged":
         sys.exit(f"{name}, {element}: {summary['outcome']}: {summary.get('message')}")
     contact = summary["contact"]
-    return {"element": element, "unknowns": summary["problem"]["d"], "force": contact["force"], "pressure": contact["max_pressure"], "area": contact["area"],
+    return {"element": element, "unknowns": summary["problem"]["d"], "force": contact["force"][:dimensions(name)], "pressure": contact["max_pressure"], "area": contact["area"],
             "qps": summary["finite"]["qps"]}
 
 
 def points(place, cells):
-    """Of each brick its 27 nodes, the first axis fastest."""
-    return [[place(*((c + k / 2) / n for c, k, n in zip((x, y, z), (i, j, k), cells))) for k in range(3) for j in range(3) for i in range(3)]
-            for z in range(cells[2]) for y in range(cells[1]) for x in range(cells[0])]
+    """Of each cell its 9 or 27 nodes, the first axis fastest."""
+    def all_of(counts):
+        return [at[::-1] for at in itertools.product(*map(range, reversed(counts)))]
+    return [[place(*((c + k / 2) / n for c, k, n in zip(cell, node, cells))) for node in all_of([3] * len(cells))] for cell in all_of(cells)]
 
 
 def limited():
@@ -81,9 +111,10 @@ def limited():
 
 
 def by_getfem(name, fine):
-    places, cells, way, *_ = SCENES[name]
-    asked = {"parts": [points(p, [fine * n for n in c]) for p, c in zip(places, cells)], "cells": [[fine * n for n in c] for c in cells],
-             "way": way, "young": YOUNG, "poisson": POISSON}
+    scene = SCENES[name]
+    cells = [[fine * n for n in c] for c in scene["cells"]]
+    asked = {"parts": [points(p, c) for p, c in zip(scene["places"], cells)], "cells": cells, "held": [[part, of, list(u.items())] for part, of, u in scene["held"]],
+             "touch": scene["touch"], "young": YOUNG, "poisson": POISSON}
     done = subprocess.run(["/usr/bin/python3", "-B", HERE / "getfem_solids.py"], input=json.dumps(asked), capture_output=True, text=True,
                           check=False, preexec_fn=limited, env={"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PATH": "/usr/bin:/bin"})
     if done.returncode < 0:  # the limit has ended it
@@ -96,8 +127,8 @@ def by_getfem(name, fine):
 def steps(name, fine, stiffness):
     """What calculix.deck makes of the scene, with its law, and the way in two steps."""
     scene = request(name, "hex20", fine)["problem"]
-    way = SCENES[name][2]
-    down, whole = ([{**one, **dict(zip(("ux", "uy", "uz"), w))} if one["on"] == "held" else one for one in scene["supports"]] for w in ((0, way[1], 0), way))
+    whole = scene["supports"]
+    down = [{key: value if key in ("on", "uy") else 0 for key, value in one.items()} for one in whole]
     texts = [calculix.deck({**scene, "supports": supports}, "surfaces", stiffness) for supports in (down, whole)]
     shear, bulk = YOUNG / 2 / (1 + POISSON), YOUNG / 3 / (1 - 2 * POISSON)
     head = texts[0].split("*STEP", 1)[0].replace(f"*ELASTIC\n{YOUNG}, {POISSON}", f"*HYPERELASTIC, NEO HOOKE\n{shear / 2:.15g}, {2 / bulk:.15g}")
@@ -121,14 +152,16 @@ def off(value, true):
 
 
 def row_of(s, name):
-    smooth, meshes = SCENES[name][3:]
-    found = [{**by_daemon(s, name, element, fine), "fine": fine} for element, times in meshes.items() for fine in times]
-    finest = next(one for one in reversed(found) if one["element"] == "hex20")
-    other = meshes["hex20"][0]
-    row = {"scene": name, "finer": finest, "getfem": by_getfem(name, other), "calculix": by_calculix(s, name, other), "rows": found}
+    smooth, meshes, element = SCENES[name]["smooth"], SCENES[name]["meshes"], ELEMENT[dimensions(name)]
+    found = [{**by_daemon(s, name, each, fine), "fine": fine} for each, times in meshes.items() for fine in times]
+    finest = next(one for one in reversed(found) if one["element"] == element)
+    other = meshes[element][0]
+    row = {"scene": name, "finer": finest, "getfem": by_getfem(name, other), "rows": found}
+    if dimensions(name) == 3:
+        row["calculix"] = by_calculix(s, name, other)
     true = row["getfem"]["force"] if row["getfem"]["load"] == 1 else None
     text = "".join(f"{x:10.5f}" for x in finest["force"])
-    print(f"{name}: {text}, pressure {finest['pressure']:.5f}; GetFEM {row['getfem']}; CalculiX {row['calculix']}", flush=True)
+    print(f"{name}: {text}, pressure {finest['pressure']:.5f}; GetFEM {row['getfem']}; CalculiX {row.get('calculix')}", flush=True)
     for one in found:
         one["getfem_off"] = off(one["force"], true) if true else None
         if one is not finest:
