@@ -189,9 +189,9 @@ without the rigid motions, whichever takes less. Nodes within `hex8` and `tet4` 
 PEERS_LARGE = """Scenes of large deformation by CalculiX, by GetFEM and by the daemon, on the same meshes of `quad8` (`make peers-large`): the force through the contact (of the cantilever, how far
 its end has gone), how many steps it takes (of the daemon, contact problems), and seconds of processor: of the daemon from request to answer, of the others of the solve alone or from deck to answer.
 Off: no answer in half a minute, or one more than a fiftieth off. The ratio is that of the quickest of the others that has an answer."""
-LARGE_SOLIDS = """Two solids under large deformation (`make peers-large-solids`): a block is pressed on a longer one and moved along it by more than its own length, another one is pressed
-on a dome and moved along that, the whole way at once. How far the force between them, as a vector, the area in contact and, where no edge makes it infinite, the largest pressure are off those of the
-finest mesh of `hex20`; and how far the force is off that of GetFEM, with bricks of 27 nodes on its coarsest, contact by integrals along rays, the way in parts; of that one also how far that of CalculiX is off ours
+LARGE_SOLIDS = """Two bodies under large deformation (`make peers-large-solids`): a block is pressed on a longer one and moved along it by about its own length, in space and in the plane,
+another one is pressed on a dome and moved along that, and a quarter of a ring on one of a larger ring, the whole way at once. How far the force between them, as a vector, the area in contact and, where no edge makes it infinite, the largest pressure are off those of the
+finest mesh of `hex20`, or `quad8`; and how far the force is off that of GetFEM, with cells of 27 nodes, or 9, on its coarsest, contact by integrals along rays, the way in parts; of solids also how far that of CalculiX is off ours
 of the same mesh and of the law that both have (`neo_hooke_isochoric`), by the stiffness of its contact, in E for the length of a side."""
 CYCLES = """Iterations of conjugate gradients to 1e-8 on boxes of equal `hex8`, clamped on one side, with the multigrid that they have without a matrix (`make bench-solids`), by cells
 along each side; aspect: how many times as long as its other sides a cell is along one axis. Grown: the most over the fewest of a row."""
@@ -264,7 +264,7 @@ def page(data, files):
     add("Decks of CalculiX", timed(tables.decks(data), data, "decks"), DECKS)
     add("Solids over one multigrid solve", timed(tables.space(data), data, "peers_space"), SPACE)
     add("Large deformation against other programs", tables.peers_large(data), PEERS_LARGE)
-    add("Solids that slide under large deformation", tables.large_solids(data), LARGE_SOLIDS)
+    add("Bodies that slide under large deformation", tables.large_solids(data), LARGE_SOLIDS)
     add("Solids without a factor", timed([*tables.cycles(data), "", *tables.shapes(data), "", *tables.runs_of_shapes(data)] if "bench_solids" in data else None, data, "bench_solids"), CYCLES, SHAPES)
     add("Predicted and actual", timed(tables.predictions(data), data, "bench_predictions"), PREDICTIONS)
     add("What the whole error costs", timed(tables.trade(data), data, "trade", "rows"), TRADE)
