@@ -110,7 +110,8 @@ typedef struct {
     double first, before; /* r_0'M^-1 r_0; the bound at the last check */
     double square;        /* r_k'M^-1 r_k */
     double lambda;        /* the bound so far, 0: there is none */
-    bool enough, hopeless;
+    double least;         /* a smaller one is not wanted */
+    bool enough, hopeless, too_small;
     const uz_hooks *hooks;
 } bounding;
 
@@ -131,7 +132,9 @@ static bool take_in(void *ctx, double along, double last, double square)
         x->enough = x->lambda > NEAR_ONE || x->lambda >= NEAR_RITZ * excluded(c, 0.0) || checked;
         x->before = c->count % CHECK_EVERY == 0 ? x->lambda : x->before;
     }
-    return !x->enough && !x->hopeless && c->count < x->most && square > 0.0 && !uz_cancelled(x->hooks);
+    /* Ritz values come down, and the bound ends near that share of the least */
+    x->too_small = x->least > 0.0 && NEAR_RITZ * excluded(c, 0.0) < x->least;
+    return !x->enough && !x->hopeless && !x->too_small && c->count < x->most && square > 0.0 && !uz_cancelled(x->hooks);
 }
 
 /* A step of so much along the direction, in pieces that threads share. */
@@ -175,9 +178,10 @@ static uz_status take_steps(bounding *x, uz_cg *cg, const uz_csc *K, uz_error *e
 /* Rounding of K's entries to single precision makes K smaller by half of FLT_EPSILON times its absolute values at most,
  * of which the norm of D^-1/2 |K| D^-1/2 is no larger than the largest row sum, 1 + that of bound_by_diagonal; twice
  * that, for what is rounded on the way: K >= A - slack M for A as steps in single precision have it. lambda_max(M^-1 D)
- * is known by a few powers, which were up to 2.3 times too small of 123 bodies. Where slack is more than ROUGH_MOST, or
- * takes more than half of the bound, steps are in double precision. */
-#define ROUGH_MOST  0.002
+ * is known by a few powers, which were up to 2.3 times too small of 123 bodies. Where slack is more than ROUGH_MOST,
+ * half of what bounds of hard bodies are, or is seen to take more than half of this one, steps are in double precision.
+ */
+#define ROUGH_MOST  0.03
 #define POWERS_MISS 3
 
 /* info->lambda: the bound, 0 where STEPS_MOST steps do not give one. most: lambda_max(M^-1 D) by find_most. */
@@ -191,9 +195,10 @@ static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, cons
                             .hooks = hooks};
     bounding x = begun;
     uz_status status = UZ_OK;
+    x.least = 2.0 * slack;
     if (cg->mg->kind->step_roughly && slack <= ROUGH_MOST)
         status = cg->mg->kind->step_roughly(cg->mg, cg->room, cg->r, take_in, &x, err);
-    if (status == UZ_OK && x.enough && x.lambda > 2.0 * slack) {
+    if (status == UZ_OK && x.enough && x.lambda > x.least) {
         info->iterations = c->count;
         info->lambda = x.lambda - slack;
         return UZ_OK;
