@@ -5,6 +5,7 @@
 #include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
+#include "linalg/pieces.h"
 
 #include <float.h>
 #include <math.h>
@@ -450,20 +451,43 @@ void uz_level_multiply_parts(double *y, const uz_level *level, const double *x, 
     multiply_all(&p);
 }
 
+/* Rests that are made at once. */
+enum { AT_ONCE = 1024 };
+/* Added and taken off again, it leaves the nearest whole number of what is smaller than 2^51. */
+#define ROUNDER 0x1.8p52
+
+static inline __attribute__((always_inline)) void find_rests(int32_t *rest, const double *whole, const float *single,
+                                                             int64_t count, double per_unit)
+{
+    for (int64_t e = 0; e < count; e++) {
+        const double value = (whole[e] - (double)single[e]) * per_unit, nearest = (value + ROUNDER) - ROUNDER;
+        rest[e] = (int32_t)(nearest < INT32_MAX ? nearest : INT32_MAX);
+    }
+}
+
+UZ_AVX2_FMA static void find_rests_wide(int32_t *rest, const double *whole, const float *single, int64_t count,
+                                        double per_unit)
+{
+    find_rests(rest, whole, single, count, per_unit);
+}
+
 /* In their own place, from the front: a rest is half as long. Rows are read as four of them. */
 static uz_rests leave_rests(double **whole, const float *single, int64_t count)
 {
-    double most = 0.0;
-    for (int64_t e = 0; e < count; e++)
-        most = fmax(most, fabs((*whole)[e]));
-    const double unit = ldexp(1.0, (most > 0.0 ? ilogb(most) : 0) - FLT_MANT_DIG - 31);
+    const double most = uz_long_max(count, *whole),
+                 unit = ldexp(1.0, (most > 0.0 ? ilogb(most) : 0) - FLT_MANT_DIG - 31);
+    const bool wide = uz_cpu_has_avx2_fma();
+    int32_t rest[AT_ONCE];
     char *to = (char *)*whole;
-    for (int64_t e = 0; e < count; e++) {
-        const double value = ((*whole)[e] - (double)single[e]) / unit;
-        const int32_t rest = (int32_t)lrint(fmin(fmax(value, -INT32_MAX), INT32_MAX));
-        memcpy(to + e * (int64_t)sizeof rest, &rest, sizeof rest);
+    for (int64_t e = 0; e < count; e += AT_ONCE) {
+        const int64_t some = count - e < AT_ONCE ? count - e : AT_ONCE;
+        if (wide)
+            find_rests_wide(rest, *whole + e, single + e, some, 1.0 / unit);
+        else
+            find_rests(rest, *whole + e, single + e, some, 1.0 / unit);
+        memcpy(to + e * (int64_t)sizeof *rest, rest, (size_t)some * sizeof *rest);
     }
-    memset(to + count * (int64_t)sizeof(int32_t), 0, 4 * sizeof(int32_t));
+    memset(to + count * (int64_t)sizeof *rest, 0, 4 * sizeof *rest);
     int32_t *rests = uz_realloc(*whole, count + 4, sizeof *rests);
     rests = rests ? rests : (int32_t *)(void *)*whole;
     *whole = NULL;
