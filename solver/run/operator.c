@@ -262,7 +262,7 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
 }
 
 /* The form that was asked for, or the one that the plan chooses once the analysis of a factor has shown its size. */
-uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, const uz_matrix_key *key,
+uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, uz_matrix_key *key,
                                  const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     uz_cost_plan *plan = &setup->plan;
@@ -292,8 +292,11 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
             plan->chosen = -1;
             int64_t n_dofs = uz_dual_form_of(m.direct)->can.contact_last ? n_b : 0;
             int64_t rows = uz_cost_is_one_to_one(m.N, n_dofs) ? 0 : m.N->rows;
-            status = uz_shared_factor_get(&setup->shared, cache, key, m.K, dofs, n_dofs, rows, settings->ordering,
-                                          accept_factor, &m, hooks, err);
+            if (cache && !key->values[0]) /* of a scene; it reads all of K */
+                status = uz_matrix_digest(key, cache, m.K, err);
+            if (status == UZ_OK)
+                status = uz_shared_factor_get(&setup->shared, cache, key, m.K, dofs, n_dofs, rows, settings->ordering,
+                                              accept_factor, &m, hooks, err);
             done = status != UZ_ERR_LIMIT || is_chosen(plan, m.direct);
             if (!done)
                 status = UZ_OK; /* the plan speaks for another form now, or for none */
@@ -308,10 +311,9 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
             status = precondition(&m, &regretted, err);
             done = !regretted;
             m.asked = regretted ? m.direct : m.asked;
-            if (regretted && m.size.by_cells > 0.0) { /* K is there now, and nobody has its digest */
+            if (regretted && m.size.by_cells > 0.0) { /* K is there now */
                 m.size = uz_cost_size_of(m.K, m.N, &setup->model, &problem->scene, n_b, problem->n_cases, settings);
                 no_factor = limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit;
-                cache = NULL;
             }
         } else {
             m.direct = plan->form[plan->chosen].op;

@@ -37,8 +37,8 @@ typedef struct uz_setup {
 } uz_setup;
 
 /* SHA-256, hex: of everything a setup is made from, the asked operator, ordering and memory limit included, and of
- * what the choice of its rows follows from; of K, for matrices (a scene's K has to be assembled first). cache (or
- * NULL): may have a name for it. */
+ * what the choice of its rows follows from; of K, for matrices (a scene's is found when a factor is looked for). cache
+ * (or NULL): may have a name for it. */
 typedef struct {
     char digest[65];
     uz_matrix_key K;
@@ -54,9 +54,9 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
 uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *problem, const uz_candidates *wanted,
                         const uz_settings *settings, const uz_hooks *hooks, uz_error *err);
 /* What follows uz_setup_create: the form of the operator by predicted cost and memory, and what it needs; with a cache
- * the factor and its analysis are found or kept there. key: of K; read only where there is a cache. UZ_ERR_LIMIT with
- * the predicted bytes where no form fits. */
-uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, const uz_matrix_key *key,
+ * the factor and its analysis are found or kept there. key: of K, or empty: then filled where a factor is looked for in
+ * a cache. UZ_ERR_LIMIT with the predicted bytes where no form fits. */
+uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, uz_matrix_key *key,
                                  const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 /* The same on the factor or the multigrid of setup->base. */
 uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, const uz_settings *settings,

@@ -53,8 +53,6 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
     }
     uz_setup *made;
     status = uz_setup_create(&made, problem, wanted, settings, err);
-    if (status == UZ_OK && cache && made->is_scene && !made->model.brick) /* which has no factor */
-        status = uz_matrix_digest(&key.K, cache, uz_setup_K(made, problem), err);
     if (status == UZ_OK)
         status = uz_setup_make_operator(made, problem, &key.K, settings, cache, hooks, err);
     if (status != UZ_OK) {
