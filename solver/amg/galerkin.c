@@ -217,11 +217,13 @@ static inline __attribute__((always_inline)) void add_node(const product *x, int
     for (int64_t e = x->below->ptr[i]; e < x->below->ptr[i + 1]; e++)
         add_product(x, A->off + x->below->at[e] * square, true, x->below->node[e], b, k);
     for (int64_t e = begin; e < end; e++) { /* coarse += (rows of P)' rows of A P */
-        const int32_t a = level->block[e];
+        const int32_t a = level->block[e], *idx = x->coarse->idx;
         const float *P = level->value + e * b * k;
+        int64_t at = x->coarse->ptr[a];
         for (int64_t s = 0; s < count && column[s] <= a; s++) {
-            double *to = column[s] == a ? x->coarse->diag + (int64_t)a * k * k
-                                        : x->coarse->off + uz_blocks_find(x->coarse, a, column[s]) * k * k;
+            while (column[s] < a && idx[at] < column[s]) /* both ascend, and it is there */
+                at++;
+            double *to = column[s] == a ? x->coarse->diag + (int64_t)a * k * k : x->coarse->off + at * k * k;
             add_block(to, P, x->row + s * b * width_of(k), b, k);
         }
     }
