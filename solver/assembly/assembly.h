@@ -239,8 +239,9 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
 /* Do supports move the body: is a prescribed value (n_fixed; NULL: none) not zero? Then ||u||_K over the free dofs
  * alone is not the norm of the deformation. */
 bool uz_is_moved(const uz_body_model *model, const double *prescribed);
-/* Is a load of the scene not zero, so that a body which is carried is deformed as well? */
-bool uz_is_loaded(const uz_scene *scene);
+/* Do loads of the scene act on free dofs, so that a body which is carried is deformed as well? Also where there is no
+ * memory to tell. */
+bool uz_is_loaded(const uz_body_model *model, const uz_scene *scene);
 /* May rows h - N u press on a body that is carried to u (d)? One closes, or nears it more than what rounding of so long
  * a way hides. Also where there is no memory to tell. */
 bool uz_may_press(const uz_csc *N, const double *h, const double *u);

@@ -9,6 +9,7 @@
 
 #include "assembly/nodal_strains.h"
 #include "assembly/stress_lanes.h"
+#include "core/vector3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -119,8 +120,50 @@ uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model
 /* Strain that makes stress, in parts of the whole, that is not told from rounding and what the equations left. */
 #define FREE 1e-7
 
-/* What solves leave of a translation, in parts of it. */
+/* What solves leave of the way of a body that is only carried along, in parts of it. */
 #define CARRIED 1e-12
+
+/* Are the strains of each element no more than that part of the way of its nodes, over its least extent? So it is of a
+ * body that is only rotated. Of rings the way is that along the axis, as the other one strains them. */
+static bool is_carried(const uz_body_model *model, const double *nodal)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const int dim = mesh->dim, ring = model->kind == UZ_AXISYMMETRIC;
+    bool carried = true;
+    for (int64_t e = 0; e < mesh->n_elements && carried; e++) {
+        const int corners = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
+        double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], way = 0, least = INFINITY;
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        uz_element element;
+        uz_body_element(&element, xyz, model, e);
+        for (int i = 0; i < count * dim; i++) {
+            u[i] = nodal[node[i / dim] * dim + i % dim];
+            way = i % dim >= ring ? fmax(way, fabs(u[i])) : way;
+        }
+        for (int a = 0; a < corners; a++)
+            for (int b = 0; b < a; b++)
+                least = fmin(least, uz_distance2(xyz + a * dim, xyz + b * dim, dim));
+        const double strain = CARRIED * way / sqrt(least);
+        carried = 2 * uz_element_strain_energy(&element, u) <=
+                  uz_most_stiffness(element.lame) * uz_element_volume(&element) * strain * strain;
+    }
+    return carried;
+}
+
+/* But for a part of its way. It strains nothing, unless along the radius of rings: what its strains come to is
+ * rounding. */
+static bool is_translation(const uz_body_model *model, const double *nodal, double part)
+{
+    const int dim = model->mesh.dim;
+    double way = 0;
+    for (int c = 0; c < dim; c++)
+        way = fmax(way, fabs(nodal[c]));
+    bool so = model->kind != UZ_AXISYMMETRIC || fabs(nodal[0]) <= part * way;
+    for (int64_t i = dim; i < model->mesh.n_nodes * dim && so; i++)
+        so = fabs(nodal[i] - nodal[i % dim]) <= part * way;
+    return so;
+}
 
 double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
                               const double *nodal)
@@ -132,16 +175,10 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
         memset(eta2, 0, (size_t)model->mesh.n_elements * sizeof *eta2);
     if (scene && uz_free_strains(&free_strain, model, scene, NULL) != UZ_OK)
         return NAN;
-    /* A translation strains nothing, unless along the radius of rings: what its strains come to is rounding. */
-    const int dim = model->mesh.dim;
-    double way = 0;
-    for (int c = 0; c < dim; c++)
-        way = fmax(way, fabs(nodal[c]));
-    const double rounding = scene && !uz_is_loaded(scene) ? CARRIED * way : 0; /* what loads deform may be less */
-    bool is_translation = !free_strain && (model->kind != UZ_AXISYMMETRIC || fabs(nodal[0]) <= rounding);
-    for (int64_t i = dim; i < model->mesh.n_nodes * dim && is_translation; i++)
-        is_translation = fabs(nodal[i] - nodal[i % dim]) <= rounding;
-    if (is_translation)
+    const bool alone = scene && model->m == 0; /* what presses on a body may be less than solves leave, as loads may */
+    if (!free_strain && (is_translation(model, nodal, 0) ||
+                         (scene && (is_translation(model, nodal, CARRIED) || (alone && is_carried(model, nodal))) &&
+                          !uz_is_loaded(model, scene))))
         return 0;
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
     uz_stress_sums sums = {.eta2_of = eta2};

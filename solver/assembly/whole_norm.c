@@ -15,7 +15,7 @@ bool uz_is_moved(const uz_body_model *model, const double *prescribed)
     return moved;
 }
 
-bool uz_is_loaded(const uz_scene *scene)
+bool uz_is_loaded(const uz_body_model *model, const uz_scene *scene)
 {
     bool loaded = false;
     for (int64_t i = 0; i < scene->n_loads && !loaded; i++) {
@@ -24,6 +24,16 @@ bool uz_is_loaded(const uz_scene *scene)
         for (int c = 0; c < 3; c++)
             loaded = loaded || load->v[c] != 0 || load->moment[c] != 0;
     }
+    double *f = loaded ? uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *f) : NULL,
+           *p = f ? uz_alloc_zero(model->d, sizeof *p) : NULL;
+    if (p && uz_nodal_loads(f, model, scene, NULL) == UZ_OK) {
+        uz_gather_nodal(p, model, f);
+        loaded = false;
+        for (int64_t j = 0; j < model->d && !loaded; j++)
+            loaded = p[j] != 0;
+    }
+    free(f);
+    free(p);
     return loaded;
 }
 

@@ -65,7 +65,7 @@ uz_status uz_run_load(uz_run *run, uz_error *err)
         load->prescribed = h + run->all;
         status = uz_body_model_load(load->owned, h, load->prescribed, &setup->model, &scene, err);
         load->moved = status == UZ_OK && uz_is_moved(&setup->model, load->prescribed);
-        load->loaded = uz_is_loaded(&scene);
+        load->loaded = load->moved && status == UZ_OK && uz_is_loaded(&setup->model, &scene);
         if (status == UZ_OK && setup->rows.in) {
             uz_candidates_gather(load->prescribed + n_fixed, h, &setup->rows);
             load->h = load->prescribed + n_fixed;

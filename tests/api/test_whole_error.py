@@ -97,6 +97,19 @@ def test_a_pressure_at_a_corner_has_no_limit(s):
     check(line["result"] == "uncertain" and "unbounded" in line["reason"], line)
 
 
+def test_a_body_that_is_only_carried_loses_nothing(s):
+    """Nor where a load acts on what supports hold, and deforms nothing: that ended as precision_limit."""
+    for solid in (False, True):
+        way = {"rotation": {"about": [3, 5, 1], "axis": [1, 2, 3], "angle": 1}} if solid else {"rotation": {"about": [3, 5], "angle": 1}}
+        for moved in ({"ux": 1, "uy": 2, **({"uz": 3} if solid else {})}, way):
+            for loads in ([], [{"on": "left", "force": [1, 2, 3][:3 if solid else 2]}]):
+                box = {"size": [2, 1, 1], "cells": [3, 2, 2]} if solid else {"size": [2, 1], "cells": [4, 2]}
+                summary = solved(s, {"problem": {
+                    "kind": "scene", "model": "solid" if solid else "plane_strain", "mesh": {"box": box}, "kinematics": "fixed",
+                    "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "left", **moved}], "loads": loads}})["summary"]
+                check(summary["outcome"] == "converged" and summary["error"]["mesh"] == 0 and not summary["warnings"], (moved, loads, summary))
+
+
 def test_mistakes_in_what_is_asked_name_what_is_there(s):
     for accuracy, there in (({"quantity": "contact.force", "on": "upper"}, 'no contact is on "upper"; there is "top"'),
                             ({"quantity": "reaction", "on": "top", "direction": [0, 1]}, 'no support is on "top"; there is "bottom", "left"')):
