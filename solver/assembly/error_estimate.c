@@ -20,6 +20,8 @@
 #define HIDDEN (16. / 9)
 /* A tetrahedron alone at its nodes differs from no mean. */
 #define LEAST_LEFT 0.25
+/* ... but for what volumes by two rules differ in, of elements with bent edges. */
+#define ALONE 1e-2
 
 typedef struct {
     const uz_body_model *model;
@@ -57,7 +59,8 @@ static void take_own_part(uz_lanes *times, const uz_strain_group *group, const i
         double left = 0;
         for (int a = 0; a < group->rule.nodes; a++)
             left += 1 - fmin(1, volume[l] / nodal->rows[place[l][a] * nodal->size + nodal->strains]);
-        (*times)[l] /= fmax(LEAST_LEFT, left / group->rule.nodes);
+        if (left > ALONE * group->rule.nodes) /* else it is compared with none of its own (nodal_strains.c) */
+            (*times)[l] /= fmax(LEAST_LEFT, left / group->rule.nodes);
     }
 }
 

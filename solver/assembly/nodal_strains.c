@@ -24,9 +24,47 @@ typedef struct {
     double share[UZ_ELEMENT_KINDS][UZ_ELEMENT_NODES][UZ_ELEMENT_SAMPLES];
 } recovery;
 
+/* The constants that strains and stresses depend on, and whose. */
+typedef struct {
+    double constant[4];
+    int32_t material;
+} constants;
+
+static int by_constants(const void *a, const void *b)
+{
+    const constants *x = a, *y = b;
+    for (int i = 0; i < 4; i++)
+        if (x->constant[i] != y->constant[i])
+            return x->constant[i] < y->constant[i] ? -1 : 1;
+    return x->material < y->material ? -1 : 1;
+}
+
+/* alike (n_materials): the first material of the same constants, as what it is called makes no strain jump; one with
+ * directions is like no other. */
+static bool find_alike(int32_t *alike, const uz_body_model *model)
+{
+    const int64_t n = model->n_materials;
+    constants *list = uz_alloc(n, sizeof *list);
+    for (int64_t k = 0; k < n && list; k++) {
+        const uz_body_material *m = &model->materials[k];
+        const bool own = m->lame.general;
+        list[k] = (constants){{own ? -1 : m->lame.lambda, own ? (double)k : m->lame.mu, m->expansion, (double)m->law},
+                              (int32_t)k};
+    }
+    if (list)
+        qsort(list, (size_t)n, sizeof *list, by_constants);
+    for (int64_t k = 0; k < n && list; k++) {
+        const bool same = k > 0 && memcmp(list[k].constant, list[k - 1].constant, sizeof list->constant) == 0;
+        alike[list[k].material] = same ? alike[list[k - 1].material] : list[k].material;
+    }
+    free(list);
+    return list != NULL;
+}
+
 /* Numbers the pairs of node and material. next: of each pair the one before at its node; head: the last pair of a node,
- * -1: none. */
-static void number_places(uz_nodal_strains *out, const uz_body_model *model, int64_t *head, int64_t *next)
+ * -1: none. alike: as of find_alike. */
+static void number_places(uz_nodal_strains *out, const uz_body_model *model, const int32_t *alike, int64_t *head,
+                          int64_t *next)
 {
     const uz_mesh *mesh = &model->mesh;
     out->count = 0;
@@ -35,12 +73,13 @@ static void number_places(uz_nodal_strains *out, const uz_body_model *model, int
     for (int64_t e = 0; e < mesh->n_elements; e++)
         for (int64_t i = mesh->first[e]; i < mesh->first[e + 1]; i++) {
             const int64_t node = mesh->node[i];
+            const int32_t material = alike[model->material_of[e]];
             int64_t at = head[node];
-            while (at >= 0 && out->material[at] != model->material_of[e])
+            while (at >= 0 && out->material[at] != material)
                 at = next[at];
             if (at < 0) {
                 at = out->count++;
-                out->material[at] = model->material_of[e];
+                out->material[at] = material;
                 out->node[at] = node;
                 next[at] = head[node];
                 head[node] = at;
@@ -98,6 +137,36 @@ static void follow(uz_nodal_strains *out, const uz_mesh *mesh, const int64_t *he
     }
 }
 
+/* A triangle, tetrahedron or wedge that is alone at its nodes, with its material, differs from no mean: nothing shows
+ * what it errs by. It is compared with what an element of one degree less has: quadratic ones with the mean of their
+ * strain, linear ones with none. (Quadrilaterals and hexahedra have products of coordinates that no mean takes over.)
+ * seen: room of one for each place. */
+static void lower_alone(uz_nodal_strains *out, unsigned char *seen, const uz_body_model *model,
+                        const double *free_strain)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const int64_t *const of = out->of ? out->of : mesh->node, total = mesh->first[mesh->n_elements];
+    for (int64_t i = 0; i < total; i++)
+        seen[of[i]] = seen[of[i]] ? 2 : 1;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        const int64_t *place = of + mesh->first[e];
+        double mean[UZ_ELEMENT_STRESSES] = {0};
+        bool alone = (1 << type->dim) != type->corners;
+        for (int a = 0; a < type->nodes && alone; a++)
+            alone = seen[place[a]] == 1;
+        if (!alone)
+            continue;
+        if (type->nodes == type->corners && free_strain)
+            uz_thermal_strain(mean, model->kind, uz_element_material(model, e)->lame, free_strain[e]);
+        for (int a = 0; a < type->corners && type->nodes > type->corners; a++)
+            for (int c = 0; c < out->strains; c++)
+                mean[c] += out->rows[place[a] * out->size + c] / type->corners;
+        for (int a = 0; a < type->nodes; a++)
+            memcpy(out->rows + place[a] * out->size, mean, (size_t)out->strains * sizeof *mean);
+    }
+}
+
 uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source *from, uz_continuation how,
                                    const uz_hooks *hooks, uz_error *err)
 {
@@ -105,6 +174,8 @@ uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source
     const uz_mesh *mesh = &model->mesh;
     const int64_t most = mesh->n_elements > 0 ? mesh->first[mesh->n_elements] : 0;
     int64_t *head = NULL, *next = NULL;
+    int32_t *alike = NULL;
+    unsigned char *seen = NULL;
     memset(out, 0, sizeof *out);
     out->count = mesh->n_nodes;
     out->strains = uz_stress_count(model->kind);
@@ -116,18 +187,22 @@ uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source
         out->material = uz_alloc(most, sizeof *out->material);
         head = uz_alloc(mesh->n_nodes, sizeof *head);
         next = uz_alloc(most, sizeof *next);
-        ok = out->of && out->node && out->material && head && next;
+        alike = uz_alloc(model->n_materials, sizeof *alike);
+        ok = out->of && out->node && out->material && head && next && alike && find_alike(alike, model);
         if (ok)
-            number_places(out, model, head, next);
+            number_places(out, model, alike, head, next);
     }
+    free(alike);
     out->rows = ok ? uz_alloc_zero(out->count * out->size, sizeof *out->rows) : NULL;
     recovery *r = out->rows ? uz_alloc(1, sizeof *r) : NULL;
-    if (!r) {
+    if (r && how == UZ_CONTINUE_LINEAR)
+        seen = uz_alloc_zero(out->count, 1);
+    if (!r || (how == UZ_CONTINUE_LINEAR && !seen)) {
         free(head);
         free(next);
-    }
-    if (!r)
+        free(r);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the strain at %lld nodes", (long long)mesh->n_nodes);
+    }
     r->out = out;
     r->model = model;
     r->how = how;
@@ -140,8 +215,11 @@ uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source
         for (int c = 0; c < out->size; c++)
             row[c] *= c == out->strains ? 1 : scale;
     }
+    if (status == UZ_OK && seen && mesh->n_elements > 0)
+        lower_alone(out, seen, model, from->free_strain);
     if (status == UZ_OK && mesh->hangs)
         follow(out, mesh, head, next);
+    free(seen);
     free(head);
     free(next);
     return status;

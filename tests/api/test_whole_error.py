@@ -10,6 +10,7 @@ import xml.etree.ElementTree
 
 import service
 from service import MATRICES, SCENE, check, expect
+from two_bodies import SOLID, brick, plate
 
 SHARED = True
 BLOCK = {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"size": [20, 40], "cells": [4, 8], "element": "quad4"}, "refine": "auto"},
@@ -95,6 +96,40 @@ def test_a_pressure_at_a_corner_has_no_limit(s):
     check(one["order"] is None and one["high"] is None and one["low"] > 0 and "no limit" in one["why"], one, summary["mesh"]["ladder"])
     line, = summary["assertions"]
     check(line["result"] == "uncertain" and "unbounded" in line["reason"], line)
+
+
+def labelled(kind, materials, young=lambda k: 1000):
+    """A clamped plate or bar under an end load; element e is of material e % materials."""
+    solid = kind in SOLID
+    nodes, elements, sides = (brick if solid else plate)(kind, [3, 1, 1] if solid else [4, 4], 0, lambda x, y, *z: (4 * x, y, *z))
+    groups = {name: {"faces" if solid else "edges": on} for name, on in sides.items()}
+    groups.update({f"m{k}": {"elements": list(range(k, len(elements), materials))} for k in range(materials)})
+    left, right, rest = ("x0", "x1", [0]) if solid else ("left", "right", [])
+    return {"problem": {"kind": "scene", "model": "solid" if solid else "plane_strain", "kinematics": "fixed",
+                        "mesh": {"nodes": nodes, "elements": {kind: elements}, "groups": groups},
+                        "materials": [{"on": f"m{k}", "young": young(k), "poisson": 0.3} for k in range(materials)],
+                        "supports": [{"on": left, "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}], "loads": [{"on": right, "traction": [0, 1, *rest]}]},
+            "quantities": [{"quantity": "strain_energy"}]}
+
+
+def test_an_element_alone_with_its_material_hides_nothing(s):
+    """Strains of elements are compared with means of their material: each with one of its own was told to lose nothing, and quantities
+    had intervals of no width."""
+    for kind in ("tri3", "tri6", "tet4", "tet10", "wedge6"):
+        count = len(labelled(kind, 1)["problem"]["mesh"]["elements"][kind])
+        one, alike, own = (solved(s, request)["summary"] for request in (
+            labelled(kind, 1), labelled(kind, count), labelled(kind, count, lambda k: 1000 + 1e-6 * k)))
+        # by another name it is the same material
+        check(abs(alike["error"]["mesh"] / one["error"]["mesh"] - 1) < 1e-9, (kind, alike["error"], one["error"]))
+        check(own["error"]["mesh"] > 0.9 * one["error"]["mesh"], (kind, own["error"], one["error"]))
+        wide, told = own["quantities"][0], one["quantities"][0]
+        check(wide["high"] - wide["low"] > 0.5 * (told["high"] - told["low"]), (kind, wide, told))
+    # nor does a body of one element
+    one = labelled("tri3", 1)
+    one["problem"]["mesh"] = {"nodes": [[0, 0], [1, 0], [0, 1]], "elements": {"tri3": [[0, 1, 2]]},
+                              "groups": {"left": {"nodes": [0, 2]}, "right": {"edges": [[0, 1]]}, "m0": {"elements": [0]}}}
+    summary = solved(s, one)["summary"]
+    check(summary["error"]["mesh"] > 0.5 and [w["code"] for w in summary["warnings"]] == ["coarse_mesh"], summary)
 
 
 def test_a_body_that_is_only_carried_loses_nothing(s):

@@ -230,9 +230,18 @@ static void look_at(plain_element *s, const plain *x, int64_t e, which_points wh
     }
 }
 
+static bool is_alike(const uz_body_material *a, const uz_body_material *b)
+{
+    return !a->lame.general && !b->lame.general && a->lame.lambda == b->lame.lambda && a->lame.mu == b->lame.mu &&
+           a->expansion == b->expansion && a->law == b->law;
+}
+
 static double *average_at(const plain *x, int64_t e, int64_t node)
 {
-    const int64_t material = x->model->material_of ? x->model->material_of[e] : 0;
+    int64_t material = x->model->material_of ? x->model->material_of[e] : 0;
+    for (int64_t k = 0; k < material; k++) /* the first of these constants */
+        if (is_alike(&x->model->materials[k], &x->model->materials[material]))
+            material = k;
     return x->average + (node * x->model->n_materials + material) * (STRESSES + 1);
 }
 
@@ -300,6 +309,31 @@ static double complementary(uz_model model, uz_lame lame, const double *stress)
     return trace * trace / (direct * (direct * lame.lambda + 2 * lame.mu)) + deviator / (2 * lame.mu);
 }
 
+/* A triangle, tetrahedron or wedge whose averages are its own, but for what volumes by two rules differ in. */
+static bool is_alone(const plain *x, const plain_element *s, int64_t e)
+{
+    const uz_element_kind kind = s->element.kind;
+    double volume = 0;
+    bool alone = kind != UZ_QUAD4 && kind != UZ_QUAD8 && kind != UZ_HEX8 && kind != UZ_HEX20;
+    for (int g = 0; g < s->points; g++)
+        volume += s->volume[g];
+    for (int a = 0; a < s->nodes; a++)
+        alone = alone && volume > (1 - 1e-2) * average_at(x, e, s->node[a])[STRESSES];
+    return alone;
+}
+
+/* Such a one of a quadratic kind is compared with the mean of its corners, a linear one with nothing. */
+static double mean_of(const plain *x, const plain_element *s, int64_t e, int c)
+{
+    const uz_element_type *type = uz_element_type_of(s->element.kind);
+    double sum = 0;
+    for (int a = 0; a < type->corners && type->corners < type->nodes; a++) {
+        const double *at = average_at(x, e, s->node[a]);
+        sum += at[c] / at[STRESSES] / type->corners;
+    }
+    return sum;
+}
+
 /* What the square of an element's part is taken for: what the averages are not of its own, and what they hide. */
 static double times_of(const plain *x, const plain_element *s, int64_t e)
 {
@@ -310,7 +344,7 @@ static double times_of(const plain *x, const plain_element *s, int64_t e)
     for (int a = 0; a < s->nodes; a++)
         others += 1 - volume / average_at(x, e, s->node[a])[STRESSES];
     return (kind == UZ_TRI6 || kind == UZ_TET10 ? 16. / 9 : 1) /
-           (kind == UZ_TET4 || kind == UZ_TET10 ? fmax(0.25, others / s->nodes) : 1);
+           ((kind == UZ_TET4 || kind == UZ_TET10) && !is_alone(x, s, e) ? fmax(0.25, others / s->nodes) : 1);
 }
 
 static void add_energies(plain *x, const plain_element *s, int64_t e)
@@ -322,7 +356,7 @@ static void add_energies(plain *x, const plain_element *s, int64_t e)
             jump[c] = -s->stress[g][c];
             for (int a = 0; a < s->nodes; a++) {
                 const double *at = average_at(x, e, s->node[a]);
-                jump[c] += s->N[g][a] * at[c] / at[STRESSES];
+                jump[c] += s->N[g][a] * (is_alone(x, s, e) ? mean_of(x, s, e, c) : at[c] / at[STRESSES]);
             }
             work += whole[c] * s->strain[g][c];
         }
