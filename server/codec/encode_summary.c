@@ -262,6 +262,12 @@ static void put_finite(text *t, const uz_finite *f)
     text_close(t, '}');
 }
 
+/* Of the body's energies, what no displacement changes. */
+static double kept_energy(const uz_summary *s)
+{
+    return s->evaluation ? s->evaluation->kept_energy : 0.0;
+}
+
 /* The energies, and how far the answer may be off. */
 static void put_certificate(text *t, const uz_summary *s, bool scene)
 {
@@ -272,8 +278,8 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
     put_named(t, "energy",
               (named[]){{"primal", isfinite(c->gap) ? c->energy_primal : (double)INFINITY},
                         {"dual", c->energy_dual},
-                        {"strain", s->evaluation ? s->evaluation->strain_energy : (double)NAN},
-                        {"potential", s->evaluation ? s->evaluation->potential_energy : (double)NAN}},
+                        {"strain", s->evaluation ? s->evaluation->strain_energy + kept_energy(s) : (double)NAN},
+                        {"potential", s->evaluation ? s->evaluation->potential_energy + kept_energy(s) : (double)NAN}},
               s->evaluation ? 4 : 2);
     text_open(t, "certificate", '{');
     put_named(t, NULL,
@@ -302,8 +308,8 @@ static void put_certificate(text *t, const uz_summary *s, bool scene)
         put_named(t, NULL,
                   (named[]){{"estimated_mesh", s->discretization_error},
                             {"bound", g->bound},
-                            {"energy_low", g->dual},
-                            {"energy_high", g->primal},
+                            {"energy_low", g->dual + kept_energy(s)},
+                            {"energy_high", g->primal + kept_energy(s)},
                             {"seconds", g->seconds}},
                   5);
         text_integer(t, "dual_unknowns", g->unknowns);

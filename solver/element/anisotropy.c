@@ -173,4 +173,5 @@ void uz_orthotropic_make(uz_anisotropy *out, uz_model model, const uz_orthotropi
         out->expansion[i] += model == UZ_PLANE_STRAIN ? out->across[i] * expansion[2] : 0;
     }
     out->warmed = n == 3 ? per * expansion[2] : 0;
+    out->kept = model == UZ_PLANE_STRAIN ? 0.5 * expansion[2] * expansion[2] / S[2][2] : 0;
 }

@@ -111,6 +111,14 @@ double uz_stress_zz(uz_model model, uz_lame lame, const double *stress, double f
     return poisson * (stress[0] + stress[1]) - young * free_strain;
 }
 
+double uz_kept_energy(uz_model model, uz_lame lame, double free_strain)
+{
+    if (model != UZ_PLANE_STRAIN)
+        return 0;
+    const double each = lame.general ? lame.general->kept : lame.mu * (1 + poisson_of(lame));
+    return each * free_strain * free_strain;
+}
+
 double uz_strain_zz(uz_model model, uz_lame lame, const double *stress, double free_strain)
 {
     if (model != UZ_PLANE_STRESS)

@@ -25,7 +25,7 @@ typedef struct {
     double expansion[6];     /* strain of a free body for a rise of temperature by 1, as of uz_thermal_strain */
     /* Across a plane model, of plane strain the stress, of plane stress the strain: across . (xx, yy, xy) of stress
      * and warmed for a rise by 1. */
-    double across[3], warmed;
+    double across[3], warmed, kept; /* kept: as of uz_kept_energy */
     double poisson; /* of the isotropic material that is as compressible, and as stiff in shear in the mean */
 } uz_anisotropy;
 
@@ -63,6 +63,10 @@ double uz_stress_work(uz_model model, uz_lame lame, const double *stress);
  * In plane strain (1 + nu) times it, for what the held third direction adds. Of a material with directions
  * `free_strain` is the rise alone. */
 void uz_thermal_strain(double *strain, uz_model model, uz_lame lame, double free_strain);
+
+/* Energy per volume of a body of plane strain that is free to grow in its plane: of what is held across it,
+ * E free_strain^2 / 2. 0 of the other models. */
+double uz_kept_energy(uz_model model, uz_lame lame, double free_strain);
 
 /* The third direct stress of a plane model: 0 in plane stress, in plane strain nu (xx + yy) - E free_strain. */
 double uz_stress_zz(uz_model model, uz_lame lame, const double *stress, double free_strain);

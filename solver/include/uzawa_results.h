@@ -239,8 +239,10 @@ typedef struct {
     double strain_energy;    /* with that of springs */
     double potential_energy; /* strain_energy less the work of the loads, over the whole body: that of the certificate
                               * leaves out what supported dofs add by themselves, and the loads' work on them */
-    double contact_area;     /* tributary area of the rows with r < 0 */
-    int64_t peak_node;       /* where max_pressure is; -1: no pressure */
+    double kept_energy;  /* in neither of both: of warmth across the plane, in plane strain, which nothing changes. Of
+                          * finite kinematics 0, and in both */
+    double contact_area; /* tributary area of the rows with r < 0 */
+    int64_t peak_node;   /* where max_pressure is; -1: no pressure */
     double peak_at[3];
     double peak_size;    /* of the side there: the root of its row's area in space, the area in the plane */
     uz_trend peak, area; /* of max_pressure and contact_area */

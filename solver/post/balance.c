@@ -303,8 +303,8 @@ static double imbalance(const balance *b)
 }
 
 /* With thermal strain e: 1/2 (strain - e)' C (strain - e) = 1/2 u'K u - u'f + 1/2 e' C e, f the thermal forces.
- * work: u'f; own: the last term. */
-static uz_status thermal_energy(double *work, double *own, const balance *b, uz_error *err)
+ * work: u'f; own: the last term; kept: of what plane strain holds across the plane. */
+static uz_status thermal_energy(double *work, double *own, double *kept, const balance *b, uz_error *err)
 {
     uz_field_body body = {.scene = b->scene};
     uz_status status = uz_field_body_init(&body, b->scene, b->model, err);
@@ -325,6 +325,7 @@ static uz_status thermal_energy(double *work, double *own, const balance *b, uz_
         uz_elastic_stress(stress, element.model, element.lame, strain);
         for (int i = 0; i < uz_stress_count(element.model); i++)
             *own += 0.5 * stress[i] * strain[i] * uz_element_volume(&element);
+        *kept += uz_kept_energy(element.model, element.lame, body.free_strain[e]) * uz_element_volume(&element);
     }
     uz_field_body_clear(&body);
     return status;
@@ -417,7 +418,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     if (status == UZ_OK)
         status = add_springs(&b, err);
     if (status == UZ_OK && !known)
-        status = thermal_energy(&expanding, &expanded, &b, err);
+        status = thermal_energy(&expanding, &expanded, &out->kept_energy, &b, err);
     if (known)
         energy = known->energy;
     else if (status == UZ_OK) /* not from the work of the forces: what they leave over works along with the body */

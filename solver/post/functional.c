@@ -471,7 +471,7 @@ static uz_status take_energy(const making *k, const double *h, const double *pre
         memcpy(k->out->gap, h, (size_t)k->model->m * sizeof *h);
     if (k->model->n_fixed > 0)
         memcpy(k->out->held, prescribed, (size_t)k->model->n_fixed * sizeof *prescribed);
-    k->out->found = k->answer->evaluation->strain_energy;
+    k->out->found = k->answer->evaluation->strain_energy + k->answer->evaluation->kept_energy;
     k->out->own = 0.5;
     k->out->times = -1;
     return status;

@@ -257,6 +257,6 @@ uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, co
     most = fmax(most, UZ_LEAST_FORCE * here->loads_size); /* of loads that hold each other supports have rounding */
     if (most > 0)
         take_greater(&out, off / most, "forces");
-    take_greater(&out, fabs(sqrt(there->strain_energy / energy) - 1), "energy");
+    take_greater(&out, fabs(sqrt((there->strain_energy + there->kept_energy) / energy) - 1), "energy");
     return out;
 }

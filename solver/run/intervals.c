@@ -694,10 +694,10 @@ static uz_status prove_one(proving *v, uz_quantity_found *out, const uz_quantity
 }
 
 /* The strain energy is the potential energy, which two energies enclose, and the work f(u) of the loads. */
-static void prove_energy(uz_quantity_found *out, const uz_guarantee *energies)
+static void prove_energy(uz_quantity_found *out, const uz_guarantee *energies, double kept)
 {
-    out->low += energies->dual;
-    out->high += energies->primal;
+    out->low += energies->dual + kept;
+    out->high += energies->primal + kept;
     out->value = (out->low + out->high) / 2;
     out->mesh = (out->high - out->low) / 2;
 }
@@ -957,7 +957,7 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
             if (status == UZ_OK && !why)
                 status = prove_one(&v, out, asked, &of, err);
             if (out->guaranteed && asked->kind == UZ_QUANTITY_STRAIN_ENERGY)
-                prove_energy(out, &result->summary.guarantee);
+                prove_energy(out, &result->summary.guarantee, e->kept_energy);
             uz_functional_clear(&of);
         }
         if (!out->guaranteed && !why && uz_stop_is_due(&g->stop)) /* whatever half a solve has said */

@@ -126,6 +126,14 @@ def test_a_warm_body_is_a_larger_one(s):
     _, flat = answer(s, warm_block("plane_strain", "neo_hooke", temperature=250), "summary,stress")
     _, cube = answer(s, warm_block("solid", "neo_hooke", temperature=250, held=[{"on": "front", "uz": 0}]), "summary,stress")
     check(all(abs(a - b) < 1e-8 for a, b in zip(flat["stress"][0], cube["stress"][0])), (flat["stress"][0], cube["stress"][0]))
+    # the energy of what is held across it is told by both kinematics; the smaller the rise the less they differ
+    for temperature in (0.1, 1):
+        told = [answer(s, warm_block(model, "linear" if how == "fixed" else "neo_hooke", temperature=temperature, kinematics=how, held=held), "summary")[1]["summary"]
+                for model, how, held in (("plane_strain", "fixed", []), ("plane_strain", "finite", []), ("solid", "fixed", [{"on": "front", "uz": 0}]),
+                                         ("plane_strain", "auto", []))]
+        energies = [one["energy"]["strain"] for one in told]
+        check(energies[0] > 0 and abs(energies[2] / energies[0] - 1) < 1e-9 and abs(energies[1] / energies[0] - 1) < 0.01 * temperature, energies)
+        check((told[3].get("small_deformation") or {"error": 0})["error"] < 0.01, told[3])
     # and auto sees that it is no small deformation
     _, auto = answer(s, warm_block("plane_strain", "neo_hooke", temperature=250, kinematics="auto"), "summary,stress")
     check(auto["summary"]["small_deformation"]["error"] > 0.05 and abs(auto["stress"][0][1] - flat["stress"][0][1]) < 1e-8, auto["summary"])
