@@ -1,5 +1,5 @@
 """Generated scenes of large deformation, held against code of its own: bodies of quad4, quad8, tri3 and hex8, bent at random, in plane
-strain, as rings and as solids, of every law, pressed on planes, circles and spheres by supports and loads, along paths too.
+strain, as rings and as solids, of every law, pressed on planes, circles and spheres by supports and loads, some of them warm or cold, along paths too.
 
 What claims to have converged must be in equilibrium: with elements and laws written once more, in quadruple precision (large/checker.c),
 forces vanish on free dofs away from the contact; on it they press, and along the obstacle there are none. No point of a fine grid in any
@@ -48,6 +48,7 @@ class Scene:
         self.tilt = 0 if ring else rng.uniform(-0.15, 0.15)
         self.steps = [round(rng.uniform(0.2, 1), 2) for _ in range(rng.randint(1, 3))] + [1] if rng.random() < 0.3 else None
         self.pull = [rng.uniform(-0.06, 0.06) for _ in range(2)] if self.element != "hex8" and not ring and rng.random() < 0.5 else None  # on its right side
+        self.warm = rng.uniform(-0.1, 0.15) if rng.random() < 0.4 else 0.0
 
     def bricks(self, rng, place):
         nx, ny, nz = rng.randint(1, 4), rng.randint(1, 3), rng.randint(1, 3)
@@ -71,10 +72,9 @@ class Scene:
         groups = {name: {"edges" if dim == 2 else "faces": on} for name, on in self.side.items()}
         mesh = {"nodes": [[float(c) for c in node] for node in self.nodes], "elements": {self.element: self.cells.tolist()}, "groups": groups}
         top = {"ux": self.aside, **({"uz": 0} if dim == 3 else {})}
-        problem = {"kind": "scene", "model": self.model, "kinematics": "finite", "mesh": mesh, "materials": [{"on": "all", "young": 1, "poisson": self.poisson, "law": self.law}],
+        problem = {"kind": "scene", "model": self.model, "kinematics": "finite", "mesh": mesh, "materials": [{"on": "all", "young": 1, "poisson": self.poisson, "law": self.law, "expansion": 0.5}],
                    "supports": [{"on": "top", **top, "uy": -self.down}], "contacts": [{"on": "bottom", "obstacle": self.obstacle()}]}
-        if self.pull:
-            problem["loads"] = [{"on": "right", "traction": self.pull}]
+        problem["loads"] = ([{"on": "right", "traction": self.pull}] if self.pull else []) + ([{"on": "all", "temperature": 2 * self.warm}] if self.warm else [])
         self.held = {key: value for support in problem["supports"] for key, value in support.items() if key in keys}
         return {"problem": problem, **({"cases": [{"name": "way", "steps": self.steps}]} if self.steps else {})}
 
@@ -86,7 +86,7 @@ class Scene:
             below, above = ({*on, *(self.middle(*side) for side in self.side[name])} for on, name in ((below, "bottom"), (above, "top")))
         held = [(n, "xyz".index(key[1]), value) for key, value in self.held.items() for n in sorted(above)]
         sides = [(a, b, self.middle(a, b) if self.element == "quad8" else -1, *self.pull) for a, b in (self.side["right"] if self.pull else ())]
-        given = [self.element, self.model, self.law, self.poisson, part, dim, len(self.nodes), len(self.cells), self.nodes, self.cells, u,
+        given = [self.element, self.model, self.law, self.poisson, part, self.warm, dim, len(self.nodes), len(self.cells), self.nodes, self.cells, u,
                  len(held), *held, len(below), sorted(below), len(sides), *sides]
         given += ["sphere", self.center, -self.radius, *([0.4] * (dim - 2)), self.radius] if self.radius else ["plane"]
         told = subprocess.run([checker], input=" ".join(text for one in given for text in texts(one)), capture_output=True, text=True, check=True).stdout
@@ -128,8 +128,9 @@ def mirrored(request, axis_in_cells):
         group.update({kind: [side[::-1] for side in sides] for kind, sides in group.items()})
     for support in problem["supports"]:
         support["ux"] = -support["ux"]
-    for load in problem.get("loads", []):
-        load["traction"][0] *= -1
+    for load in problem["loads"]:
+        if "traction" in load:
+            load["traction"][0] *= -1
     for shape in problem["contacts"][0]["obstacle"].values():
         if "center" in shape:
             shape["center"][0] *= -1

@@ -2,7 +2,8 @@
  * quadruple precision. Of the solver it has nothing: it reads a scene of generated_large.py with displacements, and
  * prints what is left over, for that program to judge.
  *
- * In:   element model law poisson part        Young's modulus is 1; part: of supports and loads
+ * In:   element model law poisson part warm   Young's modulus is 1; part: of supports and loads; warm: what a free
+ *                                             body would be longer by under the whole load
  *       dim nodes cells, places, the nodes of each cell, displacements
  *       held dofs: count, then node axis value of each
  *       nodes on the obstacle: count, then each
@@ -27,8 +28,8 @@ enum { NODES = 8, POINTS = 27, GRID = 5 };
 
 typedef struct {
     char element[16], model[16], law[32];
-    quad lambda, mu, part;
-    int dim, corners; /* of a cell: nodes at most NODES */
+    quad lambda, mu, part, size; /* size: of a free body, by its temperature */
+    int dim, corners;            /* of a cell: nodes at most NODES */
     int64_t n, cells;
     int nodes;
     double *xyz, *u; /* n x dim */
@@ -71,6 +72,7 @@ static void read_body(body *b)
         exit(2);
     const quad poisson = number();
     b->part = number();
+    b->size = 1 + b->part * number();
     b->mu = 1 / (2 * (1 + poisson));
     b->lambda = poisson / ((1 + poisson) * (1 - 2 * poisson));
     b->dim = (int)index_below(4);
@@ -215,8 +217,8 @@ static void deform(point *x, const body *b, int64_t cell, const quad at[3])
     }
 }
 
-/* First Piola-Kirchhoff stress of F, and J. */
-static quad piola(quad P[3][3], const body *b, quad F[3][3])
+/* First Piola-Kirchhoff stress of F, and J, of a body that is as it is where it is free of stress. */
+static quad piola_cold(quad P[3][3], const body *b, quad F[3][3])
 {
     quad G[3][3], trace = 0;
     const quad J = cofactors(G, F), lambda = b->lambda, mu = b->mu;
@@ -245,6 +247,18 @@ static quad piola(quad P[3][3], const body *b, quad F[3][3])
                inverse = plain ? lambda * logarithm(J) - mu : bulk * (J - 1) * J - own * trace / 3;
     for (int i = 0; i < 9; i++)
         P[i / 3][i % 3] = own * F[i / 3][i % 3] + inverse * G[i / 3][i % 3] / J;
+    return J;
+}
+
+/* A warm body is one that was larger at rest: W(F / size) on size^3 of its volume. */
+static quad piola(quad P[3][3], const body *b, quad F[3][3])
+{
+    quad own[3][3];
+    for (int i = 0; i < 9; i++)
+        own[i / 3][i % 3] = F[i / 3][i % 3] / b->size;
+    const quad J = piola_cold(P, b, own);
+    for (int i = 0; i < 9 && J > 0; i++)
+        P[i / 3][i % 3] *= b->size * b->size;
     return J;
 }
 
