@@ -261,6 +261,24 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     uz_add_stiffness(&w->tangent, ke, node, nodes);
 }
 
+/* Elastic ground, by its energy k u^2 / 2 along each axis. */
+static void add_springs(work *w)
+{
+    const uz_body_model *model = w->of->model;
+    const int dim = model->mesh.dim;
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->spring; a++) {
+        double ke[9] = {0};
+        for (int c = 0; c < dim; c++) {
+            const long double k = model->spring[dim * a + c], u = w->of->u[dim * a + c];
+            w->energy += k * u * u / 2;
+            w->small += k * u * u / 2;
+            w->force[dim * a + c] += k * u;
+            ke[c * dim + c] = (double)k;
+        }
+        uz_add_stiffness(&w->tangent, ke, &a, 1);
+    }
+}
+
 /* Pressures, where the sides are that they act on: what they do is taken off the internal forces. */
 static uz_status add_pressures(work *w, uz_error *err)
 {
@@ -504,6 +522,19 @@ double uz_finite_certificate_bytes(const uz_body_model *model, const uz_csc *K)
            24.0 * (double)model->d;
 }
 
+/* What is prescribed of the displacement of node a along its dof c, or follows from others'. */
+static double off_support(const uz_finite_answer *of, int64_t a, int c)
+{
+    const uz_body_model *model = of->model;
+    const int dim = model->mesh.dim;
+    const int64_t dof = model->dof[dim * a + c];
+    if (uz_mesh_hangs(&model->mesh, a)) /* those that it lies amid have it */
+        return of->u[dim * a + c] - uz_mesh_value_amid(&model->mesh, a, of->u + c, dim);
+    if (dof == UZ_NO_DOF)
+        return uz_is_tied(model, a) ? of->u[dim * a + c] - uz_tied_value(model, a, of->u + c, dim) : 0;
+    return dof < 0 ? uz_along_dof(model, a, c, of->u + dim * a) - of->prescribed[-1 - dof] : 0;
+}
+
 /* The factor of H, and with it the residual. */
 static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_error *err)
 {
@@ -563,20 +594,14 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
                   : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the tangent of %lld dofs", (long long)model->d);
     for (int64_t i = 0; i < model->m; i++)
         most = fmax(most, fabs(answer->r[i]));
-    for (int64_t i = 0; i < dim * model->mesh.n_nodes && status == UZ_OK; i++) {
-        const double *u = answer->u + dim * (i / dim);
-        const int64_t dof = model->dof[i];
-        double off = 0;
-        if (uz_mesh_hangs(&model->mesh, i / dim)) /* where those that it lies amid have it */
-            off = answer->u[i] - uz_mesh_value_amid(&model->mesh, i / dim, answer->u + i % dim, dim);
-        else if (dof < 0)
-            off = uz_along_dof(model, i / dim, (int)(i % dim), u) - answer->prescribed[-1 - dof];
-        out->worst_support = fmax(out->worst_support, fabs(off));
-    }
+    for (int64_t i = 0; i < dim * model->mesh.n_nodes && status == UZ_OK; i++)
+        out->worst_support = fmax(out->worst_support, fabs(off_support(answer, i / dim, (int)(i % dim))));
     for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK && !out->stopped; e++) {
         out->stopped = e % ELEMENTS_BETWEEN == 0 && uz_stop_is_due(stop);
         add_element(out, &w, e);
     }
+    if (status == UZ_OK && !out->stopped)
+        add_springs(&w);
     out->energy = (double)w.energy;
     if (status == UZ_OK && !out->stopped)
         status = add_pressures(&w, err);

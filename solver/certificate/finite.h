@@ -22,7 +22,7 @@ typedef struct {
 typedef struct {
     bool stopped;     /* before the end: nothing else is told */
     double bytes;     /* what its tangent and its factor took */
-    double energy;    /* strain energy, of the law's W */
+    double energy;    /* strain energy, of the law's W, and that of springs */
     double least_det; /* of F, at quadrature points and corners */
     /* (f' H^-1 f + 2 |r'g|)^(1/2) over the root of twice the energy: H is the second derivatives of the Lagrangian with
      * stiffness along the pressed rows, f what the forces on free dofs leave over, with what that stiffness makes of
@@ -34,7 +34,8 @@ typedef struct {
      * that the equilibrium is a strict local minimum of what the mesh can do */
     bool definite;
     double worst_reaction; /* the largest, > 0: an obstacle that pulls; relative to the largest in size */
-    double worst_support;  /* by how much a supported dof is off what is prescribed: a length */
+    double worst_support;  /* by how much a supported dof is off what is prescribed, or a tied node off what it follows:
+                            * a length */
     double least_gap;      /* of the obstacles from points on the deformed sides, a length: SAMPLES a side, and nodes */
     double least_part;     /* the same over the length of the side there, of those between nodes */
     double least_at_rows;  /* of g */

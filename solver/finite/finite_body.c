@@ -9,6 +9,27 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Elastic ground: along the axes, whatever turns; its forces are linear in displacements. */
+static void add_springs(uz_finite_measure *out, double *force, uz_body_model *tangent, const uz_body_model *model,
+                        const double *nodal)
+{
+    const int dim = model->mesh.dim;
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->spring; a++) {
+        double ke[9] = {0};
+        bool any = false;
+        for (int c = 0; c < dim; c++) {
+            const double k = model->spring[dim * a + c], u = nodal[dim * a + c];
+            out->energy += 0.5 * k * u * u;
+            if (force)
+                force[dim * a + c] += k * u;
+            ke[(dim + 1) * c] = k;
+            any = any || k > 0;
+        }
+        if (tangent && any)
+            uz_add_stiffness(tangent, ke, &a, 1);
+    }
+}
+
 void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangent, const uz_body_model *model,
                     const double *free_strain, const double *nodal, const double *step)
 {
@@ -50,6 +71,7 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
         if (tangent)
             uz_add_stiffness(tangent, ke, node, count);
     }
+    add_springs(out, force, tangent, model, nodal);
 }
 
 uz_status uz_finite_tangent_of(uz_body_model *out, const uz_body_model *model, uz_error *err)

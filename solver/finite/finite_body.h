@@ -5,12 +5,12 @@
 #include "assembly/assembly.h"
 
 typedef struct {
-    double energy;    /* strain energy */
+    double energy;    /* strain energy, that of springs included */
     double least_det; /* of F over the body, at quadrature points and corners */
     int64_t at;       /* the element that has it */
 } uz_finite_measure;
 
-/* Of the body displaced by nodal (n_nodes x dim).
+/* Of the body and its springs displaced by nodal (n_nodes x dim).
  *   free_strain  n_elements, of the temperature, each > -1; NULL: none
  *   force    n_nodes x dim, along the axes; NULL: not wanted
  *   tangent  a copy of `model` with K and K_fixed of its own, whose patterns are kept and whose values become those of

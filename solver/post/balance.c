@@ -18,7 +18,7 @@
 enum { DIM = 3, MOST_KE = UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS };
 
 typedef struct {
-    const uz_body_model *model;
+    const uz_body_model *model, *rest; /* rest: before anything moves */
     const uz_scene *scene;
     const double *u, *r;
     uz_evaluation *out;
@@ -107,7 +107,7 @@ static uz_status add_springs(balance *b, uz_error *err)
         }
         const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
         memset(share, 0, (size_t)mesh->n_nodes * sizeof *share);
-        status = group ? uz_spread_over_group(share, b->model, group, true, "/supports", err) : UZ_ERR_SCENE;
+        status = group ? uz_spread_over_group(share, b->rest, group, true, "/supports", err) : UZ_ERR_SCENE;
         for (int64_t a = 0; a < mesh->n_nodes && status == UZ_OK; a++) {
             double f[DIM] = {0};
             for (int c = 0; c < b->dim; c++)
@@ -331,13 +331,15 @@ static uz_status thermal_energy(double *work, double *own, double *kept, const b
     return status;
 }
 
-/* The forces of elements at held nodes, as they are known. */
+/* The forces of elements at held nodes, and at nodes that leave them to others, as they are known with those of
+ * springs.
+ */
 static void take_inner(balance *b, const double *inner)
 {
     for (int64_t i = 0; i < b->model->mesh.n_nodes * b->dim; i++) {
-        if (!b->held[i / b->dim])
+        if (!b->held[i / b->dim] && !leaves(b, i / b->dim))
             continue;
-        b->inner[i] = inner[i];
+        b->inner[i] = inner[i] - (b->model->spring ? b->model->spring[i] * b->u[i] : 0);
         b->size += fabs(inner[i]);
     }
 }
@@ -356,7 +358,13 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
                             const double *r, const uz_balance_known *known, uz_error *err)
 {
     const int64_t n = model->mesh.n_nodes, dim = model->mesh.dim;
-    balance b = {.model = model, .scene = scene, .u = u, .r = r, .out = out, .dim = model->mesh.dim};
+    balance b = {.model = model,
+                 .rest = known ? known->rest : model,
+                 .scene = scene,
+                 .u = u,
+                 .r = r,
+                 .out = out,
+                 .dim = model->mesh.dim};
     double *force = model->row_ends ? uz_alloc(model->m, sizeof *force) : NULL;
     double expanding = 0, expanded = 0, energy = 0, work = 0; /* work: of all loads, the thermal forces included */
     uz_status status = UZ_OK;

@@ -6,10 +6,12 @@
 #include "uzawa.h"
 
 /* What is known of a body that its stiffness at rest does not tell: forces by node (n_nodes x dim), of its elements and
- * of its loads, and its strain energy. Moments are then about places of the model's nodes where these are. */
+ * springs and of its loads, and its strain energy, with theirs. Moments are then about places of the model's nodes
+ * where these are, and springs are spread over the sides of `rest`, the body before anything moves. */
 typedef struct {
     const double *inner, *load;
     double energy;
+    const uz_body_model *rest;
 } uz_balance_known;
 
 /* Fills out->contacts, supports, loads, loads_size, imbalance and both energies; the names and zeros are there.

@@ -231,7 +231,7 @@ uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, cons
         status = sum_contact(&pressed, result, model, result->u, err);
     if (status == UZ_OK)
         status = uz_balance_forces(result->evaluation, &displaced, scene, result->u, result->r,
-                                   &(uz_balance_known){inner, load, energy}, err);
+                                   &(uz_balance_known){inner, load, energy, model}, err);
     if (status == UZ_OK)
         status = uz_measure_overlap(result->evaluation->overlap, model, scene, result->u, err);
     if (status == UZ_OK)

@@ -10,6 +10,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "run/problem.h"
 #include "run/settings.h"
 #include "run/solve.h"
@@ -29,6 +30,8 @@ enum { FEW = 4, MOST_PARTS = 200 };
  * to no less than the second. */
 #define STEP_ERROR  1e-10
 #define LEAST_ERROR 1e-12
+/* What a turn by one radian may strain tied surfaces by. */
+#define MOST_TIED 0.01
 
 bool uz_is_finite(const uz_problem *problem)
 {
@@ -130,6 +133,71 @@ static bool copy_lists(uz_scene *scene, const uz_scene *from, const uz_finite_po
     return true;
 }
 
+/* How far a slave of a tie is from where its masters' places have it. */
+static void find_offset(double off[3], const uz_body_model *base, int64_t a)
+{
+    const int dim = base->mesh.dim;
+    for (int c = 0; c < dim; c++)
+        off[c] = base->mesh.xyz[dim * a + c] - uz_tied_value(base, a, base->mesh.xyz + c, dim);
+}
+
+/* A tie has the slave's displacement from its masters', so that what lies between them stays as it was when the body
+ * turns: where it is not the same along the surface, a turn strains it. */
+static uz_status check_tie(const uz_body_model *base, const uz_group *group, int64_t tie, uz_error *err)
+{
+    const int dim = base->mesh.dim;
+    for (int64_t f = 0; f < group->n_faces; f++) {
+        int64_t node[UZ_FACE_NODES];
+        const int count = uz_mesh_face(node, &base->mesh, group->face[f]);
+        for (int a = 0; a < count; a++)
+            for (int b = 0; b < a && uz_is_tied(base, node[a]); b++) {
+                double off[2][3], square = 0;
+                char where[96];
+                if (!uz_is_tied(base, node[b]))
+                    continue;
+                find_offset(off[0], base, node[a]);
+                find_offset(off[1], base, node[b]);
+                for (int c = 0; c < dim; c++)
+                    square += (off[0][c] - off[1][c]) * (off[0][c] - off[1][c]);
+                const double strain =
+                    sqrt(square / uz_distance2(base->mesh.xyz + dim * node[a], base->mesh.xyz + dim * node[b], dim));
+                snprintf(where, sizeof where, "/ties/%lld", (long long)tie);
+                if (strain > MOST_TIED)
+                    return uz_fail(err, UZ_ERR_SCENE, where,
+                                   "the tied surfaces do not lie on each other: near node %lld turning would strain "
+                                   "them by %.2g; finite kinematics need less than %.2g: use finer meshes along the "
+                                   "tie, quad8, tri6, hex20 or tet10 where it is curved, or the kinematics \"moving\"",
+                                   (long long)node[a], strain, MOST_TIED);
+            }
+    }
+    return UZ_OK;
+}
+
+static uz_status check_ties(const uz_body_model *base, const uz_scene *scene, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; k < 2 * scene->n_ties && status == UZ_OK; k++) {
+        const uz_tie *tie = &scene->ties[k / 2];
+        const uz_group *group = uz_mesh_group(&base->mesh, k % 2 ? tie->to : tie->on, "/ties", err);
+        status = group ? check_tie(base, group, k / 2, err) : UZ_ERR_SCENE;
+    }
+    return status;
+}
+
+/* Forces of rows between bodies go over from node to node, and are known to go to nodes with dofs of their own. */
+static uz_status check_followers(const uz_body_model *base, const uz_group *group, const char *where, uz_error *err)
+{
+    for (int64_t i = 0; i < uz_group_node_count(&base->mesh, group); i++) {
+        const int64_t node = uz_group_node_at(group, i);
+        if (uz_is_tied(base, node))
+            return uz_fail(err, UZ_ERR_SCENE, where,
+                           "node %lld of \"%.63s\" follows a surface that it is tied to, and finite kinematics have no "
+                           "contact between bodies there: leave its sides out of one of them",
+                           (long long)node, group->name);
+    }
+    return UZ_OK;
+}
+
 /* What checks of the scene alone could not see. */
 static uz_status check_body(const uz_body_model *base, const uz_scene *scene, uz_error *err)
 {
@@ -150,8 +218,13 @@ static uz_status check_body(const uz_body_model *base, const uz_scene *scene, uz
             return uz_fail(err, UZ_ERR_SCENE, where,
                            "finite kinematics have no contact of a surface with itself; name two surfaces without "
                            "common sides");
+        uz_status status = check_followers(base, with, where, err);
+        snprintf(where, sizeof where, "/contacts/%lld/on", (long long)k);
+        status = status == UZ_OK ? check_followers(base, on, where, err) : status;
+        if (status != UZ_OK)
+            return status;
     }
-    return UZ_OK;
+    return check_ties(base, scene, err);
 }
 
 static uz_status begin_load(uz_finite_run *run, uz_error *err)

@@ -465,7 +465,7 @@ static void find_work(uz_finite_run *run)
 static uz_status find_part(bool *fits, uz_finite_run *run, const double *to, double part, uz_error *err)
 {
     uz_status status = UZ_OK;
-    run->turned = !run->pairs && is_more(run->norm, TURNING_STEP);
+    run->turned = !run->pairs && !run->base.spring && is_more(run->norm, TURNING_STEP);
     bool again = true;
     *fits = false;
     while (status == UZ_OK && again) {

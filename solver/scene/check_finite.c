@@ -87,19 +87,16 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                        "finite kinematics have the standard formulation only; use auto, and quad8 or tri6 for bending "
                        "and nearly incompressible bodies");
-    if (scene->n_ties > 0)
-        return uz_fail(err, UZ_ERR_SCENE, "/ties",
-                       "ties are of small deformation, and finite kinematics have none: mesh the parts as one, or use "
-                       "the kinematics \"moving\"");
+    if (scene->stabilizer > 0)
+        return uz_fail(
+            err, UZ_ERR_SCENE, "/stabilize",
+            "finite kinematics do not tell what such springs do to the answer; hold the body by supports, or "
+            "by springs of your own");
     for (int64_t i = 0; i < scene->n_supports; i++)
         if (scene->supports[i].kind == UZ_SUPPORT_RIGID)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rigid"),
                            "rigid groups are of small deformation, and finite kinematics have none: prescribe a "
                            "rotation, or use the kinematics \"moving\"");
-    for (int64_t i = 0; i < scene->n_supports; i++)
-        if (scene->supports[i].kind == UZ_SUPPORT_SPRING)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "spring"),
-                           "finite kinematics have no springs; mesh the ground, or prescribe displacements");
     for (int64_t i = 0; i < scene->n_contacts; i++) {
         const uz_status status = scene->contacts[i].kind == UZ_OBSTACLE_BODY ? check_pair(scene, i, err) : UZ_OK;
         if (status != UZ_OK)

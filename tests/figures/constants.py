@@ -98,6 +98,7 @@ PHRASES = {
     "a cantilever of 10 x 0.2 errs by 3.5 % where its end turns by 0.06.": None,  # the same
     "no row is closer than -1e-9 of the body's extent": None, "no deeper than 0.03 of the side": constant(0.03, r"#define CUTS_IN +([\d.]+)"),
     "It runs for ten minutes of processor time and in 8 GiB at most.": lambda program: all(one in (program.root / "client/request/cad.c").read_text() for one in ("MOST_SECONDS 600", "(rlim_t)8 << 30")),
+    "does not strain them by more than 0.01 per radian": constant(0.01, r"#define MOST_TIED ([\d.]+)"), "more than 0.01 for one radian is refused": None,
     "(rows leave 0.01 at most": constant(0.01, r"#define SLACK ([\d.]+)"),
     "are off the circle by 0.004, where the overlap that makes all of the stress is 0.05": None,  # of its geometry
     "Finite Element Analysis, 2nd edition, 2008": None, "Numerical Optimization, 2nd edition, 2006": None,

@@ -1,0 +1,198 @@
+"""What holds bodies of large deformation beside plain supports: springs and ties, by closed forms and by the same body made
+otherwise."""
+# not under ThreadSanitizer: about answers, not about threads
+import math
+
+import numpy
+
+import service
+from service import check, expect
+from two_bodies import PLANE, SOLID, body
+
+SHARED = True  # one service for all tests
+
+YOUNG, POISSON = 1.0, 0.3
+LAMBDA, MU = YOUNG * POISSON / (1 + POISSON) / (1 - 2 * POISSON), YOUNG / 2 / (1 + POISSON)
+LAWS = ("neo_hooke", "neo_hooke_isochoric", "st_venant_kirchhoff")
+
+
+def answer(s, request, outcome="converged", fields="summary,displacements,nodes,stress", forces=True):
+    job = s.post(request)
+    expect(job, 202)
+    ended = s.wait_status(job.json["id"], "successful", "failed")
+    check(ended["status"] == "successful", ended)
+    found = s.get(f"/v1/jobs/{job.json['id']}/result?fields={fields}").json
+    summary = found["summary"]
+    check(summary["outcome"] == outcome, summary["outcome"], summary.get("message"))
+    check((summary["resultants"]["imbalance"] < 1e-7 or not forces) and "finite" in summary, summary["resultants"])
+    return found
+
+
+def refused(s, request, pointer, word):
+    reply = s.post(request)
+    found = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", "successful")["error"]
+    check(found["pointer"] == f"/problem{pointer}" and word in found["detail"], found)
+
+
+def scene(law="neo_hooke", poisson=POISSON, **more):
+    return {"problem": {"kind": "scene", "model": "plane_strain", "kinematics": "finite",
+                        "materials": [{"on": "all", "young": YOUNG, "poisson": poisson, "law": law}], **more}}
+
+
+def nominal(law, a, b):
+    """The first Piola-Kirchhoff stress along both axes of a slice that is stretched by a and b."""
+    j, trace = a * b, a * a + b * b + 1
+    if law == "neo_hooke":
+        return [MU * (c - 1 / c) + LAMBDA * math.log(j) / c for c in (a, b)]
+    if law == "neo_hooke_isochoric":
+        return [MU * j ** (-2 / 3) * (c - trace / 3 / c) + (LAMBDA + 2 / 3 * MU) * (j - 1) * j / c for c in (a, b)]
+    strain = [(c * c - 1) / 2 for c in (a, b)]
+    return [c * (LAMBDA * sum(strain) + 2 * MU * e) for c, e in zip((a, b), strain)]
+
+
+def pull(law, a):
+    """The force of a slice of unit height that is stretched by a and free aside."""
+    low, high = 0.3, 1.5
+    for _ in range(200):
+        middle = (low + high) / 2
+        low, high = (low, middle) if nominal(law, a, middle)[1] > 0 else (middle, high)
+    return nominal(law, a, low)[0]
+
+
+# ---- springs
+
+def test_a_bar_on_a_spring_is_stretched_by_half(s):
+    """One end moves, the other one is held by a spring: the closed form of each law, as it is, mirrored and upright."""
+    for law in LAWS:
+        force, stiff = pull(law, 1.5), 0.7
+        way = 2 * 0.5 + force / stiff  # of the bar, two long, and of the spring
+        for sign, upright in ((1, False), (-1, False), (1, True)):
+            box = {"size": [1, 2] if upright else [2, 1], "cells": [2, 3] if upright else [3, 2], "element": "quad8"}
+            axis, ends = ("y", ("bottom", "top")) if upright else ("x", ("left", "right") if sign > 0 else ("right", "left"))
+            aside = {"on": "left", "ux": 0} if upright else {"on": "bottom", "uy": 0}
+            spring = [0, stiff] if upright else [stiff, 0]
+            found = answer(s, scene(law, mesh={"box": box}, supports=[{"on": ends[0], f"u{axis}": -sign * way}, {"on": ends[1], "spring": spring}, aside]))
+            c, summary = "xy".index(axis), found["summary"]
+            at = [u[c] for x, u in zip(found["nodes"], found["displacements"]) if abs(x[c] - (2 if sign > 0 else 0)) < 1e-9]
+            check(all(abs(u + sign * force / stiff) < 1e-7 for u in at), law, at, force / stiff)
+            held, springs = (one["force"][c] for one in summary["resultants"]["supports"][:2])
+            check(abs(springs - sign * force) < 1e-7 and abs(held + sign * force) < 1e-7, law, held, springs, force)
+            check(summary["finite"]["qps"] <= 8 and summary["error"]["mesh"] < 1e-6, summary["finite"])
+            check(abs(summary["energy"]["potential"] - summary["energy"]["strain"]) < 1e-12, summary["energy"])  # no loads
+            moved = answer(s, scene(law, mesh={"box": box}, supports=[{"on": ends[0], f"u{axis}": -sign * (way - force / stiff)}, {"on": ends[1], f"u{axis}": 0}, aside]))
+            stored = summary["energy"]["strain"] - moved["summary"]["energy"]["strain"]
+            check(abs(stored - force ** 2 / 2 / stiff) < 1e-8, law, stored)  # the spring's own
+
+
+def test_a_beam_on_elastic_ground_turns(s):
+    """Its force on the ground is linear in displacements, whatever turns: a cantilever that bends by more than half its length against ground
+    that is held against finer meshes, and balances."""
+    def bent(cells, kinds="quad8", mirrored=False):
+        sign = -1 if mirrored else 1
+        return answer(s, scene("st_venant_kirchhoff", 0, mesh={"box": {"size": [10, 0.5], "cells": cells, "element": kinds}},
+                               loads=[{"on": "right", "traction": [0, -4e-3 * sign]}],
+                               supports=[{"on": "left", "ux": 0, "uy": 0}, {"on": "top" if mirrored else "bottom", "spring": [0, 1e-3]}]))
+    coarse, fine, mirror = bent([20, 1]), bent([40, 2]), bent([20, 1], mirrored=True)
+    tip = [min(u[1] for u in one["displacements"]) for one in (coarse, fine)]
+    check(tip[0] < -2 and abs(tip[0] / tip[1] - 1) < 2e-3, tip)
+    check(abs(max(u[1] for u in mirror["displacements"]) + tip[0]) < 1e-7, tip)
+    ground = [one["summary"]["resultants"]["supports"][1]["force"][1] for one in (coarse, mirror)]
+    check(ground[0] > 0 and abs(ground[0] + ground[1]) < 1e-9, ground)
+
+
+def test_auto_takes_large_deformation_on_springs(s):
+    request = scene("neo_hooke", kinematics="auto", mesh={"box": {"size": [2, 1], "cells": [3, 2], "element": "quad8"}},
+                    supports=[{"on": "left", "ux": -1 - pull("neo_hooke", 1.5) / 0.7}, {"on": "right", "spring": [0.7, 0]}, {"on": "bottom", "uy": 0}])
+    found = answer(s, request)
+    check(found["summary"]["small_deformation"]["error"] > 0.05, found["summary"]["small_deformation"])
+    check(abs(found["summary"]["resultants"]["supports"][1]["force"][0] - pull("neo_hooke", 1.5)) < 1e-7, found["summary"]["resultants"])
+
+
+def test_solids_and_rings_have_springs(s):
+    """A cube and a disc that are pulled along an axis on springs: nothing is held but for symmetry."""
+    stiff, load = 0.5, 0.4
+    cube = answer(s, scene(model="solid", mesh={"box": {"size": [1, 1, 1], "cells": [2, 2, 2]}}, loads=[{"on": "top", "traction": [0, load, 0]}],
+                           supports=[{"on": "left", "ux": 0}, {"on": "back", "uz": 0}, {"on": "bottom", "spring": [0, stiff, 0]}]))
+    disc = answer(s, scene(model="axisymmetric", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}, loads=[{"on": "top", "traction": [0, load]}],
+                           supports=[{"on": "bottom", "spring": [0, math.pi * stiff]}]))
+    for one in (cube, disc):
+        bottom = [u[1] for x, u in zip(one["nodes"], one["displacements"]) if x[1] == 0]
+        check(all(abs(u - load / stiff) < 1e-7 for u in bottom), bottom)
+    check(all(abs(a[1] - b[1]) < 1e-7 for a, b in zip(cube["stress"], disc["stress"])), cube["stress"][0], disc["stress"][0])
+
+
+# ---- ties
+
+def stacked(kinds, cells=None, lean=0.0, size=1.0, **more):
+    """A unit body on another one, neither mesh a part of the other; the surface between them may lean."""
+    solid = kinds[0] in SOLID
+    sides = {"foot": [(0, "z0" if solid else "bottom")], "roof": [(0, "z1" if solid else "top")],
+             "floor": [(1, "z0" if solid else "bottom")], "head": [(1, "z1" if solid else "top")],
+             "left": [(k, "x0" if solid else "left") for k in (0, 1)], "right": [(k, "x1" if solid else "right") for k in (0, 1)]}
+    if solid:
+        sides["side"] = [(0, "y0"), (1, "y0")]
+        places = [lambda x, y, z: (x, y, z * (1 + lean * x)), lambda x, y, z: (x, y, 1 + lean * x + z * (1 - lean * x))]
+        cells = cells or [(2, 2, 2), (3, 3, 2)]
+    else:
+        places = [lambda x, y: (size * x, y * (1 + lean * x)), lambda x, y: (size * x, 1 + lean * x + y * (1 - lean * x))]
+        cells = cells or [(2, 2), (3, 2)]
+    request = scene(model="solid" if solid else "plane_strain", ties=[{"on": "roof", "to": "floor"}], **more)["problem"]
+    del request["kind"]
+    return body(kinds, cells, places, sides, **request)
+
+
+def test_tied_bodies_are_stretched_as_one(s):
+    """A uniform state is exact on any two meshes."""
+    for kinds in [[a, b] for a in PLANE for b in PLANE] + [["hex8", "hex8"], ["hex20", "hex8"], ["tet10", "hex20"]]:
+        solid = kinds[0] in SOLID
+        up = "uz" if solid else "uy"
+        supports = [{"on": "foot", up: 0}, {"on": "head", up: 1.0}, {"on": "left", "ux": 0}] + ([{"on": "side", "uy": 0}] if solid else [])
+        found = answer(s, stacked(kinds, lean=0.2, supports=supports))
+        stress = numpy.array(found["stress"])
+        check(numpy.abs(stress - stress[0]).max() < 1e-7 and stress[0].max() > 0.3, kinds, stress[0])
+        if not solid:
+            check(abs(found["summary"]["resultants"]["supports"][1]["force"][1] - pull("neo_hooke", 1.5)) < 1e-7, kinds)
+
+
+def test_tied_bodies_turn_as_one(s):
+    """Bent by a dead load, and turned as a whole by a support: as the same mesh without a tie."""
+    places = {name: [] for name in ("tied", "one")}
+    for kind in ("quad4", "quad8"):
+        for name, build in places.items():
+            cells = [(4, 2), (4, 2)]
+            request = stacked([kind, kind], cells, supports=[{"on": "foot", "ux": 0, "uy": 0}], loads=[{"on": "head", "traction": [0.03, 0.01]}])
+            if name == "one":
+                request = scene(mesh={"box": {"size": [1, 2], "cells": [4, 4], "element": kind}}, supports=[{"on": "bottom", "ux": 0, "uy": 0}],
+                                loads=[{"on": "top", "traction": [0.03, 0.01]}])
+            found = answer(s, request)
+            build[:] = sorted((round(x[0], 9), round(x[1], 9), *u) for x, u in zip(found["nodes"], found["displacements"]))
+        tied, one = ({place[:2]: place[2:] for place in places[name]} for name in ("tied", "one"))
+        off = max(abs(a - b) for at in one for a, b in zip(one[at], tied[at]))
+        check(off < 1e-10 and max(abs(u[0]) for u in one.values()) > 0.3, kind, off)
+    spin = {"rotation": {"angle": 60, "about": [0, 0]}}
+    found = answer(s, stacked(["quad4", "tri6"], lean=0.3, supports=[{"on": "foot", "ux": 0, "uy": 0, **spin}]), forces=False)
+    check(numpy.abs(found["stress"]).max() < 1e-8, numpy.abs(found["stress"]).max())
+
+
+def test_ties_on_curves_are_refused(s):
+    """Where surfaces do not lie on each other, a turn would strain them."""
+    def tube(cells, kind):
+        at = lambda r, a: (r * math.cos(a), r * math.sin(a))
+        places = [lambda x, y: at(2 - y, x * math.pi / 2), lambda x, y: at(3 - y, x * math.pi / 2)]
+        sides = {"bore": [(0, "top")], "roof": [(0, "bottom")], "floor": [(1, "top")], "head": [(1, "bottom")]}
+        problem = scene(ties=[{"on": "roof", "to": "floor"}], supports=[{"on": "bore", "ux": 0, "uy": 0}], loads=[{"on": "head", "pressure": 0.1}])["problem"]
+        del problem["kind"]
+        return body([kind, kind], cells, places, sides, **problem)
+    refused(s, tube([(4, 1), (7, 1)], "quad4"), "/ties/0", "quad8")
+    answer(s, tube([(8, 1), (13, 1)], "quad8"))
+    problem = scene(ties=[{"on": "roof", "to": "floor"}], supports=[{"on": "foot", "ux": 0, "uy": 0}, {"on": "back", "ux": 0, "uy": 0}],
+                    contacts=[{"on": "wall", "with": "right"}])["problem"]
+    del problem["kind"]
+    pair = body(["quad4"] * 3, [(2, 2), (3, 2), (1, 4)], [lambda x, y: (x, y), lambda x, y: (x, 1 + y), lambda x, y: (1 + x, 2 * y)],
+                {"foot": [(0, "bottom")], "roof": [(0, "top")], "floor": [(1, "bottom")], "right": [(0, "right"), (1, "right")],
+                 "wall": [(2, "left")], "back": [(2, "right")]}, **problem)
+    refused(s, pair, "/contacts/0/with", "leave its sides out")
+
+
+if __name__ == "__main__":
+    service.main(globals())
