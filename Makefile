@@ -468,14 +468,15 @@ peers-large-solids: bench-deps $(BUILD)/uzawad ## two solids that slide under la
 peers-space: bench-deps $(BUILD)/uzawad ## solids in contact by the daemon against the linear solve of the same K by PETSc's GAMG: a table and build/peers-space.json; CELLS=32 along a side
 	@OMP_THREAD_LIMIT=1 OMP_NUM_THREADS=1 $(call measured,peers-space) /usr/bin/python3 -B tests/peers/gamg.py $(BUILD) $(BUILD)/peers-space.json $(if $(CELLS),CELLS=$(CELLS))
 
-extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles, 500 of large deformation, 48 whose load grows until small deformation ceases to suffice, 100 with quantities, 40 solids, bounds of known scenes: tables, build/extremes.json, build/contacts.json, build/obstacles.json, build/generated_large.json, build/thresholds.json, build/quantities.json, build/solids.json, build/bounds.json; FILTER=name: some, FILTER=contacts, obstacles, large, thresholds, quantities, solids or bounds: these scenes alone, SCENES=100: the first of them
+extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles, 500 of large deformation, 48 whose load grows until small deformation ceases to suffice, 100 with quantities, 30 of large deformation with quantities, 40 solids, bounds of known scenes: tables, build/extremes.json, build/contacts.json, build/obstacles.json, build/generated_large.json, build/thresholds.json, build/quantities.json, build/large_quantities.json, build/solids.json, build/bounds.json; FILTER=name: some, FILTER=contacts, obstacles, large, large_quantities, thresholds, quantities, solids or bounds: these scenes alone, SCENES=100: the first of them
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/large-checker $(BUILD)/uzawad
-	@$(if $(filter contacts obstacles large thresholds quantities solids bounds,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
+	@$(if $(filter contacts obstacles large large_quantities thresholds quantities solids bounds,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
 	@$(if $(filter-out contacts,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_contacts.py $(BUILD) $(BUILD)/contacts.json $(SCENES))
 	@$(if $(filter-out obstacles,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_obstacles.py $(BUILD) $(BUILD)/obstacles.json $(SCENES))
 	@$(if $(filter-out large,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_large.py $(BUILD) $(BUILD)/generated_large.json $(SCENES))
 	@$(if $(filter-out thresholds,$(FILTER)),,$(call measured,thresholds) $(PYTHON) -B tests/extremes/large_thresholds.py $(BUILD) $(BUILD)/thresholds.json $(SCENES))
 	@$(if $(filter-out quantities,$(FILTER)),,$(call measured,quantities) $(PYTHON) -B tests/extremes/generated_quantities.py $(BUILD) $(BUILD)/quantities.json $(SCENES))
+	@$(if $(filter-out large_quantities,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_large_quantities.py $(BUILD) $(BUILD)/large_quantities.json $(or $(SCENES),30))
 	@$(if $(filter-out solids,$(FILTER)),,$(call measured,solids) $(PYTHON) -B tests/extremes/generated_solids.py $(BUILD) $(BUILD)/solids.json $(SCENES))
 	@$(if $(filter-out bounds,$(FILTER)),,$(call measured,bounds) $(PYTHON) -B tests/extremes/bounds.py $(BUILD) $(BUILD)/bounds.json)
 

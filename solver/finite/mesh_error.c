@@ -4,15 +4,19 @@
  * With the moduli D = dS/dE of the law where the body is,
  *     eta^2 = integral of (E* - E_h)' D (E* - E_h) over the volume at rest
  * estimates the square of the error in the energy norm of the tangent, but for what the stress does to turning parts,
- * and 2 W stands for the square of the norm of u, which it is of small strain. */
+ * and 2 W stands for the square of the norm of u, which it is of small strain. Of quantities it is the inner product of
+ * that with the same of another displacement z, in the derivative of E along it. */
 #include "finite/mesh_error.h"
 
 #include "assembly/nodal_strains.h"
 #include "assembly/parts.h"
+#include "core/alloc.h"
+#include "core/error.h"
 #include "finite/finite_element.h"
 #include "finite/hyperelastic.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { N_STRAINS = UZ_FINITE_STRAINS };
@@ -27,8 +31,13 @@ typedef struct {
     const uz_body_model *model;
     uz_nodal_strains nodal;
     double energy, eta2, unit; /* unit: integral of the moduli, twice the energy of a strain of 1 */
-    double *eta2_of;           /* n_elements; NULL: not wanted */
     bool failed;               /* a point has no energy */
+    /* What is compared: own E(u), and, `to` not NULL, half of what E(to[0]) - E(to[1]) is. Then the nodes have means of
+     * that. moved: room for both */
+    double own, *eta2_of; /* eta2_of: n_elements; NULL: not wanted */
+    const uz_strain_source *to;
+    uz_strain_group *moved;
+    bool whole; /* with what is hidden */
 } comparison;
 
 static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
@@ -75,7 +84,9 @@ static bool compare_at(double *W, double *eta2, const comparison *x, const uz_st
            off[N_STRAINS], sum = 0, work = 0, most = 0;
     for (int c = 0; c < n; c++) {
         const double E = group->strain[p][c][lane] - (at[c] < 3 ? thermal(warm) : 0);
-        off[c] = -E - (at[c] < 3 ? thermal(mean) : 0);
+        off[c] = -x->own * (E + (at[c] < 3 ? thermal(mean) : 0));
+        if (x->to)
+            off[c] -= 0.5 * (x->moved[0].strain[p][c][lane] - x->moved[1].strain[p][c][lane]);
         for (int a = 0; a < group->rule.nodes; a++)
             off[c] += group->rule.N[p][a] * x->nodal.rows[place[a] * x->nodal.size + c];
         off[c] *= per_square;
@@ -105,8 +116,13 @@ static void compare(void *ctx, const uz_strain_group *group)
     comparison *x = ctx;
     const int64_t *place[UZ_STRAIN_LANES];
     uz_nodal_places(place, &x->nodal, group, &x->model->mesh);
-    uz_lanes times;
-    uz_whole_difference(&times, group, place, &x->nodal);
+    uz_lanes times = (uz_lanes){0} + 1;
+    if (x->whole)
+        uz_whole_difference(&times, group, place, &x->nodal);
+    for (int k = 0; k < 2 && x->to; k++) {
+        x->moved[k] = *group;
+        uz_strain_group_load(&x->moved[k], &x->to[k]);
+    }
     for (int l = 0; l < group->count; l++) {
         double xyz[3 * UZ_ELEMENT_NODES], W, eta2;
         uz_element element;
@@ -131,7 +147,7 @@ static void compare(void *ctx, const uz_strain_group *group)
 uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const double *free_strain,
                                const double *u, uz_error *err)
 {
-    comparison x = {.model = model, .eta2_of = eta2};
+    comparison x = {.model = model, .own = 1, .whole = true, .eta2_of = eta2};
     const uz_strain_source from = {
         .model = model, .nodal = u, .free_strain = free_strain, .apart = true, .large = true};
     if (eta2)
@@ -143,5 +159,57 @@ uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model 
     const double square = 2 * x.energy + x.eta2;
     const bool told = status == UZ_OK && !x.failed, rests = x.energy == 0 && x.eta2 == 0;
     *error = told && rests ? 0 : told && square > ROUNDING * ROUNDING * x.unit ? sqrt(x.eta2 / square) : (double)NAN;
+    return status;
+}
+
+/* x->nodal becomes the means of what is compared: E is a polynomial of degree two, whose derivative along z is half of
+ * what it differs by between u + z and u - z. */
+static uz_status recover_along(comparison *x, const uz_strain_source *from, uz_error *err)
+{
+    uz_nodal_strains *to = &x->nodal;
+    uz_status status = uz_nodal_strains_recover(to, from, UZ_CONTINUE_LINEAR, NULL, err);
+    for (int64_t i = 0; i < to->count * to->size && status == UZ_OK; i++)
+        to->rows[i] *= i % to->size < to->strains ? x->own : 1;
+    for (int k = 0; k < 2 && status == UZ_OK && x->to; k++) {
+        uz_nodal_strains moved;
+        status = uz_nodal_strains_recover(&moved, &x->to[k], UZ_CONTINUE_LINEAR, NULL, err);
+        for (int64_t i = 0; i < to->count * to->size && status == UZ_OK; i++)
+            if (i % to->size < to->strains)
+                to->rows[i] += (k == 0 ? 0.5 : -0.5) * moved.rows[i];
+        uz_nodal_strains_clear(&moved);
+    }
+    return status;
+}
+
+uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_model *model, const double *free_strain,
+                                 const double *u, const double *z, double own, double times, uz_error *err)
+{
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    double *place = uz_alloc(2 * n, sizeof *place);
+    const uz_strain_source from = {
+        .model = model, .nodal = u, .free_strain = free_strain, .apart = true, .large = true};
+    uz_strain_source to[2] = {from, from};
+    comparison x = {.model = model, .own = own, .to = times != 0 ? to : NULL, .eta2_of = eta2};
+    uz_status status = UZ_OK;
+    x.moved = uz_alloc(2, sizeof *x.moved);
+    if (!place || !x.moved)
+        status =
+            uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the errors of %lld nodes", (long long)model->mesh.n_nodes);
+    for (int64_t i = 0; i < n && status == UZ_OK && x.to; i++) {
+        place[i] = u[i] + times * z[i];
+        place[n + i] = u[i] - times * z[i];
+    }
+    to[0].nodal = place;
+    to[1].nodal = place ? place + n : NULL;
+    if (eta2)
+        memset(eta2, 0, (size_t)model->mesh.n_elements * sizeof *eta2);
+    if (status == UZ_OK)
+        status = recover_along(&x, &from, err);
+    if (status == UZ_OK)
+        status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, err);
+    *energy = x.failed ? (double)NAN : x.eta2;
+    uz_nodal_strains_clear(&x.nodal);
+    free(x.moved);
+    free(place);
     return status;
 }

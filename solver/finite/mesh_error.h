@@ -12,4 +12,11 @@
 uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const double *free_strain,
                                const double *u, uz_error *err);
 
+/* *energy: the same estimate's eta^2 of own E(u) + times dE(u; z), dE the derivative of the strain along z (n_nodes x
+ * dim), in the moduli at u, less what it is taken to hide: what uz_mesh_error_energy is of small strain, and likewise
+ * the square of a seminorm in (own, times), of each element, too. eta2 (n_elements, NULL: not wanted): what each
+ * element has of it. times 0: z is not read. UZ_ERR_MEMORY; where the law has no energy somewhere *energy is NaN. */
+uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_model *model, const double *free_strain,
+                                 const double *u, const double *z, double own, double times, uz_error *err);
+
 #endif

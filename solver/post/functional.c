@@ -35,12 +35,16 @@ enum { EDGE_CELLS = 512, FACE_CELLS = 24 };
  * it. */
 #define OF_BLUR 0.25
 
+/* Areas are differentiated over this part of a side's size. */
+#define STEP 1e-5
+
 typedef struct {
     uz_functional *out;
     const uz_quantity *quantity;
     const uz_body_model *model;
     const uz_scene *scene;
     const uz_result *answer;
+    const uz_functional_place *at;
     int dim;
     const char *where;
 } making;
@@ -100,8 +104,31 @@ static void measure_side(double *inside, double *area, const making *k, const uz
     *inside *= sum > 0 ? *area / sum : 0;
 }
 
-/* share (n_nodes): the part of the sides around each node that is in the window; returns the area of `on` there. */
-static double find_window(double *share, double *whole, const making *k, uz_error *err)
+/* grown (n_nodes x dim) += part times the derivative of the side's area, where the body is. */
+static void add_growth(double *grown, const uz_side *side, const int64_t *node, double part)
+{
+    double xyz[3 * UZ_FACE_NODES], size = 0;
+    uz_side at = *side;
+    const int n = side->nodes * side->dim;
+    memcpy(xyz, side->xyz, (size_t)n * sizeof *xyz);
+    at.xyz = xyz;
+    for (int i = side->dim; i < n; i++)
+        size = fmax(size, fabs(xyz[i] - xyz[i % side->dim]));
+    for (int i = 0; i < n; i++) {
+        const double x = xyz[i], step = STEP * size;
+        double area[2];
+        for (int way = 0; way < 2; way++) {
+            xyz[i] = x + (way == 0 ? step : -step);
+            area[way] = fabs(uz_side_area(&at));
+        }
+        xyz[i] = x;
+        grown[node[i / side->dim] * side->dim + i % side->dim] += part * (area[0] - area[1]) / (2 * step);
+    }
+}
+
+/* share (n_nodes): the part of the sides around each node that is in the window, before anything moves; returns the
+ * area of `on` there, of large deformation that which the sides have now, whose derivative is then added to grown. */
+static double find_window(double *share, double *whole, double *grown, const making *k, uz_error *err)
 {
     const uz_mesh *mesh = &k->model->mesh;
     double window = 0;
@@ -123,6 +150,12 @@ static double find_window(double *share, double *whole, const making *k, uz_erro
                 share[node[a]] += inside;
                 whole[node[a]] += area;
             }
+            if (k->at && !other && inside > 0) {
+                uz_side moved;
+                uz_body_side(&moved, xyz, node, k->at->displaced, group->face[f]);
+                add_growth(grown, &moved, node, inside / area);
+                inside *= fabs(uz_side_area(&moved)) / area;
+            }
             window += other ? 0 : inside;
         }
     }
@@ -141,7 +174,7 @@ static uz_status take_contacts(const making *k, uz_error *err)
     uz_status status = UZ_OK;
     if (!share || !whole || !force)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld contact rows", (long long)model->m);
-    if (status == UZ_OK && windowed && !((area = find_window(share, whole, k, err)) > 0))
+    if (status == UZ_OK && windowed && !((area = find_window(share, whole, k->out->load, k, err)) > 0))
         status = uz_fail(err, UZ_ERR_SCENE, k->where,
                          "no side of the contact is in this window: give one that its edges or faces are in");
     if (status == UZ_OK)
@@ -160,6 +193,8 @@ static uz_status take_contacts(const making *k, uz_error *err)
     }
     if (status == UZ_OK)
         uz_blend_rows(k->out->gap, model);
+    for (int64_t i = 0; i < model->mesh.n_nodes * k->dim && k->at; i++) /* the same force on a larger side */
+        k->out->load[i] *= k->out->found / area;
     k->out->times = -1;
     free(share);
     free(whole);
@@ -244,7 +279,7 @@ static void find_normals(double *normal, const uz_body_model *model, const uz_gr
 }
 
 uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *model, const uz_scene *scene,
-                           const uz_result *answer, uz_error *err)
+                           const double *u, const double *r, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
     double *sum = uz_alloc(3 * mesh->n_nodes, sizeof *sum),
@@ -268,7 +303,7 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
         for (int64_t i = 0; i < model->m; i++)
             presses[model->info.contact_node[i]] =
                 presses[model->info.contact_node[i]] ||
-                (model->info.contact_of[i] == k && answer->r[i] < 0 && !uz_row_inner(model, i));
+                (model->info.contact_of[i] == k && r[i] < 0 && !uz_row_inner(model, i));
         for (int64_t a = mesh->n_given; a < mesh->n_nodes && mesh->hangs; a++) { /* nodes without rows */
             const int64_t *from;
             const double *share;
@@ -286,7 +321,7 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
             bool all = true;
             for (int a = 0; a < side.nodes; a++)
                 all = all && presses[node[a]];
-            const double mean = all ? mean_depth(&side, node, model, obstacle, answer->u) : 0,
+            const double mean = all ? mean_depth(&side, node, model, obstacle, u) : 0,
                          out = all ? mean_bulge(&side, node, normal) : 0;
             for (int a = 0; a < side.nodes; a++) {
                 sum[3 * node[a]] += size;
@@ -453,6 +488,17 @@ static uz_status take_displacement(const making *k, uz_error *err)
     return status;
 }
 
+/* Of large deformation: W(u) - W(u_h) is f(e) - a(e, e) / 2 but for terms of third order, f the loads where the body
+ * is, of which z = w - u/2 tells with K w = f, w = 0 at supports and contacts. */
+static uz_status take_energy_there(const making *k)
+{
+    memcpy(k->out->load, k->at->load, (size_t)(k->model->mesh.n_nodes * k->dim) * sizeof *k->out->load);
+    k->out->found = k->answer->evaluation->strain_energy;
+    k->out->own = -0.5;
+    k->out->times = 1;
+    return UZ_OK;
+}
+
 static uz_status take_energy(const making *k, const double *h, const double *prescribed, uz_error *err)
 {
     const uz_scene *scene = k->scene;
@@ -481,9 +527,9 @@ static uz_status take_energy(const making *k, const double *h, const double *pre
 
 uz_status uz_functional_make(uz_functional *out, const uz_quantity *quantity, const char *where,
                              const uz_body_model *model, const uz_scene *scene, const uz_result *answer,
-                             const double *h, const double *prescribed, uz_error *err)
+                             const double *h, const double *prescribed, const uz_functional_place *at, uz_error *err)
 {
-    const making k = {out, quantity, model, scene, answer, model->mesh.dim, where};
+    const making k = {out, quantity, model, scene, answer, at, model->mesh.dim, where};
     memset(out, 0, sizeof *out);
     out->load = uz_alloc_zero(model->mesh.n_nodes * k.dim, sizeof *out->load);
     out->held = uz_alloc_zero(model->n_fixed, sizeof *out->held);
@@ -497,7 +543,7 @@ uz_status uz_functional_make(uz_functional *out, const uz_quantity *quantity, co
     case UZ_QUANTITY_DISPLACEMENT:
         return take_displacement(&k, err);
     case UZ_QUANTITY_STRAIN_ENERGY:
-        return take_energy(&k, h, prescribed, err);
+        return at ? take_energy_there(&k) : take_energy(&k, h, prescribed, err);
     default:
         return take_contacts(&k, err);
     }

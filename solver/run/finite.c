@@ -51,14 +51,12 @@ uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings 
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
                        "a mesh is refined by the error of one model, and auto may take either: ask for the kinematics "
                        "\"finite\", or give a mesh");
-    if (problem->n_quantities > 0)
-        return uz_fail(err, UZ_ERR_SCENE, problem->quantities[0].asked ? "/solver/accuracy" : "/quantities",
-                       "quantities are bounded by duality of small deformation; leave them out where kinematics are "
-                       "finite, and compare meshes");
-    if (settings->guaranteed || (!refines && (settings->total_error > 0 || settings->balanced)))
+    if (settings->guaranteed || settings->quantity_error > 0 ||
+        (!refines && (settings->total_error > 0 || settings->balanced)))
         return uz_fail(err, UZ_ERR_SCENE, "/solver/accuracy",
-                       "where kinematics are finite the error of the mesh is told by estimate, but not bounded: leave "
-                       "guaranteed out, and ask for a relative_error of the equations, or refine the mesh");
+                       "where kinematics are finite the error of the mesh is told by estimate, but not bounded, and a "
+                       "mesh is refined by that of the whole: leave guaranteed out, ask for quantities beside the "
+                       "problem and for a relative_error of the equations, or refine the mesh");
     if (settings->stopping == UZ_STOP_PAPER)
         return uz_fail(err, UZ_ERR_SCENE, "/solver/stopping",
                        "finite kinematics end by their certificate; leave stopping out");

@@ -5,6 +5,7 @@
  *     uz_finite_turn     finite_turn.c     large steps of parts that turn
  *     uz_finite_correct  finite_pairs.c    what rows between bodies need in it
  *     uz_finite_report   finite_report.c   the answer as a result
+ *     uz_finite_quantities  finite_quantities.c  the numbers that it was asked for
  *     uz_solve_weighed   weigh.c           whether small deformation is enough (kinematics AUTO) */
 #ifndef UZ_RUN_FINITE_H
 #define UZ_RUN_FINITE_H
@@ -19,7 +20,7 @@
 
 /* The kind of run (solve.c): results as those of uz_solve_rounds. Every case is answered with its whole load, or with
  * the last part that has a stable equilibrium and the outcome UZ_UNSTABLE or UZ_INVERTED. Refuses what is not made for
- * it: errors at fixed moduli, quantities, bounds on the whole error. */
+ * it: errors at fixed moduli, bounds on the whole error. */
 bool uz_is_finite(const uz_problem *problem);
 uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
@@ -175,6 +176,12 @@ uz_status uz_finite_correct(uz_finite_run *run, uz_error *err);
 /* Reactions of the rows `from` stay with their places among those of run->at, where places come and go as bodies slide.
  */
 uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *from, uz_error *err);
+
+/* run->K becomes the tangent at run->at with r times the curvature of gaps and stiffness `hold` along the pressed rows.
+ */
+uz_status uz_finite_hold_tangent(uz_finite_run *run, double hold, uz_error *err);
+/* The problem's quantities, of the answer run->at, which has been evaluated. */
+uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *err);
 
 /* *out: the answer run->at under run->load. why: of the part beyond it that was tried last, `tried`. */
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err);

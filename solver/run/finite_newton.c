@@ -359,6 +359,22 @@ static uz_status find_tangent(uz_finite_run *run, const double *step, bool strai
                                            : status;
 }
 
+uz_status uz_finite_hold_tangent(uz_finite_run *run, double hold, uz_error *err)
+{
+    const uz_stop stop = {&run->hooks, run->deadline};
+    uz_status status = UZ_OK;
+    uz_row_turn_clear(&run->turn);
+    run->K = &run->tangent.K;
+    uz_finite_forget_factors(run);
+    if (run->pairs && run->n_r == run->at.rows.m)
+        status = uz_row_turn_find(&run->turn, &run->base, &run->at.rows, &run->scene, run->r, 0, &stop, err);
+    if (status == UZ_OK)
+        status = find_tangent(run, NULL, false, err);
+    if (status == UZ_OK && run->pairs)
+        status = uz_finite_widen(run, hold > 0, err);
+    return status == UZ_OK ? hold_rows(run, hold, err) : status;
+}
+
 /* Or not known. */
 static bool is_more(double norm, double than)
 {

@@ -204,6 +204,9 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
         status = mesh_error(&result->summary.discretization_error, run, err);
     if (status == UZ_OK) {
         uz_doubt_mesh(result, &run->at.rows, &run->scene);
+        status = uz_finite_quantities(result, run, err);
+    }
+    if (status == UZ_OK) {
         *out = result;
     } else {
         uz_result_free(result);

@@ -952,7 +952,7 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
             status = asked->kind == UZ_QUANTITY_STRAIN_ENERGY
                          ? take_work(&of, &v, err)
                          : uz_functional_make(&of, asked, where, &v.own.setup->model, &g->problem->scene, result, NULL,
-                                              NULL, err);
+                                              NULL, NULL, err);
             why = of.why[0] ? "supports of both kinds, springs and others, hold this group" : NULL;
             if (status == UZ_OK && !why)
                 status = prove_one(&v, out, asked, &of, err);

@@ -47,6 +47,9 @@
 /* Solves that are not exact go on to this part of the adjoint's norm. */
 #define SOLVED 1e-6
 
+/* Of large deformation: gaps that are less, in the body's size, may be none. */
+#define ROUNDING 1e-9
+
 typedef struct {
     const uz_quantity_work *work;
     const uz_result *answer;
@@ -57,15 +60,30 @@ typedef struct {
     int64_t *row_of;         /* n_nodes: a row that stands at the node, -1: none does */
     bool *active, *pressing; /* rows of the dual; the model's */
     double *z, *w;           /* n_nodes x dim; w: room of d as well */
+    double own;              /* what the answer's error has in the adjoint's, of large deformation */
     double *free_strain;
+    bool coarse;
     double own_error;    /* |e_u|^2 */
     double *of_elements; /* 3 n_elements: |e_u|^2 of each; of u plus and less z */
 } adjoint;
 
+/* The estimate of |e_u + times e_z|^2, and what each element has of it. */
+static uz_status errors_of(double *energy, double *of_elements, adjoint *x, double times, uz_error *err)
+{
+    const uz_body_model *model = x->work->model;
+    const uz_quantity_large *place = x->work->place;
+    if (place)
+        return place->errors(place->of, energy, of_elements, x->z, 1 + times * x->own, times, err);
+    for (int64_t i = 0; i < model->mesh.n_nodes * model->mesh.dim && times != 0; i++)
+        x->w[i] = x->answer->u[i] + times * x->z[i];
+    return uz_mesh_error_energy(energy, of_elements, model, x->free_strain, times != 0 ? x->w : x->answer->u, err);
+}
+
 static uz_status begin(adjoint *x, uz_error *err)
 {
     const uz_body_model *model = x->work->model;
-    const int64_t n = model->mesh.n_nodes * model->mesh.dim, m = x->work->dual->m;
+    const uz_quantity_large *place = x->work->place;
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim, m = place ? 0 : x->work->dual->m;
     x->p = uz_alloc(model->d, sizeof *x->p);
     x->h = uz_alloc(m, sizeof *x->h);
     x->y = uz_alloc_zero(m, sizeof *x->y);
@@ -89,10 +107,13 @@ static uz_status begin(adjoint *x, uz_error *err)
         if (!uz_row_inner(model, i))
             x->row_of[model->info.contact_node[i]] = i;
     uz_status status = uz_free_strains(&x->free_strain, model, x->work->scene, err);
+    if (place) /* where it is */
+        memset(x->w, 0, (size_t)n * sizeof *x->w);
     if (status == UZ_OK)
-        status = uz_contact_depth(x->depth, x->bulge, model, x->work->scene, x->answer, err);
+        status = uz_contact_depth(x->depth, x->bulge, place ? place->place.displaced : model, x->work->scene,
+                                  place ? x->w : x->answer->u, x->answer->r, err);
     if (status == UZ_OK)
-        status = uz_mesh_error_energy(&x->own_error, x->of_elements, model, x->free_strain, x->answer->u, err);
+        status = errors_of(&x->own_error, x->of_elements, x, 0, err);
     return status;
 }
 
@@ -134,17 +155,16 @@ static uz_status iterate(adjoint *x, bool *solved, uz_dual_load *load, uz_error 
     return status;
 }
 
-/* z: the adjoint's displacement by node. *solved false: there is none. */
-static uz_status solve(adjoint *x, bool *solved, const uz_functional *of, uz_error *err)
+/* w and of_rows, on the factor that is there. */
+static uz_status solve_on_factor(adjoint *x, bool *solved, const uz_functional *of, uz_error *err)
 {
     const uz_quantity_work *work = x->work;
     const uz_body_model *model = work->model;
-    const int64_t m = work->dual->m, n = model->mesh.n_nodes * model->mesh.dim;
+    const int64_t m = work->dual->m;
     const uz_candidates *rows = work->rows && work->rows->in ? work->rows : NULL;
     uz_dual_load *load = NULL;
     uz_active_end ended;
     int64_t count = 0;
-    model->law->kind->active(model->law, x->pressing, x->answer->r, model->m);
     for (int64_t i = 0, k = 0; i < model->m; i++) { /* rows left out do not press */
         if (rows && !rows->in[i])
             continue;
@@ -176,17 +196,47 @@ static uz_status solve(adjoint *x, bool *solved, const uz_functional *of, uz_err
     for (int64_t i = 0, k = 0; i < model->m && status == UZ_OK; i++) { /* back to the model's rows */
         const bool in = !rows || rows->in[i];
         x->of_rows[i] = in ? x->y[k] * work->dual->row_scale[k] : 0;
-        x->slip[i] = of->gap[i];
         k += in;
     }
-    if (status == UZ_OK)
-        uz_csc_gaxpy(x->slip, &model->N, -1, x->w);
     uz_dual_load_free(load);
-    if (status == UZ_OK)
-        uz_recover_nodal(x->z, model, x->w, of->held);
-    for (int64_t i = 0; i < n && status == UZ_OK; i++)
-        x->z[i] = of->own * x->answer->u[i] + of->times * x->z[i];
     return status;
+}
+
+/* z: the adjoint's displacement by node; of large deformation without what the answer's own error has in it, which is
+ * no displacement's. *solved false: there is none. */
+static uz_status solve(adjoint *x, bool *solved, const uz_functional *of, uz_error *err)
+{
+    const uz_body_model *model = x->work->model;
+    const uz_quantity_large *place = x->work->place;
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    model->law->kind->active(model->law, x->pressing, x->answer->r, model->m);
+    const uz_status status = place ? place->solve(place->of, solved, x->w, x->of_rows, x->pressing, of, err)
+                                   : solve_on_factor(x, solved, of, err);
+    if (status != UZ_OK || !*solved)
+        return status;
+    for (int64_t i = 0; i < model->m; i++)
+        x->slip[i] = of->gap[i];
+    uz_csc_gaxpy(x->slip, &model->N, -1, x->w);
+    uz_recover_nodal(x->z, model, x->w, of->held);
+    x->own = place ? of->own : 0;
+    for (int64_t i = 0; i < n; i++)
+        x->z[i] = (place ? 0 : of->own * x->answer->u[i]) + of->times * x->z[i];
+    return UZ_OK;
+}
+
+/* Of z and u: half of their squares in the energy norm. */
+static uz_status find_norms(double *norm, double *strain, adjoint *x, uz_error *err)
+{
+    const uz_body_model *model = x->work->model;
+    const uz_quantity_large *place = x->work->place;
+    if (place) {
+        for (int64_t i = 0; i < model->mesh.n_nodes * model->mesh.dim; i++)
+            x->w[i] = x->own * x->answer->u[i] + x->z[i];
+        *strain = x->answer->evaluation->strain_energy;
+        return place->energy(place->of, norm, x->w, err);
+    }
+    const uz_status status = uz_strain_energy(norm, model, x->z, true, err);
+    return status == UZ_OK ? uz_strain_energy(strain, model, x->answer->u, true, err) : status;
 }
 
 /* What obstacles that stand in sides between their nodes come to, by the adjoint's reactions; or sides in what they
@@ -331,7 +381,6 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
 {
     const uz_body_model *model = x->work->model;
     const int64_t n = model->mesh.n_nodes * model->mesh.dim;
-    const double *u = x->answer->u;
     double norm = 0, strain = 0, length = 0, both[2] = {0};
     bool solved = false;
     const bool pressed =
@@ -344,16 +393,11 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
         snprintf(out->why, sizeof out->why, "the rows in contact could not be held for its adjoint problem");
         return UZ_OK;
     }
-    status = uz_strain_energy(&norm, model, x->z, true, err);
-    if (status == UZ_OK)
-        status = uz_strain_energy(&strain, model, u, true, err);
+    status = find_norms(&norm, &strain, x, err);
     const double scale = norm > 0 && strain > 0 ? sqrt(strain / norm) : 1; /* both of one size */
-    for (int k = 0; k < 2 && status == UZ_OK; k++) {
-        for (int64_t i = 0; i < n; i++)
-            x->w[i] = u[i] + (k == 0 ? scale : -scale) * x->z[i];
-        status = uz_mesh_error_energy(&both[k], x->of_elements + (k + 1) * model->mesh.n_elements, model,
-                                      x->free_strain, x->w, err);
-    }
+    for (int k = 0; k < 2 && status == UZ_OK; k++)
+        status =
+            errors_of(&both[k], x->of_elements + (k + 1) * model->mesh.n_elements, x, k == 0 ? scale : -scale, err);
     if (status != UZ_OK)
         return status;
     const double share = strain > 0 ? fmin(1, x->own_error / strain) : 0; /* the square of the mesh's error, about */
@@ -378,8 +422,9 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
         return status;
     out->mesh = times * out->mesh + OF_SECOND * share * whole;
     /* where z is a rigid motion, of forces that are in balance, the residual at free nodes is what is left */
-    out->equations = sqrt(2 * fmax(0, norm)) * x->answer->summary.certificate.absolute_error +
-                     length * x->answer->summary.certificate.residual.e1;
+    const uz_certificate *left = &x->answer->summary.certificate;
+    out->equations = x->work->place ? sqrt(2 * fmax(0, norm)) * x->work->place->left
+                                    : sqrt(2 * fmax(0, norm)) * left->absolute_error + length * left->residual.e1;
     const double half = out->mesh + out->equations;
     if (!isfinite(half) || !isfinite(shift)) {
         snprintf(out->why, sizeof out->why, "nothing bounds what the equations leave of it");
@@ -391,17 +436,50 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     return UZ_OK;
 }
 
+/* Is a contact narrower than the mesh can tell? Of large deformation no warning says so. */
+static uz_status find_coarse(adjoint *x, uz_error *err)
+{
+    const uz_evaluation *e = x->answer->evaluation;
+    uz_coarse_contact found = {.contact = -1};
+    uz_status status = UZ_OK;
+    if (x->work->place)
+        status = uz_find_coarse_contact(&found, x->work->model, x->work->scene, x->answer->u, x->answer->r, err);
+    x->coarse = found.contact >= 0;
+    for (int k = 0; k < e->n_warnings; k++)
+        x->coarse = x->coarse || strcmp(e->warnings[k].code, UZ_WARN_COARSE) == 0;
+    return status;
+}
+
+/* Why no quantity of the answer can have an interval; NULL: they can. */
+static const char *why_none(const adjoint *x)
+{
+    const uz_quantity_work *work = x->work;
+    const uz_evaluation *e = x->answer->evaluation;
+    const uz_summary *s = &x->answer->summary;
+    bool overlap = work->place && s->finite.least_gap < -ROUNDING * work->model->mesh.extent;
+    if (x->coarse)
+        return "the mesh can't tell how wide the contact is (coarse_contact)";
+    for (int k = 0; k < e->n_warnings; k++)
+        overlap = overlap || strcmp(e->warnings[k].code, UZ_WARN_OVERLAP) == 0;
+    if (overlap && s->active == 0)
+        return "surfaces stand in each other, and no row of a contact presses";
+    return work->place ? work->place->why : work->dual ? NULL : "no rows are proved to hold the body";
+}
+
 uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz_error *err)
 {
     uz_evaluation *e = answer->evaluation;
     adjoint x = {.work = work, .answer = answer};
+    const uz_quantity_large *place = work->place;
     const int64_t n = work->problem->n_quantities;
     if (!e || n == 0)
         return UZ_OK;
     e->quantities = uz_alloc_zero(n, sizeof *e->quantities);
     if (!e->quantities)
         return uz_fail(err, UZ_ERR_MEMORY, "/quantities", "no memory for %lld quantities", (long long)n);
-    uz_status status = work->dual ? begin(&x, err) : UZ_OK;
+    uz_status status = work->dual || place ? begin(&x, err) : UZ_OK;
+    if (status == UZ_OK)
+        status = find_coarse(&x, err);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const uz_quantity *asked = &work->problem->quantities[i];
         uz_quantity_found *out = &e->quantities[i];
@@ -410,19 +488,13 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
         uz_quantity_place(where, work->problem, i, asked->kind == UZ_QUANTITY_MEAN_PRESSURE ? "window" : "on");
         *out = (uz_quantity_found){.kind = asked->kind, .low = NAN, .high = NAN, .mesh = NAN, .equations = NAN};
         memcpy(out->name, asked->name, sizeof out->name);
-        status =
-            uz_functional_make(&of, asked, where, work->model, work->scene, answer, work->h, work->prescribed, err);
+        status = uz_functional_make(&of, asked, where, work->model, work->scene, answer, work->h, work->prescribed,
+                                    place ? &place->place : NULL, err);
         out->value = out->found = of.found;
         memcpy(out->why, of.why, sizeof out->why);
-        bool coarse = false;
-        for (int k = 0; k < e->n_warnings && !out->why[0]; k++)
-            if ((coarse = strcmp(e->warnings[k].code, UZ_WARN_COARSE) == 0))
-                snprintf(out->why, sizeof out->why, "the mesh can't tell how wide the contact is (coarse_contact)");
-        for (int k = 0; k < e->n_warnings && !out->why[0] && answer->summary.active == 0; k++)
-            if (strcmp(e->warnings[k].code, UZ_WARN_OVERLAP) == 0)
-                snprintf(out->why, sizeof out->why, "surfaces stand in each other, and no row of a contact presses");
-        if (!work->dual && !out->why[0])
-            snprintf(out->why, sizeof out->why, "no rows are proved to hold the body");
+        const bool coarse = x.coarse && !out->why[0];
+        if (!out->why[0] && why_none(&x))
+            snprintf(out->why, sizeof out->why, "%s", why_none(&x));
         /* an interval has to wait for a finer mesh, and where that is to be finer its adjoint tells */
         if (status == UZ_OK && (!out->why[0] || (coarse && work->dual && steers(&x, out))))
             status = estimate(out, &x, &of, err);

@@ -2,7 +2,24 @@
 #ifndef UZ_QUANTITIES_H
 #define UZ_QUANTITIES_H
 
+#include "post/functional.h"
 #include "run/setup.h"
+
+/* What of an answer of large deformation is not as of small; ctx: `of`. */
+typedef struct {
+    void *of;
+    uz_functional_place place;
+    const char *why; /* why no mesh's part can be told; NULL: it can */
+    double left;     /* what the equations leave, in the energy norm */
+    /* w (d): K w = load - K_fixed held + N'y with N w = gap at the rows that press, y (m) 0 at others, K the tangent.
+     * *solved false: there is none. */
+    uz_status (*solve)(void *of, bool *solved, double *w, double *y, const bool *pressing,
+                       const uz_functional *functional, uz_error *err);
+    /* v'K v / 2 of a displacement by node, that of rows left out; and uz_finite_error_energy at the answer. */
+    uz_status (*energy)(void *of, double *energy, const double *v, uz_error *err);
+    uz_status (*errors)(void *of, double *energy, double *eta2, const double *z, double own, double times,
+                        uz_error *err);
+} uz_quantity_large;
 
 /* What is needed beside the answer. */
 typedef struct {
@@ -12,6 +29,8 @@ typedef struct {
     const uz_body_model *model;
     const uz_csc *K; /* those that `dual` is of: where springs on rows hold the body, with them */
     const uz_dual *dual;
+    const uz_quantity_large
+        *place;                   /* NULL: small deformation; else there are neither K nor `dual`, nor what is theirs */
     const double *weight;         /* m: of the springs on rows that K has; NULL: none */
     const uz_candidates *rows;    /* which of the model's rows the dual has; NULL, or in NULL: all */
     const double *h, *prescribed; /* of all rows; of supported dofs */

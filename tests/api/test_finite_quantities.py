@@ -1,0 +1,91 @@
+"""Quantities of large deformation: that they become those of small, closed forms, and intervals against finer meshes."""
+# not under ThreadSanitizer: about answers, not about threads
+import copy
+import pathlib
+import sys
+
+import service
+from service import check, expect, some
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
+import generated_large_quantities as generated  # noqa: after its place is known
+
+SHARED = True  # one service for all tests
+
+WAIT = {"Prefer": "wait=60"}
+BLOCK = {"problem": {"kind": "scene", "model": "plane_strain", "kinematics": "finite", "mesh": {"box": {"size": [1, 1], "cells": [2, 2], "element": "quad8"}},
+                     "materials": [{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke"}],
+                     "supports": [{"on": "left", "ux": 0}, {"on": "top", "uy": -0.3}],
+                     "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]}}
+
+
+def solved(s, request):
+    job = expect(s.post(request, WAIT), 200).json
+    check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", job)
+    return job["summary"]
+
+
+def test_uniform_states_have_exact_quantities(s):
+    request = copy.deepcopy(BLOCK)
+    request["quantities"] = [{"quantity": "contact.force", "on": "bottom"}, {"quantity": "reaction", "on": "top", "direction": [0, -1]},
+                             {"quantity": "displacement", "on": "right", "direction": [1, 0]}, {"quantity": "strain_energy"},
+                             {"quantity": "mean_pressure", "window": {"min": [-1, -1], "max": [2, 0.1]}},
+                             {"quantity": "mean_pressure", "window": {"min": [-1, -1], "max": [0.6, 0.1]}, "name": "half"}]
+    summary = solved(s, request)
+    force, reaction, aside, energy, pressure, half = summary["quantities"]
+    check("why" not in half and abs(half["value"] - pressure["value"]) < 0.5 * half["mesh"], half)  # sides that its end is in
+    for one in summary["quantities"][:-1]:
+        check("why" not in one and abs(one["value"] - one["on_this_mesh"]) < 1e-8 and one["high"] - one["low"] < 1e-6, one)
+    check(abs(force["value"] - 0.45842392) < 1e-7 and abs(reaction["value"] - 0.45842392) < 1e-7, force, reaction)
+    check(abs(pressure["value"] - 0.45842392 / (1 + aside["value"])) < 1e-6, pressure, aside)  # per deformed area, of any part of it
+    check(abs(energy["value"] - summary["energy"]["strain"]) < 1e-8, energy)
+
+
+def test_they_become_those_of_small_deformation(s):
+    """Of a load that strains by 1e-4 the intervals are those of small deformation, of every kind."""
+    def asked(kinematics, law, springs):
+        holds = [{"on": "left", "ux": 0}, {"on": "top", "spring": [0, 2]} if springs else {"on": "top", "uy": -1e-4}]
+        loads = [{"on": "top", "traction": [0, -3e-4]}] if springs else [{"on": "right", "traction": [2e-5, 3e-5]}]
+        request = {"problem": {**BLOCK["problem"], "kinematics": kinematics, "mesh": {"box": {"size": [2, 1], "cells": [8, 4]}},
+                               "materials": [{"on": "all", "young": 1, "poisson": 0.3, "law": law}], "supports": holds, "loads": loads,
+                               "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [0.25, -2], "radius": 2}}}]},
+                   "quantities": [{"quantity": "contact.force", "on": "bottom"}, {"quantity": "reaction", "on": "top", "direction": [0, -1]},
+                                  {"quantity": "displacement", "on": "right", "direction": [1, 0]}, {"quantity": "strain_energy"},
+                                  {"quantity": "mean_pressure", "window": {"min": [0, -1], "max": [0.4, 0.1]}}]}
+        return solved(s, request)["quantities"]
+    for springs in (False, True):
+        for small, large in zip(asked("fixed", "linear", springs), asked("finite", "neo_hooke", springs)):
+            check(("why" in small) == ("why" in large), small, large)
+            off = abs(small["on_this_mesh"] - small["value"])
+            check(abs(small["on_this_mesh"] - large["on_this_mesh"]) < 2e-3 * abs(small["on_this_mesh"]), small, large)
+            if "why" not in small:
+                check(abs((large["value"] - large["on_this_mesh"]) - (small["value"] - small["on_this_mesh"])) < 0.02 * off + 1e-3 * small["mesh"], small, large)
+                check(abs(large["mesh"] / small["mesh"] - 1) < 0.05, small, large)
+
+
+def test_finer_meshes_are_in_their_intervals(s):
+    """Generated scenes; all of them by make extremes FILTER=large_quantities."""
+    found = generated.run(s, some(range(8), 3))
+    check(not found["failures"] and len(found["rows"]) >= 5, found["failures"])
+    told = generated.told(found["rows"])[-1]
+    check(told["of"] >= 4 and told["inside"] >= 0.9 * told["of"], told)
+
+
+def test_what_is_told_where_there_is_no_interval(s):
+    """Of a part of the load, no mesh's part; as accuracy a quantity is refused."""
+    request = copy.deepcopy(BLOCK)
+    request["problem"]["materials"][0]["law"] = "st_venant_kirchhoff"
+    request["problem"]["supports"][1]["uy"] = -0.6
+    request["quantities"] = [{"quantity": "contact.force", "on": "bottom"}]
+    job = expect(s.post(request, WAIT), 200).json
+    one = job["summary"]["quantities"][0]
+    check(job["summary"]["outcome"] == "unstable" and "part of the load" in one["why"] and one["low"] is None, job["summary"])
+    request = copy.deepcopy(BLOCK)
+    request["solver"] = {"accuracy": {"quantity": "contact.force", "on": "bottom", "relative": 0.05}}
+    reply = s.post(request)
+    found = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", "successful")["error"]
+    check(found["pointer"] == "/solver/accuracy" and "quantities beside the problem" in found["detail"], found)
+
+
+if __name__ == "__main__":
+    service.main(globals())
