@@ -116,6 +116,7 @@ typedef struct {
     int32_t *rigid_of; /* n_nodes: 1 + its rigid group; NULL: there are none */
     uz_tied tied;
     uz_followers follow;
+    bool turned;       /* of uz_body_turned: shares of rigid groups are those of steps from where they are */
     int64_t *frame_of; /* n_nodes: 1 + place in info.rotated_node, <= 0: along the axes. NULL: all of them are */
     uz_mesh mesh;
     uz_mesh_info info; /* as uz_scene_to_qp gives it; its xyz is the mesh's own array */
@@ -213,9 +214,33 @@ double uz_tied_value(const uz_body_model *model, int64_t a, const double *value,
 /* The nodes whose dofs carry node a, and their shares (uz_followers); 0: it has its own, or hangs in a body without
  * rigid groups and ties. */
 int64_t uz_carriers(const int64_t **node, const double **share, const uz_body_model *model, int64_t a);
-/* The motion of a group whose nodes have these displacements (n_nodes x dim): t at its point, w in radians. */
+/* The motion of a group whose nodes have these displacements (n_nodes x dim): t at its point, w in radians; linear,
+ * from the displacements `from` on, NULL: from rest. */
 void uz_rigid_motion(double t[3], double w[3], const uz_body_model *model, const uz_rigid_group *group,
-                     const double *nodal);
+                     const double *from, const double *nodal);
+
+/* ---- rigid groups under large rotations (rigid_place.c); model: at rest, u: n_nodes x dim */
+
+/* R (by rows) of a rotation vector, and back, to the vector of at most half a turn. */
+void uz_rotation(double R[9], const double w[3]);
+void uz_rotation_vector(double w[3], const double R[9]);
+/* Of a group that u has moved as a rigid body: u(x) = t + (R - I) (x - point). */
+void uz_rigid_place(double t[3], double R[9], const uz_body_model *model, const uz_rigid_group *group, const double *u);
+/* A borrower of all of `model` but the shares of followers, which are those of a step from u: dofs of a group are dt
+ * and size times w of it. UZ_ERR_MEMORY. */
+uz_status uz_body_turned(uz_body_model *out, const uz_body_model *model, const double *u, uz_error *err);
+void uz_body_turned_clear(uz_body_model *turned);
+/* given (n_fixed): in the places of groups' motions the step from u to what is prescribed; others stay. Groups in space
+ * have all rotations held, or none, or two that are prescribed as none. */
+void uz_rigid_ways(double *given, const uz_body_model *model, const double *prescribed, const double *u);
+/* u, at a linear step from `from`, becomes one that moves groups as rigid bodies. */
+void uz_rigid_step(double *u, const uz_body_model *model, const double *from);
+/* K and K_fixed of `to` get what the forces f (n_nodes x dim) make of rotations from u. */
+void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, const double *u, const double *f);
+/* Are these the nodes of one rigid group, so that no element of them is strained? */
+bool uz_is_unstrained(const uz_body_model *model, const int64_t *node, int count);
+/* Adds a block (dim x dim) of the dofs of two nodes to K and K_fixed, whose patterns have it. */
+void uz_add_dof_block(uz_body_model *model, int64_t at, int64_t other, const double block[9]);
 /* Does the node stand on the axis of revolution? */
 bool uz_is_on_axis(const uz_body_model *model, int64_t node);
 const char *uz_dof_name(const uz_body_model *model, int64_t node, int c);

@@ -398,7 +398,8 @@ static void prescribed_at(double u[3], const uz_body_model *model, const uz_cont
         for (int c = 0; c < dim; c++)
             u[c] += share[k - 1] * at[c];
     }
-    for (int c = 0; c < dim && row->place; c++)
+    const bool steps = model->turned && uz_is_rigid(model, node); /* what is given is a step from there */
+    for (int c = 0; c < dim && row->place && !steps; c++)
         u[c] -= row->place[node * dim + c];
 }
 
@@ -472,7 +473,8 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
                 continue;
             const double gap = gap_at(&scale, model, &at, prescribed);
             if (!moves_something(model, &at))
-                status = check_held(model, &at, k, gap, scale, err);
+                status =
+                    model->turned && uz_is_rigid(model, at.node) ? UZ_OK : check_held(model, &at, k, gap, scale, err);
             else if (row == model->m)
                 return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", OTHER_BODY);
             else

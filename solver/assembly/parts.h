@@ -27,6 +27,8 @@ uz_status uz_number_tied(uz_body_model *model, uz_error *err);
 /* rigid, tied, frames -> follow. */
 uz_status uz_find_followers(uz_body_model *model, uz_error *err);
 void uz_followers_clear(uz_followers *follow);
+/* share (dim x dim): what a rotation times the group's size does at the end of an arm in parts of it. */
+void uz_rigid_arms(double *share, const double arm[3], int dim);
 /* Does one of these nodes follow others? */
 bool uz_have_carriers(const uz_body_model *model, const int64_t *node, int count);
 /* uz_add_stiffness for nodes of which one does. */

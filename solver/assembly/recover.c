@@ -55,7 +55,7 @@ void uz_restrict_nodal(double *u, const uz_body_model *model, const double *noda
     restrict_by_node(u, model, nodal);
     for (int64_t g = 0; g < model->n_rigid; g++) {
         double t[3], w[3];
-        uz_rigid_motion(t, w, model, &model->rigid[g], nodal);
+        uz_rigid_motion(t, w, model, &model->rigid[g], NULL, nodal);
         uz_set_motion(u, model, &model->rigid[g], t, w);
     }
 }

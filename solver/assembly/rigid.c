@@ -172,6 +172,20 @@ void uz_rigid_values(double *value, const uz_body_model *model, const uz_scene *
 
 /* ---- who follows whom */
 
+void uz_rigid_arms(double *share, const double arm[3], int dim)
+{
+    if (dim == 2) {
+        share[0] = -arm[1];
+        share[2] = arm[0];
+        return;
+    }
+    for (int c = 0; c < 3; c++) { /* e_c x arm */
+        const int a = (c + 1) % 3, b = (c + 2) % 3;
+        share[3 * a + c] = -arm[b];
+        share[3 * b + c] = arm[a];
+    }
+}
+
 /* share: u of a node of the group from the dofs of its anchors, dim x dim each. Returns how many anchors. */
 static int rigid_shares(double share[2][9], const uz_body_model *model, const uz_rigid_group *group, int64_t node)
 {
@@ -187,16 +201,7 @@ static int rigid_shares(double share[2][9], const uz_body_model *model, const uz
         r[c] = (x[c] - group->point[c]) / group->size;
     for (int c = 0; c < dim; c++)
         share[0][c * dim + c] = 1;
-    if (dim == 2) {
-        share[1][0] = -r[1];
-        share[1][2] = r[0];
-        return 2;
-    }
-    for (int c = 0; c < 3; c++) { /* e_c x r */
-        const int a = (c + 1) % 3, b = (c + 2) % 3;
-        share[1][3 * a + c] = -r[b];
-        share[1][3 * b + c] = r[a];
-    }
+    uz_rigid_arms(share[1], r, dim);
     return 2;
 }
 
@@ -337,8 +342,8 @@ static void carry_block(double out[9], const double *block, int line, const doub
                 out[i * dim + j] += P[k * dim + i] * half[k * dim + j];
 }
 
-/* Of dofs i of one node and j of another: the lower triangle of K, and the free rows of K_fixed. */
-static void add_block(uz_body_model *model, int64_t at, int64_t other, const double block[9])
+/* The lower triangle of K, and the free rows of K_fixed. */
+void uz_add_dof_block(uz_body_model *model, int64_t at, int64_t other, const double block[9])
 {
     const int dim = model->mesh.dim;
     for (int i = 0; i < dim; i++)
@@ -352,12 +357,18 @@ static void add_block(uz_body_model *model, int64_t at, int64_t other, const dou
         }
 }
 
+bool uz_is_unstrained(const uz_body_model *model, const int64_t *node, int count)
+{
+    bool unstrained = model->n_rigid > 0;
+    for (int a = 0; a < count && unstrained; a++)
+        unstrained = uz_is_rigid(model, node[a]) && model->rigid_of[node[a]] == model->rigid_of[node[0]];
+    return unstrained;
+}
+
 void uz_add_carried(uz_body_model *model, const double *ke, const int64_t *node, int count)
 {
     const int dim = model->mesh.dim, n = count * dim;
-    bool strained = count == 1; /* a rigid group's own elements are not */
-    for (int a = 0; a < count; a++)
-        strained = strained || !uz_is_rigid(model, node[a]) || model->rigid_of[node[a]] != model->rigid_of[node[0]];
+    const bool strained = count == 1 || !uz_is_unstrained(model, node, count);
     for (int a = 0; a < count && strained; a++)
         for (int b = 0; b < count; b++) {
             const int64_t *p, *q;
@@ -368,7 +379,7 @@ void uz_add_carried(uz_body_model *model, const double *ke, const int64_t *node,
             for (int64_t i = 0; i < ps; i++)
                 for (int64_t j = 0; j < qs; j++) {
                     carry_block(block, ke + a * dim * n + b * dim, n, P + i * dim * dim, Q + j * dim * dim, dim);
-                    add_block(model, p[i], q[j], block);
+                    uz_add_dof_block(model, p[i], q[j], block);
                 }
         }
 }
@@ -418,15 +429,21 @@ static void fit_turn(double w[3], const double x[3][3], const double u[3][3])
 }
 
 void uz_rigid_motion(double t[3], double w[3], const uz_body_model *model, const uz_rigid_group *group,
-                     const double *nodal)
+                     const double *from, const double *nodal)
 {
     const int dim = model->mesh.dim;
-    double x[3][3] = {{0}}, u[3][3] = {{0}}, arm[3], turned[3];
+    double x[3][3] = {{0}}, u[3][3] = {{0}}, arm[3], turned[3], moved[3] = {0}, R[9];
     memset(w, 0, 3 * sizeof *w);
     for (int a = 0; a < 3 && group->anchor[a] >= 0; a++) {
         place_of(x[a], &model->mesh, group->anchor[a]);
         memcpy(u[a], nodal + group->anchor[a] * dim, (size_t)dim * sizeof **u);
+        for (int c = 0; c < dim && from; c++) {
+            x[a][c] += from[group->anchor[a] * dim + c];
+            u[a][c] -= from[group->anchor[a] * dim + c];
+        }
     }
+    if (from)
+        uz_rigid_place(moved, R, model, group, from);
     if (model->kind == UZ_AXISYMMETRIC) {
         memcpy(t, (double[3]){0, u[0][1], 0}, 3 * sizeof *t);
         return;
@@ -438,7 +455,7 @@ void uz_rigid_motion(double t[3], double w[3], const uz_body_model *model, const
         fit_turn(w, x, u);
     }
     for (int c = 0; c < 3; c++)
-        arm[c] = group->point[c] - x[0][c];
+        arm[c] = group->point[c] + moved[c] - x[0][c];
     uz_cross3(turned, w, arm);
     for (int c = 0; c < 3; c++)
         t[c] = u[0][c] + turned[c];
@@ -459,7 +476,7 @@ double uz_carried_error(const uz_body_model *model, int64_t a, const double *nod
 {
     const uz_rigid_group *group = uz_rigid_group_of(model, a);
     double t[3], w[3], x[3];
-    uz_rigid_motion(t, w, model, group, nodal);
+    uz_rigid_motion(t, w, model, group, NULL, nodal);
     place_of(x, &model->mesh, a);
     const double away = sqrt(uz_distance2(x, group->point, 3)) + group->size;
     return 32 * DBL_EPSILON * (sqrt(uz_dot3(t, t)) + sqrt(uz_dot3(w, w)) * away);

@@ -7,6 +7,7 @@
 #include "certificate/pair_gaps.h"
 #include "certificate/piola.h"
 #include "certificate/pressed_side.h"
+#include "certificate/rigid_groups.h"
 #include "certificate/swallowed.h"
 #include "core/alloc.h"
 #include "core/error.h"
@@ -231,6 +232,10 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     const uz_lame lame = uz_lame_in_space(element.model, element.lame);
     const uz_elasticity law = uz_element_material(model, e)->law;
     const int n = dim * nodes;
+    bool unstrained = model->n_rigid > 0; /* of a rigid group */
+    for (int a = 0; a < nodes && unstrained; a++)
+        unstrained =
+            uz_is_rigid(model, node[a]) && uz_rigid_group_of(model, node[a]) == uz_rigid_group_of(model, node[0]);
     memset(rows, 0, (size_t)(n * n) * sizeof *rows);
     for (int i = 0; i < n; i++)
         u[i] = w->of->u[dim * node[i / dim] + i % dim];
@@ -247,18 +252,19 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
         const long double weight = (long double)rule->point[g].weight * measure;
         const bool known = det > 0 && law_at(&at, &det, &x, &element, &lame, law);
         out->least_det = isnan(det) ? -INFINITY : fmin(out->least_det, (double)det);
-        if (!known)
+        if (!known || unstrained)
             continue;
         w->energy += weight * at.W;
         add_unit(w, weight, &lame, &x, u);
         add_point(force, rows, weight, &x, &at);
     }
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n && !unstrained; i++) {
         w->force[dim * node[i / dim] + i % dim] += force[i];
         for (int k = 0; k <= i; k++)
             ke[k * n + i] = ke[i * n + k] = rows[(i * dim + k % dim) * nodes + k / dim];
     }
-    uz_add_stiffness(&w->tangent, ke, node, nodes);
+    if (!unstrained)
+        uz_add_stiffness(&w->tangent, ke, node, nodes);
 }
 
 /* Elastic ground, by its energy k u^2 / 2 along each axis. */
@@ -480,12 +486,13 @@ static uz_status leave_over(work *w, uz_error *err)
     if (!nodal)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on %lld nodes",
                        (long long)model->mesh.n_nodes);
-    const uz_status status = uz_nodal_loads(nodal, model, w->of->scene, err);
+    uz_status status = uz_nodal_loads(nodal, model, w->of->scene, err);
     for (int64_t i = 0; i < n && status == UZ_OK; i++)
         nodal[i] = (double)(nodal[i] - w->force[i]);
     if (status == UZ_OK) {
         uz_gather_nodal(w->f, model, nodal);
         uz_csc_gaxpy_t(w->f, &model->N, 1, w->of->r);
+        status = model->n_rigid > 0 ? uz_rigid_groups_bend(&w->tangent, nodal, w->of, err) : UZ_OK;
     }
     free(nodal);
     return status;
@@ -530,6 +537,8 @@ static double off_support(const uz_finite_answer *of, int64_t a, int c)
     const int64_t dof = model->dof[dim * a + c];
     if (uz_mesh_hangs(&model->mesh, a)) /* those that it lies amid have it */
         return of->u[dim * a + c] - uz_mesh_value_amid(&model->mesh, a, of->u + c, dim);
+    if (uz_is_rigid(model, a))
+        return 0; /* uz_rigid_groups_off */
     if (dof == UZ_NO_DOF)
         return uz_is_tied(model, a) ? of->u[dim * a + c] - uz_tied_value(model, a, of->u + c, dim) : 0;
     return dof < 0 ? uz_along_dof(model, a, c, of->u + dim * a) - of->prescribed[-1 - dof] : 0;
@@ -596,6 +605,7 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
         most = fmax(most, fabs(answer->r[i]));
     for (int64_t i = 0; i < dim * model->mesh.n_nodes && status == UZ_OK; i++)
         out->worst_support = fmax(out->worst_support, fabs(off_support(answer, i / dim, (int)(i % dim))));
+    out->worst_support = fmax(out->worst_support, uz_rigid_groups_off(answer));
     for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK && !out->stopped; e++) {
         out->stopped = e % ELEMENTS_BETWEEN == 0 && uz_stop_is_due(stop);
         add_element(out, &w, e);

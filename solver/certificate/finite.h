@@ -34,8 +34,8 @@ typedef struct {
      * that the equilibrium is a strict local minimum of what the mesh can do */
     bool definite;
     double worst_reaction; /* the largest, > 0: an obstacle that pulls; relative to the largest in size */
-    double worst_support;  /* by how much a supported dof is off what is prescribed, or a tied node off what it follows:
-                            * a length */
+    double worst_support;  /* by how much a supported dof is off what is prescribed, or a tied node off what it follows,
+                            * or one of a rigid group off what the group's motion has it at: a length */
     double least_gap;      /* of the obstacles from points on the deformed sides, a length: SAMPLES a side, and nodes */
     double least_part;     /* the same over the length of the side there, of those between nodes */
     double least_at_rows;  /* of g */

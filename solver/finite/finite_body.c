@@ -63,7 +63,7 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
             out->least_det = own.least_det;
             out->at = e;
         }
-        if (!(own.least_det > 0))
+        if (!(own.least_det > 0) || uz_is_unstrained(model, node, count))
             continue;
         out->energy += own.energy;
         for (int i = 0; i < dim * count && force; i++)

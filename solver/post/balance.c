@@ -417,11 +417,20 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         uz_resultant *to = &out->supports[model->rigid[g].support];
         double across[DIM];
         to->rigid = true;
-        uz_cross3(across, model->rigid[g].point, to->force);
+        const uz_rigid_group *group = &model->rigid[g];
+        double at[DIM] = {group->point[0], group->point[1], group->point[2]}, R[3 * DIM];
+        if (known) {
+            uz_rigid_place(to->moved, R, known->rest, group, u);
+            uz_rotation_vector(to->turned, R);
+            for (int c = 0; c < DIM; c++)
+                at[c] += to->moved[c];
+        } else {
+            uz_rigid_motion(to->moved, to->turned, model, group, NULL, u);
+        }
+        uz_cross3(across, at, to->force);
         for (int c = 0; c < DIM && model->kind != UZ_AXISYMMETRIC; c++)
             to->about[c] = to->moment[c] - across[c];
-        memcpy(to->point, model->rigid[g].point, sizeof to->point);
-        uz_rigid_motion(to->moved, to->turned, model, &model->rigid[g], u);
+        memcpy(to->point, group->point, sizeof to->point);
     }
     if (status == UZ_OK)
         status = add_springs(&b, err);

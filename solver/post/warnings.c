@@ -198,7 +198,8 @@ static void look_at_turns(const doubts *d)
 /* Of some scenes there is no answer of finite strain that this one could be compared with. */
 static void look_at_small_only(const doubts *d)
 {
-    const char *what = d->model->n_rigid > 0 ? "rigid groups" : NULL;
+    const bool partly = d->model->n_rigid > 0 && !uz_has_finite_model(d->scene);
+    const char *what = partly ? "rigid groups of which one rotation is held" : NULL;
     for (int64_t k = 0; k < d->model->n_materials; k++)
         what = d->model->materials[k].lame.general ? "orthotropic materials" : what;
     for (int64_t k = 0; k < d->scene->n_loads; k++)

@@ -174,6 +174,13 @@ static uz_status check_tie(const uz_body_model *base, const uz_group *group, int
 static uz_status check_ties(const uz_body_model *base, const uz_scene *scene, uz_error *err)
 {
     uz_status status = UZ_OK;
+    const int64_t *ptr = base->tied.share.ptr;
+    for (int64_t q = 0; q < (ptr ? ptr[base->mesh.n_nodes] : 0) && base->n_rigid > 0; q++)
+        if (uz_is_rigid(base, base->tied.share.idx[q]))
+            return uz_fail(err, UZ_ERR_SCENE, "/ties",
+                           "node %lld is of a rigid group, and others follow it by a tie, which finite kinematics have "
+                           "no model for: leave the sides there out of one",
+                           (long long)base->tied.share.idx[q]);
     for (int64_t k = 0; k < 2 * scene->n_ties && status == UZ_OK; k++) {
         const uz_tie *tie = &scene->ties[k / 2];
         const uz_group *group = uz_mesh_group(&base->mesh, k % 2 ? tie->to : tie->on, "/ties", err);
@@ -187,11 +194,12 @@ static uz_status check_followers(const uz_body_model *base, const uz_group *grou
 {
     for (int64_t i = 0; i < uz_group_node_count(&base->mesh, group); i++) {
         const int64_t node = uz_group_node_at(group, i);
-        if (uz_is_tied(base, node))
+        if (uz_is_tied(base, node) || uz_is_rigid(base, node))
             return uz_fail(err, UZ_ERR_SCENE, where,
-                           "node %lld of \"%.63s\" follows a surface that it is tied to, and finite kinematics have no "
-                           "contact between bodies there: leave its sides out of one of them",
-                           (long long)node, group->name);
+                           "node %lld of \"%.63s\" %s, and finite kinematics have no contact between bodies there: "
+                           "leave its sides out of one of them",
+                           (long long)node, group->name,
+                           uz_is_rigid(base, node) ? "is of a rigid group" : "follows a surface that it is tied to");
     }
     return UZ_OK;
 }

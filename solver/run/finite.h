@@ -60,11 +60,14 @@ uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_
                                const uz_finite_path *path, uz_error *err);
 uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings *settings, uz_error *err);
 
-/* A displacement, and what follows from it. Its rows are those of the body there. */
+/* A displacement, and what follows from it. Its rows are those of the body there. Free dofs of rigid groups are steps
+ * from there: 0 here. */
 typedef struct {
     double *u, *force, *loads; /* n: displacements by node, internal forces, loads: some may follow the body */
     double work;               /* of loads that follow, on the way here: they have no potential that is known */
     uz_finite_measure body;
+    uz_body_model turned; /* the body, with rigid groups where they are here; rows are of it */
+    double *given;        /* n_fixed: what is prescribed; of rigid groups the way to it from here */
     uz_body_model rows;
     double *h, *gap;  /* m of rows */
     double violation; /* the sum of the gaps that are negative */
@@ -144,6 +147,9 @@ typedef struct {
 uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run, uz_error *err);
 uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run *run, uz_error *err);
 void uz_finite_place_clear(uz_finite_place *place);
+/* The free dofs (d) of a place, and the displacement (n) that others lead to from there by a straight step. */
+void uz_finite_restrict(double *v, const uz_finite_place *place);
+void uz_finite_lead(double *to, const uz_finite_place *place, const double *v);
 
 /* From run->at to the equilibrium under run->load. On UZ_PART_SETTLED run->at, r and certificate are those of the
  * equilibrium; else run->at is somewhere. */

@@ -76,7 +76,8 @@ uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run,
     place->u = uz_alloc_zero(run->n, sizeof *place->u);
     place->force = uz_alloc_zero(run->n, sizeof *place->force);
     place->loads = uz_alloc_zero(run->n, sizeof *place->loads);
-    return place->u && place->force && place->loads
+    place->given = uz_alloc_zero(run->base.n_fixed, sizeof *place->given);
+    return place->u && place->force && place->loads && place->given
                ? UZ_OK
                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the place of %lld nodes",
                          (long long)run->base.mesh.n_nodes);
@@ -85,6 +86,7 @@ uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run,
 static void forget_rows(uz_finite_place *place)
 {
     uz_body_model_clear(&place->rows);
+    uz_body_turned_clear(&place->turned);
     free(place->h);
     free(place->gap);
     place->h = place->gap = NULL;
@@ -96,19 +98,38 @@ void uz_finite_place_clear(uz_finite_place *place)
     free(place->u);
     free(place->force);
     free(place->loads);
+    free(place->given);
     memset(place, 0, sizeof *place);
+}
+
+void uz_finite_restrict(double *v, const uz_finite_place *place)
+{
+    static const double NOTHING[3] = {0};
+    const uz_body_model *model = &place->turned;
+    uz_restrict_nodal(v, model, place->u);
+    for (int64_t k = 0; k < model->n_rigid; k++)
+        uz_set_motion(v, model, &model->rigid[k], NOTHING, NOTHING);
+}
+
+void uz_finite_lead(double *to, const uz_finite_place *place, const double *v)
+{
+    const uz_body_model *model = &place->turned;
+    const int dim = model->mesh.dim;
+    uz_recover_nodal(to, model, v, place->given);
+    for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++)
+        to[i] += uz_is_rigid(model, i / dim) ? place->u[i] : 0;
 }
 
 /* Gaps as the rows have them, with supports where the load has them. */
 static uz_status find_gaps(uz_finite_place *place, uz_finite_run *run, uz_error *err)
 {
     const int64_t m = place->rows.m;
-    uz_restrict_nodal(run->v, &run->base, place->u);
+    uz_finite_restrict(run->v, place);
     place->h = uz_alloc(m, sizeof *place->h);
     place->gap = uz_alloc(m, sizeof *place->gap);
     if (!place->h || !place->gap)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld gaps", (long long)m);
-    const uz_status status = uz_initial_gaps(place->h, run->prescribed, &place->rows, &run->scene, err);
+    const uz_status status = uz_initial_gaps(place->h, place->given, &place->rows, &run->scene, err);
     if (status != UZ_OK)
         return status;
     for (int64_t i = 0; i < m; i++)
@@ -133,7 +154,11 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
     if (run->follows && uz_follower_loads(place->loads, &run->base, &run->scene, place->u, err) != UZ_OK)
         return UZ_ERR_SCENE;
     run->scene.place = place->u;
-    uz_status status = uz_body_model_move(&place->rows, &run->base, &run->scene, &own);
+    memcpy(place->given, run->prescribed, (size_t)run->base.n_fixed * sizeof *place->given);
+    uz_rigid_ways(place->given, &run->base, run->prescribed, place->u);
+    uz_status status = uz_body_turned(&place->turned, &run->base, place->u, &own);
+    if (status == UZ_OK)
+        status = uz_body_model_move(&place->rows, &place->turned, &run->scene, &own);
     if (status == UZ_OK)
         status = find_gaps(place, run, &own);
     run->scene.place = NULL;
@@ -231,7 +256,8 @@ void uz_finite_move_supports(bool *moved, uz_finite_run *run)
         if (dof >= 0 || dof == UZ_NO_DOF)
             continue;
         const double *u = at->u + dim * (i / dim);
-        const double way = run->prescribed[-1 - dof] - uz_along_dof(model, i / dim, (int)(i % dim), u);
+        const double here = uz_is_rigid(model, i / dim) ? 0 : uz_along_dof(model, i / dim, (int)(i % dim), u);
+        const double way = at->given[-1 - dof] - here;
         const uz_csc *fixed = &run->tangent.K_fixed;
         const double rounding = 1e-15 * (fabs(run->prescribed[-1 - dof]) + model->mesh.extent);
         *moved = *moved || fabs(way) > rounding;
@@ -244,13 +270,13 @@ void uz_finite_move_supports(bool *moved, uz_finite_run *run)
 static void load_step(bool *moved, uz_finite_run *run)
 {
     const uz_finite_place *at = &run->at;
-    const uz_body_model *model = &run->base;
+    const uz_body_model *model = &at->turned;
     double *rest = run->trial.force; /* it is free until the next place is looked at */
     for (int64_t i = 0; i < run->n; i++)
         rest[i] = at->loads[i] - at->force[i];
     uz_gather_nodal(run->p, model, rest);
     uz_finite_move_supports(moved, run);
-    uz_restrict_nodal(run->v, model, at->u);
+    uz_finite_restrict(run->v, at);
     uz_csc_symv(run->p, run->K, 1, run->v);
 }
 
@@ -350,11 +376,40 @@ void uz_finite_forget_factors(uz_finite_run *run)
     uz_table_forget(run->cache, UZ_ITEM_FACTOR);
 }
 
+/* What forces on the nodes of rigid groups do as these turn: of elements less those of loads and of obstacles. */
+static uz_status add_turning(uz_finite_run *run, uz_error *err)
+{
+    const uz_finite_place *at = &run->at;
+    const uz_body_model *rows = &at->rows;
+    const int dim = rows->mesh.dim;
+    double *f = uz_alloc(run->n, sizeof *f), *force = uz_alloc(rows->m, sizeof *force);
+    if (f && force) {
+        for (int64_t i = 0; i < run->n; i++)
+            f[i] = at->force[i] - at->loads[i];
+        if (run->n_r == rows->m)
+            uz_row_forces(force, rows, run->r);
+        for (int64_t i = 0; i < rows->m && run->n_r == rows->m; i++) {
+            const row_place place = place_of_row(at, i);
+            for (int c = 0; c < dim * place.n && rows->info.contact_face[2 * i] < 0; c++)
+                f[dim * place.node[c / dim] + c % dim] +=
+                    place.share[c / dim] * force[i] * rows->info.contact_normal[dim * i + c % dim];
+        }
+        uz_rigid_turn_stiffness(&run->tangent, &run->base, at->u, f);
+    }
+    const bool room = f && force;
+    free(f);
+    free(force);
+    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on rigid groups");
+}
+
 /* At run->at, with nothing added; straight: what gaps bend left out. */
 static uz_status find_tangent(uz_finite_run *run, const double *step, bool straight, uz_error *err)
 {
+    run->tangent.follow = run->at.turned.follow;
     uz_finite_body(&run->at.body, NULL, &run->tangent, &run->base, run->free_strain, run->at.u, step);
-    const uz_status status = straight ? UZ_OK : add_curvature(run, err);
+    uz_status status = straight ? UZ_OK : add_curvature(run, err);
+    if (status == UZ_OK && run->base.n_rigid > 0)
+        status = add_turning(run, err);
     return status == UZ_OK && run->follows ? uz_follower_tangent(&run->tangent, &run->skew, &run->scene, run->at.u, err)
                                            : status;
 }
@@ -481,12 +536,13 @@ static void find_work(uz_finite_run *run)
 static uz_status find_part(bool *fits, uz_finite_run *run, const double *to, double part, uz_error *err)
 {
     uz_status status = UZ_OK;
-    run->turned = !run->pairs && !run->base.spring && is_more(run->norm, TURNING_STEP);
+    run->turned = !run->pairs && !run->base.spring && run->base.n_rigid == 0 && is_more(run->norm, TURNING_STEP);
     bool again = true;
     *fits = false;
     while (status == UZ_OK && again) {
         for (int64_t i = 0; i < run->n; i++)
             run->trial.u[i] = part == 1 ? to[i] : run->at.u[i] + part * (to[i] - run->at.u[i]);
+        uz_rigid_step(run->trial.u, &run->base, run->at.u);
         if (run->turned)
             status = uz_finite_turn(&run->turned, run, err);
         if (status == UZ_OK)
@@ -543,7 +599,7 @@ static double least_left(uz_finite_run *run)
         return 0;
     for (int64_t i = 0; i < run->n; i++)
         rest[i] = at->loads[i] - at->force[i];
-    uz_gather_nodal(f, &run->base, rest);
+    uz_gather_nodal(f, &at->turned, rest);
     uz_csc_gaxpy_t(f, N, 1, run->r);
     for (int64_t j = 0; j < run->d; j++) {
         x[j] = f[j] / run->K->val[run->K->ptr[j]];
@@ -630,7 +686,7 @@ static uz_status keep_reactions(uz_finite_run *run, uz_error *err)
 
 double uz_finite_step_norm(uz_finite_run *run)
 {
-    uz_restrict_nodal(run->v, &run->base, run->at.u);
+    uz_finite_restrict(run->v, &run->at);
     for (int64_t j = 0; j < run->d; j++)
         run->v[j] = run->last->u[j] - run->v[j];
     memset(run->Kv, 0, (size_t)run->d * sizeof *run->Kv);
@@ -680,7 +736,8 @@ static bool find_way(double way[3], const uz_finite_run *run)
 {
     const uz_body_model *model = &run->base;
     const int dim = model->mesh.dim;
-    bool alike = !run->pairs && run->found.failed == 0 && model->kind != UZ_AXISYMMETRIC, known[3] = {false};
+    bool alike = !run->pairs && model->n_rigid == 0 && run->found.failed == 0 && model->kind != UZ_AXISYMMETRIC,
+         known[3] = {false};
     for (int64_t i = 0; i < run->n && alike; i++) {
         const int64_t dof = model->dof[i], node = i / dim;
         const int c = (int)(i % dim);
@@ -878,7 +935,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         if (status != UZ_OK || in_a_row == MOST_SHIFTED)
             break;
         const double last_norm = run->norm, norm = run->norm = moved ? (double)INFINITY : uz_finite_step_norm(run);
-        uz_recover_nodal(to, &run->base, run->last->u, run->prescribed);
+        uz_finite_lead(to, &run->at, run->last->u);
         if (run->step_qps == 1)
             memcpy(led, to, (size_t)run->n * sizeof *led);
         const bool free_step = moved || run->step_qps == 1 || run->skew.ptr || (run->pairs && norm < NEAR);

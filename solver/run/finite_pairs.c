@@ -129,9 +129,9 @@ static void add_followers(uz_finite_run *run, const double *v, double *nodal)
         return;
     double *f = nodal + run->n;
     memset(f, 0, (size_t)run->n * sizeof *f);
-    uz_recover_nodal(nodal, &run->base, v, NULL);
+    uz_recover_nodal(nodal, &run->at.turned, v, NULL);
     uz_csc_gaxpy(f, &run->skew, 1, nodal);
-    uz_gather_nodal(nodal, &run->base, f);
+    uz_gather_nodal(nodal, &run->at.turned, f);
     for (int64_t j = 0; j < run->d; j++)
         run->p[j] += nodal[j];
 }
@@ -163,7 +163,7 @@ static uz_status iterate(uz_finite_run *run, double *room, history *past, uz_err
     const double now = uz_finite_step_norm(run), enough = now > 0 ? PART_LEFT * run->requested / now : ROUGHLY;
     const double left = fmin(ROUGHLY, fmax(fmax(CORRECTED, enough), PART_LEFT * run->norm));
     uz_status status = UZ_OK;
-    uz_restrict_nodal(from, &run->base, run->at.u);
+    uz_finite_restrict(from, &run->at);
     for (int64_t j = 0; j < d; j++) {
         p[j] = run->p[j];
         v[j] = run->last->u[j] - from[j];

@@ -23,7 +23,7 @@ static double rigid_at(const uz_run *run, const double *u, int64_t node, int c)
     const uz_rigid_group *group = uz_rigid_group_of(model, node);
     const uz_support *support = &supports[group->support];
     double t[3], w[3], r[3] = {0}, turned[3];
-    uz_rigid_motion(t, w, model, group, u);
+    uz_rigid_motion(t, w, model, group, NULL, u);
     for (int k = 0; k < 3; k++) {
         t[k] = isnan(support->u[k]) ? t[k] : ldexp(support->u[k], -run->load.exponent);
         w[k] = isnan(support->turn[k]) ? w[k] : ldexp(support->turn[k], -run->load.exponent);

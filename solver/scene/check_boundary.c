@@ -11,6 +11,8 @@
 #include <string.h>
 
 #define DEGREE (180 / 3.14159265358979323846)
+/* Radians: a little less than half a turn. */
+#define MOST_TURN 3.1
 
 bool uz_unit_normal(double out[3], const double normal[3], int dim)
 {
@@ -83,6 +85,7 @@ static uz_status check_rigid(const uz_scene *scene, int64_t i, uz_error *err)
     char where[UZ_CHECK_POINTER];
     const uz_support *support = &scene->supports[i];
     const bool ring = scene->model == UZ_AXISYMMETRIC, plane = scene->model != UZ_SOLID;
+    double angle = 0;
     const uz_status status = uz_check_vector(support->about, 3, "supports", i, "rigid/point", err);
     if (status != UZ_OK)
         return status;
@@ -99,11 +102,15 @@ static uz_status check_rigid(const uz_scene *scene, int64_t i, uz_error *err)
                            "whole: give uy, or nothing");
         if (plane && k >= 2 && k != 5)
             return uz_fail(err, UZ_ERR_SCENE, where, "in the plane a rigid group has ux, uy and rz");
-        if (k >= 3 && fabs(value) > UZ_MOST_LINEAR_TURN)
+        angle = k >= 3 ? hypot(angle, value) : angle;
+        const bool finite = uz_may_be_finite(scene);
+        if (angle > (finite ? MOST_TURN : UZ_MOST_LINEAR_TURN))
             return uz_fail(err, UZ_ERR_SCENE, where,
-                           "a rotation by %g degrees is not small, and rigid groups are of small deformation: at most "
-                           "%.3g degrees",
-                           value * DEGREE, UZ_MOST_LINEAR_TURN * DEGREE);
+                           finite ? "a rigid group is turned by %g degrees, and a rotation by more than half a turn is "
+                                    "another one: at most %.4g degrees"
+                                  : "a rotation by %g degrees is not small: at most %.3g degrees, or a law of finite "
+                                    "strain with the kinematics \"finite\"",
+                           angle * DEGREE, (finite ? MOST_TURN : UZ_MOST_LINEAR_TURN) * DEGREE);
     }
     return UZ_OK;
 }

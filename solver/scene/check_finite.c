@@ -92,11 +92,18 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
             err, UZ_ERR_SCENE, "/stabilize",
             "finite kinematics do not tell what such springs do to the answer; hold the body by supports, or "
             "by springs of your own");
-    for (int64_t i = 0; i < scene->n_supports; i++)
-        if (scene->supports[i].kind == UZ_SUPPORT_RIGID)
+    for (int64_t i = 0; i < scene->n_supports && scene->model == UZ_SOLID; i++) {
+        const uz_support *support = &scene->supports[i];
+        int held = 0, moved = 0;
+        for (int c = 0; c < 3 && support->kind == UZ_SUPPORT_RIGID; c++) {
+            held += !isnan(support->turn[c]);
+            moved += !isnan(support->turn[c]) && support->turn[c] != 0;
+        }
+        if (held == 1 || (held == 2 && moved > 0))
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rigid"),
-                           "rigid groups are of small deformation, and finite kinematics have none: prescribe a "
-                           "rotation, or use the kinematics \"moving\"");
+                           "large rotations about several axes are no sum, so that one of them alone is not told by a "
+                           "number: hold rx, ry and rz, or none, or two at 0");
+    }
     for (int64_t i = 0; i < scene->n_contacts; i++) {
         const uz_status status = scene->contacts[i].kind == UZ_OBSTACLE_BODY ? check_pair(scene, i, err) : UZ_OK;
         if (status != UZ_OK)

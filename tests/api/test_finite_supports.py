@@ -1,4 +1,4 @@
-"""What holds bodies of large deformation beside plain supports: springs and ties, by closed forms and by the same body made
+"""What holds bodies of large deformation beside plain supports: springs, ties, rigid groups, by closed forms and by the same body made
 otherwise."""
 # not under ThreadSanitizer: about answers, not about threads
 import math
@@ -192,6 +192,146 @@ def test_ties_on_curves_are_refused(s):
                 {"foot": [(0, "bottom")], "roof": [(0, "top")], "floor": [(1, "bottom")], "right": [(0, "right"), (1, "right")],
                  "wall": [(2, "left")], "back": [(2, "right")]}, **problem)
     refused(s, pair, "/contacts/0/with", "leave its sides out")
+
+
+# ---- rigid groups
+
+def beam(length, rigid, thick, cells, poisson=0.0, mirrored=False, **more):
+    """Along x, clamped on the left; what is beyond `length` is a rigid group."""
+    sign = -1 if mirrored else 1
+    xs = [length * i / cells for i in range(cells + 1)] + ([length + rigid] if rigid else [])
+    n = len(xs) - 1
+    at, nodes = {}, []
+    for i in range(2 * n + 1):
+        for j in range(3):
+            if i % 2 == 0 or j != 1:
+                x = xs[i // 2] if i % 2 == 0 else (xs[i // 2] + xs[i // 2 + 1]) / 2
+                at[i, j] = len(nodes)
+                nodes.append([x, sign * thick * (j / 2 - 0.5)])
+    corner = lambda i: [(i, 0), (i + 2, 0), (i + 2, 2), (i, 2)]
+    between = lambda a, b: at[(a[0] + b[0]) // 2, (a[1] + b[1]) // 2]
+    elements = []
+    for i in range(0, 2 * n, 2):
+        ring = corner(i)[::sign]
+        elements.append([at[c] for c in ring] + [between(a, b) for a, b in zip(ring, ring[1:] + ring[:1])])
+    end = 2 * cells
+    groups = {"clamp": {"nodes": [at[0, j] for j in range(3)]}, "tip": {"nodes": [k for (i, _), k in at.items() if i >= end]},
+              "far": {"nodes": [at[2 * n, 1]]}}
+    return scene("st_venant_kirchhoff", poisson, mesh={"nodes": nodes, "elements": {"quad8": elements}, "groups": groups}, **more), at, nodes
+
+
+def test_a_rigid_plate_turns_by_sixty_degrees(s):
+    """Turned with its point free to move, it bends the beam into an arc of a circle, that of an inextensible one but for its thickness."""
+    length, angle = 10.0, math.radians(60)
+    for mirrored in (False, True):
+        sign = -1 if mirrored else 1
+        request, at, nodes = beam(length, 1.0, 0.1, 20, mirrored=mirrored, supports=[{"on": "clamp", "ux": 0, "uy": 0},
+                                                                                   {"on": "tip", "rigid": {"point": [length, 0], "rz": sign * 60}}])
+        found = answer(s, request)
+        u = found["displacements"][at[40, 1]]
+        there = [length * math.sin(angle) / angle, length * (1 - math.cos(angle)) / angle]
+        check(math.hypot(u[0] + length - there[0], sign * u[1] - there[1]) < 2e-3 * length, u, there)
+        group = found["summary"]["resultants"]["supports"][1]
+        check(abs(group["rigid"]["rotation"][0] - sign * 60) < 1e-7, group)
+        check(abs(group["rigid"]["moment"][-1] / (sign * YOUNG * 0.1 ** 3 / 12 * angle / length) - 1) < 0.01 and math.hypot(*group["force"]) < 1e-9, group)
+        # the plate has kept its shape: every distance in it
+        tip = [k for (i, _), k in at.items() if i >= 40]
+        moved = [numpy.array(nodes[k]) + found["displacements"][k] for k in tip]
+        off = max(abs(numpy.linalg.norm(moved[a] - moved[b]) - numpy.linalg.norm(numpy.array(nodes[tip[a]]) - nodes[tip[b]]))
+                  for a in range(len(tip)) for b in range(a))
+        check(off < 1e-12 * length, off)
+
+
+def elastica(length, rigid, load):
+    """Of EI = 1 under a dead load across its rigid tip: theta'' = -load cos theta, theta'(length) = load rigid cos theta; the tip's place."""
+    def shoot(bend):
+        theta, kappa, x, y, n = 0.0, bend, 0.0, 0.0, 4000
+        for _ in range(n):
+            h, state = length / n, (theta, kappa, x, y)
+            slope = lambda z: (z[1], -load * math.cos(z[0]), math.cos(z[0]), math.sin(z[0]))
+            k1 = slope(state)
+            k2 = slope([a + h / 2 * b for a, b in zip(state, k1)])
+            theta, kappa, x, y = (a + h * b for a, b in zip(state, k2))
+        return kappa - load * rigid * math.cos(theta), x + rigid * math.cos(theta), y + rigid * math.sin(theta)
+    low, high = 0.0, load * (length + rigid)
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if shoot(middle)[0] < 0 else (low, middle)
+    return shoot(low)[1:]
+
+
+def test_an_elastica_with_a_rigid_tip(s):
+    """A dead load on the far end of a free rigid group: its arm shortens as it turns."""
+    length, rigid, thick = 10.0, 3.0, 0.1
+    stiff = YOUNG * thick ** 3 / 12
+    load = 2.0 * stiff / length ** 2
+    request, at, nodes = beam(length, rigid, thick, 20, supports=[{"on": "clamp", "ux": 0, "uy": 0}, {"on": "tip", "rigid": {"point": [length, 0]}}],
+                              loads=[{"on": "far", "force": [0, load]}])
+    found = answer(s, request)
+    far = at[42, 1]
+    x, y = (a + b for a, b in zip(nodes[far], found["displacements"][far]))
+    there = elastica(length, rigid, load / stiff)
+    check(there[1] > 0.5 * length and math.hypot(x - there[0], y - there[1]) < 2e-3 * length, (x, y), there)
+    check(found["summary"]["finite"]["qps"] <= 40, found["summary"]["finite"])
+
+
+def test_a_column_with_a_rigid_head_buckles(s):
+    """Euler's load of a clamped column under a dead load on its rigid head, k b tan(k L) = 1: stable below it, and not above."""
+    length, rigid, thick = 10.0, 4.0, 0.2
+    low, high = 1e-6, math.pi / 2 / length
+    for _ in range(100):
+        k = (low + high) / 2
+        low, high = (k, high) if k * rigid * math.tan(k * length) < 1 else (low, k)
+    limit = low ** 2 * YOUNG * thick ** 3 / 12
+    for part in (0.97, 1.03):
+        request, _, _ = beam(length, rigid, thick, 20, supports=[{"on": "clamp", "ux": 0, "uy": 0}, {"on": "tip", "rigid": {"point": [length, 0]}}],
+                             loads=[{"on": "far", "force": [-part * limit, 0]}])
+        found = answer(s, request, "converged" if part < 1 else "unstable")
+        check(found["summary"]["finite"]["definite"], found["summary"]["finite"])
+        check(part < 1 or abs(found["summary"]["finite"]["load"] * part - 1) < 0.01, found["summary"]["finite"])
+
+
+def test_a_rigid_side_is_one_that_is_turned(s):
+    """A block whose side is turned by all of a rotation, as a rigid group and by a support that turns it: the same, in the plane and in space."""
+    for solid, turn in ((False, [0, 0, 0.8]), (True, [0.5, -0.4, 0.9])):
+        dim, angle = 3 if solid else 2, math.hypot(*turn)
+        box = {"size": [2, 1, 1][:dim], "cells": [4, 2, 2][:dim], "element": "hex8" if solid else "quad8"}
+        point = [2, 0.5, 0.5][:dim]
+        held = {"on": "left", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}
+        axis = {"axis": [t / angle for t in turn]} if solid else {}
+        plain = {"on": "right", "ux": 0.1, "uy": 0, **({"uz": 0} if solid else {}), "rotation": {"angle": math.degrees(angle), "about": point, **axis}}
+        motion = {key: math.degrees(by) for key, by in zip(("rx", "ry", "rz"), turn) if solid or key == "rz"}
+        rigid = {"on": "right", "rigid": {"point": point, "ux": 0.1, "uy": 0, **({"uz": 0} if solid else {}), **motion}}
+        by = [answer(s, scene(model="solid" if solid else "plane_strain", mesh={"box": box}, supports=[held, one])) for one in (plain, rigid)]
+        off = numpy.abs(numpy.array(by[0]["displacements"]) - by[1]["displacements"]).max()
+        check(off < 1e-8, solid, off)
+        forces = [one["summary"]["resultants"]["supports"][1]["force"] for one in by]
+        check(all(abs(a - b) < 1e-8 for a, b in zip(*forces)), forces)
+
+
+def test_rigid_groups_turn_freely_in_space(s):
+    """The same load turned with the whole scene: the answer is turned; without anything else to hold it."""
+    def solved(turned):
+        c, d = (0.0, 1.0) if turned else (1.0, 0.0)
+        place = lambda x, y, z: (c * x - d * y, d * x + c * y, z)
+        mesh = body(["hex8"], [(4, 1, 2)], [lambda x, y, z: place(4 * x, 0.5 * y, z)], {"clamp": [(0, "x0")], "tip": [(0, "x1")]})["problem"]["mesh"]
+        force = place(0, 0.004, 0)
+        far = {"nodes": [next(k for k, x in enumerate(mesh["nodes"]) if math.dist(x, place(4, 0, 1)) < 1e-9)]}
+        mesh["groups"]["corner"] = far
+        return answer(s, scene(model="solid", mesh=mesh, supports=[{"on": "clamp", "ux": 0, "uy": 0, "uz": 0}, {"on": "tip", "rigid": {"point": place(4, 0.25, 0.5)}}],
+                               loads=[{"on": "corner", "force": [*force]}]))
+    one, other = solved(False), solved(True)
+    u, v = (numpy.array(found["displacements"]) for found in (one, other))
+    check(numpy.abs(u).max() > 0.5, numpy.abs(u).max())
+    check(numpy.abs(numpy.column_stack((-u[:, 1], u[:, 0], u[:, 2])) - v).max() < 1e-7, numpy.abs(u).max())
+
+
+def test_what_rigid_groups_cannot_be(s):
+    cube = {"box": {"size": [1, 1, 1], "cells": [1, 1, 1]}}
+    held = {"on": "left", "ux": 0, "uy": 0, "uz": 0}
+    for motion, pointer, word in (({"rx": 30}, "/supports/1/rigid", "or two at 0"), ({"rx": 30, "ry": 0}, "/supports/1/rigid", "or two at 0"),
+                                  ({"rx": 120, "ry": 120, "rz": 120}, "/supports/1/rigid/rz", "half a turn")):
+        refused(s, scene(model="solid", mesh=cube, supports=[held, {"on": "right", "rigid": {"point": [1, 0, 0], **motion}}]), pointer, word)
 
 
 if __name__ == "__main__":

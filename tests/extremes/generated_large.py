@@ -1,5 +1,6 @@
 """Generated scenes of large deformation, held against code of its own: bodies of quad4, quad8, tri3 and hex8, bent at random, in plane
-strain, as rings and as solids, of every law, pressed on planes, circles and spheres by supports and loads, some of them warm or cold, along paths too.
+strain, as rings and as solids, of every law, pressed on planes, circles and spheres by supports and loads, some of them warm or cold, along
+paths too, a third of them with a side on springs or with nodes that are a rigid group.
 
 What claims to have converged must be in equilibrium: with elements and laws written once more, in quadruple precision (large/checker.c),
 forces vanish on free dofs away from the contact; on it they press, and along the obstacle there are none. No point of a fine grid in any
@@ -47,6 +48,15 @@ class Scene:
         self.center, self.radius = (rng.uniform(0.2, 0.8) * self.long, rng.uniform(1, 4)) if not ring and rng.random() < 0.6 else (None, None)
         self.tilt = 0 if ring else rng.uniform(-0.15, 0.15)
         self.steps = [round(rng.uniform(0.2, 1), 2) for _ in range(rng.randint(1, 3))] + [1] if rng.random() < 0.3 else None
+        beside = random.Random(f"held {number}")
+        below, above = ({n for side in self.side[name] for n in side} for name in ("bottom", "top"))
+        right = {n for side in self.side["right"] for n in side} if self.element != "hex8" else set(self.side.pop("right"))
+        if self.element == "quad8":
+            right |= {self.middle(*side) for side in self.side["right"]}
+        self.group = sorted(right - below - above) if not ring and beside.random() < 0.25 else []
+        flat = 0 if not self.group else numpy.linalg.matrix_rank(self.nodes[self.group] - self.nodes[self.group[0]], 1e-6)
+        self.group = self.group if flat >= self.nodes.shape[1] - 1 else []  # what tells a rotation
+        self.springs = [beside.uniform(0.05, 1), beside.uniform(0.05, 1)] if self.element != "hex8" and not ring and not self.group and beside.random() < 0.25 else None
         self.pull = [rng.uniform(-0.06, 0.06) for _ in range(2)] if self.element != "hex8" and not ring and rng.random() < 0.5 else None  # on its right side
         self.warm = rng.uniform(-0.1, 0.15) if rng.random() < 0.4 else 0.0
 
@@ -57,7 +67,7 @@ class Scene:
         cells = [[at(i + p, j + q, k + r) for p, q, r in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))]
                  for k in range(nz) for j in range(ny) for i in range(nx)]
         faces = lambda j: [[at(i, j, k), at(i + 1, j, k), at(i + 1, j, k + 1), at(i, j, k + 1)] for k in range(nz) for i in range(nx)]
-        return nodes, cells, {"bottom": faces(0), "top": faces(ny)}
+        return nodes, cells, {"bottom": faces(0), "top": faces(ny), "right": [at(nx, j, k) for j in range(ny + 1) for k in range(nz + 1)]}
 
     def obstacle(self):
         dim = self.nodes.shape[1]
@@ -75,6 +85,11 @@ class Scene:
         problem = {"kind": "scene", "model": self.model, "kinematics": "finite", "mesh": mesh, "materials": [{"on": "all", "young": 1, "poisson": self.poisson, "law": self.law, "expansion": 0.5}],
                    "supports": [{"on": "top", **top, "uy": -self.down}], "contacts": [{"on": "bottom", "obstacle": self.obstacle()}]}
         problem["loads"] = ([{"on": "right", "traction": self.pull}] if self.pull else []) + ([{"on": "all", "temperature": 2 * self.warm}] if self.warm else [])
+        if self.springs:
+            problem["supports"].append({"on": "right", "spring": self.springs})
+        if self.group:
+            groups["plate"] = {"nodes": self.group}
+            problem["supports"].append({"on": "plate", "rigid": {"point": [float(c) for c in self.nodes[self.group[0]]]}})
         self.held = {key: value for support in problem["supports"] for key, value in support.items() if key in keys}
         return {"problem": problem, **({"cases": [{"name": "way", "steps": self.steps}]} if self.steps else {})}
 
@@ -88,6 +103,8 @@ class Scene:
         sides = [(a, b, self.middle(a, b) if self.element == "quad8" else -1, *self.pull) for a, b in (self.side["right"] if self.pull else ())]
         given = [self.element, self.model, self.law, self.poisson, part, self.warm, dim, len(self.nodes), len(self.cells), self.nodes, self.cells, u,
                  len(held), *held, len(below), sorted(below), len(sides), *sides]
+        ground = [(a, b, self.middle(a, b) if self.element == "quad8" else -1) for a, b in self.side["right"]] if self.springs else []
+        given += [len(ground), *(self.springs or []), *ground, len(self.group), *self.group]
         given += ["sphere", self.center, -self.radius, *([0.4] * (dim - 2)), self.radius] if self.radius else ["plane"]
         told = subprocess.run([checker], input=" ".join(text for one in given for text in texts(one)), capture_output=True, text=True, check=True).stdout
         return {name: float(value) for name, value in (line.split() for line in told.splitlines())}
@@ -104,7 +121,8 @@ class Scene:
         force = max(abs(told[c] - left[f"total{c}"]) for c in range(1 if self.model == "axisymmetric" else 0, dim))
         limits = {"inverted": not left["det"] > 0, "support": not left["support"] <= OFF, "left over": not left["left"] <= LEFT_OVER * most,
                   "deep": not left["gap"] >= -DEEP * self.long, "along": not left["along"] <= LEFT_OVER * most,
-                  "pulls": not left["press"] >= -LEFT_OVER * most, "force": not force <= 10 * LEFT_OVER * most}
+                  "pulls": not left["press"] >= -LEFT_OVER * most,
+                  "bent": not left["shape"] <= OFF * self.long, "not free": not left["free"] <= LEFT_OVER * most, "force": not force <= 10 * LEFT_OVER * most}
         return [f"{name}: {left}" for name, is_so in limits.items() if is_so]
 
 
@@ -127,7 +145,10 @@ def mirrored(request, axis_in_cells):
     for group in mesh["groups"].values():
         group.update({kind: [side[::-1] for side in sides] for kind, sides in group.items()})
     for support in problem["supports"]:
-        support["ux"] = -support["ux"]
+        if "ux" in support:
+            support["ux"] = -support["ux"]
+        if "rigid" in support:
+            support["rigid"]["point"][0] *= -1
     for load in problem["loads"]:
         if "traction" in load:
             load["traction"][0] *= -1

@@ -8,12 +8,16 @@
  *       held dofs: count, then node axis value of each
  *       nodes on the obstacle: count, then each
  *       loaded sides: count, then first last middle (-1: none), and the traction
+ *       sides on springs: count, their stiffness along each axis, then first last middle (-1: none)
+ *       nodes of a rigid group: count, then each
  *       sphere centre radius, or plane: the one through 0 with matter above
  * Out:  lines of a name and a number:
  *       det      the least of J over quadrature points and a grid
  *       support  how far held dofs are off
  *       most     the largest nodal force
  *       left     of forces on free dofs away from the obstacle
+ *       shape    by how much distances in the rigid group have changed, at most
+ *       free     of the sum of the forces on the group, and of their moment about its first node over its size
  *       gap      the least of nodes on it
  *       along    of forces along the obstacle: components, of a sphere the moment about its centre
  *       press    the sum of what nodes are pressed with
@@ -362,6 +366,65 @@ static void add_loads(body *b)
     }
 }
 
+static quad distance(const body *b, int64_t first, int64_t last, bool moved)
+{
+    quad square = 0;
+    for (int c = 0; c < b->dim; c++) {
+        const int64_t to = b->dim * last + c, from = b->dim * first + c;
+        const quad way = (quad)b->xyz[to] - b->xyz[from] + (moved ? (quad)b->u[to] - b->u[from] : 0);
+        square += way * way;
+    }
+    return quad_sqrt(square);
+}
+
+/* What springs pull with, spread over the sides by their length at rest, as loads are. */
+static void add_springs(body *b)
+{
+    const int64_t count = index_below((int64_t)1 << 32);
+    double stiff[3] = {0};
+    quad whole = 0, *share = calloc((size_t)b->n, sizeof *share);
+    if (!share)
+        abort();
+    for (int c = 0; c < b->dim && count > 0; c++)
+        stiff[c] = number();
+    for (int64_t k = 0; k < count; k++) {
+        const int64_t first = index_below(b->n), last = index_below(b->n), middle = index_below(b->n);
+        const quad length = distance(b, first, last, false), end = middle < 0 ? length / 2 : length / 6;
+        whole += length;
+        share[first] += end;
+        share[last] += end;
+        if (middle >= 0)
+            share[middle] += 4 * length / 6;
+    }
+    for (int64_t i = 0; i < b->dim * b->n && count > 0; i++)
+        b->load[i] -= share[i / b->dim] / whole * stiff[i % b->dim] * b->u[i];
+    free(share);
+}
+
+/* Its nodes are marked as the caller reads them. */
+static void look_at_group(const body *b, const int64_t *node, int64_t count)
+{
+    quad shape = 0, free = 0, size = 0, sum[3] = {0}, moment[3] = {0};
+    for (int64_t k = 0; k < count; k++) {
+        quad way[3] = {0}, f[3] = {0};
+        for (int64_t j = 0; j < k; j++)
+            shape = larger(shape, distance(b, node[j], node[k], true) - distance(b, node[j], node[k], false));
+        size = larger(size, distance(b, node[0], node[k], false));
+        for (int c = 0; c < b->dim; c++) {
+            const int64_t at = b->dim * node[k] + c, from = b->dim * node[0] + c;
+            way[c] = (quad)b->xyz[at] + b->u[at] - b->xyz[from] - b->u[from];
+            f[c] = b->force[at] - b->load[at];
+            sum[c] += f[c];
+        }
+        for (int c = 0; c < 3; c++)
+            moment[c] += way[(c + 1) % 3] * f[(c + 2) % 3] - way[(c + 2) % 3] * f[(c + 1) % 3];
+    }
+    for (int c = 0; c < 3 && count > 0; c++)
+        free = larger(larger(free, sum[c]), moment[c] / size);
+    tell("shape", shape);
+    tell("free", free);
+}
+
 /* What the obstacle does to its nodes: gaps, what presses, and what does not. */
 static void look_at_obstacle(const body *b, const int64_t *on, int64_t count)
 {
@@ -418,6 +481,16 @@ int main(void)
             taken[b.dim * on[k] + c] = true;
     }
     add_loads(&b);
+    add_springs(&b);
+    const int64_t in_group = index_below(b.n + 1);
+    int64_t *group = calloc((size_t)in_group + 1, sizeof *group);
+    if (!group)
+        abort();
+    for (int64_t k = 0; k < in_group; k++) {
+        group[k] = index_below(b.n);
+        for (int c = 0; c < b.dim; c++)
+            taken[b.dim * group[k] + c] = true;
+    }
     tell("det", add_forces(&b));
     for (int64_t i = 0; i < n; i++) {
         most = larger(most, b.force[i]);
@@ -425,7 +498,9 @@ int main(void)
     }
     tell("most", most);
     tell("left", left);
+    look_at_group(&b, group, in_group);
     look_at_obstacle(&b, on, count);
+    free(group);
     free(taken);
     free(on);
     free(b.xyz);

@@ -1,0 +1,246 @@
+/* rigid_place.c: rigid groups under large rotations.
+ *
+ * A group at P + t, turned by R, has its nodes at u(x) = t + (R - I) (x - P). Its dofs are then those of the next step
+ * from there, d = dt + w x (R (x - P)), linear as in rigid.c about where the group is; the step leads to t + dt and
+ * exp(w) R, so that distances are kept whatever its size. The second derivative of that way, w x (w x r), makes of
+ * forces f on the nodes a stiffness of the rotation, w' sum (sym(f r') - f'r I) w (J. Simo and L. Vu-Quoc, "A
+ * three-dimensional finite-strain rod model. Part II", Comput. Methods Appl. Mech. Engrg. 58 (1986) 79-116). */
+#include "assembly/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/vector3.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void multiply(double out[9], const double A[9], const double B[9])
+{
+    double product[9] = {0};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            for (int k = 0; k < 3; k++)
+                product[3 * i + j] += A[3 * i + k] * B[3 * k + j];
+    memcpy(out, product, sizeof product);
+}
+
+void uz_rotation(double R[9], const double w[3])
+{
+    const double angle = sqrt(uz_dot3(w, w)), half = sin(angle / 2);
+    const double sine = angle > 0 ? sin(angle) / angle : 1, rest = angle > 0 ? 2 * half * half / (angle * angle) : 0.5;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            R[3 * i + j] = (i == j ? cos(angle) : 0) + rest * w[i] * w[j];
+    for (int c = 0; c < 3; c++) {
+        const int i = (c + 1) % 3, j = (c + 2) % 3;
+        R[3 * j + i] += sine * w[c];
+        R[3 * i + j] -= sine * w[c];
+    }
+}
+
+/* By the quaternion whose largest component is found first (S. Shepperd, J. Guid. Control 1 (1978) 223-224). */
+void uz_rotation_vector(double w[3], const double R[9])
+{
+    const double trace = R[0] + R[4] + R[8];
+    double q[4], square[4] = {1 + trace, 1 + 2 * R[0] - trace, 1 + 2 * R[4] - trace, 1 + 2 * R[8] - trace};
+    const double skew[3] = {R[7] - R[5], R[2] - R[6], R[3] - R[1]};
+    int most = 0;
+    for (int k = 1; k < 4; k++)
+        most = square[k] > square[most] ? k : most;
+    const double own = sqrt(square[most]) / 2;
+    for (int k = 0; k < 4; k++) {
+        const int i = most - 1, j = k - 1;
+        q[k] = k == most ? own : (most == 0 ? skew[j] : k == 0 ? skew[i] : R[3 * i + j] + R[3 * j + i]) / (4 * own);
+    }
+    double axis[3] = {q[1], q[2], q[3]};
+    if (q[0] < 0)
+        for (int c = 0; c < 3; c++)
+            axis[c] = -axis[c];
+    const double sine = uz_unit3(axis), angle = 2 * atan2(sine, fabs(q[0]));
+    for (int c = 0; c < 3; c++)
+        w[c] = angle * axis[c];
+}
+
+static void place_of(double x[3], const uz_body_model *model, int64_t node, const double *u)
+{
+    const int dim = model->mesh.dim;
+    for (int c = 0; c < 3; c++)
+        x[c] = c < dim ? model->mesh.xyz[node * dim + c] + (u ? u[node * dim + c] : 0) : 0;
+}
+
+/* Q: an orthonormal basis that goes with the group's anchors, in its columns. */
+static void basis(double Q[9], const uz_body_model *model, const uz_rigid_group *group, const double *u)
+{
+    double x[3][3], e[3][3] = {{0}};
+    for (int a = 0; a < (model->mesh.dim == 2 ? 2 : 3); a++)
+        place_of(x[a], model, group->anchor[a], u);
+    for (int c = 0; c < 3; c++)
+        e[0][c] = x[1][c] - x[0][c];
+    uz_unit3(e[0]);
+    if (model->mesh.dim == 2) {
+        e[2][2] = 1;
+    } else {
+        double side[3];
+        for (int c = 0; c < 3; c++)
+            side[c] = x[2][c] - x[0][c];
+        uz_cross3(e[2], e[0], side);
+        uz_unit3(e[2]);
+    }
+    uz_cross3(e[1], e[2], e[0]);
+    for (int i = 0; i < 9; i++)
+        Q[i] = e[i % 3][i / 3];
+}
+
+void uz_rigid_place(double t[3], double R[9], const uz_body_model *model, const uz_rigid_group *group, const double *u)
+{
+    const double *own = u + group->anchor[0] * model->mesh.dim;
+    double from[9], to[9], x[3];
+    memset(R, 0, 9 * sizeof *R);
+    R[0] = R[4] = R[8] = 1;
+    memset(t, 0, 3 * sizeof *t);
+    memcpy(t, own, (size_t)model->mesh.dim * sizeof *t);
+    if (model->kind == UZ_AXISYMMETRIC)
+        return;
+    basis(from, model, group, NULL);
+    basis(to, model, group, u);
+    for (int i = 0; i < 9; i++) {
+        R[i] = 0;
+        for (int k = 0; k < 3; k++)
+            R[i] += to[3 * (i / 3) + k] * from[3 * (i % 3) + k];
+    }
+    place_of(x, model, group->anchor[0], NULL);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            t[i] -= (R[3 * i + j] - (i == j)) * (x[j] - group->point[j]);
+}
+
+/* u of a node of the group. */
+static void displacement(double *u, const uz_body_model *model, const uz_rigid_group *group, int64_t node,
+                         const double t[3], const double R[9])
+{
+    double x[3];
+    place_of(x, model, node, NULL);
+    for (int i = 0; i < model->mesh.dim; i++) {
+        u[i] = t[i];
+        for (int j = 0; j < 3; j++)
+            u[i] += (R[3 * i + j] - (i == j)) * (x[j] - group->point[j]);
+    }
+}
+
+uz_status uz_body_turned(uz_body_model *out, const uz_body_model *model, const double *u, uz_error *err)
+{
+    const int dim = model->mesh.dim;
+    const uz_followers *follow = &model->follow;
+    *out = *model;
+    if (model->n_rigid == 0)
+        return UZ_OK;
+    const int64_t n = follow->first[model->mesh.n_nodes] * dim * dim;
+    out->follow.share = uz_alloc(n, sizeof *out->follow.share);
+    if (!out->follow.share) {
+        out->follow.share = follow->share;
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the nodes of rigid groups");
+    }
+    memcpy(out->follow.share, follow->share, (size_t)n * sizeof *out->follow.share);
+    out->turned = true;
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->kind != UZ_AXISYMMETRIC; a++) {
+        const uz_rigid_group *group = uz_rigid_group_of(model, a);
+        double t[3], R[9], at[3], arm[3];
+        if (!group)
+            continue;
+        uz_rigid_place(t, R, model, group, u);
+        place_of(at, model, a, u);
+        for (int c = 0; c < 3; c++)
+            arm[c] = (at[c] - group->point[c] - t[c]) / group->size;
+        uz_rigid_arms(out->follow.share + (follow->first[a] + 1) * dim * dim, arm, dim);
+    }
+    return UZ_OK;
+}
+
+void uz_body_turned_clear(uz_body_model *turned)
+{
+    if (turned->turned)
+        free(turned->follow.share);
+    memset(turned, 0, sizeof *turned);
+}
+
+void uz_rigid_ways(double *given, const uz_body_model *model, const double *prescribed, const double *u)
+{
+    const int dim = model->mesh.dim, turns = dim == 2 ? 1 : 3;
+    for (int64_t k = 0; k < model->n_rigid; k++) {
+        const uz_rigid_group *group = &model->rigid[k];
+        const int64_t *dof = model->dof + group->anchor[0] * dim;
+        double t[3], R[9], to[3] = {0}, way[3];
+        bool whole = true;
+        uz_rigid_place(t, R, model, group, u);
+        for (int c = 0; c < dim; c++)
+            if (dof[c] < 0 && dof[c] != UZ_NO_DOF)
+                given[-1 - dof[c]] = prescribed[-1 - dof[c]] - t[c];
+        if (model->kind == UZ_AXISYMMETRIC)
+            continue;
+        dof = model->dof + group->anchor[1] * dim;
+        for (int c = 0; c < turns; c++) {
+            whole = whole && dof[c] < 0;
+            to[dim == 2 ? 2 : c] = dof[c] < 0 ? prescribed[-1 - dof[c]] / group->size : 0;
+        }
+        memset(way, 0, sizeof way);
+        if (whole && dim == 3) {
+            double back[9], turn[9];
+            for (int i = 0; i < 9; i++)
+                back[i] = R[3 * (i % 3) + i / 3];
+            uz_rotation(turn, to);
+            multiply(turn, turn, back);
+            uz_rotation_vector(way, turn);
+        } else if (whole) {
+            way[2] = to[2] - atan2(R[3], R[0]);
+        }
+        for (int c = 0; c < turns; c++) /* others turn about an axis that is free, and stay */
+            if (dof[c] < 0)
+                given[-1 - dof[c]] = group->size * way[dim == 2 ? 2 : c];
+    }
+}
+
+void uz_rigid_step(double *u, const uz_body_model *model, const double *from)
+{
+    const int dim = model->mesh.dim;
+    for (int64_t k = 0; k < model->n_rigid; k++) {
+        const uz_rigid_group *group = &model->rigid[k];
+        double t[3], R[9], dt[3], w[3], turn[9];
+        uz_rigid_place(t, R, model, group, from);
+        uz_rigid_motion(dt, w, model, group, from, u);
+        uz_rotation(turn, w);
+        multiply(turn, turn, R);
+        for (int c = 0; c < 3; c++)
+            t[c] += dt[c];
+        for (int64_t a = 0; a < model->mesh.n_nodes; a++)
+            if (uz_rigid_group_of(model, a) == group && model->kind != UZ_AXISYMMETRIC)
+                displacement(u + a * dim, model, group, a, t, turn);
+            else if (uz_rigid_group_of(model, a) == group)
+                u[a * dim + 1] = from[a * dim + 1] + dt[1];
+    }
+}
+
+void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, const double *u, const double *f)
+{
+    const int dim = model->mesh.dim;
+    for (int64_t k = 0; k < model->n_rigid && model->kind != UZ_AXISYMMETRIC; k++) {
+        const uz_rigid_group *group = &model->rigid[k];
+        double t[3], R[9], G[9] = {0}, block[9] = {0};
+        uz_rigid_place(t, R, model, group, u);
+        for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+            double r[3], force[3] = {0};
+            if (uz_rigid_group_of(model, a) != group)
+                continue;
+            place_of(r, model, a, u);
+            for (int c = 0; c < 3; c++)
+                r[c] -= group->point[c] + t[c];
+            memcpy(force, f + a * dim, (size_t)dim * sizeof *force);
+            for (int i = 0; i < 9; i++)
+                G[i] +=
+                    0.5 * (force[i / 3] * r[i % 3] + r[i / 3] * force[i % 3]) - (i % 4 == 0 ? uz_dot3(force, r) : 0);
+        }
+        for (int i = 0; i < (dim == 2 ? 1 : 9); i++)
+            block[i] = (dim == 2 ? G[8] : G[i]) / (group->size * group->size);
+        uz_add_dof_block(to, group->anchor[1], group->anchor[1], block);
+    }
+}
