@@ -173,6 +173,24 @@ static uz_problem asking_problem(void)
     return problem;
 }
 
+/* Large deformation on a spring, with a rigid side. */
+static uz_problem finite_supports_problem(void)
+{
+    uz_problem problem = asking_problem();
+    uz_scene *scene = &problem.scene;
+    uz_scene_clear(scene);
+    *scene = finite_problem().scene;
+    snprintf(scene->supports[0].on, sizeof scene->supports[0].on, "left");
+    add_support(scene, "top", NAN, NAN);
+    add_support(scene, "right", NAN, NAN);
+    scene->supports[1].kind = UZ_SUPPORT_SPRING;
+    scene->supports[1].spring[1] = 1;
+    scene->supports[2].kind = UZ_SUPPORT_RIGID;
+    for (int c = 0; c < 3; c++)
+        scene->supports[2].turn[c] = NAN;
+    return problem;
+}
+
 /* A block on a ball, which it stands in between its nodes. */
 static uz_problem block_problem(void)
 {
@@ -274,6 +292,8 @@ TEST(moving_contact)
     uz_problem refined = finite_problem();
     refined.scene.refine = true;
     check_scenario("refined at finite strain", refined, UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
+    check_scenario("finite strain on springs", finite_supports_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO,
+                   UZ_ORDERING_AUTO, false);
 }
 
 TEST(small_deformation_is_compared)
