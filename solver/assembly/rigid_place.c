@@ -44,15 +44,15 @@ void uz_rotation_vector(double w[3], const double R[9])
 {
     const double trace = R[0] + R[4] + R[8];
     double q[4], square[4] = {1 + trace, 1 + 2 * R[0] - trace, 1 + 2 * R[4] - trace, 1 + 2 * R[8] - trace};
-    const double skew[3] = {R[7] - R[5], R[2] - R[6], R[3] - R[1]};
+    const double skew[4] = {0, R[7] - R[5], R[2] - R[6], R[3] - R[1]};
     int most = 0;
     for (int k = 1; k < 4; k++)
         most = square[k] > square[most] ? k : most;
     const double own = sqrt(square[most]) / 2;
-    for (int k = 0; k < 4; k++) {
-        const int i = most - 1, j = k - 1;
-        q[k] = k == most ? own : (most == 0 ? skew[j] : k == 0 ? skew[i] : R[3 * i + j] + R[3 * j + i]) / (4 * own);
-    }
+    for (int k = 0; k < 4; k++)
+        q[k] = k == most             ? own
+               : most == 0 || k == 0 ? skew[most + k] / (4 * own)
+                                     : (R[3 * most + k - 4] + R[3 * k + most - 4]) / (4 * own);
     double axis[3] = {q[1], q[2], q[3]};
     if (q[0] < 0)
         for (int c = 0; c < 3; c++)

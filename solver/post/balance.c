@@ -354,6 +354,30 @@ static uz_status energy_of(double *energy, const balance *b, uz_error *err)
     return uz_strain_energy(energy, model, b->u, carried, err);
 }
 
+/* How rigid groups have moved, linearly or (large) as they are turned, and the moments about their points there. */
+static void tell_groups(balance *b, bool large)
+{
+    const uz_body_model *model = b->rest;
+    for (int64_t g = 0; g < model->n_rigid; g++) {
+        const uz_rigid_group *group = &model->rigid[g];
+        uz_resultant *to = &b->out->supports[group->support];
+        double at[DIM] = {group->point[0], group->point[1], group->point[2]}, across[DIM], R[3 * DIM];
+        to->rigid = true;
+        if (large) {
+            uz_rigid_place(to->moved, R, model, group, b->u);
+            uz_rotation_vector(to->turned, R);
+        } else {
+            uz_rigid_motion(to->moved, to->turned, model, group, NULL, b->u);
+        }
+        for (int c = 0; c < DIM && large; c++)
+            at[c] += to->moved[c];
+        uz_cross3(across, at, to->force);
+        for (int c = 0; c < DIM && model->kind != UZ_AXISYMMETRIC; c++)
+            to->about[c] = to->moment[c] - across[c];
+        memcpy(to->point, group->point, sizeof to->point);
+    }
+}
+
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                             const double *r, const uz_balance_known *known, uz_error *err)
 {
@@ -413,25 +437,8 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     for (int64_t a = 0; a < n && status == UZ_OK; a++)
         if (b.held[a] && !uz_mesh_hangs(&model->mesh, a))
             add_reaction(&b, a);
-    for (int64_t g = 0; g < model->n_rigid && status == UZ_OK; g++) {
-        uz_resultant *to = &out->supports[model->rigid[g].support];
-        double across[DIM];
-        to->rigid = true;
-        const uz_rigid_group *group = &model->rigid[g];
-        double at[DIM] = {group->point[0], group->point[1], group->point[2]}, R[3 * DIM];
-        if (known) {
-            uz_rigid_place(to->moved, R, known->rest, group, u);
-            uz_rotation_vector(to->turned, R);
-            for (int c = 0; c < DIM; c++)
-                at[c] += to->moved[c];
-        } else {
-            uz_rigid_motion(to->moved, to->turned, model, group, NULL, u);
-        }
-        uz_cross3(across, at, to->force);
-        for (int c = 0; c < DIM && model->kind != UZ_AXISYMMETRIC; c++)
-            to->about[c] = to->moment[c] - across[c];
-        memcpy(to->point, group->point, sizeof to->point);
-    }
+    if (status == UZ_OK)
+        tell_groups(&b, known != NULL);
     if (status == UZ_OK)
         status = add_springs(&b, err);
     if (status == UZ_OK && !known)

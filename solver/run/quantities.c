@@ -40,6 +40,9 @@
 #define OF_CONTACT 1.6
 #define OF_HEAT    2.5
 #define OF_OTHER   1.3
+/* ... times this of large deformation, where what stress does to turning parts and terms of third order are left out:
+ * of 120 generated scenes true values were as far off as 1.36 times what was told without. */
+#define OF_LARGE 1.5
 /* ... and of the value times the square of the mesh's error: of a force that balance alone makes all but known, the
  * rest is of second order. */
 #define OF_SECOND 1e-2
@@ -409,7 +412,8 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
         length = hypot(length, x->z[i]);
     const double depth = depth_shift(x, of, x->depth), bulge = depth_shift(x, of, x->bulge);
     const double shift = (both[0] - both[1]) / (4 * scale);
-    const double times = !pressed ? OF_OTHER : x->free_strain ? OF_HEAT : OF_CONTACT;
+    const double of_kind = !pressed ? OF_OTHER : x->free_strain ? OF_HEAT : OF_CONTACT;
+    const double times = of_kind * (x->work->place ? OF_LARGE : 1);
     double *part = x->of_elements + model->mesh.n_elements;
     out->mesh = OF_ESTIMATE * fabs(shift) + product_of_errors(part, x, scale) + OF_DEPTH * fabs(depth) + fabs(bulge) +
                 end_error(part, x) + of->blur;

@@ -42,7 +42,7 @@ def test_uniform_states_have_exact_quantities(s):
 
 
 def test_they_become_those_of_small_deformation(s):
-    """Of a load that strains by 1e-4 the intervals are those of small deformation, of every kind."""
+    """Of a load that strains by 1e-4 the intervals are those of small deformation, of every kind, but for what is always added (OF_LARGE)."""
     def asked(kinematics, law, springs):
         holds = [{"on": "left", "ux": 0}, {"on": "top", "spring": [0, 2]} if springs else {"on": "top", "uy": -1e-4}]
         loads = [{"on": "top", "traction": [0, -3e-4]}] if springs else [{"on": "right", "traction": [2e-5, 3e-5]}]
@@ -60,7 +60,7 @@ def test_they_become_those_of_small_deformation(s):
             check(abs(small["on_this_mesh"] - large["on_this_mesh"]) < 2e-3 * abs(small["on_this_mesh"]), small, large)
             if "why" not in small:
                 check(abs((large["value"] - large["on_this_mesh"]) - (small["value"] - small["on_this_mesh"])) < 0.02 * off + 1e-3 * small["mesh"], small, large)
-                check(abs(large["mesh"] / small["mesh"] - 1) < 0.05, small, large)
+                check(abs(large["mesh"] / small["mesh"] - 1.5) < 0.05, small, large)
 
 
 def test_finer_meshes_are_in_their_intervals(s):

@@ -326,6 +326,42 @@ def test_rigid_groups_turn_freely_in_space(s):
     check(numpy.abs(numpy.column_stack((-u[:, 1], u[:, 0], u[:, 2])) - v).max() < 1e-7, numpy.abs(u).max())
 
 
+def test_a_rigid_side_rolls_on_an_obstacle(s):
+    """A flat side that is free to turn, pressed on a circle: beside its middle it tilts, and moments about its point vanish; mirrored it
+    tilts the other way."""
+    turned = []
+    for at in (0.8, 1.0, 1.2):
+        found = answer(s, scene(mesh={"box": {"size": [2, 1], "cells": [8, 4], "element": "quad8"}},
+                                supports=[{"on": "top", "ux": 0, "uy": -0.2}, {"on": "bottom", "rigid": {"point": [1, 0]}}],
+                                contacts=[{"on": "bottom", "obstacle": {"circle": {"center": [at, -2], "radius": 2}}}]))
+        summary = found["summary"]
+        group = summary["resultants"]["supports"][1]
+        check(summary["finite"]["steps"] == 1 and summary["finite"]["qps"] <= 6 and summary["contact"]["force"][1] > 0.5, summary["finite"])
+        check(math.hypot(*group["force"]) < 1e-8 and abs(group["rigid"]["moment"][0]) < 1e-8, group)
+        turned.append(group["rigid"]["rotation"][0])
+    check(turned[0] < -2 and abs(turned[1]) < 1e-8 and abs(turned[0] + turned[2]) < 1e-7, turned)
+
+
+def test_rigid_groups_along_paths_and_in_quantities(s):
+    """A path by three points ends where the whole comes to at once, and so does auto; the force that a group takes has an interval, which
+    that of a finer mesh lies in."""
+    def turned(cells=(8, 2), **motion):
+        return scene(mesh={"box": {"size": [4, 1], "cells": cells, "element": "quad8"}},
+                     supports=[{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "rigid": {"point": [4, 0.5], "rz": 60, **motion}}])
+    whole = answer(s, turned())["displacements"]
+    path = s.post({**turned(), "cases": [{"name": "way", "steps": [0.3, 0.6, 1]}]}).json["id"]
+    check(s.wait_status(path, "successful", "failed")["status"] == "successful", path)
+    there = s.get(f"/v1/jobs/{path}/result?fields=displacements&case=way").json["displacements"]
+    auto = turned()
+    auto["problem"]["kinematics"] = "auto"
+    for other in (there, answer(s, auto)["displacements"]):
+        check(numpy.abs(numpy.array(whole) - other).max() < 1e-8, numpy.abs(numpy.array(whole) - other).max())
+    asked = {"quantities": [{"quantity": "reaction", "on": "right", "direction": [0, 1]}, {"quantity": "strain_energy"}]}
+    coarse, fine = (answer(s, {**turned(cells, ux=-0.5, uy=1.5), **asked})["summary"]["quantities"] for cells in ((8, 2), (24, 6)))
+    for one, other in zip(coarse, fine):
+        check(one["low"] < other["value"] < one["high"] and one["high"] - one["low"] < 0.2 * abs(one["value"]), one, other)
+
+
 def test_what_rigid_groups_cannot_be(s):
     cube = {"box": {"size": [1, 1, 1], "cells": [1, 1, 1]}}
     held = {"on": "left", "ux": 0, "uy": 0, "uz": 0}

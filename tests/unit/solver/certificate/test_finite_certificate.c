@@ -11,7 +11,7 @@
 typedef struct {
     uz_scene scene;
     uz_result *result;
-    uz_body_model base, there;
+    uz_body_model base, turned, there; /* turned: with rigid groups where they are */
     double *prescribed, *p, *h;
 } answered;
 
@@ -34,7 +34,8 @@ static void answer(answered *a, const uz_scene *scene)
     CHECK_INT(a->result->summary.outcome, UZ_CONVERGED);
     CHECK_INT(uz_body_model_build(&a->base, scene, UZ_BODY_SUPPORTED, &err), UZ_OK);
     a->scene.place = a->result->u;
-    CHECK_INT(uz_body_model_move(&a->there, &a->base, &a->scene, &err), UZ_OK);
+    CHECK_INT(uz_body_turned(&a->turned, &a->base, a->result->u, &err), UZ_OK);
+    CHECK_INT(uz_body_model_move(&a->there, &a->turned, &a->scene, &err), UZ_OK);
     a->scene.place = NULL;
     a->prescribed = body_room(a->base.n_fixed + 1, sizeof(double));
     a->p = body_room(a->base.d + 1, sizeof(double));
@@ -45,6 +46,7 @@ static void answer(answered *a, const uz_scene *scene)
 static void give_back(answered *a)
 {
     uz_body_model_clear(&a->there);
+    uz_body_turned_clear(&a->turned);
     uz_body_model_clear(&a->base);
     uz_result_free(a->result);
     free(a->prescribed);
@@ -71,6 +73,48 @@ static uz_scene on_a_ball(void)
     ball->kind = UZ_OBSTACLE_ROUND;
     ball->radius = 1.5;
     return s;
+}
+
+/* A side that is rigid and free, on a spring: springs that are stiffer, a group that is bent, turned too far, or pushed
+ * along are seen. */
+TEST(springs_and_rigid_groups)
+{
+    uz_scene s = block("quad8", 2, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "left", 0, 0, NAN);
+    body_spring(&s, "top", 0, 0.1, 0);
+    body_hold(&s, "right", NAN, NAN, NAN)->kind = UZ_SUPPORT_RIGID;
+    for (int c = 0; c < 3; c++)
+        s.supports[2].turn[c] = NAN;
+    body_load(&s, UZ_LOAD_TRACTION, "right", 0.1, -0.1, 0);
+    answered a;
+    answer(&a, &s);
+    uz_result *r = a.result;
+    const int64_t n = r->n_nodes;
+    const uz_finite_certificate c = judge(&a);
+    CHECK_MSG(c.definite && c.residual <= 1e-8 && c.worst_support < 1e-14, "%g %g", c.residual, c.worst_support);
+    CHECK(fabs(c.energy - r->evaluation->strain_energy) < 1e-12 && fabs(r->evaluation->supports[2].turned[2]) > 0.05);
+    double spring = 0, most = 0;
+    for (int64_t i = 0; i < 2 * n; i++)
+        spring += 0.5 * a.base.spring[i] * r->u[i] * r->u[i];
+    CHECK(spring > 1e-4);
+    for (int64_t i = 0; i < 2 * n; i++)
+        a.base.spring[i] *= 1.001;
+    CHECK(judge(&a).residual > 1e-5 && fabs(judge(&a).energy - c.energy - 0.001 * spring) < 1e-12);
+    for (int64_t i = 0; i < 2 * n; i++)
+        a.base.spring[i] /= 1.001;
+    for (int64_t i = 0; i < n; i++) {
+        if (!(r->mesh.xyz[2 * i] > 1 - 1e-9))
+            continue;
+        r->u[2 * i] += 1e-6; /* along with the others, or alone */
+        most = fmax(most, judge(&a).worst_support);
+        CHECK(judge(&a).worst_support > 4e-7);
+        r->u[2 * i] -= 1e-6;
+    }
+    CHECK(most < 1e-5 && judge(&a).worst_support < 1e-14);
+    for (int64_t i = 0; i < n; i++)
+        r->u[2 * i] += r->mesh.xyz[2 * i] > 1 - 1e-9 ? 1e-6 : 0;
+    CHECK(judge(&a).worst_support < 1e-14 && judge(&a).residual > 1e-6);
+    give_back(&a);
 }
 
 TEST(an_answer_and_what_is_wrong_with_others)
