@@ -205,6 +205,21 @@ def test_who_waits_for_another_sleeps(s):
     s.wait_status(job, "dismissed", seconds=PATIENT_S)
 
 
+# Of MPI's calls those that wait, and ask all the time while they do; what begins with MPI_I does not.
+WAITING = {"Send", "Ssend", "Recv", "Sendrecv", "Probe", "Wait", "Waitall", "Waitany", "Barrier", "Bcast", "Reduce", "Allreduce", "Scan",
+           "Exscan", "Gather", "Gatherv", "Scatter", "Scatterv", "Allgather", "Allgatherv", "Alltoall", "Alltoallv"}
+
+
+@needs_group
+@options("--workers", "1", "--group-command", PAIR)
+def test_nothing_waits_awake(s):
+    """Neither rows nor vectors nor sums are waited for by a call of MPI's: a process sleeps then (neighbours.c)."""
+    listed = subprocess.run(["nm", "-D", "--undefined-only", str(s.build / "uzawa-group")], capture_output=True, text=True, check=True)
+    called = {line.split()[-1].split("@")[0] for line in listed.stdout.splitlines()}
+    check("MPI_Testall" in called and "MPI_Isend" in called, called)
+    check(not {f"MPI_{name}" for name in WAITING} & called, called)
+
+
 @needs_group
 @options("--workers", "1", "--group-command", PAIR)
 def test_a_group_that_nobody_needs(s):

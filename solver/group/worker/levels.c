@@ -211,19 +211,22 @@ static float *scale_modes(const spread_system *s, const spread_rows *rows)
 static void *gather(const void *own, int64_t count, size_t each, int64_t *total)
 {
     int size, *counts, *firsts, mine = (int)((size_t)count * each);
+    MPI_Request request;
     if ((size_t)count * each > INT32_MAX)
         end_group("the next matrix is too large: take fewer processes, or a smaller body");
     MPI_Comm_size(MPI_COMM_WORLD, &size);
     counts = new_zeros(size, sizeof *counts);
     firsts = new_zeros(size, sizeof *firsts);
-    MPI_Allgather(&mine, 1, MPI_INT, counts, 1, MPI_INT, MPI_COMM_WORLD);
+    MPI_Iallgather(&mine, 1, MPI_INT, counts, 1, MPI_INT, MPI_COMM_WORLD, &request);
+    wait_for(1, &request);
     int64_t bytes = 0;
     for (int p = 0; p < size; bytes += counts[p++])
         firsts[p] = (int)bytes;
     if (bytes > INT32_MAX)
         end_group("the next matrix is too large for each process to have it");
     void *all = new_zeros(bytes, 1);
-    MPI_Allgatherv(own, mine, MPI_BYTE, all, counts, firsts, MPI_BYTE, MPI_COMM_WORLD);
+    MPI_Iallgatherv(own, mine, MPI_BYTE, all, counts, firsts, MPI_BYTE, MPI_COMM_WORLD, &request);
+    wait_for(1, &request);
     free(counts);
     free(firsts);
     *total = bytes / (int64_t)each;
@@ -238,6 +241,7 @@ static void aggregate_nodes(spread_system *s, const spread_rows *rows, int32_t *
     uz_below below;
     const int64_t here = s->near.here, size = (int64_t)s->b * s->k;
     int64_t count = 0, before = 0, all = 0;
+    MPI_Request request;
     float *modes = scale_modes(s, rows);
     own.nodes = here;
     if (!uz_below_init(&below, &own))
@@ -248,7 +252,8 @@ static void aggregate_nodes(spread_system *s, const spread_rows *rows, int32_t *
     if (count > 0)
         must(uz_tentative(basis, coarse, modes, aggregate, here, s->b, count, s->k, &err), &err);
     free(modes);
-    MPI_Exscan(&count, &before, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    MPI_Iexscan(&count, &before, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD, &request);
+    wait_for(1, &request);
     if (s->near.rank == 0)
         before = 0;
     for (int64_t i = 0; i < here; i++)
@@ -417,8 +422,12 @@ static void sum_up(double *x, int64_t n)
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     for (int64_t from = 0; from < n; from += AT_ONCE) {
         const int count = (int)(n - from < AT_ONCE ? n - from : AT_ONCE);
-        MPI_Reduce(rank == 0 ? MPI_IN_PLACE : x + from, x + from, count, MPI_DOUBLE, MPI_SUM, 0, MPI_COMM_WORLD);
-        MPI_Bcast(x + from, count, MPI_DOUBLE, 0, MPI_COMM_WORLD);
+        MPI_Request request;
+        MPI_Ireduce(rank == 0 ? MPI_IN_PLACE : x + from, x + from, count, MPI_DOUBLE, MPI_SUM, 0, MPI_COMM_WORLD,
+                    &request);
+        wait_for(1, &request);
+        MPI_Ibcast(x + from, count, MPI_DOUBLE, 0, MPI_COMM_WORLD, &request);
+        wait_for(1, &request);
     }
 }
 

@@ -113,6 +113,25 @@ static size_t bytes_behind(group *g, const uz_wire_head *m)
     return n * sizeof(double) * (m->kind == UZ_WIRE_APPLY ? 1 : (size_t)lanes_of(m) * (m->b != 1 ? 2 : 1));
 }
 
+/* From the first process to another. */
+static void send_to(int process, const void *from, size_t size)
+{
+    MPI_Request request;
+    if (size > INT_MAX)
+        end_group("more at once than a message holds");
+    MPI_Isend(from, (int)size, MPI_BYTE, process, 1, PETSC_COMM_WORLD, &request);
+    wait_for(1, &request);
+}
+
+static void receive(void *to, size_t size)
+{
+    MPI_Request request;
+    if (size > INT_MAX)
+        end_group("more at once than a message holds");
+    MPI_Irecv(to, (int)size, MPI_BYTE, 0, 1, PETSC_COMM_WORLD, &request);
+    wait_for(1, &request);
+}
+
 /* ---- a body comes in */
 
 /* Which process is to have each node: a partition of the graph of nodes (PT-Scotch, unless options say otherwise). */
@@ -120,6 +139,7 @@ static PetscErrorCode divide(group *g, PetscInt n, const int32_t *offset, const 
 {
     const PetscInt share = n / g->size, first = share * g->rank, mine = g->rank == g->size - 1 ? n - first : share;
     PetscMPIInt count;
+    MPI_Request request;
     PetscInt *ia, *ja;
     const PetscInt *found;
     Mat graph;
@@ -128,9 +148,9 @@ static PetscErrorCode divide(group *g, PetscInt n, const int32_t *offset, const 
     PetscFunctionBeginUser;
     if (!IS_FIRST(g)) {
         PetscCall(PetscMalloc1(mine + 1, &ia));
-        PetscCallMPI(MPI_Recv(ia, mine + 1, MPIU_INT, 0, 1, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+        receive(ia, (size_t)(mine + 1) * sizeof *ia);
         PetscCall(PetscMalloc1(ia[mine] + 1, &ja));
-        PetscCallMPI(MPI_Recv(ja, ia[mine], MPIU_INT, 0, 2, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+        receive(ja, (size_t)ia[mine] * sizeof *ja);
     }
     for (PetscMPIInt to = g->size - 1; IS_FIRST(g) && to >= 0; to--) {
         const PetscInt from = share * to, nodes = to == g->size - 1 ? n - from : share;
@@ -142,8 +162,8 @@ static PetscErrorCode divide(group *g, PetscInt n, const int32_t *offset, const 
             ja[k] = neighbour[offset[from] + k];
         if (to == 0)
             break;
-        PetscCallMPI(MPI_Send(ia, nodes + 1, MPIU_INT, to, 1, PETSC_COMM_WORLD));
-        PetscCallMPI(MPI_Send(ja, ia[nodes], MPIU_INT, to, 2, PETSC_COMM_WORLD));
+        send_to(to, ia, (size_t)(nodes + 1) * sizeof *ia);
+        send_to(to, ja, (size_t)ia[nodes] * sizeof *ja);
         PetscCall(PetscFree(ia));
         PetscCall(PetscFree(ja));
     }
@@ -161,7 +181,9 @@ static PetscErrorCode divide(group *g, PetscInt n, const int32_t *offset, const 
         counts[k] = k == g->size - 1 ? n - firsts[k] : share;
     }
     PetscCall(PetscMPIIntCast(mine, &count));
-    PetscCallMPI(MPI_Gatherv(found, count, MPIU_INT, part, counts, firsts, MPI_INT32_T, 0, PETSC_COMM_WORLD));
+    PetscCallMPI(
+        MPI_Igatherv(found, count, MPIU_INT, part, counts, firsts, MPI_INT32_T, 0, PETSC_COMM_WORLD, &request));
+    wait_for(1, &request);
     PetscCall(PetscFree2(counts, firsts));
     PetscCall(ISRestoreIndices(parts, &found));
     PetscCall(ISDestroy(&parts));
@@ -198,6 +220,7 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
 {
     body *b = find(g, 0);
     int64_t *of; /* of each process its nodes and blocks */
+    MPI_Request request;
     PetscFunctionBeginUser;
     PetscCheck(m->a > 0 && m->b > 0 && m->b <= 3 && m->c > 0 && m->c <= 6 && m->a * m->b < INT_MAX, PETSC_COMM_WORLD,
                PETSC_ERR_ARG_OUTOFRANGE, "a body of %lld nodes", (long long)m->a);
@@ -206,7 +229,8 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
     PetscCall(PetscMalloc1(2 * g->size, &of));
     if (IS_FIRST(g))
         take(g, of, 2 * (size_t)g->size * sizeof *of);
-    PetscCallMPI(MPI_Bcast(of, 2 * g->size, MPI_INT64_T, 0, PETSC_COMM_WORLD));
+    PetscCallMPI(MPI_Ibcast(of, 2 * g->size, MPI_INT64_T, 0, PETSC_COMM_WORLD, &request));
+    wait_for(1, &request);
     PetscCall(PetscMalloc2(g->size, &b->count, g->size, &b->first));
     for (PetscMPIInt k = 0, at = 0; k < g->size; at += b->count[k++]) {
         b->first[k] = at;
@@ -268,9 +292,9 @@ static PetscErrorCode take_rows(group *g, const uz_wire_head *m)
     PetscCheck(owner >= 0 && owner < g->size, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "rows for process %d", owner);
     b->arrived += nodes;
     if (owner != 0 && IS_FIRST(g))
-        PetscCallMPI(MPI_Send(g->whole, (int)bytes, MPI_BYTE, owner, 3, PETSC_COMM_WORLD));
+        send_to(owner, g->whole, bytes);
     else if (owner != 0 && g->rank == owner)
-        PetscCallMPI(MPI_Recv(need_room(g, bytes), (int)bytes, MPI_BYTE, 0, 3, PETSC_COMM_WORLD, MPI_STATUS_IGNORE));
+        receive(need_room(g, bytes), bytes);
     if (g->rank == owner) {
         const int64_t at = b->rows.ptr[b->filled], size = (int64_t)bs * bs;
         const double *value = g->whole;
@@ -305,7 +329,9 @@ static void hold(group *g, body *b)
     const double start = MPI_Wtime();
     const int n = b->here * b->bs;
     char *held = new_zeros(n, 1);
-    MPI_Scatterv(g->whole, b->count, b->first, MPI_CHAR, held, n, MPI_CHAR, 0, PETSC_COMM_WORLD);
+    MPI_Request request;
+    MPI_Iscatterv(g->whole, b->count, b->first, MPI_CHAR, held, n, MPI_CHAR, 0, PETSC_COMM_WORLD, &request);
+    wait_for(1, &request);
     system_hold(&b->system, held);
     b->made[VARIANT_HELD] = true;
     free(held);
@@ -321,9 +347,11 @@ static void take_vectors(group *g, const body *b, double *v, int first, bool dis
     const int mine = b->count[g->rank], lanes = b->system.lanes;
     const int64_t n = (int64_t)b->nodes * b->bs;
     double *own = b->system.q;
+    MPI_Request request;
     for (int l = 0; l < lanes; l++) {
         const double *from = IS_FIRST(g) ? (const double *)g->whole + (first + l) * n : NULL;
-        MPI_Scatterv(from, b->count, b->first, MPI_DOUBLE, own, mine, MPI_DOUBLE, 0, PETSC_COMM_WORLD);
+        MPI_Iscatterv(from, b->count, b->first, MPI_DOUBLE, own, mine, MPI_DOUBLE, 0, PETSC_COMM_WORLD, &request);
+        wait_for(1, &request);
         for (int64_t i = 0; i < mine; i++) {
             const double scale = b->system.scale[i];
             v[(i / b->bs * lanes + l) * 4 + i % b->bs] = displacement ? own[i] / scale : own[i] * scale;
@@ -336,11 +364,13 @@ static void put_displacements(group *g, const body *b, const double *v)
     const int mine = b->count[g->rank], lanes = b->system.lanes;
     const int64_t n = (int64_t)b->nodes * b->bs;
     double *own = b->system.q, *all = IS_FIRST(g) ? need_room(g, (size_t)(lanes * n) * sizeof *all) : NULL;
+    MPI_Request request;
     for (int l = 0; l < lanes; l++) {
         for (int64_t i = 0; i < mine; i++)
             own[i] = v[(i / b->bs * lanes + l) * 4 + i % b->bs] * b->system.scale[i];
-        MPI_Gatherv(own, mine, MPI_DOUBLE, all ? all + l * n : NULL, b->count, b->first, MPI_DOUBLE, 0,
-                    PETSC_COMM_WORLD);
+        MPI_Igatherv(own, mine, MPI_DOUBLE, all ? all + l * n : NULL, b->count, b->first, MPI_DOUBLE, 0,
+                     PETSC_COMM_WORLD, &request);
+        wait_for(1, &request);
     }
     answer(g, (uz_wire_head){.kind = UZ_WIRE_VECTOR, .id = b->id});
     if (IS_FIRST(g))

@@ -82,13 +82,15 @@ void neighbours_init(neighbours *n, const int32_t *first, const int64_t *ptr, co
             p++;
         n->take_count[p]++;
     }
-    MPI_Alltoall(n->take_count, 1, MPI_INT, n->send_count, 1, MPI_INT, MPI_COMM_WORLD);
+    MPI_Ialltoall(n->take_count, 1, MPI_INT, n->send_count, 1, MPI_INT, MPI_COMM_WORLD, n->request);
+    wait_for(1, n->request);
     sum_up(n->take_first, n->take_count, n->size);
     sum_up(n->send_first, n->send_count, n->size);
     n->sent = n->send_first[n->size - 1] + n->send_count[n->size - 1];
     n->send = new_zeros(n->sent, sizeof *n->send);
-    MPI_Alltoallv(n->number, n->take_count, n->take_first, MPI_INT32_T, n->send, n->send_count, n->send_first,
-                  MPI_INT32_T, MPI_COMM_WORLD);
+    MPI_Ialltoallv(n->number, n->take_count, n->take_first, MPI_INT32_T, n->send, n->send_count, n->send_first,
+                   MPI_INT32_T, MPI_COMM_WORLD, n->request);
+    wait_for(1, n->request);
     for (int64_t s = 0; s < n->sent; s++)
         n->send[s] -= first[n->rank];
 }

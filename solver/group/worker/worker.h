@@ -16,7 +16,7 @@
 /* For any process alone. */
 void end_group(const char *why);
 void *new_zeros(int64_t count, size_t size); /* zeros */
-/* MPI_Waitall, asleep where it takes long. */
+/* MPI_Waitall, asleep where it takes long. Nothing else waits: no call of MPI's that does is made. */
 void wait_for(int count, MPI_Request *requests);
 
 /* MPI_Allreduce in place, waiting so. */
