@@ -185,7 +185,8 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Of two nodes of one process the later one has the block; neighbours by their numbers from now on. */
+/* Of two nodes of one process the earlier one has the block, since columns of K have what follows them; neighbours by
+ * their numbers from now on. */
 static void keep_half(uz_spread *map)
 {
     int32_t kept = 0, at = 0;
@@ -193,7 +194,7 @@ static void keep_half(uz_spread *map)
         const int32_t first = kept;
         for (; at < map->offset[i + 1]; at++) {
             const int32_t other = map->neighbour[at];
-            if (map->part[other] != map->part[i] || map->number[other] < map->number[i])
+            if (map->part[other] != map->part[i] || map->number[other] > map->number[i])
                 map->neighbour[kept++] = map->number[other];
         }
         map->offset[i] = first;
@@ -270,11 +271,11 @@ static void copy_entries(double *at, int64_t width, const uz_spread *map, const 
 }
 
 /* Where in the column of a node's first dof the rows of another begin. As a rule they are the next that are read there,
- * since nodes come in the order of their dofs. */
+ * after its own, since nodes come in the order of their dofs. */
 static int64_t find_rows(uz_spread_rows *rows, const dofs *later, const dofs *earlier, int64_t number)
 {
     const uz_csc *K = rows->K;
-    int64_t k = K->ptr[earlier->first] + rows->read[number];
+    int64_t k = K->ptr[earlier->first] + (rows->read[number] > 0 ? rows->read[number] : earlier->count);
     if (k >= K->ptr[earlier->first + 1] || K->idx[k] != later->first)
         k = uz_csc_find(K, later->first, earlier->first);
     if (k >= 0)
@@ -299,6 +300,19 @@ static bool copy_columns(double *at, int64_t width, uz_spread_rows *rows, const 
         for (int64_t r = 0; r < later->count; r++)
             at[below ? r * width + c : c * width + r] = K->val[k + r];
     }
+    return true;
+}
+
+/* The block of a node itself, at the heads of its columns. False: its entries are not all there. */
+static bool copy_own(double *at, int64_t width, const uz_csc *K, const dofs *own)
+{
+    for (int64_t c = 0; c < own->count; c++)
+        for (int64_t r = c; r < own->count; r++) {
+            const int64_t k = K->ptr[own->first + c] + r - c;
+            if (k >= K->ptr[own->first + c + 1] || K->idx[k] != own->first + r)
+                return false;
+            at[r * width + c] = at[c * width + r] = K->val[k];
+        }
     return true;
 }
 
@@ -332,9 +346,11 @@ static void make_rows(uz_spread_rows *rows, const uz_spread *map, int64_t i)
     memset(values, 0, (size_t)(width * bs) * sizeof *values);
     for (int32_t k = 0; k < count; k++) {
         const dofs other = dofs_of(map, columns[k]);
-        if (k == diagonal || !own.in_a_row || !other.in_a_row ||
-            !copy_columns(values + k * bs, width, rows, &own, &other, i, columns[k]))
-            copy_entries(values + k * bs, width, map, rows->K, i, columns[k]);
+        double *at = values + k * bs;
+        if (!own.in_a_row || !other.in_a_row ||
+            !(k == diagonal ? copy_own(at, width, rows->K, &own)
+                            : copy_columns(at, width, rows, &own, &other, i, columns[k])))
+            copy_entries(at, width, map, rows->K, i, columns[k]);
     }
     fill_diagonal(values + diagonal * bs, width, bs);
     float *modes = rows->modes + rows->nodes * bs * map->modes;

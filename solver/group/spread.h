@@ -12,7 +12,7 @@ typedef struct {
     int64_t bs, modes;
     int32_t *node;               /* d: of each dof */
     int32_t *offset, *neighbour; /* nodes + 1, offset[nodes]: the graph, without loops; by uz_spread_number sorted, and
-                                    of neighbours of the same process those before a node alone */
+                                    of neighbours of the same process those after a node alone */
     int32_t *part;               /* nodes: the process of each, 0 until they are divided */
     int32_t *order, *number;     /* nodes: by process, and of each node its place in that order */
     int64_t *place;              /* d: number of its node x bs + which of its dofs */
@@ -33,7 +33,7 @@ static inline int64_t uz_spread_blocks(const uz_spread *map, int64_t node)
     return map->offset[node + 1] - map->offset[node] + 1;
 }
 
-/* The rows of one process, some at a time: among its own nodes the lower triangle. */
+/* The rows of one process, some at a time: among its own nodes the upper triangle. */
 typedef struct {
     int64_t process;       /* by the caller */
     int64_t nodes, blocks; /* of the current ones */

@@ -11,7 +11,7 @@
  *     -> ROWS    a: nodes, b: blocks, c: their process; the blocks' values (row by row, double), number of blocks of
  *                each node (int32), the blocks' columns (int32), the modes of the nodes' dofs (float). Nodes come by
  *                process, and are numbered so from now on; a message has nodes of one process only, and of the blocks
- *                among these the lower triangle
+ *                among these the upper triangle
  *     <- MADE    after the last of them. a: levels, b: bytes, x: `most`, y: seconds
  *     -> HOLD    a byte for each dof: held or not           <- MADE
  *     -> BEGIN   a: system, b: 1: from 0, c: 1, or 2 for two right-hand sides at once; unless from 0 the start of
@@ -49,7 +49,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 8
+#define UZ_WIRE_VERSION 9
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

@@ -45,6 +45,13 @@ static int64_t place_of_ghost(const neighbours *near, int32_t number)
     return low;
 }
 
+/* The row of the level that has the block with this node. */
+static int64_t row_of(const neighbours *near, int32_t begin, int32_t number)
+{
+    const int64_t j = number - (int64_t)begin;
+    return j >= 0 && j < near->here ? j : near->here + place_of_ghost(near, number);
+}
+
 static void find_places(spread_system *s, const spread_rows *rows)
 {
     uz_blocks *A = &s->level.A;
@@ -55,11 +62,8 @@ static void find_places(spread_system *s, const spread_rows *rows)
     A->ptr = new_zeros(A->nodes + 2, sizeof *A->ptr);
     for (int64_t i = 0; i < here; i++)
         for (int64_t e = rows->ptr[i]; e < rows->ptr[i + 1]; e++) {
-            const int64_t j = rows->column[e] - (int64_t)begin;
-            if (j >= 0 && j < here)
-                A->ptr[i + 1] += j < i;
-            else
-                A->ptr[here + place_of_ghost(near, rows->column[e]) + 1]++;
+            const int64_t j = row_of(near, begin, rows->column[e]);
+            A->ptr[j + 1] += j != i;
         }
     for (int64_t i = 0; i < A->nodes; i++)
         A->ptr[i + 1] += A->ptr[i];
@@ -68,7 +72,7 @@ static void find_places(spread_system *s, const spread_rows *rows)
     A->diag = new_zeros(A->nodes * size + 4, sizeof *A->diag);
 }
 
-/* Blocks as they come, times the scales of their rows and columns. */
+/* Blocks as they come, times the scales of their rows and columns; a block stands in the row of its later node. */
 static void fill_level(spread_system *s, const spread_rows *rows, const double *scale_of_ghosts)
 {
     uz_blocks *A = &s->level.A;
@@ -80,21 +84,17 @@ static void fill_level(spread_system *s, const spread_rows *rows, const double *
     for (int64_t i = 0; i < here; i++) {
         const int64_t width = (rows->ptr[i + 1] - rows->ptr[i]) * b;
         for (int64_t e = rows->ptr[i]; e < rows->ptr[i + 1]; e++) {
-            const int64_t j = rows->column[e] - (int64_t)rows->first[near->rank];
-            const bool own = j >= 0 && j < here;
-            const int64_t ghost = own ? 0 : place_of_ghost(near, rows->column[e]);
-            const double *of_column = own ? s->scale + j * b : scale_of_ghosts + ghost * b;
+            const int64_t j = row_of(near, rows->first[near->rank], rows->column[e]);
+            const double *of_column = j < here ? s->scale + j * b : scale_of_ghosts + (j - here) * b;
             double *to = A->diag + i * size;
             if (j != i) {
-                const int64_t at = next[own ? i : here + ghost]++;
-                A->idx[at] = (int32_t)(own ? j : i);
-                to = A->off + at * size;
+                A->idx[next[j]] = (int32_t)i;
+                to = A->off + next[j]++ * size;
             }
             for (int r = 0; r < b; r++)
                 for (int c = 0; c < b; c++)
-                    to[own ? r * b + c : c * b + r] =
-                        s->scale[i * b + r] * of_column[c] *
-                        rows->value[rows->ptr[i] * size + r * width + (e - rows->ptr[i]) * b + c];
+                    to[c * b + r] = s->scale[i * b + r] * of_column[c] *
+                                    rows->value[rows->ptr[i] * size + r * width + (e - rows->ptr[i]) * b + c];
         }
     }
     free(next);

@@ -89,7 +89,7 @@ typedef struct {
     double square[LANES];          /* r'z */
 } spread_system;
 
-/* Rows of the own nodes: a node's blocks are those of others' nodes, of own ones before it, and its own, columns
+/* Rows of the own nodes: a node's blocks are those of others' nodes, its own, and of own ones after it, columns
  * ascending, row by row of the matrix. modes (here x b x k). */
 typedef struct {
     const int32_t *first; /* size + 1 */

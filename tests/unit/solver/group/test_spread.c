@@ -62,7 +62,7 @@ static void gather(double *whole, float *modes, const uz_spread *map, const body
                         for (int64_t e = 0; e < bs; e++) {
                             const int64_t row = node * bs + c, other = rows.columns[block + k], column = other * bs + e;
                             const bool own = map->part[map->order[other]] == process;
-                            CHECK(!own || other <= node);
+                            CHECK(!own || other >= node);
                             whole[row * map->size + column] = *value;
                             if (own)
                                 whole[column * map->size + row] = *value;
