@@ -177,7 +177,16 @@ static void bound_by_diagonal(spread_system *s)
     s->most = root * root;
 }
 
-static void make_finest(spread_system *s, const spread_rows *rows)
+/* What rows took is taken by what follows from them. */
+static void free_blocks(spread_rows *rows)
+{
+    free(rows->column);
+    free(rows->value);
+    rows->column = NULL;
+    rows->value = NULL;
+}
+
+static void make_finest(spread_system *s, spread_rows *rows)
 {
     uz_error err = {0};
     double *scale_of_ghosts = new_zeros(s->near.ghosts * s->b, sizeof *scale_of_ghosts);
@@ -185,6 +194,7 @@ static void make_finest(spread_system *s, const spread_rows *rows)
     find_scale(s, rows);
     neighbours_fetch(&s->near, scale_of_ghosts, s->scale, (size_t)s->b * sizeof *s->scale);
     fill_level(s, rows, scale_of_ghosts);
+    free_blocks(rows);
     free(scale_of_ghosts);
     must(uz_level_round(&s->level, &err), &err);
     add_sums(s);
@@ -542,7 +552,7 @@ static void make_room(spread_system *s)
     s->coarse_z = new_zeros(coarse * s->k, sizeof *s->coarse_z);
 }
 
-void system_create(spread_system *s, const spread_rows *rows)
+void system_create(spread_system *s, spread_rows *rows)
 {
     *s = (spread_system){.b = rows->b, .k = rows->k, .strong = rows->strong};
     neighbours_init(&s->near, rows->first, rows->ptr, rows->column);

@@ -100,7 +100,8 @@ typedef struct {
     int b, k;
     double strong;
 } spread_rows;
-void system_create(spread_system *s, const spread_rows *rows);
+/* Frees the blocks of the rows once the finest level has them. */
+void system_create(spread_system *s, spread_rows *rows);
 /* From now on VARIANT_HELD is without the dofs that held (here x b) marks. */
 void system_hold(spread_system *s, const char *held);
 void system_free(spread_system *s);
