@@ -465,8 +465,8 @@ peers-large: bench-deps $(BUILD)/uzawad ## large deformation by CalculiX, GetFEM
 peers-large-solids: bench-deps $(BUILD)/uzawad ## two solids that slide under large deformation by CalculiX, GetFEM and the daemon: a table and build/large-solids.json; ONLY=part of a name
 	@$(call measured,large-solids$(if $(ONLY),-part)) /usr/bin/python3 -B tests/peers/large_solids.py $(BUILD) $(BUILD)/large-solids.json $(if $(ONLY),ONLY="$(ONLY)")
 
-peers-space: bench-deps $(BUILD)/uzawad ## solids in contact by the daemon against the linear solve of the same K by PETSc's GAMG: a table and build/peers-space.json; CELLS=32 along a side
-	@OMP_THREAD_LIMIT=1 OMP_NUM_THREADS=1 $(call measured,peers-space) /usr/bin/python3 -B tests/peers/gamg.py $(BUILD) $(BUILD)/peers-space.json $(if $(CELLS),CELLS=$(CELLS))
+peers-space: bench-deps $(BUILD)/uzawad ## solids in contact by the daemon against the linear solve of the same K by PETSc's GAMG: a table and build/peers-space.json; CELLS="32 64" along a side (32; 64: 5 GB), RUNS=3
+	@OMP_THREAD_LIMIT=1 OMP_NUM_THREADS=1 $(call measured,peers-space) /usr/bin/python3 -B tests/peers/gamg.py $(BUILD) $(BUILD)/peers-space.json $(foreach v,CELLS RUNS,$(if $($(v)),$(v)="$($(v))"))
 
 extremes: deps-test ## claims at the extremes, 1,000 generated scenes of bodies that touch, 300 of bodies on obstacles, 500 of large deformation, 48 whose load grows until small deformation ceases to suffice, 100 with quantities, 30 of large deformation with quantities, 40 solids, bounds of known scenes: tables, build/extremes.json, build/contacts.json, build/obstacles.json, build/generated_large.json, build/thresholds.json, build/quantities.json, build/large_quantities.json, build/solids.json, build/bounds.json; FILTER=name: some, FILTER=contacts, obstacles, large, large_quantities, thresholds, quantities, solids or bounds: these scenes alone, SCENES=100: the first of them
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/large-checker $(BUILD)/uzawad

@@ -123,7 +123,7 @@ def alone(make):
 
 
 KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": bench_size, "bench-solids": alone(dict), "bench-predictions": alone(dict), "extremes": alone(extremes),
-         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "quantities": alone(quantities), "thresholds": alone(thresholds), "bounds": alone(dict), "decks": alone(decks), "peers-space": alone(dict), "large": alone(dict), "peers-large": alone(dict), "large-solids": alone(dict), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
+         "theory": alone(dict), "soak": renewed_rows("rows"), "trade": trade, "solids": alone(solids), "quantities": alone(quantities), "thresholds": alone(thresholds), "bounds": alone(dict), "decks": alone(decks), "peers-space": renewed_rows("rows"), "large": alone(dict), "peers-large": alone(dict), "large-solids": alone(dict), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
 
 
 def dump(value):

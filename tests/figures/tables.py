@@ -379,11 +379,12 @@ def decks(data):
 def space(data):
     """Contact of solids over the linear solve of the same K by another program's multigrid."""
     rows = (data.get("peers_space") or {}).get("rows")
+    spread = lambda row: f" ({row['cold_spread'][0]:.2f} .. {row['cold_spread'][1]:.2f})" if row["runs"] > 1 else ""  # noqa: E731
     told = [[f"`{row['mesh']}`" if row["mesh"] != "box" else "box of `hex8`", f"{row['unknowns']:,}", f"{duration(row['gamg_setup_s'])} + {duration(row['gamg_solve_s'])}",
              str(row["gamg_iterations"]), duration(row["cold_s"]), duration(row["cached_s"]),
-             f"{row['cold_ratio']:.2f} ({row['cold_spread'][0]:.2f} .. {row['cold_spread'][1]:.2f})", f"{row['cached_ratio']:.2f}", f"`{row['operator']}`", sig(row["certified"], 2)]
-            for row in rows or ()]
-    return rows and table(["mesh", "unknowns", "GAMG", "its iterations", "cold", "another load", "cold over GAMG", "another load", "operator", "certified"], told)
+             f"{row['cold_ratio']:.2f}{spread(row)}", sig(row["target"]), f"{row['cached_ratio']:.2f}", f"`{row['operator']}`", sig(row["certified"], 2)]
+            for row in sorted(rows or (), key=lambda row: row["unknowns"])]
+    return rows and table(["mesh", "unknowns", "GAMG", "its iterations", "cold", "another load", "cold over GAMG", "target", "another load", "operator", "certified"], told)
 
 
 def large(data):

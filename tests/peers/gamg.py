@@ -1,10 +1,12 @@
 """Solids in contact by the daemon, and the linear solve of the same K by PETSc's GAMG at its defaults.
-usage: gamg.py BUILD_DIR OUTPUT.json [CELLS=32]
+usage: gamg.py BUILD_DIR OUTPUT.json [CELLS="32 64"] [RUNS=3]
 
 A cube of CELLS cells along a side, clamped on one side, pulled on the opposite one, pressed on a plane: as a box, as
 hex8 whose inner nodes were moved, as tet4. Of GAMG: making it and conjugate gradients to 1e-8, for K that is there; with
-the translations that it takes by itself or with all rigid motions, whichever takes less. Of the daemon: the whole, from request to answer, certified to 1e-6, with a body that it has not
-seen and with another load on it. Seconds of processor; a ratio is of runs one after the other, medians of RUNS."""
+the translations that it takes by itself or with all rigid motions, whichever takes less in the first run. Of the daemon:
+the whole, from request to answer, with a mesh that is no box as an uploaded file, certified to 1e-6, with a body that it
+has not seen and with another load on it. Seconds of processor; a ratio is of runs one after the other, medians of RUNS.
+64 cells take some 4 minutes a run, and 5 GB."""
 import itertools
 import json
 import pathlib
@@ -14,13 +16,15 @@ import time
 
 import numpy
 import petsc4py
-from cubes import CORNERS, POISSON, SIDE, YOUNG, by_daemon, mesh, request
+from cubes import CORNERS, POISSON, SIDE, YOUNG, by_daemon, gmsh, mesh, request
 
 petsc4py.init([])
 from petsc4py import PETSc  # noqa: E402  it reads the options when it is imported
 
-RUNS = 3
 NEIGHBOURS = 27  # of a node, itself among them
+AT_ONCE = 1 << 14  # elements whose stiffness is there at the same time
+LARGE = 400000  # unknowns, from which on the second of the targets holds
+TARGETS = {"box": (0.3, 0.15), "hex8": (1.0, 0.7), "tet4": (1.0, 0.7)}
 
 
 def stiffness(nodes, elements):
@@ -57,7 +61,9 @@ class Linear:
         n = 3 * int(free.sum())
         self.K = PETSc.Mat().createAIJ((n, n), bsize=3, nnz=3 * NEIGHBOURS, comm=PETSc.COMM_SELF)
         dof = dof.astype(PETSc.IntType)
-        self.K.setValuesRCV(dof, dof, stiffness(nodes, elements).reshape(len(dof), -1), addv=True)
+        for first in range(0, len(dof), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            self.K.setValuesRCV(dof[some], dof[some], stiffness(nodes, elements[some]).reshape(len(dof[some]), -1), addv=True)
         self.K.assemble()
         self.K.setOption(PETSc.Mat.Option.SPD, True)
         self.p, self.x = self.K.createVecLeft(), self.K.createVecRight()
@@ -67,11 +73,15 @@ class Linear:
             numpy.add.at(force, faces[side].ravel(), share * numpy.array(traction))
         self.p.setArray(force[free].ravel())
         place = PETSc.Vec().createWithArray(nodes[free].ravel(), bsize=3, comm=PETSc.COMM_SELF)
-        self.motions = PETSc.NullSpace().createRigidBody(place)
+        self.ways = (None, PETSc.NullSpace().createRigidBody(place))
 
     def solve(self):
-        """Of the quicker way: seconds of making the multigrid and of the solve, and its iterations."""
-        return min((self.solve_with(motions) for motions in (None, self.motions)), key=lambda run: run[0] + run[1])
+        """Of the quicker way, the only one from then on: seconds of making the multigrid and of the solve, and its
+        iterations."""
+        runs = [self.solve_with(motions) for motions in self.ways]
+        best = min(range(len(runs)), key=lambda k: runs[k][0] + runs[k][1])
+        self.ways = self.ways[best:best + 1]
+        return runs[best]
 
     def solve_with(self, motions):
         K = self.K.copy()  # nothing is kept of an earlier run
@@ -92,31 +102,34 @@ class Linear:
         return made - start, end - made, ksp.getIterationNumber()
 
 
-def row_of(build, kind, n):
+def row_of(build, kind, n, repeats):
     nodes, elements, faces = mesh(kind, n)
-    asked, linear, runs = request(kind, n, nodes, elements, faces), Linear(nodes, elements, faces), []
-    for _ in range(RUNS):
+    asked, file = request("box", n, nodes, elements, faces), None if kind == "box" else gmsh(kind, nodes, elements, faces)
+    linear, runs = Linear(nodes, elements, faces), []
+    for _ in range(repeats):
         made, solved, iterations = linear.solve()
-        (cold, cached), summary = by_daemon(build, asked)
+        (cold, cached), summary = by_daemon(build, asked, file)
         runs.append((made, solved, cold, cached, cold / (made + solved), cached / (made + solved)))
     middle = [statistics.median(run[k] for run in runs) for k in range(6)]
     spread = [min(run[4] for run in runs), max(run[4] for run in runs)]
-    row = {"mesh": kind, "unknowns": linear.p.getSize(), "gamg_setup_s": middle[0], "gamg_solve_s": middle[1], "gamg_iterations": iterations,
-           "cold_s": middle[2], "cached_s": middle[3], "cold_ratio": middle[4], "cached_ratio": middle[5], "cold_spread": spread,
-           "operator": summary["operator"], "certified": summary["certificate"]["relative_error"]}
-    if summary["problem"]["d"] != row["unknowns"]:
-        raise RuntimeError(f"{summary['problem']['d']} unknowns, of GAMG's K {row['unknowns']}")
-    print(f"{kind:6s} {row['unknowns']:9d} {middle[0]:10.2f} {middle[1]:10.2f} {iterations:5d} {middle[2]:8.2f} {middle[3]:8.2f} "
-          f"{middle[4]:7.2f} ({spread[0]:.2f} to {spread[1]:.2f}) {middle[5]:7.2f}  {row['operator']}", flush=True)
+    unknowns = linear.p.getSize()
+    target = TARGETS[kind][unknowns >= LARGE]
+    row = {"name": f"{kind} {unknowns}", "mesh": kind, "unknowns": unknowns, "runs": repeats, "gamg_setup_s": middle[0], "gamg_solve_s": middle[1],
+           "gamg_iterations": iterations, "cold_s": middle[2], "cached_s": middle[3], "cold_ratio": middle[4], "cached_ratio": middle[5],
+           "cold_spread": spread, "target": target, "operator": summary["operator"], "certified": summary["certificate"]["relative_error"]}
+    if summary["problem"]["d"] != unknowns:
+        raise RuntimeError(f"{summary['problem']['d']} unknowns, of GAMG's K {unknowns}")
+    print(f"{kind:6s} {unknowns:9d} {middle[0]:10.2f} {middle[1]:10.2f} {iterations:5d} {middle[2]:8.2f} {middle[3]:8.2f} "
+          f"{middle[4]:7.2f} ({spread[0]:.2f} to {spread[1]:.2f}; target {target}) {middle[5]:7.2f}  {row['operator']}", flush=True)
     return row
 
 
 def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
-    n = int(sys.argv[3].split("=")[-1]) if len(sys.argv) > 3 else 32
-    print(f"{'mesh':6s} {'unknowns':>9s} {'GAMG made':>10s} {'solved':>10s} {'its':>5s} {'cold':>8s} {'cached':>8s} {'ratio':>7s} {'':15s} {'cached':>7s}")
-    rows = [row_of(sys.argv[1], kind, n) for kind in ("box", "hex8", "tet4")]
+    given = {"CELLS": "32", "RUNS": "3", **dict(word.split("=") for word in sys.argv[3:])}
+    print(f"{'mesh':6s} {'unknowns':>9s} {'GAMG made':>10s} {'solved':>10s} {'its':>5s} {'cold':>8s} {'cached':>8s} {'ratio':>7s} {'':28s} {'cached':>7s}")
+    rows = [row_of(sys.argv[1], kind, int(n), int(given["RUNS"])) for n in given["CELLS"].split() for kind in TARGETS]
     pathlib.Path(sys.argv[2]).write_text(json.dumps({"rows": rows}), encoding="utf-8")
 
 
