@@ -246,8 +246,14 @@ static double processor_seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static bool solve(uz_cost *cost, uz_operator *taken, double *seconds, const uz_problem *problem, uz_operator op,
-                  uz_cache *cache)
+/* What of a solve a row tells. */
+typedef struct {
+    uz_cost cost;
+    uz_operator op;
+    double seconds, order, made, iterated, certified; /* of the processor; made: what stands for K^-1 */
+} solved;
+
+static bool solve(solved *out, const uz_problem *problem, uz_operator op, uz_cache *cache)
 {
     uz_settings settings = uz_settings_default();
     uz_result *result = NULL;
@@ -259,11 +265,16 @@ static bool solve(uz_cost *cost, uz_operator *taken, double *seconds, const uz_p
         uz_solve(&result, problem, &settings, cache, NULL, &err) == UZ_OK && result->summary.outcome == UZ_CONVERGED;
     const double passed = uz_seconds() - begun, spent = processor_seconds() - start;
     if (ok) {
-        *cost = result->summary.cost;
-        *taken = result->summary.op;
-        *seconds = spent * cost->actual_seconds / passed;
+        const uz_timings *t = &result->summary.timings;
+        const double share = spent / passed;
+        *out = (solved){.cost = result->summary.cost, .op = result->summary.op};
+        out->seconds = share * out->cost.actual_seconds;
+        out->order = share * t->order;
+        out->made = share * (t->factor + t->condense);
+        out->iterated = share * t->iterate;
+        out->certified = share * t->certify;
         /* the order of a factor was there, and its time known by the clock, before the price was told */
-        cost->seconds -= result->summary.timings.order * (1.0 - fmin(1.0, spent / passed));
+        out->cost.seconds -= t->order * (1.0 - fmin(1.0, share));
     } else {
         fprintf(stderr, "%s\n", result ? result->summary.message : err.message);
     }
@@ -276,11 +287,10 @@ int bench_predictions_child(const char *which)
     const predicted_row *row = &ROWS[atoi(which)];
     uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene_of(row)};
     uz_cache *cache = uz_cache_new((size_t)8 << 30);
-    uz_cost cold, cached;
-    uz_operator op;
+    solved cold, cached;
     uz_prediction asked;
     uz_settings settings = uz_settings_default();
-    double seconds[2] = {0}, before, peak;
+    double before, peak;
     uz_error err = {0};
     settings.op = row->op;
     const double begun = processor_seconds();
@@ -293,24 +303,26 @@ int bench_predictions_child(const char *which)
         fclose(file);
     }
     before = told("VmRSS");
-    if (!solve(&cold, &op, &seconds[0], &problem, row->op, cache))
+    if (!solve(&cold, &problem, row->op, cache))
         return 1;
     peak = told("VmHWM") - before;
     for (int64_t k = 0; k < problem.scene.n_loads; k++)
         for (int c = 0; c < 3; c++)
             problem.scene.loads[k].v[c] *= 1.03;
-    if (!solve(&cached, &op, &seconds[1], &problem, row->op, cache))
+    if (!solve(&cached, &problem, row->op, cache))
         return 1;
     printf("{\"element\": \"%s\", \"cells\": [%lld, %lld, %lld], \"poisson\": %g, \"stretch\": %g, \"jump\": %g, "
            "\"moved\": %s, \"asked\": \"%s\", \"operator\": \"%s\", \"unknowns\": %lld, \"asking_s\": %.4g, "
            "\"asked_s\": %.4g, \"predicted_s\": %.4g, \"cold_s\": %.4g, \"predicted_cached_s\": %.4g, "
-           "\"cached_s\": %.4g, \"predicted_bytes\": %.4g, \"counted_bytes\": %.4g, \"peak_bytes\": %.4g, "
+           "\"cached_s\": %.4g, \"order_s\": %.4g, \"made_s\": %.4g, \"iterated_s\": %.4g, \"certified_s\": %.4g, "
+           "\"cached_iterated_s\": %.4g, \"predicted_bytes\": %.4g, \"counted_bytes\": %.4g, \"peak_bytes\": %.4g, "
            "\"factor_entries\": %lld, \"flop_s\": %.4g, \"entry_s\": %.4g}\n",
            row->element, (long long)row->cells[0], (long long)row->cells[1], (long long)row->cells[2], row->poisson,
            row->stretch > 0.0 ? row->stretch : 1.0, row->jump > 0.0 ? row->jump : 1.0, row->moved ? "true" : "false",
-           uz_choice_name(UZ_CHOICE_OPERATOR, row->op), uz_choice_name(UZ_CHOICE_OPERATOR, op), (long long)asked.d,
-           asking, asked.seconds, cold.seconds, seconds[0], cached.seconds, seconds[1], cold.bytes, cold.actual_bytes,
-           peak, (long long)asked.factor_nnz, uz_cost_machine()->flop_s, uz_cost_machine()->entry_s);
+           uz_choice_name(UZ_CHOICE_OPERATOR, row->op), uz_choice_name(UZ_CHOICE_OPERATOR, cold.op), (long long)asked.d,
+           asking, asked.seconds, cold.cost.seconds, cold.seconds, cached.cost.seconds, cached.seconds, cold.order,
+           cold.made, cold.iterated, cold.certified, cached.iterated, cold.cost.bytes, cold.cost.actual_bytes, peak,
+           (long long)asked.factor_nnz, uz_cost_machine()->flop_s, uz_cost_machine()->entry_s);
     uz_cache_free(cache);
     return 0;
 }
@@ -345,7 +357,7 @@ bool bench_predictions(FILE *json, const char *filter)
     int written = 0;
     fprintf(json, "\"rows\": [");
     for (int k = 0; k < COUNT; k++) {
-        char line[1024];
+        char line[2048];
         if (filter && !strstr(ROWS[k].element, filter))
             continue;
         if (!run_child(line, sizeof line, k)) {
