@@ -347,7 +347,7 @@ static bool suits(const uz_dual_shape *shape)
 
 /* What substitutions of a load read of L, in passes as those of a sparse matrix: supernodes are read in order, and of
  * those that the load does not touch nothing forwards. Plane and solid bodies of 14,000 to 240,000 dofs. */
-#define LOAD_PASSES 0.5
+#define LOAD_PASSES 0.35
 /* Steps of the active set. */
 #define STEPS 6.0
 

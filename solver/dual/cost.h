@@ -16,6 +16,7 @@ typedef struct {
     double by_cells;   /* bytes of a multigrid on equal cells, where K has its diagonal only; else 0 */
     double stretch;    /* longest over shortest distance of an element's corners, of a solid */
     double firmness;   /* what its material resists of a change of volume, over that of a Poisson's ratio of 0.3 */
+    double entry_s;    /* for an entry of K (uz_cost_rates), where K is large; 0: that of the machine */
     int64_t cases;     /* loads on the body */
 } uz_cost_size;
 
@@ -33,14 +34,15 @@ typedef struct {
 
 typedef struct {
     double flop_s;  /* seconds for each flop of a dense kernel */
-    double entry_s; /* for each stored entry of a sparse symmetric matrix, times a vector */
+    double entry_s; /* for each stored entry of a sparse matrix, times a vector */
 } uz_cost_rates;
 
-/* CHOLMOD's supernodes reach 1 / 1.3 of a dense kernel's rate, and each entry of L costs assembling and page faults as
- * much as ten passes; a substitution 1.3. Measured on plane bodies with 15,000 to 540,000 dofs. */
-#define UZ_COST_FACTOR_FLOPS  1.3
-#define UZ_COST_FACTOR_PASSES 10.0
-#define UZ_COST_SOLVE_PASSES  1.3
+/* Large supernodes are updated at somewhat more than the rate of the dense kernel that is timed, and each entry of L
+ * costs assembling and page faults as much as 17 passes; a substitution 1.5. Measured on plane and solid bodies of
+ * 2,500 to 540,000 dofs (make bench-predictions), every other one of which they were fitted to. */
+#define UZ_COST_FACTOR_FLOPS  0.85
+#define UZ_COST_FACTOR_PASSES 17.0
+#define UZ_COST_SOLVE_PASSES  1.5
 /* Iterations that are needed where rows have several entries. */
 #define UZ_COST_ITERATIONS 330.0
 /* Vectors of d numbers that are alive together at the most crowded moment of a load, with a factor. */

@@ -707,14 +707,17 @@ static bool guess_active(uz_dual_load *load, bool *active)
 
 /* ------------------------------------------------------------- its price */
 
-/* A cycle and a product, in passes of K by columns and of the numbers of a vector. The other numbers are cycles: making
- * a multigrid, bounding the spectrum, solving once, a step of the active set, without and with sweeps over bounds on
- * many dofs, a guess of rows between two bodies, whose answer is found within them, and an iteration that starts at the
- * last one's answer. Plane bodies, obstacles; hex8, tet4, tet10 of 14,000 to 200,000 dofs. */
+/* A cycle and a product, in passes of K and of the numbers of a vector. The other numbers are cycles: making a
+ * multigrid, bounding the spectrum, solving once, a step of the active set, without and with sweeps over bounds on many
+ * dofs, a guess of rows of several entries, whose answer is found within them, and an iteration that starts at the last
+ * one's answer. All of them grow with the dofs, over those of GROWN dofs: contact has more rows to find, and less of
+ * what is read is in a cache; a power, measured. hex8, tet4, wedge6, tet10, hex20 of 14,000 to 810,000 dofs, quad4 and
+ * quad8 of 60,000 to 540,000 (make bench-predictions). */
 typedef struct {
-    double passes, numbers, create, step, guess;
+    double passes, numbers, create, step, guess, growth;
 } cycle_costs;
-static const cycle_costs PLANE = {4.0, 0.0, 56.0, 11.5, 22.0}, SOLID = {1.8, 66.0, 24.0, 3.0, 26.0};
+static const cycle_costs PLANE = {4.0, 0.0, 40.0, 10.0, 22.0, 0.3}, SOLID = {1.0, 98.0, 25.0, 3.0, 14.0, 0.14};
+#define GROWN           1e5
 #define SPECTRUM_CYCLES 30.0
 /* Load cases that begin at answers of others take this part of a whole load where the contact changes from case to
  * case, and half of that where it does not: 30 cases on hex8 and tet4 of 27,000 dofs. */
@@ -730,8 +733,9 @@ static const cycle_costs PLANE = {4.0, 0.0, 56.0, 11.5, 22.0}, SOLID = {1.8, 66.
 /* On equal cells a cycle and a product, in passes of numbers; making the multigrid and bounding the spectrum, and a
  * load that begins on coarser grids, in cycles. Solid bodies of 45,000 to 2,700,000 dofs. */
 #define CELLS_PASSES  30.0
-#define CELLS_CREATE  29.0
-#define CELLS_LOAD    20.0
+#define CELLS_CREATE  49.0
+#define CELLS_LOAD    26.0
+#define CELLS_GROWTH  0.12
 #define CELLS_VECTORS 27.0
 
 /* Steps of solids that resist changes of volume, by their firmness, and of stretched elements, over those of the same
@@ -740,7 +744,7 @@ static const cycle_costs PLANE = {4.0, 0.0, 56.0, 11.5, 22.0}, SOLID = {1.8, 66.
 typedef struct {
     double firmness, stretch;
 } hardness;
-static const hardness MAKING = {0.45, 0.55}, LOADING = {0.35, 1.2}, OF_CELLS = {0.3, 0.4};
+static const hardness MAKING = {0.39, 0.9}, LOADING = {0.25, 1.23}, OF_CELLS = {0.36, 0.37};
 #define CUBES_STRETCH 2.0 /* about the square root of 3, somewhat moved */
 
 static double find_hardness(const uz_cost_size *size, hardness of)
@@ -748,9 +752,15 @@ static double find_hardness(const uz_cost_size *size, hardness of)
     return pow(fmax(1.0, size->firmness), of.firmness) * pow(fmax(1.0, size->stretch / CUBES_STRETCH), of.stretch);
 }
 
+static double find_growth(const uz_cost_size *size, double power)
+{
+    return pow((double)size->d / GROWN, power);
+}
+
 static void add_cost_by_cells(uz_cost_estimate *cost, const uz_cost_size *size, const uz_cost_rates *rates)
 {
-    const double cycle = CELLS_PASSES * (double)size->d * rates->entry_s * find_hardness(size, OF_CELLS);
+    const double cycle = CELLS_PASSES * (double)size->d * rates->entry_s * find_hardness(size, OF_CELLS) *
+                         find_growth(size, CELLS_GROWTH);
     cost->setup_s += CELLS_CREATE * cycle;
     cost->case_s += CELLS_LOAD * cycle;
     cost->flops += (CELLS_CREATE + CELLS_LOAD) * CELLS_PASSES * 4.0 * (double)size->d;
@@ -767,7 +777,7 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     }
     const cycle_costs *of = size->modes == UZ_MODES_MOST ? &SOLID : &PLANE;
     const double passed = of->passes * (double)size->k_entries + of->numbers * (double)size->d,
-                 cycle = passed * rates->entry_s, harder = find_hardness(size, MAKING),
+                 cycle = passed * rates->entry_s * find_growth(size, of->growth), harder = find_hardness(size, MAKING),
                  setup = (of->create + SPECTRUM_CYCLES) * harder;
     const bool sweeps = size->bounds && !are_few(size->m, size->d);
     const double load =

@@ -16,55 +16,60 @@
 
 /* ----------------------------------------------------------------- the machine */
 
-/* The sparse matrix, of less than a megabyte, is about as much as a core has for itself: larger ones take up to twice
- * the time for an entry while other cores compute, which solves, going through theirs block by block, do not. */
-enum { DENSE = 192, SPARSE = 5000, BAND = 10, REACH = 70, REPEATS = 4 };
+/* What is sparse, of less than a megabyte, is about as much as a core has for itself. */
+enum { DENSE = 192, SPARSE = 1600, BAND = 32, REACH = 40, REPEATS = 40 };
 
-#define ENOUGH_S 0.02 /* of one measurement; four times take an eighth of it on a machine of today */
+#define ENOUGH_S 0.005 /* of one measurement */
 
 /* What is assumed where there is no memory to measure: a core of 2020. */
 static const uz_cost_rates ASSUMED = {3e-11, 1e-9};
 
 static uz_cost_rates measured; /* written once, under the guard */
 
+/* Seconds for each of n entries times numbers of x, summed. In four sums, whatever columns they belong to: none waits
+ * for another, and how often a processor mistakes where a column ends differs from run to run. */
+static double time_entries(const double *val, const int64_t *idx, int64_t n, const double *x)
+{
+    double sum[4] = {0.0};
+    const double start = uz_thread_seconds();
+    for (int64_t k = 0; k + 4 <= n; k += 4)
+        for (int i = 0; i < 4; i++)
+            sum[i] += val[k + i] * x[idx[k + i]];
+    const volatile double all = sum[0] + sum[1] + sum[2] + sum[3];
+    (void)all;
+    return (uz_thread_seconds() - start) / (double)n;
+}
+
 /* In pages that go back to the system: what lies free in the heap would hide what the first body takes. */
 static void measure(void)
 {
-    enum { ROOM = 2 * (DENSE * DENSE + SPARSE), ENTRIES = SPARSE * BAND };
-    const size_t bytes = (ROOM + ENTRIES) * sizeof(double) + (SPARSE + 1 + ENTRIES) * sizeof(int64_t);
+    enum { ROOM = 2 * DENSE * DENSE, ENTRIES = SPARSE * BAND };
+    const size_t bytes = (ROOM + ENTRIES) * sizeof(double) + ENTRIES * sizeof(int64_t);
     double *room = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     double dense = INFINITY, sparse = INFINITY;
     measured = ASSUMED;
     if (room == MAP_FAILED)
         return;
-    uz_csc A = {.rows = SPARSE, .cols = SPARSE, .val = room + ROOM};
-    A.ptr = (int64_t *)(void *)(A.val + ENTRIES);
-    A.idx = A.ptr + SPARSE + 1;
     for (int64_t i = 0; i < DENSE * DENSE; i++)
         room[i] = 1.0 / (double)(1 + i % 7);
-    for (int k = 0; k < REPEATS; k++) {
+    const double first = uz_thread_seconds();
+    for (int k = 0; k < REPEATS && (k == 0 || uz_thread_seconds() - first < ENOUGH_S); k++) {
         double start = uz_thread_seconds();
         uz_syrk_lower_t_while(DENSE, DENSE, room, room + DENSE * DENSE, NULL);
         dense = fmin(dense, uz_thread_seconds() - start);
     }
     measured.flop_s = dense / ((double)DENSE * DENSE * DENSE);
     /* a lower triangle with BAND entries in a column, far enough apart to be read as those of a mesh are */
-    int64_t at = 0;
-    for (int64_t j = 0; j < SPARSE; j++) {
-        A.ptr[j] = at;
-        for (int64_t k = 0; k < BAND && j + k / 4 * REACH + k < SPARSE; k++) {
-            A.idx[at] = j + k / 4 * REACH + k;
-            A.val[at++] = 1.0;
-        }
+    double *val = room + ROOM;
+    int64_t *idx = (int64_t *)(void *)(val + ENTRIES);
+    for (int64_t k = 0; k < ENTRIES; k++) {
+        idx[k] = k / BAND + k % BAND / 4 * REACH + k % BAND;
+        val[k] = 1.0;
     }
-    A.ptr[SPARSE] = at;
     const double begun = uz_thread_seconds();
-    for (int k = 0; k < REPEATS && (k == 0 || uz_thread_seconds() - begun < ENOUGH_S); k++) {
-        double start = uz_thread_seconds();
-        uz_csc_symv(room + 2 * DENSE * DENSE, &A, 1.0, room);
-        sparse = fmin(sparse, uz_thread_seconds() - start);
-    }
-    measured.entry_s = sparse / (double)A.ptr[SPARSE];
+    for (int k = 0; k < REPEATS && (k == 0 || uz_thread_seconds() - begun < ENOUGH_S); k++)
+        sparse = fmin(sparse, time_entries(val, idx, ENTRIES, room));
+    measured.entry_s = sparse;
     munmap(room, bytes);
 }
 
@@ -75,17 +80,34 @@ const uz_cost_rates *uz_cost_machine(void)
     return &measured;
 }
 
+/* Beyond what a core has for itself entries come from memory: their rate is that of K, which is there. From so many
+ * entries on, and of the first so many. */
+#define LARGE_ENTRIES  250000
+#define SAMPLE_ENTRIES 2000000
+
+/* Seconds for an entry of K where it is large, else 0. What K is multiplied with does not matter, as long as there is
+ * as much of it: its own entries. */
+static double rate_of(const uz_csc *K)
+{
+    const int64_t entries = K->ptr[K->cols];
+    if (entries < LARGE_ENTRIES)
+        return 0.0;
+    const int64_t n = entries < SAMPLE_ENTRIES ? entries : SAMPLE_ENTRIES;
+    const double once = time_entries(K->val, K->idx, n, K->val);
+    return fmin(once, time_entries(K->val, K->idx, n, K->val));
+}
+
 /* -------------------------------------------------------------------- the model */
 
 /* Putting the contact last costs a tenth more entries of L and half as many flops again (plane bodies, AMD). */
 #define LAST_ENTRIES 1.1
 #define LAST_FLOPS   1.5
 
-/* While it is made: supernodes are updated through room of their own, a fifth of the factor of a solid body. */
-#define FACTOR_PEAK 1.25
+/* While it is made: supernodes are updated through room of their own, up to a sixth of the factor of a small solid. */
+#define FACTOR_PEAK 1.1
 /* Vectors of dofs: passes of K that a certificate and a load take, and of single numbers. */
-#define CASE_PASSES  8.5
-#define CASE_NUMBERS 73.0
+#define CASE_PASSES  10.0
+#define CASE_NUMBERS 84.0
 
 static double matrix_bytes(const uz_cost_size *s)
 {
@@ -151,12 +173,12 @@ static double find_stretch(const uz_mesh *mesh, const uz_brick *brick)
 }
 
 /* How much more a solid resists a change of volume than one of shape, over what it does at a Poisson's ratio of 0.3: of
- * the material where that is most. Tetrahedra, whose shapes are hardly free to keep their volume, show the root of it.
- */
+ * the material where that is most. Linear tetrahedra, whose shapes are hardly free to keep their volume, show the root
+ * of it. */
 static double find_firmness(const uz_scene *scene, const uz_mesh *mesh, const uz_brick *brick)
 {
     const bool tetrahedra =
-        !brick && mesh->n_elements > 0 && uz_element_type_of((uz_element_kind)mesh->kind[0])->corners == 4;
+        !brick && mesh->n_elements > 0 && uz_element_type_of((uz_element_kind)mesh->kind[0])->nodes == 4;
     double most = 1.0;
     for (int64_t k = 0; k < scene->n_materials; k++) {
         const double nu = scene->materials[k].poisson;
@@ -183,6 +205,7 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_mod
                           .by_cells = brick ? uz_brick_predict_bytes(brick) : 0.0,
                           .stretch = solid ? find_stretch(&model->mesh, brick) : 1.0,
                           .firmness = solid ? find_firmness(scene, &model->mesh, brick) : 1.0,
+                          .entry_s = brick ? 0.0 : rate_of(K),
                           .cases = cases};
 }
 
@@ -208,7 +231,8 @@ _Static_assert(sizeof((uz_cost){0}.considered) == UZ_DUAL_FORMS * sizeof(uz_cost
 void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
                     uz_operator asked, size_t memory_limit)
 {
-    const uz_cost_rates *rates = uz_cost_machine();
+    const uz_cost_rates *machine = uz_cost_machine(), of_K = {machine->flop_s, size->entry_s};
+    const uz_cost_rates *rates = size->entry_s > 0.0 ? &of_K : machine;
     plan->count = 0;
     if (factor)
         plan->form[plan->count++] = estimate(&uz_dual_form_of(direct)->can, size, factor, direct, rates);
