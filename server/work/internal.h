@@ -5,6 +5,7 @@
 #include "base/clock.h"
 #include "work/ends.h"
 #include "work/feed.h"
+#include "work/pace.h"
 #include "work/process.h"
 #include "work/work.h"
 
@@ -43,6 +44,7 @@ struct work {
 
     feed *feed; /* told of every change of a job after it was committed */
     ends *ends; /* of jobs that ended here, before the feed is told */
+    pace *pace; /* of what they took; NULL: nobody keeps it */
 
     pthread_mutex_t pool_lock; /* of each process what its header says; taken alone */
     pthread_cond_t pool_idle;  /* one was given back */

@@ -18,6 +18,7 @@
 
 #include "store/store.h"
 #include "work/live.h"
+#include "work/pace.h"
 #include "work/solve.h"
 
 /* In shared memory, written while a job runs. */
@@ -58,7 +59,8 @@ typedef struct {
             uint64_t size; /* of the text */
             double queue_s, max_solve_s;
             uint64_t memory;
-        } job; /* of PREDICT the size and the memory */
+            double pace[PACE_FORMS]; /* of predicted seconds */
+        } job;                       /* of PREDICT the size and the memory */
         struct {
             ask_kind what;
             char id[65]; /* of the upload, or of the job */

@@ -38,6 +38,7 @@ bool work_predict(work *w, const work_request *request, uz_prediction *out)
     packet m = {.kind = MESSAGE_PREDICT, .u.job = {.size = request->len, .memory = w->options.solve_bytes}};
     bool over = request->is_over(request->asker), known = false, out_of_memory;
     process p;
+    double factor[PACE_FORMS];
     pthread_mutex_lock(&w->pool_lock);
     while (w->predicting && !over) {
         clock_wait(&w->pool_idle, &w->pool_lock, clock_seconds(CLOCK_MONOTONIC) + LOOK_S);
@@ -56,6 +57,8 @@ bool work_predict(work *w, const work_request *request, uz_prediction *out)
         if (message_send(p.socket, &m, -1) && converse(w, &p, request, &m)) {
             known = m.u.predicted.known;
             *out = m.u.predicted.cost;
+            pace_now(w->pace, factor);
+            out->seconds *= known ? factor[out->op] : 1.0;
         } else {
             process_kill(&p);
             process_reap(&p, &out_of_memory);

@@ -137,6 +137,8 @@ static void count_job(const run *r)
         metrics_seconds(m, METRIC_CONDENSE, f->condense);
         metrics_seconds(m, METRIC_ITERATE, f->iterate);
         metrics_seconds(m, METRIC_CERTIFY, f->certify);
+        if (f->op != UZ_OPERATOR_AUTO)
+            pace_add(r->me->w->pace, f->op, f->said_s, f->took_s);
     }
     log_write(r->me->w->log, LOG_INFO, "job_ended",
               (log_field[]){LOG_S("job", r->job->id),

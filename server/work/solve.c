@@ -35,6 +35,13 @@ static uz_status verify(solution *s, const solve_with *with, uz_error *err)
     return status;
 }
 
+/* Does one price stand for all that it took? It is that of one setup and one load. */
+static bool is_priced(const uz_summary *s)
+{
+    return s->outcome == UZ_CONVERGED && s->rounds == 1 && !s->grids && s->semicoercive.rounds == 0 &&
+           s->geometry.kind == UZ_KINEMATICS_FIXED;
+}
+
 /* Phases and cache: of the first case, which paid for the body; iterating and certifying of all. */
 void solve_count(solve_figures *f, uz_result *const *results, int64_t n)
 {
@@ -42,6 +49,7 @@ void solve_count(solve_figures *f, uz_result *const *results, int64_t n)
     if (!results || !results[0])
         return;
     const uz_summary *first = &results[0]->summary;
+    bool priced = true;
     f->has_answer = true;
     f->outcome = first->outcome;
     f->cached = first->reused.factor;
@@ -53,6 +61,21 @@ void solve_count(solve_figures *f, uz_result *const *results, int64_t n)
         f->iterations += results[i]->summary.iterations;
         f->iterate += results[i]->summary.timings.iterate;
         f->certify += results[i]->summary.timings.certify;
+        f->said_s += results[i]->summary.cost.seconds;
+        f->took_s += results[i]->summary.cost.actual_seconds;
+        priced = priced && is_priced(&results[i]->summary);
+    }
+    f->op = priced ? first->op : UZ_OPERATOR_AUTO;
+}
+
+/* What the summaries say was predicted. */
+static void set_pace(uz_result **results, int64_t n, const double *pace)
+{
+    for (int64_t i = 0; i < n && results[i]; i++) {
+        uz_cost *cost = &results[i]->summary.cost;
+        cost->seconds *= pace[results[i]->summary.op];
+        for (int k = 0; k < cost->n_considered; k++)
+            cost->considered[k].seconds *= pace[cost->considered[k].op];
     }
 }
 
@@ -101,6 +124,9 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
     out->stopped = status == UZ_ERR_CANCELLED;
     for (int64_t i = 0; status == UZ_OK && out->results && i < out->n; i++)
         out->stopped = out->stopped || out->results[i]->summary.outcome == UZ_DISMISSED;
+    solve_count(&out->figures, out->results, out->n);
+    if (with->pace && out->results)
+        set_pace(out->results, out->n, with->pace);
     if (status == UZ_OK) {
         out->outcome.status = out->stopped ? JOB_DISMISSED : JOB_SUCCESSFUL;
         if (!answers_build(&out->answers, &out->outcome, out->results, &out->request, &out->starts, with->queue_s,
@@ -112,7 +138,6 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
         codec_problem_from_error(&problem, &err, out->request.problem.kind);
         solution_fail(out, codec_encode_problem(&problem));
     }
-    solve_count(&out->figures, out->results, out->n);
 }
 
 bool solve_predict(uz_prediction *out, const solve_with *with, char *body, size_t body_len)

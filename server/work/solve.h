@@ -16,6 +16,7 @@ typedef struct {
     size_t memory_limit;   /* bytes; 0: no limit */
     double max_solve_s;    /* whatever the text asks for; 0: no limit */
     double queue_s;        /* it has waited; part of its times */
+    const double *pace;    /* PACE_FORMS: by what predicted seconds are multiplied (work/pace.h); NULL: 1 */
     /* may be NULL; hooks->ctx: the text was read. The request, with the limits above, is good until solution_clear. */
     void (*read)(void *ctx, const codec_request *request);
 } solve_with;
@@ -28,6 +29,8 @@ typedef struct {
     bool cached;                                     /* its factor was there */
     double parse, assemble, order, factor, condense; /* seconds; parse also without an answer */
     double iterate, certify;                         /* of all cases */
+    uz_operator op;                                  /* of converged answers, else UZ_OPERATOR_AUTO: */
+    double said_s, took_s; /* predicted by the model, without pace, and actual, of all cases */
 } solve_figures;
 
 typedef struct {

@@ -223,6 +223,7 @@ static void run_job(solver *s, const packet *m)
                              .memory_limit = (size_t)m->u.job.memory,
                              .max_solve_s = m->u.job.max_solve_s,
                              .queue_s = m->u.job.queue_s,
+                             .pace = m->u.job.pace,
                              .read = note_request};
     packet done = {.kind = MESSAGE_DONE};
     solution solved;

@@ -213,6 +213,7 @@ watch_end watch_job(worker *me, const job *claimed, char *body, size_t body_len,
                           .max_solve_s = o->max_solve_s,
                           .memory = o->solve_bytes}};
     memcpy(m.u.job.id, claimed->id, sizeof m.u.job.id);
+    pace_now(all->pace, m.u.job.pace);
     const bool room = segment_reach(&p->inbox, body_len, true);
     if (room && body_len > 0 && body)
         memcpy(p->inbox.at, body, body_len);

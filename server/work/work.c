@@ -260,6 +260,7 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     w->processors = processors_available();
     w->feed = feed_new();
     w->ends = ends_new();
+    w->pace = pace_new();
     w->workers = calloc((size_t)w->n, sizeof *w->workers);
     w->processes = calloc((size_t)w->n, sizeof *w->processes);
     for (int i = 0; w->workers && i < w->n; i++) {
@@ -431,6 +432,7 @@ void work_free(work *w)
     free(w->processes);
     feed_free(w->feed);
     ends_free(w->ends);
+    pace_free(w->pace);
     pthread_cond_destroy(&w->pool_idle);
     pthread_mutex_destroy(&w->pool_lock);
     pthread_cond_destroy(&w->tick);

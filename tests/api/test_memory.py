@@ -71,6 +71,26 @@ def test_by_name(s):
     check(again["predicted"]["seconds"] < cost["predicted"]["seconds"], cost, again)
 
 
+@options("--workers", "1")
+def test_predicted_seconds_follow_what_jobs_took(s):
+    body = plate([300, 100], operator="matrix_free")
+    model = expect(s.post(body, query="?validate=true"), 200).json["predicted"]["seconds"]
+    costs = [s.solve(body)["summary"]["cost"] for _ in range(4)]
+    check(min(cost["actual"]["seconds"] for cost in costs) >= 0.05, "too short to count", costs)
+    check(costs[1]["predicted"] == costs[2]["predicted"], costs)  # of two jobs nothing is learned
+    pace = min(4, max(1 / 4, sorted(ratios(costs[:3]))[1]))
+    check(abs(costs[3]["predicted"]["seconds"] - pace * costs[2]["predicted"]["seconds"]) <= 1e-6 * costs[3]["predicted"]["seconds"], costs)
+    (only,) = costs[3]["considered"]
+    check(only["seconds"] == costs[3]["predicted"]["seconds"], costs)
+    counted = [max(1 / 4, min(4, ratio)) for ratio in ratios(costs[:3] + [{**costs[3], "predicted": costs[2]["predicted"]}])]
+    later = expect(s.post(body, query="?validate=true"), 200).json["predicted"]["seconds"]
+    check(min(counted) * model / 2 < later < 2 * max(counted) * model, later, model, counted)  # its process measures rates anew
+
+
+def ratios(costs):
+    return [cost["actual"]["seconds"] / cost["predicted"]["seconds"] for cost in costs]
+
+
 def free_memory_held(s):
     with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
         return next(int(line.split()[1]) for line in file if line.startswith("RssAnon")) / 1024

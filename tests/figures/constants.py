@@ -150,6 +150,7 @@ PHRASES = {
     "killed where it does not: after 0.2 s": constant(0.2, r"#define CANCEL_S  \(([0-9.]+)"),
     "0.7 s (a tenth of the limit more": constant(0.7, r"#define LIMIT_S +\(([0-9.]+)"),
     "an answer to be certified), 0.5 s": constant(0.5, r"#define RELEASE_S \(([0-9.]+)"),
+    "times what the last 15 jobs": constant(15, r"KEPT = (\d+), FEWEST"), "Only converged jobs of 0.05 s": constant(0.05, r"#define SHORTEST_S +([\d.]+)"),
     "10,000 dofs in all cases together": constant(10000, r"#define SMALL_DOFS +(\d+)"), "and 1,000 rows": constant(1000, r"#define SMALL_ROWS +(\d+)"),
     "(a sixth of it, at least 1 GiB)": constant(30, r"least = \(size_t\)1 << (\d+), share"),
     "up to 256 and 128 MiB, lie ready": constant(256, r"RESERVE_MOST = (\d+) << 20"),
