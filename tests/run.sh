@@ -2,15 +2,12 @@
 # Runs the test programs and counts their "ok", "not ok" and "skip" lines; the last line is "N passed, N failed".
 # usage: tests/run.sh BUILD_DIR ["unit api browser guard hygiene"] [FILTER] [PROGRAMS]
 # FILTER goes to each program, which runs the tests whose name contains it; "test_http" is all of that program,
-# "test_http.not_found" some of it, as the lines of a run name them. PROGRAMS is a list of programs ("test_store
-# api/test_http", of both kinds unless one is named); without it all run. A program that dies without a "not ok" line of
-# its own counts as one failure.
+# "test_http.not_found" some of it, as the lines of a run name them. PROGRAMS is a list of such ("test_store api/test_http
+# unit/test_json_scan.memory", of both kinds unless one is named); without it all run. A program that dies without a
+# "not ok" line of its own counts as one failure.
 set -uo pipefail
 build=$1 kinds=${2:-unit api browser guard hygiene} filter=${3:-} programs=${4:-}
-if [[ $filter == test_* ]]; then
-    programs=${filter%%.*}
-    if [[ $filter == *.* ]]; then filter=${filter#*.}; else filter=; fi
-fi
+if [[ $filter == test_* ]]; then programs=$filter filter=; fi
 work=$(mktemp -d)
 log=$work/log
 limit=1800 # seconds of one program that hangs: what takes a minute alone takes ten beside others
@@ -30,7 +27,7 @@ if [[ " $kinds " == *" unit "* ]] && { [ -d "$build/locale/de_DE.UTF-8" ] || { m
 fi
 
 run_one() { # KIND NAME COMMAND...
-    local kind=$1 name=$2 out=$work/$1.$2.out status TIMEFORMAT='%U %S' user system
+    local kind=$1 name=$2 out=$work/$1.$2.$RANDOM.out status TIMEFORMAT='%U %S' user system
     shift 2
     SECONDS=0
     { time timeout -k 10 "$limit" "$@" >"$out" 2>&1; } 2>"$out.time"
@@ -49,21 +46,25 @@ run_one() { # KIND NAME COMMAND...
     fi
     cat "$out" >>"$log"
 }
-wanted() { # NAME: of this kind
-    [ -z "$programs" ] || [[ " $programs " == *" $1 "* || " $programs " == *" $kind/$1 "* ]]
+wanted() { # NAME: of this kind, and the part of it, if it is not to run as a whole
+    local one
+    [ -n "$programs" ] || echo "$kind $1"
+    for one in $programs; do
+        case ${one#"$kind"/} in "$1") echo "$kind $1" ;; "$1".*) echo "$kind $1 ${one#*.}" ;; esac
+    done
 }
 
-list_kind() { # KIND: a line "KIND NAME" for each of its programs
+list_kind() { # KIND: a line "KIND NAME [PART]" for each of its programs
     local kind=$1 file
     case $kind in
     unit | api | browser) for file in $(find tests/"$kind" -name 'test_*.c' -printf '%f\n' -o -name 'test_*.py' -printf '%f\n' | sort); do
-                              if wanted "${file%.*}"; then echo "$kind ${file%.*}"; fi
+                              wanted "${file%.*}"
                           done ;;
     guard | hygiene) echo "$kind $kind" ;;
     esac
 }
-run_program() { # KIND NAME
-    local kind=$1 name=$2
+run_program() { # KIND NAME [PART]
+    local kind=$1 name=$2 filter=${3:-$filter}
     case $kind in
     unit) run_one "$kind" "$name" "${unit_env[@]}" "$build/tests/$name" $filter ;;
     api | browser) run_one "$kind" "$name" /usr/bin/python3 -B "tests/$kind/$name.py" "$build" $filter ;;
@@ -80,9 +81,9 @@ for kind in browser api guard unit hygiene; do
 done >"$work/waiting"
 tac "$work/waiting" >"$work/computing"
 run_row() { # LIST
-    local kind name
-    while read -r kind name <&3; do
-        if mkdir "$work/$kind.$name" 2>/dev/null; then run_program "$kind" "$name" 3<&-; fi
+    local kind name part
+    while read -r kind name part <&3; do
+        if mkdir "$work/$kind.$name.$part" 2>/dev/null; then run_program "$kind" "$name" "$part" 3<&-; fi
     done 3<"$work/$1"
 }
 SECONDS=0
