@@ -293,14 +293,14 @@ $(BUILD)/%.so: tests/preload/%.c
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
         bench-size bench-solids bench-predictions bench-deps peers peers-contact peers-decks peers-large peers-large-solids peers-space extremes theory large roller arch trade figures numbers collect page-size
-test: test-build ## build and pass every test; ONCE=1: but lint, and those that make asan runs as they are
-	@tests/run.sh $(BUILD) "$(if $(ONCE),unit api browser guard)" "" "$(if $(ONCE),$(call programs,$(filter-out $(SAME_IN_ASAN),$(UNIT_SRC) $(wildcard tests/browser/test_*.py tests/api/test_*.py))))"
+test: test-build ## build and pass every test; ONCE=1: those that make asan can't run, or not as well
+	@tests/run.sh $(BUILD) "$(if $(ONCE),unit api browser guard)" "" "$(if $(ONCE),$(ONCE_ONLY))"
 
 # What each of the targets that CI runs builds before its tests, so that tests/ci.sh can have it built meanwhile.
 .PHONY: test-build test-postgresql-build asan-build tsan-build fuzz-build
 test-build: deps-test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all test-tools $(BUILD)/guard \
-	    $(if $(ONCE),$(patsubst %,$(BUILD)/tests/%,$(notdir $(basename $(filter-out $(SAME_IN_ASAN),$(UNIT_SRC))))),unit-bins)
+	    $(if $(ONCE),$(ONCE_UNIT),unit-bins)
 
 guard: deps-test ## instructions of small problems against those kept in tests/data/guard.json; KEEP=1: keep the new ones
 	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/guard
@@ -359,14 +359,16 @@ without_tsan = $(shell grep -L 'not under \(ThreadSanitizer\|sanitizers\)' $(1))
 TSAN_UNIT = $(notdir $(basename $(call without_tsan,$(shell grep -lE 'pthread_create|include "(http|base/log|store|work|core/aside)' $(UNIT_SRC)))))
 TSAN_API  = $(notdir $(basename $(call without_tsan,$(wildcard tests/api/test_*.py))))
 ASAN_API  = $(shell grep -L 'not under sanitizers' tests/api/test_*.py)
-# Of these, those that do no less there (tests/api/service.py) need not run in the ordinary build as well; nor need C
-# tests, but for those of rooms whose sources the optimizer gets with flags of their own. What says "once in CI" does
-# less there than alone, and both sanitizers see it.
+# In CI each test runs once, there, but for those that it is not made for. In the ordinary build besides: C tests of rooms
+# whose sources the optimizer gets with flags of their own, and what says "in the ordinary build too: REASON" ("too, PART:
+# REASON" of some of its tests), since too little of it can be done under a sanitizer.
 TUNED_ROOMS = $(sort $(patsubst solver/%/,tests/unit/solver/%/%,$(dir $(CONTRACTED) $(UNROLLED))))
-LESS_IN_ASAN = $(shell grep -lE 'INSTRUMENTED|SANITIZED|sanitized\.h|\<some\$(open)' $(ASAN_API) $(UNIT_SRC))
-SAME_IN_ASAN = $(filter-out $(LESS_IN_ASAN),$(ASAN_API) $(filter-out $(TUNED_ROOMS),$(UNIT_SRC))) \
-               $(shell grep -l 'once in CI' $(ASAN_API) $(UNIT_SRC))
-open := (
+TUNED_UNIT  = $(filter $(TUNED_ROOMS),$(UNIT_SRC))
+PLAIN_TOO   = $(shell grep -oE 'in the ordinary build too(, [a-z_]+)?:' $(UNIT_SRC) $(ASAN_API) | \
+                sed -E 's|^tests/([a-z]+)/(.*/)?(test_[a-z0-9_]+)\.[^,]*,? ?([a-z_]*).*|\1/\3.\4|; s|[.]$$||')
+ONCE_ONLY   = $(call programs,$(TUNED_UNIT) $(filter-out $(ASAN_API),$(wildcard tests/browser/test_*.py tests/api/test_*.py))) $(PLAIN_TOO)
+# The C tests among them are all that is to be built.
+ONCE_UNIT   = $(sort $(foreach one,$(filter unit/%,$(ONCE_ONLY)),$(BUILD)/tests/$(basename $(notdir $(one)))))
 # As tests/run.sh names them: KIND/NAME.
 programs = $(foreach test,$(1),$(word 2,$(subst /, ,$(test)))/$(notdir $(basename $(test))))
 

@@ -1,5 +1,4 @@
 """Many clients at once. usage: test_concurrency.py BUILD_DIR [FILTER]"""
-# once in CI: smaller bodies and fewer rounds than alone
 import copy
 import http.client
 import json

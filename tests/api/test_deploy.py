@@ -1,5 +1,6 @@
 """The files of server/deploy: they are well-formed, name what there is, and the programs that read them take them."""
 # not under ThreadSanitizer: about files, not about threads
+# in the ordinary build too, the_package: programs with a sanitizer are not packed
 import json
 import os
 import pathlib

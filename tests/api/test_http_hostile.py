@@ -1,5 +1,4 @@
 """Sockets that misbehave: ambiguous framing, bodies without end, clients that trickle, stall or leave."""
-# once in CI: it waits longer than alone
 import json
 import socket
 import time

@@ -2,6 +2,7 @@
 refused, and the daemon lives through both. usage: test_memory.py BUILD_DIR [FILTER]
 """
 # not under ThreadSanitizer: about answers, not about threads
+# in the ordinary build too: a sanitizer has a heap of its own
 import contextlib
 import copy
 import http.client

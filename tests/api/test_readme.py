@@ -4,7 +4,7 @@
 Each page has a daemon and a shell of its own, in which its ```sh blocks run in order; a block with a line <!-- not run: REASON --> before
 it does not. The daemon's port is put in for 127.0.0.1:8080 and the build folder for build/. JSON that a block prints must meet its schema.
 """
-# not under ThreadSanitizer: about answers, not about threads
+# not under sanitizers: it is documents that are tried here
 import json
 import os
 import pathlib
@@ -69,8 +69,6 @@ def run_blocks(found, root, address):
         script += f". ./.block{i} >.out{i} 2>.err{i}\ntouch .done{i}\n"
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS")) and name not in OF_MAKE}
     environment["UZAWA_SERVER"] = "http://" + address
-    if service.INSTRUMENTED:  # what is linked without the sanitizer
-        environment["PLAIN"] = str(pathlib.Path(sys.argv[1]).resolve().parent)
     done = subprocess.run(["bash", "-c", script], cwd=root, env=environment, timeout=120)
     return done.returncode
 

@@ -1,7 +1,6 @@
 """Nothing that was acknowledged is lost, whenever the daemon dies, and nothing is done twice.
 usage: test_recovery.py BUILD_DIR [FILTER]
 """
-# once in CI: fewer jobs and kills than alone (more are in make soak)
 import collections
 import copy
 import http.client

@@ -1,6 +1,7 @@
 """Short forms of `make soak`: a daemon that is ended under load, slow clients, cancels, many jobs. Nothing is timed:
 usage: test_soak.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
+# in the ordinary build too, no_memory: a sanitizer has a heap of its own
 import os
 import pathlib
 import signal

@@ -1,3 +1,4 @@
+/* in the ordinary build too, memory_stays: a sanitizer has memory of its own */
 #include "codec/json.h"
 #include "harness.h"
 #include "sanitized.h"

@@ -1,5 +1,4 @@
-/* The queue of the store and those who work on it: order, recovery, expiry, retention, webhooks, many threads.
- * once in CI: shorter queues than alone. */
+/* The queue of the store and those who work on it: order, recovery, expiry, retention, webhooks, many threads. */
 #include "store/engine_base.h"
 #include "sanitized.h"
 #include "sqlite_file.h"

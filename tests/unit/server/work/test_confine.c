@@ -1,4 +1,5 @@
-/* What a process that is confined can still do, and what it cannot: it tries. */
+/* What a process that is confined can still do, and what it cannot: it tries.
+ * in the ordinary build too: a sanitizer does not get through the filter */
 #include "harness.h"
 #include "work/confine.h"
 

@@ -1,5 +1,6 @@
 /* The reserve of touched pages: blocks are whole and their own, pages of a freed block serve the next one, and no more
- * is kept than was allowed. */
+ * is kept than was allowed.
+ * in the ordinary build too, pages_of: a sanitizer has a heap of its own */
 #include "core/reserve.h"
 #include "harness.h"
 #include "qp_fixture.h"

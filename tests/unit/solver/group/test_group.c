@@ -1,5 +1,6 @@
 /* Solves by other processes: what is certified holds whatever they answer. Small systems that were once certified
- * wrongly (K = diag(2, 1), whose multigrid had one level that left a dof alone), by a stand-in and by uzawa-group. */
+ * wrongly (K = diag(2, 1), whose multigrid had one level that left a dof alone), by a stand-in and by uzawa-group.
+ * in the ordinary build too, by_processes: MPI and PETSc are not made for sanitizers */
 #include "core/aside.h"
 #include "dual/form.h"
 #include "group/group.h"

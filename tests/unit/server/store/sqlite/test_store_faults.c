@@ -1,5 +1,5 @@
 /* The store on a disk that fails: power loss, full disk and errors at every write, damaged files. SOAK=N in the
- * environment runs N times as many, a build with a sanitizer a fifth: once in CI, of which make soak does more. */
+ * environment runs N times as many, as make soak does, a build with a sanitizer a fifth. */
 #include "faulty_vfs.h"
 #include "sanitized.h"
 #include "sqlite_file.h"
