@@ -902,6 +902,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     run->penalty = run->hold = run->shift = 0;
     run->norm = INFINITY;
     run->step_qps = 0;
+    run->n_mixed = 0;
     run->turned = false;
     run->at.work = 0;
     if (status == UZ_OK)

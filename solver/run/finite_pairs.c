@@ -10,9 +10,9 @@
  * K - T, to which the skew part and E are added at the last v: few, as both are small where the surfaces lie on each
  * other, and each a back-substitution, as the matrix stays. Their v are mixed so that what the problem changes about
  * them is least (D. Anderson, "Iterative procedures for nonlinear integral equations", J. ACM 12 (1965) 547-560), as
- * what is skew would turn them about the answer for long. What is added is told by the rows a little further along v,
- * so that the whole derivative counts whatever row_turn.h leaves out of its entries. The skew part of pressures that
- * follow the body (finite/follower.h) is added like that of T. */
+ * what is skew would turn them about the answer for long; differences of the steps before tell of it, too. What is
+ * added is told by the rows a little further along v, so that the whole derivative counts whatever row_turn.h leaves
+ * out of its entries. The skew part of pressures that follow the body (finite/follower.h) is added like that of T. */
 #include "run/finite.h"
 
 #include "core/alloc.h"
@@ -26,10 +26,12 @@
 /* Contact problems of a step, how many are mixed, and what may be left of a step: no more than a part of what Newton's
  * method leaves of it, which is about what the step before was in the energy's norm (S. Eisenstat and H. Walker,
  * "Choosing the forcing terms in an inexact Newton method", SIAM J. Sci. Comput. 17 (1996) 16-32). */
-enum { MOST_CORRECTIONS = 12, MIXED = 4 };
+enum { MOST_CORRECTIONS = 12, MIXED = 6 };
 #define CORRECTED 1e-3
 #define ROUGHLY   0.1
 #define PART_LEFT 0.3
+/* What differences of other steps may be off, squared. */
+#define OF_OTHERS 1e-4
 /* What rounding may change, in parts of the displacement. */
 #define ROUNDING 1e-12
 
@@ -62,63 +64,62 @@ uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *fro
 
 /* ---- the step */
 
-/* v that were asked, what came of each, and the changes; the last ones, in turn. */
-typedef struct {
-    int64_t d;
-    int n;
-    double *came[MIXED], *change[MIXED];
-} history;
-
-/* weight (k): the combination of the changes that is least, with the sum 1: the last one and multiples of differences
- * from it, by their normal equations. */
-static void least_combination(double weight[MIXED], const history *past, int k, int last)
+/* Differences of changes (came - v) and of what came, from one v to the next, of this step and of those before, whose
+ * problem changed v much alike: d each, by turns, in run->mixed. */
+static double *difference(const uz_finite_run *run, int i, bool of_came)
 {
-    double A[MIXED][MIXED + 1], sum = 0;
-    int at[MIXED], n = 0;
-    for (int i = 0; i < k; i++)
-        if (i != last)
-            at[n++] = i;
-    for (int i = 0; i < n; i++) {
-        const double *a = past->change[at[i]], *own = past->change[last];
-        for (int j = 0; j <= n; j++) {
-            const double *b = j < n ? past->change[at[j]] : NULL;
-            A[i][j] = 0;
-            for (int64_t q = 0; q < past->d; q++)
-                A[i][j] += (a[q] - own[q]) * (b ? b[q] - own[q] : -own[q]);
-        }
-        A[i][i] *= 1 + 1e-12;
-    }
-    for (int c = 0; c < n; c++)
-        for (int i = c + 1; i < n; i++) {
-            const double factor = A[c][c] > 0 ? A[i][c] / A[c][c] : 0;
-            for (int j = c; j <= n; j++)
-                A[i][j] -= factor * A[c][j];
-        }
-    for (int i = n - 1; i >= 0; i--) {
-        double value = A[i][n];
-        for (int j = i + 1; j < n; j++)
-            value -= A[i][j] * weight[at[j]];
-        weight[at[i]] = A[i][i] > 0 && isfinite(value / A[i][i]) ? value / A[i][i] : 0;
-        sum += weight[at[i]];
-    }
-    weight[last] = 1 - sum;
+    return run->mixed + (2 * (i % MIXED) + of_came) * run->d;
 }
 
-/* v becomes what is asked next, after `came` came of it. */
-static void mix(double *v, history *past, const double *came)
+/* weight (k): the combination of the differences of changes that is nearest to `change`, by the normal equations of
+ * unit vectors. */
+static void nearest_combination(double weight[MIXED], const uz_finite_run *run, int k, const double *change)
 {
-    const int last = past->n % MIXED, k = past->n < MIXED ? past->n + 1 : MIXED;
-    double weight[MIXED] = {0};
-    for (int64_t j = 0; j < past->d; j++) {
-        past->came[last][j] = came[j];
-        past->change[last][j] = came[j] - v[j];
+    double A[MIXED][MIXED + 1], size[MIXED];
+    for (int i = 0; i < k; i++)
+        size[i] = uz_norm(run->d, difference(run, i, false));
+    for (int i = 0; i < k; i++) {
+        const double *a = difference(run, i, false);
+        for (int j = 0; j < k; j++)
+            A[i][j] = size[i] * size[j] > 0 ? uz_dot(run->d, a, difference(run, j, false)) / (size[i] * size[j]) : 0;
+        A[i][i] += OF_OTHERS;
+        A[i][k] = size[i] > 0 ? uz_dot(run->d, a, change) / size[i] : 0;
     }
-    past->n++;
-    least_combination(weight, past, k, last);
-    for (int64_t j = 0; j < past->d; j++) {
-        v[j] = 0;
-        for (int i = 0; i < k; i++)
-            v[j] += weight[i] * past->came[i][j];
+    for (int c = 0; c < k; c++)
+        for (int i = c + 1; i < k; i++) {
+            const double factor = A[i][c] / A[c][c];
+            for (int j = c; j <= k; j++)
+                A[i][j] -= factor * A[c][j];
+        }
+    for (int i = k - 1; i >= 0; i--) {
+        for (int j = i + 1; j < k; j++)
+            A[i][k] -= A[i][j] * weight[j];
+        weight[i] = A[i][k] / A[i][i];
+    }
+    for (int i = 0; i < k; i++)
+        weight[i] = size[i] > 0 ? weight[i] / size[i] : 0;
+}
+
+/* v becomes what is asked next, after `came` came of it, and of the v before it what `before` and its change say, which
+ * become those of this one. */
+static void mix(uz_finite_run *run, double *v, double *before, double *change_before, const double *came)
+{
+    double weight[MIXED] = {0};
+    double *change = difference(run, run->n_mixed, false), *later = difference(run, run->n_mixed, true);
+    for (int64_t j = 0; j < run->d; j++) {
+        const double own = came[j] - v[j];
+        change[j] = own - change_before[j];
+        later[j] = came[j] - before[j];
+        change_before[j] = own;
+        before[j] = v[j] = came[j];
+    }
+    run->n_mixed++;
+    const int k = run->n_mixed < MIXED ? run->n_mixed : MIXED;
+    nearest_combination(weight, run, k, change_before);
+    for (int i = 0; i < k; i++) {
+        const double *by = difference(run, i, true);
+        for (int64_t j = 0; j < run->d; j++)
+            v[j] -= weight[i] * by[j];
     }
 }
 
@@ -154,24 +155,26 @@ static uz_status add_turn(uz_finite_run *run, const double *v, uz_error *err)
     return status;
 }
 
-/* room: 4 d + m + 2 n. p and h are those of the symmetric part. */
-static uz_status iterate(uz_finite_run *run, double *room, history *past, uz_error *err)
+/* room: 6 d + m + 2 n. p and h are those of the symmetric part. */
+static uz_status iterate(uz_finite_run *run, double *room, uz_error *err)
 {
     const int64_t d = run->d, m = run->at.rows.m;
-    double *p = room, *from = p + d, *v = from + d, *came = v + d, *h = came + d, *nodal = h + m;
-    /* of the first step the norm is infinite; nor more than the answer is asked for, as far as this step goes */
+    double *p = room, *from = p + d, *v = from + d, *came = v + d, *before = came + d, *change = before + d,
+           *h = change + d, *nodal = h + m;
+    /* of the first step the norm is infinite, or not known; nor more than the answer is asked for, as far as this step
+     * goes */
     const double now = uz_finite_step_norm(run), enough = now > 0 ? PART_LEFT * run->requested / now : ROUGHLY;
-    const double left = fmin(ROUGHLY, fmax(fmax(CORRECTED, enough), PART_LEFT * run->norm));
+    const double left = run->norm > 0 ? fmin(ROUGHLY, fmax(fmax(CORRECTED, enough), PART_LEFT * run->norm)) : ROUGHLY;
     uz_status status = UZ_OK;
     uz_finite_restrict(from, &run->at);
-    for (int64_t j = 0; j < d; j++) {
+    for (int64_t j = 0; j < d; j++) { /* it came of none */
         p[j] = run->p[j];
-        v[j] = run->last->u[j] - from[j];
+        v[j] = before[j] = change[j] = run->last->u[j] - from[j];
     }
     for (int64_t i = 0; i < m; i++)
         h[i] = run->at.h[i];
     for (int k = 0; k < MOST_CORRECTIONS && status == UZ_OK; k++) {
-        double change = 0;
+        double off = 0;
         for (int64_t j = 0; j < d; j++)
             run->p[j] = p[j];
         for (int64_t i = 0; i < m; i++)
@@ -185,11 +188,11 @@ static uz_status iterate(uz_finite_run *run, double *room, history *past, uz_err
             break;
         for (int64_t j = 0; j < d; j++) {
             came[j] = run->last->u[j] - from[j];
-            change = hypot(change, came[j] - v[j]);
+            off = hypot(off, came[j] - v[j]);
         }
-        if (change <= left * uz_norm(d, came) || change <= ROUNDING * uz_norm(d, run->last->u))
+        if (off <= left * uz_norm(d, came) || off <= ROUNDING * uz_norm(d, run->last->u))
             break;
-        mix(v, past, came);
+        mix(run, v, before, change, came);
     }
     for (int64_t i = 0; i < m; i++)
         run->at.h[i] = h[i];
@@ -199,18 +202,12 @@ static uz_status iterate(uz_finite_run *run, double *room, history *past, uz_err
 uz_status uz_finite_correct(uz_finite_run *run, uz_error *err)
 {
     const int64_t d = run->d;
-    history past = {.d = d};
-    double *room = uz_alloc(4 * d + run->at.rows.m + 2 * run->n, sizeof *room),
-           *kept = uz_alloc(2 * MIXED * d, sizeof *kept);
-    uz_status status =
-        room && kept ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld dofs", (long long)d);
-    for (int i = 0; i < MIXED && status == UZ_OK; i++) {
-        past.came[i] = kept + 2 * i * d;
-        past.change[i] = past.came[i] + d;
-    }
-    if (status == UZ_OK)
-        status = iterate(run, room, &past, err);
+    double *room = uz_alloc(6 * d + run->at.rows.m + 2 * run->n, sizeof *room);
+    if (!run->mixed)
+        run->mixed = uz_alloc(2 * MIXED * d, sizeof *run->mixed);
+    const uz_status status = room && run->mixed
+                                 ? iterate(run, room, err)
+                                 : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld dofs", (long long)d);
     free(room);
-    free(kept);
     return status;
 }
