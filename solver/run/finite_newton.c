@@ -357,16 +357,17 @@ typedef struct {
 
 /* What a tangent that is not positive definite gets, from nothing on: first stiffness along the pressed rows, as
  * contact may be all that keeps the body stable; then what reactions times the curvature of gaps add is left out of it,
- * which takes most where reactions are too large; then stiffness of the undeformed body. pressed: are there such rows?
- * roughly: their reactions are hardly known, and are not worth being held for. */
+ * which takes most where reactions are too large; then stiffness of the undeformed body, of which what is left from the
+ * tangent before is no beginning: with it rows are not held yet. pressed: are there such rows? roughly: their reactions
+ * are hardly known, and are not worth being held for. */
 static void add_more(addition *add, bool pressed, bool roughly)
 {
-    if (pressed && !add->straight && !roughly && (add->hold == 0 || (add->hold < MOST_HOLD && add->shift == 0)))
-        add->hold = add->hold == 0 ? LEAST_HOLD : fmin(MOST_HOLD, MORE_HOLD * add->hold);
-    else if (pressed && !add->straight)
+    if (!pressed || add->straight)
+        add->shift = fmax(FIRST_SHIFT, MORE_SHIFT * add->shift);
+    else if (roughly || add->hold == MOST_HOLD)
         *add = (addition){.straight = true};
     else
-        add->shift = fmax(FIRST_SHIFT, MORE_SHIFT * add->shift);
+        *add = (addition){.hold = add->hold == 0 ? LEAST_HOLD : fmin(MOST_HOLD, MORE_HOLD * add->hold)};
 }
 
 void uz_finite_forget_factors(uz_finite_run *run)
