@@ -354,22 +354,25 @@ test-hygiene: ## formatting, static analysis, both compilers
 sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/libuzawa.a $(BUILD)/uzawa && \
             $(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) PLAIN=$(BUILD) OPT="-O1 -g1 -fno-pie" LDFLAGS=-no-pie SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that say
-# "not under ThreadSanitizer", or "not under sanitizers" at all.
+# "not under ThreadSanitizer", or "not under sanitizers" at all. Of those some say "for ThreadSanitizer, PART: REASON".
 without_tsan = $(shell grep -L 'not under \(ThreadSanitizer\|sanitizers\)' $(1))
 TSAN_UNIT = $(notdir $(basename $(call without_tsan,$(shell grep -lE 'pthread_create|include "(http|base/log|store|work|core/aside)' $(UNIT_SRC)))))
 TSAN_API  = $(notdir $(basename $(call without_tsan,$(wildcard tests/api/test_*.py))))
+TSAN_PARTS = $(call marked,for ThreadSanitizer,$(wildcard tests/api/test_*.py))
 ASAN_API  = $(shell grep -L 'not under sanitizers' tests/api/test_*.py)
 # In CI each test runs once, there, but for those that it is not made for. In the ordinary build besides: C tests of rooms
 # whose sources the optimizer gets with flags of their own, and what says "in the ordinary build too: REASON" ("too, PART:
 # REASON" of some of its tests), since too little of it can be done under a sanitizer.
 TUNED_ROOMS = $(sort $(patsubst solver/%/,tests/unit/solver/%/%,$(dir $(CONTRACTED) $(UNROLLED))))
 TUNED_UNIT  = $(filter $(TUNED_ROOMS),$(UNIT_SRC))
-PLAIN_TOO   = $(shell grep -oE 'in the ordinary build too(, [a-z_]+)?:' $(UNIT_SRC) $(ASAN_API) | \
-                sed -E 's|^tests/([a-z]+)/(.*/)?(test_[a-z0-9_]+)\.[^,]*,? ?([a-z_]*).*|\1/\3.\4|; s|[.]$$||')
+PLAIN_TOO   = $(call marked,in the ordinary build too,$(UNIT_SRC) $(ASAN_API))
 ONCE_ONLY   = $(call programs,$(TUNED_UNIT) $(filter-out $(ASAN_API),$(wildcard tests/browser/test_*.py tests/api/test_*.py))) $(PLAIN_TOO)
 # The C tests among them are all that is to be built.
 ONCE_UNIT   = $(sort $(foreach one,$(filter unit/%,$(ONCE_ONLY)),$(BUILD)/tests/$(basename $(notdir $(one)))))
-# As tests/run.sh names them: KIND/NAME.
+# What says "PHRASE: REASON", or "PHRASE, PART: REASON" of some of its tests; and all of what is given: KIND/NAME.PART or
+# KIND/NAME, as tests/run.sh names them.
+marked = $(shell grep -oE '$(1)(, [a-z_]+)?:' $(2) | \
+           sed -E 's|^tests/([a-z]+)/(.*/)?(test_[a-z0-9_]+)\.[^,]*,? ?([a-z_]*).*|\1/\3.\4|; s|[.]$$||')
 programs = $(foreach test,$(1),$(word 2,$(subst /, ,$(test)))/$(notdir $(basename $(test))))
 
 asan: asan-build ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
@@ -383,7 +386,7 @@ ubsan: deps-test ## the C tests under UndefinedBehaviorSanitizer alone
 	@tests/run.sh $(BUILD)/ubsan unit "$(FILTER)"
 
 tsan: tsan-build ## the server's tests under ThreadSanitizer
-	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT:%=unit/%) $(TSAN_API:%=api/%)"
+	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT:%=unit/%) $(TSAN_API:%=api/%) $(TSAN_PARTS)"
 
 tsan-build: deps-test
 	$(call sanitized,tsan,-fsanitize=thread) all $(TSAN_UNIT:%=$(BUILD)/tsan/tests/%)

@@ -1,4 +1,8 @@
 """Who may do what: tokens, rates, connections, TLS, public addresses, users."""
+# not under ThreadSanitizer: one client at a time, but for these:
+# for ThreadSanitizer, reload: tokens go while others read them
+# for ThreadSanitizer, connections_of_one: which all threads count
+# for ThreadSanitizer, tls: the certificate is read anew beside those who use it
 import http.client
 import json
 import os

@@ -1,4 +1,5 @@
 """The daemon as a process: command line, signals, drain, restart, descriptors, log."""
+# not under ThreadSanitizer: about one process, which every test there begins, signals and ends
 import os
 import signal
 import socket

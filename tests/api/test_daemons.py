@@ -1,5 +1,9 @@
 """Several daemons on one database: any of them serves any request; one that is killed, stopped or cut off loses nothing
 and writes nothing that is another's."""
+# not under ThreadSanitizer: about many processes, of which each has the threads that these see:
+# for ThreadSanitizer, any_daemon: workers, listeners and handlers on one database
+# for ThreadSanitizer, a_wait_at_another: what is told by the database to who waits here
+# for ThreadSanitizer, connections_that: connections to the database, which all threads share, are made anew
 import collections
 import concurrent.futures
 import contextlib

@@ -1,4 +1,5 @@
 """The way to a PostgreSQL database: roles with least rights, TLS, a pooler between."""
+# not under ThreadSanitizer: about the way to a database; threads of it are in test_daemons
 import contextlib
 import os
 import pathlib

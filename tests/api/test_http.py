@@ -1,4 +1,7 @@
 """The HTTP interface of the real daemon, by its contract: every route and every refusal."""
+# not under ThreadSanitizer: one client at a time, but for these:
+# for ThreadSanitizer, idempotency_race: one key in eight threads
+# for ThreadSanitizer, long_poll: who waits is woken by the one who ends the job
 import gzip
 import json
 import re

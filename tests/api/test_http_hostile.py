@@ -1,4 +1,9 @@
 """Sockets that misbehave: ambiguous framing, bodies without end, clients that trickle, stall or leave."""
+# not under ThreadSanitizer: one client at a time, but for these:
+# for ThreadSanitizer, the_service_ends: while a thread refuses
+# for ThreadSanitizer, slow_requests: another thread ends them
+# for ThreadSanitizer, half_sent: those that are new take the places of others
+# for ThreadSanitizer, room_for_health: and of all
 import json
 import socket
 import time

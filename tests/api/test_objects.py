@@ -1,5 +1,8 @@
 """Large results and uploads in an object store: several daemons with one bucket, what fails there, and what a crash leaves.
 """
+# not under ThreadSanitizer: about what is kept where, but for these, in which threads meet:
+# for ThreadSanitizer, results_and_uploads: many put and get at once
+# for ThreadSanitizer, the_object_store_is_away: all wait for one store
 import concurrent.futures
 import contextlib
 import json

@@ -1,6 +1,7 @@
 """Clients kept apart: jobs, uploads, keys, lists and events belong to the owner of the token that they came with.
 usage: test_owners.py BUILD_DIR [FILTER]
 """
+# not under ThreadSanitizer: one client at a time; many are in test_concurrency
 import hashlib
 import json
 import os

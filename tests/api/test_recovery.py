@@ -1,6 +1,10 @@
 """Nothing that was acknowledged is lost, whenever the daemon dies, and nothing is done twice.
 usage: test_recovery.py BUILD_DIR [FILTER]
 """
+# not under ThreadSanitizer: a process that is killed tells of no race, and its file has no threads; but
+# for ThreadSanitizer, killed_during_submission: many post while it starts anew
+# for ThreadSanitizer, job_that_kills: a process ends beside the one who watches it
+# for ThreadSanitizer, drain_leaves: workers, jobs and the drain end together
 import collections
 import copy
 import http.client

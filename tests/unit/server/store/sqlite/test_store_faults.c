@@ -1,5 +1,6 @@
 /* The store on a disk that fails: power loss, full disk and errors at every write, damaged files. SOAK=N in the
- * environment runs N times as many, as make soak does, a build with a sanitizer a fifth. */
+ * environment runs N times as many, as make soak does, a build with a sanitizer a fifth.
+ * not under ThreadSanitizer: it is the disk that fails; many threads on one store are in test_store_queue */
 #include "faulty_vfs.h"
 #include "sanitized.h"
 #include "sqlite_file.h"
