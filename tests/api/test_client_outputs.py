@@ -21,6 +21,8 @@ import service
 from fake_server import Fake
 from service import Skip, check, options
 
+SHARED = True  # one service for all tests
+
 CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
 PAPER, SPRINGS = "tests/data/paper_body.json", "tests/data/small_matrices.json"
 ID = "0" * 31 + "1"
@@ -453,6 +455,7 @@ def test_delete_survives_a_lost_reply(_):
         run(fake.url, "delete", ID, code=4)
 
 
+@options()
 def test_factors(server):
     check(json.loads(run(server, "factors", "--json").stdout)["factors"] == [])
     solved(server), solved(server)
@@ -474,6 +477,7 @@ def doctor(url, code, **environment):
     return {line["check"]: line for line in lines}
 
 
+@options()
 def test_doctor_of_a_healthy_service(server):
     found = doctor(server.url, 0)
     check(all(line["state"] == "ok" and line["remedy"] == "" for name, line in found.items() if name != "disk"), found)

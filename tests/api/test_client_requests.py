@@ -14,6 +14,8 @@ import service
 from fake_server import Fake
 from service import check, options
 
+SHARED = True  # one service for all tests
+
 CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
 PAPER = "tests/data/paper_body.json"
 MATRICES = {name: f"tests/data/springs_{name}.mtx" for name in "KNhp"}
