@@ -447,6 +447,7 @@ def test_what_is_not_modelled_is_refused(s):
               "/problem/contacts/0/obstacle/height", "cylinders"),
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
              (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
+             (block(kinematics="auto", stabilize=True, supports=[{"on": "top", "uy": -0.3}]), "/problem/stabilize", "springs of your own"),
              (block(mesh={"box": {"size": [1, 1], "cells": "auto"}}), "/problem/mesh/box/cells", "give their numbers"),
               (block(kinematics="auto", mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "/problem/mesh/refine", "finite"),
               ({**block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "solver": {"accuracy": {"total": 0.1, "guaranteed": True}}},
