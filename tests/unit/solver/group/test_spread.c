@@ -17,17 +17,18 @@ typedef struct {
     double val[D * D];
 } body;
 
-/* A band and some couplings far away; dof j belongs to node j % nodes, so that dofs of a node are apart. */
-static void fill(body *b, int32_t nodes)
+/* A band with holes, in blocks of nodes too, and some couplings far away. Dof j belongs to node j % nodes, so that dofs
+ * of a node are apart, or they have numbers in a row. */
+static void fill(body *b, int32_t nodes, bool in_a_row)
 {
     memset(b, 0, sizeof *b);
     for (int j = 0; j < D; j++) {
-        b->node[j] = j % nodes;
+        b->node[j] = in_a_row ? j / ((D + nodes - 1) / nodes) : j % nodes;
         b->value[2 * j] = (float)j;
         b->value[2 * j + 1] = (float)(100 + j);
         b->dense[j][j] = 10.0 + j;
         for (int i = j + 1; i < D; i++)
-            if (i - j < 3 || (i * 7 + j) % 31 == 0)
+            if ((i - j < 3 && (i + j) % 11 != 0) || (i * 7 + j) % 31 == 0)
                 b->dense[i][j] = b->dense[j][i] = -1.0 / (1.0 + i + 2.0 * j);
     }
     int64_t at = 0;
@@ -78,12 +79,12 @@ static void gather(double *whole, float *modes, const uz_spread *map, const body
     CHECK(node == map->nodes);
 }
 
-static void check_spread(int32_t nodes, int64_t bs, int64_t padded)
+static void check_spread(int32_t nodes, int64_t bs, int64_t padded, bool in_a_row)
 {
     body *b = malloc(sizeof *b);
     uz_spread map;
     uz_error err = {0};
-    fill(b, nodes);
+    fill(b, nodes, in_a_row);
     CHECK(uz_spread_init(&map, &b->K, &b->modes, &err) == UZ_OK);
     CHECK(map.bs == bs && map.size == D + padded);
     for (int64_t i = 0; i < map.nodes; i++)
@@ -113,14 +114,20 @@ static void check_spread(int32_t nodes, int64_t bs, int64_t padded)
 
 TEST(nodes_are_filled_up)
 {
-    check_spread(15, 3, 5); /* ten nodes of three dofs, five of two */
-    check_spread(20, 2, 0);
+    check_spread(15, 3, 5, false); /* ten nodes of three dofs, five of two */
+    check_spread(20, 2, 0, false);
+}
+
+TEST(columns_of_dofs_in_a_row_are_copied_where_they_are_whole)
+{
+    check_spread(14, 3, 2, true); /* the last one has one dof */
+    check_spread(20, 2, 0, true);
 }
 
 TEST(dofs_are_nodes_where_too_much_would_be_added)
 {
-    check_spread(27, 1, 0); /* thirteen nodes of two, fourteen of one */
-    check_spread(4, 1, 0);  /* ten dofs each are no node */
+    check_spread(27, 1, 0, false); /* thirteen nodes of two, fourteen of one */
+    check_spread(4, 1, 0, false);  /* ten dofs each are no node */
 }
 
 TEST(a_part_that_does_not_exist_is_refused)
@@ -128,7 +135,7 @@ TEST(a_part_that_does_not_exist_is_refused)
     body *b = malloc(sizeof *b);
     uz_spread map;
     uz_error err = {0};
-    fill(b, 20);
+    fill(b, 20, false);
     CHECK(uz_spread_init(&map, &b->K, &b->modes, &err) == UZ_OK);
     for (int64_t i = 0; i < map.nodes; i++)
         map.part[i] = i == 7 ? PROCESSES : 0;
