@@ -4,6 +4,7 @@
  *     uz_finite_settle   finite_newton.c   the equilibrium under one part: contact problems on tangents
  *     uz_finite_turn     finite_turn.c     large steps of parts that turn
  *     uz_finite_correct  finite_pairs.c    what rows between bodies need in it
+ *     uz_finite_may_pass finite_passing.c  what a part may not have gone through
  *     uz_finite_report   finite_report.c   the answer as a result
  *     uz_finite_quantities  finite_quantities.c  the numbers that it was asked for
  *     uz_solve_weighed   weigh.c           whether small deformation is enough (kinematics AUTO) */
@@ -16,6 +17,7 @@
 #include "core/hooks.h"
 #include "finite/finite_body.h"
 #include "finite/follower.h"
+#include "obstacle/obstacle.h"
 #include "uzawa.h"
 
 /* The kind of run (solve.c): results as those of uz_solve_rounds. Every case is answered with its whole load, or with
@@ -175,6 +177,16 @@ void uz_finite_move_supports(bool *moved, uz_finite_run *run);
 /* run->trial.u becomes the place that the step from run->at leads to if its parts turn, where that makes more of a
  * difference than the strain that the step is for (*turned); run->tangent is of no use then. */
 uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err);
+
+/* May a point go straight from x along `way`? Where it is within the obstacle it has to be so on the side where it went
+ * in: what comes out behind, or nears it, has been led through the obstacle, and what would have stopped it is not seen
+ * any more. */
+bool uz_finite_may_go(const uz_obstacle *obstacle, const double *x, const double *way);
+/* May the sides of contacts go straight from one displacement to another (n each), past round obstacles, which may be
+ * smaller than a side, and past those of other bodies? What goes into one of these must not come out behind; nor
+ * `beside`, as at a corner. */
+uz_status uz_finite_may_pass(bool *may, const uz_finite_run *run, const double *from, const double *to, bool beside,
+                             uz_error *err);
 
 /* Of rows between bodies. run->K becomes the tangent with run->turn, and, where `hold`, room for stiffness along
  * those that were pressed. */

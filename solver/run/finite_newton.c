@@ -31,6 +31,7 @@
 #include "cache/parts.h"
 #include "obstacle/obstacle.h"
 #include "run/solve.h"
+#include "scene/mesh_parts.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -64,8 +65,6 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4 };
 #define LARGE_STEP 0.3
 /* Ways of supports that differ by less than this part of the body's extent are the same. */
 #define CARRIED 1e-12
-/* A way to where they are is looked at from this many points of it at least. */
-#define WAY_POINTS 64
 /* Along a path: how far its end may be from where the first tangent leads to, in ways there. */
 #define MOST_LEAP 1.0
 
@@ -729,151 +728,105 @@ static int axis_of(double *sign, const uz_body_model *model, int64_t node, int c
     return axis;
 }
 
-/* Where all supports still have to go the same way, the body is carried along before anything else: contact is where it
- * comes to, and the first problem would otherwise be that of where it was. Not after a part that failed, which may have
- * been led through an obstacle so, nor of rings, which have no way but along their axis. way: of each axis, 0 where
- * nothing is held. */
-static bool find_way(double way[3], const uz_finite_run *run)
+/* Where all supports of a part of the mesh still have to go the same way, it is carried along before anything else:
+ * contact is where it comes to, and the first problem would otherwise be that of where it was. Not after a part of the
+ * load that failed, which may have been led through an obstacle so, nor of rings, which have no way but along their
+ * axis. to (n): run->at with that; *carried: is there any? */
+static uz_status find_carried(bool *carried, double *to, const uz_finite_run *run, uz_error *err)
 {
     const uz_body_model *model = &run->base;
-    const int dim = model->mesh.dim;
-    bool alike = !run->pairs && model->n_rigid == 0 && run->found.failed == 0 && model->kind != UZ_AXISYMMETRIC,
-         known[3] = {false};
+    const uz_mesh *mesh = &model->mesh;
+    const int dim = mesh->dim;
+    int64_t *part = uz_alloc(mesh->n_nodes, sizeof *part);
+    int64_t parts = part ? uz_mesh_number_parts(part, mesh) : -1;
+    double *way = parts < 0 ? NULL : uz_alloc(3 * parts, sizeof *way); /* along each axis; NaN: not known */
+    bool *alike = way ? uz_alloc(parts, sizeof *alike) : NULL;
+    *carried = false;
+    if (alike && model->tied.share.ptr) { /* what is tied goes together */
+        memset(part, 0, (size_t)mesh->n_nodes * sizeof *part);
+        parts = 1;
+    }
+    for (int64_t i = 0; i < 3 * parts && alike; i++) {
+        way[i] = NAN;
+        alike[i / 3] = true;
+    }
     for (int64_t i = 0; i < run->n && alike; i++) {
         const int64_t dof = model->dof[i], node = i / dim;
         const int c = (int)(i % dim);
         double sign;
-        if (dof >= 0 || dof == UZ_NO_DOF)
+        if (dof >= 0 || dof == UZ_NO_DOF || !alike[part[node]])
             continue;
         const int axis = axis_of(&sign, model, node, c);
-        alike = axis >= 0;
-        if (!alike)
-            break;
+        alike[part[node]] = axis >= 0;
+        if (axis < 0)
+            continue;
+        double *known = &way[3 * part[node] + axis];
         const double own = sign * (run->prescribed[-1 - dof] - uz_along_dof(model, node, c, run->at.u + dim * node));
-        way[axis] = known[axis] ? way[axis] : own;
-        known[axis] = true;
-        alike = fabs(own - way[axis]) <= CARRIED * model->mesh.extent;
+        *known = isnan(*known) ? own : *known;
+        alike[part[node]] = fabs(own - *known) <= CARRIED * mesh->extent;
     }
-    return alike;
+    for (int64_t i = 0; i < run->n && alike; i++) {
+        const int64_t dof = model->dof[i], of = part[i / dim];
+        const double own = way[3 * of + i % dim];
+        const bool goes = alike[of] && fabs(own) > 0;
+        const bool exact = dof < 0 && dof != UZ_NO_DOF && !uz_node_frame(model, i / dim);
+        to[i] = !goes ? run->at.u[i] : exact ? run->prescribed[-1 - dof] : run->at.u[i] + own;
+        *carried = *carried || goes;
+    }
+    const bool room = alike;
+    free(part);
+    free(way);
+    free(alike);
+    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a body");
 }
 
-/* May a point go straight from x along `way`? Where it is within the obstacle it has to be so on the side where it went
- * in: what comes out behind, or nears it, has been led through the obstacle, and what would have stopped it is not seen
- * any more. */
-static bool may_go(const uz_obstacle *obstacle, const double *x, const double *way)
-{
-    const double length = sqrt(uz_dot3(way, way));
-    double entry[3] = {0}, done = 0;
-    bool outside = true; /* all the way since the last point */
-    while (true) {
-        uz_gap gap;
-        double at[3];
-        for (int c = 0; c < 3; c++)
-            at[c] = x[c] + way[c] * (done / length);
-        if (uz_obstacle_gap(&gap, obstacle, at, NULL) != UZ_OK || (!outside && !(uz_dot3(entry, gap.normal) > 0)))
-            return false;
-        if (outside)
-            memcpy(entry, gap.normal, sizeof entry);
-        if (done >= length)
-            return true;
-        const double step = fmax(gap.gap, length / WAY_POINTS);
-        outside = step <= gap.gap;
-        done = fmin(length, done + step);
-    }
-}
-
-/* May all places of rows at run->at? */
-static uz_status may_be_carried(bool *may, uz_finite_run *run, const double way[3], uz_error *err)
+/* May all places of rows at run->at go straight to `to`, past rigid obstacles? */
+static uz_status may_be_carried(bool *may, uz_finite_run *run, const double *to, uz_error *err)
 {
     const uz_body_model *rows = &run->at.rows;
+    const int dim = rows->mesh.dim;
     uz_status status = UZ_OK;
     for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK && *may; k++) {
         uz_obstacle *obstacle = NULL;
+        if (run->scene.contacts[k].kind == UZ_OBSTACLE_BODY)
+            continue;
         status = uz_obstacle_new(&obstacle, &run->scene.contacts[k], k, run->scene.model, err);
         for (int64_t i = 0; status == UZ_OK && i < rows->m && *may; i++) {
             const row_place place = place_of_row(&run->at, i);
-            *may = rows->info.contact_of[i] != k || may_go(obstacle, place.at, way);
+            double way[3] = {0};
+            for (int a = 0; a < place.n; a++)
+                for (int c = 0; c < dim; c++)
+                    way[c] += place.share[a] * (to[dim * place.node[a] + c] - run->at.u[dim * place.node[a] + c]);
+            *may =
+                rows->info.contact_of[i] != k || !(uz_dot3(way, way) > 0) || uz_finite_may_go(obstacle, place.at, way);
         }
         uz_obstacle_free(obstacle);
     }
     return status;
 }
 
-/* From run->at, whose rows are known. *fits: as of uz_finite_place_find. */
-static uz_status carry(bool *fits, uz_finite_run *run, uz_error *err)
+/* From run->at, which is `begun` and whose rows are known. *fits: as of uz_finite_place_find. to: n, room. What comes
+ * out beside another body, past its corner, is carried only where something is still in the way. */
+static uz_status carry(bool *fits, uz_finite_run *run, const double *begun, double *to, uz_error *err)
 {
-    const uz_body_model *model = &run->base;
-    const int dim = model->mesh.dim;
-    double way[3] = {0};
-    bool carried = find_way(way, run) && uz_dot3(way, way) > 0;
-    const uz_status status = carried ? may_be_carried(&carried, run, way, err) : UZ_OK;
+    bool carried = false, clear = true;
+    if (run->found.failed > 0 || run->base.n_rigid > 0 || run->base.kind == UZ_AXISYMMETRIC)
+        return UZ_OK;
+    uz_status status = find_carried(&carried, to, run, err);
+    if (status == UZ_OK && carried)
+        status = may_be_carried(&carried, run, to, err);
+    if (status == UZ_OK && carried && run->pairs)
+        status = uz_finite_may_pass(&carried, run, begun, to, false, err);
     if (status != UZ_OK || !carried)
         return status;
-    for (int64_t i = 0; i < run->n; i++) {
-        const int64_t dof = model->dof[i];
-        const bool exact = dof < 0 && dof != UZ_NO_DOF && !uz_node_frame(model, i / dim);
-        run->at.u[i] = exact ? run->prescribed[-1 - dof] : run->at.u[i] + way[i % dim];
-    }
+    memcpy(run->at.u, to, (size_t)run->n * sizeof *to);
+    status = uz_finite_place_find(fits, &run->at, run, err);
+    if (status == UZ_OK && *fits && run->pairs && run->at.violation == 0)
+        status = uz_finite_may_pass(&clear, run, begun, to, true, err);
+    if (status != UZ_OK || (*fits && clear))
+        return status;
+    memcpy(run->at.u, begun, (size_t)run->n * sizeof *begun);
     return uz_finite_place_find(fits, &run->at, run, err);
-}
-
-/* May all of a side go straight from one displacement to another (n each), past a round obstacle? Between points by
- * which it is looked at there is a quarter of the radius, or, of very small ones, a sixty-fourth of the side. What goes
- * less than the radius stays in front of it, or grazes it. */
-static bool side_may_go(const uz_mesh *mesh, uz_face face, const uz_obstacle *obstacle, double radius,
-                        const double *from, const double *to)
-{
-    int64_t node[UZ_FACE_NODES];
-    const int dim = mesh->dim, count = uz_mesh_face(node, mesh, face);
-    const int corners = dim == 2 ? 2 : count % 3 == 0 ? 3 : 4;
-    double x[4][3] = {{0}}, way[4][3] = {{0}}, longest = 0, length = 0;
-    for (int a = 0; a < corners; a++) {
-        for (int c = 0; c < dim; c++) {
-            x[a][c] = mesh->xyz[dim * node[a] + c] + from[dim * node[a] + c];
-            way[a][c] = to[dim * node[a] + c] - from[dim * node[a] + c];
-        }
-        longest = fmax(longest, sqrt(uz_dot3(way[a], way[a])));
-        length = fmax(length, sqrt(uz_distance2(x[a], x[0], 3)));
-    }
-    if (longest < radius)
-        return true;
-    const int n = (int)fmin(WAY_POINTS, ceil(4 * length / radius));
-    for (int i = 0; i <= n; i++)
-        for (int j = 0; j <= (dim == 2 ? 0 : corners == 3 ? n - i : n); j++) {
-            const double s = (double)i / n, t = (double)j / n;
-            const double share[4] = {corners == 4 ? (1 - s) * (1 - t) : 1 - s - t, corners == 4 ? s * (1 - t) : s,
-                                     corners == 4 ? s * t : t, (1 - s) * t};
-            double at[3] = {0}, along[3] = {0};
-            for (int a = 0; a < corners; a++)
-                for (int c = 0; c < dim; c++) {
-                    at[c] += share[a] * x[a][c];
-                    along[c] += share[a] * way[a][c];
-                }
-            if (uz_dot3(along, along) > 0 && !may_go(obstacle, at, along))
-                return false;
-        }
-    return true;
-}
-
-/* May the sides of contacts go straight from where the part began to run->at? What has gone through a round obstacle,
- * which may be smaller than a side, has no rows there that would bring it back. Where sides slide around one it takes
- * smaller parts, whose ways are near those that they go. */
-static uz_status may_be_led(bool *may, const uz_finite_run *run, const double *begun, uz_error *err)
-{
-    const uz_mesh *mesh = &run->base.mesh;
-    uz_status status = UZ_OK;
-    for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK && *may; k++) {
-        const uz_contact *contact = &run->scene.contacts[k];
-        uz_obstacle *obstacle = NULL;
-        if (contact->kind != UZ_OBSTACLE_ROUND || contact->inside)
-            continue;
-        const uz_group *on = uz_mesh_group(mesh, contact->on, "", err);
-        status = on ? uz_obstacle_new(&obstacle, contact, k, run->scene.model, err) : UZ_ERR_SCENE;
-        for (int64_t i = 0; status == UZ_OK && i < on->n_faces && *may; i++)
-            *may = side_may_go(mesh, on->face[i], obstacle, contact->radius, begun, run->at.u);
-        uz_obstacle_free(obstacle);
-    }
-    return status;
 }
 
 /* Of a part that has settled: it is unsettled where it may not have gone there. */
@@ -881,7 +834,7 @@ static uz_status look_back(uz_part *out, const uz_finite_run *run, const double 
                            uz_error *err)
 {
     bool may = true;
-    const uz_status status = may_be_led(&may, run, begun, err);
+    const uz_status status = uz_finite_may_pass(&may, run, begun, run->at.u, false, err);
     if (!may || leaps(run, begun, led))
         *out = UZ_PART_UNSETTLED;
     return status;
@@ -911,7 +864,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     if (status == UZ_OK) {
         status = uz_finite_place_find(&fits, &run->at, run, err); /* supports have moved */
         if (status == UZ_OK && fits)
-            status = carry(&fits, run, err);
+            status = carry(&fits, run, begun, to, err);
     }
     while (status == UZ_OK && fits && !done && run->step_qps < MOST_QPS) {
         bool moved = false, found = false, inverted = false;

@@ -307,10 +307,10 @@ TEST(what_converges_is_an_equilibrium)
 }
 
 /* Reactions of a first step that is much too long, times the curvature of gaps, made tangents that no stiffness along
- * rows mends: these took 66 to 144 contact problems, in three to seven parts. */
+ * rows mends: these took 66 to 460 contact problems, most of them in three parts and more, or had no answer. */
 TEST(reactions_of_a_large_step_do_not_cut_the_load_in_parts)
 {
-    static const int SEED[] = {68, 71, 161, 207, 208, 225, 239};
+    static const int SEED[] = {37, 68, 101, 138, 161, 207, 208, 225, 239};
     for (size_t i = 0; i < sizeof SEED / sizeof *SEED; i++) {
         qp_random rng = {(uint64_t)SEED[i]};
         uz_scene s = random_pair(&rng, (SEED[i] - 1) % 4 == 3);
@@ -318,6 +318,39 @@ TEST(reactions_of_a_large_step_do_not_cut_the_load_in_parts)
         check_converged(r, 1, 45);
         CHECK_MSG(r->summary.finite.failed == 0, "seed %d: %lld parts failed", SEED[i],
                   (long long)r->summary.finite.failed);
+        give_back(r, &s);
+    }
+}
+
+/* A strip, or a plate, much thinner than the block below it that its upper side is led through, straight down, or on to
+ * a place beyond its end: nothing is left in its way there, and no side would tell. */
+static uz_scene led_through(qp_random *rng, bool solid, bool beyond)
+{
+    static const char *const PLANE[] = {"quad4", "quad8", "tri3", "tri6"}, *const SPACE[] = {"hex8", "tet4"};
+    const double thin = 0.02 + 0.08 * random_unit(rng), wide = 0.3 + 0.5 * random_unit(rng),
+                 high = 0.2 + 0.3 * random_unit(rng), at = (2 - wide) * random_unit(rng);
+    const double to = beyond ? 3.1 + random_unit(rng) : (3 - wide) * random_unit(rng), way = 4 + random_unit(rng);
+    const char *element[2];
+    for (int i = 0; i < 2; i++)
+        element[i] = solid ? SPACE[(int)(2 * random_unit(rng))] : PLANE[(int)(4 * random_unit(rng))];
+    const box_part a = {{0, 0, 0}, {3, high, 1}, {3 + (int64_t)(4 * random_unit(rng)), 2, 2}, element[0]},
+                   b = {{at, high + 0.05 * random_unit(rng), 0.2}, {wide, thin, 0.6}, {2, 1, 1}, element[1]};
+    uz_scene s = two(solid ? UZ_SOLID : UZ_PLANE_STRAIN, UZ_ELASTIC_NEO_HOOKE, &a, &b, NULL);
+    body_hold(&s, "abottom", 0, 0, solid ? 0 : NAN);
+    body_hold(&s, "btop", to - at, -way, solid ? 0 : NAN);
+    const bool turned = random_unit(rng) < 0.5;
+    touch(&s, turned ? "atop" : "bbottom", turned ? "bbottom" : "atop");
+    return s;
+}
+
+TEST(no_thin_body_goes_through_another)
+{
+    enum { SCENES = 20 };
+    for (int k = 0; k < SCENES; k += step_of_cases()) {
+        qp_random rng = {(uint64_t)k + 1};
+        uz_scene s = led_through(&rng, k % 4 == 3, k % 2);
+        uz_result *r = solve_to(&s, 1e-6);
+        CHECK_MSG(r->summary.outcome != UZ_CONVERGED, "scene %d", k);
         give_back(r, &s);
     }
 }
