@@ -2,15 +2,18 @@
 usage: test_generated_large.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
 import pathlib
+import random
 import sys
 
 import numpy
 
-from service import check
+from service import check, some
+from two_bodies import body
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
 import generated_large  # noqa: after its place is known
 import service  # noqa
+from generated_contacts import exchanged, renumbered  # noqa
 
 CHECKER = pathlib.Path(sys.argv[1]) / "large-checker"
 
@@ -46,6 +49,53 @@ def test_an_answer_that_is_off_is_seen(s):
     found["displacements"][lowest][1] += 1e-6
     scene.pull = None
     check(any("left over" in one for one in scene.wrong(found, 1, CHECKER)), "the traction is not missed")
+
+
+def pair(number):
+    """A block on another one, which its upper side presses on it and moves along it."""
+    rng = random.Random(f"pair {number}")
+    solid = number % 5 == 4
+    kinds = [rng.choice(("hex8", "tet4") if solid else ("quad4", "quad8", "tri3", "tri6")) for _ in range(2)]
+    long, wide = rng.uniform(1.5, 3), rng.uniform(0.6, 1.2)
+    left, above = rng.uniform(0, long - wide), 1 + rng.uniform(0, 0.05)
+    cells = [[rng.randint(3, 6), 2], [rng.randint(2, 4), 2]]
+    if solid:
+        cells = [[*one, n] for one, n in zip(cells, (2, rng.randint(1, 2)))]
+    places = [lambda x, y, *z: (long * x, y, *z), lambda x, y, *z: (left + wide * x, above + 0.8 * y, *(0.1 + 0.8 * t for t in z))]
+    low, high = ("y0", "y1") if solid else ("bottom", "top")
+    groups = {"foot": [(0, low)], "floor": [(0, high)], "sole": [(1, low)], "head": [(1, high)]}
+    across = {"uz": 0} if solid else {}
+    on = rng.choice((("sole", "floor"), ("floor", "sole")))
+    model = "solid" if solid else rng.choice(("plane_strain", "plane_stress"))
+    return body(kinds, cells, places, groups, model=model, kinematics="finite",
+                materials=[{"on": "all", "young": 1, "poisson": rng.uniform(0, 0.4), "law": rng.choice(generated_large.LAWS)}],
+                supports=[{"on": "foot", "ux": 0, "uy": 0, **across},
+                          {"on": "head", "ux": rng.uniform(-0.6, 0.6), "uy": -rng.uniform(0.1, 0.3), **across}],
+                contacts=[{"on": on[0], "with": on[1]}])
+
+
+def test_images_and_numbers_change_rounding_only(s):
+    """Of bodies on obstacles and of pairs: mirrored along x, their nodes, elements and sides in another order, and the other surface
+    named first. Whether it has converged, and where it is."""
+    said, converged = [], 0
+    scenes = [one for one in map(generated_large.Scene, range(60)) if one.model != "axisymmetric" and not one.steps][:25]
+    requests = [(f"body {one.number}", one.request()) for one in scenes] + [(f"pair {k}", pair(k)) for k in range(25)]
+    for name, request in some(requests):
+        base = generated_large.answers(s, request)[0][0]
+        images = {"mirrored": (generated_large.mirrored(request), None), "renumbered": renumbered(request, random.Random(name))}
+        if "with" in request["problem"]["contacts"][0]:
+            images["exchanged"] = (exchanged(request), None)
+        converged += base["summary"]["outcome"] == "converged"
+        for how, (image, number) in images.items():
+            other = generated_large.answers(s, image)[0][0]
+            u = numpy.array(other["displacements"])
+            u = u[number] if number else u
+            u[:, 0] *= -1 if how == "mirrored" else 1
+            apart = numpy.abs(u - base["displacements"]).max() / max(numpy.abs(u).max(), 1e-300)
+            if other["summary"]["outcome"] != base["summary"]["outcome"] or (base["summary"]["outcome"] == "converged" and not apart < 1e-8):
+                said.append(f"{name} {how}: {base['summary']['outcome']}, {other['summary']['outcome']}, apart {apart:.2g}")
+    check(not said, "; ".join(said))
+    check(converged > 0.8 * len(some(requests)), converged)
 
 
 if __name__ == "__main__":

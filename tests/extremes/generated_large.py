@@ -18,7 +18,7 @@ import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "api"))
 import service  # noqa: after its place is known
-from two_bodies import plate  # noqa
+from two_bodies import EDGES, plate  # noqa
 
 LAWS = ("neo_hooke", "neo_hooke_isochoric", "st_venant_kirchhoff")
 LEFT_OVER, DEEP, OFF, MIRRORED = 1e-6, 1e-8, 1e-9, 1e-8  # of the largest nodal force; of the body's extent
@@ -133,32 +133,40 @@ def texts(value):
     return [float(value).hex() if isinstance(value, float) else str(value)]
 
 
-def mirrored(request, axis_in_cells):
-    """Along x, with cells in an order that is not inside out."""
+CORNERS = {"tri": [0, 2, 1], "quad": [0, 3, 2, 1], "hex": [1, 0, 3, 2, 5, 4, 7, 6], "tet": [0, 2, 1, 3]}
+MIDDLES = {"tri6": [(0, 1), (1, 2), (2, 0)], "quad8": [(0, 1), (1, 2), (2, 3), (3, 0)], "hex20": EDGES["hex"], "tet10": EDGES["tet"]}
+
+
+def order(kind):
+    """Of the nodes of a cell that has been mirrored, so that it is not inside out: corners, then what lies between them."""
+    corners, edges = CORNERS[kind.rstrip("0123456789")], [set(edge) for edge in MIDDLES.get(kind, [])]
+    return corners + [len(corners) + edges.index({corners[a], corners[b]}) for a, b in MIDDLES.get(kind, [])]
+
+
+def mirrored(request):
+    """Along x."""
     image = json.loads(json.dumps(request))
     problem = image["problem"]
     mesh = problem["mesh"]
     mesh["nodes"] = [[-x, *rest] for x, *rest in mesh["nodes"]]
-    for cells in mesh["elements"].values():
+    for kind, cells in mesh["elements"].items():
         for cell in cells:
-            cell[:] = [cell[k] for k in axis_in_cells]
+            cell[:] = [cell[k] for k in order(kind)]
     for group in mesh["groups"].values():
-        group.update({kind: [side[::-1] for side in sides] for kind, sides in group.items()})
+        group.update({kind: [side[::-1] for side in sides] for kind, sides in group.items() if kind != "nodes"})
     for support in problem["supports"]:
         if "ux" in support:
             support["ux"] = -support["ux"]
         if "rigid" in support:
             support["rigid"]["point"][0] *= -1
-    for load in problem["loads"]:
+    for load in problem.get("loads", []):
         if "traction" in load:
             load["traction"][0] *= -1
-    for shape in problem["contacts"][0]["obstacle"].values():
-        if "center" in shape:
-            shape["center"][0] *= -1
+    for contact in problem["contacts"]:
+        for shape in contact.get("obstacle", {}).values():
+            if "center" in shape:
+                shape["center"][0] *= -1
     return image
-
-
-ORDERS = {"tri3": [0, 2, 1], "quad4": [0, 3, 2, 1], "quad8": [0, 3, 2, 1, 7, 6, 5, 4], "hex8": [1, 0, 3, 2, 5, 4, 7, 6]}
 
 
 def answers(s, request):
@@ -184,7 +192,7 @@ def look(s, number, outcomes, checker):
         outcomes[outcome] = outcomes.get(outcome, 0) + 1
         said += scene.wrong(case, part, checker) if outcome == "converged" else []
     if number % 8 == 0 and scene.model != "axisymmetric":
-        images, _ = answers(s, mirrored(request, ORDERS[scene.element]))
+        images, _ = answers(s, mirrored(request))
         for case, image in zip(cases, images):
             flip = numpy.array(image["displacements"])
             flip[:, 0] *= -1
