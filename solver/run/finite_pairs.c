@@ -75,7 +75,7 @@ static double *difference(const uz_finite_run *run, int i, bool of_came)
  * unit vectors. */
 static void nearest_combination(double weight[MIXED], const uz_finite_run *run, int k, const double *change)
 {
-    double A[MIXED][MIXED + 1], size[MIXED];
+    double A[MIXED][MIXED + 1] = {{0}}, size[MIXED] = {0};
     for (int i = 0; i < k; i++)
         size[i] = uz_norm(run->d, difference(run, i, false));
     for (int i = 0; i < k; i++) {
