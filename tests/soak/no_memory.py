@@ -55,7 +55,7 @@ def environment(build, s):
 
 def _ask(s, method, path, body=None, headers=None):
     """(status, JSON or None); (0, None) where the connection broke: a daemon without memory may drop it."""
-    connection = http.client.HTTPConnection(s.host, s.port, timeout=5)
+    connection = http.client.HTTPConnection(s.host, s.port, timeout=20)
     try:
         connection.request(method, path, body, headers or {})
         reply = connection.getresponse()
@@ -77,7 +77,7 @@ def _way(s, text):
     return job["id"]
 
 
-def _ended(s, job, seconds=20):
+def _ended(s, job, seconds=60):
     """The status that an acknowledged job ends with, None if it does not end."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
