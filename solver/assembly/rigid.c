@@ -368,8 +368,7 @@ bool uz_is_unstrained(const uz_body_model *model, const int64_t *node, int count
 void uz_add_carried(uz_body_model *model, const double *ke, const int64_t *node, int count)
 {
     const int dim = model->mesh.dim, n = count * dim;
-    const bool strained = count == 1 || !uz_is_unstrained(model, node, count);
-    for (int a = 0; a < count && strained; a++)
+    for (int a = 0; a < count; a++)
         for (int b = 0; b < count; b++) {
             const int64_t *p, *q;
             const double *P, *Q;

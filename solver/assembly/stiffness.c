@@ -284,9 +284,9 @@ static void add_element(adder *s, const double *ke, int64_t e)
 {
     int count;
     const int64_t *node = uz_mesh_element(&s->model->mesh, e, &count);
-    if (s->model->follow.first)
+    if (s->model->follow.first && !uz_is_unstrained(s->model, node, count))
         uz_add_stiffness(s->model, ke, node, count);
-    else
+    else if (!s->model->follow.first)
         add_to_columns(s->model, &s->of, ke, node, count);
 }
 
