@@ -399,8 +399,10 @@ static void prescribed_at(double u[3], const uz_body_model *model, const uz_cont
             u[c] += share[k - 1] * at[c];
     }
     const bool steps = model->turned && uz_is_rigid(model, node); /* what is given is a step from there */
-    for (int c = 0; c < dim && row->place && !steps; c++)
-        u[c] -= row->place[node * dim + c];
+    for (int c = 0; c < dim; c++)
+        u[c] += steps && !row->place   ? model->place[node * dim + c]
+                : row->place && !steps ? -row->place[node * dim + c]
+                                       : 0;
 }
 
 /* The gap of a row with the prescribed displacements and zero for the free ones. The sum is also given in absolute

@@ -427,6 +427,30 @@ static uz_status look_at_side(uz_finite_certificate *out, const uz_finite_answer
     return status;
 }
 
+/* Nodes that have rows, from the obstacles themselves: what g says of them is checked by what it should be. A middle's
+ * row has a share of its ends' (uz_blend_rows), edges of lines and tables are rounded for rows. */
+static uz_status look_at_rows(uz_finite_certificate *out, const uz_finite_answer *of, uz_obstacle *const *obstacle,
+                              uz_error *err)
+{
+    const uz_body_model *model = of->model;
+    const int dim = model->mesh.dim;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < model->m && status == UZ_OK; i++) {
+        const uz_obstacle *own = obstacle[model->info.contact_of[i]];
+        const int64_t node = model->info.contact_node[i];
+        double x[3] = {0};
+        uz_gap at = {.gap = of->g[i]};
+        for (int c = 0; c < dim; c++)
+            x[c] = model->mesh.xyz[dim * node + c] + of->u[dim * node + c];
+        if (own && !uz_row_inner(model, i) && !(model->row_ends && model->row_ends[2 * i] >= 0) &&
+            !uz_obstacle_has_edges(own))
+            status = uz_obstacle_gap(&at, own, x, err);
+        out->least_at_rows = fmin(out->least_at_rows, of->g[i]);
+        out->least_at_nodes = fmin(out->least_at_nodes, at.gap);
+    }
+    return status;
+}
+
 /* Reactions, gaps at rows and between them, and what curvature adds to the tangent. */
 static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double most, uz_error *err)
 {
@@ -451,13 +475,13 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double mo
     }
     if (status == UZ_OK)
         status = add_curvature(w, obstacle, most, err);
+    if (status == UZ_OK)
+        status = look_at_rows(out, of, obstacle, err);
     for (int64_t k = 0; k < n && obstacle; k++)
         uz_obstacle_free(obstacle[k]);
     free(obstacle);
-    for (int64_t i = 0; i < of->model->m; i++) {
-        out->least_at_rows = fmin(out->least_at_rows, of->g[i]);
+    for (int64_t i = 0; i < of->model->m; i++)
         out->worst_reaction = fmax(out->worst_reaction, most > 0 ? of->r[i] / most : of->r[i]);
-    }
     return status;
 }
 
@@ -597,7 +621,8 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
                                    .residual = INFINITY,
                                    .least_gap = INFINITY,
                                    .least_part = INFINITY,
-                                   .least_at_rows = INFINITY};
+                                   .least_at_rows = INFINITY,
+                                   .least_at_nodes = INFINITY};
     uz_status status =
         begin(&w) ? UZ_OK
                   : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the tangent of %lld dofs", (long long)model->d);

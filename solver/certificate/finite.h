@@ -39,6 +39,7 @@ typedef struct {
     double least_gap;      /* of the obstacles from points on the deformed sides, a length: SAMPLES a side, and nodes */
     double least_part;     /* the same over the length of the side there, of those between nodes */
     double least_at_rows;  /* of g */
+    double least_at_nodes; /* of the obstacles, which have no overlap left, from the nodes that have rows */
     bool swallows;         /* an obstacle is inside of the body (swallowed.h) */
 } uz_finite_certificate;
 

@@ -647,7 +647,7 @@ static uz_status ask_certificate(bool *done, uz_part *out, uz_finite_run *run, u
     else if (!c->definite)
         *out = UZ_PART_INDEFINITE;
     else if (!(c->residual <= fmax(run->requested, c->rounding)) || c->worst_support > length ||
-             c->least_at_rows < -length || c->worst_reaction > 0)
+             c->least_at_rows < -length || (run->load >= 1 && c->least_at_nodes < -length) || c->worst_reaction > 0)
         *done = false;
     else
         *out = UZ_PART_SETTLED;
