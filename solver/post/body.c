@@ -35,7 +35,7 @@ void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const
     out->body = body;
     out->u = u;
     out->volume = 0;
-    out->group.begun = false;
+    out->group.begun = out->group.shaped = false;
     out->group.count = 0;
 }
 
