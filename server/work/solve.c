@@ -35,10 +35,12 @@ static uz_status verify(solution *s, const solve_with *with, uz_error *err)
     return status;
 }
 
-/* Does one price stand for all that it took? It is that of one setup and one load. */
+/* Does one price stand for all that it took? It is that of one setup and one load: of a setup all that was cached is
+ * left out, of parts of one nothing. */
 static bool is_priced(const uz_summary *s)
 {
-    return s->outcome == UZ_CONVERGED && s->rounds == 1 && !s->grids && s->semicoercive.rounds == 0 &&
+    const bool whole = s->reused.op || (!s->reused.factor && !s->reused.ordering);
+    return whole && s->outcome == UZ_CONVERGED && s->rounds == 1 && !s->grids && s->semicoercive.rounds == 0 &&
            s->geometry.kind == UZ_KINEMATICS_FIXED;
 }
 
