@@ -86,11 +86,11 @@ const uz_cost_rates *uz_cost_machine(void)
 #define SAMPLE_ENTRIES 2000000
 
 /* Seconds for an entry of K where it is large, else 0. What K is multiplied with does not matter, as long as there is
- * as much of it: its own entries. */
+ * as much of it: its own entries, where there are as many as rows: a diagonal may have gaps. */
 static double rate_of(const uz_csc *K)
 {
     const int64_t entries = K->ptr[K->cols];
-    if (entries < LARGE_ENTRIES)
+    if (entries < LARGE_ENTRIES || entries < K->rows)
         return 0.0;
     const int64_t n = entries < SAMPLE_ENTRIES ? entries : SAMPLE_ENTRIES;
     const double once = time_entries(K->val, K->idx, n, K->val);
