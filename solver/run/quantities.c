@@ -46,6 +46,8 @@
 /* ... and of the value times the square of the mesh's error: of a force that balance alone makes all but known, the
  * rest is of second order. */
 #define OF_SECOND 1e-2
+/* Of the square of what the equations leave, in the energy of that. */
+#define OF_ITSELF 1.5
 
 /* Solves that are not exact go on to this part of the adjoint's norm. */
 #define SOLVED 1e-6
@@ -429,6 +431,8 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     const uz_certificate *left = &x->answer->summary.certificate;
     out->equations = x->work->place ? sqrt(2 * fmax(0, norm)) * x->work->place->left
                                     : sqrt(2 * fmax(0, norm)) * left->absolute_error + length * left->residual.e1;
+    if (x->work->place && out->kind == UZ_QUANTITY_STRAIN_ENERGY) /* what is left works along itself, too */
+        out->equations += OF_ITSELF * x->work->place->left * x->work->place->left;
     const double half = out->mesh + out->equations;
     if (!isfinite(half) || !isfinite(shift)) {
         snprintf(out->why, sizeof out->why, "nothing bounds what the equations leave of it");
