@@ -15,6 +15,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define PI 3.14159265358979323846
+
 static void multiply(double out[9], const double A[9], const double B[9])
 {
     double product[9] = {0};
@@ -192,7 +194,7 @@ void uz_rigid_ways(double *given, const uz_body_model *model, const double *pres
             multiply(turn, turn, back);
             uz_rotation_vector(way, turn);
         } else if (whole) {
-            way[2] = to[2] - atan2(R[3], R[0]);
+            way[2] = remainder(to[2] - atan2(R[3], R[0]), 2 * PI); /* R knows no whole turns */
         }
         for (int c = 0; c < turns; c++) /* others turn about an axis that is free, and stay */
             if (dof[c] < 0)

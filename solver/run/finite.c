@@ -14,11 +14,14 @@
 #include "run/problem.h"
 #include "run/settings.h"
 #include "run/solve.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#define DEGREE (180 / 3.14159265358979323846)
 
 /* Parts are doubled after at most FEW contact problems. The smallest one, of the whole load while none of it is borne.
  */
@@ -47,6 +50,11 @@ uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings 
                        "cells are chosen by the error of small deformation; give their numbers where kinematics are "
                        "finite");
     const bool refines = problem->scene.refine;
+    for (int64_t i = 0; i < problem->scene.n_supports && refines; i++)
+        if (problem->scene.supports[i].kind == UZ_SUPPORT_RIGID)
+            return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
+                           "nodes that hang beside a rigid group do not follow it where kinematics are finite: give a "
+                           "mesh, or hold the side by its displacements");
     if (refines && !uz_is_finite(problem)) /* before what it asks of the accuracy */
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
                        "a mesh is refined by the error of one model, and auto may take either: ask for the kinematics "
@@ -260,6 +268,25 @@ static uz_status begin_load(uz_finite_run *run, uz_error *err)
     return status;
 }
 
+/* From one point of a path to the next a group goes the shorter way round. */
+static uz_status check_turns(const uz_finite_run *run, uz_error *err)
+{
+    const double part = run->part - (run->from ? run->from->part : 0);
+    for (int64_t i = 0; i < run->scene.n_supports; i++) {
+        const uz_support *support = &run->scene.supports[i];
+        double angle = 0;
+        for (int k = 0; k < 3 && support->kind == UZ_SUPPORT_RIGID; k++)
+            angle = isnan(support->turn[k]) ? angle : hypot(angle, part * support->turn[k]);
+        if (angle > UZ_MOST_TURN)
+            return uz_fail(
+                err, UZ_ERR_SCENE, "/cases",
+                "\"%.63s\" is turned by %g degrees from one point of the path to the next, and a rotation by "
+                "more than half a turn is another one: put points between",
+                support->on, angle * DEGREE);
+    }
+    return UZ_OK;
+}
+
 static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
                        double deadline, const uz_finite_path *path, uz_error *err)
 {
@@ -281,6 +308,8 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_SUPPORTED, err);
     if (status == UZ_OK)
         status = check_body(&run->base, &run->scene, err);
+    if (status == UZ_OK)
+        status = check_turns(run, err);
     if (status == UZ_OK)
         status = begin_load(run, err);
     if (status == UZ_OK)

@@ -11,8 +11,6 @@
 #include <string.h>
 
 #define DEGREE (180 / 3.14159265358979323846)
-/* Radians: a little less than half a turn. */
-#define MOST_TURN 3.1
 
 bool uz_unit_normal(double out[3], const double normal[3], int dim)
 {
@@ -104,13 +102,13 @@ static uz_status check_rigid(const uz_scene *scene, int64_t i, uz_error *err)
             return uz_fail(err, UZ_ERR_SCENE, where, "in the plane a rigid group has ux, uy and rz");
         angle = k >= 3 ? hypot(angle, value) : angle;
         const bool finite = uz_may_be_finite(scene);
-        if (angle > (finite ? MOST_TURN : UZ_MOST_LINEAR_TURN))
+        if (angle > (finite ? UZ_MOST_TURN : UZ_MOST_LINEAR_TURN))
             return uz_fail(err, UZ_ERR_SCENE, where,
                            finite ? "a rigid group is turned by %g degrees, and a rotation by more than half a turn is "
                                     "another one: at most %.4g degrees"
                                   : "a rotation by %g degrees is not small: at most %.3g degrees, or a law of finite "
                                     "strain with the kinematics \"finite\"",
-                           angle * DEGREE, (finite ? MOST_TURN : UZ_MOST_LINEAR_TURN) * DEGREE);
+                           angle * DEGREE, (finite ? UZ_MOST_TURN : UZ_MOST_LINEAR_TURN) * DEGREE);
     }
     return UZ_OK;
 }

@@ -23,6 +23,9 @@ bool uz_has_finite_model(const uz_scene *scene);
 /* Of solids: the certificate's factor is one within an envelope. */
 #define UZ_MOST_FINITE_DOFS 20000
 
+/* Radians: a rotation by more than half a turn, and some room for rounding, is another one. */
+#define UZ_MOST_TURN 3.1
+
 /* Does it turn its group? */
 bool uz_support_turns(const uz_support *support);
 

@@ -362,12 +362,68 @@ def test_rigid_groups_along_paths_and_in_quantities(s):
         check(one["low"] < other["value"] < one["high"] and one["high"] - one["low"] < 0.2 * abs(one["value"]), one, other)
 
 
+def test_planes_stop_rigid_groups(s):
+    """A strip whose right side is rigid, pushed against a plane, which says what a polyline of one line says: nothing goes through, in
+    the plane and in space."""
+    def pushed(obstacle, dim=2, **more):
+        up = [0, 2e-4, 0][:dim]
+        mesh = {"size": [8, 0.5, 0.5][:dim], "cells": [16, 2, 1][:dim]}
+        held = {key: 0 for key in ("ux", "uy", "uz")[:dim]}
+        return scene(mesh={"box": {**mesh, "element": "quad8" if dim == 2 else "hex8"}}, contacts=[{"on": "top", "obstacle": obstacle}],
+                     supports=[{"on": "left", **held}, {"on": "right", "rigid": {"point": [8, 0.25, 0.25][:dim]}}], loads=[{"on": "bottom", "traction": up}], **more)
+    found = [answer(s, pushed(shape)) for shape in ({"plane": {"point": [0, 0.6], "normal": [0, -1]}}, {"polyline": {"points": [[20, 0.6], [-20, 0.6]]}})]
+    for one in found:
+        highest = max(x[1] + u[1] for x, u in zip(one["nodes"], one["displacements"]))
+        check(abs(highest - 0.6) < 1e-9 and one["summary"]["contact"]["force"][1] < -1e-5, highest, one["summary"]["contact"])
+    energy = [one["summary"]["energy"]["strain"] for one in found]
+    check(abs(energy[0] / energy[1] - 1) < 1e-7, energy)
+    solid = answer(s, pushed({"plane": {"point": [0, 0.6, 0], "normal": [0, -1, 0]}}, 3, model="solid"))
+    check(abs(max(x[1] + u[1] for x, u in zip(solid["nodes"], solid["displacements"])) - 0.6) < 1e-9, "within the plane")
+
+
+def test_pressure_on_a_rigid_group_turns_with_it(s):
+    """It bends a beam far beyond the load at which dead pressure's tangent finds nothing stable any more, as it does a tip that is a hundred
+    times stiffer."""
+    thick = 0.5
+    request, at, _ = beam(10.0, 3.0, thick, 20, 0.3, supports=[{"on": "clamp", "ux": 0, "uy": 0}, {"on": "tip", "rigid": {"point": [10, 0]}}],
+                          loads=[{"on": "low", "pressure": 1.5 * thick ** 3 / 12 / 100}])
+    problem = request["problem"]
+    problem["mesh"]["groups"].update({"low": {"edges": [[at[40, 0], at[42, 0]]]}, "block": {"elements": [20]}, "soft": {"elements": list(range(20))}})
+    rigid = answer(s, request)["displacements"][at[42, 1]]
+    problem["materials"] = [{**problem["materials"][0], "on": "soft"}, {**problem["materials"][0], "on": "block", "young": 100}]
+    del problem["supports"][1]
+    stiff = answer(s, request)["displacements"][at[42, 1]]
+    check(math.dist(rigid, stiff) < 2e-3 and rigid[0] < -12, rigid, stiff)
+
+
+def test_paths_turn_groups_past_half_a_turn(s):
+    """In steps of less than half a turn; more between two points is refused."""
+    def turned(*steps, dim=2):
+        still = {"rx": 0, "ry": 0} if dim == 3 else {}
+        box = {"size": [10, 0.2, 0.2][:dim], "cells": [20, 1, 1][:dim], "element": "quad8" if dim == 2 else "hex20"}
+        request = scene(mesh={"box": box}, supports=[{"on": "left", **{key: 0 for key in ("ux", "uy", "uz")[:dim]}},
+                                                    {"on": "right", "rigid": {"point": [10, 0.1, 0.1][:dim], **still, "rz": 170}}], **({"model": "solid"} if dim == 3 else {}))
+        return {**request, "cases": [{"name": "way", "steps": list(steps)}]}
+    job = s.post(turned(0.5, 1, 1.5)).json["id"]
+    check(s.wait_status(job, "successful", "failed")["status"] == "successful", job)
+    last = s.get(f"/v1/jobs/{job}/result?fields=summary&case=way").json["summary"]
+    bent = YOUNG / (1 - POISSON ** 2) * 0.2 ** 3 / 12 * math.radians(255) ** 2 / 2 / 10
+    check(last["outcome"] == "converged" and abs(last["energy"]["strain"] / bent - 1) < 0.02, last["outcome"], last["energy"], bent)
+    for dim in (2, 3):
+        reply = s.post(turned(1, -1, dim=dim))
+        expect(reply, 202)
+        error = s.wait_status(reply.json["id"], "failed", "successful").get("error", {})
+        check("put points between" in error.get("detail", ""), error)
+
+
 def test_what_rigid_groups_cannot_be(s):
     cube = {"box": {"size": [1, 1, 1], "cells": [1, 1, 1]}}
     held = {"on": "left", "ux": 0, "uy": 0, "uz": 0}
     for motion, pointer, word in (({"rx": 30}, "/supports/1/rigid", "or two at 0"), ({"rx": 30, "ry": 0}, "/supports/1/rigid", "or two at 0"),
                                   ({"rx": 120, "ry": 120, "rz": 120}, "/supports/1/rigid/rz", "half a turn")):
         refused(s, scene(model="solid", mesh=cube, supports=[held, {"on": "right", "rigid": {"point": [1, 0, 0], **motion}}]), pointer, word)
+    refused(s, {**scene(mesh={"box": {"size": [2, 1], "cells": [2, 1]}, "refine": "auto"}, supports=[{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "rigid": {"point": [2, 0.5], "rz": 5}}]),
+                "solver": {"accuracy": {"total": 0.3}}}, "/mesh/refine", "do not follow it")
 
 
 if __name__ == "__main__":

@@ -458,7 +458,8 @@ def renumbered(request, rng):
         return lists
     kind = "faces" if len(nodes[0]) == 3 else "edges"
     scene["mesh"] = {"nodes": moved, "elements": {k: again(v) for k, v in scene["mesh"]["elements"].items()},
-                     "groups": {name: {kind: again(g[kind])} for name, g in scene["mesh"]["groups"].items()}}
+                     "groups": {name: {"nodes": [number[k] for k in g["nodes"]]} if "nodes" in g else {kind: again(g[kind])}
+                                for name, g in scene["mesh"]["groups"].items()}}
     return {"problem": scene}, number
 
 
