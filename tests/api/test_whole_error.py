@@ -132,6 +132,17 @@ def test_an_element_alone_with_its_material_hides_nothing(s):
     check(summary["error"]["mesh"] > 0.5 and [w["code"] for w in summary["warnings"]] == ["coarse_mesh"], summary)
 
 
+def test_a_strip_one_element_thick_hides_nothing(s):
+    """Of incompatible modes no stress jumps between its elements: it converged with an error of 2.5e-15, where it was off by as much as
+    its stress, which free sides do not bear."""
+    box = {"size": [6, 1], "cells": [6, 1], "element": "quad4"}
+    summary = solved(s, {"problem": {
+        "kind": "scene", "model": "plane_stress", "formulation": "incompatible_modes", "kinematics": "fixed", "mesh": {"box": box},
+        "materials": [{"on": "all", "young": 1000, "poisson": 0, "expansion": 1e-3}], "supports": [{"on": "left", "ux": 0, "uy": 0}],
+        "loads": [{"on": "all", "temperature": 1}]}})["summary"]
+    check(0.5 < summary["error"]["mesh"] < 0.75 and [w["code"] for w in summary["warnings"]] == ["coarse_mesh"], summary)
+
+
 def test_a_body_that_is_only_carried_loses_nothing(s):
     """Nor where a load acts on what supports hold, and deforms nothing: that ended as precision_limit."""
     for solid in (False, True):
