@@ -14,6 +14,8 @@
 #define LATE    0.05
 #define LEAST_S 50e-6 /* as short as a sleep can be, about */
 #define MOST_S  1e-4  /* large messages go on only while they are asked for */
+#define LONG_S  0.5   /* what has not come by then is not one of these */
+#define IDLE_S  2e-3
 
 void wait_for(int count, MPI_Request *requests)
 {
@@ -23,7 +25,8 @@ void wait_for(int count, MPI_Request *requests)
         MPI_Testall(count, requests, &there, MPI_STATUSES_IGNORE);
         if (there)
             return;
-        const double waited = MPI_Wtime() - since, nap = fmin(MOST_S, fmax(LEAST_S, LATE * waited));
+        const double waited = MPI_Wtime() - since, most = waited < LONG_S ? MOST_S : IDLE_S;
+        const double nap = fmin(most, fmax(LEAST_S, LATE * waited));
         if (waited < SPIN_S)
             sched_yield();
         else
