@@ -5,6 +5,7 @@
 #include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "linalg/pieces.h"
 
 #include <float.h>
@@ -139,12 +140,6 @@ static bool number_slots(uz_aggregates *mg, int32_t *node_of_group, const uz_csc
     return ok;
 }
 
-static int compare_columns(const void *a, const void *b)
-{
-    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* A->ptr and idx. */
 static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
 {
@@ -182,7 +177,7 @@ static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
         for (int64_t e = from + 1; e < to; e++)
             ascends = ascends && A->idx[e] > A->idx[e - 1];
         if (!ascends)
-            qsort(A->idx + from, (size_t)(to - from), sizeof *A->idx, compare_columns);
+            qsort(A->idx + from, (size_t)(to - from), sizeof *A->idx, uz_ascending_32);
         A->ptr[i] = count;
         for (int64_t e = from; e < to; e++)
             if (e == from || A->idx[e] != A->idx[e - 1])

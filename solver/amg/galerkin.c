@@ -5,6 +5,7 @@
 #include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
+#include "core/order.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -19,16 +20,10 @@ typedef struct {
     int32_t *column; /* ptr[nodes] */
 } columns;
 
-static int compare(const void *a, const void *b)
-{
-    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-    return (x > y) - (x < y);
-}
-
 static void sort(int32_t *list, int64_t count)
 {
     if (count > 32) {
-        qsort(list, (size_t)count, sizeof *list, compare);
+        qsort(list, (size_t)count, sizeof *list, uz_ascending_32);
         return;
     }
     for (int64_t s = 1; s < count; s++) {

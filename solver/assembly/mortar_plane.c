@@ -12,6 +12,7 @@
 #include "assembly/mortar.h"
 
 #include "core/alloc.h"
+#include "core/order.h"
 #include "core/vector3.h"
 
 #include <math.h>
@@ -331,12 +332,6 @@ static bool add_segment(uz_mortar_pair *pair, int64_t i, int64_t k, double a, do
     return room;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Segments between the master's nodes, projected along the slave's field of normals. */
 static bool points(uz_mortar_pair *pair, int64_t i)
 {
@@ -356,7 +351,7 @@ static bool points(uz_mortar_pair *pair, int64_t i)
     if (room) {
         cut[n_cuts++] = -1;
         cut[n_cuts++] = 1;
-        qsort(cut, (size_t)n_cuts, sizeof *cut, ascending);
+        qsort(cut, (size_t)n_cuts, sizeof *cut, uz_ascending_real);
     }
     for (int64_t k = 0; k + 1 < n_cuts && room; k++) {
         double x[2], n[2];

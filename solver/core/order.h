@@ -11,6 +11,18 @@ static inline int uz_ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+static inline int uz_ascending_32(const void *a, const void *b)
+{
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static inline int uz_ascending_real(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
 /* Sorts a list and leaves each number once; returns how many there are then. */
 static inline int64_t uz_sort_unique(int64_t *value, int64_t count)
 {

@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "linalg/linalg.h"
 
 #include <stdlib.h>
@@ -20,12 +21,6 @@ struct uz_projected {
     double *e;            /* d */
     size_t bytes;
 };
-
-static int compare(const void *a, const void *b)
-{
-    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
-    return (x > y) - (x < y);
-}
 
 /* Column k of the lower triangle of G is added to sum (n); its rows, ascending, to `met`. place (m): of each row of N
  * among the active ones, -1: it is none; seen (n): k where a row was met. */
@@ -48,7 +43,7 @@ static int64_t add_column(double *sum, int64_t *met, int64_t *seen, const uz_pro
             sum[l] += Nt->val[q] * uz_sparse_weight(x->K, j) * N->val[s];
         }
     }
-    qsort(met, (size_t)count, sizeof *met, compare);
+    qsort(met, (size_t)count, sizeof *met, uz_ascending);
     return count;
 }
 

@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "group/divide.h"
 #include "linalg/linalg.h"
 
@@ -179,12 +180,6 @@ uz_status uz_spread_divide(bool *divided, uz_spread *map, const uz_modes *modes,
     return made ? UZ_OK : fail_memory(err, map->d);
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* Of two nodes of one process the earlier one has the block, since columns of K have what follows them; neighbours by
  * their numbers from now on. */
 static void keep_half(uz_spread *map)
@@ -198,7 +193,7 @@ static void keep_half(uz_spread *map)
                 map->neighbour[kept++] = map->number[other];
         }
         map->offset[i] = first;
-        qsort(map->neighbour + first, (size_t)(kept - first), sizeof *map->neighbour, ascending);
+        qsort(map->neighbour + first, (size_t)(kept - first), sizeof *map->neighbour, uz_ascending_32);
     }
     map->offset[map->nodes] = kept;
 }

@@ -5,6 +5,7 @@
  * than the closest piece and l can be closest. Where these are few their distances are compared, else the part is
  * halved. Between the roots of all differences of squared distances, which are quadratic polynomials, one of them is
  * the least. */
+#include "core/order.h"
 #include "core/vector3.h"
 #include "obstacle/pieces.h"
 #include "obstacle/shape.h"
@@ -222,12 +223,6 @@ static double boundary(const walk *w, const feature *a, const feature *b, double
     return (low + high) / 2;
 }
 
-static int ascending(const void *one, const void *other)
-{
-    const double a = *(const double *)one, b = *(const double *)other;
-    return (a > b) - (a < b);
-}
-
 static uz_status compare(walk *w, double low, double high, uz_error *err)
 {
     feature f[3 * MOST + 1];
@@ -246,7 +241,7 @@ static uz_status compare(walk *w, double low, double high, uz_error *err)
             add_roots(at, &m, w, &f[j], &f[k], low, high);
     }
     at[m++] = high;
-    qsort(at, (size_t)m, sizeof *at, ascending);
+    qsort(at, (size_t)m, sizeof *at, uz_ascending_real);
     for (int k = 1; k < m && status == UZ_OK; k++) {
         const double q = (at[k] + at[k - 1]) / 2;
         if (!(at[k] - at[k - 1] > NOTHING))

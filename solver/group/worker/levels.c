@@ -8,6 +8,7 @@
 #include "worker.h"
 
 #include "core/alloc.h"
+#include "core/order.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -389,12 +390,6 @@ static void add_list(uz_blocks *to, const block_list *list, double factor)
     }
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-    return (x > y) - (x < y);
-}
-
 static void sum_lists(uz_blocks *sum, const block_list *list, int64_t nodes, int k)
 {
     const int64_t size = (int64_t)k * k;
@@ -409,7 +404,7 @@ static void sum_lists(uz_blocks *sum, const block_list *list, int64_t nodes, int
         if (list->at[2 * q] != list->at[2 * q + 1])
             sum->idx[start[list->at[2 * q] + 1]++] = list->at[2 * q + 1];
     for (int64_t a = 0; a < nodes; a++) { /* sorted, each once */
-        qsort(sum->idx + start[a], (size_t)(start[a + 1] - start[a]), sizeof *sum->idx, ascending);
+        qsort(sum->idx + start[a], (size_t)(start[a + 1] - start[a]), sizeof *sum->idx, uz_ascending_32);
         for (int64_t e = start[a]; e < start[a + 1]; e++)
             if (e == start[a] || sum->idx[e] != sum->idx[e - 1])
                 sum->idx[count++] = sum->idx[e];

@@ -1,6 +1,8 @@
 /* neighbours.c: waits for other processes; ghosts, and the exchange of what is known of nodes. */
 #include "worker.h"
 
+#include "core/order.h"
+
 #include <math.h>
 #include <sched.h>
 #include <stdlib.h>
@@ -41,12 +43,6 @@ void combine_all(void *x, int count, MPI_Datatype type, MPI_Op op)
     wait_for(1, &request);
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-    return (x > y) - (x < y);
-}
-
 static void list_ghosts(neighbours *n, int32_t begin, int32_t end, const int64_t *ptr, const int32_t *column)
 {
     int64_t count = 0;
@@ -57,7 +53,7 @@ static void list_ghosts(neighbours *n, int32_t begin, int32_t end, const int64_t
     for (int64_t e = 0; e < ptr[n->here]; e++)
         if (column[e] < begin || column[e] >= end)
             n->number[count++] = column[e];
-    qsort(n->number, (size_t)count, sizeof *n->number, ascending);
+    qsort(n->number, (size_t)count, sizeof *n->number, uz_ascending_32);
     for (int64_t g = 0; g < count; g++)
         if (g == 0 || n->number[g] != n->number[g - 1])
             n->number[n->ghosts++] = n->number[g];
