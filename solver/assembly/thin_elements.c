@@ -11,6 +11,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "scene/corner_table.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -27,28 +28,6 @@ static bool may_be_thin(const uz_body_model *model, const uz_scene *scene)
     for (int c = 0; c < box->dim && !may; c++)
         may = box->automatic || box->cells[c] == 1;
     return may && model->formulation == UZ_FORMULATION_INCOMPATIBLE && model->kind != UZ_AXISYMMETRIC;
-}
-
-static bool has_corners(const uz_mesh *mesh, int64_t element, const int64_t *corner, int count)
-{
-    int of_element, found = 0;
-    const int64_t *node = uz_mesh_element(mesh, element, &of_element);
-    for (int k = 0; k < count; k++)
-        for (int a = 0; a < of_element; a++)
-            found += node[a] == corner[k];
-    return found == count;
-}
-
-/* Is it of one element only? around: as of uz_mesh_list_around. */
-static bool is_outer(const uz_mesh *mesh, uz_face face, const int64_t *first, const int64_t *around)
-{
-    int64_t node[UZ_FACE_NODES];
-    const int corners = uz_element_type_of((uz_element_kind)mesh->kind[face.element])->side[face.side].corners;
-    bool outer = !mesh->inside || !(mesh->inside[face.element] >> face.side & 1);
-    uz_mesh_face(node, mesh, face);
-    for (int64_t i = first[node[0]]; i < first[node[0] + 1] && outer; i++)
-        outer = around[i] == face.element || !has_corners(mesh, around[i], node, corners);
-    return outer;
 }
 
 /* Nodes at which more acts than loads by area: supports, springs, ties, contacts, forces. */
@@ -99,51 +78,51 @@ static void add_loads(double *known, const uz_body_model *model, const uz_scene 
     }
 }
 
-static void find_known(double *known, const uz_body_model *model, const unsigned char *held, const int64_t *first,
-                       const int64_t *around)
+/* 0 at sides of one element only, where not all corners are held, NaN at others. */
+static void find_known(double *known, const uz_body_model *model, const unsigned char *held,
+                       const uz_corner_table *sides)
 {
     const uz_mesh *mesh = &model->mesh;
-    for (int64_t i = 0; i < mesh->n_elements * UZ_ELEMENT_SIDES; i++) {
-        const uz_face face = {i / UZ_ELEMENT_SIDES, (int)(i % UZ_ELEMENT_SIDES)};
-        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[face.element]);
+    for (int64_t i = 0; i < mesh->n_elements * UZ_ELEMENT_SIDES; i++)
+        known[i] = NAN;
+    for (int64_t i = 0; i < sides->count; i++) {
+        const uz_face face = sides->item[i];
+        const int corners = uz_element_type_of((uz_element_kind)mesh->kind[face.element])->side[face.side].corners;
+        const bool inside = mesh->inside && mesh->inside[face.element] >> face.side & 1;
         int64_t node[UZ_FACE_NODES];
         bool all_held = true;
-        known[i] = NAN;
-        if (face.side >= type->sides || uz_element_formulation(model, face.element) != UZ_FORMULATION_INCOMPATIBLE ||
-            !is_outer(mesh, face, first, around))
+        if (sides->same[i] || sides->same[i + 1] || inside ||
+            uz_element_formulation(model, face.element) != UZ_FORMULATION_INCOMPATIBLE)
             continue;
         uz_mesh_face(node, mesh, face);
-        for (int k = 0; k < type->side[face.side].corners; k++)
+        for (int k = 0; k < corners; k++)
             all_held = all_held && held[node[k]];
-        known[i] = all_held ? NAN : 0;
+        known[face.element * UZ_ELEMENT_SIDES + face.side] = all_held ? NAN : 0;
     }
 }
 
 uz_status uz_thin_elements_find(uz_thin_elements *out, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
+    uz_corner_table sides = {.item = NULL};
     out->known = NULL;
     if (!may_be_thin(model, scene))
         return UZ_OK;
-    int64_t *first = uz_alloc(mesh->n_nodes + 1, sizeof *first),
-            *around = uz_alloc(mesh->first[mesh->n_elements], sizeof *around);
     unsigned char *held = uz_alloc_zero(mesh->n_nodes, 1);
-    double *known = uz_alloc(mesh->n_elements * UZ_ELEMENT_SIDES, sizeof *known);
-    const bool room = first && around && held && known;
-    if (room) {
-        uz_mesh_list_around(first, around, mesh);
+    out->known = uz_alloc(mesh->n_elements * UZ_ELEMENT_SIDES, sizeof *out->known);
+    uz_status status = held && out->known ? uz_corner_table_build(&sides, mesh, true, err)
+                                          : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for sides of %lld elements",
+                                                    (long long)mesh->n_elements);
+    if (status == UZ_OK) {
         mark_held(held, model, scene);
-        find_known(known, model, held, first, around);
-        add_loads(known, model, scene);
-        out->known = known;
+        find_known(out->known, model, held, &sides);
+        add_loads(out->known, model, scene);
     } else {
-        free(known);
+        uz_thin_elements_clear(out);
     }
-    free(first);
-    free(around);
+    uz_corner_table_clear(&sides);
     free(held);
-    return room ? UZ_OK
-                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for sides of %lld elements", (long long)mesh->n_elements);
+    return status;
 }
 
 void uz_thin_elements_clear(uz_thin_elements *thin)
