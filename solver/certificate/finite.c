@@ -327,6 +327,18 @@ static int row_nodes(const int64_t **node, const double **share, const uz_body_m
     return inner ? inner->nodes : 1;
 }
 
+/* Where the row stands (3) on the deformed body; *node and *share (the number of them is returned): of which nodes. */
+static int row_place(double x[3], const int64_t **node, const double **share, const uz_finite_answer *of, int64_t row)
+{
+    const uz_mesh *mesh = &of->model->mesh;
+    const int n = row_nodes(node, share, of->model, row);
+    memset(x, 0, 3 * sizeof *x);
+    for (int a = 0; a < n; a++)
+        for (int c = 0; c < mesh->dim; c++)
+            x[c] += (*share)[a] * (mesh->xyz[mesh->dim * (*node)[a] + c] + of->u[mesh->dim * (*node)[a] + c]);
+    return n;
+}
+
 /* `force` times the second derivatives of the gap of a place of the material, whose shares of nodes stay: they are
  * k N_a N_b T, k the curvature along the obstacle, T the sum of t t' over its tangents t that are curved. */
 static void place_curvature(double *ke, double force, const double *n, const uz_gap *at, const double *share, int nodes,
@@ -354,15 +366,12 @@ static uz_status add_curvature(work *w, uz_obstacle *const *obstacle, double mos
     for (int64_t row = 0; row < model->m && status == UZ_OK; row++) {
         const double *share, *normal = model->info.contact_normal + dim * row;
         const int64_t *node;
-        double x[3] = {0}, ke[9 * UZ_FACE_NODES * UZ_FACE_NODES];
+        double x[3], ke[9 * UZ_FACE_NODES * UZ_FACE_NODES];
         uz_gap at;
         if (!(fabs(force[row]) > PRESSED * most) || !obstacle[model->info.contact_of[row]] ||
             model->sites[model->info.contact_of[row]].n == 0)
             continue;
-        const int n = row_nodes(&node, &share, model, row);
-        for (int a = 0; a < n; a++)
-            for (int c = 0; c < dim; c++)
-                x[c] += share[a] * (model->mesh.xyz[dim * node[a] + c] + w->of->u[dim * node[a] + c]);
+        const int n = row_place(x, &node, &share, w->of, row);
         status = uz_obstacle_gap(&at, obstacle[model->info.contact_of[row]], x, err);
         if (status != UZ_OK || uz_obstacle_has_edges(obstacle[model->info.contact_of[row]]))
             continue;
@@ -433,16 +442,14 @@ static uz_status look_at_rows(uz_finite_certificate *out, const uz_finite_answer
                               uz_error *err)
 {
     const uz_body_model *model = of->model;
-    const int dim = model->mesh.dim;
     uz_status status = UZ_OK;
     for (int64_t i = 0; i < model->m && status == UZ_OK; i++) {
         const uz_obstacle *own = obstacle[model->info.contact_of[i]];
-        const int64_t node = model->info.contact_node[i];
-        double x[3] = {0};
+        const double *share;
+        const int64_t *node;
+        double x[3];
         uz_gap at = {.gap = of->g[i]};
-        for (int c = 0; c < dim; c++)
-            x[c] = model->mesh.xyz[dim * node + c] + of->u[dim * node + c];
-        if (own && !uz_row_inner(model, i) && !(model->row_ends && model->row_ends[2 * i] >= 0) &&
+        if (own && row_place(x, &node, &share, of, i) == 1 && !(model->row_ends && model->row_ends[2 * i] >= 0) &&
             !uz_obstacle_has_edges(own))
             status = uz_obstacle_gap(&at, own, x, err);
         out->least_at_rows = fmin(out->least_at_rows, of->g[i]);
