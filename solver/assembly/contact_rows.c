@@ -398,11 +398,10 @@ static void prescribed_at(double u[3], const uz_body_model *model, const uz_cont
         for (int c = 0; c < dim; c++)
             u[c] += share[k - 1] * at[c];
     }
-    const bool steps = model->turned && uz_is_rigid(model, node); /* what is given is a step from there */
-    for (int c = 0; c < dim; c++)
-        u[c] += steps && !row->place   ? model->place[node * dim + c]
-                : row->place && !steps ? -row->place[node * dim + c]
-                                       : 0;
+    /* What a group is given is a step from the place, what others are is from rest. */
+    const int given_from = model->turned && uz_is_rigid(model, node), wanted_from = row->place != NULL;
+    for (int c = 0; c < dim && given_from != wanted_from; c++)
+        u[c] += (given_from - wanted_from) * model->place[node * dim + c];
 }
 
 /* The gap of a row with the prescribed displacements and zero for the free ones. The sum is also given in absolute
