@@ -184,9 +184,7 @@ static void look_at_turns(const doubts *d)
 {
     for (int64_t k = 0; k < d->scene->n_supports && !uz_is_finite_answer(d->scene); k++) {
         const uz_support *support = &d->scene->supports[k];
-        double angle = 0; /* what is free of a rigid group's rotation is NaN */
-        for (int c = 0; c < 3; c++)
-            angle = isnan(support->turn[c]) ? angle : hypot(angle, support->turn[c]);
+        const double angle = uz_support_angle(support);
         if ((uz_support_turns(support) || support->kind == UZ_SUPPORT_RIGID) && angle > MOST_TURN)
             warn(d->out, "large_rotation", angle,
                  "support %lld rotates \"%.63s\" by %.2g rad, which small deformation takes for %.2g %% of stretch: "

@@ -274,9 +274,7 @@ static uz_status check_turns(const uz_finite_run *run, uz_error *err)
     const double part = run->part - (run->from ? run->from->part : 0);
     for (int64_t i = 0; i < run->scene.n_supports; i++) {
         const uz_support *support = &run->scene.supports[i];
-        double angle = 0;
-        for (int k = 0; k < 3 && support->kind == UZ_SUPPORT_RIGID; k++)
-            angle = isnan(support->turn[k]) ? angle : hypot(angle, part * support->turn[k]);
+        const double angle = support->kind == UZ_SUPPORT_RIGID ? fabs(part) * uz_support_angle(support) : 0;
         if (angle > UZ_MOST_TURN)
             return uz_fail(
                 err, UZ_ERR_SCENE, "/cases",

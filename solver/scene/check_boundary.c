@@ -50,6 +50,14 @@ bool uz_support_turns(const uz_support *support)
            (support->turn[0] != 0 || support->turn[1] != 0 || support->turn[2] != 0);
 }
 
+double uz_support_angle(const uz_support *support)
+{
+    double angle = 0;
+    for (int c = 0; c < 3; c++)
+        angle = isnan(support->turn[c]) ? angle : hypot(angle, support->turn[c]);
+    return angle;
+}
+
 static uz_status check_turn(const uz_scene *scene, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];

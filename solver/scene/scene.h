@@ -28,6 +28,8 @@ bool uz_has_finite_model(const uz_scene *scene);
 
 /* Does it turn its group? */
 bool uz_support_turns(const uz_support *support);
+/* By how much, in radians; what is free of a rigid group's rotation (NaN) counts as none. */
+double uz_support_angle(const uz_support *support);
 
 /* normal / ||normal||, whatever its length. A component that is zero but for rounding becomes zero: it would make a
  * contact row out of noise. False where there is no direction (zero, NaN, Inf). */
