@@ -6,14 +6,16 @@ import os
 import pathlib
 import random
 import re
+import select
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree
 
 import service
-from service import ENDLESS, ROOT, SCENE, Skip, check, expect, options
+from service import ENDLESS, PATIENT_S, ROOT, SCENE, Skip, check, expect, options
 from test_client_requests import DECK
 
 SHARED = True  # one service for all tests
@@ -199,7 +201,7 @@ def git(folder, *words):
 class Repository:
     """A user's repository with two scenes on the branch main, and the tools of the build on its PATH."""
 
-    def __init__(self, folder, port):
+    def __init__(self, folder):
         self.root = pathlib.Path(folder) / "work"
         (self.root / "ci").mkdir(parents=True)
         (self.root / "scenes").mkdir()
@@ -210,7 +212,8 @@ class Repository:
         self.commit()
         git(self.root, "update-ref", "refs/remotes/origin/main", "main")
         build = str(pathlib.Path(sys.argv[1]).resolve())
-        self.address = f"127.0.0.1:{port}"
+        self.place = kept_port()
+        self.address = "{}:{}".format(*self.place.getsockname())
         self.environment = {**os.environ, "PATH": f"{build}:{os.environ['PATH']}", "HOME": str(self.root),
                             "UZAWA_SERVER": f"http://{self.address}", "RUNNER_TEMP": folder,
                             "GITHUB_WORKSPACE": str(self.root), "CI_PROJECT_DIR": str(self.root)}
@@ -227,7 +230,7 @@ class Repository:
         """One step, as the runners run it."""
         return subprocess.run(["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c",
                                script.replace("127.0.0.1:8080", self.address)], cwd=self.root, capture_output=True,
-                              text=True, timeout=120, env={**self.environment, **environment})
+                              text=True, timeout=PATIENT_S, env={**self.environment, **environment})
 
     def reports(self):
         """Failures and errors of each report, by its file."""
@@ -238,15 +241,16 @@ class Repository:
         return found
 
 
-def free_port():
-    """Not one that connections of other tests get by themselves meanwhile."""
+def kept_port():
+    """A socket that has a port which no connection gets by itself; nor any other test meanwhile, only who shares it."""
     for port in random.sample(range(20000, 32000), 100):
-        with service.socket.socket() as probe:
-            try:
-                probe.bind(("127.0.0.1", port))
-                return port
-            except OSError:
-                pass
+        kept = socket.socket()
+        try:
+            kept.bind(("127.0.0.1", port))
+            kept.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the daemon does, before it listens there
+            return kept
+        except OSError:
+            kept.close()
     raise RuntimeError("no port is free")
 
 
@@ -272,15 +276,18 @@ def run_github(repository, **environment):
         check(started.returncode == 0, started)
         solved = repository.bash(steps["Solve the scenes"], **environment)
     finally:
+        daemon = os.pidfd_open(int((repository.root.parent / "uzawad.pid").read_text()))
         stopped = repository.bash(steps["Stop the service"])
-    check(stopped.returncode == 0, stopped)
+        ended = select.select([daemon], [], [], PATIENT_S)[0]  # it answers while it ends, and to the next one's questions
+        os.close(daemon)
+    check(stopped.returncode == 0 and ended, stopped)
     return solved
 
 
 @options(None)
 def test_github_actions(_):
     with tempfile.TemporaryDirectory() as folder:
-        repository = Repository(folder, free_port())
+        repository = Repository(folder)
         done = run_github(repository)
         check(done.returncode == 0 and repository.reports() == {"plate.xml": 0, "springs.xml": 0}, done)
         repository.change(**{"assert": [{"quantity": "contact.active", "max": 1}]})
@@ -292,7 +299,7 @@ def test_github_actions(_):
 def test_github_actions_of_a_pull_request(_):
     """What has drifted since the base fails, though it meets its assertions."""
     with tempfile.TemporaryDirectory() as folder:
-        repository = Repository(folder, free_port())
+        repository = Repository(folder)
         done = run_github(repository, GITHUB_BASE_REF="main")
         check(done.returncode == 0 and "baseline    5 of 5 pass" in done.stdout, done)
         plate = json.loads(ASSERTIONS.read_text())
@@ -317,7 +324,7 @@ def run_gitlab(repository, **environment):
 @options(None)
 def test_gitlab_ci(_):
     with tempfile.TemporaryDirectory() as folder:
-        repository = Repository(folder, free_port())
+        repository = Repository(folder)
         done = run_gitlab(repository)
         check(done.returncode == 0 and repository.reports() == {"plate.xml": 0, "springs.xml": 0}, done)
         done = run_gitlab(repository, CI_MERGE_REQUEST_DIFF_BASE_SHA="main")
