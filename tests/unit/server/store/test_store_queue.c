@@ -151,26 +151,33 @@ STORE_TEST(there_is_no_credit_for_the_time_before)
     place_end(&p);
 }
 
-/* A lane puts back what took too long, and what died runs again: that time has been had, too. */
+/* A lane puts back what took too long, and what died runs again: that time has been had, too. "b" has both of its turns
+ * in less than that; on a machine that is busy with others they may last longer, and "a" is to have had more. */
 STORE_TEST(a_run_that_is_put_back_was_a_turn)
 {
-    place p;
-    char id[26][33] = {""}, who[2];
-    if (!place_begin(&p))
-        return;
-    for (int i = 0; i < 4; i++)
-        submit_with(p.s, (store_request){.share = i % 2 ? "b" : "a", .small = true}, id[i]);
-    claim_share(p.s, true, id, who);
-    CHECK_STR(who, "a");
-    sleep_s(0.05);
-    CHECK_INT(release_as(p.s, id[0], "me"), STORE_OK);
-    for (int i = 0; i < 2; i++) { /* "b" has both of its turns in less than that */
+    bool shorter = false;
+    for (double held = 0.05; !shorter && held < 10; held *= 4) {
+        place p;
+        char id[26][33] = {""}, who[2];
+        if (!place_begin(&p))
+            return;
+        for (int i = 0; i < 4; i++)
+            submit_with(p.s, (store_request){.share = i % 2 ? "b" : "a", .small = true}, id[i]);
         claim_share(p.s, true, id, who);
-        CHECK_STR(who, i == 0 ? "b" : "d");
-        CHECK_INT(finish_as(p.s, id[2 * i + 1], "me", &PLAIN_SUCCESS), STORE_OK);
+        CHECK_STR(who, "a");
+        sleep_s(held);
+        CHECK_INT(release_as(p.s, id[0], "me"), STORE_OK);
+        const double begun = clock_seconds(CLOCK_MONOTONIC);
+        claim_share(p.s, true, id, who);
+        CHECK_STR(who, "b");
+        CHECK_INT(finish_as(p.s, id[1], "me", &PLAIN_SUCCESS), STORE_OK);
+        shorter = clock_seconds(CLOCK_MONOTONIC) - begun < held;
+        claim_share(p.s, true, id, who);
+        CHECK(!shorter || strcmp(who, "d") == 0);
+        check_counts(p.s, 2, 1, 1, 0, 0);
+        place_end(&p);
     }
-    check_counts(p.s, 2, 0, 2, 0, 0);
-    place_end(&p);
+    CHECK(shorter);
 }
 
 /* A job that runs for hours has had them before it ends: else one that comes would begin where its share stood then,
@@ -322,12 +329,12 @@ TEST(a_claim_is_as_quick_in_a_long_queue)
                                 " INSERT INTO job(id, status, created, tags, share)"
                                 " SELECT printf('%032x', i), 0, 1.0, '[]', CASE WHEN i % 2 THEN 'm' ELSE i END FROM n;"
                                 "INSERT INTO request(job, body) SELECT id, x'7b7d' FROM job WHERE created = 1.0;");
-        const double begun = clock_seconds(CLOCK_MONOTONIC);
+        const double begun = clock_seconds(CLOCK_PROCESS_CPUTIME_ID); /* whatever else the machine does */
         for (int i = 0; i < 200; i++) {
             CHECK_INT(claim_id(p.s, "me", id), STORE_OK);
             CHECK_INT(round == 1 ? finish_as(p.s, id, "me", &PLAIN_SUCCESS) : release_as(p.s, id, "me"), STORE_OK);
         }
-        seconds[round] = clock_seconds(CLOCK_MONOTONIC) - begun;
+        seconds[round] = clock_seconds(CLOCK_PROCESS_CPUTIME_ID) - begun;
     }
     CHECK_MSG(seconds[1] < 20 * seconds[0] + 0.2, "%g s, %g s in a long queue", seconds[0], seconds[1]);
     place_end(&p);
@@ -519,7 +526,7 @@ STORE_TEST(a_job_stays_until_somebody_was_told)
     static const char *const NEXT[] = {"http://y/", "http://x/"};
     end_jobs(p.s, 1, NEXT[1]);
     end_jobs(p.s, 1, NEXT[0]);
-    CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_AGAIN, 1000, 0.5), STORE_OK);
+    CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_AGAIN, 1000, 3), STORE_OK);
     for (int i = 0; i < 2; i++) {
         webhook_due other;
         CHECK_INT(store_webhook_next(p.s, NULL, 0, &other), STORE_OK);
@@ -527,7 +534,7 @@ STORE_TEST(a_job_stays_until_somebody_was_told)
         CHECK_INT(store_webhook_attempted(p.s, &other, WEBHOOK_TOLD, 0, 0), STORE_OK);
         free(other.url);
         CHECK_INT(store_webhook_next(p.s, NULL, 0, &other), STORE_NOT_FOUND);
-        sleep_s(i == 0 ? 0.6 : 0);
+        sleep_s(i == 0 ? 3.1 : 0);
     }
     CHECK_INT(store_webhook_attempted(p.s, &due, WEBHOOK_TOLD, 0, 0), STORE_OK);
     free(due.url);
