@@ -1,6 +1,6 @@
 /* confine.c: limits and a filter of system calls (seccomp(2)). */
 #include "work/confine.h"
-#include "base/sanitized.h"
+#include "core/sanitized.h"
 
 #include <errno.h>
 #include <linux/audit.h>

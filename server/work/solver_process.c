@@ -5,7 +5,7 @@
 #include "work/solver_process.h"
 #include "base/clock.h"
 #include "base/memory.h"
-#include "base/sanitized.h"
+#include "core/sanitized.h"
 #include "work/answers.h"
 #include "work/confine.h"
 #include "work/message.h"

@@ -1,7 +1,7 @@
 /* watch.c: while a job runs in a process. A process that is told to stop has a moment to do so, in which it gives its
  * best answer; then it is killed, whatever it does. */
 #include "work/watch.h"
-#include "base/sanitized.h"
+#include "core/sanitized.h"
 #include "work/relay.h"
 
 #include <math.h>

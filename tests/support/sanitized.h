@@ -2,7 +2,7 @@
 #ifndef TESTS_SANITIZED_H
 #define TESTS_SANITIZED_H
 
-#include "base/sanitized.h"
+#include "core/sanitized.h"
 
 /* The allocation to fail after the n-th: paths are reached by many. Of those after the first hundreds every fifth in a
  * plain build; under a sanitizer, which repeats what that has shown, every 41st. */

@@ -1,7 +1,7 @@
 /* sanitized.h: whether this is built with AddressSanitizer or ThreadSanitizer, under which the same work takes five to
  * twenty times as long, in memory and with system calls of their own. */
-#ifndef SERVER_BASE_SANITIZED_H
-#define SERVER_BASE_SANITIZED_H
+#ifndef UZ_CORE_SANITIZED_H
+#define UZ_CORE_SANITIZED_H
 
 #ifndef __has_feature
 #define __has_feature(name) 0 /* clang's way of saying what gcc says with a macro */
