@@ -5,7 +5,7 @@ import math
 import statistics
 
 import service
-from service import check, expect, some
+from service import INSTRUMENTED, check, expect, some
 
 SHARED = True  # one service for all tests
 
@@ -80,12 +80,12 @@ def compared(s, element, tractions, errors, finest):
 
 def test_estimates_in_the_plane(s):
     for element in some(("quad4", "quad8")):
-        compared(s, element, ([0, -1], [1, 0]), (0.1, 0.05, 0.03), 0.001)
+        compared(s, element, ([0, -1], [1, 0]), (0.1, 0.05, 0.03)[:2 if INSTRUMENTED else 3], 0.005 if INSTRUMENTED else 0.001)
 
 
 def test_estimates_in_space(s):
     for element in some(("hex8", "hex20")):
-        compared(s, element, ([0, -1, 0],), (0.2, 0.14, 0.1, 0.07), 0.02)
+        compared(s, element, ([0, -1, 0],), (0.2, 0.14, 0.1, 0.07)[:2 if INSTRUMENTED else 4], 0.05 if INSTRUMENTED else 0.02)
 
 
 def test_reactions_are_those_of_other_elements(s):
@@ -104,7 +104,7 @@ def test_supports_and_loads_sum_up(s):
             problem = l_shape(element, [0.3, -1, 0.2][:dim])
             if spring:
                 problem["supports"] = [{"on": "bottom", "spring": [1e5, 2e5, 1e5][:dim]}]
-            job = solved(s, problem, 0.1, operator="factored")
+            job = solved(s, problem, 0.2 if INSTRUMENTED else 0.1, operator="factored")
             resultants = job["summary"]["resultants"]
             parts = [resultants["loads"]] + resultants["supports"] + resultants["contacts"]
             size = sum(abs(x) for part in parts for x in part["force"])
@@ -119,7 +119,7 @@ def test_pressure_has_no_zigzag(s):
     """Before a sphere and a cylinder: the square of Hertz's pressure falls with that of the distance. Rows at corners
     of all sizes lie on that line, and hanging nodes of the field between them."""
     for element, error in some((("hex8", 0.07), ("hex20", 0.05))):
-        for name, obstacle, along in (("sphere", SPHERE, (0, 2)), ("cylinder", CYLINDER, (0,))):
+        for name, obstacle, along in some((("sphere", SPHERE, (0, 2)), ("cylinder", CYLINDER, (0,)))):
             job = solved(s, block(element, obstacle), error)
             answer = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=pressure,nodes,reactions"), 200).json
             pairs = [(sum(answer["nodes"][i][c] ** 2 for c in along), p ** 2)
