@@ -43,11 +43,10 @@ for i in "${!targets[@]}"; do
         continue
     fi
     for next in "${targets[@]:i+1}"; do
-        [[ $next == +* ]] && continue
-        prepare 10 $next &
-        ahead=$!
-        break
-    done
+        prepare 10 ${next#+}
+        [[ $next == +* ]] || break
+    done &
+    ahead=$!
     run 0 "$work/$i" ${targets[i]}
     count $? "$work/$i" ${targets[i]}
 done
