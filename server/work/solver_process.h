@@ -2,6 +2,8 @@
 #ifndef SERVER_WORK_SOLVER_PROCESS_H
 #define SERVER_WORK_SOLVER_PROCESS_H
 
+#include "core/sanitized.h"
+
 /* The first argument in that role; the others are numbers: the daemon's process id, bytes of cache with the reserve,
  * bytes that a solve may take (0: no limit). */
 #define SOLVER_ROLE "--solver-process"
@@ -11,8 +13,8 @@ enum { SOLVER_ARGUMENTS = 5 };
 enum { SOLVER_SOCKET = 3, SOLVER_BOARD, SOLVER_INBOX, SOLVER_OUTBOX };
 
 /* Of the cache's bytes one part in so many, up to a limit, is the reserve's: memory that lies ready for the next
- * factor. */
-enum { RESERVE_SHARE = 4, RESERVE_MOST = 256 << 20 };
+ * factor. Tests under a sanitizer start some hundred solver processes, each of which would make all of it ready. */
+enum { RESERVE_SHARE = 4, RESERVE_MOST = (SANITIZED ? 8 : 256) << 20 };
 
 /* Its exit status where the group of processes that it solved with was lost: with it goes all that was made. */
 enum { SOLVER_GROUP_LOST = 3 };

@@ -153,7 +153,7 @@ PHRASES = {
     "times what the last 15 jobs": constant(15, r"KEPT = (\d+), FEWEST"), "Only converged jobs of 0.05 s": constant(0.05, r"#define SHORTEST_S +([\d.]+)"),
     "10,000 dofs in all cases together": constant(10000, r"#define SMALL_DOFS +(\d+)"), "and 1,000 rows": constant(1000, r"#define SMALL_ROWS +(\d+)"),
     "(a sixth of it, at least 1 GiB)": constant(30, r"least = \(size_t\)1 << (\d+), share"),
-    "up to 256 and 128 MiB, lie ready": constant(256, r"RESERVE_MOST = (\d+) << 20"),
+    "up to 256 and 128 MiB, lie ready": constant(256, r"RESERVE_MOST = \(SANITIZED \? 8 : (\d+)\) << 20"),
     "lanes have at most 64 MiB": constant(64, r"#define LANE_CACHE +\(\(size_t\)(\d+) << 20\)"),
     "keeps 4 MiB for what": constant(4, r"#define SPARE_BYTES +\(\(off_t\)(\d+) << 20\)"),
     "its cache and 512 MiB": constant(512, r"#define LIMIT_ROOM \(\(size_t\)(\d+) << 20\)"),
