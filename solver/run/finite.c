@@ -342,7 +342,6 @@ static void end(uz_finite_run *run)
     free(run->v);
     free(run->Kv);
     free(run->step);
-    free(run->mixed);
 }
 
 /* What is gone back to. */

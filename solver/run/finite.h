@@ -136,8 +136,6 @@ typedef struct {
     double penalty, hold, shift; /* of merits; what the last tangent had added, see finite_newton.c */
     double stiffest, grain;      /* of the undeformed body: its stiffest dof; what rounding may leave of an energy */
     int64_t step_qps;
-    int n_mixed; /* differences of corrections so far, and room for the last of them (finite_pairs.c) */
-    double *mixed;
     bool turned;     /* `at`, or the last trial, is not straight on from the place before (finite_turn.c) */
     uz_result *last; /* of the last contact problem: methods and factor */
     uz_timings spent;

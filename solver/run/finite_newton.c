@@ -485,14 +485,14 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         run->spent.assemble += uz_seconds() - start;
         if (status != UZ_OK)
             break;
+        run->hold = held = add.hold; /* before corrections, which need it */
+        run->shift = shifted = add.shift;
         load_step(moved, run);
         load_rows(run, add.hold * stiffest);
         status = uz_finite_solve_qp(run, &own);
         run->step_qps += status == UZ_OK;
         if (status == UZ_OK && (run->turn.force.n > 0 || run->skew.ptr))
             status = uz_finite_correct(run, &own);
-        run->hold = held = add.hold;
-        run->shift = shifted = add.shift;
         const bool was_straight = add.straight;
         if (!step)
             add_more(&add, pressed, roughly);
@@ -856,7 +856,6 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     run->penalty = run->hold = run->shift = 0;
     run->norm = INFINITY;
     run->step_qps = 0;
-    run->n_mixed = 0;
     run->turned = false;
     run->at.work = 0;
     if (status == UZ_OK)

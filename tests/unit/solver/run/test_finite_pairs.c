@@ -59,7 +59,7 @@ TEST(stacked_blocks_pass_the_patch_test)
             body_hold(&s, "btop", NAN, -0.3, NAN);
             touch(&s, k % 2 ? "atop" : "bbottom", k % 2 ? "bbottom" : "atop");
             uz_result *r = solve_to(&s, 1e-9);
-            check_converged(r, 1, 80); /* the corners of both are on the verge of each other's ends */
+            check_converged(r, 1, 30); /* the corners of both are on the verge of each other's ends */
             CHECK_MSG(fabs(r->evaluation->supports[0].force[1] - FORCE[law - 1]) < 1e-8, "%.9g",
                       r->evaluation->supports[0].force[1]);
             for (int64_t i = 0; i < r->n_nodes; i++)
@@ -102,7 +102,7 @@ TEST(two_tubes_are_one)
         }
         touch(&s, k == 1 ? "bleft" : "aright", k == 1 ? "aright" : "bleft");
         uz_result *r = solve_to(&s, 1e-8);
-        check_converged(r, 1, 12);
+        check_converged(r, 1, 7);
         CHECK_MSG(ring || fabs(r->summary.max_pressure / PRESSURE - 1) < 1e-6, "%.8g", r->summary.max_pressure);
         CHECK_MSG(fabs(2 + moved_by(r, 2, 0)[0] - OUTER) < 1e-7, "%.9g", 2 + moved_by(r, 2, 0)[0]);
         give_back(r, &s);
@@ -132,7 +132,7 @@ TEST(a_block_that_slides_over_another_is_mirrored)
         for (int i = 0; i < 2; i++) {
             s[i] = slid(ELEMENTS[k], 4, 2 * i, k == 1);
             r[i] = solve_to(&s[i], 1e-10);
-            check_converged(r[i], 1, 28);
+            check_converged(r[i], 1, 8);
         }
         const double *here = r[0]->evaluation->supports[0].force, *there = r[1]->evaluation->supports[0].force;
         if (k < 2) /* triangles of a box all lean to one side */
@@ -159,7 +159,7 @@ TEST(stacked_bricks_pass_the_patch_test)
         body_hold(&s, "abottom", NAN, 0, NAN);
         body_hold(&s, "btop", NAN, STRETCH - 1, NAN);
         uz_result *r = solve_to(&s, 1e-9);
-        check_converged(r, 1, 16);
+        check_converged(r, 1, 6);
         /* across there is no stress: mu (c^2 - 1) + lambda ln(c^2 STRETCH) = 0 */
         const double mu = 1 / 2.6, lambda = 0.3 / (1.3 * 0.4);
         double c = 1;
@@ -196,7 +196,7 @@ TEST(a_brick_that_slides_over_another_is_mirrored)
             body_hold(&s[i], "abottom", 0, 0, 0);
             body_hold(&s[i], "btop", 1.2 * i, -0.15, 0);
             r[i] = solve_to(&s[i], 1e-10);
-            check_converged(r[i], 1, 30);
+            check_converged(r[i], 1, 7);
         }
         const double *here = r[0]->evaluation->supports[0].force, *there = r[1]->evaluation->supports[0].force;
         CHECK_MSG(fabs(here[0] + there[0]) < 1e-8 && fabs(here[1] - there[1]) < 1e-8 && fabs(here[2]) < 1e-8,
@@ -244,7 +244,7 @@ TEST(rings_that_are_pressed_and_slide)
         body_hold(&s, "btop", i - 1, -0.6, NAN);
         touch(&s, "bright", "aright");
         uz_result *r = solve_to(&s, 1e-8);
-        check_converged(r, 1, 24);
+        check_converged(r, 1, 7);
         const uz_resultant *foot = r->evaluation->supports;
         const double force[2] = {foot[0].force[0] + foot[1].force[0], foot[0].force[1] + foot[1].force[1]};
         CHECK_MSG(fabs(fabs(force[1]) - UP[i]) < face * UP[i], "%.8g", force[1]);
@@ -303,7 +303,7 @@ TEST(what_converges_is_an_equilibrium)
         uz_scene_clear(&s);
     }
     printf("# %d of %d converged, in at most %lld contact problems\n", converged, tried, (long long)most);
-    CHECK(2 * converged > tried && most <= 60); /* with those that go with one factor */
+    CHECK(2 * converged > tried && most <= 25);
 }
 
 /* Reactions of a first step that is much too long, times the curvature of gaps, made tangents that no stiffness along
@@ -315,7 +315,7 @@ TEST(reactions_of_a_large_step_do_not_cut_the_load_in_parts)
         qp_random rng = {(uint64_t)SEED[i]};
         uz_scene s = random_pair(&rng, (SEED[i] - 1) % 4 == 3);
         uz_result *r = solve_to(&s, 1e-8);
-        check_converged(r, 1, 45);
+        check_converged(r, 1, 15);
         CHECK_MSG(r->summary.finite.failed == 0, "seed %d: %lld parts failed", SEED[i],
                   (long long)r->summary.finite.failed);
         give_back(r, &s);
