@@ -38,6 +38,10 @@ enum { MOST_CORRECTIONS = 6, DIRECTIONS = 10, RESTARTS = 4 };
 /* What GMRES leaves, and one solve on the way, of what may be left. */
 #define OF_LEFT 0.3
 #define SOLVED  0.01
+/* A step of more than this in the energy's norm is far from the answer: it stays that of the symmetric part, which goes
+ * down, where the whole tangent would make it more than so many times as long. */
+#define FAR    0.1
+#define LONGER 2.0
 /* A reaction below this part of the largest, or a gap below this part of the body's extent, has no sign. */
 #define NO_FORCE 1e-10
 #define NO_GAP   1e-11
@@ -130,6 +134,7 @@ typedef struct {
     double *g, *nodal; /* nodal: 2 n */
     bool *pressing, *held;
     double left; /* of a step, relative */
+    bool far;    /* is it more than FAR? */
 } correction;
 
 /* run->p and at.h: with what v adds. */
@@ -256,7 +261,7 @@ static bool has_its_rows(correction *x)
 }
 
 /* x->v becomes the step in which the rows that press in run->last do so; *done: it is that of the whole tangent, and
- * the answer of run->last. */
+ * the answer of run->last, or that is to stay. */
 static uz_status settle_rows(bool *done, correction *x, uz_error *err)
 {
     uz_finite_run *run = x->run;
@@ -280,7 +285,10 @@ static uz_status settle_rows(bool *done, correction *x, uz_error *err)
             x->next[j] += x->came[j];
             x->off[j] = x->next[j] - x->v[j];
         }
-        const double off = uz_norm(d, x->off), least = x->left * uz_norm(d, x->next);
+        const double off = uz_norm(d, x->off), length = uz_norm(d, x->next), least = x->left * length;
+        *done = x->far && !(length <= LONGER * uz_norm(d, x->came));
+        if (*done)
+            return UZ_OK;
         enough = off <= fmax(least, ROUNDING * uz_norm(d, run->last->u));
         if (!isfinite(off)) /* the whole tangent is singular with these rows */
             memcpy(x->v, x->came, (size_t)d * sizeof *x->v);
@@ -361,6 +369,7 @@ uz_status uz_finite_correct(uz_finite_run *run, uz_error *err)
             *at_rows[k] = x.basis + (DIRECTIONS + 1) * d + (int64_t)k * m;
         x.nodal = x.g + m;
         x.left = run->norm > 0 ? fmin(ROUGHLY, fmax(fmax(CORRECTED, enough), PART_LEFT * run->norm)) : ROUGHLY;
+        x.far = now > FAR;
         memcpy(x.p, run->p, (size_t)d * sizeof *x.p);
         for (int64_t i = 0; i < m; i++)
             x.h[i] = run->at.h[i];
