@@ -322,6 +322,20 @@ TEST(reactions_of_a_large_step_do_not_cut_the_load_in_parts)
     }
 }
 
+/* Corners of both bodies stand at each other, where the tangent has most of a skew part, and is next to singular on the
+ * way: these took 53 to 110 contact problems while that part was added by further ones. */
+TEST(corners_of_both_bodies_take_few_contact_problems)
+{
+    static const int SEED[] = {19, 58, 71, 110, 165, 1058, 2091};
+    for (size_t i = 0; i < sizeof SEED / sizeof *SEED; i += (size_t)step_of_cases()) {
+        qp_random rng = {(uint64_t)SEED[i]};
+        uz_scene s = random_pair(&rng, (SEED[i] - 1) % 4 == 3);
+        uz_result *r = solve_to(&s, 1e-8);
+        check_converged(r, 2, 25);
+        give_back(r, &s);
+    }
+}
+
 /* A strip, or a plate, much thinner than the block below it that its upper side is led through, straight down, or on to
  * a place beyond its end: nothing is left in its way there, and no side would tell. */
 static uz_scene led_through(qp_random *rng, bool solid, bool beyond)
