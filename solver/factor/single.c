@@ -37,10 +37,11 @@ static inline __attribute__((always_inline)) void keep_last(four *out, const dou
     *out = (four)((lanes)AT(x) & kept);
 }
 
-/* The columns of a strip are neighbours in memory, so the next strip's lines are found from this one's. */
+/* The columns of a strip are neighbours in memory, so the next strip's lines are found from this one's. They come into
+ * the second cache only: a processor has few lines on their way to the first one, more to the second. */
 static inline __attribute__((always_inline)) void fetch(const double *entry, int64_t ahead)
 {
-    __builtin_prefetch((const void *)((uintptr_t)entry + (uintptr_t)(ahead * (int64_t)sizeof(double))), 0, 3);
+    __builtin_prefetch((const void *)((uintptr_t)entry + (uintptr_t)(ahead * (int64_t)sizeof(double))), 0, 2);
 }
 
 /* The rows below `columns` of a supernode's columns, which take part in all of their strips: `edge` of them are in the
