@@ -131,8 +131,8 @@ static void look_at_sides(contact_sides *on)
     int corners;
     for (int64_t f = 0; f < on->group->n_faces; f++) {
         double normal[UZ_FACE_NODES + 1][3];
-        const int count = nodes_of(node, &corners, on, f);
-        for (int a = 0; a < count && normals_of(normal, node, on, f); a++)
+        const int count = normals_of(normal, node, on, f) ? nodes_of(node, &corners, on, f) : 0;
+        for (int a = 0; a < count; a++)
             for (int c = 0; c < 3; c++)
                 on->normals[3 * node[a] + c] += normal[a][c];
     }
