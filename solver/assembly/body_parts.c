@@ -75,6 +75,8 @@ static void hold_row(uz_parts *parts, uz_part *p, const double row[UZ_MOTIONS])
 static void hold_at(uz_parts *parts, uz_part *p, const double *x, const double *n)
 {
     double at[3], row[UZ_MOTIONS] = {0};
+    if (p->rank == parts->motions)
+        return;
     place_in_part(at, p, x, parts->dim);
     memcpy(row, n, (size_t)parts->dim * sizeof *n);
     uz_cross3(row + 3, at, row);
