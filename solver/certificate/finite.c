@@ -70,7 +70,7 @@ static inline __attribute__((always_inline)) void add_point_of(long double *forc
     double A[9][9], grad[4][UZ_ELEMENT_NODES];
     for (int i = 0; i < count; i++)
         for (int k = 0; k < count; k++)
-            A[i][k] = (double)(weight * at->A[entry[i]][entry[k]]);
+            A[i][k] = (double)weight * at->A[entry[i]][entry[k]];
     for (int a = 0; a < nodes; a++)
         for (int J = 0; J <= dim; J++)
             grad[J][a] = J < dim ? x->grad[a][J] : x->around[a];
@@ -178,24 +178,22 @@ static bool law_at(uz_piola *at, long double *det, point_at *x, const uz_element
 static void add_unit(work *w, long double weight, const uz_lame *lame, const point_at *x, const double *u)
 {
     const int dim = x->dim;
-    long double H[9], size = 0, trace = 0, squares = 0;
-    double turn = 0;
+    const double zero[3] = {0};
+    double H[9], size = 0, trace = 0, squares = 0, turn = 0;
     for (int i = 0; i < 9; i++) {
-        H[i] = x->F[i] - (i % 4 == 0);
-        size += i < 8 || dim == 3 || x->ring ? x->F[i] * x->F[i] : 0;
+        H[i] = (double)(x->F[i] - (i % 4 == 0));
+        size += i < 8 || dim == 3 || x->ring ? (double)(x->F[i] * x->F[i]) : 0;
     }
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
-            const long double E =
+            const double E =
                 (H[3 * i + j] + H[3 * j + i] + H[i] * H[j] + H[3 + i] * H[3 + j] + H[6 + i] * H[6 + j]) / 2;
             trace += i == j ? E : 0;
             squares += E * E;
         }
-    for (int a = 0; a < x->nodes; a++) {
-        const double zero[3] = {0};
-        turn = fmax(turn, sqrt(uz_distance2(u + dim * a, zero, dim) * uz_distance2(x->grad[a], zero, dim)));
-    }
-    w->unit += weight * (lame->lambda + 2 * lame->mu) * (size / 2 + (long double)turn * turn);
+    for (int a = 0; a < x->nodes; a++)
+        turn = fmax(turn, uz_distance2(u + dim * a, zero, dim) * uz_distance2(x->grad[a], zero, dim));
+    w->unit += weight * (lame->lambda + 2 * lame->mu) * (size / 2 + turn);
     w->small += weight * (lame->lambda * trace * trace / 2 + lame->mu * squares);
 }
 
