@@ -68,21 +68,30 @@ double uz_invert_small(double inverse[3][3], double J[3][3], int dim)
     return det;
 }
 
-double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3])
+/* As add_nodes. Returns det J. */
+static inline double find_gradients(double grad[UZ_ELEMENT_NODES][3], const double *xyz,
+                                    double local[UZ_ELEMENT_NODES][3], int nodes, int dim)
 {
-    double local[UZ_ELEMENT_NODES][3], J[3][3], inverse[3][3];
-    const int dim = uz_element_type_of(element->kind)->dim, nodes = uz_element_node_count(element->kind);
-    const uz_element_type *type = uz_element_type_of(element->kind);
-    type->shape(type, NULL, local, point);
-    uz_jacobian(J, element, local);
+    double J[3][3] = {{0}}, inverse[3][3];
+    add_nodes(J, xyz, local, nodes, dim);
     const double det = uz_invert_small(inverse, J, dim);
     for (int a = 0; a < nodes; a++)
         for (int j = 0; j < dim; j++) {
-            grad[a][j] = 0;
+            double sum = 0;
             for (int i = 0; i < dim; i++)
-                grad[a][j] += inverse[j][i] * local[a][i];
+                sum += inverse[j][i] * local[a][i];
+            grad[a][j] = sum;
         }
     return det;
+}
+
+double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3])
+{
+    double local[UZ_ELEMENT_NODES][3];
+    const uz_element_type *type = uz_element_type_of(element->kind);
+    type->shape(type, NULL, local, point);
+    return type->dim == 2 ? find_gradients(grad, element->xyz, local, type->nodes, 2)
+                          : find_gradients(grad, element->xyz, local, type->nodes, 3);
 }
 
 double uz_ring_radius(double *largest, const uz_element *element, const double *N)

@@ -1,13 +1,14 @@
 #include "finite/turning.h"
 
 #include "assembly/parts.h"
+#include "core/cpu.h"
 #include "element/element.h"
 
 #include <math.h>
 #include <string.h>
 
 /* H[c][i] (dim x dim): the derivative of u_c by x_i. */
-static void gradient(double H[3][3], const uz_gauss_state *at, const double *u, int nodes, int dim)
+UZ_INLINE void gradient(double H[3][3], const uz_gauss_state *at, const double *u, int nodes, int dim)
 {
     for (int c = 0; c < dim; c++)
         for (int i = 0; i < dim; i++) {
@@ -17,7 +18,7 @@ static void gradient(double H[3][3], const uz_gauss_state *at, const double *u, 
         }
 }
 
-static void multiply(double out[3][3], double A[3][3], double B[3][3], int dim)
+UZ_INLINE void multiply(double out[3][3], double A[3][3], double B[3][3], int dim)
 {
     for (int i = 0; i < dim; i++)
         for (int j = 0; j < dim; j++) {
@@ -28,7 +29,7 @@ static void multiply(double out[3][3], double A[3][3], double B[3][3], int dim)
 }
 
 /* R of a skew w (both dim x dim): (I + w) V^-1 with V^2 = I - w^2. Returns |w|^2. */
-static double rotation(double R[3][3], double w[3][3], int dim)
+UZ_INLINE double rotation(double R[3][3], double w[3][3], int dim)
 {
     double square = 0, ww[3][3];
     for (int i = 0; i < dim; i++)
@@ -43,7 +44,7 @@ static double rotation(double R[3][3], double w[3][3], int dim)
 }
 
 /* H, of where a step begins, becomes what a turned step changes it by; h is the step's. out: the integrands. */
-static void turn(uz_turning *out, double H[3][3], double h[3][3], int dim)
+UZ_INLINE void turn(uz_turning *out, double H[3][3], double h[3][3], int dim)
 {
     double F[3][3], inverse[3][3], g[3][3], w[3][3], stretch[3][3], R[3][3], to[3][3];
     for (int i = 0; i < dim; i++)
@@ -68,6 +69,34 @@ static void turn(uz_turning *out, double H[3][3], double h[3][3], int dim)
             H[i][j] -= F[i][j];
 }
 
+UZ_INLINE void add_turning(uz_turning *out, double *force, const uz_element *element, const int64_t *node,
+                           const double *u, const double *step, int dim)
+{
+    const int count = uz_element_node_count(element->kind);
+    for (int g = 0; g < uz_element_rule(element->kind, element->model)->count; g++) {
+        uz_gauss_state at;
+        uz_turning own;
+        double H[3][3], h[3][3], around = 0;
+        uz_gauss_state_at(&at, element, g);
+        const bool ring = element->model == UZ_AXISYMMETRIC;
+        const double weight = element->lame.mu * at.volume;
+        gradient(H, &at, u, count, dim);
+        gradient(h, &at, step, count, dim);
+        turn(&own, H, h, dim);
+        out->turning += weight * own.turning;
+        out->strain += weight * own.strain;
+        for (int a = 0; a < count && ring; a++)
+            around += at.N[a] / at.radius * step[dim * a];
+        for (int a = 0; a < count; a++) {
+            double *to = force + dim * node[a];
+            for (int c = 0; c < dim; c++)
+                for (int i = 0; i < dim; i++)
+                    to[c] += weight * H[c][i] * at.grad[a][i];
+            to[0] += ring ? weight * around * at.N[a] / at.radius : 0;
+        }
+    }
+}
+
 void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, const double *from, const double *to)
 {
     const uz_mesh *mesh = &model->mesh;
@@ -84,33 +113,41 @@ void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, c
             u[i] = from[dim * node[i / dim] + i % dim];
             step[i] = to[dim * node[i / dim] + i % dim] - u[i];
         }
-        for (int g = 0; g < uz_element_rule(element.kind, element.model)->count; g++) {
-            uz_gauss_state at;
-            uz_turning own;
-            double H[3][3], h[3][3], around = 0;
-            uz_gauss_state_at(&at, &element, g);
-            const bool ring = element.model == UZ_AXISYMMETRIC;
-            const double weight = element.lame.mu * at.volume;
-            gradient(H, &at, u, count, dim);
-            gradient(h, &at, step, count, dim);
-            turn(&own, H, h, dim);
-            out->turning += weight * own.turning;
-            out->strain += weight * own.strain;
-            for (int a = 0; a < count && ring; a++)
-                around += at.N[a] / at.radius * step[dim * a];
-            for (int a = 0; a < count; a++) {
-                for (int i = 0; i < dim * dim; i++)
-                    force[dim * node[a] + i / dim] += weight * H[i / dim][i % dim] * at.grad[a][i % dim];
-                force[dim * node[a]] += ring ? weight * around * at.N[a] / at.radius : 0;
-            }
-        }
+        if (dim == 2)
+            add_turning(out, force, &element, node, u, step, 2);
+        else
+            add_turning(out, force, &element, node, u, step, 3);
     }
+}
+
+/* The lower triangle of blocks, and with it the upper one. */
+UZ_INLINE void add_metric(double *ke, const uz_element *element, int dim)
+{
+    const int count = uz_element_node_count(element->kind), n = dim * count;
+    for (int g = 0; g < uz_element_rule(element->kind, element->model)->count; g++) {
+        uz_gauss_state at;
+        uz_gauss_state_at(&at, element, g);
+        const double weight = element->lame.mu * at.volume;
+        const double around = element->model == UZ_AXISYMMETRIC ? 1 / at.radius : 0;
+        for (int a = 0; a < count; a++)
+            for (int b = 0; b <= a; b++) {
+                double *of = ke + dim * (n * a + b);
+                double sum = 0;
+                for (int i = 0; i < dim; i++)
+                    sum += at.grad[a][i] * at.grad[b][i];
+                for (int c = 0; c < dim; c++)
+                    of[(n + 1) * c] += weight * sum;
+                of[0] += around > 0 ? weight * around * around * at.N[a] * at.N[b] : 0;
+            }
+    }
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < i; k++)
+            ke[n * k + i] = ke[n * i + k];
 }
 
 void uz_turning_metric(uz_body_model *metric, const uz_body_model *model)
 {
     const uz_mesh *mesh = &model->mesh;
-    const int dim = mesh->dim;
     memset(metric->K.val, 0, (size_t)metric->K.ptr[metric->K.cols] * sizeof *metric->K.val);
     memset(metric->K_fixed.val, 0, (size_t)metric->K_fixed.ptr[metric->K_fixed.cols] * sizeof *metric->K_fixed.val);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
@@ -119,22 +156,10 @@ void uz_turning_metric(uz_body_model *metric, const uz_body_model *model)
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         uz_body_element(&element, xyz, model, e);
-        for (int g = 0; g < uz_element_rule(element.kind, element.model)->count; g++) {
-            uz_gauss_state at;
-            uz_gauss_state_at(&at, &element, g);
-            const double weight = element.lame.mu * at.volume;
-            const double around = element.model == UZ_AXISYMMETRIC ? 1 / at.radius : 0;
-            for (int a = 0; a < count; a++)
-                for (int b = 0; b < count; b++) {
-                    double *of = ke + dim * (dim * count * a + b);
-                    double sum = 0;
-                    for (int i = 0; i < dim; i++)
-                        sum += at.grad[a][i] * at.grad[b][i];
-                    for (int c = 0; c < dim; c++)
-                        of[(dim * count + 1) * c] += weight * sum;
-                    of[0] += around > 0 ? weight * around * around * at.N[a] * at.N[b] : 0;
-                }
-        }
+        if (mesh->dim == 2)
+            add_metric(ke, &element, 2);
+        else
+            add_metric(ke, &element, 3);
         uz_add_stiffness(metric, ke, node, count);
     }
 }
