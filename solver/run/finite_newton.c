@@ -279,12 +279,15 @@ static void load_step(bool *moved, uz_finite_run *run)
     uz_csc_symv(run->p, run->K, 1, run->v);
 }
 
-/* A matrix comes once: by its number it need not be read to be known. Between bodies its pattern changes. */
+/* A matrix comes once: by its number it need not be read to be known. In a cache of its own its pattern needs a name
+ * only, but between bodies, where it changes. */
 static uz_status name_matrix(uz_finite_run *run, const uz_csc *K, uz_error *err)
 {
     uz_status status = UZ_OK;
-    if (run->pairs || !run->name.pattern[0])
+    if (run->pairs)
         status = uz_pattern_digest(run->name.pattern, K, err);
+    else
+        snprintf(run->name.pattern, sizeof run->name.pattern, "tangent");
     snprintf(run->name.values, sizeof run->name.values, "%lld", (long long)run->tangents);
     uz_table_name(run->cache, K, &run->name);
     return status;
