@@ -175,13 +175,13 @@ static bool settle_thickness(double *W, double S[N_STRAINS], double D[N_STRAINS]
 }
 
 /* Energy, stress and tangent at C, and what F and C are across the plane where that follows from them: in plane stress
- * the tangent is that in the plane, condensed. */
+ * the tangent is that in the plane, condensed. D NULL: the tangent is not wanted, nor needed, as it is in plane stress.
+ */
 static bool law_at(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS], double F[3][3], double C[N_STRAINS],
-                   const uz_element *element, uz_elasticity law)
+                   uz_model model, uz_lame lame, uz_elasticity law)
 {
-    const uz_lame lame = uz_lame_in_space(element->model, element->lame);
-    const int n = element->model == UZ_SOLID ? N_STRAINS : UZ_FINITE_PLANE_STRAINS;
-    if (element->model != UZ_PLANE_STRESS)
+    const int n = model == UZ_SOLID ? N_STRAINS : UZ_FINITE_PLANE_STRAINS;
+    if (model != UZ_PLANE_STRESS)
         return uz_hyperelastic(W, S, D, n, law, lame.lambda, lame.mu, C);
     if (!settle_thickness(W, S, D, law, lame, C))
         return false;
@@ -361,6 +361,9 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
     gradients H, of_step;
     points at;
     four force[3][UZ_ELEMENT_NODES / LANES] = {{{0}}};
+    const uz_model model = x->element->model;
+    const uz_lame lame = uz_lame_in_space(model, x->element->lame);
+    const bool tangent = x->ke || model == UZ_PLANE_STRESS;
     shape_of(&rest, rule, x->element, dim, ring);
     find_gradients(H, rule, &rest, x->u, dim, ring);
     if (x->ke && x->step)
@@ -377,7 +380,7 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
         deformation(F, H, g, dim, ring);
         F[2][2] += dim == 2 && !ring ? x->element->across : 0;
         cauchy_green(C, F, dim);
-        if (!(out->least_det > 0) || !law_at(&W, S, D, F, C, x->element, x->law)) {
+        if (!(out->least_det > 0) || !law_at(&W, S, tangent ? D : NULL, F, C, model, lame, x->law)) {
             out->least_det = fmin(out->least_det, 0); /* also where no stretch across a plane is without stress */
             return false;
         }
@@ -485,7 +488,7 @@ bool uz_finite_law(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS
                    const uz_element *element, uz_elasticity law)
 {
     double F[3][3];
-    return law_at(W, S, D, F, C, element, law);
+    return law_at(W, S, D, F, C, element->model, uz_lame_in_space(element->model, element->lame), law);
 }
 
 void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elasticity law, const double *u,
@@ -504,7 +507,8 @@ void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elas
     F[2][2] += element->across;
     out->det = orientation(F, rule.dim);
     cauchy_green(C, F, rule.dim);
-    const bool good = out->det > 0 && law_at(&W, S, D, F, C, element, law);
+    const bool good =
+        out->det > 0 && law_at(&W, S, D, F, C, element->model, uz_lame_in_space(element->model, element->lame), law);
     out->det = orientation(F, rule.dim);
     for (int c = 0; c < N_STRAINS; c++)
         out->strain[c] = 0.5 * (C[c] - (c < 3));

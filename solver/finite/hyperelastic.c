@@ -6,6 +6,7 @@
  * with numbers that depend on C by its invariants alone. */
 #include "finite/hyperelastic.h"
 
+#include <float.h>
 #include <math.h>
 
 typedef struct {
@@ -50,7 +51,7 @@ static bool inverse(double B[3][3], double *det, const double C[UZ_FINITE_STRAIN
     B[1][2] = C[3] * C[5] - C[0] * C[4];
     B[0][2] = C[3] * C[4] - C[1] * C[5];
     *det = C[0] * B[0][0] + C[3] * B[0][1] + C[5] * B[0][2];
-    if (!(plane > 0 && *det > 0))
+    if (!(plane > 0 && *det >= DBL_MIN)) /* below, 1 / det is no number */
         return false;
     for (int i = 0; i < 3; i++)
         for (int j = i; j < 3; j++)
@@ -67,7 +68,7 @@ static void kirchhoff(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE
         const double E = 0.5 * (C[i] - (i < 3)), direct = i < 3 ? lambda : 0;
         *W += (i < 3 ? 1 : 2) * mu * E * E;
         S[i] = direct * sum + 2 * mu * E;
-        for (int j = 0; j < n; j++)
+        for (int j = 0; j < n && D; j++)
             D[i][j] = (j < 3 ? direct : 0) + (i != j ? 0 : i < 3 ? 2 * mu : mu);
     }
 }
@@ -82,7 +83,7 @@ static inline __attribute__((always_inline)) void of_coefficients(double S[UZ_FI
         const int *p = AXIS[i];
         const double own = B[p[0]][p[1]];
         S[i] = k.a * (i < 3) + k.b * own;
-        for (int j = 0; j <= i; j++) {
+        for (int j = 0; j <= i && D; j++) {
             const int *q = AXIS[j];
             const double other = B[q[0]][q[1]];
             const double mixed = 0.5 * (B[p[0]][q[0]] * B[p[1]][q[1]] + B[p[0]][q[1]] * B[p[1]][q[0]]);
@@ -103,7 +104,9 @@ bool uz_hyperelastic(double *W, double S[UZ_FINITE_STRAINS], double D[UZ_FINITE_
     }
     const coefficients k = of_law(law, lambda, mu, sqrt(det), C[0] + C[1] + C[2]);
     *W = k.W;
-    if (n == UZ_FINITE_PLANE_STRAINS)
+    if (!D)
+        of_coefficients(S, NULL, k, B, n);
+    else if (n == UZ_FINITE_PLANE_STRAINS)
         of_coefficients(S, D, k, B, UZ_FINITE_PLANE_STRAINS);
     else
         of_coefficients(S, D, k, B, UZ_FINITE_STRAINS);

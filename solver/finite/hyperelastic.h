@@ -10,7 +10,7 @@
 
 enum { UZ_FINITE_STRAINS = 6, UZ_FINITE_PLANE_STRAINS = 4 };
 
-/* W per undeformed volume, S, and the tangent dS/dE (symmetric). False: det C <= 0, and nothing is filled.
+/* W per undeformed volume, S, and the tangent dS/dE (symmetric; NULL: not wanted). False: det C <= 0, nothing is made.
  *   n           components, 4 or 6: of 4 the others of C are 0, and those of S and D are not filled
  *   lambda, mu  Lame's constants of small strain
  * Source: Bonet and Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", ch. 6. */
