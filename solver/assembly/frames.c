@@ -20,6 +20,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* What is left across a normal of a frame's own direction by the rounding of the displacement to where it is found: an
+ * entry of N more for it would be a dof of the contact more, and where each row had one the analysis and the form of
+ * the operator would be others. */
+#define OF_PLACE 1e-13
+
 const double *uz_node_frame(const uz_body_model *model, int64_t node)
 {
     const int dim = model->mesh.dim;
@@ -56,9 +61,10 @@ void uz_free_shares(double share[3], const uz_body_model *model, int64_t node, c
 {
     const int dim = model->mesh.dim;
     const bool turned = uz_node_frame(model, node) != NULL;
+    const double rounding = model->place ? OF_PLACE : 16 * DBL_EPSILON;
     uz_to_frame(share, model, node, n);
     for (int c = 0; c < dim; c++)
-        if (model->dof[node * dim + c] < 0 || (turned && fabs(share[c]) <= 16 * DBL_EPSILON))
+        if (model->dof[node * dim + c] < 0 || (turned && fabs(share[c]) <= rounding))
             share[c] = 0;
 }
 

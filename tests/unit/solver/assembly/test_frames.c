@@ -232,6 +232,42 @@ TEST(recovering_and_restricting_are_inverse)
     uz_scene_clear(&scene);
 }
 
+/* Entries of N where nodes have moved along the normals of a circle to `off` of their way across them. */
+static int64_t entries_of_moved(double off)
+{
+    uz_scene scene = box_scene(4, 1, 8, 2), moved;
+    const double center[2] = {1.3, -41};
+    uz_body_model at, model;
+    uz_error err = {0};
+    add_support(&scene, "top", 0, 0);
+    add_plane(&scene, "bottom", center[0], center[1], 0, 0);
+    scene.contacts[0].kind = UZ_OBSTACLE_ROUND;
+    scene.contacts[0].radius = 40;
+    model = build_body(&scene);
+    double *place = zeros(2 * model.mesh.n_nodes);
+    for (int64_t i = 0; i < model.mesh.n_nodes; i++) {
+        const double x = model.mesh.xyz[2 * i] - center[0], y = model.mesh.xyz[2 * i + 1] - center[1];
+        place[2 * i] = -0.01 * x - off * y;
+        place[2 * i + 1] = -0.01 * y + off * x;
+    }
+    moved = scene;
+    moved.place = place;
+    CHECK_MSG(uz_body_model_move(&at, &model, &moved, &err) == UZ_OK, "%s", err.message);
+    CHECK_INT(at.m, 9);
+    const int64_t entries = at.N.ptr[at.d];
+    uz_body_model_clear(&at);
+    uz_body_model_clear(&model);
+    free(place);
+    uz_scene_clear(&scene);
+    return entries;
+}
+
+TEST(what_moves_along_its_normals_keeps_one_dof_per_node)
+{
+    CHECK_INT(entries_of_moved(2e-14), 9);
+    CHECK_INT(entries_of_moved(1e-11), 18);
+}
+
 /* ------------------------------------------------------------------ three directions */
 
 /* One brick whose nodes are all contact nodes; node a has the directions of mask bits held. */
