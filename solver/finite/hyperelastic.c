@@ -8,6 +8,8 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
+#include <string.h>
 
 typedef struct {
     double W, a, b, c, e, f;
@@ -23,9 +25,26 @@ static coefficients neo_hooke(double lambda, double mu, double J, double trace)
                           .f = -2 * pressed};
 }
 
+/* x^(-1/3) of a positive normal number, to a few roundings in a third of the time that cbrt and a division take: from
+ * the exponent's third, by the constant of Moroz and others, "Fast calculation of cube and inverse cube roots using a
+ * magic constant" (Energies 14 (2021) 1058), and three steps of third order on 1 - x y^3. */
+static double inverse_root(double x)
+{
+    uint64_t bits;
+    double y;
+    memcpy(&bits, &x, sizeof bits);
+    bits = 0x553ef0ff289dd796u - bits / 3;
+    memcpy(&y, &bits, sizeof y);
+    for (int k = 0; k < 3; k++) {
+        const double left = 1 - x * y * y * y;
+        y += y * left * (1.0 / 3 + 2.0 / 9 * left);
+    }
+    return y;
+}
+
 static coefficients neo_hooke_isochoric(double lambda, double mu, double J, double trace)
 {
-    const double K = lambda + 2.0 / 3 * mu, root = cbrt(J), a = mu / (root * root), p = K * (J - 1) * J,
+    const double K = lambda + 2.0 / 3 * mu, root = inverse_root(J), a = mu * root * root, p = K * (J - 1) * J,
                  b = p - a * trace / 3;
     return (coefficients){.W = 0.5 * (a * trace - 3 * mu) + 0.5 * K * (J - 1) * (J - 1),
                           .a = a,
@@ -53,9 +72,10 @@ static bool inverse(double B[3][3], double *det, const double C[UZ_FINITE_STRAIN
     *det = C[0] * B[0][0] + C[3] * B[0][1] + C[5] * B[0][2];
     if (!(plane > 0 && *det >= DBL_MIN)) /* below, 1 / det is no number */
         return false;
+    const double scale = 1 / *det;
     for (int i = 0; i < 3; i++)
         for (int j = i; j < 3; j++)
-            B[i][j] = B[j][i] = B[i][j] / *det;
+            B[i][j] = B[j][i] = B[i][j] * scale;
     return true;
 }
 
