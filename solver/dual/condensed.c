@@ -256,20 +256,24 @@ void uz_condensed_response(double *z, const uz_condensed *dense, const double *w
 }
 
 /* Without D two triangular solves do: slower each, but there is nothing to form. */
+void uz_condensed_apply_factor(double *Dr, const uz_condensed_load *x, const double *r)
+{
+    const uz_condensed *dense = x->dense;
+    uz_condensed_response(x->apply_room, dense, r);
+    uz_trsv_lower(dense->n_b, dense->L_bb, dense->n_b, x->apply_room, true);
+    memset(Dr, 0, (size_t)dense->dual.m * sizeof *Dr);
+    uz_csc_gaxpy(Dr, &dense->N_b, 1.0, x->apply_room);
+}
+
 uz_status uz_condensed_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
     const uz_condensed_load *x = (const uz_condensed_load *)load;
-    const uz_condensed *dense = x->dense;
-    int64_t m = dense->dual.m;
+    int64_t m = x->dense->dual.m;
     (void)err;
-    if (x->D) {
+    if (x->D)
         uz_symv_lower(m, x->D, r, Dr);
-        return UZ_OK;
-    }
-    uz_condensed_response(x->apply_room, dense, r);
-    uz_trsv_lower(dense->n_b, dense->L_bb, dense->n_b, x->apply_room, true);
-    memset(Dr, 0, (size_t)m * sizeof *Dr);
-    uz_csc_gaxpy(Dr, &dense->N_b, 1.0, x->apply_room);
+    else
+        uz_condensed_apply_factor(Dr, x, r);
     return UZ_OK;
 }
 

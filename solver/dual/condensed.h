@@ -44,6 +44,9 @@ typedef struct {
 /* z (n_b) = L_bb^-1 N_b'w; contact last. */
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
 
+/* D r through the factor of the Schur complement; contact last. */
+void uz_condensed_apply_factor(double *Dr, const uz_condensed_load *x, const double *r);
+
 /* Operations; applying never fails. */
 uz_status uz_condensed_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
 uz_status uz_condensed_prepare(uz_dual_load *load, uz_error *err);

@@ -148,10 +148,33 @@ static bool are_independent(const double *chol, const double *D, const int64_t *
 
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
+/* The Cholesky factor (count x count) of the rows to be solved for, which are listed: of D the active ones, or of T =
+ * D^-1 the others. *block NULL: it is singular, or had to stop. */
+static uz_status factor_rows(double **block, int64_t *rows, int64_t *count, uz_condensed_load *x, const bool *active,
+                             bool others, uz_error *err)
+{
+    const uz_stop *stop = &x->load.stop;
+    const int64_t m = x->load.dual->m;
+    *count = list_rows(rows, active, !others, m);
+    const uz_status status = others || x->dense->scaled ? need(x, others, err) : UZ_OK;
+    const double *matrix = others ? x->D_inverse : x->D;
+    double *made = status == UZ_OK ? uz_alloc(*count * *count, sizeof *made) : NULL;
+    *block = made;
+    if (status == UZ_OK && !made)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)*count);
+    const bool ok = status == UZ_OK && matrix && gather_lower(made, matrix, rows, *count, m, stop) &&
+                    uz_potrf_lower_while(*count, made, stop) &&
+                    (x->dense->scaled || are_independent(made, x->D, rows, *count, m));
+    if (!ok) {
+        free(made);
+        *block = NULL;
+    }
+    return status;
+}
+
 /* By D_AA r_A = g0_A, or in the scaled form by T = D^-1: with v = g0 - g, r = T v, and r_I = 0 gives T_II x_I =
- * -T_IA g0_A: the rows that do not touch, mostly the fewer, are solved for, and D is not needed. There the second pass
- * solves for what the first left of the gaps, computed through the factor: T is badly conditioned, its answer is not
- * yet that of the body. */
+ * -T_IA g0_A: the fewer of both are solved for. In that form the second pass solves for what the first left of the
+ * gaps, computed through the factor: T is badly conditioned, as D is, and its answer not yet that of the body. */
 uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active,
                                     uz_error *err)
 {
@@ -159,53 +182,54 @@ uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, doub
     const uz_stop *stop = &load->stop;
     const bool scaled = x->dense->scaled;
     int64_t m = load->dual->m, count, *rows = uz_alloc(m, sizeof *rows);
-    double *v = x->work, *change = x->work2, *part = scaled ? change : v; /* part: at the rows, one after the other */
-    uz_status status = UZ_OK;
+    double *v = x->work, *change = x->work2, *block = NULL;
     if (!rows)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
-    count = list_rows(rows, active, !scaled, m);
-    if (scaled)
-        status = need(x, true, err);
-    const double *matrix = scaled ? x->D_inverse : x->D;
-    double *block = uz_alloc(count * count, sizeof *block);
-    if (status == UZ_OK && !block)
-        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)count);
-    bool ok = status == UZ_OK && matrix && gather_lower(block, matrix, rows, count, m, stop) &&
-              uz_potrf_lower_while(count, block, stop) && (scaled || are_independent(block, x->D, rows, count, m));
+    bool others = scaled && 2 * list_rows(rows, active, true, m) >= m;
+    uz_status status = factor_rows(&block, rows, &count, x, active, others, err);
+    if (status == UZ_OK && !block && scaled && !others && !uz_stop_is_due(stop)) {
+        others = true;
+        status = factor_rows(&block, rows, &count, x, active, true, err);
+    }
+    bool ok = status == UZ_OK && block;
+    double *part = others ? change : v; /* at the rows, one after the other */
     if (ok) {
         memset(r, 0, (size_t)m * sizeof *r);
         memcpy(g, load->g0, (size_t)m * sizeof *g);
     }
     for (int pass = 0; ok && pass < PASSES; pass++) {
-        if (scaled) {
+        if (others) {
             memcpy(v, g, (size_t)m * sizeof *v);
             for (int64_t k = 0; k < count; k++)
                 v[rows[k]] = 0.0;
-            uz_symv_lower(m, matrix, v, change);
+            uz_symv_lower(m, x->D_inverse, v, change);
             if (!(ok = !uz_stop_is_due(stop)))
                 break;
         }
         for (int64_t k = 0; k < count; k++)
-            part[k] = scaled ? change[rows[k]] : g[rows[k]]; /* rows ascend: none is written before it is read */
+            part[k] = others ? change[rows[k]] : g[rows[k]]; /* rows ascend: none is written before it is read */
         uz_potrs_lower(count, block, count, part);
         if (!(ok = !uz_stop_is_due(stop)))
             break;
         for (int64_t k = 0; k < count; k++)
-            if (scaled)
+            if (others)
                 v[rows[k]] = -part[k];
             else
                 r[rows[k]] += part[k];
-        uz_symv_lower(m, matrix, scaled ? v : r, change);
-        if (!(ok = !uz_stop_is_due(stop)))
-            break;
-        if (scaled) {
+        if (others) {
+            uz_symv_lower(m, x->D_inverse, v, change);
+            if (!(ok = !uz_stop_is_due(stop)))
+                break;
             for (int64_t k = 0; k < count; k++)
                 change[rows[k]] = 0.0;
             for (int64_t i = 0; i < m; i++)
                 r[i] += change[i];
-            (void)uz_condensed_apply(load, change, r, NULL);
-            ok = !uz_stop_is_due(stop);
         }
+        if (scaled)
+            uz_condensed_apply_factor(change, x, r);
+        else
+            uz_symv_lower(m, x->D, r, change);
+        ok = !uz_stop_is_due(stop);
         for (int64_t i = 0; i < m; i++)
             g[i] = load->g0[i] - change[i];
     }

@@ -166,8 +166,9 @@ static void check_recovery(subject *s, const double *r)
     free(close);
 }
 
-/* D_AA r_A = g0_A and r = 0 elsewhere; bounds: each row bounds a dof, so that nobody may refuse. */
-static void check_active(subject *s, bool bounds)
+/* D_AA r_A = g0_A and r = 0 elsewhere; bounds: each row bounds a dof, so that nobody may refuse. every: 0, A is a
+ * guess; of so many rows the first, or, negative, all but that. */
+static void check_active(subject *s, bool bounds, int64_t every)
 {
     const int64_t d = s->dual->d, m = s->dual->m;
     double *r = vector(m), *g = vector(m), *Dr = vector(m), *gap = vector(m), *u = vector(d);
@@ -175,9 +176,9 @@ static void check_active(subject *s, bool bounds)
     uz_active_end end = UZ_ACTIVE_UNSOLVED;
     uz_error err = {0};
     int64_t count = 0;
-    if (!uz_dual_load_guess_active(s->load, active))
+    if (every != 0 || !uz_dual_load_guess_active(s->load, active))
         for (int64_t i = 0; i < m; i++)
-            active[i] = s->load->g0[i] < 0;
+            active[i] = every == 0 ? s->load->g0[i] < 0 : (i % every == 0) == (every > 0);
     for (int64_t i = 0; i < m; i++)
         count += active[i];
     CHECK(count > 1 && count < m);
@@ -280,7 +281,9 @@ static void check_forms(const uz_qp *qp, bool bounds)
         check_operator(&s, &first, x, y);
         CHECK((s.inverted > 0) == (bounds && s.can->needs_factor));
         check_recovery(&s, r);
-        check_active(&s, bounds);
+        check_active(&s, bounds, 0);
+        for (int64_t every = -4; every <= 4 && bounds && s.can->exact; every += 8)
+            check_active(&s, bounds, every);
         if (!s.can->needs_factor)
             check_inverse_norm(&s, r);
         if (s.can->lanes)
