@@ -44,6 +44,8 @@
 enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4 };
 /* The certificate is asked once steps are less than this part of the energy's norm. */
 #define ASKED_FROM 1e-3
+/* The certificate was seen to find 1.39 to 170 times what single dofs tell of the forces left over. */
+#define LEFT_AT_LEAST 1.3
 /* A determinant of F that is next to none. */
 #define NEARLY_FLAT 0.2
 /* Stiffness along pressed rows, in those of the stiffest dof: from little on, as rows that have to open are held by it,
@@ -622,7 +624,7 @@ static bool may_be_settled(uz_finite_run *run, double before)
     if (!(run->norm < ASKED_FROM) || run->turned)
         return false;
     const bool approaches = run->norm == 0 || run->norm < 0.5 * before;
-    return !approaches || run->step_qps == MOST_QPS || least_left(run) <= run->requested;
+    return !approaches || run->step_qps == MOST_QPS || LEFT_AT_LEAST * least_left(run) <= run->requested;
 }
 
 /* What the certificate says of run->at. *done: it is not to be iterated further. */
