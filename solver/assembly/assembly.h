@@ -291,8 +291,8 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
  * and the error is relative to the norm of the strain that has: free expansion would hide it. *share (may be NULL):
  * that norm over ||u_h||_E, 1 without temperature. A body that is carried along or expands freely has no error. eta2
  * (n_elements, NULL: not wanted): what each element has of the square of the error, not relative; all 0 where the error
- * is. With a scene, elements with incompatible modes that reach from one known load to another one are off by no less
- * than the mean stress between both differs by from them (thin_elements.h). */
+ * is. With a scene, thin stacks of elements with incompatible modes from one known load to another one are off by no
+ * less than the mean stress between both differs by from them (thin_elements.h). */
 double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
                               const double *nodal);
 

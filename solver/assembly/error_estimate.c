@@ -29,8 +29,7 @@ typedef struct {
     const uz_body_model *model;
     uz_nodal_strains nodal; /* rows: stresses, once they are recovered */
     uz_stress_sums sums;
-    bool whole;             /* with what is hidden */
-    uz_thin_elements *thin; /* NULL, or sums has eta2_of, and elements differ by no less than from their loads */
+    bool whole; /* with what is hidden */
 } estimate;
 
 void uz_energy_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
@@ -87,20 +86,13 @@ static void compare(void *ctx, const uz_strain_group *group)
     if (x->whole)
         uz_whole_difference(&x->sums.times, group, place, &x->nodal);
     uz_stress_rows_compare(&x->sums, x->nodal.rows, x->nodal.size, group, place);
-    for (int l = 0; l < group->count && x->thin; l++) {
-        double *own = &x->sums.eta2_of[group->element[l]];
-        const double least = uz_thin_difference(x->thin, x->model, group, l);
-        x->sums.eta2 += fmax(0, least - *own);
-        *own = fmax(least, *own);
-    }
 }
 
-/* The integrals of both stresses, added to the sums; whole: with what is hidden in them. thin: as of estimate. */
-static uz_status integrate(uz_stress_sums *sums, const uz_strain_source *from, bool whole, uz_thin_elements *thin,
-                           uz_error *err)
+/* The integrals of both stresses, added to the sums; whole: with what is hidden in them. */
+static uz_status integrate(uz_stress_sums *sums, const uz_strain_source *from, bool whole, uz_error *err)
 {
     const uz_body_model *model = from->model;
-    estimate x = {.model = model, .sums = *sums, .whole = whole, .thin = thin};
+    estimate x = {.model = model, .sums = *sums, .whole = whole};
     const uz_strain_work work = {make_rule, compare, &x};
     uz_status status = uz_nodal_strains_recover(&x.nodal, from, UZ_CONTINUE_LINEAR, NULL, err);
     const int n = x.nodal.strains;
@@ -125,7 +117,7 @@ uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model
 {
     uz_stress_sums sums = {.eta2_of = eta2};
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
-    const uz_status status = integrate(&sums, &from, false, NULL, err);
+    const uz_status status = integrate(&sums, &from, false, err);
     *energy = sums.eta2;
     return status;
 }
@@ -194,17 +186,20 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
                           !uz_is_loaded(model, scene))))
         return 0;
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
-    uz_thin_elements thin = {0};
-    double *own = NULL;
-    uz_status status = scene ? uz_thin_elements_find(&thin, model, scene, NULL) : UZ_OK;
-    if (thin.known && !eta2) {
+    double *least = NULL, *own = NULL;
+    uz_status status = scene ? uz_thin_elements_errors(&least, scene, &from, 1, NULL) : UZ_OK;
+    if (least && !eta2) {
         own = uz_alloc_zero(model->mesh.n_elements, sizeof *own);
         status = own ? UZ_OK : UZ_ERR_MEMORY;
     }
     uz_stress_sums sums = {.eta2_of = eta2 ? eta2 : own};
     if (status == UZ_OK)
-        status = integrate(&sums, &from, true, thin.known ? &thin : NULL, NULL);
-    uz_thin_elements_clear(&thin);
+        status = integrate(&sums, &from, true, NULL);
+    for (int64_t e = 0; e < model->mesh.n_elements && least && status == UZ_OK; e++) {
+        sums.eta2 += fmax(0, least[e] - sums.eta2_of[e]);
+        sums.eta2_of[e] = fmax(least[e], sums.eta2_of[e]);
+    }
+    free(least);
     free(own);
     free(free_strain);
     if (status != UZ_OK)

@@ -7,6 +7,8 @@
  *     value = found + a(e_u, e_z) + depth, within parts of both, of |e_u| |e_z| summed over elements, and of what the
  *             ends of contacts leave
  *
+ * The product knows of thin stacks what their jumps hide (assembly/thin_elements.h).
+ *
  * Where a mesh is refined for it, elements are told what each has of that.
  *
  * The parts cover the errors of generated scenes (tests/extremes/generated_quantities.py; docs/accuracy.md has the
@@ -14,6 +16,7 @@
  * residual in z. */
 #include "run/quantities.h"
 
+#include "assembly/thin_elements.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hooks.h"
@@ -70,6 +73,7 @@ typedef struct {
     bool coarse;
     double own_error;    /* |e_u|^2 */
     double *of_elements; /* 3 n_elements: |e_u|^2 of each; of u plus and less z */
+    double *least[2];    /* n_elements: no less of u, of z; NULL: nothing is known (assembly/thin_elements.h) */
 } adjoint;
 
 /* The estimate of |e_u + times e_z|^2, and what each element has of it. */
@@ -82,6 +86,28 @@ static uz_status errors_of(double *energy, double *of_elements, adjoint *x, doub
     for (int64_t i = 0; i < model->mesh.n_nodes * model->mesh.dim && times != 0; i++)
         x->w[i] = x->answer->u[i] + times * x->z[i];
     return uz_mesh_error_energy(energy, of_elements, model, x->free_strain, times != 0 ? x->w : x->answer->u, err);
+}
+
+/* ... where stacks of elements tell it of u, or of an adjoint: under these parts of the loads and of the strain of the
+ * temperatures. */
+static uz_status least_of(double **least, adjoint *x, const double *nodal, double loads, double warmth, uz_error *err)
+{
+    const int64_t n = x->work->model->mesh.n_elements;
+    double *strain = x->free_strain && warmth != 0 ? uz_alloc(n, sizeof *strain) : NULL;
+    const uz_strain_source from = {.model = x->work->model, .nodal = nodal, .free_strain = strain};
+    *least = NULL;
+    if (x->free_strain && warmth != 0 && !strain)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the strains of %lld elements", (long long)n);
+    for (int64_t e = 0; e < n && strain; e++)
+        strain[e] = warmth * x->free_strain[e];
+    const uz_status status = x->work->place ? UZ_OK : uz_thin_elements_errors(least, x->work->scene, &from, loads, err);
+    free(strain);
+    return status;
+}
+
+static double own_error_of(const adjoint *x, int64_t element)
+{
+    return fmax(x->of_elements[element], x->least[0] ? x->least[0][element] : 0);
 }
 
 static uz_status begin(adjoint *x, uz_error *err)
@@ -119,6 +145,10 @@ static uz_status begin(adjoint *x, uz_error *err)
                                   place ? x->w : x->answer->u, x->answer->r, err);
     if (status == UZ_OK)
         status = errors_of(&x->own_error, x->of_elements, x, 0, err);
+    if (status == UZ_OK)
+        status = least_of(&x->least[0], x, x->answer->u, 1, 1, err);
+    for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK; e++)
+        x->own_error += own_error_of(x, e) - x->of_elements[e];
     return status;
 }
 
@@ -334,8 +364,9 @@ static double product_of_errors(double *part, const adjoint *x, double scale)
     const int64_t n = x->work->model->mesh.n_elements;
     double *other = part + n, sum = 0, weighted = 0, square[2] = {0}, factor[2] = {0};
     for (int64_t e = 0; e < n; e++) {
-        const double own = x->of_elements[e];
-        other[e] = fmax(0, 0.5 * (part[e] + other[e]) - own);
+        const double own = own_error_of(x, e);
+        other[e] =
+            fmax(x->least[1] ? scale * scale * x->least[1][e] : 0, 0.5 * (part[e] + other[e]) - x->of_elements[e]);
         part[e] = sqrt(own * other[e]);
         sum += part[e];
         square[0] += own;
@@ -351,7 +382,7 @@ static double product_of_errors(double *part, const adjoint *x, double scale)
     const double whole = (sum > 0 ? weighted * fmax(1, least / sum) : factor[1] * least) / scale;
     for (int64_t e = 0; e < n; e++)
         part[e] = sum > OF_PRODUCT * norms ? whole * part[e] / weighted
-                  : norms > 0              ? whole * (x->of_elements[e] / square[0] + other[e] / square[1]) / 2
+                  : norms > 0              ? whole * (own_error_of(x, e) / square[0] + other[e] / square[1]) / 2
                                            : 0;
     return whole;
 }
@@ -373,7 +404,7 @@ static uz_status keep_shares(const adjoint *x, const double *part, double second
     if (!share)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the errors of %lld elements", (long long)n);
     for (int64_t i = 0; i < n; i++) {
-        share[i] = part[i] + (x->own_error > 0 ? second * x->of_elements[i] / x->own_error : 0);
+        share[i] = part[i] + (x->own_error > 0 ? second * own_error_of(x, i) / x->own_error : 0);
         sum += share[i];
     }
     for (int64_t i = 0; i < n && sum > 0; i++)
@@ -388,6 +419,7 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     const int64_t n = model->mesh.n_nodes * model->mesh.dim;
     double norm = 0, strain = 0, length = 0, both[2] = {0};
     bool solved = false;
+    const bool energy = out->kind == UZ_QUANTITY_STRAIN_ENERGY; /* its z is u/2, with w for the temperatures, less w */
     const bool pressed =
         x->work->scene->n_contacts > 0 && (out->kind == UZ_QUANTITY_CONTACT_FORCE ||
                                            out->kind == UZ_QUANTITY_REACTION || out->kind == UZ_QUANTITY_MEAN_PRESSURE);
@@ -403,6 +435,10 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     for (int k = 0; k < 2 && status == UZ_OK; k++)
         status =
             errors_of(&both[k], x->of_elements + (k + 1) * model->mesh.n_elements, x, k == 0 ? scale : -scale, err);
+    free(x->least[1]);
+    x->least[1] = NULL;
+    if (status == UZ_OK)
+        status = least_of(&x->least[1], x, x->z, energy ? 0.5 : 0, energy ? -0.5 : 0, err);
     if (status != UZ_OK)
         return status;
     const double share = strain > 0 ? fmin(1, x->own_error / strain) : 0; /* the square of the mesh's error, about */
@@ -431,7 +467,7 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     const uz_certificate *left = &x->answer->summary.certificate;
     out->equations = x->work->place ? sqrt(2 * fmax(0, norm)) * x->work->place->left
                                     : sqrt(2 * fmax(0, norm)) * left->absolute_error + length * left->residual.e1;
-    if (x->work->place && out->kind == UZ_QUANTITY_STRAIN_ENERGY) /* what is left works along itself, too */
+    if (x->work->place && energy) /* what is left works along itself, too */
         out->equations += OF_ITSELF * x->work->place->left * x->work->place->left;
     const double half = out->mesh + out->equations;
     if (!isfinite(half) || !isfinite(shift)) {
@@ -510,8 +546,8 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
         e->n_quantities = i + 1;
     }
     e->asked = work->settings->quantity_error;
-    void *room[] = {x.p, x.h, x.y,           x.g,      x.of_rows, x.depth,    x.bulge,      x.slip,
-                    x.z, x.w, x.free_strain, x.active, x.row_of,  x.pressing, x.of_elements};
+    void *room[] = {x.least[0], x.least[1], x.p, x.h,           x.y,      x.g,      x.of_rows,  x.depth,      x.bulge,
+                    x.slip,     x.z,        x.w, x.free_strain, x.active, x.row_of, x.pressing, x.of_elements};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return status;

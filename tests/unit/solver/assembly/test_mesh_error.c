@@ -3,7 +3,6 @@
 #include "assembly/assembly.h"
 #include "assembly/thin_elements.h"
 #include "body_fixture.h"
-#include "core/vector3.h"
 #include "element/strain_lanes.h"
 #include "element_mesh.h"
 #include "post/parts.h"
@@ -170,7 +169,7 @@ typedef struct {
     const uz_body_model *model;
     const double *u, *free_strain;
     double *average, eta2, stress2, whole2;
-    uz_thin_elements thin;
+    double *least;
 } plain;
 
 typedef struct {
@@ -350,59 +349,6 @@ static double times_of(const plain *x, const plain_element *s, int64_t e)
            ((kind == UZ_TET4 || kind == UZ_TET10) && !is_alone(x, s, e) ? fmax(0.25, others / s->nodes) : 1);
 }
 
-/* The unit normal in the middle of a side of an element, by its diagonals. */
-static void side_normal(double n[3], const plain_element *s, const uz_element_side *side)
-{
-    const int dim = uz_element_type_of(s->element.kind)->dim;
-    double way[2][3] = {{0}, {0, 0, 1}};
-    for (int c = 0; c < dim; c++) {
-        way[0][c] = s->xyz[side->node[dim - 1] * dim + c] - s->xyz[side->node[0] * dim + c];
-        if (dim == 3)
-            way[1][c] = s->xyz[side->node[3] * dim + c] - s->xyz[side->node[1] * dim + c];
-    }
-    uz_cross3(n, way[0], way[1]);
-    uz_unit3(n);
-}
-
-/* What the mean stress between two sides whose loads are known differs by from them, as an energy. */
-static double plain_thin(const plain *x, const plain_element *s, int64_t e)
-{
-    static const int AXES[2][STRESSES][2] = {{{0, 0}, {1, 1}, {0, 1}},
-                                             {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}}};
-    const uz_element_type *type = uz_element_type_of(s->element.kind);
-    double off[STRESSES] = {0}, volume = 0;
-    for (int g = 0; g < s->points; g++)
-        volume += s->volume[g];
-    for (int i = 0; i < type->sides && x->thin.known; i++)
-        for (int j = i + 1; j < type->sides; j++) {
-            const double *known = x->thin.known + e * UZ_ELEMENT_SIDES;
-            double n[3], m[3], delta = -0.5 * (known[i] + known[j]), middle = 0;
-            for (int c = 0; c < type->dim; c++) { /* opposite sides have their middles on both sides of the centre */
-                double at[2] = {0};
-                for (int k = 0; k < type->side[i].corners; k++) {
-                    at[0] += type->local[type->side[i].node[k]][c];
-                    at[1] += type->local[type->side[j].node[k]][c];
-                }
-                middle += at[0] * at[1];
-            }
-            side_normal(n, s, &type->side[i]);
-            side_normal(m, s, &type->side[j]);
-            if (isnan(delta) || middle >= 0 || uz_dot3(n, m) > -0.9)
-                continue;
-            for (int c = 0; c < 3; c++)
-                n[c] -= m[c];
-            uz_unit3(n);
-            for (int c = 0; c < s->stresses; c++) {
-                const int *a = AXES[type->dim == 3][c];
-                for (int g = 0; g < s->points; g++)
-                    delta += (a[0] == a[1] ? 1 : 2) * n[a[0]] * n[a[1]] * s->volume[g] / volume * s->stress[g][c];
-            }
-            for (int c = 0; c < s->stresses; c++)
-                off[c] += delta * n[AXES[type->dim == 3][c][0]] * n[AXES[type->dim == 3][c][1]];
-        }
-    return volume * complementary(s->element.model, s->element.lame, off);
-}
-
 static void add_energies(plain *x, const plain_element *s, int64_t e)
 {
     double eta2 = 0;
@@ -421,7 +367,7 @@ static void add_energies(plain *x, const plain_element *s, int64_t e)
         x->stress2 += s->volume[g] * complementary(s->element.model, s->element.lame, s->stress[g]);
         x->whole2 += s->volume[g] * work;
     }
-    x->eta2 += fmax(eta2, plain_thin(x, s, e));
+    x->eta2 += fmax(eta2, x->least ? x->least[e] : 0);
 }
 
 static double plain_estimate(double *share, const uz_body_model *model, const uz_scene *scene, const double *u)
@@ -431,7 +377,8 @@ static double plain_estimate(double *share, const uz_body_model *model, const uz
     double *free_strain = NULL;
     CHECK_INT(uz_free_strains(&free_strain, model, scene, NULL), UZ_OK);
     x.free_strain = free_strain;
-    CHECK_INT(uz_thin_elements_find(&x.thin, model, scene, NULL), UZ_OK);
+    const uz_strain_source from = {.model = model, .nodal = u, .free_strain = free_strain};
+    CHECK_INT(uz_thin_elements_errors(&x.least, scene, &from, 1, NULL), UZ_OK);
     x.average = body_room(model->mesh.n_nodes * model->n_materials * (STRESSES + 1), sizeof *x.average);
     for (int64_t e = 0; e < model->mesh.n_elements; e++) {
         look_at(&s, &x, e, SAMPLES);
@@ -441,7 +388,7 @@ static double plain_estimate(double *share, const uz_body_model *model, const uz
         look_at(&s, &x, e, ENERGY);
         add_energies(&x, &s, e);
     }
-    uz_thin_elements_clear(&x.thin);
+    free(x.least);
     free(x.average);
     free(free_strain);
     *share = sqrt(x.stress2 / x.whole2);
@@ -544,40 +491,43 @@ TEST(estimate_of_boxes_is_that_of_single_elements)
         }
 }
 
-/* A strip, a bar, a plate one element thick, squeezed evenly between what is at two opposite sides: where that is known
- * and does not squeeze as much, all of it is error, V s^2 / E. */
-TEST(elements_one_thick_owe_the_stress_between_their_loads)
+/* A strip, a bar, a plate of one or two elements, squeezed evenly between what is at two opposite sides: where that is
+ * known and does not squeeze as much, all of it is error, V s^2 / E. Four are not thin any more. */
+TEST(thin_bodies_owe_the_stress_between_their_loads)
 {
-    enum { PRESSED, FREE, HALF, PULLED, STANDARD, TWO, CONTACT, FORCE, WAYS };
+    enum { PRESSED, FREE, HALF, PULLED, STANDARD, CONTACT, FORCE, WAYS };
     static const double TOLD[WAYS] = {[FREE] = 1, [HALF] = 0.5, [PULLED] = 2};
+    static const int THICK[] = {1, 2, 4};
     for (int solid = 0; solid < 2; solid++)
-        for (int way = 0; way < WAYS; way++) {
+        for (int way = 0; way < 3 * WAYS; way++) {
             const char *element = solid ? "hex8" : "quad4", *below = solid ? "back" : "bottom",
                        *above = solid ? "front" : "top";
-            const int dim = solid ? 3 : 2, thick = way == TWO ? 2 : 1;
+            const int dim = solid ? 3 : 2, thick = THICK[way / WAYS], ends = way % WAYS;
+            const bool along = thick == 4; /* cells a quarter as long as the body is thick */
             uz_scene s = body_scene(solid ? UZ_SOLID : UZ_PLANE_STRESS, element, (double[3]){6, solid ? 4 : 1, 1},
-                                    (int64_t[3]){6, solid ? 2 : thick, thick});
-            s.formulation = way == STANDARD ? UZ_FORMULATION_AUTO : UZ_FORMULATION_INCOMPATIBLE;
+                                    (int64_t[3]){along ? 24 : 6, solid ? 2 : thick, thick});
+            s.formulation = ends == STANDARD ? UZ_FORMULATION_AUTO : UZ_FORMULATION_INCOMPATIBLE;
             s.materials[0].poisson = 0;
             const double stress = 1e-3 * s.materials[0].young, pull[3] = {0, solid ? 0 : stress, solid ? stress : 0};
             body_hold(&s, "left", 0, 0, 0);
-            if (way == PRESSED || way == HALF)
+            if (ends == PRESSED || ends == HALF)
                 body_load(&s, UZ_LOAD_PRESSURE, above, stress, 0, 0)->value = stress;
-            if (way == PRESSED)
+            if (ends == PRESSED)
                 body_load(&s, UZ_LOAD_PRESSURE, below, stress, 0, 0)->value = stress;
-            if (way == PULLED)
+            if (ends == PULLED)
                 body_load(&s, UZ_LOAD_TRACTION, above, pull[0], pull[1], pull[2]);
-            if (way == PULLED) /* outwards at both */
+            if (ends == PULLED) /* outwards at both */
                 body_load(&s, UZ_LOAD_TRACTION, below, 0, -pull[1], -pull[2]);
-            if (way == FORCE)
+            if (ends == FORCE)
                 body_load(&s, UZ_LOAD_FORCE, above, 1, 0, 0);
-            if (way == CONTACT)
+            if (ends == CONTACT)
                 body_plane(&s, below, (double[3]){0}, (double[3]){0, !solid, solid});
             uz_body_model model = body_model(&s);
             double *u = body_room(model.mesh.n_nodes * dim, sizeof *u);
             for (int64_t a = 0; a < model.mesh.n_nodes; a++)
                 u[a * dim + dim - 1] = -1e-3 * model.mesh.xyz[a * dim + dim - 1];
-            const double got = uz_estimate_mesh_error(NULL, NULL, &model, &s, u), square = TOLD[way] * TOLD[way];
+            const double told = along ? 0 : TOLD[ends], square = told * told;
+            const double got = uz_estimate_mesh_error(NULL, NULL, &model, &s, u);
             CHECK_MSG(fabs(got - sqrt(square / (1 + square))) < 1e-12, "%s, way %d: %.17g", element, way, got);
             free(u);
             uz_body_model_clear(&model);
@@ -586,12 +536,16 @@ TEST(elements_one_thick_owe_the_stress_between_their_loads)
 }
 
 /* Warm strips and bars, clamped at one end: nothing jumps between elements, and the stress at the clamp is off by as
- * much as it is. Against the solution of a fine mesh the error is 0.68 of the norm of both. */
-TEST(a_strip_one_element_thick_does_not_hide_its_error)
+ * much as it is. Against the solution of a fine mesh the error of strips is 0.68 of the norm of both, 0.73 and 0.53
+ * where they are two elements thick. */
+TEST(a_thin_strip_does_not_hide_its_error)
 {
-    for (int solid = 0; solid < 2; solid++) {
+    static const int CELLS[][2] = {{6, 1}, {6, 2}, {12, 2}};
+    for (int k = 0; k < 6; k++) {
+        const bool solid = k >= 3;
+        const int *cells = CELLS[k % 3];
         uz_scene s = body_scene(solid ? UZ_SOLID : UZ_PLANE_STRESS, solid ? "hex8" : "quad4", (double[3]){6, 1, 1},
-                                (int64_t[3]){6, 1, 1});
+                                (int64_t[3]){cells[0], cells[1], cells[1]});
         s.formulation = UZ_FORMULATION_INCOMPATIBLE;
         s.materials[0].poisson = 0;
         s.materials[0].expansion = 1e-5;
@@ -600,7 +554,7 @@ TEST(a_strip_one_element_thick_does_not_hide_its_error)
         uz_result *x = body_solve(&s, 1e-10);
         uz_body_model model = body_model(&s);
         const double got = uz_estimate_mesh_error(NULL, NULL, &model, &s, x->u);
-        CHECK_MSG(got > 0.5 && got < 0.75, "%.17g", got);
+        CHECK_MSG(got > 0.5 && got < 0.75, "%d x %d: %.17g", cells[0], cells[1], got);
         uz_body_model_clear(&model);
         uz_result_free(x);
         uz_scene_clear(&s);
