@@ -174,6 +174,15 @@ double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, boo
            (pairs ? (double)uz_csc_bytes(&base->K) : 0) + 8 * (NODAL * n + FREE * (double)base->d);
 }
 
+/* Is the body only carried along? The certificate takes its strains for rounding, and there is nothing to strain it. */
+static bool is_carried(const uz_finite_run *run)
+{
+    bool so = run->certificate.residual == 0 && !uz_is_loaded(&run->base, &run->scene);
+    for (int64_t i = 0; i < run->n_r && so; i++)
+        so = !(run->r[i] < 0);
+    return so;
+}
+
 /* Of a body at rest, as no part of the load was borne, nothing is told; nor where there is no memory, but that a mesh
  * is refined by it. */
 static uz_status mesh_error(double *error, const uz_finite_run *run, uz_error *err)
@@ -182,6 +191,8 @@ static uz_status mesh_error(double *error, const uz_finite_run *run, uz_error *e
     *error = NAN;
     const uz_status status =
         known ? uz_finite_mesh_error(error, NULL, &run->base, run->free_strain, run->at.u, asked ? err : NULL) : UZ_OK;
+    if (status == UZ_OK && known && is_carried(run))
+        *error = 0;
     return asked ? status : UZ_OK;
 }
 

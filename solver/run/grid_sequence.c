@@ -355,7 +355,8 @@ static bool is_doubted(const search *g, const answers *x, int64_t n_elements, in
         if (!is_answered(s))
             continue;
         estimated = estimated || !s->guarantee.proved;
-        wrong = wrong || (again && (isnan(now->potential) ? n_elements < few : refuted(now - 1, now)));
+        const bool strained = s->discretization_error != 0; /* else energies are rounding */
+        wrong = wrong || (again && strained && (isnan(now->potential) ? n_elements < few : refuted(now - 1, now)));
         finer = finer || wants_finer(s);
     }
     return g->refines && x->error <= g->requested && (finer || (estimated && (again ? wrong : n_elements < few)));

@@ -554,6 +554,9 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
         out->straightened = uz_bound_straighten(&model.mesh);
         status = prove(result, &g, &model, &problem->scene, &err);
     }
+    const double whole = s->certificate.energy_norm;
+    if (out->proved && !isfinite(out->relative) && s->discretization_error == 0 && out->bound < whole)
+        out->relative = out->bound / (whole - out->bound); /* it is carried along: as the certificate's error */
     if (status == UZ_OK && out->proved && problem->scene.refine)
         status = share_gap(result, &g, &err);
     if (status == UZ_OK && out->proved && result->evaluation->n_quantities > 0)

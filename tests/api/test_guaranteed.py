@@ -150,8 +150,8 @@ def test_nothing_to_be_relative_to(s):
         check(summary["outcome"] == "converged" and summary["error"]["total"] == summary["error"]["bound"] == 0, summary)
     held = [{"on": "left", "ux": 1, "uy": 1}]
     summary = summary_of(s, asked({"total": 0.01, "guaranteed": True}, loads=[], supports=held, contacts=[]))
-    check(summary["outcome"] == "mesh_limit" and 0 < summary["error"]["bound"] < 1e-6, summary["error"])
-    check(summary["error"]["total"] is None and "may be all of the answer" in summary["message"], summary["message"])
+    error = summary["error"]  # carried along by its supports: relative to its way
+    check(summary["outcome"] == "converged" and 0 < error["bound"] < 1e-6 and 0 < error["total"] < 1e-9, error)
 
 
 def test_cases_and_chosen_cells(s):

@@ -161,6 +161,26 @@ def test_a_body_that_is_only_carried_loses_nothing(s):
                 check(summary["outcome"] == "converged" and summary["error"]["mesh"] == 0 and not summary["warnings"], (moved, loads, summary))
 
 
+def test_a_body_that_is_only_carried_loses_nothing_on_any_mesh(s):
+    """Of large deformation its mesh's error was null, and a mesh to refine ended as mesh_limit; so did a guaranteed error."""
+    turned = {"rotation": {"about": [3, 5], "angle": 40}}
+    for kinematics, moved, accuracy in (("finite", {"ux": 1, "uy": 2}, {"total": 0.05}), ("finite", turned, {"total": 0.05}),
+                                        ("fixed", {"ux": 1, "uy": 2}, {"total": 0.05, "guaranteed": True})):
+        for refine in (False, True):
+            mesh = {"box": {"size": [2, 1], "cells": [4, 2], "element": "quad8"}, **({"refine": "auto"} if refine else {})}
+            material = {"on": "all", "young": 1000, "poisson": 0.3, **({"law": "neo_hooke"} if kinematics == "finite" else {})}
+            summary = solved(s, {"problem": {"kind": "scene", "model": "plane_strain", "kinematics": kinematics, "mesh": mesh, "materials": [material],
+                                             "supports": [{"on": "left", **moved}]},
+                                 "solver": {"accuracy": accuracy} if refine or kinematics == "fixed" else {}})["summary"]
+            check(summary["outcome"] == "converged" and summary["error"]["total"] < 1e-9, (kinematics, moved, refine), summary)
+    # what strains it by as little as rounding is not told to lose nothing
+    summary = solved(s, {"problem": {
+        "kind": "scene", "model": "plane_strain", "kinematics": "finite", "mesh": {"box": {"size": [2, 1], "cells": [4, 2]}},
+        "materials": [{"on": "all", "young": 1000, "poisson": 0.3, "law": "neo_hooke"}], "supports": [{"on": "left", "ux": 1, "uy": 2}],
+        "loads": [{"on": "right", "traction": [1e-13, 0]}]}})["summary"]
+    check(summary["error"]["mesh"] is None, summary["error"], summary["outcome"])
+
+
 def test_mistakes_in_what_is_asked_name_what_is_there(s):
     for accuracy, there in (({"quantity": "contact.force", "on": "upper"}, 'no contact is on "upper"; there is "top"'),
                             ({"quantity": "reaction", "on": "top", "direction": [0, 1]}, 'no support is on "top"; there is "bottom", "left"')):
