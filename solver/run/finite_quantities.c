@@ -172,6 +172,7 @@ uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *
     const uz_stop stop = {&run->hooks, run->deadline};
     tangent x = {.run = run};
     uz_body_model displaced = {.mesh.xyz = NULL};
+    const bool cut = answer->summary.outcome == UZ_MESH_LIMIT; /* or that is the answer under a part */
     bool known = false;
     if (run->problem->n_quantities == 0)
         return UZ_OK;
@@ -191,9 +192,10 @@ uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *
         status = prepare(&known, &x, err);
     const uz_quantity_large place = {.of = &x,
                                      .place = {&displaced, at->loads},
-                                     .why = !whole  ? "this is the answer under a part of the load"
-                                            : known ? NULL
-                                                    : "its tangent has no factor",
+                                     .why = !whole   ? "this is the answer under a part of the load"
+                                            : cut    ? "an obstacle, or another body, stands in it between rows"
+                                            : !known ? "its tangent has no factor"
+                                                     : NULL,
                                      .left = run->certificate.residual * sqrt(2 * at->body.energy),
                                      .solve = solve,
                                      .energy = energy_of,

@@ -24,6 +24,7 @@
 #include "post/functional.h"
 #include "run/problem.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -321,6 +322,18 @@ static double end_error(double *part, const adjoint *x)
     return sum;
 }
 
+/* Of the sums K u, by their largest terms, in the adjoint: all that is left of forces that are known from balance. */
+static double rounding_of(const adjoint *x)
+{
+    const uz_body_model *model = x->work->model;
+    double sum = 0;
+    for (int64_t i = 0; i < model->mesh.n_nodes * model->mesh.dim; i++) {
+        const int64_t j = model->dof[i];
+        sum += j >= 0 ? fabs(x->z[i] * model->K.val[model->K.ptr[j]] * x->answer->u[i]) : 0;
+    }
+    return DBL_EPSILON * sum;
+}
+
 /* No row presses, and the nearest obstacle is no farther than displacements may be off: is there contact? */
 static bool is_about_to_touch(const adjoint *x, double mesh_error)
 {
@@ -465,8 +478,9 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     out->mesh = times * out->mesh + OF_SECOND * share * whole;
     /* where z is a rigid motion, of forces that are in balance, the residual at free nodes is what is left */
     const uz_certificate *left = &x->answer->summary.certificate;
-    out->equations = x->work->place ? sqrt(2 * fmax(0, norm)) * x->work->place->left
-                                    : sqrt(2 * fmax(0, norm)) * left->absolute_error + length * left->residual.e1;
+    out->equations = x->work->place
+                         ? sqrt(2 * fmax(0, norm)) * x->work->place->left
+                         : sqrt(2 * fmax(0, norm)) * left->absolute_error + length * left->residual.e1 + rounding_of(x);
     if (x->work->place && energy) /* what is left works along itself, too */
         out->equations += OF_ITSELF * x->work->place->left * x->work->place->left;
     const double half = out->mesh + out->equations;

@@ -72,7 +72,7 @@ def test_finer_meshes_are_in_their_intervals(s):
 
 
 def test_what_is_told_where_there_is_no_interval(s):
-    """Of a part of the load, no mesh's part; as accuracy a quantity is refused."""
+    """Of a part of the load, no mesh's part, nor of an answer that stands in its obstacle; as accuracy a quantity is refused."""
     request = copy.deepcopy(BLOCK)
     request["problem"]["materials"][0]["law"] = "st_venant_kirchhoff"
     request["problem"]["supports"][1]["uy"] = -0.6
@@ -80,6 +80,13 @@ def test_what_is_told_where_there_is_no_interval(s):
     job = expect(s.post(request, WAIT), 200).json
     one = job["summary"]["quantities"][0]
     check(job["summary"]["outcome"] == "unstable" and "part of the load" in one["why"] and one["low"] is None, job["summary"])
+    # nor where an obstacle stands in the body between its rows
+    request["problem"].update(mesh={"box": {"size": [4, 1], "cells": [32, 8], "element": "quad8"}}, supports=[{"on": "top", "ux": 0, "uy": -0.2}],
+                              contacts=[{"on": "bottom", "obstacle": {"circle": {"center": [2.05, -0.1], "radius": 0.1}}}])
+    request["problem"]["materials"][0]["law"] = "neo_hooke"
+    summary = s.solve(request)["summary"]
+    one = summary["quantities"][0]
+    check(summary["outcome"] == "mesh_limit" and "between rows" in one["why"] and one["low"] is None, summary)
     request = copy.deepcopy(BLOCK)
     request["solver"] = {"accuracy": {"quantity": "contact.force", "on": "bottom", "relative": 0.05}}
     reply = s.post(request)
