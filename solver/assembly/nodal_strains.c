@@ -27,34 +27,42 @@ typedef struct {
 /* The constants that strains and stresses depend on, and whose. */
 typedef struct {
     double constant[4];
+    const uz_anisotropy *general; /* of a material with directions: what it has in place of the first two */
     int32_t material;
 } constants;
+
+static int compare_constants(const constants *x, const constants *y)
+{
+    for (int i = 0; i < 4; i++)
+        if (x->constant[i] != y->constant[i])
+            return x->constant[i] < y->constant[i] ? -1 : 1;
+    return x->general && y->general ? memcmp(x->general, y->general, sizeof *x->general) : !y->general - !x->general;
+}
 
 static int by_constants(const void *a, const void *b)
 {
     const constants *x = a, *y = b;
-    for (int i = 0; i < 4; i++)
-        if (x->constant[i] != y->constant[i])
-            return x->constant[i] < y->constant[i] ? -1 : 1;
-    return x->material < y->material ? -1 : 1;
+    const int order = compare_constants(x, y);
+    return order ? order : x->material < y->material ? -1 : 1;
 }
 
-/* alike (n_materials): the first material of the same constants, as what it is called makes no strain jump; one with
- * directions is like no other. */
+/* alike (n_materials): the first material of the same constants, as what it is called makes no strain jump. */
 static bool find_alike(int32_t *alike, const uz_body_model *model)
 {
     const int64_t n = model->n_materials;
     constants *list = uz_alloc(n, sizeof *list);
     for (int64_t k = 0; k < n && list; k++) {
         const uz_body_material *m = &model->materials[k];
-        const bool own = m->lame.general;
-        list[k] = (constants){{own ? -1 : m->lame.lambda, own ? (double)k : m->lame.mu, m->expansion, (double)m->law},
-                              (int32_t)k};
+        const uz_lame *lame = &m->lame;
+        list[k] =
+            (constants){{lame->general ? 0 : lame->lambda, lame->general ? 0 : lame->mu, m->expansion, (double)m->law},
+                        lame->general,
+                        (int32_t)k};
     }
     if (list)
         qsort(list, (size_t)n, sizeof *list, by_constants);
     for (int64_t k = 0; k < n && list; k++) {
-        const bool same = k > 0 && memcmp(list[k].constant, list[k - 1].constant, sizeof list->constant) == 0;
+        const bool same = k > 0 && compare_constants(&list[k], &list[k - 1]) == 0;
         alike[list[k].material] = same ? alike[list[k - 1].material] : list[k].material;
     }
     free(list);

@@ -124,6 +124,16 @@ def test_an_element_alone_with_its_material_hides_nothing(s):
         check(own["error"]["mesh"] > 0.9 * one["error"]["mesh"], (kind, own["error"], one["error"]))
         wide, told = own["quantities"][0], one["quantities"][0]
         check(wide["high"] - wide["low"] > 0.5 * (told["high"] - told["low"]), (kind, wide, told))
+    # nor a material with directions by another name: tri3 were told half of their error, tri6 a fourth
+    for kind in ("tri3", "tri6", "tet4", "tet10", "quad8"):
+        told = []
+        for materials in (1, 2):
+            request = labelled(kind, materials)
+            for material in request["problem"]["materials"]:
+                del material["young"], material["poisson"]
+                material["orthotropic"] = {"young": [3000, 1000, 2000], "poisson": [0.2, 0.25, 0.3], "shear": [400, 350, 300]}
+            told.append(solved(s, request)["summary"]["error"]["mesh"])
+        check(abs(told[1] / told[0] - 1) < 1e-9, kind, told)
     # nor does a body of one element
     one = labelled("tri3", 1)
     one["problem"]["mesh"] = {"nodes": [[0, 0], [1, 0], [0, 1]], "elements": {"tri3": [[0, 1, 2]]},
