@@ -200,8 +200,8 @@ uz_status uz_load_on_modes(uz_pressing *how, double *y, const double *Z, int64_t
             largest = fmax(largest, terms[c]);
         }
         const double scale = largest > 0.0 ? largest : 1.0;
-        for (int64_t c = 0; c < k; c++) /* what no load works on counts with the largest of the others */
-            terms[c] = terms[c] > 0.0 ? terms[c] : scale;
+        for (int64_t c = 0; c < k; c++) /* what no load works on, but by rounding, counts with the largest */
+            terms[c] = terms[c] > ROUNDING * scale ? terms[c] : scale;
         memcpy(s.b, load, (size_t)k * sizeof *s.b);
         solve(&s, scale);
         if (sqrt(dot(s.y, s.y, k)) > tolerance * scale)

@@ -7,6 +7,7 @@ import subprocess
 
 import service
 from service import SCENE, check, expect
+from two_bodies import body
 
 SHARED = True  # one service for all tests
 
@@ -17,9 +18,9 @@ N = "%%MatrixMarket matrix coordinate real general\n1 2 1\n1 2 1\n"
 
 def block(load=-0.05, **more):
     """A block on a plane with a roller at its left side: nothing but the plane holds it along y."""
-    body = copy.deepcopy(SCENE)
-    body["problem"].update(supports=[{"on": "left", "ux": 0}], loads=[{"on": "top", "traction": [0, load]}])
-    return {**body, "solver": {}, **more}
+    request = copy.deepcopy(SCENE)
+    request["problem"].update(supports=[{"on": "left", "ux": 0}], loads=[{"on": "top", "traction": [0, load]}])
+    return {**request, "solver": {}, **more}
 
 
 def chain(*p):
@@ -81,6 +82,24 @@ def test_rounding_holds_nothing(s):
 
 
 # ---------------------------------------------------------------- refused
+
+def test_rounding_of_turned_loads_is_none(s):
+    """A block on a plane, another one on it, that presses both; the lower one is pushed to its wall. Turned by an angle, what rounding left of
+    that push along the way up was taken for a load, and the stack refused as not pressed on, at 63 of 72 angles."""
+    forces = []
+    for degrees in (0, 0.3, 45.3, 90.3, 200.3, 305.3):
+        a = math.radians(degrees)
+        across, up = [math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]
+        request = body(["quad4", "tri3"], [(3, 1), (3, 1)], [lambda x, y, k=k: [2 * x * c + (y + k) * u for c, u in zip(across, up)] for k in (0, 1)],
+                       {"wall": [(0, "left"), (1, "left")], "foot": [(0, "bottom")], "roof": [(0, "top")], "floor": [(1, "bottom")], "top": [(1, "top")],
+                        "side": [(0, "right")]},
+                       model="plane_strain", kinematics="fixed", materials=[{"on": "all", "young": 1000, "poisson": 0.3}],
+                       supports=[{"on": "wall", "normal": across, "u": 0}],
+                       loads=[{"on": "top", "pressure": 3}, {"on": "side", "traction": [-t for t in across]}],
+                       contacts=[{"on": "foot", "obstacle": {"plane": {"point": [0, 0], "normal": up}}}, {"on": "floor", "with": "roof"}])
+        forces.append(ended(s, request)["summary"]["contact"]["reaction_sum"])
+    check(all(abs(f / forces[0] - 1) < 1e-6 for f in forces), forces)
+
 
 def test_the_motion_is_named(s):
     error = error_of(s, block(0.05))
