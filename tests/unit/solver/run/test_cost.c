@@ -6,6 +6,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 /* A solid of hex8 under few rows. */
 static bool is_surely_free(uz_cost_plan *plan, int64_t nx, int64_t ny, int64_t nz, uz_operator asked, size_t limit)
@@ -44,6 +45,36 @@ TEST(a_factor_that_cannot_fit_is_not_counted)
     uz_cost_plan plan;
     CHECK(is_surely_free(&plan, 40, 40, 40, UZ_OPERATOR_AUTO, (size_t)1 << 30));
     CHECK(!plan.form[0].fits);
+}
+
+/* A K of a user's may have gaps in its diagonal, and fewer entries than rows. Its entries stand for a vector while it
+ * is timed, and what lies behind them, here a page that can't be read, is none. */
+TEST(the_rate_of_k_is_measured_within_its_entries)
+{
+    enum { ENTRIES = 1 << 18 };
+    const int64_t d = 4 * ENTRIES;
+    const size_t bytes = ENTRIES * sizeof(double), page = 1 << 16;
+    char *room = mmap(NULL, bytes + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    int64_t *ptr = calloc((size_t)d + 1, sizeof *ptr), *idx = malloc(ENTRIES * sizeof *idx);
+    CHECK(room != MAP_FAILED && ptr && idx && mprotect(room + bytes, page, PROT_NONE) == 0);
+    for (int64_t j = 0; j <= d; j++)
+        ptr[j] = (j + 3) / 4;
+    for (int64_t k = 0; k < ENTRIES; k++)
+        idx[k] = 4 * k;
+    const uz_settings settings = uz_settings_default();
+    uz_csc K = {.rows = d, .cols = d, .ptr = ptr, .idx = idx, .val = (double *)(void *)room}, N = {.rows = 0};
+    CHECK(uz_csc_init(&N, 0, d, 0, NULL) == UZ_OK);
+    CHECK(uz_cost_size_of(&K, &N, NULL, NULL, 0, 0, &settings).entry_s == 0);
+    for (int64_t k = 0; k < ENTRIES; k++) /* as many as rows: it is measured */
+        idx[k] = k;
+    for (int64_t j = 0; j <= d; j++)
+        ptr[j] = j < ENTRIES ? j : ENTRIES;
+    K.rows = K.cols = ENTRIES;
+    CHECK(uz_cost_size_of(&K, &N, NULL, NULL, 0, 0, &settings).entry_s > 0);
+    uz_csc_clear(&N);
+    munmap(room, bytes + page);
+    free(ptr);
+    free(idx);
 }
 
 /* A cycle on tet4 takes about the time of one on hex8 of as many dofs: most of it is not reading K. */
