@@ -4,8 +4,9 @@
  *     adjoint z_h: one solve on the factor that is there, the rows in contact held as equations
  *     a(e_u, e_z) = 1/4 (|e_u + e_z|^2 - |e_u - e_z|^2), each square by the recovered stresses
  *     depth: what obstacles that stand in sides between their nodes come to, by the adjoint's reactions
- *     value = found + a(e_u, e_z) + depth, within parts of both, of |e_u| |e_z| summed over elements, and of what the
- *             ends of contacts leave
+ *     springs: what those at nodes do otherwise than those that are spread over sides
+ *     value = found + a(e_u, e_z) + depth + springs, within parts of these, of |e_u| |e_z| summed over elements, and of
+ *             what the ends of contacts leave
  *
  * The product knows of thin stacks what their jumps hide (assembly/thin_elements.h).
  *
@@ -20,6 +21,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "linalg/blas.h"
 #include "post/balance.h"
 #include "post/functional.h"
 #include "run/problem.h"
@@ -32,7 +34,7 @@
 
 /* Parts of the half width: of the estimate, of what depths and ends of contacts come to. */
 #define OF_ESTIMATE 0.5
-#define OF_DEPTH    0.5
+#define OF_DEPTH    0.5 /* also of springs at nodes */
 #define OF_END      0.1
 /* ... and of the product of the norms of both errors at least, where elements say less. */
 #define OF_PRODUCT 0.5
@@ -285,6 +287,65 @@ static double depth_shift(const adjoint *x, const uz_functional *of, const doubl
     return of->times * sum;
 }
 
+/* k u along z at a place amid these nodes, with their shape functions there. */
+static double spring_product(const adjoint *x, const double *k, const int64_t *node, const double *N, int nodes)
+{
+    const int dim = x->work->model->mesh.dim;
+    const double own = x->work->place ? x->own : 0;
+    double sum = 0;
+    for (int c = 0; c < dim; c++) {
+        double u = 0, z = 0;
+        for (int a = 0; a < nodes; a++) {
+            u += N[a] * x->answer->u[node[a] * dim + c];
+            z += N[a] * x->z[node[a] * dim + c];
+        }
+        sum += k[c] * u * (z + own * u);
+    }
+    return sum;
+}
+
+/* What springs at nodes, by the parts that these have of a group's area, do on u along z, less what the same do that
+ * are spread evenly over its sides. */
+static double spring_difference(const adjoint *x, const uz_group *group, const double *k)
+{
+    static const double ONE = 1;
+    double at_nodes = 0, evenly = 0, weights = 0, area = 0;
+    for (int64_t f = 0; f < group->n_faces; f++) {
+        double xyz[3 * UZ_FACE_NODES], N[UZ_FACE_NODES], weight[UZ_FACE_NODES], n[3] = {0}, point[2];
+        int64_t node[UZ_FACE_NODES];
+        uz_side side;
+        uz_body_side(&side, xyz, node, x->work->model, group->face[f]);
+        uz_side_positive_weights(weight, &side);
+        for (int a = 0; a < side.nodes; a++) {
+            weights += weight[a];
+            at_nodes += weight[a] * spring_product(x, k, node + a, &ONE, 1);
+        }
+        for (int g = 0; g < uz_side_gauss_count(&side); g++) {
+            const double part = uz_side_gauss(point, &side, g);
+            uz_side_shape(N, &side, point);
+            uz_side_area_vector(n, &side, point);
+            area += part * uz_norm(3, n);
+            evenly += part * uz_norm(3, n) * spring_product(x, k, node, N, side.nodes);
+        }
+    }
+    return area > 0 ? at_nodes / weights - evenly / area : 0;
+}
+
+/* Where a body turns on its springs those at the ends of sides hold it too well. With a_h for a with springs at nodes,
+ * l(u) - l(u_h) has f(z_h) - a(u_h, z_h) = (a_h - a)(u_h, z_h) besides a(e_u, e_z). */
+static double spring_shift(const adjoint *x)
+{
+    double sum = 0;
+    for (int64_t k = 0; k < x->work->scene->n_supports; k++) {
+        const uz_support *support = &x->work->scene->supports[k];
+        const bool spring = support->kind == UZ_SUPPORT_SPRING;
+        const uz_group *group = spring ? uz_mesh_group(&x->work->model->mesh, support->on, "", NULL) : NULL;
+        if (group && group->kind == UZ_GROUP_FACES)
+            sum += spring_difference(x, group, support->spring);
+    }
+    return sum;
+}
+
 /* What the end of a contact amid a side leaves open: of each side with rows that press and others that do not, what it
  * would come to if the open ones were closed by force, or the pressing ones let go. -> part, of its element, and sum.
  */
@@ -462,12 +523,12 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     for (int64_t i = 0; i < n; i++)
         length = hypot(length, x->z[i]);
     const double depth = depth_shift(x, of, x->depth), bulge = depth_shift(x, of, x->bulge);
-    const double shift = (both[0] - both[1]) / (4 * scale);
+    const double shift = (both[0] - both[1]) / (4 * scale), spring = spring_shift(x);
     const double of_kind = !pressed ? OF_OTHER : x->free_strain ? OF_HEAT : OF_CONTACT;
     const double times = of_kind * (x->work->place ? OF_LARGE : 1);
     double *part = x->of_elements + model->mesh.n_elements;
-    out->mesh = OF_ESTIMATE * fabs(shift) + product_of_errors(part, x, scale) + OF_DEPTH * fabs(depth) + fabs(bulge) +
-                end_error(part, x) + of->blur;
+    out->mesh = OF_ESTIMATE * fabs(shift) + product_of_errors(part, x, scale) +
+                OF_DEPTH * (fabs(depth) + fabs(spring)) + fabs(bulge) + end_error(part, x) + of->blur;
     double whole = fabs(out->found); /* a reaction may be what large forces leave of each other */
     for (int64_t i = 0; i < model->m && out->kind == UZ_QUANTITY_REACTION; i++)
         whole += fabs(x->answer->r[i]);
@@ -488,7 +549,7 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
         snprintf(out->why, sizeof out->why, "nothing bounds what the equations leave of it");
         return UZ_OK;
     }
-    out->value = out->found + shift + depth;
+    out->value = out->found + shift + depth + spring;
     out->low = out->value - half;
     out->high = out->value + half;
     return UZ_OK;

@@ -121,6 +121,26 @@ def test_forces_that_balance_tells_are_in_their_intervals(s):
         check(force["low"] <= true <= force["high"] and force["high"] - force["low"] < 1e-11, (formulation, cells, load), force)
 
 
+def test_springs_at_nodes_are_those_of_the_body(s):
+    """A stiff block on soft ground that is pushed aside at its top turns by F H / (k L^2 / 12). Springs at the nodes of three sides of linear
+    elements are stiffer by 2/9, and neither jumps of stress nor intervals knew of it: half widths were of 1e-5 of that."""
+    for element in ("quad4", "tri3", "quad8", "hex8", "tet4", "hex20", "tet10"):
+        solid = element in ("hex8", "tet4", "hex20", "tet10")
+        aside, along, rest = [[1, 0], [0, 1], []] if not solid else [[1, 0, 0], [0, 1, 0], [0]]
+        box = {"size": [3, 2, 1] if solid else [3, 2], "cells": [3, 2, 2] if solid else [3, 2], "element": element}
+        summary = solved(s, {"problem": {
+            "kind": "scene", "model": "solid" if solid else "plane_stress", "kinematics": "fixed", "mesh": {"box": box},
+            "materials": [{"on": "all", "young": 1e6, "poisson": 0}], "supports": [{"on": "bottom", "spring": [5, 4, *([3] if solid else [])]}],
+            "loads": [{"on": "top", "force": [0.1, 0, *rest]}]},
+            "quantities": [{"quantity": "displacement", "on": "top", "direction": aside}, {"quantity": "reaction", "on": "bottom", "direction": aside},
+                           {"quantity": "strain_energy"}, {"quantity": "reaction", "on": "bottom", "direction": along, "name": "up"}]})
+        turn = 0.1 * 2 / (4 * 3**2 / 12)
+        for one, true in zip(summary["quantities"], (0.1 / 5 + turn * 2, -0.1, 0.05 * (0.1 / 5 + turn * 2), 0)):
+            size = 1e-5 * abs(true) + 1e-9  # of the block's own strain
+            check(one["low"] - size <= true <= one["high"] + size, element, one, true)
+            check(abs(one["value"] - true) < 0.25 * abs(one["on_this_mesh"] - true) + size, element, one, true)  # the rest is of second order
+
+
 def test_facets_of_a_hole_stand_for_its_circle(s):
     """A sector of a plate on a pin too thick for its hole: chords of both circles are alike, and the pin is in none of them."""
     found, turn = [], math.pi / 4
