@@ -44,6 +44,21 @@ static void turned(double out[3], const uz_support *support, const double *x, in
 
 #define OTHER_BODY "the scene's supports are not those of this body"
 
+/* Does a group that turns, or may, take the node along? With large rotations that is another way than the shares of
+ * the group's motion say, which are those of the first step from rest, and another one under each part of the load. */
+static bool is_turned(const prescription *p, const uz_rigid_group *group, int64_t node)
+{
+    const int dim = p->model->mesh.dim;
+    const double *turn = p->scene->supports[group->support].turn;
+    double arm[3] = {0}, way[3] = {0};
+    for (int c = 0; c < dim; c++)
+        arm[c] = p->model->mesh.xyz[node * dim + c] - group->point[c];
+    for (int c = dim == 2 ? 2 : 0; c < 3; c++)
+        for (int i = 1; i < 3 && turn[c] != 0; i++) /* also where it is free: NaN */
+            way[c] = fmax(way[c], fabs(arm[(c + i) % 3]));
+    return p->model->kind != UZ_AXISYMMETRIC && fmax(fmax(way[0], way[1]), way[2]) > AGREE * p->model->mesh.extent;
+}
+
 /* A node of a rigid group has what the group's motion makes of n . u: what another support gives it, too, has to be
  * that, and nothing of it may be free. */
 static uz_status agree_with_group(const prescription *p, int64_t support, int64_t node, const double n[3], double value,
@@ -57,6 +72,7 @@ static uz_status agree_with_group(const prescription *p, int64_t support, int64_
     const int64_t count = uz_carriers(&from, &share, model, node);
     double u[3], along = 0, size = fabs(value);
     char where[96];
+    const bool turns = uz_is_finite_answer(p->scene) && is_turned(p, group, node);
     bool moves = false;
     for (int64_t k = 0; k < count; k++)
         for (int c = 0; c < dim; c++) {
@@ -70,14 +86,16 @@ static uz_status agree_with_group(const prescription *p, int64_t support, int64_
         along += n[c] * u[c];
         size += fabs(n[c] * u[c]);
     }
-    if (!moves && fabs(along - value) <= AGREE * size)
+    if (!moves && !turns && fabs(along - value) <= AGREE * size)
         return UZ_OK;
     snprintf(where, sizeof where, "/supports/%lld/on", (long long)support);
     return uz_fail(err, UZ_ERR_SCENE, where,
                    "node %lld of \"%.63s\" is of the rigid group \"%.63s\", which %s: prescribe that motion of the "
                    "group, or leave the node out of one of them",
                    (long long)node, p->scene->supports[support].on, p->scene->supports[group->support].on,
-                   moves ? "is free to move it along what is held here" : "moves it otherwise");
+                   moves   ? "is free to move it along what is held here"
+                   : turns ? "turns it by a large rotation, which is not compared with what is held here"
+                           : "moves it otherwise");
 }
 
 static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c, double value, uz_error *err)

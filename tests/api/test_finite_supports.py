@@ -425,6 +425,18 @@ def test_what_rigid_groups_cannot_be(s):
     refused(s, {**scene(mesh={"box": {"size": [2, 1], "cells": [2, 1]}, "refine": "auto"}, supports=[{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "rigid": {"point": [2, 0.5], "rz": 5}}]),
                 "solver": {"accuracy": {"total": 0.3}}}, "/mesh/refine", "do not follow it")
 
+    # what else holds a node that the group turns: that it agrees at first order was enough, and it converged at another place
+    tip = {"name": "tip", "where": {"nearest": [1, 0]}}
+    for motion, there, word in (({"rz": 30}, {"uy": math.radians(30)}, "large rotation"), ({}, {"ux": 0}, "large rotation"),
+                                ({"rz": 0}, {"uy": 0.1}, "moves it otherwise")):
+        request = scene(mesh={"box": {"size": [2, 1], "cells": [2, 1]}}, groups=[tip],
+                        supports=[{"on": "bottom", "rigid": {"point": [0, 0], "ux": 0, "uy": 0, **motion}}, {"on": "top", "ux": 0}, {"on": "tip", **there}])
+        refused(s, request, "/supports/2/on", word)
+    for motion, there in (({"rz": 0}, {"ux": 0, "uy": 0}), ({"rz": 10}, None)):  # but where it stays, or nothing else holds
+        answer(s, scene(mesh={"box": {"size": [2, 1], "cells": [2, 1]}}, groups=[tip],
+                        supports=[{"on": "bottom", "rigid": {"point": [0, 0], "ux": 0, "uy": 0, **motion}}, {"on": "top", "uy": 0.01},
+                                  *([{"on": "tip", **there}] if there else [])]))
+
 
 if __name__ == "__main__":
     service.main(globals())
