@@ -18,6 +18,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* A normal has a part along an axis that counts. */
 #define ALONG 0.1
@@ -79,6 +80,12 @@ static double of_pair(const holder *a, const holder *b, const uz_body_model *mod
     return most;
 }
 
+/* Supports of one group hold the body in one place, however many say it. */
+static bool is_one_group(const uz_scene *scene, int64_t i, int64_t j)
+{
+    return i < scene->n_supports && j < scene->n_supports && strcmp(scene->supports[i].on, scene->supports[j].on) == 0;
+}
+
 /* Loads may hold each other, and what is left for supports is rounding. */
 static double largest_force(const uz_evaluation *e)
 {
@@ -107,7 +114,7 @@ uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_sc
     find_contacts(of + scene->n_supports, model, r);
     for (int64_t i = 0; i < n; i++)
         for (int64_t j = 0; j < i && of[i].any; j++)
-            if (of[j].any)
+            if (of[j].any && !is_one_group(scene, i, j))
                 most = fmax(most, of_pair(&of[i], &of[j], model, thick, least));
     free(of);
     *out = force > 0 ? most * sqrt(2 * e->strain_energy) / force : 0;

@@ -108,6 +108,16 @@ def test_auto_takes_large_deformation_on_springs(s):
     check(abs(found["summary"]["resultants"]["supports"][1]["force"][0] - pull("neo_hooke", 1.5)) < 1e-7, found["summary"]["resultants"])
 
 
+def test_a_support_that_is_said_twice_holds_in_one_place(s):
+    """A body is held against itself by what holds it in two: a clamp said twice, or along two normals, was taken for that, and compared."""
+    clamp = {"on": "left", "ux": 0, "uy": 0}
+    for supports in ([clamp], [clamp, clamp], [{"on": "left", "normal": n, "u": 0} for n in ([1, 1], [1, -1])]):
+        request = scene(kinematics="auto", mesh={"box": {"size": [4, 1], "cells": [16, 4], "element": "quad8"}}, supports=supports,
+                        loads=[{"on": "right", "traction": [0, 1e-5]}])
+        summary = s.solve(request)["summary"]
+        check(summary["outcome"] == "converged" and "small_deformation" not in summary, supports, summary)
+
+
 def test_solids_and_rings_have_springs(s):
     """A cube and a disc that are pulled along an axis on springs: nothing is held but for symmetry."""
     stiff, load = 0.5, 0.4
