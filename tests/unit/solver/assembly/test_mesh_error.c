@@ -345,7 +345,7 @@ static double times_of(const plain *x, const plain_element *s, int64_t e)
         volume += s->volume[g];
     for (int a = 0; a < s->nodes; a++)
         others += 1 - volume / average_at(x, e, s->node[a])[STRESSES];
-    return (kind == UZ_TRI6 || kind == UZ_TET10 ? 16. / 9 : 1) /
+    return (kind == UZ_TRI6 || kind == UZ_TET10 || kind == UZ_WEDGE15 ? 16. / 9 : 1) /
            ((kind == UZ_TET4 || kind == UZ_TET10) && !is_alone(x, s, e) ? fmax(0.25, others / s->nodes) : 1);
 }
 
