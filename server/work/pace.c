@@ -3,7 +3,6 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { KEPT = 15, FEWEST = 3 };
 #define SHORTEST_S 0.05 /* below it what no model counts is as much */
@@ -44,17 +43,15 @@ void pace_add(pace *p, uz_operator op, double said, double took)
     pthread_mutex_unlock(&p->lock);
 }
 
-static int compare(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double median(const double *ratio, int count)
 {
-    double sorted[KEPT];
-    memcpy(sorted, ratio, (size_t)count * sizeof *ratio);
-    qsort(sorted, (size_t)count, sizeof *sorted, compare);
+    double sorted[KEPT] = {0};
+    for (int k = 0; k < count; k++) {
+        int at = k;
+        for (; at > 0 && sorted[at - 1] > ratio[k]; at--)
+            sorted[at] = sorted[at - 1];
+        sorted[at] = ratio[k];
+    }
     return 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
 }
 
