@@ -1,6 +1,7 @@
 /* What solves take here for what was predicted. */
 #include "harness.h"
 #include "work/pace.h"
+#include "work/solve.h"
 
 #include <math.h>
 
@@ -59,4 +60,44 @@ TEST(what_tells_nothing_is_left_out)
     pace_add(NULL, UZ_OPERATOR_FACTORED, 1.0, 2.0);
     pace_free(p);
     pace_free(NULL);
+}
+
+static uz_operator told_by(const uz_summary *summary, int64_t n)
+{
+    uz_result result[2] = {{.summary = summary[0]}, {.summary = summary[n - 1]}},
+              *results[2] = {&result[0], &result[1]};
+    solve_figures figures = {0};
+    solve_count(&figures, results, n);
+    CHECK_REL(figures.said_s, 2.0 * (double)n, 1e-15);
+    CHECK_REL(figures.took_s, 3.0 * (double)n, 1e-15);
+    return figures.op;
+}
+
+/* What a job took is what its price stands for where it made all of its setup, or nothing of it, and solved once. */
+TEST(jobs_that_were_not_priced_as_they_went_tell_nothing)
+{
+    const uz_summary whole = {.op = UZ_OPERATOR_CONDENSED,
+                              .geometry.kind = UZ_KINEMATICS_FIXED,
+                              .outcome = UZ_CONVERGED,
+                              .rounds = 1,
+                              .cost = {.seconds = 2.0, .actual_seconds = 3.0}};
+    uz_grid_sequence grids = {0};
+    uz_summary cached = whole, factor = whole, order = whole, unmet = whole, again = whole, meshes = whole,
+               loose = whole, moved = whole;
+    CHECK_INT(told_by(&whole, 1), UZ_OPERATOR_CONDENSED);
+    cached.reused = (uz_reuse){.assembly = true, .ordering = true, .factor = true, .op = true};
+    CHECK_INT(told_by(&cached, 1), UZ_OPERATOR_CONDENSED);
+    factor.reused = (uz_reuse){.assembly = true, .ordering = true, .factor = true};
+    order.reused.ordering = true;
+    unmet.outcome = UZ_ITERATION_LIMIT;
+    again.rounds = 2;
+    meshes.grids = &grids;
+    loose.semicoercive.rounds = 1;
+    moved.geometry.kind = UZ_KINEMATICS_MOVING;
+    const uz_summary *others[] = {&factor, &order, &unmet, &again, &meshes, &loose, &moved};
+    for (size_t k = 0; k < sizeof others / sizeof others[0]; k++) {
+        const uz_summary cases[2] = {whole, *others[k]};
+        CHECK_INT(told_by(others[k], 1), UZ_OPERATOR_AUTO);
+        CHECK_INT(told_by(cases, 2), UZ_OPERATOR_AUTO);
+    }
 }
