@@ -231,6 +231,9 @@ static inline double uz_root(double square)
     return square > 0.0 ? sqrt(square) : 0.0;
 }
 
+/* Seconds that sweeps forwards and backwards over a level take on this machine for each entry of its lower triangle,
+ * which is more than a core has for itself: the least of several, in about six milliseconds. */
+double uz_amg_rate(void);
 /* Predicted bytes of a uz_amg for a matrix of n dofs and nnz entries in its lower triangle. */
 double uz_amg_predict_bytes(int64_t n, int64_t nnz, int modes);
 

@@ -351,9 +351,9 @@ static bool suits(const uz_dual_shape *shape)
 
 /* What substitutions of a load read of L, in passes as those of a sparse matrix: supernodes are read in order, and of
  * those that the load does not touch nothing forwards. Plane and solid bodies of 14,000 to 240,000 dofs. */
-#define LOAD_PASSES 0.35
-/* Steps of the active set. */
-#define STEPS 6.0
+#define LOAD_PASSES 0.9
+/* Steps of the active set, as if each had the whole block anew. */
+#define STEPS 0.5
 
 static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
                      const uz_cost_rates *rates)

@@ -15,8 +15,10 @@ typedef struct {
     bool bounds;       /* and with the free dofs only */
     double by_cells;   /* bytes of a multigrid on equal cells, where K has its diagonal only; else 0 */
     double stretch;    /* longest over shortest distance of an element's corners, of a solid */
+    double slender;    /* longest over second longest side of the box around a solid */
     double firmness;   /* what its material resists of a change of volume, over that of a Poisson's ratio of 0.3 */
     double entry_s;    /* for an entry of K (uz_cost_rates), where K is large; 0: that of the machine */
+    double cycle_s;    /* likewise, where a multigrid is worth its while */
     int64_t cases;     /* loads on the body */
 } uz_cost_size;
 
@@ -35,6 +37,8 @@ typedef struct {
 typedef struct {
     double flop_s;  /* seconds for each flop of a dense kernel */
     double entry_s; /* for each stored entry of a sparse matrix, times a vector */
+    double cycle_s; /* for each entry that two sweeps of a multigrid read; on equal cells for each dof of a step of the
+                       smoother */
 } uz_cost_rates;
 
 /* Large supernodes are updated at somewhat more than the rate of the dense kernel that is timed, and each entry of L

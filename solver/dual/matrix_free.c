@@ -707,16 +707,23 @@ static bool guess_active(uz_dual_load *load, bool *active)
 
 /* ------------------------------------------------------------- its price */
 
-/* A cycle and a product, in passes of K and of the numbers of a vector. The other numbers are cycles: making a
- * multigrid, bounding the spectrum, solving once, a step of the active set, without and with sweeps over bounds on many
- * dofs, a guess of rows of several entries, whose answer is found within them, and an iteration that starts at the last
- * one's answer. All of them grow with the dofs, over those of GROWN dofs: contact has more rows to find, and less of
- * what is read is in a cache; a power, measured. hex8, tet4, wedge6, tet10, hex20 of 14,000 to 810,000 dofs, quad4 and
- * quad8 of 60,000 to 540,000 (make bench-predictions). */
+/* A cycle and a product, in entries that two sweeps read, for each entry of K and for each dof. They grow with the
+ * dofs, over those of GROWN dofs: what is read comes from farther off, and contact has more rows to find; a power,
+ * measured. */
 typedef struct {
-    double passes, numbers, create, step, guess, growth;
+    double passes, numbers, growth;
+} cycle_cost;
+/* Of making a multigrid and bounding the spectrum, and of loads. The other numbers are such cycles: making a multigrid,
+ * bounding the spectrum, solving once, a step of the active set, without and with sweeps over bounds on many dofs, a
+ * guess of rows of several entries, whose answer is found within them, and an iteration that starts at the last one's
+ * answer. hex8, tet4, wedge6, tet10, hex20 of 14,000 to 810,000 dofs, quad4 and quad8 of 60,000 to 540,000 (make
+ * bench-predictions). */
+typedef struct {
+    cycle_cost making, loading;
+    double create, step, guess;
 } cycle_costs;
-static const cycle_costs PLANE = {4.0, 0.0, 40.0, 10.0, 22.0, 0.3}, SOLID = {1.0, 98.0, 25.0, 3.0, 14.0, 0.14};
+static const cycle_costs PLANE = {{1.7, 41.0, 0.0}, {4.0, 19.0, 0.2}, 40.0, 10.0, 22.0},
+                         SOLID = {{1.25, 77.0, 0.06}, {0.0, 163.0, 0.15}, 25.0, 3.0, 11.6};
 #define GROWN           1e5
 #define SPECTRUM_CYCLES 30.0
 /* Load cases that begin at answers of others take this part of a whole load where the contact changes from case to
@@ -730,26 +737,29 @@ static const cycle_costs PLANE = {4.0, 0.0, 40.0, 10.0, 22.0, 0.3}, SOLID = {1.0
 #define VECTORS        62.0
 #define BOUNDS_VECTORS 40.0
 
-/* On equal cells a cycle and a product, in passes of numbers; making the multigrid and bounding the spectrum, and a
- * load that begins on coarser grids, in cycles. Solid bodies of 45,000 to 2,700,000 dofs. */
-#define CELLS_PASSES  30.0
-#define CELLS_CREATE  49.0
-#define CELLS_LOAD    26.0
-#define CELLS_GROWTH  0.12
+/* On equal cells: making the multigrid and bounding the spectrum, and a load that begins on coarser grids, in steps of
+ * the smoother. Solid bodies of 100,000 to 810,000 dofs. */
+#define CELLS_CREATE  280.0
+#define CELLS_LOAD    235.0
+#define CELLS_GROWTH  0.06
+#define CELLS_FLOPS   40.0 /* for each dof, of what is as much as a step */
 #define CELLS_VECTORS 27.0
 
-/* Steps of solids that resist changes of volume, by their firmness, and of stretched elements, over those of the same
- * body of cubes at a Poisson's ratio of 0.3: powers of both, measured at 0.45, 0.49 and 10 times as long along one
- * axis. Without a matrix what is stretched is coarsened where it is short first. */
+/* Steps of solids that resist changes of volume, by their firmness, of stretched elements, and of long bodies, over
+ * those of the same body of cubes at a Poisson's ratio of 0.3: powers of these, measured at 0.45, 0.49, elements 10
+ * times as long along one axis, and cubes of them in bodies as long. Without a matrix what is stretched is coarsened
+ * where it is short first. */
 typedef struct {
-    double firmness, stretch;
+    double firmness, stretch, slender;
 } hardness;
-static const hardness MAKING = {0.39, 0.9}, LOADING = {0.25, 1.23}, OF_CELLS = {0.36, 0.37};
+static const hardness MAKING = {0.4, 1.3, 0.0}, LOADING = {0.24, 0.3, 0.7}, MAKING_CELLS = {0.45, 0.35, 0.0},
+                      LOADING_CELLS = {0.29, 0.3, 0.2};
 #define CUBES_STRETCH 2.0 /* about the square root of 3, somewhat moved */
 
 static double find_hardness(const uz_cost_size *size, hardness of)
 {
-    return pow(fmax(1.0, size->firmness), of.firmness) * pow(fmax(1.0, size->stretch / CUBES_STRETCH), of.stretch);
+    return pow(fmax(1.0, size->firmness), of.firmness) * pow(fmax(1.0, size->stretch / CUBES_STRETCH), of.stretch) *
+           pow(fmax(1.0, size->slender), of.slender);
 }
 
 static double find_growth(const uz_cost_size *size, double power)
@@ -757,13 +767,20 @@ static double find_growth(const uz_cost_size *size, double power)
     return pow((double)size->d / GROWN, power);
 }
 
+/* Entries that a cycle and a product are as much as. */
+static double find_work(const uz_cost_size *size, const cycle_cost *of)
+{
+    return (of->passes * (double)size->k_entries + of->numbers * (double)size->d) * find_growth(size, of->growth);
+}
+
 static void add_cost_by_cells(uz_cost_estimate *cost, const uz_cost_size *size, const uz_cost_rates *rates)
 {
-    const double cycle = CELLS_PASSES * (double)size->d * rates->entry_s * find_hardness(size, OF_CELLS) *
-                         find_growth(size, CELLS_GROWTH);
-    cost->setup_s += CELLS_CREATE * cycle;
-    cost->case_s += CELLS_LOAD * cycle;
-    cost->flops += (CELLS_CREATE + CELLS_LOAD) * CELLS_PASSES * 4.0 * (double)size->d;
+    const double step = (double)size->d * rates->cycle_s * find_growth(size, CELLS_GROWTH),
+                 create = CELLS_CREATE * find_hardness(size, MAKING_CELLS),
+                 load = CELLS_LOAD * find_hardness(size, LOADING_CELLS);
+    cost->setup_s += create * step;
+    cost->case_s += load * step;
+    cost->flops += (create + load) * CELLS_FLOPS * (double)size->d;
     cost->bytes += size->by_cells + 8.0 * CELLS_VECTORS * (double)size->d;
 }
 
@@ -776,24 +793,23 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
         return;
     }
     const cycle_costs *of = size->modes == UZ_MODES_MOST ? &SOLID : &PLANE;
-    const double passed = of->passes * (double)size->k_entries + of->numbers * (double)size->d,
-                 cycle = passed * rates->entry_s * find_growth(size, of->growth), harder = find_hardness(size, MAKING),
-                 setup = (of->create + SPECTRUM_CYCLES) * harder;
+    const double making = find_work(size, &of->making), loading = find_work(size, &of->loading),
+                 harder = find_hardness(size, MAKING), setup = (of->create + SPECTRUM_CYCLES) * harder * making;
     const bool sweeps = size->bounds && !are_few(size->m, size->d);
-    const double load =
-        find_hardness(size, LOADING) * (SOLVE_CYCLES + (size->m == 0       ? 0.0
-                                                        : size->bounds     ? STEPS * (sweeps ? SWEPT_CYCLES : of->step)
-                                                        : size->active_set ? STEPS * of->guess
-                                                                           : UZ_COST_ITERATIONS * CHANGE_CYCLES));
+    const double load = loading * find_hardness(size, LOADING) *
+                        (SOLVE_CYCLES + (size->m == 0       ? 0.0
+                                         : size->bounds     ? STEPS * (sweeps ? SWEPT_CYCLES : of->step)
+                                         : size->active_set ? STEPS * of->guess
+                                                            : UZ_COST_ITERATIONS * CHANGE_CYCLES));
     double levels = uz_amg_predict_bytes(size->d, size->k_entries, size->modes);
-    cost->setup_s += setup * cycle;
+    cost->setup_s += setup * rates->cycle_s;
     cost->steps = SPECTRUM_CYCLES * harder;
-    cost->setup_steps_s = SPECTRUM_CYCLES * harder * cycle;
-    cost->case_steps_s = load * cycle;
-    cost->next_steps_s = (size->bounds ? NEXT_CASE : 1.0) * load * cycle;
+    cost->setup_steps_s = cost->steps * making * rates->cycle_s;
+    cost->case_steps_s = load * rates->cycle_s;
+    cost->next_steps_s = (size->bounds ? NEXT_CASE : 1.0) * load * rates->cycle_s;
     cost->next_s = cost->case_s + cost->next_steps_s;
     cost->case_s += cost->case_steps_s;
-    cost->flops += (setup + load) * 4.0 * passed;
+    cost->flops += (setup + load) * 4.0;
     /* beside it the dofs that are swept, with both triangles of K */
     const double swept = 32.0 * (double)size->k_entries + 52.0 * (double)size->d;
     cost->bytes += levels + (sweeps ? swept : 0.0);

@@ -2,6 +2,7 @@
 #include "run/cost.h"
 #include "dual/form.h"
 
+#include "amg/amg.h"
 #include "linalg/blas.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -22,7 +23,7 @@ enum { DENSE = 192, SPARSE = 1600, BAND = 32, REACH = 40, REPEATS = 40 };
 #define ENOUGH_S 0.005 /* of one measurement */
 
 /* What is assumed where there is no memory to measure: a core of 2020. */
-static const uz_cost_rates ASSUMED = {3e-11, 1e-9};
+static const uz_cost_rates ASSUMED = {.flop_s = 3e-11, .entry_s = 1e-9};
 
 static uz_cost_rates measured; /* written once, under the guard */
 
@@ -80,17 +81,42 @@ const uz_cost_rates *uz_cost_machine(void)
     return &measured;
 }
 
+static double of_sweeps, of_cells; /* likewise, each under its own */
+
+static void measure_sweeps(void)
+{
+    of_sweeps = uz_amg_rate();
+}
+
+static void measure_cells(void)
+{
+    of_cells = uz_brick_rate();
+}
+
+/* Only who may take a multigrid waits for its rate. */
+static double cycle_rate(bool cells)
+{
+    static pthread_once_t sweeps_guard = PTHREAD_ONCE_INIT, cells_guard = PTHREAD_ONCE_INIT;
+    pthread_once(cells ? &cells_guard : &sweeps_guard, cells ? measure_cells : measure_sweeps);
+    return cells ? of_cells : of_sweeps;
+}
+
 /* Beyond what a core has for itself entries come from memory: their rate is that of K, which is there. From so many
  * entries on, and of the first so many. */
 #define LARGE_ENTRIES  250000
 #define SAMPLE_ENTRIES 2000000
+
+static bool is_large(const uz_csc *K)
+{
+    return K->ptr[K->cols] >= LARGE_ENTRIES;
+}
 
 /* Seconds for an entry of K where it is large, else 0. What K is multiplied with does not matter, as long as there is
  * as much of it: its own entries, where there are as many as rows: a diagonal may have gaps. */
 static double rate_of(const uz_csc *K)
 {
     const int64_t entries = K->ptr[K->cols];
-    if (entries < LARGE_ENTRIES || entries < K->rows)
+    if (!is_large(K) || entries < K->rows)
         return 0.0;
     const int64_t n = entries < SAMPLE_ENTRIES ? entries : SAMPLE_ENTRIES;
     const double once = time_entries(K->val, K->idx, n, K->val);
@@ -106,8 +132,8 @@ static double rate_of(const uz_csc *K)
 /* While it is made: supernodes are updated through room of their own, up to a sixth of the factor of a small solid. */
 #define FACTOR_PEAK 1.1
 /* Vectors of dofs: passes of K that a certificate and a load take, and of single numbers. */
-#define CASE_PASSES  10.0
-#define CASE_NUMBERS 84.0
+#define CASE_PASSES  3.5
+#define CASE_NUMBERS 19.0
 
 static double matrix_bytes(const uz_cost_size *s)
 {
@@ -172,6 +198,22 @@ static double find_stretch(const uz_mesh *mesh, const uz_brick *brick)
     return n > 0 ? exp(sum / (double)n) : 1.0;
 }
 
+/* Of the box around it. */
+static double find_slender(const uz_mesh *mesh, const uz_brick *brick)
+{
+    double side[3] = {0.0};
+    for (int c = 0; c < 3; c++) {
+        double least = INFINITY, most = -INFINITY;
+        for (int64_t i = 0; i < mesh->n_nodes && !brick; i++) {
+            least = fmin(least, mesh->xyz[3 * i + c]);
+            most = fmax(most, mesh->xyz[3 * i + c]);
+        }
+        side[c] = brick ? (double)brick->cells[c] * brick->cell[c] : most - least;
+    }
+    const double longest = fmax(fmax(side[0], side[1]), side[2]), shortest = fmin(fmin(side[0], side[1]), side[2]);
+    return longest / (side[0] + side[1] + side[2] - longest - shortest);
+}
+
 /* How much more a solid resists a change of volume than one of shape, over what it does at a Poisson's ratio of 0.3: of
  * the material where that is most. Linear tetrahedra, whose shapes are hardly free to keep their volume, show the root
  * of it. */
@@ -204,8 +246,10 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_mod
                           .bounds = by_active_set && uz_dual_bounds_dofs(N),
                           .by_cells = brick ? uz_brick_predict_bytes(brick) : 0.0,
                           .stretch = solid ? find_stretch(&model->mesh, brick) : 1.0,
+                          .slender = solid ? find_slender(&model->mesh, brick) : 1.0,
                           .firmness = solid ? find_firmness(scene, &model->mesh, brick) : 1.0,
                           .entry_s = brick ? 0.0 : rate_of(K),
+                          .cycle_s = brick || is_large(K) ? cycle_rate(brick != NULL) : 0.0,
                           .cases = cases};
 }
 
@@ -228,20 +272,33 @@ double uz_cost_seconds(const uz_cost_estimate *form, int64_t cases)
 
 _Static_assert(sizeof((uz_cost){0}.considered) == UZ_DUAL_FORMS * sizeof(uz_cost_option), "a result names each form");
 
+/* What a number of a cycle takes where that was not measured, in entries. */
+#define SWEPT_ENTRY 0.7
+#define STEPPED_DOF 2.5
+
+static uz_cost_rates rates_of(const uz_cost_size *size)
+{
+    uz_cost_rates rates = *uz_cost_machine();
+    rates.cycle_s =
+        size->cycle_s > 0.0 ? size->cycle_s : rates.entry_s * (size->by_cells > 0.0 ? STEPPED_DOF : SWEPT_ENTRY);
+    if (size->entry_s > 0.0)
+        rates.entry_s = size->entry_s;
+    return rates;
+}
+
 void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
                     uz_operator asked, size_t memory_limit)
 {
-    const uz_cost_rates *machine = uz_cost_machine(), of_K = {machine->flop_s, size->entry_s};
-    const uz_cost_rates *rates = size->entry_s > 0.0 ? &of_K : machine;
+    const uz_cost_rates rates = rates_of(size);
     plan->count = 0;
     if (factor)
-        plan->form[plan->count++] = estimate(&uz_dual_form_of(direct)->can, size, factor, direct, rates);
+        plan->form[plan->count++] = estimate(&uz_dual_form_of(direct)->can, size, factor, direct, &rates);
     for (int k = 0; k < UZ_DUAL_FORMS; k++) {
         const uz_dual_abilities *can = &uz_dual_forms[k]->can;
         if (can->asked_for && can->op != asked)
             continue;
         if (!can->needs_factor || (factor && can->op != direct))
-            plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, rates);
+            plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, &rates);
     }
     plan->chosen = -1;
     for (int k = 0; k < plan->count; k++) {

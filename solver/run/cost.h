@@ -1,8 +1,9 @@
 /* cost.h: what a solve will take, before it is begun: seconds and bytes of each form of the operator.
  *
- * The model counts the work that dominates: flops of the factorization, entries of K and L that are passed through. Its
- * constants are numbers of such passes, measured on plane and solid bodies and on obstacle problems; its two rates are
- * measured on the machine, in a few milliseconds, when they are first asked for. */
+ * The model counts the work that dominates: flops of the factorization, entries of K and L that are passed through,
+ * what a cycle of multigrid reads. Its constants are numbers of these, measured on plane and solid bodies and on
+ * obstacle problems; its rates are measured on the machine by the kernels that do the work, in a few milliseconds each,
+ * when they are first asked for. */
 #ifndef UZ_COST_H
 #define UZ_COST_H
 

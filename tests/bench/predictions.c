@@ -316,13 +316,15 @@ int bench_predictions_child(const char *which)
            "\"asked_s\": %.4g, \"predicted_s\": %.4g, \"cold_s\": %.4g, \"predicted_cached_s\": %.4g, "
            "\"cached_s\": %.4g, \"order_s\": %.4g, \"made_s\": %.4g, \"iterated_s\": %.4g, \"certified_s\": %.4g, "
            "\"cached_iterated_s\": %.4g, \"predicted_bytes\": %.4g, \"counted_bytes\": %.4g, \"peak_bytes\": %.4g, "
-           "\"factor_entries\": %lld, \"flop_s\": %.4g, \"entry_s\": %.4g}\n",
+           "\"factor_entries\": %lld, \"flop_s\": %.4g, \"entry_s\": %.4g, \"sweep_s\": %.4g, "
+           "\"step_s\": %.4g}\n",
            row->element, (long long)row->cells[0], (long long)row->cells[1], (long long)row->cells[2], row->poisson,
            row->stretch > 0.0 ? row->stretch : 1.0, row->jump > 0.0 ? row->jump : 1.0, row->moved ? "true" : "false",
            uz_choice_name(UZ_CHOICE_OPERATOR, row->op), uz_choice_name(UZ_CHOICE_OPERATOR, cold.op), (long long)asked.d,
            asking, asked.seconds, cold.cost.seconds, cold.seconds, cached.cost.seconds, cached.seconds, cold.order,
            cold.made, cold.iterated, cold.certified, cached.iterated, cold.cost.bytes, cold.cost.actual_bytes, peak,
-           (long long)asked.factor_nnz, uz_cost_machine()->flop_s, uz_cost_machine()->entry_s);
+           (long long)asked.factor_nnz, uz_cost_machine()->flop_s, uz_cost_machine()->entry_s, uz_amg_rate(),
+           uz_brick_rate());
     uz_cache_free(cache);
     return 0;
 }

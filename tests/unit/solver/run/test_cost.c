@@ -4,6 +4,7 @@
 #include "run/cost.h"
 #include "scene_fixture.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -167,17 +168,19 @@ TEST(what_is_harder_costs_more)
                                     .stretch = 1.8,
                                     .firmness = 1.0,
                                     .cases = 1};
-        uz_cost_size larger = plain, firmer = plain, longer = plain, more = plain, easier = plain;
+        uz_cost_size larger = plain, firmer = plain, longer = plain, slender = plain, more = plain, easier = plain;
         larger.d *= 2;
         larger.k_entries *= 2;
         firmer.firmness = 14.6; /* 0.49 */
         longer.stretch = 10.0;
+        slender.slender = 10.0;
         more.cases = 10;
         easier.firmness = 0.6;
         const double base = seconds_without_factor(plain);
         CHECK(seconds_without_factor(larger) > 2.0 * base && seconds_without_factor(larger) < 2.5 * base);
         CHECK(seconds_without_factor(firmer) > 1.5 * base && seconds_without_factor(firmer) < 5.0 * base);
         CHECK(seconds_without_factor(longer) > 1.5 * base && seconds_without_factor(longer) < 10.0 * base);
+        CHECK(seconds_without_factor(slender) > 1.1 * base && seconds_without_factor(slender) < 3.0 * base);
         CHECK(seconds_without_factor(more) > 2.0 * base && seconds_without_factor(more) < 10.0 * base);
         CHECK_REL(seconds_without_factor(easier), base, 1e-12);
     }
@@ -195,9 +198,14 @@ TEST(a_large_K_has_its_own_rate)
                          .active_set = true,
                          .bounds = true,
                          .cases = 1};
+    size.cycle_s = 1e-12; /* nothing */
     const double base = seconds_without_factor(size);
     size.entry_s = 3.0 * uz_cost_machine()->entry_s;
-    CHECK_REL(seconds_without_factor(size), 3.0 * base, 1e-9);
+    CHECK_REL(seconds_without_factor(size), 3.0 * base, 0.1);
+    size.cycle_s = 1e-9;
+    const double cycles = seconds_without_factor(size);
+    size.cycle_s = 2e-9;
+    CHECK(seconds_without_factor(size) > 1.8 * cycles && seconds_without_factor(size) < 2.0 * cycles);
     enum { N = 600, WIDE = 500 }; /* enough entries to be timed */
     uz_csc K = {.rows = N, .cols = N}, none = {.rows = 0, .cols = N};
     K.ptr = calloc(N + 1, sizeof *K.ptr);
@@ -209,13 +217,32 @@ TEST(a_large_K_has_its_own_rate)
         const uz_settings settings = uz_settings_default();
         for (int64_t j = 0; j <= N; j++)
             K.ptr[j] = j * wide;
-        const double rate = uz_cost_size_of(&K, &none, NULL, NULL, 0, 1, &settings).entry_s;
-        CHECK(wide == WIDE ? rate > 1e-11 && rate < 1e-6 : rate == 0.0);
+        const uz_cost_size of = uz_cost_size_of(&K, &none, NULL, NULL, 0, 1, &settings);
+        CHECK(wide == WIDE ? of.entry_s > 1e-11 && of.entry_s < 1e-6 : of.entry_s == 0.0);
+        CHECK(wide == WIDE ? of.cycle_s > 1e-11 && of.cycle_s < 1e-6 : of.cycle_s == 0.0);
     }
     free(K.ptr);
     free(K.idx);
     free(K.val);
     free(none.ptr);
+}
+
+/* Rates are of the kernels themselves: a sweep reads four bytes an entry and a step some forty a dof, neither faster
+ * than a core computes; the least of several is the same again. */
+TEST(cycles_have_rates_of_their_own)
+{
+    double sweep = INFINITY, step = INFINITY, least_sweep = INFINITY, least_step = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        sweep = fmin(sweep, uz_amg_rate());
+        step = fmin(step, uz_brick_rate());
+    }
+    for (int k = 0; k < 3; k++) {
+        least_sweep = fmin(least_sweep, uz_amg_rate());
+        least_step = fmin(least_step, uz_brick_rate());
+    }
+    CHECK_MSG(sweep > 2e-11 && sweep < 1e-7 && step > 1e-10 && step < 1e-6, "%g, %g s", sweep, step);
+    CHECK_MSG(least_sweep < 2.0 * sweep && sweep < 2.0 * least_sweep, "%g, %g s", sweep, least_sweep);
+    CHECK_MSG(least_step < 2.0 * step && step < 2.0 * least_step, "%g, %g s", step, least_step);
 }
 
 /* Poisson's ratio and the elements of a scene find their way to the price. */

@@ -1,0 +1,54 @@
+/* rate.c: how fast the smoother is here. */
+#include "brick/levels.h"
+
+#include "core/clock.h"
+
+#include <math.h>
+#include <sys/mman.h>
+
+/* Cells along each side of a cube, the vectors of which are more than most cores have for themselves. */
+enum { CELLS = 24, NODES = CELLS + 1, REPEATS = 40 };
+
+#define ENOUGH_S 0.004
+/* What is assumed where there is no memory: a core of 2022. */
+#define ASSUMED_S 2.2e-9
+
+static double time_step(const uz_brick_level *level, uz_brick_planes *planes, float *room)
+{
+    const int64_t n = uz_brick_numbers(level);
+    const uz_brick_vectors v = {room, room + n, room + 2 * n, room + 2 * n, room + 3 * n};
+    const int most = planes->most;
+    double least = INFINITY;
+    for (int64_t i = 0; i < n; i++) {
+        v.b[i] = 1.0F;
+        room[3 * n + i] = 0.01F;
+    }
+    planes->most = 1; /* seconds are those of this thread */
+    const double begun = uz_thread_seconds();
+    for (int k = 0; k < REPEATS && (k < 2 || uz_thread_seconds() - begun < ENOUGH_S); k++) {
+        const double start = uz_thread_seconds();
+        uz_brick_step(level, &v, planes, 0.1F, 0.1F);
+        least = fmin(least, uz_thread_seconds() - start);
+    }
+    planes->most = most;
+    return least / (3.0 * NODES * NODES * NODES);
+}
+
+double uz_brick_rate(void)
+{
+    const int64_t stride = uz_brick_stride(CELLS), plane = stride * NODES + UZ_BRICK_PAD;
+    uz_brick_level level = {.cells = {CELLS, CELLS, CELLS}, .stride = stride, .plane = plane, .size = plane * NODES};
+    const size_t bytes = 4 * (size_t)uz_brick_numbers(&level) * sizeof(float);
+    double rate = ASSUMED_S;
+    size_t ignored = 0;
+    uz_brick_planes planes = {.most = 0};
+    for (int k = 0; k < 9 * UZ_BRICK_PARITIES; k++) /* small enough that steps change little */
+        level.block[k] = 0.01F;
+    float *room = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (room != MAP_FAILED && uz_brick_planes_init(&planes, &level, &ignored))
+        rate = time_step(&level, &planes, room);
+    uz_brick_planes_clear(&planes);
+    if (room != MAP_FAILED)
+        munmap(room, bytes);
+    return rate;
+}
