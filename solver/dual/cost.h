@@ -13,6 +13,7 @@ typedef struct {
     int modes;         /* of the near-null space */
     bool active_set;   /* the active set is to solve */
     bool bounds;       /* and with the free dofs only */
+    bool alone;        /* a form without a factor was asked for by name */
     double by_cells;   /* bytes of a multigrid on equal cells, where K has its diagonal only; else 0 */
     double stretch;    /* longest over shortest distance of an element's corners, of a solid */
     double slender;    /* longest over second longest side of the box around a solid */

@@ -736,6 +736,10 @@ static const cycle_costs PLANE = {{1.7, 41.0, 0.0}, {4.0, 19.0, 0.2}, 40.0, 10.0
 /* As UZ_COST_VECTORS, with conjugate gradients; not all of them at the time of what a guess of bounds takes. */
 #define VECTORS        62.0
 #define BOUNDS_VECTORS 40.0
+/* Where no other form is to be had and the steps are so much harder, aggregates of another kind are made beside the
+ * first ones, of which this part is more than what is there later: hex8 and tet10 at 0.49, stretched hex8. */
+#define BADLY  2.2
+#define SECOND 0.75
 
 /* On equal cells: making the multigrid and bounding the spectrum, and a load that begins on coarser grids, in steps of
  * the smoother. Solid bodies of 100,000 to 810,000 dofs. */
@@ -812,7 +816,7 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     cost->flops += (setup + load) * 4.0;
     /* beside it the dofs that are swept, with both triangles of K */
     const double swept = 32.0 * (double)size->k_entries + 52.0 * (double)size->d;
-    cost->bytes += levels + (sweeps ? swept : 0.0);
+    cost->bytes += levels + (sweeps ? swept : 0.0) + (size->alone && harder > BADLY ? SECOND * levels : 0.0);
     cost->bytes += 8.0 * (size->bounds ? BOUNDS_VECTORS : VECTORS) * (double)size->d;
 }
 

@@ -244,6 +244,7 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_mod
                           .modes = solid ? 6 : 3,
                           .active_set = by_active_set,
                           .bounds = by_active_set && uz_dual_bounds_dofs(N),
+                          .alone = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor,
                           .by_cells = brick ? uz_brick_predict_bytes(brick) : 0.0,
                           .stretch = solid ? find_stretch(&model->mesh, brick) : 1.0,
                           .slender = solid ? find_slender(&model->mesh, brick) : 1.0,

@@ -292,3 +292,21 @@ TEST(an_order_that_is_there_makes_no_form_dearer)
     for (int k = 0; k < slow.count; k++)
         CHECK_REL(slow.form[k].setup_s, quick.form[k].setup_s + 1000.0, 1e-12);
 }
+
+/* What is asked for by name has room for aggregates of another kind where the steps are many; a choice does without. */
+TEST(a_form_without_another_takes_more_where_it_is_hard)
+{
+    uz_cost_size size = {.d = 100000, .m = 1000, .n_b = 1000, .k_entries = 4100000, .modes = 6, .bounds = true};
+    double bytes[2][2];
+    for (int hard = 0; hard < 2; hard++)
+        for (int alone = 0; alone < 2; alone++) {
+            uz_cost_plan plan;
+            size.firmness = hard ? 14.6 : 1.0;
+            size.alone = alone == 1;
+            uz_cost_decide(&plan, &size, NULL, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_MATRIX_FREE, 0);
+            bytes[hard][alone] = plan.form[plan.chosen].bytes;
+        }
+    CHECK_REL(bytes[0][1], bytes[0][0], 1e-15);
+    CHECK_REL(bytes[1][0], bytes[0][0], 1e-15);
+    CHECK(bytes[1][1] > 1.1 * bytes[1][0] && bytes[1][1] < 2.0 * bytes[1][0]);
+}
