@@ -304,7 +304,6 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
     plan->chosen = -1;
     for (int k = 0; k < plan->count; k++) {
         uz_cost_estimate *form = &plan->form[k];
-        form->setup_s += factor ? factor->order_s : 0.0; /* it has been taken, whatever is chosen */
         form->fits = memory_limit == 0 || form->bytes <= (double)memory_limit;
         bool allowed = asked == UZ_OPERATOR_AUTO || form->op == asked;
         if (!allowed || !form->fits)
@@ -314,6 +313,8 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
                                  MUCH_CHEAPER * uz_cost_seconds(form, size->cases) < before))
             plan->chosen = k;
     }
+    for (int k = 0; k < plan->count && factor; k++) /* it has been taken, whatever is chosen */
+        plan->form[k].setup_s += factor->order_s;
 }
 
 /* Of the dense block of a layer's dofs, with the contact last: METIS took 6 to 75 times its cube in flops and 9 to 58

@@ -283,14 +283,17 @@ TEST(an_order_that_is_there_makes_no_form_dearer)
                                .active_set = true,
                                .bounds = true,
                                .cases = 1};
-    uz_factor_info factor = {.nnz = 4000000, .flops = 1e9, .bytes = 32000000};
-    uz_cost_plan quick, slow;
-    uz_cost_decide(&quick, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
-    factor.order_s = 1000.0;
-    uz_cost_decide(&slow, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
-    CHECK_INT(slow.form[slow.chosen].op, quick.form[quick.chosen].op);
-    for (int k = 0; k < slow.count; k++)
-        CHECK_REL(slow.form[k].setup_s, quick.form[k].setup_s + 1000.0, 1e-12);
+    for (int large = 0; large < 2; large++) {
+        uz_factor_info factor = {.nnz = large ? 400000000 : 4000000, .flops = large ? 1e12 : 1e9, .bytes = 32000000};
+        uz_cost_plan quick, slow;
+        uz_cost_decide(&quick, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+        factor.order_s = 1000.0;
+        uz_cost_decide(&slow, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+        CHECK_INT(slow.form[slow.chosen].op, quick.form[quick.chosen].op);
+        CHECK_INT(slow.form[slow.chosen].op, large ? UZ_OPERATOR_MATRIX_FREE : UZ_OPERATOR_CONDENSED);
+        for (int k = 0; k < slow.count; k++)
+            CHECK_REL(slow.form[k].setup_s, quick.form[k].setup_s + 1000.0, 1e-12);
+    }
 }
 
 /* What is asked for by name has room for aggregates of another kind where the steps are many; a choice does without. */
