@@ -23,8 +23,8 @@ typedef struct {
     const double *u, *r;
     uz_evaluation *out;
     int dim;
-    double *load, *contact, *inner; /* n_nodes x dim; inner: f_int at held nodes */
-    bool *held;                     /* n_nodes */
+    double *load, *contact, *inner; /* n_nodes x dim; inner: f_int where it is wanted */
+    bool *held, *wanted;            /* n_nodes; wanted: held, or other nodes bear what acts there */
     int64_t *first, *support;       /* supports of each node: support[first[a]..first[a + 1]) */
     double centre[DIM];
     double force[DIM], moment[DIM]; /* of everything, the moment about the centre: the first node */
@@ -146,13 +146,13 @@ static bool list_supports(balance *b)
     return true;
 }
 
-/* Do other nodes bear what acts on this one? */
-static bool leaves(const balance *b, int64_t node)
+static void find_wanted(balance *b)
 {
-    return uz_mesh_hangs(&b->model->mesh, node) || uz_is_tied(b->model, node);
+    for (int64_t a = 0; a < b->model->mesh.n_nodes; a++)
+        b->wanted[a] = b->held[a] || uz_mesh_hangs(&b->model->mesh, a) || uz_is_tied(b->model, a);
 }
 
-/* f_int at held nodes, of the elements that touch one, and at hanging nodes. */
+/* f_int where it is wanted, of the elements that touch such nodes. */
 static void add_elements(balance *b)
 {
     const uz_body_model *model = b->model;
@@ -166,7 +166,7 @@ static void add_elements(balance *b)
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         bool touches = false;
         for (int a = 0; a < count; a++)
-            touches = touches || b->held[node[a]] || leaves(b, node[a]);
+            touches = touches || b->wanted[node[a]];
         if (!touches)
             continue;
         if (!alike || made != uz_element_material(model, e)) {
@@ -177,7 +177,7 @@ static void add_elements(balance *b)
         const int dim = b->dim, n = count * dim;
         for (int i = 0; i < n; i++) {
             double sum = 0;
-            if (!b->held[node[i / dim]] && !leaves(b, node[i / dim]))
+            if (!b->wanted[node[i / dim]])
                 continue;
             for (int j = 0; j < n; j++)
                 sum += ke[i * n + j] * b->u[node[j / dim] * dim + j % dim];
@@ -331,13 +331,11 @@ static uz_status thermal_energy(double *work, double *own, double *kept, const b
     return status;
 }
 
-/* The forces of elements at held nodes, and at nodes that leave them to others, as they are known with those of
- * springs.
- */
+/* The forces of elements where they are wanted, as they are known with those of springs. */
 static void take_inner(balance *b, const double *inner)
 {
     for (int64_t i = 0; i < b->model->mesh.n_nodes * b->dim; i++) {
-        if (!b->held[i / b->dim] && !leaves(b, i / b->dim))
+        if (!b->wanted[i / b->dim])
             continue;
         b->inner[i] = inner[i] - (b->model->spring ? b->model->spring[i] * b->u[i] : 0);
         b->size += fabs(inner[i]);
@@ -378,6 +376,17 @@ static void tell_groups(balance *b, bool large)
     }
 }
 
+static bool make_room(balance *b, int64_t n)
+{
+    b->load = uz_alloc_zero(n * b->dim, sizeof *b->load);
+    b->contact = uz_alloc_zero(n * b->dim, sizeof *b->contact);
+    b->inner = uz_alloc_zero(n * b->dim, sizeof *b->inner);
+    b->held = uz_alloc_zero(n, sizeof *b->held);
+    b->wanted = uz_alloc(n, sizeof *b->wanted);
+    b->first = uz_alloc_zero(n + 2, sizeof *b->first);
+    return b->load && b->contact && b->inner && b->held && b->wanted && b->first;
+}
+
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                             const double *r, const uz_balance_known *known, uz_error *err)
 {
@@ -392,12 +401,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     double *force = model->row_ends ? uz_alloc(model->m, sizeof *force) : NULL;
     double expanding = 0, expanded = 0, energy = 0, work = 0; /* work: of all loads, the thermal forces included */
     uz_status status = UZ_OK;
-    b.load = uz_alloc_zero(n * dim, sizeof *b.load);
-    b.contact = uz_alloc_zero(n * dim, sizeof *b.contact);
-    b.inner = uz_alloc_zero(n * dim, sizeof *b.inner);
-    b.held = uz_alloc_zero(n, sizeof *b.held);
-    b.first = uz_alloc_zero(n + 2, sizeof *b.first);
-    if (!b.load || !b.contact || !b.inner || !b.held || !b.first)
+    if (!make_room(&b, n))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on %lld nodes", (long long)n);
     else if (model->row_ends && !force)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld contact rows", (long long)model->m);
@@ -426,6 +430,8 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     }
     if (status == UZ_OK && !list_supports(&b))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
+    if (status == UZ_OK)
+        find_wanted(&b);
     if (status == UZ_OK && known)
         take_inner(&b, known->inner);
     else if (status == UZ_OK)
@@ -456,6 +462,7 @@ done:
     free(b.contact);
     free(b.inner);
     free(b.held);
+    free(b.wanted);
     free(b.first);
     free(b.support);
     return status;
