@@ -354,6 +354,9 @@ static bool suits(const uz_dual_shape *shape)
 #define LOAD_PASSES 0.9
 /* Steps of the active set, as if each had the whole block anew. */
 #define STEPS 0.5
+/* The part of a load's time that load cases take which pass a factor together: 0.3 to 0.45 of it, 50 cases on hex8 and
+ * tet4 of 45,000 and 105,000 dofs. */
+#define NEXT_CASE 0.4
 
 static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
                      const uz_cost_rates *rates)
@@ -363,6 +366,7 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     cost->flops += dense + STEPS * step + 8.0 * entries;
     cost->setup_s += dense * rates->flop_s;
     cost->case_s += STEPS * step * rates->flop_s + LOAD_PASSES * entries * rates->entry_s;
+    cost->next_s = NEXT_CASE * cost->case_s;
     cost->bytes += 8.0 * UZ_COST_VECTORS * (double)size->d;
     cost->bytes += 8.0 * (n_b * n_b + 2.0 * m * m + n_b * m);
 }

@@ -118,7 +118,8 @@ TEST(patience_is_as_long_as_a_factor_is_dear)
     CHECK_INT(uz_cost_patience(&plan, &size), 0);
 }
 
-/* The first of many loads costs what one does; the others less where they begin at answers, the same on a factor. */
+/* The first of many loads costs what one does; the others less where they begin at answers, or pass a factor together.
+ */
 TEST(further_loads_cost_less_without_a_factor)
 {
     const uz_factor_info factor = {.nnz = 40000000, .flops = 1e11, .bytes = 320000000};
@@ -140,7 +141,7 @@ TEST(further_loads_cost_less_without_a_factor)
         CHECK_REL(one, form->setup_s + form->case_s, 1e-12);
         CHECK(uz_cost_seconds(form, 1) <= one && uz_cost_seconds(form, 1) >= one);
         CHECK_REL(many, one + 49 * form->next_s, 1e-12);
-        CHECK(form->op == UZ_OPERATOR_MATRIX_FREE ? form->next_s < 0.7 * form->case_s : form->next_s >= form->case_s);
+        CHECK(form->op == UZ_OPERATOR_FACTORED ? form->next_s >= form->case_s : form->next_s < 0.7 * form->case_s);
     }
 }
 
