@@ -261,8 +261,8 @@ bool uz_cost_is_one_to_one(const uz_csc *N, int64_t n_b)
 
 /* ------------------------------------------------------------------- the choice */
 
-/* The model is trusted to this factor where it speaks against the form that measurements have chosen, and asked only
- * where there are seconds to win. */
+/* A form without a factor has to be so much cheaper for one load, as a factor spares later ones on the body much; of
+ * several load cases what it spares them is counted. It is asked for only where there are seconds to win. */
 #define MUCH_CHEAPER 2.0
 #define WORTH_S      2.0
 
@@ -287,8 +287,9 @@ static uz_cost_rates rates_of(const uz_cost_size *size)
     return rates;
 }
 
-void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
-                    uz_operator asked, size_t memory_limit)
+/* ordered: the order of a factor has been found, whatever is chosen; else forms with a factor would take it. */
+static void decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, bool ordered,
+                   uz_operator direct, uz_operator asked, size_t memory_limit)
 {
     const uz_cost_rates rates = rates_of(size);
     plan->count = 0;
@@ -302,25 +303,36 @@ void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_facto
             plan->form[plan->count++] = estimate(can, size, can->needs_factor ? factor : NULL, direct, &rates);
     }
     plan->chosen = -1;
+    const double cheaper = size->cases > 1 ? 1.0 : MUCH_CHEAPER;
     for (int k = 0; k < plan->count; k++) {
         uz_cost_estimate *form = &plan->form[k];
+        if (factor && !ordered && uz_dual_form_of(form->op)->can.needs_factor)
+            form->setup_s += factor->order_s;
         form->fits = memory_limit == 0 || form->bytes <= (double)memory_limit;
         bool allowed = asked == UZ_OPERATOR_AUTO || form->op == asked;
         if (!allowed || !form->fits)
             continue;
         const double before = plan->chosen >= 0 ? uz_cost_seconds(&plan->form[plan->chosen], size->cases) : INFINITY;
         if (plan->chosen < 0 || (!uz_dual_form_of(form->op)->can.needs_factor && before > WORTH_S &&
-                                 MUCH_CHEAPER * uz_cost_seconds(form, size->cases) < before))
+                                 cheaper * uz_cost_seconds(form, size->cases) < before))
             plan->chosen = k;
     }
-    for (int k = 0; k < plan->count && factor; k++) /* it has been taken, whatever is chosen */
+    for (int k = 0; k < plan->count && factor && ordered; k++)
         plan->form[k].setup_s += factor->order_s;
 }
 
+void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
+                    uz_operator asked, size_t memory_limit)
+{
+    decide(plan, size, factor, true, direct, asked, memory_limit);
+}
+
 /* Of the dense block of a layer's dofs, with the contact last: METIS took 6 to 75 times its cube in flops and 9 to 58
- * times its square in entries; hex8, tet4, hex20, tet10, cubes, bars and plates of 14,000 to 105,000 dofs. */
+ * times its square in entries; hex8, tet4, hex20, tet10, cubes, bars and plates of 14,000 to 105,000 dofs. Its own time
+ * was that of 100 to 230 passes of K. */
 #define LEAST_FLOPS   6.0
 #define LEAST_ENTRIES 9.0
+#define LEAST_PASSES  100.0
 
 bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const uz_mesh *mesh, uz_operator direct,
                             uz_operator asked, size_t memory_limit)
@@ -328,10 +340,12 @@ bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const 
     if (asked != UZ_OPERATOR_AUTO)
         return false;
     const double layer = 3.0 * uz_mesh_breadth(mesh), entries = LEAST_ENTRIES * layer * layer;
+    const double rate = size->entry_s > 0.0 ? size->entry_s : uz_cost_machine()->entry_s;
     const uz_factor_info least = {.nnz = (int64_t)entries,
+                                  .order_s = LEAST_PASSES * (double)size->k_entries * rate,
                                   .flops = LEAST_FLOPS * layer * layer * layer,
                                   .bytes = (size_t)(sizeof(double) * entries)};
-    uz_cost_decide(plan, size, &least, direct, asked, memory_limit);
+    decide(plan, size, &least, false, direct, asked, memory_limit);
     return plan->chosen >= 0 && !uz_dual_form_of(plan->form[plan->chosen].op)->can.needs_factor;
 }
 

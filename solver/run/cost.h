@@ -36,13 +36,15 @@ bool uz_cost_is_one_to_one(const uz_csc *N, int64_t n_b);
 double uz_cost_analysis_bytes(const uz_cost_size *size);
 
 /* All forms, `direct` being the one the factor was analysed for, and the cheapest that fits the limit (0: none):
- * `direct` unless another is much cheaper or it does not fit. asked: AUTO, or the one form that may be chosen. chosen
- * is -1 where none fits. factor NULL: its analysis did not fit, so that no form with a factor does. */
+ * `direct` unless it does not fit or another is much cheaper, of several load cases cheaper. asked: AUTO, or the one
+ * form that may be chosen. chosen is -1 where none fits. factor NULL: its analysis did not fit, so that no form with a
+ * factor does. */
 void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,
                     uz_operator asked, size_t memory_limit);
 
 /* Decides so for a solid by counts, without the analysis of a factor: does matrix_free win even over the least that a
- * factor of a body of this breadth (uz_mesh_breadth) takes? false: it has to be analysed, or there is no choice. */
+ * factor of a body of this breadth (uz_mesh_breadth) takes, with its order, which nobody else needs? false: it has to
+ * be analysed, or there is no choice. */
 bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const uz_mesh *mesh, uz_operator direct,
                             uz_operator asked, size_t memory_limit);
 

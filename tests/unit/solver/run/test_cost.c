@@ -2,6 +2,7 @@
 #include "body_fixture.h"
 #include "harness.h"
 #include "run/cost.h"
+#include "scene/breadth.h"
 #include "scene_fixture.h"
 
 #include <math.h>
@@ -32,6 +33,37 @@ TEST(a_large_cube_needs_no_order_of_a_factor)
     CHECK_INT(plan.form[plan.chosen].op, UZ_OPERATOR_MATRIX_FREE);
     CHECK(plan.count > 1 && plan.form[0].op == UZ_OPERATOR_CONDENSED);
     CHECK(!is_surely_free(&plan, 80, 80, 80, UZ_OPERATOR_CONDENSED, 0));
+}
+
+/* Before there is an order, only forms with a factor have to pay for it: 100 passes of K. */
+TEST(what_needs_no_order_does_not_pay_for_it)
+{
+    enum { CELLS = 40 };
+    const uz_box box = {.size = {CELLS, CELLS, CELLS}, .cells = {CELLS, CELLS, CELLS}, .dim = 3, .element = "hex8"};
+    uz_mesh mesh;
+    uz_error err = {0};
+    CHECK_MSG(uz_mesh_from_box(&mesh, &box, &err) == UZ_OK, "%s", err.message);
+    const int64_t d = 3 * mesh.n_nodes;
+    const uz_cost_size size = {.d = d,
+                               .m = 25,
+                               .n_b = 25,
+                               .k_entries = 41 * d,
+                               .n_entries = 25,
+                               .modes = 6,
+                               .active_set = true,
+                               .bounds = true};
+    const double layer = 3.0 * uz_mesh_breadth(&mesh);
+    const uz_factor_info least = {.nnz = (int64_t)(9.0 * layer * layer), .flops = 6.0 * layer * layer * layer};
+    uz_cost_plan counted, analysed;
+    CHECK(uz_cost_is_surely_free(&counted, &size, &mesh, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0));
+    uz_cost_decide(&analysed, &size, &least, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+    CHECK(counted.count == analysed.count && counted.count > 2);
+    for (int k = 0; k < counted.count; k++) {
+        const bool free = counted.form[k].op == UZ_OPERATOR_MATRIX_FREE;
+        const double order = free ? 0.0 : 100.0 * (double)size.k_entries * uz_cost_machine()->entry_s;
+        CHECK_REL(counted.form[k].setup_s, analysed.form[k].setup_s + order, 1e-6);
+    }
+    uz_mesh_clear(&mesh);
 }
 
 TEST(a_bar_and_a_small_cube_have_their_factor_counted)
