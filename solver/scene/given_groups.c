@@ -10,12 +10,20 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Numbers from 0 on, each of which is in it or not: a group of elements names the nodes of all of them, each many
+ * times. */
+typedef struct {
+    uint64_t *word;
+    int64_t first, end, count; /* words that may have some; numbers that are in it */
+} number_set;
+
 /* What the groups are made from. */
 typedef struct {
     uz_mesh *mesh;
     const uz_given_mesh *given;
     const int64_t *new_node;
     uz_corner_table sides;
+    number_set nodes, elements; /* of the name at hand; empty between names */
     uz_error *err;
 } group_work;
 
@@ -40,15 +48,35 @@ static bool append(number_list *list, int64_t value)
     return true;
 }
 
-/* Sorts the list and leaves each number once. */
-static void sort_unique(number_list *list)
+static void put_in(number_set *set, int64_t number)
 {
-    list->count = uz_sort_unique(list->value, list->count);
+    const int64_t at = number / 64;
+    const uint64_t bit = (uint64_t)1 << number % 64;
+    if (set->count == 0)
+        set->first = set->end = at;
+    set->count += (set->word[at] & bit) == 0;
+    set->word[at] |= bit;
+    set->first = at < set->first ? at : set->first;
+    set->end = at >= set->end ? at + 1 : set->end;
 }
 
-/* Everything that is given under one name. */
+/* Empties it. The numbers, ascending; NULL: no memory. */
+static int64_t *take_out(number_set *set, int64_t *count)
+{
+    int64_t *number = uz_alloc(set->count, sizeof *number), found = 0;
+    for (int64_t at = set->first; at < set->end; at++) {
+        for (uint64_t left = number ? set->word[at] : 0; left; left &= left - 1)
+            number[found++] = 64 * at + __builtin_ctzll(left);
+        set->word[at] = 0;
+    }
+    *count = found;
+    set->first = set->end = set->count = 0;
+    return number;
+}
+
+/* The sides that are given under one name; nodes and elements are in sets. */
 typedef struct {
-    number_list nodes, faces, elements; /* faces: element * UZ_SIDE_STEP + side */
+    number_list faces; /* element * UZ_SIDE_STEP + side */
     int64_t n_inner;
 } named_parts;
 
@@ -78,14 +106,13 @@ static void group_place(char where[UZ_POINTER], const uz_given_mesh *given, cons
 
 /* ---- faces */
 
-static bool append_face(named_parts *parts, const group_work *work, uz_face face)
+static bool append_face(named_parts *parts, group_work *work, uz_face face)
 {
     int64_t node[UZ_FACE_NODES];
     const int count = uz_mesh_face(node, work->mesh, face);
-    bool room = append(&parts->faces, face.element * UZ_SIDE_STEP + face.side);
-    for (int k = 0; k < count && room; k++)
-        room = append(&parts->nodes, node[k]);
-    return room;
+    for (int k = 0; k < count; k++)
+        put_in(&work->nodes, node[k]);
+    return append(&parts->faces, face.element * UZ_SIDE_STEP + face.side);
 }
 
 static uz_status refuse_face(const group_work *work, const uz_given_group *group, int64_t i, const char *what)
@@ -101,7 +128,7 @@ static uz_status refuse_face(const group_work *work, const uz_given_group *group
 }
 
 /* Adds the side of an element that a given face is, and its nodes. */
-static uz_status collect_face(named_parts *parts, const group_work *work, const uz_given_group *group, int64_t i)
+static uz_status collect_face(named_parts *parts, group_work *work, const uz_given_group *group, int64_t i)
 {
     static const int CORNERS[2][UZ_FACE_NODES + 1] = {{0, 0, 2, 2}, {0, 0, 0, 3, 4, 0, 3, 0, 4}}; /* among so many */
     int64_t node[UZ_FACE_NODES], corner[UZ_MOST_CORNERS], there[UZ_FACE_NODES];
@@ -144,7 +171,7 @@ static bool drop_repeated(uz_group *group, const number_list *code)
     if (!sorted.value)
         return false;
     memcpy(sorted.value, code->value, (size_t)code->count * sizeof *code->value);
-    sort_unique(&sorted);
+    sorted.count = uz_sort_unique(sorted.value, sorted.count);
     unsigned char *seen = uz_alloc_zero(sorted.count, sizeof *seen);
     for (int64_t i = 0; seen && sorted.count < code->count && i < code->count; i++) {
         const int64_t *at =
@@ -163,7 +190,7 @@ static bool drop_repeated(uz_group *group, const number_list *code)
 /* ---- one name */
 
 /* Adds what one group has. */
-static uz_status collect(named_parts *parts, const group_work *work, const uz_given_group *group)
+static uz_status collect(named_parts *parts, group_work *work, const uz_given_group *group)
 {
     char where[UZ_POINTER];
     const int64_t n_nodes = work->given->n_nodes, n_elements = work->mesh->n_elements;
@@ -176,8 +203,8 @@ static uz_status collect(named_parts *parts, const group_work *work, const uz_gi
                            "the group \"%s\" asks for node %lld, but there are only 0 to %lld", group->name,
                            (long long)given, (long long)n_nodes - 1);
         }
-        if (work->new_node[given] >= 0 && !append(&parts->nodes, work->new_node[given]))
-            return uz_no_memory(work->err, GROUPS);
+        if (work->new_node[given] >= 0)
+            put_in(&work->nodes, work->new_node[given]);
     }
     for (int64_t i = 0; i < group->n_faces && status == UZ_OK; i++)
         status = collect_face(parts, work, group, i);
@@ -191,31 +218,27 @@ static uz_status collect(named_parts *parts, const group_work *work, const uz_gi
                            (long long)e, (long long)n_elements - 1);
         }
         const int64_t *node = uz_mesh_element(work->mesh, e, &count);
-        bool room = append(&parts->elements, e);
-        for (int k = 0; k < count && room; k++)
-            room = append(&parts->nodes, node[k]);
-        if (!room)
-            return uz_no_memory(work->err, GROUPS);
+        put_in(&work->elements, e);
+        for (int k = 0; k < count; k++)
+            put_in(&work->nodes, node[k]);
     }
     return status;
 }
 
 /* A new group of what was collected, with this status; frees what it does not take. */
-static uz_status finish_group(const group_work *work, const char *name, named_parts *parts, uz_status status)
+static uz_status finish_group(group_work *work, const char *name, named_parts *parts, uz_status status)
 {
     if (status == UZ_OK) {
         uz_group *out = &work->mesh->groups[work->mesh->n_groups++];
         snprintf(out->name, sizeof out->name, "%s", name);
-        sort_unique(&parts->nodes);
-        sort_unique(&parts->elements);
-        out->kind = parts->elements.count ? UZ_GROUP_ELEMENTS : parts->faces.count ? UZ_GROUP_FACES : UZ_GROUP_NODES;
-        out->node = parts->nodes.value;
-        out->n_nodes = parts->nodes.count;
-        parts->nodes.value = NULL;
+        out->kind = work->elements.count ? UZ_GROUP_ELEMENTS : parts->faces.count ? UZ_GROUP_FACES : UZ_GROUP_NODES;
+        out->node = take_out(&work->nodes, &out->n_nodes);
+        if (!out->node)
+            status = uz_no_memory(work->err, GROUPS);
         if (out->kind == UZ_GROUP_ELEMENTS) {
-            out->element = parts->elements.value;
-            out->n_elements = parts->elements.count;
-            parts->elements.value = NULL;
+            out->element = take_out(&work->elements, &out->n_elements);
+            if (!out->element)
+                status = uz_no_memory(work->err, GROUPS);
         } else if (out->kind == UZ_GROUP_FACES) {
             out->n_inner = parts->n_inner;
             out->face = uz_alloc(parts->faces.count, sizeof *out->face);
@@ -226,9 +249,7 @@ static uz_status finish_group(const group_work *work, const char *name, named_pa
                 status = uz_no_memory(work->err, GROUPS);
         }
     }
-    free(parts->nodes.value);
     free(parts->faces.value);
-    free(parts->elements.value);
     return status;
 }
 
@@ -247,7 +268,10 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
     mesh->groups = uz_alloc_zero(given->n_groups + 2, sizeof *mesh->groups);
     if (!mesh->groups)
         return uz_no_memory(work.err, GROUPS);
-    uz_status status = uz_corner_table_build(&work.sides, mesh, true, err);
+    work.nodes.word = uz_alloc_zero(mesh->n_nodes / 64 + 1, sizeof *work.nodes.word);
+    work.elements.word = uz_alloc_zero(mesh->n_elements / 64 + 1, sizeof *work.elements.word);
+    uz_status status = work.nodes.word && work.elements.word ? uz_corner_table_build(&work.sides, mesh, true, err)
+                                                             : uz_no_memory(err, GROUPS);
     for (int64_t i = 0; i < given->n_groups && status == UZ_OK;
          i++) { /* all of its name, unless an earlier one has it */
         const char *name = given->groups[i].name;
@@ -264,7 +288,7 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
         for (int64_t i = 0; i < work.sides.count && status == UZ_OK; i++)
             if (!work.sides.same[i] && !work.sides.same[i + 1] && !append_face(&parts, &work, work.sides.item[i]))
                 status = uz_no_memory(work.err, GROUPS);
-        sort_unique(&parts.faces);
+        parts.faces.count = uz_sort_unique(parts.faces.value, parts.faces.count);
         status = finish_group(&work, "boundary", &parts, status);
     }
     const uz_group *named = uz_mesh_group(mesh, "all", "", NULL);
@@ -280,5 +304,7 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
         *all = (uz_group){.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
     }
     uz_corner_table_clear(&work.sides);
+    free(work.nodes.word);
+    free(work.elements.word);
     return status;
 }
