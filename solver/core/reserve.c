@@ -296,14 +296,35 @@ bool uz_reserve_fill(uz_reserve *reserve)
     return bytes > 0 && keep_fresh(reserve, bytes) && more;
 }
 
+void uz_reserve_give_back(uz_reserve *reserve, size_t bytes)
+{
+    piece *out = NULL;
+    pthread_mutex_lock(&reserve->mutex);
+    reserve->expected = 0;
+    while (reserve->kept && bytes > 0) {
+        piece *first = reserve->kept;
+        if (first->bytes > bytes) { /* whole pages of its end */
+            const size_t part = bytes / HUGE_PAGE * HUGE_PAGE;
+            first->bytes -= part;
+            reserve->kept_bytes -= part;
+            munmap(first->at + first->bytes, part);
+            break;
+        }
+        reserve->kept = first->next;
+        reserve->kept_bytes -= first->bytes;
+        bytes -= first->bytes;
+        first->next = out;
+        out = first;
+    }
+    if (reserve->largest > reserve->kept_bytes)
+        reserve->largest = reserve->kept_bytes;
+    pthread_mutex_unlock(&reserve->mutex);
+    unmap_pieces(out);
+}
+
 void uz_reserve_empty(uz_reserve *reserve)
 {
-    pthread_mutex_lock(&reserve->mutex);
-    piece *list = reserve->kept;
-    reserve->kept = NULL;
-    reserve->kept_bytes = reserve->largest = 0;
-    pthread_mutex_unlock(&reserve->mutex);
-    unmap_pieces(list);
+    uz_reserve_give_back(reserve, SIZE_MAX);
 }
 
 size_t uz_reserve_bytes(uz_reserve *reserve)

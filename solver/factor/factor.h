@@ -142,5 +142,7 @@ void uz_factor_use_threads(int threads);
 /* The big blocks, which are the factor's above all, come from the reserve from now on. Process-wide: called once at
  * most, after uz_factor_use_huge_pages and before anything is factored; the reserve outlives every factor. */
 void uz_factor_use_reserve(uz_reserve *used);
+/* A body gets no factor, and takes so many bytes: the reserve, if there is one, leaves them to it. */
+void uz_factor_expect_none(size_t bytes);
 
 #endif

@@ -58,6 +58,12 @@ void uz_expect_factor(const uz_csc *K)
         uz_reserve_expect(reserve, bytes);
 }
 
+void uz_factor_expect_none(size_t bytes)
+{
+    if (reserve)
+        uz_reserve_give_back(reserve, bytes);
+}
+
 void uz_factor_use_huge_pages(void)
 {
     SuiteSparse_config.malloc_func = allocate;

@@ -205,6 +205,7 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
         budget = uz_amg_predict_bytes(m->size.d, m->size.k_entries, m->size.modes) +
                  fmax(0.0, limit - plan->form[plan->chosen].bytes);
     uz_status status = UZ_OK;
+    uz_factor_expect_none((size_t)plan->form[plan->chosen].bytes);
     if (setup->model.brick) {
         uz_multigrid *mg = NULL;
         status = uz_brick_multigrid(&mg, setup->model.brick, (size_t)budget, err);

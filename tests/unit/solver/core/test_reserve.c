@@ -85,6 +85,27 @@ TEST(no_more_is_kept_than_allowed)
     uz_reserve_free(reserve);
 }
 
+TEST(what_is_kept_is_left_to_others)
+{
+    uz_reserve *reserve = uz_reserve_new(64 * MB, 40 * MB);
+    unsigned char *a = uz_reserve_take(reserve, 10 * MB), *b = uz_reserve_take(reserve, 30 * MB);
+    CHECK(a && b && uz_reserve_give(reserve, a) && uz_reserve_give(reserve, b));
+    CHECK(uz_reserve_bytes(reserve) == 40 * MB);
+    uz_reserve_give_back(reserve, 13 * MB); /* whole pages of it */
+    CHECK(uz_reserve_bytes(reserve) == 28 * MB);
+    CHECK(!uz_reserve_fill(reserve) && uz_reserve_bytes(reserve) == 28 * MB); /* so much is enough now */
+    a = uz_reserve_take(reserve, 32 * MB);
+    CHECK(a && uz_reserve_bytes(reserve) == 0);
+    memset(a, 7, 32 * MB);
+    CHECK(has_only(a, 32 * MB, 7) && uz_reserve_give(reserve, a));
+    while (uz_reserve_fill(reserve))
+        ;
+    CHECK(uz_reserve_bytes(reserve) == 32 * MB); /* as much as a block has taken since */
+    uz_reserve_give_back(reserve, SIZE_MAX);
+    CHECK(uz_reserve_bytes(reserve) == 0);
+    uz_reserve_free(reserve);
+}
+
 static bool is_there(void *at, size_t bytes)
 {
     unsigned char pages[8192];
