@@ -28,11 +28,12 @@ void uz_list_members(int64_t *start, int32_t *member, const int32_t *of, int64_t
 }
 
 /* a_ij^2 > square a_ii a_jj for some pair of dofs of the two nodes. */
-static bool is_strong(const uz_blocks *A, const float *inverse, double square, int64_t i, int64_t e)
+static bool is_strong(const uz_level *level, double square, int64_t i, int64_t e)
 {
-    const int b = A->b;
-    const double *block = A->off + e * b * b;
-    const float *of_row = inverse + i * b, *of_column = inverse + (int64_t)A->idx[e] * b;
+    const int b = level->A.b;
+    double room[UZ_MODES_MOST * UZ_MODES_MOST];
+    const double *block = uz_level_block(room, level, false, e, b * b);
+    const float *of_row = level->inverse + i * b, *of_column = level->inverse + (int64_t)level->A.idx[e] * b;
     for (int r = 0; r < b; r++)
         for (int c = 0; c < b; c++) {
             const double value = block[r * b + c];
@@ -42,15 +43,16 @@ static bool is_strong(const uz_blocks *A, const float *inverse, double square, i
     return false;
 }
 
-static bool build_graph(graph *g, const uz_blocks *A, const uz_below *below, const float *inverse, double square)
+static bool build_graph(graph *g, const uz_level *level, const uz_below *below, double square)
 {
+    const uz_blocks *A = &level->A;
     const int64_t count = A->ptr[A->nodes];
     bool *strong = uz_alloc(count, sizeof *strong);
     int64_t links = 0;
     g->ptr = uz_alloc_zero(A->nodes + 1, sizeof *g->ptr);
     for (int64_t i = 0; strong && g->ptr && i < A->nodes; i++)
         for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
-            links += strong[e] = is_strong(A, inverse, square, i, e);
+            links += strong[e] = is_strong(level, square, i, e);
     g->node = strong ? uz_alloc(2 * links, sizeof *g->node) : NULL;
     int64_t at = 0;
     for (int64_t i = 0; g->node && g->ptr && i < A->nodes; i++) {
@@ -76,12 +78,12 @@ static void take_free_neighbours(const graph *g, int32_t *aggregate, int64_t a, 
             aggregate[g->node[k]] = number;
 }
 
-uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_blocks *A, const uz_below *below,
-                       const float *inverse, double threshold, uz_error *err)
+uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_level *level, const uz_below *below,
+                       double threshold, uz_error *err)
 {
-    const int64_t n_nodes = A->nodes;
+    const int64_t n_nodes = level->A.nodes;
     graph g = {0};
-    const bool ok = build_graph(&g, A, below, inverse, threshold * threshold);
+    const bool ok = build_graph(&g, level, below, threshold * threshold);
     /* whole neighbourhoods first; then what is left joins a neighbour's aggregate; what has none forms its own */
     int32_t number = 0;
     for (int64_t a = 0; ok && a < n_nodes; a++)
@@ -110,5 +112,6 @@ uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_blocks *A, c
     *count = number;
     free(g.ptr);
     free(g.node);
-    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)(n_nodes * A->b));
+    return ok ? UZ_OK
+              : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)(n_nodes * level->A.b));
 }

@@ -496,16 +496,3 @@ void uz_level_part(uz_level *level)
     level->off_rest = leave_rests(&A->off, level->off, A->ptr[A->nodes] * size);
     level->diag_rest = leave_rests(&A->diag, level->diag, A->nodes * size);
 }
-
-const double *uz_level_block(double *room, const uz_level *level, bool own, int64_t e)
-{
-    const int64_t size = (int64_t)level->A.b * level->A.b;
-    const double *whole = own ? level->A.diag : level->A.off;
-    const float *single = (own ? level->diag : level->off) + e * size;
-    if (whole)
-        return whole + e * size;
-    const uz_rests *rest = own ? &level->diag_rest : &level->off_rest;
-    for (int64_t k = 0; k < size; k++)
-        room[k] = (double)single[k] + rest->unit * (double)rest->value[e * size + k];
-    return room;
-}

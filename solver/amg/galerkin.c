@@ -206,11 +206,12 @@ static inline __attribute__((always_inline)) void add_node(const product *x, int
     for (int64_t s = 0; s < count; s++)
         x->place[column[s]] = (int32_t)s;
     memset(x->row, 0, (size_t)(count * b * width_of(k)) * sizeof *x->row);
-    add_product(x, A->diag + i * square, false, i, b, k);
+    double room[ROWS_MOST * ROWS_MOST];
+    add_product(x, uz_level_block(room, level, true, i, square), false, i, b, k);
     for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
-        add_product(x, A->off + e * square, false, A->idx[e], b, k);
+        add_product(x, uz_level_block(room, level, false, e, square), false, A->idx[e], b, k);
     for (int64_t e = x->below->ptr[i]; e < x->below->ptr[i + 1]; e++)
-        add_product(x, A->off + x->below->at[e] * square, true, x->below->node[e], b, k);
+        add_product(x, uz_level_block(room, level, false, x->below->at[e], square), true, x->below->node[e], b, k);
     for (int64_t e = begin; e < end; e++) { /* coarse += (rows of P)' rows of A P */
         const int32_t a = level->block[e], *idx = x->coarse->idx;
         const float *P = level->value + e * b * k;

@@ -118,13 +118,14 @@ void uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
         const bool own = is_any_held(inverse + i * b, fine->inverse + i * b, b);
         weigh(held_i, rest_i, inverse + i * b, b);
         if (own)
-            add_coupling(loss, fine, &(coupling){uz_level_block(room, fine, true, i), false, i, i, held_i, rest_i});
+            add_coupling(loss, fine,
+                         &(coupling){uz_level_block(room, fine, true, i, b * b), false, i, i, held_i, rest_i});
         for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
             const int64_t j = A->idx[e];
             const bool other = is_any_held(inverse + j * b, fine->inverse + j * b, b);
             if (!own && !other)
                 continue;
-            const double *block = uz_level_block(room, fine, false, e);
+            const double *block = uz_level_block(room, fine, false, e, b * b);
             weigh(held_j, rest_j, inverse + j * b, b);
             if (own)
                 add_coupling(loss, fine, &(coupling){block, false, i, j, held_i, rest_j});

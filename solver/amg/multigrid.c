@@ -70,19 +70,23 @@ uz_status uz_level_round(uz_level *level, uz_error *err)
 }
 
 /* y = A x, vectors with `width` numbers for each node, the surplus ones 0: four where uz_blocks_multiply takes them. */
-static void multiply(double *y, const uz_blocks *A, const double *x, int width)
+static void multiply(double *y, const uz_level *level, const double *x, int width)
 {
+    const uz_blocks *A = &level->A;
     const int b = A->b;
     const int64_t size = (int64_t)b * b;
-    if (width == 4) {
+    double room[UZ_MODES_MOST * UZ_MODES_MOST];
+    if (width == 4 && A->off)
         uz_blocks_multiply(y, A, x, 1);
+    else if (width == 4)
+        uz_level_multiply_parts(y, level, x, 1);
+    if (width == 4)
         return;
-    }
     memset(y, 0, (size_t)(A->nodes * width) * sizeof *y);
     for (int64_t i = 0; i < A->nodes; i++)
         for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
             const bool own = e < A->ptr[i];
-            const double *block = own ? A->diag + i * size : A->off + e * size;
+            const double *block = uz_level_block(room, level, own, own ? i : e, size);
             const int64_t j = own ? i : A->idx[e];
             for (int r = 0; r < b; r++)
                 for (int c = 0; c < b; c++) {
@@ -103,7 +107,7 @@ uz_status uz_level_range(double *range, const uz_level *level, uz_error *err)
     for (int64_t i = 0; x && i < A->nodes * b; i++)
         x[i / b * width + i % b] = level->inverse[i] > 0.0F ? uz_uniform(&state) - 0.5 : 0.0;
     for (int step = 0; x && y && step < POWER_STEPS; step++) {
-        multiply(y, A, x, width);
+        multiply(y, level, x, width);
         for (int64_t i = 0; i < A->nodes; i++)
             for (int r = 0; r < width; r++)
                 y[i * width + r] *= r < b ? (double)level->inverse[i * b + r] : 0.0;
@@ -156,7 +160,7 @@ static uz_status coarsen(uz_level *level, bool *done, float **modes, double thre
     double range = 1.0;
     uz_status status = uz_below_init(&below, A) && aggregate && basis ? UZ_OK : fail_memory(n, err);
     if (status == UZ_OK)
-        status = uz_aggregate(aggregate, &level->aggregates, A, &below, level->inverse, threshold, err);
+        status = uz_aggregate(aggregate, &level->aggregates, level, &below, threshold, err);
     *done = status == UZ_OK && (level->aggregates == 0 || (double)(level->aggregates * k) > LEAST_GAIN * (double)n);
     if (status == UZ_OK && !*done) {
         coarse = uz_alloc(level->aggregates * k * k, sizeof *coarse);
@@ -308,6 +312,8 @@ static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes
         status = fail_memory(K->cols, err);
     if (status == UZ_OK)
         status = uz_level_round(&mg->level[0], err);
+    if (status == UZ_OK) /* what is left of K: for the next level, and for products afterwards */
+        uz_level_part(&mg->level[0]);
     if (status == UZ_OK && !(of_level = scale_modes(mg, modes)))
         status = fail_memory(K->cols, err);
     while (status == UZ_OK && !done) {
@@ -348,8 +354,6 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
     uz_status status = n > ALONE ? build(mg, K, modes, team, memory_limit, stop, err) : UZ_OK;
     if (status == UZ_OK)
         status = factor_last(mg, K, memory_limit, stop, err);
-    if (mg->base.levels > 1) /* what is left for products with K */
-        uz_level_part(&mg->level[0]);
     for (int l = 1; l + 1 < mg->base.levels; l++) { /* only the last level needs them again */
         free(mg->level[l].A.off);
         free(mg->level[l].A.diag);

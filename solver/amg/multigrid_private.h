@@ -2,6 +2,7 @@
 #ifndef UZ_MULTIGRID_PRIVATE_H
 #define UZ_MULTIGRID_PRIVATE_H
 
+#include "core/cpu.h"
 #include "factor/factor.h"
 #include "amg/amg.h"
 
@@ -50,7 +51,7 @@ void uz_below_clear(uz_below *below);
  */
 typedef struct {
     uz_blocks A; /* the last level: kept for what holding dofs takes from it; else without numbers, once the next level
-                  * is made */
+                  * is made, level 0 as soon as it is in parts */
     float *off, *diag;            /* the same in single precision */
     uz_rests off_rest, diag_rest; /* level 0: what that has left off, with which both are A */
     float *inverse; /* nodes x b: 1 / a_jj, 0 where a dof is not there, which makes it vanish from every sweep */
@@ -145,8 +146,18 @@ void uz_level_multiply_parts(double *y, const uz_level *level, const double *x, 
 /* The numbers of A, at most 4, become those that single precision has left off: level 0, whose sweeps have the others.
  */
 void uz_level_part(uz_level *level);
-/* Block e of A->off, or that of node e of A->diag, from A or from its parts; room: b x b, where it may be put. */
-const double *uz_level_block(double *room, const uz_level *level, bool own, int64_t e);
+/* Block e of A->off, or that of node e of A->diag, from A or from its parts; room: size, b x b, where it may be put. */
+UZ_INLINE const double *uz_level_block(double *room, const uz_level *level, bool own, int64_t e, int64_t size)
+{
+    const double *whole = own ? level->A.diag : level->A.off;
+    const float *single = (own ? level->diag : level->off) + e * size;
+    if (whole)
+        return whole + e * size;
+    const uz_rests *rest = own ? &level->diag_rest : &level->off_rest;
+    for (int64_t k = 0; k < size; k++)
+        room[k] = (double)single[k] + rest->unit * (double)rest->value[e * size + k];
+    return room;
+}
 
 /* level (room->b[0]): S r by a power of two above the largest, which is returned; 0 or infinite: there is none. */
 double uz_read_dofs(float *level, const uz_aggregates *mg, const double *r);
@@ -179,8 +190,8 @@ uz_status uz_blocks_to_columns(uz_csc *out, const uz_blocks *A, const float *inv
 void uz_list_members(int64_t *start, int32_t *member, const int32_t *of, int64_t n, int64_t groups);
 
 /* aggregate (nodes): the aggregate of each node, -1 for nodes that hang on no other strongly. *count: aggregates. */
-uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_blocks *A, const uz_below *below,
-                       const float *inverse, double threshold, uz_error *err);
+uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_level *level, const uz_below *below,
+                       double threshold, uz_error *err);
 
 /* basis (nodes b x k): the modes of each aggregate made orthonormal, 0 where there are none; coarse (aggregates x k x
  * k): the modes in that basis, row by row: those of the coarse level. */

@@ -177,13 +177,15 @@ UZ_INLINE void smooth_node(const smoothing *x, rows_of_node *row, int64_t i, int
     const uz_below *below = x->below;
     const int32_t *aggregate = x->aggregate;
     const int64_t size = (int64_t)b * k, square = (int64_t)b * b;
+    double room[UZ_MODES_MOST * UZ_MODES_MOST];
     row->count = 0;
-    subtract(row, aggregate[i], A->diag + i * square, false, x->basis + i * size, b, k);
+    subtract(row, aggregate[i], uz_level_block(room, level, true, i, square), false, x->basis + i * size, b, k);
     for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
-        subtract(row, aggregate[A->idx[e]], A->off + e * square, false, x->basis + A->idx[e] * size, b, k);
+        subtract(row, aggregate[A->idx[e]], uz_level_block(room, level, false, e, square), false,
+                 x->basis + A->idx[e] * size, b, k);
     for (int64_t e = below->ptr[i]; e < below->ptr[i + 1]; e++)
-        subtract(row, aggregate[below->node[e]], A->off + below->at[e] * square, true, x->basis + below->node[e] * size,
-                 b, k);
+        subtract(row, aggregate[below->node[e]], uz_level_block(room, level, false, below->at[e], square), true,
+                 x->basis + below->node[e] * size, b, k);
     for (int64_t s = 1; s < row->count; s++) /* few, and nearly in order */
         for (int64_t t = s; t > 0 && row->met[t] < row->met[t - 1]; t--) {
             const int32_t swap = row->met[t];

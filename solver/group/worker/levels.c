@@ -248,16 +248,16 @@ static void *gather(const void *own, int64_t count, size_t each, int64_t *total)
 static void aggregate_nodes(spread_system *s, const spread_rows *rows, int32_t *aggregate, float *basis)
 {
     uz_error err = {0};
-    uz_blocks own = s->level.A;
+    uz_level own = s->level;
     uz_below below;
     const int64_t here = s->near.here, size = (int64_t)s->b * s->k;
     int64_t count = 0, before = 0, all = 0;
     MPI_Request request;
     float *modes = scale_modes(s, rows);
-    own.nodes = here;
-    if (!uz_below_init(&below, &own))
+    own.A.nodes = here;
+    if (!uz_below_init(&below, &own.A))
         end_group("no memory");
-    must(uz_aggregate(aggregate, &count, &own, &below, s->level.inverse, s->strong, &err), &err);
+    must(uz_aggregate(aggregate, &count, &own, &below, s->strong, &err), &err);
     uz_below_clear(&below);
     float *coarse = new_zeros(count * s->k * s->k, sizeof *coarse);
     if (count > 0)
