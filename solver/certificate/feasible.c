@@ -30,9 +30,12 @@ uz_status uz_touched_dofs(uz_csc *Nt, int64_t **dof, const uz_csc *N, uz_error *
 {
     uz_csc touched = *N; /* without its empty columns */
     memset(Nt, 0, sizeof *Nt);
+    int64_t count = 0;
+    for (int64_t j = 0; N->ptr && j < N->cols; j++)
+        count += N->ptr[j + 1] > N->ptr[j];
     touched.cols = 0;
-    touched.ptr = uz_alloc(N->cols + 1, sizeof *touched.ptr);
-    *dof = uz_alloc(N->cols, sizeof **dof);
+    touched.ptr = uz_alloc(count + 1, sizeof *touched.ptr);
+    *dof = uz_alloc(count, sizeof **dof);
     uz_status status = UZ_OK;
     if (touched.ptr && *dof) {
         touched.ptr[0] = 0;

@@ -17,15 +17,10 @@ static bool is_bound(const uz_bounds *bounds, const uz_csc *N, int64_t k, int64_
     return N->val[k] != 0.0 && bounds->dof[N->idx[k]] == j;
 }
 
-/* box->n, and box->dof where they are not all. */
 static bool list_dofs(uz_bounded *box, const uz_dual *dual)
 {
     const uz_csc *N = &dual->N;
-    box->n = dual->d;
-    if (uz_sparse_has_entries(dual))
-        return true;
     box->dof = uz_alloc(dual->m < dual->d ? dual->m : dual->d, sizeof *box->dof);
-    box->n = 0;
     for (int64_t j = 0; box->dof && j < dual->d; j++) {
         bool bound = false;
         for (int64_t k = N->ptr[j]; !bound && k < N->ptr[j + 1]; k++)
@@ -42,7 +37,7 @@ static void find_tightest(uz_bounded *box, const uz_dual_load *load)
     const uz_bounds *bounds = box->bounds;
     const uz_csc *N = &load->dual->N;
     for (int64_t b = 0; b < box->n; b++) {
-        const int64_t j = uz_bounded_dof(box, b);
+        const int64_t j = box->dof[b];
         box->upper[b] = box->lower[b] = -1;
         box->top[b] = INFINITY;
         box->bottom[b] = -INFINITY;
@@ -67,17 +62,17 @@ static void find_tightest(uz_bounded *box, const uz_dual_load *load)
 uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, uz_error *err)
 {
     const uz_dual *dual = x->load.dual;
-    const bool sweeps = uz_sparse_has_entries(dual);
+    const bool sized = uz_sparse_has_entries(dual);
     const int64_t d = dual->d, m = dual->m;
     uz_bounded *box = x->box = uz_alloc_zero(1, sizeof *box);
     if (!box)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
     box->bounds = bounds;
     bool ok = list_dofs(box, dual);
-    double **room[] = {&box->top, &box->bottom, &box->u, &box->size, &box->point};
-    const int64_t count[] = {box->n, box->n, d, sweeps ? d : 0, sweeps ? d : 0};
+    double **room[] = {&box->top, &box->bottom, &box->u, &box->size};
+    const int64_t count[] = {box->n, box->n, d, sized ? d : 0};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        ok = (count[k] == 0 || (*room[k] = uz_alloc(count[k], sizeof(double)))) && ok;
+        ok = ((k == 3 && !sized) || (*room[k] = uz_alloc(count[k], sizeof(double)))) && ok;
     int64_t **rows[] = {&box->upper, &box->lower, &box->holder};
     for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++)
         ok = (*rows[k] = uz_alloc(box->n, sizeof(int64_t))) && ok;
@@ -90,7 +85,7 @@ uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, uz_error
     box->point_energy = INFINITY;
     find_tightest(box, &x->load);
     memcpy(box->u, x->base, (size_t)d * sizeof *box->u);
-    x->load.bytes += 8 * (size_t)((sweeps ? 3 : 1) * d + (box->dof ? 6 : 5) * box->n + m) + (size_t)d;
+    x->load.bytes += 8 * (size_t)((sized ? 2 : 1) * d + 6 * box->n + m) + (size_t)d;
     return UZ_OK;
 }
 
@@ -106,7 +101,7 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
     if (!keep)
         memset(box->u, 0, (size_t)x->load.dual->d * sizeof *box->u);
     for (int64_t b = 0; b < box->n; b++) {
-        const int64_t j = uz_bounded_dof(box, b);
+        const int64_t j = box->dof[b];
         int64_t holder = -1;
         for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++) {
             const int64_t i = N->idx[k];
@@ -153,7 +148,7 @@ static bool has_doubts(const uz_bounded *box)
     bool doubts = false;
     for (int64_t b = 0; b < box->n && !doubts; b++) {
         const int64_t row = box->holder[b];
-        doubts = row >= 0 && uz_reaction_pulls(box->force[uz_bounded_dof(box, b)] / box->bounds->scale[row]);
+        doubts = row >= 0 && uz_reaction_pulls(box->force[box->dof[b]] / box->bounds->scale[row]);
     }
     return doubts;
 }
@@ -205,7 +200,7 @@ void uz_bounded_react(const uz_sparse_load *x, double *g, bool *active)
     memset(box->r, 0, (size_t)m * sizeof *box->r);
     memset(active, 0, (size_t)m * sizeof *active);
     for (int64_t b = 0; b < box->n; b++) {
-        const int64_t j = uz_bounded_dof(box, b);
+        const int64_t j = box->dof[b];
         int64_t row = box->holder[b];
         if (row < 0)
             continue;
@@ -275,12 +270,12 @@ static bool approach(uz_bounded *box, const uz_csc *K, const double *exact, doub
     double length = 1.0, *trial = box->size;
     bool fell = false, there = false;
     for (int64_t j = 0; begins && j < K->cols; j++)
-        box->point[j] = clip(0.0, box->bottom[j], box->top[j]);
+        box->point[j] = clip(0.0, box->least[j], box->most[j]);
     if (begins)
         box->point_energy = energy(box, K, box->point);
     for (int k = 0; k < HALVINGS; k++, length *= 0.5) {
         for (int64_t j = 0; j < K->cols; j++)
-            trial[j] = clip(box->point[j] + length * (exact[j] - box->point[j]), box->bottom[j], box->top[j]);
+            trial[j] = clip(box->point[j] + length * (exact[j] - box->point[j]), box->least[j], box->most[j]);
         const double reached = energy(box, K, trial);
         if (reached < box->point_energy) {
             memcpy(chosen, trial, (size_t)K->cols * sizeof *trial);
@@ -309,7 +304,7 @@ typedef struct {
 
 static bool is_held(const uz_bounded *box, int64_t j)
 {
-    return box->point[j] >= box->top[j] || box->point[j] <= box->bottom[j];
+    return box->point[j] >= box->most[j] || box->point[j] <= box->least[j];
 }
 
 /* Links from each dof to the next one at the border of the contact, or that pulls at its bound; force = p - K point.
@@ -317,8 +312,8 @@ static bool is_held(const uz_bounded *box, int64_t j)
 static void count_links(region *x, const uz_bounded *box, const uz_csc *K)
 {
     for (int64_t j = 0; j < K->cols; j++) {
-        const bool pulls = (box->point[j] >= box->top[j] && box->force[j] < 0.0) ||
-                           (box->point[j] <= box->bottom[j] && box->force[j] > 0.0);
+        const bool pulls = (box->point[j] >= box->most[j] && box->force[j] < 0.0) ||
+                           (box->point[j] <= box->least[j] && box->force[j] > 0.0);
         x->links[j] = pulls ? 0 : MOST_LINKS + 1;
     }
     for (int64_t j = 0; j < K->cols; j++)
@@ -409,18 +404,49 @@ static void sweep(region *x, const uz_bounded *box, bool backwards)
         double pull = x->pull[a] - x->u[a] / x->inverse[a];
         for (int64_t k = x->ptr[a]; k < x->ptr[a + 1]; k++)
             pull -= x->val[k] * x->u[x->idx[k]];
-        x->u[a] = clip(x->u[a] + OVERRELAXATION * pull * x->inverse[a], box->bottom[j], box->top[j]);
-        x->held += x->u[a] >= box->top[j] || x->u[a] <= box->bottom[j];
+        x->u[a] = clip(x->u[a] + OVERRELAXATION * pull * x->inverse[a], box->least[j], box->most[j]);
+        x->held += x->u[a] >= box->most[j] || x->u[a] <= box->least[j];
     }
+}
+
+/* What sweeps need besides, at the first of them. */
+static bool make_point(uz_sparse_load *x)
+{
+    uz_bounded *box = x->box;
+    const int64_t d = x->load.dual->d;
+    double **room[] = {&box->point, &box->most, &box->least};
+    if (box->point)
+        return true;
+    bool ok = true;
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        ok = (*room[k] = uz_alloc(d, sizeof(double))) && ok;
+    if (!ok) {
+        for (size_t k = 0; k < sizeof room / sizeof room[0]; k++) {
+            free(*room[k]);
+            *room[k] = NULL;
+        }
+        return false;
+    }
+    for (int64_t j = 0; j < d; j++) {
+        box->most[j] = INFINITY;
+        box->least[j] = -INFINITY;
+    }
+    for (int64_t b = 0; b < box->n; b++) {
+        box->most[box->dof[b]] = box->top[b];
+        box->least[box->dof[b]] = box->bottom[b];
+    }
+    x->load.bytes += sizeof room / sizeof room[0] * sizeof(double) * (size_t)d;
+    return true;
 }
 
 bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
 {
-    const uz_sparse_load *x = (const uz_sparse_load *)load;
+    uz_sparse_load *x = (uz_sparse_load *)load;
     const uz_csc *K = load->K;
     uz_bounded *box = x->box;
     region near;
-    if (!box || box->contradictory || !uz_sparse_has_entries(load->dual)) /* sweeps go by the entries of K */
+    if (!box || box->contradictory || !uz_sparse_has_entries(load->dual) ||
+        !make_point(x)) /* sweeps go by entries of K */
         return false;
     /* The energy only falls, so the points converge to the solution whatever the exact steps do. */
     const bool there = approach(box, K, x->known_u ? box->u : x->base, x->work);
@@ -440,11 +466,12 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
         free(own[k]);
     box->point_energy = energy(box, K, box->point);
     memset(active, 0, (size_t)load->dual->m * sizeof *active);
-    for (int64_t j = 0; j < K->cols; j++) {
-        if (box->point[j] >= box->top[j] && box->force[j] > 0.0)
-            active[box->upper[j]] = true;
-        else if (box->point[j] <= box->bottom[j] && box->force[j] < 0.0)
-            active[box->lower[j]] = true;
+    for (int64_t b = 0; b < box->n; b++) {
+        const int64_t j = box->dof[b];
+        if (box->point[j] >= box->top[b] && box->force[j] > 0.0)
+            active[box->upper[b]] = true;
+        else if (box->point[j] <= box->bottom[b] && box->force[j] < 0.0)
+            active[box->lower[b]] = true;
     }
     return true;
 }

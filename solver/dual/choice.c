@@ -33,10 +33,13 @@ uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked)
 
 uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err)
 {
-    *dofs = uz_alloc(N->cols, sizeof **dofs);
+    int64_t touched = 0;
+    for (int64_t j = 0; j < N->cols; j++)
+        touched += N->ptr[j + 1] > N->ptr[j];
+    *dofs = uz_alloc(touched, sizeof **dofs);
     *count = 0;
     if (!*dofs)
-        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld dofs", (long long)N->cols);
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld dofs", (long long)touched);
     for (int64_t j = 0; j < N->cols; j++)
         if (N->ptr[j + 1] > N->ptr[j])
             (*dofs)[(*count)++] = j;

@@ -51,6 +51,6 @@ typedef struct {
 /* Iterations that are needed where rows have several entries. */
 #define UZ_COST_ITERATIONS 330.0
 /* Vectors of d numbers that are alive together at the most crowded moment of a load, with a factor. */
-#define UZ_COST_VECTORS 36.0
+#define UZ_COST_VECTORS 35.0
 
 #endif

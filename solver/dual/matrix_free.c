@@ -664,7 +664,7 @@ static bool start_on_grids(free_load *x, bool *active)
     memset(active, 0, (size_t)load->dual->m * sizeof *active);
     for (int64_t b = 0; b < box->n; b++)
         if (held[b])
-            active[box->u[uz_bounded_dof(box, b)] >= box->top[b] ? box->upper[b] : box->lower[b]] = true;
+            active[box->u[box->dof[b]] >= box->top[b] ? box->upper[b] : box->lower[b]] = true;
     free(held);
     x->coarse = STARTED_TOLERANCE;
     return true;
@@ -680,7 +680,7 @@ static void start_near(free_load *x, bool *active)
     x->coarse = STARTED_TOLERANCE;
     memset(active, 0, (size_t)load->dual->m * sizeof *active);
     for (int64_t b = 0; b < box->n; b++) {
-        const int64_t j = uz_bounded_dof(box, b), upper = box->upper[b], lower = box->lower[b];
+        const int64_t j = box->dof[b], upper = box->upper[b], lower = box->lower[b];
         const double weight = uz_sparse_weight(load->K, j),
                      above = upper >= 0 ? -weight * box->bounds->scale[upper] * box->r[upper] : 0.0,
                      below = lower >= 0 ? -weight * box->bounds->scale[lower] * box->r[lower] : 0.0;
@@ -734,9 +734,11 @@ static const cycle_costs PLANE = {{1.7, 41.0, 0.0}, {4.0, 19.0, 0.2}, 40.0, 10.0
 #define STEPS         6.0
 #define SWEPT_CYCLES  30.0
 #define CHANGE_CYCLES 6.0
-/* As UZ_COST_VECTORS, with conjugate gradients; not all of them at the time of what a guess of bounds takes. */
-#define VECTORS        62.0
-#define BOUNDS_VECTORS 40.0
+/* As UZ_COST_VECTORS, with conjugate gradients; not all of them at the time of what a guess of bounds takes. Few bounds
+ * are not swept, and take no vectors of all dofs. */
+#define VECTORS            60.0
+#define BOUNDS_VECTORS     38.0
+#define FEW_BOUNDS_VECTORS 32.0
 /* Where no other form is to be had and the steps are so much harder, aggregates of another kind are made beside the
  * first ones, of which this part is more than what is there later: hex8 and tet10 at 0.49, stretched hex8. */
 #define BADLY  2.2
@@ -748,7 +750,7 @@ static const cycle_costs PLANE = {{1.7, 41.0, 0.0}, {4.0, 19.0, 0.2}, 40.0, 10.0
 #define CELLS_LOAD    235.0
 #define CELLS_GROWTH  0.06
 #define CELLS_FLOPS   40.0 /* for each dof, of what is as much as a step */
-#define CELLS_VECTORS 27.0
+#define CELLS_VECTORS 25.0
 
 /* Steps of solids that resist changes of volume, by their firmness, of stretched elements, and of long bodies, over
  * those of the same body of cubes at a Poisson's ratio of 0.3: powers of these, measured at 0.45, 0.49, elements 10
@@ -818,7 +820,8 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     /* beside it the dofs that are swept, with both triangles of K */
     const double swept = 32.0 * (double)size->k_entries + 52.0 * (double)size->d;
     cost->bytes += levels + (sweeps ? swept : 0.0) + (size->alone && harder > BADLY ? SECOND * levels : 0.0);
-    cost->bytes += 8.0 * (size->bounds ? BOUNDS_VECTORS : VECTORS) * (double)size->d;
+    const double vectors = !size->bounds ? VECTORS : sweeps ? BOUNDS_VECTORS : FEW_BOUNDS_VECTORS;
+    cost->bytes += 8.0 * vectors * (double)size->d;
 }
 
 /* The same on so many processes of equal speed; here are K, its rows on their way, and the vectors. Of 1,006,000

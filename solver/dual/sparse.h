@@ -11,12 +11,12 @@ typedef struct {
     double *scale; /* m */
 } uz_bounds;
 
-/* The same problem as minimize 1/2 u'Ku - p'u, bottom <= u <= top, of one load. Bounds are listed: of all dofs where K
- * has its entries, as sweeps go by those, else of the dofs alone that rows are on. */
+/* The same problem as minimize 1/2 u'Ku - p'u, bottom <= u <= top, of one load. Bounds are listed of the dofs that rows
+ * are on. */
 typedef struct {
     const uz_bounds *bounds;
     const double *p;        /* d: that of the load */
-    int64_t n, *dof;        /* n: the dof of each, ascending; NULL: all d */
+    int64_t n, *dof;        /* n: the dof of each, ascending */
     double *top, *bottom;   /* n: +-INFINITY where there is none */
     int64_t *upper, *lower; /* n: the row that says so, the tightest; -1: none */
     bool contradictory;     /* some bottom lies above its top */
@@ -26,16 +26,11 @@ typedef struct {
     double *force;          /* d, work2 of the load: a residual of equilibrium */
     double *size;           /* d: what its rounding is in proportion to; NULL: K has no entries */
     double largest;         /* of |u|, >= 0: size was told by it, roughly; -1: by the terms of the sums */
-    double *point;          /* d: where the sweeps ended, NULL: there are none; energy INFINITY before the first */
+    double *point;          /* d: where the sweeps ended; NULL before the first: then its energy is INFINITY */
     double point_energy;
-    size_t swept_bytes; /* what the dofs that were swept last took, until the sweeps ended */
+    double *most, *least; /* d: top and bottom of each dof, for sweeps; NULL before the first */
+    size_t swept_bytes;   /* what the dofs that were swept last took, until the sweeps ended */
 } uz_bounded;
-
-/* The dof of bound b. */
-static inline int64_t uz_bounded_dof(const uz_bounded *box, int64_t b)
-{
-    return box->dof ? box->dof[b] : b;
-}
 
 typedef struct {
     uz_dual dual;

@@ -73,9 +73,9 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
     uz_work *work = &run->work;
     if (!work->ws) /* loads of a block may need no linear solve */
         work->ws = uz_factor_workspace_new();
-    if (!work->scratch)
+    if (!work->scratch && setup->factor)
         work->scratch = uz_alloc(run->d, sizeof(double));
-    if (!work->ws || !work->scratch)
+    if (!work->ws || (setup->factor && !work->scratch))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
     const uz_status status =
         run->load.moved ? uz_whole_norm(&whole_norm, &setup->model, answer->u, run->load.prescribed, err) : UZ_OK;

@@ -53,8 +53,9 @@ void uz_report_setup(uz_run *run)
     summary->timings.condense = setup->condense_s;
 }
 
-/* Of length d: p, u, the room of the run and of the certificate, which also transposes N. */
-#define RUN_VECTORS 10.0
+/* Of length d: p, u, the room of the certificate, which also transposes N; with a factor the run has room of its own.
+ */
+#define RUN_VECTORS 8.0
 
 /* A cached setup is spared, of prediction and of what is measured alike. */
 static void report_cost(uz_run *run)
@@ -85,7 +86,8 @@ static void report_cost(uz_run *run)
     const uz_dual_load *load = run->work.dual;
     const double made =
         setup->factor && !run->asked->reused.factor ? (double)uz_csc_bytes(K) + (double)factor.room : 0.0;
-    const double solved = 8.0 * RUN_VECTORS * (double)run->d + (load ? (double)load->bytes + (double)load->most : 0.0);
+    const double vectors = RUN_VECTORS + (setup->factor ? 1.0 : 0.0),
+                 solved = 8.0 * vectors * (double)run->d + (load ? (double)load->bytes + (double)load->most : 0.0);
     cost->actual_bytes =
         (double)setup->bytes + (shared ? (double)factor.bytes : 0.0) +
         (run->asked->setup->is_scene
