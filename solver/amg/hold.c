@@ -11,8 +11,10 @@
 #include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "linalg/pieces.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -48,18 +50,29 @@ typedef struct {
     bool transposed;
     int64_t i, j;               /* its nodes */
     const double *left, *right; /* b: weights of its rows and columns */
+    int32_t first, end;         /* of the coarse matrix it is added to these rows alone: below its diagonal */
 } coupling;
+
+/* Are there rows to add to where these columns, ascending, meet one another? */
+static inline bool meets(const coupling *x, int32_t a_first, int32_t a_last, int32_t c_first, int32_t c_last)
+{
+    return (a_last > c_last ? a_last : c_last) >= x->first && (a_first > c_first ? a_first : c_first) < x->end;
+}
 
 /* to += G + G', G = P_i' left A right P_j, row by row of those that count: of held dofs one in three does. */
 static inline __attribute__((always_inline)) void add_blocks(uz_blocks *to, const uz_level *fine, const coupling *x,
                                                              int b, int k)
 {
     int rows = 0, row[SIZE_MOST];
+    const int64_t begin = fine->ptr[x->i], end = fine->ptr[x->i + 1];
     for (int r = 0; r < b; r++)
         if (x->left[r] > 0.0)
             row[rows++] = r;
-    for (int64_t e = fine->ptr[x->j]; e < fine->ptr[x->j + 1]; e++) {
+    for (int64_t e = fine->ptr[x->j]; begin < end && e < fine->ptr[x->j + 1]; e++) {
         const float *P = fine->value + e * b * k;
+        const int32_t column = fine->block[e];
+        if (!meets(x, fine->block[begin], fine->block[end - 1], column, column))
+            continue;
         double AP[SIZE_MOST * SIZE_MOST] = {0};
         for (int q = 0; q < rows; q++)
             for (int s = 0; s < b; s++) {
@@ -68,14 +81,16 @@ static inline __attribute__((always_inline)) void add_blocks(uz_blocks *to, cons
                 for (int c = 0; c < k; c++)
                     AP[q * k + c] += factor * (double)P[s * k + c];
             }
-        for (int64_t f = fine->ptr[x->i]; f < fine->ptr[x->i + 1]; f++) {
+        for (int64_t f = begin; f < end; f++) {
             const float *of_row = fine->value + f * b * k;
+            if (!meets(x, fine->block[f], fine->block[f], column, column))
+                continue;
             double G[SIZE_MOST * SIZE_MOST] = {0};
             for (int q = 0; q < rows; q++)
                 for (int p = 0; p < k; p++)
                     for (int c = 0; c < k; c++)
                         G[p * k + c] += (double)of_row[row[q] * k + p] * AP[q * k + c];
-            add_symmetric(to, fine->block[f], fine->block[e], G, k);
+            add_symmetric(to, fine->block[f], column, G, k);
         }
     }
 }
@@ -109,30 +124,83 @@ static void weigh(double *held, double *rest, const float *inverse, int b)
     }
 }
 
-void uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
+/* What a level loses, as the threads that share it see that: each adds to some rows of the coarse matrix, in the order
+ * of the nodes, and goes through all of these. */
+typedef struct {
+    uz_blocks *loss;
+    const uz_level *fine;
+    const float *inverse;
+    const bool *any; /* nodes: has it held dofs? */
+    int32_t first[UZ_ASIDE_MOST + 1];
+} losing;
+
+static void lose_part(void *ctx, int part)
 {
+    const losing *x = ctx;
+    const uz_level *fine = x->fine;
     const uz_blocks *A = &fine->A;
     const int b = A->b;
+    const int32_t first = x->first[part], end = x->first[part + 1];
     double room[SIZE_MOST * SIZE_MOST], held_i[SIZE_MOST], rest_i[SIZE_MOST], held_j[SIZE_MOST], rest_j[SIZE_MOST];
     for (int64_t i = 0; i < A->nodes; i++) {
-        const bool own = is_any_held(inverse + i * b, fine->inverse + i * b, b);
-        weigh(held_i, rest_i, inverse + i * b, b);
+        const bool own = x->any[i];
+        weigh(held_i, rest_i, x->inverse + i * b, b);
         if (own)
-            add_coupling(loss, fine,
-                         &(coupling){uz_level_block(room, fine, true, i, b * b), false, i, i, held_i, rest_i});
+            add_coupling(
+                x->loss, fine,
+                &(coupling){uz_level_block(room, fine, true, i, b * b), false, i, i, held_i, rest_i, first, end});
         for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
             const int64_t j = A->idx[e];
-            const bool other = is_any_held(inverse + j * b, fine->inverse + j * b, b);
+            const bool other = x->any[j];
             if (!own && !other)
                 continue;
             const double *block = uz_level_block(room, fine, false, e, b * b);
-            weigh(held_j, rest_j, inverse + j * b, b);
+            weigh(held_j, rest_j, x->inverse + j * b, b);
             if (own)
-                add_coupling(loss, fine, &(coupling){block, false, i, j, held_i, rest_j});
+                add_coupling(x->loss, fine, &(coupling){block, false, i, j, held_i, rest_j, first, end});
             if (other)
-                add_coupling(loss, fine, &(coupling){block, true, j, i, held_j, rest_i});
+                add_coupling(x->loss, fine, &(coupling){block, true, j, i, held_j, rest_i, first, end});
         }
     }
+}
+
+/* Rows of each part, so that as many blocks of held dofs' rows of P are of each. */
+static bool share_out(losing *x, int parts)
+{
+    const uz_level *fine = x->fine;
+    int32_t *count = uz_alloc_zero(x->loss->nodes, sizeof *count);
+    int64_t all = 0, so_far = 0;
+    int part = 0;
+    if (!count)
+        return false;
+    for (int64_t i = 0; i < fine->A.nodes; i++)
+        for (int64_t e = fine->ptr[i]; x->any[i] && e < fine->ptr[i + 1]; e++, all++)
+            count[fine->block[e]]++;
+    for (int64_t a = 0; a < x->loss->nodes; so_far += count[a++])
+        while (part + 1 < parts && so_far * parts >= all * (part + 1))
+            x->first[++part] = (int32_t)a;
+    while (part < parts)
+        x->first[++part] = (int32_t)x->loss->nodes;
+    free(count);
+    return true;
+}
+
+/* Nodes of a part, at least. */
+enum { PART_LEAST = 4096 };
+
+bool uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
+{
+    const int64_t nodes = fine->A.nodes, most = nodes / PART_LEAST;
+    const int threads = most < 2 ? 1 : uz_aside_threads(), parts = threads < most || most < 2 ? threads : (int)most;
+    bool *any = uz_alloc(nodes, sizeof *any);
+    losing x = {loss, fine, inverse, any, {0}};
+    for (int64_t i = 0; any && i < nodes; i++)
+        any[i] = is_any_held(inverse + i * fine->A.b, fine->inverse + i * fine->A.b, fine->A.b);
+    const bool ok = any && share_out(&x, parts);
+    if (ok)
+        uz_aside_share(lose_part, &x, parts);
+    free(any);
+    return ok;
 }
 
 static bool is_zero(const double *block, int64_t size)
@@ -148,15 +216,29 @@ static void pass_on(uz_blocks *next, const uz_blocks *loss, const uz_level *leve
 {
     static const double all[SIZE_MOST] = {1, 1, 1, 1, 1, 1}, half[SIZE_MOST] = {.5, .5, .5, .5, .5, .5};
     const int64_t size = (int64_t)loss->b * loss->b;
+    const int32_t rows = (int32_t)next->nodes;
     const int64_t end = uz_team_first(team, 1, loss->nodes);
     for (int64_t i = uz_team_first(team, 0, loss->nodes); i < end; i++) {
         if (!is_zero(loss->diag + i * size, size))
-            add_coupling(next, level, &(coupling){loss->diag + i * size, false, i, i, all, half});
+            add_coupling(next, level, &(coupling){loss->diag + i * size, false, i, i, all, half, 0, rows});
         for (int64_t e = loss->ptr[i]; e < loss->ptr[i + 1]; e++)
             if (!is_zero(loss->off + e * size, size))
-                add_coupling(next, level, &(coupling){loss->off + e * size, false, i, loss->idx[e], all, all});
+                add_coupling(next, level, &(coupling){loss->off + e * size, false, i, loss->idx[e], all, all, 0, rows});
     }
     uz_team_sum(team, next);
+}
+
+typedef struct {
+    float *to;
+    const float *from;
+    const double *loss;
+} difference;
+
+static void subtract_numbers(void *ctx, int64_t begin, int64_t end)
+{
+    const difference *x = ctx;
+    for (int64_t e = begin; e < end; e++)
+        x->to[e] = (float)((double)x->from[e] - x->loss[e]);
 }
 
 /* The level without what it loses, in arrays of its own. */
@@ -165,15 +247,15 @@ static bool subtract(uz_level *own, const uz_level *level, const uz_blocks *loss
     const int b = level->A.b;
     const int64_t size = (int64_t)b * b, n = level->A.nodes * b, off = level->A.ptr[level->A.nodes] * size,
                   diag = level->A.nodes * size;
-    own->off = uz_alloc_zero(off + 8, sizeof *own->off);
-    own->diag = uz_alloc_zero(diag + 8, sizeof *own->diag);
+    own->off = uz_alloc(off + 8, sizeof *own->off);
+    own->diag = uz_alloc(diag + 8, sizeof *own->diag);
     own->inverse = uz_alloc(n, sizeof *own->inverse);
     if (!own->off || !own->diag || !own->inverse)
         return false;
-    for (int64_t e = 0; e < off; e++)
-        own->off[e] = (float)((double)level->off[e] - loss->off[e]);
-    for (int64_t e = 0; e < diag; e++)
-        own->diag[e] = (float)((double)level->diag[e] - loss->diag[e]);
+    uz_by_pieces(subtract_numbers, &(difference){own->off, level->off, loss->off}, off);
+    uz_by_pieces(subtract_numbers, &(difference){own->diag, level->diag, loss->diag}, diag);
+    memset(own->off + off, 0, 8 * sizeof *own->off);
+    memset(own->diag + diag, 0, 8 * sizeof *own->diag);
     for (int64_t i = 0; i < n; i++) {
         const int64_t at = i / b * size + i % b * b + i % b;
         own->inverse[i] = own->diag[at] > (float)LOST * level->diag[at] ? 1.0F / own->diag[at] : 0.0F;
@@ -297,6 +379,10 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
     }
     if (status != UZ_OK)
         return status;
-    uz_level_loss(&loss, finest, inverse);
+    if (!uz_level_loss(&loss, finest, inverse)) {
+        free(loss.off);
+        free(loss.diag);
+        return fail_memory(mg->base.n, err);
+    }
     return lose(room, mg, 1, &loss, bytes, NULL, stop, err);
 }

@@ -208,8 +208,8 @@ uz_status uz_level_round(uz_level *level, uz_error *err);
 /* *range: lambda_max(D^-1 A), a little too large: powers reach it within some per cent from below. */
 uz_status uz_level_range(double *range, const uz_level *level, uz_error *err);
 /* What the next level loses, in the places of its matrix (`loss`, zeros at entry), with the dofs of this one that have
- * no inverse here, but do in the level. */
-void uz_level_loss(uz_blocks *loss, const uz_level *level, const float *inverse);
+ * no inverse here, but do in the level. False: no memory. */
+bool uz_level_loss(uz_blocks *loss, const uz_level *level, const float *inverse);
 /* coarse = P'A P. */
 uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *below, int k, const uz_team *team,
                       const uz_stop *stop, uz_error *err);

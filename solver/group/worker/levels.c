@@ -616,7 +616,8 @@ void system_hold(spread_system *s, const char *held)
         return;
     uz_blocks loss = zeros_like(&s->part);
     scale_ghosts(s, 0.5);
-    uz_level_loss(&loss, &s->level, v->inverse);
+    if (!uz_level_loss(&loss, &s->level, v->inverse))
+        end_group("no memory");
     scale_ghosts(s, 2.0);
     block_list list = gather_blocks(&loss);
     free(loss.off);
