@@ -4,6 +4,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/pieces.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -43,6 +44,21 @@ static bool is_strong(const uz_level *level, double square, int64_t i, int64_t e
     return false;
 }
 
+/* Which blocks are strong, as the threads that share them see that. */
+typedef struct {
+    const uz_level *level;
+    double square;
+    bool *strong;
+} judgement;
+
+static void judge_nodes(void *ctx, int64_t begin, int64_t end)
+{
+    const judgement *x = ctx;
+    for (int64_t i = begin; i < end; i++)
+        for (int64_t e = x->level->A.ptr[i]; e < x->level->A.ptr[i + 1]; e++)
+            x->strong[e] = is_strong(x->level, x->square, i, e);
+}
+
 static bool build_graph(graph *g, const uz_level *level, const uz_below *below, double square)
 {
     const uz_blocks *A = &level->A;
@@ -50,9 +66,10 @@ static bool build_graph(graph *g, const uz_level *level, const uz_below *below, 
     bool *strong = uz_alloc(count, sizeof *strong);
     int64_t links = 0;
     g->ptr = uz_alloc_zero(A->nodes + 1, sizeof *g->ptr);
-    for (int64_t i = 0; strong && g->ptr && i < A->nodes; i++)
-        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
-            links += strong[e] = is_strong(level, square, i, e);
+    if (strong)
+        uz_by_pieces(judge_nodes, &(judgement){level, square, strong}, A->nodes);
+    for (int64_t e = 0; strong && e < count; e++)
+        links += strong[e];
     g->node = strong ? uz_alloc(2 * links, sizeof *g->node) : NULL;
     int64_t at = 0;
     for (int64_t i = 0; g->node && g->ptr && i < A->nodes; i++) {

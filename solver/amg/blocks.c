@@ -140,38 +140,44 @@ static bool number_slots(uz_aggregates *mg, int32_t *node_of_group, const uz_csc
     return ok;
 }
 
-/* A->ptr and idx. */
-static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
+/* Pairs of nodes that columns of K know, as the threads that share the columns see that: counted, then listed. */
+typedef struct {
+    const uz_aggregates *mg;
+    const uz_csc *K;
+    int parts;
+    int64_t *place[UZ_PARTS_MOST]; /* nodes: how many pairs a part has of each row, then where the next one goes */
+    int32_t *seen[UZ_PARTS_MOST];
+    int32_t *idx; /* NULL: they are counted */
+} pairing;
+
+static void find_pairs(void *ctx, int part)
 {
-    uz_blocks *A = &mg->level[0].A;
-    int32_t *seen = uz_alloc(A->nodes, sizeof *seen);
-    A->ptr = uz_alloc_zero(A->nodes + 2, sizeof *A->ptr);
-    bool ok = seen && A->ptr;
-    /* pairs of nodes, once for each column that knows them: counted, then listed */
-    for (int pass = 0; ok && pass < 2; pass++) {
-        for (int64_t i = 0; i < A->nodes; i++)
-            seen[i] = -1;
-        for (int64_t j = 0; j < K->cols; j++) {
-            const int32_t J = (int32_t)uz_slot_node(mg, mg->slot[j]);
-            for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
-                const int32_t I = (int32_t)uz_slot_node(mg, mg->slot[K->idx[q]]);
-                if (I == J || seen[I] == J)
-                    continue;
-                seen[I] = J;
-                if (pass == 0)
-                    A->ptr[(I > J ? I : J) + 2]++;
-                else
-                    A->idx[A->ptr[(I > J ? I : J) + 1]++] = I > J ? J : I;
-            }
+    const pairing *x = ctx;
+    const uz_csc *K = x->K;
+    const int64_t *slot = x->mg->slot;
+    int64_t *place = x->place[part];
+    int32_t *seen = x->seen[part];
+    for (int64_t i = 0; i < x->mg->level[0].A.nodes; i++)
+        seen[i] = -1;
+    for (int64_t j = K->cols * part / x->parts; j < K->cols * (part + 1) / x->parts; j++) {
+        const int32_t J = (int32_t)uz_slot_node(x->mg, slot[j]);
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
+            const int32_t I = (int32_t)uz_slot_node(x->mg, slot[K->idx[q]]);
+            if (I == J || seen[I] == J)
+                continue;
+            seen[I] = J;
+            if (x->idx)
+                x->idx[place[I > J ? I : J]] = I > J ? J : I;
+            place[I > J ? I : J]++;
         }
-        for (int64_t i = 0; pass == 0 && i < A->nodes; i++)
-            A->ptr[i + 2] += A->ptr[i + 1];
-        if (pass == 0)
-            ok = (A->idx = uz_alloc(A->ptr[A->nodes + 1], sizeof *A->idx)) != NULL;
     }
-    free(seen);
+}
+
+/* Each row sorted, and each once. */
+static void sort_rows(uz_blocks *A)
+{
     int64_t count = 0, from = 0;
-    for (int64_t i = 0; ok && i < A->nodes; i++) { /* sorted, each once */
+    for (int64_t i = 0; i < A->nodes; i++) {
         const int64_t to = A->ptr[i + 1];
         bool ascends = true;
         for (int64_t e = from + 1; e < to; e++)
@@ -184,8 +190,40 @@ static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
                 A->idx[count++] = A->idx[e];
         from = to;
     }
-    if (ok)
-        A->ptr[A->nodes] = count;
+    A->ptr[A->nodes] = count;
+}
+
+/* A->ptr and idx. */
+static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
+{
+    uz_blocks *A = &mg->level[0].A;
+    const int threads = A->nodes < PART_LEAST ? 1 : uz_aside_threads();
+    pairing x = {.mg = mg, .K = K, .parts = threads < UZ_PARTS_MOST ? threads : UZ_PARTS_MOST};
+    bool ok = (A->ptr = uz_alloc_zero(A->nodes + 1, sizeof *A->ptr)) != NULL;
+    for (int part = 0; part < x.parts; part++) {
+        x.place[part] = uz_alloc_zero(A->nodes, sizeof *x.place[part]);
+        x.seen[part] = uz_alloc(A->nodes, sizeof *x.seen[part]);
+        ok = ok && x.place[part] && x.seen[part];
+    }
+    if (ok) {
+        uz_aside_share(find_pairs, &x, x.parts);
+        int64_t count = 0;
+        for (int64_t i = 0; i < A->nodes; A->ptr[++i] = count)
+            for (int part = 0; part < x.parts; part++) {
+                const int64_t own = x.place[part][i];
+                x.place[part][i] = count;
+                count += own;
+            }
+        ok = (x.idx = A->idx = uz_alloc(count, sizeof *A->idx)) != NULL;
+    }
+    if (ok) {
+        uz_aside_share(find_pairs, &x, x.parts);
+        sort_rows(A);
+    }
+    for (int part = 0; part < x.parts; part++) {
+        free(x.place[part]);
+        free(x.seen[part]);
+    }
     return ok;
 }
 

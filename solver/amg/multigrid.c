@@ -96,6 +96,29 @@ static void multiply(double *y, const uz_level *level, const double *x, int widt
         }
 }
 
+/* Vectors of `width` numbers for each node, of which the first b are dofs. */
+typedef struct {
+    double *x, *y;
+    const float *inverse;
+    int b, width;
+    double length;
+} power;
+
+static void precondition(void *ctx, int64_t begin, int64_t end)
+{
+    const power *p = ctx;
+    for (int64_t i = begin; i < end; i++)
+        for (int r = 0; r < p->width; r++)
+            p->y[i * p->width + r] *= r < p->b ? (double)p->inverse[i * p->b + r] : 0.0;
+}
+
+static void normalize(void *ctx, int64_t begin, int64_t end)
+{
+    const power *p = ctx;
+    for (int64_t i = begin * p->width; i < end * p->width; i++)
+        p->x[i] = p->y[i] / p->length;
+}
+
 uz_status uz_level_range(double *range, const uz_level *level, uz_error *err)
 {
     const uz_blocks *A = &level->A;
@@ -108,15 +131,14 @@ uz_status uz_level_range(double *range, const uz_level *level, uz_error *err)
         x[i / b * width + i % b] = level->inverse[i] > 0.0F ? uz_uniform(&state) - 0.5 : 0.0;
     for (int step = 0; x && y && step < POWER_STEPS; step++) {
         multiply(y, level, x, width);
-        for (int64_t i = 0; i < A->nodes; i++)
-            for (int r = 0; r < width; r++)
-                y[i * width + r] *= r < b ? (double)level->inverse[i * b + r] : 0.0;
+        power p = {x, y, level->inverse, b, width, 1.0};
+        uz_by_pieces(precondition, &p, A->nodes);
         const double before = uz_norm(n, x), after = uz_norm(n, y);
         *range = before > 0.0 && after > 0.0 ? 1.1 * (after / before) : 1.0;
         if (!(before > 0.0) || !(after > 0.0))
             break;
-        for (int64_t i = 0; i < n; i++)
-            x[i] = y[i] / after;
+        p.length = after;
+        uz_by_pieces(normalize, &p, A->nodes);
     }
     const bool ok = x && y;
     free(x);
@@ -202,15 +224,15 @@ static size_t count_bytes(const uz_aggregates *mg)
  * root of its largest row sum times its largest column sum. In any order of the dofs: all of K's entries count. */
 static uz_status bound_by_diagonal(double *bound, const uz_csc *K, uz_error *err)
 {
-    double most = 0.0, *row = uz_alloc_zero(K->cols, sizeof *row), *root = uz_alloc(K->cols, sizeof *root);
-    const bool ok = row && root;
+    double most = 0.0, *row = uz_alloc_zero(K->cols, sizeof *row), *scale = uz_alloc(K->cols, sizeof *scale);
+    const bool ok = row && scale;
     for (int64_t j = 0; ok && j < K->cols; j++)
-        root[j] = sqrt(K->val[K->ptr[j]]);
+        scale[j] = 1.0 / sqrt(K->val[K->ptr[j]]);
     for (int64_t j = 0; ok && j < K->cols; j++) {
         double own = 0.0;
         for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
             const int64_t i = K->idx[k];
-            const double scaled = fabs(K->val[k]) / root[j] / root[i];
+            const double scaled = fabs(K->val[k]) * scale[j] * scale[i];
             own += scaled;
             row[i] += scaled;
         }
@@ -220,7 +242,7 @@ static uz_status bound_by_diagonal(double *bound, const uz_csc *K, uz_error *err
         most = fmax(most, row[j]);
     *bound = (1.0 + most) * (1.0 + most);
     free(row);
-    free(root);
+    free(scale);
     return ok ? UZ_OK : fail_memory(K->cols, err);
 }
 
