@@ -75,9 +75,13 @@ function fine_ticks(low, high) {
 
 /** [{value, text}]: round numbers from low to high along a bar of so many pixels, by the rule of the service's pictures. */
 export function round_ticks(low, high, pixels) {
-  const ROOM = 56, least = ((high - low) * ROOM) / pixels, power = 10 ** Math.floor(Math.log10(least)), found = [];
+  const ROOM = 56, MOST = 8, least = ((high - low) * ROOM) / pixels, power = 10 ** Math.floor(Math.log10(least)), found = [];
   const step = [1, 2, 5].map((digit) => digit * power).find((one) => least <= one * (1 + 1e-9)) ?? 10 * power;
-  for (let k = Math.ceil(low / step - 1e-9); least > 0 && k <= high / step + 1e-9; k++) found.push({ value: k * step, text: number(Number((k * step).toPrecision(12)), 6) });
+  const first = Math.ceil(low / step - 1e-9); // where the values differ by rounding no number is the next one's neighbour
+  for (let i = 0; least > 0 && i < MOST && (first + i) * step <= high + 1e-9 * step; i++) {
+    const value = (first + i) * step, text = number(Number(value.toPrecision(12)), 6);
+    if (text !== found.at(-1)?.text) found.push({ value, text });
+  }
   return found;
 }
 
