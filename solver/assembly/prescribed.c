@@ -44,19 +44,25 @@ static void turned(double out[3], const uz_support *support, const double *x, in
 
 #define OTHER_BODY "the scene's supports are not those of this body"
 
-/* Does a group that turns, or may, take the node along? With large rotations that is another way than the shares of
- * the group's motion say, which are those of the first step from rest, and another one under each part of the load. */
-static bool is_turned(const prescription *p, const uz_rigid_group *group, int64_t node)
+/* Does a group that turns, or may, take the node along n? With large rotations that is another way than the shares of
+ * the group's motion say, which are those of the first step from rest, and another one under each part of the load. A
+ * turn about one of the axes takes nothing along that. */
+static bool is_turned(const prescription *p, const uz_rigid_group *group, int64_t node, const double n[3])
 {
     const int dim = p->model->mesh.dim;
     const double *turn = p->scene->supports[group->support].turn;
-    double arm[3] = {0}, way[3] = {0};
+    double arm[3] = {0}, way = 0, across = INFINITY;
+    int axes = 0;
     for (int c = 0; c < dim; c++)
         arm[c] = p->model->mesh.xyz[node * dim + c] - group->point[c];
-    for (int c = dim == 2 ? 2 : 0; c < 3; c++)
-        for (int i = 1; i < 3 && turn[c] != 0; i++) /* also where it is free: NaN */
-            way[c] = fmax(way[c], fabs(arm[(c + i) % 3]));
-    return p->model->kind != UZ_AXISYMMETRIC && fmax(fmax(way[0], way[1]), way[2]) > AGREE * p->model->mesh.extent;
+    for (int c = dim == 2 ? 2 : 0; c < 3; c++) {
+        const int d = (c + 1) % 3, e = (c + 2) % 3;
+        if (turn[c] == 0) /* NaN: it is free */
+            continue;
+        way = fmax(way, fmax(fabs(arm[d]), fabs(arm[e])));
+        across = axes++ == 0 ? fmax(fabs(n[d]), fabs(n[e])) : INFINITY;
+    }
+    return p->model->kind != UZ_AXISYMMETRIC && way > AGREE * p->model->mesh.extent && across > AGREE;
 }
 
 /* A node of a rigid group has what the group's motion makes of n . u: what another support gives it, too, has to be
@@ -72,7 +78,7 @@ static uz_status agree_with_group(const prescription *p, int64_t support, int64_
     const int64_t count = uz_carriers(&from, &share, model, node);
     double u[3], along = 0, size = fabs(value);
     char where[96];
-    const bool turns = uz_is_finite_answer(p->scene) && is_turned(p, group, node);
+    const bool turns = uz_is_finite_answer(p->scene) && is_turned(p, group, node, n);
     bool moves = false;
     for (int64_t k = 0; k < count; k++)
         for (int c = 0; c < dim; c++) {

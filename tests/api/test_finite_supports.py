@@ -446,6 +446,15 @@ def test_what_rigid_groups_cannot_be(s):
         answer(s, scene(mesh={"box": {"size": [2, 1], "cells": [2, 1]}}, groups=[tip],
                         supports=[{"on": "bottom", "rigid": {"point": [0, 0], "ux": 0, "uy": 0, **motion}}, {"on": "top", "uy": 0.01},
                                   *([{"on": "tip", **there}] if there else [])]))
+    # nor does it take anything along its axis: a sheet that turns in its plane, which is one of symmetry
+    for turn in ({"rx": 0, "ry": 0, "rz": 20}, {"rx": 0, "ry": 0}, {"rx": 5, "ry": 0, "rz": 20}):
+        sheet = scene(model="solid", mesh={"box": {"size": [2, 1, 0.5], "cells": [2, 1, 1]}},
+                      supports=[{"on": "left", "ux": 0, "uy": 0, "uz": 0}, {"on": "back", "uz": 0},
+                                {"on": "right", "rigid": {"point": [2, 0.5, 0], "ux": 0, "uy": 0, "uz": 0, **turn}}])
+        if turn["rx"]:
+            refused(s, sheet, "/supports/1/on", "large rotation")
+        else:
+            answer(s, sheet, forces="rz" in turn)
 
 
 if __name__ == "__main__":
