@@ -38,6 +38,8 @@ static const double ALONG[] = {1e2, 1e5};
 /* A strain that is rounding: F is about 1, and known to its last digits. */
 #define ROUNDING 2e-14
 #define TINY     1e-7
+/* The same of one element alone, where solves leave more of the way than elsewhere. */
+#define OF_ELEMENT 1e-12
 
 typedef struct {
     const uz_finite_answer *of;
@@ -245,6 +247,8 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
             (void)law_at(&at, &det, &x, &element, &lame, law);
         out->least_det = fmin(out->least_det, (double)det);
     }
+    const long double small = w->small, unit = w->unit; /* of the elements before */
+    w->small = w->unit = 0;
     for (int g = 0; g < rule->count; g++) {
         long double det = deform(&x, &measure, &element, u, rule->point[g].at);
         const long double weight = (long double)rule->point[g].weight * measure;
@@ -256,6 +260,9 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
         add_unit(w, weight, &lame, &x, u);
         add_point(force, rows, weight, &x, &at);
     }
+    out->unstrained = out->unstrained && 2 * w->small <= OF_ELEMENT * OF_ELEMENT * w->unit;
+    w->small += small;
+    w->unit += unit;
     for (int i = 0; i < n && !unstrained; i++) {
         w->force[dim * node[i / dim] + i % dim] += force[i];
         for (int k = 0; k <= i; k++)
@@ -624,6 +631,7 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
     double most = 0;
     *out = (uz_finite_certificate){.least_det = INFINITY,
                                    .residual = INFINITY,
+                                   .unstrained = true,
                                    .least_gap = INFINITY,
                                    .least_part = INFINITY,
                                    .least_at_rows = INFINITY,

@@ -30,6 +30,7 @@ typedef struct {
      * of H. INFINITY where H is not positive definite */
     double residual;
     double rounding; /* less than this of `residual` may be rounding of F, as where strains are tiny */
+    bool unstrained; /* no element has more strain than what solves and rounding leave of its own F and way */
     /* A Cholesky factor of H exists: the energy grows along every small motion that leaves the pressed rows closed, so
      * that the equilibrium is a strict local minimum of what the mesh can do */
     bool definite;

@@ -174,10 +174,11 @@ double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, boo
            (pairs ? (double)uz_csc_bytes(&base->K) : 0) + 8 * (NODAL * n + FREE * (double)base->d);
 }
 
-/* Is the body only carried along? The certificate takes its strains for rounding, and there is nothing to strain it. */
+/* Is the body only carried along? The certificate takes its strains for rounding, and there is nothing to strain it.
+ * Each element by itself: soft ones have little energy beside what rounding makes of stiff ones. */
 static bool is_carried(const uz_finite_run *run)
 {
-    bool so = run->certificate.residual == 0 && !uz_is_loaded(&run->base, &run->scene);
+    bool so = run->certificate.residual == 0 && run->certificate.unstrained && !uz_is_loaded(&run->base, &run->scene);
     for (int64_t i = 0; i < run->n_r && so; i++)
         so = !(run->r[i] < 0);
     return so;
