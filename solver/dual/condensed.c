@@ -351,7 +351,7 @@ static bool suits(const uz_dual_shape *shape)
 
 /* What substitutions of a load read of L, in passes as those of a sparse matrix: supernodes are read in order, and of
  * those that the load does not touch nothing forwards. Plane and solid bodies of 14,000 to 240,000 dofs. */
-#define LOAD_PASSES 0.9
+#define LOAD_PASSES 0.65
 /* Steps of the active set, as if each had the whole block anew. */
 #define STEPS 0.5
 /* The part of a load's time that load cases take which pass a factor together: 0.3 to 0.45 of it, 50 cases on hex8 and
