@@ -70,9 +70,9 @@ uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, uz_error
     box->bounds = bounds;
     bool ok = list_dofs(box, dual);
     double **room[] = {&box->top, &box->bottom, &box->u, &box->size};
-    const int64_t count[] = {box->n, box->n, d, sized ? d : 0};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        ok = ((k == 3 && !sized) || (*room[k] = uz_alloc(count[k], sizeof(double)))) && ok;
+    const int64_t count[] = {box->n, box->n, d, d};
+    for (size_t k = 0; k < (sized ? 4 : 3); k++)
+        ok = (*room[k] = uz_alloc(count[k], sizeof(double))) && ok;
     int64_t **rows[] = {&box->upper, &box->lower, &box->holder};
     for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++)
         ok = (*rows[k] = uz_alloc(box->n, sizeof(int64_t))) && ok;
@@ -414,19 +414,12 @@ static bool make_point(uz_sparse_load *x)
 {
     uz_bounded *box = x->box;
     const int64_t d = x->load.dual->d;
-    double **room[] = {&box->point, &box->most, &box->least};
     if (box->point)
         return true;
-    bool ok = true;
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        ok = (*room[k] = uz_alloc(d, sizeof(double))) && ok;
-    if (!ok) {
-        for (size_t k = 0; k < sizeof room / sizeof room[0]; k++) {
-            free(*room[k]);
-            *room[k] = NULL;
-        }
+    if (!(box->point = uz_alloc(3 * d, sizeof *box->point)))
         return false;
-    }
+    box->most = box->point + d;
+    box->least = box->most + d;
     for (int64_t j = 0; j < d; j++) {
         box->most[j] = INFINITY;
         box->least[j] = -INFINITY;
@@ -435,7 +428,7 @@ static bool make_point(uz_sparse_load *x)
         box->most[box->dof[b]] = box->top[b];
         box->least[box->dof[b]] = box->bottom[b];
     }
-    x->load.bytes += sizeof room / sizeof room[0] * sizeof(double) * (size_t)d;
+    x->load.bytes += 3 * sizeof *box->point * (size_t)d;
     return true;
 }
 

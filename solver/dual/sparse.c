@@ -93,8 +93,8 @@ void uz_sparse_unload(uz_sparse_load *x)
         free(room[k]);
     if (!box)
         return;
-    void *of_box[] = {box->dof,   box->top,   box->bottom, box->u,     box->size, box->point, box->r,
-                      box->upper, box->lower, box->holder, box->fixed, box->most, box->least};
+    void *of_box[] = {box->dof, box->top,   box->bottom, box->u,      box->size, box->point,
+                      box->r,   box->upper, box->lower,  box->holder, box->fixed};
     for (size_t k = 0; k < sizeof of_box / sizeof of_box[0]; k++)
         free(of_box[k]);
     free(box);

@@ -28,7 +28,7 @@ typedef struct {
     double largest;         /* of |u|, >= 0: size was told by it, roughly; -1: by the terms of the sums */
     double *point;          /* d: where the sweeps ended; NULL before the first: then its energy is INFINITY */
     double point_energy;
-    double *most, *least; /* d: top and bottom of each dof, for sweeps; NULL before the first */
+    double *most, *least; /* d, behind point: top and bottom of each dof, for sweeps */
     size_t swept_bytes;   /* what the dofs that were swept last took, until the sweeps ended */
 } uz_bounded;
 
