@@ -3,8 +3,6 @@
 
 #include "core/clock.h"
 
-#include <math.h>
-#include <string.h>
 #include <sys/mman.h>
 
 /* Nodes of a cube that hexahedra couple with their neighbours: 4 MB, more than most cores have for themselves. */
@@ -35,9 +33,13 @@ static void couple(sample *s)
     }
 }
 
+static void sweep(void *ctx)
+{
+    uz_level_take_step(ctx, UZ_STEP_SWEEP_DOWN | UZ_STEP_SWEEP_UP);
+}
+
 double uz_amg_rate(void)
 {
-    double least = INFINITY;
     sample *s = mmap(NULL, sizeof *s, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (s == MAP_FAILED)
         return ASSUMED_S;
@@ -54,14 +56,9 @@ double uz_amg_rate(void)
         s->b[k] = k % WIDTH < ROWS ? 1.0F : 0.0F;
     const uz_level level = {
         .A = {.nodes = NODES, .b = ROWS, .ptr = s->ptr, .idx = s->idx}, .off = s->off, .diag = s->diag};
-    const uz_level_step step = {
+    uz_level_step step = {
         .level = &level, .inverse = s->inverse, .b = s->b, .x = s->x, .t = s->t, .k = UZ_MODES_MOST, .lanes = 1};
-    const double begun = uz_thread_seconds();
-    for (int k = 0; k < REPEATS && (k < 2 || uz_thread_seconds() - begun < ENOUGH_S); k++) {
-        const double start = uz_thread_seconds();
-        uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN | UZ_STEP_SWEEP_UP);
-        least = fmin(least, uz_thread_seconds() - start);
-    }
+    const double least = uz_least_seconds(sweep, &step, 2, REPEATS, ENOUGH_S);
     munmap(s, sizeof *s);
     const int64_t diagonal = (int64_t)NODES * ROWS * (ROWS + 1) / 2;
     return least / (double)(numbers + diagonal);

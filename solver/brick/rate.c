@@ -3,7 +3,6 @@
 
 #include "core/clock.h"
 
-#include <math.h>
 #include <sys/mman.h>
 
 /* Cells along each side of a cube, the vectors of which are more than most cores have for themselves. */
@@ -13,23 +12,29 @@ enum { CELLS = 24, NODES = CELLS + 1, REPEATS = 40 };
 /* What is assumed where there is no memory: a core of 2022. */
 #define ASSUMED_S 2.2e-9
 
+typedef struct {
+    const uz_brick_level *level;
+    uz_brick_vectors v;
+    uz_brick_planes *planes;
+} smoothing;
+
+static void smooth(void *ctx)
+{
+    const smoothing *x = ctx;
+    uz_brick_step(x->level, &x->v, x->planes, 0.1F, 0.1F);
+}
+
 static double time_step(const uz_brick_level *level, uz_brick_planes *planes, float *room)
 {
     const int64_t n = uz_brick_numbers(level);
-    const uz_brick_vectors v = {room, room + n, room + 2 * n, room + 2 * n, room + 3 * n};
+    smoothing x = {level, {room, room + n, room + 2 * n, room + 2 * n, room + 3 * n}, planes};
     const int most = planes->most;
-    double least = INFINITY;
     for (int64_t i = 0; i < n; i++) {
-        v.b[i] = 1.0F;
+        x.v.b[i] = 1.0F;
         room[3 * n + i] = 0.01F;
     }
     planes->most = 1; /* seconds are those of this thread */
-    const double begun = uz_thread_seconds();
-    for (int k = 0; k < REPEATS && (k < 2 || uz_thread_seconds() - begun < ENOUGH_S); k++) {
-        const double start = uz_thread_seconds();
-        uz_brick_step(level, &v, planes, 0.1F, 0.1F);
-        least = fmin(least, uz_thread_seconds() - start);
-    }
+    const double least = uz_least_seconds(smooth, &x, 2, REPEATS, ENOUGH_S);
     planes->most = most;
     return least / (3.0 * NODES * NODES * NODES);
 }

@@ -27,18 +27,30 @@ static const uz_cost_rates ASSUMED = {.flop_s = 3e-11, .entry_s = 1e-9};
 
 static uz_cost_rates measured; /* written once, under the guard */
 
-/* Seconds for each of n entries times numbers of x, summed. In four sums, whatever columns they belong to: none waits
- * for another, and how often a processor mistakes where a column ends differs from run to run. */
-static double time_entries(const double *val, const int64_t *idx, int64_t n, const double *x)
+typedef struct {
+    const double *val, *x;
+    const int64_t *idx;
+    int64_t n;
+} entry_pass;
+
+/* n entries times numbers of x, summed. In four sums, whatever columns they belong to: none waits for another, and how
+ * often a processor mistakes where a column ends differs from run to run. */
+static void pass_entries(void *ctx)
 {
+    const entry_pass *of = ctx;
     double sum[4] = {0.0};
-    const double start = uz_thread_seconds();
-    for (int64_t k = 0; k + 4 <= n; k += 4)
+    for (int64_t k = 0; k + 4 <= of->n; k += 4)
         for (int i = 0; i < 4; i++)
-            sum[i] += val[k + i] * x[idx[k + i]];
+            sum[i] += of->val[k + i] * of->x[of->idx[k + i]];
     const volatile double all = sum[0] + sum[1] + sum[2] + sum[3];
     (void)all;
-    return (uz_thread_seconds() - start) / (double)n;
+}
+
+/* room: a matrix, and behind it one of its size for the product. */
+static void multiply_dense(void *ctx)
+{
+    double *room = ctx;
+    uz_syrk_lower_t_while(DENSE, DENSE, room, room + DENSE * DENSE, NULL);
 }
 
 /* In pages that go back to the system: what lies free in the heap would hide what the first body takes. */
@@ -47,19 +59,12 @@ static void measure(void)
     enum { ROOM = 2 * DENSE * DENSE, ENTRIES = SPARSE * BAND };
     const size_t bytes = (ROOM + ENTRIES) * sizeof(double) + ENTRIES * sizeof(int64_t);
     double *room = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    double dense = INFINITY, sparse = INFINITY;
     measured = ASSUMED;
     if (room == MAP_FAILED)
         return;
     for (int64_t i = 0; i < DENSE * DENSE; i++)
         room[i] = 1.0 / (double)(1 + i % 7);
-    const double first = uz_thread_seconds();
-    for (int k = 0; k < REPEATS && (k == 0 || uz_thread_seconds() - first < ENOUGH_S); k++) {
-        double start = uz_thread_seconds();
-        uz_syrk_lower_t_while(DENSE, DENSE, room, room + DENSE * DENSE, NULL);
-        dense = fmin(dense, uz_thread_seconds() - start);
-    }
-    measured.flop_s = dense / ((double)DENSE * DENSE * DENSE);
+    measured.flop_s = uz_least_seconds(multiply_dense, room, 1, REPEATS, ENOUGH_S) / ((double)DENSE * DENSE * DENSE);
     /* a lower triangle with BAND entries in a column, far enough apart to be read as those of a mesh are */
     double *val = room + ROOM;
     int64_t *idx = (int64_t *)(void *)(val + ENTRIES);
@@ -67,10 +72,8 @@ static void measure(void)
         idx[k] = k / BAND + k % BAND / 4 * REACH + k % BAND;
         val[k] = 1.0;
     }
-    const double begun = uz_thread_seconds();
-    for (int k = 0; k < REPEATS && (k == 0 || uz_thread_seconds() - begun < ENOUGH_S); k++)
-        sparse = fmin(sparse, time_entries(val, idx, ENTRIES, room));
-    measured.entry_s = sparse;
+    measured.entry_s =
+        uz_least_seconds(pass_entries, &(entry_pass){val, room, idx, ENTRIES}, 1, REPEATS, ENOUGH_S) / ENTRIES;
     munmap(room, bytes);
 }
 
@@ -115,12 +118,10 @@ static bool is_large(const uz_csc *K)
  * as much of it: its own entries, where there are as many as rows: a diagonal may have gaps. */
 static double rate_of(const uz_csc *K)
 {
-    const int64_t entries = K->ptr[K->cols];
-    if (!is_large(K) || entries < K->rows)
+    const int64_t count = K->ptr[K->cols], n = count < SAMPLE_ENTRIES ? count : SAMPLE_ENTRIES;
+    if (!is_large(K) || count < K->rows)
         return 0.0;
-    const int64_t n = entries < SAMPLE_ENTRIES ? entries : SAMPLE_ENTRIES;
-    const double once = time_entries(K->val, K->idx, n, K->val);
-    return fmin(once, time_entries(K->val, K->idx, n, K->val));
+    return uz_least_seconds(pass_entries, &(entry_pass){K->val, K->val, K->idx, n}, 2, 2, 0.0) / (double)n;
 }
 
 /* -------------------------------------------------------------------- the model */
@@ -340,9 +341,8 @@ bool uz_cost_is_surely_free(uz_cost_plan *plan, const uz_cost_size *size, const 
     if (asked != UZ_OPERATOR_AUTO)
         return false;
     const double layer = 3.0 * uz_mesh_breadth(mesh), entries = LEAST_ENTRIES * layer * layer;
-    const double rate = size->entry_s > 0.0 ? size->entry_s : uz_cost_machine()->entry_s;
     const uz_factor_info least = {.nnz = (int64_t)entries,
-                                  .order_s = LEAST_PASSES * (double)size->k_entries * rate,
+                                  .order_s = LEAST_PASSES * (double)size->k_entries * rates_of(size).entry_s,
                                   .flops = LEAST_FLOPS * layer * layer * layer,
                                   .bytes = (size_t)(sizeof(double) * entries)};
     decide(plan, size, &least, false, direct, asked, memory_limit);
