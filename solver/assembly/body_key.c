@@ -168,7 +168,8 @@ static void put_supports(uz_buffer *key, const uz_scene *scene, int dim)
         put_int(key, support->kind);
         put_name(key, support->on, sizeof support->on);
         if (support->kind == UZ_SUPPORT_RIGID) {
-            int free = 0; /* which of its motions are */
+            int free = 0;    /* which of its motions are */
+            put_int(key, i); /* a group knows its support by its place in the list */
             for (int c = 0; c < 6; c++)
                 free |= isnan(c < 3 ? support->u[c] : support->turn[c - 3]) ? 1 << c : 0;
             put_int(key, free);
@@ -193,6 +194,8 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
         put_names(key, &contact->on_groups);
         put_doubles(key, normal, 3);
         put_int(key, contact->kind);
+        put_int(key, contact->faceted); /* where nodes are that refinement puts on facets */
+        put_double(key, contact->feature_angle);
         if (contact->kind == UZ_OBSTACLE_PLANE)
             continue;
         if (shape && shape->lists)
@@ -210,8 +213,6 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
         put_name(key, contact->with, sizeof contact->with);
         put_names(key, &contact->with_groups);
         put_int(key, contact->between);
-        put_int(key, contact->faceted);
-        put_double(key, contact->feature_angle);
     }
 }
 

@@ -80,6 +80,17 @@ def test_prescribed_motions_need_the_force_that_makes_them(s):
     near(half["summary"]["resultants"]["supports"][1]["force"], [0, -0.01], 1e-8)
 
 
+def test_the_order_of_supports_says_nothing(s):
+    """Also where the body is cached: the group has its motion from its own support, and the force stands there."""
+    one = beam([0, 0], [10, 0.5], rigid={"uy": 0.01, "rz": 0.1})
+    other = {"problem": {**one["problem"], "supports": one["problem"]["supports"][::-1]}}
+    first, second = answer(s, one), answer(s, other)
+    near([t for u in second["displacements"] for t in u], [t for u in first["displacements"] for t in u], 1e-9)
+    near(second["summary"]["resultants"]["supports"][0]["force"], first["summary"]["resultants"]["supports"][1]["force"], 1e-9)
+    near(second["summary"]["resultants"]["supports"][0]["rigid"]["displacement"],
+         first["summary"]["resultants"]["supports"][1]["rigid"]["displacement"], 1e-9)
+
+
 def test_nodes_of_the_group_keep_their_distances(s):
     found = answer(s, beam([0, -0.01], [12, 2]))
     plate = found["summary"]["resultants"]["supports"][1]["rigid"]

@@ -159,6 +159,8 @@ TEST(key_holds_supports_obstacles_and_meshes_of_all_kinds)
     KEY(hold_along(&s, 1, 0), true);
     KEY((s.supports[0].kind = UZ_SUPPORT_SPRING, s.supports[0].spring[0] = 3), true);
     KEY(make_round(&s, 1), true);
+    KEY(s.contacts[0].faceted = true, true); /* of a plane, too: refinement asks */
+    KEY(s.contacts[0].feature_angle = 20, true);
     KEY((s.contacts[0].kind = UZ_OBSTACLE_BODY, memcpy(s.contacts[0].with, "top", 4)), true);
     KEY((s.contacts[0].kind = UZ_OBSTACLE_BODY, s.contacts[0].between = UZ_CONTACT_SURFACES), true);
     KEY((s.contacts[0].kind = UZ_OBSTACLE_BODY, s.contacts[0].faceted = true), true);
@@ -231,6 +233,22 @@ TEST(keys_of_obstacles_and_meshes_differ_in_each_number)
     a.contacts = owned;
     a.given = (uz_given_mesh){0};
     uz_scene_clear(&a);
+}
+
+/* A body knows the support of a rigid group by its place in the list. */
+TEST(key_holds_the_place_of_a_rigid_group)
+{
+    uz_scene a = paper_scene(4, 2), b = paper_scene(4, 2);
+    add_support(&a, "right", (double)NAN, (double)NAN);
+    add_support(&b, "right", (double)NAN, (double)NAN);
+    a.supports[1].kind = b.supports[1].kind = UZ_SUPPORT_RIGID;
+    CHECK(same_key(&a, &b));
+    const uz_support first = b.supports[0];
+    b.supports[0] = b.supports[1];
+    b.supports[1] = first;
+    CHECK(!same_key(&a, &b));
+    uz_scene_clear(&a);
+    uz_scene_clear(&b);
 }
 
 TEST(key_leaves_out_what_the_body_does_not_depend_on)
