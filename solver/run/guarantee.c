@@ -557,11 +557,12 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
     const double whole = s->certificate.energy_norm;
     if (out->proved && !isfinite(out->relative) && s->discretization_error == 0 && out->bound < whole)
         out->relative = out->bound / (whole - out->bound); /* it is carried along: as the certificate's error */
-    if (status == UZ_OK && out->proved && problem->scene.refine)
+    const bool own = g.shown != NULL;                      /* else nothing is proved, or by a closer mesh alone */
+    if (status == UZ_OK && own && problem->scene.refine)
         status = share_gap(result, &g, &err);
-    if (status == UZ_OK && out->proved && result->evaluation->n_quantities > 0)
+    if (status == UZ_OK && own && result->evaluation->n_quantities > 0)
         status = uz_bound_keep_maps(&g.body, &g.stop, &err);
-    if (status == UZ_OK && out->proved)
+    if (status == UZ_OK && own)
         status = uz_prove_quantities(result, &g, &err);
     clear(&g);
     uz_body_model_clear(&model);
@@ -573,8 +574,9 @@ static void guarantee_answer(uz_result *result, const uz_problem *problem, const
         uz_quantity_found *q = &result->evaluation->quantities[i];
         if (!q->guaranteed && !*q->unproved)
             snprintf(q->unproved, sizeof q->unproved, "%s",
-                     out->proved ? "it was stopped before it was proved, or had no memory"
-                                 : "the whole error is not guaranteed (error.why)");
+                     own           ? "it was stopped before it was proved, or had no memory"
+                     : out->proved ? "the whole error is guaranteed by a finer mesh, not by the answer's own"
+                                   : "the whole error is not guaranteed (error.why)");
     }
     out->seconds = uz_seconds() - began;
     s->timings.total += out->seconds;

@@ -388,6 +388,20 @@ def test_quantities_of_bodies_on_each_other(s):
     check(low["force"] < 102.45 < high["force"] and abs(low["force"] + high["reaction"]) < 0.01 and abs(high["force"] + low["reaction"]) < 0.01, low, high)
 
 
+def test_what_a_finer_mesh_alone_proves(s):
+    """Linear and quadratic triangles in each other, on a ridge: the dual problem of the answer's own mesh has no solution. Quantities
+    are from that mesh, and stay estimates that say so."""
+    groups = {"left": [(0, "left")], "bottom": [(0, "bottom")], "roof": [(0, "top")], "floor": [(1, "bottom")], "held": [(1, "left")]}
+    request = body(["tri6", "tri3"], [(8, 2), (12, 4)], [lambda x, y: (8 * x, y), lambda x, y: (6.4 * x, 0.999 + y)], groups,
+                   model="plane_strain", materials=[{"on": "all", "young": 50, "poisson": 0.3}],
+                   supports=[{"on": "left", "spring": [135, 135]}, {"on": "held", "ux": 0, "uy": 0}],
+                   contacts=[{"on": "bottom", "obstacle": {"height": {"x": [-1, 3.2, 16], "z": [-0.029, -0.009, -0.039]}}},
+                             {"on": "floor", "with": "roof"}])
+    summary = summary_of(s, {**request, "quantities": [{"quantity": "strain_energy"}], "solver": {"accuracy": {"guaranteed": True}}})
+    check(summary["error"]["kind"] == "guaranteed", summary["error"])
+    check(summary["quantities"][0]["kind"] == "estimated" and "finer mesh" in summary["quantities"][0]["why"], summary["quantities"])
+
+
 def test_uniform_pressure_between_bodies(s):
     """Blocks of one width on each other, free to spread: no mesh has an error."""
     for element, cells in (("quad4", ((6, 4), (6, 3))), ("quad4", ((7, 4), (4, 3))), ("tri6", ((5, 2), (3, 2)))):
