@@ -211,6 +211,10 @@ const uz_rigid_group *uz_rigid_group_of(const uz_body_model *model, int64_t node
 bool uz_is_tied(const uz_body_model *model, int64_t node);
 /* What such a node has of a value (n_nodes x stride). */
 double uz_tied_value(const uz_body_model *model, int64_t a, const double *value, int64_t stride);
+/* The same of a displacement by node, along dof c of node a. */
+double uz_tied_along(const uz_body_model *model, int64_t a, int c, const double *nodal);
+/* v (dim), along the axes: what of it is along directions in which the node follows its masters. */
+void uz_tied_part(double v[3], const uz_body_model *model, int64_t a);
 /* The nodes whose dofs carry node a, and their shares (uz_followers); 0: it has its own, or hangs in a body without
  * rigid groups and ties. */
 int64_t uz_carriers(const int64_t **node, const double **share, const uz_body_model *model, int64_t a);

@@ -156,6 +156,8 @@ static uz_status prescribe_along(prescription *p, int64_t support, int64_t node,
         return UZ_OK;
     uz_to_frame(share, p->model, node, n);
     for (int c = 0; c < p->model->mesh.dim; c++) {
+        if (dof[c] == UZ_NO_DOF) /* what follows a tie has no part in what is held */
+            continue;
         if (dof[c] < 0 && (p->source[-1 - dof[c]] || (c == 0 && uz_is_on_axis(p->model, node)))) {
             known += share[c] * p->value[-1 - dof[c]];
             size += fabs(share[c] * p->value[-1 - dof[c]]);

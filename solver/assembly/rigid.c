@@ -242,21 +242,30 @@ static void append_tied(uz_followers *f, int64_t *n, const uz_body_model *model,
 {
     const uz_csc *tied = &model->tied.share;
     const int dim = model->mesh.dim;
-    const int64_t *dof = model->dof + a * dim;
     double own[2][9], held[9] = {0};
     int64_t node[2];
     bool any = false;
     for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1]; q++) {
         const int carriers = own_carriers(node, own, model, tied->idx[q]);
         for (int k = 0; k < carriers; k++) {
-            for (int i = 0; i < dim * dim; i++)
-                own[k][i] = dof[i / dim] == UZ_NO_DOF ? own[k][i] : 0;
+            for (int j = 0; j < dim; j++) {
+                double column[3] = {0};
+                for (int i = 0; i < dim; i++)
+                    column[i] = own[k][i * dim + j];
+                uz_tied_part(column, model, a);
+                for (int i = 0; i < dim; i++)
+                    own[k][i * dim + j] = column[i];
+            }
             append(f, f->first[a], n, dim, node[k], own[k], tied->val[q]);
         }
     }
     for (int c = 0; c < dim; c++) {
-        held[c * dim + c] = dof[c] == UZ_NO_DOF ? 0 : 1;
-        any = any || dof[c] != UZ_NO_DOF;
+        double along[3] = {c == 0, c == 1, c == 2};
+        const bool is_held = model->dof[a * dim + c] != UZ_NO_DOF;
+        uz_from_frame(along, model, a);
+        for (int i = 0; i < dim && is_held; i++)
+            held[i * dim + c] = along[i];
+        any = any || is_held;
     }
     if (any)
         append(f, f->first[a], n, dim, a, held, 1);

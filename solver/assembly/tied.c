@@ -3,7 +3,7 @@
  * The mean of u_slave - u_master with each dual function of the slave's surface (mortar.c) is to vanish, u_j = sum_l
  * M_jl / D_j u_l, in all directions: bilateral rows with one slave node each, by which its displacement is eliminated.
  * Stress that is constant across the surface is a solution exactly, since the dual functions sum to 1 and the slave's
- * displacement may be any linear one. What supports hold of a slave stays theirs. */
+ * displacement may be any linear one. What supports hold of a slave, along an axis or a normal, stays theirs. */
 #include "assembly/discretization.h"
 #include "assembly/parts.h"
 
@@ -144,11 +144,11 @@ uz_status uz_number_tied(uz_body_model *model, uz_error *err)
     for (int64_t a = 0; a < model->mesh.n_nodes && model->tied.share.ptr; a++) {
         if (!uz_is_tied(model, a))
             continue;
-        if (uz_node_frame(model, a) || uz_is_rigid(model, a))
+        if (uz_is_rigid(model, a))
             return uz_fail(err, UZ_ERR_SCENE, "/ties",
-                           "node %lld follows a surface that it is tied to, and %s: leave the sides there out of one",
-                           (long long)a,
-                           uz_is_rigid(model, a) ? "is of a rigid group" : "a support holds it along a normal");
+                           "node %lld follows a surface that it is tied to, and is of a rigid group: leave the sides "
+                           "there out of one",
+                           (long long)a);
         for (int c = 0; c < dim; c++) /* what supports hold stays */
             if (model->dof[a * dim + c] == 0)
                 model->dof[a * dim + c] = UZ_NO_DOF;
@@ -163,4 +163,21 @@ double uz_tied_value(const uz_body_model *model, int64_t a, const double *value,
     for (int64_t q = share->ptr[a]; q < share->ptr[a + 1]; q++)
         sum += share->val[q] * value[share->idx[q] * stride];
     return sum;
+}
+
+double uz_tied_along(const uz_body_model *model, int64_t a, int c, const double *nodal)
+{
+    double v[3];
+    for (int i = 0; i < model->mesh.dim; i++)
+        v[i] = uz_tied_value(model, a, nodal + i, model->mesh.dim);
+    return uz_along_dof(model, a, c, v);
+}
+
+void uz_tied_part(double v[3], const uz_body_model *model, int64_t a)
+{
+    double local[3];
+    uz_to_frame(local, model, a, v);
+    for (int c = 0; c < model->mesh.dim; c++)
+        v[c] = model->dof[a * model->mesh.dim + c] == UZ_NO_DOF ? local[c] : 0;
+    uz_from_frame(v, model, a);
 }

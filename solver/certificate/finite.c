@@ -576,7 +576,8 @@ static double off_support(const uz_finite_answer *of, int64_t a, int c)
     if (uz_is_rigid(model, a))
         return 0; /* uz_rigid_groups_off */
     if (dof == UZ_NO_DOF)
-        return uz_is_tied(model, a) ? of->u[dim * a + c] - uz_tied_value(model, a, of->u + c, dim) : 0;
+        return uz_is_tied(model, a) ? uz_along_dof(model, a, c, of->u + dim * a) - uz_tied_along(model, a, c, of->u)
+                                    : 0;
     return dof < 0 ? uz_along_dof(model, a, c, of->u + dim * a) - of->prescribed[-1 - dof] : 0;
 }
 

@@ -209,15 +209,26 @@ static void leave_hanging(balance *b)
 static void leave_tied(balance *b)
 {
     const uz_csc *tied = &b->model->tied.share;
-    for (int64_t i = 0; tied->ptr && i < b->model->mesh.n_nodes * b->dim; i++) {
-        const int64_t a = i / b->dim;
-        const double spring = b->model->spring ? b->model->spring[i] * b->u[i] : 0;
-        for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1] && b->model->dof[i] == UZ_NO_DOF; q++) {
-            const int64_t to = tied->idx[q] * b->dim + i % b->dim;
-            b->inner[to] += tied->val[q] * (b->inner[i] + spring);
-            b->load[to] += tied->val[q] * b->load[i];
-            b->contact[to] += tied->val[q] * b->contact[i];
+    for (int64_t a = 0; tied->ptr && a < b->model->mesh.n_nodes; a++) {
+        double inner[DIM] = {0}, load[DIM] = {0}, contact[DIM] = {0};
+        if (!uz_is_tied(b->model, a))
+            continue;
+        for (int c = 0; c < b->dim; c++) {
+            const int64_t i = a * b->dim + c;
+            inner[c] = b->inner[i] + (b->model->spring ? b->model->spring[i] * b->u[i] : 0);
+            load[c] = b->load[i];
+            contact[c] = b->contact[i];
         }
+        uz_tied_part(inner, b->model, a);
+        uz_tied_part(load, b->model, a);
+        uz_tied_part(contact, b->model, a);
+        for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1]; q++)
+            for (int c = 0; c < b->dim; c++) {
+                const int64_t to = tied->idx[q] * b->dim + c;
+                b->inner[to] += tied->val[q] * inner[c];
+                b->load[to] += tied->val[q] * load[c];
+                b->contact[to] += tied->val[q] * contact[c];
+            }
     }
 }
 

@@ -47,8 +47,9 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
         int64_t dof = model->dof[i], node = i / dim;
         double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
         double rounding = 2 * uz_turning_error(model, node, u); /* there and back */
-        const double held = uz_is_rigid(model, node)                      ? rigid_at(run, u, node, (int)(i % dim))
-                            : dof == UZ_NO_DOF && uz_is_tied(model, node) ? uz_tied_value(model, node, u + i % dim, dim)
+        const double held = uz_is_rigid(model, node) ? rigid_at(run, u, node, (int)(i % dim))
+                            : dof == UZ_NO_DOF && uz_is_tied(model, node)
+                                ? uz_tied_along(model, node, (int)(i % dim), u)
                             : dof == UZ_NO_DOF ? uz_mesh_value_amid(&model->mesh, node, u + i % dim, dim)
                             : dof < 0          ? ldexp(run->load.prescribed[-1 - dof], -run->load.exponent)
                                                : given;

@@ -143,6 +143,37 @@ def test_a_rigid_head_and_an_answer_verified(s):
     check("tied" in reply.json["detail"], reply.json)
 
 
+def turned(request, R):
+    """By R, with normals for the axes that supports hold along."""
+    def turn(x):
+        return [sum(r * t for r, t in zip(row, x)) for row in R]
+    scene = dict(request["problem"])
+    scene["mesh"] = {**scene["mesh"], "nodes": [turn(x) for x in scene["mesh"]["nodes"]]}
+    scene["loads"] = [{**one, "traction": turn(one["traction"])} for one in scene["loads"]]
+    scene["supports"] = [{"on": one["on"], "normal": [row[c] for row in R], "u": one[name]}
+                         for one in scene["supports"] for c, name in enumerate(("ux", "uy", "uz")[:len(R)]) if name in one]
+    return {"problem": scene}, turn
+
+
+def test_normals_hold_tied_nodes_as_axes_do(s):
+    """Sides that are tied end on sides that are held, and all is turned: so are displacements, reactions and what holds."""
+    for kinds, R in ((["quad4", "tri6"], [[0.8, -0.6], [0.6, 0.8]]),
+                     (["hex8", "tet10"], [[2 / 3, -1 / 3, 2 / 3], [2 / 3, 2 / 3, -1 / 3], [-1 / 3, 2 / 3, 2 / 3]])):
+        request = pulled(kinds)
+        request["problem"]["loads"].append({"on": "right", "traction": [0.5] * len(R)})
+        request["problem"]["supports"].append({"on": "left", "uz" if len(R) == 3 else "uy": 0})
+        image, turn = turned(request, R)
+        one, other = answer(s, request), answer(s, image)
+        size = max(abs(t) for u in one["displacements"] for t in u)
+        for u, v in zip(one["displacements"], other["displacements"]):
+            check(all(abs(a - b) < 1e-9 * size for a, b in zip(turn(u), v)), u, v)
+        for a, b in zip(one["summary"]["resultants"]["supports"], other["summary"]["resultants"]["supports"]):
+            check(all(abs(x - y) < 1e-8 for x, y in zip(turn((a["force"] + [0])[:len(R)]), b["force"])), a, b)
+        given = {"displacements": other["displacements"], "reactions": other["reactions"]}
+        reply = expect(s.request("POST", "/v1/verify", {**image, "answer": given}), 200)
+        check(reply.json["summary"]["outcome"] == "verified", reply.json)
+
+
 def test_a_gap_within_the_tolerance(s):
     check(answer(s, pulled(["quad4", "quad4"], gap=0.01)))
     far = pulled(["quad4", "quad4"], gap=0.3)
