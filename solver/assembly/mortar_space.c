@@ -27,7 +27,9 @@ enum { MOST_CORNERS = 12, MOST_PIECES = 5, ENOUGH_ABOUT = 25, MOST_ABOUT = 60 };
  * their normals off the means of the faces', in such angles. */
 #define MOST_SAGITTA 1.0
 #define MOST_TILT    3.0
-#define ROUNDING     1e-9
+/* ... and the least discriminant that they may have on their faces: on a sphere, 60 degrees from the node. */
+#define LEAST_DISCRIMINANT 0.25
+#define ROUNDING           1e-9
 
 /* A piece smaller than this part of the slave face is what rounding leaves. */
 #define LEAST_PIECE 1e-12
@@ -118,6 +120,30 @@ static int list_about(int64_t about[MOST_ABOUT], const uz_mortar_surface *surfac
     return n;
 }
 
+/* The least that the discriminant of a quadric can be on a face of three or four nodes: a quadratic in the place, or in
+ * each of its two coordinates, is no less than its least Bernstein coefficient. */
+static double least_discriminant(const uz_smooth_patch *patch, const uz_mortar_side *side)
+{
+    double middle[3] = {0}, corner[4], edges = 0, corners = 0, least = INFINITY;
+    const int n = side->nodes;
+    for (int a = 0; a < n; a++) {
+        corner[a] = uz_smooth_patch_discriminant(patch, side->xyz + 3 * a);
+        corners += corner[a];
+        for (int c = 0; c < 3; c++)
+            middle[c] += side->xyz[3 * a + c] / n;
+    }
+    for (int a = 0; a < n; a++) {
+        const int b = (a + 1) % n;
+        double x[3];
+        for (int c = 0; c < 3; c++)
+            x[c] = 0.5 * (side->xyz[3 * a + c] + side->xyz[3 * b + c]);
+        const double edge = 2 * uz_smooth_patch_discriminant(patch, x) - 0.5 * (corner[a] + corner[b]);
+        edges += edge;
+        least = fmin(least, fmin(edge, corner[a]));
+    }
+    return n == 3 ? least : fmin(least, 4 * uz_smooth_patch_discriminant(patch, middle) - 0.25 * corners - 0.5 * edges);
+}
+
 /* Leaves out quadrics that are not what the faces around their places stand for: where a surface bends from one node to
  * the next, as from the arm of a clip into its bend, the one through all nodes may be anywhere between them. A face of
  * length l that turns by a from each of its ends to the middle has a sagitta of l a / 4. False: no memory. */
@@ -150,6 +176,10 @@ static bool drop_wild_patches(bool *known, const uz_mortar_surface *surface)
                 x[i % 3] += N[i / 3] * side->xyz[i];
             if (!known[place])
                 continue;
+            if (q < side->nodes && least_discriminant(&surface->patch[place], side) < LEAST_DISCRIMINANT) {
+                known[place] = false;
+                continue;
+            }
             const double height = uz_smooth_patch_height(normal, &surface->patch[place], x);
             uz_smooth_patch_height(here, &surface->patch[place], surface->patch[place].at);
             known[place] = fabs(height) <= MOST_SAGITTA * most * size + ROUNDING * size &&

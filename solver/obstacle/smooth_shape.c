@@ -452,25 +452,41 @@ bool uz_smooth_patch_fit(uz_smooth_patch *out, const double at[3], const double 
     return n >= FEWEST && p.size > 0 && isfinite(p.c[0] + p.c[2] + p.c[7]);
 }
 
-double uz_smooth_patch_height(double normal[3], const uz_smooth_patch *p, const double x[3])
+/* The quadric above x: c_7 z^2 - line z + graph = 0 for its height z over the patch's plane, with these. */
+typedef struct {
+    double along[2], from, line, graph, discriminant;
+} above;
+
+static above look_above(const uz_smooth_patch *p, const double x[3])
 {
-    double off[3], term[PARAMETERS], slope[2] = {p->c[0], p->c[1]}, steep = 1;
+    double off[3], term[PARAMETERS];
+    above a = {.graph = 0};
     for (int c = 0; c < 3; c++)
         off[c] = (x[c] - p->at[c]) / p->size;
-    const double along[2] = {uz_dot3(off, p->t[0]), uz_dot3(off, p->t[1])}, from = uz_dot3(off, p->n);
-    double z = from;
-    for (int k = 0; k < 4; k++) { /* Newton's method for the height over the patch's plane */
-        double f = -z;
-        terms_at(term, along[0], along[1], z);
-        for (int j = 0; j < PARAMETERS; j++)
-            f += p->c[j] * term[j];
-        steep = 1 - p->c[5] * along[0] - p->c[6] * along[1] - 2 * p->c[7] * z;
-        z += f / steep;
-    }
-    slope[0] += 2 * p->c[2] * along[0] + p->c[3] * along[1] + p->c[5] * z;
-    slope[1] += p->c[3] * along[0] + 2 * p->c[4] * along[1] + p->c[6] * z;
+    a.along[0] = uz_dot3(off, p->t[0]);
+    a.along[1] = uz_dot3(off, p->t[1]);
+    a.from = uz_dot3(off, p->n);
+    terms_at(term, a.along[0], a.along[1], 0);
+    for (int j = 0; j < PARAMETERS; j++)
+        a.graph += p->c[j] * term[j];
+    a.line = 1 - p->c[5] * a.along[0] - p->c[6] * a.along[1];
+    a.discriminant = a.line * a.line - 4 * p->c[7] * a.graph;
+    return a;
+}
+
+double uz_smooth_patch_discriminant(const uz_smooth_patch *p, const double x[3])
+{
+    return look_above(p, x).discriminant;
+}
+
+double uz_smooth_patch_height(double normal[3], const uz_smooth_patch *p, const double x[3])
+{
+    const above a = look_above(p, x);
+    const double steep = sqrt(fmax(0, a.discriminant)), z = 2 * a.graph / (a.line + steep); /* the root next to 0 */
+    const double slope[2] = {p->c[0] + 2 * p->c[2] * a.along[0] + p->c[3] * a.along[1] + p->c[5] * z,
+                             p->c[1] + p->c[3] * a.along[0] + 2 * p->c[4] * a.along[1] + p->c[6] * z};
     for (int c = 0; c < 3; c++)
         normal[c] = p->n[c] - (slope[0] * p->t[0][c] + slope[1] * p->t[1][c]) / steep;
     uz_unit3(normal);
-    return p->size * (z - from);
+    return p->size * (z - a.from);
 }

@@ -42,5 +42,8 @@ bool uz_smooth_patch_fit(uz_smooth_patch *out, const double at[3], const double 
 
 /* From x along the patch's n to the quadric, and the quadric's unit normal there, on the side of n. */
 double uz_smooth_patch_height(double normal[3], const uz_smooth_patch *patch, const double x[3]);
+/* The discriminant of the equation for that height, quadratic in x along the patch's plane and 1 at its node: the
+ * quadric is neither above nor below x where it is negative, and turns away from the plane where it is 0. */
+double uz_smooth_patch_discriminant(const uz_smooth_patch *patch, const double x[3]);
 
 #endif

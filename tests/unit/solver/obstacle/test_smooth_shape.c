@@ -237,6 +237,39 @@ TEST(patches_lie_on_an_ellipsoid)
     CHECK(!uz_smooth_patch_fit(&patch, xyz, exact, xyz + 3, 4));
 }
 
+/* Five columns of nodes on a wave are on a quadric of two sheets. What is above a face between them is the one that
+ * goes through the node, which leads from node to node without a leap. */
+TEST(a_patch_stays_on_its_sheet)
+{
+    enum { COLUMNS = 5, ROWS = 3, POINTS = 40 };
+    static const double X[COLUMNS] = {-1.9205, -0.8581, 0.2042, 1.2666, 2.329},
+                        Z[COLUMNS] = {2.6614, 2.5909, 2.7567, 2.8508, 2.6982}, UP[3] = {0, 0, 1};
+    for (int of = 0; of < COLUMNS; of++) {
+        double at[3] = {X[of], 0, Z[of]}, others[3 * (COLUMNS * ROWS - 1)], normal[3], before = 0;
+        int n = 0;
+        uz_smooth_patch patch;
+        for (int i = 0; i < COLUMNS * ROWS; i++) {
+            const int row = i / COLUMNS;
+            const double x[3] = {X[i % COLUMNS], 0.6074 * (row - 1), Z[i % COLUMNS]};
+            if (i != COLUMNS + of)
+                memcpy(others + 3 * n++, x, sizeof x);
+        }
+        CHECK(uz_smooth_patch_fit(&patch, at, UP, others, n));
+        for (int k = 0; k <= 2 * POINTS; k++) { /* over the facets on both sides */
+            const int left = k < POINTS ? of - 1 : of;
+            const double s = (double)(k % POINTS) / POINTS;
+            if (left < 0 || left + 1 >= COLUMNS)
+                continue;
+            const double x[3] = {(1 - s) * X[left] + s * X[left + 1], 0.1, (1 - s) * Z[left] + s * Z[left + 1]};
+            const double height = uz_smooth_patch_height(normal, &patch, x);
+            CHECK_MSG(fabs(height) < 0.25 && (k % POINTS == 0 || fabs(height - before) < 0.04), "column %d at %g: %g",
+                      of, x[0], height);
+            CHECK(uz_smooth_patch_discriminant(&patch, x) > 0.2);
+            before = height;
+        }
+    }
+}
+
 /* Cones have six parameters: any six points are on one, whose normals may be anywhere. */
 TEST(six_nodes_tell_no_cone)
 {
