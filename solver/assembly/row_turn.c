@@ -356,8 +356,9 @@ static bool add_rows_at(double *force, double *gap, double factor, const work *w
     int64_t next = 0;
     bool all = true;
     for (int64_t i = 0; i < at->m; i++) {
+        const uz_contact_sites *sites = &at->sites[at->info.contact_of[i]];
         r[i] = 0;
-        g[i] = at->sites[at->info.contact_of[i]].gap[at->row_place[i]];
+        g[i] = sites->gap ? sites->gap[at->row_place[i]] : 0; /* a plane has no sites */
     }
     uz_blend_rows(g, at);
     for (int64_t j = 0; j < w->n_pressed && all; j++) {

@@ -380,6 +380,25 @@ def test_a_brick_slides_over_another(s):
         check(summary["outcome"] == "converged" and ("finite" in summary) == (used == "finite"), (down, summary))
 
 
+def test_a_body_between_another_and_a_plane(s):
+    """Held at one end. A plane, which has no places of its own, is what a line is that has."""
+    found = []
+    for obstacle in ({"plane": {"point": [0, 0], "normal": [0, 1]}}, {"polyline": {"points": [[-9, 0], [9, 0]]}}):
+        request = stacked(0.3)
+        request["problem"]["supports"][0] = {"on": {"where": {"x": 0}}, "ux": 0, "uy": 0}
+        request["problem"]["contacts"].append({"on": {"where": {"y": 0}}, "obstacle": obstacle})
+        summary = answer(s, request, "summary")[1]["summary"]
+        check(summary["outcome"] == "converged", summary)
+        found.append([contact["force"] for contact in summary["resultants"]["contacts"]])
+    check(found[0][1][1] > 0.01, found)
+    check(all(abs(a - b) < 1e-7 for one, other in zip(*found) for a, b in zip(one, other)), found)
+    request = bricks(0.3, 0.15)
+    request["problem"]["supports"][0] = {"on": "ax0", "ux": 0, "uy": 0, "uz": 0}
+    request["problem"]["contacts"].append({"on": "ay0", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}})
+    summary = answer(s, request, "summary")[1]["summary"]
+    check(summary["outcome"] == "converged" and summary["resultants"]["contacts"][1]["force"][1] > 0.01, summary)
+
+
 def test_what_a_comparison_takes_is_predicted(s):
     """By ?validate=true, within a fifth of what is counted: of finite kinematics, and of auto where it compares."""
     cube = block(model="solid", mesh={"box": {"size": [1, 1, 1], "cells": [10, 10, 10]}}, supports=[{"on": "top", "ux": 0, "uy": -0.2, "uz": 0}],
