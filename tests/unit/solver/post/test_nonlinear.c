@@ -216,12 +216,37 @@ TEST(a_bar_may_buckle_by_its_thickness)
     }
 }
 
+/* By an angle, with a normal for each axis that supports hold along. */
+static void turn_about(uz_scene *s, uz_body_model *model, double angle)
+{
+    const uz_support given[2] = {s->supports[0], s->supports[1]};
+    const int64_t n = s->n_supports;
+    const double c = cos(angle), d = sin(angle);
+    for (int64_t i = 0; i < model->mesh.n_nodes; i++) {
+        double *x = model->mesh.xyz + 2 * i;
+        const double at[2] = {x[0], x[1]};
+        x[0] = c * at[0] - d * at[1];
+        x[1] = d * at[0] + c * at[1];
+    }
+    s->n_supports = 0;
+    for (int64_t k = 0; k < n; k++)
+        for (int axis = 0; axis < 2; axis++) {
+            if (isnan(given[k].u[axis]))
+                continue;
+            uz_support *support = body_hold(s, given[k].on, NAN, NAN, NAN);
+            support->kind = UZ_SUPPORT_NORMAL;
+            support->normal[0] = axis == 0 ? c : -d;
+            support->normal[1] = axis == 0 ? d : c;
+        }
+}
+
 /* A strip of L = 8, h = 0.5, held at both ends along x and y, along y, at one end; and with its upper side held along
- * x, next to the end that is. */
+ * x, next to the end that is: as it lies, and turned. */
 TEST(what_is_left_out_pulls_between_holders)
 {
     static const double L = 8, H = 0.5;
-    for (int k = 0; k < 4; k++) {
+    for (int turn = 0; turn < 8; turn++) {
+        const int k = turn % 4;
         uz_scene s = body_scene(UZ_PLANE_STRAIN, "quad8", (double[3]){L, H, 0}, (int64_t[3]){8, 1, 0});
         uz_body_model model;
         uz_error err = {0};
@@ -237,6 +262,11 @@ TEST(what_is_left_out_pulls_between_holders)
         const double buckling = uz_least_buckling_strain(&model), h = L * H / model.mesh.extent;
         const double next = sqrt(L * H / 3); /* the least distance that counts */
         const double want[] = {sqrt(1 + pow(h / L, 2)) / L, h / L / L, 0, sqrt(1 + pow(h / next, 2)) / next};
+        if (turn >= 4) {
+            turn_about(&s, &model, 0.6);
+            force[0] = (uz_resultant){.force = {3, 0, 0}}; /* the left has two supports now */
+            force[1] = (uz_resultant){.force = {0, 4, 0}};
+        }
         CHECK_INT(uz_force_leverage(&got, &model, &s, &e, NULL, buckling, &err), UZ_OK);
         CHECK_MSG(fabs(got - want[k] * 2 / 5) <= 1e-12, "%d: %.17g, not %.17g", k, got, want[k] * 2 / 5);
         uz_body_model_clear(&model);
