@@ -270,6 +270,28 @@ TEST(a_patch_stays_on_its_sheet)
     }
 }
 
+/* Two rows tell nothing of how a surface bends from one to the other: it is not what rounding makes of it, which
+ * depends on the order of the nodes. */
+TEST(rounding_bends_no_patch)
+{
+    enum { NODES = 7 };
+    static const double X[NODES + 1][3] = {{0.31, 0, 0.02},    {-1.02, 0, 0.05},    {1.27, 0, 0.09},
+                                           {2.21, 0, 0.31},    {-1.02, 0.83, 0.05}, {0.31, 0.83, 0.02},
+                                           {1.27, 0.83, 0.09}, {2.21, 0.83, 0.31}};
+    static const double UP[3] = {0, 0, 1}, BETWEEN[3] = {0.7, 0.4, 0.06};
+    double first = NAN;
+    for (int turn = 0; turn < NODES; turn++) {
+        double others[3 * NODES], normal[3];
+        uz_smooth_patch patch;
+        for (int i = 0; i < NODES; i++)
+            memcpy(others + 3 * i, X[1 + (i + turn) % NODES], sizeof X[0]);
+        CHECK(uz_smooth_patch_fit(&patch, X[0], UP, others, NODES));
+        const double height = uz_smooth_patch_height(normal, &patch, BETWEEN);
+        first = turn == 0 ? height : first;
+        CHECK_MSG(fabs(height - first) < 1e-6, "%g: %g", height, height - first);
+    }
+}
+
 /* Cones have six parameters: any six points are on one, whose normals may be anywhere. */
 TEST(six_nodes_tell_no_cone)
 {
