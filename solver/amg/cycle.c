@@ -103,7 +103,7 @@ static inline __attribute__((always_inline)) void sweep_down(const uz_level_step
                 x[r] = r < b ? value[l][r] : 0.0F;
             for (int r = 0; reduces && r < b; r++) {
                 const int64_t at = (i * lanes + l) * width + r;
-                value[l][r] = step->swept[at] -= step->share * (step->along[at] + value[l][r]);
+                value[l][r] = step->swept[at] -= step->share[l] * (step->along[at] + value[l][r]);
             }
             for (int r = 0; r < b; r++) {
                 left[r] = 0.0F;

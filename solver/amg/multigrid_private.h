@@ -122,13 +122,13 @@ static inline int uz_width(int b)
  * Dofs without an inverse take no part.
  *
  * Instead of the sweep down, of conjugate gradients whose residual is kept swept (rough.c): REDUCE: x = (D + L)^-1 b,
- * swept -= share (along + x) and t = -L'swept; RAISE: x = (D + L) swept. */
+ * swept -= share (along + x), each lane by a share of its own, and t = -L'swept; RAISE: x = (D + L) swept. */
 typedef struct {
     const uz_level *level;
     const float *inverse, *b;
     float *x, *t, *coarse; /* coarse: the next level's right-hand side on the way down, its answer on the way up */
     int k, lanes;
-    float *swept, share; /* of the last two parts alone */
+    float *swept, share[UZ_LANES_MOST]; /* of the last two parts alone */
     const float *along;
 } uz_level_step;
 enum {

@@ -109,7 +109,7 @@ static uz_status take_step(rough *v, double *along, uz_error *err)
     uz_level_step down = v->step;
     down.b = v->w;
     down.along = v->p;
-    down.share = (float)*along;
+    down.share[0] = (float)*along;
     uz_level_take_step(&down, UZ_STEP_REDUCE);
     const uz_status status = precondition(v, err);
     v->factor = (float)(v->square / last);

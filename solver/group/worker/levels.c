@@ -542,6 +542,8 @@ static void make_room(spread_system *s)
     s->x = new_zeros(size, sizeof *s->x);
     s->t = new_zeros(size, sizeof *s->t);
     s->lanes = 1;
+    s->single = true;
+    s->diagonal = new_zeros(4 * s->near.here, sizeof *s->diagonal);
     s->coarse = new_zeros(coarse * LANES * uz_width(s->k), sizeof *s->coarse);
     s->coarse_r = new_zeros(coarse * s->k, sizeof *s->coarse_r);
     s->coarse_z = new_zeros(coarse * s->k, sizeof *s->coarse_z);
@@ -641,7 +643,7 @@ int64_t system_bytes(const spread_system *s, int which)
         return coarse;
     const int64_t prolongation = s->level.ptr ? s->level.ptr[nodes] * (4 + 4 * s->b * s->k) : 0;
     return coarse + blocks_bytes(&s->level.A) + blocks_bytes(&s->next) + prolongation +
-           4 * size * (s->level.A.ptr[nodes] + nodes) + nodes * (8 + 60 * LANES * 4);
+           4 * size * (s->level.A.ptr[nodes] + nodes) + nodes * (24 + 60 * LANES * 4);
 }
 
 int system_levels(const spread_system *s, int which)
@@ -652,10 +654,10 @@ int system_levels(const spread_system *s, int which)
 void system_free(spread_system *s)
 {
     uz_level *level = &s->level;
-    void *own[] = {s->scale,    level->off,  level->diag, level->inverse, level->ptr, level->block, level->value,
-                   s->face,     s->outside,  s->modes,    s->rhs,         s->x,       s->t,         s->coarse,
-                   s->coarse_r, s->coarse_z, s->u,        s->f,           s->r,       s->z,         s->p,
-                   s->q};
+    void *own[] = {s->scale,     level->off, level->diag, level->inverse, level->ptr, level->block,
+                   level->value, s->face,    s->outside,  s->modes,       s->rhs,     s->x,
+                   s->t,         s->coarse,  s->coarse_r, s->coarse_z,    s->u,       s->f,
+                   s->r,         s->z,       s->p,        s->q,           s->diagonal};
     free_variant(s, VARIANT_HELD);
     free_variant(s, VARIANT_WHOLE);
     for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)

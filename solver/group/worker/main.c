@@ -390,6 +390,7 @@ static PetscErrorCode make_steps(group *g, spread_system *s, const uz_wire_head 
 static void begin_solve(group *g, const body *b, spread_system *s, const uz_wire_head *m)
 {
     const bool from_zero = m->b == 1;
+    s->rough = false;
     s->lanes = lanes_of(m);
     memset(s->f, 0, 4 * (size_t)(s->lanes * s->near.here) * sizeof *s->f); /* surplus numbers stood elsewhere */
     memset(s->u, 0, 4 * (size_t)(s->lanes * s->near.here) * sizeof *s->u);
@@ -428,6 +429,8 @@ static PetscErrorCode obey(group *g, const uz_wire_head *m)
     const int which = (int)m->a;
     if (m->kind == UZ_WIRE_BEGIN)
         begin_solve(g, b, s, m);
+    else if (m->kind != UZ_WIRE_STEPS)
+        system_settle(s);
     if (m->kind == UZ_WIRE_BEGIN || m->kind == UZ_WIRE_AGAIN) {
         system_begin(s, which, m->kind == UZ_WIRE_BEGIN && m->b == 1);
         answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .x = system_square(s)});

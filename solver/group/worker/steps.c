@@ -1,4 +1,4 @@
-/* steps.c: one V-cycle, and conjugate gradients with it.
+/* steps.c: one V-cycle, and conjugate gradients with it in double precision, for what rough.c can't do.
  *
  * On the finest level each process sweeps once forwards over its own rows from 0, S = (D' + L)^-1, L the strict lower
  * triangle among them, and once backwards, S', after the coarse correction. With D' = D + sum_j |o_ij| over the entries
@@ -17,21 +17,17 @@
 #include <math.h>
 #include <string.h>
 
-/* to += (D' - D) x - O x: what the own sweeps, of which D' + L + L' is the matrix, see of the difference to A. */
-static void add_outside(spread_system *s, float *to)
+void add_known_outside(const spread_system *s, float *to, const float *x, float sign)
 {
-    neighbours *near = &s->near;
+    const neighbours *near = &s->near;
     const uz_blocks *A = &s->level.A;
     const int b = s->b, width = 4 * s->lanes;
-    float *of_ghosts = s->x + width * near->here;
-    if (near->size == 1)
-        return;
-    neighbours_fetch(near, of_ghosts, s->x, (size_t)width * sizeof *s->x);
+    const float *of_ghosts = s->x + width * near->here;
     for (int64_t f = 0; f < s->faces; f++)
         for (int q = 0; q < width; q += 4)
             for (int c = 0; c < b; c++) {
                 const int64_t at = width * (int64_t)s->face[f] + q + c;
-                to[at] += s->outside[s->face[f] * b + c] * s->x[at];
+                to[at] += sign * s->outside[s->face[f] * b + c] * x[at];
             }
     for (int64_t g = 0; g < near->ghosts; g++)
         for (int64_t e = A->ptr[near->here + g]; e < A->ptr[near->here + g + 1]; e++)
@@ -39,7 +35,14 @@ static void add_outside(spread_system *s, float *to)
                 for (int r = 0; r < b; r++)
                     for (int c = 0; c < b; c++)
                         to[width * (int64_t)A->idx[e] + q + c] -=
-                            s->level.off[(e * b + r) * b + c] * of_ghosts[width * g + q + r];
+                            sign * s->level.off[(e * b + r) * b + c] * of_ghosts[width * g + q + r];
+}
+
+void add_outside(spread_system *s, float *to, const float *x, float sign)
+{
+    const size_t width = 4 * (size_t)s->lanes;
+    neighbours_fetch(&s->near, s->x + width * (size_t)s->near.here, x, width * sizeof *x);
+    add_known_outside(s, to, x, sign);
 }
 
 /* Where each process does it alone; lane by lane. */
@@ -59,7 +62,7 @@ static void correct_alone(spread_system *s, const variant *v)
     }
 }
 
-static void correct(spread_system *s, const variant *v, const uz_level_step *step)
+void system_correct(spread_system *s, const variant *v, const uz_level_step *step)
 {
     uz_level_take_step(step, UZ_STEP_RESTRICT);
     combine_all(s->coarse, (int)(s->next.nodes * s->lanes * uz_width(s->k)), MPI_FLOAT, MPI_SUM);
@@ -100,16 +103,21 @@ static void find_units(const spread_system *s, double unit[LANES], const double 
         }
 }
 
+void system_scale(const spread_system *s, float *to, const double *r, const double unit[LANES])
+{
+    for (int64_t i = 0; i < fours(s); i++) {
+        const double by = unit[lane_of(s, i)], inverse = by > 0.0 && !isinf(by) ? 1.0 / by : 0.0; /* powers of two */
+        for (int64_t q = 4 * i; q < 4 * i + 4; q++)
+            to[q] = inverse > 0.0 ? (float)(r[q] * inverse) : 0.0F;
+    }
+}
+
 static void cycle(spread_system *s, int which, double *z, const double *r, const double unit[LANES])
 {
     const variant *v = &s->variant[which];
     uz_level own = s->level;
     own.A.nodes = s->near.here;
-    for (int64_t i = 0; i < fours(s); i++) {
-        const double by = unit[lane_of(s, i)], inverse = by > 0.0 && !isinf(by) ? 1.0 / by : 0.0; /* powers of two */
-        for (int64_t q = 4 * i; q < 4 * i + 4; q++)
-            s->rhs[q] = inverse > 0.0 ? (float)(r[q] * inverse) : 0.0F;
-    }
+    system_scale(s, s->rhs, r, unit);
     const uz_level_step step = {.level = &own,
                                 .inverse = v->inverse,
                                 .b = s->rhs,
@@ -120,10 +128,10 @@ static void cycle(spread_system *s, int which, double *z, const double *r, const
                                 .lanes = s->lanes};
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
     if (v->base) {
-        add_outside(s, s->t);
-        correct(s, v, &step);
+        add_outside(s, s->t, s->x, 1.0F);
+        system_correct(s, v, &step);
     }
-    add_outside(s, s->rhs);
+    add_outside(s, s->rhs, s->x, 1.0F);
     uz_level_take_step(&step, UZ_STEP_SWEEP_UP);
     for (int64_t i = 0; i < fours(s); i++) {
         const double by = isinf(unit[lane_of(s, i)]) ? NAN : unit[lane_of(s, i)];
@@ -136,6 +144,7 @@ void system_precondition(spread_system *s, int which, double *z, const double *r
 {
     double unit[LANES];
     s->lanes = 1;
+    s->rough = false;
     find_units(s, unit, r);
     cycle(s, which, z, r, unit);
 }
@@ -164,16 +173,31 @@ static void multiply(spread_system *s, int which, double *y, double *x)
                 y[width * i + q] = 0.0;
 }
 
-void system_begin(spread_system *s, int which, bool u_is_zero)
+void system_residual(spread_system *s, int which, bool u_is_zero)
 {
     if (!u_is_zero)
         multiply(s, which, s->q, s->u);
     for (int64_t i = 0; i < 4 * fours(s); i++)
         s->r[i] = s->f[i] - (u_is_zero ? 0.0 : s->q[i]);
-    find_units(s, s->unit, s->r);
+}
+
+/* z = M^-1 r, p = z, in double precision. */
+static void begin_in_double(spread_system *s, int which)
+{
+    s->rough = false;
     cycle(s, which, s->z, s->r, s->unit);
     memcpy(s->p, s->z, 4 * (size_t)fours(s) * sizeof *s->p);
     dot(s, s->square, s->r, s->z);
+}
+
+void system_begin(spread_system *s, int which, bool u_is_zero)
+{
+    system_residual(s, which, u_is_zero);
+    find_units(s, s->unit, s->r);
+    if (s->single)
+        rough_begin(s, which);
+    else
+        begin_in_double(s, which);
 }
 
 double system_square(const spread_system *s)
@@ -195,10 +219,9 @@ static void find_lengths(const spread_system *s, double alpha[LANES], bool *move
     }
 }
 
-int system_steps(spread_system *s, int which, bool *flat, int most, double goal2)
+static int make_steps(spread_system *s, int which, bool *flat, int most, double goal2)
 {
     int made = 0;
-    *flat = false;
     while (made < most && system_square(s) > goal2) {
         double alpha[LANES], beta[LANES] = {0};
         bool moves;
@@ -227,4 +250,21 @@ int system_steps(spread_system *s, int which, bool *flat, int most, double goal2
         made++;
     }
     return made;
+}
+
+int system_steps(spread_system *s, int which, bool *flat, int most, double goal2)
+{
+    int made = 0;
+    *flat = false;
+    if (s->rough) {
+        bool stuck;
+        made = rough_steps(s, which, &stuck, most, goal2);
+        if (!stuck)
+            return made;
+        s->single = false; /* K is too ill-conditioned for it, and was no better before */
+        system_residual(s, which, false);
+        find_units(s, s->unit, s->r);
+        begin_in_double(s, which);
+    }
+    return made + make_steps(s, which, flat, most - made, goal2);
 }

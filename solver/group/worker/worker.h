@@ -81,12 +81,17 @@ typedef struct {
     variant variant[VARIANTS];
     int lanes; /* of the solve at hand: 1 or LANES */
     float *rhs, *x, *t, *coarse;
-    float *alone;                  /* here x 8: x and t of one lane of two */
     double *coarse_r, *coarse_z;   /* next.nodes x k */
+    float *diagonal;               /* here x 4: of A, 0 where dofs take no part; of rough.c */
     double *u, *f, *r, *z, *p, *q; /* vectors */
     double most;                   /* a bound on lambda_max(diag(K)^-1 M) */
     double unit[LANES];            /* of the residual that a solve began with */
     double square[LANES];          /* r'z */
+    bool single;                   /* steps may be in single precision, */
+    bool rough;                    /* and are: u, z and p are those of rough.c */
+    float length[LANES];           /* of the last of these steps, which x there has not taken yet */
+    double before[LANES];          /* square before it, */
+    double known[LANES];           /* and of the last residual in double precision */
 } spread_system;
 
 /* Rows of the own nodes: a node's blocks are those of others' nodes, its own, and of own ones after it, columns
@@ -110,12 +115,32 @@ int system_levels(const spread_system *s, int which);
 
 /* z = M^-1 r: one V-cycle. One lane. */
 void system_precondition(spread_system *s, int which, double *z, const double *r);
-/* From u and f, of so many lanes: r = f - K u, z = M^-1 r, p = z. u_is_zero: as is K u then. */
+/* From u and f, of so many lanes. u_is_zero: as is K u then. */
 void system_begin(spread_system *s, int which, bool u_is_zero);
+/* u has all steps that were made; they are over. */
+void system_settle(spread_system *s);
 /* r'z, of the worse lane. */
 double system_square(const spread_system *s);
 /* Steps of conjugate gradients until that is <= goal2; how many. *flat: the last one was not made, as p'K p was not
  * positive. */
 int system_steps(spread_system *s, int which, bool *flat, int most, double goal2);
+
+/* ---- steps.c and rough.c share these */
+
+/* r = f - K u in double precision. */
+void system_residual(spread_system *s, int which, bool u_is_zero);
+/* to (here) = r in single precision, by the units of the lanes, powers of two. */
+void system_scale(const spread_system *s, float *to, const double *r, const double unit[LANES]);
+/* to += sign ((D' - D) x - O x): what the own sweeps, of which D' + L + L' is the matrix, see of the difference to A.
+ * add_known_outside: of the x that add_outside was last called with. */
+void add_outside(spread_system *s, float *to, const float *x, float sign);
+void add_known_outside(const spread_system *s, float *to, const float *x, float sign);
+/* The coarse correction of what the step's sweep down has left. */
+void system_correct(spread_system *s, const variant *v, const uz_level_step *step);
+
+/* From s->r. */
+void rough_begin(spread_system *s, int which);
+/* Steps as system_steps has them. *stuck: single precision leads no further; what there is is settled. */
+int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2);
 
 #endif

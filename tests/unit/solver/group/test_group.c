@@ -105,6 +105,8 @@ static void check_small_systems(uz_process_group *group, expectation wanted)
     for (int64_t d = 2; d <= 22; d += 4)
         check_problem("random", random_qp(&rng, &(qp_kind){.d = d, .m = 1 + d / 4, .condition = 10.0 * (double)d}),
                       group, wanted);
+    /* steps in single precision lead nowhere there */
+    check_problem("ill-conditioned", random_qp(&rng, &(qp_kind){.d = 10, .m = 2, .condition = 1e6}), group, wanted);
 }
 
 /* As a bound on lambda_max(diag(K)^-1 M): what is said of a residual is then possible whatever it is. */
