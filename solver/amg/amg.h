@@ -149,7 +149,7 @@ typedef struct uz_cg_stop {
     int64_t max_iterations;
     const uz_hooks *hooks; /* asked in each iteration; may be NULL */
     double deadline;       /* uz_seconds() */
-    bool begun;            /* cg->r is b - K x already, at free dofs; kinds that solve do not read it */
+    bool begun;            /* cg->r is b - K x already, at free dofs */
     bool unchecked; /* the caller looks at the residual himself: where the recurrence meets the tolerance, its own
                        is told in `last` and cg->r, and the true one is not computed. Kinds that solve then leave cg->r
                        as it is */

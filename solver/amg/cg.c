@@ -92,12 +92,21 @@ void uz_cg_turn(uz_cg *cg, double beta)
     uz_by_pieces(turn_direction, &u, cg->n);
 }
 
-/* There x at held dofs counts as 0: its part goes to the right-hand side. */
+/* What x lacks is solved for where the residual is known: then less has to be told, and no product made. Else, as x at
+ * held dofs counts as 0 there, its part goes to the right-hand side. */
 static uz_status solve_elsewhere(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b,
                                  const uz_cg_stop *stop, uz_error *err)
 {
     const uz_multigrid_kind *kind = cg->mg->kind;
     bool moved = false; /* not where all touches from the beginning */
+    if (stop->begun) {
+        memset(cg->p, 0, (size_t)cg->n * sizeof *cg->p);
+        memcpy(cg->z, cg->r, (size_t)cg->n * sizeof *cg->z);
+        const uz_status status = kind->solve(cg->mg, K, cg->room, info, cg->p, cg->r, cg->z, 1, stop, err);
+        for (int64_t j = 0; j < cg->n; j++)
+            x[j] += cg->p[j];
+        return status;
+    }
     for (int64_t j = 0; cg->held && j < cg->n; j++) {
         cg->p[j] = cg->held[j] ? x[j] : 0.0;
         moved = moved || cg->p[j] != 0.0;
