@@ -248,6 +248,8 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
 
 /* The residual's share of the value that is sharp enough, as a share of its root. */
 #define SHARP 0.1
+/* The same of what is left of what is enough, where nothing of M is believed. */
+#define UNSOLVED 0.9
 enum { NORM_STEPS_MOST = 400 };
 
 /* s'K^-1 s at most, s = e - K w, by what does not depend on M, with all that rounding may hide in s. */
@@ -290,7 +292,7 @@ static uz_status sharpen(free_load *x, double *value, double *w, const double *e
     uz_status status = UZ_OK;
     *value = part + left;
     for (int k = 0; status == UZ_OK && k < SHARPENED_MOST && isfinite(left); k++) {
-        const double harmless = fmax(SHARP * SHARP * part, 0.9 * (enough - part));
+        const double harmless = fmax(SHARP * SHARP * part, UNSOLVED * (enough - part));
         if (!(left > harmless) || *value <= enough)
             break;
         const uz_cg_stop stop = {.absolute = 0.5 * last * sqrt(harmless / left),
@@ -341,11 +343,16 @@ static uz_status bound_inverse_norm(free_load *x, double *value, double *e, doub
     for (int64_t j = 0; j < n; j++)
         x->cg.r[j] = e[j] /= unit;
     enough = enough / unit / unit;
-    if (!(known->least > 0.0)) /* else lambda is a guess */
+    if (known->least > 0.0) { /* what sharpen would ask for, at once; lambda is a guess */
+        stop.absolute = 0.5 * sqrt(UNSOLVED * enough * known->least);
+        stop.relative = 0.25 * SHARP * sqrt(known->least);
+    } else {
         stop.absolute = sqrt(0.5 * known->lambda * enough);
+    }
     uz_status status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
     double scaled = bound_by_cycle(x, e, w, info.last);
-    if (status == UZ_OK && scaled > enough && info.last > stop.relative * info.first && stop.absolute > 0.0) {
+    const bool told = !(known->least > 0.0) && stop.absolute > 0.0;
+    if (status == UZ_OK && told && scaled > enough && info.last > stop.relative * info.first) {
         stop.absolute = stop.relative * info.first;
         stop.relative = 0.0;
         status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
@@ -391,9 +398,11 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
 /* Nor better, where few dofs have bounds, than to this share of what the guess changes: the next one would change more
  * than that. Plane bodies take more guesses above this share, solids none of 0.2. */
 #define GUESS_KEPT 0.05
-/* Of the aim: below this a solve is as good as exact; where lambda is a guess, which is rather too large, */
+/* Of the aim: below this a solve is as good as exact; where M is not to be trusted, so that lambda is a guess and each
+ * certificate takes as many steps as five digits do. The aim is relative to u'K u, which exceeds the energy of what
+ * supports move (by 70 times, a ring that is pressed together), and the certificate to that. */
 #define ACTIVE_FLOOR  0.5
-#define GUESSED_FLOOR 0.1
+#define GUESSED_FLOOR 0.02
 /* What u misses of K u = p + N'r, in the norm of K^-1; e (d): force - N'r. Nobody bounds an answer by rows that pull.
  */
 static uz_status measure_slack(free_load *x, const double *e, const double *r, uz_error *err)
