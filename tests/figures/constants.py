@@ -110,7 +110,7 @@ PHRASES = {
     "Mathematical Programming Computation 4, 2012": None,
     "a block squeezed by 30 %": None,  # tests/peers/large.py
     "| 102,000 | 2.6 | 2.6 to 2.9 | 1.0 + 1.4 | 1.0 to 1.1 |": None, "| 336,000 | 7.9 | 6.6 to 7.8 | 2.7 to 3.4 + 3.8 to 4.2 | 0.85 to 1.0 |": None,  # by hand, on two processors
-    "| 1,006,000 | 17.6 to 23.6 | 14.9 to 21.0 | 8.9 + 12.7 | 0.84 to 0.89 |": None, "is about 1.2 times that of `matrix_free`: two processors could do it in 0.6 of its time": None, "Of 346,000 dofs it takes 1.1 s": None, "alone takes 1.9 s for `distributed`, and each of two others 4 s": None,  # likewise
+    "| 1,006,000 | 17.6 to 23.6 | 14.9 to 21.0 | 8.9 + 12.7 | 0.84 to 0.89 |": None, "Of 346,000 dofs it takes 1.1 s": None, "alone takes 1.9 s for `distributed`, and each of two others 4 s": None,  # likewise
     "4,000 jobs of solids of 20 x 20 x 12 hex8 (93 MB each) over three daemons, nothing else on the machine: 98.8 % of the jobs that could hit did, by chance 80 %, and all of them took 0.47 of the time": None,  # tests/soak/daemons.py zipf 4000
     "(plane bodies of 16,000 dofs, solids of 5,000:": None,  # likewise
     # rules of the program
