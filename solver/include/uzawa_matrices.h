@@ -57,12 +57,6 @@ uz_status uz_mm_read(uz_csc *out, uz_mm_info *info, const char *text, size_t len
 /* Reads a text that is a vector (n x 1 or 1 x n, array or coordinate); *out has *n numbers, the caller frees it. */
 uz_status uz_mm_read_vector(double **out, int64_t *n, const char *text, size_t len, size_t max_bytes, uz_error *err);
 
-/* Writes coordinate text that reads back bit for bit (shortest digits that do). *text is NUL-terminated, caller frees.
- */
-uz_status uz_mm_write(char **text, size_t *len, const uz_csc *A, uz_mm_symmetry symmetry, uz_error *err);
-/* Writes array text, n x 1. */
-uz_status uz_mm_write_vector(char **text, size_t *len, const double *x, int64_t n, uz_error *err);
-
 /* ----------------------------------------------------------------- NumPy */
 
 /* A matrix or a vector in any format that is read, told by how the bytes begin: an array as numpy.save writes it, or

@@ -187,9 +187,8 @@ static void bench_accuracies(report *out)
 
 static void bench_reader(report *out)
 {
-    double writer = 0.0, reader = bench_mm_rate(&writer);
+    const double reader = bench_mm_rate();
     print_row(out, "matrix_market_read", "MB/s", (bench_value){reader, reader, reader, 5}, "");
-    print_row(out, "matrix_market_write", "MB/s", (bench_value){writer, writer, writer, 5}, "");
 }
 
 static void bench_obstacles(report *out)

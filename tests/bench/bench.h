@@ -6,9 +6,9 @@
 
 #include <stdio.h>
 
-/* Reads a coordinate text of about 100 MB from memory, one thread: the median of 5 runs. *writer_rate (may be NULL) is
- * the rate at which the same matrix is written. 0 where there was no memory or the text was refused. */
-double bench_mm_rate(double *writer_rate);
+/* Reads a coordinate text of about 100 MB from memory, one thread: MB/s, the median of 5 runs. 0 where there was no
+ * memory or the text was refused. */
+double bench_mm_rate(void);
 
 /* A measured set of values: median, extremes, count. */
 typedef struct {

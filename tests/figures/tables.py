@@ -237,7 +237,7 @@ In three dimensions (a cube of 32^3 `hex8` bricks, d = 101,277) cold takes {cold
 
 An oblique plane costs {oblique_nx600} times one along an axis.
 
-Matrix Market: {matrix_market_read} MB/s read, {matrix_market_write} MB/s written. The obstacle problem OBSTCLAE (d = 9,604, m = 19,208) to certified 1e-8: {obstclae} ms, {ipopt_over_uzawa_obstclae} times faster than Ipopt to its default tolerance."""
+Matrix Market: {matrix_market_read} MB/s read. The obstacle problem OBSTCLAE (d = 9,604, m = 19,208) to certified 1e-8: {obstclae} ms, {ipopt_over_uzawa_obstclae} times faster than Ipopt to its default tolerance."""
 
 
 def sentences(data):

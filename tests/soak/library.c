@@ -5,7 +5,7 @@
  * asks for one solve, nothing cached: "scene" or "matrices"; each is answered by a line with its seconds. */
 #include "codec/codec.h"
 #include "core/clock.h"
-#include "uzawa.h"
+#include "mm_text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,33 +22,20 @@ static char *read_file(const char *path, size_t *len)
     return text;
 }
 
-/* Takes the text; false if it is NULL or the file can't be written. */
-static bool write_file(const char *folder, const char *name, char *text, size_t len)
-{
-    char path[4096];
-    snprintf(path, sizeof path, "%s/%s.mtx", folder, name);
-    FILE *file = text ? fopen(path, "wb") : NULL;
-    bool ok = file && fwrite(text, 1, len, file) == len;
-    ok = file && fclose(file) == 0 && ok;
-    free(text);
-    return ok;
-}
-
 static bool write_matrices(const uz_qp *qp, const char *folder)
 {
-    const uz_csc *matrix[2] = {&qp->K, &qp->N};
-    const double *vector[2] = {qp->h, qp->p};
-    const int64_t rows[2] = {qp->N.rows, qp->K.rows};
-    static const uz_mm_symmetry kind[2] = {UZ_MM_SYMMETRIC, UZ_MM_GENERAL};
+    static const char *const NAME[4] = {"K", "N", "h", "p"};
     bool ok = true;
-    for (int k = 0; k < 2; k++) {
-        char *text = NULL;
-        size_t len = 0;
-        ok = uz_mm_write(&text, &len, matrix[k], kind[k], NULL) == UZ_OK && ok;
-        ok = write_file(folder, k ? "N" : "K", text, len) && ok;
-        text = NULL;
-        ok = uz_mm_write_vector(&text, &len, vector[k], rows[k], NULL) == UZ_OK && ok;
-        ok = write_file(folder, k ? "p" : "h", text, len) && ok;
+    for (int k = 0; k < 4; k++) {
+        char path[4096];
+        snprintf(path, sizeof path, "%s/%s.mtx", folder, NAME[k]);
+        FILE *file = fopen(path, "wb");
+        if (file && k < 2)
+            mm_put_matrix(file, k == 0 ? &qp->K : &qp->N, k == 0 ? UZ_MM_SYMMETRIC : UZ_MM_GENERAL);
+        else if (file)
+            mm_put_vector(file, k == 2 ? qp->h : qp->p, k == 2 ? qp->N.rows : qp->K.rows);
+        ok = file && !ferror(file) && ok;
+        ok = file && fclose(file) == 0 && ok;
     }
     return ok;
 }

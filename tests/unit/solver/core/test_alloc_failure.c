@@ -151,36 +151,6 @@ static uz_status read_sparse_vector(uz_error *err)
     return read_vector_text("%%MatrixMarket matrix coordinate real general\n3 1 2\n3 1 1\n1 1 2\n", err);
 }
 
-static uz_status write_matrix(uz_error *err)
-{
-    int64_t ptr[2] = {0, 400}, idx[400];
-    double val[400];
-    for (int k = 0; k < 400; k++) {
-        idx[k] = k;
-        val[k] = k / 7.0;
-    }
-    uz_csc A = {.rows = 400, .cols = 1, .ptr = ptr, .idx = idx, .val = val};
-    char *text;
-    size_t len;
-    uz_status status = uz_mm_write(&text, &len, &A, UZ_MM_GENERAL, err);
-    CHECK(status == UZ_OK || (!text && len == 0));
-    free(text);
-    return status;
-}
-
-static uz_status write_vector(uz_error *err)
-{
-    double x[400];
-    for (int k = 0; k < 400; k++)
-        x[k] = k / 7.0;
-    char *text;
-    size_t len;
-    uz_status status = uz_mm_write_vector(&text, &len, x, 400, err);
-    CHECK(status == UZ_OK || (!text && len == 0));
-    free(text);
-    return status;
-}
-
 /* ------------------------------------------------------------------ NumPy */
 
 static uz_status write_arrays(uz_error *err)
@@ -230,6 +200,4 @@ TEST(matrix_market)
     FAIL_EACH_ALLOCATION(read_array, 3);
     FAIL_EACH_ALLOCATION(read_vector, 3);
     FAIL_EACH_ALLOCATION(read_sparse_vector, 7);
-    FAIL_EACH_ALLOCATION(write_matrix, 3);
-    FAIL_EACH_ALLOCATION(write_vector, 3);
 }
