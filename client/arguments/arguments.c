@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdarg.h>
-#include <stdlib.h>
 #include <string.h>
 
 const char CLIENT_DEFAULT_SERVER[] = "http://127.0.0.1:8080";

@@ -1,7 +1,6 @@
 #include "arguments/commands.h"
 #include "arguments/arguments.h"
 
-#include <limits.h>
 #include <string.h>
 
 #define OUTCOME_EXITS                                                                                                  \

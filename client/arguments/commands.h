@@ -6,7 +6,6 @@
 #include "text/options.h"
 
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdio.h>
 
 #define CLIENT_VERSION_TEXT "0.1.0"

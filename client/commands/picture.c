@@ -1,6 +1,5 @@
 /* plot: pictures from the service, as SVG or, by way of rsvg-convert, as PNG. */
 #include "commands/fetch.h"
-#include "show/report.h"
 
 #include <errno.h>
 #include <poll.h>

@@ -4,7 +4,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #define INLINE_MOST (64u << 10) /* larger files are uploaded: they are sent once, however many jobs name them */
 

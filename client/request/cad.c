@@ -1,7 +1,6 @@
 /* cad.c: a part from a CAD program, of which gmsh makes a mesh: a program of its own, within limits of time and memory.
  */
 #include "request/build.h"
-#include "show/report.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -9,7 +8,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,7 +1,6 @@
 /* deck.c: a deck of Abaqus or CalculiX as a request: POST /v1/decks. In: schemas/deck.json, read by the solver's one
  * reader of the format. Out: schemas/translation.json, whose request is one as any other, with the mesh in numbers. */
 #include "codec/decode.h"
-#include "codec/problem.h"
 #include "codec/room.h"
 #include "codec/text.h"
 

@@ -5,7 +5,6 @@
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* The library's error about one of the matrices, or about what it names itself. */
 static bool refuse_call(decoding *d, uz_error *err, const char *name)

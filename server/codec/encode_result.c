@@ -4,7 +4,6 @@
 #include "codec/text.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Numbers, or points of `dim` numbers each; nothing for a vector that was not asked for. */

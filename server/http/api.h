@@ -9,7 +9,6 @@
 #include "http/rates.h"
 #include "http/transport/transport.h"
 #include "store/store.h"
-#include "store/uploads.h"
 #include "work/webhook.h"
 #include "work/work.h"
 

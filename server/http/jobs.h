@@ -2,7 +2,6 @@
 #ifndef SERVER_HTTP_JOBS_H
 #define SERVER_HTTP_JOBS_H
 
-#include "codec/codec.h"
 #include "http/api.h"
 
 /* Reads the job named in the path; false with a 404 or 500 in reply. */

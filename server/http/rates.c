@@ -6,7 +6,6 @@
 #include "store/nodes.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 #define ROUND_S 0.5
 

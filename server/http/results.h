@@ -2,7 +2,6 @@
 #ifndef SERVER_HTTP_RESULTS_H
 #define SERVER_HTTP_RESULTS_H
 
-#include "http/fields.h"
 #include "http/api.h"
 
 /* What the store has, and what is computed from it. */

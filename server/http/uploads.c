@@ -3,7 +3,6 @@
 #include "http/api.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 static bool refuse(api *context, http_request *rq, upload_status status, problem_details *problem)

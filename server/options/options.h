@@ -7,7 +7,6 @@
 #ifndef SERVER_OPTIONS_H
 #define SERVER_OPTIONS_H
 
-#include "base/log.h"
 #include "text/options.h"
 
 #include <stdbool.h>

@@ -1,6 +1,5 @@
 #include "work/feed.h"
 
-#include <errno.h>
 #include <math.h>
 #include <poll.h>
 #include <pthread.h>

@@ -1,6 +1,5 @@
 #include "work/segment.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <stdint.h>
 #include <sys/mman.h>

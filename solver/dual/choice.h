@@ -2,7 +2,6 @@
 #ifndef UZ_DUAL_CHOICE_H
 #define UZ_DUAL_CHOICE_H
 
-#include "dual/cost.h"
 #include "uzawa.h"
 
 /* What a form of the operator needs, and what it can do. */

@@ -9,7 +9,6 @@
 #include "linalg/blas.h"
 #include "core/error.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

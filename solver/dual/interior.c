@@ -3,7 +3,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "dual/springs.h"
-#include "linalg/blas.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -5,9 +5,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "core/random.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

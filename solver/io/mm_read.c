@@ -5,7 +5,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 

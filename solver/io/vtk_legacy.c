@@ -3,7 +3,6 @@
 #include "core/error.h"
 #include "io/vtk.h"
 
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 

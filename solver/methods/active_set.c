@@ -12,7 +12,6 @@
 #include "core/error.h"
 #include "dual/interior.h"
 #include "methods/exchange.h"
-#include "methods/kinds.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -11,11 +11,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "methods/exchange.h"
-#include "methods/kinds.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* The first turn: so many columns of D. */
 #define FIRST_TURN 64.0

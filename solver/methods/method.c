@@ -1,5 +1,4 @@
 /* method.c: the table of methods. */
-#include "methods/iterate.h"
 #include "methods/kinds.h"
 
 #include "core/error.h"

@@ -6,7 +6,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 /* A table steeper than this is a step: its normal would be rounding. */
 #define STEEPEST 1e6

@@ -6,7 +6,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 static uz_status check(const uz_obstacle_subject *s)
 {

@@ -11,7 +11,6 @@
 #include "core/vector3.h"
 #include "obstacle/pieces.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,6 @@
 /* arrays.c: the surface of a deformed body as arrays for a viewer: uz_surface_compute. */
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/hooks.h"
 #include "picture/arc.h"
 #include "picture/arrays.h"
 #include "picture/scenery.h"

@@ -7,14 +7,12 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "linalg/linalg.h"
 #include "run/rows.h"
 #include "run/run.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Gaps left out may be negative by this part of what they are the difference of. */
 #define ROUNDING (64.0 * DBL_EPSILON)

@@ -6,8 +6,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "linalg/blas.h"
-#include "run/problem.h"
-#include "run/settings.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,14 +3,12 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "finite/mesh_error.h"
-#include "run/problem.h"
 #include "run/results.h"
 #include "scene/bisect.h"
 #include "scene/subdivide.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #define BULK  0.5
 #define LEAST 0.05 /* one more grid is worth its while */

@@ -17,7 +17,6 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "linalg/blas.h"
-#include "linalg/linalg.h"
 #include "methods/milestones.h"
 #include "post/balance.h"
 #include "run/results.h"

@@ -12,7 +12,6 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "run/problem.h"
 #include "methods/exchange.h"
 #include "precise/precise.h"
 #include "run/run.h"

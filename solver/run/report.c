@@ -1,21 +1,14 @@
 /* report.c: what is told of the solve of one load. */
 #include "run/run.h"
 
-#include "core/alloc.h"
 #include "core/aside.h"
 #include "core/clock.h"
-#include "core/error.h"
 #include "linalg/linalg.h"
-#include "run/problem.h"
 #include "run/quantities.h"
 #include "run/results.h"
-#include "run/rows.h"
 
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 void uz_report_setup(uz_run *run)
 {

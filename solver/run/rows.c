@@ -3,11 +3,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "element/element_type.h"
-#include "scene/mesh.h"
 #include "scene/scene.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* With fewer rows than these there is nothing to save; and nothing worth another certificate where more than this part

@@ -16,8 +16,6 @@
 #include "core/hooks.h"
 #include "methods/steps.h"
 #include "methods/turns.h"
-#include "run/problem.h"
-#include "run/rows.h"
 #include "run/settings.h"
 
 #include <float.h>

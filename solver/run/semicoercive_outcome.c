@@ -14,7 +14,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* The null space of matrices is known by iterations on a factor: its rounding allows no more. */
 #define BALANCED 1e-7

@@ -12,9 +12,7 @@
 #include "core/error.h"
 #include "run/finite.h"
 #include "run/problem.h"
-#include "run/results.h"
 
-#include <stdlib.h>
 
 /* Are the cells of a box, or the elements to be bisected, chosen by the error asked for? */
 static bool is_mesh_chosen(const uz_problem *problem)

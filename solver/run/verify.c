@@ -11,7 +11,6 @@
 #include "scene/scene.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* What a component of a rigid node's displacement has to be: by the motion that the anchors of its group tell, but for

@@ -20,7 +20,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Small deformation is off by less than the first; gaps and normals that are off by more than the second are a reason
  * to compare, too. */

@@ -3,7 +3,6 @@
 #include "core/error.h"
 #include "core/order.h"
 #include "scene/check.h"
-#include "scene/scene.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -5,7 +5,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 uz_status uz_given_refuse(const uz_given_mesh *given, int64_t element, const char *what, const char *remedy,
                           uz_error *err)

@@ -1,5 +1,4 @@
 /* scene.c: what a scene owns. */
-#include "scene/mesh.h"
 #include "scene/scene.h"
 
 #include <stdlib.h>

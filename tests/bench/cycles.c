@@ -9,7 +9,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Cells along each side of a body whose length along x is `aspect` times its others. */
 static const struct {

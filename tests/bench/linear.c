@@ -5,7 +5,6 @@
 #include "core/clock.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 

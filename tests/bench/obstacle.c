@@ -3,7 +3,6 @@
 #include "bench/bench.h"
 #include "core/clock.h"
 
-#include <string.h>
 
 enum { SIDE = 98, RUNS = 5 };
 

@@ -6,8 +6,6 @@
 #include "core/clock.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { RUNS = 11 };
 

@@ -6,7 +6,6 @@
 #include "bench/bench.h"
 #include "core/clock.h"
 
-#include <string.h>
 #include <time.h>
 
 enum { RUNS = 5, OBSTACLE_SIDE = 98 };

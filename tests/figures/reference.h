@@ -13,7 +13,6 @@
 #include "quad_exact.h"
 
 #include <math.h>
-#include <stdio.h>
 
 typedef struct {
     const uz_qp *qp;

@@ -3,7 +3,6 @@
 #include "core/alloc.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 static bool put(FILE *file, const void *from, int64_t count)

@@ -8,7 +8,6 @@
 #define SERVER_HTTP_DEADLINES_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 typedef struct deadlines deadlines;
 typedef struct deadline deadline; /* of one conn */

@@ -3,7 +3,6 @@
 #define SERVER_HTTP_PEER_H
 
 #include <pthread.h>
-#include <stdbool.h>
 #include <stddef.h>
 
 struct sockaddr;

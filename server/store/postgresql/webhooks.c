@@ -1,7 +1,6 @@
 /* webhooks.c: whom to tell of the end of which job (store.h). */
 #include "store/postgresql/internal.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

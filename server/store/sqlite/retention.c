@@ -3,7 +3,6 @@
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Jobs, and bytes of theirs, that go in one transaction: others wait for its end. */
 #define MOST_AT_ONCE  20

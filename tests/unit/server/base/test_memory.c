@@ -3,7 +3,6 @@
 #include "base/memory.h"
 #include "options/options.h"
 
-#include <stdio.h>
 #include <unistd.h>
 
 TEST(share_of_a_worker)

@@ -1,5 +1,4 @@
 /* The cube of bricks that orderings are measured on: its element, its patch, and a certified contact on it. */
-#include "factor/factor.h"
 #include "harness.h"
 #include "hex8.h"
 #include "qp_fixture.h"

@@ -7,7 +7,6 @@
 #include "sanitized.h"
 #include "scene_fixture.h"
 
-#include <float.h>
 
 __attribute__((constructor)) static void settle_threads(void)
 {

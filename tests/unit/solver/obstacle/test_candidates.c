@@ -1,5 +1,4 @@
 /* Contact candidates left out by trial and check: the answer of the rest is that of all, and says so. */
-#include "core/alloc.h"
 #include "harness.h"
 #include "obstacle/candidates.h"
 #include "qp_fixture.h"

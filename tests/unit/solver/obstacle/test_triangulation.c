@@ -4,7 +4,6 @@
 #include "harness.h"
 #include "obstacle/obstacle.h"
 
-#include <float.h>
 #include <stdlib.h>
 
 /* The unit cube by corners (bits x, y, z), normals outwards. */

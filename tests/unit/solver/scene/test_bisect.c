@@ -1,5 +1,4 @@
 /* Bisection of triangles and tetrahedra: whole sides meet, shapes stay, groups are inherited. */
-#include "core/alloc.h"
 #include "harness.h"
 #include "scene/bisect.h"
 #include "scene/corner_table.h"

@@ -1,12 +1,10 @@
 /* Boxes of every element: conforming, positive, filling the box, with the right sides. */
-#include "core/alloc.h"
 #include "harness.h"
 #include "scene/corner_table.h"
 #include "scene/mesh.h"
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 static uz_box make_box(const char *element, int dim)

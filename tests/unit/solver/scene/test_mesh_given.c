@@ -1,11 +1,9 @@
 /* Meshes in numbers: what is refused and where, how faces find their elements, how groups come together. */
-#include "core/alloc.h"
 #include "harness.h"
 #include "scene/mesh.h"
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_NODES = 40, MOST_ELEMENTS = 8, MOST_PLACES = 60, MOST_GROUPS = 6, MOST_LIST = 24 };

@@ -1,6 +1,5 @@
 /* Parts of a mesh, and whether the body lies all the way between two of its sides: a strip folded so that its ends
  * overlap, and a plate beside it. */
-#include "assembly/assembly.h"
 #include "body_fixture.h"
 #include "harness.h"
 #include "scene/mesh_parts.h"

@@ -7,7 +7,6 @@
 #include "store/engine_base.h"
 #include "store_place.h"
 
-#include <stdatomic.h>
 #include <sys/stat.h>
 
 static long scaled(long runs)
